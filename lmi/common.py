@@ -284,17 +284,17 @@ class _Search:
         for i, mode in enumerate(modes):
             tau = cp.Variable(len(mode.radii)) if mode.radii.size else None
             own, rise = (min(rates), t[0]) if self.shares is None else (rates[i], t[i])
-            constraints.append(_inequality(P, mode, tau, own, rise, unit) >> 0)
+            constraints.append(inequality(P, mode, tau, own, rise, unit) >> 0)
             taus.append(tau)
         problem = cp.Problem(cp.Maximize(t[0] if self.shares is None else self.shares @ t), constraints)
-        _run(problem, n + max(mode.radii.size for mode in modes), self.tolerance, self.diagonal)
+        run_program(problem, n + max(mode.radii.size for mode in modes), self.tolerance, self.diagonal)
         if p.value is None or not np.isfinite(p.value).all():
             raise NoCertificate(f"the solver answered {problem.status}")
         value = np.diag(p.value) if self.diagonal else (p.value + p.value.T) / 2
         return value, [np.zeros(0) if tau is None else tau.value for tau in taus]
 
 
-def _inequality(P: Any, mode: UncertainMatrix, tau: Any, b: Any, t: Any, unit: float) -> Any:
+def inequality(P: Any, mode: UncertainMatrix, tau: Any, b: Any, t: Any, unit: float) -> Any:
     """Return the matrix of the module's inequality over ``unit``, in coordinates of radii 1, minus ``t I``."""
     import cvxpy as cp
     from scipy import sparse
@@ -309,7 +309,8 @@ def _inequality(P: Any, mode: UncertainMatrix, tau: Any, b: Any, t: Any, unit: f
     return cp.bmat([[form - H @ cp.diag(tau) @ H.T, coupling], [coupling.T, cp.diag(tau)]])
 
 
-def _run(problem: Any, rows: int, tolerance: float, diagonal: bool = False) -> None:
+def run_program(problem: Any, rows: int, tolerance: float, diagonal: bool = False) -> None:
+    """Solve a program of blocks of so many rows at most; whether it was solved is asked by the caller."""
     import warnings
 
     options: dict[str, Any] = {"tol_gap_abs": tolerance * 1e-2, "tol_gap_rel": tolerance, "tol_feas": tolerance * 1e-2}
@@ -369,9 +370,9 @@ def least_condition(
     for (mode, _), rate in zip(pairs, rates, strict=True):
         taus.append(cp.Variable(len(mode.radii)) if mode.radii.size else None)
         unit = float(np.abs(mode.A).max(initial=0.0)) or 1.0
-        constraints.append(_inequality(P, mode, taus[-1], rate, 0.0, unit) >> 0)
+        constraints.append(inequality(P, mode, taus[-1], rate, 0.0, unit) >> 0)
     problem = cp.Problem(cp.Minimize(c), constraints)
-    _run(problem, n + max(mode.radii.size for mode in modes), tolerance, shape == "diagonal")
+    run_program(problem, n + max(mode.radii.size for mode in modes), tolerance, shape == "diagonal")
     if p.value is None or not np.isfinite(p.value).all():
         raise NoCertificate(f"the solver answered {problem.status}")
     value = np.diag(p.value) if shape == "diagonal" else (p.value + p.value.T) / 2
@@ -453,8 +454,8 @@ def _multipliers(mode: UncertainMatrix) -> np.ndarray:
     checkpoint()
     unit = float(np.abs(mode.A).max(initial=0.0)) or 1.0
     tau, t = cp.Variable(len(mode.radii)), cp.Variable()
-    problem = cp.Problem(cp.Maximize(t), [_inequality(np.eye(len(mode.A)), mode, tau, 0.0, t, unit) >> 0])
-    _run(problem, len(mode.A) + len(mode.radii), 1e-7)
+    problem = cp.Problem(cp.Maximize(t), [inequality(np.eye(len(mode.A)), mode, tau, 0.0, t, unit) >> 0])
+    run_program(problem, len(mode.A) + len(mode.radii), 1e-7)
     if tau.value is None or not np.isfinite(tau.value).all():
         raise NoCertificate(f"the solver answered {problem.status}")
     return tau.value

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import random
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
@@ -32,7 +33,15 @@ Edge = tuple[int, int, Fraction, Fraction]
 def false_family_claims(data: Json, files: Mapping[str, bytes] | None = None) -> list[str]:
     """Say what is false in an accepted certificate of a family; an empty list if nothing is."""
     oracle = FamilyOracle(data, files or {})
-    for claim in (oracle.graph, oracle.structures, oracle.behaviours, oracle.functions, oracle.finals, oracle.inputs):
+    for claim in (
+        oracle.graph,
+        oracle.structures,
+        oracle.behaviours,
+        oracle.functions,
+        oracle.finals,
+        oracle.inputs,
+        oracle.restricted,
+    ):
         claim()
     return oracle.false
 
@@ -391,3 +400,159 @@ class FamilyOracle:
             if s * abs(L).max() < 300:
                 u = (rho1 + pole / T * np.exp(z)) * L @ expm(-L * s) @ np.array([float(x) for x in self.start or ()])
                 self.require((abs(u) <= bounds * (1 + SLACK) + 1e-9 * bounds.max(initial=0)).all(), "a later peak")
+
+    # ------------------------------------------------------------------ restricted signals
+
+    def restricted(self) -> None:
+        """Rates of restricted signals, by members in rationals: the forms, their ratio, and what follows."""
+        for place, said in enumerate(self.data.get("restricted", ())):
+            nodes = self.pieces[said["component"]]
+            if said["claim"] == "shares":
+                self.shares(nodes, said, f"restricted[{place}]")
+                continue
+            if said["claim"] != "rate":
+                (self.last_mode if said["claim"] == "last mode" else self.windows)(nodes, said)
+                continue
+            basis = self.common_kernel(nodes)
+            if basis is None or len(nodes) == 1:
+                self.require(False, "a rate without a common kernel")
+                continue
+            rate, ratio, signals = number(said["rate"]), number(said["ratio"]), said["signals"]
+            self.require((said["bounded"] is True) == (rate * self.gain[2] >= 2), "a bounded input")
+            self.require(said["bounded"] in (True, None), "bounded")
+            dwell = None if signals == "constant" else number(signals["dwell"])
+            self.require(dwell is None or (dwell > 0 and signals["clock"] in ("t", "s")), "a dwell time")
+            if said["forms"] is None:
+                own = [number(V["rate"]) for V in self.data["lyapunov"]["functions"] if self.same_part(V, said)]
+                self.require(ratio == 1 and rate <= max(own), "a rate of restricted signals by functions")
+                continue
+            forms = [self.symmetric(lower) for lower in said["forms"]]
+            self.require(ratio >= 1 and (dwell is not None or ratio == 1), "a ratio")
+            if dwell is not None:
+                for P in forms:
+                    for Q in forms:
+                        S = [[ratio * x - y for x, y in zip(*rows, strict=True)] for rows in zip(P, Q, strict=True)]
+                        self.require(semidefinite(S), "the ratio of forms")
+                if signals["clock"] == "s":
+                    rate += Fraction(math.log(ratio) * (1 - SLACK)) / dwell
+            self.forms(nodes, basis, forms, rate)
+
+    @staticmethod
+    def same_part(one: Json, other: Json) -> bool:
+        return bool(one["component"] == other["component"])
+
+    def forms(self, nodes: list[int], basis: Matrix, forms: list[Matrix], rate: Fraction) -> None:
+        """Forms of each mode that all decay at a rate, in the coordinates of the first nodes of the leading groups."""
+        pivots = [c[0] for c in self.balanced_first(nodes)]
+        free = [v for v in nodes if v not in pivots]
+        to_zero = self.lift(basis, nodes, free, pivots)
+        for some, P in zip(self.members, forms, strict=True):
+            self.require(len(P) == len(free) and self.definite(P), "P is not definite")
+            for L in some:
+                own = self.part(L, nodes)
+                A = times(to_zero, [[row[nodes.index(v)] for v in free] for row in own])
+                PA = times(P, A)
+                S = [[PA[i][j] + PA[j][i] - rate * P[i][j] for j in range(len(P))] for i in range(len(P))]
+                self.require(semidefinite(S), "a rate of restricted signals")
+
+    def last_mode(self, nodes: list[int], said: Json) -> None:
+        """What each mode does by itself, by kernels of its members, and where agents are under signals that switch."""
+        self.require(self.common_kernel(nodes) is None, "a last mode where every signal does the same")
+        constant = said["signals"] == "constant"
+        self.require(constant or said["signals"]["clock"] == "t", "infinitely many switches")
+        self.require(constant or number(said["signals"]["dwell"]) > 0, "a dwell time")
+        for k, told in enumerate(said["modes"]):
+            kernels = [kernel(self.part(L, nodes)) for L in self.members[k]]
+            first = kernels[0]
+            same = all(
+                len(own) == len(first) and not any(x for b in first for (x,) in times(L, [[y] for y in b]))
+                for own, L in zip(kernels, (self.part(L, nodes) for L in self.members[k]), strict=True)
+            )
+            uncertain = any(s in nodes and low < high for s, _, low, high in self.modes[k][0])
+            single = self.closed_components(k, nodes) == 1
+            camps = len(first) == 1 and len(set(map(abs, first[0]))) == 1
+            found = "stability" if not first else "bipartite consensus" if camps and single else None
+            if not same or (found is None and uncertain):
+                found = None
+            elif found is None:
+                found = "interval bipartite consensus" if single else "bipartite containment"
+            self.require(told == found, "a behaviour of the last mode")
+        for excess in self.ends_of(nodes, said, self.switched):
+            self.require(
+                excess <= 1e-7 * max(1.0, *(abs(float(z)) for z in self.start or ())), "an end of the last mode"
+            )
+
+    def ends_of(self, nodes: list[int], said: Json, runs: Any) -> Iterator[float]:
+        """How far agents end outside of what is said, under signals that are played."""
+        ends = said["final_state"]
+        self.require((ends is None) == (self.start is None), "final states of restricted signals")
+        if ends is None:
+            return
+        self.require(list(ends) == [self.labels[v] for v in nodes], "final states by agent")
+        for x in runs(nodes):
+            for entry, y in zip(ends.values(), x, strict=True):
+                mid = number(entry["mid"]) if isinstance(entry, dict) else number(entry)
+                radius = number(entry["radius"]) if isinstance(entry, dict) else Fraction(0)
+                yield abs(y - float(mid)) - float(radius)
+
+    def windows(self, nodes: list[int], said: Json) -> None:
+        """Joint windows: the mean of all modes by its kernel, the contraction in floats, and modes played in turn."""
+        self.require(self.common_kernel(nodes) is None, "windows where every signal does the same")
+        window, on, eta = (number(x) for x in (said["signals"]["window"], said["signals"]["on"], said["eta"]))
+        self.require(0 < on <= window, "a window")
+        m, mandatory = len(self.modes), [self.part(some[0], nodes) for some in self.members]
+        mean = [[sum((L[i][j] for L in mandatory), Fraction(0)) for j in range(len(nodes))] for i in range(len(nodes))]
+        for i, row in enumerate(mean):  # edges of both signs on one pair cancel: they are told by the sizes
+            row[i] = sum((L[i][i] for L in mandatory), Fraction(0))
+        basis = kernel(mean)
+        camps = len(basis) == 1 and len(set(map(abs, basis[0]))) == 1
+        every = [self.part(L, nodes) for some in self.members for L in some]
+        fit = camps and not any(x for L in every for (x,) in times(L, [[y] for y in basis[0]]))
+        self.require(fit or not basis, "what windows do")
+        self.require(said["behaviour"] == ("bipartite consensus" if fit else "stability"), "a behaviour of windows")
+        largest = max(float(L[i][i]) for L in every for i in range(len(nodes)))
+        edges = [e for some, _ in self.modes for e in some if e[0] in nodes]
+        least = min(abs(float(self.ends(e)[0])) for e in edges if self.ends(e)[0])
+        bound = np.exp(-largest * float(window)) * min(1.0, float(on) * least)
+        self.require(eta > 0 and float(eta) <= bound * (1 + SLACK), "the contraction of windows")
+
+        def in_turn(own: list[int]) -> Iterator[np.ndarray]:
+            floats = [[np.array(self.part(L, own), dtype=float) for L in some] for some in self.members]
+            for _ in range(SIGNALS):
+                x = np.array([float(self.start[v]) for v in own])  # type: ignore[index]
+                for _ in range(300):
+                    for k in self.draw.sample(range(m), m):
+                        x = expm(-self.draw.choice(floats[k]) * self.draw.choice((0.5, 2)) / largest) @ x
+                yield x
+
+        for excess in self.ends_of(nodes, said, in_turn):
+            self.require(excess <= 1e-3 * max(1.0, *(abs(float(z)) for z in self.start or ())), "an end of windows")
+
+    def shares(self, nodes: list[int], said: Json, of: str) -> None:
+        """Shares of the clock: one form, the rates of its modes by members in rationals, and their mean."""
+        shares = [number(x) for x in said["signals"]["shares"]]
+        self.require(len(shares) == len(self.modes) and min(shares) >= 0 and sum(shares) == 1, "shares")
+        steps = {x["of"]: x for x in self.data["proof"] if x["kind"] == "family-rate"}
+        rates = [number(steps[f"{of}.modes[{k}]"]["numbers"]["b"]) for k in range(len(shares))]
+        mean = sum((s * b for s, b in zip(shares, rates, strict=True)), Fraction(0))
+        rate, free = number(said["rate"]), [self.index[label] for label in said["nodes"]]
+        self.require(rate <= mean and free == sorted(set(free)) and set(free) <= set(nodes), "a mean rate")
+        pivots, P, basis = [v for v in nodes if v not in free], self.symmetric(said["form"]), list[Vector]()
+        every = [self.part(L, nodes) for some in self.members for L in some]
+        if pivots:
+            stacked = [row for L in every for row in L]
+            near = [b for b in kernel(stacked) if all(abs(x) == abs(b[0]) for x in b)]
+            self.require(len(pivots) == 1 and len(near) == 1, "camps of all modes")
+            basis = near[:1]
+        if len(pivots) != len(basis):
+            return
+        told = None if rate <= 0 else "bipartite consensus" if basis else "stability"
+        self.require(said["behaviour"] == told, "a behaviour by shares")
+        self.require(len(P) == len(free) and self.definite(P), "P is not definite")
+        to_zero = self.lift(basis, nodes, free, pivots)
+        for some, b in zip(self.members, rates, strict=True):
+            for L in some:
+                own = self.part(L, nodes)
+                PA = times(P, times(to_zero, [[row[nodes.index(v)] for v in free] for row in own]))
+                S = [[PA[i][j] + PA[j][i] - b * P[i][j] for j in range(len(P))] for i in range(len(P))]
+                self.require(semidefinite(S), "a rate by shares")

@@ -29,6 +29,7 @@ from ptcc_certify.certificate.request import (
     read_initial_state,
     read_seconds,
 )
+from ptcc_certify.certificate.restricted_claims import STEP, claims_for
 from ptcc_certify.certificate.verdict import Assessment
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.family import MANY_MODES
@@ -46,8 +47,9 @@ from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.base import refuse_no_protocol
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent, decide
+from ptcc_certify.theorems.restricted_signals import ClockShares, SignalClass, read_signal
 
-STEPS = ("the decision", "upper bound on the decay rate", "Lyapunov functions", "independent check")
+STEPS = ("the decision", "upper bound on the decay rate", "Lyapunov functions", STEP, "independent check")
 #: GB that the check may take for families whose members have more nodes than are solved for exactly.
 LARGE_MEMORY = 16
 #: Share of the upper bound that ends the search, and share of the time that the bound may take at first.
@@ -73,6 +75,10 @@ class FamilyCertificate(FamilyContent, Shown):
         What ``"graph"`` is called, and where ``"x(0)"`` comes from.
     scenario : mapping or None
         The scenario file that asked for it, as JSON; it is kept, and nothing is read from it.
+    signal : "any", "constant" or DwellTime
+        The signals that it was asked for.
+    restricted : tuple of Claim
+        What holds for these beside what holds for every signal.
 
     References
     ----------
@@ -164,6 +170,7 @@ def certify_family(
     x0: Any = None,
     *,
     time_limit: float | None = None,
+    signal: SignalClass = "any",
     expectations: Expectations | str | None = None,
     scenario: Mapping[str, Any] | None = None,
     origins: Mapping[str, str] | None = None,
@@ -180,6 +187,8 @@ def certify_family(
         The initial state; without it no final states and no peaks.
     time_limit : float, optional
         Seconds of wall time for the searches; without it 60, and 1 more for every 1,000 nodes.
+    signal : {"any", "constant"} or DwellTime
+        Restricted signals of which more is claimed, beside what holds for every signal.
     expectations : Expectations or str, optional
     scenario, origins : mapping, optional
         See :func:`ptcc_certify.certify`.
@@ -213,6 +222,9 @@ def certify_family(
         raise ParameterError(
             f"{len(family.modes):,} modes, and a certificate holds {MANY_MODES:,} at most; {mend} and decide take any"
         )
+    signal = read_signal(signal)
+    if isinstance(signal, ClockShares) and len(signal.shares) != len(family.modes):
+        raise ParameterError(f"{len(signal.shares)} shares of the clock for {len(family.modes)} modes")
     asked, seconds, progress = read_expectations(expectations), read_seconds(time_limit, family), listener(progress)
     initial_state = None if x0 is None else read_initial_state(analyse(family.modes[0].mandatory), x0, "x0")
     progress(STEPS[0])
@@ -222,9 +234,15 @@ def certify_family(
         for component in components:
             part = _prove(component, notes, progress)
             parts.append(part if initial_state is None else _with_means(part))
+        if signal != "any":
+            progress(STEP)
+        kept: dict[str, Any] = {
+            "signal": signal,
+            "restricted": claims_for(signal, parts, protocol, initial_state, notes),
+        }
     progress(STEPS[3])
     told = origins_of(None, x0, None) | dict(origins or {})
-    kept: dict[str, Any] = {"origins": told, "scenario": scenario}
+    kept |= {"origins": told, "scenario": scenario}
     return FamilyCertificate(family, protocol, tuple(parts), initial_state, asked, tuple(dict.fromkeys(notes)), **kept)
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from ptcc_certify.bounds.kept_means import LeadingGroup, leading_groups
 from ptcc_certify.certificate.certificate_data import Source
 from ptcc_certify.certificate.request import Expectations
+from ptcc_certify.certificate.restricted_claims import Claim, LastModeClaim, RateClaim, ShareClaim, WindowClaim
 from ptcc_certify.checker.family_bounds import deviations, mean_intervals, peaks
 from ptcc_certify.checker.family_limits import WeightedMean, limits
 from ptcc_certify.checker.reading import Interval
@@ -29,6 +30,7 @@ from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
 from ptcc_certify.theorems.family_kernel import UNKNOWN
+from ptcc_certify.theorems.restricted_signals import SignalClass
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,6 +131,8 @@ class FamilyContent:
     source: Source | None = None
     origins: Mapping[str, str] = field(default_factory=dict)
     scenario: Mapping[str, Any] | None = None
+    signal: SignalClass = "any"
+    restricted: tuple[Claim, ...] = ()
 
     @property
     def common(self) -> bool:
@@ -155,6 +159,26 @@ class FamilyContent:
         """The rate that every component has for every signal; None if some has none that is proved."""
         rates = [part.rate for part in self.parts if part.component.nodes.size > 1]
         return None if None in rates else min((r for r in rates if r is not None), default=None)
+
+    @property
+    def rate_of_signal(self) -> Fraction | None:
+        """The rate that every component has for the signals that were asked for; None if some has none."""
+        own = {claim.component: claim.rate for claim in self.restricted if isinstance(claim, RateClaim | ShareClaim)}
+        rates = [own.get(k, part.rate) for k, part in enumerate(self.parts) if part.component.nodes.size > 1]
+        return None if None in rates else min((r for r in rates if r is not None), default=None)
+
+    @property
+    def ends_of_signal(self) -> Mapping[int, LastModeClaim | WindowClaim | ShareClaim]:
+        """Where agents end under restricted signals, by the numbers of components that depend on the signal."""
+        own = {k for k, part in enumerate(self.parts) if part.component.behaviour == DEPENDS}
+        claims = (claim for claim in self.restricted if not isinstance(claim, RateClaim))
+        return {claim.component: claim for claim in claims if claim.component in own}
+
+    @property
+    def member_bound(self) -> Fraction | None:
+        """No rate for constant signals is larger; None if none is proved."""
+        bounds = (part.upper_bound for part in self.parts)
+        return min((b.value for b in bounds if b is not None and b.kind == "member"), default=None)
 
     @property
     def upper_bound(self) -> Fraction | None:

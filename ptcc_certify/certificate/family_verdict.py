@@ -12,12 +12,14 @@ from fractions import Fraction
 
 from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.certificate.family_content import FamilyContent
+from ptcc_certify.certificate.restricted_claims import LastModeClaim
 from ptcc_certify.certificate.verdict import CERTIFIED, LAST, MET, OPEN, REFUTED, UNDECIDED, Answer, Assessment
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.graphs.family import Mode
-from ptcc_certify.theorems.counterexample_text import counterexample_text
+from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_name
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
 from ptcc_certify.theorems.family_claims import component_holds, component_refutation
+from ptcc_certify.theorems.last_mode import last_mode_shows
 
 #: What to try where edges do not tell whether rest states agree.
 NEXT_STEP = (
@@ -43,7 +45,7 @@ def assess_family(certificate: FamilyContent, report: CheckReport | None) -> Ass
     ('refuted', 3)
     """
     asked, components = certificate.expectations, [part.component for part in certificate.parts]
-    answers = [] if asked.behaviour is None else [judge_family_behaviour(components, asked.behaviour)]
+    answers = [] if asked.behaviour is None else [_judge_behaviour(certificate, components, asked.behaviour)]
     answers += [] if asked.min_rate is None else [_judge_rate(certificate, asked.min_rate)]
     answers += [] if asked.max_input is None else [_judge_input(certificate, asked.max_input)]
     if report is None or not report.accepted:
@@ -86,12 +88,30 @@ def judge_family_behaviour(components: Sequence[FamilyComponent], expected: str)
     return Answer(OPEN, expected, "not decided") if None in answers else Answer(MET, expected)
 
 
+def _judge_behaviour(certificate: FamilyContent, components: Sequence[FamilyComponent], expected: str) -> Answer:
+    """Tell whether a behaviour holds for every signal, or for those that were asked for, by the last mode."""
+    last = certificate.ends_of_signal
+    others = [component for k, component in enumerate(components) if k not in last]
+    answer = judge_family_behaviour(others, expected) if others else Answer(MET, expected)
+    for claim in last.values():
+        shows = [last_mode_shows(told, expected) for told in claim.behaviours]
+        if False in shows and answer.status != REFUTED:
+            number = shows.index(False)
+            whose = f"{mode_name(certificate.family, number)} by itself: " * isinstance(claim, LastModeClaim)
+            return Answer(REFUTED, expected, f"{whose or 'it is '}{claim.behaviours[number]}")
+        if None in shows and answer.status == MET:
+            answer = Answer(OPEN, expected, "not decided of these signals")
+    return answer
+
+
 def _judge_rate(certificate: FamilyContent, least: Fraction) -> Answer:
     """Tell whether a rate of at least so much is proved for every signal, or excluded by the upper bound."""
-    what, rate, bound = f"rate >= {near(least, 12)}", certificate.rate, certificate.upper_bound
+    what, rate, bound = f"rate >= {near(least, 12)}", certificate.rate_of_signal, certificate.upper_bound
+    if certificate.signal != "any":
+        bound = certificate.member_bound
     if all(part.component.nodes.size == 1 for part in certificate.parts) or (rate is not None and rate >= least):
         return Answer(MET, what)
-    if any(part.component.behaviour == DEPENDS for part in certificate.parts):
+    if certificate.signal == "any" and any(part.component.behaviour == DEPENDS for part in certificate.parts):
         return Answer(REFUTED, what, "no rate holds for every signal")
     if not certificate.common:
         return Answer(OPEN, what, "whether rest states agree is not decided")

@@ -14,7 +14,9 @@ from ptcc_certify.certificate.family_content import FamilyContent
 from ptcc_certify.certificate.format import producer
 from ptcc_certify.certificate.format_family_rows import form_entry, form_steps, rows_entry, rows_steps
 from ptcc_certify.certificate.format_graph import structure_section
+from ptcc_certify.certificate.format_restricted import claim_entry, claim_steps, enclosed
 from ptcc_certify.certificate.format_vectors import Writer
+from ptcc_certify.certificate.restricted_claims import Claim
 from ptcc_certify.checker import NOT_OF_FAMILIES, OBLIGATIONS, SCHEMA, digest
 from ptcc_certify.checker.family import THEOREM
 from ptcc_certify.checker.family_limits import EQUAL
@@ -25,9 +27,6 @@ from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import BIPARTITE_CONTAINMENT, INTERVAL_BIPARTITE_CONSENSUS, analyse
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
-
-#: Bits of the middles and radii of final states, which are rounded outwards.
-_BITS = 64
 
 
 def family_document(certificate: FamilyContent, files: bool = False) -> tuple[dict[str, Any], Writer]:
@@ -47,7 +46,7 @@ def family_document(certificate: FamilyContent, files: bool = False) -> tuple[di
         "initial_state": out.state("start", certificate.initial_state),
         "final_state": None
         if finals is None
-        else {label: None if ends is None else _enclosed(*ends) for label, ends in zip(labels, finals, strict=True)},
+        else {label: None if ends is None else enclosed(*ends) for label, ends in zip(labels, finals, strict=True)},
         "input": {
             "bounded": certificate.bounded,
             "peaks": None if peaks is None else dict(zip(labels, map(_up, peaks), strict=True)),
@@ -55,6 +54,8 @@ def family_document(certificate: FamilyContent, files: bool = False) -> tuple[di
         "proof": _proof(certificate, components, functions),
         "verdict": "certified",
     }
+    if certificate.restricted:
+        document["restricted"] = [claim_entry(claim, _labels(certificate, claim)) for claim in certificate.restricted]
     return document | {"digest": digest(document), "unverified": _unverified(certificate)}, out
 
 
@@ -63,22 +64,16 @@ def _function(family: Family, component: FamilyComponent, number: int, V: Any, o
     return rows_entry(labels, number, V, out) if V.kind == "rows" else form_entry(labels, number, V)
 
 
+def _labels(certificate: FamilyContent, claim: Claim) -> Sequence[str]:
+    return certificate.parts[claim.component].component.family.labels
+
+
 def _up(x: Fraction) -> str:
     """Write a bound, rounded up to 60 bits or so."""
     if not x:
         return "0"
     unit = Fraction(2) ** (longest([x.numerator]) - longest([x.denominator]) - 60)
     return format_exact(-(-x // unit) * unit)
-
-
-def _enclosed(low: Fraction, high: Fraction) -> Any:
-    """Write ends as a middle and a radius, rounded outwards."""
-    if low == high:
-        return format_exact(low)
-    size = max(abs(low), abs(high))
-    unit = Fraction(2) ** (longest([size.numerator]) - longest([size.denominator]) - _BITS)
-    below, above = low // unit, -(-high // unit)
-    return {"mid": format_exact((below + above) * unit / 2), "radius": format_exact((above - below) * unit / 2)}
 
 
 def _proof(
@@ -94,7 +89,11 @@ def _proof(
         steps += [_step(kind, of, witness, **numbers) for kind, of, witness, numbers in own]
     if certificate.final_states is not None:
         steps.append(_step("family-final-state", "final_state", _means(certificate)))
-    return steps + [_step("family-input", "input")] * (certificate.bounded is not None)
+    steps += [_step("family-input", "input")] * (certificate.bounded is not None)
+    for k, claim in enumerate(certificate.restricted):
+        own = claim_steps(f"restricted[{k}]", claim)
+        steps += [_step(kind, of, witness, **numbers) for kind, of, witness, numbers in own]
+    return steps
 
 
 def _means(certificate: FamilyContent) -> list[Any] | None:

@@ -63,6 +63,7 @@ from ptcc_certify.simulation.instants import PAST
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.trajectory import Trajectory
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
+from ptcc_certify.theorems.restricted_signals import SignalClass
 from ptcc_certify.theorems.table import theorem_for
 from ptcc_certify.theorems.theorem import RateProof, Theorem
 
@@ -79,7 +80,7 @@ STEPS = (
 #: of the time then left that the first of the steps may take.
 SEARCHING, SHARES = 0.4, (0.3, 0.3, 0.8, 1.0)
 #: Options of :func:`certify` that families take, too.
-_OF_FAMILIES = ("time_limit", "expectations", "scenario", "origins", "progress")
+_OF_FAMILIES = ("signal", "time_limit", "expectations", "scenario", "origins", "progress")
 #: Instants of a simulated run where the graph is large.
 FEW_SAMPLES = 51
 #: A simulated end state is settled when it is this near to the final state, relative to the initial state.
@@ -109,6 +110,7 @@ def certify(
     limits: Limits | Sequence[Limits] = (),
     delta: Any = None,
     noise: Any = None,
+    signal: SignalClass = "any",
     time_limit: float | None = None,
     expectations: Expectations | str | None = None,
     scenario: Mapping[str, Any] | None = None,
@@ -153,6 +155,8 @@ def certify(
     noise : number, optional
         Nominal protocol: bound of the measurement noise ``|n_k|``, ``u = -gain L (X + n)``, whose effect is bounded
         under each of ``limits`` but sampling. Noise times an infinite gain is bounded by nothing.
+    signal : {"any", "constant"} or DwellTime
+        Of a family: restricted signals of which more is claimed, beside what holds for every signal.
     time_limit : float, optional
         Seconds of wall time. Simulation and searches may take 40 % together, each its share of what is left; what is
         proved by then stands and is checked, and ``cut_off`` names what was ended. Without it they have 60 s, and 1 s
@@ -171,8 +175,8 @@ def certify(
     Returns
     -------
     Certificate or FamilyCertificate
-        Of a family the latter: it takes the nominal protocol, ``x0``, ``time_limit``, ``expectations``, ``scenario``,
-        ``origins`` and ``progress``.
+        Of a family the latter: it takes the nominal protocol, ``x0``, ``signal``, ``time_limit``, ``expectations``,
+        ``scenario``, ``origins`` and ``progress``.
 
     Raises
     ------
@@ -205,12 +209,20 @@ def certify(
     FamilyCertificate(bipartite consensus for every signal, rate 3.59999, certified)
     """
     options: dict[str, Any] = {"method": method, "at": at, "initial_set": initial_set, "limits": limits, "delta": delta}
-    options |= {"noise": noise, "time_limit": time_limit, "expectations": expectations, "scenario": scenario}
+    options |= {
+        "noise": noise,
+        "signal": signal,
+        "time_limit": time_limit,
+        "expectations": expectations,
+        "scenario": scenario,
+    }
     options["origins"] = origins_of(graph, x0, sigma0) | dict(origins or {})
     if uncertainty or is_family(graph):
         options |= {"simulation": simulation, "sigma0": sigma0, "disturbance": disturbance, "progress": progress}
         family = _family(graph, orientation, uncertainty, options)
         return certify_family(family, protocol, x0, **{name: options[name] for name in _OF_FAMILIES})
+    if options.pop("signal") != "any":
+        raise ParameterError("signal is for families of graphs, which change; this is one graph: leave it out")
     limits, progress = list(limits) if isinstance(limits, Iterable) else [limits], listener(progress)
     options["limits"] = limits
     graph = as_graph(graph, orientation)

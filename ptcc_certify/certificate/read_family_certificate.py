@@ -14,6 +14,7 @@ from ptcc_certify.certificate.certificate_data import Source
 from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate
 from ptcc_certify.certificate.format import read_protocol
 from ptcc_certify.certificate.format_family import certificate_family
+from ptcc_certify.certificate.format_restricted import read_claim
 from ptcc_certify.certificate.format_vectors import Reader
 from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.checker.reading import exact, triangle
@@ -46,7 +47,11 @@ def read_family_certificate(source: Source) -> FamilyCertificate:
     parts = tuple(ComponentProof(c, tuple(some)) for c, some in zip(components, functions, strict=True))
     state = Reader(family.labels, source.files).state(document["initial_state"])
     expectations = _read_expectations(document["unverified"].get("asked"))
-    return FamilyCertificate(family, read_protocol(document["protocol"]), parts, state, expectations, source=source)
+    restricted = enumerate(document.get("restricted", ()))
+    said = tuple(read_claim(f"restricted[{k}]", entry, document["proof"], components) for k, entry in restricted)
+    kept: dict[str, Any] = {"signal": said[0].signal if said else "any", "restricted": said}
+    protocol = read_protocol(document["protocol"])
+    return FamilyCertificate(family, protocol, parts, state, expectations, source=source, **kept)
 
 
 def _read_expectations(asked: Any) -> Expectations:

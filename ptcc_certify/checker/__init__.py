@@ -42,6 +42,7 @@ from ptcc_certify.checker.protocol import (
 )
 from ptcc_certify.checker.rates import check_rate_bound, check_rates
 from ptcc_certify.checker.reading import SCHEMA, RejectedError, UnreadableError, digest, entries, fields, need, read
+from ptcc_certify.checker.restricted_signals import check_restricted
 from ptcc_certify.checker.side_files import SideFiles
 from ptcc_certify.checker.structure import MANY_COMPONENTS, check_claim, check_structure
 from ptcc_certify.checker.theorem_function import check_paper
@@ -52,8 +53,10 @@ GRAPH = "a graph file is not read: compare the SHA-256 that is printed, or use p
 KEYS = (
     *("schema", "producer", "graph", "structure", "claim", "components", "protocol", "paper", "lyapunov", "rates"),
     *("overshoot", "initial_state", "sliding_variable", "influence", "final_state", "reaching_time", "input", "proof"),
-    *("verdict", "digest", "unverified"),
+    *("verdict", "digest", "unverified", "restricted"),
 )
+#: Parts that need not be there.
+OPTIONAL = ("components", "restricted")
 
 #: Parts that are null in a certificate of a family.
 NOT_OF_FAMILIES = ("paper", "rates", "overshoot", "sliding_variable", "influence", "reaching_time")
@@ -149,7 +152,7 @@ def _verdict(doc: Document) -> str:
         Something does not follow; ``doc.at`` tells where.
     """
     data = doc.data
-    fields(data, [key for key in KEYS if key != "components" or key in data], "the certificate")
+    fields(data, [key for key in KEYS if key not in OPTIONAL or key in data], "the certificate")
     need(data["schema"] == SCHEMA, "an unknown schema")
     need(isinstance(data["producer"], str), "producer is not a text")
     need(isinstance(data["unverified"], dict), "unverified is not an object")
@@ -157,6 +160,7 @@ def _verdict(doc: Document) -> str:
     protocol = check_protocol(doc)
     if isinstance(data["graph"], dict) and "modes" in data["graph"]:
         return _family_verdict(doc, protocol)
+    need("restricted" not in data, "restricted signals of one graph")
     graph = check_graph(doc)
     structure = check_structure(doc, graph, data["structure"])
     claim = check_claim(doc, structure, protocol.sliding)
@@ -189,6 +193,7 @@ def _family_verdict(doc: Document, protocol: Protocol) -> str:
     functions = check_family_functions(doc, family)
     state = None if begin.state is None else list(begin.state)
     check_family_bounds(doc, family, functions, protocol.gains, state)
+    check_restricted(doc, family, functions, protocol.gains, state)
     for key in NOT_OF_FAMILIES:
         need(doc.section(key) is None, "a part that certificates of families do not have")
     return _close(doc, True)

@@ -117,8 +117,8 @@ def check_form(doc: Document, family: Family, component: Component, entry: Any, 
     modes = []
     for k in range(len(family.modes)):
         numbers = doc.open("family-rate", f"{of}.modes[{k}]", ["b"], witness=True)
-        modes.append(_quotient(family, k, component, nodes))
-        _decreases(doc.exact, modes[k], (P, scale), component.whole[1], numbers["b"], numbers["witness"])
+        modes.append(quotient_of(family, k, component, nodes))
+        decreases(doc.exact, modes[k], (P, scale), component.whole[1], numbers["b"], numbers["witness"])
         rates.append(numbers["b"])
         doc.done(f"b = {down(numbers['b'])}")
     need(min(rates) == rate, "the rate is not the least of the modes'")
@@ -153,7 +153,7 @@ def _mean(doc: Document, graph: Digraph, component: Component, entry: Any) -> We
 # ---------------------------------------------------------------------- the quotient
 
 
-def _quotient(family: Family, number: int, component: Component, nodes: list[int]) -> QuotientMode:
+def quotient_of(family: Family, number: int, component: Component, nodes: list[int]) -> QuotientMode:
     """Return a mode in the coordinates ``xi``; columns are numbered as ``nodes``."""
     mode, place, edges = family.modes[number], {v: i for i, v in enumerate(nodes)}, component.part.edges[number]
     kernel, scale = component.whole
@@ -213,7 +213,7 @@ def _part(columns: dict[int, Whole], place: dict[int, int], edge: Edge, tied: bo
 # ---------------------------------------------------------------------- rates
 
 
-def _decreases(
+def decreases(
     judge: Arithmetic, mode: QuotientMode, form: tuple[Matrix, int], kernel_scale: int, b: Fraction, witness: Any
 ) -> None:
     """Verify ``P A + A'P >= b P`` for all members of a mode, ``P > 0``.

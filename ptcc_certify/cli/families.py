@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.family import Family
     from ptcc_certify.theorems.family_behaviour import FamilyComponent
+    from ptcc_certify.theorems.restricted_signals import SignalClass
 
 #: Options of certify that families do not take.
 _NOT_OF_FAMILIES = (
@@ -77,6 +78,58 @@ def mode_options(command: Any) -> Any:
     ):
         command = option(command)
     return command
+
+
+restricted_options = shared.options_of(
+    shared.number_option(
+        "--dwell", metavar="THETA", help="Families: at least so much time between switches; claim more for these."
+    ),
+    shared.number_option(
+        "--clock-dwell", metavar="TAU", help="Families: the same on the stretched clock, which is infinite at T."
+    ),
+    shared.number_option(
+        "--clock-window", metavar="H", help="Families: every edge is on in each window of so much stretched clock,"
+    ),
+    shared.number_option("--window-on", metavar="DELTA", help="for so much of it at least."),
+    shared.number_option("--window", metavar="H", hidden=True),
+    click.option(
+        "--share",
+        multiple=True,
+        metavar="NU",
+        help="Families: the share of the stretched clock that a mode acts, an outage too; one for each graph.",
+    ),
+)
+
+
+def signals_of(options: shared.Options) -> SignalClass:
+    """Return the signals of which more is asked, or refuse two kinds of them at once."""
+    from ptcc_certify.theorems.restricted_signals import WINDOWS_OF_TIME, ClockShares, DwellTime, JointWindows
+
+    if options["window"] is not None:
+        raise ParameterError(f"--window: {WINDOWS_OF_TIME}: --clock-window")
+    dwells = {"t": options["dwell"], "s": options["clock_dwell"]}
+    given: list[Any] = [DwellTime(least, clock=clock) for clock, least in dwells.items() if least is not None]
+    if len(given) > 1:
+        raise ParameterError("--dwell is of time, --clock-dwell of the clock: give one of them")
+    length, on = options["clock_window"], options["window_on"]
+    if (length is None) != (on is None):
+        raise ParameterError(
+            "--clock-window is the length of windows, --window-on what each edge is on in them: give both"
+        )
+    given += [] if length is None else [JointWindows(length, on=on, clock="s")]
+    given += [ClockShares(options["share"])] if options["share"] else []
+    if len(given) > 1:
+        raise ParameterError("dwell times, windows and shares are for signals of different kinds: give one of them")
+    if given and options["signal"] == "constant":
+        raise ParameterError("--signal constant never switches: leave dwell times, windows and shares out")
+    return given[0] if given else options["signal"]
+
+
+def refuse_restricted(options: shared.Options) -> None:
+    """Refuse restricted signals where one graph acts for ever."""
+    for name in ("dwell", "clock_dwell", "window", "clock_window", "window_on", "share"):
+        if options[name]:
+            raise ParameterError(f"{shared.flag_of(name)}: is for families of graphs; this is one graph: leave it out")
 
 
 def read_graph_or_family(graphs: tuple[str, ...], options: shared.Options) -> SignedDigraph | Family:
@@ -188,12 +241,13 @@ def certify_family(
     most = options["max_input"]
     if most is not None and most <= 0:
         raise ParameterError("--max-input is outside its domain; it must be > 0")
-    if options["signal"] == "constant" and (most is not None or options["min_rate"] is not None):
-        raise ParameterError("--min-rate and --max-input are judged for --signal any; leave them out with constant")
+    signal = signals_of(options)
     protocol = shared.protocol_of(options)
     x0 = shared.read_initial_state(options["x0"], options["seed"], family.modes[0].mandatory)
     LOG.info("%s", one_line(f"read {', '.join(graphs)}: {family!r}"))
-    if options["signal"] == "constant" and (left := _constant_alone(decide(family, "constant"), decide(family))):
+    if signal == "constant" and (left := _constant_alone(decide(family, "constant"), decide(family))):
+        if most is not None or options["min_rate"] is not None:
+            raise ParameterError("--min-rate and --max-input: no rate is certified of members that end differently")
         _show_decision(graphs, family, left, as_json, screen, options)
         code = _expected(left, options["expect"])
         if output:
@@ -207,7 +261,12 @@ def certify_family(
     asked = Expectations(options["expect"], options["min_rate"], most)
     with progress(STEPS, screen.quiet) as begin:
         origins = {"graph": Path(name).name, "read": read, **drawn}
-        limit = {"time_limit": options["time_limit"], "expectations": asked, "scenario": scenario_record()}
+        limit = {
+            "time_limit": options["time_limit"],
+            "expectations": asked,
+            "scenario": scenario_record(),
+            "signal": signal,
+        }
         certificate = run(family, protocol, x0, origins=origins, progress=begin, **limit)
         assessment = certificate.assessment
     LOG.info("verdict %s; exit code %d", one_line(assessment.text), assessment.exit_code)

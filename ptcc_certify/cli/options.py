@@ -108,7 +108,9 @@ def _certificate_output(context: click.Context, parameter: click.Parameter, outp
     return output
 
 
-def _options(*decorators: Callable[[Any], Any]) -> Callable[[Any], Any]:
+def options_of(*decorators: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Return one decorator of several, which adds their options in this order."""
+
     def apply(function: Any) -> Any:
         for decorator in reversed(decorators):
             function = decorator(function)
@@ -130,7 +132,7 @@ def expect_option(text: str) -> Callable[[Any], Any]:
     )
 
 
-reading_options = _options(
+reading_options = options_of(
     click.option(
         "--edges",
         type=click.Choice(["information", "listens"]),
@@ -160,7 +162,7 @@ graphs_argument = click.argument(
     shell_complete=complete(GRAPHS, PACKAGED),
 )
 certificate_argument = click.argument("certificate", callback=_certificate, shell_complete=complete(CERTIFICATES))
-protocol_options = _options(
+protocol_options = options_of(
     click.option(
         "--protocol",
         "kind",
@@ -192,7 +194,7 @@ protocol_options = _options(
         "--sigma0", metavar="STATE", help="Sliding mode: like --x0; 0 leaves no reaching phase.  [default: 0]"
     ),
 )
-limit_options = _options(
+limit_options = options_of(
     number_option("--gain-cap", metavar="G", help="Nominal: the gain is at most G."),
     number_option("--stop-before", metavar="EPS", help="Nominal: the input is 0 from T - EPS on."),
     number_option("--sample-period", metavar="H", help="Nominal: gain and input are held over periods H."),

@@ -43,6 +43,11 @@ SECTIONS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
             "uncertainty": ("uncertainty", '"10%"'),
             "optional": ("optional", '["a,b"]'),
             "signal": ("signal", '"any"'),
+            "dwell": ("dwell", '"0.1"'),
+            "clock_dwell": ("clock_dwell", '"0.1"'),
+            "clock_window": ("clock_window", '"2"'),
+            "window_on": ("window_on", '"0.5"'),
+            "share": ("share", '["0.7", "0.3"]'),
         },
     ),
     "protocol": (

@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lmi.exact.decimal_rounding import down, near, up
+from ptcc_certify.certificate.restricted_claims import LastModeClaim
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.structure import STABILITY
+from ptcc_certify.report.restricted_screen import last_states, restricted_entries
 from ptcc_certify.report.structure_text import Lines, structure_text
 from ptcc_certify.report.text_layout import (
     TEXT,
@@ -77,6 +79,7 @@ def family_summary(certificate: FamilyCertificate, name: str, origins: Mapping[s
         ("protocol", _protocol_text(certificate, origins)),
         *_claim_entries(components, f" at T = {near(T)}"),
         *_rate_entries(certificate),
+        *restricted_entries(certificate),
         *_final_entries(certificate),
         *_error_entries(certificate),
         *_input_entries(certificate),
@@ -119,7 +122,8 @@ def family_lines(certificate: FamilyCertificate, name: str, origins: Mapping[str
         drawn = f" ({origins['x(0)']})" if "x(0)" in origins else ""
         entries.append(("x(0)", value_list(family.labels, certificate.initial_state) + drawn))
     entries += _claim_entries(components, f" at T = {near(certificate.protocol.T)}", every=True)
-    entries += [*_rate_entries(certificate), *_function_entries(certificate), *_final_entries(certificate, long=True)]
+    entries += [*_rate_entries(certificate), *restricted_entries(certificate), *_function_entries(certificate)]
+    entries += _final_entries(certificate, long=True)
     entries += [*_error_entries(certificate, long=True), *_input_entries(certificate, long=True)]
     entries += [("note", note) for note in certificate.notes]
     entries.append(("proof", _proof_text(certificate)))
@@ -350,6 +354,13 @@ def _final_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
     if certificate.final_states is not None and certificate.common:
         width = 12 * TEXT if long else 2 * TEXT - 20
         yield from _interval_entries(certificate.family.labels, certificate.final_states, width)
+    elif certificate.final_states is not None and any(c.final_states for c in certificate.ends_of_signal.values()):
+        pairs = zip(certificate.final_states, last_states(certificate), strict=True)
+        states = [other if ends is None else ends for ends, other in pairs]
+        ends = _interval_entries(certificate.family.labels, states, 12 * TEXT if long else 2 * TEXT - 20)
+        claims = certificate.ends_of_signal.values()
+        rests = not any(isinstance(claim, LastModeClaim) and None in claim.behaviours for claim in claims)
+        yield from ends if rests else (("x(t)", text) for _, text in ends)
 
 
 def _interval_entries(labels: Sequence[str], states: Sequence[tuple[Fraction, Fraction] | None], width: int) -> Lines:

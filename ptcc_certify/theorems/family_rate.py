@@ -84,14 +84,14 @@ def explicit_rate(component: FamilyComponent) -> ExplicitRate | None:
     family, n = component.family, component.family.n_nodes
     if component.behaviour not in (STABILITY, BIPARTITE_CONSENSUS) or n == 1 or component.signal != "any":
         return None
-    largest = max(map(_largest_sum, family.modes))
-    least = min(map(_least_mandatory, family.modes))
+    largest = max(map(largest_sum, family.modes))
+    least = min(map(least_mandatory, family.modes))
     eta = least / (3 * largest * len(family.modes))
     exponent, multiple = (n, 2) if component.behaviour == STABILITY else (n - 1, 1)
     return ExplicitRate(eta, exponent, multiple, exponent / largest)
 
 
-def _largest_sum(mode: Mode) -> Fraction:
+def largest_sum(mode: Mode) -> Fraction:
     """Return the largest sum of ``w+`` into a node."""
     sums: dict[int, Fraction] = {}
     table = mode.upper.table
@@ -104,7 +104,7 @@ def _largest_sum(mode: Mode) -> Fraction:
     return max(sums.values(), default=Fraction(0))
 
 
-def _least_mandatory(mode: Mode) -> Fraction:
+def least_mandatory(mode: Mode) -> Fraction:
     """Return the least mandatory weight."""
     mandatory = np.flatnonzero(~mode.optional)
     return mode.lower.fraction(int(mandatory[np.argmin(mode.lower.table[mandatory])]))

@@ -30,10 +30,12 @@ from ptcc_certify.certificate.certificate import RejectedCertificate, read_certi
 from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate, certify_family
 from ptcc_certify.certificate.format_family import family_document
 from ptcc_certify.checker import check
+from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.follower_function import follower_functions
 from ptcc_certify.protocols import NominalProtocol
 from ptcc_certify.theorems.family_behaviour import decide
+from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows
 
 SEED = int(os.environ.get("PTCC_FUZZ_SEED", "0"))
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
@@ -82,6 +84,37 @@ def cases() -> list[tuple[str, Json]]:
     day, night = ([("a", "b", 1, 1)], [("b", "a", 1, 1)])
     modes = {"day": Family.from_intervals(day), "night": Family.from_intervals(night, nodes="ab")}
     found.append(("leaders change", document(Family.switching(modes))))
+    return found + restricted_cases()
+
+
+def restricted_cases() -> list[tuple[str, Json]]:
+    """True certificates with claims for restricted signals: of both clocks, and of constant ones."""
+    found, draw = [], np.random.default_rng(3)
+    signals = {"time": DwellTime("0.3", clock="t"), "clock": DwellTime(4, clock="s"), "constant": "constant"}
+    for kind, share in (("stability", Fraction(1, 5)), ("consensus", Fraction(0)), ("consensus", Fraction(1, 5))):
+        family = with_common_kernel(draw, kind, 3, 2, share, 0.3)
+        for name, signal in signals.items():
+            made = certify_family(family, PROTOCOL, time_limit=5, signal=signal)
+            found.append((f"{name} {kind} {share}", {**made.to_dict(), "unverified": {}}))
+    for k in range(6):
+        made = random_family(random.Random(k), "depends", nodes=4 - k % 2).family
+        state = list(range(1, made.n_nodes + 1)) if k else None
+        last = certify_family(made, PROTOCOL, state, signal=signals["constant" if k == 2 else "time"])
+        found.append((f"last mode {k}", {**last.to_dict(), "unverified": {}}))
+    for k, signs in enumerate(((1, -1, 1), (-1, 1, 1))):
+        cut = [[(f"n{j}", f"n{(j + 1) % 3}", sign)] for j, sign in enumerate(signs[: 3 - k])]
+        modes = [SignedDigraph.from_edges(edges, nodes=["n0", "n1", "n2"]) for edges in cut]
+        windows = JointWindows(2, on="0.3", clock="s")
+        made = certify_family(Family.switching(modes), PROTOCOL, None if k else [1, 2, -3], signal=windows)
+        found.append((f"windows {k}", {**made.to_dict(), "unverified": {}}))
+    outage = Family.from_intervals([], nodes=["a", "b", "c"])
+    for k, back in enumerate((0, -1)):
+        pair = Family.from_intervals([("a", "b", 1, 2), ("b", "c", -1, -1), *[("c", "a", 1, 1)] * -back], nodes="abc")
+        other = Family.from_intervals([("a", "b", 1, 1), *[("b", "a", -1, 0)] * -back], nodes="abc")
+        modes = Family.switching({"pair": pair, "outage": outage, "other": other})
+        made = certify_family(modes, PROTOCOL, None, signal=ClockShares(["0.8", "0.1", "0.1"]))
+        assert made.restricted
+        found.append((f"shares {k}", {**made.to_dict(), "unverified": {}}))
     return found
 
 

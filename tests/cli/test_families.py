@@ -317,3 +317,55 @@ def test_no_name_of_a_file_or_a_mode_steers_the_terminal():
     ):
         run = ptcc(*words)
         assert "\x1b" not in run.out + run.err and len(run.out + run.err) > 10, words
+
+
+def test_more_is_claimed_for_restricted_signals():
+    spoiled = ("day.csv", "spoiled.csv", "--switching")
+    outage = ("day.csv", "outage.csv", "--switching")
+    Path("outage.csv").write_text("a,,\nb,,\nc,,\n")
+    for words, line in (
+        ((*BOTH, "--dwell", "0.2"), "dwell      at least 0.2 of time between switches: rate "),
+        ((*BOTH, "--clock-dwell", "3"), "dwell      at least 3 of clock between switches: rate "),
+        ((*BOTH, "--signal", "constant"), "constant   if mode and weights never change: rate "),
+        ((*spoiled, "--dwell", "0.2"), "dwell      at least 0.2 of time between switches: the last mode decides"),
+        ((*spoiled, "--clock-dwell", "3"), "nothing more is proved"),
+        (
+            (*outage, "--share", "0.5", "--share", "0.5"),
+            "shares     modes at 0.5, 0.5 of the clock: bipartite consensus",
+        ),
+        ((*outage, "--clock-window", "2", "--window-on", "1"), "windows    each edge on for 1 of every 2 of the clock"),
+    ):
+        run = ptcc("certify", *words, "--kappa", "3", "-o", "c.json")
+        assert run.code == 0 and line in run.out, run
+        checked = ptcc("check", "c.json")
+        assert checked.code == 0 and (line in checked.out) == (line != "nothing more is proved"), checked
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (("--dwell", "1", "--clock-dwell", "1"), "give one of them"),
+        (("--dwell", "0"), "dwell = 0 is outside its domain"),
+        (("--dwell", "1", "--signal", "constant"), "never switches"),
+        (("--window", "1"), "windows of time prove nothing at T"),
+        (("--clock-window", "1"), "give both"),
+        (("--clock-window", "1", "--window-on", "2"), "at most the whole window"),
+        (("--clock-window", "1", "--window-on", "1", "--dwell", "1"), "signals of different kinds"),
+        (("--share", "0.5"), "they must sum to 1"),
+        (("--share", "1"), "1 shares of the clock for 2 modes"),
+    ],
+)
+def test_restricted_signals_that_are_none_are_refused(words: tuple[str, ...], reason: str):
+    run = ptcc("certify", *BOTH, *words)
+    assert run.code == 2 and reason in run.err and run.err.count("\n") == 1, run
+
+
+def test_one_graph_has_no_restricted_signals():
+    run = ptcc("certify", "day.csv", "--dwell", "1")
+    assert run.code == 2 and "--dwell: is for families" in run.err, run
+
+
+def test_restricted_signals_are_keys_of_scenarios():
+    Path("t.toml").write_text(FILES["s.toml"].replace("[protocol]", 'dwell = "0.2"\n[protocol]'))
+    run = ptcc("certify", "t.toml")
+    assert run.code == 0 and "at least 0.2 of time between switches" in run.out, run

@@ -1,0 +1,164 @@
+"""Claims for restricted signals in the file of a family's certificate, their obligations, and how they are read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
+from typing import Any
+
+from lmi.exact.numbers import longest
+from ptcc_certify.certificate.restricted_claims import Claim, LastModeClaim, RateClaim, ShareClaim, WindowClaim
+from ptcc_certify.checker.reading import exact, interval, triangle
+from ptcc_certify.graphs.rationals import format_exact
+from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
+from ptcc_certify.lyapunov.clock_shares import ShareForm
+from ptcc_certify.lyapunov.family_function import FamilyFunction, prove_ends
+from ptcc_certify.lyapunov.mode_forms import ModeForms
+from ptcc_certify.theorems.family_behaviour import FamilyComponent
+from ptcc_certify.theorems.joint_windows import contraction
+from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows, SignalClass
+
+#: Bits of the middles and radii of final states, which are rounded outwards.
+_BITS = 64
+Step = tuple[str, str, Any, dict[str, str]]
+
+
+def signal_entry(signal: SignalClass) -> Any:
+    """Return a class of signals as JSON.
+
+    Examples
+    --------
+    >>> signal_entry(DwellTime("0.5", clock="t"))
+    {'dwell': '1/2', 'clock': 't'}
+    """
+    if isinstance(signal, ClockShares):
+        return {"shares": [format_exact(share) for share in signal.shares]}
+    if isinstance(signal, JointWindows):
+        return {"window": format_exact(signal.length), "on": format_exact(signal.on)}
+    if isinstance(signal, DwellTime):
+        return {"dwell": format_exact(signal.least), "clock": signal.clock}
+    return signal
+
+
+def enclosed(low: Fraction, high: Fraction) -> Any:
+    """Write ends as a middle and a radius, rounded outwards.
+
+    Examples
+    --------
+    >>> enclosed(Fraction(1), Fraction(1)), enclosed(Fraction(1), Fraction(2))
+    ('1', {'mid': '3/2', 'radius': '1/2'})
+    """
+    if low == high:
+        return format_exact(low)
+    size = max(abs(low), abs(high))
+    unit = Fraction(2) ** (longest([size.numerator]) - longest([size.denominator]) - _BITS)
+    below, above = low // unit, -(-high // unit)
+    return {"mid": format_exact((below + above) * unit / 2), "radius": format_exact((above - below) * unit / 2)}
+
+
+def claim_entry(claim: Claim, labels: Sequence[str]) -> dict[str, Any]:
+    """Return a claim about the component of the agents ``labels`` as JSON."""
+    if isinstance(claim, ShareClaim):
+        return {
+            "claim": "shares",
+            "signals": signal_entry(claim.signal),
+            "component": claim.component,
+            "nodes": [labels[v] for v in claim.form.function.nodes],
+            "form": _lower_triangle(claim.form.function.matrix),
+            "rate": format_exact(claim.rate),
+            "behaviour": claim.behaviour,
+        }
+    if not isinstance(claim, RateClaim):
+        ends = claim.final_states
+        about = {"signals": signal_entry(claim.signal), "component": claim.component}
+        final = None if ends is None else {v: enclosed(*pair) for v, pair in zip(labels, ends, strict=True)}
+        if isinstance(claim, LastModeClaim):
+            return {"claim": "last mode", **about, "modes": list(claim.behaviours), "final_state": final}
+        told = {"behaviour": claim.behaviour, "eta": format_exact(claim.rate.eta)}
+        return {"claim": "windows", **about, **told, "final_state": final}
+    forms = claim.forms
+    return {
+        "claim": "rate",
+        "signals": signal_entry(claim.signal),
+        "component": claim.component,
+        "forms": None if forms is None else [_lower_triangle(P) for P in forms.matrices],
+        "ratio": format_exact(claim.ratio),
+        "rate": format_exact(claim.rate),
+        "bounded": True if claim.bounded else None,
+    }
+
+
+def _lower_triangle(P: Sequence[Sequence[Any]]) -> list[list[str]]:
+    return [[format_exact(x) for x in row[: i + 1]] for i, row in enumerate(P)]
+
+
+def claim_steps(of: str, claim: Claim) -> Iterator[Step]:
+    """Yield kind, place, witness and numbers of the obligations of a claim."""
+    if isinstance(claim, ShareClaim):
+        V = claim.form.function
+        for mode, (rate, tau, rests) in enumerate(zip(V.rates, V.multipliers, claim.form.at_rest, strict=True)):
+            witness = None if rests else {"multipliers": [format_exact(x) for x in tau]}
+            yield "family-rate", f"{of}.modes[{mode}]", witness, {"b": format_exact(rate)}
+        yield "clock-shares", of, None, {}
+        return
+    if not isinstance(claim, RateClaim):
+        yield "last-mode" if isinstance(claim, LastModeClaim) else "joint-windows", of, None, {}
+        return
+    if claim.forms is not None:
+        for mode, (rate, tau) in enumerate(zip(claim.forms.rates, claim.forms.multipliers, strict=True)):
+            witness = {"multipliers": [format_exact(x) for x in tau]}
+            yield "family-rate", f"{of}.modes[{mode}]", witness, {"b": format_exact(rate)}
+    yield "restricted-rate", of, None, {}
+
+
+def _read_signal(said: Any) -> SignalClass:
+    if isinstance(said, str):
+        return said
+    if "shares" in said:
+        return ClockShares(tuple(map(exact, said["shares"])))
+    if "window" in said:
+        return JointWindows(exact(said["window"]), on=exact(said["on"]), clock="s")
+    return DwellTime(exact(said["dwell"]), clock=said["clock"])
+
+
+def read_claim(
+    of: str, entry: Mapping[str, Any], proof: Sequence[Mapping[str, Any]], components: Sequence[FamilyComponent]
+) -> Claim:
+    """Return a claim of a certificate that was accepted; about one of its components."""
+    size = components[entry["component"]].nodes.size
+    number, signal, forms = entry["component"], _read_signal(entry["signals"]), None
+    steps = [x for x in proof if x["kind"] == "family-rate" and x["of"].startswith(f"{of}.modes[")]
+    if entry["claim"] == "shares":
+        assert isinstance(signal, ClockShares), "the check has verified what a claim is about"
+        return ShareClaim(number, signal, _read_share_form(entry, steps, components[number]), exact(entry["rate"]))
+    if entry["claim"] != "rate":
+        ends = entry["final_state"] and tuple((m - r, m + r) for m, r in map(interval, entry["final_state"].values()))
+        if entry["claim"] == "last mode":
+            return LastModeClaim(number, signal, tuple(entry["modes"]), ends)
+        assert isinstance(signal, JointWindows), "the check has verified what a claim is about"
+        behaviour, eta = entry["behaviour"], exact(entry["eta"])
+        return WindowClaim(number, signal, behaviour, contraction(size, signal, behaviour, eta), ends)
+    if (triangles := entry["forms"]) is not None:
+        forms = ModeForms(
+            tuple(triangle(lower, len(lower)) for lower in triangles),
+            tuple(exact(step["numbers"]["b"]) for step in steps),
+            tuple(tuple(map(exact, step["witness"]["multipliers"])) for step in steps),
+            exact(entry["ratio"]),
+        )
+    return RateClaim(entry["component"], signal, forms, exact(entry["rate"]), bool(entry["bounded"]))
+
+
+def _read_share_form(
+    entry: Mapping[str, Any], steps: Sequence[Mapping[str, Any]], component: FamilyComponent
+) -> ShareForm:
+    index = {label: v for v, label in enumerate(component.family.labels)}
+    nodes = tuple(index[label] for label in entry["nodes"])
+    pivots = tuple(v for v in range(component.nodes.size) if v not in set(nodes))
+    matrix, witnesses = triangle(entry["form"], len(nodes)), [step["witness"] for step in steps]
+    ends = prove_ends(matrix)
+    assert ends is not None, "the check has proved it definite"
+    rates = tuple(exact(step["numbers"]["b"]) for step in steps)
+    taus = tuple(() if witness is None else tuple(map(exact, witness["multipliers"])) for witness in witnesses)
+    function = FamilyFunction("full", pivots, nodes, matrix, rates, taus, *ends)
+    behaviour = BIPARTITE_CONSENSUS if pivots else STABILITY
+    return ShareForm(function, behaviour, tuple(witness is None for witness in witnesses))

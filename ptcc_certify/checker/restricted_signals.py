@@ -1,0 +1,389 @@
+"""Verifies what is claimed of a family for restricted signals: dwell times, windows, nothing that ever changes.
+
+Section 19 of the format, "Restricted signals". In mode ``i`` the value ``xi' P_i xi`` decays at the rate ``b_i`` for
+all members, and at a switch ``P_j <= ratio P_i`` bounds what it becomes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from fractions import Fraction
+from typing import Any
+
+from lmi.exact.decimal_rounding import down
+from lmi.exact.definite import Arithmetic
+from lmi.exact.elementary_enclosures import exp, log
+from lmi.exact.numbers import integers
+from lmi.exact.work import spend
+from ptcc_certify.checker.family import CONSENSUS, CONTAINMENT, INTERVAL, STABILITY, Component, Edge, Family
+from ptcc_certify.checker.family_function import decreases, quotient_of
+from ptcc_certify.checker.family_rows import Function
+from ptcc_certify.checker.graph import ordered, positions
+from ptcc_certify.checker.matrix_products import Matrix, combined, need_rows
+from ptcc_certify.checker.proof_cursor import Document
+from ptcc_certify.checker.reading import Interval, entries, exact, fields, interval, need, triangle
+
+#: Claims that are read.
+MANY_CLAIMS = 100
+RATE = ("claim", "signals", "component", "forms", "ratio", "rate", "bounded")
+LAST_MODE = ("claim", "signals", "component", "modes", "final_state")
+WINDOWS = ("claim", "signals", "component", "behaviour", "eta", "final_state")
+SHARES = ("claim", "signals", "component", "nodes", "form", "rate", "behaviour")
+#: Products of short integers that an edge of a claim costs, about.
+EACH_EDGE = 100
+#: Longest ratio, in bits, of which the logarithm is enclosed.
+RATIO_BITS = 4000
+
+Form = tuple[Matrix, int]
+
+
+def check_restricted(
+    doc: Document,
+    family: Family,
+    functions: Sequence[Function],
+    gains: dict[str, Fraction],
+    x: Sequence[Fraction] | None,
+) -> None:
+    """Verify every claim for restricted signals."""
+    if "restricted" not in doc.data:
+        return
+    items = entries(doc.section("restricted"), "restricted")
+    need(0 < len(items) <= MANY_CLAIMS, f"no claim for restricted signals, or more than {MANY_CLAIMS}")
+    for k, entry in enumerate(items):
+        doc.at = of = f"restricted[{k}]"
+        kind = entry.get("claim") if isinstance(entry, dict) else None
+        if kind == "rate":
+            _check_rate(doc, family, functions, gains, entry, of)
+        elif kind == "last mode":
+            _check_last_mode(doc, family, x, entry, of)
+        elif kind == "windows":
+            _check_windows(doc, family, x, entry, of)
+        else:
+            need(kind == "shares", "an unknown claim")
+            _check_shares(doc, family, entry, of)
+
+
+def _component(family: Family, number: Any) -> Component:
+    need(type(number) is int and 0 <= number < len(family.components), "an unknown component")
+    return family.components[number]
+
+
+def _dwell(entry: Any) -> tuple[Fraction, str] | None:
+    """Return a dwell time and its clock; None: mode and weights never change."""
+    if entry == "constant":
+        return None
+    fields(entry, ("dwell", "clock"), "signals")
+    least, clock = exact(entry["dwell"]), entry["clock"]
+    need(least > 0 and clock in ("t", "s"), "a dwell time that is not positive, or of an unknown clock")
+    return least, clock
+
+
+def _check_rate(
+    doc: Document, family: Family, functions: Sequence[Function], gains: dict[str, Fraction], entry: Any, of: str
+) -> None:
+    fields(entry, RATE, "a claim")
+    component, dwell = _component(family, entry["component"]), _dwell(entry["signals"])
+    need(not component.depends and len(component.nodes) > 1, "a rate where nothing, or no common kernel, decays")
+    ratio, rate = exact(entry["ratio"]), exact(entry["rate"])
+    forms: list[Form] = []
+    if entry["forms"] is None:
+        own = [V.rate for V in functions if V.component is component]
+        need(bool(own), "no function of this component")
+        most = max(own)
+    else:
+        forms, rates = _forms(doc, family, component, entry["forms"], of)
+        most = min(rates)
+    doc.open("restricted-rate", of)
+    need(ratio >= 1 and (bool(forms and dwell) or ratio == 1), "the ratio is not 1, or less")
+    if dwell is not None:
+        _check_ratio(doc.exact, forms, ratio)
+        if dwell[1] == "s" and ratio > 1:
+            need(max(map(int.bit_length, ratio.as_integer_ratio())) <= RATIO_BITS, "a ratio that is too long")
+            most -= log(ratio)[1] / dwell[0]
+    need(rate <= most, "the rate is not proved")
+    enough = rate * gains["rho2"] * gains["kappa"] >= 2
+    need(entry["bounded"] is (True if enough else None), "whether the input is bounded")
+    doc.done(f"rate {down(rate)}" if rate > 0 else "nothing decays")
+
+
+def _forms(
+    doc: Document, family: Family, component: Component, section: Any, of: str
+) -> tuple[list[Form], list[Fraction]]:
+    """Verify the forms of all modes with their rates."""
+    pivots = set(component.pivots.values())
+    nodes = [v for v in component.nodes if v not in pivots]
+    need(bool(nodes), "a form of no agents")
+    need_rows(len(nodes))
+    forms, rates = [], []
+    for k, lower in enumerate(entries(section, "forms", len(family.modes))):
+        form = integers(triangle(lower, len(nodes)))
+        need(doc.exact.definite(form[0]), "P is not proved definite")
+        numbers = doc.open("family-rate", f"{of}.modes[{k}]", ["b"], witness=True)
+        mode = quotient_of(family, k, component, nodes)
+        decreases(doc.exact, mode, form, component.whole[1], numbers["b"], numbers["witness"])
+        doc.done(f"b = {down(numbers['b'])}")
+        forms.append(form)
+        rates.append(numbers["b"])
+    return forms, rates
+
+
+def _check_ratio(judge: Arithmetic, forms: Sequence[Form], ratio: Fraction) -> None:
+    """Verify ``P_j <= ratio P_i`` for all pairs of forms."""
+    p, q = ratio.as_integer_ratio()
+    distinct: list[Form] = []
+    for form in forms:
+        if form not in distinct:
+            distinct.append(form)
+    for i, (P, unit) in enumerate(distinct):
+        for j, (Q, scale) in enumerate(distinct):
+            if i != j:
+                S = combined("the ratio of forms", (p * scale, P), (-q * unit, Q))
+                need(judge.definite(S), "the ratio of two forms is not proved")
+
+
+# ---------------------------------------------------------------------- the last mode
+
+
+def reachable_bounds(
+    nodes: Sequence[int], edges: Iterable[tuple[int, int, int]], x: Sequence[Fraction]
+) -> dict[int, Interval]:
+    """Bound ``x_k(t)`` for every node and all times, under every signal.
+
+    ``+-x_l(0)`` reaches ``k`` with the sign of a path of edges of any modes; the largest that reaches it, also from
+    itself, is an upper bound of ``x_k``: in the graph with a node for each sign, no largest value of a set that hears
+    nobody else ever grows.
+
+    Examples
+    --------
+    >>> reachable_bounds([0, 1, 2], [(0, 1, -1), (1, 0, -1), (2, 2, 1)], [1, 2, 5])
+    {0: (-2, 1), 1: (-1, 2), 2: (5, 5)}
+    """
+    out: dict[int, list[tuple[int, int]]] = {v: [] for v in nodes}
+    for s, t, sign in edges:
+        out[s].append((t, sign))
+    best: dict[tuple[int, int], Fraction] = {}
+    for value, v, side in sorted(((side * x[v], v, side) for v in nodes for side in (1, -1)), reverse=True):
+        found = [(v, side)] if (v, side) not in best else []
+        best.update(dict.fromkeys(found, value))
+        for u, own in found:
+            for w, sign in out[u]:
+                if (w, own * sign) not in best:
+                    best[w, own * sign] = value
+                    found.append((w, own * sign))
+    return {v: (-best[v, -1], best[v, 1]) for v in nodes}
+
+
+def mode_behaviour(family: Family, number: int, component: Component) -> str | None:
+    """Return what a mode does to a component where it acts for ever, its weights changing; None if that is not told."""
+    structure, edges = family.modes[number].structure, component.part.edges[number]
+    closed = component.part.closed[number]
+    if not any(structure.gauges[k] is not None for k in closed):
+        return STABILITY
+    if len(closed) == 1 and _camps_fit(component.nodes, edges):
+        return CONSENSUS
+    if any(low < high for _, _, _, low, high in edges):
+        return None
+    return INTERVAL if len(closed) == 1 else CONTAINMENT
+
+
+def _camps_fit(nodes: Sequence[int], edges: Sequence[Edge]) -> bool:
+    near: dict[int, list[tuple[int, int]]] = {v: [] for v in nodes}
+    for s, t, sign, _, _ in edges:
+        near[s].append((t, sign))
+        near[t].append((s, sign))
+    camp: dict[int, int] = {}
+    for root in nodes:
+        found = [] if root in camp else [root]
+        camp.setdefault(root, 1)
+        for v in found:
+            for u, sign in near[v]:
+                if u not in camp:
+                    camp[u] = sign * camp[v]
+                    found.append(u)
+    return all(camp[t] == sign * camp[s] for s, t, sign, _, _ in edges)
+
+
+def _check_last_mode(doc: Document, family: Family, x: Sequence[Fraction] | None, entry: Any, of: str) -> None:
+    """Verify what each mode does to a component where it is the last one, and where the agents end."""
+    fields(entry, LAST_MODE, "a claim")
+    component, dwell = _component(family, entry["component"]), _dwell(entry["signals"])
+    need(component.depends, "every signal does the same")
+    need(dwell is None or dwell[1] == "t", "modes that may change for ever")
+    doc.open("last-mode", of)
+    spend(EACH_EDGE * sum(1 + len(edges) for edges in component.part.edges), what="restricted signals")
+    told = entries(entry["modes"], "modes", len(family.modes))
+    known = [mode_behaviour(family, k, component) for k in range(len(family.modes))]
+    need(told == known, "another behaviour of a mode")
+    section = entry["final_state"]
+    need((section is None) == (x is None), "final states are claimed iff there is an initial state")
+    if x is not None:
+        edges = {edge[:3] for some in component.part.edges for edge in some}
+        bounds = reachable_bounds(component.nodes, edges, x)
+        _check_intervals(family, component, section, bounds)
+    doc.done(", ".join(dict.fromkeys(str(b or "not told") for b in known)))
+
+
+# ---------------------------------------------------------------------- windows
+
+
+def closed_groups(nodes: Sequence[int], edges: Iterable[tuple[int, int, int]]) -> list[tuple[list[int], bool]]:
+    """Return the closed strong components of a graph, each with whether it is balanced; a pair may have both signs.
+
+    Nodes are finished by a first search; in the opposite order, a second search begins once in every component that
+    hears nobody else, and this is all that its beginning hears.
+
+    Examples
+    --------
+    >>> closed_groups([0, 1, 2], [(0, 1, 1), (1, 0, -1), (1, 2, 1)]), closed_groups([3, 5], [(5, 3, 1), (5, 3, -1)])
+    ([([0, 1], False)], [([5], True)])
+    """
+    out: dict[int, list[int]] = {v: [] for v in nodes}
+    into: dict[int, list[tuple[int, int]]] = {v: [] for v in nodes}
+    for s, t, sign in edges:
+        out[s].append(t)
+        into[t].append((s, sign))
+    groups, reached = [], set[int]()
+    for root in reversed(_finished(nodes, out)):
+        if root in reached:
+            continue
+        camp, found, balanced = {root: 1}, [root], True
+        for v in found:
+            for u, sign in into[v]:
+                if u not in camp:
+                    camp[u] = sign * camp[v]
+                    found.append(u)
+                balanced &= camp[u] == sign * camp[v]
+        groups.append((sorted(found), balanced))
+        ahead = [root]
+        reached.add(root)
+        for v in ahead:
+            for u in out[v]:
+                if u not in reached:
+                    reached.add(u)
+                    ahead.append(u)
+    return groups
+
+
+def _finished(nodes: Sequence[int], out: dict[int, list[int]]) -> list[int]:
+    """Return the nodes in the order in which a search in depth leaves them."""
+    order: list[int] = []
+    seen = set[int]()
+    for root in nodes:
+        stack = [] if root in seen else [(root, iter(out[root]))]
+        seen.add(root)
+        while stack:
+            v, rest = stack[-1]
+            following = next((u for u in rest if u not in seen), None)
+            if following is None:
+                order.append(v)
+                stack.pop()
+            else:
+                seen.add(following)
+                stack.append((following, iter(out[following])))
+    return order
+
+
+def contraction_below(largest: Fraction, least: Fraction, window: Fraction, on: Fraction) -> Fraction:
+    """Return ``e^(-D h) min(1, on w)``, or a little less: 0 where it is below ``e^-100,000``.
+
+    Examples
+    --------
+    >>> round(float(contraction_below(Fraction(1), Fraction(1), Fraction(1), Fraction(1, 2))), 6)
+    0.18394
+    """
+    return exp(-largest * window)[0] * min(Fraction(1), on * least)
+
+
+def _check_windows(doc: Document, family: Family, x: Sequence[Fraction] | None, entry: Any, of: str) -> None:
+    """Verify what joint windows do, and the contraction in as many as there are nodes."""
+    fields(entry, WINDOWS, "a claim")
+    component, signals = _component(family, entry["component"]), fields(entry["signals"], ("window", "on"), "signals")
+    window, on, eta = exact(signals["window"]), exact(signals["on"]), exact(entry["eta"])
+    need(0 < on <= window, "a window, or the part of it in which an edge is on")
+    need(component.depends, "every signal does the same")
+    doc.open("joint-windows", of)
+    spend(EACH_EDGE * sum(1 + len(edges) for edges in component.part.edges), what="restricted signals")
+    part, sums = component.part, [Fraction(0)]
+    weights = []
+    for edges, mode in zip(part.edges, family.modes, strict=True):
+        total = dict.fromkeys(component.nodes, 0)
+        for _, t, _, low, high in edges:
+            total[t] += high
+            weights += [Fraction(low, mode.unit)] * (low > 0)
+        sums.append(Fraction(max(total.values()), mode.unit))
+    on_edges = {edge[:3] for edges in part.edges for edge in edges if edge[3]}
+    groups = closed_groups(component.nodes, on_edges)
+    consensus = part.camps is not None and len(groups) == 1
+    need(consensus or not any(balanced for _, balanced in groups), "nothing follows from these windows")
+    need(entry["behaviour"] == (CONSENSUS if consensus else STABILITY), "another behaviour")
+    need(0 < eta <= contraction_below(max(sums), min(weights), window, on), "the contraction is not proved")
+    section = entry["final_state"]
+    need((section is None) == (x is None), "final states are claimed iff there is an initial state")
+    if x is not None:
+        every = {edge[:3] for edges in part.edges for edge in edges}
+        bounds = agreed_bounds(component.nodes, every, x, part.camps if consensus else None)
+        _check_intervals(family, component, section, bounds)
+    doc.done(entry["behaviour"])
+
+
+def agreed_bounds(
+    nodes: Sequence[int], edges: Iterable[tuple[int, int, int]], x: Sequence[Fraction], camps: Mapping[int, int] | None
+) -> dict[int, Interval]:
+    """Return ends of agents that end at 0 (no camps), or at one value up to camps, within all their bounds.
+
+    Examples
+    --------
+    >>> agreed_bounds([0, 1], [(0, 1, -1)], [3, 5], {0: 1, 1: -1})
+    {0: (3, 3), 1: (-3, -3)}
+    """
+    if camps is None:
+        return dict.fromkeys(nodes, (Fraction(0), Fraction(0)))
+    bounds = reachable_bounds(nodes, edges, x)
+    ends = [bounds[v] if camps[v] > 0 else (-bounds[v][1], -bounds[v][0]) for v in nodes]
+    low, high = max(low for low, _ in ends), min(high for _, high in ends)
+    return {v: (low, high) if camps[v] > 0 else (-high, -low) for v in nodes}
+
+
+def _check_intervals(family: Family, component: Component, section: Any, bounds: Mapping[int, Interval]) -> None:
+    labels = [family.labels[v] for v in component.nodes]
+    for v, end in zip(component.nodes, ordered(labels, section, "final_state").values(), strict=True):
+        middle, radius = interval(end)
+        low, high = bounds[v]
+        need(middle - radius <= low and high <= middle + radius, "a final state is not enclosed")
+
+
+# ---------------------------------------------------------------------- shares of the clock
+
+
+def _check_shares(doc: Document, family: Family, entry: Any, of: str) -> None:
+    """Verify one form for all modes, of which each has a rate of its own, and the mean of these rates."""
+    fields(entry, SHARES, "a claim")
+    part = _component(family, entry["component"]).part
+    shares = [exact(x) for x in entries(fields(entry["signals"], ("shares",), "signals")["shares"], "shares")]
+    need(len(shares) == len(family.modes) and min(shares) >= 0 and sum(shares) == 1, "shares of the modes")
+    nodes = positions(doc, family.modes[0].structure.graph, entry["nodes"], "nodes of a form")
+    pivots = [v for v in part.nodes if v not in set(nodes)]
+    need(bool(nodes) and set(nodes) <= set(part.nodes) and nodes == sorted(set(nodes)), "nodes of a form")
+    if pivots:
+        need(len(pivots) == 1 and part.camps is not None, "states at rest that no camps tell")
+        camps = part.camps or {}
+        kernel = {v: {1: Fraction(camps[v] * camps[pivots[0]])} for v in part.nodes}
+        drawn = Component(part, CONSENSUS, kernel, {1: pivots[0]})
+    else:
+        drawn = Component(part, STABILITY, {v: {} for v in part.nodes}, {})
+    need_rows(len(nodes))
+    form = integers(triangle(entry["form"], len(nodes)))
+    need(doc.exact.definite(form[0]), "P is not proved definite")
+    mean = Fraction(0)
+    for k, share in enumerate(shares):
+        numbers = doc.open("family-rate", f"{of}.modes[{k}]", ["b"], witness=True)
+        decreases(
+            doc.exact, quotient_of(family, k, drawn, nodes), form, drawn.whole[1], numbers["b"], numbers["witness"]
+        )
+        mean += share * numbers["b"]
+        doc.done(f"b = {down(numbers['b'])}" if numbers["b"] > 0 else "nothing decays")
+    doc.open("clock-shares", of)
+    rate = exact(entry["rate"])
+    need(rate <= mean, "the rate is not proved")
+    need(entry["behaviour"] == (drawn.behaviour if rate > 0 else None), "another behaviour")
+    doc.done(f"rate {down(rate)}" if rate > 0 else "nothing decays")

@@ -1,0 +1,199 @@
+"""One quadratic form for each mode of a family, for signals that switch seldom or never: the search, and the proof.
+
+In mode ``i`` the value ``xi' P_i xi`` decays at the rate ``r_i`` whatever the weights do in their intervals, and
+``P_j <= ratio P_i`` bounds what a switch adds.
+
+References
+----------
+docs/theory/families.md, "Dwell times".
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from lmi.common import CommonCertificate, UncertainMatrix, best_multipliers, common_lyapunov, evaluate
+from lmi.definiteness_proofs import prove_generalized_margin
+from lmi.dyadic import round_to_bits
+from lmi.errors import LMIError
+from lmi.exact.elementary_enclosures import rounded
+from lmi.search_time import checkpoint
+from lmi.switched import SwitchedCertificate, switched_lyapunov
+from ptcc_certify.lyapunov.error_system import rounded_matrix
+from ptcc_certify.lyapunov.family_function import FamilyFunction, prove_ends, prove_mode
+from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.theorems.matrix_arithmetic import Matrix
+
+#: Rows up to which forms are searched, of one mode and of all together, and modes.
+ROWS, ALL_ROWS, MODES = 24, 96, 12
+_MATRIX_BITS, _MULTIPLIER_BITS, _RATIO_BITS = 60, 40, 53
+
+
+@dataclass(frozen=True, eq=False)
+class ModeForms:
+    """Forms ``xi' P_i xi``, one of each mode, in the coordinates of the quotient; proved.
+
+    Attributes
+    ----------
+    matrices : tuple of n rows of n Fraction
+        ``P_i``, positive definite.
+    rates : tuple of Fraction
+        Of each mode with its own matrix, per unit of the stretched clock.
+    multipliers : tuple of tuples of Fraction
+        As those of :class:`~ptcc_certify.lyapunov.family_function.FamilyFunction`.
+    ratio : Fraction
+        ``P_j <= ratio P_i`` for all modes; at least 1.
+    """
+
+    matrices: tuple[Matrix, ...]
+    rates: tuple[Fraction, ...]
+    multipliers: tuple[tuple[Fraction, ...], ...]
+    ratio: Fraction = Fraction(1)
+
+    @property
+    def rate(self) -> Fraction:
+        """The least of the rates."""
+        return min(self.rates)
+
+
+def within_reach(quotient: Quotient) -> bool:
+    """Tell whether forms of each mode are searched in a family of this size."""
+    rows, modes = len(quotient.nodes), len(quotient.modes)
+    return 0 < rows <= ROWS and modes <= MODES and rows * modes <= ALL_ROWS
+
+
+def search_mode_forms(quotient: Quotient, price: float, known: Sequence[FamilyFunction] = ()) -> ModeForms | None:
+    """Search and prove forms with a large least rate minus ``price ln(ratio)``; None if nothing was proved.
+
+    Parameters
+    ----------
+    quotient : Quotient
+    price : float
+        Switches per unit of the stretched clock.
+    known : sequence of FamilyFunction
+        What was proved for every signal: where the search begins.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graphs.family import Family
+    >>> from ptcc_certify.theorems.family_behaviour import decide
+    >>> day = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -4)])
+    >>> night = SignedDigraph.from_edges([("b", "a", 1), ("a", "c", -1)])
+    >>> quotient = Quotient.of(decide(Family.switching([day, night]))[0])
+    >>> seldom, often = (search_mode_forms(quotient, price) for price in (0.01, 100))
+    >>> seldom.rate > often.rate, seldom.ratio > often.ratio
+    (True, True)
+    """
+    modes = [mode.array for mode in quotient.modes]
+    try:
+        with np.errstate(all="ignore"):
+            return prove_mode_forms(quotient, switched_lyapunov(modes, price, start=_start(modes, known)))
+    except (LMIError, np.linalg.LinAlgError) as error:
+        if type(error).__name__ == "OutOfTime":
+            raise
+        return None
+
+
+def search_single_forms(quotient: Quotient) -> ModeForms | None:
+    """Search and prove the form of the largest rate of each mode by itself; the ratio is not proved, and 1.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graphs.family import Family
+    >>> day, night = SignedDigraph.from_edges([("a", "b", 3)]), SignedDigraph.from_edges([("b", "a", 1)])
+    >>> [round(float(r), 3) for r in search_single_forms(Quotient(Family.switching([day, night]))).rates]
+    [6.0, 2.0]
+    """
+    found = []
+    for mode in quotient.modes:
+        try:
+            with np.errstate(all="ignore"):
+                found.append(best_multipliers(common_lyapunov([mode.array]), [mode.array]))
+        except (LMIError, np.linalg.LinAlgError) as error:
+            if type(error).__name__ == "OutOfTime":
+                raise
+            return None
+    certificate = SwitchedCertificate(
+        tuple(c.matrix for c in found), tuple(c.rate for c in found), tuple(c.multipliers[0] for c in found), 1.0
+    )
+    return prove_mode_forms(quotient, certificate, ratios=False)
+
+
+def _start(modes: Sequence[UncertainMatrix], known: Sequence[FamilyFunction]) -> CommonCertificate | None:
+    """Return the best of the functions that were proved, as the search takes it; None if none has all multipliers."""
+    sizes = [mode.radii.size for mode in modes]
+    full = [V for V in known if not any(sizes) or [len(tau) for tau in V.multipliers] == sizes]
+    if not full:
+        return None
+    V = max(full, key=lambda V: V.rate)
+    P = np.array([[float(x) for x in row] for row in V.matrix])
+    top = float(np.linalg.eigvalsh(P)[-1])
+    taus = [np.array([float(x) for x in tau]) / top for tau in V.multipliers or [()] * len(modes)]
+    with contextlib.suppress(np.linalg.LinAlgError):
+        return evaluate(P / top, modes, taus)
+    return None
+
+
+def prove_mode_forms(quotient: Quotient, found: SwitchedCertificate, ratios: bool = True) -> ModeForms | None:
+    """Round matrices and multipliers, and prove rates and, unless ``ratios`` is False, the ratio; None if a step fails.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graphs.family import Family
+    >>> quotient = Quotient(Family.from_intervals([("a", "b", 1, 1)]))
+    >>> one = SwitchedCertificate((np.eye(1),), (2.0,), (np.zeros(0),), 1.0)
+    >>> round(float(prove_mode_forms(quotient, one).rate), 6)
+    2.0
+    """
+    exponents = [math.ceil(math.log2(float(np.abs(P).max()))) for P in found.matrices]
+    matrices, rates, multipliers = [], [], []
+    cases = zip(quotient.modes, found.matrices, found.multipliers, found.rates, exponents, strict=True)
+    for mode, P, tau, guess, exponent in cases:
+        checkpoint()
+        factor = Fraction(2) ** (exponent - min(exponents))
+        matrix = [[factor * x for x in row] for row in rounded_matrix(P, _MATRIX_BITS)]
+        unit = 2.0 ** (_MATRIX_BITS - min(exponents))
+        own = tuple(round_to_bits(float(t * unit), _MULTIPLIER_BITS) for t in tau)
+        rate = prove_mode(mode, matrix, own, guess) if prove_ends(matrix) is not None else None
+        if rate is None:
+            return None
+        matrices.append(matrix)
+        rates.append(rate)
+        multipliers.append(own)
+    ratio = prove_ratio(matrices) if ratios else Fraction(1)
+    return None if ratio is None else ModeForms(tuple(matrices), tuple(rates), tuple(multipliers), ratio)
+
+
+def prove_ratio(matrices: Sequence[Matrix]) -> Fraction | None:
+    """Prove ``P_j <= ratio P_i`` for all pairs of different matrices; None if it fails.
+
+    Examples
+    --------
+    >>> one, other = [[Fraction(1)]], [[Fraction(3)]]
+    >>> prove_ratio([one, one]), 3 <= prove_ratio([one, other, one]) < 3.001
+    (Fraction(1, 1), True)
+    """
+    distinct: list[Matrix] = []
+    for P in matrices:
+        if P not in distinct:
+            distinct.append(P)
+    floats = [np.array([[float(x) for x in row] for row in P]) for P in distinct]
+    inverses = [np.linalg.inv(np.linalg.cholesky(P)) for P in floats]
+    largest = Fraction(1)
+    for P, inverse in zip(distinct, inverses, strict=True):
+        for Q, values in zip(distinct, floats, strict=True):
+            if P is Q:
+                continue
+            guess = float(np.linalg.eigvalsh(inverse @ values @ inverse.T)[-1])
+            checkpoint()
+            minus = prove_generalized_margin([[-x for x in row] for row in Q], P, -guess)
+            if minus is None:
+                return None
+            largest = max(largest, -minus)
+    return rounded(largest, _RATIO_BITS, up=True)

@@ -1,0 +1,117 @@
+"""What the screen of a family's certificate tells of restricted signals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from lmi.exact.decimal_rounding import down, near, up
+from ptcc_certify.certificate.restricted_claims import LastModeClaim, RateClaim, ShareClaim, WindowClaim
+from ptcc_certify.checker.reading import Interval
+from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS
+from ptcc_certify.report.text_layout import printable, shorten_label
+from ptcc_certify.theorems.counterexample_text import mode_name
+from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows, SignalClass
+
+if TYPE_CHECKING:
+    from ptcc_certify.certificate.family_content import FamilyContent
+
+CLOCK = {"t": "time", "s": "clock"}
+
+
+def restricted_entries(certificate: FamilyContent) -> Iterator[tuple[str, str]]:
+    """Yield what is proved for restricted signals, component after component.
+
+    Examples
+    --------
+    >>> unsure = Family.from_intervals([("a", "b", 1, 2), ("b", "a", -2, -1)])
+    >>> cert = certify(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), signal="constant")
+    >>> print(*next(restricted_entries(cert)), sep=": ")
+    constant: if mode and weights never change: rate 1.58578, input bounded
+    """
+    if certificate.signal == "any":
+        return
+    head = signal_text(certificate.signal)
+    several = len(certificate.parts) > 1
+    if not certificate.restricted:
+        yield *head[:1], f"{head[1]}: nothing more is proved"  # type: ignore[misc]
+    for claim in certificate.restricted:
+        if isinstance(claim, LastModeClaim):
+            yield head[0], f"{head[1]}: {_last_mode_text(certificate, claim)}"
+            continue
+        if isinstance(claim, ShareClaim):
+            yield head[0], f"{head[1]}: {_share_text(certificate, claim)}"
+            continue
+        if isinstance(claim, WindowClaim):
+            yield head[0], f"{head[1]}: {_window_text(certificate, claim)}"
+            continue
+        name = shorten_label(certificate.parts[claim.component].component.family.labels[0])
+        where = f"component of {printable(name)}: " if several else ""
+        yield head[0], f"{where}{head[1]}: {_rate_text(certificate, claim)}"
+
+
+def signal_text(signal: SignalClass) -> tuple[str, str]:
+    """Name restricted signals: the word at the beginning of a line, and the condition.
+
+    Examples
+    --------
+    >>> signal_text(DwellTime("0.5", clock="t"))
+    ('dwell', 'at least 0.5 of time between switches')
+    """
+    if isinstance(signal, DwellTime):
+        return "dwell", f"at least {near(signal.least, 6)} of {CLOCK[signal.clock]} between switches"
+    if isinstance(signal, ClockShares):
+        return "shares", f"modes at {', '.join(near(share, 4) for share in signal.shares)} of the clock"
+    if isinstance(signal, JointWindows):
+        return "windows", f"each edge on for {near(signal.on, 6)} of every {near(signal.length, 6)} of the clock"
+    return "constant", "if mode and weights never change"
+
+
+def _last_mode_text(certificate: FamilyContent, claim: LastModeClaim) -> str:
+    """Tell what the last mode does, of each mode where they differ."""
+    begin = "the last mode decides" if len(claim.behaviours) > 1 and claim.signal != "constant" else ""
+    untold = "rest where the weights say" if claim.signal == "constant" else "no limit while weights move"
+    told = [behaviour or untold for behaviour in claim.behaviours]
+    if len(set(told)) == 1:
+        camps = ", camps of that mode" if begin and told[0] == BIPARTITE_CONSENSUS else ""
+        return f"{begin}: {told[0]}{camps}".removeprefix(": ")
+    names = (printable(mode_name(certificate.family, k)) for k in range(len(told)))
+    each = "; ".join(f"{name} {behaviour}" for name, behaviour in zip(names, told, strict=True))
+    return f"{begin}: {each}".removeprefix(": ")
+
+
+def _window_text(certificate: FamilyContent, claim: WindowClaim) -> str:
+    rate = claim.rate
+    left = math.floor(math.log10(rate.multiple) + rate.exponent * math.log10(rate.eta))
+    return f"{claim.behaviour}; what is left shrinks by 1e{left} of it in {near(rate.window, 6)} of the clock"
+
+
+def _share_text(certificate: FamilyContent, claim: ShareClaim) -> str:
+    if claim.behaviour is None:
+        return "no rate is proved"
+    names = (printable(mode_name(certificate.family, k)) for k in range(len(certificate.family.modes)))
+    own = map(down, claim.form.function.rates)
+    each = ", ".join(f"{name} {rate}" for name, rate in zip(names, own, strict=True))
+    return f"{claim.behaviour}, rate {down(claim.rate)}; of each: {each}"
+
+
+def last_states(certificate: FamilyContent) -> list[Interval | None]:
+    """Return the ends between which agents stay whose last mode decides; None of the others."""
+    result: list[Interval | None] = [None] * certificate.family.n_nodes
+    for number, claim in certificate.ends_of_signal.items():
+        nodes = certificate.parts[number].component.nodes.tolist()
+        for v, ends in zip(nodes, claim.final_states or (), strict=False):
+            result[v] = ends
+    return result
+
+
+def _rate_text(certificate: FamilyContent, claim: RateClaim) -> str:
+    text = f"rate {down(claim.rate)}" if claim.rate > 0 else "no rate is proved"
+    if claim.ratio > 1 and isinstance(claim.signal, DwellTime):
+        text += f", V up to {up(claim.ratio, 3)} times"
+        if claim.signal.clock == "t":
+            text += f" at each of {claim.signal.switches(certificate.protocol.T)} switches at most"
+        else:
+            text += " V(0)"
+    return text + ", input bounded" * claim.bounded

@@ -1,0 +1,393 @@
+"""Claims for restricted signals: proved, and kept by random signals that are admissible."""
+
+from __future__ import annotations
+
+import copy
+import random
+from fractions import Fraction
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from common_kernel_families import random_family
+from families import random_family as any_family
+from scipy.linalg import expm
+
+from ptcc_certify import Family, NominalProtocol, SignedDigraph, certify
+from ptcc_certify.certificate.certificate import read_certificate
+from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
+from ptcc_certify.certificate.request import Expectations
+from ptcc_certify.certificate.restricted_claims import LastModeClaim, RateClaim
+from ptcc_certify.checker import check, digest
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows
+
+PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
+IN_TIME, ON_CLOCK = DwellTime("0.2", clock="t"), DwellTime(3, clock="s")
+
+
+@cache
+def slowed_by_switches() -> Family:
+    """Two stable modes, each much faster by itself than under the worst switching."""
+    one = SignedDigraph.from_edges([("b", "a", -10), ("c", "a", 10), ("a", "b", 1), ("b", "c", -3)], nodes="abc")
+    other = SignedDigraph.from_edges([("b", "a", 1), ("c", "a", -3), ("c", "b", -10), ("a", "c", 1)])
+    return Family.switching({"one": one, "other": other})
+
+
+def families() -> list[Family]:
+    draw = np.random.default_rng(11)
+    made = [random_family(draw, kind, 4, 2) for kind in ("stability", "consensus", "containment")]
+    return [slowed_by_switches(), *made, random_family(draw, "consensus", 3, 2, Fraction(1, 5), 0.3)]
+
+
+@cache
+def certificates() -> list[FamilyCertificate]:
+    signals = (IN_TIME, ON_CLOCK, "constant")
+    return [certify_family(family, PROTOCOL, signal=signal) for family in families() for signal in signals]
+
+
+def switches(rng: np.random.Generator, signal: Any) -> list[float]:
+    """Instants of switches on the clock: the least gaps, or somewhat longer ones."""
+    if signal == "constant":
+        return []
+    gaps = float(signal.least) * (1 + rng.exponential(0.3, 6) * (rng.random(6) < 0.5))
+    instants = np.cumsum([rng.random() * float(signal.least), *gaps])
+    return (PROTOCOL.gain.clock(instants[instants < 1]) if signal.clock == "t" else instants).tolist()
+
+
+def excess(certificate: FamilyCertificate, claim: RateClaim, rng: np.random.Generator) -> float:
+    """The largest logarithm of ``V`` over its bound along a random signal."""
+    part, m = certificate.parts[claim.component], len(certificate.family.modes)
+    quotient = Quotient.of(part.component)
+    V = max(part.functions, key=lambda V: V.rate)
+    matrices = (V.matrix,) * m if claim.forms is None else claim.forms.matrices
+    forms = [np.array(P, dtype=float) for P in matrices]
+    ends = [0.0, *switches(rng, claim.signal)]
+    ends.append(ends[-1] + 3.0)
+    modes = [int(rng.integers(m))]
+    while len(modes) < len(ends) - 1:
+        modes.append(int(rng.choice([k for k in range(m) if k != modes[-1]] or [0])))
+    xi, worst = rng.normal(size=len(quotient.nodes)), -np.inf
+    first, held = np.log(xi @ forms[modes[0]] @ xi), {}
+    for count, ((begin, end), mode) in enumerate(zip(pairwise(ends), modes, strict=True)):
+        own, s = quotient.modes[mode], begin
+        for step in np.diff(np.linspace(begin, end, 6)):
+            level = [Fraction(int(x)) for x in rng.integers(0, 2, len(own.parts))]
+            if claim.signal == "constant":
+                level = held.setdefault("level", level)
+            xi = expm(-np.array(own.member(level), dtype=float) * step) @ xi
+            s += step
+            ratio = np.log(float(claim.ratio))
+            allowed = {"constant": 0.0, "t": count * ratio, "s": ratio}[getattr(claim.signal, "clock", "constant")]
+            worst = max(worst, np.log(xi @ forms[mode] @ xi) - first + float(claim.rate) * s - allowed)
+    return worst
+
+
+def excesses(runs: int, seed: int) -> list[float]:
+    rng = np.random.default_rng(seed)
+    cases = [(certificate, claim) for certificate in certificates() for claim in certificate.restricted]
+    return [excess(*case, rng) for case in cases for _ in range(runs)]
+
+
+def test_every_claim_is_verified():
+    for certificate in certificates():
+        assert certificate.verdict == "certified" and certificate.restricted
+        assert check(certificate.to_dict(), stdlib=True).accepted
+
+
+def test_no_admissible_signal_exceeds_the_bound():
+    found = excesses(10, 0)
+    assert -1e-3 < max(found) <= 1e-9  # attained at the beginning
+
+
+@pytest.mark.campaign
+def test_no_admissible_signal_of_thousands_exceeds_the_bound():
+    assert max(excesses(400, 1)) <= 1e-9
+
+
+def test_more_is_proved_for_seldom_switches_than_for_any():
+    """Each mode has the rate 4.4 by itself; switched fast, in equal shares, they decay with 0.65."""
+    family = slowed_by_switches()
+    rates = [
+        certify_family(family, PROTOCOL, signal=signal).rate_of_signal
+        for signal in ("any", DwellTime("0.1", clock="s"), DwellTime(10, clock="s"), IN_TIME, "constant")
+    ]
+    assert rates[0] <= rates[1] < rates[2] < rates[4] and rates[3] > rates[0]
+
+
+def test_a_rate_for_restricted_signals_is_never_below_that_for_any():
+    for certificate in certificates():
+        assert certificate.rate is None or certificate.rate_of_signal >= certificate.rate
+
+
+def test_the_claims_are_read_back(tmp_path: Path):
+    for certificate in certificates()[:6]:
+        certificate.save(tmp_path / "c.json")
+        again = read_certificate(tmp_path / "c.json")
+        assert again.signal == certificate.signal
+        for one, other in zip(again.restricted, certificate.restricted, strict=True):
+            assert (one.rate, one.ratio, one.bounded) == (other.rate, other.ratio, other.bounded)
+
+
+def test_dwell_times_at_their_limits():
+    family = slowed_by_switches()
+    long, short = (certify_family(family, PROTOCOL, signal=DwellTime(x, clock="t")) for x in (5, "1e-6"))
+    assert DwellTime(5, clock="t").switches(PROTOCOL.T) == 1 and long.rate_of_signal > short.rate_of_signal
+    assert short.restricted[0].ratio == 1 and short.rate_of_signal == short.rate
+    one = Family.from_intervals([("a", "b", 1, 2), ("b", "a", -1, -1)])
+    (claim,) = certify_family(one, PROTOCOL, signal=ON_CLOCK).restricted
+    assert claim.ratio == 1
+    alone = certify_family(Family.from_intervals([], nodes=["a"]), PROTOCOL, signal=ON_CLOCK)
+    assert alone.restricted == () and alone.verdict == "certified"
+
+
+def test_a_dwell_in_time_has_so_many_switches_before_the_deadline():
+    """Gaps of just the dwell, the first switch soon after 0: as many as fit."""
+    for least, count in (("1", 1), ("2", 1), ("0.5", 2), ("0.4", 3), ("0.3", 4)):
+        dwell = DwellTime(least, clock="t")
+        first = 1e-9
+        fits = sum(first + k * float(dwell.least) < 1 for k in range(10))
+        assert dwell.switches(Fraction(1)) == count == fits
+
+
+@pytest.mark.parametrize("wrong", [("0", "t"), ("-1", "s"), ("1", "x"), ("1", None), ("nan", "t")])
+def test_a_dwell_time_that_is_none_is_refused(wrong: tuple[str, Any]):
+    with pytest.raises(ParameterError):
+        DwellTime(wrong[0], clock=wrong[1])
+
+
+def test_signals_that_are_none_are_refused():
+    with pytest.raises(ParameterError, match="DwellTime"):
+        certify(slowed_by_switches(), PROTOCOL, signal="seldom")
+    with pytest.raises(ParameterError, match="families"):
+        certify(SignedDigraph.from_edges([("a", "b", 1)]), PROTOCOL, signal=ON_CLOCK)
+
+
+def test_a_rate_that_is_asked_for_is_judged_for_these_signals():
+    family = slowed_by_switches()
+    asked = Expectations(min_rate="4")
+    never = certify_family(family, PROTOCOL, signal="constant", expectations=asked)
+    assert never.assessment.asked == "met"
+    assert certify_family(family, PROTOCOL, expectations=asked).assessment.asked != "met"
+
+
+def resealed(data: dict[str, Any]) -> dict[str, Any]:
+    return {**data, "digest": digest(data)}
+
+
+def test_no_claim_is_larger_than_its_proof():
+    kept = next(c for c in certificates() if c.signal == ON_CLOCK and c.restricted[0].ratio > 1)
+    data = kept.to_dict()
+    (entry,) = data["restricted"]
+    rate, ratio = Fraction(entry["rate"]), Fraction(entry["ratio"])
+    for key, new in (
+        ("rate", str(rate + Fraction(1, 10**6))),
+        ("ratio", str(ratio - Fraction(1, 100))),
+        ("ratio", "1"),
+        ("bounded", None if entry["bounded"] else True),
+        ("forms", None),
+        ("forms", entry["forms"][:1]),
+        ("signals", "constant"),
+        ("signals", {"dwell": str(ON_CLOCK.least / 2), "clock": "s"}),
+        ("signals", {"dwell": "0", "clock": "t"}),
+        ("component", 1),
+        ("claim", "more"),
+    ):
+        made = copy.deepcopy(data)
+        made["restricted"][0][key] = new
+        assert not check(resealed(made)).accepted, (key, new)
+    longer = copy.deepcopy(data)
+    longer["restricted"][0]["signals"]["dwell"] = str(2 * ON_CLOCK.least)
+    assert check(resealed(longer)).accepted
+
+
+# ---------------------------------------------------------------------- the last mode
+
+
+def last(family: Family, signal: Any = IN_TIME, **more: Any) -> FamilyCertificate:
+    return certify_family(family, PROTOCOL, range(1, family.n_nodes + 1), signal=signal, **more)
+
+
+def against() -> Family:
+    """Two modes with different camps."""
+    one = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 1)])
+    return Family.switching({"one": one, "other": SignedDigraph.from_edges([("a", "b", -1), ("b", "c", 2)])})
+
+
+def test_where_kernels_differ_the_last_mode_decides():
+    made = last(against())
+    (claim,) = made.restricted
+    assert made.verdict == "certified" and made.behaviours == ("depends on the signal",)
+    assert isinstance(claim, LastModeClaim) and set(claim.behaviours) == {"bipartite consensus"}
+    assert claim.final_states == ((1, 1), (-1, 2), (-1, 3)) and last(against(), ON_CLOCK).restricted == ()
+
+
+def test_an_expectation_is_judged_by_the_last_mode():
+    for expected, met in (("bipartite consensus", True), ("bipartite containment", True), ("stability", False)):
+        answers = [last(against(), signal, expectations=expected).assessment.asked for signal in (IN_TIME, "any")]
+        assert answers == (["met", "refuted"] if met else ["refuted", "refuted"])
+    outage = Family.switching([against().modes[0].mandatory, SignedDigraph.from_edges([], nodes="abc")])
+    assert last(outage).restricted[0].behaviours == ("bipartite consensus", "bipartite containment")
+    assert last(outage, expectations="bipartite consensus").assessment.asked == "refuted"
+    assert last(outage, expectations="bipartite containment").assessment.asked == "met"
+
+
+def test_a_mode_whose_uncertain_weights_move_targets_is_not_told():
+    unsure = Family.from_intervals([("a", "c", 1, 2), ("b", "c", 1, 1)])
+    made = last(unsure, expectations="bipartite containment")
+    assert made.restricted[0].behaviours == (None,) and made.assessment.asked not in ("met", "refuted")
+    assert made.restricted[0].final_states == ((1, 1), (1, 3), (3, 3))
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_no_signal_leaves_the_ends_of_the_last_mode(seed: int):
+    draw, rng = random.Random(seed), np.random.default_rng(seed)
+    family = any_family(draw, "depends", nodes=draw.randint(3, 6)).family
+    made = last(family)
+    (claim,) = made.restricted
+    assert made.verdict == "certified" and check(made.to_dict(), stdlib=True).accepted
+    low, high = np.array(claim.final_states, dtype=float).T
+    for _ in range(20):
+        x = np.arange(1.0, family.n_nodes + 1)
+        for _ in range(6):
+            mode = family.modes[int(rng.integers(len(family.modes)))]
+            L = np.array(mode.member(rng.random(mode.n_edges) < 0.5).dense_laplacian(), dtype=float)
+            x = expm(-L * rng.exponential(1.0)) @ x
+            assert (x >= low - 1e-9).all() and (x <= high + 1e-9).all()
+
+
+# ---------------------------------------------------------------------- windows
+
+WINDOWS = JointWindows(2, on="0.4", clock="s")
+
+
+def cut_up(rng: np.random.Generator, n: int, stable: bool) -> Family:
+    """Modes that share out the edges of a connected graph, most of them alone in theirs."""
+    edges = [(f"n{k}", f"n{k + 1}", int(rng.choice([1, -1]))) for k in range(n - 1)]
+    sign = int(np.prod([w for *_, w in edges])) * (-1 if stable else 1)
+    edges.append((f"n{n - 1}", "n0", sign))
+    labels = [f"n{k}" for k in range(n)]
+    graphs = [SignedDigraph.from_edges([edge], nodes=labels) for edge in edges]
+    return Family.switching(graphs)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_joint_windows_contract_as_much_as_is_claimed(seed: int):
+    rng = np.random.default_rng(seed)
+    n, stable = int(rng.integers(2, 5)), bool(seed % 2)
+    family = cut_up(rng, n, stable)
+    signal = JointWindows(n, on=Fraction(1, 2), clock="s")
+    made = certify_family(family, PROTOCOL, range(1, n + 1), signal=signal)
+    (claim,) = made.restricted
+    assert claim.behaviour == ("stability" if stable else "bipartite consensus")
+    assert made.verdict == "certified" and check(made.to_dict(), stdlib=True).accepted
+    camps = made.parts[0].component.gauge
+    laplacians = [mode.mandatory.dense_laplacian() for mode in family.modes]
+    x = np.arange(1.0, n + 1)
+    size = (lambda x: abs(x).max()) if stable else (lambda x: np.ptp(camps * x))
+    for _ in range(4):
+        before = size(x)
+        for _ in range(claim.rate.exponent):
+            spare = rng.dirichlet(np.ones(n)) * (n - n / 2)
+            for k in rng.permutation(n):
+                x = expm(-laplacians[k] * (0.5 + spare[k])) @ x
+        assert size(x) <= before * float(claim.rate.contraction) + 1e-15
+    low, high = np.array(claim.final_states, dtype=float).T
+    if not stable:
+        assert (x >= low - size(x) - 1e-9).all() and (x <= high + size(x) + 1e-9).all()
+
+
+def test_windows_without_a_joint_graph_prove_nothing():
+    apart = Family.switching([SignedDigraph.from_edges([("a", "c", 1)], nodes="abc")] * 2)
+    assert last(apart, WINDOWS).restricted == ()
+    spoiled = Family.from_intervals([("a", "b", 1, 1), ("b", "a", -1, 0), ("b", "c", 0, 1)])
+    assert last(spoiled, WINDOWS).restricted == ()
+    assert last(slowed_by_switches(), WINDOWS).restricted == ()  # every signal brings it to 0 already
+
+
+def test_windows_of_time_and_windows_that_are_none_are_refused():
+    with pytest.raises(ParameterError, match="prove nothing at T"):
+        JointWindows(1, on=1, clock="t")
+    for length, on, clock in ((0, 1, "s"), (1, 2, "s"), (1, 0, "s"), (1, 1, None)):
+        with pytest.raises(ParameterError):
+            JointWindows(length, on=on, clock=clock)
+
+
+def test_windows_are_read_back_and_judged(tmp_path: Path):
+    made = certify_family(cut_up(np.random.default_rng(0), 3, False), PROTOCOL, [1, 2, 3], signal=WINDOWS)
+    made.save(tmp_path / "c.json")
+    again = read_certificate(tmp_path / "c.json")
+    assert again.restricted[0].rate == made.restricted[0].rate and again.signal == WINDOWS
+    data = made.to_dict()
+    eta = Fraction(data["restricted"][0]["eta"])
+    for key, new in (("eta", str(eta * 2)), ("eta", "0"), ("behaviour", "stability"), ("component", 1)):
+        forged = copy.deepcopy(data)
+        forged["restricted"][0][key] = new
+        assert not check(resealed(forged)).accepted, key
+    forged = copy.deepcopy(data)
+    forged["restricted"][0]["signals"]["window"] = "3"
+    assert not check(resealed(forged)).accepted
+
+
+# ---------------------------------------------------------------------- shares of the clock
+
+
+def with_outage(kind: str) -> Family:
+    modes = [random_family(np.random.default_rng(k), kind, 4).modes[0].mandatory for k in (2, 2)]
+    outage = SignedDigraph.from_edges([], nodes=range(4))
+    return Family.switching({"one": modes[0], "outage": outage, "other": modes[1]})
+
+
+@pytest.mark.parametrize("kind", ["stability", "consensus"])
+def test_shares_of_the_clock_weigh_the_rates_of_modes(kind: str):
+    family, shares = with_outage(kind), [Fraction(5, 10), Fraction(3, 10), Fraction(2, 10)]
+    made = certify_family(family, PROTOCOL, signal=ClockShares(shares))
+    (claim,) = made.restricted
+    assert made.verdict == "certified" and check(made.to_dict(), stdlib=True).accepted
+    assert claim.behaviour == {"stability": "stability", "consensus": "bipartite consensus"}[kind]
+    V = claim.form.function
+    assert V.rates[1] == 0 < claim.rate == sum(s * r for s, r in zip(shares, V.rates, strict=True))
+    P, quotient, rng = np.array(V.matrix, dtype=float), Quotient(family), np.random.default_rng(0)
+    for _ in range(30):
+        xi, spent = rng.normal(size=len(P)), np.zeros(3)
+        first = xi @ P @ xi
+        for _ in range(8):
+            mode, step = int(rng.integers(3)), rng.exponential(0.3)
+            xi = expm(-np.array(quotient.modes[mode].center, dtype=float) * step) @ xi
+            spent[mode] += step
+            decay = np.exp(-np.array(V.rates, dtype=float) @ spent)
+            assert xi @ P @ xi <= decay * first * (1 + 1e-9)
+
+
+def test_what_shares_prove_is_judged_and_read_back(tmp_path: Path):
+    signal = ClockShares(["0.9", "0.1", "0"])
+    made = certify_family(with_outage("consensus"), PROTOCOL, signal=signal, expectations="bipartite consensus")
+    assert made.assessment.asked == "met"
+    made.save(tmp_path / "c.json")
+    again = read_certificate(tmp_path / "c.json")
+    assert again.signal == signal and again.restricted[0].rate == made.restricted[0].rate
+    data = made.to_dict()
+    for key, new in (
+        ("rate", str(made.restricted[0].rate + Fraction(1, 1000))),
+        ("behaviour", "stability"),
+        ("behaviour", None),
+        ("nodes", data["graph"]["nodes"]),
+        ("signals", {"shares": ["1", "0.1", "0"]}),
+        ("signals", {"shares": ["1.5", "-0.5", "0"]}),
+        ("signals", {"shares": ["1", "0"]}),
+    ):
+        forged = copy.deepcopy(data)
+        forged["restricted"][0][key] = new
+        assert not check(resealed(forged)).accepted, (key, new)
+
+
+def test_shares_that_are_none_are_refused():
+    for wrong in (["0.5"], ["0.5", "0.6"], ["1.5", "-0.5"], ["x", "1"]):
+        with pytest.raises(ParameterError):
+            ClockShares(wrong)
+    with pytest.raises(ParameterError, match="2 shares"):
+        certify_family(with_outage("consensus"), PROTOCOL, signal=ClockShares(["0.5", "0.5"]))
