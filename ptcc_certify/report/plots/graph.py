@@ -77,13 +77,13 @@ def plot_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
     if structure.followers.size:
         groups = [c.nodes for c in structure.closed_components if len(c.nodes) > 1]
         for nodes in groups:
-            _draw_ground(ax, graph, place, nodes, radius)
+            draw_ground(ax, graph, place, nodes, radius)
         if groups:
             ax.fill([], [], color=GROUND, label="leader group")
-    _draw_nodes(ax, structure, place, radius)
+    draw_nodes(ax, structure, place, radius)
     _draw_arrows(ax, arrows, place, bends, radius)
-    lines = _boxes_along(arrows, place, bends)
-    written = _draw_labels(ax, graph.labels, place, radius, None if inside else [box for line in lines for box in line])
+    lines = boxes_along(arrows, place, bends)
+    written = draw_labels(ax, graph.labels, place, radius, None if inside else [box for line in lines for box in line])
     _draw_weights(ax, arrows, place, bends, written, lines)
     ax.set_aspect("equal")
     ax.set_xlim(-width / 2, width / 2)
@@ -91,11 +91,11 @@ def plot_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
     ax.set_axis_off()
     finished(ax, "", "")
     if own:
-        _fit_height(ax, np.concatenate([written, *lines]), radius)
+        fit_height(ax, np.concatenate([written, *lines]), radius)
     return ax
 
 
-def _fit_height(ax: Axes, boxes: np.ndarray, radius: float) -> None:
+def fit_height(ax: Axes, boxes: np.ndarray, radius: float) -> None:
     """Make a figure as high as what is drawn and its legend need."""
     low, high = boxes[:, 1].min() - radius, boxes[:, 3].max() + radius
     figure, legend = ax.figure.figure, ax.get_legend()  # type: ignore[union-attr]
@@ -105,7 +105,7 @@ def _fit_height(ax: Axes, boxes: np.ndarray, radius: float) -> None:
     figure.set_figheight(min(_HEIGHT, room + scale * (high - low)))
 
 
-def _draw_nodes(ax: Axes, structure: Structure, place: np.ndarray, radius: float) -> None:
+def draw_nodes(ax: Axes, structure: Structure, place: np.ndarray, radius: float) -> None:
     """Draw the nodes, those of leaders outlined."""
     group = camp_groups(structure)
     for name, (colour, _) in CAMP_STYLES.items():
@@ -134,7 +134,7 @@ def _draw_arrows(ax: Axes, arrows: Sequence[Arrow], place: np.ndarray, bends: np
             ax.plot([], [], color=colour, linestyle=line, linewidth=1.1, label=name)
 
 
-def _draw_labels(
+def draw_labels(
     ax: Axes, labels: Sequence[str], place: np.ndarray, radius: float, lines: list[np.ndarray] | None
 ) -> list[np.ndarray]:
     """Write labels into the nodes, or, given lines, around where they cover least; return the boxes that are taken."""
@@ -151,7 +151,7 @@ def _draw_labels(
         turns = np.arctan2(p[1], p[0]) + np.pi / 4 * np.array([0, 1, -1, 2, -2, 3, -3, 4])  # away from the middle first
         ways = np.stack([np.cos(turns), np.sin(turns)], axis=1)
         spots = [p + way * (far * radius + 1) + half * way for far in (1, 2, 3, 4, 5, 6, 7) for way in ways]
-        taken.append(box := _least_covered(spots, half, taken))
+        taken.append(box := least_covered(spots, half, taken))
         if (np.maximum(box[:2] - p, p - box[2:]) > 3 * radius).any():  # far from its node
             ax.plot(*np.stack([p, np.clip(p, box[:2], box[2:])], axis=1), color="0.6", linewidth=0.5, zorder=1)
         ax.annotate(text, p, (box[:2] + box[2:]) / 2, va="center", color="black", path_effects=HALO, **looks)
@@ -178,13 +178,13 @@ def _draw_weights(
         beside = along[::-1] * [1, -1] / np.linalg.norm(along) * (np.linalg.norm(half) + 1)
         spots += [spots[0] + beside, spots[0] - beside]
         others = [*lines[:k], lines[k][:NEAR_ENDS], lines[k][-NEAR_ENDS:], *lines[k + 1 :]]
-        box = _least_covered(spots, half, [*taken, *(box for line in others for box in line)])
+        box = least_covered(spots, half, [*taken, *(box for line in others for box in line)])
         taken.append(box)
         (x, y), colour = (box[:2] + box[2:]) / 2, EDGE_STYLES[arrow.sign][0]
         ax.text(x, y, text, fontsize=NAME_SIZE, color=colour, ha="center", va="center", bbox=ground, zorder=4)
 
 
-def _boxes_along(arrows: Sequence[Arrow], place: np.ndarray, bends: np.ndarray) -> list[list[np.ndarray]]:
+def boxes_along(arrows: Sequence[Arrow], place: np.ndarray, bends: np.ndarray) -> list[list[np.ndarray]]:
     """Return small boxes along each arrow, which leave no gaps."""
     boxes = []
     for (a, b, *_), bend in zip(arrows, bends, strict=True):
@@ -193,7 +193,7 @@ def _boxes_along(arrows: Sequence[Arrow], place: np.ndarray, bends: np.ndarray) 
     return boxes
 
 
-def _least_covered(spots: Sequence[np.ndarray], half: np.ndarray, taken: list[np.ndarray]) -> np.ndarray:
+def least_covered(spots: Sequence[np.ndarray], half: np.ndarray, taken: list[np.ndarray]) -> np.ndarray:
     """Return the box about the first of some spots that covers least of the boxes taken."""
     boxes = [np.array([*(spot - half), *(spot + half)]) for spot in spots]
     others = np.array(taken)
@@ -205,7 +205,7 @@ def _least_covered(spots: Sequence[np.ndarray], half: np.ndarray, taken: list[np
     return min(boxes, key=covered)
 
 
-def _draw_ground(ax: Axes, graph: SignedDigraph, place: np.ndarray, nodes: Sequence[int], radius: float) -> None:
+def draw_ground(ax: Axes, graph: SignedDigraph, place: np.ndarray, nodes: Sequence[int], radius: float) -> None:
     """Draw a ground under a leader group: under its nodes, along its edges, and between them where no other node is."""
     inside, looks = np.zeros(graph.n_nodes, dtype=bool), {"color": GROUND, "zorder": 0}
     inside[list(nodes)] = True
