@@ -32,7 +32,7 @@ from ptcc_certify.certificate.request import (
 from ptcc_certify.certificate.verdict import Assessment
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.graphs.display_hook import Shown, family_summary
+from ptcc_certify.graphs.display_hook import Shown, family_summary, plot_of_family
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io import write_atomically
 from ptcc_certify.graphs.size_limits import EXACT_NODES
@@ -94,6 +94,28 @@ class FamilyCertificate(FamilyContent, Shown):
     def summary(self) -> str:
         """Return what ``ptcc certify`` prints of it."""
         return family_summary(self)
+
+    def plot(self, what: str = "decay", **keywords: Any) -> Any:
+        """Draw a figure of the certificate.
+
+        Parameters
+        ----------
+        what : {"decay", "input", "graph", "states"}
+            Runs under many signals within what is proved for every signal: their error, their inputs, their states; or
+            the graphs.
+        **keywords : Any
+            ``ax`` and others of the function ``ptcc_certify.plot_family_<what>``, of states ``plot_family``.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+
+        Raises
+        ------
+        ParameterError
+            No figure is called so, or there is nothing to draw.
+        """
+        return plot_of_family(self, what, **keywords)
 
     # ------------------------------------------------------------------ the file
 

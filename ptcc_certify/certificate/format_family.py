@@ -14,6 +14,7 @@ from ptcc_certify.certificate.family_content import FamilyContent
 from ptcc_certify.certificate.format import producer
 from ptcc_certify.certificate.format_family_rows import form_entry, form_steps, rows_entry, rows_steps
 from ptcc_certify.certificate.format_graph import structure_section
+from ptcc_certify.certificate.format_upper_bound import upper_bound_entry
 from ptcc_certify.certificate.format_vectors import Writer
 from ptcc_certify.checker import NOT_OF_FAMILIES, OBLIGATIONS, SCHEMA, digest
 from ptcc_certify.checker.family import THEOREM
@@ -23,6 +24,7 @@ from ptcc_certify.graphs.digraph import Weights
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import BIPARTITE_CONTAINMENT, INTERVAL_BIPARTITE_CONSENSUS, analyse
+from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
 
 #: Bits of the middles and radii of final states, which are rounded outwards.
@@ -102,9 +104,9 @@ def _step(kind: str, of: str, witness: Any = None, **numbers: str) -> dict[str, 
 
 def _unverified(certificate: FamilyContent) -> dict[str, Any]:
     expectations = certificate.expectations
-    bounds = [part.upper_bound for part in certificate.parts]
+    bounds = [(part.component, part.upper_bound) for part in certificate.parts]
     return {
-        "upper_bounds": [None if b is None else {"value": format_exact(b.value), "kind": b.kind} for b in bounds],
+        "upper_bounds": [None if b is None else upper_bound_entry(Quotient.of(c), b) for c, b in bounds],
         "asked": {"behaviour": expectations.behaviour},
         "origins": dict(certificate.origins),
         "scenario": certificate.scenario,
