@@ -245,10 +245,8 @@ def _draw_tubes(
                 low, high = (float(end) for end in interval)
                 places[low, high, CAMP_STYLES[name][0]] = None
                 tubes.append((np.maximum(low - moves[k], -largest[k]), np.minimum(high + moves[k], largest[k])))
-        if name != "single leaders":
-            tubes = [(np.min([low for low, _ in tubes], axis=0), np.max([high for _, high in tubes], axis=0))] * bool(
-                tubes
-            )
+        if name != "single leaders" and tubes:
+            tubes = [(np.min([low for low, _ in tubes], axis=0), np.max([high for _, high in tubes], axis=0))]
         for least, most in tubes:
             looks: dict[str, Any] = {"color": CAMP_STYLES[name][0], "alpha": 0.12, "linewidth": 0}
             ax.fill_between(run.t[before], least, most, **looks, label=label)

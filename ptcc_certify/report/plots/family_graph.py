@@ -33,8 +33,8 @@ from ptcc_certify.theorems.counterexample_text import mode_name
 
 #: Modes that are drawn, and nodes of which two modes have room side by side.
 PANELS, BESIDE_NODES = 6, 8
-#: Height of a panel in inches, as a share of its width, and of its name.
-_SHAPE, _TITLE = 0.72, 0.2
+#: Height of a panel in inches, as a share of its width; of its name, and of the legend.
+_SHAPE, _TITLE, _LEGEND = 0.72, 0.2, 0.72
 #: Widths of arrows in points: of the least weight that is drawn, and what the largest adds.
 _WIDTHS = 0.6, 1.6
 #: Columns of a panel's name.
@@ -93,17 +93,19 @@ def plot_family_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
     family = as_family(getattr(subject, "family", subject))
     drawn = family.modes[:PANELS]
     side = 2 if len(drawn) > 1 and family.n_nodes <= BESIDE_NODES else 1
-    rows, width = math.ceil(len(drawn) / side), SINGLE_COLUMN[0] / side
-    high = rows * (width * _SHAPE + _TITLE * (len(drawn) > 1))
-    ax = axes_of(ax, (SINGLE_COLUMN[0], 0.6 + high))
+    rows, title = math.ceil(len(drawn) / side), _TITLE * (len(drawn) > 1)
+    width = SINGLE_COLUMN[0] / side if ax is None else ax.get_window_extent().width / ax.figure.dpi / side
+    room = 72 * width * np.array([1.0, _SHAPE])
+    layout = _Layout.of(family, drawn, room) if family.n_nodes <= LABELLED_NODES else None
+    high = width * _SHAPE if layout is None else layout.size[1] / 72
+    ax = axes_of(ax, (SINGLE_COLUMN[0], _LEGEND + rows * (high + title)))
     ax.set_axis_off()
     panels = [ax]
     if len(drawn) > 1:
-        share = 1 - _TITLE * rows / high
+        share = high / (high + title)
         places = (divmod(number, side) for number in range(len(drawn)))
         panels = [ax.inset_axes((c / side, 1 - (r + 1) / rows, 1 / side, share / rows)) for r, c in places]
-    size = np.array(ax.get_window_extent().size) / ax.figure.dpi * 72 * [1.05 / side, 0.95 / rows]
-    _draw_modes(panels, family, drawn, size)
+    _draw_modes(panels, family, drawn, layout)
     seen: dict[str, Any] = {}
     for number, panel in enumerate(panels):
         for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
@@ -116,33 +118,47 @@ def plot_family_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def _draw_modes(panels: Sequence[Axes], family: Family, drawn: Sequence[Mode], size: np.ndarray) -> None:
-    """Draw modes with nodes in the same places, on panels of a size in points."""
-    n, structures = family.n_nodes, [analyse(mode.mandatory) for mode in drawn]
-    if n > LABELLED_NODES:
+class _Layout(NamedTuple):
+    """Where nodes lie in points, how large they are, and whether their labels are in them; the size of a panel."""
+
+    place: np.ndarray
+    radius: float
+    inside: bool
+    size: np.ndarray
+
+    @classmethod
+    def of(cls, family: Family, drawn: Sequence[Mode], room: np.ndarray) -> _Layout:
+        """Lay out all edges of the modes that are drawn, in a room in points; a flat drawing takes less height."""
+        n = family.n_nodes
+        inside = max(map(columns, family.labels)) <= INSIDE and n <= FREE_NODES
+        radius = float(np.clip(32 / np.sqrt(n), 7.5, 10)) if inside else 4.5
+        pairs = {(a.source, a.target, a.sign): a for mode in drawn for a, _ in _ranges(mode)}
+        margin = np.array([4 * radius + 4 if inside else 60, 4 * radius + 4])
+        place, _ = places_and_bends(list(pairs.values()), np.full(n, -1), radius, room - margin)
+        high = min(room[1], float(np.ptp(place[:, 1])) + margin[1] + 16)  # for bent arrows, and labels
+        return cls(place, radius, inside, np.array([room[0], high]))
+
+
+def _draw_modes(panels: Sequence[Axes], family: Family, drawn: Sequence[Mode], layout: _Layout | None) -> None:
+    """Draw modes with nodes in the same places; as matrices where there is no layout."""
+    structures = [analyse(mode.mandatory) for mode in drawn]
+    if layout is None:
         for panel, structure in zip(panels, structures, strict=True):
             draw_adjacency(panel, structure)
             if len(panels) > 1 and (legend := panel.get_legend()) is not None:
                 legend.remove()
         return
-    camps = family_camps(family)
-    inside = max(map(columns, family.labels)) <= INSIDE and n <= FREE_NODES
-    radius = float(np.clip(32 / np.sqrt(n), 7.5, 10)) if inside else 4.5
-    room = size - np.array([4 * radius if inside else 60, 4 * radius])
-    edges = [_ranges(mode) for mode in drawn]
-    pairs = {(a.source, a.target, a.sign): a for some in edges for a, _ in some}
-    place, _ = places_and_bends(list(pairs.values()), np.full(n, -1), radius, room)
+    place, radius, inside, size = layout
+    camps, edges = family_camps(family), [_ranges(mode) for mode in drawn]
     largest = max((arrow.size for some in edges for arrow, _ in some), default=1.0)
     for panel, structure, some in zip(panels, structures, edges, strict=True):
         groups = camp_groups(structure) if camps is None else camps
         _draw_nodes(panel, place, radius, groups, structure.leaders)
         bends = _bends(some)
         _draw_arrows(panel, some, place, bends, radius, largest)
-        arrows = [arrow for arrow, _ in some]
-        lines = boxes_along(arrows, place, bends)
-        written = draw_labels(
-            panel, family.labels, place, radius, None if inside else [box for line in lines for box in line]
-        )
+        lines = boxes_along([arrow for arrow, _ in some], place, bends)
+        taken = None if inside else [box for line in lines for box in line]
+        written = draw_labels(panel, family.labels, place, radius, taken)
         _draw_ranges(panel, some, place, bends, written, lines)
         panel.set_aspect("equal")
         panel.set_xlim(-size[0] / 2, size[0] / 2)
