@@ -39,6 +39,7 @@ BOUND_KINDS = {
 }
 #: Modes, uncertain weights and parts of a proof that are listed.
 MODES, WEIGHTS = 12, 8
+_PLOTS = {"states": plot_family, "decay": plot_family_decay, "input": plot_family_input}
 #: The theorem, as page and statement give it.
 THEOREM = (
     "If the mandatory graphs of all modes have one kernel K, and every uncertain edge joins agents whose rows of a"
@@ -78,7 +79,7 @@ def family_view(saved: FamilyCertificate, runs: Sequence[FamilyTrajectory]) -> d
         "modes": [_mode_row(saved, k) for k in range(min(len(saved.family.modes), MODES))],
         "states": _states(saved),
         "endings": endings(saved),
-        "remaining": _remaining(saved),
+        "remaining": [(Markup("{}\u00a0T").format(f), bound) for f, bound in remaining(saved)],
         "functions": _functions(saved),
         "bound_words": bound_words(saved),
         "worst_ratio": max((ratio.worst_ratio for ratio in ratios), default=0.0),
@@ -220,29 +221,33 @@ def _rounded(x: Fraction, way: int) -> str:
     return Markup("{}{}").format(sign, outwards(abs(x), 5)) if x else "0"
 
 
-def _states(saved: FamilyCertificate) -> tuple[list[str], list[list[Any]]]:
-    """Return head and rows of the table of initial and final states."""
+def state_rows(saved: FamilyCertificate) -> list[tuple[str, str, str, str | None]]:
+    """Return label, camp, initial and final state of every agent; None where no limit is claimed."""
     if saved.initial_state is None:
-        return [], []
+        return []
     labels, finals = saved.family.labels, saved.final_states or ()
     camp = ["\u2013"] * len(labels)
     for part in saved.parts:
         for number, side in enumerate(camps(part.component), 1):
             for v in part.component.nodes[side].tolist():
                 camp[v] = f"camp {number}"
-    rows = [
-        [texts.label(labels[k]), camp[k], rational(saved.initial_state[k]), _ends(finals[k])]
-        for k in range(min(len(labels), texts.LISTED * 2))
-    ]
-    return ["Agent", "Camp", "Initial state", "State at the deadline, for every signal"], rows
+    ends = [None if end is None else _ends(end) for end in finals]
+    return list(zip(labels, camp, map(rational, saved.initial_state), ends, strict=True))
 
 
-def _remaining(saved: FamilyCertificate) -> list[tuple[Any, ...]]:
+def _states(saved: FamilyCertificate) -> tuple[list[str], list[list[Any]]]:
+    """Return head and rows of the table of initial and final states."""
+    rows = state_rows(saved)[: 2 * texts.LISTED]
+    written = [[texts.label(name), camp, first, last or _ends(None)] for name, camp, first, last in rows]
+    return ["Agent", "Camp", "Initial state", "State at the deadline, for every signal"], written
+
+
+def remaining(saved: FamilyCertificate) -> list[tuple[float, Markup]]:
     """Return instants and the bound of the deviation of any agent from its final state there."""
     if saved.initial_state is None or saved.rate is None or not saved.common:
         return []
     bounds = saved.deviation_bound([float(1 - Fraction(str(f))) for f in FRACTIONS]).max(axis=0)
-    return [(Markup("{}\u00a0T").format(f), above(float(x), 2)) for f, x in zip(FRACTIONS, bounds, strict=True)]
+    return [(f, above(float(x), 2)) for f, x in zip(FRACTIONS, bounds, strict=True)]
 
 
 def _functions(saved: FamilyCertificate) -> list[tuple[Any, ...]]:
@@ -306,20 +311,28 @@ def _counterexamples(saved: FamilyCertificate) -> list[tuple[str, Markup, Family
     ]
 
 
+def draw_family(
+    saved: FamilyCertificate, runs: Sequence[FamilyTrajectory], wanted: Sequence[str] = ("graph", "decay")
+) -> dict[str, Any]:
+    """Draw those of the wanted figures for which there is something to draw."""
+    small = bool(runs) and saved.family.n_nodes <= INPUT_NODES
+    there = {"graph": saved.family.n_nodes <= DRAWN_NODES, "states": small, "input": small}
+    there["decay"] = bool(runs) and saved.common and saved.rate is not None
+    axes = {
+        name: plot_family_graph(saved) if name == "graph" else _PLOTS[name](saved, runs=runs)
+        for name in wanted
+        if there[name]
+    }
+    return {name: ax.figure for name, ax in axes.items()}
+
+
 def _figures(
     saved: FamilyCertificate,
     runs: Sequence[FamilyTrajectory],
     why: Sequence[tuple[str, Markup, FamilyComponent, Counterexample]],
 ) -> dict[str, Any]:
     """Draw the graphs, runs within what is proved, and counterexamples: as far as there are any."""
-    figures: dict[str, Any] = {}
-    if saved.family.n_nodes <= DRAWN_NODES:
-        figures["graph"] = plot_family_graph(saved).figure
-    if runs and saved.family.n_nodes <= INPUT_NODES:
-        figures["states"] = plot_family(saved, runs=runs).figure
-        figures["input"] = plot_family_input(saved, runs=runs).figure
-    if runs and saved.common and saved.rate is not None:
-        figures["decay"] = plot_family_decay(saved, runs=runs).figure
+    figures = draw_family(saved, runs, ("graph", "states", "decay", "input"))
     for number, (_, _, component, one) in enumerate(why):
         try:
             figures[f"why{number}"] = plot_counterexample(component, why=one, protocol=saved.protocol).figure

@@ -15,11 +15,12 @@ from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.graphs.io import write_atomically
 from ptcc_certify.graphs.io.files import refuse_no_path
 from ptcc_certify.graphs.size_limits import INPUT_NODES, REPEATED_NODES
+from ptcc_certify.report.family_page import draw_family
 from ptcc_certify.report.figures import draw
 from ptcc_certify.report.page import rejected_html, report_html
 from ptcc_certify.report.plots.family import sample_runs
 from ptcc_certify.report.plots.style import figure_bytes
-from ptcc_certify.report.statement import report_latex
+from ptcc_certify.report.statement import family_latex, report_latex
 from ptcc_certify.simulation.family_run import FamilyTrajectory
 
 #: What a report is written as.
@@ -109,15 +110,7 @@ def write_report(
     saved, why = _with_run(saved, simulation)
     progress("report")
     if suffix == ".tex":
-        drawn = draw(saved, ("graph", "decay"))
-        files = {name: path.with_name(f"{path.stem}_{name}.pdf") for name in drawn}
-        if folder := next((file for file in files.values() if file.is_dir()), None):
-            raise ParameterError(f"{folder}: is a folder, where a figure of the statement would go; name another file")
-        text = report_latex(saved, {name: file.name for name, file in files.items()})
-        contents = {files[name]: figure_bytes(figure, ".pdf") for name, figure in drawn.items()}
-        for file, content in contents.items():
-            write_atomically(file, content)
-        write_atomically(path, text)
+        _write_statement(path, draw(saved, ("graph", "decay")), lambda names: report_latex(saved, names))
     else:
         write_atomically(path, report_html(saved, no_run=why, day=day))
     return saved.verdict
@@ -139,9 +132,26 @@ def _write_family(
     day: date | None,
 ) -> None:
     """Write the page of a family's certificate, or its statement."""
+    if suffix == ".tex" and saved.source is None:
+        raise ParameterError("nothing is certified of this family, so that there is no statement; a page tells why")
     runs, why = _runs(saved, simulation)
     progress("report")
-    write_atomically(path, report_html(saved, runs=runs, no_run=why, day=day))
+    if suffix == ".tex":
+        _write_statement(path, draw_family(saved, runs), lambda names: family_latex(saved, names))
+    else:
+        write_atomically(path, report_html(saved, runs=runs, no_run=why, day=day))
+
+
+def _write_statement(path: Path, drawn: Mapping[str, Any], latex: Callable[[dict[str, str]], str]) -> None:
+    """Write a statement, given the names of its figures, and these beside it."""
+    files = {name: path.with_name(f"{path.stem}_{name}.pdf") for name in drawn}
+    if folder := next((file for file in files.values() if file.is_dir()), None):
+        raise ParameterError(f"{folder}: is a folder, where a figure of the statement would go; name another file")
+    text = latex({name: file.name for name, file in files.items()})
+    contents = {files[name]: figure_bytes(figure, ".pdf") for name, figure in drawn.items()}
+    for file, content in contents.items():
+        write_atomically(file, content)
+    write_atomically(path, text)
 
 
 def _runs(saved: FamilyCertificate, simulation: bool | None) -> tuple[list[FamilyTrajectory], str]:
