@@ -6,16 +6,18 @@ A family of one mode with known weights is a graph, and :func:`ptcc_certify.cert
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from lmi import search_time as deadline
-from lmi.exact.decimal_rounding import down
+from lmi.exact.decimal_rounding import down, float_down, float_up
 from lmi.search_time import share_of_time
+from ptcc_certify.certificate.certificate_data import Source
 from ptcc_certify.certificate.checking import check
 from ptcc_certify.certificate.family_content import ComponentProof, FamilyContent
 from ptcc_certify.certificate.family_verdict import assess_family
@@ -37,6 +39,7 @@ from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io import write_atomically
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import analyse
+from ptcc_certify.graphs.tables import import_pandas
 from ptcc_certify.lyapunov.family_rate_upper_bound import prove_family_rate_bound
 from ptcc_certify.lyapunov.family_search import FamilySearch, search_family
 from ptcc_certify.lyapunov.follower_function import follower_functions
@@ -44,6 +47,9 @@ from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.base import refuse_no_protocol
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent, decide
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 STEPS = ("the decision", "upper bound on the decay rate", "Lyapunov functions", "independent check")
 #: GB that the check may take for families whose members have more nodes than are solved for exactly.
@@ -170,6 +176,66 @@ class FamilyCertificate(FamilyContent, Shown):
             write_atomically(Path(path).parent / name, content)
         text = json.dumps(document, indent=1, ensure_ascii=False) + "\n"
         write_atomically(Path(path), text.encode("utf-8", "backslashreplace"))
+
+    def to_json(self) -> str:
+        """Return the certificate as one JSON object, without NaN or infinity."""
+        return json.dumps(self.to_dict(), ensure_ascii=False, allow_nan=False)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return the ends between which every agent is at the deadline, rounded outwards to floats; NaN where unknown.
+
+        Raises
+        ------
+        ParameterError
+            There is no initial state, or pandas is not installed.
+
+        Examples
+        --------
+        >>> pair = Family.from_intervals([("a", "b", -2, -1)])
+        >>> certify_family(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2]).to_pandas().loc["b"].tolist()
+        [-1.0, -1.0]
+        """
+        if self.final_states is None:
+            raise ParameterError("the certificate has no initial state; certify the family with x0")
+        pandas, unknown = import_pandas(), (math.nan, math.nan)
+        ends = [unknown if one is None else (float_down(one[0]), float_up(one[1])) for one in self.final_states]
+        index = pandas.Index(self.family.labels, name="node")
+        return pandas.DataFrame(ends, index=index, columns=["least", "largest"], dtype=float)
+
+    @property
+    def path(self) -> Path:
+        """The file that it was read from."""
+        return self._file.path
+
+    @property
+    def sha256(self) -> str:
+        """Of the file that it was read from."""
+        return self._file.sha256
+
+    @property
+    def report(self) -> CheckReport:
+        """What the independent check says of a certificate that was read."""
+        return self._file.report
+
+    @property
+    def _file(self) -> Source:
+        if self.source is None:
+            of = "report, path and sha256 are of a certificate that was read from a file"
+            raise ParameterError(
+                f"{of}; for a page or LaTeX: write_report(certificate, path); else save it, and read it"
+            )
+        return self.source
+
+    def __eq__(self, other: object) -> bool:
+        """Two certificates are equal when they claim and prove the same; upper bounds on the rate do not count."""
+        return isinstance(other, FamilyCertificate) and self._digest == other._digest
+
+    def __hash__(self) -> int:
+        return hash(self._digest)
+
+    @property
+    def _digest(self) -> str:
+        return str(self._document[0]["digest"])
 
     def __repr__(self) -> str:
         behaviour = self.behaviours[0] if len(self.parts) == 1 else f"{len(self.parts)} components"
