@@ -19,7 +19,6 @@ The names at the top, by topic:
 - Many graphs: ``Ensemble``, ``certify_many``
 - Figures: ``plot_trajectory``, ``plot_decay``, ``plot_run``, ``plot_sliding``, ``plot_trade_off``, ``plot_input``,
   ``plot_effort``, ``plot_graph``, ``plot_spectrum``, ``plot_frontier``, ``plot_family``, ``plot_family_decay``,
-  ``plot_family_graph``, ``plot_family_input``, ``plot_counterexample``,
   ``save_figure``, ``SINGLE_COLUMN``, ``DOUBLE_COLUMN``
 - Reports: ``write_report``, ``explore``, ``cite``
 - Errors: ``PTCCError``
@@ -94,11 +93,8 @@ _EXPORTS = {
     "plot_graph": "report.plots.graph",
     "plot_spectrum": "report.plots.spectrum",
     "plot_frontier": "report.plots.spectrum",
-    "plot_counterexample": "report.plots.counterexample",
     "plot_family": "report.plots.family",
     "plot_family_decay": "report.plots.family",
-    "plot_family_graph": "report.plots.family_graph",
-    "plot_family_input": "report.plots.family_input",
     "save_figure": "report.plots.style",
     "SINGLE_COLUMN": "report.plots.style",
     "DOUBLE_COLUMN": "report.plots.style",

@@ -241,12 +241,12 @@ FAMILIES = {
     "ptcc.certify(day, p).report": "for a page or LaTeX: write_report(certificate, path)",
     "ptcc.certify(day, p).summary()": "claim      bipartite consensus at T = 1 for every signal",
     "ptcc.write_report(ptcc.certify(day, p), 'f.html')": "certified",
-    "ptcc.plot_family_graph(day)": "Axes",
-    "ptcc.plot_family_graph(W)": "GraphError: a matrix does not tell its direction",
-    "ptcc.plot_graph(day)": "ParameterError: this figure is of one graph; of families draw plot_family_graph",
+    "ptcc.plot_graph(day)": "Axes",
+    "ptcc.plot_input(ptcc.certify(day, p, [1, 2]))": "Axes",
+    "ptcc.plot_spectrum(day)": "ParameterError: this figure is of one graph; of families draw plot_graph",
     "ptcc.plot_decay(ptcc.certify(day, p, [1, 2]))": "ParameterError: this figure is of one graph",
     "ptcc.plot_family(day)": "ParameterError: this figure is drawn from the certificate of a family, not from Family",
-    "ptcc.plot_counterexample(ptcc.decide(day)[0])": "ParameterError: the component has no counterexample",
+    "ptcc.decide(day)[0].plot()": "ParameterError: the component has no counterexample",
     "ptcc.analyse(day)": "GraphError: Family(2 nodes, 1 of 2 weights uncertain) is several graphs",
 }
 CALLS = CONTROL_RESEARCHER | NETWORK_SCIENTIST | ENGINEER | STUDENT | REVIEWER | MISTAKES | FAMILIES

@@ -110,7 +110,8 @@ class FamilyCertificate(FamilyContent, Shown):
             Runs under many signals within what is proved for every signal: their error, their inputs, their states; or
             the graphs.
         **keywords : Any
-            ``ax`` and others of the function ``ptcc_certify.plot_family_<what>``, of states ``plot_family``.
+            ``ax`` and others of the function that draws it: ``plot_family_decay``, ``plot_input``, ``plot_graph`` or
+            ``plot_family``.
 
         Returns
         -------

@@ -74,8 +74,8 @@ def plot(subject: Any, what: str, **keywords: Any) -> Any:
 #: The same of a family of graphs.
 _FAMILY_FIGURES = {
     "decay": "plot_family_decay",
-    "input": "plot_family_input",
-    "graph": "plot_family_graph",
+    "input": "plot_input",
+    "graph": "plot_graph",
     "states": "plot_family",
 }
 
@@ -100,6 +100,17 @@ def plot_of_family(subject: Any, what: str, **keywords: Any) -> Any:
     if what not in _FAMILY_FIGURES:
         raise ParameterError(f"what = {what!r} is unknown; one of {', '.join(_FAMILY_FIGURES)}")
     return getattr(import_module("ptcc_certify"), _FAMILY_FIGURES[what])(subject, **keywords)
+
+
+def plot_of_counterexample(component: Any, **keywords: Any) -> Any:
+    """Draw what refutes a behaviour of a component of a family.
+
+    Examples
+    --------
+    >>> plot_of_counterexample(ptcc.decide([("a", "b", 1, 1), ("b", "a", -1, 0)])[0]).get_ylabel()
+    'state $x_k$'
+    """
+    return import_module("ptcc_certify.report.plots.counterexample").plot_counterexample(component, **keywords)
 
 
 def summary(subject: Any) -> str:

@@ -17,7 +17,7 @@ from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.report.plots.adjacency import draw_adjacency
 from ptcc_certify.report.plots.agents import CAMP_STYLES, NAME_SIZE, camp_groups, text_width
 from ptcc_certify.report.plots.family import family_camps
-from ptcc_certify.report.plots.graph import (
+from ptcc_certify.report.plots.graph_labels import (
     INSIDE,
     NEAR_ENDS,
     WEIGHED_ARROWS,

@@ -29,11 +29,11 @@ def refuse_family(subject: Any) -> None:
     >>> from ptcc_certify.report.plots.subject import refuse_family
     >>> refuse_family(ptcc.as_family([("a", "b", 1, 2)]))
     Traceback (most recent call last):
-    ptcc_certify.errors.ParameterError: this figure is of one graph; of families draw plot_family_graph, and ...
+    ptcc_certify.errors.ParameterError: this figure is of one graph; of families draw plot_graph, and of their ...
     """
     if isinstance(subject, Family | FamilyCertificate):
-        others = "of their certificates plot_family, plot_family_decay and plot_family_input"
-        raise ParameterError(f"this figure is of one graph; of families draw plot_family_graph, and {others}")
+        others = "of their certificates plot_family, plot_family_decay and plot_input"
+        raise ParameterError(f"this figure is of one graph; of families draw plot_graph, and {others}")
 
 
 def trajectory_of(subject: Any) -> Trajectory:
