@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
@@ -91,7 +92,7 @@ def family_view(saved: FamilyCertificate, runs: Sequence[FamilyTrajectory]) -> d
         "commands": _commands(saved),
         "file_name": None if saved.source is None else saved.source.path.name,
         "sha256": None if saved.source is None else saved.source.sha256,
-        "document": saved.to_dict() if saved.source is not None else None,
+        "document": None if saved.source is None else saved.source.document,
         "report": saved.checked,
         "bound_kinds": BOUND_KINDS,
         "theorem": THEOREM,
@@ -317,7 +318,8 @@ def draw_family(
     """Draw those of the wanted figures for which there is something to draw."""
     small = bool(runs) and saved.family.n_nodes <= INPUT_NODES
     there = {"graph": saved.family.n_nodes <= DRAWN_NODES, "states": small, "input": small}
-    there["decay"] = bool(runs) and saved.common and saved.rate is not None
+    moves = bool(runs) and saved.common and saved.rate is not None
+    there["decay"] = moves and bool(saved.deviation_bound([1.0]).max() > 0)
     axes = {
         name: plot_family_graph(saved) if name == "graph" else _PLOTS[name](saved, runs=runs)
         for name in wanted
@@ -346,4 +348,6 @@ def _commands(saved: FamilyCertificate) -> list[str]:
         return []
     name = shlex.quote(PurePath(saved.source.path).name)
     name = f"./{name}" if name.startswith("-") else name
-    return [f"ptcc check {name}", f"python -m ptcc_certify.checker {name}"]
+    memory = saved.source.report.memory
+    more = f" --memory {math.ceil(memory)}" if memory > 1 else ""
+    return [f"ptcc check {name}{more}", f"python -m ptcc_certify.checker {name}{more}"]

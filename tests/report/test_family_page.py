@@ -105,3 +105,21 @@ def test_intervals_of_the_page_enclose_what_is_proved():
     low, high = saved.final_states[0]
     shown = re.search(r"\[([0-9.]+),\N{NO-BREAK SPACE}([0-9.]+)\]", report_html(saved))
     assert float(shown[1]) <= low <= high <= float(shown[2])
+
+
+@pytest.mark.parametrize(
+    ("family", "x0", "figures"),
+    [
+        ([("a", "b", 1, 2)], [0, 0], {"graph", "states", "input"}),
+        ([("a", "b", 1, 2), ("c", "d", -2, -1)], [1, 2, 3, 4], {"graph", "states", "decay", "input"}),
+        (Family.switching([SignedDigraph.from_edges([], nodes=["a"])] * 2), [3], {"graph", "states", "input"}),
+        (Family.switching([DAY, SignedDigraph.from_edges([], nodes=DAY.labels)]), [1, 2, 3], None),
+    ],
+    ids=["at rest", "two components", "one agent", "outage"],
+)
+def test_what_there_is_nothing_to_draw_of_is_left_out(family, x0, figures, tmp_path):
+    made = certify(family, PROTOCOL, x0)
+    assert write_report(made, tmp_path / "c.html") == "certified"
+    assert write_report(made, tmp_path / "c.tex", simulation=False) == "certified"
+    drawn = set(re.findall('id="figure-([a-z0-9]+)"', (tmp_path / "c.html").read_text("utf-8")))
+    assert drawn == ({"graph", "states", "input", "why0"} if figures is None else figures)

@@ -176,6 +176,8 @@ def plot_family_decay(
     places = {"left": first.remaining, "time": first.t, "clock": first.clock}[axis][before]
     scale = float(np.abs(first.states[:, 0]).max()) or 1.0
     floor = FLOOR_FACTOR * first.rtol * scale
+    if not (bound >= floor).any():
+        raise ParameterError("every agent begins where it ends: there is no decay to draw")
     label: str | None = "random signals"
     for run in runs:
         if run.deadline_resolved and np.array_equal(run.t, first.t):
