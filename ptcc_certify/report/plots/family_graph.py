@@ -98,6 +98,7 @@ def plot_family_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
     room = 72 * width * np.array([1.0, _SHAPE])
     layout = _Layout.of(family, drawn, room) if family.n_nodes <= LABELLED_NODES else None
     high = width * _SHAPE if layout is None else layout.size[1] / 72
+    title *= 2 if layout is None else 1  # matrices name their axes
     ax = axes_of(ax, (SINGLE_COLUMN[0], _LEGEND + rows * (high + title)))
     ax.set_axis_off()
     panels = [ax]
