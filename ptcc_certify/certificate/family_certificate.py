@@ -156,7 +156,8 @@ class FamilyCertificate(FamilyContent, Shown):
     def to_dict(self) -> dict[str, Any]:
         """Return the certificate as JSON-ready data, without side files: a copy."""
         document, files = self._document
-        return json.loads(json.dumps(family_document(self)[0] if files and self.source is None else document))
+        whole = family_document(self)[0] if files and self.source is None else document
+        return json.loads(json.dumps(whole | {"verdict": self.verdict}))
 
     def save(self, path: str | Path) -> None:
         """Write the certificate; the file appears whole or not at all.
@@ -239,8 +240,11 @@ class FamilyCertificate(FamilyContent, Shown):
         return str(self._document[0]["digest"])
 
     def __repr__(self) -> str:
-        behaviour = self.behaviours[0] if len(self.parts) == 1 else f"{len(self.parts)} components"
-        behaviour += " for every signal" if behaviour != DEPENDS else ""
+        behaviour = self.parts[0].component.behaviour if len(self.parts) == 1 else f"{len(self.parts)} components"
+        if behaviour is None:
+            behaviour = "not decided"
+        elif behaviour != DEPENDS:
+            behaviour += " for every signal"
         rate = "none" if self.rate is None else down(self.rate)
         return f"FamilyCertificate({behaviour}, rate {rate}, {self.verdict})"
 

@@ -150,7 +150,7 @@ class FamilyContent:
         component, n = part.component, len(x)
         if component.behaviour == STABILITY:
             return dict.fromkeys(range(n), (Fraction(0), Fraction(0)))
-        if component.behaviour == DEPENDS:
+        if component.behaviour in (None, DEPENDS):
             return dict.fromkeys(range(n))
         moves = deviations(self._bound_functions(part), False, x)
         if component.behaviour == BIPARTITE_CONSENSUS:
