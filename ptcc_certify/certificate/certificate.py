@@ -348,20 +348,6 @@ def read_certificate(
     return _accepted(path, document, sha256, report)
 
 
-def read_graph_certificate(path: Any, *, memory: float = 1) -> Certificate:
-    """Read a certificate of one graph; see :func:`read_certificate`.
-
-    Raises
-    ------
-    ParameterError
-        It is one of a family.
-    """
-    certificate = read_certificate(path, memory=memory)
-    if not isinstance(certificate, Certificate):
-        raise ParameterError(f"{shorten(str(path), 200)}: a certificate of a family of graphs; give one of a graph")
-    return certificate
-
-
 def _accepted(
     path: Path, document: dict[str, Any], sha256: str, report: CheckReport
 ) -> Certificate | FamilyCertificate:
