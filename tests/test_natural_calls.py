@@ -228,7 +228,31 @@ MISTAKES = {
     "ptcc.as_state(np.ma.masked_equal(x0, 2), g)": "ParameterError: the initial state x0 has masked entries; give one",
     "sparse.save_npz('m.npz', g.adjacency()) or ptcc.as_graph('m.npz')": "GraphError: m.npz: a matrix does not tell",
 }
-CALLS = CONTROL_RESEARCHER | NETWORK_SCIENTIST | ENGINEER | STUDENT | REVIEWER | MISTAKES
+FAMILIES = {
+    "day": "Family(2 nodes, 1 of 2 weights uncertain)",
+    "len(day), list(day), 'ann' in day, 'ed' in day": "(2, ['ann', 'bob'], True, False)",
+    "day == ptcc.as_family(day) and hash(day) == hash(ptcc.as_family(day))": "True",
+    "day.to_pandas().iloc[1].astype(str).tolist()": "['', 'ann', 'bob', '-2.0', '-1.0']",
+    "ptcc.Family.switching({'day': day, 'day two': day}).modes[0] == day.modes[0]": "True",
+    "ptcc.certify(day, p)": "FamilyCertificate(bipartite consensus for every signal",
+    "ptcc.certify(day, p).plot()": "ParameterError: the certificate has no initial state; certify the family with x0",
+    "ptcc.certify(day, p, [1, 2]).plot('graph')": "Axes",
+    "ptcc.certify(day, p, [1, 2]).plot('spectrum')": "ParameterError: eigenvalues of single graphs do not tell what",
+    "ptcc.certify(day, p, [1, 2]).plot('picture')": "ParameterError: what = 'picture' is unknown; one of decay, input",
+    "ptcc.certify(day, p, [1, 2]).to_pandas().shape": "(2, 2)",
+    "ptcc.certify(day, p).to_pandas()": "ParameterError: the certificate has no initial state",
+    "ptcc.certify(day, p).report": "for a page or LaTeX: write_report(certificate, path)",
+    "ptcc.certify(day, p).summary()": "claim      bipartite consensus at T = 1 for every signal",
+    "ptcc.write_report(ptcc.certify(day, p), 'f.html')": "certified",
+    "ptcc.plot_graph(day)": "Axes",
+    "ptcc.plot_input(ptcc.certify(day, p, [1, 2]))": "Axes",
+    "ptcc.plot_spectrum(day)": "ParameterError: this figure is of one graph; of families draw plot_graph",
+    "ptcc.plot_decay(ptcc.certify(day, p, [1, 2]))": "ParameterError: this figure is of one graph",
+    "ptcc.plot_family(day)": "ParameterError: this figure is drawn from the certificate of a family, not from Family",
+    "ptcc.decide(day)[0].plot()": "ParameterError: the component has no counterexample",
+    "ptcc.analyse(day)": "GraphError: Family(2 nodes, 1 of 2 weights uncertain) is several graphs",
+}
+CALLS = CONTROL_RESEARCHER | NETWORK_SCIENTIST | ENGINEER | STUDENT | REVIEWER | MISTAKES | FAMILIES
 
 
 @pytest.fixture(scope="module")
@@ -247,6 +271,7 @@ def names(tmp_path_factory) -> dict[str, Any]:
         **{"ptcc": ptcc, "np": np, "nx": nx, "pd": pd, "sparse": sparse, "Fraction": Fraction, "StringIO": StringIO},
         **{"g": g, "G": digraph, "p": p, "x0": x0, "cert": cert, "folder": folder, "Path": Path},
         "df": pd.DataFrame(edges, columns=["source", "target", "weight"]),
+        "day": ptcc.as_family([("ann", "bob", -2, -1), ("bob", "ann", -1, -1)]),
         "W": np.array([[0, -2.0], [-1, 0]]),
         "robust": ptcc.SlidingModeProtocol(T_r="0.5", T_s="0.5", kappa=1),
         "fast": {"method": "perron", "simulation": False},

@@ -2,6 +2,7 @@
 
 import builtins
 import copy
+import json
 import pickle
 from fractions import Fraction
 
@@ -17,6 +18,9 @@ from ptcc_certify.protocols.gain_limits import GainLimits
 TEAM = ptcc.as_graph([("ann", "bob", 2), ("bob", "ann", -1), ("bob", "eve", 1)])
 PROTOCOL = ptcc.NominalProtocol(T=1, rho1=1, rho2=1, kappa=1)
 ROBUST = ptcc.SlidingModeProtocol(delta="0.5")
+
+
+FAMILY = ptcc.as_family([("a", "b", 1, 2)])
 
 
 @pytest.fixture(scope="module")
@@ -46,6 +50,9 @@ def objects(cert):
         "report of the check": cert.checked,
         "expectations": ptcc.Expectations("stability"),
         "set of initial states": ptcc.box([0, 0, 0], [1, 1, 1]),
+        "family": FAMILY,
+        "mode": FAMILY.modes[0],
+        "certificate of a family": ptcc.certify(FAMILY, PROTOCOL, [1, 2]),
     }
 
 
@@ -108,6 +115,17 @@ def test_a_certificate_equals_what_is_read_back(cert, tmp_path):
     assert {ptcc.read_certificate(form) for form in forms} == {cert}
     assert all(ptcc.check(form).accepted for form in forms)
     assert ptcc.check(ptcc.read_certificate(cert)).accepted
+
+
+def test_a_certificate_of_a_family_equals_what_is_read_back(tmp_path):
+    made = ptcc.certify(FAMILY, PROTOCOL, [1, 2])
+    made.save(tmp_path / "c.json")
+    read = ptcc.read_certificate(tmp_path / "c.json")
+    assert made == read and hash(made) == hash(read) and made != ptcc.certify(FAMILY, PROTOCOL, [1, 3])
+    assert read.path == tmp_path / "c.json" and read.report.accepted and len(read.sha256) == 64
+    assert ptcc.read_certificate(json.loads(made.to_json())) == made
+    assert made.to_pandas().equals(read.to_pandas())
+    assert np.isnan(ptcc.certify([("a", "b", 0, 1)], PROTOCOL, [1, 2]).to_pandas().loc["b", "least"])
 
 
 def test_a_report_is_written_of_a_certificate_as_of_its_file(cert, tmp_path):

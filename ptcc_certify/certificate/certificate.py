@@ -333,20 +333,6 @@ def read_certificate(
     return accepted_certificate(path, document, sha256, report, read_side_files(document, path.parent))
 
 
-def read_graph_certificate(path: Any, *, memory: float = 1) -> Certificate:
-    """Read a certificate of one graph; see :func:`read_certificate`.
-
-    Raises
-    ------
-    ParameterError
-        It is one of a family.
-    """
-    certificate = read_certificate(path, memory=memory)
-    if not isinstance(certificate, Certificate):
-        raise ParameterError(f"{shorten(str(path), 200)}: a certificate of a family of graphs; give one of a graph")
-    return certificate
-
-
 def accepted_certificate(
     path: Path, document: Mapping[str, Any], sha256: str, report: CheckReport, files: Mapping[str, bytes]
 ) -> Certificate | FamilyCertificate:

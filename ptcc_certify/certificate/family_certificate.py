@@ -6,17 +6,19 @@ A family of one mode with known weights is a graph, and :func:`ptcc_certify.cert
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from lmi import search_time as deadline
-from lmi.exact.decimal_rounding import down
+from lmi.exact.decimal_rounding import down, float_down, float_up
 from lmi.search_time import share_of_time
 from ptcc_certify.bounds.kept_means import with_means
+from ptcc_certify.certificate.certificate_data import Source
 from ptcc_certify.certificate.checking import check
 from ptcc_certify.certificate.family_content import ComponentProof, FamilyContent
 from ptcc_certify.certificate.family_verdict import assess_family
@@ -34,11 +36,12 @@ from ptcc_certify.certificate.verdict import Assessment
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.family import MANY_MODES
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.graphs.display_hook import Shown, family_summary
+from ptcc_certify.graphs.display_hook import Shown, family_summary, plot_of_family
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io import write_atomically
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import analyse
+from ptcc_certify.graphs.tables import import_pandas
 from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.family_rate_upper_bound import prove_family_rate_bound
 from ptcc_certify.lyapunov.family_search import FamilySearch, search_family
@@ -48,6 +51,9 @@ from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.base import refuse_no_protocol
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent, decide
 from ptcc_certify.theorems.restricted_signals import ClockShares, SignalClass, read_signal
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 STEPS = ("the decision", "upper bound on the decay rate", "Lyapunov functions", STEP, "independent check")
 #: GB that the check may take for families whose members have more nodes than are solved for exactly.
@@ -103,6 +109,29 @@ class FamilyCertificate(FamilyContent, Shown):
         """Return what ``ptcc certify`` prints of it."""
         return family_summary(self)
 
+    def plot(self, what: str = "decay", **keywords: Any) -> Any:
+        """Draw a figure of the certificate.
+
+        Parameters
+        ----------
+        what : {"decay", "input", "graph", "states"}
+            Runs under many signals within what is proved for every signal: their error, their inputs, their states; or
+            the graphs.
+        **keywords : Any
+            ``ax`` and others of the function that draws it: ``plot_family_decay``, ``plot_input``, ``plot_graph`` or
+            ``plot_family``.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+
+        Raises
+        ------
+        ParameterError
+            No figure is called so, or there is nothing to draw.
+        """
+        return plot_of_family(self, what, **keywords)
+
     # ------------------------------------------------------------------ the file
 
     @cached_property
@@ -135,7 +164,8 @@ class FamilyCertificate(FamilyContent, Shown):
     def to_dict(self) -> dict[str, Any]:
         """Return the certificate as JSON-ready data, without side files: a copy."""
         document, files = self._document
-        return json.loads(json.dumps(family_document(self)[0] if files and self.source is None else document))
+        whole = family_document(self)[0] if files and self.source is None else document
+        return json.loads(json.dumps(whole | {"verdict": self.verdict}))
 
     def save(self, path: str | Path) -> None:
         """Write the certificate; the file appears whole or not at all.
@@ -157,9 +187,72 @@ class FamilyCertificate(FamilyContent, Shown):
         text = json.dumps(document, indent=1, ensure_ascii=False) + "\n"
         write_atomically(Path(path), text.encode("utf-8", "backslashreplace"))
 
+    def to_json(self) -> str:
+        """Return the certificate as one JSON object, without NaN or infinity."""
+        return json.dumps(self.to_dict(), ensure_ascii=False, allow_nan=False)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return the ends between which every agent is at the deadline, rounded outwards to floats; NaN where unknown.
+
+        Raises
+        ------
+        ParameterError
+            There is no initial state, or pandas is not installed.
+
+        Examples
+        --------
+        >>> pair = Family.from_intervals([("a", "b", -2, -1)])
+        >>> certify_family(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2]).to_pandas().loc["b"].tolist()
+        [-1.0, -1.0]
+        """
+        if self.final_states is None:
+            raise ParameterError("the certificate has no initial state; certify the family with x0")
+        pandas, unknown = import_pandas(), (math.nan, math.nan)
+        ends = [unknown if one is None else (float_down(one[0]), float_up(one[1])) for one in self.final_states]
+        index = pandas.Index(self.family.labels, name="node")
+        return pandas.DataFrame(ends, index=index, columns=["least", "largest"], dtype=float)
+
+    @property
+    def path(self) -> Path:
+        """The file that it was read from."""
+        return self._file.path
+
+    @property
+    def sha256(self) -> str:
+        """Of the file that it was read from."""
+        return self._file.sha256
+
+    @property
+    def report(self) -> CheckReport:
+        """What the independent check says of a certificate that was read."""
+        return self._file.report
+
+    @property
+    def _file(self) -> Source:
+        if self.source is None:
+            of = "report, path and sha256 are of a certificate that was read from a file"
+            raise ParameterError(
+                f"{of}; for a page or LaTeX: write_report(certificate, path); else save it, and read it"
+            )
+        return self.source
+
+    def __eq__(self, other: object) -> bool:
+        """Two certificates are equal when they claim and prove the same; upper bounds on the rate do not count."""
+        return isinstance(other, FamilyCertificate) and self._digest == other._digest
+
+    def __hash__(self) -> int:
+        return hash(self._digest)
+
+    @property
+    def _digest(self) -> str:
+        return str(self._document[0]["digest"])
+
     def __repr__(self) -> str:
-        behaviour = self.behaviours[0] if len(self.parts) == 1 else f"{len(self.parts)} components"
-        behaviour += " for every signal" if behaviour != DEPENDS else ""
+        behaviour = self.parts[0].component.behaviour if len(self.parts) == 1 else f"{len(self.parts)} components"
+        if behaviour is None:
+            behaviour = "not decided"
+        elif behaviour != DEPENDS:
+            behaviour += " for every signal"
         rate = "none" if self.rate is None else down(self.rate)
         return f"FamilyCertificate({behaviour}, rate {rate}, {self.verdict})"
 

@@ -5,6 +5,7 @@ Nothing here writes, reads or checks.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -210,7 +211,7 @@ class FamilyContent:
         component, n = part.component, len(x)
         if component.behaviour == STABILITY:
             return dict.fromkeys(range(n), (Fraction(0), Fraction(0)))
-        if component.behaviour == DEPENDS or not part.certifiable:
+        if component.behaviour in (None, DEPENDS) or not part.certifiable:
             return dict.fromkeys(range(n))
         groups = dict(enumerate(part.leading_groups))
         means = {j: c for j, group in groups.items() if (c := group.final_value(x)) is not None}
@@ -240,6 +241,43 @@ class FamilyContent:
             for k, bound in peaks(self._bound_functions(part), gains, x).items():
                 result[nodes[k]] = bound
         return tuple(result)
+
+    def input_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
+        """Bound of ``|u_k(t)|`` for every agent and every signal, from the initial state.
+
+        ``|u_k| = gain |(L X)_k| <= gain sqrt(inputs_k V(0)) e^(-rate s / 2)``; it grows without limit towards the
+        deadline if ``rate rho2 kappa < 2``.
+
+        Parameters
+        ----------
+        remaining : (M,) array_like
+            ``1 - t/T`` at the instants, in (0, 1].
+
+        Returns
+        -------
+        (N, M) array
+            Infinite where nothing is proved.
+
+        Raises
+        ------
+        ParameterError
+            There is no initial state.
+        """
+        if self.initial_state is None:
+            raise ParameterError("the certificate has no initial state; certify the family with x0")
+        gain = self.protocol.gain
+        clock, height = (np.asarray(of(remaining)) for of in (gain.clock_at_remaining, gain.value_at_remaining))
+        bounds = np.full((self.family.n_nodes, clock.size), np.inf)
+        for part in self.parts:
+            nodes = part.component.nodes
+            if nodes.size == 1:
+                bounds[nodes] = 0
+            x = [self.initial_state[v] for v in nodes.tolist()]
+            for V in self._bound_functions(part):
+                size = np.array([math.sqrt(V.inputs[k] * V.value(x)) for k in range(nodes.size)]) * (1 + 1e-12)
+                decay = height * np.exp(-float(V.rate) * (1 - 1e-12) / 2 * clock)
+                bounds[nodes] = np.minimum(bounds[nodes], np.multiply.outer(size, decay))
+        return bounds
 
     def deviation_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
         """Bound of ``|x_k(t) - x_k(T)|`` for every agent and every signal, from the initial state.

@@ -15,6 +15,7 @@ from ptcc_certify.certificate.format import producer
 from ptcc_certify.certificate.format_family_rows import form_entry, form_steps, rows_entry, rows_steps
 from ptcc_certify.certificate.format_graph import structure_section
 from ptcc_certify.certificate.format_restricted import claim_entry, claim_steps, enclosed
+from ptcc_certify.certificate.format_upper_bound import upper_bound_entry
 from ptcc_certify.certificate.format_vectors import Writer
 from ptcc_certify.certificate.restricted_claims import Claim
 from ptcc_certify.checker import NOT_OF_FAMILIES, OBLIGATIONS, SCHEMA, digest
@@ -26,6 +27,7 @@ from ptcc_certify.graphs.digraph import Weights
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import BIPARTITE_CONTAINMENT, INTERVAL_BIPARTITE_CONSENSUS, analyse
+from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
 
 
@@ -122,9 +124,9 @@ def _step(kind: str, of: str, witness: Any = None, **numbers: str) -> dict[str, 
 
 def _unverified(certificate: FamilyContent) -> dict[str, Any]:
     expectations = certificate.expectations
-    bounds = [part.upper_bound for part in certificate.parts]
+    bounds = [(part.component, part.upper_bound) for part in certificate.parts]
     return {
-        "upper_bounds": [None if b is None else {"value": format_exact(b.value), "kind": b.kind} for b in bounds],
+        "upper_bounds": [None if b is None else upper_bound_entry(Quotient.of(c), b) for c, b in bounds],
         "asked": {"behaviour": expectations.behaviour},
         "read": dict(certificate.family.read) or None,
         "origins": dict(certificate.origins),

@@ -15,12 +15,14 @@ from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCe
 from ptcc_certify.certificate.format import read_protocol
 from ptcc_certify.certificate.format_family import certificate_family
 from ptcc_certify.certificate.format_restricted import read_claim
+from ptcc_certify.certificate.format_upper_bound import read_upper_bound
 from ptcc_certify.certificate.format_vectors import Reader
 from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.checker.reading import exact, triangle
 from ptcc_certify.checker.side_files import SideFiles
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.lyapunov.family_function import FamilyFunction, prove_ends
+from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound
 from ptcc_certify.lyapunov.follower_function import FollowerFunction, LeadingPart
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.theorems.family_behaviour import FamilyComponent, decide
@@ -29,7 +31,7 @@ from ptcc_certify.theorems.family_behaviour import FamilyComponent, decide
 def read_family_certificate(source: Source) -> FamilyCertificate:
     """Return what an accepted file says: family, behaviours, Lyapunov functions and what follows of them.
 
-    The decision is made anew; no upper bound on the rate is taken from the file, which does not prove it.
+    The decision is made anew, and so is the proof of each upper bound on the rate from the members that the file names.
     """
     document = source.document
     family = certificate_family(document["graph"], source.files)
@@ -44,7 +46,8 @@ def read_family_certificate(source: Source) -> FamilyCertificate:
         number = section["component"]
         of = f"lyapunov.functions[{k}]"
         functions[number].append(_read_function(of, section, components[number], document["proof"], files))
-    parts = tuple(ComponentProof(c, tuple(some)) for c, some in zip(components, functions, strict=True))
+    bounds = _read_bounds(document["unverified"].get("upper_bounds"), components)
+    parts = tuple(ComponentProof(c, tuple(V), b) for c, V, b in zip(components, functions, bounds, strict=True))
     state = Reader(family.labels, source.files).state(document["initial_state"])
     expectations = _read_expectations(document["unverified"].get("asked"))
     restricted = enumerate(document.get("restricted", ()))
@@ -52,6 +55,15 @@ def read_family_certificate(source: Source) -> FamilyCertificate:
     kept: dict[str, Any] = {"signal": said[0].signal if said else "any", "restricted": said}
     protocol = read_protocol(document["protocol"])
     return FamilyCertificate(family, protocol, parts, state, expectations, source=source, **kept)
+
+
+def _read_bounds(stated: Any, components: Sequence[FamilyComponent]) -> list[FamilyRateBound | None]:
+    """Prove the upper bounds anew that a file states, one for each component."""
+    entries = stated if isinstance(stated, list) and len(stated) == len(components) else [None] * len(components)
+    return [
+        None if entry is None or component.kernel is None else read_upper_bound(Quotient.of(component), entry)
+        for entry, component in zip(entries, components, strict=True)
+    ]
 
 
 def _read_expectations(asked: Any) -> Expectations:

@@ -11,6 +11,7 @@ from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
 from ptcc_certify.cli.completion import CERTIFICATES, GRAPHS, PACKAGED, complete
+from ptcc_certify.cli.families import mode_options, read_graph_or_family, refuse_options
 from ptcc_certify.cli.kinds_of_file import kind_of
 from ptcc_certify.cli.scenario import graph_of
 from ptcc_certify.cli.terminal import FIGURES, print_lines, progress, refuse_output
@@ -18,7 +19,9 @@ from ptcc_certify.errors import ExitCode, ParameterError
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate
+    from ptcc_certify.certificate.family_certificate import FamilyCertificate
     from ptcc_certify.graphs.digraph import SignedDigraph
+    from ptcc_certify.graphs.family import Family
     from ptcc_certify.simulation.trajectory import Trajectory
 
 #: Options that a certificate takes; the others are for graphs.
@@ -27,10 +30,12 @@ _OF_CERTIFICATES = ("graph", "what", "output", "wide", "time_unit", "memory", "x
 OF_A_RUN = ("states", "input", "decay")
 
 
-@click.command(cls=shared.OneGraph)
+@click.command()
 @click.argument(
     "graph",
-    metavar="CERT|GRAPH",
+    nargs=-1,
+    required=True,
+    metavar="CERT|GRAPH..",
     is_eager=True,
     callback=graph_of,
     shell_complete=complete((*CERTIFICATES, *GRAPHS), PACKAGED),
@@ -50,29 +55,37 @@ OF_A_RUN = ("states", "input", "decay")
 @click.option("--wide", is_flag=True, help="As wide as two columns of a journal (states).")
 @shared.time_unit_option
 @shared.reading_options
+@mode_options
 @shared.protocol_options
 @shared.limit_options
 @shared.method_option
 @shared.time_limit_option
 @shared.memory_option
-def plot(graph: str, what: str | None, output: str | None, wide: bool, time_unit: str, **options: Any) -> int:
-    """Draw one figure of a certificate, a graph or a scenario.
+def plot(
+    graph: tuple[str, ...], what: str | None, output: str | None, wide: bool, time_unit: str, **options: Any
+) -> int:
+    """Draw one figure of a certificate, a graph, a family of graphs or a scenario.
 
     A certificate is checked first, and its run is repeated; that of one without an initial state, as `design` makes,
     begins at --x0. A graph is simulated, for its decay certified, with the options about protocol and initial state
     that `certify` has too.
+
+    Of a family - its certificate, or several graphs with --switching, weights in intervals, --uncertainty, --optional -
+    runs under many signals are drawn within what is proved for every signal.
     """
     from ptcc_certify.certificate.certificate import RejectedCertificate
     from ptcc_certify.report.plots.style import save_figure
 
-    certified = kind_of(graph) in ("a certificate", "JSON")
+    certified = kind_of(graph[0]) in ("a certificate", "JSON")
+    if certified and len(graph) > 1:
+        raise ParameterError(f"{graph[0]}: is a certificate, which is drawn by itself; leave out {graph[1]}")
     what = what or ("decay" if certified else "graph")
-    output = output or f"{PurePath(graph).stem.lstrip('-') or 'graph'}-{what}.png"
+    output = output or f"{PurePath(graph[0]).stem.lstrip('-') or 'graph'}-{what}.png"
     if PurePath(output).suffix.lower() not in FIGURES:
         raise ParameterError(f"{output}: figures are written to {', '.join(FIGURES)}; choose one of these")
     refuse_output(output)
     try:
-        subject = _of_certificate(graph, what, options) if certified else _of_graph(graph, what, options)
+        subject = _of_certificate(graph[0], what, options) if certified else _of_graphs(graph, what, options)
     except RejectedCertificate as error:
         print_lines(f"rejected: {error}", err=True)
         return ExitCode.VIOLATED
@@ -81,9 +94,9 @@ def plot(graph: str, what: str | None, output: str | None, wide: bool, time_unit
     return ExitCode.OK
 
 
-def _of_certificate(path: str, what: str, options: shared.Options) -> Certificate:
+def _of_certificate(path: str, what: str, options: shared.Options) -> Certificate | FamilyCertificate:
     """Read a certificate's file, and repeat its run if that is drawn; refuse options that are about a graph."""
-    from ptcc_certify.certificate.certificate import read_graph_certificate
+    from ptcc_certify.certificate.certificate import Certificate, read_certificate
 
     context = click.get_current_context()
     for parameter in context.command.params:
@@ -93,26 +106,51 @@ def _of_certificate(path: str, what: str, options: shared.Options) -> Certificat
     begins = any(context.get_parameter_source(name) is ParameterSource.COMMANDLINE for name in ("x0", "seed"))
     with progress(("independent check", "simulation")) as begin:
         begin("independent check")
-        certificate = read_graph_certificate(path, memory=options["memory"])
+        certificate = read_certificate(path, memory=options["memory"])
         if begins and certificate.initial_state is not None:
             raise ParameterError(f"--x0 is for what holds no initial state; the certificate {path} has its own")
         if what not in OF_A_RUN:
             return certificate
         if begins:
-            x0 = shared.read_initial_state(options["x0"], options["seed"], certificate.graph)
+            one = certificate.graph if isinstance(certificate, Certificate) else certificate.family.modes[0].mandatory
+            x0 = shared.read_initial_state(options["x0"], options["seed"], one)
             certificate = replace(certificate, initial_state=tuple(x0))  # to be drawn: what is proved holds for all
         elif certificate.initial_state is None:
             raise ParameterError(f"{path}: the certificate holds no initial state; give one with --x0")
         begin("simulation")
-        return certificate.with_simulation()
+        return certificate.with_simulation() if isinstance(certificate, Certificate) else certificate
 
 
-def _of_graph(path: str, what: str, options: shared.Options) -> Certificate | Trajectory | tuple[SignedDigraph, Any]:
+def _of_graphs(graphs: tuple[str, ...], what: str, options: shared.Options) -> Any:
+    """Return what the figure of a graph, or of a family, is drawn from."""
+    from ptcc_certify.graphs.family import Family
+
+    given = read_graph_or_family(graphs, options)
+    return _of_family(given, what, options) if isinstance(given, Family) else _of_graph(given, what, options)
+
+
+def _of_family(family: Family, what: str, options: shared.Options) -> Family | FamilyCertificate:
+    """Return what the figure of a family is drawn from: itself, or its certificate."""
+    from ptcc_certify.certificate.family_certificate import STEPS, certify_family
+
+    refuse_options(options)
+    if what not in OF_A_RUN:
+        return family
+    protocol = shared.protocol_of(options)
+    x0 = shared.read_initial_state(options["x0"], options["seed"], family.modes[0].mandatory)
+    if x0 is None:
+        raise ParameterError(f"{what} is drawn from an initial state; give one with --x0")
+    with progress(STEPS) as begin:
+        return certify_family(family, protocol, x0, time_limit=options["time_limit"], progress=begin)
+
+
+def _of_graph(
+    signed: SignedDigraph, what: str, options: shared.Options
+) -> Certificate | Trajectory | tuple[SignedDigraph, Any]:
     """Return what the figure of a graph is drawn from: itself, a run, or for its decay a certificate."""
     from ptcc_certify.certificate.procedure import STEPS, certify
     from ptcc_certify.simulation.run import simulate
 
-    signed = shared.read(path, options)
     protocol = shared.protocol_of(options, () if what == "decay" else ("delta", "disturbance"))
     if what in ("graph", "spectrum"):
         return signed, protocol
@@ -128,13 +166,20 @@ def _of_graph(path: str, what: str, options: shared.Options) -> Certificate | Tr
 
 
 def _drawn(what: str, subject: Any, wide: bool, time_unit: str) -> Any:
-    """Draw a figure of a certificate, a run, or a graph with its protocol."""
+    """Draw a figure of a certificate, a run, a family, or a graph with its protocol."""
+    from ptcc_certify.certificate.family_certificate import FamilyCertificate
+    from ptcc_certify.graphs.display_hook import plot_of_family
+    from ptcc_certify.graphs.family import Family
     from ptcc_certify.report.plots.decay import plot_decay
     from ptcc_certify.report.plots.graph import plot_graph
     from ptcc_certify.report.plots.input import plot_input
     from ptcc_certify.report.plots.spectrum import plot_spectrum
     from ptcc_certify.report.plots.trajectory import plot_run
 
+    if isinstance(subject, Family | FamilyCertificate):
+        if wide:
+            raise ParameterError("--wide: is for one graph, not for families yet; leave it out")
+        return plot_of_family(subject, what, **({"time_unit": time_unit} if what in OF_A_RUN else {}))
     subject, protocol = subject if isinstance(subject, tuple) else (subject, None)
     if what == "graph":
         return plot_graph(subject)

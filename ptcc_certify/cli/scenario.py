@@ -366,10 +366,10 @@ def takes_one_graph(name: str | None) -> str:
 
     Examples
     --------
-    >>> takes_one_graph("plot")
-    'ptcc plot takes one graph; a family (several graphs, uncertain weights) goes to ptcc classify, certify or simulate'
+    >>> takes_one_graph("design")
+    'ptcc design takes one graph; a family (several graphs, uncertain weights) is for ptcc classify, certify, ...'
     """
-    where = "a family (several graphs, uncertain weights) goes to ptcc classify, certify or simulate"
+    where = "a family (several graphs, uncertain weights) is for ptcc classify, certify, simulate, plot"
     return f"ptcc {name} takes one graph; {where}"
 
 

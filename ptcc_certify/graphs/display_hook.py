@@ -71,6 +71,48 @@ def plot(subject: Any, what: str, **keywords: Any) -> Any:
     return getattr(import_module("ptcc_certify"), _FIGURES[what])(subject, **keywords)
 
 
+#: The same of a family of graphs.
+_FAMILY_FIGURES = {
+    "decay": "plot_family_decay",
+    "input": "plot_input",
+    "graph": "plot_graph",
+    "states": "plot_family",
+}
+
+
+def plot_of_family(subject: Any, what: str, **keywords: Any) -> Any:
+    """Draw a figure of a family or of its certificate.
+
+    Raises
+    ------
+    ParameterError
+        No figure is called so, or families have none.
+
+    Examples
+    --------
+    >>> plot_of_family(None, "spectrum")
+    Traceback (most recent call last):
+    ptcc_certify.errors.ParameterError: eigenvalues of single graphs do not tell what switching among them does; ...
+    """
+    if what == "spectrum":
+        why = "eigenvalues of single graphs do not tell what switching among them does"
+        raise ParameterError(f"{why}; draw those of one graph, or the decay of the family")
+    if what not in _FAMILY_FIGURES:
+        raise ParameterError(f"what = {what!r} is unknown; one of {', '.join(_FAMILY_FIGURES)}")
+    return getattr(import_module("ptcc_certify"), _FAMILY_FIGURES[what])(subject, **keywords)
+
+
+def plot_of_counterexample(component: Any, **keywords: Any) -> Any:
+    """Draw what refutes a behaviour of a component of a family.
+
+    Examples
+    --------
+    >>> plot_of_counterexample(ptcc.decide([("a", "b", 1, 1), ("b", "a", -1, 0)])[0]).get_ylabel()
+    'state $x_k$'
+    """
+    return import_module("ptcc_certify.report.plots.counterexample").plot_counterexample(component, **keywords)
+
+
 def summary(subject: Any) -> str:
     """Return what the command line prints of a certificate."""
     origins = subject.request.origins

@@ -14,7 +14,7 @@ from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,6 +22,10 @@ from ptcc_certify.errors import GraphError, NumberError
 from ptcc_certify.graphs.digraph import Exact, SignedDigraph, Weights, ordered_labels, refuse_unknown_orientation
 from ptcc_certify.graphs.display_hook import Shown
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, shorten
+from ptcc_certify.graphs.tables import import_pandas
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Interval = tuple[Hashable, Hashable, Exact, Exact]
 
@@ -159,6 +163,17 @@ class Mode:
         if self.tied and not self.known.all():
             yield json.dumps({"undirected": True})
         yield from self.lines()
+
+    def __eq__(self, other: object) -> bool:
+        """Two modes are equal when their nodes and edges are; names do not count."""
+        return isinstance(other, Mode) and self._lines == other._lines
+
+    def __hash__(self) -> int:
+        return hash(self._lines)
+
+    @cached_property
+    def _lines(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        return tuple(sorted(self.labels)), tuple(self.marked_lines())
 
     def __repr__(self) -> str:
         uncertain, optional = int((~self.known).sum()), int(self.optional.sum())
@@ -357,8 +372,35 @@ class Family(Shown):
                 )
         return cls(tuple(joint), tuple(note for _, family in families for note in family.notes))
 
+    def to_pandas(self) -> pd.DataFrame:
+        """Return the edges of all modes as a table: mode, ends, and the interval of the weight, rounded to floats.
+
+        Raises
+        ------
+        ParameterError
+            pandas is not installed.
+
+        Examples
+        --------
+        >>> Family.from_intervals([("a", "b", -3, -2)]).to_pandas().values.tolist()
+        [['', 'a', 'b', -3.0, -2.0]]
+        """
+        columns = ["mode", "source", "target", "weight_min", "weight_max"]
+        rows = []
+        for mode in self.modes:
+            for edge in range(mode.n_edges):
+                ends = (self.labels[int(end[edge])] for end in (mode.source, mode.target))
+                rows.append((mode.name, *ends, *map(float, mode.edge_interval(edge))))
+        return import_pandas().DataFrame(rows, columns=columns)
+
     def __len__(self) -> int:
         return self.n_nodes
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.labels)
+
+    def __contains__(self, label: object) -> bool:
+        return str(label) in self.labels
 
     def __eq__(self, other: object) -> bool:
         """Two families are equal when their nodes and their modes are, in the same order."""

@@ -378,11 +378,7 @@ def prove_candidate(quotient: Quotient, candidate: Candidate) -> FamilyRateBound
         value = prove_word(matrices, durations)
         return None if value is None else FamilyRateBound(value, "word", candidate.members, tuple(durations))
     shares = [h / sum(durations) for h in durations]
-    n = len(matrices[0])
-    A = [
-        [sum((s * M[i][j] for s, M in zip(shares, matrices, strict=True)), Fraction(0)) for j in range(n)]
-        for i in range(n)
-    ]
+    A, n = _mixture(matrices, shares), len(matrices[0])
     mean = FamilyRateBound(
         2 * sum((A[i][i] for i in range(n)), Fraction(0)) / n, candidate.kind, candidate.members, tuple(shares)
     )
@@ -396,6 +392,39 @@ def prove_candidate(quotient: Quotient, candidate: Candidate) -> FamilyRateBound
             if 2 * bound < mean.value and (witness := prove_slow_eigenvalues(A, bound)) is not None:
                 return FamilyRateBound(2 * bound, candidate.kind, candidate.members, tuple(shares), *witness)
     return mean
+
+
+def prove_again(
+    quotient: Quotient, kind: str, members: tuple[Member, ...], durations: Vector, value: Fraction
+) -> FamilyRateBound | None:
+    """Prove the bound that given members make, with ``value`` as the aim; None if it fails.
+
+    Examples
+    --------
+    >>> quotient = Quotient(Family.from_intervals([("a", "b", 1, 2)]))
+    >>> prove_again(quotient, "member", (Member(0, (Fraction(1),)),), (Fraction(1),), Fraction(4)).value
+    Fraction(4, 1)
+    """
+    if not 0 < len(quotient.nodes) <= EXACT_NODES:
+        return None
+    matrices = [quotient.modes[m.mode].member(m.levels) for m in members]
+    if kind == "word":
+        rate = prove_word(matrices, durations)
+        return None if rate is None else FamilyRateBound(rate, kind, members, durations)
+    A = _mixture(matrices, durations)
+    mean = 2 * sum((A[i][i] for i in range(len(A))), Fraction(0)) / len(A)
+    if mean <= value:
+        return FamilyRateBound(mean, kind, members, durations)
+    witness = prove_slow_eigenvalues(A, value / 2)
+    return None if witness is None else FamilyRateBound(value, kind, members, durations, *witness)
+
+
+def _mixture(matrices: Sequence[Matrix], shares: Sequence[Fraction]) -> Matrix:
+    n = len(matrices[0])
+    return [
+        [sum((s * M[i][j] for s, M in zip(shares, matrices, strict=True)), Fraction(0)) for j in range(n)]
+        for i in range(n)
+    ]
 
 
 def prove_word(matrices: Sequence[Matrix], durations: Sequence[Fraction]) -> Fraction | None:

@@ -22,6 +22,7 @@ from ptcc_certify.graphs.size_limits import SHOWN_NODES
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.report.family_screen import decision_lines, family_lines, family_text
 from ptcc_certify.report.figures import draw
+from ptcc_certify.report.plots.family_graph import plot_family_graph
 from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.plots.style import figure_bytes
 from ptcc_certify.report.plots.trade_off import plot_trade_off
@@ -57,17 +58,25 @@ def certificate_html(certificate: Certificate) -> str:
 
 @shows(FamilyCertificate)
 def family_certificate_html(certificate: FamilyCertificate) -> str:
-    """Show the certificate of a family: the screen of ``ptcc certify``."""
+    """Show the certificate of a family: the screen of ``ptcc certify``, and a drawing of up to 120 nodes."""
     origins = certificate.origins
-    return _page(family_lines(certificate, origins.get("graph", "family"), origins), None, "")
+    lines = family_lines(certificate, origins.get("graph", "family"), origins)
+    return _page(lines, *_family_figure(certificate.family))
 
 
 @shows(Family)
 def family_html(family: Family) -> str:
-    """Show a family: the screen of ``ptcc classify``, up to 120 nodes; of more its size alone."""
+    """Show a family: the screen of ``ptcc classify``, and a drawing, up to 120 nodes; of more its size alone."""
     if family.n_nodes > SHOWN_NODES:
         return _page([f"{'family':<{_HEAD}}{family_text(family, 'family')}"], None, "")
-    return _page(decision_lines(decide(family), family, "family"), None, "")
+    return _page(decision_lines(decide(family), family, "family"), *_family_figure(family))
+
+
+def _family_figure(family: Family) -> tuple[Any, str]:
+    """Return a drawing of a family, unless it is large, and a text in its place."""
+    if family.n_nodes > SHOWN_NODES:
+        return None, ""
+    return plot_family_graph(family).figure, f"drawing of the family: {family_text(family, 'family')}"
 
 
 @shows(Trajectory)

@@ -9,6 +9,7 @@ import math
 import re
 import shlex
 from collections import Counter
+from collections.abc import Sequence
 from datetime import date
 from fractions import Fraction
 from functools import cache
@@ -21,16 +22,20 @@ from markupsafe import Markup
 
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate
+from ptcc_certify.certificate.family_certificate import FamilyCertificate
+from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.obligations import VerifiedObligation
 from ptcc_certify.graphs.io.graph_files import reading_flags
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.size_limits import DRAWN_NODES, LABELLED_NODES
 from ptcc_certify.report import notation as texts
+from ptcc_certify.report.family_page import family_view
 from ptcc_certify.report.figures import draw, inline_figure
 from ptcc_certify.report.notation import above, agent_parts, enclosed, printable, rational
 from ptcc_certify.report.plots.agents import camp_groups
 from ptcc_certify.report.plots.distributions import plot_degrees, plot_final_states
 from ptcc_certify.report.structure_text import camps, remarks_on
+from ptcc_certify.simulation.family_run import FamilyTrajectory
 from ptcc_certify.theorems.table import THEOREMS
 
 #: Agents up to which each has a row, and how many there are of either extreme above; leader groups that have a row.
@@ -39,18 +44,26 @@ ROWS, EXTREMES, GROUPS = 60, 10, 12
 FEW = 8
 
 
-def report_html(saved: Certificate, *, no_run: str = "no run was asked for", day: date | None = None) -> str:
+def report_html(
+    saved: Certificate | FamilyCertificate,
+    *,
+    no_run: str = "no run was asked for",
+    runs: Sequence[FamilyTrajectory] = (),
+    day: date | None = None,
+) -> str:
     """Return a certificate as one page of HTML that loads nothing and runs no script.
 
     The first screen is the answer in words; the same certificate makes the same page on the same day.
 
     Parameters
     ----------
-    saved : Certificate
+    saved : Certificate or FamilyCertificate
         As :func:`ptcc_certify.certificate.certificate.read_certificate` reads it; with a trajectory
-        (:meth:`Certificate.with_simulation`) there are figures of bound and input.
+        (:meth:`Certificate.with_simulation`) there are figures of bound and input. One of a family may be undecided.
     no_run : str
         Why there is no trajectory, for the page.
+    runs : sequence of FamilyTrajectory
+        Of a family, for figures of bound and input.
     day : date, optional
         The day that the page gives as that of its writing; today by default.
 
@@ -68,7 +81,11 @@ def report_html(saved: Certificate, *, no_run: str = "no run was asked for", day
     >>> "<h1>Bipartite consensus at T = 1</h1>" in page, "<bdi>&lt;b&gt;</bdi>" in page, "<b>" in page
     (True, True, False)
     """
-    return _environment().get_template("page.html").render(_view(saved) | _written(day) | {"no_run": no_run})
+    template = "family_page.html" if isinstance(saved, FamilyCertificate) else "page.html"
+    report = saved.checked
+    more = {"no_run": no_run, "obligations": [] if report is None else _obligations(report)}
+    shown = family_view(saved, runs) if isinstance(saved, FamilyCertificate) else _view(saved)
+    return _environment().get_template(template).render(shown | _written(day) | more)
 
 
 def rejected_html(error: RejectedCertificate, *, day: date | None = None) -> str:
@@ -123,6 +140,7 @@ def _environment() -> jinja2.Environment:
     environment.globals |= {"style": Markup(style), "inline_figure": inline_figure, "newline": Markup("\n")}
     environment.globals |= {"ROWS": ROWS, "EXTREMES": EXTREMES, "GROUPS": GROUPS, "FEW": FEW}
     environment.globals |= {"LABELLED_NODES": LABELLED_NODES}
+    environment.filters |= {"merged": dict.__or__, "capitalized": lambda text: text[:1].upper() + text[1:]}
     return environment
 
 
@@ -148,7 +166,6 @@ def _view(saved: Certificate) -> dict[str, Any]:
         "statements": {theorem.number: theorem.statement for theorem in THEOREMS},
         "states": _states(saved),
         "endings": _endings(saved),
-        "obligations": _obligations(saved),
         "group_sizes": sorted(Counter((len(c.nodes), c.balanced) for c in saved.structure.closed_components).items()),
         "kinds": Counter(m.kind for m in saved.envelope.functions).items(),
         "remaining": _remaining(saved),
@@ -210,10 +227,10 @@ def _endings(saved: Certificate) -> list[tuple[Markup, str]]:
     return [(texts.labels(list(nodes), saved.graph.labels, FEW), enclosed(value)) for value, nodes in same]
 
 
-def _obligations(saved: Certificate) -> list[tuple[VerifiedObligation, list[VerifiedObligation]]]:
+def _obligations(report: CheckReport) -> list[tuple[VerifiedObligation, list[VerifiedObligation]]]:
     """Return the obligations of one kind and statement together, in the order of the first of each."""
     kinds: dict[tuple[str, str, str], list[VerifiedObligation]] = {}
-    for obligation in saved.report.obligations:
+    for obligation in report.obligations:
         kinds.setdefault((obligation.kind, obligation.statement, obligation.lemma), []).append(obligation)
     return [(same[0], same) for same in kinds.values()]
 

@@ -8,23 +8,27 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
-from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate, read_graph_certificate
+from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate, read_certificate
+from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.certificate.request import listener
 from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.graphs.io import write_atomically
 from ptcc_certify.graphs.io.files import refuse_no_path
 from ptcc_certify.graphs.size_limits import INPUT_NODES, REPEATED_NODES
+from ptcc_certify.report.family_page import draw_family
 from ptcc_certify.report.figures import draw
 from ptcc_certify.report.page import rejected_html, report_html
+from ptcc_certify.report.plots.family import sample_runs
 from ptcc_certify.report.plots.style import figure_bytes
-from ptcc_certify.report.statement import report_latex
+from ptcc_certify.report.statement import family_latex, report_latex
+from ptcc_certify.simulation.family_run import FamilyTrajectory
 
 #: What a report is written as.
 SUFFIXES = (".html", ".htm", ".tex")
 
 
 def write_report(
-    certificate: str | Path | Mapping[str, Any] | Certificate,
+    certificate: str | Path | Mapping[str, Any] | Certificate | FamilyCertificate,
     output: str | Path,
     *,
     simulation: bool | None = None,
@@ -39,12 +43,13 @@ def write_report(
 
     Parameters
     ----------
-    certificate : path, mapping or Certificate
+    certificate : path, mapping, Certificate or FamilyCertificate
         A file of schema ``ptcc-certificate/2``, its parsed JSON, or a certificate.
     output : path
         The suffix decides what is written.
     simulation : bool, optional
-        Whether to repeat the CVODES run for the figures; by default up to 1,000 agents.
+        Whether to repeat the CVODES run for the figures; by default up to 1,000 agents. Of a family runs under many
+        signals, by default up to 100 agents.
     progress : callable, optional
         Told which of ``independent check``, ``simulation``, ``report`` begins.
     memory : float
@@ -80,7 +85,7 @@ def write_report(
     path, suffix = Path(output), Path(output).suffix.lower()
     if suffix not in SUFFIXES:
         raise ParameterError(f"{output}: a report is written to .html or .tex; choose one of these")
-    if not (in_memory := isinstance(certificate, Certificate | Mapping)):
+    if not (in_memory := isinstance(certificate, Certificate | FamilyCertificate | Mapping)):
         refuse_no_path(certificate)
     file = None if in_memory else Path(certificate)  # type: ignore[arg-type]
     if file is not None and path.is_file() and file.is_file() and path.samefile(file):
@@ -92,28 +97,75 @@ def write_report(
     progress = listener(progress)
     progress("independent check")
     try:
-        saved = read_graph_certificate(certificate, memory=memory)
+        saved = _read(certificate, memory)
     except RejectedCertificate as error:
         if suffix == ".tex":
             raise
         write_atomically(path, rejected_html(error, day=day))
         return "rejected"
     progress("simulation")
+    if isinstance(saved, FamilyCertificate):
+        _write_family(saved, path, suffix, simulation, progress, day)
+        return saved.verdict
     saved, why = _with_run(saved, simulation)
     progress("report")
     if suffix == ".tex":
-        drawn = draw(saved, ("graph", "decay"))
-        files = {name: path.with_name(f"{path.stem}_{name}.pdf") for name in drawn}
-        if folder := next((file for file in files.values() if file.is_dir()), None):
-            raise ParameterError(f"{folder}: is a folder, where a figure of the statement would go; name another file")
-        text = report_latex(saved, {name: file.name for name, file in files.items()})
-        contents = {files[name]: figure_bytes(figure, ".pdf") for name, figure in drawn.items()}
-        for file, content in contents.items():
-            write_atomically(file, content)
-        write_atomically(path, text)
+        _write_statement(path, draw(saved, ("graph", "decay")), lambda names: report_latex(saved, names))
     else:
         write_atomically(path, report_html(saved, no_run=why, day=day))
     return saved.verdict
+
+
+def _read(certificate: Any, memory: float) -> Certificate | FamilyCertificate:
+    """Read a certificate back; that of a family of which nothing is certified has no file, and stays what it is."""
+    if isinstance(certificate, FamilyCertificate) and certificate.verdict != "certified":
+        return certificate
+    return read_certificate(certificate, memory=memory)
+
+
+def _write_family(
+    saved: FamilyCertificate,
+    path: Path,
+    suffix: str,
+    simulation: bool | None,
+    progress: Callable[[str], None],
+    day: date | None,
+) -> None:
+    """Write the page of a family's certificate, or its statement."""
+    if suffix == ".tex" and saved.source is None:
+        raise ParameterError("nothing is certified of this family, so that there is no statement; a page tells why")
+    runs, why = _runs(saved, simulation)
+    progress("report")
+    if suffix == ".tex":
+        _write_statement(path, draw_family(saved, runs), lambda names: family_latex(saved, names))
+    else:
+        write_atomically(path, report_html(saved, runs=runs, no_run=why, day=day))
+
+
+def _write_statement(path: Path, drawn: Mapping[str, Any], latex: Callable[[dict[str, str]], str]) -> None:
+    """Write a statement, given the names of its figures, and these beside it."""
+    files = {name: path.with_name(f"{path.stem}_{name}.pdf") for name in drawn}
+    if folder := next((file for file in files.values() if file.is_dir()), None):
+        raise ParameterError(f"{folder}: is a folder, where a figure of the statement would go; name another file")
+    text = latex({name: file.name for name, file in files.items()})
+    contents = {files[name]: figure_bytes(figure, ".pdf") for name, figure in drawn.items()}
+    for file, content in contents.items():
+        write_atomically(file, content)
+    write_atomically(path, text)
+
+
+def _runs(saved: FamilyCertificate, simulation: bool | None) -> tuple[list[FamilyTrajectory], str]:
+    """Simulate a family under many signals, if there is an initial state; return why there is no run."""
+    if simulation is False:
+        return [], "it was left out (--no-simulation)"
+    if saved.initial_state is None:
+        return [], "the certificate names no initial state"
+    if simulation is None and saved.family.n_nodes > INPUT_NODES:
+        return [], f"above {INPUT_NODES} agents it is made only where that is asked for"
+    try:
+        return sample_runs(saved), ""
+    except (SimulationError, ParameterError, OverflowError) as error:
+        return [], f"it failed: {error}"
 
 
 def _with_run(saved: Certificate, simulation: bool | None) -> tuple[Certificate, str]:

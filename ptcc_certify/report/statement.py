@@ -6,6 +6,7 @@ Its sentences are in ``templates/statement.tex``; what is not LaTeX already is e
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from fractions import Fraction
 from functools import cache
 
@@ -14,9 +15,13 @@ from markupsafe import Markup
 
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.protocols.casadi_latex import symbol_latex
 from ptcc_certify.report import notation as texts
+from ptcc_certify.report.family_page import BOUND_KINDS, THEOREM, family_facts, remaining, state_rows
+from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_name
+from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
 
 #: Agents up to which ``W`` is printed (a matrix of amsmath has 10 columns), and edges up to which these are.
 _MATRIX, _EDGES = 10, 60
@@ -26,6 +31,17 @@ _CAPTIONS = {
         "What is left of the error against the time left, both logarithmic. Thick line: the proved bound, the least of"
         " those of the Lyapunov functions, which are the thin lines; dashed: that of the theorem's own. With circles: a"
         " simulated run (numerical), down to the dotted line, below which the integrator resolves nothing."
+    ),
+}
+_FAMILY_CAPTIONS = {
+    "graph": (
+        "The graphs: arrows point to who listens, solid from allies, dashed from opponents; dotted ones may fail. A"
+        " pale band is as wide as the largest weight, the line on it as the least."
+    ),
+    "decay": (
+        "How far agents are from their final states, against the time left, both logarithmic. Thick line: the proved"
+        " bound for every signal. Thin: simulated runs (numerical), down to the dotted line, below which the integrator"
+        " resolves nothing."
     ),
 }
 #: What a behaviour is, in symbols.
@@ -78,26 +94,96 @@ def report_latex(saved: Certificate, figures: dict[str, str] | None = None) -> s
     """
     names = texts.parameter_names(saved.protocol)
     view = texts.facts(saved) | {
-        # nothing but ASCII is safe in a comment
-        "comment": Markup("".join(c if " " <= c <= "~" else "?" for c in saved.path.name)),
+        "comment": _comment(saved.path.name),
         "parameters": [(Markup(symbol_latex(name)), getattr(saved.protocol, name)) for name in names],
-        **{"structure": saved.structure, "named": _named(saved.graph)},
+        **{"structure": saved.structure, "named": _named(saved.graph.labels)},
         **{"matrix": _matrix(saved.graph), "edges": _edges(saved.graph)},
         **{"connectivity": texts.structure_text(saved.structure).partition(";")[0], "bounds": _bounds(saved)},
         "shares": _shares(saved),
         "times": [0.0, *(r.time for r in saved.reaching or () if r.z is not None)],
         **dict(zip(("columns", "rows"), _states(saved), strict=True)),
-        **{"figures": figures or {}, "stem": re.sub("[^A-Za-z0-9]+", "-", saved.path.stem)},
-        "sha256": Markup(r"\allowbreak{}".join(saved.sha256[i : i + 8] for i in range(0, 64, 8))),
+        **{"figures": figures or {}, "stem": _stem(saved.path.stem)},
+        "sha256": _broken(saved.sha256),
     }
     return _environment().get_template("statement.tex").render(view)
 
 
-def _named(graph: SignedDigraph) -> list[str]:
+def family_latex(saved: FamilyCertificate, figures: dict[str, str] | None = None) -> str:
+    r"""Return a family's certificate as a statement in LaTeX, to be read by ``\input``; see :func:`report_latex`.
+
+    Parameters
+    ----------
+    saved : FamilyCertificate
+        As :func:`ptcc_certify.certificate.certificate.read_certificate` reads it.
+    figures : mapping of {"graph", "decay"} to str, optional
+        Names of the files that are included.
+
+    Examples
+    --------
+    >>> unsure = Family.from_intervals([("a", "b", "0.8", "1.2"), ("b", "a", "0.5", "1.5")])
+    >>> with TemporaryDirectory() as folder:
+    ...     certify(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2]).save(f"{folder}/c.json")
+    ...     text = family_latex(read_certificate(f"{folder}/c.json"))
+    >>> print(next(line for line in text.splitlines() if line.startswith("Consensus")))
+    Consensus occurs at $T$ for every such choice: as $t \to T$, all $x_{k}(t)$ have the same limit.
+    """
+    assert saved.source is not None
+    names = texts.parameter_names(saved.protocol)
+    rows = [(_cut(label), *cells) for label, *cells in state_rows(saved)[: texts.LISTED]]
+    view = family_facts(saved) | {
+        "comment": _comment(saved.source.path.name),
+        "parameters": [(Markup(symbol_latex(name)), getattr(saved.protocol, name)) for name in names],
+        **{"named": _named(saved.family.labels), "listed": _intervals(saved), "rows": rows},
+        "remaining": [(f, _number(bound)) for f, bound in remaining(saved)],
+        "why": [counterexample_text(c, c.counterexample) for c in _depending(saved) if c.counterexample is not None],
+        **{"figures": figures or {}, "stem": _stem(saved.source.path.stem), "report": saved.checked},
+        **{"sha256": _broken(saved.source.sha256), "sha256_plain": saved.source.sha256},
+        **{"bound_kinds": BOUND_KINDS, "theorem": THEOREM, "captions": _FAMILY_CAPTIONS},
+    }
+    return _environment().get_template("family_statement.tex").render(view)
+
+
+def _depending(saved: FamilyCertificate) -> list[FamilyComponent]:
+    return [part.component for part in saved.parts if part.component.behaviour == DEPENDS]
+
+
+def _intervals(saved: FamilyCertificate) -> list[tuple[str, list[tuple[int, int, Fraction, Fraction]]]]:
+    """Return listener, source and interval of the edges of every mode of a family that has few, agents from 1."""
+    modes = saved.family.modes
+    if sum(mode.n_edges for mode in modes) > _EDGES:
+        return []
+    return [
+        (
+            texts.printable(mode_name(saved.family, number)),
+            [(int(mode.target[e]) + 1, int(mode.source[e]) + 1, *mode.edge_interval(e)) for e in range(mode.n_edges)],
+        )
+        for number, mode in enumerate(modes)
+    ]
+
+
+def _comment(name: str) -> Markup:
+    """Return a file name for a comment, in which nothing is safe but ASCII."""
+    return Markup("".join(c if " " <= c <= "~" else "?" for c in name))
+
+
+def _stem(stem: str) -> str:
+    return re.sub("[^A-Za-z0-9]+", "-", stem)
+
+
+def _broken(sha256: str) -> Markup:
+    """Return a hash that LaTeX may break over lines."""
+    return Markup(r"\allowbreak{}".join(sha256[i : i + 8] for i in range(0, 64, 8)))
+
+
+def _cut(label: str) -> str:
+    return texts.printable(label, texts.CHARACTERS // 2)
+
+
+def _named(labels: Sequence[str]) -> list[str]:
     """Return the labels in the order of the agents' numbers, unless they are these numbers or too many."""
-    numbers = [str(k) for k in range(1, graph.n_nodes + 1)]
-    cut = [texts.printable(label, texts.CHARACTERS // 2) for label in graph.labels[: texts.LISTED]]
-    return cut if graph.n_nodes <= texts.LISTED and cut != numbers else []
+    numbers = [str(k) for k in range(1, len(labels) + 1)]
+    cut = [_cut(label) for label in labels[: texts.LISTED]]
+    return cut if len(labels) <= texts.LISTED and cut != numbers else []
 
 
 def _matrix(graph: SignedDigraph) -> list[list[Fraction]]:
@@ -142,7 +228,7 @@ def _states(saved: Certificate) -> tuple[list[str], list[tuple[str, str, tuple[s
     heads = ("$x_{k}(0)$", r"$\sigma_{k}(0)$", "at the deadline", "limit, if it settles")
     agents = range(min(saved.graph.n_nodes, texts.LISTED))
     numbers = texts.state_columns(saved, heads, agents, lambda x: texts.enclosed(x) if x[1] else texts.rational(x[0]))
-    labels = [texts.printable(label, texts.CHARACTERS // 2) for label in saved.graph.labels[: texts.LISTED]]
+    labels = [_cut(label) for label in saved.graph.labels[: texts.LISTED]]
     return list(numbers), list(zip(labels, texts.agent_parts(saved), zip(*numbers.values(), strict=True), strict=False))
 
 

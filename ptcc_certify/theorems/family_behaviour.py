@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.display_hook import plot_of_counterexample
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.io import as_family
 from ptcc_certify.graphs.rationals import shorten
@@ -175,6 +176,34 @@ class FamilyComponent:
             return _stable_member(0, self.family.modes[0])
         two = self._two_components() if behaviour == INTERVAL_BIPARTITE_CONSENSUS else None
         return two or self.counterexample
+
+    def plot(self, behaviour: str | None = None, **keywords: Any) -> Any:
+        """Draw what refutes a behaviour: a run from the state, under the signal, that the counterexample names.
+
+        Parameters
+        ----------
+        behaviour : str, optional
+            By default the counterexample of the component is drawn, why its behaviour depends on the signal.
+        **keywords : Any
+            ``ax``, ``protocol`` and ``time_unit`` of
+            :func:`~ptcc_certify.report.plots.counterexample.plot_counterexample`.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+
+        Raises
+        ------
+        ParameterError
+            There is no counterexample, or no state of it is known.
+
+        Examples
+        --------
+        >>> decide(Family.from_intervals([("a", "b", 1, 2)]))[0].plot("stability").get_ylabel()
+        'state $x_k$'
+        """
+        why = self.counterexample if behaviour is None else self.refutation(behaviour)
+        return plot_of_counterexample(self, why=why, **keywords)
 
     def _balanced_closed_set(self) -> Counterexample | None:
         for number, structure in enumerate(self.structures):

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from bad_inputs import ptcc
 
+from ptcc_certify import NominalProtocol, certify
 from ptcc_certify.certificate.verdict import CERTIFIED
 from ptcc_certify.graphs.io import read_family
 
@@ -186,7 +187,7 @@ def test_what_is_not_decided_says_what_to_try_and_writes_nothing():
     assert run.code == 4 and "left open: rate >= 0.001" in " ".join(run.out.split()), run
 
 
-@pytest.mark.parametrize("command", ["plot", "design", "explore"])
+@pytest.mark.parametrize("command", ["design", "explore"])
 def test_commands_about_one_graph_say_so(command: str):
     needs = ("--max-input", "1", "--initial-bound", "1", "--deadline", "1") if command == "design" else ()
     for words in (("day.csv", "night.csv"), ("unsure.csv",), ("day.csv", "--switching")):
@@ -199,11 +200,35 @@ def test_commands_about_one_graph_say_so(command: str):
         assert f"ptcc {command} takes one graph" in ptcc(command, "s.toml").err
 
 
-def test_pages_and_figures_of_the_certificate_of_a_family_are_refused():
-    assert ptcc("certify", "may_fail.csv", "-o", "c.json").code == 0
-    for words in (("report", "c.json", "-o", "p.html"), ("plot", "c.json")):
+def test_pages_statements_and_figures_are_made_of_the_certificate_of_a_family():
+    assert ptcc("certify", *BOTH, "--kappa", "3", "--x0", "3,1,2", "-o", "c.json").code == 0
+    for name in ("p.html", "p.tex"):
+        assert ptcc("report", "c.json", "-o", name, "--no-simulation").out == f"certified  {name}\n"
+    assert "Bipartite consensus at T = 1 for every signal" in Path("p.html").read_text("utf-8")
+    for what in ("decay", "graph"):
+        assert ptcc("plot", "c.json", "--what", what).out == f"written    c-{what}.png\n"
+        assert Path(f"c-{what}.png").stat().st_size > 10_000
+
+
+def test_figures_are_made_of_the_files_of_a_family():
+    assert ptcc("plot", *BOTH).out == "written    day-graph.png\n"
+    assert ptcc("plot", "unsure.csv", "--what", "input", "--x0", "3,1,2").out == "written    unsure-input.png\n"
+    for words, told in (
+        (("plot", *BOTH, "--what", "spectrum"), "eigenvalues of single graphs do not tell"),
+        (("plot", "day.csv", "night.csv"), "2 graphs; add --switching"),
+        (("plot", *BOTH, "--what", "states", "--gain-cap", "3"), "--gain-cap: is for one graph"),
+        (("plot", *BOTH, "--wide"), "--wide: is for one graph"),
+    ):
         run = ptcc(*words)
-        assert run.code == 2 and "certificate of a family" in run.err
+        assert (run.code, run.out) == (2, "") and told in run.err, run
+
+
+def test_a_certificate_without_an_initial_state_is_drawn_from_one_that_is_given():
+    certify(read_family(BOTH[:2]), NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)).save("c.json")
+    assert "give one with --x0" in ptcc("plot", "c.json").err
+    assert ptcc("plot", "c.json", "--what", "states", "--x0", "3,1,2").code == 0
+    assert "is a certificate, which is drawn by itself" in ptcc("plot", "c.json", "day.csv").err
+    assert "--switching is for a graph" in ptcc("plot", "c.json", "--switching").err
 
 
 def _rows(*rows: str, header: str = INTERVALS) -> str:

@@ -83,11 +83,11 @@ def test_each_is_shown_with_what_it_says_and_a_figure() -> None:
     assert "certified" in shown(cert).text
 
 
-def test_families_are_told_in_words() -> None:
+def test_families_are_told_in_words_and_drawn() -> None:
     family = ptcc.as_family("fig3a", uncertainty="10%")
     for value in (family, certify(family, PROTOCOL)):
         page = shown(value)
-        assert not page.images and "depends on the signal" in page.text
+        assert "drawing of the family" in page.images[0]["alt"] and "depends on the signal" in page.text
 
 
 def test_what_cannot_be_drawn_is_told_in_words() -> None:

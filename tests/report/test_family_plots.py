@@ -8,9 +8,13 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.report.plots.counterexample import plot_counterexample
 from ptcc_certify.report.plots.family import plot_family, plot_family_decay, sample_runs
+from ptcc_certify.report.plots.family_graph import plot_family_graph
+from ptcc_certify.report.plots.family_input import plot_family_input
 from ptcc_certify.simulation.family_run import simulate_family
 from ptcc_certify.simulation.signals import RandomSignal, WorstCaseSignal
+from ptcc_certify.theorems.family_behaviour import decide
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
 DAY = Family.from_graph(SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1), ("c", "a", -2)]), uncertainty="20%")
@@ -55,3 +59,88 @@ def test_what_cannot_be_drawn_is_refused(drawn):
     ):
         with pytest.raises(ParameterError, match=told):
             call()
+
+
+def test_the_input_of_every_run_lies_below_its_bound(drawn):
+    certificate, runs = drawn
+    ax = plot_family_input(certificate, runs=runs)
+    lines = {line.get_label(): line for line in ax.lines}
+    bound = lines["proved for every signal"]
+    for line in ax.lines:
+        t, size = line.get_xdata(), line.get_ydata()
+        if len(t) == len(bound.get_xdata()) and line is not bound:
+            assert not (size > bound.get_ydata() * 1.000001).any()
+    assert float(bound.get_ydata()[0]) == pytest.approx(float(max(certificate.input_peaks)))
+
+
+def test_modes_are_drawn_side_by_side_with_nodes_in_the_same_places():
+    ax = plot_family_graph(Family.switching({"day": DAY, "night": NIGHT}))
+    titles = [panel.get_title() for panel in ax.child_axes]
+    places = [[text.get_position() for text in panel.texts if text.get_text() in "abc"] for panel in ax.child_axes]
+    assert titles == ["day", "night"] and places[0] == places[1]
+
+
+def test_ranges_of_uncertain_weights_are_written_at_their_edges_and_edges_that_may_fail_are_named():
+    ax = plot_family_graph(Family.from_intervals([("a", "b", -2, -1), ("b", "c", 0, 3), ("c", "a", -1, 1)]))
+    assert {"1\N{EN DASH}2", "0\N{EN DASH}3"} <= {text.get_text() for text in ax.texts}
+    assert {"uncertain weight", "may fail"} <= {text.get_text() for text in ax.get_legend().get_texts()}
+
+
+@pytest.mark.parametrize("n", [1, 2, 9, 50])
+def test_graphs_of_all_sizes_are_drawn(n):
+    edges = [(k, (k + 1) % n, 0, 1 + k % 2) for k in range(n)] if n > 1 else []
+    mode = Family.from_intervals(edges, nodes=range(n))
+    for family in (mode, Family.switching([mode] * 8)):
+        plot_family_graph(family).figure.canvas.draw()
+
+
+DECIDED = {
+    "moving state": Family.switching(
+        {"day": Family.from_graph(NIGHT), "foe": SignedDigraph.from_edges([("c", "a", 2), ("a", "b", 1)])}
+    ),
+    "edge": Family.from_graph(NIGHT, optional=[("a", "b")]),
+    "kernels": Family.switching([NIGHT, SignedDigraph.from_edges([("a", "b", 1), ("b", "a", -1), ("a", "c", 1)])]),
+    "undirected": Family.from_intervals([("a", "b", 1, 2), ("b", "c", 0, 1)], undirected=True),
+}
+
+
+@pytest.mark.parametrize("name", DECIDED)
+def test_a_state_that_moves_rests_up_to_half_the_deadline_and_not_after(name):
+    (component,) = decide(DECIDED[name])
+    ax = plot_counterexample(component)
+    agents = [line for line in ax.lines if len(line.get_xdata()) > 2]
+    t = agents[0].get_xdata()
+    states = np.array([line.get_ydata() for line in agents])
+    assert np.ptp(states[:, t < 0.5], axis=1).max() < 1e-9 < 1e-2 < np.ptp(states, axis=1).max()
+
+
+@pytest.mark.parametrize("behaviour", ["stability", "bipartite consensus", "interval bipartite consensus"])
+@pytest.mark.parametrize("name", DECIDED)
+def test_every_refutation_is_drawn(name, behaviour):
+    (component,) = decide(DECIDED[name])
+    why = component.refutation(behaviour)
+    assert why is not None
+    assert plot_counterexample(component, why=why).lines or why.kind == "no camps"
+
+
+def test_a_behaviour_that_holds_has_no_counterexample():
+    with pytest.raises(ParameterError, match="holds for every signal"):
+        plot_counterexample(decide(DAY)[0])
+
+
+def test_states_are_drawn_where_no_limit_is_claimed():
+    certificate = certify_family(DECIDED["edge"], PROTOCOL, [1, 2, 3])
+    runs = sample_runs(certificate, [RandomSignal(1)])
+    assert not plot_family(certificate, runs=runs).collections
+    plot_family_input(certificate, runs=runs)
+    with pytest.raises(ParameterError, match="no proved bound"):
+        plot_family_decay(certificate, runs=runs)
+
+
+def test_a_certificate_draws_its_figures_by_name(drawn):
+    certificate, runs = drawn
+    assert certificate.plot("states", runs=runs).get_ylabel() == "state $x_k$"
+    assert certificate.plot("graph").child_axes
+    for what, told in (("spectrum", "eigenvalues of single graphs"), ("picture", "is unknown")):
+        with pytest.raises(ParameterError, match=told):
+            certificate.plot(what)

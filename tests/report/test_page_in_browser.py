@@ -12,7 +12,7 @@ import pytest
 from generators import sparse_digraph
 from report_examples import MADE, NOMINAL, forged, nominal, undecided
 
-from ptcc_certify import NominalProtocol, SignedDigraph, certify
+from ptcc_certify import Expectations, Family, NominalProtocol, SignedDigraph, certify
 from ptcc_certify.report.report_file import write_report
 
 pytestmark = pytest.mark.browser
@@ -68,6 +68,18 @@ def large() -> Any:
     return certify(graph, NOMINAL, list(range(2_000)), simulation=False, method="perron")
 
 
+def family() -> Any:
+    names = ["alpha" + "x" * 80, "a long name of an agent", "<c>", "d"]
+    ring = SignedDigraph.from_edges([(names[k - 1], names[k], 1 - 2 * (k == 0)) for k in range(4)])
+    unsure = Family.from_graph(ring, uncertainty="20%")
+    return certify(Family.switching({"a long name of a mode" * 3: unsure, "night": ring}), NOMINAL, [1, 2, 3, "1/7"])
+
+
+def refuted_family() -> Any:
+    unsure = Family.from_graph(SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1)]), optional=[("b", "c")])
+    return certify(unsure, NOMINAL, [1, 2, 3], expectations=Expectations("stability"))
+
+
 def rejected(folder: Path) -> Path:
     made = nominal()
     made.save(folder / "c.json")
@@ -76,6 +88,8 @@ def rejected(folder: Path) -> Path:
 
 CERTIFIED = {name: MADE[name] for name in ("nominal", "sliding", "disconnected")}
 CERTIFIED |= {"long labels": long_labels, "right to left": right_to_left, "large": large}
+FAMILIES = {"family": family, "refuted family": refuted_family}
+CERTIFIED |= FAMILIES
 NAMES = (*CERTIFIED, "undecided", "rejected")
 
 
@@ -128,7 +142,7 @@ def test_text_stands_out_from_its_ground(name: str, scheme: str, page_file: Any,
     page.close()
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [name for name in NAMES if name not in FAMILIES])
 def test_the_first_screen_holds_the_answer(name: str, page_file: Any, browser: Any):
     page = browser.new_page(viewport={"width": 1280, "height": 800})
     page.goto(page_file(name).as_uri())
@@ -145,6 +159,16 @@ def test_the_first_screen_holds_the_answer(name: str, page_file: Any, browser: A
     assert entries == ([] if name == "rejected" else shown)
     assert re.search("written on [0-9]{4}-[0-9]{2}-[0-9]{2} by ptcc-certify [0-9]", answer)
     assert ("What this means" in answer) == (name == "rejected")
+    page.close()
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_the_first_screen_of_a_family_holds_the_answer(name: str, page_file: Any, browser: Any):
+    page = browser.new_page(viewport={"width": 1280, "height": 900})
+    page.goto(page_file(name).as_uri())
+    for part in ("h1", ".verdict", ".answer div:has(dt:text-is('Input'))"):
+        box = page.locator(part).bounding_box()
+        assert box["y"] >= 0 and box["y"] + box["height"] <= 900, part
     page.close()
 
 

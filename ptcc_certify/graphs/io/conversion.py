@@ -69,7 +69,9 @@ def as_graph(graph: Any, orientation: str | None = None) -> SignedDigraph:
             raise ParameterError("a SignedDigraph has its orientation; leave out orientation=")
         return held
     if isinstance(graph, Family):
-        raise GraphError(f"{graph!r} is several graphs, and one is asked for; certify and decide take families")
+        raise GraphError(
+            f"{graph!r} is several graphs, and one is asked for; certify, decide and simulate_family take families"
+        )
     way = orientation or "information"
     if isinstance(graph, str) and not os.path.exists(graph) and graph not in GRAPHS and "." not in graph:  # noqa: PTH110
         names = f"({', '.join(GRAPHS)}); check the path{did_you_mean(graph, GRAPHS)}"

@@ -12,7 +12,8 @@ from ptcc_certify.bounds.envelope import FLOOR_FACTOR
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.certificate.family_comparison import worst_case_signals
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.graphs.structure import analyse
+from ptcc_certify.graphs.family import Family
+from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, analyse, find_camps
 from ptcc_certify.report.plots.agents import CAMP_STYLES, NAMED_AGENTS, camp_groups, draw_deadlines, name_agents
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled, time_label
 from ptcc_certify.simulation.family_run import FamilyTrajectory, simulate_family
@@ -44,6 +45,18 @@ def sample_runs(certificate: FamilyCertificate, signals: Iterable[Signal] | None
     return [simulate_family(certificate.family, certificate.protocol, start, signal) for signal in chosen]
 
 
+def family_camps(family: Family) -> np.ndarray | None:
+    """Return the camp, of ``CAMP_STYLES``, of every node that all edges of all modes keep; None if there are none.
+
+    Examples
+    --------
+    >>> family_camps(ptcc.as_family([("a", "b", -2, -1)])).tolist()
+    ['first camp', 'second camp']
+    """
+    gauge, violated, _ = find_camps(family.n_nodes, *family.union)
+    return None if violated.size else np.where(gauge > 0, "first camp", "second camp").astype(object)
+
+
 @styled
 def plot_family(
     subject: FamilyCertificate,
@@ -55,9 +68,9 @@ def plot_family(
     """Draw the states ``x_k(t)`` under many signals, within what is proved for every signal.
 
     Thin lines are runs under given or random signals, thicker ones under worst cases, in the colours and lines of the
-    camps in the first mode. Shaded: where the agents of a camp are for every signal, the final interval of each widened
-    by the bound of ``|x_k(t) - x_k(T)|``, and never beyond the largest state. Bars behind ``T``: the final intervals.
-    Of more than eight agents those are drawn that begin highest and lowest.
+    camps: those of the consensus, or those in the first mode. Shaded: where the agents of a camp are for every signal,
+    the final interval of each widened by the bound of ``|x_k(t) - x_k(T)|``, and never beyond the largest state. Bars
+    behind ``T``: the final intervals. Of more than eight agents those are drawn that begin highest and lowest.
 
     Parameters
     ----------
@@ -87,9 +100,11 @@ def plot_family(
     >>> ax.get_xlabel(), [text.get_text() for text in ax.get_legend().get_texts()][-2:]
     ('time $t$ (s)', ['proved for every signal', 'deadline $T$'])
     """
-    runs, ax = _runs_of(subject, runs), axes_of(ax)
+    runs, ax = runs_of(subject, runs), axes_of(ax)
     first = runs[0]
-    groups = camp_groups(analyse(subject.family.modes[0].mandatory))
+    groups = family_camps(subject.family)
+    if groups is None or not all(part.component.behaviour == BIPARTITE_CONSENSUS for part in subject.parts):
+        groups = camp_groups(analyse(subject.family.modes[0].mandatory))
     agents = _drawn_agents(first.states[:, 0])
     named = {k: CAMP_STYLES[groups[k]][0] for k in agents}
     labels = set()
@@ -152,7 +167,7 @@ def plot_family_decay(
     """
     if axis not in _AXES:
         raise ParameterError(f'axis "{axis}" is unknown; one of {", ".join(_AXES)}')
-    runs, ax = _runs_of(subject, runs), axes_of(ax)
+    runs, ax = runs_of(subject, runs), axes_of(ax)
     first = runs[0]
     before = first.remaining > 0
     bound = subject.deviation_bound(first.remaining[before]).max(axis=0)
@@ -161,6 +176,8 @@ def plot_family_decay(
     places = {"left": first.remaining, "time": first.t, "clock": first.clock}[axis][before]
     scale = float(np.abs(first.states[:, 0]).max()) or 1.0
     floor = FLOOR_FACTOR * first.rtol * scale
+    if not (bound >= floor).any():
+        raise ParameterError("every agent begins where it ends: there is no decay to draw")
     label: str | None = "random signals"
     for run in runs:
         if run.deadline_resolved and np.array_equal(run.t, first.t):
@@ -184,7 +201,14 @@ def plot_family_decay(
     return finished(ax, name, r"$\max_k |x_k(t) - x_k(T)|$")
 
 
-def _runs_of(subject: Any, runs: Sequence[FamilyTrajectory] | None) -> list[FamilyTrajectory]:
+def runs_of(subject: Any, runs: Sequence[FamilyTrajectory] | None) -> list[FamilyTrajectory]:
+    """Return runs that are given, or those that are drawn of a certificate by default.
+
+    Raises
+    ------
+    ParameterError
+        The subject is no certificate of a family, or the runs are of another one.
+    """
     if not isinstance(subject, FamilyCertificate):
         raise ParameterError(
             f"this figure is drawn from the certificate of a family, not from {type(subject).__name__}"
@@ -223,10 +247,8 @@ def _draw_tubes(
                 low, high = (float(end) for end in interval)
                 places[low, high, CAMP_STYLES[name][0]] = None
                 tubes.append((np.maximum(low - moves[k], -largest[k]), np.minimum(high + moves[k], largest[k])))
-        if name != "single leaders":
-            tubes = [(np.min([low for low, _ in tubes], axis=0), np.max([high for _, high in tubes], axis=0))] * bool(
-                tubes
-            )
+        if name != "single leaders" and tubes:
+            tubes = [(np.min([low for low, _ in tubes], axis=0), np.max([high for _, high in tubes], axis=0))]
         for least, most in tubes:
             looks: dict[str, Any] = {"color": CAMP_STYLES[name][0], "alpha": 0.12, "linewidth": 0}
             ax.fill_between(run.t[before], least, most, **looks, label=label)

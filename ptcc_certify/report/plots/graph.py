@@ -9,26 +9,30 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import FancyArrowPatch, Polygon
 
+from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.size_limits import LABELLED_NODES
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.report.plots.adjacency import draw_adjacency
-from ptcc_certify.report.plots.agents import CAMP_STYLES, HALO, NAME_SIZE, camp_groups, text_width
+from ptcc_certify.report.plots.agents import CAMP_STYLES, NAME_SIZE, camp_groups, text_width
+from ptcc_certify.report.plots.family_graph import plot_family_graph
+from ptcc_certify.report.plots.graph_labels import (
+    INSIDE,
+    NEAR_ENDS,
+    WEIGHED_ARROWS,
+    WEIGHT_SHARES,
+    boxes_along,
+    draw_labels,
+    least_covered,
+)
 from ptcc_certify.report.plots.graph_layout import FREE_NODES, Arrow, arc, arrows_of, places_and_bends, triangles_of
 from ptcc_certify.report.plots.style import EDGE_STYLES, SINGLE_COLUMN, axes_of, finished, styled
 from ptcc_certify.report.plots.subject import structure_of
-from ptcc_certify.report.text_layout import columns, printable, shorten_text
+from ptcc_certify.report.text_layout import columns
 
 #: Colour of the ground under a leader group, and how far it reaches beyond its nodes, in radii.
 GROUND, REACH = "#E2E2E2", 1.5
-#: Columns of a label that fit into a node, and that are written beside one.
-INSIDE, BESIDE = 3, 15
-#: Arrows of which each has its weight written at it.
-WEIGHED_ARROWS = 24
-#: Where a weight may stand, as shares of its arrow; the first is best.
-WEIGHT_SHARES = np.array([0.5, 0.45, 0.55, 0.4, 0.6, 0.35, 0.65, 0.3, 0.7, 0.25, 0.75])
-#: Boxes along an arrow of three points each; its own weight keeps off so many at either end.
-BOX, NEAR_ENDS = 3, 5
 #: Height of the drawing in inches.
 _HEIGHT = 3.4
 
@@ -45,9 +49,12 @@ def plot_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
     Graphs of more than 40 nodes are drawn as their matrix ``W``: row ``k`` holds whom ``k`` listens to, camps and
     followers stand together.
 
+    Of a family the modes stand side by side, nodes in the same places. An uncertain weight is a line as wide as its
+    least size on a pale band as wide as its largest; an edge that may fail is a dotted line on the band.
+
     Parameters
     ----------
-    subject : Structure, Certificate, Trajectory or graph-like
+    subject : Structure, Certificate, Trajectory, Family, FamilyCertificate or graph-like
         As :func:`ptcc_certify.as_graph` takes it: a path, a networkx graph, the name of a packaged graph.
     ax : Axes, optional
 
@@ -61,6 +68,8 @@ def plot_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
     >>> [text.get_text() for text in ax.texts]
     ['a', 'b', 'c', '1', '2']
     """
+    if isinstance(subject, Family | FamilyCertificate):
+        return plot_family_graph(subject, ax=ax)
     structure = structure_of(subject)
     graph, own, ax = structure.graph, ax is None, axes_of(ax, (SINGLE_COLUMN[0], _HEIGHT))
     if graph.n_nodes > LABELLED_NODES:
@@ -77,13 +86,13 @@ def plot_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
     if structure.followers.size:
         groups = [c.nodes for c in structure.closed_components if len(c.nodes) > 1]
         for nodes in groups:
-            _draw_ground(ax, graph, place, nodes, radius)
+            draw_ground(ax, graph, place, nodes, radius)
         if groups:
             ax.fill([], [], color=GROUND, label="leader group")
-    _draw_nodes(ax, structure, place, radius)
+    draw_nodes(ax, structure, place, radius)
     _draw_arrows(ax, arrows, place, bends, radius)
-    lines = _boxes_along(arrows, place, bends)
-    written = _draw_labels(ax, graph.labels, place, radius, None if inside else [box for line in lines for box in line])
+    lines = boxes_along(arrows, place, bends)
+    written = draw_labels(ax, graph.labels, place, radius, None if inside else [box for line in lines for box in line])
     _draw_weights(ax, arrows, place, bends, written, lines)
     ax.set_aspect("equal")
     ax.set_xlim(-width / 2, width / 2)
@@ -91,11 +100,11 @@ def plot_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
     ax.set_axis_off()
     finished(ax, "", "")
     if own:
-        _fit_height(ax, np.concatenate([written, *lines]), radius)
+        fit_height(ax, np.concatenate([written, *lines]), radius)
     return ax
 
 
-def _fit_height(ax: Axes, boxes: np.ndarray, radius: float) -> None:
+def fit_height(ax: Axes, boxes: np.ndarray, radius: float) -> None:
     """Make a figure as high as what is drawn and its legend need."""
     low, high = boxes[:, 1].min() - radius, boxes[:, 3].max() + radius
     figure, legend = ax.figure.figure, ax.get_legend()  # type: ignore[union-attr]
@@ -105,7 +114,7 @@ def _fit_height(ax: Axes, boxes: np.ndarray, radius: float) -> None:
     figure.set_figheight(min(_HEIGHT, room + scale * (high - low)))
 
 
-def _draw_nodes(ax: Axes, structure: Structure, place: np.ndarray, radius: float) -> None:
+def draw_nodes(ax: Axes, structure: Structure, place: np.ndarray, radius: float) -> None:
     """Draw the nodes, those of leaders outlined."""
     group = camp_groups(structure)
     for name, (colour, _) in CAMP_STYLES.items():
@@ -134,30 +143,6 @@ def _draw_arrows(ax: Axes, arrows: Sequence[Arrow], place: np.ndarray, bends: np
             ax.plot([], [], color=colour, linestyle=line, linewidth=1.1, label=name)
 
 
-def _draw_labels(
-    ax: Axes, labels: Sequence[str], place: np.ndarray, radius: float, lines: list[np.ndarray] | None
-) -> list[np.ndarray]:
-    """Write labels into the nodes, or, given lines, around where they cover least; return the boxes that are taken."""
-    looks: dict[str, Any] = {"fontsize": NAME_SIZE, "parse_math": False, "ha": "center", "zorder": 5}
-    nodes = [np.array([*(p - radius), *(p + radius)]) for p in place]
-    if lines is None:
-        for label, p in zip(labels, place, strict=True):
-            ax.annotate(printable(label), p, color="white", va="center_baseline", **looks)
-        return nodes
-    taken = nodes + lines
-    for label, p in zip(labels, place, strict=True):
-        text = shorten_text(printable(label), BESIDE)
-        half = np.array([text_width(text) / 2, 0.6 * NAME_SIZE])
-        turns = np.arctan2(p[1], p[0]) + np.pi / 4 * np.array([0, 1, -1, 2, -2, 3, -3, 4])  # away from the middle first
-        ways = np.stack([np.cos(turns), np.sin(turns)], axis=1)
-        spots = [p + way * (far * radius + 1) + half * way for far in (1, 2, 3, 4, 5, 6, 7) for way in ways]
-        taken.append(box := _least_covered(spots, half, taken))
-        if (np.maximum(box[:2] - p, p - box[2:]) > 3 * radius).any():  # far from its node
-            ax.plot(*np.stack([p, np.clip(p, box[:2], box[2:])], axis=1), color="0.6", linewidth=0.5, zorder=1)
-        ax.annotate(text, p, (box[:2] + box[2:]) / 2, va="center", color="black", path_effects=HALO, **looks)
-    return nodes + taken[len(nodes) + len(lines) :]
-
-
 def _draw_weights(
     ax: Axes,
     arrows: Sequence[Arrow],
@@ -178,34 +163,13 @@ def _draw_weights(
         beside = along[::-1] * [1, -1] / np.linalg.norm(along) * (np.linalg.norm(half) + 1)
         spots += [spots[0] + beside, spots[0] - beside]
         others = [*lines[:k], lines[k][:NEAR_ENDS], lines[k][-NEAR_ENDS:], *lines[k + 1 :]]
-        box = _least_covered(spots, half, [*taken, *(box for line in others for box in line)])
+        box = least_covered(spots, half, [*taken, *(box for line in others for box in line)])
         taken.append(box)
         (x, y), colour = (box[:2] + box[2:]) / 2, EDGE_STYLES[arrow.sign][0]
         ax.text(x, y, text, fontsize=NAME_SIZE, color=colour, ha="center", va="center", bbox=ground, zorder=4)
 
 
-def _boxes_along(arrows: Sequence[Arrow], place: np.ndarray, bends: np.ndarray) -> list[list[np.ndarray]]:
-    """Return small boxes along each arrow, which leave no gaps."""
-    boxes = []
-    for (a, b, *_), bend in zip(arrows, bends, strict=True):
-        along = np.linspace(0.06, 0.94, 2 + int(np.linalg.norm(place[b] - place[a]) / BOX))
-        boxes.append([np.array([*(p - BOX / 2), *(p + BOX / 2)]) for p in arc(place[a], place[b], bend, along)])
-    return boxes
-
-
-def _least_covered(spots: Sequence[np.ndarray], half: np.ndarray, taken: list[np.ndarray]) -> np.ndarray:
-    """Return the box about the first of some spots that covers least of the boxes taken."""
-    boxes = [np.array([*(spot - half), *(spot + half)]) for spot in spots]
-    others = np.array(taken)
-
-    def covered(box: np.ndarray) -> float:
-        sides = np.minimum(box[2:], others[:, 2:]) - np.maximum(box[:2], others[:, :2])
-        return float(np.prod(np.maximum(sides, 0), axis=1).sum())
-
-    return min(boxes, key=covered)
-
-
-def _draw_ground(ax: Axes, graph: SignedDigraph, place: np.ndarray, nodes: Sequence[int], radius: float) -> None:
+def draw_ground(ax: Axes, graph: SignedDigraph, place: np.ndarray, nodes: Sequence[int], radius: float) -> None:
     """Draw a ground under a leader group: under its nodes, along its edges, and between them where no other node is."""
     inside, looks = np.zeros(graph.n_nodes, dtype=bool), {"color": GROUND, "zorder": 0}
     inside[list(nodes)] = True

@@ -10,10 +10,12 @@ from matplotlib.axes import Axes
 from lmi.exact.decimal_rounding import up
 from ptcc_certify.bounds.input.effort import Effort
 from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.report.input_lines import initial_states_text
 from ptcc_certify.report.plots.agents import NAME_SIZE, draw_agents, draw_deadlines, name_agents
+from ptcc_certify.report.plots.family_input import plot_family_input
 from ptcc_certify.report.plots.style import RUN, axes_of, finished, styled, time_label
 from ptcc_certify.report.plots.subject import limits_text, require_same, structure_of, trajectory_of
 from ptcc_certify.simulation.trajectory import Trajectory
@@ -40,11 +42,12 @@ def plot_input(
     drawn where the integrator no longer resolves what the gain multiplies. No peak is drawn where none holds: for runs
     that begin later than 0, sampled inputs, disturbance or noise of the nominal protocol, boundary layers. Of a
     certificate with one set of limits of the gain the run under these is drawn, and their peak; the legend names them.
-    A held input is drawn in steps if every period is sampled.
+    A held input is drawn in steps if every period is sampled. Of a family the largest input under each of many signals
+    is drawn, below its bound for every signal.
 
     Parameters
     ----------
-    subject : Certificate or Trajectory
+    subject : Certificate, FamilyCertificate or Trajectory
         Of one initial state. The run of a certificate that holds none is simulated.
     ax : Axes, optional
     certificate : Certificate, optional
@@ -70,6 +73,8 @@ def plot_input(
     >>> ax.get_ylabel(), ax.texts[0].get_text()
     ('input $|u_k|$', 'certified peak 16.1')
     """
+    if isinstance(subject, FamilyCertificate):
+        return plot_family_input(subject, ax=ax, time_unit=time_unit)
     run, structure = _run_under_limits(subject), structure_of(subject)
     certificate = subject if isinstance(subject, Certificate) else certificate
     peak = None if certificate is None else _certified_peak(run, certificate)

@@ -8,10 +8,32 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import near
 from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io import as_graph
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.simulation.trajectory import Trajectory
+
+
+def refuse_family(subject: Any) -> None:
+    """Refuse a family, or its certificate, where the figure is of one graph.
+
+    Raises
+    ------
+    ParameterError
+        Names the functions that draw families.
+
+    Examples
+    --------
+    >>> from ptcc_certify.report.plots.subject import refuse_family
+    >>> refuse_family(ptcc.as_family([("a", "b", 1, 2)]))
+    Traceback (most recent call last):
+    ptcc_certify.errors.ParameterError: this figure is of one graph; of families draw plot_graph, and of their ...
+    """
+    if isinstance(subject, Family | FamilyCertificate):
+        others = "of their certificates plot_family, plot_family_decay and plot_input"
+        raise ParameterError(f"this figure is of one graph; of families draw plot_graph, and {others}")
 
 
 def trajectory_of(subject: Any) -> Trajectory:
@@ -31,6 +53,7 @@ def trajectory_of(subject: Any) -> Trajectory:
     array([3., 5.])
     """
     run = subject
+    refuse_family(subject)
     if isinstance(subject, Certificate):
         run = subject.simulate() if subject.trajectory is None else subject.trajectory
     if not isinstance(run, Trajectory):
@@ -54,6 +77,7 @@ def structure_of(subject: Any) -> Structure:
     >>> structure_of(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])).balanced
     True
     """
+    refuse_family(subject)
     if isinstance(subject, Structure):
         return subject
     return subject.structure if isinstance(subject, Certificate) else analyse(as_graph(subject))

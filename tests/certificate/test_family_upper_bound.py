@@ -1,0 +1,46 @@
+"""Facts about the upper bound in the file of a family: it is read back with what proves it, or not at all."""
+
+import pytest
+
+from ptcc_certify import Family, NominalProtocol, SignedDigraph, certify, read_certificate
+
+PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
+DAY = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1)])
+NIGHT = SignedDigraph.from_edges([("c", "a", -2), ("a", "b", 1)])
+FAMILIES = {
+    "word": Family.switching({"day": DAY, "night": NIGHT}),
+    "member": Family.from_graph(DAY, uncertainty="10%"),
+    "rivals": Family.from_intervals(
+        [("a", "b", -1, 1), ("b", "a", 1, 2), ("b", "c", -3, -2), ("c", "b", 1, 1), ("c", "a", 1, 1)]
+    ),
+    "undirected": Family.from_intervals([("a", "b", 1, 2), ("b", "c", 1, 3)], undirected=True),
+}
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_a_bound_is_read_back_as_it_was_proved(name):
+    made = certify(FAMILIES[name], PROTOCOL)
+    bound = made.parts[0].upper_bound
+    assert bound is not None and (name not in ("word", "member") or bound.kind == name)
+    assert read_certificate(made.to_dict()).parts[0].upper_bound == bound
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_a_bound_below_what_its_members_prove_is_not_taken(name):
+    made = certify(FAMILIES[name], PROTOCOL)
+    document, bound = made.to_dict(), made.upper_bound
+    document["unverified"]["upper_bounds"][0]["value"] = str(bound / 2)
+    read = read_certificate(document).upper_bound
+    assert read is None or read >= bound
+
+
+def test_members_that_the_family_has_not_prove_nothing():
+    made = certify(FAMILIES["member"], PROTOCOL)
+    for change in ({"mode": 1}, {"mode": "0"}, {"weights": []}, {"weights": [["a", "b", "0.1"], ["b", "c", "-1"]]}):
+        document = made.to_dict()
+        document["unverified"]["upper_bounds"][0]["members"][0] |= change
+        assert read_certificate(document).upper_bound is None
+    for junk in (5, [], [5], [{}], [{"members": 3}], None):
+        document = made.to_dict()
+        document["unverified"]["upper_bounds"] = junk
+        assert read_certificate(document).upper_bound is None

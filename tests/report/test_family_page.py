@@ -1,0 +1,130 @@
+"""Facts about the page and the statement of a family: what they say is what is certified, and a refutation is drawn."""
+
+import re
+from dataclasses import replace
+from datetime import date
+
+import pytest
+
+from ptcc_certify import Expectations, Family, NominalProtocol, SignedDigraph, certify, read_certificate
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.io import as_family
+from ptcc_certify.report.page import report_html
+from ptcc_certify.report.plots.family import sample_runs
+from ptcc_certify.report.report_file import write_report
+from ptcc_certify.report.statement import family_latex
+from ptcc_certify.simulation.signals import RandomSignal
+
+PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
+DAY = SignedDigraph.from_edges([("ann", "<b>", 1), ("<b>", "eve", -1)])
+NIGHT = SignedDigraph.from_edges([("eve", "ann", -2), ("ann", "<b>", 1)])
+SWITCHING = Family.switching({"day": DAY, "night": NIGHT})
+UNSURE = Family.from_graph(DAY, optional=[("<b>", "eve")])
+
+
+@pytest.fixture(scope="module")
+def made():
+    return certify(SWITCHING, PROTOCOL, [3, 1, 2])
+
+
+def words(page):
+    text = re.sub(r"(?s)<style>.*?</style>|<svg.*?</svg>", "", page)
+    return " ".join(re.sub("<[^>]*>", " ", text).split())
+
+
+def test_the_first_screen_tells_family_signal_end_rate_bound_ratio_and_input(made, tmp_path):
+    made.save(tmp_path / "c.json")
+    assert write_report(tmp_path / "c.json", tmp_path / "c.html", day=date(2026, 1, 1)) == "certified"
+    page = (tmp_path / "c.html").read_text("utf-8")
+    first = words(page.partition("<nav")[0])
+    for told in (
+        "2 modes ( day , night ) on 3 agents, 4 edges in all",
+        "arbitrarily often, in whatever order is worst",
+        "ann , &lt;b&gt; in [−2, 3]; eve in [−3, 2]",
+        "By the deadline T = 1, for every signal and every initial state",
+        "because of a periodic signal",
+        "No agent needs an input of more than",
+        "c.json ; this page was written on 2026-01-01",
+    ):
+        assert told in first, told
+    assert {f'id="figure-{name}"' in page for name in ("graph", "states", "decay", "input")} == {True}
+    assert "<script" not in page and "<b>" not in page
+    assert "The bounds are kept" in words(page)
+
+
+def test_an_expectation_that_is_refuted_is_told_and_its_counterexample_is_drawn():
+    saved = read_certificate(certify(SWITCHING, PROTOCOL, expectations=Expectations("stability")).to_dict())
+    page = report_html(saved)
+    assert "REFUTED" in page and 'id="figure-why0"' in page
+    assert "Refuted: stability (held in day, ann hears nobody else and keeps its value)" in words(page)
+
+
+def test_of_a_behaviour_that_depends_on_the_signal_the_page_tells_why_and_what_holds_all_the_same():
+    page = report_html(read_certificate(certify(UNSURE, PROTOCOL, [3, 1, 2]).to_dict()))
+    text = words(page)
+    assert "The state ann=0, &lt;b&gt;=0, eve=1" not in text  # labels keep their case
+    assert (
+        "the state ann=0, &lt;b&gt;=0, eve=1 rests at the least weights and moves with &lt;b&gt; -&gt; eve on" in text
+    )
+    assert "no limit is claimed of eve" in text and 'id="figure-why0"' in page
+    assert "for every signal and every initial state" not in text.partition("What was asked")[0]
+
+
+def test_a_page_of_an_undecided_family_says_what_to_try_and_claims_nothing(made, tmp_path):
+    parts = tuple(
+        replace(part, component=replace(part.component, behaviour=None, kernel=None), functions=(), upper_bound=None)
+        for part in made.parts
+    )
+    undecided = replace(made, parts=parts)
+    assert write_report(undecided, tmp_path / "u.html", simulation=False) == "undecided"
+    assert repr(undecided) == "FamilyCertificate(not decided, rate none, undecided)"
+    assert undecided.to_dict()["verdict"] == "undecided" and undecided.to_pandas().isna().all(axis=None)
+    text = words((tmp_path / "u.html").read_text("utf-8"))
+    assert "What to try" in text and "Undecided: what the agents do" in text and "It is not decided" in text
+    assert "How to check it" not in text and "proof obligation" not in text.partition("What this does not say")[0]
+    with pytest.raises(ParameterError, match="no statement"):
+        write_report(undecided, tmp_path / "u.tex")
+
+
+def test_a_statement_has_intervals_behaviour_rate_bound_and_input(made, tmp_path):
+    family = Family.switching({"day": Family.from_graph(DAY, uncertainty="10%"), "night": NIGHT})
+    certify(family, PROTOCOL, [3, 1, 2]).save(tmp_path / "c.json")
+    assert write_report(tmp_path / "c.json", tmp_path / "c.tex", simulation=False) == "certified"
+    text = (tmp_path / "c.tex").read_text("utf-8")
+    for told in (
+        r"in mode day $w_{2,1} \in [0.9, 1.1]$, $w_{3,2} \in [-1.1, -0.9]$; in mode night $w_{1,3} = -2$",
+        "Bipartite consensus occurs at $T$ for every such choice",
+        r"V(X(t)) \le \mathrm{e}^{-",
+        "No rate above $",
+        r"The input satisfies $|u_{k}| \le",
+        r"{}$<$b$>$ & camp 1 & $1$ & $[",
+        r"\includegraphics[width=\linewidth]{c_graph.pdf}",
+    ):
+        assert told in text, told
+    assert (tmp_path / "c_graph.pdf").exists() and not (tmp_path / "c_decay.pdf").exists()
+
+
+def test_intervals_of_the_page_enclose_what_is_proved():
+    pair = as_family([("a", "b", "1/3", "2/3"), ("b", "a", "1/7", "6/7")])
+    saved = read_certificate(certify(pair, PROTOCOL, ["1/3", "2/7"]).to_dict())
+    low, high = saved.final_states[0]
+    shown = re.search(r"\[([0-9.]+),\N{NO-BREAK SPACE}([0-9.]+)\]", report_html(saved))
+    assert float(shown[1]) <= low <= high <= float(shown[2])
+
+
+@pytest.mark.parametrize(
+    ("family", "x0", "figures"),
+    [
+        ([("a", "b", 1, 2)], [0, 0], {"graph", "states", "input"}),
+        ([("a", "b", 1, 2), ("c", "d", -2, -1)], [1, 2, 3, 4], {"graph", "states", "decay", "input"}),
+        (Family.switching([SignedDigraph.from_edges([], nodes=["a"])] * 2), [3], {"graph", "states", "input"}),
+        (Family.switching([DAY, SignedDigraph.from_edges([], nodes=DAY.labels)]), [1, 2, 3], None),
+    ],
+    ids=["at rest", "two components", "one agent", "outage"],
+)
+def test_what_there_is_nothing_to_draw_of_is_left_out(family, x0, figures):
+    saved = read_certificate(certify(family, PROTOCOL, x0).to_dict())
+    page = report_html(saved, runs=sample_runs(saved, [RandomSignal(1)]))
+    drawn = set(re.findall('id="figure-([a-z0-9]+)"', page))
+    assert drawn == ({"graph", "states", "input", "why0"} if figures is None else figures)
+    assert r"\end{proposition}" in family_latex(saved)
