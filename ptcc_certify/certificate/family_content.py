@@ -13,9 +13,12 @@ from typing import Any
 
 import numpy as np
 
+from lmi.exact.numbers import integers
 from ptcc_certify.certificate.certificate_data import Source
 from ptcc_certify.certificate.request import Expectations
-from ptcc_certify.checker.family_bounds import deviations, final_interval, peaks
+from ptcc_certify.checker.family_bounds import deviations, final_box, final_interval, least, peaks
+from ptcc_certify.checker.family_function import Scaled
+from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.checker.reading import Interval
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
@@ -65,18 +68,19 @@ class BoundFunction:
         return self.function.rate
 
     @property
-    def inputs(self) -> Mapping[int, Fraction]:
-        """``|(L X)_k|^2 <= inputs[k] V``."""
-        return dict(enumerate(self.function.input_constants))
+    def speeds(self) -> list[Scaled]:
+        """Bounds of ``|(L X)_k| / sqrt(V)``."""
+        return [self.function.speeds]
 
     @property
-    def coordinates(self) -> Mapping[int, Fraction]:
-        """``xi_k^2 <= coordinates[k] V``."""
-        return dict(zip(self.function.nodes, self.function.coordinate_constants, strict=True))
+    def sizes(self) -> list[Scaled]:
+        """Bounds of ``|xi_k| / sqrt(V)``."""
+        (roots,), scale = integers([[root_above(c) for c in self.function.coordinate_constants]])
+        return [(dict(zip(self.function.nodes, roots, strict=True)), Fraction(1, scale))]
 
-    def value(self, x: Sequence[Fraction]) -> Fraction:
-        """Return ``V`` of a state of the component."""
-        return self.function.value(self.quotient.coordinates(x))
+    def root(self, x: Sequence[Fraction]) -> Fraction:
+        """Bound ``sqrt(V)`` of a state of the component."""
+        return root_above(self.function.value(self.quotient.coordinates(x)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -151,16 +155,12 @@ class FamilyContent:
             return dict.fromkeys(range(n), (Fraction(0), Fraction(0)))
         if component.behaviour == DEPENDS:
             return dict.fromkeys(range(n))
-        moves = deviations(self._bound_functions(part), False, x)
+        moves = deviations(self._bound_functions(part), x)
         if component.behaviour == BIPARTITE_CONSENSUS:
             assert component.gauge is not None
             camps = dict(enumerate(component.gauge.tolist()))
             return dict(final_interval(range(n), camps, FamilyGroups(component).sources.tolist(), moves, x))
-        largest = max(map(abs, x))
-        return {
-            k: (max(-largest, x[k] - moves.get(k, 2 * largest)), min(largest, x[k] + moves.get(k, 2 * largest)))
-            for k in range(n)
-        }
+        return dict(final_box(range(n), moves, x))
 
     @property
     def bounded(self) -> bool | None:
@@ -181,8 +181,9 @@ class FamilyContent:
         for part in self.parts:
             nodes = part.component.nodes.tolist()
             x = [self.initial_state[v] for v in nodes]
-            for k, bound in peaks(self._bound_functions(part), gains, x).items():
-                result[nodes[k]] = bound
+            bounds, unit = peaks(self._bound_functions(part), gains, x)
+            for k, bound in bounds.items():
+                result[nodes[k]] = Fraction(bound, unit)
         return tuple(result)
 
     def deviation_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
@@ -213,9 +214,13 @@ class FamilyContent:
                 bounds[nodes] = 0
             x = [self.initial_state[v] for v in nodes.tolist()]
             for V in self._bound_functions(part):
-                moves = deviations([V], part.component.behaviour == STABILITY, x)
+                moves, unit = deviations([V], x)
+                if part.component.behaviour == STABILITY and moves:
+                    root = V.root(x)
+                    sizes = [(vector, factor * root) for vector, factor in V.sizes]
+                    moves, unit = least([(moves, Fraction(1, unit)), *sizes])
                 if moves:
-                    size = np.array([float(moves[k]) for k in range(nodes.size)]) * (1 + 1e-12)
+                    size = np.array([moves[k] / unit for k in range(nodes.size)]) * (1 + 1e-12)
                     decay = np.exp(-float(V.rate) * (1 - 1e-12) / 2 * clock)
                     bounds[nodes] = np.minimum(bounds[nodes], np.multiply.outer(size, decay))
         return bounds

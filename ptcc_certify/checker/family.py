@@ -8,17 +8,17 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
+from math import gcd
 from typing import Any
 
 from lmi.exact.numbers import integers, longest, sized
 from lmi.exact.work import keeps, spend
-from ptcc_certify.checker.digraph import Digraph
-from ptcc_certify.checker.graph import NODE_BYTES, positions
+from ptcc_certify.checker.graph import NODE_BYTES, digraph, positions
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, interval, need, same
 from ptcc_certify.checker.side_files import Numbers, beside
@@ -145,7 +145,7 @@ def check_family(doc: Document) -> Family:
         on = [edge for edge in edges if edge[3]]
         source, target = ([edge[k] for edge in on] for k in (0, 1))
         need(keeps(NODE_BYTES * len(labels)), TOO_LARGE)
-        graph = Digraph(labels, source, target, [sign * low for _, _, sign, low, _ in on], unit)
+        graph = digraph(doc, labels, source, target, [sign * low for _, _, sign, low, _ in on], unit)
         structure = check_structure(doc, graph, section, f"graph.modes[{number}]")
         need(section["connectivity"] == _connectivity(structure), "another connectivity of a mode")
         modes.append(Mode(edges, unit, tied, structure))
@@ -238,18 +238,40 @@ def _check_edges(edges: Sequence[Edge], tied: bool) -> None:
 
 def _hash(labels: Sequence[str], modes: Sequence[tuple[Sequence[Edge], int, bool]]) -> str:
     """Return the SHA-256 of nodes and modes; of undirected edges it tells if some weight is uncertain."""
-    quote = json.JSONEncoder(ensure_ascii=False).encode
-    hashed = hashlib.sha256("".join(f"[{quote(x)}]\n" for x in sorted(labels)).encode("utf-8", "surrogatepass"))
+    quoted = [*map(json.JSONEncoder(ensure_ascii=False).encode, labels)]
+    order = sorted(range(len(labels)), key=labels.__getitem__)
+    hashed = hashlib.sha256("".join([f"[{quoted[v]}]\n" for v in order]).encode("utf-8", "surrogatepass"))
     for number, (edges, unit, tied) in enumerate(modes):
         hashed.update(b"{}\n" if number else b"")
         hashed.update(b'{"undirected": true}\n' if tied and any(low < high for _, _, _, low, high in edges) else b"")
         spend(2 * len(edges), unit.bit_length(), unit.bit_length(), "the hash of long weights")
-        for s, t, sign, low, high in sorted(edges, key=lambda e: (labels[e[0]], labels[e[1]], e[2])):
-            ends = dict.fromkeys(sorted((sign * low, sign * high)))
-            weights = ", ".join(f'"{Fraction(w, unit)}"' for w in ends)
-            line = f"[{quote(labels[s])}, {quote(labels[t])}, {weights}]\n"
-            hashed.update(line.encode("utf-8", "surrogatepass"))
+        # Edges ascend by target and sign. Put aside target by target in the order of labels, they do from every source.
+        into, out = grouped(edges, 1, len(labels)), [list[Edge]() for _ in labels]
+        for v in order:
+            for edge in into[v]:
+                out[edge[0]].append(edge)
+        for v in order:
+            lines = [f"[{quoted[v]}, {quoted[edge[1]]}, {_weight(edge, unit)}]\n" for edge in out[v]]
+            hashed.update("".join(lines).encode("utf-8", "surrogatepass"))
     return hashed.hexdigest()
+
+
+def grouped(edges: Iterable[Edge], end: int, n: int) -> list[list[Edge]]:
+    """Return the edges of every node that is their source, for ``end`` 0, or their target, for 1."""
+    groups: list[list[Edge]] = [[] for _ in range(n)]
+    for edge in edges:
+        groups[edge[end]].append(edge)
+    return groups
+
+
+def _weight(edge: Edge, unit: int) -> str:
+    """Write a weight, or the least and the largest one."""
+    _, _, sign, low, high = edge
+    texts = []
+    for size in (low, high) if low < high else (low,):
+        common = gcd(size, unit)
+        texts.append(f'"{sign * size // common}"' if common == unit else f'"{sign * size // common}/{unit // common}"')
+    return ", ".join(texts[::sign])
 
 
 # ---------------------------------------------------------------------- claims
@@ -278,32 +300,22 @@ def _check_claims(doc: Document, labels: list[str], modes: list[Mode]) -> list[C
 
 def _parts(n: int, modes: Sequence[Mode]) -> list[Part]:
     """Return the weak components of all edges, each with the camps that keep all its edges, or None."""
-    near: list[list[tuple[int, int]]] = [[] for _ in range(n)]
-    for mode in modes:
-        for s, t, sign, _, _ in mode.edges:
-            near[s].append((t, sign))
-            near[t].append((s, sign))
-    camp, home = [0] * n, [0] * n
+    edges = [edge for mode in modes for edge in mode.edges]
+    source, target, minus = [e[0] for e in edges], [e[1] for e in edges], [e[2] < 0 for e in edges]
+    first, opposite, odd = modes[0].structure.graph.signed_pieces(n, source, target, minus)
+    groups: dict[int, list[int]] = {}
+    for v, root in enumerate(first):
+        groups.setdefault(root, []).append(v)
+    home = {root: k for k, root in enumerate(groups)}
     parts: list[Part] = []
-    for root in range(n):
-        if camp[root]:
-            continue
-        camp[root], found, fit = 1, [root], True
-        for v in found:
-            home[v] = len(parts)
-            for u, sign in near[v]:
-                if not camp[u]:
-                    camp[u] = sign * camp[v]
-                    found.append(u)
-                fit &= camp[u] == sign * camp[v]
-        found.sort()
-        camps = {v: camp[v] for v in found} if fit else None
-        parts.append(Part(found, camps, [[] for _ in modes], [[] for _ in modes]))
+    for root, nodes in groups.items():
+        camps = None if root in odd else {v: -1 if opposite[v] else 1 for v in nodes}
+        parts.append(Part(nodes, camps, [[] for _ in modes], [[] for _ in modes]))
     for number, mode in enumerate(modes):
         for edge in mode.edges:
-            parts[home[edge[0]]].edges[number].append(edge)
+            parts[home[first[edge[0]]]].edges[number].append(edge)
         for k, group in enumerate(mode.structure.closed):
-            parts[home[group[0]]].closed[number].append(k)
+            parts[home[first[group[0]]]].closed[number].append(k)
     return parts
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from operator import mul
 from typing import Any
 
@@ -25,6 +26,8 @@ from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, need, triangle
 
 Vector = dict[int, Fraction]
+#: Integers by node, and a number by which all are multiplied.
+Scaled = tuple[Mapping[int, int], Fraction]
 Whole = dict[int, int]
 KEYS = ("class", "component", "nodes", "lower_triangle", "rate", "inputs", "coordinates")
 
@@ -81,6 +84,16 @@ class FamilyFunction:
     rate: Fraction
     inputs: Vector
     coordinates: Vector
+
+    @cached_property
+    def speeds(self) -> list[Scaled]:
+        """Bounds of ``|(L X)_k| / sqrt(V)``."""
+        (values,), scale = integers([[root_above(c) for c in self.inputs.values()]])
+        return [(dict(zip(self.inputs, values, strict=True)), Fraction(1, scale))]
+
+    def root(self, x: Sequence[Fraction]) -> Fraction:
+        """Bound ``sqrt(V)`` of a state."""
+        return root_above(self.value(x))
 
     def value(self, x: Sequence[Fraction]) -> Fraction:
         """Return ``V`` of a state."""
