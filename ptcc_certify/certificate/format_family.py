@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.numbers import longest
 from ptcc_certify.certificate.family_content import FamilyContent
 from ptcc_certify.certificate.format import producer
@@ -64,20 +66,20 @@ def _function(family: Family, component: FamilyComponent, number: int, V: Any, o
 
 def _up(x: Fraction) -> str:
     """Write a bound, rounded up to 60 bits or so."""
-    if not x:
-        return "0"
-    unit = Fraction(2) ** (longest([x.numerator]) - longest([x.denominator]) - 60)
-    return format_exact(-(-x // unit) * unit)
+    return format_exact(rounded(x, _BITS - 4, up=True))
 
 
 def _enclosed(low: Fraction, high: Fraction) -> Any:
     """Write ends as a middle and a radius, rounded outwards."""
-    if low == high:
-        return format_exact(low)
+    return format_exact(low) if low == high else dict(zip(("mid", "radius"), _ball(low, high), strict=True))
+
+
+@lru_cache(maxsize=100)  # the ends of agents that agree are the same
+def _ball(low: Fraction, high: Fraction) -> tuple[str, str]:
     size = max(abs(low), abs(high))
     unit = Fraction(2) ** (longest([size.numerator]) - longest([size.denominator]) - _BITS)
     below, above = low // unit, -(-high // unit)
-    return {"mid": format_exact((below + above) * unit / 2), "radius": format_exact((above - below) * unit / 2)}
+    return format_exact((below + above) * unit / 2), format_exact((above - below) * unit / 2)
 
 
 def _proof(

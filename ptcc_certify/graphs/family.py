@@ -148,11 +148,11 @@ class Mode:
         """
         names = [json.dumps(label, ensure_ascii=False) for label in self.labels]
         rank = np.argsort(sorted(range(len(names)), key=self.labels.__getitem__))
-        least, largest = self.texts
+        source, target, (least, largest) = self.source.tolist(), self.target.tolist(), self.texts
         for edge in np.lexsort((self.sign, rank[self.target], rank[self.source])).tolist():
-            weights = dict.fromkeys((least[edge], largest[edge]))
-            ends = names[self.source[edge]], names[self.target[edge]]
-            yield f"[{', '.join([*ends, *map(json.dumps, weights)])}]"
+            low, high = least[edge], largest[edge]
+            weights = f'"{low}"' if low == high else f'"{low}", "{high}"'
+            yield f"[{names[source[edge]]}, {names[target[edge]]}, {weights}]"
 
     def marked_lines(self) -> Iterator[str]:
         """Yield a line that tells whether uncertain edges are undirected, if so, then those of all edges."""

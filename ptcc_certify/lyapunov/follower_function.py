@@ -286,8 +286,12 @@ def _drifts(kernel: Kernel, followers: np.ndarray, parts: Sequence[LeadingPart])
     if not any(speeds.values()):
         return [zero] * followers.size
     own = [speeds.get(c.nodes[0], zero) for c in kernel.structure.closed_components if c.balanced]
-    rows = (zip(kernel.row(k), own, strict=True) for k in followers.tolist())
-    return [sum((abs(b) * q for b, q in row if b), zero) for row in rows]
+    told = [zero, *own]
+    codes = zip(followers.tolist(), abs(kernel.codes[followers]).tolist(), strict=True)
+    return [
+        sum((abs(b) * q for b, q in zip(kernel.row(k), own, strict=True) if b), zero) if code == UNKNOWN else told[code]
+        for k, code in codes
+    ]
 
 
 def composite_rate(rows: IntervalRows, d: np.ndarray, outside: np.ndarray, drifts: Sequence[Fraction]) -> Fraction:
