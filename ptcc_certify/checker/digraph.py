@@ -225,25 +225,23 @@ class Digraph:
         """
         parent, opposite, odd = list(range(n)), [False] * n, set()
 
-        def root(v: int) -> int:
-            path = []
-            while parent[v] != v:
-                path.append(v)
-                v = parent[v]
+        def root(v: int) -> tuple[int, bool]:
             against = False
-            for u in reversed(path):
-                against ^= opposite[u]
-                parent[u], opposite[u] = v, against
-            return v
+            while parent[v] != v:
+                opposite[v] ^= opposite[parent[v]]
+                parent[v] = parent[parent[v]]  # every other step is left out next time
+                against ^= opposite[v]
+                v = parent[v]
+            return v, against
 
         for s, t, m in zip(source, target, minus, strict=True):
-            one, other = sorted((root(s), root(t)))
-            against = opposite[s] ^ opposite[t] ^ m
+            (one, x), (other, y) = sorted((root(s), root(t)))
             if one != other:
-                parent[other], opposite[other] = one, against
-            elif against:
+                parent[other], opposite[other] = one, x ^ y ^ m
+            elif x ^ y ^ m:
                 odd.add(one)
-        return [root(v) for v in range(n)], opposite, {parent[v] for v in odd}
+        first, against = map(list, zip(*map(root, range(n)), strict=True))
+        return first, against, {first[v] for v in odd}
 
     @cached_property
     def pieces(self) -> tuple[list[int], set[int]]:

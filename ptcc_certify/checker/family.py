@@ -8,17 +8,18 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from itertools import pairwise
+from itertools import chain, groupby, pairwise
 from math import gcd
+from operator import itemgetter
 from typing import Any
 
 from lmi.exact.numbers import integers, longest, sized
 from lmi.exact.work import keeps, spend
-from ptcc_certify.checker.graph import NODE_BYTES, digraph, positions
+from ptcc_certify.checker.graph import NODE_BYTES, digraph, positions, read_nodes
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, interval, need, same
 from ptcc_certify.checker.side_files import Numbers, beside
@@ -135,6 +136,15 @@ class Component:
         """The rows of the basis in integers, and what divides them."""
         return _whole(self.kernel)
 
+    def coordinates(self, nodes: Sequence[int], x: Sequence[Fraction]) -> tuple[list[int], int]:
+        """Return ``xi`` of a state at nodes that are no pivots, in integers, and what divides them."""
+        (kernel, unit), pivots = self.whole, self.pivots
+        (whole,), scale = integers([[x[v] for v in (*nodes, *pivots.values())]])
+        rest, bits = dict(zip(pivots, whole[len(nodes) :], strict=True)), unit.bit_length() + 64
+        spend(len(nodes) + sum(len(kernel[v]) for v in nodes), longest(whole), bits, "a Lyapunov function")
+        own = zip(nodes, whole[: len(nodes)], strict=True)
+        return [unit * y - sum(b * rest[j] for j, b in kernel[v].items()) for v, y in own], unit * scale
+
 
 def check_family(doc: Document) -> Family:
     """Verify modes, structures and what is claimed of every component."""
@@ -164,10 +174,7 @@ def _connectivity(structure: Structure) -> str:
 
 def _read_modes(doc: Document) -> tuple[list[str], list[tuple[list[Edge], int, bool]]]:
     section = fields(doc.section("graph"), ("nodes", "modes", "sha256"), "graph")
-    labels = entries(section["nodes"], "nodes")
-    need(bool(labels) and all(isinstance(x, str) for x in labels), "nodes are not texts, or there is none")
-    index = {label: v for v, label in enumerate(labels)}
-    need(len(index) == len(labels), "a node occurs twice")
+    labels, index = read_nodes(section)
     items = entries(section["modes"], "modes")
     need(0 < len(items) <= MANY_MODES, f"no mode, or more than {MANY_MODES}")
     drafts = []
@@ -246,22 +253,14 @@ def _hash(labels: Sequence[str], modes: Sequence[tuple[Sequence[Edge], int, bool
         hashed.update(b'{"undirected": true}\n' if tied and any(low < high for _, _, _, low, high in edges) else b"")
         spend(2 * len(edges), unit.bit_length(), unit.bit_length(), "the hash of long weights")
         # Edges ascend by target and sign. Put aside target by target in the order of labels, they do from every source.
-        into, out = grouped(edges, 1, len(labels)), [list[Edge]() for _ in labels]
-        for v in order:
-            for edge in into[v]:
-                out[edge[0]].append(edge)
+        into = {t: list(some) for t, some in groupby(edges, itemgetter(1))}
+        out: list[list[Edge]] = [[] for _ in labels]
+        for edge in chain.from_iterable(into.get(v, ()) for v in order):
+            out[edge[0]].append(edge)
         for v in order:
             lines = [f"[{quoted[v]}, {quoted[edge[1]]}, {_weight(edge, unit)}]\n" for edge in out[v]]
             hashed.update("".join(lines).encode("utf-8", "surrogatepass"))
     return hashed.hexdigest()
-
-
-def grouped(edges: Iterable[Edge], end: int, n: int) -> list[list[Edge]]:
-    """Return the edges of every node that is their source, for ``end`` 0, or their target, for 1."""
-    groups: list[list[Edge]] = [[] for _ in range(n)]
-    for edge in edges:
-        groups[edge[end]].append(edge)
-    return groups
 
 
 def _weight(edge: Edge, unit: int) -> str:
@@ -270,7 +269,7 @@ def _weight(edge: Edge, unit: int) -> str:
     texts = []
     for size in (low, high) if low < high else (low,):
         common = gcd(size, unit)
-        texts.append(f'"{sign * size // common}"' if common == unit else f'"{sign * size // common}/{unit // common}"')
+        texts.append(f'"{sign * size // common}{f"/{unit // common}" if common < unit else ""}"')
     return ", ".join(texts[::sign])
 
 
@@ -358,7 +357,7 @@ def _check_kernel(doc: Document, modes: Sequence[Mode], part: Part, witness: Any
         count += sum(len(whole[s]) + len(whole[t]) for s, t, _, low, high in edges if low < high)
         spend(2 * count, graph.bits, bits, "rows of kernels")
         for v in part.nodes:
-            need(not _row_product(graph.row(v), whole), "a column of the kernel is not at rest")
+            need(not combination(graph.row(v), whole), "a column of the kernel is not at rest")
         for s, t, sign, low, high in edges:
             agrees = low == high or whole[t] == {j: sign * x for j, x in whole[s].items()}
             need(agrees, "an uncertain edge does not agree with the kernel")
@@ -447,10 +446,16 @@ def _state(doc: Document, structure: Structure, inside: set[int], entry: Any) ->
     return zero | dict(zip(nodes, middles, strict=True)), zero | dict(zip(nodes, radii, strict=True))
 
 
-def _row_product(row: dict[int, int], rows: dict[int, dict[int, int]]) -> dict[int, int]:
-    """Return a row of ``L B``, without zeros."""
+def combination(factors: Mapping[int, int], vectors: Mapping[int, dict[int, int]]) -> dict[int, int]:
+    """Return the sum of multiples of vectors, without zeros.
+
+    Examples
+    --------
+    >>> combination({1: 2, 2: -1}, {1: {5: 1, 6: 1}, 2: {5: 2}})
+    {6: 2}
+    """
     total: dict[int, int] = {}
-    for v, weight in row.items():
-        for j, x in rows[v].items():
-            total[j] = total.get(j, 0) + weight * x
+    for k, factor in factors.items():
+        for j, x in vectors[k].items():
+            total[j] = total.get(j, 0) + factor * x
     return {j: x for j, x in total.items() if x}

@@ -70,16 +70,12 @@ class FollowerFunction:
 
     def root(self, x: Sequence[Fraction]) -> Fraction:
         """Return ``W`` of a state, rounded up."""
-        (kernel, unit), pivots = self.component.whole, self.component.pivots
-        (whole,), scale = integers([[x[v] for v in self.component.nodes]])
-        state = dict(zip(self.component.nodes, whole, strict=True))
-        spend(2 * self.component.size, longest(whole), unit.bit_length() + 64, "a Lyapunov function")
+        xi, unit = self.component.coordinates(list(self.vector), x)
         top, bottom = 0, 1
-        for v, d in self.vector.items():
-            xi = abs(unit * state[v] - sum(b * state[pivots[j]] for j, b in kernel[v].items()))
-            if xi * bottom > top * d:
-                top, bottom = xi, d
-        roots = [Fraction(top * self.scale, bottom * unit * scale)]
+        for y, d in zip(map(abs, xi), self.vector.values(), strict=True):
+            if y * bottom > top * d:
+                top, bottom = y, d
+        roots = [Fraction(top * self.scale, bottom * unit)]
         roots += [part.function.root(x) / part.times for part in self.parts]
         return rounded(max(roots), BITS, up=True)
 
