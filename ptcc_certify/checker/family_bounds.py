@@ -22,7 +22,7 @@ from ptcc_certify.checker.family_rows import Function as VerifiedFunction
 from ptcc_certify.checker.graph import ordered
 from ptcc_certify.checker.input_formulas import BITS
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import Interval, exact, fields, interval, need
+from ptcc_certify.checker.reading import Interval, exact, fields, interval, length, need
 
 Gains = Mapping[str, Fraction]
 
@@ -74,6 +74,19 @@ def deviations(functions: Iterable[Function], x: Sequence[Fraction]) -> tuple[di
     return _multiples((V, 2 * V.root(x) / V.rate) for V in functions if V.rate > 0)
 
 
+def _together(
+    nodes: Sequence[int], moves: tuple[Mapping[int, int], int], x: Sequence[Fraction]
+) -> tuple[dict[int, int], dict[int, int], int]:
+    """Return states and deviations of some nodes as integers over one scale, and that."""
+    (state,), scale = integers([[x[k] for k in nodes]])
+    bounds, unit = moves
+    bits = longest(state) + longest(bounds.values()), scale.bit_length() + unit.bit_length()
+    spend(2 * len(nodes), *bits, "final states of many agents")
+    sized(2 * len(nodes), sum(bits), "final states of many agents")
+    values = {k: y * unit for k, y in zip(nodes, state, strict=True)}
+    return values, {k: d * scale for k, d in bounds.items()}, scale * unit
+
+
 def final_interval(
     nodes: Sequence[int],
     camps: Mapping[int, int],
@@ -82,26 +95,20 @@ def final_interval(
     x: Sequence[Fraction],
 ) -> dict[int, Interval]:
     """Return ends of ``x_k(T)`` of a component that comes to consensus, from the deciding nodes and all deviations."""
-    (state,), scale = integers([[x[k] for k in nodes]])
-    bounds, unit = moves
-    values = {k: camps[k] * y * unit for k, y in zip(nodes, state, strict=True)}
-    group = [values[k] for k in deciding]
-    low = max([min(group), *(values[k] - scale * d for k, d in bounds.items())])
-    high = min([max(group), *(values[k] + scale * d for k, d in bounds.items())])
-    below, above = Fraction(low, scale * unit), Fraction(high, scale * unit)
+    values, bounds, scale = _together(nodes, moves, x)
+    group = [camps[k] * values[k] for k in deciding]
+    low = max([min(group), *(camps[k] * values[k] - d for k, d in bounds.items())])
+    high = min([max(group), *(camps[k] * values[k] + d for k, d in bounds.items())])
+    below, above = Fraction(low, scale), Fraction(high, scale)
     return {k: (below, above) if camps[k] > 0 else (-above, -below) for k in nodes}
 
 
 def final_box(nodes: Sequence[int], moves: tuple[Mapping[int, int], int], x: Sequence[Fraction]) -> dict[int, Interval]:
     """Return ends of ``x_k(T)`` of a component with a common kernel: nothing grows, and nobody moves further."""
-    (state,), scale = integers([[x[k] for k in nodes]])
-    bounds, unit = moves
-    most, result = max(map(abs, state)) * unit, {}
-    for k, y in zip(nodes, state, strict=True):
-        d = bounds[k] * scale if k in bounds else 2 * most
-        ends = max(-most, y * unit - d), min(most, y * unit + d)
-        result[k] = Fraction(ends[0], scale * unit), Fraction(ends[1], scale * unit)
-    return result
+    values, bounds, scale = _together(nodes, moves, x)
+    most = max(map(abs, values.values()))
+    ways = ((k, y, bounds.get(k, 2 * most)) for k, y in values.items())
+    return {k: (Fraction(max(-most, y - d), scale), Fraction(min(most, y + d), scale)) for k, y, d in ways}
 
 
 def peaks(functions: Iterable[Function], gains: Gains, x: Sequence[Fraction]) -> tuple[dict[int, int], int]:
@@ -195,6 +202,8 @@ def _check_input(
     told = list(map(exact, ordered(family.labels, entry, "peaks").values()))
     for component in family.components:
         bounds, unit = peaks([V for V in functions if V.component is component], gains, x or ())
+        bits = length(told[v] for v in component.nodes), max(longest(bounds.values()), unit.bit_length())
+        spend(2 * len(component.nodes), *bits, "peaks of many agents")
         for v in component.nodes:
             need(told[v].numerator * unit >= bounds.get(v, 0) * told[v].denominator, "a peak is not proved")
     doc.done(f"peaks of {len(told)} agents")

@@ -192,6 +192,7 @@ def _rows(
     for mode, edges in zip(family.modes, component.part.edges, strict=True):
         bits = longest(edge[4] for edge in edges)
         spend(4 * (len(edges) + len(followers)), bits, longest(sizes.values()), "rows of a family")
+        spend(len(followers), bits + longest(sizes.values()) + 64, units.bit_length(), "rows of a family")
         sized(2 * len(followers), bits + longest(sizes.values()) + units.bit_length() + 64, "rows of a family")
         pull, push = dict.fromkeys(sizes, 0), dict.fromkeys(sizes, 0)
         for s, t, _, low, high in edges:
