@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import itertools
 import random
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from fractions import Fraction
 
 import numpy as np
 
+from ptcc_certify.checker.family_bounds import least
+from ptcc_certify.checker.family_function import Scaled
 from ptcc_certify.graphs.family import Family, Mode
 
 Edge = tuple[int, int, Fraction, Fraction]
@@ -139,3 +141,9 @@ def exact_value(n: int, edges: list[tuple[int, int, Fraction]], z: list[Fraction
             for i, row in enumerate(rows)
         ]
     return sum((row[n] * x for row, x in zip(rows[:n], z, strict=True)), Fraction(0))
+
+
+def bounds_of(vectors: Iterable[Scaled]) -> dict[int, Fraction]:
+    """Return what some vectors say of every node."""
+    whole, scale = least(vectors)
+    return {k: Fraction(x, scale) for k, x in whole.items()}

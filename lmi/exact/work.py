@@ -7,6 +7,7 @@ on none. Limits grow in proportion to a memory that is allowed, in GB.
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -161,8 +162,11 @@ def limited(memory: float = 1) -> Iterator[Account]:
     if not 0 < memory < GB:  # nor nan, nor infinite
         raise ValueError("the memory is not a positive number of GB")
     account = Account(memory)
-    token = _account.set(account)
+    token, collects = _account.set(account), gc.isenabled()
+    gc.disable()  # many small tuples and no cycles: looking for some would take a quarter of the time
     try:
         yield account
     finally:
         _account.reset(token)
+        if collects:
+            gc.enable()

@@ -27,12 +27,13 @@ import numpy as np
 
 from lmi.dyadic import dyadic_array, round_to_bits
 from lmi.sparse_h_matrix import solve
+from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import analyse, find_camps
-from ptcc_certify.lyapunov.family_function import FamilyFunction, mean_constant, root_above, rounded_up
+from ptcc_certify.lyapunov.family_function import FamilyFunction, mean_constant, rounded_up
 from ptcc_certify.lyapunov.interval_rows import IntervalRows, Policy
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.theorems.family_kernel import reached

@@ -5,7 +5,6 @@ Nothing here writes, reads or checks.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -14,12 +13,15 @@ from typing import Any
 
 import numpy as np
 
+from lmi.exact.numbers import integers
 from ptcc_certify.bounds.kept_means import LeadingGroup, leading_groups
 from ptcc_certify.certificate.certificate_data import Source
 from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.certificate.restricted_claims import Claim, LastModeClaim, RateClaim, ShareClaim, WindowClaim
-from ptcc_certify.checker.family_bounds import deviations, mean_intervals, peaks
+from ptcc_certify.checker.family_bounds import deviations, least, mean_intervals, peaks
+from ptcc_certify.checker.family_function import Scaled
 from ptcc_certify.checker.family_limits import WeightedMean, limits
+from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.checker.reading import Interval
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
@@ -94,14 +96,15 @@ class BoundFunction:
         return self.function.rate
 
     @property
-    def inputs(self) -> Mapping[int, Fraction]:
-        """``|(L X)_k|^2 <= inputs[k] V``."""
-        return dict(enumerate(self.function.input_constants))
+    def speeds(self) -> list[Scaled]:
+        """Bounds of ``|(L X)_k| / sqrt(V)``."""
+        return [self.function.speeds]
 
     @property
-    def coordinates(self) -> Mapping[int, Fraction]:
-        """``xi_k^2 <= coordinates[k] V``."""
-        return dict(zip(self.function.nodes, self.function.coordinate_constants, strict=True))
+    def sizes(self) -> list[Scaled]:
+        """Bounds of ``|xi_k| / sqrt(V)``."""
+        (roots,), scale = integers([[root_above(c) for c in self.function.coordinate_constants]])
+        return [(dict(zip(self.function.nodes, roots, strict=True)), Fraction(1, scale))]
 
     @property
     def means(self) -> list[WeightedMean]:
@@ -114,9 +117,9 @@ class BoundFunction:
             result.append(WeightedMean(abs(signs[min(signs)]) - 1, weights, size, constant))
         return result
 
-    def value(self, x: Sequence[Fraction]) -> Fraction:
-        """Return ``V`` of a state of the component."""
-        return self.function.value(self.quotient.coordinates(x))
+    def root(self, x: Sequence[Fraction]) -> Fraction:
+        """Bound ``sqrt(V)`` of a state of the component."""
+        return root_above(self.function.value(self.quotient.coordinates(x)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -216,7 +219,7 @@ class FamilyContent:
         groups = dict(enumerate(part.leading_groups))
         means = {j: c for j, group in groups.items() if (c := group.final_value(x)) is not None}
         functions = self._bound_functions(part)
-        near, moves = mean_intervals(functions, x), deviations(functions, False, x)
+        near, moves = mean_intervals(functions, x), deviations(functions, x)
         return dict(limits(part.kernel_rows, {j: group.nodes for j, group in groups.items()}, means, near, moves, x))
 
     @property
@@ -238,8 +241,9 @@ class FamilyContent:
         for part in self.parts:
             nodes = part.component.nodes.tolist()
             x = [self.initial_state[v] for v in nodes]
-            for k, bound in peaks(self._bound_functions(part), gains, x).items():
-                result[nodes[k]] = bound
+            bounds, unit = peaks(self._bound_functions(part), gains, x)
+            for k, bound in bounds.items():
+                result[nodes[k]] = Fraction(bound, unit)
         return tuple(result)
 
     def input_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
@@ -274,7 +278,9 @@ class FamilyContent:
                 bounds[nodes] = 0
             x = [self.initial_state[v] for v in nodes.tolist()]
             for V in self._bound_functions(part):
-                size = np.array([math.sqrt(V.inputs[k] * V.value(x)) for k in range(nodes.size)]) * (1 + 1e-12)
+                speeds, unit = least(V.speeds)
+                root = V.root(x) / unit
+                size = np.array([float(speeds[k] * root) for k in range(nodes.size)]) * (1 + 1e-12)
                 decay = height * np.exp(-float(V.rate) * (1 - 1e-12) / 2 * clock)
                 bounds[nodes] = np.minimum(bounds[nodes], np.multiply.outer(size, decay))
         return bounds
@@ -307,9 +313,13 @@ class FamilyContent:
                 bounds[nodes] = 0
             x = [self.initial_state[v] for v in nodes.tolist()]
             for V in self._bound_functions(part):
-                moves = deviations([V], part.component.behaviour == STABILITY, x)
+                moves, unit = deviations([V], x)
+                if part.component.behaviour == STABILITY and moves:
+                    root = V.root(x)
+                    sizes = [(vector, factor * root) for vector, factor in V.sizes]
+                    moves, unit = least([(moves, Fraction(1, unit)), *sizes])
                 if moves:
-                    size = np.array([float(moves[k]) for k in range(nodes.size)]) * (1 + 1e-12)
+                    size = np.array([moves[k] / unit for k in range(nodes.size)]) * (1 + 1e-12)
                     decay = np.exp(-float(V.rate) * (1 - 1e-12) / 2 * clock)
                     bounds[nodes] = np.minimum(bounds[nodes], np.multiply.outer(size, decay))
         return bounds

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from lmi.exact.numbers import longest
+from lmi.exact.elementary_enclosures import rounded
 from ptcc_certify.certificate.family_content import FamilyContent
 from ptcc_certify.certificate.format import producer
 from ptcc_certify.certificate.format_family_rows import form_entry, form_steps, rows_entry, rows_steps
@@ -72,10 +72,7 @@ def _labels(certificate: FamilyContent, claim: Claim) -> Sequence[str]:
 
 def _up(x: Fraction) -> str:
     """Write a bound, rounded up to 60 bits or so."""
-    if not x:
-        return "0"
-    unit = Fraction(2) ** (longest([x.numerator]) - longest([x.denominator]) - 60)
-    return format_exact(-(-x // unit) * unit)
+    return format_exact(rounded(x, 60, up=True))
 
 
 def _proof(
@@ -181,19 +178,36 @@ def certificate_family(section: Mapping[str, Any], files: Mapping[str, bytes]) -
     for mode in section["modes"]:
         rows = mode["edges"]
         if isinstance(rows, dict):
-            count = rows["count"]
-            source, target = (np.array(side.integers(rows[key], key, count)) for key in ("source", "target"))
-            least, largest = (side.numbers(rows[key], key, count) for key in ("least", "largest"))
-            ends = list(zip(least, largest, strict=True))
+            source, target, *ends = _columns(rows, side)
         else:
             source, target = (np.array([index[row[k]] for row in rows], dtype=np.int64) for k in (0, 1))
-            ends = [(exact(row[2]), exact(row[-1])) for row in rows]
-        sign = np.array([1 if high > 0 else -1 for _, high in ends], dtype=np.int8)
-        sizes = [sorted(map(abs, pair)) for pair in ends]
-        both, m = Weights([low for low, _ in sizes] + [high for _, high in sizes]), len(ends)
-        bounds = both.take(np.arange(m)), both.take(np.arange(m, 2 * m))
-        modes.append(Mode(labels, source, target, sign, *bounds, name=mode["name"], tied=mode["undirected"]))
+            ends = [([exact(row[k]) for row in rows], np.arange(len(rows))) for k in (2, -1)]
+        sign, lower, upper = _sizes(*ends)
+        modes.append(Mode(labels, source, target, sign, lower, upper, name=mode["name"], tied=mode["undirected"]))
     return Family(tuple(modes))
+
+
+def _columns(rows: Mapping[str, Any], files: SideFiles) -> tuple[Any, ...]:
+    """Return sources and targets of edges in side files, and distinct values and their places of both ends."""
+    names = ("source", "target", "least", "largest")
+    entries = ({key: rows[name][key] for key in ("file", "sha256")} for name in names)
+    source, target, *ends = (np.array(files.column(entry, rows["count"])) for entry in entries)
+    distinct = []
+    for name, column in zip(names[2:], ends, strict=True):
+        values, codes = np.unique(column, return_inverse=True)
+        scale = exact(rows[name].get("scale", "1"))
+        distinct.append(([Fraction(x) / scale for x in values.tolist()], codes))
+    return source, target, *distinct
+
+
+def _sizes(least: tuple[list[Fraction], Any], largest: tuple[list[Fraction], Any]) -> tuple[np.ndarray, Any, Any]:
+    """Return signs and bounds of sizes of weights between the values ``[codes]`` of two lists."""
+    (low, below), (high, above) = least, largest
+    m, above = len(below), above + len(low)
+    positive = np.array([x > 0 for x in (*low, *high)], dtype=bool)[above]
+    codes = np.concatenate([np.where(positive, below, above), np.where(positive, above, below)])
+    both = Weights([abs(x) for x in (*low, *high)], codes)
+    return np.where(positive, 1, -1).astype(np.int8), both.take(np.arange(m)), both.take(np.arange(m, 2 * m))
 
 
 def claim_witnesses(family: Family, components: Sequence[FamilyComponent]) -> list[Any]:

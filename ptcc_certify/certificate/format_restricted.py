@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
+from functools import lru_cache
 from typing import Any
 
 from lmi.exact.numbers import longest
@@ -50,10 +51,15 @@ def enclosed(low: Fraction, high: Fraction) -> Any:
     """
     if low == high:
         return format_exact(low)
+    return dict(zip(("mid", "radius"), _ball(low, high), strict=True))
+
+
+@lru_cache(maxsize=100)  # the ends of agents that agree are the same
+def _ball(low: Fraction, high: Fraction) -> tuple[str, str]:
     size = max(abs(low), abs(high))
     unit = Fraction(2) ** (longest([size.numerator]) - longest([size.denominator]) - _BITS)
     below, above = low // unit, -(-high // unit)
-    return {"mid": format_exact((below + above) * unit / 2), "radius": format_exact((above - below) * unit / 2)}
+    return format_exact((below + above) * unit / 2), format_exact((above - below) * unit / 2)
 
 
 def claim_entry(claim: Claim, labels: Sequence[str]) -> dict[str, Any]:

@@ -39,16 +39,17 @@ class ArrayDigraph(Digraph):
             np.add.at(total, j, weights[k] * numbers[i])
         return total.tolist()
 
-    @cached_property
-    def pieces(self) -> tuple[list[int], set[int]]:
-        """Weak components and those in conflict, from the signed double cover; see :attr:`Digraph.pieces`.
+    @staticmethod
+    def signed_pieces(
+        n: int, source: Sequence[int], target: Sequence[int], minus: Sequence[bool]
+    ) -> tuple[list[int], list[bool], set[int]]:
+        """Return weak components from the signed double cover; see :meth:`Digraph.signed_pieces`.
 
         Node ``v`` is there twice, ``v`` and ``v + n``: with either sign. An edge joins equal or opposite signs. Camps
         exclude each other where both copies of a node are connected.
         """
-        n, source, target = self.n, np.asarray(self.source), np.asarray(self.target)
-        over = n * np.array(self.minus, dtype=np.int64)[np.asarray(self.which)]
-        x, y = np.concatenate([source, source + n]), np.concatenate([target + over, target + n - over])
+        tails, heads, over = np.asarray(source), np.asarray(target), n * np.array(minus, dtype=np.int64)
+        x, y = np.concatenate([tails, tails + n]), np.concatenate([heads + over, heads + n - over])
         label = np.arange(2 * n)
         while x.size:
             # Each label takes the smallest one next to it, then that one's, and so on.
@@ -58,8 +59,9 @@ class ArrayDigraph(Digraph):
                 label = further
             apart = label[x] != label[y]
             x, y = x[apart], y[apart]
-        first = np.minimum(label[:n], label[n:])
-        return first.tolist(), set(first[label[:n] == label[n:]].tolist())
+        one, other = label[:n], label[n:]
+        first = np.minimum(one, other)
+        return first.tolist(), (other < one).tolist(), set(first[one == other].tolist())
 
     def _lines(self, order: Sequence[int], rank: Sequence[int], *texts: Sequence[str]) -> Iterator[str]:
         edges, place = [np.asarray(part) for part in (self.source, self.target, self.which)], np.array(rank)

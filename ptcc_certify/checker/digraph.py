@@ -33,9 +33,11 @@ def numbered(weights: Any) -> tuple[list[Any], array[int]]:
     >>> numbered([2, -3, 2])
     ([2, -3], array('q', [0, 1, 0]))
     """
-    keys = (
-        weights if isinstance(weights, array) else [f"{p:x}/{q:x}" for p, q in (w.as_integer_ratio() for w in weights)]
-    )
+    keys: Any
+    try:
+        keys = weights if isinstance(weights, array) else array("q", weights)
+    except (OverflowError, TypeError):
+        keys = [f"{p:x}/{q:x}" for p, q in (w.as_integer_ratio() for w in weights)]
     distinct = dict(zip(keys, weights, strict=True))
     number = {key: k for k, key in enumerate(distinct)}
     return list(distinct.values()), array("q", map(number.__getitem__, keys))
@@ -201,22 +203,52 @@ class Digraph:
                     todo.append(u)
         return marks
 
+    @staticmethod
+    def signed_pieces(
+        n: int, source: Sequence[int], target: Sequence[int], minus: Sequence[bool]
+    ) -> tuple[list[int], list[bool], set[int]]:
+        """Return the weak components of signed edges.
+
+        Returns
+        -------
+        first : list of int
+            The smallest node of every node's component.
+        opposite : list of bool
+            Whether camps that fit have the node against that one.
+        odd : set of int
+            The components that no camps fit.
+
+        Examples
+        --------
+        >>> Digraph.signed_pieces(4, [0, 2, 3], [1, 3, 2], [True, False, True])
+        ([0, 0, 2, 2], [False, True, False, False], {2})
+        """
+        parent, opposite, odd = list(range(n)), [False] * n, set()
+
+        def root(v: int) -> tuple[int, bool]:
+            against = False
+            while parent[v] != v:
+                opposite[v] ^= opposite[parent[v]]
+                parent[v] = parent[parent[v]]  # every other step is left out next time
+                against ^= opposite[v]
+                v = parent[v]
+            return v, against
+
+        for s, t, m in zip(source, target, minus, strict=True):
+            (one, x), (other, y) = sorted((root(s), root(t)))
+            if one != other:
+                parent[other], opposite[other] = one, x ^ y ^ m
+            elif x ^ y ^ m:
+                odd.add(one)
+        first, against = map(list, zip(*map(root, range(n)), strict=True))
+        return first, against, {first[v] for v in odd}
+
     @cached_property
     def pieces(self) -> tuple[list[int], set[int]]:
         """The smallest node of every node's weak component, and those components that no camps fit."""
-        camp, piece, minus = [False] * self.n, [-1] * self.n, self.minus
-        for root in range(self.n):
-            todo = [] if piece[root] >= 0 else [root]
-            while todo:
-                v = todo.pop()
-                piece[v] = root
-                for adjacency in (self.into, self.out):
-                    for u, k in zip(*edges_of(adjacency, v), strict=True):
-                        if piece[u] < 0:
-                            piece[u], camp[u] = root, camp[v] ^ minus[k]
-                            todo.append(u)
-        edges = zip(self.source, self.target, self.which, strict=True)
-        return piece, {piece[s] for s, t, k in edges if camp[s] ^ camp[t] != minus[k]}
+        minus = [self.minus[k] for k in self.which]
+        first, _, odd = self.signed_pieces(self.n, self.source, self.target, minus)
+        return first, odd
 
     def closed(self, group: Sequence[int]) -> bool:
         """Tell whether no edge enters a group from outside; -1 marks nodes of none."""

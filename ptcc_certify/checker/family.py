@@ -8,17 +8,18 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from itertools import pairwise
+from itertools import chain, groupby, pairwise
+from math import gcd
+from operator import itemgetter
 from typing import Any
 
 from lmi.exact.numbers import integers, longest, sized
 from lmi.exact.work import keeps, spend
-from ptcc_certify.checker.digraph import Digraph
-from ptcc_certify.checker.graph import NODE_BYTES, positions
+from ptcc_certify.checker.graph import NODE_BYTES, digraph, positions, read_nodes
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, interval, need, same
 from ptcc_certify.checker.side_files import Numbers, beside
@@ -135,6 +136,15 @@ class Component:
         """The rows of the basis in integers, and what divides them."""
         return _whole(self.kernel)
 
+    def coordinates(self, nodes: Sequence[int], x: Sequence[Fraction]) -> tuple[list[int], int]:
+        """Return ``xi`` of a state at nodes that are no pivots, in integers, and what divides them."""
+        (kernel, unit), pivots = self.whole, self.pivots
+        (whole,), scale = integers([[x[v] for v in (*nodes, *pivots.values())]])
+        rest, bits = dict(zip(pivots, whole[len(nodes) :], strict=True)), unit.bit_length() + 64
+        spend(len(nodes) + sum(len(kernel[v]) for v in nodes), longest(whole), bits, "a Lyapunov function")
+        own = zip(nodes, whole[: len(nodes)], strict=True)
+        return [unit * y - sum(b * rest[j] for j, b in kernel[v].items()) for v, y in own], unit * scale
+
 
 def check_family(doc: Document) -> Family:
     """Verify modes, structures and what is claimed of every component."""
@@ -145,7 +155,7 @@ def check_family(doc: Document) -> Family:
         on = [edge for edge in edges if edge[3]]
         source, target = ([edge[k] for edge in on] for k in (0, 1))
         need(keeps(NODE_BYTES * len(labels)), TOO_LARGE)
-        graph = Digraph(labels, source, target, [sign * low for _, _, sign, low, _ in on], unit)
+        graph = digraph(doc, labels, source, target, [sign * low for _, _, sign, low, _ in on], unit)
         structure = check_structure(doc, graph, section, f"graph.modes[{number}]")
         need(section["connectivity"] == _connectivity(structure), "another connectivity of a mode")
         modes.append(Mode(edges, unit, tied, structure))
@@ -164,10 +174,7 @@ def _connectivity(structure: Structure) -> str:
 
 def _read_modes(doc: Document) -> tuple[list[str], list[tuple[list[Edge], int, bool]]]:
     section = fields(doc.section("graph"), ("nodes", "modes", "sha256"), "graph")
-    labels = entries(section["nodes"], "nodes")
-    need(bool(labels) and all(isinstance(x, str) for x in labels), "nodes are not texts, or there is none")
-    index = {label: v for v, label in enumerate(labels)}
-    need(len(index) == len(labels), "a node occurs twice")
+    labels, index = read_nodes(section)
     items = entries(section["modes"], "modes")
     need(0 < len(items) <= MANY_MODES, f"no mode, or more than {MANY_MODES}")
     drafts = []
@@ -238,18 +245,32 @@ def _check_edges(edges: Sequence[Edge], tied: bool) -> None:
 
 def _hash(labels: Sequence[str], modes: Sequence[tuple[Sequence[Edge], int, bool]]) -> str:
     """Return the SHA-256 of nodes and modes; of undirected edges it tells if some weight is uncertain."""
-    quote = json.JSONEncoder(ensure_ascii=False).encode
-    hashed = hashlib.sha256("".join(f"[{quote(x)}]\n" for x in sorted(labels)).encode("utf-8", "surrogatepass"))
+    quoted = [*map(json.JSONEncoder(ensure_ascii=False).encode, labels)]
+    order = sorted(range(len(labels)), key=labels.__getitem__)
+    hashed = hashlib.sha256("".join([f"[{quoted[v]}]\n" for v in order]).encode("utf-8", "surrogatepass"))
     for number, (edges, unit, tied) in enumerate(modes):
         hashed.update(b"{}\n" if number else b"")
         hashed.update(b'{"undirected": true}\n' if tied and any(low < high for _, _, _, low, high in edges) else b"")
         spend(2 * len(edges), unit.bit_length(), unit.bit_length(), "the hash of long weights")
-        for s, t, sign, low, high in sorted(edges, key=lambda e: (labels[e[0]], labels[e[1]], e[2])):
-            ends = dict.fromkeys(sorted((sign * low, sign * high)))
-            weights = ", ".join(f'"{Fraction(w, unit)}"' for w in ends)
-            line = f"[{quote(labels[s])}, {quote(labels[t])}, {weights}]\n"
-            hashed.update(line.encode("utf-8", "surrogatepass"))
+        # Edges ascend by target and sign. Put aside target by target in the order of labels, they do from every source.
+        into = {t: list(some) for t, some in groupby(edges, itemgetter(1))}
+        out: list[list[Edge]] = [[] for _ in labels]
+        for edge in chain.from_iterable(into.get(v, ()) for v in order):
+            out[edge[0]].append(edge)
+        for v in order:
+            lines = [f"[{quoted[v]}, {quoted[edge[1]]}, {_weight(edge, unit)}]\n" for edge in out[v]]
+            hashed.update("".join(lines).encode("utf-8", "surrogatepass"))
     return hashed.hexdigest()
+
+
+def _weight(edge: Edge, unit: int) -> str:
+    """Write a weight, or the least and the largest one."""
+    _, _, sign, low, high = edge
+    texts = []
+    for size in (low, high) if low < high else (low,):
+        common = gcd(size, unit)
+        texts.append(f'"{sign * size // common}{f"/{unit // common}" if common < unit else ""}"')
+    return ", ".join(texts[::sign])
 
 
 # ---------------------------------------------------------------------- claims
@@ -278,32 +299,22 @@ def _check_claims(doc: Document, labels: list[str], modes: list[Mode]) -> list[C
 
 def _parts(n: int, modes: Sequence[Mode]) -> list[Part]:
     """Return the weak components of all edges, each with the camps that keep all its edges, or None."""
-    near: list[list[tuple[int, int]]] = [[] for _ in range(n)]
-    for mode in modes:
-        for s, t, sign, _, _ in mode.edges:
-            near[s].append((t, sign))
-            near[t].append((s, sign))
-    camp, home = [0] * n, [0] * n
+    edges = [edge for mode in modes for edge in mode.edges]
+    source, target, minus = [e[0] for e in edges], [e[1] for e in edges], [e[2] < 0 for e in edges]
+    first, opposite, odd = modes[0].structure.graph.signed_pieces(n, source, target, minus)
+    groups: dict[int, list[int]] = {}
+    for v, root in enumerate(first):
+        groups.setdefault(root, []).append(v)
+    home = {root: k for k, root in enumerate(groups)}
     parts: list[Part] = []
-    for root in range(n):
-        if camp[root]:
-            continue
-        camp[root], found, fit = 1, [root], True
-        for v in found:
-            home[v] = len(parts)
-            for u, sign in near[v]:
-                if not camp[u]:
-                    camp[u] = sign * camp[v]
-                    found.append(u)
-                fit &= camp[u] == sign * camp[v]
-        found.sort()
-        camps = {v: camp[v] for v in found} if fit else None
-        parts.append(Part(found, camps, [[] for _ in modes], [[] for _ in modes]))
+    for root, nodes in groups.items():
+        camps = None if root in odd else {v: -1 if opposite[v] else 1 for v in nodes}
+        parts.append(Part(nodes, camps, [[] for _ in modes], [[] for _ in modes]))
     for number, mode in enumerate(modes):
         for edge in mode.edges:
-            parts[home[edge[0]]].edges[number].append(edge)
+            parts[home[first[edge[0]]]].edges[number].append(edge)
         for k, group in enumerate(mode.structure.closed):
-            parts[home[group[0]]].closed[number].append(k)
+            parts[home[first[group[0]]]].closed[number].append(k)
     return parts
 
 
@@ -346,7 +357,7 @@ def _check_kernel(doc: Document, modes: Sequence[Mode], part: Part, witness: Any
         count += sum(len(whole[s]) + len(whole[t]) for s, t, _, low, high in edges if low < high)
         spend(2 * count, graph.bits, bits, "rows of kernels")
         for v in part.nodes:
-            need(not _row_product(graph.row(v), whole), "a column of the kernel is not at rest")
+            need(not combination(graph.row(v), whole), "a column of the kernel is not at rest")
         for s, t, sign, low, high in edges:
             agrees = low == high or whole[t] == {j: sign * x for j, x in whole[s].items()}
             need(agrees, "an uncertain edge does not agree with the kernel")
@@ -435,10 +446,16 @@ def _state(doc: Document, structure: Structure, inside: set[int], entry: Any) ->
     return zero | dict(zip(nodes, middles, strict=True)), zero | dict(zip(nodes, radii, strict=True))
 
 
-def _row_product(row: dict[int, int], rows: dict[int, dict[int, int]]) -> dict[int, int]:
-    """Return a row of ``L B``, without zeros."""
+def combination(factors: Mapping[int, int], vectors: Mapping[int, dict[int, int]]) -> dict[int, int]:
+    """Return the sum of multiples of vectors, without zeros.
+
+    Examples
+    --------
+    >>> combination({1: 2, 2: -1}, {1: {5: 1, 6: 1}, 2: {5: 2}})
+    {6: 2}
+    """
     total: dict[int, int] = {}
-    for v, weight in row.items():
-        for j, x in rows[v].items():
-            total[j] = total.get(j, 0) + weight * x
+    for k, factor in factors.items():
+        for j, x in vectors[k].items():
+            total[j] = total.get(j, 0) + factor * x
     return {j: x for j, x in total.items() if x}

@@ -1,8 +1,8 @@
 """Bounds of a family for every signal: where each agent ends, and how large its input gets; proved and verified here.
 
-With ``V <= e^(-r s) V(0)`` and ``|(L X)_k|^2 <= c_k V`` for every member, for every signal
+With ``V <= e^(-r s) V(0)`` and ``|(L X)_k| <= c_k sqrt(V)`` for every member, for every signal
 
-    |u_k| <= gain sqrt(c_k V(0)) e^(-r s / 2),      |x_k(t) - x_k(T)| <= (2/r) sqrt(c_k V(0)) e^(-r s / 2)
+    |u_k| <= gain c_k sqrt(V(0)) e^(-r s / 2),      |x_k(t) - x_k(T)| <= (2/r) c_k sqrt(V(0)) e^(-r s / 2)
 
 and ``r rho2 kappa >= 2`` makes the first largest at ``t = 0``. Where agents end by the common kernel is in
 :mod:`~ptcc_certify.checker.family_limits`.
@@ -15,15 +15,16 @@ from fractions import Fraction
 from typing import Protocol
 
 from lmi.exact.elementary_enclosures import rounded
-from lmi.exact.numbers import longest
+from lmi.exact.numbers import integers, longest, sized
 from lmi.exact.work import spend
 from ptcc_certify.checker.family import STABILITY, Component, Family
+from ptcc_certify.checker.family_function import Scaled
 from ptcc_certify.checker.family_limits import WeightedMean, check_means, limits
 from ptcc_certify.checker.family_rows import Function as VerifiedFunction
 from ptcc_certify.checker.graph import ordered
 from ptcc_certify.checker.input_formulas import BITS, root_above
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import Interval, exact, fields, interval, need
+from ptcc_certify.checker.reading import Interval, exact, fields, interval, length, need
 
 Gains = Mapping[str, Fraction]
 #: Products of short integers that a root costs, about.
@@ -38,34 +39,47 @@ class Function(Protocol):
         """The proved rate."""
 
     @property
-    def inputs(self) -> Mapping[int, Fraction]:
-        """Constants of inputs."""
-
-    @property
-    def coordinates(self) -> Mapping[int, Fraction]:
-        """Constants of coordinates."""
+    def speeds(self) -> Sequence[Scaled]:
+        """Bounds of ``|(L X)_k| / sqrt(V)`` for every member; a node may be in several vectors."""
 
     @property
     def means(self) -> Sequence[WeightedMean]:
         """Weighted means, with their constants."""
 
-    def value(self, x: Sequence[Fraction]) -> Fraction:
-        """Return ``V`` of a state."""
+    def root(self, x: Sequence[Fraction]) -> Fraction:
+        """Bound ``sqrt(V)`` of a state."""
 
 
-def deviations(functions: Iterable[Function], stable: bool, x: Sequence[Fraction]) -> dict[int, Fraction]:
-    """Bound ``|x_k(0) - x_k(T)|`` by functions of one component; empty if none decays."""
-    least: dict[int, Fraction] = {}
-    for V in functions:
-        if V.rate <= 0:
-            continue
-        spend(EACH_ROOT * len(V.inputs), what="bounds of many agents")
-        value = rounded(V.value(x), BITS, up=True)
-        bounds = {k: 2 * root_above(c * value) / V.rate for k, c in V.inputs.items()}
-        for k, c in V.coordinates.items() if stable else ():
-            bounds[k] = min(bounds[k], root_above(c * value))
-        least = {k: min(bound, least.get(k, bound)) for k, bound in bounds.items()}
-    return least
+def least(bounds: Iterable[Scaled]) -> tuple[dict[int, int], int]:
+    """Return the least number of every node in some vectors as integers over one scale, and that.
+
+    Examples
+    --------
+    >>> least([({1: 3, 2: 3}, Fraction(1, 2)), ({2: 1}, Fraction(1))])
+    ({1: 3, 2: 2}, 2)
+    """
+    some = list(bounds)
+    (factors,), scale = integers([[factor for _, factor in some]])
+    result: dict[int, int] = {}
+    for (vector, _), factor in zip(some, factors, strict=True):
+        bits = longest(vector.values())
+        spend(len(vector), bits, factor.bit_length(), "bounds of many agents")
+        sized(len(vector), bits + factor.bit_length(), "bounds of many agents")
+        for k, x in vector.items():
+            bound = factor * x
+            result[k] = min(bound, result.get(k, bound))
+    return result, scale
+
+
+def _multiples(functions: Iterable[tuple[Function, Fraction]]) -> tuple[dict[int, int], int]:
+    """Return the least of all speeds, those of every function multiplied by a number that is rounded up."""
+    some = [(V.speeds, rounded(factor, BITS, up=True)) for V, factor in functions]
+    return least((vector, unit * factor) for speeds, factor in some for vector, unit in speeds)
+
+
+def deviations(functions: Iterable[Function], x: Sequence[Fraction]) -> tuple[dict[int, int], int]:
+    """Bound ``|x_k(0) - x_k(T)|`` by functions of one component, as :func:`least` does; empty if none decays."""
+    return _multiples((V, 2 * V.root(x) / V.rate) for V in functions if V.rate > 0)
 
 
 def mean_intervals(functions: Iterable[Function], x: Sequence[Fraction]) -> list[tuple[int, Interval]]:
@@ -73,24 +87,21 @@ def mean_intervals(functions: Iterable[Function], x: Sequence[Fraction]) -> list
     result = []
     for V in functions:
         if V.means and V.rate > 0:
-            value = rounded(V.value(x), BITS, up=True)
+            factor = rounded(2 * V.root(x) / V.rate, BITS, up=True)
             for mean in V.means:
                 spend(EACH_ROOT + 10 * len(mean.weights), what="means of many agents")
-                result.append((mean.column, mean.interval(x, 2 * root_above(mean.constant * value) / V.rate)))
+                result.append((mean.column, mean.interval(x, root_above(mean.constant) * factor)))
     return result
 
 
-def peaks(functions: Iterable[Function], gains: Gains, x: Sequence[Fraction]) -> dict[int, Fraction]:
-    """Bound ``|u_k|`` for all times by functions of one component with ``rate rho2 kappa >= 2``; empty if none has."""
+def peaks(functions: Iterable[Function], gains: Gains, x: Sequence[Fraction]) -> tuple[dict[int, int], int]:
+    """Bound ``|u_k|`` for all times by functions of one component with ``rate rho2 kappa >= 2``, as :func:`least` does.
+
+    Empty if no function has this rate.
+    """
     pole = gains["rho2"] * gains["kappa"]
-    first, least = gains["rho1"] + pole / gains["T"], dict[int, Fraction]()
-    for V in functions:
-        if V.rate * pole >= 2:
-            spend(EACH_ROOT * len(V.inputs), what="bounds of many agents")
-            value = rounded(V.value(x), BITS, up=True)
-            bounds = {k: first * root_above(c * value) for k, c in V.inputs.items()}
-            least = {k: min(bound, least.get(k, bound)) for k, bound in bounds.items()}
-    return least
+    first = gains["rho1"] + pole / gains["T"]
+    return _multiples((V, first * V.root(x)) for V in functions if V.rate * pole >= 2)
 
 
 def final_states(
@@ -107,13 +118,10 @@ def final_states(
     if component.depends:
         return dict.fromkeys(component.nodes)
     whole, _ = component.whole
-    bits, own = (
-        longest(b for row in whole.values() for b in row.values()),
-        longest(x[v].numerator for v in component.nodes),
-    )
-    spend(8 * component.size, bits, own, "final states")
+    bits = longest(b for row in whole.values() for b in row.values())
+    spend(8 * component.size, bits, longest(x[v].numerator for v in component.nodes), "final states")
     near = mean_intervals(functions, x)
-    return dict(limits(component.kernel, groups, means, near, deviations(functions, False, x), x))
+    return dict(limits(component.kernel, groups, means, near, deviations(functions, x), x))
 
 
 # ---------------------------------------------------------------------- the check
@@ -161,9 +169,11 @@ def _check_input(
         doc.done("bounded")
         return
     need(x is not None, "peaks without an initial state")
-    least = dict.fromkeys(range(len(family.labels)), Fraction(0))
+    told = list(map(exact, ordered(family.labels, entry, "peaks").values()))
     for component in family.components:
-        least |= peaks([V for V in functions if V.component is component], gains, x or ())
-    for v, text in enumerate(ordered(family.labels, entry, "peaks").values()):
-        need(exact(text) >= least[v], "a peak is not proved")
-    doc.done(f"peaks of {len(least)} agents")
+        bounds, unit = peaks([V for V in functions if V.component is component], gains, x or ())
+        bits = length(told[v] for v in component.nodes), max(longest(bounds.values()), unit.bit_length())
+        spend(2 * len(component.nodes), *bits, "peaks of many agents")
+        for v in component.nodes:
+            need(told[v].numerator * unit >= bounds.get(v, 0) * told[v].denominator, "a peak is not proved")
+    doc.done(f"peaks of {len(told)} agents")

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from operator import mul
 from typing import Any
 
@@ -18,7 +19,7 @@ from lmi.exact.definite import Arithmetic
 from lmi.exact.numbers import integers, longest, sized
 from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph
-from ptcc_certify.checker.family import Component, Edge, Family
+from ptcc_certify.checker.family import Component, Edge, Family, combination
 from ptcc_certify.checker.family_limits import WeightedMean
 from ptcc_certify.checker.graph import ordered, positions
 from ptcc_certify.checker.input_formulas import root_above
@@ -27,6 +28,8 @@ from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, need, triangle
 
 Vector = dict[int, Fraction]
+#: Integers by node, and a number by which all are multiplied.
+Scaled = tuple[Mapping[int, int], Fraction]
 Whole = dict[int, int]
 KEYS = ("class", "component", "nodes", "lower_triangle", "rate", "inputs", "coordinates", "means")
 #: Means of one function.
@@ -88,17 +91,22 @@ class FamilyFunction:
     coordinates: Vector
     means: list[WeightedMean]
 
+    @cached_property
+    def speeds(self) -> list[Scaled]:
+        """Bounds of ``|(L X)_k| / sqrt(V)``."""
+        (values,), scale = integers([[root_above(c) for c in self.inputs.values()]])
+        return [(dict(zip(self.inputs, values, strict=True)), Fraction(1, scale))]
+
+    def root(self, x: Sequence[Fraction]) -> Fraction:
+        """Bound ``sqrt(V)`` of a state."""
+        return root_above(self.value(x))
+
     def value(self, x: Sequence[Fraction]) -> Fraction:
         """Return ``V`` of a state."""
-        (kernel, unit), pivots = self.component.whole, self.component.pivots
-        (whole,), scale = integers([[x[v] for v in (*self.nodes, *pivots.values())]])
-        own, rest = whole[: len(self.nodes)], dict(zip(pivots, whole[len(self.nodes) :], strict=True))
-        bits = longest(b for v in self.nodes for b in kernel[v].values())
-        spend(sum(len(kernel[v]) for v in self.nodes), longest(whole), bits, "a Lyapunov function")
-        xi = [unit * y - sum(b * rest[j] for j, b in kernel[v].items()) for v, y in zip(self.nodes, own, strict=True)]
+        xi, unit = self.component.coordinates(self.nodes, x)
         spend(len(xi) ** 2, longest(xi), longest(max(row, key=abs) for row in self.matrix), "a Lyapunov function")
         total = sum(y * sum(map(mul, row, xi)) for y, row in zip(xi, self.matrix, strict=True))
-        return Fraction(total, self.scale * (unit * scale) ** 2)
+        return Fraction(total, self.scale * unit**2)
 
 
 def check_form(doc: Document, family: Family, component: Component, entry: Any, of: str) -> FamilyFunction:
@@ -176,10 +184,8 @@ def quotient_of(family: Family, number: int, component: Component, nodes: list[i
     sized(min(len(nodes) ** 2, sum(map(len, rows.values())) + pulls), bits + own + len(nodes), "a quotient")
     center = []
     for v in nodes:
-        total = {i: scale * x for i, x in rows[v].items()}
-        for i, x in _sum(kernel[v], {j: rows[component.pivots[j]] for j in kernel[v]}).items():
-            total[i] = total.get(i, 0) - x
-        center.append({i: x for i, x in total.items() if x})
+        factors = {v: scale, **{component.pivots[j]: -b for j, b in kernel[v].items()}}
+        center.append(combination(factors, rows))
     return QuotientMode(center, rows, parts, 2 * mode.unit)
 
 
@@ -193,21 +199,11 @@ def _columns(component: Component, nodes: list[int], place: dict[int, int]) -> d
     return columns
 
 
-def _sum(factors: Whole, vectors: Mapping[int, Whole]) -> Whole:
-    """Return the sum of multiples of some vectors."""
-    total: Whole = {}
-    for k, factor in factors.items():
-        for i, x in vectors[k].items():
-            total[i] = total.get(i, 0) + factor * x
-    return total
-
-
 def _part(columns: dict[int, Whole], place: dict[int, int], edge: Edge, tied: bool) -> Part:
     s, t, sign, low, high = edge
     h = {place[v]: x for v, x in ((t, 1), (s, -sign)) if v in place}
     effect = {t: 1, **({s: -sign} if tied else {})}
-    f = _sum(effect, columns)
-    return Part({i: x for i, x in f.items() if x}, h, effect, high - low)
+    return Part(combination(effect, columns), h, effect, high - low)
 
 
 # ---------------------------------------------------------------------- rates

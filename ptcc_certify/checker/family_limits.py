@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from lmi.exact.numbers import integers, longest
+from lmi.exact.numbers import integers, longest, sized
 from lmi.exact.work import spend
 from ptcc_certify.checker.family import Component, Family
 from ptcc_certify.checker.graph import positions
@@ -76,26 +76,29 @@ def limits(
     groups: Mapping[int, Sequence[int]],
     means: Mapping[int, Fraction],
     near: Iterable[tuple[int, Interval]],
-    moves: Mapping[int, Fraction],
+    moves: tuple[Mapping[int, int], int],
     x: Sequence[Fraction],
 ) -> dict[int, Interval]:
     """Return ends of ``x_k(T)`` of every agent.
 
     ``kernel`` has the rows of ``B`` without zeros, ``groups`` the sets ``A_j``, ``means`` the ``c_j`` that are known
-    exactly, ``near`` other columns with ends of theirs, ``moves`` bounds of ``|x_k(0) - x_k(T)|``.
+    exactly, ``near`` other columns with ends of theirs, ``moves`` bounds of ``|x_k(0) - x_k(T)|`` as integers over one.
     """
-    ends: dict[int, Interval] = {}
-    for j, group in groups.items():
-        values = [kernel[v][j] * x[v] for v in group]
-        ends[j] = (means[j], means[j]) if j in means else (min(values), max(values))
-    for j, (low, high) in near:
-        ends[j] = max(low, ends[j][0]), min(high, ends[j][1])
+    values, bounds, scale = _together(list(kernel), moves, x)
     units = {v: item for v, row in kernel.items() if len(row) == 1 and abs((item := next(iter(row.items())))[1]) == 1}
-    for v, d in moves.items():
+    ways: dict[int, tuple[list[int], list[int]]] = {}
+    for j, group in groups.items():
+        own = [values[v] if kernel[v][j] > 0 else -values[v] for v in group]
+        ways[j] = [min(own)], [max(own)]
+    for v, d in bounds.items():
         if v in units:
             j, g = units[v]
-            low, high = ends[j]
-            ends[j] = max(low, g * x[v] - d), min(high, g * x[v] + d)
+            middle = values[v] if g > 0 else -values[v]
+            ways[j][0].append(middle - d)
+            ways[j][1].append(middle + d)
+    ends = {j: (Fraction(max(low), scale), Fraction(min(high), scale)) for j, (low, high) in ways.items()}
+    for j, (low, high) in (*near, *((j, (c, c)) for j, c in means.items())):
+        ends[j] = max(low, ends[j][0]), min(high, ends[j][1])
     result: dict[int, Interval] = {}
     for v, row in kernel.items():
         if v in units:
@@ -104,10 +107,24 @@ def limits(
             continue
         low = sum((b * ends[j][b < 0] for j, b in row.items()), Fraction(0))
         high = sum((b * ends[j][b > 0] for j, b in row.items()), Fraction(0))
-        if v in moves:
-            low, high = max(low, x[v] - moves[v]), min(high, x[v] + moves[v])
+        if v in bounds:
+            low = max(low, Fraction(values[v] - bounds[v], scale))
+            high = min(high, Fraction(values[v] + bounds[v], scale))
         result[v] = low, high
     return result
+
+
+def _together(
+    nodes: Sequence[int], moves: tuple[Mapping[int, int], int], x: Sequence[Fraction]
+) -> tuple[dict[int, int], dict[int, int], int]:
+    """Return states and deviations of some nodes as integers over one scale, and that."""
+    (state,), scale = integers([[x[k] for k in nodes]])
+    bounds, unit = moves
+    bits = longest(state) + longest(bounds.values()), scale.bit_length() + unit.bit_length()
+    spend(2 * len(nodes), *bits, "final states of many agents")
+    sized(2 * len(nodes), sum(bits), "final states of many agents")
+    values = {k: y * unit for k, y in zip(nodes, state, strict=True)}
+    return values, {k: d * scale for k, d in bounds.items()}, scale * unit
 
 
 # ---------------------------------------------------------------------- the check

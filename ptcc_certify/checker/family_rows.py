@@ -20,10 +20,10 @@ from typing import Any
 
 from lmi.exact.decimal_rounding import down
 from lmi.exact.elementary_enclosures import rounded
-from lmi.exact.numbers import integers, longest, sized
+from lmi.exact.numbers import common_denominator, integers, longest, sized
 from lmi.exact.work import spend
 from ptcc_certify.checker.family import Component, Family, Part
-from ptcc_certify.checker.family_function import FamilyFunction, check_form
+from ptcc_certify.checker.family_function import FamilyFunction, Scaled, check_form
 from ptcc_certify.checker.family_limits import WeightedMean
 from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.proof_cursor import Document
@@ -58,10 +58,8 @@ class FollowerFunction:
         over this.
     parts : list of LeadingPart
     rate : Fraction
-    inputs : dict of int to Fraction
-        ``|(L X)_k|^2 <= inputs[k] W^2`` for every member.
-    coordinates : dict of int to Fraction
-        ``xi_k^2 <= coordinates[k] W^2``.
+    speeds : list of Scaled
+        Bounds of ``|(L X)_k| / W`` for every member.
     """
 
     component: Component
@@ -69,28 +67,23 @@ class FollowerFunction:
     scale: int
     parts: list[LeadingPart]
     rate: Fraction
-    inputs: dict[int, Fraction]
-    coordinates: dict[int, Fraction]
+    speeds: list[Scaled]
 
     @property
     def means(self) -> tuple[WeightedMean, ...]:
         """None."""
         return ()
 
-    def value(self, x: Sequence[Fraction]) -> Fraction:
-        """Return ``W^2`` of a state, rounded up."""
-        (kernel, unit), pivots = self.component.whole, self.component.pivots
-        (whole,), scale = integers([[x[v] for v in self.component.nodes]])
-        state = dict(zip(self.component.nodes, whole, strict=True))
-        spend(2 * self.component.size, longest(whole), unit.bit_length() + 64, "a Lyapunov function")
+    def root(self, x: Sequence[Fraction]) -> Fraction:
+        """Return ``W`` of a state, rounded up."""
+        xi, unit = self.component.coordinates(list(self.vector), x)
         top, bottom = 0, 1
-        for v, d in self.vector.items():
-            xi = abs(unit * state[v] - sum(b * state[pivots[j]] for j, b in kernel[v].items()))
-            if xi * bottom > top * d:
-                top, bottom = xi, d
-        squares = [Fraction(top * self.scale, bottom * unit * scale) ** 2]
-        squares += [part.function.value(x) / part.times**2 for part in self.parts]
-        return rounded(max(squares), BITS, up=True)
+        for y, d in zip(map(abs, xi), self.vector.values(), strict=True):
+            if y * bottom > top * d:
+                top, bottom = y, d
+        roots = [Fraction(top * self.scale, bottom * unit)]
+        roots += [part.function.root(x) / part.times for part in self.parts]
+        return rounded(max(roots), BITS, up=True)
 
 
 Function = FamilyFunction | FollowerFunction
@@ -142,14 +135,12 @@ def check_rows(doc: Document, family: Family, component: Component, entry: Any, 
     others = {v: b * scale for v, b in zip(led, bounds, strict=True)}
     speeds = {v: b for v, b in others.items() if v in pivots}
     sizes |= {v: 0 if v in pivots else b for v, b in others.items()} | dict.fromkeys(resting, 0)
-    inputs = _rows(family, component, followers, sizes, speeds, (rate, scale * common))
+    pushes = _rows(family, component, followers, sizes, speeds, (rate, scale * common))
     doc.done(f"b = {down(rate)}, {len(followers)} rows")
-    for part in parts:
-        inputs |= {v: rounded(c * part.times**2, BITS, up=True) for v, c in part.function.inputs.items()}
-    inputs |= dict.fromkeys(resting, Fraction(0))
-    coordinates = {v: Fraction(size, scale * common) ** 2 for v, size in sizes.items() if size}
+    all_speeds: list[Scaled] = [pushes, (dict.fromkeys(resting, 0), Fraction(1))]
+    all_speeds += [(own, unit * part.times) for part in parts for own, unit in part.function.speeds]
     only = {v: sizes[v] for v in followers}
-    return FollowerFunction(component, only, scale * common, parts, rate, inputs, coordinates)
+    return FollowerFunction(component, only, scale * common, parts, rate, all_speeds)
 
 
 def _part(doc: Document, family: Family, component: Component, entry: Any, of: str, number: int) -> LeadingPart:
@@ -192,8 +183,8 @@ def _rows(
     sizes: dict[int, int],
     speeds: dict[int, int],
     aim: tuple[Fraction, int],
-) -> dict[int, Fraction]:
-    """Verify all rows at the rate ``aim[0]``; return the constants of inputs. Sizes and speeds are over ``aim[1]``."""
+) -> Scaled:
+    """Verify all rows at the rate ``aim[0]``; return the speeds of followers. Sizes and speeds are over ``aim[1]``."""
     rate, scale = aim
     kernel, unit = component.whole
     drifts = dict.fromkeys(followers, 0)
@@ -201,22 +192,23 @@ def _rows(
     if any(speeds.values()):
         moving = {j: speeds.get(v, 0) for j, v in component.pivots.items()}
         drifts = {v: sum(abs(b) * moving[j] for j, b in kernel[v].items()) for v in followers}
-    own, most = dict.fromkeys(followers, True), dict.fromkeys(followers, Fraction(0))
+    units = common_denominator({mode.unit for mode in family.modes}, len(followers), "the weights")
+    most = dict.fromkeys(followers, 0)
     p, q = rate.as_integer_ratio()
     for mode, edges in zip(family.modes, component.part.edges, strict=True):
         bits = longest(edge[4] for edge in edges)
         spend(4 * (len(edges) + len(followers)), bits, longest(sizes.values()), "rows of a family")
-        sized(2 * len(followers), bits + longest(sizes.values()) + 64, "rows of a family")
-        pull, push = dict.fromkeys(followers, 0), dict.fromkeys(followers, 0)
+        spend(len(followers), bits + longest(sizes.values()) + 64, units.bit_length(), "rows of a family")
+        sized(2 * len(followers), bits + longest(sizes.values()) + units.bit_length() + 64, "rows of a family")
+        pull, push = dict.fromkeys(sizes, 0), dict.fromkeys(sizes, 0)
         for s, t, _, low, high in edges:
-            if t in own:
-                d, other = sizes[t], sizes[s]
-                gap = d - other
-                pull[t] += (high if gap < 0 else low) * gap
-                push[t] += high * (d + other)
+            d, other = sizes[t], sizes[s]
+            gap = d - other
+            pull[t] += (high if gap < 0 else low) * gap
+            push[t] += high * (d + other)
+        lost, needed, factor = 2 * q * mode.unit, p * mode.unit * unit, units // mode.unit
         for v in followers:
-            lost = drifts[v] * mode.unit
-            need(2 * q * (unit * pull[v] - lost) >= p * mode.unit * unit * sizes[v], "a row does not decay fast enough")
-        for v, total in push.items():
-            most[v] = max(most[v], Fraction(total, mode.unit * scale))
-    return {v: rounded(x**2, BITS, up=True) for v, x in most.items()}
+            decays = 2 * q * unit * pull[v] - lost * drifts[v] >= needed * sizes[v]
+            need(decays, "a row does not decay fast enough")
+            most[v] = max(most[v], push[v] * factor)
+    return most, Fraction(1, units * scale)

@@ -27,21 +27,29 @@ def check_graph(doc: Document) -> Digraph:
     loops = how["self_loops"]
     need(isinstance(loops, str) and bool(re.fullmatch(r"refused|dropped [0-9]{1,12}", loops)), "read: self_loops")
     need(isinstance(how["undirected"], bool), "read: undirected")
+    labels, index = read_nodes(section)
+    _fit(NODE_BYTES * len(labels))
+    graph = digraph(doc, labels, *_edges(doc, section["edges"], index))
+    doc.sha256 = graph.sha256()
+    need(section["sha256"] == doc.sha256, "the SHA-256 of the edge list is another")
+    return graph
+
+
+def read_nodes(section: dict[str, Any]) -> tuple[list[str], dict[str, int]]:
+    """Return the labels of the nodes, and their positions."""
     labels = entries(section["nodes"], "nodes")
     need(bool(labels) and all(isinstance(x, str) for x in labels), "nodes are not texts, or there is none")
     index = {label: v for v, label in enumerate(labels)}
     need(len(index) == len(labels), "a node occurs twice")
-    _fit(NODE_BYTES * len(labels))
-    columns = _edges(doc, section["edges"], index)
-    kind: type[Digraph] = Digraph
-    if doc.exact.numpy and len(columns[0]) >= MANY_EDGES:
-        from ptcc_certify.checker.array_digraph import ArrayDigraph
+    return labels, index
 
-        kind = ArrayDigraph
-    graph = kind(labels, *columns)
-    doc.sha256 = graph.sha256()
-    need(section["sha256"] == doc.sha256, "the SHA-256 of the edge list is another")
-    return graph
+
+def digraph(doc: Document, labels: Sequence[str], source: Any, target: Any, weights: Any, scale: int) -> Digraph:
+    """Return a graph: of many edges its array twin."""
+    kind = Digraph
+    if doc.exact.numpy and len(source) >= MANY_EDGES:
+        from ptcc_certify.checker.array_digraph import ArrayDigraph as kind  # noqa: N813
+    return kind(labels, source, target, weights, scale)
 
 
 def _fit(size: int) -> None:

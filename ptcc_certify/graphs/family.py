@@ -14,6 +14,7 @@ from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
+from itertools import chain, islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Interval = tuple[Hashable, Hashable, Exact, Exact]
+#: Lines that are formed and hashed at a time.
+_TOGETHER = 65_536
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -150,13 +153,15 @@ class Mode:
 
         Sorted by source label, target label and sign, so that the order of nodes does not count.
         """
-        names = [json.dumps(label, ensure_ascii=False) for label in self.labels]
+        names = np.array([json.dumps(label, ensure_ascii=False) for label in self.labels], dtype=object)
         rank = np.argsort(sorted(range(len(names)), key=self.labels.__getitem__))
-        least, largest = self.texts
-        for edge in np.lexsort((self.sign, rank[self.target], rank[self.source])).tolist():
-            weights = dict.fromkeys((least[edge], largest[edge]))
-            ends = names[self.source[edge]], names[self.target[edge]]
-            yield f"[{', '.join([*ends, *map(json.dumps, weights)])}]"
+        ends = [np.array(texts, dtype=object) for texts in self.texts]
+        order = np.lexsort((self.sign, rank[self.target], rank[self.source]))
+        for some in np.split(order, range(_TOGETHER, order.size, _TOGETHER)):
+            columns = names[self.source[some]], names[self.target[some]], *(texts[some] for texts in ends)
+            for s, t, least, largest in zip(*(column.tolist() for column in columns), strict=True):
+                weights = f'"{least}"' if least == largest else f'"{least}", "{largest}"'
+                yield f"[{s}, {t}, {weights}]"
 
     def marked_lines(self) -> Iterator[str]:
         """Yield a line that tells whether uncertain edges are undirected, if so, then those of all edges."""
@@ -235,9 +240,11 @@ class Family(Shown):
     @cached_property
     def union(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Source, target and sign of all edges of all modes, each once, sorted."""
-        columns = [np.concatenate([getattr(m, end) for m in self.modes]) for end in ("target", "source", "sign")]
-        target, source, sign = np.unique(np.array(columns, dtype=np.int64), axis=1)
-        return source, target, sign.astype(np.int8)
+        n = self.n_nodes
+        keys = [2 * (mode.target * n + mode.source) + (mode.sign > 0) for mode in self.modes]  # each ascends
+        pair, positive = np.divmod(keys[0] if len(keys) == 1 else np.unique(np.concatenate(keys)), 2)
+        target, source = np.divmod(pair, n)
+        return source, target, (2 * positive - 1).astype(np.int8)
 
     def restricted(self, nodes: np.ndarray) -> Family:
         """Return the family on the nodes ``nodes`` (indices, ascending) and the edges among them."""
@@ -252,9 +259,13 @@ class Family(Shown):
         terms. Before the edges of a mode that are undirected, some of them uncertain, a line ``{"undirected": true}``:
         both directions change together. Names of modes do not count. That of one graph is the graph's own.
         """
-        nodes = "".join(f"{json.dumps([label], ensure_ascii=False)}\n" for label in sorted(self.labels))
-        modes = "{}\n".join("".join(f"{line}\n" for line in mode.marked_lines()) for mode in self.modes)
-        return hashlib.sha256((nodes + modes).encode("utf-8", "surrogatepass")).hexdigest()
+        parts: list[Iterable[str]] = [(json.dumps([label], ensure_ascii=False) for label in sorted(self.labels))]
+        for number, mode in enumerate(self.modes):
+            parts += [["{}"] * (number > 0), mode.marked_lines()]
+        digest, lines = hashlib.sha256(), chain.from_iterable(parts)
+        while some := list(islice(lines, _TOGETHER)):
+            digest.update("".join(f"{line}\n" for line in some).encode("utf-8", "surrogatepass"))
+        return digest.hexdigest()
 
     # ------------------------------------------------------------------ constructors
 

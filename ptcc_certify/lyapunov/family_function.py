@@ -10,12 +10,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from math import isqrt
+from functools import cached_property
 
 import numpy as np
 
 from lmi.definiteness_proofs import prove_generalized_margin
 from lmi.exact import arithmetic
+from lmi.exact.numbers import integers
+from ptcc_certify.checker.family_function import Scaled
+from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.lyapunov.quotient import Quotient, QuotientMode
 from ptcc_certify.theorems.matrix_arithmetic import Matrix, integer_matrix, integer_rows
 
@@ -95,6 +98,12 @@ class FamilyFunction:
         if self.rate <= 0:
             return None
         return tuple(4 * c / self.rate**2 for c in self.input_constants)
+
+    @cached_property
+    def speeds(self) -> Scaled:
+        """Bounds of ``|(L X)_k| / sqrt(V)`` for every member: integers by node, and what multiplies them."""
+        (values,), scale = integers([[root_above(c) for c in self.input_constants]])
+        return dict(enumerate(values)), Fraction(1, scale)
 
     def value(self, xi: Sequence[Fraction]) -> Fraction:
         """Return ``V`` of quotient coordinates."""
@@ -262,22 +271,6 @@ def inverse_forms(P: Matrix, vectors: Sequence[Sequence[Fraction]]) -> list[Frac
     (whole, scale), (rows, unit) = integer_matrix(P), integer_matrix(vectors)
     bounds = arithmetic().above(integer_rows(whole), integer_rows(rows))
     return None if bounds is None else [x * scale / unit**2 for x in bounds]
-
-
-def root_above(x: Fraction) -> Fraction:
-    """Return a rational not below the square root of ``x >= 0``, to about 60 bits.
-
-    Examples
-    --------
-    >>> root_above(Fraction(0)), 0 <= root_above(Fraction(2)) ** 2 - 2 < 1e-15
-    (Fraction(0, 1), True)
-    """
-    if not x:
-        return Fraction(0)
-    shift = 60 - (x.numerator.bit_length() - x.denominator.bit_length()) // 2
-    scaled = x * Fraction(4) ** shift
-    ceiling = -(-scaled.numerator // scaled.denominator)
-    return (isqrt(ceiling - 1) + 1) / Fraction(2) ** shift
 
 
 def rounded_up(x: Fraction) -> Fraction:

@@ -21,32 +21,35 @@ docs/theory/families.md, "Rows".
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
+from operator import mul
 
 import numpy as np
 
 from lmi.exact.elementary_enclosures import rounded
+from lmi.exact.numbers import integers
+from ptcc_certify.checker.family_function import Scaled
+from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.structure import weak_components
-from ptcc_certify.lyapunov.family_function import FamilyFunction, root_above
+from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.family_rows import FollowerDecay, follower_decays, follower_nodes
 from ptcc_certify.lyapunov.family_search import search_family
 from ptcc_certify.lyapunov.interval_rows import IntervalRows, least_quotient
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.theorems.family_behaviour import FamilyComponent, decide
-from ptcc_certify.theorems.family_kernel import Kernel, TooLarge
+from ptcc_certify.theorems.family_kernel import UNKNOWN, Kernel, TooLarge
 
 #: Shares of the rate of the followers that the agents they follow may take: the larger, the smaller is ``W(0)``. Above
 #: ``MANY_FOLLOWERS`` there is one function alone.
 LOSSES, MANY_FOLLOWERS = (0.01, 0.3), 5000
-#: Bits of constants and values, which are rounded up; the check rounds likewise.
-CONSTANT_BITS = 64
+#: Bits of ``W``, which is rounded up; the check rounds likewise.
+ROOT_BITS = 64
 #: Bits of the least ``e``.
 _BITS = 24
 #: Agents of a part of ``R``, beyond which no function is searched for it.
@@ -137,39 +140,45 @@ class FollowerFunction:
         return sizes
 
     @cached_property
-    def inputs(self) -> Mapping[int, Fraction]:
-        """``|(L X)_k|^2 <= inputs[k] W^2`` for every member: ``sum_l w+ (size_k + size_l)`` of followers."""
-        rows = IntervalRows.of(self.family.modes, self.followers)
-        sums = rows.largest_sums(np.concatenate([self.vector, self.outside]))
-        result = dict.fromkeys(range(self.family.n_nodes), Fraction(0))
-        for k, total in zip(self.followers.tolist(), sums.tolist(), strict=True):
-            result[k] = rounded((total * rows.unit) ** 2, CONSTANT_BITS, up=True)
+    def speeds(self) -> list[Scaled]:
+        """Bounds of ``|(L X)_k| / W`` for every member: ``sum_l w+ (size_k + size_l)`` of followers.
+
+        Integers by node, and what multiplies them.
+        """
+        rows, rest = IntervalRows.of(self.family.modes, self.followers), set(range(self.family.n_nodes))
+        sums = rows.largest_sums(np.concatenate([self.vector, self.outside])).tolist()
+        result: list[Scaled] = [(dict(zip(self.followers.tolist(), sums, strict=True)), rows.unit)]
         for part in self.parts:
-            for v, c in zip(part.agents.tolist(), part.function.input_constants, strict=True):
-                result[v] = rounded(c * part.times**2, CONSTANT_BITS, up=True)
-        return result
+            vector, unit = part.function.speeds
+            result.append((dict(zip(part.agents.tolist(), vector.values(), strict=True)), unit * part.times))
+        return [*result, (dict.fromkeys(rest.difference(*(vector for vector, _ in result)), 0), Fraction(1))]
 
-    @cached_property
-    def coordinates(self) -> Mapping[int, Fraction]:
-        """``xi_k^2 <= coordinates[k] W^2``, of all agents but pivots and those at rest."""
-        return {k: Fraction(int(size)) ** 2 for k, size in enumerate(self._sizes.tolist()) if size}
+    @property
+    def sizes(self) -> list[Scaled]:
+        """Bounds of ``|xi_k| / W``, of all agents but pivots and those at rest."""
+        return [({k: size for k, size in enumerate(self._sizes.tolist()) if size}, Fraction(1))]
 
-    def value(self, x: Sequence[Fraction]) -> Fraction:
-        """Return ``W^2`` of a state of the component, rounded up to 64 bits."""
-        pivots = [c.nodes[0] for c in self.kernel.structure.closed_components if c.balanced]
-        scale = math.lcm(*{y.denominator for y in x})
-        whole = [y.numerator * (scale // y.denominator) for y in x]
-        rest = [whole[p] for p in pivots]
-        top, bottom = Fraction(0), 1
-        for k, d in zip(self.followers.tolist(), self.vector.tolist(), strict=True):
-            xi = abs(whole[k] - sum(b * y for b, y in zip(self.kernel.row(k), rest, strict=True) if b))
-            if xi * bottom > top * d:
-                top, bottom = xi, d
-        squares = [(Fraction(top) / (bottom * scale)) ** 2]
+    def root(self, x: Sequence[Fraction]) -> Fraction:
+        """Return ``W`` of a state of the component, rounded up to 64 bits."""
+        (whole,), scale = integers([x])
+        state, d = np.array(whole, dtype=object), self.vector
+        largest = -least_quotient(-abs(state[self.followers] - self._targets(state)), d)
+        roots = [largest / scale]
         for part in self.parts:
             own = part.quotient.coordinates([x[v] for v in part.agents.tolist()])
-            squares.append(part.function.value(own) / part.times**2)
-        return rounded(max(squares), CONSTANT_BITS, up=True)
+            roots.append(root_above(part.function.value(own)) / part.times)
+        return rounded(max(roots), ROOT_BITS, up=True)
+
+    def _targets(self, state: np.ndarray) -> np.ndarray:
+        """Return what the pivots make of every follower at rest, of a state of Python ints."""
+        pivots = [c.nodes[0] for c in self.kernel.structure.closed_components if c.balanced]
+        rest = np.array([0, *state[pivots].tolist()], dtype=object)
+        codes = self.kernel.codes[self.followers]
+        told = np.where(codes == UNKNOWN, 0, codes)
+        targets = rest[abs(told)] * np.sign(told).astype(object)
+        for k in np.flatnonzero(codes == UNKNOWN).tolist():
+            targets[k] = sum(map(mul, self.kernel.row(int(self.followers[k])), rest[1:].tolist()))
+        return targets
 
 
 def follower_functions(
@@ -278,8 +287,12 @@ def _drifts(kernel: Kernel, followers: np.ndarray, parts: Sequence[LeadingPart])
     if not any(speeds.values()):
         return [zero] * followers.size
     own = [speeds.get(c.nodes[0], zero) for c in kernel.structure.closed_components if c.balanced]
-    rows = (zip(kernel.row(k), own, strict=True) for k in followers.tolist())
-    return [sum((abs(b) * q for b, q in row if b), zero) for row in rows]
+    told = [zero, *own]
+    codes = zip(followers.tolist(), abs(kernel.codes[followers]).tolist(), strict=True)
+    return [
+        sum((abs(b) * q for b, q in zip(kernel.row(k), own, strict=True) if b), zero) if code == UNKNOWN else told[code]
+        for k, code in codes
+    ]
 
 
 def composite_rate(rows: IntervalRows, d: np.ndarray, outside: np.ndarray, drifts: Sequence[Fraction]) -> Fraction:

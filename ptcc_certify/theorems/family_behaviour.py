@@ -291,8 +291,10 @@ def decide(family: Any, signal: str = "any") -> tuple[FamilyComponent, ...]:
 
 def _decide_connected(nodes: np.ndarray, family: Family, signal: str) -> FamilyComponent:
     structures = tuple(analyse(mode.mandatory) for mode in family.modes)
-    gauge, violated, _ = find_camps(family.n_nodes, *family.union)
-    camps = None if violated.size else gauge
+    camps = structures[0].gauge
+    if structures[0].graph.n_edges < family.union[0].size:  # of all modes, and edges that may fail
+        gauge, violated, _ = find_camps(family.n_nodes, *family.union)
+        camps = None if violated.size else gauge
     if signal == "constant":
         behaviour, kernel, counterexample = _under_constant_signals(family, structures)
     else:

@@ -33,6 +33,7 @@ STANDARD = {
     *(
         "fractions",
         "functools",
+        "gc",
         "hashlib",
         "io",
         "itertools",

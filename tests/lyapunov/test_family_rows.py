@@ -9,7 +9,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from families import random_family
-from row_families import laplacian, random_followers, random_led, random_vertex, vertices
+from row_families import bounds_of, laplacian, random_followers, random_led, random_vertex, vertices
 from scipy.linalg import expm
 
 from ptcc_certify.graphs.family import Family
@@ -227,19 +227,17 @@ def follow(seed: int, kind: str) -> int:
         for W in follower_functions(component):
             n = W.family.n_nodes
             x = [Fraction(rng.randint(-20, 20), 3) for _ in range(n)]
-            X, start, s = np.array([float(v) for v in x]), float(W.value(x)), 0.0
+            speeds, sizes = (bounds_of(some) for some in (W.speeds, W.sizes))
+            X, start, s = np.array([float(v) for v in x]), float(W.root(x)), 0.0
             for _ in range(8):
                 L = laplacian(mode := rng.choice(W.family.modes), random_vertex(rng, mode))
-                bound = start * np.exp(-float(W.rate) * s)
-                if bound > 1e-12 * start > 0:
-                    assert float(W.value([Fraction(v) for v in X.tolist()])) <= bound * (1 + 1e-6)
-                    for k, c in W.inputs.items():
-                        assert (L @ X)[k] ** 2 <= float(c) * bound * (1 + 1e-6) + 1e-18
+                bound = start * np.exp(-float(W.rate) / 2 * s)
+                if bound > 1e-6 * start > 0:
+                    assert float(W.root([Fraction(v) for v in X.tolist()])) <= bound * (1 + 1e-6)
+                    assert all(abs((L @ X)[k]) <= speeds[k] * bound * (1 + 1e-6) + 1e-9 for k in range(n))
                     rest = [c.nodes[0] for c in W.kernel.structure.closed_components if c.balanced]
                     xi = X - np.array([[float(b) for b in W.kernel.row(k)] for k in range(n)]).reshape(n, -1) @ X[rest]
-                    assert all(
-                        xi[k] ** 2 <= float(W.coordinates.get(k, 0)) * bound * (1 + 1e-6) + 1e-18 for k in range(n)
-                    )
+                    assert all(abs(xi[k]) <= sizes.get(k, 0) * bound * (1 + 1e-6) + 1e-9 for k in range(n))
                 h = rng.choice([0.01, 0.1, 0.5])
                 X, s = expm(-L * h) @ X, s + h
             count += 1
