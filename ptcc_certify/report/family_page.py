@@ -25,6 +25,7 @@ from ptcc_certify.report.plots.counterexample import plot_counterexample
 from ptcc_certify.report.plots.family import plot_family, plot_family_decay
 from ptcc_certify.report.plots.family_graph import plot_family_graph
 from ptcc_certify.report.plots.family_input import plot_family_input
+from ptcc_certify.report.restricted_screen import restricted_entries
 from ptcc_certify.report.structure_text import structure_text
 from ptcc_certify.simulation.family_run import FamilyTrajectory
 from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_name
@@ -61,6 +62,7 @@ def family_facts(saved: FamilyCertificate) -> dict[str, Any]:
         "mode_names": [texts.printable(mode_name(family, k)) for k in range(len(family.modes))],
         "rate_bound": min((p.upper_bound for p in saved.parts if p.upper_bound), key=lambda b: b.value, default=None),
         "constant": all(component.nodes.size == 1 for component in components),
+        "restricted": [text for _, text in restricted_entries(saved)] if certified else [],
         "explicit_power": _explicit_power(saved),
         "peak_agent": None if not saved.input_peaks else family.labels[saved.input_peaks.index(max(saved.input_peaks))],
     }

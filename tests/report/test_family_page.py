@@ -14,6 +14,7 @@ from ptcc_certify.report.plots.family import sample_runs
 from ptcc_certify.report.report_file import write_report
 from ptcc_certify.report.statement import family_latex
 from ptcc_certify.simulation.signals import RandomSignal
+from ptcc_certify.theorems.restricted_signals import DwellTime
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
 DAY = SignedDigraph.from_edges([("ann", "<b>", 1), ("<b>", "eve", -1)])
@@ -50,6 +51,13 @@ def test_the_first_screen_tells_family_signal_end_rate_bound_ratio_and_input(mad
     assert {f'id="figure-{name}"' in page for name in ("graph", "states", "decay", "input")} == {True}
     assert "<script" not in page and "<b>" not in page
     assert "The bounds are kept" in words(page)
+
+
+def test_what_is_proved_of_restricted_signals_is_told_too():
+    saved = read_certificate(certify(SWITCHING, PROTOCOL, signal=DwellTime("0.2", clock="t")).to_dict())
+    told = "t least 0.2 of time between switches: rate "
+    assert f"If signals are restricted A{told}" in words(report_html(saved))
+    assert f"Of signals that are restricted more is proved: a{told}" in family_latex(saved)
 
 
 def test_an_expectation_that_is_refuted_is_told_and_its_counterexample_is_drawn():
