@@ -31,7 +31,7 @@ from ptcc_certify.certificate.request import (
     read_initial_state,
     read_seconds,
 )
-from ptcc_certify.certificate.restricted_claims import STEP, claims_for
+from ptcc_certify.certificate.restricted_search import STEP, claims_for
 from ptcc_certify.certificate.verdict import Assessment
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.family import MANY_MODES

@@ -1,0 +1,167 @@
+"""Searches what may be claimed of a family for restricted signals, dwell times or weights that never change, say.
+
+Each claim is about one component with common states at rest, and stands beside what is claimed for every signal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+
+from lmi.exact.elementary_enclosures import log, rounded
+from lmi.search_time import share_of_time
+from ptcc_certify.certificate.family_content import ComponentProof
+from ptcc_certify.certificate.restricted_claims import Claim, LastModeClaim, RateClaim, ShareClaim, WindowClaim
+from ptcc_certify.checker.restricted_signals import agreed_bounds, reachable_bounds
+from ptcc_certify.graphs.size_limits import EXACT_NODES
+from ptcc_certify.graphs.structure import STABILITY
+from ptcc_certify.lyapunov.clock_shares import search_share_form
+from ptcc_certify.lyapunov.family_function import FamilyFunction
+from ptcc_certify.lyapunov.mode_forms import ModeForms, search_mode_forms, search_single_forms, within_reach
+from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.protocols import Protocol
+from ptcc_certify.theorems.family_behaviour import DEPENDS
+from ptcc_certify.theorems.joint_windows import joint_behaviour, window_rate
+from ptcc_certify.theorems.last_mode import last_mode_behaviours
+from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows, SignalClass
+
+STEP = "restricted signals"
+#: 1 - t/T at which switches are weighed against the rate.
+_WEIGHED = 0.01
+#: Relative gain for which forms of their own are written, and bits of rates.
+_GAIN, _RATE_BITS = 1e-6, 60
+#: What is told with every claim of windows.
+_OF_THE_CLOCK = (
+    "the windows are of the stretched clock: in time they shrink towards T, and who switches at a fixed pace in time "
+    "does not keep them"
+)
+
+
+def claims_for(
+    signal: SignalClass,
+    parts: Sequence[ComponentProof],
+    protocol: Protocol,
+    state: Sequence[Fraction] | None,
+    notes: list[str],
+) -> tuple[Claim, ...]:
+    """Return what is proved beside for restricted signals, component after component.
+
+    Parameters
+    ----------
+    signal : SignalClass
+    parts : sequence of ComponentProof
+        What was proved for every signal.
+    protocol : NominalProtocol
+    state : sequence of N Fraction, or None
+    notes : list of str
+        Is told what the time limit cut off.
+    """
+    if signal == "any":
+        return ()
+    claims: list[Claim] = []
+    for number, part in enumerate(parts):
+        if part.component.nodes.size == 1 or part.component.behaviour is None:
+            continue
+        if isinstance(signal, ClockShares):
+            claims += filter(None, [_share_claim(number, signal, part, notes)])
+        elif part.component.behaviour == DEPENDS:
+            if isinstance(signal, JointWindows):
+                claims += filter(None, [_window_claim(number, signal, part, state)])
+            elif not isinstance(signal, DwellTime) or signal.clock == "t":
+                claims.append(_last_mode_claim(number, signal, part, state))
+        elif not isinstance(signal, JointWindows) and (claim := _rate_claim(number, signal, part, protocol, notes)):
+            claims.append(claim)
+    if any(isinstance(claim, WindowClaim) for claim in claims):
+        notes.append(_OF_THE_CLOCK)
+    return tuple(claims)
+
+
+def _rate_claim(
+    number: int, signal: SignalClass, part: ComponentProof, protocol: Protocol, notes: list[str]
+) -> RateClaim | None:
+    best, forms = part.rate, None
+    own = [V for V in part.functions if isinstance(V, FamilyFunction)]
+    with share_of_time(1.0, STEP, notes):
+        if part.component.nodes.size <= EXACT_NODES and within_reach(quotient := Quotient.of(part.component)):
+            forms = _search(quotient, signal, own, protocol)
+    price = switch_price(signal, protocol)
+    if forms is not None and best is not None and _worth(forms, price) <= float(best) + _GAIN * abs(float(best)):
+        forms = None
+    rate = best if forms is None else own_rate(signal, forms)
+    return None if rate is None else RateClaim(number, signal, forms, rate, rate * protocol.gain.pole >= 2)
+
+
+def _share_claim(number: int, signal: ClockShares, part: ComponentProof, notes: list[str]) -> ShareClaim | None:
+    with share_of_time(1.0, STEP, notes):
+        form = search_share_form(part.component, signal.shares)
+        return None if form is None else ShareClaim(number, signal, form, form.mean(signal.shares))
+    return None
+
+
+def _window_claim(
+    number: int, signal: JointWindows, part: ComponentProof, state: Sequence[Fraction] | None
+) -> WindowClaim | None:
+    component, bounds = part.component, None
+    behaviour = joint_behaviour(component)
+    rate = None if behaviour is None else window_rate(component, signal, behaviour)
+    if behaviour is None or rate is None:
+        return None
+    if state is not None:
+        edges = zip(*(end.tolist() for end in component.family.union), strict=True)
+        x = [state[v] for v in component.nodes.tolist()]
+        camps = None if behaviour == STABILITY else dict(enumerate(component.gauge.tolist()))  # type: ignore[union-attr]
+        bounds = tuple(agreed_bounds(range(len(x)), edges, x, camps).values())
+    return WindowClaim(number, signal, behaviour, rate, bounds)
+
+
+def _last_mode_claim(
+    number: int, signal: SignalClass, part: ComponentProof, state: Sequence[Fraction] | None
+) -> LastModeClaim:
+    component, bounds = part.component, None
+    if state is not None:
+        edges = zip(*(end.tolist() for end in component.family.union), strict=True)
+        x = [state[v] for v in component.nodes.tolist()]
+        bounds = tuple(reachable_bounds(range(len(x)), edges, x).values())
+    return LastModeClaim(number, signal, last_mode_behaviours(component), bounds)
+
+
+def _search(
+    quotient: Quotient, signal: SignalClass, own: Sequence[FamilyFunction], protocol: Protocol
+) -> ModeForms | None:
+    if isinstance(signal, DwellTime):
+        return search_mode_forms(quotient, switch_price(signal, protocol), own)
+    return search_single_forms(quotient)
+
+
+def switch_price(signal: SignalClass, protocol: Protocol) -> float:
+    """Return the switches per unit of the stretched clock: all of them, or those until 0.99 T.
+
+    Examples
+    --------
+    >>> switch_price(DwellTime("0.5", clock="s"), NominalProtocol(T=1, rho1=1, rho2=1, kappa=3))
+    2.0
+    """
+    if not isinstance(signal, DwellTime):
+        return 0.0
+    if signal.clock == "s":
+        return float(1 / signal.least)
+    return signal.switches(protocol.T) / float(protocol.gain.clock_at_remaining(_WEIGHED))
+
+
+def _worth(forms: ModeForms, price: float) -> float:
+    return float(forms.rate) - price * float(log(forms.ratio)[1])
+
+
+def own_rate(signal: SignalClass, forms: ModeForms) -> Fraction:
+    """Return the rate that forms of each mode prove: the least of theirs, minus ``ln(ratio)/dwell`` on the clock.
+
+    Examples
+    --------
+    >>> forms = ModeForms((), (Fraction(3), Fraction(2)), (), Fraction(2))
+    >>> own_rate("constant", forms), float(own_rate(DwellTime(1, clock="s"), forms))
+    (Fraction(2, 1), 1.3068528194400546)
+    """
+    if not isinstance(signal, DwellTime) or signal.clock == "t":
+        return forms.rate
+    loss = log(forms.ratio)[1] / signal.least
+    return forms.rate - rounded(loss, _RATE_BITS, up=True)
