@@ -690,7 +690,7 @@ def test_numpy_integers_are_integers():
 
 
 def test_an_empty_name_of_a_table_is_refused():
-    with pytest.raises(ParameterError, match="names no file"):
+    with pytest.raises(FormatError, match="names no file"):
         quickly(TRIANGLE, output="")
 
 

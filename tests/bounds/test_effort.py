@@ -486,7 +486,7 @@ def judge_limits(graph: SignedDigraph, seed: int) -> list[tuple[str, float]]:
     L = graph.laplacian().toarray()
     for cert, x in ((proved, floats(x0)), (proved.changed(initial_set=box), draw(rng, box, 2)[:, seed % 2])):
         assert cert.effort is not None
-        final = final_state(cert.structure, x.tolist()).values
+        final = np.asarray(final_state(cert.structure, x.tolist()))
         unsampled = [limits for limits in proved.limits if limits.sample_period is None]
         assert [entry.limits for entry in cert.effort.residual][: len(unsampled)] == unsampled
         for entry in cert.effort.residual:
