@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
-from ptcc_certify.checker.reading import Interval
-from ptcc_certify.lyapunov.clock_shares import ShareForm
-from ptcc_certify.lyapunov.mode_forms import ModeForms
 from ptcc_certify.theorems.family_rate import ExplicitRate
 from ptcc_certify.theorems.restricted_signals import ClockShares, JointWindows, SignalClass
+
+if TYPE_CHECKING:  # classes of signals are told without the solvers
+    from ptcc_certify.checker.reading import Interval
+    from ptcc_certify.lyapunov.clock_shares import ShareForm
+    from ptcc_certify.lyapunov.mode_forms import ModeForms
 
 
 @dataclass(frozen=True, eq=False)
