@@ -32,7 +32,7 @@ from ptcc_certify import Ensemble, NominalProtocol, SignedDigraph, analyse, batc
 from ptcc_certify.batch import COLUMNS, Row, backends, table_bytes
 from ptcc_certify.batch import rows as rows_module
 from ptcc_certify.batch.settings import Settings
-from ptcc_certify.errors import ParameterError, PTCCError
+from ptcc_certify.errors import FormatError, ParameterError, PTCCError
 from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.ensembles import CONNECTIVITIES
 from ptcc_certify.graphs.io import random_states, read_graph, write_graph
