@@ -241,7 +241,7 @@ FAMILIES = {
     "ptcc.certify(day, p, [1, 2]).plot('picture')": "ParameterError: what = 'picture' is unknown; one of decay, input",
     "ptcc.certify(day, p, [1, 2]).to_pandas().shape": "(2, 2)",
     "ptcc.certify(day, p).to_pandas()": "ParameterError: the certificate has no initial state",
-    "ptcc.certify(day, p).report": "for a page or LaTeX: write_report(certificate, path)",
+    "ptcc.certify(day, p).report": "... for a page or LaTeX: write_report(certificate, path)",
     "ptcc.certify(day, p).summary()": "claim      bipartite consensus at T = 1 for every signal",
     "ptcc.write_report(ptcc.certify(day, p), 'f.html')": "certified",
     "ptcc.plot_graph(day)": "Axes",
