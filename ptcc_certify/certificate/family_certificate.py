@@ -28,6 +28,7 @@ from ptcc_certify.certificate.request import (
     read_expectations,
     read_initial_state,
     read_seconds,
+    read_sliding_variable,
 )
 from ptcc_certify.certificate.verdict import Assessment
 from ptcc_certify.checker import CheckReport
@@ -59,10 +60,16 @@ class FamilyCertificate(FamilyContent, Shown):
     Attributes
     ----------
     family : Family
-    protocol : NominalProtocol
+    protocol : NominalProtocol or SlidingModeProtocol
     parts : tuple of ComponentProof
         One for each weakly connected component of all edges of all modes.
     initial_state : tuple of N Fraction, or None
+    sigma0 : tuple of N Fraction, or None
+        ``sigma(0)``, under the sliding-mode protocol.
+    reaching : tuple of N ReachingTime, or None
+        Proved reaching times, which no graph enters.
+    disturbance : str or None
+        What a run met, as a file tells; no part of the claim.
     expectations : Expectations
     notes : tuple of str
     source : Source or None
@@ -161,21 +168,24 @@ def certify_family(
     protocol: Protocol,
     x0: Any = None,
     *,
+    sigma0: Any = None,
     time_limit: float | None = None,
     expectations: Expectations | str | None = None,
     scenario: Mapping[str, Any] | None = None,
     origins: Mapping[str, str] | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> FamilyCertificate:
-    """Certify what the nominal protocol does on a family of graphs, whatever the signal.
+    """Certify what a protocol does on a family of graphs, whatever the signal, and whatever the disturbances.
 
     Parameters
     ----------
     family : Family
-    protocol : NominalProtocol
+    protocol : NominalProtocol or SlidingModeProtocol
         With ``rho2 > 0``.
     x0 : state-like, optional
         The initial state; without it no final states and no peaks.
+    sigma0 : state-like, optional
+        Sliding mode: ``sigma(0)``, like ``x0``; without it 0, which leaves no reaching phase.
     time_limit : float, optional
         Seconds of wall time for the searches; without it 60, and 1 more for every 1,000 nodes.
     expectations : Expectations or str, optional
@@ -191,7 +201,7 @@ def certify_family(
     Raises
     ------
     ParameterError
-        No protocol, another than the nominal one, or an initial state that does not fit.
+        No protocol, or an initial state that does not fit.
 
     Examples
     --------
@@ -202,12 +212,14 @@ def certify_family(
     (('stability',), 'certified', True)
     """
     refuse_no_protocol(protocol)
-    if protocol.reaching is not None:
-        raise ParameterError("families are certified under the nominal protocol; give NominalProtocol(..)")
+    if sigma0 is not None and protocol.reaching is None:
+        raise ParameterError("sigma0 belongs to the sliding-mode protocol; leave it out or change the protocol")
     if not protocol.prescribed:
         raise ParameterError("rho2 = 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
     asked, seconds, progress = read_expectations(expectations), read_seconds(time_limit, family), listener(progress)
-    initial_state = None if x0 is None else read_initial_state(analyse(family.modes[0].mandatory), x0, "x0")
+    structure = analyse(family.modes[0].mandatory)
+    initial_state = None if x0 is None else read_initial_state(structure, x0, "x0")
+    sigma, reaching = read_sliding_variable(structure, protocol, sigma0)
     progress(STEPS[0])
     components = decide(family)
     parts, notes = [], list(family.notes)
@@ -215,9 +227,9 @@ def certify_family(
         for component in components:
             parts.append(_prove(component, notes, progress))
     progress(STEPS[3])
-    told = origins_of(None, x0, None) | dict(origins or {})
-    kept: dict[str, Any] = {"origins": told, "scenario": scenario}
-    return FamilyCertificate(family, protocol, tuple(parts), initial_state, asked, tuple(dict.fromkeys(notes)), **kept)
+    told = origins_of(None, x0, sigma0) | dict(origins or {})
+    kept: dict[str, Any] = {"expectations": asked, "notes": tuple(dict.fromkeys(notes)), "scenario": scenario}
+    return FamilyCertificate(family, protocol, tuple(parts), initial_state, sigma, reaching, origins=told, **kept)
 
 
 def _prove(component: FamilyComponent, notes: list[str], progress: Callable[[str], None]) -> ComponentProof:

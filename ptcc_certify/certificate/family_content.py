@@ -5,6 +5,7 @@ Nothing here writes, reads or checks.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -13,9 +14,14 @@ from typing import Any
 
 import numpy as np
 
+from ptcc_certify.bounds.envelope import Instants
+from ptcc_certify.bounds.family_deviation import deviation_on_clock, deviation_while_driven, sliding_sizes
+from ptcc_certify.bounds.reaching_phase import ReachingPhase
 from ptcc_certify.certificate.certificate_data import Source
 from ptcc_certify.certificate.request import Expectations
-from ptcc_certify.checker.family_bounds import deviations, final_interval, peaks
+from ptcc_certify.checker.family_bounds import deviations, final_interval, largest_state, peaks
+from ptcc_certify.checker.family_sliding import Drive, last_time
+from ptcc_certify.checker.protocol import sliding_bounded, sliding_part
 from ptcc_certify.checker.reading import Interval
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
@@ -25,6 +31,7 @@ from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound
 from ptcc_certify.lyapunov.follower_function import FollowerFunction
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.protocols import Protocol
+from ptcc_certify.protocols.reaching_time import ReachingTime
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
 from ptcc_certify.theorems.family_groups import FamilyGroups
 
@@ -78,6 +85,10 @@ class BoundFunction:
         """Return ``V`` of a state of the component."""
         return self.function.value(self.quotient.coordinates(x))
 
+    def largest(self, sizes: Mapping[int, Fraction]) -> Fraction:
+        """Bound ``V`` of all states with ``|x_k| <= sizes_k``."""
+        return self.function.largest(self.quotient.coordinate_sizes(sizes))
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FamilyContent:
@@ -87,6 +98,9 @@ class FamilyContent:
     protocol: Protocol
     parts: tuple[ComponentProof, ...]
     initial_state: tuple[Fraction, ...] | None = None
+    sigma0: tuple[Fraction, ...] | None = None
+    reaching: tuple[ReachingTime, ...] | None = None
+    disturbance: str | None = None
     expectations: Expectations = field(default_factory=Expectations)
     notes: tuple[str, ...] = ()
     source: Source | None = None
@@ -126,11 +140,64 @@ class FamilyContent:
 
     # ------------------------------------------------------------------ bounds
 
-    def _bound_functions(self, part: ComponentProof) -> list[BoundFunction | FollowerFunction]:
-        result: list[BoundFunction | FollowerFunction] = []
-        for V in part.functions:
-            result.append(BoundFunction(Quotient.of(part.component), V) if isinstance(V, FamilyFunction) else V)
-        return result
+    @property
+    def direct(self) -> bool:
+        """Whether no sliding variable moves: the agents move as without disturbances."""
+        return self.sigma0 is None or not any(self.sigma0)
+
+    @property
+    def settling_share(self) -> float:
+        """The share of ``T`` in which no sliding variable moves: ``T_s / T``, or 1."""
+        return 1.0 if self.direct else float(self.protocol.span / self.protocol.T)
+
+    @cached_property
+    def nominal_state(self) -> tuple[Fraction, ...] | None:
+        """``x(0) - sigma(0)``, where there is an initial state."""
+        if self.initial_state is None or self.sigma0 is None:
+            return self.initial_state
+        return tuple(x - s for x, s in zip(self.initial_state, self.sigma0, strict=True))
+
+    @cached_property
+    def _drives(self) -> tuple[Drive | None, ...]:
+        """What sliding variables do to every component; its nodes are numbered within it."""
+        if self.sigma0 is None or self.reaching is None or self.direct:
+            return (None,) * len(self.parts)
+        return tuple(self._drive(part.component) for part in self.parts)
+
+    def _drive(self, component: FamilyComponent) -> Drive:
+        assert self.sigma0 is not None and self.reaching is not None
+        sigma0 = dict(enumerate(self.sigma0[v] for v in component.nodes.tolist()))
+        edges = [
+            [
+                (int(s), int(t), mode.upper.fraction(e))
+                for e, (s, t) in enumerate(zip(mode.source, mode.target, strict=True))
+            ]
+            for mode in component.family.modes
+        ]
+        quiet = last_time([r.z for r in self.reaching], self.sigma0)
+        return Drive.of(self.protocol.parameters, sigma0, quiet, edges)
+
+    @cached_property
+    def drives(self) -> tuple[Fraction, ...] | None:
+        """``c`` of every function, part after part: how much sliding variables drive it; None if none moves."""
+        if self.direct:
+            return None
+        pairs = zip(self.parts, self._drives, strict=True)
+        return tuple(own.constant(V) for part, own in pairs if own is not None for V in self._bound_functions(part))
+
+    def _bound_functions(self, part: ComponentProof) -> Sequence[BoundFunction | FollowerFunction]:
+        return self.bound_functions[self.parts.index(part)]
+
+    @cached_property
+    def bound_functions(self) -> tuple[tuple[BoundFunction | FollowerFunction, ...], ...]:
+        """The functions of every part, as the formulas of the bounds take them."""
+        return tuple(
+            tuple(
+                BoundFunction(Quotient.of(part.component), V) if isinstance(V, FamilyFunction) else V
+                for V in part.functions
+            )
+            for part in self.parts
+        )
 
     @cached_property
     def final_states(self) -> tuple[Interval | None, ...] | None:
@@ -138,55 +205,71 @@ class FamilyContent:
         if self.initial_state is None:
             return None
         result: list[Interval | None] = [None] * self.family.n_nodes
-        for part in self.parts:
-            nodes = part.component.nodes.tolist()
-            x = [self.initial_state[v] for v in nodes]
-            for k, ends in self._final(part, x).items():
-                result[nodes[k]] = ends
+        for part, driven in zip(self.parts, self._drives, strict=True):
+            for k, ends in self._final(part, self._state(part), driven).items():
+                result[int(part.component.nodes[k])] = ends
         return tuple(result)
 
-    def _final(self, part: ComponentProof, x: list[Fraction]) -> Mapping[int, Interval | None]:
+    def _state(self, part: ComponentProof) -> list[Fraction]:
+        """Return ``x(0) - sigma(0)`` of a component."""
+        assert self.nominal_state is not None
+        return [self.nominal_state[v] for v in part.component.nodes.tolist()]
+
+    def _final(self, part: ComponentProof, x: list[Fraction], driven: Drive | None) -> Mapping[int, Interval | None]:
         component, n = part.component, len(x)
         if component.behaviour == STABILITY:
             return dict.fromkeys(range(n), (Fraction(0), Fraction(0)))
         if component.behaviour == DEPENDS:
             return dict.fromkeys(range(n))
-        moves = deviations(self._bound_functions(part), False, x)
+        moves = deviations(self._bound_functions(part), False, x, driven)
         if component.behaviour == BIPARTITE_CONSENSUS:
             assert component.gauge is not None
             camps = dict(enumerate(component.gauge.tolist()))
-            return dict(final_interval(range(n), camps, FamilyGroups(component).sources.tolist(), moves, x))
-        largest = max(map(abs, x))
-        return {
-            k: (max(-largest, x[k] - moves.get(k, 2 * largest)), min(largest, x[k] + moves.get(k, 2 * largest)))
-            for k in range(n)
-        }
+            return dict(final_interval(range(n), camps, FamilyGroups(component).sources.tolist(), moves, x, driven))
+        largest = largest_state(range(n), x, driven)
+        reach = {k: moves.get(k, 2 * largest + abs(x[k])) for k in range(n)}
+        return {k: (max(-largest, x[k] - d), min(largest, x[k] + d)) for k, d in reach.items()}
 
     @property
     def bounded(self) -> bool | None:
-        """Whether the input is proved bounded for every signal and initial state; None if it is not."""
+        """Whether the input is proved bounded for every signal and initial state; None if it is not.
+
+        Under the sliding-mode protocol its nominal part; of the sliding part see :attr:`sliding_bounded`.
+        """
         pole = self.protocol.gain.pole
         held = (
             part.component.nodes.size == 1 or any(V.rate * pole >= 2 for V in part.functions) for part in self.parts
         )
         return True if all(held) else None
 
+    @property
+    def sliding_bounded(self) -> bool | None:
+        """Whether the sliding part of the input is bounded for every ``sigma(0)``; None if there is none."""
+        return None if self.sigma0 is None else sliding_bounded(self.protocol.parameters)
+
+    @cached_property
+    def sliding_peaks(self) -> tuple[Fraction, ...] | None:
+        """Bounds of ``|u_k - u_k^nom|`` under the sliding-mode protocol; None if none are proved."""
+        own = None if self.sigma0 is None else sliding_part(self.protocol.parameters, self.sigma0)
+        return None if own is None else tuple(own)
+
     @cached_property
     def input_peaks(self) -> tuple[Fraction, ...] | None:
-        """Bounds of ``|u_k|`` for every signal; None if none are proved."""
-        if self.initial_state is None or not self.bounded:
+        """Bounds of ``|u_k|`` for every signal, its sliding part included; None if none are proved."""
+        if self.initial_state is None or not self.bounded or (self.sigma0 is not None and self.sliding_peaks is None):
             return None
-        result = [Fraction(0)] * self.family.n_nodes
+        result = list(self.sliding_peaks or (Fraction(0),) * self.family.n_nodes)
         gains = self.protocol.parameters
-        for part in self.parts:
+        for part, driven in zip(self.parts, self._drives, strict=True):
             nodes = part.component.nodes.tolist()
-            x = [self.initial_state[v] for v in nodes]
-            for k, bound in peaks(self._bound_functions(part), gains, x).items():
-                result[nodes[k]] = bound
+            for k, bound in peaks(self._bound_functions(part), gains, self._state(part), driven).items():
+                result[nodes[k]] += bound
         return tuple(result)
 
     def deviation_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
         """Bound of ``|x_k(t) - x_k(T)|`` for every agent and every signal, from the initial state.
+
+        Whatever the disturbances, under the sliding-mode protocol.
 
         Parameters
         ----------
@@ -205,17 +288,39 @@ class FamilyContent:
         """
         if self.initial_state is None:
             raise ParameterError("the certificate has no initial state; certify the family with x0")
-        clock = np.asarray(self.protocol.gain.clock_at_remaining(remaining))
-        bounds = np.full((self.family.n_nodes, clock.size), np.inf)
-        for part in self.parts:
-            nodes = part.component.nodes
+        at = self._instants(remaining)
+        bounds = np.full((self.family.n_nodes, at.clock.size), np.inf)
+        for part, driven in zip(self.parts, self._drives, strict=True):
+            nodes, x, stable = part.component.nodes, self._state(part), part.component.behaviour == STABILITY
             if nodes.size == 1:
-                bounds[nodes] = 0
-            x = [self.initial_state[v] for v in nodes.tolist()]
+                bounds[nodes] = 0 if driven is None else sliding_sizes(driven, self._phase, at)
             for V in self._bound_functions(part):
-                moves = deviations([V], part.component.behaviour == STABILITY, x)
-                if moves:
-                    size = np.array([float(moves[k]) for k in range(nodes.size)]) * (1 + 1e-12)
-                    decay = np.exp(-float(V.rate) * (1 - 1e-12) / 2 * clock)
-                    bounds[nodes] = np.minimum(bounds[nodes], np.multiply.outer(size, decay))
+                if driven is None:
+                    own = deviation_on_clock(V, stable, x, at.clock)
+                else:
+                    own = deviation_while_driven(V, stable, x, driven, self._phase, at)
+                if own is not None:
+                    bounds[nodes] = np.minimum(bounds[nodes], own)
         return bounds
+
+    def norm_bound(self, V: Any, part: int, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
+        """Bound ``sqrt(V(x - sigma))`` of a function of a part at instants ``1 - t/T``, from the initial state.
+
+        Where no sliding variable moves it is ``e^(-rate s / 2) sqrt(V(0))``.
+        """
+        at, half, driven = self._instants(remaining), float(V.rate) / 2, self._drives[part]
+        root = math.sqrt(V.value(self._state(self.parts[part]))) * (1 + 1e-12)
+        if driven is None:
+            return root * np.exp(-half * at.clock)
+        return self._phase.driven(half, root, float(driven.constant(V)), at)
+
+    def _instants(self, remaining: Sequence[float] | np.ndarray) -> Instants:
+        """Return values of the clock, and those of the reaching phase if there is one."""
+        if not self.direct:
+            return self._phase.instants(np.asarray(remaining, dtype=float))
+        return Instants(np.asarray(self.protocol.gain.clock_at_remaining(remaining)))
+
+    @cached_property
+    def _phase(self) -> ReachingPhase:
+        assert self.protocol.reaching is not None and self.reaching is not None
+        return ReachingPhase(self.protocol.reaching, self.reaching)

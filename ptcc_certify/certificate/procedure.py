@@ -79,7 +79,7 @@ STEPS = (
 #: of the time then left that the first of the steps may take.
 SEARCHING, SHARES = 0.4, (0.3, 0.3, 0.8, 1.0)
 #: Options of :func:`certify` that families take, too.
-_OF_FAMILIES = ("time_limit", "expectations", "scenario", "origins", "progress")
+_OF_FAMILIES = ("sigma0", "time_limit", "expectations", "scenario", "origins", "progress")
 #: Instants of a simulated run where the graph is large.
 FEW_SAMPLES = 51
 #: A simulated end state is settled when it is this near to the final state, relative to the initial state.
@@ -171,7 +171,7 @@ def certify(
     Returns
     -------
     Certificate or FamilyCertificate
-        Of a family the latter: it takes the nominal protocol, ``x0``, ``time_limit``, ``expectations``, ``scenario``,
+        Of a family the latter: it takes ``x0``, ``sigma0``, ``time_limit``, ``expectations``, ``scenario``,
         ``origins`` and ``progress``.
 
     Raises

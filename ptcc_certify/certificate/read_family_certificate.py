@@ -11,7 +11,7 @@ import numpy as np
 
 from ptcc_certify.certificate.certificate_data import Source
 from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate
-from ptcc_certify.certificate.format import read_protocol
+from ptcc_certify.certificate.format import read_protocol, read_reaching
 from ptcc_certify.certificate.format_family import certificate_family
 from ptcc_certify.certificate.format_vectors import Reader
 from ptcc_certify.certificate.request import Expectations
@@ -44,8 +44,14 @@ def read_family_certificate(source: Source) -> FamilyCertificate:
         functions[number].append(_read_function(of, section, components[number], document["proof"], files))
     parts = tuple(ComponentProof(c, tuple(some)) for c, some in zip(components, functions, strict=True))
     state = Reader(family.labels, source.path.parent).state(document["initial_state"])
-    expectations = _read_expectations(document["unverified"].get("asked"))
-    return FamilyCertificate(family, read_protocol(document["protocol"]), parts, state, expectations, source=source)
+    sigma0 = Reader(family.labels, source.path.parent).state(document["sliding_variable"])
+    protocol, expectations = (
+        read_protocol(document["protocol"]),
+        _read_expectations(document["unverified"].get("asked")),
+    )
+    told = {"disturbance": document["protocol"].get("disturbance"), "expectations": expectations, "source": source}
+    reaching = read_reaching(document["reaching_time"], protocol)
+    return FamilyCertificate(family, protocol, parts, state, sigma0, reaching, **told)
 
 
 def _read_expectations(asked: Any) -> Expectations:

@@ -94,6 +94,22 @@ class FamilyFunction:
         total = sum(y * sum(map(mul, row, xi)) for y, row in zip(xi, self.matrix, strict=True))
         return Fraction(total, self.scale * (unit * scale) ** 2)
 
+    def largest(self, sizes: Mapping[int, Fraction]) -> Fraction:
+        """Bound ``V`` of all states with ``|x_k| <= sizes_k``: ``b'|P| b``, ``b = |C| sizes``, by entries."""
+        (kernel, unit), pivots = self.component.whole, self.component.pivots
+        (whole,), scale = integers([[sizes[v] for v in (*self.nodes, *pivots.values())]])
+        own, rest = whole[: len(self.nodes)], dict(zip(pivots, whole[len(self.nodes) :], strict=True))
+        bits = longest(b for v in self.nodes for b in kernel[v].values())
+        spend(sum(len(kernel[v]) for v in self.nodes), longest(whole), bits, "what drives a Lyapunov function")
+        b = [
+            unit * y + sum(abs(q) * rest[j] for j, q in kernel[v].items()) for v, y in zip(self.nodes, own, strict=True)
+        ]
+        spend(len(b) ** 2, longest(b), longest(max(row, key=abs) for row in self.matrix), "what drives a function")
+        total = sum(
+            y * sum(abs(p) * z for p, z in zip(row, b, strict=True)) for y, row in zip(b, self.matrix, strict=True)
+        )
+        return Fraction(total, self.scale * (unit * scale) ** 2)
+
 
 def check_form(doc: Document, family: Family, component: Component, entry: Any, of: str) -> FamilyFunction:
     """Verify a quadratic form of a component, or of a part of one that hears nobody else."""

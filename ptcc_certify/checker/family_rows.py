@@ -13,7 +13,7 @@ at ``w+`` where the bracket is negative, at ``w-`` elsewhere.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -86,13 +86,30 @@ class FollowerFunction:
         squares += [part.function.value(x) / part.times**2 for part in self.parts]
         return rounded(max(squares), BITS, up=True)
 
+    def largest(self, sizes: Mapping[int, Fraction]) -> Fraction:
+        """Bound ``W^2`` of all states with ``|x_k| <= sizes_k``, rounded up."""
+        (kernel, unit), pivots = self.component.whole, self.component.pivots
+        (whole,), scale = integers([[sizes[v] for v in self.component.nodes]])
+        state = dict(zip(self.component.nodes, whole, strict=True))
+        spend(2 * self.component.size, longest(whole), unit.bit_length() + 64, "what drives a Lyapunov function")
+        top, bottom = 0, 1
+        for v, d in self.vector.items():
+            xi = unit * state[v] + sum(abs(b) * state[pivots[j]] for j, b in kernel[v].items())
+            if xi * bottom > top * d:
+                top, bottom = xi, d
+        squares = [Fraction(top * self.scale, bottom * unit * scale) ** 2]
+        squares += [part.function.largest(sizes) / part.times**2 for part in self.parts]
+        return rounded(max(squares), BITS, up=True)
+
 
 Function = FamilyFunction | FollowerFunction
 
 
 def check_family_functions(doc: Document, family: Family) -> list[Function]:
     """Verify every function, its rates and constants."""
-    section = fields(doc.section("lyapunov"), ("functions",), "lyapunov")
+    section = doc.section("lyapunov")
+    more = ["drives"] * (isinstance(section, dict) and "drives" in section)
+    section = fields(section, ("functions", *more), "lyapunov")
     items = entries(section["functions"], "functions")
     need(len(items) <= MANY_FUNCTIONS, f"more than {MANY_FUNCTIONS} Lyapunov functions")
     result: list[Function] = []

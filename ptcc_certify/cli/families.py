@@ -24,10 +24,7 @@ if TYPE_CHECKING:
     from ptcc_certify.theorems.family_behaviour import FamilyComponent
 
 #: Options of certify that families do not take.
-_NOT_OF_FAMILIES = (
-    *("sigma0", "disturbance", "delta", "noise", *shared.LIMITS, "method", "at", "initial_bound", "simulation"),
-    *("T_r", "T_s", "mu1", "mu2", "mu3"),
-)
+_NOT_OF_FAMILIES = ("noise", *shared.LIMITS, "method", "at", "initial_bound", "simulation")
 
 
 def _pair(context: click.Context, parameter: click.Parameter, texts: Sequence[str]) -> tuple[tuple[str, str], ...]:
@@ -175,6 +172,10 @@ def certify_family(
     from ptcc_certify.theorems.family_behaviour import decide
 
     refuse_options(options)
+    if options["disturbance"] is not None:
+        raise ParameterError(
+            "--disturbance: no run is made of a family; it is certified for every one within --delta: leave it out"
+        )
     most = options["max_input"]
     if most is not None and most <= 0:
         raise ParameterError("--max-input is outside its domain; it must be > 0")
@@ -182,6 +183,7 @@ def certify_family(
         raise ParameterError("--min-rate and --max-input are judged for --signal any; leave them out with constant")
     protocol = shared.protocol_of(options)
     x0 = shared.read_initial_state(options["x0"], options["seed"], family.modes[0].mandatory)
+    sigma0 = shared.sliding_keywords(protocol, options, family.modes[0].mandatory).get("sigma0")
     LOG.info("%s", one_line(f"read {', '.join(graphs)}: {family!r}"))
     if options["signal"] == "constant" and (left := _constant_alone(decide(family, "constant"), decide(family))):
         _show_decision(graphs, family, left, as_json, screen, options)
@@ -193,12 +195,13 @@ def certify_family(
         )
         return code or ExitCode.UNDECIDED
     name, read = _names(graphs, family, options)
-    drawn = {"x(0)": f"random, seed {options['seed']}"} if options["x0"] == "random" else {}
+    states = {"x(0)": options["x0"], "sigma(0)": options["sigma0"]}
+    drawn = {what: f"random, seed {options['seed']}" for what, text in states.items() if text == "random"}
     asked = Expectations(options["expect"], options["min_rate"], most)
     with progress(STEPS, screen.quiet) as begin:
         origins = {"graph": Path(name).name, "read": read, **drawn}
         limit = {"time_limit": options["time_limit"], "expectations": asked, "scenario": scenario_record()}
-        certificate = run(family, protocol, x0, origins=origins, progress=begin, **limit)
+        certificate = run(family, protocol, x0, sigma0=sigma0, origins=origins, progress=begin, **limit)
         assessment = certificate.assessment
     LOG.info("verdict %s; exit code %d", one_line(assessment.text), assessment.exit_code)
     saved = output is not None and assessment.verdict == CERTIFIED
@@ -218,13 +221,10 @@ def certify_family(
 def refuse_options(options: shared.Options) -> None:
     """Refuse what is asked of one graph alone, on the command line or in a scenario."""
     source = click.get_current_context().get_parameter_source
-    if options["kind"] != "nominal":
-        raise ParameterError("--protocol: families are for the nominal protocol alone; leave it out")
-    for name in _NOT_OF_FAMILIES:
-        if source(name) in (ParameterSource.COMMANDLINE, ParameterSource.DEFAULT_MAP) and options[name] not in (
-            None,
-            False,
-        ):
+    foreign = (*_NOT_OF_FAMILIES, *["disturbance", "delta"] * (options["kind"] == "nominal"))
+    for name in foreign:
+        given = source(name) in (ParameterSource.COMMANDLINE, ParameterSource.DEFAULT_MAP)
+        if given and options[name] not in (None, False):
             raise ParameterError(f"{shared.flag_of(name)}: is for one graph, not for families yet; leave it out")
 
 

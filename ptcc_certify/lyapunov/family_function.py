@@ -93,6 +93,11 @@ class FamilyFunction:
             return None
         return tuple(4 * c / self.rate**2 for c in self.input_constants)
 
+    def largest(self, sizes: Sequence[Fraction]) -> Fraction:
+        """Bound ``V`` of all quotient coordinates with ``|xi_k| <= sizes_k``, by entries."""
+        rows = (sum((abs(p) * b for p, b in zip(row, sizes, strict=True)), Fraction(0)) for row in self.matrix)
+        return sum((b * total for b, total in zip(sizes, rows, strict=True)), Fraction(0))
+
     def value(self, xi: Sequence[Fraction]) -> Fraction:
         """Return ``V`` of quotient coordinates."""
         products = (

@@ -155,20 +155,34 @@ class FollowerFunction:
 
     def value(self, x: Sequence[Fraction]) -> Fraction:
         """Return ``W^2`` of a state of the component, rounded up to 64 bits."""
+        squares = [self._largest_share(x, bounds=False)]
+        for part in self.parts:
+            own = part.quotient.coordinates([x[v] for v in part.agents.tolist()])
+            squares.append(part.function.value(own) / part.times**2)
+        return rounded(max(squares), CONSTANT_BITS, up=True)
+
+    def largest(self, sizes: Mapping[int, Fraction]) -> Fraction:
+        """Bound ``W^2`` of all states with ``|x_k| <= sizes_k``, rounded up to 64 bits."""
+        squares = [self._largest_share([sizes[v] for v in range(self.family.n_nodes)], bounds=True)]
+        for part in self.parts:
+            own = dict(enumerate(sizes[v] for v in part.agents.tolist()))
+            squares.append(part.function.largest(part.quotient.coordinate_sizes(own)) / part.times**2)
+        return rounded(max(squares), CONSTANT_BITS, up=True)
+
+    def _largest_share(self, x: Sequence[Fraction], bounds: bool) -> Fraction:
+        """Return the largest ``(xi_k / d_k)^2`` of a state, or of all states within some bounds."""
         pivots = [c.nodes[0] for c in self.kernel.structure.closed_components if c.balanced]
         scale = math.lcm(*{y.denominator for y in x})
         whole = [y.numerator * (scale // y.denominator) for y in x]
         rest = [whole[p] for p in pivots]
         top, bottom = Fraction(0), 1
         for k, d in zip(self.followers.tolist(), self.vector.tolist(), strict=True):
-            xi = abs(whole[k] - sum(b * y for b, y in zip(self.kernel.row(k), rest, strict=True) if b))
+            row = zip(self.kernel.row(k), rest, strict=True)
+            terms = (abs(b) * y if bounds else -b * y for b, y in row if b)
+            xi = abs(whole[k] + sum(terms))
             if xi * bottom > top * d:
                 top, bottom = xi, d
-        squares = [(Fraction(top) / (bottom * scale)) ** 2]
-        for part in self.parts:
-            own = part.quotient.coordinates([x[v] for v in part.agents.tolist()])
-            squares.append(part.function.value(own) / part.times**2)
-        return rounded(max(squares), CONSTANT_BITS, up=True)
+        return (Fraction(top) / (bottom * scale)) ** 2
 
 
 def follower_functions(

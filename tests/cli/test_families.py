@@ -203,7 +203,11 @@ BAD = {
     "standard input twice": ("a,b,1", ("-", "-", "--switching"), "standard input, which is one graph"),
     "a scenario beside": ("a,b,1", ("s.toml", "--switching"), "a scenario stands alone"),
     "signal": ("a,b,1", ("--signal", "fast"), "'fast' is not one of"),
-    "sliding mode": (_rows("a,b,1,2"), ("--protocol", "sliding-mode"), "nominal protocol alone"),
+    "disturbance": (
+        _rows("a,b,1,2"),
+        ("--protocol", "sliding-mode", "--disturbance", "sin(t)"),
+        "no run is made of a family",
+    ),
     "no deadline": (_rows("a,b,1,2"), ("--rho2", "0"), "rho2 = 0 gives no deadline"),
     "another length": (_rows("a,b,1,2"), ("--x0", "1,2,3"), "3 values for 2 nodes"),
     **{
