@@ -254,17 +254,25 @@ class FamilyContent:
         return None if own is None else tuple(own)
 
     @cached_property
-    def input_peaks(self) -> tuple[Fraction, ...] | None:
-        """Bounds of ``|u_k|`` for every signal, its sliding part included; None if none are proved."""
-        if self.initial_state is None or not self.bounded or (self.sigma0 is not None and self.sliding_peaks is None):
+    def nominal_peaks(self) -> tuple[Fraction, ...] | None:
+        """Bounds of ``gain |(L x)_k|`` for every signal; None if none are proved."""
+        if self.initial_state is None or not self.bounded:
             return None
-        result = list(self.sliding_peaks or (Fraction(0),) * self.family.n_nodes)
+        result = [Fraction(0)] * self.family.n_nodes
         gains = self.protocol.parameters
         for part, driven in zip(self.parts, self._drives, strict=True):
             nodes = part.component.nodes.tolist()
             for k, bound in peaks(self._bound_functions(part), gains, self._state(part), driven).items():
-                result[nodes[k]] += bound
+                result[nodes[k]] = bound
         return tuple(result)
+
+    @property
+    def input_peaks(self) -> tuple[Fraction, ...] | None:
+        """Bounds of ``|u_k|`` for every signal, its sliding part included; None if none are proved."""
+        nominal, own = self.nominal_peaks, self.sliding_peaks
+        if nominal is None or self.sigma0 is None:
+            return nominal
+        return None if own is None else tuple(x + y for x, y in zip(nominal, own, strict=True))
 
     def deviation_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
         """Bound of ``|x_k(t) - x_k(T)|`` for every agent and every signal, from the initial state.
