@@ -172,7 +172,8 @@ def certify_family(
     from ptcc_certify.theorems.family_behaviour import decide
 
     refuse_options(options)
-    if options["disturbance"] is not None:
+    given = click.get_current_context().get_parameter_source("disturbance") == ParameterSource.COMMANDLINE
+    if given and options["disturbance"] is not None:  # one of a scenario is for ptcc simulate
         raise ParameterError(
             "--disturbance: no run is made of a family; it is certified for every one within --delta: leave it out"
         )

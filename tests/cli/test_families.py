@@ -174,6 +174,30 @@ def _rows(*rows: str, header: str = INTERVALS) -> str:
     return "\n".join([header, *rows, ""])
 
 
+def test_a_family_is_certified_for_every_disturbance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    Path("day.csv").write_text("a,b,1\nb,a,1\nb,c,-1\n")
+    Path("night.csv").write_text("a,b,1\nb,a,2\na,c,-1\n")
+    Path("s.toml").write_text(
+        '[graph]\nfile = ["day.csv", "night.csv"]\nuncertainty = "10%"\n[protocol]\nkind = "sliding-mode"\nkappa = 3\n'
+        '[initial_state]\nx0 = [1, 2, 3]\nsigma0 = [1, 0.5, -0.25]\n[disturbance]\nsignal = "sin(t)"\n'
+    )
+    flags = ("--protocol", "sliding-mode", "--kappa", "3", "--sigma0", "1,0.5,-0.25", "--x0", "1,2,3")
+    family = ("day.csv", "night.csv", "--switching", "--uncertainty", "10%")
+    run = ptcc("certify", *family, *flags, "-o", "c.json")
+    assert run.code == 0 and max(map(len, run.out.splitlines())) <= 80
+    assert "at T = 1 for every signal and disturbance" in run.out and "sigma(0) given" in run.out
+    assert "T_r + 0.99 T_s" in run.out
+    assert ptcc("check", "c.json", *family).code == 0
+    data = json.loads(Path("c.json").read_text())
+    assert len(data["lyapunov"]["drives"]) == len(data["lyapunov"]["functions"]) > 0
+    assert "reaching time at most" in ptcc("certify", *family, *flags, "-v").out
+    assert ptcc("certify", "s.toml", "-o", "s.json").code == 0 == ptcc("simulate", "s.toml", "--steps", "2").code
+    assert json.loads(Path("s.json").read_text())["digest"] == data["digest"]
+    direct = ptcc("certify", *family, *flags[:4], "--x0", "1,2,3")
+    assert "sigma(0) 0" in direct.out and "at 0.99 T" in direct.out and direct.code == 0
+
+
 BAD = {
     "least above largest": (_rows("a,b,2,1"), (), "bad.csv, line 2: edge a -> b: its least weight 2 is above"),
     "always zero": (_rows("a,b,0,0"), (), "line 2: edge a -> b: its weight is always 0"),
