@@ -18,6 +18,7 @@ from ptcc_certify.bounds.reaching_phase import ReachingPhase
 from ptcc_certify.checker.family_bounds import Function, deviations
 from ptcc_certify.checker.family_sliding import Drive
 from ptcc_certify.checker.input_formulas import BITS, root_above
+from ptcc_certify.graphs.rationals import nearest_float
 
 _SLACK = 1 + 1e-12
 
@@ -64,16 +65,22 @@ def deviation_while_driven(
     if V.rate <= 0:
         return None
     root, half = root_above(rounded(V.value(y), BITS, up=True)), float(V.rate) * (1 - 1e-12) / 2
-    c, nodes = float(drive.constant(V)) * _SLACK, range(len(y))
-    v, rest = phase.driven(half, float(root) * _SLACK, c, at), phase.rest(at)
-    speeds = np.sqrt([float(V.inputs[k]) for k in nodes]) * _SLACK
-    own = np.multiply.outer(speeds, (v + c * rest) / half)
-    own += np.multiply.outer([float(drive.pulls[k]) for k in nodes], rest)
-    if stable:
-        sizes = np.array([np.sqrt(float(V.coordinates[k])) if k in V.coordinates else np.inf for k in nodes]) * _SLACK
-        with np.errstate(invalid="ignore"):
+    c, nodes = _float(drive.constant(V)), range(len(y))
+    with np.errstate(over="ignore", invalid="ignore"):
+        v, rest = phase.driven(half, _float(root), c, at), phase.rest(at)
+        speeds = np.sqrt([_float(V.inputs[k]) for k in nodes])
+        own = np.multiply.outer(speeds, (v + c * rest) / half)
+        own += np.multiply.outer([_float(drive.pulls[k]) for k in nodes], rest)
+        if stable:
+            sizes = np.sqrt([_float(V.coordinates[k]) if k in V.coordinates else np.inf for k in nodes])
             own = np.fmin(own, np.multiply.outer(sizes, v))
-    return own + sliding_sizes(drive, phase, at)
+        own += sliding_sizes(drive, phase, at)
+    return np.nan_to_num(own, nan=np.inf, posinf=np.inf)
+
+
+def _float(x: Fraction) -> float:
+    """Return a float that is not below; infinity beyond their range."""
+    return nearest_float(x) * _SLACK
 
 
 def sliding_sizes(drive: Drive, phase: ReachingPhase, at: Instants) -> np.ndarray:

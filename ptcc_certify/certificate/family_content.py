@@ -25,6 +25,7 @@ from ptcc_certify.checker.protocol import sliding_bounded, sliding_part
 from ptcc_certify.checker.reading import Interval
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
+from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
 from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound
@@ -317,10 +318,10 @@ class FamilyContent:
         Where no sliding variable moves it is ``e^(-rate s / 2) sqrt(V(0))``.
         """
         at, half, driven = self._instants(remaining), float(V.rate) / 2, self._drives[part]
-        root = math.sqrt(V.value(self._state(self.parts[part]))) * (1 + 1e-12)
+        root = math.sqrt(nearest_float(V.value(self._state(self.parts[part])))) * (1 + 1e-12)
         if driven is None:
             return root * np.exp(-half * at.clock)
-        return self._phase.driven(half, root, float(driven.constant(V)), at)
+        return self._phase.driven(half, root, nearest_float(driven.constant(V)), at)
 
     def _instants(self, remaining: Sequence[float] | np.ndarray) -> Instants:
         """Return values of the clock, and those of the reaching phase if there is one."""

@@ -39,6 +39,8 @@ from ptcc_certify.checker.reading import entries, exact, need
 Sizes = Mapping[int, Fraction]
 #: Stretches into which the time is cut while sliding variables move.
 STRETCHES = 64
+#: Below these ``psi``, and what a stretch leaves of a norm, are not made smaller: shorter numbers.
+LEAST, MOST_DECAY = Fraction(1, 2**200), Fraction(100)
 
 
 class Function(Protocol):
@@ -105,7 +107,7 @@ class Drive:
     def _stretches(self) -> list[tuple[Fraction, Fraction, Fraction, Fraction, Fraction]]:
         """The gain at both ends, ``psi`` at the begin and the clock, from above, the clock from below."""
         parts = stretches(self.gain, self.reaching, self.reaching.quiet, STRETCHES)
-        sizes = ((part.first, part.last, part.psi[1], part.clock[1], -part.clock[0]) for part in parts)
+        sizes = ((part.first, part.last, max(part.psi[1], LEAST), part.clock[1], -part.clock[0]) for part in parts)
         return [tuple(rounded(x, BITS, up=True) for x in own) for own in sizes]  # type: ignore[misc]
 
     @cached_property
@@ -138,7 +140,7 @@ class Drive:
         for first, last, psi, clock, passed in self._stretches:
             added = c * psi * min(clock, 1 / half)
             most = max(most, first * v + last * added)
-            v = rounded(v * decay_above(-half * passed) + added, BITS, up=True)
+            v = rounded(v * decay_above(min(-half * passed, MOST_DECAY)) + added, BITS, up=True)
         return rounded(max(most, self._stretches[-1][1] * v), BITS, up=True)
 
     def end(self, k: int, sum_of_roots: Fraction, root_constant: Fraction) -> Fraction:

@@ -24,8 +24,7 @@ def sliding_lines(
     Examples
     --------
     >>> p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
-    >>> zero = (Fraction(0),)
-    >>> list(sliding_lines(["a"], p, zero, certified_reaching_times(p, zero)))
+    >>> list(sliding_lines(["a"], p, [Fraction(0)], [ReachingTime(p.T_r, Fraction(0))]))
     [('sigma(0)', '0: no reaching phase, the agents slide from the beginning')]
     """
     if protocol is None or reaching is None or sigma0 is None:
