@@ -97,12 +97,15 @@ def sliding_cases() -> list[tuple[str, Json]]:
         x0 = None if k == 2 else draw.integers(-9, 10, 3).tolist()
         made = certify_family(family, protocol, x0, sigma0=sigma0, time_limit=3)
         found.append((f"sliding {kind} {k}", {**made.to_dict(), "unverified": {}}))
+    protocol = SlidingModeProtocol(**gains, mu3=1)
+    apart = Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 1), ("c", "d", 0, 1)], nodes="abcde")
+    made = certify_family(apart, protocol, [1, 2, 3, 4, 5], sigma0=[1, -2, 3, 0, 1], time_limit=3)
+    found.append(("sliding apart", {**made.to_dict(), "unverified": {}}))
     led = Family.from_intervals(
         [("a", "b", 1, 2), ("b", "a", 1, 1), ("b", "c", 1, 3), ("a", "d", 1, 1), ("c", "d", 1, 2)]
     )
     parts = tuple(ComponentProof(c, tuple(follower_functions(c))) for c in decide(led))
     state, sigma0 = tuple(map(Fraction, (1, 2, 3, 4))), tuple(map(Fraction, (1, 0, -1, 2)))
-    protocol = SlidingModeProtocol(**gains, mu3=1)
     made = FamilyCertificate(led, protocol, parts, state, sigma0, certified_reaching_times(protocol, sigma0))
     found.append(("sliding rows", {**made.to_dict(), "unverified": {}}))
     return found
