@@ -14,6 +14,7 @@ from lmi.exact.elementary_enclosures import log, rounded
 from lmi.search_time import share_of_time
 from ptcc_certify.checker.reading import Interval
 from ptcc_certify.checker.restricted_signals import agreed_bounds, reachable_bounds
+from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import STABILITY
 from ptcc_certify.lyapunov.clock_shares import ShareForm, search_share_form
@@ -40,6 +41,15 @@ _OF_THE_CLOCK = (
     "the windows are of the stretched clock: in time they shrink towards T, and who switches at a fixed pace in time "
     "does not keep them"
 )
+
+
+def require_nominal(signal: SignalClass, protocol: Protocol) -> None:
+    """Refuse restricted signals under the sliding-mode protocol."""
+    if signal != "any" and protocol.reaching is not None:
+        raise ParameterError(
+            "restricted signals are certified under the nominal protocol; leave out signal (--signal, --dwell, "
+            "--clock-dwell, --clock-window, --share), or give NominalProtocol(..)"
+        )
 
 
 @dataclass(frozen=True, eq=False)
