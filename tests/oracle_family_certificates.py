@@ -33,15 +33,8 @@ Edge = tuple[int, int, Fraction, Fraction]
 def false_family_claims(data: Json, files: Mapping[str, bytes] | None = None) -> list[str]:
     """Say what is false in an accepted certificate of a family; an empty list if nothing is."""
     oracle = FamilyOracle(data, files or {})
-    for claim in (
-        oracle.graph,
-        oracle.structures,
-        oracle.behaviours,
-        oracle.functions,
-        oracle.finals,
-        oracle.inputs,
-        oracle.restricted,
-    ):
+    claims = (oracle.graph, oracle.structures, oracle.behaviours, oracle.functions, oracle.sliding, oracle.drives)
+    for claim in (*claims, oracle.finals, oracle.inputs, oracle.restricted):
         claim()
     return oracle.false
 
@@ -193,7 +186,7 @@ class FamilyOracle:
             found = [{"nodes": x, "claim": claim} for x, claim in zip(names, told, strict=True)]
             self.require(self.data["claim"] is None and self.data["components"] == found, "claims of components")
         self.require(self.data["verdict"] == "certified", "verdict")
-        empty = ("paper", "rates", "overshoot", "sliding_variable", "influence", "reaching_time")
+        empty = ("paper", "rates", "overshoot", "influence")
         self.require(all(self.data[key] is None for key in empty), "parts that families do not have")
 
     # ------------------------------------------------------------------ Lyapunov functions
@@ -307,6 +300,77 @@ class FamilyOracle:
     def definite(P: Matrix) -> bool:
         return semidefinite(P) and not kernel(P)
 
+    # ------------------------------------------------------------------ sliding variables
+
+    @cached_property
+    def gains(self) -> dict[str, Fraction]:
+        said = self.data["protocol"]
+        return {key: number(x) for key, x in said.items() if key not in ("kind", "disturbance")}
+
+    @cached_property
+    def sigma0(self) -> Vector:
+        said = self.data["sliding_variable"]
+        return [Fraction(0)] * self.n if said is None else [number(said[label]) for label in self.labels]
+
+    reach, integral = Oracle.reach, staticmethod(Oracle.integral)
+
+    def sliding(self) -> None:
+        """Reaching times, and the sliding part of the input: no graph enters, so that it is as for one graph."""
+        g, said = self.gains, self.data["sliding_variable"]
+        slides = self.data["protocol"]["kind"] == "sliding-mode"
+        self.require(slides == ("mu1" in g) == (said is not None), "a sliding variable")
+        self.require(min(x for key, x in g.items() if key != "delta") > 0, "a parameter")
+        Oracle.reaching(self)  # type: ignore[arg-type]
+        own = self.data["input"].get("sliding")
+        self.require((own is not None) == slides, "a sliding part")
+        if own is None:
+            return
+        self.require(0 <= g["delta"] < g["mu1"] and said is not None and list(said) == self.labels, "mu1 and delta")
+        self.require(own["bounded"] is (g["mu3"] * g["kappa"] >= 1), "sliding: bounded")
+        push = g["mu2"] + g["mu3"] * g["kappa"] / g["T_r"]
+        if own["agents"] is not None:
+            self.require(own["bounded"] or not any(self.sigma0), "sliding: not bounded")
+            for s, x in zip(self.sigma0, map(number, own["agents"].values()), strict=True):
+                self.require(x >= g["mu1"] + push * abs(s), "sliding: agents")
+
+    def drives(self) -> None:
+        """How sliding variables drive a function: ``C L sigma`` of members, and corners of what is stated."""
+        told = self.data["lyapunov"].get("drives")
+        self.require((told is not None) == any(self.sigma0), "drives")
+        for said, text in zip(self.data["lyapunov"]["functions"], told or [], strict=False):
+            nodes = self.pieces[said["component"]]
+            basis, c = self.common_kernel(nodes), number(text)
+            if basis is None:
+                continue
+            first = [group[0] for group in self.balanced_first(nodes)]
+            free = [v for v in nodes if v not in first]
+            C = self.lift(basis, nodes, free, first)
+            for some in self.members:
+                pulls = [
+                    max(
+                        sum((abs(x) * abs(self.sigma0[j]) for j, x in enumerate(L[v]) if j in nodes), Fraction(0))
+                        for L in some
+                    )
+                    for v in nodes
+                ]
+                own = [self.sigma0[v] for v in nodes]
+                vectors = [[y for (y,) in times(self.part(L, nodes), [[x] for x in own])] for L in some]
+                vectors += [[p * self.draw.choice((-1, 1)) for p in pulls] for _ in range(8)]
+                for x in vectors:
+                    xi = dict(zip(free, [y for (y,) in times(C, [[z] for z in x])], strict=True))
+                    self.require(self.size(said, xi) <= c**2, "a drive")
+
+    def size(self, said: Json, xi: dict[int, Fraction]) -> Fraction:
+        """``V`` of coordinates by node."""
+        if said["class"] != "rows":
+            z = [xi[self.index[label]] for label in said["nodes"]]
+            return self.form(self.symmetric(said["lower_triangle"]), z)
+        led = [self.index[label] for part in said["parts"] for label in part["nodes"]]
+        followers = [v for v in xi if v not in led]
+        squares = [(xi[v] / number(d)) ** 2 for v, d in zip(followers, said["vector"], strict=True)]
+        squares += [self.size(part["function"], xi) / number(part["times"]) ** 2 for part in said["parts"]]
+        return max(squares)
+
     # ------------------------------------------------------------------ where agents end, and their inputs
 
     @cached_property
@@ -316,9 +380,8 @@ class FamilyOracle:
 
     @cached_property
     def gain(self) -> tuple[Fraction, Fraction, Fraction]:
-        T, rho1, rho2, kappa = (number(self.data["protocol"][key]) for key in ("T", "rho1", "rho2", "kappa"))
-        self.require(min(T, rho1, rho2, kappa) > 0, "the protocol")
-        return T, rho1, rho2 * kappa
+        g = self.gains
+        return g["T"] if "T" in g else g["T_r"] + g["T_s"], g["rho1"], g["rho2"] * g["kappa"]
 
     def depends(self, nodes: list[int]) -> bool:
         return self.common_kernel(nodes) is None
@@ -337,14 +400,15 @@ class FamilyOracle:
             self.require(None not in ends, "no final state")
             for some in self.members:
                 for L in some:
-                    end = self.limit(self.part(L, nodes), [self.start[v] for v in nodes])
+                    end = self.limit(self.part(L, nodes), [self.start[v] - self.sigma0[v] for v in nodes])
                     self.require(all(Oracle.holds(x, y) for x, y in zip(ends, end, strict=True)), "a final state")
             for x in self.switched(nodes):
                 for entry, y in zip(ends, x, strict=True):
                     mid = number(entry["mid"]) if isinstance(entry, dict) else number(entry)
                     radius = number(entry["radius"]) if isinstance(entry, dict) else Fraction(0)
                     size = max(1.0, *(abs(float(z)) for z in self.start))
-                    self.require(abs(y - float(mid)) <= float(radius) + 1e-7 * size, "a final state by switches")
+                    slack = (1e-4 if any(self.sigma0) else 1e-7) * size
+                    self.require(abs(y - float(mid)) <= float(radius) + slack, "a final state by switches")
 
     @staticmethod
     def limit(L: Matrix, x: Vector) -> Vector:
@@ -361,20 +425,40 @@ class FamilyOracle:
         flat = [(k, L) for k, some in enumerate(self.members) for L in some]
         size = max(float(x) for _, L in flat for row in L for x in row)
         for _ in range(SIGNALS if size else 0):
-            x = np.array([float(self.start[v]) for v in nodes])
+            x = np.array([float(self.start[v] - self.sigma0[v]) for v in nodes])
+            if any(self.sigma0):
+                x = self.driven(
+                    x, nodes, [np.array(self.part(self.draw.choice(flat)[1], nodes), dtype=float) for _ in range(5)]
+                )
             for _ in range(5):
                 L = np.array(self.part(self.draw.choice(flat)[1], nodes), dtype=float)
                 x = expm(-L * self.draw.choice((0.1, 1, 3)) / size) @ x
             last = self.part(self.draw.choice(flat)[1], nodes)
             yield np.array([float(y) for y in self.limit(last, [Fraction(float(y)) for y in x])])
 
+    def driven(self, y: np.ndarray, nodes: list[int], members: list[np.ndarray]) -> np.ndarray:
+        """``x - sigma`` at ``T_r``, one member after the other, the disturbance with the sign or against, in steps."""
+        T, rho1, pole = map(float, self.gain)
+        T_r, mu2, power = map(float, self.reach)
+        push = float(self.gains["mu1"]) - float(self.gains["delta"]) * self.draw.choice((-1, 0, 1))
+        sigma, steps = np.array([float(self.sigma0[v]) for v in nodes]), 400
+        for k in range(steps):
+            a, b = ((1 - (1 - j / steps) ** 2) * T_r for j in (k, k + 1))
+            psi = np.exp(-mu2 * (b - a)) * ((T_r - b) / (T_r - a)) ** power
+            later = np.sign(sigma) * np.maximum(psi * (np.abs(sigma) - push * (b - a)), 0)
+            L, s = members[k * len(members) // steps], rho1 * (b - a) + pole * np.log((T - a) / (T - b))
+            y = expm(-L * s) @ (y + (sigma + later) / 2) - (sigma + later) / 2
+            sigma = later
+        return y
+
     def inputs(self) -> None:
-        said = self.data["input"]
+        said, g = self.data["input"], self.gains
         T, rho1, pole = self.gain
         if said["bounded"] is None:
             self.require(said["peaks"] is None, "peaks of an input that is not bounded")
             return
-        self.require(said["bounded"] is True and (said["peaks"] is None) == (self.start is None), "bounded")
+        unknown = self.start is None or ("mu1" in g and g["mu3"] * g["kappa"] < 1 and any(self.sigma0))
+        self.require(said["bounded"] is True and (said["peaks"] is None) == unknown, "bounded")
         for nodes in self.pieces:
             self.require(not self.depends(nodes), "an input that depends on the signal is bounded")
             for some in self.members:
@@ -389,9 +473,13 @@ class FamilyOracle:
         first = rho1 + pole / T
         for some in self.members:
             for L in some:
-                size = [abs(sum((a * x for a, x in zip(row, self.start, strict=True)), Fraction(0))) for row in L]
-                self.require(all(first * x <= b for x, b in zip(size, bounds, strict=True)), "a peak at the beginning")
-                self.later(np.array(L, dtype=float), np.array(bounds, dtype=float))
+                for v, (row, b) in enumerate(zip(L, bounds, strict=True)):
+                    u = -first * sum((a * x for a, x in zip(row, self.start, strict=True)), Fraction(0))
+                    if s := self.sigma0[v]:
+                        u -= g["mu1"] * (1 if s > 0 else -1) + (g["mu2"] + g["mu3"] * g["kappa"] / g["T_r"]) * s
+                    self.require(abs(u) + (0 if s else g.get("delta", 0)) <= b, "a peak at the beginning")
+                if not any(self.sigma0):
+                    self.later(np.array(L, dtype=float), np.array(bounds, dtype=float))
 
     def later(self, L: np.ndarray, bounds: np.ndarray) -> None:
         T, rho1, pole = map(float, self.gain)

@@ -31,18 +31,16 @@ from ptcc_certify.bounds.envelope import (
     Instants,
     clock_values,
     deviation_constants,
-    remaining_part,
 )
+from ptcc_certify.bounds.reaching_phase import ReachingPhase
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.protocols.base import ReachingProtocol
-from ptcc_certify.protocols.reaching_time import LAST_Z, ReachingTime, sliding_bound
+from ptcc_certify.protocols.reaching_time import ReachingTime, sliding_bound
 
 if TYPE_CHECKING:
     from ptcc_certify.simulation.trajectory import Trajectory
 
-# The integral is bounded from above piece by piece: b decreases, so its value at the start of a piece is the largest.
-_PIECES = 4000
 #: Arrays of instants whose bounds are cached.
 _CACHE_SIZE = 8
 
@@ -83,10 +81,9 @@ class SlidingEnvelope(Envelope):
         """Whether ``sigma(0) = 0``: there is no reaching phase, and the bounds are those of the nominal protocol."""
         return not any(self.sigma0)
 
-    @property
-    def _spans(self) -> tuple[float, float, float]:
-        """``T``, ``T_r`` and ``T_s`` in floats."""
-        return float(self.protocol.T), float(self.protocol.T_r), float(self.protocol.T_s)
+    @cached_property
+    def _phase(self) -> ReachingPhase:
+        return ReachingPhase(self.protocol, self.reaching)
 
     def _at(self, clock: Any) -> Instants:
         """Refuse values of the clock alone where there is a reaching phase."""
@@ -96,10 +93,7 @@ class SlidingEnvelope(Envelope):
 
     def _when(self, remaining: Any) -> Instants:
         """Return ``s`` and ``z`` where ``1 - t/(T_r + T_s)`` is ``remaining``, or refuse it."""
-        q, (T, T_r, T_s) = remaining_part(remaining), self._spans
-        with np.errstate(divide="ignore"):
-            z = -np.log(np.maximum((q - T_s / T) * (T / T_r), 0.0))
-            return Instants(np.asarray(self.gain.clock_at_remaining(q)), z)
+        return self._phase.instants(remaining)
 
     def _of(self, trajectory: Trajectory) -> Instants:
         run = trajectory.sliding
@@ -219,9 +213,9 @@ class SlidingEnvelope(Envelope):
         Of those that bound the reaching phase: one that bounds only the growth would end in infinity.
         """
         reaching = np.isfinite(at.z)
-        knots = np.unique(np.concatenate([self._pieces, at.z[reaching]]))
+        knots = np.unique(np.concatenate([self._phase.pieces, at.z[reaching]]))
         place = np.where(reaching, np.searchsorted(knots, at.z), knots.size)
-        size, s, last = self._sliding(knots) / unit, self._clock_at(knots), self._clock_at(np.array(np.inf))
+        size, s, last = self._sliding(knots) / unit, self._phase.clock(knots), self._phase.clock(np.array(np.inf))
         later = np.where(reaching, 0.0, np.maximum(at.clock - last, 0.0))
         y0 = [x / Fraction(unit) for x in self._nominal_state(x0)]
         for function, root in self._initial_values((m for m in functions if m.rate_below > 0), y0):
@@ -247,19 +241,6 @@ class SlidingEnvelope(Envelope):
                 self._cache.clear()
             self._cache[key] = sliding_bound(self.protocol, self.sigma0, z, self.reaching)
         return self._cache[key]
-
-    @cached_property
-    def _pieces(self) -> np.ndarray:
-        """Instants ``z`` at which the pieces begin, until all sliding variables are certainly 0."""
-        certain = [LAST_Z if r.z is None else float(min(r.z, Fraction(LAST_Z))) for r in self.reaching]
-        fine = np.concatenate([[0.0], np.geomspace(1e-9, 1, 2000) * max(certain)])
-        levels = self.protocol.reaching_gain.clock_at_tau(fine)
-        return np.interp(np.linspace(0, levels[-1], _PIECES), levels, fine)
-
-    def _clock_at(self, z: np.ndarray) -> np.ndarray:
-        """Return ``s`` at instants ``z`` before ``T_r``, and at ``T_r`` where ``z`` is infinite."""
-        T, T_r, T_s = self._spans
-        return self.gain.clock_at_remaining((T_s + T_r * np.exp(-z)) / T)
 
     def _drive(self, function: LyapunovFunction) -> tuple[np.ndarray, np.ndarray]:
         """Return ``|R C|`` and ``|R B|``, ``P = R'R``: how sliding variables enter the coordinates and drive them."""

@@ -30,8 +30,9 @@ from ptcc_certify.certificate.request import (
     read_expectations,
     read_initial_state,
     read_seconds,
+    read_sliding_variable,
 )
-from ptcc_certify.certificate.restricted_search import STEP, claims_for
+from ptcc_certify.certificate.restricted_search import STEP, claims_for, require_nominal
 from ptcc_certify.certificate.verdict import Assessment
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.family import MANY_MODES
@@ -69,10 +70,16 @@ class FamilyCertificate(FamilyContent, Shown):
     Attributes
     ----------
     family : Family
-    protocol : NominalProtocol
+    protocol : NominalProtocol or SlidingModeProtocol
     parts : tuple of ComponentProof
         One for each weakly connected component of all edges of all modes.
     initial_state : tuple of N Fraction, or None
+    sigma0 : tuple of N Fraction, or None
+        ``sigma(0)``, under the sliding-mode protocol.
+    reaching : tuple of N ReachingTime, or None
+        Proved reaching times, which no graph enters.
+    disturbance : str or None
+        What a run met, as a file tells; no part of the claim.
     expectations : Expectations
     notes : tuple of str
     source : Source or None
@@ -262,6 +269,7 @@ def certify_family(
     protocol: Protocol,
     x0: Any = None,
     *,
+    sigma0: Any = None,
     time_limit: float | None = None,
     signal: SignalClass = "any",
     expectations: Expectations | str | None = None,
@@ -269,15 +277,17 @@ def certify_family(
     origins: Mapping[str, str] | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> FamilyCertificate:
-    """Certify what the nominal protocol does on a family of graphs, whatever the signal.
+    """Certify what a protocol does on a family of graphs, whatever the signal, and whatever the disturbances.
 
     Parameters
     ----------
     family : Family
-    protocol : NominalProtocol
+    protocol : NominalProtocol or SlidingModeProtocol
         With ``rho2 > 0``.
     x0 : state-like, optional
         The initial state; without it no final states and no peaks.
+    sigma0 : state-like, optional
+        Sliding mode: ``sigma(0)``, like ``x0``; without it 0, which leaves no reaching phase.
     time_limit : float, optional
         Seconds of wall time for the searches; without it 60, and 1 more for every 1,000 nodes.
     signal : {"any", "constant"} or DwellTime
@@ -295,7 +305,8 @@ def certify_family(
     Raises
     ------
     ParameterError
-        No protocol, another than the nominal one, an initial state that does not fit, or more than 1,000 modes.
+        No protocol, a state that does not fit, restricted signals under the sliding-mode protocol, or more than 1,000
+        modes.
 
     Examples
     --------
@@ -306,8 +317,8 @@ def certify_family(
     (('stability',), 'certified', True)
     """
     refuse_no_protocol(protocol)
-    if protocol.reaching is not None:
-        raise ParameterError("families are certified under the nominal protocol; give NominalProtocol(..)")
+    if sigma0 is not None and protocol.reaching is None:
+        raise ParameterError("sigma0 belongs to the sliding-mode protocol; leave it out or change the protocol")
     if not protocol.prescribed:
         raise ParameterError("rho2 = 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
     if len(family.modes) > MANY_MODES:
@@ -316,17 +327,20 @@ def certify_family(
             f"{len(family.modes):,} modes, and a certificate holds {MANY_MODES:,} at most; {mend} and decide take any"
         )
     signal = read_signal(signal)
+    require_nominal(signal, protocol)
     if isinstance(signal, ClockShares) and len(signal.shares) != len(family.modes):
         raise ParameterError(f"{len(signal.shares)} shares of the clock for {len(family.modes)} modes")
     asked, seconds, progress = read_expectations(expectations), read_seconds(time_limit, family), listener(progress)
-    initial_state = None if x0 is None else read_initial_state(analyse(family.modes[0].mandatory), x0, "x0")
+    structure = analyse(family.modes[0].mandatory)
+    initial_state = None if x0 is None else read_initial_state(structure, x0, "x0")
+    sigma, reaching = read_sliding_variable(structure, protocol, sigma0)
     progress(STEPS[0])
     components = decide(family)
     parts, notes = [], list(family.notes)
     with deadline.time_limit(seconds):
         for component in components:
             part = _prove(component, notes, progress)
-            parts.append(part if initial_state is None else _with_means(part))
+            parts.append(part if initial_state is None or (sigma is not None and any(sigma)) else _with_means(part))
         if signal != "any":
             progress(STEP)
         kept: dict[str, Any] = {
@@ -334,9 +348,9 @@ def certify_family(
             "restricted": claims_for(signal, parts, protocol, initial_state, notes),
         }
     progress(STEPS[3])
-    told = origins_of(None, x0, None) | dict(origins or {})
-    kept |= {"origins": told, "scenario": scenario}
-    return FamilyCertificate(family, protocol, tuple(parts), initial_state, asked, tuple(dict.fromkeys(notes)), **kept)
+    kept |= {"expectations": asked, "notes": tuple(dict.fromkeys(notes)), "scenario": scenario}
+    told = origins_of(None, x0, sigma0) | dict(origins or {})
+    return FamilyCertificate(family, protocol, tuple(parts), initial_state, sigma, reaching, origins=told, **kept)
 
 
 def _with_means(part: ComponentProof) -> ComponentProof:

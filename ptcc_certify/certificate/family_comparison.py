@@ -9,7 +9,9 @@ from fractions import Fraction
 import numpy as np
 
 from ptcc_certify.bounds.envelope import FLOOR_FACTOR
+from ptcc_certify.bounds.reaching_phase import ReachingPhase
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
+from ptcc_certify.certificate.family_content import BoundFunction
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.lyapunov.family_function import FamilyFunction
@@ -46,6 +48,12 @@ class FamilyComparison:
     floor : float
     judged : int
         How many of the deviations rose above the floor.
+    sliding_ratio : float or None
+        ``max |sigma_k(t)|`` over ``psi(t) |sigma_k(0)|``; infinite where one is not 0 by its proved reaching time. None
+        if no sliding variable moves.
+
+    Where sliding variables move, ``lyapunov_ratio`` is of ``y = x - sigma`` and what drives it, and there is no
+    ``mode_ratio``.
     """
 
     deviation_ratio: float | None
@@ -55,12 +63,13 @@ class FamilyComparison:
     mode_ratio: float | None
     floor: float
     judged: int
+    sliding_ratio: float | None = None
 
     @property
     def worst_ratio(self) -> float:
         """The largest of the ratios; 0 if there is none."""
         ratios = (self.deviation_ratio, self.final_ratio, self.input_ratio, self.lyapunov_ratio, self.mode_ratio)
-        return max((ratio for ratio in ratios if ratio is not None), default=0.0)
+        return max((ratio for ratio in (*ratios, self.sliding_ratio) if ratio is not None), default=0.0)
 
     @property
     def violated(self) -> bool:
@@ -98,29 +107,29 @@ def compare(certificate: FamilyCertificate, run: FamilyTrajectory) -> FamilyComp
     (False, True)
     """
     _require_same(certificate, run)
-    unit = float(np.abs(run.states[:, 0]).max()) or 1.0
-    floor = FLOOR_FACTOR * run.rtol * unit
+    sizes = [np.abs(run.states[:, 0]).max(), *([] if run.sliding is None else np.abs(run.sliding.sigma0))]
+    floor = FLOOR_FACTOR * run.rtol * (float(max(sizes)) or 1.0)
     before = np.isfinite(run.clock)
     deviation, judged = None, 0
     if run.deadline_index is not None and run.deadline_resolved:
         moved = np.abs(run.states[:, before] - run.final_state[:, None]) - floor
         judged = int((moved > 0).sum())
         deviation = _worst(moved, certificate.deviation_bound(run.remaining[before]))
-    peaks = certificate.input_peaks
-    input_ratio = None
-    if peaks is not None:
-        gain = run.protocol.gain.value_at_remaining(run.remaining)
-        error = np.multiply.outer(2 * Members(run.family).in_weight * floor, gain)
-        input_ratio = _worst(np.abs(run.input) - error, np.array([[float(peak)] for peak in peaks]))
-    ratios = [_lyapunov_ratios(*one, run, floor) for one in functions_of(certificate)]
+    modes = None
+    if certificate.direct:
+        ratios = [_lyapunov_ratios(*one, run, floor) for one in functions_of(certificate)]
+        decays, modes = [one for one, _ in ratios], max((mode for _, mode in ratios), default=None)
+    else:
+        decays = list(_driven_ratios(certificate, run, floor))
     return FamilyComparison(
         deviation,
         _final_ratio(certificate, run, floor),
-        input_ratio,
-        max((rate for rate, _ in ratios), default=None),
-        max((mode for _, mode in ratios), default=None),
+        _input_ratio(certificate, run, floor),
+        max(decays, default=None),
+        modes,
         floor,
         judged,
+        _sliding_ratio(certificate, run),
     )
 
 
@@ -156,11 +165,17 @@ def _require_same(certificate: FamilyCertificate, run: FamilyTrajectory) -> None
     if run.family is not certificate.family and run.family != certificate.family:
         raise ParameterError("the run is of another family than the certificate")
     for name, same in (
-        ("protocol", run.protocol.gain == certificate.protocol.gain),
+        ("protocol", _same_protocol(certificate, run)),
         ("initial state", run.t[0] == 0 and _close(run.states[:, 0], certificate.initial_state)),
     ):
         if not same:
             raise ParameterError(f"the run is of another {name} than the certificate")
+
+
+def _same_protocol(certificate: FamilyCertificate, run: FamilyTrajectory) -> bool:
+    if run.sliding is None or certificate.sigma0 is None:
+        return run.sliding is None and certificate.sigma0 is None and run.protocol.gain == certificate.protocol.gain
+    return run.protocol == certificate.protocol and _close(run.sliding.sigma0, certificate.sigma0)
 
 
 def _close(x: np.ndarray, exact: tuple[Fraction, ...]) -> bool:
@@ -171,7 +186,7 @@ def _worst(values: np.ndarray, bounds: np.ndarray) -> float | None:
     """Return the largest ratio of values that are positive; None if nothing bounds them."""
     if not np.isfinite(bounds).any():
         return None
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         return float(np.where(values > 0, values / bounds, 0.0).max(initial=0.0))
 
 
@@ -187,17 +202,58 @@ def _final_ratio(certificate: FamilyCertificate, run: FamilyTrajectory, floor: f
     return _worst(away, (high - low) / 2)
 
 
+def _input_ratio(certificate: FamilyCertificate, run: FamilyTrajectory, floor: float) -> float | None:
+    """Return the worst ratio of inputs, and of their nominal parts, to their peaks."""
+    gain = run.protocol.gain.value_at_remaining(run.remaining)
+    error, ratios = np.multiply.outer(2 * Members(run.family).in_weight * floor, gain), []
+    for values, peaks in ((run.input, certificate.input_peaks), (gain * run.error, certificate.nominal_peaks)):
+        if peaks is not None:
+            ratios.append(_worst(np.abs(values) - error, np.array([[float(peak)] for peak in peaks])))
+    return max((ratio for ratio in ratios if ratio is not None), default=None)
+
+
+def _sliding_ratio(certificate: FamilyCertificate, run: FamilyTrajectory) -> float | None:
+    """Return the worst ratio of sliding variables to ``psi |sigma_k(0)|``."""
+    slid, reaching, protocol = run.sliding, certificate.reaching, certificate.protocol.reaching
+    if slid is None or reaching is None or protocol is None or certificate.direct:
+        return None
+    certain = np.array([np.inf if r.z is None else float(r.z) for r in reaching])
+    if not (slid.reaching_z <= certain * (1 + 1e-9)).all():
+        return float("inf")
+    with np.errstate(divide="ignore"):
+        share = ReachingPhase(protocol, reaching).share(-np.log(slid.reaching_remaining))
+    return _worst(np.abs(slid.sigma), np.multiply.outer(np.abs(slid.sigma0), share))
+
+
+def _driven_ratios(certificate: FamilyCertificate, run: FamilyTrajectory, floor: float) -> Iterator[float]:
+    """Yield the worst ratio of ``sqrt(V(x - sigma))`` to its bound, of every quadratic function that decays."""
+    assert run.sliding is not None
+    before = np.isfinite(run.clock)
+    y = (run.states - run.sliding.sigma)[:, before]
+    for number, part in enumerate(certificate.parts):
+        for V, own in zip(part.functions, certificate.bound_functions[number], strict=True):
+            if isinstance(V, FamilyFunction) and isinstance(own, BoundFunction) and V.rate > 0:
+                root, size = _roots(part.component.nodes, own.quotient, V, y, floor)
+                bound = certificate.norm_bound(own, number, run.remaining[before])
+                yield _worst(root - size, bound) or 0.0
+
+
+def _roots(
+    nodes: np.ndarray, quotient: Quotient, V: FamilyFunction, x: np.ndarray, floor: float
+) -> tuple[np.ndarray, float]:
+    """Return ``sqrt(V)`` of states, and what an error of the floor in every one of them makes of it."""
+    signal = WorstCaseSignal.against(V, quotient, nodes, len(x))
+    assert signal.form is not None
+    coordinates = [1 + sum((abs(b) for b in quotient.basis[v]), Fraction(0)) for v in quotient.nodes]
+    size = float(V.highest) ** 0.5 * float(np.linalg.norm([float(c) for c in coordinates])) * floor
+    return np.sqrt(np.maximum((x * (signal.form @ x)).sum(axis=0), 0.0)), size
+
+
 def _lyapunov_ratios(
     nodes: np.ndarray, quotient: Quotient, V: FamilyFunction, run: FamilyTrajectory, floor: float
 ) -> tuple[float, float]:
     """Return the worst ratios of ``sqrt(V)`` to its bounds by one rate, and by those of the modes."""
-    signal = WorstCaseSignal.against(V, quotient, nodes, len(run.labels))
-    assert signal.form is not None
-    x = run.states[:, np.isfinite(run.clock)]
-    root = np.sqrt(np.maximum((x * (signal.form @ x)).sum(axis=0), 0.0))
-    # an error of the floor in every state
-    coordinates = [1 + sum((abs(b) for b in quotient.basis[v]), Fraction(0)) for v in quotient.nodes]
-    size = float(V.highest) ** 0.5 * float(np.linalg.norm([float(c) for c in coordinates])) * floor
+    root, size = _roots(nodes, quotient, V, run.states[:, np.isfinite(run.clock)], floor)
     clock, spent = run.clock[: root.size], run.clock_of_modes()[:, : root.size]
     rates = np.array([float(rate) for rate in V.rates])
     excess, result = np.maximum(root - size, 0.0)[1:], []

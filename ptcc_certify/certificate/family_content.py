@@ -14,23 +14,36 @@ from typing import Any
 import numpy as np
 
 from lmi.exact.numbers import integers
+from ptcc_certify.bounds.envelope import Instants
+from ptcc_certify.bounds.family_deviation import (
+    deviation_on_clock,
+    deviation_while_driven,
+    input_on_clock,
+    input_while_driven,
+    sliding_sizes,
+)
 from ptcc_certify.bounds.kept_means import LeadingGroup, leading_groups
+from ptcc_certify.bounds.reaching_phase import ReachingPhase
 from ptcc_certify.certificate.certificate_data import Source
 from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.certificate.restricted_claims import Claim, LastModeClaim, RateClaim, ShareClaim, WindowClaim
-from ptcc_certify.checker.family_bounds import deviations, least, mean_intervals, peaks
+from ptcc_certify.checker.family_bounds import deviations, ends_near, peaks
 from ptcc_certify.checker.family_function import Scaled
 from ptcc_certify.checker.family_limits import WeightedMean, limits
+from ptcc_certify.checker.family_sliding import Drive, last_time
 from ptcc_certify.checker.input_formulas import root_above
+from ptcc_certify.checker.protocol import sliding_bounded, sliding_part
 from ptcc_certify.checker.reading import Interval
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
+from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.structure import STABILITY
 from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound
 from ptcc_certify.lyapunov.follower_function import FollowerFunction
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.protocols import Protocol
+from ptcc_certify.protocols.reaching_time import ReachingTime
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
 from ptcc_certify.theorems.family_kernel import UNKNOWN
 from ptcc_certify.theorems.restricted_signals import SignalClass
@@ -121,6 +134,10 @@ class BoundFunction:
         """Bound ``sqrt(V)`` of a state of the component."""
         return root_above(self.function.value(self.quotient.coordinates(x)))
 
+    def largest(self, sizes: Mapping[int, Fraction]) -> Fraction:
+        """Bound ``V`` of all states with ``|x_k| <= sizes_k``."""
+        return self.function.largest(self.quotient.coordinate_sizes(sizes))
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FamilyContent:
@@ -130,6 +147,9 @@ class FamilyContent:
     protocol: Protocol
     parts: tuple[ComponentProof, ...]
     initial_state: tuple[Fraction, ...] | None = None
+    sigma0: tuple[Fraction, ...] | None = None
+    reaching: tuple[ReachingTime, ...] | None = None
+    disturbance: str | None = None
     expectations: Expectations = field(default_factory=Expectations)
     notes: tuple[str, ...] = ()
     source: Source | None = None
@@ -191,11 +211,64 @@ class FamilyContent:
 
     # ------------------------------------------------------------------ bounds
 
-    def _bound_functions(self, part: ComponentProof) -> list[BoundFunction | FollowerFunction]:
-        result: list[BoundFunction | FollowerFunction] = []
-        for V in part.functions:
-            result.append(BoundFunction(Quotient.of(part.component), V) if isinstance(V, FamilyFunction) else V)
-        return result
+    @property
+    def direct(self) -> bool:
+        """Whether no sliding variable moves: the agents move as without disturbances."""
+        return self.sigma0 is None or not any(self.sigma0)
+
+    @property
+    def settling_share(self) -> float:
+        """The share of ``T`` in which no sliding variable moves: ``T_s / T``, or 1."""
+        return 1.0 if self.direct else float(self.protocol.span / self.protocol.T)
+
+    @cached_property
+    def nominal_state(self) -> tuple[Fraction, ...] | None:
+        """``x(0) - sigma(0)``, where there is an initial state."""
+        if self.initial_state is None or self.sigma0 is None:
+            return self.initial_state
+        return tuple(x - s for x, s in zip(self.initial_state, self.sigma0, strict=True))
+
+    @cached_property
+    def _drives(self) -> tuple[Drive | None, ...]:
+        """What sliding variables do to every component; its nodes are numbered within it."""
+        if self.sigma0 is None or self.reaching is None or self.direct:
+            return (None,) * len(self.parts)
+        return tuple(self._drive(part.component) for part in self.parts)
+
+    def _drive(self, component: FamilyComponent) -> Drive:
+        assert self.sigma0 is not None and self.reaching is not None
+        sigma0 = dict(enumerate(self.sigma0[v] for v in component.nodes.tolist()))
+        edges = [
+            [
+                (int(s), int(t), mode.upper.fraction(e))
+                for e, (s, t) in enumerate(zip(mode.source, mode.target, strict=True))
+            ]
+            for mode in component.family.modes
+        ]
+        quiet = last_time([r.z for r in self.reaching], self.sigma0)
+        return Drive.of(self.protocol.parameters, sigma0, quiet, edges)
+
+    @cached_property
+    def drives(self) -> tuple[Fraction, ...] | None:
+        """``c`` of every function, part after part: how much sliding variables drive it; None if none moves."""
+        if self.direct:
+            return None
+        pairs = zip(self.parts, self._drives, strict=True)
+        return tuple(own.constant(V) for part, own in pairs if own is not None for V in self._bound_functions(part))
+
+    def _bound_functions(self, part: ComponentProof) -> Sequence[BoundFunction | FollowerFunction]:
+        return self.bound_functions[self.parts.index(part)]
+
+    @cached_property
+    def bound_functions(self) -> tuple[tuple[BoundFunction | FollowerFunction, ...], ...]:
+        """The functions of every part, as the formulas of the bounds take them."""
+        return tuple(
+            tuple(
+                BoundFunction(Quotient.of(part.component), V) if isinstance(V, FamilyFunction) else V
+                for V in part.functions
+            )
+            for part in self.parts
+        )
 
     @cached_property
     def final_states(self) -> tuple[Interval | None, ...] | None:
@@ -203,54 +276,79 @@ class FamilyContent:
         if self.initial_state is None:
             return None
         result: list[Interval | None] = [None] * self.family.n_nodes
-        for part in self.parts:
-            nodes = part.component.nodes.tolist()
-            x = [self.initial_state[v] for v in nodes]
-            for k, ends in self._final(part, x).items():
-                result[nodes[k]] = ends
+        for part, driven in zip(self.parts, self._drives, strict=True):
+            for k, ends in self._final(part, self._state(part), driven).items():
+                result[int(part.component.nodes[k])] = ends
         return tuple(result)
 
-    def _final(self, part: ComponentProof, x: list[Fraction]) -> Mapping[int, Interval | None]:
+    def _state(self, part: ComponentProof) -> list[Fraction]:
+        """Return ``x(0) - sigma(0)`` of a component."""
+        assert self.nominal_state is not None
+        return [self.nominal_state[v] for v in part.component.nodes.tolist()]
+
+    def _final(self, part: ComponentProof, x: list[Fraction], driven: Drive | None) -> Mapping[int, Interval | None]:
         component, n = part.component, len(x)
         if component.behaviour == STABILITY:
             return dict.fromkeys(range(n), (Fraction(0), Fraction(0)))
         if component.behaviour in (None, DEPENDS) or not part.certifiable:
             return dict.fromkeys(range(n))
-        groups = dict(enumerate(part.leading_groups))
-        means = {j: c for j, group in groups.items() if (c := group.final_value(x)) is not None}
-        functions = self._bound_functions(part)
-        near, moves = mean_intervals(functions, x), deviations(functions, x)
-        return dict(limits(part.kernel_rows, {j: group.nodes for j, group in groups.items()}, means, near, moves, x))
+        means = {j: c for j, group in enumerate(part.leading_groups) if (c := group.final_value(x)) is not None}
+        groups = {j: group.nodes for j, group in enumerate(part.leading_groups)}
+        functions, kernel = self._bound_functions(part), part.kernel_rows
+        near, wide = ends_near(kernel, groups, functions, x, driven)
+        return dict(limits(kernel, groups, means, near, deviations(functions, x, driven), x, wide))
 
     @property
     def bounded(self) -> bool | None:
-        """Whether the input is proved bounded for every signal and initial state; None if it is not."""
+        """Whether the input is proved bounded for every signal and initial state; None if it is not.
+
+        Under the sliding-mode protocol its nominal part; of the sliding part see :attr:`sliding_bounded`.
+        """
         pole = self.protocol.gain.pole
         held = (
             part.component.nodes.size == 1 or any(V.rate * pole >= 2 for V in part.functions) for part in self.parts
         )
         return True if all(held) else None
 
+    @property
+    def sliding_bounded(self) -> bool | None:
+        """Whether the sliding part of the input is bounded for every ``sigma(0)``; None if there is none."""
+        return None if self.sigma0 is None else sliding_bounded(self.protocol.parameters)
+
     @cached_property
-    def input_peaks(self) -> tuple[Fraction, ...] | None:
-        """Bounds of ``|u_k|`` for every signal; None if none are proved."""
+    def sliding_peaks(self) -> tuple[Fraction, ...] | None:
+        """Bounds of ``|u_k - u_k^nom|`` under the sliding-mode protocol; None if none are proved."""
+        own = None if self.sigma0 is None else sliding_part(self.protocol.parameters, self.sigma0)
+        return None if own is None else tuple(own)
+
+    @cached_property
+    def nominal_peaks(self) -> tuple[Fraction, ...] | None:
+        """Bounds of ``gain |(L x)_k|`` for every signal; None if none are proved."""
         if self.initial_state is None or not self.bounded:
             return None
         result = [Fraction(0)] * self.family.n_nodes
         gains = self.protocol.parameters
-        for part in self.parts:
+        for part, driven in zip(self.parts, self._drives, strict=True):
             nodes = part.component.nodes.tolist()
-            x = [self.initial_state[v] for v in nodes]
-            bounds, unit = peaks(self._bound_functions(part), gains, x)
+            bounds, unit = peaks(self._bound_functions(part), gains, self._state(part), driven)
             for k, bound in bounds.items():
                 result[nodes[k]] = Fraction(bound, unit)
         return tuple(result)
+
+    @property
+    def input_peaks(self) -> tuple[Fraction, ...] | None:
+        """Bounds of ``|u_k|`` for every signal, its sliding part included; None if none are proved."""
+        nominal, own = self.nominal_peaks, self.sliding_peaks
+        if nominal is None or self.sigma0 is None:
+            return nominal
+        return None if own is None else tuple(x + y for x, y in zip(nominal, own, strict=True))
 
     def input_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
         """Bound of ``|u_k(t)|`` for every agent and every signal, from the initial state.
 
         ``|u_k| = gain |(L X)_k| <= gain sqrt(inputs_k V(0)) e^(-rate s / 2)``; it grows without limit towards the
-        deadline if ``rate rho2 kappa < 2``.
+        deadline if ``rate rho2 kappa < 2``. Under the sliding-mode protocol with what its sliding part adds at most,
+        whatever the disturbances.
 
         Parameters
         ----------
@@ -267,26 +365,28 @@ class FamilyContent:
         ParameterError
             There is no initial state.
         """
-        if self.initial_state is None:
-            raise ParameterError("the certificate has no initial state; certify the family with x0")
-        gain = self.protocol.gain
-        clock, height = (np.asarray(of(remaining)) for of in (gain.clock_at_remaining, gain.value_at_remaining))
-        bounds = np.full((self.family.n_nodes, clock.size), np.inf)
-        for part in self.parts:
-            nodes = part.component.nodes
+        self._require_state()
+        at, gain = self._instants(remaining), np.asarray(self.protocol.gain.value_at_remaining(remaining))
+        bounds = np.full((self.family.n_nodes, at.clock.size), np.inf)
+        for part, driven in zip(self.parts, self._drives, strict=True):
+            nodes, x = part.component.nodes, self._state(part)
             if nodes.size == 1:
                 bounds[nodes] = 0
-            x = [self.initial_state[v] for v in nodes.tolist()]
             for V in self._bound_functions(part):
-                speeds, unit = least(V.speeds)
-                root = V.root(x) / unit
-                size = np.array([float(speeds[k] * root) for k in range(nodes.size)]) * (1 + 1e-12)
-                decay = height * np.exp(-float(V.rate) * (1 - 1e-12) / 2 * clock)
-                bounds[nodes] = np.minimum(bounds[nodes], np.multiply.outer(size, decay))
-        return bounds
+                if driven is None:
+                    own = input_on_clock(V, x, at.clock, gain)
+                else:
+                    own = input_while_driven(V, x, driven, self._phase, at, gain)
+                bounds[nodes] = np.minimum(bounds[nodes], own)
+        if self.sigma0 is None:
+            return bounds
+        added = [np.inf] * len(bounds) if self.sliding_peaks is None else list(map(nearest_float, self.sliding_peaks))
+        return np.asarray((bounds + np.array(added)[:, None]) * (1 + 1e-12))
 
     def deviation_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
         """Bound of ``|x_k(t) - x_k(T)|`` for every agent and every signal, from the initial state.
+
+        Whatever the disturbances, under the sliding-mode protocol.
 
         Parameters
         ----------
@@ -303,23 +403,44 @@ class FamilyContent:
         ParameterError
             There is no initial state.
         """
+        self._require_state()
+        at = self._instants(remaining)
+        bounds = np.full((self.family.n_nodes, at.clock.size), np.inf)
+        for part, driven in zip(self.parts, self._drives, strict=True):
+            nodes, x, stable = part.component.nodes, self._state(part), part.component.behaviour == STABILITY
+            if nodes.size == 1:
+                bounds[nodes] = 0 if driven is None else sliding_sizes(driven, self._phase, at)
+            for V in self._bound_functions(part):
+                if driven is None:
+                    own = deviation_on_clock(V, stable, x, at.clock)
+                else:
+                    own = deviation_while_driven(V, stable, x, driven, self._phase, at)
+                if own is not None:
+                    bounds[nodes] = np.minimum(bounds[nodes], own)
+        return bounds
+
+    def norm_bound(self, V: Any, part: int, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
+        """Bound ``sqrt(V(x - sigma))`` of a function of a part at instants ``1 - t/T``, from the initial state.
+
+        Where no sliding variable moves it is ``e^(-rate s / 2) sqrt(V(0))``.
+        """
+        at, half, driven = self._instants(remaining), float(V.rate) / 2, self._drives[part]
+        root = nearest_float(V.root(self._state(self.parts[part]))) * (1 + 1e-12)
+        if driven is None:
+            return root * np.exp(-half * at.clock)
+        return self._phase.driven(half, root, nearest_float(driven.constant(V)), at)
+
+    def _require_state(self) -> None:
         if self.initial_state is None:
             raise ParameterError("the certificate has no initial state; certify the family with x0")
-        clock = np.asarray(self.protocol.gain.clock_at_remaining(remaining))
-        bounds = np.full((self.family.n_nodes, clock.size), np.inf)
-        for part in self.parts:
-            nodes = part.component.nodes
-            if nodes.size == 1:
-                bounds[nodes] = 0
-            x = [self.initial_state[v] for v in nodes.tolist()]
-            for V in self._bound_functions(part):
-                moves, unit = deviations([V], x)
-                if part.component.behaviour == STABILITY and moves:
-                    root = V.root(x)
-                    sizes = [(vector, factor * root) for vector, factor in V.sizes]
-                    moves, unit = least([(moves, Fraction(1, unit)), *sizes])
-                if moves:
-                    size = np.array([moves[k] / unit for k in range(nodes.size)]) * (1 + 1e-12)
-                    decay = np.exp(-float(V.rate) * (1 - 1e-12) / 2 * clock)
-                    bounds[nodes] = np.minimum(bounds[nodes], np.multiply.outer(size, decay))
-        return bounds
+
+    def _instants(self, remaining: Sequence[float] | np.ndarray) -> Instants:
+        """Return values of the clock, and those of the reaching phase if there is one."""
+        if not self.direct:
+            return self._phase.instants(np.asarray(remaining, dtype=float))
+        return Instants(np.asarray(self.protocol.gain.clock_at_remaining(remaining)))
+
+    @cached_property
+    def _phase(self) -> ReachingPhase:
+        assert self.protocol.reaching is not None and self.reaching is not None
+        return ReachingPhase(self.protocol.reaching, self.reaching)

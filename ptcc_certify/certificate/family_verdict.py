@@ -62,6 +62,11 @@ def assess_family(certificate: FamilyContent, report: CheckReport | None) -> Ass
         rate, kappa = certificate.rate, certificate.protocol.gain.pole / certificate.protocol.parameters["rho2"]
         if rate is not None:
             advice = f"--rho2 {up(2 / (rate * kappa), 3)} bounds it"
+    if certificate.sliding_bounded is False and certificate.sliding_peaks is None:
+        caveat = caveat or "the input is not proved bounded"
+        advice = " ".join(
+            [advice.removesuffix(" bounds it"), f"--mu3 {up(1 / certificate.protocol.kappa, 3)} bounds it"]
+        ).strip()
     remark = "" if useful is not False else "little is proved by 0.99 T"
     return Assessment(CERTIFIED, False, useful, remark, advice, tuple(answers), caveat)
 
@@ -126,7 +131,8 @@ def _judge_input(certificate: FamilyContent, most: Fraction) -> Answer:
     what, peaks = f"|u_k| <= {near(most, 12)}", certificate.input_peaks
     if peaks is not None and max(peaks) <= most:
         return Answer(MET, what)
-    if certificate.initial_state is not None and (first := first_input(certificate)) > most:
+    known = certificate.initial_state is not None and certificate.protocol.reaching is None
+    if known and (first := first_input(certificate)) > most:
         return Answer(REFUTED, what, f"it is up to {down(first)} at the start, proved")
     return Answer(OPEN, what, "no bound is proved" if peaks is None else f"proved: {up(max(peaks))}")
 
@@ -160,8 +166,9 @@ def _usefulness(certificate: FamilyContent) -> bool | None:
     if not certificate.common:
         return None
     if certificate.initial_state is not None:
-        size = float(max(map(abs, certificate.initial_state)))
-        return size == 0 or bool(certificate.deviation_bound([float(LAST)]).max() <= size * float(LAST))
+        sizes = map(abs, (*certificate.initial_state, *(certificate.sigma0 or ())))
+        size, instant = float(max(sizes)), float(LAST) * certificate.settling_share
+        return size == 0 or bool(certificate.deviation_bound([instant]).max() <= size * float(LAST))
     clock = float(certificate.protocol.gain.clock_at_remaining(float(LAST)))
     for part in certificate.parts:
         left = [math.sqrt(V.overshoot) * math.exp(-float(V.rate) / 2 * clock) for V in part.functions]

@@ -7,7 +7,7 @@ that is claimed is taken from the key ``unverified``.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -53,13 +53,16 @@ def certificate_document(content: Content, verdict: str, files: bool = False) ->
     graph, structure = content.graph, content.structure
     out = Writer(graph.labels, files)
     influence, final = _write_final_state(content, out)
+    run = content.trajectory
     document: dict[str, Any] = {
         "schema": SCHEMA,
         "producer": producer(),
         "graph": graph_section(graph, out),
         "structure": structure_section(structure, out),
         **claim_sections(structure, content.claims, final, out),
-        "protocol": _write_protocol(content),
+        "protocol": protocol_section(
+            content.protocol, None if run is None or run.sliding is None else run.sliding.source
+        ),
         "paper": _write_paper(content),
         "lyapunov": {"functions": [_write_function(V, out) for V in content.functions]},
         "rates": {
@@ -73,7 +76,7 @@ def certificate_document(content: Content, verdict: str, files: bool = False) ->
         "sliding_variable": out.state("sigma", content.sigma0),
         "influence": influence,
         "final_state": final,
-        "reaching_time": _write_reaching(content),
+        "reaching_time": reaching_section(graph.labels, content.reaching),
         "input": effort_section(content.effort, out),
         "proof": [_write_obligation(o, out) for o in content.obligations],
         "verdict": verdict,
@@ -104,7 +107,7 @@ def read_document(
         "protocol": protocol,
         "initial_state": initial_state,
         "sigma0": data.state(document["sliding_variable"]),
-        "reaching": _read_reaching(document["reaching_time"], protocol),
+        "reaching": read_reaching(document["reaching_time"], protocol),
         "lyapunov": lyapunov,
         "proof": RateProof(
             None if lyapunov is None else lyapunov.rate, tuple(o for o in proof if o.of.split(".")[0] == "paper"), rho
@@ -129,11 +132,10 @@ def producer() -> str:
 # ---------------------------------------------------------------------- protocol
 
 
-def _write_protocol(content: Content) -> dict[str, Any]:
-    run, section = content.trajectory, content.protocol.to_dict()
-    if content.reaching is None:
-        return section
-    return {**section, "disturbance": None if run is None or run.sliding is None else run.sliding.source}
+def protocol_section(protocol: Protocol, disturbance: str | None) -> dict[str, Any]:
+    """Return a protocol as files have it; ``disturbance`` is what a run of the sliding-mode protocol met, if any."""
+    section: dict[str, Any] = protocol.to_dict()
+    return section if protocol.reaching is None else {**section, "disturbance": disturbance}
 
 
 def read_protocol(section: Mapping[str, Any]) -> Protocol:
@@ -142,14 +144,16 @@ def read_protocol(section: Mapping[str, Any]) -> Protocol:
     return Protocol.from_dict({key: value if key == "kind" else exact(value) for key, value in parameters.items()})
 
 
-def _write_reaching(content: Content) -> dict[str, Any] | None:
-    if content.reaching is None:
+def reaching_section(labels: Sequence[str], reaching: Sequence[ReachingTime] | None) -> dict[str, Any] | None:
+    """Return proved reaching times as files have them."""
+    if reaching is None:
         return None
-    times = {label: text(r.z) for label, r in zip(content.graph.labels, content.reaching, strict=True)}
+    times = {label: text(r.z) for label, r in zip(labels, reaching, strict=True)}
     return {"bound": SLIDING_BOUND, "clock": SLIDING_CLOCK, "z": times}
 
 
-def _read_reaching(section: Mapping[str, Any] | None, protocol: Protocol) -> tuple[ReachingTime, ...] | None:
+def read_reaching(section: Mapping[str, Any] | None, protocol: Protocol) -> tuple[ReachingTime, ...] | None:
+    """Return the reaching times of an accepted certificate."""
     if section is None or protocol.reaching is None:
         return None
     return tuple(ReachingTime(protocol.reaching.T_r, number(z)) for z in section["z"].values())

@@ -11,7 +11,7 @@ import numpy as np
 
 from lmi.exact.elementary_enclosures import rounded
 from ptcc_certify.certificate.family_content import FamilyContent
-from ptcc_certify.certificate.format import producer
+from ptcc_certify.certificate.format import producer, protocol_section, reaching_section
 from ptcc_certify.certificate.format_family_rows import form_entry, form_steps, rows_entry, rows_steps
 from ptcc_certify.certificate.format_graph import structure_section
 from ptcc_certify.certificate.format_restricted import claim_entry, claim_steps, enclosed
@@ -38,20 +38,25 @@ def family_document(certificate: FamilyContent, files: bool = False) -> tuple[di
     components = [part.component for part in parts]
     functions = [(k, V) for k, part in enumerate(parts) for V in part.functions]
     finals, peaks, labels = certificate.final_states, certificate.input_peaks, family.labels
+    drives = certificate.drives
     document: dict[str, Any] = {
         "schema": SCHEMA,
         "producer": producer(),
         **family_sections(family, components, out),
-        "protocol": certificate.protocol.to_dict(),
+        "protocol": protocol_section(certificate.protocol, certificate.disturbance),
         **dict.fromkeys(NOT_OF_FAMILIES),
-        "lyapunov": {"functions": [_function(family, components[k], k, V, out) for k, V in functions]},
+        "lyapunov": {"functions": [_function(family, components[k], k, V, out) for k, V in functions]}
+        | ({} if drives is None else {"drives": list(map(format_exact, drives))}),
         "initial_state": out.state("start", certificate.initial_state),
+        "sliding_variable": out.state("sigma", certificate.sigma0),
+        "reaching_time": reaching_section(labels, certificate.reaching),
         "final_state": None
         if finals is None
         else {label: None if ends is None else enclosed(*ends) for label, ends in zip(labels, finals, strict=True)},
         "input": {
             "bounded": certificate.bounded,
             "peaks": None if peaks is None else dict(zip(labels, map(_up, peaks), strict=True)),
+            **_sliding_part(certificate),
         },
         "proof": _proof(certificate, components, functions),
         "verdict": "certified",
@@ -70,6 +75,15 @@ def _labels(certificate: FamilyContent, claim: Claim) -> Sequence[str]:
     return certificate.parts[claim.component].component.family.labels
 
 
+def _sliding_part(certificate: FamilyContent) -> dict[str, Any]:
+    """Write the sliding part of the input; nothing under the nominal protocol."""
+    bounded, own = certificate.sliding_bounded, certificate.sliding_peaks
+    if bounded is None:
+        return {}
+    agents = None if own is None else dict(zip(certificate.family.labels, map(_up, own), strict=True))
+    return {"sliding": {"bounded": bounded, "agents": agents}}
+
+
 def _up(x: Fraction) -> str:
     """Write a bound, rounded up to 60 bits or so."""
     return format_exact(rounded(x, 60, up=True))
@@ -86,8 +100,14 @@ def _proof(
     for k, (_, V) in enumerate(functions):
         own = (rows_steps if V.kind == "rows" else form_steps)(f"lyapunov.functions[{k}]", V)
         steps += [_step(kind, of, witness, **numbers) for kind, of, witness, numbers in own]
+    steps += [_step("sliding-bound", "protocol")] * (certificate.sigma0 is not None)
+    if certificate.drives is not None:
+        times = zip(certificate.reaching or (), certificate.sigma0 or (), strict=True)
+        steps += [_step("reaching-time", "reaching_time")] * any(s and r.z is not None for r, s in times)
+        steps += [_step("family-drive", f"lyapunov.functions[{k}]") for k in range(len(functions))]
     if certificate.final_states is not None:
         steps.append(_step("family-final-state", "final_state", _means(certificate)))
+    steps += [_step("input-sliding", "input")] * (certificate.sliding_peaks is not None)
     steps += [_step("family-input", "input")] * (certificate.bounded is not None)
     for k, claim in enumerate(certificate.restricted):
         own = claim_steps(f"restricted[{k}]", claim)

@@ -80,7 +80,7 @@ STEPS = (
 #: of the time then left that the first of the steps may take.
 SEARCHING, SHARES = 0.4, (0.3, 0.3, 0.8, 1.0)
 #: Options of :func:`certify` that families take, too.
-_OF_FAMILIES = ("signal", "time_limit", "expectations", "scenario", "origins", "progress")
+_OF_FAMILIES = ("sigma0", "signal", "time_limit", "expectations", "scenario", "origins", "progress")
 #: Instants of a simulated run where the graph is large.
 FEW_SAMPLES = 51
 #: A simulated end state is settled when it is this near to the final state, relative to the initial state.
@@ -175,8 +175,8 @@ def certify(
     Returns
     -------
     Certificate or FamilyCertificate
-        Of a family the latter: it takes the nominal protocol, ``x0``, ``signal``, ``time_limit``, ``expectations``,
-        ``scenario``, ``origins`` and ``progress``.
+        Of a family the latter: it takes ``x0``, ``sigma0``, ``signal`` (under the nominal protocol), ``time_limit``,
+        ``expectations``, ``scenario``, ``origins`` and ``progress``.
 
     Raises
     ------

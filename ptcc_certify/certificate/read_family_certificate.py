@@ -12,7 +12,7 @@ import numpy as np
 
 from ptcc_certify.certificate.certificate_data import Source
 from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate
-from ptcc_certify.certificate.format import read_protocol
+from ptcc_certify.certificate.format import read_protocol, read_reaching
 from ptcc_certify.certificate.format_family import certificate_family
 from ptcc_certify.certificate.format_restricted import read_claim
 from ptcc_certify.certificate.format_upper_bound import read_upper_bound
@@ -48,13 +48,16 @@ def read_family_certificate(source: Source) -> FamilyCertificate:
         functions[number].append(_read_function(of, section, components[number], document["proof"], files))
     bounds = _read_bounds(document["unverified"].get("upper_bounds"), components)
     parts = tuple(ComponentProof(c, tuple(V), b) for c, V, b in zip(components, functions, bounds, strict=True))
-    state = Reader(family.labels, source.files).state(document["initial_state"])
-    expectations = _read_expectations(document["unverified"].get("asked"))
+    data = Reader(family.labels, source.files)
+    state, sigma0 = (data.state(document[key]) for key in ("initial_state", "sliding_variable"))
     restricted = enumerate(document.get("restricted", ()))
     said = tuple(read_claim(f"restricted[{k}]", entry, document["proof"], components) for k, entry in restricted)
-    kept: dict[str, Any] = {"signal": said[0].signal if said else "any", "restricted": said}
-    protocol = read_protocol(document["protocol"])
-    return FamilyCertificate(family, protocol, parts, state, expectations, source=source, **kept)
+    protocol, disturbance = read_protocol(document["protocol"]), document["protocol"].get("disturbance")
+    kept: dict[str, Any] = {"signal": said[0].signal if said else "any", "restricted": said, "disturbance": disturbance}
+    kept |= {"expectations": _read_expectations(document["unverified"].get("asked")), "source": source}
+    return FamilyCertificate(
+        family, protocol, parts, state, sigma0, read_reaching(document["reaching_time"], protocol), **kept
+    )
 
 
 def _read_bounds(stated: Any, components: Sequence[FamilyComponent]) -> list[FamilyRateBound | None]:

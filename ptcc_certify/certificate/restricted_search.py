@@ -13,6 +13,7 @@ from lmi.search_time import share_of_time
 from ptcc_certify.certificate.family_content import ComponentProof
 from ptcc_certify.certificate.restricted_claims import Claim, LastModeClaim, RateClaim, ShareClaim, WindowClaim
 from ptcc_certify.checker.restricted_signals import agreed_bounds, reachable_bounds
+from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import STABILITY
 from ptcc_certify.lyapunov.clock_shares import search_share_form
@@ -35,6 +36,15 @@ _OF_THE_CLOCK = (
     "the windows are of the stretched clock: in time they shrink towards T, and who switches at a fixed pace in time "
     "does not keep them"
 )
+
+
+def require_nominal(signal: SignalClass, protocol: Protocol) -> None:
+    """Refuse restricted signals under the sliding-mode protocol."""
+    if signal != "any" and protocol.reaching is not None:
+        raise ParameterError(
+            "restricted signals are certified under the nominal protocol; leave out signal (--signal, --dwell, "
+            "--clock-dwell, --clock-window, --share), or give NominalProtocol(..)"
+        )
 
 
 def claims_for(

@@ -25,6 +25,7 @@ from lmi.exact.work import WorkError, limited
 from ptcc_certify.checker.family import check_family
 from ptcc_certify.checker.family_bounds import check_family_bounds
 from ptcc_certify.checker.family_rows import check_family_functions
+from ptcc_certify.checker.family_sliding import check_drive
 from ptcc_certify.checker.final_state import check_final_state
 from ptcc_certify.checker.graph import check_graph
 from ptcc_certify.checker.input import INPUT_NODES, Verified, check_input
@@ -59,7 +60,7 @@ KEYS = (
 OPTIONAL = ("components", "restricted")
 
 #: Parts that are null in a certificate of a family.
-NOT_OF_FAMILIES = ("paper", "rates", "overshoot", "sliding_variable", "influence", "reaching_time")
+NOT_OF_FAMILIES = ("paper", "rates", "overshoot", "influence")
 
 #: What values of another type, or too deep, raise where they are used.
 MALFORMED = (ArithmeticError, LookupError, TypeError, ValueError, AttributeError, RecursionError, MemoryError)
@@ -187,12 +188,13 @@ def _close(doc: Document, proved: bool) -> str:
 
 def _family_verdict(doc: Document, protocol: Protocol) -> str:
     """Verify a certificate of a family, part after part; return its verdict."""
-    need(not protocol.sliding, "families are certified under the nominal protocol")
     family = check_family(doc)
     begin = check_begin(doc, family.modes[0].structure.graph, protocol)
     functions = check_family_functions(doc, family)
+    drive = check_drive(doc, family, functions, protocol, begin)
+    check_family_bounds(doc, family, functions, protocol, begin, drive)
+    need(not (protocol.sliding and "restricted" in doc.data), "restricted signals under the sliding-mode protocol")
     state = None if begin.state is None else list(begin.state)
-    check_family_bounds(doc, family, functions, protocol.gains, state)
     check_restricted(doc, family, functions, protocol.gains, state)
     for key in NOT_OF_FAMILIES:
         need(doc.section(key) is None, "a part that certificates of families do not have")

@@ -136,13 +136,20 @@ class Component:
         """The rows of the basis in integers, and what divides them."""
         return _whole(self.kernel)
 
-    def coordinates(self, nodes: Sequence[int], x: Sequence[Fraction]) -> tuple[list[int], int]:
-        """Return ``xi`` of a state at nodes that are no pivots, in integers, and what divides them."""
+    def coordinates(
+        self, nodes: Sequence[int], x: Sequence[Fraction] | Mapping[int, Fraction], sizes: bool = False
+    ) -> tuple[list[int], int]:
+        """Return ``xi`` of a state at nodes that are no pivots, in integers, and what divides them.
+
+        Of sizes: the largest ``|xi|`` of all states with ``|x_k|`` at most these.
+        """
         (kernel, unit), pivots = self.whole, self.pivots
         (whole,), scale = integers([[x[v] for v in (*nodes, *pivots.values())]])
         rest, bits = dict(zip(pivots, whole[len(nodes) :], strict=True)), unit.bit_length() + 64
         spend(len(nodes) + sum(len(kernel[v]) for v in nodes), longest(whole), bits, "a Lyapunov function")
         own = zip(nodes, whole[: len(nodes)], strict=True)
+        if sizes:
+            return [unit * y + sum(abs(b) * rest[j] for j, b in kernel[v].items()) for v, y in own], unit * scale
         return [unit * y - sum(b * rest[j] for j, b in kernel[v].items()) for v, y in own], unit * scale
 
 

@@ -108,6 +108,13 @@ class FamilyFunction:
         total = sum(y * sum(map(mul, row, xi)) for y, row in zip(xi, self.matrix, strict=True))
         return Fraction(total, self.scale * unit**2)
 
+    def largest(self, sizes: Mapping[int, Fraction]) -> Fraction:
+        """Bound ``V`` of all states with ``|x_k| <= sizes_k``: ``b'|P| b``, ``b = |C| sizes``, by entries."""
+        b, unit = self.component.coordinates(self.nodes, sizes, sizes=True)
+        spend(len(b) ** 2, longest(b), longest(max(row, key=abs) for row in self.matrix), "a Lyapunov function")
+        total = sum(y * sum(map(mul, map(abs, row), b)) for y, row in zip(b, self.matrix, strict=True))
+        return Fraction(total, self.scale * unit**2)
+
 
 def check_form(doc: Document, family: Family, component: Component, entry: Any, of: str) -> FamilyFunction:
     """Verify a quadratic form of a component, or of a part of one that hears nobody else."""

@@ -9,6 +9,9 @@ If ``q' L = 0`` for every member, ``q`` supported on ``A_j``, then ``q' X`` is k
 ``c_j = q' X(0) / sum_k q_k g_k``: exactly. Of edges ``s -> t`` with ``w- < w+`` this asks ``q_t = 0``, or if both
 directions change together, ``q_t = sign q_s``. If only ``|q' L X|^2 <= m V`` for every member, ``V`` a Lyapunov
 function of rate ``r``, then ``|q' X(0) - q' X(T)| <= (2/r) sqrt(m V(0))``.
+
+Sliding variables push the extremes outwards. But ``y = x - sigma`` obeys ``y' = -gain L x`` and ends where ``x`` does:
+``q' y`` is kept.
 """
 
 from __future__ import annotations
@@ -78,27 +81,31 @@ def limits(
     near: Iterable[tuple[int, Interval]],
     moves: tuple[Mapping[int, int], int],
     x: Sequence[Fraction],
+    wide: Mapping[int, Interval] | None = None,
 ) -> dict[int, Interval]:
     """Return ends of ``x_k(T)`` of every agent.
 
     ``kernel`` has the rows of ``B`` without zeros, ``groups`` the sets ``A_j``, ``means`` the ``c_j`` that are known
     exactly, ``near`` other columns with ends of theirs, ``moves`` bounds of ``|x_k(0) - x_k(T)|`` as integers over one.
+    Where sliding variables move, ``x`` is ``y(0)``, and ``wide`` has ends of all columns in place of extremes of ``x``.
     """
     values, bounds, scale = _together(list(kernel), moves, x)
     units = {v: item for v, row in kernel.items() if len(row) == 1 and abs((item := next(iter(row.items())))[1]) == 1}
     ways: dict[int, tuple[list[int], list[int]]] = {}
     for j, group in groups.items():
         own = [values[v] if kernel[v][j] > 0 else -values[v] for v in group]
-        ways[j] = [min(own)], [max(own)]
+        ways[j] = ([min(own)], [max(own)]) if wide is None else ([], [])
     for v, d in bounds.items():
         if v in units:
             j, g = units[v]
             middle = values[v] if g > 0 else -values[v]
             ways[j][0].append(middle - d)
             ways[j][1].append(middle + d)
-    ends = {j: (Fraction(max(low), scale), Fraction(min(high), scale)) for j, (low, high) in ways.items()}
-    for j, (low, high) in (*near, *((j, (c, c)) for j, c in means.items())):
-        ends[j] = max(low, ends[j][0]), min(high, ends[j][1])
+    ends = dict(wide or {})
+    told = ((j, (Fraction(max(low), scale), Fraction(min(high), scale))) for j, (low, high) in ways.items() if low)
+    for j, (low, high) in (*told, *near, *((j, (c, c)) for j, c in means.items())):
+        first, last = ends.get(j, (low, high))
+        ends[j] = max(low, first), min(high, last)
     result: dict[int, Interval] = {}
     for v, row in kernel.items():
         if v in units:

@@ -13,7 +13,7 @@ at ``w+`` where the bracket is negative, at ``w-`` elsewhere.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -77,13 +77,24 @@ class FollowerFunction:
     def root(self, x: Sequence[Fraction]) -> Fraction:
         """Return ``W`` of a state, rounded up."""
         xi, unit = self.component.coordinates(list(self.vector), x)
+        roots = [self._share(xi) / unit]
+        roots += [part.function.root(x) / part.times for part in self.parts]
+        return rounded(max(roots), BITS, up=True)
+
+    def largest(self, sizes: Mapping[int, Fraction]) -> Fraction:
+        """Bound ``W^2`` of all states with ``|x_k| <= sizes_k``, rounded up."""
+        xi, unit = self.component.coordinates(list(self.vector), sizes, sizes=True)
+        squares = [(self._share(xi) / unit) ** 2]
+        squares += [part.function.largest(sizes) / part.times**2 for part in self.parts]
+        return rounded(max(squares), BITS, up=True)
+
+    def _share(self, xi: Sequence[int]) -> Fraction:
+        """Return the largest ``|xi_k| / d_k``."""
         top, bottom = 0, 1
         for y, d in zip(map(abs, xi), self.vector.values(), strict=True):
             if y * bottom > top * d:
                 top, bottom = y, d
-        roots = [Fraction(top * self.scale, bottom * unit)]
-        roots += [part.function.root(x) / part.times for part in self.parts]
-        return rounded(max(roots), BITS, up=True)
+        return Fraction(top * self.scale, bottom)
 
 
 Function = FamilyFunction | FollowerFunction
@@ -91,7 +102,9 @@ Function = FamilyFunction | FollowerFunction
 
 def check_family_functions(doc: Document, family: Family) -> list[Function]:
     """Verify every function, its rates and constants."""
-    section = fields(doc.section("lyapunov"), ("functions",), "lyapunov")
+    section = doc.section("lyapunov")
+    more = ["drives"] * (isinstance(section, dict) and "drives" in section)
+    section = fields(section, ("functions", *more), "lyapunov")
     items = entries(section["functions"], "functions")
     need(len(items) <= MANY_FUNCTIONS, f"more than {MANY_FUNCTIONS} Lyapunov functions")
     result: list[Function] = []

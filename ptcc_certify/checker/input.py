@@ -19,7 +19,7 @@ from ptcc_certify.checker.graph import by_agent, ordered
 from ptcc_certify.checker.lyapunov import Function
 from ptcc_certify.checker.matrix_products import Matrix, block, congruence, decrease, less, need_rows, only
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.protocol import Begin, Protocol
+from ptcc_certify.checker.protocol import Begin, Protocol, check_sliding_part, sliding_part
 from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, length, need, triangle
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.checker.structure import Structure
@@ -58,17 +58,12 @@ class Verified:
             g["T_r"] + g["T_s"] if self.protocol.sliding else g["T"], g["rho1"], g["rho2"] * g["kappa"]
         )
 
-    @property
-    def sliding_bounded(self) -> bool:
-        """Whether the sliding part of the input is bounded for every ``sigma(0)``."""
-        return self.protocol.gains["mu3"] * self.protocol.gains["kappa"] >= 1
-
     def sliding_part(self) -> list[Fraction]:
         """Return what the sliding-mode protocol adds to the input of every agent at most."""
-        g, sigma0 = self.protocol.gains, self.begin.sigma or Numbers([])
-        need(self.sliding_bounded or not any(sigma0), "the sliding part is not bounded")
-        push = g["mu2"] + g["mu3"] * g["kappa"] / g["T_r"]
-        return [g["mu1"] + push * abs(s) for s in sigma0]
+        own = sliding_part(self.protocol.gains, self.begin.sigma or Numbers([]))
+        if own is None:
+            raise RejectedError("the sliding part is not bounded")
+        return own
 
 
 def check_input(doc: Document, verified: Verified) -> None:
@@ -82,7 +77,7 @@ def check_input(doc: Document, verified: Verified) -> None:
     need(len(entries(section["residual"], "residual")) <= MANY_LIMITS, f"more than {MANY_LIMITS} limits")
     _threshold(doc, verified, section)
     constants = _constants(doc, verified, entries(section["constants"], "constants", len(verified.functions)))
-    _sliding(doc, verified, section["sliding"])
+    check_sliding_part(doc, verified.structure.graph, verified.protocol, verified.begin, section["sliding"])
     initial_set = _initial_set(doc, verified, section["initial_set"])
     if initial_set is None:
         for key in PARTS:
@@ -151,7 +146,7 @@ def _spectrum(doc: Document, structure: Structure, line: Fraction) -> str:
     return nonzero_spectrum_beyond(rows, graph.unit, line, parts, doc.exact.characteristic)
 
 
-# ---------------------------------------------------------------------- constants, sliding part, initial states
+# ---------------------------------------------------------------------- constants, initial states
 
 
 def _constants(doc: Document, verified: Verified, section: Sequence[Any]) -> list[list[Fraction] | None]:
@@ -176,20 +171,6 @@ def _constants(doc: Document, verified: Verified, section: Sequence[Any]) -> lis
         doc.done(f"at most {up(max(constants))}")
         results[k] = constants
     return results
-
-
-def _sliding(doc: Document, verified: Verified, section: Any) -> None:
-    """Verify the sliding part of the input."""
-    doc.at = "input.sliding"
-    need((section is not None) == verified.protocol.sliding, "a sliding part belongs to the sliding-mode protocol")
-    if section is None:
-        return
-    fields(section, ("bounded", "agents"), "sliding")
-    need(section["bounded"] is verified.sliding_bounded, "bounded for every initial state iff mu3 kappa >= 1")
-    if section["agents"] is not None:
-        doc.open("input-sliding", "input")
-        _above(doc, verified, section["agents"], "the sliding part", verified.sliding_part())
-        doc.done("for every disturbance within delta")
 
 
 def _initial_set(doc: Document, verified: Verified, section: Any) -> formulas.InitialSet | None:

@@ -435,6 +435,43 @@ class Reaching:
         return _one_sided(by_size), _one_sided(by_sign) * self.push
 
 
+class Stretch(NamedTuple):
+    """A stretch of the time while sliding variables move.
+
+    The gain at its two ends, from above; how far the clock goes; ``int gain^2 dt`` and the length, from above; ``psi``
+    at its begin, from above, and at its end, from below.
+    """
+
+    first: Fraction
+    last: Fraction
+    clock: Interval
+    square: Fraction
+    length: Fraction
+    psi: Interval
+
+
+def stretches(gain: PrescribedGain, reaching: Reaching, z: Fraction, count: int) -> list[Stretch]:
+    """Cut the time up to ``z = ln(T/(T - t))`` into stretches of equal length in ``z``.
+
+    Examples
+    --------
+    >>> gain = PrescribedGain(Fraction(2), Fraction(1), Fraction(1))
+    >>> one = Fraction(1)
+    >>> reaching = Reaching([one], one, one, one, one, one)
+    >>> len(stretches(gain, reaching, reaching.quiet, 3))
+    3
+    """
+    bits = length((gain.T, gain.rho1, gain.k, z, reaching.T_r, reaching.mu2))
+    spend(300 * count, bits, bits, "bounds while sliding variables move")
+    shares = ((z * j / count, exp(-z * j / count, BITS)) for j in range(count + 1))  # z and 1 - t/T
+    instants, result = [(x, q, reaching.decay(q)) for x, q in shares], []
+    for (a, (low, high), before), (b, (end, nearest), after) in pairwise(instants):
+        passed = max(gain.clock(b, nearest) - gain.clock(a, low), Fraction(0)), gain.clock(b, end) - gain.clock(a, high)
+        square, span = gain.square(b, end) - gain.square(a, high), gain.T * (high - end)
+        result.append(Stretch(gain.value(low), gain.value(end), passed, square, span, (after[0], before[1])))
+    return result
+
+
 class Piece(NamedTuple):
     """A piece of the time while sliding variables move, all from above.
 
@@ -569,20 +606,15 @@ class InputBounds:
             return self._cache[k, z]
         assert self.reaching is not None
         gain, form, v, pieces = self.gain, self.form(k), self.initial_root(k), list[Piece]()
-        bits = length((gain.T, gain.rho1, gain.k, z, self.reaching.T_r, self.reaching.mu2))
-        spend(300 * PIECES, bits, bits, "bounds of the input while sliding variables move")
         pushes = zip(*map(self.reaching.pushes, self._coordinates(form)), strict=True)
         w, f = (root_above(form.value(own, sizes=True)) for own in pushes)
-        shares = ((z * j / PIECES, exp(-z * j / PIECES, BITS)) for j in range(PIECES + 1))  # z and 1 - t/T
-        instants = [(x, q, self.reaching.decay(q)) for x, q in shares]
-        for (a, (low, high), before), (b, (end, nearest), after) in pairwise(instants):
-            added = w * (before[1] - after[0]) + f * gain.T * (high - end)
-            clock, square = gain.clock(b, end) - gain.clock(a, high), gain.square(b, end) - gain.square(a, high)
-            above = (v, added, gain.value(low), gain.value(end), clock, square)
+        for part in stretches(gain, self.reaching, z, PIECES):
+            added = w * (part.psi[1] - part.psi[0]) + f * part.length
+            above = (v, added, part.first, part.last, part.clock[1], part.square)
             pieces.append(Piece(*(rounded(x, BITS, up=True) for x in above)))
-            passed = max(gain.clock(b, nearest) - gain.clock(a, low), Fraction(0))
-            v = rounded(v * decay_above(form.rate / 2 * passed) + added, BITS, up=True)
-        begin = rounded(v * exp(form.rate / 2 * gain.clock(z, instants[-1][1][0]), BITS)[1], BITS, up=True)
+            v = rounded(v * decay_above(form.rate / 2 * part.clock[0]) + added, BITS, up=True)
+        nearest = exp(-z, BITS)[0]
+        begin = rounded(v * exp(form.rate / 2 * gain.clock(z, nearest), BITS)[1], BITS, up=True)
         self._cache[k, z] = pieces, begin
         return self._cache[k, z]
 

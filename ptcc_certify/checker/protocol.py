@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 from lmi.exact.elementary_enclosures import decay_integrals_below
 from lmi.exact.numbers import shorten
@@ -11,7 +13,7 @@ from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.graph import by_agent, ordered
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import exact, fields, need
+from ptcc_certify.checker.reading import RejectedError, exact, fields, need
 from ptcc_certify.checker.side_files import Numbers
 
 SLIDING_BOUND = "||sigma(t)|| <= phi(t,T_r)^(-mu3) e^(-mu2 t) ||sigma(0)||"
@@ -91,3 +93,35 @@ def check_sliding(doc: Document, graph: Digraph, protocol: Protocol, begin: Begi
         else:
             need(not end, f"agent {shorten(label)} starts at 0")
     doc.done(f"{sum(1 for x in z if x is not None)} of {graph.n} agents before T_r")
+
+
+def sliding_bounded(gains: Mapping[str, Fraction]) -> bool:
+    """Whether the sliding part of the input is bounded for every ``sigma(0)``."""
+    return gains["mu3"] * gains["kappa"] >= 1
+
+
+def sliding_part(gains: Mapping[str, Fraction], sigma0: Sequence[Fraction] | Numbers) -> list[Fraction] | None:
+    """Return what the sliding-mode protocol adds to the input of every agent at most; None where it is not bounded."""
+    if not sliding_bounded(gains) and any(sigma0):
+        return None
+    push = gains["mu2"] + gains["mu3"] * gains["kappa"] / gains["T_r"]
+    return [gains["mu1"] + push * abs(s) for s in sigma0]
+
+
+def check_sliding_part(doc: Document, graph: Digraph, protocol: Protocol, begin: Begin, section: Any) -> None:
+    """Verify the sliding part of the input."""
+    doc.at = "input.sliding"
+    need((section is not None) == protocol.sliding, "a sliding part belongs to the sliding-mode protocol")
+    if section is None:
+        return
+    fields(section, ("bounded", "agents"), "sliding")
+    need(section["bounded"] is sliding_bounded(protocol.gains), "bounded for every initial state iff mu3 kappa >= 1")
+    if section["agents"] is not None:
+        doc.open("input-sliding", "input")
+        least = sliding_part(protocol.gains, begin.sigma or Numbers([]))
+        if least is None:
+            raise RejectedError("the sliding part is not bounded")
+        values = by_agent(doc, graph, section["agents"], "the sliding part", files=False)
+        low = next((label for label, x, y in zip(graph.labels, values, least, strict=True) if x < y), None)
+        need(low is None, f"the sliding part of agent {shorten(low or '')} is not proved")
+        doc.done("for every disturbance within delta")

@@ -25,10 +25,7 @@ if TYPE_CHECKING:
     from ptcc_certify.theorems.restricted_signals import SignalClass
 
 #: Options of certify that families do not take.
-_NOT_OF_FAMILIES = (
-    *("sigma0", "disturbance", "delta", "noise", *shared.LIMITS, "method", "at", "initial_bound", "simulation"),
-    *("T_r", "T_s", "mu1", "mu2", "mu3"),
-)
+_NOT_OF_FAMILIES = ("noise", *shared.LIMITS, "method", "at", "initial_bound", "simulation")
 #: Options that tell how files of families are read, and the keywords of read_family.
 _READING = {"edges": "orientation"} | {n: n for n in (*shared.READING[1:], "uncertainty", "optional")}
 
@@ -233,17 +230,21 @@ def certify_family(
     from ptcc_certify.certificate.family_certificate import STEPS
     from ptcc_certify.certificate.family_certificate import certify_family as run
     from ptcc_certify.certificate.request import Expectations
+    from ptcc_certify.certificate.restricted_claims import require_nominal
     from ptcc_certify.certificate.verdict import CERTIFIED
     from ptcc_certify.report.family_screen import family_lines, family_summary
     from ptcc_certify.theorems.family_behaviour import decide
 
     refuse_options(options)
+    _refuse_disturbance(options)
     most = options["max_input"]
     if most is not None and most <= 0:
         raise ParameterError("--max-input is outside its domain; it must be > 0")
     signal = signals_of(options)
     protocol = shared.protocol_of(options)
+    require_nominal(signal, protocol)
     x0 = shared.read_initial_state(options["x0"], options["seed"], family.modes[0].mandatory)
+    sigma0 = shared.sliding_keywords(protocol, options, family.modes[0].mandatory).get("sigma0")
     LOG.info("%s", one_line(f"read {', '.join(graphs)}: {family!r}"))
     if signal == "constant" and (left := _constant_alone(decide(family, "constant"), decide(family))):
         if most is not None or options["min_rate"] is not None:
@@ -257,16 +258,13 @@ def certify_family(
         )
         return code or ExitCode.UNDECIDED
     name, read = _names(graphs, family, options)
-    drawn = {"x(0)": f"random, seed {options['seed']}"} if options["x0"] == "random" else {}
+    states = {"x(0)": options["x0"], "sigma(0)": options["sigma0"]}
+    drawn = {what: f"random, seed {options['seed']}" for what, text in states.items() if text == "random"}
     asked = Expectations(options["expect"], options["min_rate"], most)
     with progress(STEPS, screen.quiet) as begin:
         origins = {"graph": Path(name).name, "read": read, **drawn}
-        limit = {
-            "time_limit": options["time_limit"],
-            "expectations": asked,
-            "scenario": scenario_record(),
-            "signal": signal,
-        }
+        limit = {"time_limit": options["time_limit"], "expectations": asked, "scenario": scenario_record()}
+        limit |= {"signal": signal, "sigma0": sigma0}
         certificate = run(family, protocol, x0, origins=origins, progress=begin, **limit)
         assessment = certificate.assessment
     LOG.info("verdict %s; exit code %d", one_line(assessment.text), assessment.exit_code)
@@ -284,16 +282,22 @@ def certify_family(
     return assessment.exit_code
 
 
+def _refuse_disturbance(options: shared.Options) -> None:
+    """Refuse a disturbance on the command line; one of a scenario is for ptcc simulate."""
+    given = click.get_current_context().get_parameter_source("disturbance") == ParameterSource.COMMANDLINE
+    if given and options["disturbance"] is not None:
+        raise ParameterError(
+            "--disturbance: no run is made of a family; it is certified for every one within --delta: leave it out"
+        )
+
+
 def refuse_options(options: shared.Options) -> None:
     """Refuse what is asked of one graph alone, on the command line or in a scenario."""
     source = click.get_current_context().get_parameter_source
-    if options["kind"] != "nominal":
-        raise ParameterError("--protocol: families are for the nominal protocol alone; leave it out")
-    for name in _NOT_OF_FAMILIES:
-        if source(name) in (ParameterSource.COMMANDLINE, ParameterSource.DEFAULT_MAP) and options[name] not in (
-            None,
-            False,
-        ):
+    foreign = (*_NOT_OF_FAMILIES, *["disturbance", "delta"] * (options["kind"] == "nominal"))
+    for name in foreign:
+        given = source(name) in (ParameterSource.COMMANDLINE, ParameterSource.DEFAULT_MAP)
+        if given and options[name] not in (None, False):
             raise ParameterError(f"{shared.flag_of(name)}: is for one graph, not for families yet; leave it out")
 
 

@@ -134,14 +134,18 @@ def _of_family(family: Family, what: str, options: shared.Options) -> Family | F
     from ptcc_certify.certificate.family_certificate import STEPS, certify_family
 
     refuse_options(options)
+    given = click.get_current_context().get_parameter_source("disturbance") is ParameterSource.COMMANDLINE
+    if given and options["disturbance"] is not None:
+        raise ParameterError("--disturbance: runs of a family are drawn under the worst one; leave it out")
     if what not in OF_A_RUN:
         return family
     protocol = shared.protocol_of(options)
     x0 = shared.read_initial_state(options["x0"], options["seed"], family.modes[0].mandatory)
     if x0 is None:
         raise ParameterError(f"{what} is drawn from an initial state; give one with --x0")
+    sigma0 = shared.sliding_keywords(protocol, options, family.modes[0].mandatory).get("sigma0")
     with progress(STEPS) as begin:
-        return certify_family(family, protocol, x0, time_limit=options["time_limit"], progress=begin)
+        return certify_family(family, protocol, x0, sigma0=sigma0, time_limit=options["time_limit"], progress=begin)
 
 
 def _of_graph(

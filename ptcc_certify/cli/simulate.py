@@ -120,4 +120,5 @@ def _run_family(
     signal = "random" if options["signal"] == "any" else options["signal"]  # of a scenario for ptcc certify
     x0 = shared.read_initial_state(options["x0"], options["seed"], family.modes[0].mandatory)
     played = as_signal(signal, options["seed"])
-    return simulate_family(family, protocol, x0, played, times=times, samples=options["samples"])
+    more = shared.sliding_keywords(protocol, options, family.modes[0].mandatory)
+    return simulate_family(family, protocol, x0, played, times=times, samples=options["samples"], **more)

@@ -105,6 +105,11 @@ class FamilyFunction:
         (values,), scale = integers([[root_above(c) for c in self.input_constants]])
         return dict(enumerate(values)), Fraction(1, scale)
 
+    def largest(self, sizes: Sequence[Fraction]) -> Fraction:
+        """Bound ``V`` of all quotient coordinates with ``|xi_k| <= sizes_k``, by entries."""
+        rows = (sum((abs(p) * b for p, b in zip(row, sizes, strict=True)), Fraction(0)) for row in self.matrix)
+        return sum((b * total for b, total in zip(sizes, rows, strict=True)), Fraction(0))
+
     def value(self, xi: Sequence[Fraction]) -> Fraction:
         """Return ``V`` of quotient coordinates."""
         products = (

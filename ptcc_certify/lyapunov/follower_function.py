@@ -21,7 +21,7 @@ docs/theory/families.md, "Rows".
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -169,15 +169,27 @@ class FollowerFunction:
             roots.append(root_above(part.function.value(own)) / part.times)
         return rounded(max(roots), ROOT_BITS, up=True)
 
-    def _targets(self, state: np.ndarray) -> np.ndarray:
-        """Return what the pivots make of every follower at rest, of a state of Python ints."""
+    def largest(self, sizes: Mapping[int, Fraction]) -> Fraction:
+        """Bound ``W^2`` of all states with ``|x_k| <= sizes_k``, rounded up to 64 bits."""
+        (whole,), scale = integers([[sizes[v] for v in range(self.family.n_nodes)]])
+        state, d = np.array(whole, dtype=object), self.vector
+        largest = -least_quotient(-(state[self.followers] + self._targets(state, sizes=True)), d)
+        squares = [(largest / scale) ** 2]
+        for part in self.parts:
+            own = dict(enumerate(sizes[v] for v in part.agents.tolist()))
+            squares.append(part.function.largest(part.quotient.coordinate_sizes(own)) / part.times**2)
+        return rounded(max(squares), ROOT_BITS, up=True)
+
+    def _targets(self, state: np.ndarray, sizes: bool = False) -> np.ndarray:
+        """Return what the pivots make of every follower at rest, of a state of Python ints, or at most, of sizes."""
         pivots = [c.nodes[0] for c in self.kernel.structure.closed_components if c.balanced]
         rest = np.array([0, *state[pivots].tolist()], dtype=object)
         codes = self.kernel.codes[self.followers]
         told = np.where(codes == UNKNOWN, 0, codes)
-        targets = rest[abs(told)] * np.sign(told).astype(object)
+        targets = rest[abs(told)] if sizes else rest[abs(told)] * np.sign(told).astype(object)
         for k in np.flatnonzero(codes == UNKNOWN).tolist():
-            targets[k] = sum(map(mul, self.kernel.row(int(self.followers[k])), rest[1:].tolist()))
+            row = self.kernel.row(int(self.followers[k]))
+            targets[k] = sum(map(mul, map(abs, row) if sizes else row, rest[1:].tolist()))
         return targets
 
 

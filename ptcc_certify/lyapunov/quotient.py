@@ -15,7 +15,7 @@ docs/theory/families.md, "Common quadratic functions" and "Uncertain weights".
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -169,6 +169,11 @@ class Quotient:
     def coordinates(self, x: Sequence[Fraction]) -> list[Fraction]:
         """Return ``xi`` of a state."""
         return [x[v] - sum(b * x[p] for b, p in zip(self.basis[v], self.pivots, strict=True)) for v in self.nodes]
+
+    def coordinate_sizes(self, sizes: Mapping[int, Fraction]) -> list[Fraction]:
+        """Return bounds of ``|xi_k|`` of all states with ``|x_k| <= sizes_k``."""
+        rows = ((v, zip(self.basis[v], self.pivots, strict=True)) for v in self.nodes)
+        return [sizes[v] + sum((abs(b) * sizes[p] for b, p in row), Fraction(0)) for v, row in rows]
 
     def _verify_rest(self) -> None:
         if (moved := moving_rest_state(self.family, self.kernel)) is not None:

@@ -6,6 +6,7 @@ import math
 import shlex
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from itertools import islice
 from pathlib import PurePath
 from typing import Any
 
@@ -18,6 +19,7 @@ from ptcc_certify.certificate.verdict import REFUTED
 from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.graphs.family import Mode
 from ptcc_certify.graphs.size_limits import DRAWN_NODES, INPUT_NODES
+from ptcc_certify.protocols.reaching_time import ReachingTime
 from ptcc_certify.report import notation as texts
 from ptcc_certify.report.family_screen import groups_text, sharpest
 from ptcc_certify.report.notation import above, rational
@@ -64,6 +66,7 @@ def family_facts(saved: FamilyCertificate) -> dict[str, Any]:
         "constant": all(component.nodes.size == 1 for component in components),
         "restricted": [text for _, text in restricted_entries(saved)] if certified else [],
         "explicit_power": _explicit_power(saved),
+        "sliding": saved.protocol.reaching is not None,
         "peak_agent": None if not saved.input_peaks else family.labels[saved.input_peaks.index(max(saved.input_peaks))],
     }
 
@@ -78,7 +81,8 @@ def family_view(saved: FamilyCertificate, runs: Sequence[FamilyTrajectory]) -> d
         **{"title": _title(facts), "protocol": protocol, "figures": figures, "runs": runs, "why": why},
         "equations": texts.formula_svg(protocol.latex(), inline=False),
         "parameters": [(name, getattr(protocol, name)) for name in texts.parameter_names(protocol)],
-        "verdict_text": texts.typeset(saved.assessment.text.replace("--rho2 ", "rho2 = ")),
+        "verdict_text": texts.typeset(saved.assessment.text.replace("--rho2 ", "rho2 = ").replace("--mu3 ", "mu3 = ")),
+        "reaching": _reaching(saved),
         "modes": [_mode_row(saved, k) for k in range(min(len(saved.family.modes), MODES))],
         "states": _states(saved),
         "endings": endings(saved),
@@ -224,6 +228,14 @@ def _rounded(x: Fraction, way: int) -> str:
     return Markup("{}{}").format(sign, outwards(abs(x), 5)) if x else "0"
 
 
+def _reaching(saved: FamilyCertificate) -> list[tuple[str, Fraction, ReachingTime]]:
+    """Return label, ``sigma(0)`` and reaching time of agents; nothing where no sliding variable moves."""
+    if saved.direct:
+        return []
+    rows = zip(saved.family.labels, saved.sigma0 or (), saved.reaching or (), strict=True)
+    return list(islice(rows, 2 * texts.LISTED))
+
+
 def state_rows(saved: FamilyCertificate) -> list[tuple[str, str, str, str | None]]:
     """Return label, camp, initial and final state of every agent; None where no limit is claimed."""
     if saved.initial_state is None:
@@ -242,7 +254,8 @@ def _states(saved: FamilyCertificate) -> tuple[list[str], list[list[Any]]]:
     """Return head and rows of the table of initial and final states."""
     rows = state_rows(saved)[: 2 * texts.LISTED]
     written = [[texts.label(name), camp, first, last or _ends(None)] for name, camp, first, last in rows]
-    return ["Agent", "Camp", "Initial state", "State at the deadline, for every signal"], written
+    whatever = "for every signal" if saved.protocol.reaching is None else "for every signal and disturbance"
+    return ["Agent", "Camp", "Initial state", f"State at the deadline, {whatever}"], written
 
 
 def remaining(saved: FamilyCertificate) -> list[tuple[float, Markup]]:

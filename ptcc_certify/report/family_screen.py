@@ -14,6 +14,7 @@ from ptcc_certify.certificate.restricted_claims import LastModeClaim
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.structure import STABILITY
 from ptcc_certify.report.restricted_screen import last_states, restricted_entries
+from ptcc_certify.report.sliding_lines import sliding_lines
 from ptcc_certify.report.structure_text import Lines, structure_text
 from ptcc_certify.report.text_layout import (
     TEXT,
@@ -77,7 +78,7 @@ def family_summary(certificate: FamilyCertificate, name: str, origins: Mapping[s
     entries = [
         *_family_entries(certificate.family, name, origins),
         ("protocol", _protocol_text(certificate, origins)),
-        *_claim_entries(components, f" at T = {near(T)}"),
+        *_claim_entries(components, f" at T = {near(T)}", disturbed=certificate.sigma0 is not None),
         *_rate_entries(certificate),
         *restricted_entries(certificate),
         *_final_entries(certificate),
@@ -121,7 +122,9 @@ def family_lines(certificate: FamilyCertificate, name: str, origins: Mapping[str
     if certificate.initial_state is not None:
         drawn = f" ({origins['x(0)']})" if "x(0)" in origins else ""
         entries.append(("x(0)", value_list(family.labels, certificate.initial_state) + drawn))
-    entries += _claim_entries(components, f" at T = {near(certificate.protocol.T)}", every=True)
+    entries += sliding_lines(family.labels, certificate.protocol.reaching, certificate.sigma0, certificate.reaching)
+    disturbed = certificate.sigma0 is not None
+    entries += _claim_entries(components, f" at T = {near(certificate.protocol.T)}", every=True, disturbed=disturbed)
     entries += [*_rate_entries(certificate), *restricted_entries(certificate), *_function_entries(certificate)]
     entries += _final_entries(certificate, long=True)
     entries += [*_error_entries(certificate, long=True), *_input_entries(certificate, long=True)]
@@ -189,6 +192,8 @@ def _gains(certificate: FamilyCertificate) -> str:
 
 def _protocol_text(certificate: FamilyCertificate, origins: Mapping[str, str]) -> str:
     begin = "no x(0)" if certificate.initial_state is None else f"x(0) {origins.get('x(0)', 'given')}"
+    if certificate.sigma0 is not None:
+        begin += f", sigma(0) {'0' if certificate.direct else origins.get('sigma(0)', 'given')}"
     return f"{_gains(certificate)}; {begin}"
 
 
@@ -206,14 +211,16 @@ def sharpest(component: FamilyComponent) -> str:
     return (str(component.behaviour or "not decided"), *special_behaviours(component))[-1]
 
 
-def _claim_entries(components: Sequence[FamilyComponent], when: str = "", every: bool = False) -> Lines:
+def _claim_entries(
+    components: Sequence[FamilyComponent], when: str = "", every: bool = False, disturbed: bool = False
+) -> Lines:
     """Tell what every component does; where that depends on the signal, why, and what holds all the same."""
     order = sorted(range(len(components)), key=lambda k: -components[k].nodes.size)
     if len(components) == 1:
-        yield "claim", _claim_text(components[0], when, every)
+        yield "claim", _claim_text(components[0], when, every, disturbed)
     else:
         for place, k in enumerate(order[:_COMPONENTS]):
-            text = _claim_text(components[k], when, False)
+            text = _claim_text(components[k], when, False, disturbed)
             names = [printable(label) for label in components[k].family.labels[:TEXT]]
             room = max(TEXT - len(text) - 2, 12)
             yield "claim" if not place else "", f"{shorten_list(names, room, components[k].nodes.size)}: {text}"
@@ -224,13 +231,13 @@ def _claim_entries(components: Sequence[FamilyComponent], when: str = "", every:
         yield from _depends_entries(component, every)
 
 
-def _claim_text(component: FamilyComponent, when: str, every: bool) -> str:
+def _claim_text(component: FamilyComponent, when: str, every: bool, disturbed: bool) -> str:
     if component.behaviour is None:
         return "not decided"
     if component.behaviour == DEPENDS:
         return DEPENDS if component.signal == "any" else "depends on which graph it is"
     whatever = WHATEVER[component.signal].replace("mode and ", "mode and " * (len(component.family.modes) > 1))
-    text = f"{sharpest(component)}{when} {whatever}"
+    text = f"{sharpest(component)}{when} {whatever}{' and disturbance' * disturbed}"
     sides = [_names(component, side.tolist(), TEXT if every else 20) for side in camps(component)]
     if component.behaviour == STABILITY or len(sides) < 2:
         return text
@@ -378,12 +385,15 @@ def _error_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
     """Tell how near the agents are to their final states by when."""
     if not certificate.common or certificate.rate is None or certificate.initial_state is None:
         return
+    share = certificate.settling_share
     if not long:
-        bound = certificate.deviation_bound([0.01]).max()
-        yield "error", f"at 0.99 T: every agent within {up(float(bound), 2)} of its final state"
+        bound = certificate.deviation_bound([0.01 * share]).max()
+        when = "0.99 T" if certificate.direct else "T_r + 0.99 T_s"
+        yield "error", f"at {when}: every agent within {up(float(bound), 2)} of its final state"
         return
-    bounds = certificate.deviation_bound([remaining for remaining, _ in _INSTANTS]).max(axis=0)
-    told = (f"{up(float(bound), 2)} at {when}" for (_, when), bound in zip(_INSTANTS, bounds, strict=True))
+    instants = [(q, name) for q, name in _INSTANTS if q <= share]
+    bounds = certificate.deviation_bound([remaining for remaining, _ in instants]).max(axis=0)
+    told = (f"{up(float(bound), 2)} at {when}" for (_, when), bound in zip(instants, bounds, strict=True))
     yield "error", f"every agent is within so much of its final state: {', '.join(told)}"
 
 
@@ -399,6 +409,15 @@ def _input_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
             yield "input", "not proved bounded"
         return
     peaks, labels = certificate.input_peaks, certificate.family.labels
+    if peaks is None and certificate.sliding_bounded is False:
+        known = certificate.sliding_peaks is not None
+        whole = (
+            "bounded while sigma(0) = 0"
+            if known
+            else "the nominal part is bounded, of the sliding part nothing is proved"
+        )
+        yield "input", whole
+        return
     yield from _peak_entries(labels, peaks or ())
     if long and peaks is not None:
         told = [f"{shorten_label(label)} {up(peak, 4)}" for label, peak in zip(labels, peaks, strict=True)]

@@ -14,11 +14,11 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from lmi.exact.decimal_rounding import down, near, up
-from lmi.exact.elementary_enclosures import LARGEST_PUSH
 from ptcc_certify.errors import PTCCError
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.report.family_screen import WHATEVER, family_summary
 from ptcc_certify.report.input_lines import disturbed_lines, initial_states_text, input_lines, limits_text
+from ptcc_certify.report.sliding_lines import sliding_lines
 from ptcc_certify.report.structure_text import (
     ORIENTATION,
     Lines,
@@ -517,31 +517,10 @@ def _claim_lines(structure: Structure, claims: Sequence[Claim], when: str = "") 
 
 def _sliding_lines(certificate: Certificate) -> Lines:
     """Tell ``sigma(0)``, what is proved of the sliding variables, and which disturbance the run met."""
-    reaching, labels, run = certificate.reaching, certificate.graph.labels, certificate.trajectory
-    if reaching is None or certificate.sigma0 is None:
-        return
-    if certificate.direct:
-        yield "sigma(0)", "0: no reaching phase, the agents slide from the beginning"
-    else:
-        yield "sigma(0)", value_list(labels, certificate.sigma0)
-        late = [label for label, r in zip(labels, reaching, strict=True) if r.z is None]
-        last = max((r for r in reaching if r.z is not None), key=lambda r: r.z or 0, default=None)
-        clauses = []
-        if last is not None and last.z:
-            agent = labels[reaching.index(last)]
-            margin = f"{down(last.remaining, 3)} before T_r" if last.remaining else "nearer to T_r than a float tells"
-            clauses.append(
-                f"reaching time{' of others' * bool(late)} at most {up(last.time, 6)}, {margin} (agent {agent})"
-            )
-        if late and (p := certificate.protocol.reaching) is not None:
-            pole, push = p.mu3 * p.kappa, p.mu2 * p.T_r
-            why = "0 is reached nearer to T_r than can be written"
-            if pole < 1:
-                why = "mu3 kappa < 1 and sigma(0) is large"
-            if push + pole > LARGEST_PUSH:
-                why = f"mu2 T_r + mu3 kappa is above {LARGEST_PUSH}, where no earlier instant is proved"
-            clauses.append(f"reaching time T_r for {shorten_list(late, 40)}: {why}")
-        yield "sliding", "; ".join(clauses)
+    run = certificate.trajectory
+    yield from sliding_lines(
+        certificate.graph.labels, certificate.protocol.reaching, certificate.sigma0, certificate.reaching
+    )
     if run is not None and (slid := run.sliding) is not None:
         yield "disturbed", f"the run meets d = {slid.source}; |d| <= delta: {slid.bounded_by}"
 

@@ -135,12 +135,19 @@ def family_latex(saved: FamilyCertificate, figures: dict[str, str] | None = None
         "parameters": [(Markup(symbol_latex(name)), getattr(saved.protocol, name)) for name in names],
         **{"named": _named(saved.family.labels), "listed": _intervals(saved), "rows": rows},
         "remaining": [(f, _number(bound)) for f, bound in remaining(saved)],
+        **{"sigma0": saved.sigma0, "last_time": _last_time(saved)},
         "why": [counterexample_text(c, c.counterexample) for c in _depending(saved) if c.counterexample is not None],
         **{"figures": figures or {}, "stem": _stem(saved.source.path.stem), "report": saved.checked},
         **{"sha256": _broken(saved.source.sha256), "sha256_plain": saved.source.sha256},
         **{"bound_kinds": BOUND_KINDS, "theorem": THEOREM, "captions": _FAMILY_CAPTIONS},
     }
     return _environment().get_template("family_statement.tex").render(view)
+
+
+def _last_time(saved: FamilyCertificate) -> float | None:
+    """Return an instant from which on all sliding variables are proved 0; None if that is ``T_r``."""
+    times = [None if r.z is None else r.time for r in saved.reaching or ()]
+    return None if None in times else max((t for t in times if t is not None), default=0.0)
 
 
 def _depending(saved: FamilyCertificate) -> list[FamilyComponent]:

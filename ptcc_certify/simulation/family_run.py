@@ -21,22 +21,20 @@ from ptcc_certify.graphs.io import as_family, as_states
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.base import refuse_no_protocol
 from ptcc_certify.protocols.gain_limits import GainLimits
-from ptcc_certify.simulation.cvodes import Motion, Phase, Tolerances
+from ptcc_certify.simulation.cvodes import Tolerances
 from ptcc_certify.simulation.family_members import Choice, Members
+from ptcc_certify.simulation.family_motion import FamilyMotion
+from ptcc_certify.simulation.family_sliding import DrivenFamilyMotion, SlidingRun
 from ptcc_certify.simulation.instants import PAST, Instants, default_instants, wanted_instants
 from ptcc_certify.simulation.interrupt import interruptible
 from ptcc_certify.simulation.signals import Signal, as_signal
-from ptcc_certify.simulation.trajectory import RESOLVED, Trajectory
+from ptcc_certify.simulation.trajectory import RESOLVED, SlidingTrajectory, Trajectory
 
 if TYPE_CHECKING:
-    import casadi as ca
-
     from ptcc_certify.graphs.digraph import Exact
 
 #: Choices of a signal before a run is given up, and those after which it does not go on to see where it settles.
 MOST_STRETCHES, MOST_SETTLING = 100_000, 2_000
-# Beyond this product of in-weights and the stretch of the clock implicit steps are cheaper.
-_STIFF = 10.0
 # The state at T is given up beyond this s max(D), as for one graph.
 _MAX_CLOCK = 1e13
 
@@ -108,56 +106,24 @@ class FamilyTrajectory(Trajectory):
         return f"Family{super().__repr__()[:-1]}, signal: {self.signal})"
 
 
-class FamilyMotion(Motion):
-    """The agents of a family, moved by the members that a signal chooses.
+@dataclass(frozen=True, eq=False, repr=False)
+class FamilySlidingTrajectory(FamilyTrajectory, SlidingTrajectory):
+    """A run of a family of graphs under the sliding-mode protocol, the Filippov solution.
 
-    Parameters
-    ----------
-    members : Members
-    state : (N, 1) array
-        In units of ``unit``.
-    tolerances : Tolerances
+    Its attributes are those of :class:`FamilyTrajectory` and of
+    :class:`~ptcc_certify.simulation.trajectory.SlidingTrajectory`.
+
+    Examples
+    --------
+    >>> robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
+    >>> pair = [("a", "b", "0.8", "1.2"), ("b", "a", "-1.2", "-0.8")]
+    >>> run = simulate_family(pair, robust, [1, 2], sigma0=[1, 0], disturbance="sin(9*k*t)")
+    >>> run.final_state.round(9) + 0, bool((run.reaching_times < 1).all())
+    (array([0., 0.]), True)
     """
 
-    def __init__(self, members: Members, state: np.ndarray, tolerances: Tolerances):
-        import casadi as ca
-
-        super().__init__(members.family.modes[0].mandatory, state, 1, tolerances)
-        self.members, self.in_weight, n = members, members.in_weight, len(state)
-        self._largest = float(self.in_weight.max(initial=0.0))
-        self._pattern = ca.Sparsity(n, n, members.indptr.tolist(), members.indices.tolist())
-        self._weights = ca.MX.sym("weights", members.indices.size)
-        self._steps: dict[bool, Any] = {}
-        self._data = np.zeros(members.indices.size)
-
-    def choose(self, choice: Choice) -> None:
-        """Let a member act from now on."""
-        self._data = self.members.data(choice)
-
-    def slope(self, x: ca.MX, phase: Phase, clock: ca.MX, ends: tuple[float, float]) -> ca.MX:
-        """Return ``dX/dz`` on a stretch of length 1; its true length is a factor of the weights."""
-        import casadi as ca
-
-        return -ca.mtimes(ca.MX(self._pattern, self._weights), x)
-
-    def move(self, span: float) -> None:
-        """Move on by a stretch of the clock."""
-        if span <= 0 or not self._largest:
-            return
-        stiffness = span * self._largest
-        self.state = self._call(self._step(stiffness > _STIFF), stiffness, (self._data * span).tolist())[0]
-
-    def _step(self, stiff: bool) -> Any:
-        """Return CVODES for stretches of length 1, with implicit steps if they are stiff."""
-        import casadi as ca
-
-        if stiff not in self._steps:
-            x, clock = ca.MX.sym("x", self.state.size), ca.MX.sym("z")
-            ode = self.slope(x, Phase(0, 1, 1, past=True), clock, (0.0, 1.0))
-            problem = {"x": x, "t": clock, "p": self._weights, "ode": ode}
-            explicit = {"linear_multistep_method": "adams", "nonlinear_solver_iteration": "functional"}
-            self._steps[stiff] = self._integrator(problem, 0.0, np.ones(1), **({} if stiff else explicit))
-        return self._steps[stiff]
+    def _more_columns(self) -> list[tuple[str, np.ndarray]]:
+        return [*FamilyTrajectory._more_columns(self), *SlidingTrajectory._more_columns(self)]
 
 
 class _Course:
@@ -167,7 +133,7 @@ class _Course:
         self.motion, self.clock, self.until, self.stretches = motion, 0.0, 0.0, 0
         self.choices: list[Choice] = []
         self.switches: list[float] = []
-        self._play = play(lambda: motion.state[:, 0] * unit)
+        self._play = play(lambda: motion.agents() * unit)
         self._begin()
 
     def _begin(self) -> None:
@@ -219,6 +185,8 @@ def simulate_family(
     x0: Any,
     signal: Any = "random",
     *,
+    sigma0: Any = None,
+    disturbance: Any = None,
     times: Iterable[Exact] | None = None,
     remaining: float = 1e-8,
     samples: int = 201,
@@ -226,18 +194,22 @@ def simulate_family(
     rtol: float = 1e-11,
     atol: float = 1e-11,
 ) -> FamilyTrajectory:
-    """Integrate ``X' = -gain(t) L(t) X`` for a family of graphs from which a signal chooses ``L(t)``.
+    """Integrate a protocol for a family of graphs from which a signal chooses ``L(t)``, as ``X' = -gain(t) L(t) X``.
 
     Parameters
     ----------
     family : family-like
         Whatever :func:`ptcc_certify.as_family` takes: a Family, graphs by name, edges with intervals.
-    protocol : NominalProtocol
+    protocol : NominalProtocol or SlidingModeProtocol
     x0 : state-like
         N numbers in the order of ``family.labels``, or by label.
     signal : Signal, str, path, file object or sequence of rows
         ``"random"``, ``"worst-case"``, a table of instants and modes, or a
         :class:`~ptcc_certify.simulation.signals.Signal`: see :func:`~ptcc_certify.simulation.signals.as_signal`.
+    sigma0 : state-like, optional
+        Sliding mode: ``sigma(0)``, like ``x0``; without it 0, which leaves no reaching phase.
+    disturbance : Disturbance, str, number or sequence, optional
+        Sliding mode: as for :func:`ptcc_certify.simulate`, but none that reads the states; by default the worst case.
     times : increasing numbers >= 0, optional
         The instants wanted, in units of time.
     remaining : float
@@ -252,14 +224,14 @@ def simulate_family(
     Returns
     -------
     FamilyTrajectory
-        Its state at ``T`` has settled (``deadline_resolved``) if the run came to rest in all members, or in the one
-        that stays; under a signal that switches for ever it need not. From ``T`` on the last member stays, unless a
-        table tells.
+        A :class:`FamilySlidingTrajectory` under the sliding-mode protocol. Its state at ``T`` has settled
+        (``deadline_resolved``) if the run came to rest in all members, or in the one that stays; under a signal that
+        switches for ever it need not. From ``T`` on the last member stays, unless a table tells.
 
     Raises
     ------
     ParameterError
-        Another protocol than the nominal one, an initial state, option or signal that does not fit.
+        An initial state, option, disturbance or signal that does not fit.
     SimulationError
         The integrator failed, or the signal switches too often.
 
@@ -277,30 +249,50 @@ def simulate_family(
     begin, tolerances = time.perf_counter(), Tolerances.within(rtol, atol)
     family = as_family(family)
     refuse_no_protocol(protocol)
-    if protocol.reaching is not None:
-        raise ParameterError("families run under the nominal protocol; give NominalProtocol(..)")
-    graph = family.modes[0].mandatory
-    x = np.array([[float(value) for value in row] for row in as_states(x0, graph, "x0")])
-    if x.shape[1] > 1:
-        raise ParameterError("families run from one initial state at a time; give N numbers x0")
+    for name, value in (("sigma0", sigma0), ("disturbance", disturbance)):
+        if value is not None and protocol.reaching is None:
+            raise ParameterError(f"{name} belongs to the sliding-mode protocol; leave it out or change the protocol")
+    x = _one_state(x0, family, "x0")
     played = as_signal(signal)
     if times is None:
         instants = default_instants(protocol, remaining, samples, past)
     else:
         instants = wanted_instants(protocol, times)
+    sliding = None
+    if (robust := protocol.reaching) is not None:
+        sigma = np.zeros(family.n_nodes) if sigma0 is None else _one_state(sigma0, family, "sigma0")[:, 0]
+        sliding = SlidingRun.of(robust, family.labels, sigma, disturbance, float(instants.t[-1]))
     with interruptible():
-        run = _run(family, protocol, x, played, instants, tolerances)
+        run = _run(family, protocol, x, played, instants, (tolerances, sliding))
     run.stats["seconds"] = time.perf_counter() - begin  # type: ignore[index]
     return run
 
 
+def _one_state(values: Any, family: Family, name: str) -> np.ndarray:
+    """Return a state as an (N, 1) array."""
+    x = np.array([[float(value) for value in row] for row in as_states(values, family.modes[0].mandatory, name)])
+    if x.shape[1] > 1:
+        raise ParameterError(f"families run from one initial state at a time; give N numbers {name}")
+    return x
+
+
 def _run(
-    family: Family, protocol: Protocol, x: np.ndarray, signal: Signal, instants: Instants, tolerances: Tolerances
+    family: Family,
+    protocol: Protocol,
+    x: np.ndarray,
+    signal: Signal,
+    instants: Instants,
+    how: tuple[Tolerances, SlidingRun | None],
 ) -> FamilyTrajectory:
-    gain, unit = protocol.gain, float(np.abs(x).max()) or 1.0
+    (tolerances, sliding), gain = how, protocol.gain
+    y = x if sliding is None else x - sliding.sigma0[:, None]
+    unit = float(max(np.abs(x).max(), np.abs(y).max())) or 1.0
     clock = np.asarray(GainLimits().limit(gain).clock(instants.t, instants.remaining))
     members = Members(family)
-    motion = FamilyMotion(members, x / unit, tolerances)
+    if sliding is None or not sliding.sigma0.any():
+        motion = FamilyMotion(members, y / unit, tolerances)
+    else:
+        motion = DrivenFamilyMotion(members, y / unit, tolerances, sliding, unit)
     course = _Course(motion, lambda state: signal.play(members, gain, state), unit)
     states = np.empty((family.n_nodes, clock.size))
     acting = np.zeros(clock.size, dtype=np.int64)
@@ -312,13 +304,15 @@ def _run(
     if early.size < clock.size:
         residual = _settle(course, clock[early], states[:, early], RESOLVED / 10 * max(tolerances))
         _go_past(course, signal, instants, early.size, (states, acting), protocol)
-    return FamilyTrajectory(
+    more: dict[str, Any] = {} if sliding is None else sliding.fields(instants)
+    trajectory = FamilyTrajectory if sliding is None else FamilySlidingTrajectory
+    return trajectory(
         graph=family.modes[0].mandatory,
         protocol=protocol,
         t=instants.t,
         remaining=instants.remaining,
         clock=clock,
-        states=states * unit,
+        states=states * unit + more.get("sigma", 0.0),
         rtol=tolerances.rtol,
         atol=tolerances.atol,
         deadline_index=instants.deadline(protocol),
@@ -329,6 +323,7 @@ def _run(
         choices=tuple(course.choices),
         switches=np.array(course.switches),
         acting=acting,
+        **more,
     )
 
 

@@ -33,7 +33,8 @@ from ptcc_certify.checker import check
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.follower_function import follower_functions
-from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.protocols.reaching_time import certified_reaching_times
 from ptcc_certify.theorems.family_behaviour import decide
 from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows
 
@@ -84,7 +85,7 @@ def cases() -> list[tuple[str, Json]]:
     day, night = ([("a", "b", 1, 1)], [("b", "a", 1, 1)])
     modes = {"day": Family.from_intervals(day), "night": Family.from_intervals(night, nodes="ab")}
     found.append(("leaders change", document(Family.switching(modes))))
-    return found + restricted_cases()
+    return found + restricted_cases() + sliding_cases()
 
 
 def restricted_cases() -> list[tuple[str, Json]]:
@@ -115,6 +116,31 @@ def restricted_cases() -> list[tuple[str, Json]]:
         made = certify_family(modes, PROTOCOL, None, signal=ClockShares(["0.8", "0.1", "0.1"]))
         assert made.restricted
         found.append((f"shares {k}", {**made.to_dict(), "unverified": {}}))
+    return found
+
+
+def sliding_cases() -> list[tuple[str, Json]]:
+    """True certificates under the sliding-mode protocol: sliding variables 0, moving, and of an unbounded part."""
+    found, draw = [], np.random.default_rng(7)
+    gains = {"T_r": 1, "T_s": 1, "rho1": 1, "rho2": 1, "kappa": 3, "mu1": 2, "mu2": 1, "delta": 1}
+    for k, kind in enumerate(("consensus", "stability", "containment", "undirected", "consensus", "consensus")):
+        family = with_common_kernel(draw, kind, 3, 1 + k % 2, Fraction(1, 5), 0.5)
+        sigma0 = [0, 0, 0] if k == 4 else draw.integers(-4, 5, 3).tolist()
+        protocol = SlidingModeProtocol(**gains, mu3="0.1" if k == 5 else 1)
+        x0 = None if k == 2 else draw.integers(-9, 10, 3).tolist()
+        made = certify_family(family, protocol, x0, sigma0=sigma0, time_limit=3)
+        found.append((f"sliding {kind} {k}", {**made.to_dict(), "unverified": {}}))
+    protocol = SlidingModeProtocol(**gains, mu3=1)
+    apart = Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 1), ("c", "d", 0, 1)], nodes="abcde")
+    made = certify_family(apart, protocol, [1, 2, 3, 4, 5], sigma0=[1, -2, 3, 0, 1], time_limit=3)
+    found.append(("sliding apart", {**made.to_dict(), "unverified": {}}))
+    led = Family.from_intervals(
+        [("a", "b", 1, 2), ("b", "a", 1, 1), ("b", "c", 1, 3), ("a", "d", 1, 1), ("c", "d", 1, 2)]
+    )
+    parts = tuple(ComponentProof(c, tuple(follower_functions(c))) for c in decide(led))
+    state, sigma0 = tuple(map(Fraction, (1, 2, 3, 4))), tuple(map(Fraction, (1, 0, -1, 2)))
+    made = FamilyCertificate(led, protocol, parts, state, sigma0, certified_reaching_times(protocol, sigma0))
+    found.append(("sliding rows", {**made.to_dict(), "unverified": {}}))
     return found
 
 
@@ -297,6 +323,37 @@ def test_no_mutant_is_accepted_that_is_false():
     assert fuzzed(numbers(120))["accepted"] > 0 or os.environ.get("PTCC_FUZZ_ONLY")
 
 
+NEW = ("sliding_variable", "reaching_time", "protocol", "drives", "input", "final_state")
+
+
+def of_sliding(count: int) -> Counter[str]:
+    """Change what families have under the sliding-mode protocol alone, in one place."""
+    rng, seen = np.random.default_rng([SEED, 5]), Counter[str]()
+    for _ in range(count):
+        name, data = pick(rng, [case for case in cases() if case[0].startswith("sliding")])
+        paths = [(path, x) for path, x in leaves(data) if set(path[:2]) & set(NEW) and fraction(x) is not None]
+        path, text = pick(rng, paths)
+        made = resealed(changed(data, path, nudged(rng, text)))
+        if not same_claim(made, data):
+            accepted = check(made).accepted
+            seen[f"{path[0]} {'accepted' if accepted else 'rejected'}"] += 1
+            assert not accepted or false_family_claims(made) == [], (name, path, at(made, path))
+    return seen
+
+
+def test_no_mutant_of_what_slides_is_accepted_that_is_false():
+    seen = of_sliding(60)
+    assert {key.split()[1] for key in seen} == {"accepted", "rejected"}
+
+
+@pytest.mark.campaign
+def test_no_mutant_of_thousands_of_what_slides_is_accepted_that_is_false(capsys: pytest.CaptureFixture[str]):
+    seen = of_sliding(3000)
+    with capsys.disabled():
+        print(f"\nseed {SEED}: {dict(seen)}")
+    assert sum(seen.values()) > 2000
+
+
 @pytest.mark.campaign
 def test_no_mutant_of_thousands_is_accepted_that_is_false(capsys: pytest.CaptureFixture[str]):
     count = fuzzed(numbers(4000))
@@ -328,6 +385,8 @@ def test_certificates_of_families_are_valid():
         (("graph", "modes", 0, "edges", 0), ["a"]),
         (("structure", "modes", 0, "connectivity"), "torn"),
         (("protocol", "kind"), "sliding-mode"),
+        (("sliding_variable",), {}),
+        (("lyapunov",), {"functions": [], "drives": []}),
         (("paper",), {}),
         (("verdict",), "undecided"),
         (("input", "bounded"), False),

@@ -301,8 +301,10 @@ def test_obligations_are_described_with_their_texts():
     assert json.loads(blocks[0]) == {kind: list(texts) for kind, texts in OBLIGATIONS.items()}
     table, families = obligation_table("14"), obligation_table("19")
     assert table == ["structure", "claim", "final-state", *[kind for kind in table if kind not in table[:3]]]
-    assert set(table) | set(families) == set(OBLIGATIONS) and len(table) + len(families) == len(OBLIGATIONS) + 1
-    assert set(table) & set(families) == {"structure"}
+    assert set(table) | set(families) == set(OBLIGATIONS) and len(set(table)) + len(set(families)) == len(
+        table + families
+    )
+    assert set(table) & set(families) == {"structure", "sliding-bound", "reaching-time", "input-sliding"}
     for kind in OBLIGATIONS:
         assert f"- **{kind}**: " in FORMAT, kind
 

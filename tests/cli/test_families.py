@@ -210,6 +210,18 @@ def test_pages_statements_and_figures_are_made_of_the_certificate_of_a_family():
         assert Path(f"c-{what}.png").stat().st_size > 10_000
 
 
+def test_the_sliding_mode_protocol_has_pages_statements_and_figures_of_families():
+    slide = ("--kappa", "3", "--x0", "3,1,2", "--protocol", "sliding-mode", "--delta", "1", "--sigma0", "random")
+    assert ptcc("certify", *BOTH, *slide, "-o", "c.json").code == 0
+    checked = ptcc("check", "c.json", *BOTH)
+    assert checked.code == 0 and "for every signal and disturbance" in checked.out
+    for name in ("p.html", "p.tex"):
+        assert ptcc("report", "c.json", "-o", name, "--no-simulation").out == f"certified  {name}\n"
+    assert "Sliding-mode protocol" in Path("p.html").read_text("utf-8")
+    assert ptcc("plot", "c.json", "--what", "input").out == "written    c-input.png\n"
+    assert "--disturbance: runs of a family" in ptcc("plot", *BOTH, *slide, "--disturbance", "sin(t)").err
+
+
 def test_figures_are_made_of_the_files_of_a_family():
     assert ptcc("plot", *BOTH).out == "written    day-graph.png\n"
     assert ptcc("plot", "unsure.csv", "--what", "input", "--x0", "3,1,2").out == "written    unsure-input.png\n"
@@ -233,6 +245,30 @@ def test_a_certificate_without_an_initial_state_is_drawn_from_one_that_is_given(
 
 def _rows(*rows: str, header: str = INTERVALS) -> str:
     return "\n".join([header, *rows, ""])
+
+
+def test_a_family_is_certified_for_every_disturbance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    Path("day.csv").write_text("a,b,1\nb,a,1\nb,c,-1\n")
+    Path("night.csv").write_text("a,b,1\nb,a,2\na,c,-1\n")
+    Path("s.toml").write_text(
+        '[graph]\nfile = ["day.csv", "night.csv"]\nuncertainty = "10%"\n[protocol]\nkind = "sliding-mode"\nkappa = 3\n'
+        '[initial_state]\nx0 = [1, 2, 3]\nsigma0 = [1, 0.5, -0.25]\n[disturbance]\nsignal = "sin(t)"\n'
+    )
+    flags = ("--protocol", "sliding-mode", "--kappa", "3", "--sigma0", "1,0.5,-0.25", "--x0", "1,2,3")
+    family = ("day.csv", "night.csv", "--switching", "--uncertainty", "10%")
+    run = ptcc("certify", *family, *flags, "-o", "c.json")
+    assert run.code == 0 and max(map(len, run.out.splitlines())) <= 80
+    assert "at T = 1 for every signal and disturbance" in run.out and "sigma(0) given" in run.out
+    assert "T_r + 0.99 T_s" in run.out
+    assert ptcc("check", "c.json", *family).code == 0
+    data = json.loads(Path("c.json").read_text())
+    assert len(data["lyapunov"]["drives"]) == len(data["lyapunov"]["functions"]) > 0
+    assert "reaching time at most" in ptcc("certify", *family, *flags, "-v").out
+    assert ptcc("certify", "s.toml", "-o", "s.json").code == 0 == ptcc("simulate", "s.toml", "--steps", "2").code
+    assert json.loads(Path("s.json").read_text())["digest"] == data["digest"]
+    direct = ptcc("certify", *family, *flags[:4], "--x0", "1,2,3")
+    assert "sigma(0) 0" in direct.out and "at 0.99 T" in direct.out and direct.code == 0
 
 
 BAD = {
@@ -269,7 +305,16 @@ BAD = {
     "standard input twice": ("a,b,1", ("-", "-", "--switching"), "standard input, which is one graph"),
     "a scenario beside": ("a,b,1", ("s.toml", "--switching"), "a scenario stands alone"),
     "signal": ("a,b,1", ("--signal", "fast"), "'fast' is not one of"),
-    "sliding mode": (_rows("a,b,1,2"), ("--protocol", "sliding-mode"), "nominal protocol alone"),
+    "disturbance": (
+        _rows("a,b,1,2"),
+        ("--protocol", "sliding-mode", "--disturbance", "sin(t)"),
+        "no run is made of a family",
+    ),
+    "restricted signals": (
+        _rows("a,b,1,2"),
+        ("--protocol", "sliding-mode", "--dwell", "1"),
+        "restricted signals are certified under the nominal protocol",
+    ),
     "no deadline": (_rows("a,b,1,2"), ("--rho2", "0"), "rho2 = 0 gives no deadline"),
     "another length": (_rows("a,b,1,2"), ("--x0", "1,2,3"), "3 values for 2 nodes"),
     **{

@@ -33,6 +33,13 @@ def test_the_seed_of_a_random_signal_tells_the_run():
     assert runs[0] == runs[1] != runs[2]
 
 
+def test_a_family_slides_under_disturbances():
+    sliding = ("--protocol", "sliding-mode", "--sigma0", "1,0.5,-1", "--disturbance", "sin(9*k*t)")
+    rows = list(csv.DictReader(ptcc(*FAMILY, *sliding, "--steps", "4").out.splitlines()))
+    assert [float(row["sigma(a)"]) > 0 for row in rows] == [True, True, False, False, False]  # 0 at T_r = 1/2
+    assert [float(row["a"]) for row in rows[-1:]] == pytest.approx([-float(rows[-1]["c"])], abs=1e-8)
+
+
 def test_figures_of_families_are_drawn():
     assert ptcc(*FAMILY, "--signal", "worst-case", "-o", "run.png").code == 0
     assert Path("run.png").read_bytes().startswith(b"\x89PNG")

@@ -105,6 +105,23 @@ def assert_once(component: FamilyComponent, text: str) -> None:
     assert set(words) == set(component.family.labels) or "in all" in text, text
 
 
+@pytest.mark.parametrize("sigma0", [None, [1, "-1/2", 0]])
+@pytest.mark.parametrize("mu3", ["0.1", 1])
+def test_the_screen_of_a_family_that_slides_is_short_and_tells_of_disturbances(sigma0, mu3):
+    unsure = Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 1), ("b", "c", -2, -1)])
+    protocol = ptcc.SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=3, mu1=2, mu2=1, mu3=mu3, delta=1)
+    certificate = certify_family(unsure, protocol, [1, 2, 3], sigma0=sigma0, time_limit=2)
+    lines, more = family_summary(certificate, "unsure"), "\n".join(family_lines(certificate, "unsure"))
+    text = "\n".join(lines)
+    assert len(lines) <= 10 and max(map(len, lines)) <= 80
+    assert "for every signal and disturbance" in text
+    assert ("T_r + 0.99 T_s" in text) == ("reaching time" in more) == (sigma0 is not None)
+    if mu3 == "0.1" and sigma0:
+        assert "of the sliding part nothing is proved" in text and "--mu3" in more
+    else:
+        assert "bounded; |u_k| <=" in text
+
+
 def test_a_wish_is_refuted_by_an_input_that_some_member_has_at_the_start():
     """The largest first input is that of a vertex: no member of a random family exceeds it, and one attains it."""
     rng = random.Random(1)

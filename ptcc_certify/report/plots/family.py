@@ -42,7 +42,8 @@ def sample_runs(certificate: FamilyCertificate, signals: Iterable[Signal] | None
         raise ParameterError("the certificate has no initial state; certify the family with x0")
     chosen = [*map(RandomSignal, range(_RANDOM)), *worst_case_signals(certificate)] if signals is None else signals
     start = [float(x) for x in certificate.initial_state]
-    return [simulate_family(certificate.family, certificate.protocol, start, signal) for signal in chosen]
+    more: dict[str, Any] = {} if certificate.sigma0 is None else {"sigma0": [float(s) for s in certificate.sigma0]}
+    return [simulate_family(certificate.family, certificate.protocol, start, signal, **more) for signal in chosen]
 
 
 def family_camps(family: Family) -> np.ndarray | None:
@@ -237,7 +238,10 @@ def _draw_tubes(
     finals = certificate.final_states or ()
     largest = np.zeros(len(groups))  # what the states of a component never exceed
     for part in certificate.parts:
-        largest[part.component.nodes] = np.abs(run.states[part.component.nodes, 0]).max()
+        nodes = part.component.nodes
+        largest[nodes] = np.abs(run.states[nodes, 0]).max()
+        if run.sliding is not None:
+            largest[nodes] += np.abs(run.sliding.sigma0[nodes]).sum()
     T, label = float(certificate.protocol.T), "proved for every signal"
     places: dict[tuple[float, float, str], None] = {}
     for name in dict.fromkeys(groups[agents]):

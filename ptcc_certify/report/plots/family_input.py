@@ -87,9 +87,13 @@ def plot_family_input(
         ax.plot(t, bound, color=BOUND, linewidth=1.8, label="proved for every signal")
         top = max(top, float(bound.max()))
     if subject.input_peaks:
+        peak = float(bound[0]) if subject.direct else float(max(subject.input_peaks))
+        if not subject.direct:  # it need not be at the beginning
+            ax.axhline(peak, color=BOUND, linewidth=0.8, linestyle="--")
+            top = max(top, peak)
         ax.annotate(
             f"certified peak {up(max(subject.input_peaks), 3)}",
-            (0, float(bound[0])),
+            (0, peak),
             (4, 2),
             textcoords="offset points",
             fontsize=NAME_SIZE,

@@ -1,0 +1,217 @@
+"""How sliding variables drive the agents of a family, for every signal and every disturbance; proved and verified here.
+
+``y = x - sigma`` obeys ``y' = -gain L (y + sigma)``, and ``|sigma_k| <= psi |sigma_k(0)|``, which no graph enters. With
+``sqrt(V)`` a norm that decays by ``e^(-rate s / 2)`` where nothing drives, and ``m_k`` the largest
+``sum_l w+_kl (|sigma_k(0)| + |sigma_l(0)|)`` of a mode,
+
+    sqrt(V(y(t)))  <=  e^(-rate s(t) / 2) sqrt(V(y(0))) + c int_0^t e^(-rate (s(t) - s(r)) / 2) gain(r) psi(r) dr
+
+where ``c^2`` is the largest ``V`` of all states with ``|x_k| <= m_k``, of every mode.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property
+from typing import Protocol
+
+from lmi.exact.decimal_rounding import up
+from lmi.exact.elementary_enclosures import rounded
+from lmi.exact.numbers import longest
+from lmi.exact.work import spend
+from ptcc_certify.checker.family import Family
+from ptcc_certify.checker.family_rows import Function as VerifiedFunction
+from ptcc_certify.checker.input_formulas import (
+    BITS,
+    PrescribedGain,
+    Reaching,
+    decay_above,
+    root_above,
+    stretches,
+)
+from ptcc_certify.checker.proof_cursor import Document
+from ptcc_certify.checker.protocol import Begin, check_sliding
+from ptcc_certify.checker.protocol import Protocol as Gains
+from ptcc_certify.checker.reading import Interval, entries, exact, need
+
+Sizes = Mapping[int, Fraction]
+#: Stretches into which the time is cut while sliding variables move.
+STRETCHES = 64
+#: Below these ``psi``, and what a stretch leaves of a norm, are not made smaller: shorter numbers.
+LEAST, MOST_DECAY = Fraction(1, 2**200), Fraction(100)
+
+
+class Function(Protocol):
+    """What a Lyapunov function says: see :class:`~ptcc_certify.checker.family_function.FamilyFunction`."""
+
+    @property
+    def rate(self) -> Fraction:
+        """The proved rate."""
+
+    def largest(self, sizes: Sizes) -> Fraction:
+        """Bound ``V`` of all states with ``|x_k| <= sizes_k``."""
+
+
+def nominal_gain(gains: Mapping[str, Fraction]) -> PrescribedGain:
+    """Return the gain of the nominal part of the input."""
+    T = gains["T_r"] + gains["T_s"] if "T_r" in gains else gains["T"]
+    return PrescribedGain(T, gains["rho1"], gains["rho2"] * gains["kappa"])
+
+
+def pulls(edges: Iterable[tuple[int, int, Fraction]], sigma0: Sizes) -> dict[int, Fraction]:
+    """Return ``m_k = sum_l w+ (|sigma_k(0)| + |sigma_l(0)|)`` of sources, targets and largest sizes of edges.
+
+    ``|(L sigma)_k| <= psi m_k`` for every member. Entries of ``C L`` may cancel at ``w+`` and not elsewhere, so that
+    this is formed before ``C`` is.
+
+    Examples
+    --------
+    >>> pulls([(0, 1, Fraction(2))], {0: Fraction(3), 1: Fraction(-1)})
+    {0: Fraction(0, 1), 1: Fraction(8, 1)}
+    """
+    total = dict.fromkeys(sigma0, Fraction(0))
+    for source, target, size in edges:
+        total[target] += size * (abs(sigma0[source]) + abs(sigma0[target]))
+    return total
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """What sliding variables that are not 0 at first do to the agents of a family, or of a component of it.
+
+    Attributes
+    ----------
+    gain : PrescribedGain
+        Of the nominal part of the input.
+    reaching : Reaching
+    sigma0 : mapping of int to Fraction
+        By node.
+    modes : sequence of mapping of int to Fraction
+        ``m_k`` of :func:`pulls` by node, of every mode.
+    """
+
+    gain: PrescribedGain
+    reaching: Reaching
+    sigma0: Sizes
+    modes: Sequence[Sizes]
+    _constants: dict[int, tuple[Function, Fraction]] = field(default_factory=dict)
+
+    @cached_property
+    def pulls(self) -> dict[int, Fraction]:
+        """The largest ``m_k`` of all modes."""
+        return {k: max(mode[k] for mode in self.modes) for k in self.sigma0}
+
+    @cached_property
+    def _stretches(self) -> list[tuple[Fraction, Fraction, Fraction, Fraction, Fraction]]:
+        """The gain at both ends, ``psi`` at the begin and the clock, from above, the clock from below."""
+        parts = stretches(self.gain, self.reaching, self.reaching.quiet, STRETCHES)
+        sizes = ((part.first, part.last, max(part.psi[1], LEAST), part.clock[1], -part.clock[0]) for part in parts)
+        return [tuple(rounded(x, BITS, up=True) for x in own) for own in sizes]  # type: ignore[misc]
+
+    @cached_property
+    def integral(self) -> Fraction:
+        """``int gain psi dt`` from above."""
+        return sum((psi * clock for _, _, psi, clock, _ in self._stretches), Fraction(0))
+
+    @cached_property
+    def largest(self) -> Fraction:
+        """``max gain psi`` from above."""
+        return max(last * psi for _, last, psi, _, _ in self._stretches)
+
+    def constant(self, V: Function) -> Fraction:
+        """Return ``c`` of a function, rounded up."""
+        if id(V) not in self._constants:
+            self._constants[id(V)] = V, root_above(max(V.largest(mode) for mode in self.modes))
+        return self._constants[id(V)][1]
+
+    def sum(self, V: Function, root: Fraction) -> Fraction:
+        """Bound ``int gain sqrt(V(y)) dt`` from a bound of ``sqrt(V(y(0)))``, for a positive rate."""
+        return 2 / V.rate * (root + self.constant(V) * self.integral)
+
+    def peak(self, V: Function, root: Fraction) -> Fraction:
+        """Bound ``gain sqrt(V(y))`` for all times from a bound of ``sqrt(V(y(0)))``, for ``rate rho2 kappa >= 2``.
+
+        Then ``gain e^(-rate s / 2)`` does not grow: in a stretch the product is at most the gain at its begin times the
+        root there, and the gain at its end times what the stretch adds.
+        """
+        half, most, v, c = V.rate / 2, Fraction(0), root, self.constant(V)
+        for first, last, psi, clock, passed in self._stretches:
+            added = c * psi * min(clock, 1 / half)
+            most = max(most, first * v + last * added)
+            v = rounded(v * decay_above(min(-half * passed, MOST_DECAY)) + added, BITS, up=True)
+        return rounded(max(most, self._stretches[-1][1] * v), BITS, up=True)
+
+    def ends(self, camps: Mapping[int, int], y: Sequence[Fraction]) -> Interval:
+        """Return ends of ``g_k x_k(T)`` from ``y(0)``, of agents that hear nobody else and all end at the same number.
+
+        The extremes of ``g_k y_k`` move outwards by at most ``gain psi m_k``; and ``x(T)`` is a mean of ``g_k x_k(0)``
+        plus means of what the ``g_k sigma_k`` lose, each of which goes to 0 without turning.
+        """
+        values, reach = [g * y[k] for k, g in camps.items()], max(self.pulls[k] for k in camps) * self.integral
+        sigma, zero = [g * self.sigma0[k] for k, g in camps.items()], Fraction(0)
+        first = [value + s for value, s in zip(values, sigma, strict=True)]
+        lost, won = (sum((max(sign * s, zero) for s in sigma), zero) for sign in (1, -1))
+        return max(min(values) - reach, min(first) - lost), min(max(values) + reach, max(first) + won)
+
+    @classmethod
+    def of(
+        cls,
+        gains: Mapping[str, Fraction],
+        sigma0: Sizes,
+        quiet: Fraction | None,
+        modes: Sequence[Iterable[tuple[int, int, Fraction]]],
+    ) -> Drive:
+        """Return what sliding variables do.
+
+        Parameters
+        ----------
+        gains : mapping
+            The parameters of the protocol.
+        sigma0 : mapping of int to Fraction
+            By node.
+        quiet : Fraction or None
+            From when on all are 0, ``ln(T_r/(T_r - t))``; None: ``T_r``.
+        modes : sequence of edges
+            Source, target and largest size, of every mode.
+        """
+        power, push = gains["mu3"] * gains["kappa"], gains["mu1"] + gains["delta"]
+        own = list(sigma0.values())
+        reaching = Reaching(own, gains["T_r"], gains["T_s"], gains["mu2"], power, push, quiet)
+        return cls(nominal_gain(gains), reaching, sigma0, [pulls(edges, sigma0) for edges in modes])
+
+
+def last_time(times: Sequence[Fraction | None], sigma0: Iterable[Fraction]) -> Fraction | None:
+    """Return the last reaching time of the sliding variables that are not 0 at first; None: ``T_r``."""
+    own = [z for z, s in zip(times, sigma0, strict=True) if s]
+    return None if None in own else max((z for z in own if z is not None), default=Fraction(0))
+
+
+# ---------------------------------------------------------------------- the check
+
+
+def check_drive(
+    doc: Document, family: Family, functions: Sequence[VerifiedFunction], protocol: Gains, begin: Begin
+) -> Drive | None:
+    """Verify the sliding variables, and how they drive every Lyapunov function."""
+    graph = family.modes[0].structure.graph
+    check_sliding(doc, graph, protocol, begin)
+    result = None
+    if begin.sigma is not None and any(begin.sigma):
+        sigma0 = dict(enumerate(begin.sigma))
+        bits = longest(edge[4] for mode in family.modes for edge in mode.edges)
+        spend(10 * sum(len(mode.edges) for mode in family.modes), bits, 128, "what sliding variables do")
+        times = [None if z is None else exact(z) for z in doc.data["reaching_time"]["z"].values()]
+        edges = ([(s, t, Fraction(high, mode.unit)) for s, t, _, _, high in mode.edges] for mode in family.modes)
+        result = Drive.of(protocol.gains, sigma0, last_time(times, begin.sigma), list(edges))
+    doc.at = "lyapunov.drives"
+    need((result is not None) == ("drives" in doc.data["lyapunov"]), "drives belong to sliding variables that move")
+    if result is not None:
+        for k, (V, text) in enumerate(
+            zip(functions, entries(doc.data["lyapunov"]["drives"], "drives", len(functions)), strict=True)
+        ):
+            doc.open("family-drive", f"lyapunov.functions[{k}]")
+            need(exact(text) >= result.constant(V), "what drives the function is not proved")
+            doc.done(f"c = {up(exact(text))}")
+    return result
