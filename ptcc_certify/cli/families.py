@@ -230,7 +230,7 @@ def certify_family(
     from ptcc_certify.certificate.family_certificate import STEPS
     from ptcc_certify.certificate.family_certificate import certify_family as run
     from ptcc_certify.certificate.request import Expectations
-    from ptcc_certify.certificate.restricted_claims import require_nominal
+    from ptcc_certify.certificate.restricted_search import require_nominal
     from ptcc_certify.certificate.verdict import CERTIFIED
     from ptcc_certify.report.family_screen import family_lines, family_summary
     from ptcc_certify.theorems.family_behaviour import decide
