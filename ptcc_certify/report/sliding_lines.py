@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
 from lmi.exact.decimal_rounding import down, up
 from lmi.exact.elementary_enclosures import LARGEST_PUSH
-from ptcc_certify.protocols.base import ReachingProtocol
-from ptcc_certify.protocols.reaching_time import ReachingTime
 from ptcc_certify.report.structure_text import Lines
 from ptcc_certify.report.text_layout import shorten_list, value_list
+
+if TYPE_CHECKING:
+    from ptcc_certify.protocols.base import ReachingProtocol
+    from ptcc_certify.protocols.reaching_time import ReachingTime
 
 
 def sliding_lines(
