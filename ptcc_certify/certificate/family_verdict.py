@@ -98,8 +98,11 @@ def _judge_behaviour(certificate: FamilyContent, components: Sequence[FamilyComp
     last = certificate.ends_of_signal
     others = [component for k, component in enumerate(components) if k not in last]
     answer = judge_family_behaviour(others, expected) if others else Answer(MET, expected)
-    for claim in last.values():
-        shows = [last_mode_shows(told, expected) for told in claim.behaviours]
+    for k, claim in last.items():
+        family = components[k].family
+        edges = [mode.sign for mode in family.modes] if isinstance(claim, LastModeClaim) else [family.union[2]]
+        told = zip(claim.behaviours, edges, strict=True)
+        shows = [last_mode_shows(one, expected, bool((signs > 0).all())) for one, signs in told]
         if False in shows and answer.status != REFUTED:
             number = shows.index(False)
             whose = f"{mode_name(certificate.family, number)} by itself: " * isinstance(claim, LastModeClaim)

@@ -16,7 +16,7 @@ from ptcc_certify.theorems.family_behaviour import Counterexample, FamilyCompone
 
 _CHAIN = (BIPARTITE_CONSENSUS, INTERVAL_BIPARTITE_CONSENSUS, BIPARTITE_CONTAINMENT)
 #: The behaviour of which each special case is one.
-_GENERAL = {
+GENERAL = {
     CONSENSUS: BIPARTITE_CONSENSUS,
     SIGNED_AVERAGE_CONSENSUS: BIPARTITE_CONSENSUS,
     CONTAINMENT: BIPARTITE_CONTAINMENT,
@@ -62,9 +62,9 @@ def component_holds(component: FamilyComponent, behaviour: str) -> bool | None:
     >>> component_holds(pair, "containment"), component_holds(pair, "signed-average consensus")
     (True, False)
     """
-    if behaviour not in _GENERAL:
+    if behaviour not in GENERAL:
         return component.holds(behaviour)
-    general = component.holds(_GENERAL[behaviour])
+    general = component.holds(GENERAL[behaviour])
     if not general:
         return general
     special = special_behaviours(component)
@@ -73,7 +73,7 @@ def component_holds(component: FamilyComponent, behaviour: str) -> bool | None:
 
 def component_refutation(component: FamilyComponent, behaviour: str) -> Counterexample | None:
     """Return what refutes a behaviour, special cases included; None where a special case alone does not hold."""
-    return component.refutation(_GENERAL.get(behaviour, behaviour))
+    return component.refutation(GENERAL.get(behaviour, behaviour))
 
 
 def camps(component: FamilyComponent) -> list[np.ndarray]:

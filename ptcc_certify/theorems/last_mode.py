@@ -9,11 +9,14 @@ from __future__ import annotations
 from ptcc_certify.graphs.structure import (
     BIPARTITE_CONSENSUS,
     BIPARTITE_CONTAINMENT,
+    CONSENSUS,
     INTERVAL_BIPARTITE_CONSENSUS,
+    SIGNED_AVERAGE_CONSENSUS,
     STABILITY,
     find_camps,
 )
 from ptcc_certify.theorems.family_behaviour import FamilyComponent
+from ptcc_certify.theorems.family_claims import GENERAL
 
 #: Each implies those after it.
 _CHAIN = (BIPARTITE_CONSENSUS, INTERVAL_BIPARTITE_CONSENSUS, BIPARTITE_CONTAINMENT)
@@ -48,16 +51,30 @@ def last_mode_behaviours(component: FamilyComponent) -> tuple[str | None, ...]:
     return tuple(result)
 
 
-def last_mode_shows(told: str | None, behaviour: str) -> bool | None:
-    """Tell whether a mode that does what is told shows a behaviour; None if that is not known.
+def last_mode_shows(told: str | None, behaviour: str, positive: bool = False) -> bool | None:
+    """Tell whether agents that do what is told show a behaviour, special cases included; None if that is not known.
+
+    Consensus and containment are bipartite ones without negative edges.
+
+    Parameters
+    ----------
+    told : str or None
+    behaviour : str
+    positive : bool
+        Whether all edges by which they do it are positive.
 
     Examples
     --------
-    >>> last_mode_shows("bipartite consensus", "bipartite containment"), last_mode_shows("stability", "stability")
-    (True, True)
+    >>> last_mode_shows("bipartite consensus", "bipartite containment"), last_mode_shows("stability", "consensus")
+    (True, False)
+    >>> last_mode_shows("bipartite consensus", "consensus", positive=True)
+    True
     """
     if told is None:
         return None
-    if behaviour not in (STABILITY, *_CHAIN):
-        return None
-    return behaviour in (_CHAIN[_CHAIN.index(told) :] if told in _CHAIN else (told,))
+    general = GENERAL.get(behaviour, behaviour)
+    if general not in (_CHAIN[_CHAIN.index(told) :] if told in _CHAIN else (told,)):
+        return False
+    if behaviour not in GENERAL or (positive and behaviour != SIGNED_AVERAGE_CONSENSUS):
+        return True
+    return False if behaviour == CONSENSUS else None

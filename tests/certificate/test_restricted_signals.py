@@ -236,6 +236,24 @@ def test_an_expectation_is_judged_by_the_last_mode():
     assert last(outage, expectations="bipartite containment").assessment.asked == "met"
 
 
+def test_consensus_is_told_of_restricted_signals_where_all_weights_are_positive():
+    line = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 1)])
+    outage = Family.switching([line, SignedDigraph.from_edges([], nodes="abc")])
+    halves = Family.switching(
+        [SignedDigraph.from_edges([edge], nodes="abc") for edge in [("a", "b", 1), ("b", "c", 1)]]
+    )
+    windows, shares = JointWindows(2, on=1, clock="s"), ClockShares(["0.9", "0.1"])
+    for family, signal, expected, asked in (
+        (outage, shares, "consensus", "met"),
+        (halves, windows, "consensus", "met"),
+        (halves, IN_TIME, "containment", "met"),
+        (halves, IN_TIME, "consensus", "refuted"),
+        (against(), IN_TIME, "consensus", "refuted"),
+        (outage, shares, "signed-average consensus", "left open"),
+    ):
+        assert last(family, signal, expectations=expected).assessment.asked == asked, (signal, expected)
+
+
 def test_a_mode_whose_uncertain_weights_move_targets_is_not_told():
     unsure = Family.from_intervals([("a", "c", 1, 2), ("b", "c", 1, 1)])
     made = last(unsure, expectations="bipartite containment")
