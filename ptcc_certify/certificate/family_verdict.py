@@ -20,6 +20,7 @@ from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
 from ptcc_certify.theorems.family_claims import component_holds, component_refutation
 from ptcc_certify.theorems.last_mode import last_mode_shows
+from ptcc_certify.theorems.restricted_signals import ClockShares, JointWindows
 
 #: What to try where edges do not tell whether rest states agree.
 NEXT_STEP = (
@@ -97,7 +98,11 @@ def _judge_behaviour(certificate: FamilyContent, components: Sequence[FamilyComp
     """Tell whether a behaviour holds for every signal, or for those that were asked for, by the last mode."""
     last = certificate.ends_of_signal
     others = [component for k, component in enumerate(components) if k not in last]
-    answer = judge_family_behaviour(others, expected) if others else Answer(MET, expected)
+    narrow = isinstance(certificate.signal, ClockShares | JointWindows)  # no constant member is one of these signals
+    judged = [component for component in others if component.behaviour != DEPENDS or not narrow]
+    answer = judge_family_behaviour(judged, expected) if judged else Answer(MET, expected)
+    if len(judged) < len(others) and answer.status == MET:
+        answer = Answer(OPEN, expected, "not decided of these signals")
     for k, claim in last.items():
         family = components[k].family
         edges = [mode.sign for mode in family.modes] if isinstance(claim, LastModeClaim) else [family.union[2]]
@@ -116,13 +121,16 @@ def _judge_rate(certificate: FamilyContent, least: Fraction) -> Answer:
     """Tell whether a rate of at least so much is proved for every signal, or excluded by the upper bound."""
     what, rate, bound = f"rate >= {near(least, 12)}", certificate.rate_of_signal, certificate.upper_bound
     if certificate.signal != "any":
-        bound = certificate.member_bound
+        held = not isinstance(certificate.signal, ClockShares | JointWindows)  # a constant member is one of them
+        bound = certificate.member_bound if held else None
     if all(part.component.nodes.size == 1 for part in certificate.parts) or (rate is not None and rate >= least):
         return Answer(MET, what)
     if certificate.signal == "any" and any(part.component.behaviour == DEPENDS for part in certificate.parts):
         return Answer(REFUTED, what, "no rate holds for every signal")
     if not certificate.common:
-        return Answer(OPEN, what, "whether rest states agree is not decided")
+        differ = any(part.component.behaviour == DEPENDS for part in certificate.parts)
+        reason = "rest states of modes differ" if differ else "whether rest states agree is not decided"
+        return Answer(OPEN, what, reason)
     if bound is not None and least > bound:
         return Answer(REFUTED, what, f"upper bound {up(bound, 8)}, proved")
     reason = "none is proved" if rate is None else f"proved: {down(rate)}"

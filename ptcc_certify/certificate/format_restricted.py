@@ -148,7 +148,7 @@ def read_claim(
         forms = ModeForms(
             tuple(triangle(lower, len(lower)) for lower in triangles),
             tuple(exact(step["numbers"]["b"]) for step in steps),
-            tuple(tuple(map(exact, step["witness"]["multipliers"])) for step in steps),
+            tuple(tuple(map(exact, step["witness"]["multipliers"])) if step["witness"] else () for step in steps),
             exact(entry["ratio"]),
         )
     return RateClaim(entry["component"], signal, forms, exact(entry["rate"]), bool(entry["bounded"]))

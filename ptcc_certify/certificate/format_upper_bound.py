@@ -67,6 +67,7 @@ def read_upper_bound(quotient: Quotient, entry: Any) -> FamilyRateBound | None:
         members = tuple(_member(quotient, one) for one in entries(entry["members"], "members"))
         durations = tuple(exact(h) for h in entries(entry["durations"], "durations", len(members)))
         need(0 < len(members) <= _MANY and all(h > 0 for h in durations), "no durations")
+        need(entry["kind"] in ("mixture", "word") or (entry["kind"] == "member" and len(members) == 1), "no bound")
         need(entry["kind"] == "word" or sum(durations) == 1, "no shares")
         value = exact(entry["value"])
     except (RejectedError, LookupError, TypeError, ValueError, ArithmeticError):

@@ -20,7 +20,7 @@ from ptcc_certify.certificate.format_vectors import Reader
 from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.checker.reading import exact, triangle
 from ptcc_certify.checker.side_files import SideFiles
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.errors import FormatError, ParameterError
 from ptcc_certify.lyapunov.family_function import FamilyFunction, prove_ends
 from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound
 from ptcc_certify.lyapunov.follower_function import FollowerFunction, LeadingPart
@@ -114,7 +114,10 @@ def _read_rows(
     of: str, section: Mapping[str, Any], component: FamilyComponent, proof: Any, files: SideFiles
 ) -> FollowerFunction:
     family, kernel = component.family, component.kernel
-    assert kernel is not None, "the check has verified a common kernel"
+    if kernel is None:
+        raise FormatError(
+            "rest states of more than 120 agents are verified, not read back; see ptcc check --json"
+        )
     index = {label: v for v, label in enumerate(family.labels)}
     pivots = {c.nodes[0] for c in kernel.structure.closed_components if c.balanced}
     agents = [np.array([index[label] for label in part["nodes"]]) for part in section["parts"]]

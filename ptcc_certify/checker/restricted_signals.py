@@ -49,6 +49,8 @@ def check_restricted(
         return
     items = entries(doc.section("restricted"), "restricted")
     need(0 < len(items) <= MANY_CLAIMS, f"no claim for restricted signals, or more than {MANY_CLAIMS}")
+    said = [entry.get("signals") if isinstance(entry, dict) else None for entry in items]
+    need(all(signals == said[0] for signals in said), "claims about different signals")
     for k, entry in enumerate(items):
         doc.at = of = f"restricted[{k}]"
         kind = entry.get("claim") if isinstance(entry, dict) else None

@@ -37,18 +37,15 @@ def restricted_entries(certificate: FamilyContent) -> Iterator[tuple[str, str]]:
     if not certificate.restricted:
         yield *head[:1], f"{head[1]}: nothing more is proved"  # type: ignore[misc]
     for claim in certificate.restricted:
-        if isinstance(claim, LastModeClaim):
-            yield head[0], f"{head[1]}: {_last_mode_text(certificate, claim)}"
-            continue
-        if isinstance(claim, ShareClaim):
-            yield head[0], f"{head[1]}: {_share_text(certificate, claim)}"
-            continue
-        if isinstance(claim, WindowClaim):
-            yield head[0], f"{head[1]}: {_window_text(certificate, claim)}"
-            continue
         name = shorten_label(certificate.parts[claim.component].component.family.labels[0])
         where = f"component of {printable(name)}: " if several else ""
-        yield head[0], f"{where}{head[1]}: {_rate_text(certificate, claim)}"
+        if isinstance(claim, LastModeClaim):
+            text = _last_mode_text(certificate, claim)
+        elif isinstance(claim, ShareClaim):
+            text = _share_text(certificate, claim)
+        else:
+            text = _window_text(claim) if isinstance(claim, WindowClaim) else _rate_text(certificate, claim)
+        yield head[0], f"{where}{head[1]}: {text}"
 
 
 def signal_text(signal: SignalClass) -> tuple[str, str]:
@@ -81,9 +78,10 @@ def _last_mode_text(certificate: FamilyContent, claim: LastModeClaim) -> str:
     return f"{begin}: {each}".removeprefix(": ")
 
 
-def _window_text(certificate: FamilyContent, claim: WindowClaim) -> str:
+def _window_text(claim: WindowClaim) -> str:
     rate = claim.rate
-    left = math.floor(math.log10(rate.multiple) + rate.exponent * math.log10(rate.eta))
+    size = math.log10(rate.eta.numerator) - math.log10(rate.eta.denominator)
+    left = math.floor(math.log10(rate.multiple) + rate.exponent * size)
     return f"{claim.behaviour}; what is left shrinks by 1e{left} of it in {near(rate.window, 6)} of the clock"
 
 

@@ -195,7 +195,8 @@ class Members:
         >>> Members(family).worst(x, np.array([0.0, 1.0, 0.0]))  # b is to stay large
         Choice(mode=0, levels=(1.0, 0.0))
         """
-        least, worst = np.inf, Choice(0)
+        least, worst = np.inf, self.choice(0, 0.0)
+        x, gradient = (v / (np.abs(v).max(initial=0.0) or 1.0) for v in (x, gradient))  # products stay within floats
         for mode, own in enumerate(self.arrays):
             falls = gradient[own.target] * (x[own.target] - own.sign * x[own.source])
             slopes = np.bincount(own.parameter, own.gap * falls[own.uncertain], minlength=own.q)

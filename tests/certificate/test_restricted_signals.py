@@ -24,6 +24,7 @@ from ptcc_certify.certificate.restricted_claims import LastModeClaim, RateClaim
 from ptcc_certify.checker import check, digest
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.report.restricted_screen import restricted_entries
 from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
@@ -409,3 +410,39 @@ def test_shares_that_are_none_are_refused():
             ClockShares(wrong)
     with pytest.raises(ParameterError, match="2 shares"):
         certify_family(with_outage("consensus"), PROTOCOL, signal=ClockShares(["0.5", "0.5"]))
+
+
+def test_the_claims_of_a_certificate_are_about_the_same_signals():
+    document = certify_family(slowed_by_switches(), PROTOCOL, signal=DwellTime(20, clock="s")).to_dict()
+    second = copy.deepcopy(document["restricted"][0])
+    second["signals"]["dwell"] = "21"
+    document["restricted"].append(second)
+    own = [step for step in document["proof"] if step["of"].startswith("restricted[0]")]
+    document["proof"] += [step | {"of": step["of"].replace("[0]", "[1]", 1)} for step in own]
+    document["digest"] = digest(document)
+    assert check(document).reason == "claims about different signals"
+    second["signals"]["dwell"] = "20"
+    document["digest"] = digest(document)
+    assert check(document).accepted
+
+
+def test_no_constant_member_refutes_what_shares_or_windows_are_asked_for():
+    chain = Family.switching([SignedDigraph.from_edges([e], nodes="abc") for e in (("a", "b", 1), ("b", "c", -1))])
+    expected = "bipartite consensus"
+    for signal in (ClockShares(["1/2", "1/2"]), JointWindows(1000, on=500, clock="s")):
+        (answer,) = certify_family(chain, PROTOCOL, signal=signal, expectations=expected).assessment.answers
+        assert (answer.status, answer.why) == ("left open", "not decided of these signals"), signal
+    (answer,) = certify_family(chain, PROTOCOL, signal="constant", expectations=expected).assessment.answers
+    assert answer.status == "refuted"
+    pair = [SignedDigraph.from_edges([("a", "b", w), ("b", "a", w)]) for w in (1, 100)]
+    asked = Expectations(min_rate="201.99999999")
+    shared = certify_family(Family.switching(pair), PROTOCOL, signal=ClockShares(["1/2", "1/2"]), expectations=asked)
+    assert shared.assessment.answers[0].status != "refuted"
+
+
+def test_claims_of_several_components_name_theirs():
+    first = SignedDigraph.from_edges([("a", "b", 1), ("x", "z", 1)], nodes="abcxyz")
+    second = SignedDigraph.from_edges([("b", "c", 1), ("y", "z", 1)], nodes="abcxyz")
+    certificate = certify_family(Family.switching([first, second]), PROTOCOL, signal=JointWindows(2, on=1, clock="s"))
+    lines = [text for head, text in restricted_entries(certificate) if head == "windows"]
+    assert lines and all(line.startswith("component of ") for line in lines)
