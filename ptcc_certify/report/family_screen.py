@@ -283,11 +283,10 @@ def groups_text(component: FamilyComponent) -> str:
     for group in groups.agreeing:
         names = _names(component, group.nodes.tolist(), 30)
         parts.append(f"{names} keeps its value" if group.nodes.size == 1 else f"{names} agree up to camps")
-    member = {v for group in groups.agreeing for v in group.nodes.tolist()}
-    zero = groups.at_zero.tolist()
-    others = [v for v in range(component.nodes.size) if v not in member and v not in set(zero)]
-    drawn = [v for v in others if groups.bounded_by(v)]
-    free = [v for v in others if v not in set(drawn)]
+    zero, near = groups.at_zero.tolist(), set(groups.bounded.tolist())
+    known = {v for group in groups.agreeing for v in group.nodes.tolist()}.union(zero)
+    others = [v for v in range(component.nodes.size) if v not in known]
+    drawn, free = ([v for v in others if (v in near) == wanted] for wanted in (True, False))
     if zero:
         parts.append(f"{_names(component, zero, 30)} {'end' if len(zero) > 1 else 'ends'} at 0")
     if drawn:

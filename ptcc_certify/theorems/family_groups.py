@@ -102,6 +102,16 @@ class FamilyGroups:
             return None
         return tuple(np.unique(member[heard][member[heard] >= 0]).tolist())
 
+    @cached_property
+    def bounded(self) -> np.ndarray:
+        """All nodes that hear agreeing groups and, of ``R``, nobody else: :meth:`bounded_by` of these is not empty."""
+        source, target, _ = self.component.family.union
+        others = self.sources[self._membership[self.sources] < 0]
+        near, loose = (
+            reached(self._size, source, target, first) for first in (np.flatnonzero(self._membership >= 0), others)
+        )
+        return np.setdiff1d(near, loose)
+
     @property
     def _size(self) -> int:
         return self.component.family.n_nodes

@@ -265,6 +265,7 @@ def run(rng: random.Random, component: FamilyComponent, x: np.ndarray, rounds: i
 
 def groups_hold(rng: random.Random, component: FamilyComponent) -> bool:
     groups, n = FamilyGroups(component), component.family.n_nodes
+    assert groups.bounded.tolist() == [v for v in range(n) if groups.bounded_by(v)]
     start = np.array([rng.choice((-1, 1)) * rng.uniform(0.5, 1) for _ in range(n)])
     start[groups.at_zero] *= 100
     for greedy in (None, rng.randrange(n)):
