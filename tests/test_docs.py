@@ -786,3 +786,32 @@ def test_examples_run_by_default(pytestconfig):
 
 def test_exceptions_to_the_rule_are_public_names():
     assert set().union(*NO_SOURCE.values()) <= {name for _, name in PUBLIC}
+
+
+# ---------------------------------------------------------------------- sections that are cited
+
+THEORY = Path(ptcc_certify.__file__).parent.parent / "docs" / "theory"
+CITED = re.compile(r'docs/theory/([\w-]+\.md), ((?:"[^"]+"(?:,| and)?\s+)*"[^"]+")')
+
+
+@cache
+def headings(page: str) -> frozenset[str]:
+    return frozenset(re.findall(r"^#{1,4} (.+?)\s*$", (THEORY / page).read_text(encoding="utf-8"), re.MULTILINE))
+
+
+def sections_cited(text: str) -> set[tuple[str, str]]:
+    """Return the pages of the theory and the sections of each that a text cites, also across ends of lines."""
+    text = re.sub(r"\n\s*(#:? )?\s*", " ", text)
+    return {(page, name) for page, names in CITED.findall(text) for name in re.findall(r'"([^"]+)"', names)}
+
+
+def test_sections_are_found_one_by_one_and_across_lines():
+    text = 'docs/theory/rates.md, "One", "Two\n    words" and "Three". See "Four".'
+    assert sections_cited(text) == {("rates.md", "One"), ("rates.md", "Two words"), ("rates.md", "Three")}
+
+
+def test_every_section_of_the_theory_that_code_cites_is_there():
+    sources = [p for room in ("ptcc_certify", "lmi") for p in (THEORY.parent.parent / room).rglob("*.py")]
+    cited = {one for path in sources for one in sections_cited(path.read_text(encoding="utf-8"))}
+    assert len(cited) > 10
+    assert not sorted((page, name) for page, name in cited if name not in headings(page))
