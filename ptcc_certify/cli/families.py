@@ -12,7 +12,7 @@ import click
 from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
-from ptcc_certify.cli.scenario import is_scenario, read_scenario, scenario_record
+from ptcc_certify.cli.scenario import OF_FAMILIES, is_scenario, read_scenario, scenario_record
 from ptcc_certify.cli.terminal import LOG, Screen, print_json, progress
 from ptcc_certify.errors import ExitCode, ParameterError, one_line
 from ptcc_certify.graphs.rationals import shorten
@@ -332,6 +332,25 @@ def same_family(
     elif order != tuple(range(len(order))):
         told["modes"] = f"the same modes in another order than in the certificate, {', '.join(own)}"
     return report, told
+
+
+def family_of_files(graph: str, read: Any, options: shared.Options) -> Family | None:
+    """Return the family that a file makes with options or a scenario, read as a certificate says; None of one graph."""
+    from ptcc_certify.graphs.io.family_files import is_family_file
+
+    own = read_scenario(graph) if is_scenario(graph) else None
+    several = own is not None and len(own.graphs) > 1
+    asked = any(options[name] or (own is not None and own.options.get(name)) for name in OF_FAMILIES)
+    if not (several or asked or is_family_file(shared.graph_file(graph))):
+        return None
+    way = {
+        "orientation": None if read["orientation"] == "matrix" else read["orientation"],
+        "duplicates": {"refused": "refuse"}.get(read["duplicates"], read["duplicates"]),
+        "drop_self_loops": read["self_loops"] != "refused",
+        "undirected": read["undirected"],
+    }
+    family = _read_again(way, (graph,), options)[1]
+    return family if family.graph is None else None
 
 
 def _read_again(read: Any, graphs: tuple[str, ...], options: shared.Options) -> tuple[tuple[str, ...], Family, str]:

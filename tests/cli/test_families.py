@@ -87,6 +87,19 @@ def test_what_is_written_is_checked_against_the_files():
     assert ptcc("check", "c.json", "day.csv", "nowhere.csv").code == 2
 
 
+def test_a_certificate_of_one_graph_is_of_no_family():
+    assert ptcc("certify", "day.csv", "--no-simulation", "-o", "one.json").code == 0
+    for key in ('uncertainty = "10%"', 'optional = ["a,b"]'):
+        Path("one.toml").write_text(f'[graph]\nfile = "day.csv"\n{key}\n')
+        assert ptcc("check", "one.json", "one.toml").code == 1
+    for words in (("day.csv", "--uncertainty", "10%"), ("day.csv", "--optional", "a,b"), ("s.toml",), ("unsure.csv",)):
+        run = ptcc("check", "one.json", *words)
+        assert run.code == 1 and "one graph in the certificate, a family in the files" in " ".join(run.out.split()), run
+    for words in (("day.csv",), ("day.csv", "--uncertainty", "0"), ("day.csv", "--switching")):
+        assert ptcc("check", "one.json", *words).code == 0
+    assert ptcc("check", "one.json", "day.csv", "--signal", "constant").code == 2
+
+
 def test_modes_are_the_same_in_any_order_and_by_any_name():
     """Which file is which is told where names or order are others; no claim rests on them."""
     assert ptcc("certify", *BOTH, "-o", "c.json").code == 0
