@@ -15,7 +15,7 @@ from ptcc_certify.graphs.family import Family, read_share
 from ptcc_certify.graphs.io.edge_list import column, edge_columns, records
 from ptcc_certify.graphs.io.files import Source, name_and_ending, read_bytes
 from ptcc_certify.graphs.io.graph_files import MATRICES, is_edge_list, read_graph
-from ptcc_certify.graphs.rationals import format_exact, parse_exact, shorten
+from ptcc_certify.graphs.rationals import as_fraction, format_exact, parse_exact, shorten
 
 _LEAST = ("weight_min", "min_weight", "w_min", "least", "min", "lower")
 _LARGEST = ("weight_max", "max_weight", "w_max", "largest", "max", "upper")
@@ -204,6 +204,23 @@ def truth(answer: object) -> bool | None:
     return text in _YES if text in (*_YES, *_NO) else None
 
 
+def refuse_outside(weight: object, least: Fraction, largest: Fraction, place: str) -> None:
+    """Refuse a weight that stands beside an interval and lies outside of it; what is no number says nothing.
+
+    Examples
+    --------
+    >>> refuse_outside("n/a", Fraction(1), Fraction(2), "row 1"), refuse_outside(1.5, Fraction(1), Fraction(2), "row 1")
+    (None, None)
+    """
+    try:
+        number = as_fraction(weight, "weight")  # type: ignore[arg-type]
+    except (NumberError, TypeError):
+        return
+    if not least <= number <= largest:
+        ends = f"{format_exact(least)} to {format_exact(largest)}"
+        raise GraphError(f"{place}: weight {format_exact(number)} lies outside of its interval, {ends}; mend one")
+
+
 def _both(pair: Sequence[str], undirected: bool) -> list[tuple[str, str]]:
     return [(pair[0], pair[1])] + [(pair[1], pair[0])] * undirected
 
@@ -294,6 +311,8 @@ def _row(
         raise FormatError(
             f"{where}: edge {edge}: its least weight {least} is above its largest {largest}; exchange them"
         )
+    if low is not None and ends[2] is not None:
+        refuse_outside(field(ends[2]), least, largest, f"{where}: edge {edge}")
     if least == largest == 0:
         raise FormatError(f"{where}: edge {edge}: its weight is always 0; remove the row")
     if source == target:
