@@ -114,7 +114,11 @@ def _judge_rate(certificate: FamilyContent, least: Fraction) -> Answer:
     if certificate.signal == "any" and any(part.component.behaviour == DEPENDS for part in certificate.parts):
         return Answer(REFUTED, what, "no rate holds for every signal")
     if not certificate.common:
-        return Answer(OPEN, what, "whether rest states agree is not decided")
+        differ = any(part.component.behaviour == DEPENDS for part in certificate.parts)
+        why = (
+            "no rate is proved of modes that end differently" if differ else "whether rest states agree is not decided"
+        )
+        return Answer(OPEN, what, why)
     if bound is not None and least > bound:
         return Answer(REFUTED, what, f"upper bound {up(bound, 8)}, proved")
     reason = "none is proved" if rate is None else f"proved: {down(rate)}"

@@ -251,7 +251,7 @@ def certify_family(
         _show_decision(graphs, family, left, as_json, screen, options)
         code = _expected(left, options["expect"])
         if output:
-            click.echo("note: certificates are for --signal any; nothing was written", err=True)
+            click.echo("note: of fixed weights that are unknown no certificate is made; nothing was written", err=True)
         click.echo(
             "undecided: of fixed weights that are unknown the behaviour is decided, no rate is certified", err=True
         )
@@ -298,10 +298,14 @@ def refuse_options(options: shared.Options) -> None:
 
 
 def _constant_alone(constant: Sequence[FamilyComponent], every: Sequence[FamilyComponent]) -> Sequence[FamilyComponent]:
-    """Return what constant signals do where it does not follow from what all signals do; nothing where it does."""
+    """Return what constant signals do where neither all signals nor single modes show it; nothing where they do."""
     from ptcc_certify.theorems.family_behaviour import DEPENDS
+    from ptcc_certify.theorems.last_mode import last_mode_behaviours
 
-    follows = all(one.behaviour == other.behaviour != DEPENDS for one, other in zip(constant, every, strict=True))
+    follows = all(
+        None not in last_mode_behaviours(other) if other.behaviour == DEPENDS else one.behaviour == other.behaviour
+        for one, other in zip(constant, every, strict=True)
+    )
     return () if follows else constant
 
 

@@ -25,6 +25,7 @@ FILES = {
     "s.toml": '[graph]\nfile = ["day.csv", "night.csv"]\nuncertainty = "5%"\n[protocol]\nkappa = 3\n',
 }
 BOTH = ("day.csv", "night.csv", "--switching")
+SPOILED = ("day.csv", "spoiled.csv", "--switching")
 
 
 @pytest.fixture(autouse=True)
@@ -169,7 +170,10 @@ def test_the_json_is_the_certificate_or_the_decision():
         ((*BOTH, "--kappa", "3", "--max-input", "59"), 4, "left open: |u_k| <= 59"),
         (("day.csv", "spoiled.csv", "--switching", "--min-rate", "1"), 3, "no rate holds for every signal"),
         (("day.csv", "spoiled.csv", "--switching", "--expect", "bipartite-consensus"), 3, "multiply to -1"),
-        (("day.csv", "spoiled.csv", "--switching", "--signal", "constant"), 4, "no rate is certified"),
+        ((*SPOILED, "--signal", "constant"), 0, "if mode and weights never change: bipartite consensus"),
+        ((*SPOILED, "--signal", "constant", "--expect", "bipartite-consensus"), 0, "met: bipartite consensus"),
+        ((*SPOILED, "--signal", "constant", "--min-rate", "1"), 4, "modes that end differently"),
+        (("day.csv", "--optional", "a,b", "--signal", "constant"), 4, "no rate is certified"),
         ((*BOTH, "--signal", "constant"), 0, "certified"),
     ],
 )
