@@ -58,6 +58,8 @@ if TYPE_CHECKING:
 STEPS = ("the decision", "upper bound on the decay rate", "Lyapunov functions", STEP, "independent check")
 #: GB that the check may take for families whose members have more nodes than are solved for exactly.
 LARGE_MEMORY = 16
+#: What certificates of one graph have, and what is in its place here.
+_OF_FAMILIES = {"final_state": "final_states", "behaviour": "behaviours", "envelope": "deviation_bound"}
 #: Share of the upper bound that ends the search, and share of the time that the bound may take at first.
 _ENOUGH, _BOUND_SHARE = Fraction(99, 100), 0.3
 
@@ -235,6 +237,13 @@ class FamilyCertificate(FamilyContent, Shown):
                 f"{of}; for a page or LaTeX: write_report(certificate, path); else save it, and read it"
             )
         return self.source
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            """Refuse a name that only certificates of one graph have, with that of families."""
+            hint = f"; that of a family has {_OF_FAMILIES[name]}" if name in _OF_FAMILIES else ""
+            raise AttributeError(f"a FamilyCertificate has no {name}{hint}", name=name, obj=self)
 
     def __eq__(self, other: object) -> bool:
         """Two certificates are equal when they claim and prove the same; upper bounds on the rate do not count."""

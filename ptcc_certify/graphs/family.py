@@ -220,6 +220,11 @@ class Family(Shown):
     notes: tuple[str, ...] = field(default=())
     read: Mapping[str, Any] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        if not (isinstance(self.modes, tuple) and self.modes and all(isinstance(mode, Mode) for mode in self.modes)):
+            mend = "Family.from_graph takes a graph, Family.switching several, as_family whatever makes a family"
+            raise GraphError(f"Family takes a tuple of modes, at least one; {mend}")
+
     @property
     def labels(self) -> tuple[str, ...]:
         """The N nodes."""

@@ -39,6 +39,8 @@ GRAPH = SignedDigraph.from_edges([("a", "b", 2), ("b", "c", -3)])
         (lambda: Family.from_intervals([("a", "b", 1, 2)], orientation="up"), 'orientation "up" is unknown'),
         (lambda: Family.from_intervals([]), "node"),
         (lambda: Family.switching({}), "at least one mode"),
+        (lambda: Family(GRAPH), "Family.from_graph takes a graph"),
+        (lambda: Family(()), "at least one"),
         (
             lambda: Family.switching({"day": GRAPH, "night": SignedDigraph.from_edges([("a", "b", 1)])}),
             "night has no node c",
