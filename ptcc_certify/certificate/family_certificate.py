@@ -326,7 +326,8 @@ def certify_family(
         )
     signal = read_signal(signal)
     if isinstance(signal, ClockShares) and len(signal.shares) != len(family.modes):
-        raise ParameterError(f"{len(signal.shares)} shares of the clock for {len(family.modes)} modes")
+        count, modes = len(signal.shares), len(family.modes)
+        raise ParameterError(f"{count} share{'s' * (count > 1)} of the clock; give one for each of {modes} modes")
     asked, seconds, progress = read_expectations(expectations), read_seconds(time_limit, family), listener(progress)
     initial_state = None if x0 is None else read_initial_state(analyse(family.modes[0].mandatory), x0, "x0")
     progress(STEPS[0])

@@ -241,6 +241,9 @@ def certify_family(
     most = options["max_input"]
     if most is not None and most <= 0:
         raise ParameterError("--max-input is outside its domain; it must be > 0")
+    given, modes = len(options["share"]), len(family.modes)
+    if given not in (0, modes):
+        raise ParameterError(f"--share: {given} given, and {modes} modes; give one for each, outages too")
     signal = signals_of(options)
     protocol = shared.protocol_of(options)
     x0 = shared.read_initial_state(options["x0"], options["seed"], family.modes[0].mandatory)

@@ -370,7 +370,7 @@ def test_more_is_claimed_for_restricted_signals():
         ((*spoiled, "--dwell", "0.2"), "dwell      at least 0.2 of time between switches: the last mode decides"),
         ((*spoiled, "--clock-dwell", "3"), "nothing more is proved"),
         (
-            (*outage, "--share", "0.5", "--share", "0.5"),
+            (*outage, "--share", "0.5", "--share", "50%"),
             "shares     modes at 0.5, 0.5 of the clock: bipartite consensus",
         ),
         ((*outage, "--clock-window", "2", "--window-on", "1"), "windows    each edge on for 1 of every 2 of the clock"),
@@ -391,8 +391,9 @@ def test_more_is_claimed_for_restricted_signals():
         (("--clock-window", "1"), "give both"),
         (("--clock-window", "1", "--window-on", "2"), "at most the whole window"),
         (("--clock-window", "1", "--window-on", "1", "--dwell", "1"), "signals of different kinds"),
-        (("--share", "0.5"), "they must sum to 1"),
-        (("--share", "1"), "1 shares of the clock for 2 modes"),
+        (("--share", "0.7"), "--share: 1 given, and 2 modes; give one for each"),
+        (("--share", "0.7", "--share", "20%"), "sum to 9/10; give one for each mode, 1 in all"),
+        (("--share", "0.7", "--share", "x%"), "share = x is not a finite number"),
     ],
 )
 def test_restricted_signals_that_are_none_are_refused(words: tuple[str, ...], reason: str):
