@@ -344,6 +344,14 @@ def test_modes_are_called_by_their_files():
     assert "day, night: 2 modes" in ptcc("classify", *BOTH).out
 
 
+def test_a_file_that_is_given_twice_is_told():
+    for command in ("classify", "certify"):
+        run = ptcc(command, "day.csv", "night.csv", "day.csv", "--switching")
+        told = "day.csv was given 2 times: modes day, day (3) are the same"
+        assert run.code == 0 and told in " ".join(run.out.split()), run
+        assert "given" not in ptcc(command, *BOTH).out
+
+
 def test_no_name_of_a_file_or_a_mode_steers_the_terminal():
     odd = "day\x1bc.csv"
     Path(odd).write_text(FILES["day.csv"])

@@ -114,7 +114,18 @@ def read_family(
         raise GraphError(f"optional edge {shorten(source)} -> {shorten(target)} is in no file; check the labels")
     read = {"orientation": orientation, "undirected": undirected, **options}
     read |= {"uncertainty": format_exact(share), "optional": [list(pair) for pair in wanted]}
-    return replace(Family.switching(named), read=read)
+    family = Family.switching(named)
+    return replace(family, read=read, notes=family.notes + _given_again([str(path) for path in sources], [*named]))
+
+
+def _given_again(paths: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
+    """Return a note about each file that is given more than once."""
+    notes = []
+    for path in dict.fromkeys(paths):
+        if len(same := [name for other, name in zip(paths, names, strict=True) if other == path]) > 1:
+            modes = ", ".join(shorten(name) for name in same)
+            notes.append(f"{shorten(Path(path).name)} was given {len(same)} times: modes {modes} are the same")
+    return tuple(notes)
 
 
 def keywords_of(read: Any) -> dict[str, Any]:
