@@ -67,7 +67,7 @@ def mode_options(command: Any) -> Any:
             multiple=True,
             metavar="SOURCE,TARGET",
             callback=_pair,
-            help="Family: this edge may fail; repeat it for more.",
+            help="Family: this edge may fail, on which TARGET hears SOURCE; repeat it for more.",
         ),
         click.option(
             "--uncertainty", metavar="SHARE", help="Family: every weight is known up to this share of it, such as 10%."

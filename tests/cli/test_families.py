@@ -282,7 +282,12 @@ BAD = {
     "percent": ("a,b,1", ("--uncertainty", "10"), "write 10% if it is one"),
     "no share": ("a,b,1", ("--uncertainty", "much"), '"much" is not a number'),
     "no edge": ("a,b,1", ("--optional", "a"), "--optional: a is no edge; write SOURCE,TARGET"),
-    "unknown edge": ("a,b,1", ("--optional", "b,a"), "optional edge b -> a is in no file"),
+    "unknown edge": ("a,b,1", ("--optional", "a,c"), "optional edge a -> c is in no file; check the labels"),
+    "turned edge": (
+        "a,b,1",
+        ("--optional", "a,b", "--edges", "listens"),
+        "optional edge a -> b is in no file; b -> a is: name the one who is heard first",
+    ),
     "standard input twice": ("a,b,1", ("-", "-", "--switching"), "standard input, which is one graph"),
     "a scenario beside": ("a,b,1", ("s.toml", "--switching"), "a scenario stands alone"),
     "signal": ("a,b,1", ("--signal", "fast"), "'fast' is not one of"),

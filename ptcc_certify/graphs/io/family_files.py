@@ -11,7 +11,7 @@ from typing import Any
 
 from ptcc_certify.errors import FormatError, GraphError, NumberError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.graphs.family import Family, read_share
+from ptcc_certify.graphs.family import Family, Mode, read_share
 from ptcc_certify.graphs.io.edge_list import column, edge_columns, records
 from ptcc_certify.graphs.io.files import Source, name_and_ending, read_bytes
 from ptcc_certify.graphs.io.graph_files import MATRICES, is_edge_list, read_graph
@@ -58,7 +58,7 @@ def read_family(
     uncertainty : number or str
         Of weights that are given as one number: a share from 0 to 1, or a text as "10%".
     optional : iterable of (source, target)
-        Edges that may fail, in every mode that has them.
+        Edges that may fail, in every mode that has them: from who is heard to who listens, whatever the orientation.
     orientation : {"information", "listens"}, optional
         As in :func:`read_graph`.
     undirected : bool
@@ -111,7 +111,9 @@ def read_family(
         missing -= off
     if missing:
         source, target = min(missing)
-        raise GraphError(f"optional edge {shorten(source)} -> {shorten(target)} is in no file; check the labels")
+        turned = any(_has(mode, (target, source)) for family in named.values() for mode in family.modes)
+        mend = f"{_text((target, source))} is: name the one who is heard first" if turned else "check the labels"
+        raise GraphError(f"optional edge {_text((source, target))} is in no file; {mend}")
     read = {"orientation": orientation, "undirected": undirected, **options}
     read |= {"uncertainty": format_exact(share), "optional": [list(pair) for pair in wanted]}
     family = Family.switching(named)
@@ -236,8 +238,9 @@ def _both(pair: Sequence[str], undirected: bool) -> list[tuple[str, str]]:
     return [(pair[0], pair[1])] + [(pair[1], pair[0])] * undirected
 
 
-def _has(graph: SignedDigraph, pair: tuple[str, str]) -> bool:
-    source, target = (graph.index.get(label) for label in pair)
+def _has(graph: SignedDigraph | Mode, pair: tuple[str, str]) -> bool:
+    index = {label: k for k, label in enumerate(graph.labels) if label in pair}
+    source, target = (index.get(label, -1) for label in pair)
     return bool(((graph.source == source) & (graph.target == target)).any())
 
 
