@@ -88,9 +88,13 @@ restricted_options = shared.options_of(
         "--clock-dwell", metavar="TAU", help="Families: the same on the stretched clock, which is infinite at T."
     ),
     shared.number_option(
-        "--clock-window", metavar="H", help="Families: every edge is on in each window of so much stretched clock,"
+        "--clock-window",
+        metavar="H",
+        help="Families: the length of windows of stretched clock; every edge is on in each.",
     ),
-    shared.number_option("--window-on", metavar="DELTA", help="for so much of it at least."),
+    shared.number_option(
+        "--window-on", metavar="DELTA", help="Families: for how much of every window an edge is on, at least."
+    ),
     shared.number_option("--window", metavar="H", hidden=True),
     click.option(
         "--share",

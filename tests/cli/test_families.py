@@ -342,6 +342,15 @@ def test_what_is_wrong_with_the_family_of_a_scenario_is_told_by_its_key(text: st
 def test_what_new_writes_tells_of_families():
     text = ptcc("new").out
     assert "# uncertainty = " in text and '["day.csv", "night.csv"]' in text
+    assert "repeat" not in text and ",  [default" not in text
+
+
+def test_new_takes_the_graphs_of_a_family():
+    assert ptcc("new", *BOTH[:2], "-o", "n.toml").code == 0
+    assert '\nfile = ["day.csv", "night.csv"] ' in Path("n.toml").read_text()
+    assert ptcc("classify", "n.toml").out == ptcc("classify", *BOTH).out
+    assert 'file = "unsure.csv"' in ptcc("new", "unsure.csv").out
+    assert "has no node c, which another mode has" in ptcc("new", "day.csv", "other.csv").err
 
 
 def test_modes_are_called_by_their_files():
