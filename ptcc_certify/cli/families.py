@@ -133,7 +133,7 @@ def refuse_restricted(options: shared.Options) -> None:
     """Refuse restricted signals where one graph acts for ever."""
     for name in ("dwell", "clock_dwell", "window", "clock_window", "window_on", "share"):
         if options[name]:
-            raise ParameterError(f"{shared.flag_of(name)}: is for families of graphs; this is one graph: leave it out")
+            raise ParameterError(f"{shared.flag_of(name)} is for families of graphs; this is one graph: leave it out")
 
 
 def read_graph_or_family(graphs: tuple[str, ...], options: shared.Options) -> SignedDigraph | Family:
@@ -301,7 +301,7 @@ def refuse_options(options: shared.Options) -> None:
             None,
             False,
         ):
-            raise ParameterError(f"{shared.flag_of(name)}: is for one graph, not for families yet; leave it out")
+            raise ParameterError(f"{shared.flag_of(name)} is for one graph, not for families yet; leave it out")
 
 
 def _constant_alone(constant: Sequence[FamilyComponent], every: Sequence[FamilyComponent]) -> Sequence[FamilyComponent]:

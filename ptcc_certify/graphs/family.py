@@ -431,7 +431,7 @@ class Family(Shown):
         optional = sum(int(mode.optional.sum()) for mode in self.modes)
         parts = [f"{self.n_nodes} nodes"] + [f"{len(self.modes)} modes"] * (len(self.modes) > 1)
         parts += [f"{uncertain} of {edges} weights uncertain"] * bool(uncertain)
-        parts += [f"{optional} edges optional"] * bool(optional)
+        parts += [f"{optional} edge{'s' * (optional > 1)} optional"] * bool(optional)
         return f"Family({', '.join(parts)})"
 
 

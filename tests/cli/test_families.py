@@ -77,11 +77,14 @@ def test_what_is_written_is_checked_against_the_files():
     checked = ptcc("check", "c.json")
     assert checked.code == 0 and "bipartite consensus at T = 1 for every signal" in checked.out
     for words, why in (
-        (("day.csv", "spoiled.csv"), "in mode night (spoiled of the files) the certificate alone has"),
+        (
+            ("day.csv", "spoiled.csv"),
+            'in mode night (spoiled of the files) ["c", "a", "-2"] is only in the certificate',
+        ),
         ((*BOTH, "--uncertainty", "1%"), "in mode day (one of 2 that differ)"),
         (("day.csv",), "2 modes in the certificate, 1 in the files"),
-        (("other.csv", "--uncertainty", "1%"), "the certificate alone has node c"),
-        (("day.csv", "day.csv"), "in mode night (day (2) of the files) the certificate alone has"),
+        (("other.csv", "--uncertainty", "1%"), "node c is only in the certificate"),
+        (("day.csv", "day.csv"), "in mode night (day (2) of the files) ["),
     ):
         run = ptcc("check", "c.json", *words)
         assert run.code == 1 and why in " ".join(run.out.split()), run
@@ -211,10 +214,20 @@ def test_commands_about_one_graph_say_so(command: str):
         run = ptcc(command, *words, *needs)
         assert (run.code, run.out, len(run.err.splitlines())) == (2, "", 1), run
         assert re.search(
-            "takes one graph|ptcc classify and certify take|option of ptcc classify, ptcc certify", run.err
+            "takes one graph|ptcc classify, certify, simulate and plot take|option of ptcc classify, ptcc certify",
+            run.err,
         )
     if command != "explore":
         assert f"ptcc {command} takes one graph" in ptcc(command, "s.toml").err
+
+
+def test_help_names_the_commands_that_take_families():
+    taken = "`classify`, `certify`, `simulate`, `plot` and `check` take families"
+    assert taken.replace("`", "") in " ".join(ptcc("--help").out.replace("`", "").split())
+    for words in (("unsure.csv", "--switching"), ("unsure.csv", "--what", "graph")):
+        assert ptcc("plot" if "--what" in words else "simulate", *words).code == 0
+    refused = ptcc("explore", "unsure.csv").err
+    assert "ptcc classify, certify, simulate and plot take it" in refused
 
 
 def test_pages_statements_and_figures_are_made_of_the_certificate_of_a_family():
@@ -233,8 +246,8 @@ def test_figures_are_made_of_the_files_of_a_family():
     for words, told in (
         (("plot", *BOTH, "--what", "spectrum"), "eigenvalues of single graphs do not tell"),
         (("plot", "day.csv", "night.csv"), "2 graphs; add --switching"),
-        (("plot", *BOTH, "--what", "states", "--gain-cap", "3"), "--gain-cap: is for one graph"),
-        (("plot", *BOTH, "--wide"), "--wide: is for one graph"),
+        (("plot", *BOTH, "--what", "states", "--gain-cap", "3"), "--gain-cap is for one graph"),
+        (("plot", *BOTH, "--wide"), "--wide is for one graph"),
     ):
         run = ptcc(*words)
         assert (run.code, run.out) == (2, "") and told in run.err, run
@@ -425,7 +438,7 @@ def test_restricted_signals_that_are_none_are_refused(words: tuple[str, ...], re
 
 def test_one_graph_has_no_restricted_signals():
     run = ptcc("certify", "day.csv", "--dwell", "1")
-    assert run.code == 2 and "--dwell: is for families" in run.err, run
+    assert run.code == 2 and "--dwell is for families" in run.err, run
 
 
 def test_restricted_signals_are_keys_of_scenarios():

@@ -82,7 +82,7 @@ def read_family(
     --------
     >>> family = read_family(StringIO("source,target,weight_min,weight_max\na,b,1,2\nb,a,-1,0\n"))
     >>> family, family.modes[0].edge_interval(0)
-    (Family(2 nodes, 2 of 2 weights uncertain, 1 edges optional), (Fraction(-1, 1), Fraction(0, 1)))
+    (Family(2 nodes, 2 of 2 weights uncertain, 1 edge optional), (Fraction(-1, 1), Fraction(0, 1)))
     >>> read_family([StringIO("a,b,1"), StringIO("b,a,1")], uncertainty="10%")
     Family(2 nodes, 2 modes, 2 of 2 weights uncertain)
     """
