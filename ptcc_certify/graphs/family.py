@@ -202,6 +202,11 @@ class Family(Shown):
     read : mapping
         The keywords with which :func:`ptcc_certify.read_family` reads its files again; empty if it is from none.
 
+    Raises
+    ------
+    GraphError
+        It is given no tuple of modes.
+
     References
     ----------
     docs/theory/families.md.
