@@ -59,6 +59,8 @@ if TYPE_CHECKING:
 STEPS = ("the decision", "upper bound on the decay rate", "Lyapunov functions", STEP, "independent check")
 #: GB that the check may take for families whose members have more nodes than are solved for exactly.
 LARGE_MEMORY = 16
+#: What certificates of one graph have, and what is in its place here.
+_OF_FAMILIES = {"final_state": "final_states", "behaviour": "behaviours", "envelope": "deviation_bound"}
 #: Share of the upper bound that ends the search, and share of the time that the bound may take at first.
 _ENOUGH, _BOUND_SHARE = Fraction(99, 100), 0.3
 
@@ -243,6 +245,13 @@ class FamilyCertificate(FamilyContent, Shown):
             )
         return self.source
 
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            """Refuse a name that only certificates of one graph have, with that of families."""
+            hint = f"; that of a family has {_OF_FAMILIES[name]}" if name in _OF_FAMILIES else ""
+            raise AttributeError(f"a FamilyCertificate has no {name}{hint}", name=name, obj=self)
+
     def __eq__(self, other: object) -> bool:
         """Two certificates are equal when they claim and prove the same; upper bounds on the rate do not count."""
         return isinstance(other, FamilyCertificate) and self._digest == other._digest
@@ -329,7 +338,8 @@ def certify_family(
     signal = read_signal(signal)
     require_nominal(signal, protocol)
     if isinstance(signal, ClockShares) and len(signal.shares) != len(family.modes):
-        raise ParameterError(f"{len(signal.shares)} shares of the clock for {len(family.modes)} modes")
+        count, modes = len(signal.shares), len(family.modes)
+        raise ParameterError(f"{count} share{'s' * (count > 1)} of the clock; give one for each of {modes} modes")
     asked, seconds, progress = read_expectations(expectations), read_seconds(time_limit, family), listener(progress)
     structure = analyse(family.modes[0].mandatory)
     initial_state = None if x0 is None else read_initial_state(structure, x0, "x0")

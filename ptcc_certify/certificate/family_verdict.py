@@ -129,8 +129,8 @@ def _judge_rate(certificate: FamilyContent, least: Fraction) -> Answer:
         return Answer(REFUTED, what, "no rate holds for every signal")
     if not certificate.common:
         differ = any(part.component.behaviour == DEPENDS for part in certificate.parts)
-        reason = "rest states of modes differ" if differ else "whether rest states agree is not decided"
-        return Answer(OPEN, what, reason)
+        reason = "whether rest states agree is not decided"
+        return Answer(OPEN, what, "no rate is proved of modes that end differently" if differ else reason)
     if bound is not None and least > bound:
         return Answer(REFUTED, what, f"upper bound {up(bound, 8)}, proved")
     reason = "none is proved" if rate is None else f"proved: {down(rate)}"

@@ -105,8 +105,8 @@ def cli() -> None:
 
     GRAPH is a file (a table source,target,weight, or any common format of graphs), - for standard input, or the name
     of a packaged graph: fig1a, fig1b, fig3a, fig3b, fig5a, fig5b, highland_tribes. A scenario file, SCENARIO.toml,
-    stands for a graph with all that is asked about it. `classify` and `certify` take families of graphs, too: several
-    with --switching, or uncertain weights.
+    stands for a graph with all that is asked about it. `classify`, `certify`, `simulate`, `plot` and `check` take
+    families of graphs, too: several with --switching, or uncertain weights.
 
     Begin with: ptcc certify fig1b
     """

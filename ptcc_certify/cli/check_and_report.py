@@ -11,7 +11,7 @@ from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
 from ptcc_certify.cli.completion import GRAPHS, PACKAGED, complete
-from ptcc_certify.cli.families import family_options, same_family
+from ptcc_certify.cli.families import family_of_files, mode_options, same_family
 from ptcc_certify.cli.terminal import Screen, print_json, print_lines, progress, screen_options
 from ptcc_certify.errors import ExitCode, ParameterError
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 @shared.certificate_argument
 @click.argument("graph", nargs=-1, shell_complete=complete(GRAPHS, PACKAGED))
 @shared.reading_options
-@family_options
+@mode_options
 @click.option("--stdlib", is_flag=True, help="Use the standard library alone, even where python-flint is installed.")
 @shared.memory_option
 @shared.json_option
@@ -78,6 +78,9 @@ def _same_graph(
     from ptcc_certify.graphs.difference import difference
     from ptcc_certify.graphs.io.graph_files import read_graph_as, reading_flags
 
+    if (family := family_of_files(graph, document["graph"]["read"], options)) is not None:
+        reason = f"one graph in the certificate, a family in the files: {family!r}"
+        return replace(report, accepted=False, obligations=(), rejected="graph", reason=reason), {}
     source = click.get_current_context().get_parameter_source
     names = [name for name in shared.READING if source(name) is ParameterSource.COMMANDLINE]
     overrides = {"orientation" if name == "edges" else name: options[name] for name in names}

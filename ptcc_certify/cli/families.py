@@ -12,7 +12,7 @@ import click
 from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
-from ptcc_certify.cli.scenario import is_scenario, read_scenario, scenario_record
+from ptcc_certify.cli.scenario import OF_FAMILIES, is_scenario, read_scenario, scenario_record
 from ptcc_certify.cli.terminal import LOG, Screen, print_json, progress
 from ptcc_certify.errors import ExitCode, ParameterError, one_line
 from ptcc_certify.graphs.rationals import shorten
@@ -64,7 +64,7 @@ def mode_options(command: Any) -> Any:
             multiple=True,
             metavar="SOURCE,TARGET",
             callback=_pair,
-            help="Family: this edge may fail; repeat it for more.",
+            help="Family: this edge may fail, on which TARGET hears SOURCE; repeat it for more.",
         ),
         click.option(
             "--uncertainty", metavar="SHARE", help="Family: every weight is known up to this share of it, such as 10%."
@@ -85,9 +85,13 @@ restricted_options = shared.options_of(
         "--clock-dwell", metavar="TAU", help="Families: the same on the stretched clock, which is infinite at T."
     ),
     shared.number_option(
-        "--clock-window", metavar="H", help="Families: every edge is on in each window of so much stretched clock,"
+        "--clock-window",
+        metavar="H",
+        help="Families: the length of windows of stretched clock; every edge is on in each.",
     ),
-    shared.number_option("--window-on", metavar="DELTA", help="for so much of it at least."),
+    shared.number_option(
+        "--window-on", metavar="DELTA", help="Families: for how much of every window an edge is on, at least."
+    ),
     shared.number_option("--window", metavar="H", hidden=True),
     click.option(
         "--share",
@@ -126,7 +130,7 @@ def refuse_restricted(options: shared.Options) -> None:
     """Refuse restricted signals where one graph acts for ever."""
     for name in ("dwell", "clock_dwell", "window", "clock_window", "window_on", "share"):
         if options[name]:
-            raise ParameterError(f"{shared.flag_of(name)}: is for families of graphs; this is one graph: leave it out")
+            raise ParameterError(f"{shared.flag_of(name)} is for families of graphs; this is one graph: leave it out")
 
 
 def read_graph_or_family(graphs: tuple[str, ...], options: shared.Options) -> SignedDigraph | Family:
@@ -240,6 +244,9 @@ def certify_family(
     most = options["max_input"]
     if most is not None and most <= 0:
         raise ParameterError("--max-input is outside its domain; it must be > 0")
+    given, modes = len(options["share"]), len(family.modes)
+    if given not in (0, modes):
+        raise ParameterError(f"--share: {given} given, and {modes} modes; give one for each, outages too")
     signal = signals_of(options)
     protocol = shared.protocol_of(options)
     require_nominal(signal, protocol)
@@ -252,7 +259,7 @@ def certify_family(
         _show_decision(graphs, family, left, as_json, screen, options)
         code = _expected(left, options["expect"])
         if output:
-            click.echo("note: certificates are for --signal any; nothing was written", err=True)
+            click.echo("note: of fixed weights that are unknown no certificate is made; nothing was written", err=True)
         click.echo(
             "undecided: of fixed weights that are unknown the behaviour is decided, no rate is certified", err=True
         )
@@ -298,14 +305,18 @@ def refuse_options(options: shared.Options) -> None:
     for name in foreign:
         given = source(name) in (ParameterSource.COMMANDLINE, ParameterSource.DEFAULT_MAP)
         if given and options[name] not in (None, False):
-            raise ParameterError(f"{shared.flag_of(name)}: is for one graph, not for families yet; leave it out")
+            raise ParameterError(f"{shared.flag_of(name)} is for one graph, not for families yet; leave it out")
 
 
 def _constant_alone(constant: Sequence[FamilyComponent], every: Sequence[FamilyComponent]) -> Sequence[FamilyComponent]:
-    """Return what constant signals do where it does not follow from what all signals do; nothing where it does."""
+    """Return what constant signals do where neither all signals nor single modes show it; nothing where they do."""
     from ptcc_certify.theorems.family_behaviour import DEPENDS
+    from ptcc_certify.theorems.last_mode import last_mode_behaviours
 
-    follows = all(one.behaviour == other.behaviour != DEPENDS for one, other in zip(constant, every, strict=True))
+    follows = all(
+        None not in last_mode_behaviours(other) if other.behaviour == DEPENDS else one.behaviour == other.behaviour
+        for one, other in zip(constant, every, strict=True)
+    )
     return () if follows else constant
 
 
@@ -336,6 +347,25 @@ def same_family(
     elif order != tuple(range(len(order))):
         told["modes"] = f"the same modes in another order than in the certificate, {', '.join(own)}"
     return report, told
+
+
+def family_of_files(graph: str, read: Any, options: shared.Options) -> Family | None:
+    """Return the family that a file makes with options or a scenario, read as a certificate says; None of one graph."""
+    from ptcc_certify.graphs.io.family_files import is_family_file
+
+    own = read_scenario(graph) if is_scenario(graph) else None
+    several = own is not None and len(own.graphs) > 1
+    asked = any(options[name] or (own is not None and own.options.get(name)) for name in OF_FAMILIES)
+    if not (several or asked or is_family_file(shared.graph_file(graph))):
+        return None
+    way = {
+        "orientation": None if read["orientation"] == "matrix" else read["orientation"],
+        "duplicates": {"refused": "refuse"}.get(read["duplicates"], read["duplicates"]),
+        "drop_self_loops": read["self_loops"] != "refused",
+        "undirected": read["undirected"],
+    }
+    family = _read_again(way, (graph,), options)[1]
+    return family if family.graph is None else None
 
 
 def _read_again(read: Any, graphs: tuple[str, ...], options: shared.Options) -> tuple[tuple[str, ...], Family, str]:

@@ -22,31 +22,27 @@ _WRITTEN = ("graph", "kind", "T", "rho1", "rho2", "kappa", "x0", "seed")
 
 
 @click.command()
-@click.argument("graph", required=False, shell_complete=complete(GRAPHS, PACKAGED))
+@click.argument("graph", nargs=-1, shell_complete=complete(GRAPHS, PACKAGED))
 @click.option("-o", "--output", type=click.Path(dir_okay=False), help="Write it to this file, such as scenario.toml.")
 @click.option("--force", is_flag=True, help="Replace an existing file.")
 @click.pass_context
-def new(context: click.Context, graph: str | None, output: str | None, force: bool) -> int:
-    """Write a commented scenario file, with GRAPH in it if one is given.
+def new(context: click.Context, graph: tuple[str, ...], output: str | None, force: bool) -> int:
+    """Write a commented scenario file, with GRAPH in it if one is given; several are the modes of a family.
 
     A scenario holds all that a run needs - graph, protocol, initial state, limits, expectations - in one file that
     `ptcc certify`, `simulate`, `design` and `plot` take in place of GRAPH. Flags override it. Without -o it is printed.
     """
-    from ptcc_certify.graphs.io import read_graph, write_atomically
-    from ptcc_certify.graphs.io.packaged import GRAPHS
+    from ptcc_certify.graphs.io import read_family, write_atomically
 
-    labels: tuple[str, ...] = ()
-    if graph == "-":
+    if "-" in graph:
         raise ParameterError("a scenario names the file of its graph; save the graph first")
-    if graph is not None and is_scenario(graph):
-        raise ParameterError(f"{shorten(graph, 200)}: is a scenario itself; copy it, or name a graph")
-    if graph is not None:
-        labels = read_graph(graph_file(graph)).labels
-    if graph is not None and not (graph in GRAPHS and kind_of(graph) == "missing"):
-        graph = _relative(graph, Path(output or "").parent)
+    if scenario := next(filter(is_scenario, graph), None):
+        raise ParameterError(f"{shorten(scenario, 200)}: is a scenario itself; copy it, or name a graph")
+    labels = read_family([graph_file(one) for one in graph]).labels if graph else ()
+    files = [_named(one, Path(output or "").parent) for one in graph]
     root = context.find_root().command
     commands = root.commands.values() if isinstance(root, click.Group) else ()
-    text = template({p.name: p for command in reversed([*commands]) for p in command.params if p.name}, graph, labels)
+    text = template({p.name: p for command in reversed([*commands]) for p in command.params if p.name}, files, labels)
     if output is None:
         click.echo(text, nl=False)
         return 0
@@ -59,15 +55,15 @@ def new(context: click.Context, graph: str | None, output: str | None, force: bo
     return 0
 
 
-def template(options: Mapping[str, click.Parameter], graph: str | None = None, labels: Sequence[str] = ()) -> str:
+def template(options: Mapping[str, click.Parameter], files: Sequence[str] = (), labels: Sequence[str] = ()) -> str:
     """Return a commented scenario: every key with its meaning and its default.
 
     Parameters
     ----------
     options : mapping of str to click.Parameter
         What the keys stand for, by name.
-    graph : str, optional
-        What it is about.
+    files : sequence of str
+        What it is about: a graph, or the modes of a family.
     labels : sequence of str
         The nodes of the graph; those of a small one are shown where their values go.
 
@@ -81,8 +77,9 @@ def template(options: Mapping[str, click.Parameter], graph: str | None = None, l
     for section, (title, keys) in SECTIONS.items():
         lines += ["", f"[{section}]  # {title}"]
         for key, (option, example) in keys.items():
-            if key == "file" and graph is not None:
-                example = _quoted(graph)
+            if key == "file" and files:
+                quoted = [_quoted(file) for file in files]
+                example = quoted[0] if len(files) == 1 else f"[{', '.join(quoted)}]"
             line = f"{'' if option in _WRITTEN else '# '}{key} = {example}"
             lines.append(f"{line:<32}  # {_meaning(options.get(option))}")
             if key == "x0" and 0 < len(labels) <= 12:
@@ -104,6 +101,7 @@ def _meaning(option: click.Parameter | None) -> str:
             'A list, ["day.csv", "night.csv"], is a family: any of them may act at any time.'
         )
     text, _, default = (option.help or "").partition("  [default: ")
+    text = text.replace("; repeat it for more", "; list several")  # flags are repeated, keys hold lists
     if isinstance(option.type, click.Choice) and len(option.type.choices) > 1:
         text += f" One of {', '.join(map(str, option.type.choices))}."
     if not default:
@@ -112,6 +110,13 @@ def _meaning(option: click.Parameter | None) -> str:
         known = isinstance(shown, bool | int | str)
         default = f"{str(shown).lower() if isinstance(shown, bool) else shown if known else 'none'}]"
     return f"{text}  [default: {default}"
+
+
+def _named(graph: str, folder: Path) -> str:
+    """Return a file as seen from a folder; a packaged graph by its name."""
+    from ptcc_certify.graphs.io.packaged import GRAPHS
+
+    return graph if graph in GRAPHS and kind_of(graph) == "missing" else _relative(graph, folder)
 
 
 def _relative(path: str, folder: Path) -> str:

@@ -182,7 +182,7 @@ def _drawn(what: str, subject: Any, wide: bool, time_unit: str) -> Any:
 
     if isinstance(subject, Family | FamilyCertificate):
         if wide:
-            raise ParameterError("--wide: is for one graph, not for families yet; leave it out")
+            raise ParameterError("--wide is for one graph, not for families yet; leave it out")
         return plot_of_family(subject, what, **({"time_unit": time_unit} if what in OF_A_RUN else {}))
     subject, protocol = subject if isinstance(subject, tuple) else (subject, None)
     if what == "graph":

@@ -369,7 +369,7 @@ def takes_one_graph(name: str | None) -> str:
     >>> takes_one_graph("design")
     'ptcc design takes one graph; a family (several graphs, uncertain weights) is for ptcc classify, certify, ...'
     """
-    where = "a family (several graphs, uncertain weights) is for ptcc classify, certify, simulate, plot"
+    where = "a family (several graphs, uncertain weights) is for ptcc classify, certify, simulate, plot, check"
     return f"ptcc {name} takes one graph; {where}"
 
 

@@ -99,7 +99,7 @@ def _run(graphs: tuple[str, ...], protocol: Protocol, options: shared.Options) -
     if isinstance(signed, Family):
         return _run_family(signed, protocol, times, options)
     if click.get_current_context().get_parameter_source("signal") == ParameterSource.COMMANDLINE:
-        raise ParameterError("--signal: is for families (--switching, --uncertainty, intervals); this is one graph")
+        raise ParameterError("--signal is for families (--switching, --uncertainty, intervals); this is one graph")
     more = shared.run_keywords(protocol, options, signed) | {n: options[n] for n in ("samples", "boundary_layer")}
     if options["noise"] is not None:
         more |= {"noise": "telegraph", "noise_bound": options["noise"]}
@@ -116,7 +116,7 @@ def _run_family(
     refuse_options(options)
     if options["dimension"] > 1 or options["boundary_layer"] is not None:
         flag = "--dimension" if options["dimension"] > 1 else "--boundary-layer"
-        raise ParameterError(f"{flag}: is for one graph, not for families yet; leave it out")
+        raise ParameterError(f"{flag} is for one graph, not for families yet; leave it out")
     signal = "random" if options["signal"] == "any" else options["signal"]  # of a scenario for ptcc certify
     x0 = shared.read_initial_state(options["x0"], options["seed"], family.modes[0].mandatory)
     played = as_signal(signal, options["seed"])

@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from scipy import sparse
 
+#: Attributes of edges in networkx graphs and their files that make a family of a graph.
+OF_EDGES = frozenset({"weight_min", "weight_max", "optional"})
 _INT64_LIMIT = 2**62
 SMALLEST_WEIGHT, LARGEST_WEIGHT = 2.3e-308, 1.7e308
 _SURROGATE_PAIR = re.compile("[\ud800-\udbff][\udc00-\udfff]")
@@ -370,7 +372,8 @@ class SignedDigraph(ReadOnly, Shown):
         Raises
         ------
         GraphError
-            ``graph`` is undirected (say ``graph.to_directed()``), a multigraph, or an edge has no weight.
+            ``graph`` is undirected (say ``graph.to_directed()``), a multigraph, an edge has no weight, or an attribute
+            that makes a family of it.
 
         Examples
         --------
@@ -380,15 +383,13 @@ class SignedDigraph(ReadOnly, Shown):
         >>> SignedDigraph.from_networkx(team).edges, SignedDigraph.from_networkx(team, orientation="listens").edges
         ((('ann', 'bob', Fraction(-2, 1)),), (('bob', 'ann', Fraction(-2, 1)),))
         """
-        if not hasattr(graph, "is_multigraph"):
-            raise GraphError(f"a {type(graph).__name__} is no networkx graph; ptcc_certify.as_graph takes other data")
-        if graph.is_multigraph():
-            raise GraphError("the networkx graph is a multigraph; merge parallel edges into one signed edge first")
-        if not graph.is_directed():
-            raise GraphError("the networkx graph is undirected; give graph.to_directed() if both ends listen")
+        refuse_networkx(graph)
         mend = 'give each edge a signed number, or name the attribute: from_networkx(graph, weight="sign")'
         triples = []
         for u, v, data in graph.edges(data=True):
+            if more := OF_EDGES & data.keys():
+                uncertain = f'edge {shorten(str(u))} -> {shorten(str(v))} has the attribute "{min(more)}"'
+                raise GraphError(f"{uncertain}, which makes a family of graphs; ptcc_certify.as_family takes it")
             if weight not in data:
                 raise GraphError(f'edge {shorten(str(u))} -> {shorten(str(v))} has no attribute "{weight}"; {mend}')
             triples.append((u, v, data[weight]))
@@ -694,3 +695,21 @@ def ordered_labels(labels: list[str]) -> tuple[list[str], np.ndarray]:
     if all(_INTEGER_LABEL.fullmatch(label) for label in labels):
         order = sorted(order, key=lambda i: (int(labels[i]), labels[i]))
     return [labels[i] for i in order], np.argsort(order)
+
+
+def refuse_networkx(graph: Any) -> None:
+    """Refuse what is no directed networkx graph with one edge at most from node to node.
+
+    Examples
+    --------
+    >>> refuse_networkx([])
+    Traceback (most recent call last):
+        ...
+    ptcc_certify.errors.GraphError: a list is no networkx graph; ptcc_certify.as_graph takes other data
+    """
+    if not hasattr(graph, "is_multigraph"):
+        raise GraphError(f"a {type(graph).__name__} is no networkx graph; ptcc_certify.as_graph takes other data")
+    if graph.is_multigraph():
+        raise GraphError("the networkx graph is a multigraph; merge parallel edges into one signed edge first")
+    if not graph.is_directed():
+        raise GraphError("the networkx graph is undirected; give graph.to_directed() if both ends listen")

@@ -123,4 +123,4 @@ def summary(subject: Any) -> str:
 def family_summary(subject: Any) -> str:
     """Return what the command line prints of a family's certificate."""
     lines = import_module("ptcc_certify.report.family_screen").family_summary
-    return "\n".join(lines(subject, subject.origins.get("graph", "family"), subject.origins))
+    return "\n".join(lines(subject, subject.origins.get("graph", ""), subject.origins))

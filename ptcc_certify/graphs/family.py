@@ -202,6 +202,11 @@ class Family(Shown):
     read : mapping
         The keywords with which :func:`ptcc_certify.read_family` reads its files again; empty if it is from none.
 
+    Raises
+    ------
+    GraphError
+        It is given no tuple of modes.
+
     References
     ----------
     docs/theory/families.md.
@@ -219,6 +224,11 @@ class Family(Shown):
     modes: tuple[Mode, ...]
     notes: tuple[str, ...] = field(default=())
     read: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.modes, tuple) and self.modes and all(isinstance(mode, Mode) for mode in self.modes)):
+            mend = "Family.from_graph takes a graph, Family.switching several, as_family whatever makes a family"
+            raise GraphError(f"Family takes a tuple of modes, at least one; {mend}")
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -426,7 +436,7 @@ class Family(Shown):
         optional = sum(int(mode.optional.sum()) for mode in self.modes)
         parts = [f"{self.n_nodes} nodes"] + [f"{len(self.modes)} modes"] * (len(self.modes) > 1)
         parts += [f"{uncertain} of {edges} weights uncertain"] * bool(uncertain)
-        parts += [f"{optional} edges optional"] * bool(optional)
+        parts += [f"{optional} edge{'s' * (optional > 1)} optional"] * bool(optional)
         return f"Family({', '.join(parts)})"
 
 

@@ -42,20 +42,21 @@ def family_difference(one: Family, other: Family) -> str | None:
     Examples
     --------
     >>> family_difference(Family.from_intervals([("a", "b", 1, 2)]), Family.from_intervals([("a", "b", 1, 3)]))
-    'the certificate alone has ["a", "b", "1", "2"], and the files alone ["a", "b", "1", "3"]'
+    '["a", "b", "1", "2"] is only in the certificate, and ["a", "b", "1", "3"] is only in the files'
     """
     if mode_order(one, other) is not None:
         return None
     if odd := sorted(set(one.labels) ^ set(other.labels)):
-        return f"the {'certificate' if odd[0] in one.labels else 'files'} alone has node {shorten(odd[0])}"
+        return f"node {shorten(odd[0])} is only in the {'certificate' if odd[0] in one.labels else 'files'}"
     if len(one.modes) != len(other.modes):
-        return f"{len(one.modes)} modes in the certificate, {len(other.modes)} in the files"
+        modes = len(one.modes)
+        return f"{modes} mode{'s' * (modes > 1)} in the certificate, {len(other.modes)} in the files"
     pairs = _different_modes(one, other)
     number, place = pairs[0]
     first, second = (set(f.modes[k].marked_lines()) for f, k in ((one, number), (other, place)))
     alone = [
-        f"the {where} alone {'has ' if k == 0 or not first - second else ''}{shorten(min(some), 120)}"
-        for k, (where, some) in enumerate((("certificate", first - second), ("files", second - first)))
+        f"{shorten(min(some), 120)} is only in the {where}"
+        for where, some in (("certificate", first - second), ("files", second - first))
         if some
     ]
     return _mode_text(one, other, pairs) + ", and ".join(alone)

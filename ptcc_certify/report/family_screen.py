@@ -151,6 +151,8 @@ def family_text(family: Family, name: str) -> str:
     rest = f"{counted(family.n_nodes, 'node')}, {counted(edges, 'edge')}"
     rest += f", {uncertain} uncertain" * (uncertain > optional)
     rest += f", {optional}{' of them' * (uncertain > optional)} optional" * bool(optional)
+    if not (several or name):
+        return rest
     if not several:
         return f"{shorten_text(printable(name), max(TEXT - len(rest) - 2, 8))}: {rest}"
     names = [printable(mode_name(family, k)) for k in range(len(family.modes))]

@@ -60,7 +60,7 @@ def certificate_html(certificate: Certificate) -> str:
 def family_certificate_html(certificate: FamilyCertificate) -> str:
     """Show the certificate of a family: the screen of ``ptcc certify``, and a drawing of up to 120 nodes."""
     origins = certificate.origins
-    lines = family_lines(certificate, origins.get("graph", "family"), origins)
+    lines = family_lines(certificate, origins.get("graph", ""), origins)
     return _page(lines, *_family_figure(certificate.family))
 
 
@@ -68,15 +68,15 @@ def family_certificate_html(certificate: FamilyCertificate) -> str:
 def family_html(family: Family) -> str:
     """Show a family: the screen of ``ptcc classify``, and a drawing, up to 120 nodes; of more its size alone."""
     if family.n_nodes > SHOWN_NODES:
-        return _page([f"{'family':<{_HEAD}}{family_text(family, 'family')}"], None, "")
-    return _page(decision_lines(decide(family), family, "family"), *_family_figure(family))
+        return _page([f"{'family':<{_HEAD}}{family_text(family, '')}"], None, "")
+    return _page(decision_lines(decide(family), family, ""), *_family_figure(family))
 
 
 def _family_figure(family: Family) -> tuple[Any, str]:
     """Return a drawing of a family, unless it is large, and a text in its place."""
     if family.n_nodes > SHOWN_NODES:
         return None, ""
-    return plot_family_graph(family).figure, f"drawing of the family: {family_text(family, 'family')}"
+    return plot_family_graph(family).figure, f"drawing of the family: {family_text(family, '')}"
 
 
 @shows(Trajectory)

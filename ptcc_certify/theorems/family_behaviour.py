@@ -107,7 +107,7 @@ class Counterexample:
     off: tuple[int, ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FamilyComponent:
     """One weakly connected component of the union of all modes, and what it does under every signal.
 
@@ -137,6 +137,13 @@ class FamilyComponent:
     kernel: Kernel | None
     counterexample: Counterexample | None
     signal: str = "any"
+
+    def __repr__(self) -> str:
+        signals = {"any": "every signal", "constant": "constant signals"}[self.signal]
+        whom = "" if self.behaviour in (None, DEPENDS) else f" for {signals}"
+        n, modes = self.nodes.size, len(self.family.modes)
+        parts = [f"{n} node{'s' * (n > 1)}"] + [f"{modes} modes"] * (modes > 1)
+        return f"FamilyComponent({', '.join(parts)}, {self.behaviour or 'not decided'}{whom})"
 
     @cached_property
     def structures(self) -> tuple[Structure, ...]:

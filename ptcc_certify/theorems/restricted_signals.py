@@ -133,7 +133,7 @@ class ClockShares:
     Attributes
     ----------
     shares : tuple of Fraction
-        One of each mode; their sum is 1.
+        One of each mode; their sum is 1. Texts may be percentages, "75%".
 
     Raises
     ------
@@ -153,13 +153,22 @@ class ClockShares:
     shares: tuple[Fraction, ...]
 
     def __post_init__(self) -> None:
-        shares = tuple(parameter("share", share, zero_allowed=True) for share in self.shares)
+        shares = tuple(_share(share) for share in self.shares)
         object.__setattr__(self, "shares", shares)
         if sum(shares) != 1:
-            raise ParameterError(f"shares of the clock sum to {readable(sum(shares, Fraction(0)))}; they must sum to 1")
+            raise ParameterError(
+                f"shares of the clock sum to {readable(sum(shares, Fraction(0)))}; give one for each mode, 1 in all"
+            )
 
     def __repr__(self) -> str:
         return f"ClockShares({', '.join(map(readable, self.shares))})"
+
+
+def _share(value: Any) -> Fraction:
+    """Return a share of the clock: ``0.75`` or ``"75%"``."""
+    percent = isinstance(value, str) and value.strip().endswith("%")
+    number = parameter("share", value.strip()[:-1] if percent else value, zero_allowed=True)
+    return number / 100 if percent else number
 
 
 #: What a certificate may be asked for: all signals, constant ones, or restricted ones.

@@ -25,6 +25,7 @@ FILES = {
     "s.toml": '[graph]\nfile = ["day.csv", "night.csv"]\nuncertainty = "5%"\n[protocol]\nkappa = 3\n',
 }
 BOTH = ("day.csv", "night.csv", "--switching")
+SPOILED = ("day.csv", "spoiled.csv", "--switching")
 
 
 @pytest.fixture(autouse=True)
@@ -76,15 +77,31 @@ def test_what_is_written_is_checked_against_the_files():
     checked = ptcc("check", "c.json")
     assert checked.code == 0 and "bipartite consensus at T = 1 for every signal" in checked.out
     for words, why in (
-        (("day.csv", "spoiled.csv"), "in mode night (spoiled of the files) the certificate alone has"),
+        (
+            ("day.csv", "spoiled.csv"),
+            'in mode night (spoiled of the files) ["c", "a", "-2"] is only in the certificate',
+        ),
         ((*BOTH, "--uncertainty", "1%"), "in mode day (one of 2 that differ)"),
         (("day.csv",), "2 modes in the certificate, 1 in the files"),
-        (("other.csv", "--uncertainty", "1%"), "the certificate alone has node c"),
-        (("day.csv", "day.csv"), "in mode night (day (2) of the files) the certificate alone has"),
+        (("other.csv", "--uncertainty", "1%"), "node c is only in the certificate"),
+        (("day.csv", "day.csv"), "in mode night (day (2) of the files) ["),
     ):
         run = ptcc("check", "c.json", *words)
         assert run.code == 1 and why in " ".join(run.out.split()), run
     assert ptcc("check", "c.json", "day.csv", "nowhere.csv").code == 2
+
+
+def test_a_certificate_of_one_graph_is_of_no_family():
+    assert ptcc("certify", "day.csv", "--no-simulation", "-o", "one.json").code == 0
+    for key in ('uncertainty = "10%"', 'optional = ["a,b"]'):
+        Path("one.toml").write_text(f'[graph]\nfile = "day.csv"\n{key}\n')
+        assert ptcc("check", "one.json", "one.toml").code == 1
+    for words in (("day.csv", "--uncertainty", "10%"), ("day.csv", "--optional", "a,b"), ("s.toml",), ("unsure.csv",)):
+        run = ptcc("check", "one.json", *words)
+        assert run.code == 1 and "one graph in the certificate, a family in the files" in " ".join(run.out.split()), run
+    for words in (("day.csv",), ("day.csv", "--uncertainty", "0"), ("day.csv", "--switching")):
+        assert ptcc("check", "one.json", *words).code == 0
+    assert ptcc("check", "one.json", "day.csv", "--signal", "constant").code == 2
 
 
 def test_modes_are_the_same_in_any_order_and_by_any_name():
@@ -156,7 +173,10 @@ def test_the_json_is_the_certificate_or_the_decision():
         ((*BOTH, "--kappa", "3", "--max-input", "59"), 4, "left open: |u_k| <= 59"),
         (("day.csv", "spoiled.csv", "--switching", "--min-rate", "1"), 3, "no rate holds for every signal"),
         (("day.csv", "spoiled.csv", "--switching", "--expect", "bipartite-consensus"), 3, "multiply to -1"),
-        (("day.csv", "spoiled.csv", "--switching", "--signal", "constant"), 4, "no rate is certified"),
+        ((*SPOILED, "--signal", "constant"), 0, "if mode and weights never change: bipartite consensus"),
+        ((*SPOILED, "--signal", "constant", "--expect", "bipartite-consensus"), 0, "met: bipartite consensus"),
+        ((*SPOILED, "--signal", "constant", "--min-rate", "1"), 4, "modes that end differently"),
+        (("day.csv", "--optional", "a,b", "--signal", "constant"), 4, "no rate is certified"),
         ((*BOTH, "--signal", "constant"), 0, "certified"),
     ],
 )
@@ -194,10 +214,20 @@ def test_commands_about_one_graph_say_so(command: str):
         run = ptcc(command, *words, *needs)
         assert (run.code, run.out, len(run.err.splitlines())) == (2, "", 1), run
         assert re.search(
-            "takes one graph|ptcc classify and certify take|option of ptcc classify, ptcc certify", run.err
+            "takes one graph|ptcc classify, certify, simulate and plot take|option of ptcc classify, ptcc certify",
+            run.err,
         )
     if command != "explore":
         assert f"ptcc {command} takes one graph" in ptcc(command, "s.toml").err
+
+
+def test_help_names_the_commands_that_take_families():
+    taken = "`classify`, `certify`, `simulate`, `plot` and `check` take families"
+    assert taken.replace("`", "") in " ".join(ptcc("--help").out.replace("`", "").split())
+    for words in (("unsure.csv", "--switching"), ("unsure.csv", "--what", "graph")):
+        assert ptcc("plot" if "--what" in words else "simulate", *words).code == 0
+    refused = ptcc("explore", "unsure.csv").err
+    assert "ptcc classify, certify, simulate and plot take it" in refused
 
 
 def test_pages_statements_and_figures_are_made_of_the_certificate_of_a_family():
@@ -228,8 +258,8 @@ def test_figures_are_made_of_the_files_of_a_family():
     for words, told in (
         (("plot", *BOTH, "--what", "spectrum"), "eigenvalues of single graphs do not tell"),
         (("plot", "day.csv", "night.csv"), "2 graphs; add --switching"),
-        (("plot", *BOTH, "--what", "states", "--gain-cap", "3"), "--gain-cap: is for one graph"),
-        (("plot", *BOTH, "--wide"), "--wide: is for one graph"),
+        (("plot", *BOTH, "--what", "states", "--gain-cap", "3"), "--gain-cap is for one graph"),
+        (("plot", *BOTH, "--wide"), "--wide is for one graph"),
     ):
         run = ptcc(*words)
         assert (run.code, run.out) == (2, "") and told in run.err, run
@@ -301,7 +331,12 @@ BAD = {
     "percent": ("a,b,1", ("--uncertainty", "10"), "write 10% if it is one"),
     "no share": ("a,b,1", ("--uncertainty", "much"), '"much" is not a number'),
     "no edge": ("a,b,1", ("--optional", "a"), "--optional: a is no edge; write SOURCE,TARGET"),
-    "unknown edge": ("a,b,1", ("--optional", "b,a"), "optional edge b -> a is in no file"),
+    "unknown edge": ("a,b,1", ("--optional", "a,c"), "optional edge a -> c is in no file; check the labels"),
+    "turned edge": (
+        "a,b,1",
+        ("--optional", "a,b", "--edges", "listens"),
+        "optional edge a -> b is in no file; b -> a is: name the one who is heard first",
+    ),
     "standard input twice": ("a,b,1", ("-", "-", "--switching"), "standard input, which is one graph"),
     "a scenario beside": ("a,b,1", ("s.toml", "--switching"), "a scenario stands alone"),
     "signal": ("a,b,1", ("--signal", "fast"), "'fast' is not one of"),
@@ -365,11 +400,28 @@ def test_what_is_wrong_with_the_family_of_a_scenario_is_told_by_its_key(text: st
 def test_what_new_writes_tells_of_families():
     text = ptcc("new").out
     assert "# uncertainty = " in text and '["day.csv", "night.csv"]' in text
+    assert "repeat" not in text and ",  [default" not in text
+
+
+def test_new_takes_the_graphs_of_a_family():
+    assert ptcc("new", *BOTH[:2], "-o", "n.toml").code == 0
+    assert '\nfile = ["day.csv", "night.csv"] ' in Path("n.toml").read_text()
+    assert ptcc("classify", "n.toml").out == ptcc("classify", *BOTH).out
+    assert 'file = "unsure.csv"' in ptcc("new", "unsure.csv").out
+    assert "has no node c, which another mode has" in ptcc("new", "day.csv", "other.csv").err
 
 
 def test_modes_are_called_by_their_files():
     assert [mode.name for mode in read_family(["day.csv", "night.csv"]).modes] == ["day", "night"]
     assert "day, night: 2 modes" in ptcc("classify", *BOTH).out
+
+
+def test_a_file_that_is_given_twice_is_told():
+    for command in ("classify", "certify"):
+        run = ptcc(command, "day.csv", "night.csv", "day.csv", "--switching")
+        told = "day.csv was given 2 times: modes day, day (3) are the same"
+        assert run.code == 0 and told in " ".join(run.out.split()), run
+        assert "given" not in ptcc(command, *BOTH).out
 
 
 def test_no_name_of_a_file_or_a_mode_steers_the_terminal():
@@ -398,7 +450,7 @@ def test_more_is_claimed_for_restricted_signals():
         ((*spoiled, "--dwell", "0.2"), "dwell      at least 0.2 of time between switches: the last mode decides"),
         ((*spoiled, "--clock-dwell", "3"), "nothing more is proved"),
         (
-            (*outage, "--share", "0.5", "--share", "0.5"),
+            (*outage, "--share", "0.5", "--share", "50%"),
             "shares     modes at 0.5, 0.5 of the clock: bipartite consensus",
         ),
         ((*outage, "--clock-window", "2", "--window-on", "1"), "windows    each edge on for 1 of every 2 of the clock"),
@@ -419,8 +471,9 @@ def test_more_is_claimed_for_restricted_signals():
         (("--clock-window", "1"), "give both"),
         (("--clock-window", "1", "--window-on", "2"), "at most the whole window"),
         (("--clock-window", "1", "--window-on", "1", "--dwell", "1"), "signals of different kinds"),
-        (("--share", "0.5"), "they must sum to 1"),
-        (("--share", "1"), "1 shares of the clock for 2 modes"),
+        (("--share", "0.7"), "--share: 1 given, and 2 modes; give one for each"),
+        (("--share", "0.7", "--share", "20%"), "sum to 9/10; give one for each mode, 1 in all"),
+        (("--share", "0.7", "--share", "x%"), "share = x is not a finite number"),
     ],
 )
 def test_restricted_signals_that_are_none_are_refused(words: tuple[str, ...], reason: str):
@@ -430,7 +483,7 @@ def test_restricted_signals_that_are_none_are_refused(words: tuple[str, ...], re
 
 def test_one_graph_has_no_restricted_signals():
     run = ptcc("certify", "day.csv", "--dwell", "1")
-    assert run.code == 2 and "--dwell: is for families" in run.err, run
+    assert run.code == 2 and "--dwell is for families" in run.err, run
 
 
 def test_restricted_signals_are_keys_of_scenarios():

@@ -229,7 +229,8 @@ def test_every_key_is_an_option_with_a_meaning_and_an_example_that_is_read():
 
 def test_without_its_comments_every_line_of_the_template_is_toml():
     lines = [
-        line.removeprefix("# ") for line in template(PARAMETERS, "a b.csv", ["é", 'say "x"', "a\x7fb"]).splitlines()[2:]
+        line.removeprefix("# ")
+        for line in template(PARAMETERS, ["a b.csv"], ["é", 'say "x"', "a\x7fb"]).splitlines()[2:]
     ]
     once = [line for line in lines if not line.startswith("x0 = {")]
     sections = tomllib.loads("\n".join(once))

@@ -49,10 +49,10 @@ def test_figures_of_families_are_drawn():
     ("words", "told"),
     [
         ((*FAMILY, "--signal", "dusk.csv"), "dusk.csv: no such file"),
-        ((*FAMILY, "--dimension", "2"), "--dimension: is for one graph"),
-        ((*FAMILY, "--gain-cap", "5"), "--gain-cap: is for one graph"),
+        ((*FAMILY, "--dimension", "2"), "--dimension is for one graph"),
+        ((*FAMILY, "--gain-cap", "5"), "--gain-cap is for one graph"),
         (("simulate", "day.csv", "night.csv"), "add --switching"),
-        (("simulate", "day.csv", "--signal", "random"), "--signal: is for families"),
+        (("simulate", "day.csv", "--signal", "random"), "--signal is for families"),
     ],
 )
 def test_what_does_not_fit_is_refused_in_one_line(words: tuple[str, ...], told: str):

@@ -5,15 +5,17 @@ from __future__ import annotations
 import json
 import random
 from fractions import Fraction
+from io import StringIO
 
 import numpy as np
 import pytest
 
-from ptcc_certify.errors import GraphError, ParameterError
+from ptcc_certify.errors import FormatError, GraphError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.family_difference import family_difference, mode_order
 from ptcc_certify.graphs.io import as_family, read_family
+from ptcc_certify.graphs.io.family_conversion import is_family
 from ptcc_certify.graphs.io.family_files import keywords_of
 from tests.families import KINDS, random_family
 
@@ -37,6 +39,8 @@ GRAPH = SignedDigraph.from_edges([("a", "b", 2), ("b", "c", -3)])
         (lambda: Family.from_intervals([("a", "b", 1, 2)], orientation="up"), 'orientation "up" is unknown'),
         (lambda: Family.from_intervals([]), "node"),
         (lambda: Family.switching({}), "at least one mode"),
+        (lambda: Family(GRAPH), "Family.from_graph takes a graph"),
+        (lambda: Family(()), "at least one"),
         (
             lambda: Family.switching({"day": GRAPH, "night": SignedDigraph.from_edges([("a", "b", 1)])}),
             "night has no node c",
@@ -135,7 +139,7 @@ def test_the_names_of_modes_do_not_count_and_their_order_counts_for_the_hash_alo
     assert mode_order(one, turned) == (1, 0) and family_difference(one, turned) is None
     assert mode_order(one, other) is None
     assert family_difference(one, other) == (
-        'in mode night the certificate alone has ["b", "a", "-1"], and the files alone ["a", "b", "1"]'
+        'in mode night ["b", "a", "-1"] is only in the certificate, and ["a", "b", "1"] is only in the files'
     )
 
 
@@ -146,7 +150,7 @@ def test_families_that_differ_in_how_often_a_mode_occurs_are_told_apart():
     edge = ("a", "b", 1, 2)
     tied = Family.from_intervals([edge], undirected=True)
     apart = Family.from_intervals([edge, ("b", "a", 1, 2)])
-    assert family_difference(tied, apart) == 'the certificate alone has {"undirected": true}'
+    assert family_difference(tied, apart) == '{"undirected": true} is only in the certificate'
 
 
 def test_a_family_knows_how_its_files_were_read(tmp_path):
@@ -164,3 +168,39 @@ def test_a_family_knows_how_its_files_were_read(tmp_path):
 )
 def test_what_no_certificate_writes_is_no_way_of_reading(read):
     assert keywords_of(read) == {}
+
+
+def test_attributes_of_networkx_edges_make_a_family(tmp_path):
+    nx = pytest.importorskip("networkx")
+    plain, unsure = nx.DiGraph(), nx.DiGraph()
+    plain.add_edge("a", "b", weight=2)
+    unsure.add_node("alone")
+    unsure.add_edge("a", "b", weight=2, optional=True)
+    unsure.add_edge("b", "a", weight_min=-3, weight_max=-1)
+    (mode,) = as_family(unsure).modes
+    assert [mode.edge_interval(k) for k in range(2)] == [(-3, -1), (0, 2)] and "alone" in mode.labels
+    assert as_family(plain).graph == SignedDigraph.from_edges([("a", "b", 2)])
+    assert is_family(unsure) and not is_family(plain) and is_family([plain, plain])
+    with pytest.raises(GraphError, match=r"optional.*makes a family of graphs"):
+        SignedDigraph.from_networkx(unsure)
+    with pytest.raises(ParameterError, match="leave out the uncertainty"):
+        as_family(unsure, uncertainty="10%")
+    for attributes in ({"weight_min": 1}, {"optional": True}):
+        with pytest.raises(GraphError, match="edge a -> b: it has no weight"):
+            as_family(nx.DiGraph([("a", "b", attributes)]))
+    for name, write in (("g.graphml", nx.write_graphml), ("g.gml", lambda g, p: nx.write_gml(g, p, stringizer=str))):
+        write(unsure.subgraph("ab"), tmp_path / name)
+        with pytest.raises(FormatError, match="which makes a family; as a CSV file"):
+            read_family(tmp_path / name)
+
+
+def test_a_weight_beside_an_interval_lies_in_it():
+    pandas = pytest.importorskip("pandas")
+    for weight, taken in (("9", False), ("1", True), ("", True), ("n/a", True)):
+        text = f"source,target,weight,weight_min,weight_max\na,b,{weight},0.5,2\n"
+        for read in (lambda t: read_family(StringIO(t)), lambda t: as_family(pandas.read_csv(StringIO(t)))):
+            if taken:
+                assert read(text).modes[0].edge_interval(0) == (Fraction(1, 2), 2)
+            else:
+                with pytest.raises(GraphError, match="weight 9 lies outside of its interval, 1/2 to 2"):
+                    read(text)

@@ -196,3 +196,10 @@ def test_a_call_that_does_not_fit_a_family_is_one_line(call, says: str):
     with pytest.raises(ptcc.PTCCError, match=re.escape(says)) as refused:
         call()
     assert "\n" not in str(refused.value)
+
+
+def test_a_family_without_a_name_is_told_by_its_size():
+    unsure = Family.from_intervals([("a", "b", 0, 1)])
+    assert repr(unsure) == "Family(2 nodes, 1 of 1 weights uncertain, 1 edge optional)"
+    cert = certify_family(unsure, ptcc.NominalProtocol(T=1, rho1=1, rho2=1, kappa=3))
+    assert cert.summary().splitlines()[0].split() == ["family", "2", "nodes,", "1", "edge,", "1", "optional"]

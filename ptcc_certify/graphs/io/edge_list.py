@@ -106,7 +106,7 @@ def header(row: Sequence[str], place: str) -> tuple[int, int, int] | None:
         parse_exact("".join(row[2:3]))
     except NumberError:
         if column(row, ("weight_min", "weight_max"), place) is not None:
-            mend = "ptcc classify and certify take it, and ptcc_certify.read_family"
+            mend = "ptcc classify, certify, simulate and plot take it, and ptcc_certify.read_family"
             raise FormatError(f"{place}: weights in intervals, which make a family of graphs; {mend}") from None
         raise FormatError(f"{place}: the header names no weight; name one column weight, sign or rating") from None
     return None

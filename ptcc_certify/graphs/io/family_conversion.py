@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from typing import Any
+from fractions import Fraction
+from typing import Any, NamedTuple
 
 from ptcc_certify.errors import GraphError, NumberError, ParameterError
-from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.digraph import OF_EDGES, SignedDigraph, refuse_networkx
 from ptcc_certify.graphs.family import Family, read_share
 from ptcc_certify.graphs.io.conversion import as_graph
 from ptcc_certify.graphs.io.edge_list import edge_columns
-from ptcc_certify.graphs.io.family_files import interval_columns, is_family_file, read_family, truth
+from ptcc_certify.graphs.io.family_files import interval_columns, is_family_file, read_family, refuse_outside, truth
 from ptcc_certify.graphs.io.packaged import GRAPHS, file_or_packaged
 from ptcc_certify.graphs.rationals import as_fraction, shorten
 
@@ -31,6 +32,7 @@ def as_family(family: Any, orientation: str | None = None, *, uncertainty: Any =
         - a DataFrame of edges with columns ``source``, ``target``, ``weight_min``, ``weight_max``, or a list of
           ``(source, target, least, largest)``: weights in intervals; a column ``optional`` (true or false) marks edges
           that may fail;
+        - a ``networkx.DiGraph`` whose edges have these attributes in place of ``weight``, or ``optional`` beside it;
         - whatever :func:`~ptcc_certify.graphs.io.as_graph` takes: one graph; a path may also be of a file with
           intervals.
     orientation : {"information", "listens"}, optional
@@ -77,7 +79,8 @@ def as_family(family: Any, orientation: str | None = None, *, uncertainty: Any =
     if isinstance(family, str | os.PathLike) and (family in GRAPHS or os.path.exists(family)):  # noqa: PTH110
         return read_family(file_or_packaged(os.fspath(family)), uncertainty=uncertainty, orientation=orientation)
     if (edges := _interval_edges(family, uncertainty)) is not None:
-        return Family.from_intervals(edges, orientation=orientation or "information")
+        nodes = family.nodes if hasattr(family, "is_multigraph") else ()
+        return Family.from_intervals(edges, nodes, orientation=orientation or "information")
     return Family.from_graph(as_graph(family, orientation), uncertainty=uncertainty)
 
 
@@ -113,36 +116,80 @@ def _is_list_of_graphs(held: Any) -> bool:
     )
 
 
+class _Entry(NamedTuple):
+    """An edge as a user holds it: where it stands, its ends, its weight or an interval, and whether it may fail."""
+
+    place: str
+    source: Any
+    target: Any
+    weight: Any
+    least: Any
+    largest: Any
+    optional: Any
+
+    def interval(self, share: Fraction) -> tuple[Any, Any, Any, Any]:
+        """Return source, target, least and largest weight."""
+        single = self.least is None and self.largest is None
+        if not single and share:
+            raise ParameterError(_TWICE)
+        ends = (self.weight, self.weight) if single else (self.least, self.largest)
+        if None in ends:
+            raise GraphError(f"{self.place}: it has no weight; give weight, or weight_min and weight_max")
+        if (answer := truth(self.optional)) is None:
+            raise GraphError(f"{self.place}: optional is {shorten(str(self.optional))}; write True or False")
+        try:
+            least, largest = (as_fraction(end, "the weight") for end in ends)
+        except NumberError as error:
+            raise GraphError(f"{self.place}: {error}") from None
+        if share:
+            least, largest = sorted((least * (1 - share), least * (1 + share)))
+        refuse_outside(self.weight, least, largest, self.place)
+        return (self.source, self.target, min(least, 0), max(largest, 0)) if answer else (*self[1:3], least, largest)
+
+
 def _interval_edges(held: Any, uncertainty: Any = 0) -> list[tuple[Any, Any, Any, Any]] | None:
-    """Return the edges of a DataFrame with intervals, or of a list of edges with four entries; None of others."""
+    """Return the edges of a DataFrame or networkx graph with intervals, or of a list of edges with four entries.
+
+    None of others.
+    """
     if isinstance(held, list | tuple):
         intervals = bool(held) and all(isinstance(row, tuple) and len(row) == 4 for row in held)
         if intervals and read_share(uncertainty):
             raise ParameterError(_TWICE)
         return [*held] if intervals else None
-    if not hasattr(held, "columns") or not hasattr(held, "to_numpy"):
+    if hasattr(held, "is_multigraph"):
+        entries = _entries_of_networkx(held)
+    elif hasattr(held, "columns") and hasattr(held, "to_numpy"):
+        entries = _entries_of_table(held)
+    else:
         return None
-    names = [str(name) for name in held.columns]
+    share = read_share(uncertainty)
+    return None if entries is None else [entry.interval(share) for entry in entries]
+
+
+def _entries_of_table(table: Any) -> list[_Entry] | None:
+    names = [str(name) for name in table.columns]
     low, high, may_fail = interval_columns(names, "the DataFrame")
     ends = edge_columns(names, "the DataFrame")
     if ends is None or (low, high, may_fail) == (None, None, None):
         return None
-    if low is not None and read_share(uncertainty):
-        raise ParameterError(_TWICE)
-    weights = (low, high) if low is not None else (ends[2], ends[2])
-    if None in weights:
+    if low is None and ends[2] is None:
         raise GraphError("the DataFrame names no weight; name a column weight, or weight_min and weight_max")
-    at = [list(held[held.columns[k]]) for k in (*ends[:2], *weights) if k is not None]
-    off = [False] * len(at[0]) if may_fail is None else list(held[held.columns[may_fail]])
-    share, rows = (read_share(uncertainty) if low is None else 0), []
-    for number, (source, target, least, largest, fails) in enumerate(zip(*at, off, strict=True), 1):
-        if (answer := truth(fails)) is None:
-            raise GraphError(f"row {number} of the DataFrame: optional is {shorten(str(fails))}; write True or False")
-        try:
-            one, other = (as_fraction(end, "the weight") for end in (least, largest))
-        except NumberError as error:
-            raise GraphError(f"row {number} of the DataFrame: {error}") from None
-        if share:
-            one, other = sorted((one * (1 - share), one * (1 + share)))
-        rows.append((source, target, min(one, 0), max(other, 0)) if answer else (source, target, one, other))
-    return rows
+    m = len(table)
+    rest = [
+        [absent] * m if k is None else list(table[table.columns[k]])
+        for k, absent in ((ends[2], None), (low, None), (high, None), (may_fail, False))
+    ]
+    at = [list(table[table.columns[k]]) for k in ends[:2]] + rest
+    return [_Entry(f"row {row} of the DataFrame", *entry) for row, entry in enumerate(zip(*at, strict=True), 1)]
+
+
+def _entries_of_networkx(graph: Any) -> list[_Entry] | None:
+    if not any(OF_EDGES & data.keys() for *_, data in graph.edges(data=True)):
+        return None
+    refuse_networkx(graph)
+    absent = {"weight": None, "weight_min": None, "weight_max": None, "optional": False}
+    return [
+        _Entry(f"edge {shorten(str(u))} -> {shorten(str(v))}", u, v, *(data.get(k, absent[k]) for k in absent))
+        for u, v, data in graph.edges(data=True)
+    ]

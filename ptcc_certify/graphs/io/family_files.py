@@ -11,11 +11,11 @@ from typing import Any
 
 from ptcc_certify.errors import FormatError, GraphError, NumberError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.graphs.family import Family, read_share
+from ptcc_certify.graphs.family import Family, Mode, read_share
 from ptcc_certify.graphs.io.edge_list import column, edge_columns, records
 from ptcc_certify.graphs.io.files import Source, name_and_ending, read_bytes
 from ptcc_certify.graphs.io.graph_files import MATRICES, is_edge_list, read_graph
-from ptcc_certify.graphs.rationals import format_exact, parse_exact, shorten
+from ptcc_certify.graphs.rationals import as_fraction, format_exact, parse_exact, shorten
 
 _LEAST = ("weight_min", "min_weight", "w_min", "least", "min", "lower")
 _LARGEST = ("weight_max", "max_weight", "w_max", "largest", "max", "upper")
@@ -58,7 +58,7 @@ def read_family(
     uncertainty : number or str
         Of weights that are given as one number: a share from 0 to 1, or a text as "10%".
     optional : iterable of (source, target)
-        Edges that may fail, in every mode that has them.
+        Edges that may fail, in every mode that has them: from who is heard to who listens, whatever the orientation.
     orientation : {"information", "listens"}, optional
         As in :func:`read_graph`.
     undirected : bool
@@ -82,7 +82,7 @@ def read_family(
     --------
     >>> family = read_family(StringIO("source,target,weight_min,weight_max\na,b,1,2\nb,a,-1,0\n"))
     >>> family, family.modes[0].edge_interval(0)
-    (Family(2 nodes, 2 of 2 weights uncertain, 1 edges optional), (Fraction(-1, 1), Fraction(0, 1)))
+    (Family(2 nodes, 2 of 2 weights uncertain, 1 edge optional), (Fraction(-1, 1), Fraction(0, 1)))
     >>> read_family([StringIO("a,b,1"), StringIO("b,a,1")], uncertainty="10%")
     Family(2 nodes, 2 modes, 2 of 2 weights uncertain)
     """
@@ -111,10 +111,23 @@ def read_family(
         missing -= off
     if missing:
         source, target = min(missing)
-        raise GraphError(f"optional edge {shorten(source)} -> {shorten(target)} is in no file; check the labels")
+        turned = any(_has(mode, (target, source)) for family in named.values() for mode in family.modes)
+        mend = f"{_text((target, source))} is: name the one who is heard first" if turned else "check the labels"
+        raise GraphError(f"optional edge {_text((source, target))} is in no file; {mend}")
     read = {"orientation": orientation, "undirected": undirected, **options}
     read |= {"uncertainty": format_exact(share), "optional": [list(pair) for pair in wanted]}
-    return replace(Family.switching(named), read=read)
+    family = Family.switching(named)
+    return replace(family, read=read, notes=family.notes + _given_again([str(path) for path in sources], [*named]))
+
+
+def _given_again(paths: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
+    """Return a note about each file that is given more than once."""
+    notes = []
+    for path in dict.fromkeys(paths):
+        if len(same := [name for other, name in zip(paths, names, strict=True) if other == path]) > 1:
+            modes = ", ".join(shorten(name) for name in same)
+            notes.append(f"{shorten(Path(path).name)} was given {len(same)} times: modes {modes} are the same")
+    return tuple(notes)
 
 
 def keywords_of(read: Any) -> dict[str, Any]:
@@ -204,12 +217,30 @@ def truth(answer: object) -> bool | None:
     return text in _YES if text in (*_YES, *_NO) else None
 
 
+def refuse_outside(weight: object, least: Fraction, largest: Fraction, place: str) -> None:
+    """Refuse a weight that stands beside an interval and lies outside of it; what is no number says nothing.
+
+    Examples
+    --------
+    >>> refuse_outside("n/a", Fraction(1), Fraction(2), "row 1"), refuse_outside(1.5, Fraction(1), Fraction(2), "row 1")
+    (None, None)
+    """
+    try:
+        number = as_fraction(weight, "weight")  # type: ignore[arg-type]
+    except (NumberError, TypeError):
+        return
+    if not least <= number <= largest:
+        ends = f"{format_exact(least)} to {format_exact(largest)}"
+        raise GraphError(f"{place}: weight {format_exact(number)} lies outside of its interval, {ends}; mend one")
+
+
 def _both(pair: Sequence[str], undirected: bool) -> list[tuple[str, str]]:
     return [(pair[0], pair[1])] + [(pair[1], pair[0])] * undirected
 
 
-def _has(graph: SignedDigraph, pair: tuple[str, str]) -> bool:
-    source, target = (graph.index.get(label) for label in pair)
+def _has(graph: SignedDigraph | Mode, pair: tuple[str, str]) -> bool:
+    index = {label: k for k, label in enumerate(graph.labels) if label in pair}
+    source, target = (index.get(label, -1) for label in pair)
     return bool(((graph.source == source) & (graph.target == target)).any())
 
 
@@ -294,6 +325,8 @@ def _row(
         raise FormatError(
             f"{where}: edge {edge}: its least weight {least} is above its largest {largest}; exchange them"
         )
+    if low is not None and ends[2] is not None:
+        refuse_outside(field(ends[2]), least, largest, f"{where}: edge {edge}")
     if least == largest == 0:
         raise FormatError(f"{where}: edge {edge}: its weight is always 0; remove the row")
     if source == target:

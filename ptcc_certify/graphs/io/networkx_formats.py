@@ -12,6 +12,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from ptcc_certify.errors import FormatError
+from ptcc_certify.graphs.digraph import OF_EDGES
 from ptcc_certify.graphs.io.files import decoded, lines_of, one_line_errors
 from ptcc_certify.graphs.io.graph_from_rows import Numbers, Rows
 from ptcc_certify.graphs.rationals import shorten
@@ -27,6 +28,10 @@ def _rows(graph: Any, labels: list[str], undirected: str, name: str) -> Rows:
         first.append(number[u])
         second.append(number[v])
         attributes = default | _lower_case(data)
+        if more := OF_EDGES & attributes.keys():
+            edge = f"{shorten(labels[first[-1]])} -> {shorten(labels[second[-1]])}"
+            mend = "as a CSV file with columns source, target, weight_min, weight_max, optional it is read"
+            raise FormatError(f'{name}: edge {edge} has the attribute "{min(more)}", which makes a family; {mend}')
         try:
             codes.append(weights[str(attributes.get("weight", attributes.get("sign", "")))])
         except KeyError:
