@@ -331,7 +331,7 @@ def certify_family(
             progress(STEP)
         kept: dict[str, Any] = {
             "signal": signal,
-            "restricted": claims_for(signal, parts, protocol, initial_state, notes),
+            "restricted": claims_for(signal, parts, protocol, initial_state, notes, asked.min_rate),
         }
     progress(STEPS[3])
     told = origins_of(None, x0, None) | dict(origins or {})

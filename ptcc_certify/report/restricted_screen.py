@@ -107,6 +107,8 @@ def last_states(certificate: FamilyContent) -> list[Interval | None]:
 
 
 def _rate_text(certificate: FamilyContent, claim: RateClaim) -> str:
+    if claim.forms is None:
+        return f"rate {down(claim.rate)}, as for every signal; nothing more is proved"
     text = f"rate {down(claim.rate)}" if claim.rate > 0 else "no rate is proved"
     if claim.ratio > 1 and isinstance(claim.signal, DwellTime):
         text += f", V up to {up(claim.ratio, 3)} times"
