@@ -59,6 +59,7 @@ def assess_family(certificate: FamilyContent, report: CheckReport | None) -> Ass
     if certificate.common and not certificate.bounded:
         grows = certificate.unbounded
         caveat = "the input is not bounded for some signal" if grows else "the input is not proved bounded"
+        caveat += " for every signal" * (not grows and certificate.signal != "any")
         rate, kappa = certificate.rate, certificate.protocol.gain.pole / certificate.protocol.parameters["rho2"]
         if rate is not None:
             advice = f"--rho2 {up(2 / (rate * kappa), 3)} bounds it"
@@ -92,7 +93,9 @@ def _judge_behaviour(certificate: FamilyContent, components: Sequence[FamilyComp
     """Tell whether a behaviour holds for every signal, or for those that were asked for, by the last mode."""
     last = certificate.ends_of_signal
     others = [component for k, component in enumerate(components) if k not in last]
-    answer = judge_family_behaviour(others, expected) if others else Answer(MET, expected)
+    met = Answer(MET, expected, "these signals" if last else "every signal" * (certificate.signal != "any"))
+    answer = judge_family_behaviour(others, expected) if others else met
+    answer = met if answer.status == MET else answer
     for k, claim in last.items():
         family = components[k].family
         edges = [mode.sign for mode in family.modes] if isinstance(claim, LastModeClaim) else [family.union[2]]
@@ -112,8 +115,10 @@ def _judge_rate(certificate: FamilyContent, least: Fraction) -> Answer:
     what, rate, bound = f"rate >= {near(least, 12)}", certificate.rate_of_signal, certificate.upper_bound
     if certificate.signal != "any":
         bound = certificate.member_bound
-    if all(part.component.nodes.size == 1 for part in certificate.parts) or (rate is not None and rate >= least):
-        return Answer(MET, what)
+    alone = all(part.component.nodes.size == 1 for part in certificate.parts)
+    if alone or (rate is not None and rate >= least):
+        every = alone or (certificate.rate is not None and certificate.rate >= least)
+        return Answer(MET, what, "" if certificate.signal == "any" else "every signal" if every else "these signals")
     if certificate.signal == "any" and any(part.component.behaviour == DEPENDS for part in certificate.parts):
         return Answer(REFUTED, what, "no rate holds for every signal")
     if not certificate.common:
@@ -128,7 +133,7 @@ def _judge_input(certificate: FamilyContent, most: Fraction) -> Answer:
     """Tell whether every input is proved to stay within so much for every signal."""
     what, peaks = f"|u_k| <= {near(most, 12)}", certificate.input_peaks
     if peaks is not None and max(peaks) <= most:
-        return Answer(MET, what)
+        return Answer(MET, what, "every signal" * (certificate.signal != "any"))
     if certificate.initial_state is not None and (first := first_input(certificate)) > most:
         return Answer(REFUTED, what, f"it is up to {down(first)} at the start, proved")
     return Answer(OPEN, what, "no bound is proved" if peaks is None else f"proved: {up(max(peaks))}")

@@ -310,7 +310,8 @@ def _rate_entries(certificate: FamilyCertificate) -> Lines:
     limit = "" if bound is None else f"upper bound {up(bound)}"
     if rate is not None:
         ratio = "" if bound is None else f": both proved, ratio {down(rate / bound)}"
-        yield "rate", f"{down(rate)}, {limit}{ratio}" if limit else f"{down(rate)}, proved"
+        which = f"{down(rate)}{_every(certificate)}"
+        yield "rate", f"{which}, {limit}{ratio}" if limit else f"{which}, proved"
         return
     explicit = [explicit_rate(part.component) for part in certificate.parts]
     logs = [one.log10_decay_rate for one in explicit if one is not None]
@@ -353,13 +354,15 @@ def _final_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
     """Tell between which ends every agent is at the deadline, agents with the same ends together."""
     if certificate.final_states is not None and certificate.common:
         width = 12 * TEXT if long else 2 * TEXT - 20
-        yield from _interval_entries(certificate.family.labels, certificate.final_states, width)
+        states = _interval_entries(certificate.family.labels, certificate.final_states, width)
+        yield from ((name, f"{text}{_every(certificate)}") for name, text in states)
     elif certificate.final_states is not None and any(c.final_states for c in certificate.ends_of_signal.values()):
         pairs = zip(certificate.final_states, last_states(certificate), strict=True)
-        states = [other if ends is None else ends for ends, other in pairs]
-        ends = _interval_entries(certificate.family.labels, states, 12 * TEXT if long else 2 * TEXT - 20)
+        known = [other if ends is None else ends for ends, other in pairs]
+        ends = _interval_entries(certificate.family.labels, known, 12 * TEXT if long else 2 * TEXT - 20)
         claims = certificate.ends_of_signal.values()
         rests = not any(isinstance(claim, LastModeClaim) and None in claim.behaviours for claim in claims)
+        ends = ((name, f"{text} (these signals)") for name, text in list(ends))
         yield from ends if rests else (("x(t)", text) for _, text in ends)
 
 
@@ -380,11 +383,11 @@ def _error_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
         return
     if not long:
         bound = certificate.deviation_bound([0.01]).max()
-        yield "error", f"at 0.99 T: every agent within {up(float(bound), 2)} of its final state"
+        yield "error", f"at 0.99 T: every agent within {up(float(bound), 2)} of its final state{_every(certificate)}"
         return
     bounds = certificate.deviation_bound([remaining for remaining, _ in _INSTANTS]).max(axis=0)
     told = (f"{up(float(bound), 2)} at {when}" for (_, when), bound in zip(_INSTANTS, bounds, strict=True))
-    yield "error", f"every agent is within so much of its final state: {', '.join(told)}"
+    yield "error", f"every agent is within so much of its final state: {', '.join(told)}{_every(certificate)}"
 
 
 def _input_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
@@ -396,22 +399,27 @@ def _input_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
         elif certificate.unbounded:
             yield "INPUT", "NOT BOUNDED for some signal from some initial states"
         else:
-            yield "input", "not proved bounded"
+            yield "input", f"not proved bounded{_every(certificate)}"
         return
     peaks, labels = certificate.input_peaks, certificate.family.labels
-    yield from _peak_entries(labels, peaks or ())
+    yield from _peak_entries(labels, peaks or (), _every(certificate))
     if long and peaks is not None:
         told = [f"{shorten_label(label)} {up(peak, 4)}" for label, peak in zip(labels, peaks, strict=True)]
         yield "", f"|u_k| <= {shorten_list(told, 4 * TEXT)}"
 
 
-def _peak_entries(labels: Sequence[str], peaks: Sequence[Fraction]) -> Lines:
+def _every(certificate: FamilyCertificate) -> str:
+    """Tell apart what holds for every signal where more is claimed of some."""
+    return "" if certificate.signal == "any" else " (every signal)"
+
+
+def _peak_entries(labels: Sequence[str], peaks: Sequence[Fraction], every: str) -> Lines:
     if not peaks:
         yield "input", "bounded for every signal and every initial state"
         return
     largest = max(peaks)
     agent = shorten_label(labels[peaks.index(largest)], 22)
-    yield "input", f"bounded; |u_k| <= {up(largest, 4)}, the largest of agent {agent}"
+    yield "input", f"bounded; |u_k| <= {up(largest, 4)}, the largest of agent {agent}{every}"
 
 
 def _proof_text(certificate: FamilyCertificate) -> str:

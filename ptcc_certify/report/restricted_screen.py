@@ -28,7 +28,7 @@ def restricted_entries(certificate: FamilyContent) -> Iterator[tuple[str, str]]:
     >>> unsure = Family.from_intervals([("a", "b", 1, 2), ("b", "a", -2, -1)])
     >>> cert = certify(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), signal="constant")
     >>> print(*next(restricted_entries(cert)), sep=": ")
-    constant: if mode and weights never change: rate 1.58578, input bounded
+    constant: if mode and weights never change: rate 1.58578, as for every signal; nothing more is proved
     """
     if certificate.signal == "any":
         return

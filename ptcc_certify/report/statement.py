@@ -129,7 +129,10 @@ def family_latex(saved: FamilyCertificate, figures: dict[str, str] | None = None
     """
     assert saved.source is not None
     names = texts.parameter_names(saved.protocol)
-    rows = [(_cut(label), *cells) for label, *cells in state_rows(saved)[: texts.LISTED]]
+    rows = [
+        (_cut(label), Markup("--") if camp == "\N{EN DASH}" else camp, *ends)
+        for label, camp, *ends in state_rows(saved)[: texts.LISTED]
+    ]
     view = family_facts(saved) | {
         "comment": _comment(saved.source.path.name),
         "parameters": [(Markup(symbol_latex(name)), getattr(saved.protocol, name)) for name in names],

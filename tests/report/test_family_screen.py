@@ -24,6 +24,7 @@ from ptcc_certify.report.family_screen import (
 )
 from ptcc_certify.theorems.counterexample_text import counterexample_text
 from ptcc_certify.theorems.family_behaviour import FamilyComponent
+from ptcc_certify.theorems.restricted_signals import DwellTime
 
 PROTOCOL = ptcc.NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
 LONG = "agent number {} of a rather long list of agents"
@@ -70,6 +71,19 @@ def test_the_certificate_of_any_family_fits_the_screen(kind: str):
     assert re.match("verdict    certified" if cert.verdict == "certified" else "verdict    undecided", verdict)
     assert cert.summary().splitlines()[-1] == lines[-1]
     assert family_lines(cert, "g.csv")[-1].startswith(f"verdict    {cert.assessment.text}")
+
+
+def test_where_more_is_claimed_of_some_signals_every_line_says_of_which_it_is():
+    line = ptcc.SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -2)])
+    pair = Family.switching([line, ptcc.SignedDigraph.from_edges([("b", "a", 1), ("a", "c", -1)])])
+    depends = Family.switching([line, ptcc.SignedDigraph.from_edges([("a", "b", -1), ("b", "c", -1)])])
+    asked = Expectations("bipartite consensus")
+    for family, told in ((pair, "every signal)"), (depends, "these signals)")):
+        for signal in ("any", DwellTime("0.4", clock="t")):
+            cert = certify_family(family, PROTOCOL, [1, 2, 3], signal=signal, expectations=asked)
+            marked = [line for line in family_lines(cert, "g.csv") if re.match(r"rate|x\(T|error|input|verdict", line)]
+            assert len(marked) == (5 if family is pair else 1 if signal == "any" else 2)
+            assert {told in line for line in marked} == {signal != "any"}
 
 
 def test_every_refutation_is_told_in_words():
