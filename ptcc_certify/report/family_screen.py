@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lmi.exact.decimal_rounding import down, near, up
-from ptcc_certify.certificate.restricted_claims import LastModeClaim
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.structure import STABILITY
-from ptcc_certify.report.restricted_screen import last_states, restricted_entries
+from ptcc_certify.report.restricted_screen import restricted_entries, rests, states_of_signal
 from ptcc_certify.report.structure_text import Lines, structure_text
 from ptcc_certify.report.text_layout import (
     TEXT,
@@ -357,13 +356,10 @@ def _final_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
         states = _interval_entries(certificate.family.labels, certificate.final_states, width)
         yield from ((name, f"{text}{_every(certificate)}") for name, text in states)
     elif certificate.final_states is not None and any(c.final_states for c in certificate.ends_of_signal.values()):
-        pairs = zip(certificate.final_states, last_states(certificate), strict=True)
-        known = [other if ends is None else ends for ends, other in pairs]
-        ends = _interval_entries(certificate.family.labels, known, 12 * TEXT if long else 2 * TEXT - 20)
-        claims = certificate.ends_of_signal.values()
-        rests = not any(isinstance(claim, LastModeClaim) and None in claim.behaviours for claim in claims)
-        ends = ((name, f"{text} (these signals)") for name, text in list(ends))
-        yield from ends if rests else (("x(t)", text) for _, text in ends)
+        width = 12 * TEXT if long else 2 * TEXT - 20
+        ends = _interval_entries(certificate.family.labels, states_of_signal(certificate), width)
+        what = "x(T)" if rests(certificate) else "x(t)"
+        yield from ((name and what, f"{text} (these signals)") for name, text in ends)
 
 
 def _interval_entries(labels: Sequence[str], states: Sequence[tuple[Fraction, Fraction] | None], width: int) -> Lines:

@@ -106,6 +106,18 @@ def last_states(certificate: FamilyContent) -> list[Interval | None]:
     return result
 
 
+def states_of_signal(certificate: FamilyContent) -> list[Interval | None]:
+    """Return the final states for every signal, and where there are none, those for the signals that were asked for."""
+    pairs = zip(certificate.final_states or (), last_states(certificate), strict=False)
+    return [other if ends is None else ends for ends, other in pairs]
+
+
+def rests(certificate: FamilyContent) -> bool:
+    """Tell whether the signals that were asked for bring all agents to rest whose end depends on the signal."""
+    claims = certificate.ends_of_signal.values()
+    return not any(isinstance(claim, LastModeClaim) and None in claim.behaviours for claim in claims)
+
+
 def _rate_text(certificate: FamilyContent, claim: RateClaim) -> str:
     if claim.forms is None:
         return f"rate {down(claim.rate)}, as for every signal; nothing more is proved"

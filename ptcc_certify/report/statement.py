@@ -34,10 +34,7 @@ _CAPTIONS = {
     ),
 }
 _FAMILY_CAPTIONS = {
-    "graph": (
-        "The graphs: arrows point to who listens, solid from allies, dashed from opponents; dotted ones may fail. A"
-        " pale band is as wide as the largest weight, the line on it as the least."
-    ),
+    "graph": "The graphs: arrows point to who listens, solid from allies, dashed from opponents.",
     "decay": (
         "How far agents are from their final states, against the time left, both logarithmic. Thick line: the proved"
         " bound for every signal. Thin: simulated runs (numerical), down to the dotted line, below which the integrator"
@@ -141,9 +138,19 @@ def family_latex(saved: FamilyCertificate, figures: dict[str, str] | None = None
         "why": [counterexample_text(c, c.counterexample) for c in _depending(saved) if c.counterexample is not None],
         **{"figures": figures or {}, "stem": _stem(saved.source.path.stem), "report": saved.checked},
         **{"sha256": _broken(saved.source.sha256), "sha256_plain": saved.source.sha256},
-        **{"bound_kinds": BOUND_KINDS, "theorem": THEOREM, "captions": _FAMILY_CAPTIONS},
+        **{"bound_kinds": BOUND_KINDS, "theorem": THEOREM, "captions": _family_captions(saved)},
     }
     return _environment().get_template("family_statement.tex").render(view)
+
+
+def _family_captions(saved: FamilyCertificate) -> dict[str, str]:
+    """Return captions that speak of bands and dotted edges where there are some."""
+    caption = _FAMILY_CAPTIONS["graph"]
+    if any(mode.parameters.size for mode in saved.family.modes):
+        caption += " A pale band is as wide as the largest weight, the line on it as the least."
+    if any(mode.optional.any() for mode in saved.family.modes):
+        caption += " Dotted ones may fail."
+    return _FAMILY_CAPTIONS | {"graph": caption}
 
 
 def _depending(saved: FamilyCertificate) -> list[FamilyComponent]:

@@ -122,7 +122,7 @@ def plot_family(
     low, high = float(np.min([*map(np.min, values), *bars])), float(np.max([*map(np.max, values), *bars]))
     low, high = (low, high) if low < high else (low - 1, high + 1)
     ax.set_ylim(low - 0.08 * (high - low), high + 0.08 * (high - low))
-    return finished(ax, time_label("time $t$", time_unit), "state $x_k$", f"{len(runs)} signals")
+    return finished(ax, time_label("time $t$", time_unit), "state $x_k$", count_of_signals(subject, runs))
 
 
 @styled
@@ -178,7 +178,7 @@ def plot_family_decay(
     floor = FLOOR_FACTOR * first.rtol * scale
     if not (bound >= floor).any():
         raise ParameterError("every agent begins where it ends: there is no decay to draw")
-    label: str | None = "random signals"
+    label: str | None = "random signals" if subject.signal == "any" else "any signal (random)"
     for run in runs:
         if run.deadline_resolved and np.array_equal(run.t, first.t):
             gap = np.abs(run.states[:, before] - run.final_state[:, None]).max(axis=0)
@@ -217,6 +217,11 @@ def runs_of(subject: Any, runs: Sequence[FamilyTrajectory] | None) -> list[Famil
     if not result or not all(isinstance(run, FamilyTrajectory) and run.family == subject.family for run in result):
         raise ParameterError("runs are what simulate_family returned for the family of the certificate")
     return result
+
+
+def count_of_signals(certificate: FamilyCertificate, runs: Sequence[FamilyTrajectory]) -> str:
+    """Tell how many signals are drawn, and where some are promised, that these are any."""
+    return f"{len(runs)} signals" + ", any signal" * (certificate.signal != "any")
 
 
 def _drawn_agents(x: np.ndarray) -> list[int]:

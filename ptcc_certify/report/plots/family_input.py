@@ -12,7 +12,7 @@ from lmi.exact.decimal_rounding import up
 from ptcc_certify.bounds.envelope import FLOOR_FACTOR
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.report.plots.agents import NAME_SIZE
-from ptcc_certify.report.plots.family import runs_of
+from ptcc_certify.report.plots.family import count_of_signals, runs_of
 from ptcc_certify.report.plots.style import BOUND, RUN, axes_of, finished, styled, time_label
 from ptcc_certify.simulation.family_members import Members
 from ptcc_certify.simulation.family_run import FamilyTrajectory
@@ -101,4 +101,4 @@ def plot_family_input(
         ax.set_ylim(start * 10.0**-_DECADES, 2 * top)
     else:
         ax.set_ylim(0, 1.12 * top or 1)
-    return finished(ax, time_label("time $t$", time_unit), r"$\max_k |u_k|$", f"{len(runs)} signals")
+    return finished(ax, time_label("time $t$", time_unit), r"$\max_k |u_k|$", count_of_signals(subject, runs))
