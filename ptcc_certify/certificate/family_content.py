@@ -305,7 +305,11 @@ class FamilyContent:
         """
         if self.initial_state is None:
             raise ParameterError("the certificate has no initial state; certify the family with x0")
-        clock = np.asarray(self.protocol.gain.clock_at_remaining(remaining))
+        return self.deviation_at(np.asarray(self.protocol.gain.clock_at_remaining(remaining)))
+
+    def deviation_at(self, clock: np.ndarray) -> np.ndarray:
+        """Return the same bound, (N, M), at (M,) instants of the stretched clock, from the initial state."""
+        assert self.initial_state is not None
         bounds = np.full((self.family.n_nodes, clock.size), np.inf)
         for part in self.parts:
             nodes = part.component.nodes
