@@ -11,6 +11,7 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.graphs.family import Family, Mode
+from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import STABILITY
 from ptcc_certify.report.restricted_screen import restricted_entries, rests, states_of_signal
 from ptcc_certify.report.structure_text import Lines, structure_text
@@ -312,15 +313,26 @@ def _rate_entries(certificate: FamilyCertificate) -> Lines:
         which = f"{down(rate)}{_every(certificate)}"
         yield "rate", f"{which}, {limit}{ratio}" if limit else f"{which}, proved"
         return
+    why = f" ({_no_search(certificate)})".replace(" ()", "")
     explicit = [explicit_rate(part.component) for part in certificate.parts]
     logs = [one.log10_decay_rate for one in explicit if one is not None]
     if logs and len(logs) == sum(part.component.nodes.size > 1 for part in certificate.parts):
         yield (
             "rate",
-            f"above 1e{int(min(logs)) - 1}, in closed form; no larger one was proved" + f"; {limit}" * bool(limit),
+            f"above 1e{int(min(logs)) - 1}, in closed form; no larger one was proved{why}" + f"; {limit}" * bool(limit),
         )
     else:
-        yield "rate", "there is one, but none was proved" + f"; {limit}" * bool(limit)
+        yield "rate", f"there is one, but none was proved{why}" + f"; {limit}" * bool(limit)
+
+
+def _no_search(certificate: FamilyCertificate) -> str:
+    """Tell why no rate was proved: too many agents for a search, or too little time; nothing where it is not known."""
+    sizes = [part.component.nodes.size for part in certificate.parts if part.component.nodes.size > 1 and not part.rate]
+    if max(sizes, default=0) > EXACT_NODES:
+        return f"{max(sizes)} agents are above the {EXACT_NODES} of the searches"
+    return "the searches took too long; raise --time-limit" * any(
+        "cut off" in note or note == "Lyapunov functions" for note in certificate.notes
+    )
 
 
 def _function_entries(certificate: FamilyCertificate) -> Lines:
