@@ -13,8 +13,8 @@ from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.certificate.family_comparison import worst_case_signals
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, analyse, find_camps
-from ptcc_certify.report.plots.agents import CAMP_STYLES, NAMED_AGENTS, camp_groups, draw_deadlines, name_agents
+from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, find_camps
+from ptcc_certify.report.plots.agents import CAMP_STYLES, NAMED_AGENTS, draw_deadlines, family_groups, name_agents
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled, time_label
 from ptcc_certify.simulation.family_run import FamilyTrajectory, simulate_family
 from ptcc_certify.simulation.signals import RandomSignal, Signal
@@ -68,7 +68,7 @@ def plot_family(
     """Draw the states ``x_k(t)`` under many signals, within what is proved for every signal.
 
     Thin lines are runs under given or random signals, thicker ones under worst cases, in the colours and lines of the
-    camps: those of the consensus, or those in the first mode. Shaded: where the agents of a camp are for every signal,
+    camps: those of the consensus, or what agents are in every mode. Shaded: where those of a camp are for every signal,
     the final interval of each widened by the bound of ``|x_k(t) - x_k(T)|``, and never beyond the largest state. Bars
     behind ``T``: the final intervals. Of more than eight agents those are drawn that begin highest and lowest.
 
@@ -104,7 +104,7 @@ def plot_family(
     first = runs[0]
     groups = family_camps(subject.family)
     if groups is None or not all(part.component.behaviour == BIPARTITE_CONSENSUS for part in subject.parts):
-        groups = camp_groups(analyse(subject.family.modes[0].mandatory))
+        groups = family_groups(subject.family)
     agents = _drawn_agents(first.states[:, 0])
     named = {k: CAMP_STYLES[groups[k]][0] for k in agents}
     labels = set()
