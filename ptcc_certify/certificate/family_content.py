@@ -325,5 +325,5 @@ class FamilyContent:
                 if moves:
                     size = np.array([moves[k] / unit for k in range(nodes.size)]) * (1 + 1e-12)
                     decay = np.exp(-float(V.rate) * (1 - 1e-12) / 2 * clock)
-                    bounds[nodes] = np.minimum(bounds[nodes], np.multiply.outer(size, decay))
+                    bounds[nodes] = np.fmin(bounds[nodes], np.multiply.outer(size, decay))
         return bounds

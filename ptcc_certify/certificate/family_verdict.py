@@ -181,12 +181,13 @@ def _useful_rho2(certificate: FamilyContent) -> Fraction | None:
     candidates = float(rho2) * np.geomspace(1, _LARGEST, max(15, min(500, 10**6 // certificate.family.n_nodes)))
     clock = float(gain.clock_at_remaining(float(LAST))) + (candidates - float(rho2)) * kappa * last
     if certificate.initial_state is not None:
-        left = certificate.deviation_at(clock).max(axis=0)
+        with np.errstate(over="ignore", invalid="ignore"):  # functions with negative rates
+            left = certificate.deviation_at(clock).max(axis=0)
         enough = left <= float(max(map(abs, certificate.initial_state)) * LAST)
     else:
         enough = np.ones(clock.size, bool)
         for part in (part for part in certificate.parts if part.component.nodes.size > 1):
-            decays = [math.sqrt(V.overshoot) * np.exp(-float(V.rate) / 2 * clock) for V in part.functions]
+            decays = [math.sqrt(V.overshoot) * np.exp(-float(V.rate) / 2 * clock) for V in part.functions if V.rate > 0]
             enough &= np.min(decays or [np.full(clock.size, np.inf)], axis=0) <= float(LAST)
     return Fraction(up(float(candidates[enough.argmax()]), 3)) if enough.any() else None
 
