@@ -355,7 +355,7 @@ def certify_family(
             progress(STEP)
         kept: dict[str, Any] = {
             "signal": signal,
-            "restricted": claims_for(signal, parts, protocol, initial_state, notes),
+            "restricted": claims_for(signal, parts, protocol, initial_state, notes, asked.min_rate),
         }
     progress(STEPS[3])
     kept |= {"expectations": asked, "notes": tuple(dict.fromkeys(notes)), "scenario": scenario}

@@ -404,7 +404,14 @@ class FamilyContent:
             There is no initial state.
         """
         self._require_state()
-        at = self._instants(remaining)
+        return self._deviation(self._instants(remaining))
+
+    def deviation_at(self, clock: np.ndarray) -> np.ndarray:
+        """Return the same bound, (N, M), at (M,) instants of the stretched clock; no sliding variable moves."""
+        assert self.direct
+        return self._deviation(Instants(clock))
+
+    def _deviation(self, at: Instants) -> np.ndarray:
         bounds = np.full((self.family.n_nodes, at.clock.size), np.inf)
         for part, driven in zip(self.parts, self._drives, strict=True):
             nodes, x, stable = part.component.nodes, self._state(part), part.component.behaviour == STABILITY

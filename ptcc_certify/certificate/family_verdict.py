@@ -10,6 +10,8 @@ import math
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
+import numpy as np
+
 from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.certificate.family_content import FamilyContent
 from ptcc_certify.certificate.restricted_claims import LastModeClaim
@@ -22,6 +24,8 @@ from ptcc_certify.theorems.family_claims import component_holds, component_refut
 from ptcc_certify.theorems.last_mode import last_mode_shows
 from ptcc_certify.theorems.restricted_signals import ClockShares, JointWindows
 
+#: Up to which multiple of ``rho2`` one is looked for that makes the bound useful.
+_LARGEST = 2e4
 #: What to try where edges do not tell whether rest states agree.
 NEXT_STEP = (
     "whether rest states agree is not decided: it takes exact rows of more than 120 agents; round the weights to few "
@@ -56,13 +60,18 @@ def assess_family(certificate: FamilyContent, report: CheckReport | None) -> Ass
             else f"the independent check does not accept {report.rejected}: {report.reason}"
         )
         return Assessment(UNDECIDED, False, None, why, "", tuple(answers))
-    useful, caveat, advice = _usefulness(certificate), "", ""
+    useful, caveat, rho2, effects = _usefulness(certificate), "", Fraction(0), []
+    if useful is False and certificate.direct and (gain := _useful_rho2(certificate)) is not None:
+        rho2, effects = gain, ["leaves 1 %"]
     if certificate.common and not certificate.bounded:
         grows = certificate.unbounded
         caveat = "the input is not bounded for some signal" if grows else "the input is not proved bounded"
+        caveat += " for every signal" * (not grows and certificate.signal != "any")
         rate, kappa = certificate.rate, certificate.protocol.gain.pole / certificate.protocol.parameters["rho2"]
         if rate is not None:
-            advice = f"--rho2 {up(2 / (rate * kappa), 3)} bounds it"
+            rho2 = max(rho2, Fraction(up(2 / (rate * kappa), 3)))
+            effects.append("bounds the input" if effects else "bounds it")
+    advice = f"--rho2 {near(rho2)} {' and '.join(effects)}" if effects else ""
     if certificate.sliding_bounded is False and certificate.sliding_peaks is None:
         caveat = caveat or "the input is not proved bounded"
         advice = " ".join(
@@ -100,7 +109,9 @@ def _judge_behaviour(certificate: FamilyContent, components: Sequence[FamilyComp
     others = [component for k, component in enumerate(components) if k not in last]
     narrow = isinstance(certificate.signal, ClockShares | JointWindows)  # no constant member is one of these signals
     judged = [component for component in others if component.behaviour != DEPENDS or not narrow]
-    answer = judge_family_behaviour(judged, expected) if judged else Answer(MET, expected)
+    met = Answer(MET, expected, "these signals" if last else "every signal" * (certificate.signal != "any"))
+    answer = judge_family_behaviour(judged, expected) if judged else met
+    answer = met if answer.status == MET else answer
     if len(judged) < len(others) and answer.status == MET:
         answer = Answer(OPEN, expected, "not decided of these signals")
     for k, claim in last.items():
@@ -123,8 +134,10 @@ def _judge_rate(certificate: FamilyContent, least: Fraction) -> Answer:
     if certificate.signal != "any":
         held = not isinstance(certificate.signal, ClockShares | JointWindows)  # a constant member is one of them
         bound = certificate.member_bound if held else None
-    if all(part.component.nodes.size == 1 for part in certificate.parts) or (rate is not None and rate >= least):
-        return Answer(MET, what)
+    alone = all(part.component.nodes.size == 1 for part in certificate.parts)
+    if alone or (rate is not None and rate >= least):
+        every = alone or (certificate.rate is not None and certificate.rate >= least)
+        return Answer(MET, what, "" if certificate.signal == "any" else "every signal" if every else "these signals")
     if certificate.signal == "any" and any(part.component.behaviour == DEPENDS for part in certificate.parts):
         return Answer(REFUTED, what, "no rate holds for every signal")
     if not certificate.common:
@@ -141,7 +154,7 @@ def _judge_input(certificate: FamilyContent, most: Fraction) -> Answer:
     """Tell whether every input is proved to stay within so much for every signal."""
     what, peaks = f"|u_k| <= {near(most, 12)}", certificate.input_peaks
     if peaks is not None and max(peaks) <= most:
-        return Answer(MET, what)
+        return Answer(MET, what, "every signal" * (certificate.signal != "any"))
     known = certificate.initial_state is not None and certificate.protocol.reaching is None
     if known and (first := first_input(certificate)) > most:
         return Answer(REFUTED, what, f"it is up to {down(first)} at the start, proved")
@@ -170,6 +183,27 @@ def _first_rows(mode: Mode, x: Sequence[Fraction]) -> Mapping[int, tuple[Fractio
         before = sums.get(target, (Fraction(0), Fraction(0)))
         sums[target] = before[0] + low, before[1] + high
     return sums
+
+
+def _useful_rho2(certificate: FamilyContent) -> Fraction | None:
+    """Return a short ``rho2`` with which the bounds at hand leave 1 % at 0.99 T; None if there is none within reach.
+
+    ``rho2`` enters the bounds by the clock alone, ``s = rho1 t + rho2 kappa ln(T/(T-t))``.
+    """
+    gain, rho2 = certificate.protocol.gain, certificate.protocol.parameters["rho2"]
+    kappa, last = float(gain.pole / rho2), -math.log(float(LAST))
+    candidates = float(rho2) * np.geomspace(1, _LARGEST, max(15, min(500, 10**6 // certificate.family.n_nodes)))
+    clock = float(gain.clock_at_remaining(float(LAST))) + (candidates - float(rho2)) * kappa * last
+    if certificate.initial_state is not None:
+        with np.errstate(over="ignore", invalid="ignore"):  # functions with negative rates
+            left = certificate.deviation_at(clock).max(axis=0)
+        enough = left <= float(max(map(abs, certificate.initial_state)) * LAST)
+    else:
+        enough = np.ones(clock.size, bool)
+        for part in (part for part in certificate.parts if part.component.nodes.size > 1):
+            decays = [math.sqrt(V.overshoot) * np.exp(-float(V.rate) / 2 * clock) for V in part.functions if V.rate > 0]
+            enough &= np.min(decays or [np.full(clock.size, np.inf)], axis=0) <= float(LAST)
+    return Fraction(up(float(candidates[enough.argmax()]), 3)) if enough.any() else None
 
 
 def _usefulness(certificate: FamilyContent) -> bool | None:

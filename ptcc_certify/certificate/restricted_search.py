@@ -31,6 +31,8 @@ STEP = "restricted signals"
 _WEIGHED = 0.01
 #: Relative gain for which forms of their own are written, and bits of rates.
 _GAIN, _RATE_BITS = 1e-6, 60
+#: Shares of the price of a switch at which a rate that is asked for is looked for.
+_CHEAPER = (0.3, 0.1, 0.01)
 #: What is told with every claim of windows.
 _OF_THE_CLOCK = (
     "the windows are of the stretched clock: in time they shrink towards T, and who switches at a fixed pace in time "
@@ -53,6 +55,7 @@ def claims_for(
     protocol: Protocol,
     state: Sequence[Fraction] | None,
     notes: list[str],
+    least: Fraction | None = None,
 ) -> tuple[Claim, ...]:
     """Return what is proved beside for restricted signals, component after component.
 
@@ -65,6 +68,8 @@ def claims_for(
     state : sequence of N Fraction, or None
     notes : list of str
         Is told what the time limit cut off.
+    least : Fraction, optional
+        A rate that is asked for: under a dwell time in time one of it goes before one with a smaller constant.
     """
     if signal == "any":
         return ()
@@ -79,7 +84,9 @@ def claims_for(
                 claims += filter(None, [_window_claim(number, signal, part, state)])
             elif not isinstance(signal, DwellTime) or signal.clock == "t":
                 claims.append(_last_mode_claim(number, signal, part, state))
-        elif not isinstance(signal, JointWindows) and (claim := _rate_claim(number, signal, part, protocol, notes)):
+        elif not isinstance(signal, JointWindows) and (
+            claim := _rate_claim(number, signal, part, protocol, notes, least)
+        ):
             claims.append(claim)
     if any(isinstance(claim, WindowClaim) for claim in claims):
         notes.append(_OF_THE_CLOCK)
@@ -87,15 +94,21 @@ def claims_for(
 
 
 def _rate_claim(
-    number: int, signal: SignalClass, part: ComponentProof, protocol: Protocol, notes: list[str]
+    number: int, signal: SignalClass, part: ComponentProof, protocol: Protocol, notes: list[str], least: Fraction | None
 ) -> RateClaim | None:
     best, forms = part.rate, None
     own = [V for V in part.functions if isinstance(V, FamilyFunction)]
+    price = switch_price(signal, protocol)
+    asked = least if isinstance(signal, DwellTime) and signal.clock == "t" else None
     with share_of_time(1.0, STEP, notes):
         if part.component.nodes.size <= EXACT_NODES and within_reach(quotient := Quotient.of(part.component)):
-            forms = _search(quotient, signal, own, protocol)
-    price = switch_price(signal, protocol)
-    if forms is not None and best is not None and _worth(forms, price) <= float(best) + _GAIN * abs(float(best)):
+            forms = search_single_forms(quotient) if price == 0 else search_mode_forms(quotient, price, own)
+            for cheaper in _CHEAPER:  # switches cost no rate in time, only a constant
+                if asked is None or asked <= max(best or 0, forms.rate if forms else 0):
+                    break
+                forms = search_mode_forms(quotient, price * cheaper, own) or forms
+    wanted = forms is not None and asked is not None and forms.rate >= asked > (best or 0)
+    if not wanted and forms and best is not None and _worth(forms, price) <= float(best) + _GAIN * abs(float(best)):
         forms = None
     rate = best if forms is None else own_rate(signal, forms)
     return None if rate is None else RateClaim(number, signal, forms, rate, rate * protocol.gain.pole >= 2)
@@ -133,14 +146,6 @@ def _last_mode_claim(
         x = [state[v] for v in component.nodes.tolist()]
         bounds = tuple(reachable_bounds(range(len(x)), edges, x).values())
     return LastModeClaim(number, signal, last_mode_behaviours(component), bounds)
-
-
-def _search(
-    quotient: Quotient, signal: SignalClass, own: Sequence[FamilyFunction], protocol: Protocol
-) -> ModeForms | None:
-    if isinstance(signal, DwellTime):
-        return search_mode_forms(quotient, switch_price(signal, protocol), own)
-    return search_single_forms(quotient)
 
 
 def switch_price(signal: SignalClass, protocol: Protocol) -> float:

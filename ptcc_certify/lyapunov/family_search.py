@@ -112,7 +112,8 @@ def search_family(
         with share_of_time(1.0, "undirected", cut_off):
             functions += filter(None, [undirected_function(quotient)])
     if shares is not None or not any(V.optimal for V in functions):
-        limited = np.isfinite(seconds_left())
+        small = "full" in kinds and len(quotient.nodes) <= FULL_ROWS
+        limited = np.isfinite(seconds_left()) and small  # else nothing comes after the diagonal one
         for kind, rows, share in (("diagonal", DIAGONAL_ROWS, _DIAGONAL_SHARE), ("full", FULL_ROWS, 1.0)):
             if kind not in kinds or (
                 enough is not None and any(_worth(quotient, V, shares) >= enough for V in functions)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import shlex
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
@@ -27,7 +28,7 @@ from ptcc_certify.report.plots.counterexample import plot_counterexample
 from ptcc_certify.report.plots.family import plot_family, plot_family_decay
 from ptcc_certify.report.plots.family_graph import plot_family_graph
 from ptcc_certify.report.plots.family_input import plot_family_input
-from ptcc_certify.report.restricted_screen import restricted_entries
+from ptcc_certify.report.restricted_screen import restricted_entries, rests, signal_text, states_of_signal
 from ptcc_certify.report.structure_text import structure_text
 from ptcc_certify.simulation.family_run import FamilyTrajectory
 from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_name
@@ -43,6 +44,8 @@ BOUND_KINDS = {
 }
 #: Modes, uncertain weights and parts of a proof that are listed.
 MODES, WEIGHTS = 12, 8
+#: How sentences begin that do not begin with a label.
+_BEGINNINGS = ("the state ", "the leader ", "the signs ", "the graph ", "a state ", "no limit ", "held ")
 _PLOTS = {"states": plot_family, "decay": plot_family_decay, "input": plot_family_input}
 #: The theorem, as page and statement give it.
 THEOREM = (
@@ -65,6 +68,8 @@ def family_facts(saved: FamilyCertificate) -> dict[str, Any]:
         "rate_bound": min((p.upper_bound for p in saved.parts if p.upper_bound), key=lambda b: b.value, default=None),
         "constant": all(component.nodes.size == 1 for component in components),
         "restricted": [text for _, text in restricted_entries(saved)] if certified else [],
+        "promise": "" if saved.signal == "any" else signal_text(saved.signal)[1],
+        "these": states_of_signal(saved) != list(saved.final_states or ()),
         "explicit_power": _explicit_power(saved),
         "sliding": saved.protocol.reaching is not None,
         "peak_agent": None if not saved.input_peaks else family.labels[saved.input_peaks.index(max(saved.input_peaks))],
@@ -93,7 +98,9 @@ def family_view(saved: FamilyCertificate, runs: Sequence[FamilyTrajectory]) -> d
         "violated": any(ratio.violated for ratio in ratios),
         "judged": sum(ratio.judged for ratio in ratios),
         "worst_runs": sum(run.signal.startswith("worst") for run in runs),
-        "groups": [texts.printable(groups_text(c), 2000) for c in facts["components"] if c.behaviour == DEPENDS],
+        "groups": [
+            _sentence(texts.printable(groups_text(c), 2000)) for c in facts["components"] if c.behaviour == DEPENDS
+        ],
         "answers": [(answer.status, texts.typeset(str(answer))) for answer in saved.assessment.answers],
         "commands": _commands(saved),
         "file_name": None if saved.source is None else saved.source.path.name,
@@ -101,6 +108,7 @@ def family_view(saved: FamilyCertificate, runs: Sequence[FamilyTrajectory]) -> d
         "document": None if saved.source is None else saved.source.document,
         "report": saved.checked,
         "bound_kinds": BOUND_KINDS,
+        "sentence": _sentence,
         "theorem": THEOREM,
     }
 
@@ -200,11 +208,8 @@ def bound_words(saved: FamilyCertificate) -> list[Markup]:
 
 def endings(saved: FamilyCertificate) -> list[tuple[Markup, str]]:
     """Return agents and the interval in which they end, those with the same ends together."""
-    finals = saved.final_states
-    if finals is None:
-        return []
     groups: dict[Any, list[int]] = {}
-    for k, ends in enumerate(finals):
+    for k, ends in enumerate(states_of_signal(saved)):
         groups.setdefault(ends, []).append(k)
     return [(texts.labels(nodes, saved.family.labels, 8), _ends(ends)) for ends, nodes in groups.items()]
 
@@ -240,7 +245,7 @@ def state_rows(saved: FamilyCertificate) -> list[tuple[str, str, str, str | None
     """Return label, camp, initial and final state of every agent; None where no limit is claimed."""
     if saved.initial_state is None:
         return []
-    labels, finals = saved.family.labels, saved.final_states or ()
+    labels, finals = saved.family.labels, states_of_signal(saved)
     camp = ["\u2013"] * len(labels)
     for part in saved.parts:
         for number, side in enumerate(camps(part.component), 1):
@@ -254,8 +259,10 @@ def _states(saved: FamilyCertificate) -> tuple[list[str], list[list[Any]]]:
     """Return head and rows of the table of initial and final states."""
     rows = state_rows(saved)[: 2 * texts.LISTED]
     written = [[texts.label(name), camp, first, last or _ends(None)] for name, camp, first, last in rows]
-    whatever = "for every signal" if saved.protocol.reaching is None else "for every signal and disturbance"
-    return ["Agent", "Camp", "Initial state", f"State at the deadline, {whatever}"], written
+    which = "every signal" if states_of_signal(saved) == list(saved.final_states or ()) else "these signals"
+    which += " and disturbance" * (saved.protocol.reaching is not None)
+    last = "State at the deadline" if rests(saved) else "State at any instant"
+    return ["Agent", "Camp", "Initial state", f"{last}, for {which}"], written
 
 
 def remaining(saved: FamilyCertificate) -> list[tuple[float, Markup]]:
@@ -322,9 +329,19 @@ def _counterexamples(saved: FamilyCertificate) -> list[tuple[str, Markup, Family
                     result.append((asked, part.component, why))
                 break
     return [
-        (what, Markup("{}").format(texts.printable(counterexample_text(c, why), 500)), c, why)
+        (what, Markup("{}").format(_minus(texts.printable(counterexample_text(c, why), 500))), c, why)
         for what, c, why in result
     ]
+
+
+def _minus(text: str) -> str:
+    """Write minus signs of numbers as such."""
+    return re.sub(r"(?<=[= ])-(?=\d)", "\N{MINUS SIGN}", text)
+
+
+def _sentence(text: str) -> str:
+    """Begin with a capital letter, unless the text begins with a label."""
+    return text[0].upper() + text[1:] if text.startswith(_BEGINNINGS) else text
 
 
 def draw_family(

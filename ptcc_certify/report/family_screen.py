@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lmi.exact.decimal_rounding import down, near, up
-from ptcc_certify.certificate.restricted_claims import LastModeClaim
 from ptcc_certify.graphs.family import Family, Mode
+from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import STABILITY
-from ptcc_certify.report.restricted_screen import last_states, restricted_entries
+from ptcc_certify.report.restricted_screen import restricted_entries, rests, states_of_signal
 from ptcc_certify.report.sliding_lines import sliding_lines
 from ptcc_certify.report.structure_text import Lines, structure_text
 from ptcc_certify.report.text_layout import (
@@ -318,17 +318,29 @@ def _rate_entries(certificate: FamilyCertificate) -> Lines:
     limit = "" if bound is None else f"upper bound {up(bound)}"
     if rate is not None:
         ratio = "" if bound is None else f": both proved, ratio {down(rate / bound)}"
-        yield "rate", f"{down(rate)}, {limit}{ratio}" if limit else f"{down(rate)}, proved"
+        which = f"{down(rate)}{_every(certificate)}"
+        yield "rate", f"{which}, {limit}{ratio}" if limit else f"{which}, proved"
         return
+    why = f" ({_no_search(certificate)})".replace(" ()", "")
     explicit = [explicit_rate(part.component) for part in certificate.parts]
     logs = [one.log10_decay_rate for one in explicit if one is not None]
     if logs and len(logs) == sum(part.component.nodes.size > 1 for part in certificate.parts):
         yield (
             "rate",
-            f"above 1e{int(min(logs)) - 1}, in closed form; no larger one was proved" + f"; {limit}" * bool(limit),
+            f"above 1e{int(min(logs)) - 1}, in closed form; no larger one was proved{why}" + f"; {limit}" * bool(limit),
         )
     else:
-        yield "rate", "there is one, but none was proved" + f"; {limit}" * bool(limit)
+        yield "rate", f"there is one, but none was proved{why}" + f"; {limit}" * bool(limit)
+
+
+def _no_search(certificate: FamilyCertificate) -> str:
+    """Tell why no rate was proved: too many agents for a search, or too little time; nothing where it is not known."""
+    sizes = [part.component.nodes.size for part in certificate.parts if part.component.nodes.size > 1 and not part.rate]
+    if max(sizes, default=0) > EXACT_NODES:
+        return f"{max(sizes)} agents are above the {EXACT_NODES} of the searches"
+    return "the searches took too long; raise --time-limit" * any(
+        "cut off" in note or note == "Lyapunov functions" for note in certificate.notes
+    )
 
 
 def _function_entries(certificate: FamilyCertificate) -> Lines:
@@ -361,14 +373,13 @@ def _final_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
     """Tell between which ends every agent is at the deadline, agents with the same ends together."""
     if certificate.final_states is not None and certificate.common:
         width = 12 * TEXT if long else 2 * TEXT - 20
-        yield from _interval_entries(certificate.family.labels, certificate.final_states, width)
+        states = _interval_entries(certificate.family.labels, certificate.final_states, width)
+        yield from ((name, f"{text}{_every(certificate)}") for name, text in states)
     elif certificate.final_states is not None and any(c.final_states for c in certificate.ends_of_signal.values()):
-        pairs = zip(certificate.final_states, last_states(certificate), strict=True)
-        states = [other if ends is None else ends for ends, other in pairs]
-        ends = _interval_entries(certificate.family.labels, states, 12 * TEXT if long else 2 * TEXT - 20)
-        claims = certificate.ends_of_signal.values()
-        rests = not any(isinstance(claim, LastModeClaim) and None in claim.behaviours for claim in claims)
-        yield from ends if rests else (("x(t)", text) for _, text in ends)
+        width = 12 * TEXT if long else 2 * TEXT - 20
+        ends = _interval_entries(certificate.family.labels, states_of_signal(certificate), width)
+        what = "x(T)" if rests(certificate) else "x(t)"
+        yield from ((name and what, f"{text} (these signals)") for name, text in ends)
 
 
 def _interval_entries(labels: Sequence[str], states: Sequence[tuple[Fraction, Fraction] | None], width: int) -> Lines:
@@ -390,12 +401,13 @@ def _error_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
     if not long:
         bound = certificate.deviation_bound([0.01 * share]).max()
         when = "0.99 T" if certificate.direct else "T_r + 0.99 T_s"
-        yield "error", f"at {when}: every agent within {up(float(bound), 2)} of its final state"
+        within = f"{up(float(bound), 2)} of its final state{_every(certificate)}"
+        yield "error", f"at {when}: every agent within {within}"
         return
     instants = [(q, name) for q, name in _INSTANTS if q <= share]
     bounds = certificate.deviation_bound([remaining for remaining, _ in instants]).max(axis=0)
     told = (f"{up(float(bound), 2)} at {when}" for (_, when), bound in zip(instants, bounds, strict=True))
-    yield "error", f"every agent is within so much of its final state: {', '.join(told)}"
+    yield "error", f"every agent is within so much of its final state: {', '.join(told)}{_every(certificate)}"
 
 
 def _input_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
@@ -407,7 +419,7 @@ def _input_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
         elif certificate.unbounded:
             yield "INPUT", "NOT BOUNDED for some signal from some initial states"
         else:
-            yield "input", "not proved bounded"
+            yield "input", f"not proved bounded{_every(certificate)}"
         return
     peaks, labels = certificate.input_peaks, certificate.family.labels
     if peaks is None and certificate.sliding_bounded is False:
@@ -419,19 +431,24 @@ def _input_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
         )
         yield "input", whole
         return
-    yield from _peak_entries(labels, peaks or ())
+    yield from _peak_entries(labels, peaks or (), _every(certificate))
     if long and peaks is not None:
         told = [f"{shorten_label(label)} {up(peak, 4)}" for label, peak in zip(labels, peaks, strict=True)]
         yield "", f"|u_k| <= {shorten_list(told, 4 * TEXT)}"
 
 
-def _peak_entries(labels: Sequence[str], peaks: Sequence[Fraction]) -> Lines:
+def _every(certificate: FamilyCertificate) -> str:
+    """Tell apart what holds for every signal where more is claimed of some."""
+    return "" if certificate.signal == "any" else " (every signal)"
+
+
+def _peak_entries(labels: Sequence[str], peaks: Sequence[Fraction], every: str) -> Lines:
     if not peaks:
         yield "input", "bounded for every signal and every initial state"
         return
     largest = max(peaks)
     agent = shorten_label(labels[peaks.index(largest)], 22)
-    yield "input", f"bounded; |u_k| <= {up(largest, 4)}, the largest of agent {agent}"
+    yield "input", f"bounded; |u_k| <= {up(largest, 4)}, the largest of agent {agent}{every}"
 
 
 def _proof_text(certificate: FamilyCertificate) -> str:

@@ -28,7 +28,7 @@ def restricted_entries(certificate: FamilyContent) -> Iterator[tuple[str, str]]:
     >>> unsure = Family.from_intervals([("a", "b", 1, 2), ("b", "a", -2, -1)])
     >>> cert = certify(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), signal="constant")
     >>> print(*next(restricted_entries(cert)), sep=": ")
-    constant: if mode and weights never change: rate 1.58578, input bounded
+    constant: if mode and weights never change: rate 1.58578, as for every signal; nothing more is proved
     """
     if certificate.signal == "any":
         return
@@ -104,7 +104,21 @@ def last_states(certificate: FamilyContent) -> list[Interval | None]:
     return result
 
 
+def states_of_signal(certificate: FamilyContent) -> list[Interval | None]:
+    """Return the final states for every signal, and where there are none, those for the signals that were asked for."""
+    pairs = zip(certificate.final_states or (), last_states(certificate), strict=False)
+    return [other if ends is None else ends for ends, other in pairs]
+
+
+def rests(certificate: FamilyContent) -> bool:
+    """Tell whether the signals that were asked for bring all agents to rest whose end depends on the signal."""
+    claims = certificate.ends_of_signal.values()
+    return not any(isinstance(claim, LastModeClaim) and None in claim.behaviours for claim in claims)
+
+
 def _rate_text(certificate: FamilyContent, claim: RateClaim) -> str:
+    if claim.forms is None:
+        return f"rate {down(claim.rate)}, as for every signal; nothing more is proved"
     text = f"rate {down(claim.rate)}" if claim.rate > 0 else "no rate is proved"
     if claim.ratio > 1 and isinstance(claim.signal, DwellTime):
         text += f", V up to {up(claim.ratio, 3)} times"

@@ -34,10 +34,7 @@ _CAPTIONS = {
     ),
 }
 _FAMILY_CAPTIONS = {
-    "graph": (
-        "The graphs: arrows point to who listens, solid from allies, dashed from opponents; dotted ones may fail. A"
-        " pale band is as wide as the largest weight, the line on it as the least."
-    ),
+    "graph": "The graphs: arrows point to who listens, solid from allies, dashed from opponents.",
     "decay": (
         "How far agents are from their final states, against the time left, both logarithmic. Thick line: the proved"
         " bound for every signal. Thin: simulated runs (numerical), down to the dotted line, below which the integrator"
@@ -129,7 +126,10 @@ def family_latex(saved: FamilyCertificate, figures: dict[str, str] | None = None
     """
     assert saved.source is not None
     names = texts.parameter_names(saved.protocol)
-    rows = [(_cut(label), *cells) for label, *cells in state_rows(saved)[: texts.LISTED]]
+    rows = [
+        (_cut(label), Markup("--") if camp == "\N{EN DASH}" else camp, *ends)
+        for label, camp, *ends in state_rows(saved)[: texts.LISTED]
+    ]
     view = family_facts(saved) | {
         "comment": _comment(saved.source.path.name),
         "parameters": [(Markup(symbol_latex(name)), getattr(saved.protocol, name)) for name in names],
@@ -139,7 +139,7 @@ def family_latex(saved: FamilyCertificate, figures: dict[str, str] | None = None
         "why": [counterexample_text(c, c.counterexample) for c in _depending(saved) if c.counterexample is not None],
         **{"figures": figures or {}, "stem": _stem(saved.source.path.stem), "report": saved.checked},
         **{"sha256": _broken(saved.source.sha256), "sha256_plain": saved.source.sha256},
-        **{"bound_kinds": BOUND_KINDS, "theorem": THEOREM, "captions": _FAMILY_CAPTIONS},
+        **{"bound_kinds": BOUND_KINDS, "theorem": THEOREM, "captions": _family_captions(saved)},
     }
     return _environment().get_template("family_statement.tex").render(view)
 
@@ -148,6 +148,16 @@ def _last_time(saved: FamilyCertificate) -> float | None:
     """Return an instant from which on all sliding variables are proved 0; None if that is ``T_r``."""
     times = [None if r.z is None else r.time for r in saved.reaching or ()]
     return None if None in times else max((t for t in times if t is not None), default=0.0)
+
+
+def _family_captions(saved: FamilyCertificate) -> dict[str, str]:
+    """Return captions that speak of bands and dotted edges where there are some."""
+    caption = _FAMILY_CAPTIONS["graph"]
+    if any(mode.parameters.size for mode in saved.family.modes):
+        caption += " A pale band is as wide as the largest weight, the line on it as the least."
+    if any(mode.optional.any() for mode in saved.family.modes):
+        caption += " Dotted ones may fail."
+    return _FAMILY_CAPTIONS | {"graph": caption}
 
 
 def _depending(saved: FamilyCertificate) -> list[FamilyComponent]:

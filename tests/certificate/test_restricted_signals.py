@@ -176,6 +176,15 @@ def test_a_rate_that_is_asked_for_is_judged_for_these_signals():
     assert certify_family(family, PROTOCOL, expectations=asked).assessment.asked != "met"
 
 
+def test_a_rate_that_is_asked_for_is_worth_more_than_a_small_constant():
+    """A dwell time in time costs no rate: what is proved for long ones holds for short ones."""
+    family, short = slowed_by_switches(), DwellTime("0.02", clock="t")
+    first = certify_family(family, PROTOCOL, signal=short)
+    assert first.rate_of_signal == first.rate < 4 and "nothing more is proved" in first.summary()
+    made = certify_family(family, PROTOCOL, signal=short, expectations=Expectations(min_rate="4"))
+    assert made.assessment.asked == "met" and made.rate_of_signal >= 4 and made.verdict == "certified"
+
+
 def resealed(data: dict[str, Any]) -> dict[str, Any]:
     return {**data, "digest": digest(data)}
 

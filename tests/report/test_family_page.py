@@ -55,9 +55,24 @@ def test_the_first_screen_tells_family_signal_end_rate_bound_ratio_and_input(mad
 
 def test_what_is_proved_of_restricted_signals_is_told_too():
     saved = read_certificate(certify(SWITCHING, PROTOCOL, signal=DwellTime("0.2", clock="t")).to_dict())
-    told = "t least 0.2 of time between switches: rate "
-    assert f"If signals are restricted A{told}" in words(report_html(saved))
-    assert f"Of signals that are restricted more is proved: a{told}" in family_latex(saved)
+    told = "t least 0.2 of time between switches"
+    page = words(report_html(saved))
+    assert f"If signals are restricted A{told}: rate " in page and f"Signal Promised: a{told}." in page
+    assert "holds for signals that keep the promise alone" in page
+    assert f"Of signals that are restricted (a{told}) more is proved: rate " in family_latex(saved)
+
+
+def test_ends_under_the_last_mode_stand_on_page_and_statement():
+    other = SignedDigraph.from_edges([("ann", "<b>", -1), ("<b>", "eve", -1)])
+    signal = DwellTime("0.2", clock="t")
+    saved = read_certificate(certify(Family.switching([DAY, other]), PROTOCOL, [1, 2, 3], signal=signal).to_dict())
+    page, statement = words(report_html(saved)), family_latex(saved)
+    assert "each stays within: ann 1; &lt;b&gt; [−1, 2]; eve [−2, 3]." in page.replace("\N{NO-BREAK SPACE}", " ")
+    assert "State at the deadline, for these signals" in page
+    assert "& -- & $2$ & $[-1, 2]$" in statement and "U+2013" not in statement
+    assert "(at least 0.2 of time between switches) more is proved: the last mode decides, bip" in statement
+    axes = [saved.plot(what) for what in ("states", "input")]
+    assert all("any signal" in ax.get_legend().get_title().get_text() for ax in axes)
 
 
 def test_an_expectation_that_is_refuted_is_told_and_its_counterexample_is_drawn():
@@ -70,9 +85,9 @@ def test_an_expectation_that_is_refuted_is_told_and_its_counterexample_is_drawn(
 def test_of_a_behaviour_that_depends_on_the_signal_the_page_tells_why_and_what_holds_all_the_same():
     page = report_html(read_certificate(certify(UNSURE, PROTOCOL, [3, 1, 2]).to_dict()))
     text = words(page)
-    assert "The state ann=0, &lt;b&gt;=0, eve=1" not in text  # labels keep their case
     assert (
-        "the state ann=0, &lt;b&gt;=0, eve=1 rests at the least weights and moves with &lt;b&gt; -&gt; eve on" in text
+        "Why The state ann=0, &lt;b&gt;=0, eve=1 rests at the least weights and moves with &lt;b&gt; -&gt; eve on"
+        in text
     )
     assert "no limit is claimed of eve" in text and 'id="figure-why0"' in page
     assert "for every signal and every initial state" not in text.partition("What was asked")[0]

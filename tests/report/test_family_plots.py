@@ -8,10 +8,12 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.report.plots.agents import CAMP_STYLES
 from ptcc_certify.report.plots.counterexample import plot_counterexample
 from ptcc_certify.report.plots.family import plot_family, plot_family_decay, sample_runs
 from ptcc_certify.report.plots.family_graph import plot_family_graph
 from ptcc_certify.report.plots.family_input import plot_family_input
+from ptcc_certify.report.plots.trajectory import plot_trajectory
 from ptcc_certify.simulation.family_run import simulate_family
 from ptcc_certify.simulation.signals import RandomSignal, WorstCaseSignal
 from ptcc_certify.theorems.family_behaviour import decide
@@ -71,6 +73,18 @@ def test_the_input_of_every_run_lies_below_its_bound(drawn):
         if len(t) == len(bound.get_xdata()) and line is not bound:
             assert not (size > bound.get_ydata() * 1.000001).any()
     assert float(bound.get_ydata()[0]) == pytest.approx(float(max(certificate.input_peaks)))
+
+
+def test_no_agent_has_a_role_that_it_has_in_one_mode_alone():
+    day = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1)])
+    night, spoiled = (SignedDigraph.from_edges([("c", "a", w), ("a", "b", 1)], nodes="abc") for w in (-2, 2))
+    for other, names in ((night, {"first camp", "second camp"}), (spoiled, {"agents"})):
+        family = Family.switching([day, other])
+        for ax in (
+            plot_trajectory(simulate_family(family, PROTOCOL, [1, 4, -3], RandomSignal(1), times=[0, 0.5])),
+            plot_family_graph(family),
+        ):
+            assert {t.get_text() for t in ax.get_legend().get_texts()} & set(CAMP_STYLES) == names
 
 
 def test_modes_are_drawn_side_by_side_with_nodes_in_the_same_places():

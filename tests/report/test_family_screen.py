@@ -24,6 +24,7 @@ from ptcc_certify.report.family_screen import (
 )
 from ptcc_certify.theorems.counterexample_text import counterexample_text
 from ptcc_certify.theorems.family_behaviour import FamilyComponent
+from ptcc_certify.theorems.restricted_signals import DwellTime
 
 PROTOCOL = ptcc.NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
 LONG = "agent number {} of a rather long list of agents"
@@ -70,6 +71,39 @@ def test_the_certificate_of_any_family_fits_the_screen(kind: str):
     assert re.match("verdict    certified" if cert.verdict == "certified" else "verdict    undecided", verdict)
     assert cert.summary().splitlines()[-1] == lines[-1]
     assert family_lines(cert, "g.csv")[-1].startswith(f"verdict    {cert.assessment.text}")
+
+
+def test_where_more_is_claimed_of_some_signals_every_line_says_of_which_it_is():
+    line = ptcc.SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -2)])
+    pair = Family.switching([line, ptcc.SignedDigraph.from_edges([("b", "a", 1), ("a", "c", -1)])])
+    depends = Family.switching([line, ptcc.SignedDigraph.from_edges([("a", "b", -1), ("b", "c", -1)])])
+    asked = Expectations("bipartite consensus")
+    for family, told in ((pair, "every signal)"), (depends, "these signals)")):
+        for signal in ("any", DwellTime("0.4", clock="t")):
+            cert = certify_family(family, PROTOCOL, [1, 2, 3], signal=signal, expectations=asked)
+            marked = [line for line in family_lines(cert, "g.csv") if re.match(r"rate|x\(T|error|input|verdict", line)]
+            assert len(marked) == (5 if family is pair else 1 if signal == "any" else 2)
+            assert {told in line for line in marked} == {signal != "any"}
+
+
+def test_the_gain_that_is_proposed_makes_the_bound_useful_and_bounds_the_input():
+    edges = [("a", "b", 1), ("b", "c", -2)], [("b", "a", 1), ("a", "c", -1)]
+    pair = Family.switching([ptcc.SignedDigraph.from_edges(some) for some in edges])
+    slow = ptcc.NominalProtocol(T=1, rho1=1, rho2="0.1", kappa=2)
+    for x0 in (None, [1, 2, 4]):
+        cert = certify_family(pair, slow, x0)
+        told = re.search(r"--rho2 ([0-9.]+) leaves 1 % and bounds the input", cert.assessment.text)
+        assert cert.assessment.useful is False and told
+        again = certify_family(pair, ptcc.NominalProtocol(T=1, rho1=1, rho2=told[1], kappa=2), x0)
+        assert again.assessment.useful and again.bounded, x0
+
+
+def test_where_no_rate_is_proved_the_line_says_why():
+    for size, seconds, told in ((130, 9, "(130 agents are above the 120"), (60, 0.01, "raise --time-limit)")):
+        ring = [(k, (k + 1) % size, 1 - 2 * (k == 0)) for k in range(size)]
+        family = Family.from_graph(ptcc.SignedDigraph.from_edges(ring), uncertainty="10%")
+        lines = family_lines(certify_family(family, PROTOCOL, time_limit=seconds), "g.csv")
+        assert told in next(line for line in lines if line.startswith("rate"))
 
 
 def test_every_refutation_is_told_in_words():

@@ -11,9 +11,11 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 from scipy.optimize import isotonic_regression
 
-from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.graphs.family import Family
+from ptcc_certify.graphs.structure import Structure, analyse, find_camps
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, STEPS, tick_count
 from ptcc_certify.report.text_layout import columns, printable, shorten_text
+from ptcc_certify.simulation.family_run import FamilyTrajectory
 from ptcc_certify.simulation.trajectory import Trajectory
 
 #: Colour and line of the parts of a graph, which differ without colours too.
@@ -23,6 +25,7 @@ CAMP_STYLES: dict[str, tuple[str, Any]] = {
     "unbalanced leaders": ("#CC79A7", "-."),
     "single leaders": ("#332288", (0, (1, 0.6))),
     "followers": (BEHIND, (0, (3, 1.5))),
+    "agents": (BEHIND, "-"),
 }
 #: Agents, and agents of one part of a graph, of which each has a line.
 NAMED_AGENTS, NAMED_OF_PART = 8, 3
@@ -43,6 +46,24 @@ def camp_groups(structure: Structure) -> np.ndarray:
     return group
 
 
+def family_groups(family: Family) -> np.ndarray:
+    """Return the part of ``CAMP_STYLES`` that every node has in all modes; else the camps of all edges; else "agents".
+
+    Examples
+    --------
+    >>> from ptcc_certify.report.plots.agents import family_groups
+    >>> day, night = SignedDigraph.from_edges([("a", "b", 1)]), SignedDigraph.from_edges([("b", "a", 1)], nodes="ab")
+    >>> family_groups(Family.switching([day, night])).tolist()
+    ['first camp', 'first camp']
+    """
+    own = [camp_groups(analyse(mode.mandatory)) for mode in family.modes]
+    if all((one == own[0]).all() for one in own):
+        return own[0]
+    gauge, violated, _ = find_camps(family.n_nodes, *family.union)
+    camps = np.where(gauge > 0, "first camp", "second camp").astype(object)
+    return np.full(family.n_nodes, "agents", dtype=object) if violated.size else camps
+
+
 def text_width(text: str) -> float:
     """Return the width in points that a name has room for; letters of some scripts take two columns."""
     return 0.62 * NAME_SIZE * columns(text)
@@ -57,7 +78,7 @@ def draw_agents(
     range and median, with a line for the agent whose quantity is the largest at first, and for that with the least;
     of a ``size``, which is never negative, the largest is drawn instead, and what is below it.
     """
-    group = camp_groups(structure)
+    group = family_groups(run.family) if isinstance(run, FamilyTrajectory) else camp_groups(structure)
     single: dict[int, str] = {}
     step: Any = "post" if looks.get("drawstyle") == "steps-post" else None
     for name, (colour, line) in CAMP_STYLES.items():

@@ -13,8 +13,8 @@ from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.certificate.family_comparison import worst_case_signals
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, analyse, find_camps
-from ptcc_certify.report.plots.agents import CAMP_STYLES, NAMED_AGENTS, camp_groups, draw_deadlines, name_agents
+from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, find_camps
+from ptcc_certify.report.plots.agents import CAMP_STYLES, NAMED_AGENTS, draw_deadlines, family_groups, name_agents
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled, time_label
 from ptcc_certify.simulation.family_run import FamilyTrajectory, simulate_family
 from ptcc_certify.simulation.signals import RandomSignal, Signal
@@ -69,7 +69,7 @@ def plot_family(
     """Draw the states ``x_k(t)`` under many signals, within what is proved for every signal.
 
     Thin lines are runs under given or random signals, thicker ones under worst cases, in the colours and lines of the
-    camps: those of the consensus, or those in the first mode. Shaded: where the agents of a camp are for every signal,
+    camps: those of the consensus, or what agents are in every mode. Shaded: where those of a camp are for every signal,
     the final interval of each widened by the bound of ``|x_k(t) - x_k(T)|``, and never beyond the largest state. Bars
     behind ``T``: the final intervals. Of more than eight agents those are drawn that begin highest and lowest.
 
@@ -105,7 +105,7 @@ def plot_family(
     first = runs[0]
     groups = family_camps(subject.family)
     if groups is None or not all(part.component.behaviour == BIPARTITE_CONSENSUS for part in subject.parts):
-        groups = camp_groups(analyse(subject.family.modes[0].mandatory))
+        groups = family_groups(subject.family)
     agents = _drawn_agents(first.states[:, 0])
     named = {k: CAMP_STYLES[groups[k]][0] for k in agents}
     labels = set()
@@ -123,7 +123,7 @@ def plot_family(
     low, high = float(np.min([*map(np.min, values), *bars])), float(np.max([*map(np.max, values), *bars]))
     low, high = (low, high) if low < high else (low - 1, high + 1)
     ax.set_ylim(low - 0.08 * (high - low), high + 0.08 * (high - low))
-    return finished(ax, time_label("time $t$", time_unit), "state $x_k$", f"{len(runs)} signals")
+    return finished(ax, time_label("time $t$", time_unit), "state $x_k$", count_of_signals(subject, runs))
 
 
 @styled
@@ -179,7 +179,7 @@ def plot_family_decay(
     floor = FLOOR_FACTOR * first.rtol * scale
     if not (bound >= floor).any():
         raise ParameterError("every agent begins where it ends: there is no decay to draw")
-    label: str | None = "random signals"
+    label: str | None = "random signals" if subject.signal == "any" else "any signal (random)"
     for run in runs:
         if run.deadline_resolved and np.array_equal(run.t, first.t):
             gap = np.abs(run.states[:, before] - run.final_state[:, None]).max(axis=0)
@@ -218,6 +218,11 @@ def runs_of(subject: Any, runs: Sequence[FamilyTrajectory] | None) -> list[Famil
     if not result or not all(isinstance(run, FamilyTrajectory) and run.family == subject.family for run in result):
         raise ParameterError("runs are what simulate_family returned for the family of the certificate")
     return result
+
+
+def count_of_signals(certificate: FamilyCertificate, runs: Sequence[FamilyTrajectory]) -> str:
+    """Tell how many signals are drawn, and where some are promised, that these are any."""
+    return f"{len(runs)} signals" + ", any signal" * (certificate.signal != "any")
 
 
 def _drawn_agents(x: np.ndarray) -> list[int]:

@@ -15,7 +15,7 @@ from ptcc_certify.graphs.io import as_family
 from ptcc_certify.graphs.size_limits import LABELLED_NODES
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.report.plots.adjacency import draw_adjacency
-from ptcc_certify.report.plots.agents import CAMP_STYLES, NAME_SIZE, camp_groups, text_width
+from ptcc_certify.report.plots.agents import CAMP_STYLES, NAME_SIZE, family_groups, text_width
 from ptcc_certify.report.plots.family import family_camps
 from ptcc_certify.report.plots.graph_labels import (
     INSIDE,
@@ -70,8 +70,8 @@ def plot_family_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
 
     Arrows are those of :func:`~ptcc_certify.plot_graph`. An uncertain weight is a line as wide as its least size on a
     pale band as wide as its largest; an edge that may fail is a dotted line on the band; the range stands beside. Nodes
-    have the colours of the camps that all edges of all modes keep, or of those in each mode; outlined are the leaders
-    by mandatory edges. Up to six modes are drawn; of more than 40 nodes the mandatory edges, as matrices.
+    have the colours of the camps that all edges keep, or of what they are in every mode; outlined are the leaders by
+    mandatory edges. Up to six modes are drawn; of more than 40 nodes the mandatory edges, as matrices.
 
     Parameters
     ----------
@@ -151,9 +151,9 @@ def _draw_modes(panels: Sequence[Axes], family: Family, drawn: Sequence[Mode], l
         return
     place, radius, inside, size = layout
     camps, edges = family_camps(family), [_ranges(mode) for mode in drawn]
+    groups = family_groups(family) if camps is None else camps
     largest = max((arrow.size for some in edges for arrow, _ in some), default=1.0)
     for panel, structure, some in zip(panels, structures, edges, strict=True):
-        groups = camp_groups(structure) if camps is None else camps
         _draw_nodes(panel, place, radius, groups, structure.leaders)
         bends = _bends(some)
         _draw_arrows(panel, some, place, bends, radius, largest)

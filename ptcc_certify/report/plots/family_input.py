@@ -12,7 +12,7 @@ from lmi.exact.decimal_rounding import up
 from ptcc_certify.bounds.envelope import FLOOR_FACTOR
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.report.plots.agents import NAME_SIZE
-from ptcc_certify.report.plots.family import runs_of
+from ptcc_certify.report.plots.family import count_of_signals, runs_of
 from ptcc_certify.report.plots.style import BOUND, RUN, axes_of, finished, styled, time_label
 from ptcc_certify.simulation.family_members import Members
 from ptcc_certify.simulation.family_run import FamilyTrajectory
@@ -31,6 +31,7 @@ def plot_family_input(
 ) -> Axes:
     """Draw ``max_k |u_k(t)|`` under many signals below its bound for every signal, and the proved peak.
 
+    Signals of a search for worst cases keep the error large, and their inputs need not be: they are called slowest.
     Nothing of a run is drawn where the integrator no longer resolves what the gain multiplies. A bound that grows much
     towards the deadline is drawn on a logarithmic axis.
 
@@ -73,7 +74,7 @@ def plot_family_input(
         own = run.remaining > 0
         size = np.abs(run.input[:, own]).max(axis=0)
         resolved = np.where(size > noise * gain.value_at_remaining(run.remaining[own]), size, np.nan)
-        label = "worst cases" if (worst := run.signal.startswith("worst")) else "other signals"
+        label = "slowest" if (worst := run.signal.startswith("worst")) else "other signals"
         looks: dict[str, Any] = {
             "color": "black" if worst else RUN,
             "linewidth": 0.9 if worst else 0.6,
@@ -105,4 +106,4 @@ def plot_family_input(
         ax.set_ylim(start * 10.0**-_DECADES, 2 * top)
     else:
         ax.set_ylim(0, 1.12 * top or 1)
-    return finished(ax, time_label("time $t$", time_unit), r"$\max_k |u_k|$", f"{len(runs)} signals")
+    return finished(ax, time_label("time $t$", time_unit), r"$\max_k |u_k|$", count_of_signals(subject, runs))
