@@ -226,8 +226,10 @@ def test_help_names_the_commands_that_take_families():
     assert taken.replace("`", "") in " ".join(ptcc("--help").out.replace("`", "").split())
     for words in (("unsure.csv", "--switching"), ("unsure.csv", "--what", "graph")):
         assert ptcc("plot" if "--what" in words else "simulate", *words).code == 0
-    refused = ptcc("explore", "unsure.csv").err
-    assert "ptcc classify, certify, simulate and plot take it" in refused
+    for file in ("unsure.csv", "may_fail.csv"):
+        for command in (("explore", file), ("batch", file)):
+            run = ptcc(*command)
+            assert "ptcc classify, certify, simulate and plot take it" in " ".join((run.out + run.err).split()), run
 
 
 def test_pages_statements_and_figures_are_made_of_the_certificate_of_a_family():

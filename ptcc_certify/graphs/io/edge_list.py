@@ -11,7 +11,7 @@ from itertools import chain
 import numpy as np
 
 from ptcc_certify.errors import FormatError, NumberError
-from ptcc_certify.graphs.digraph import SignedDigraph, ordered_labels
+from ptcc_certify.graphs.digraph import OF_EDGES, SignedDigraph, ordered_labels
 from ptcc_certify.graphs.io.files import lines_of
 from ptcc_certify.graphs.io.graph_from_rows import HEADER_MEND, Numbers, Rows
 from ptcc_certify.graphs.rationals import parse_exact, shorten
@@ -99,15 +99,15 @@ def header(row: Sequence[str], place: str) -> tuple[int, int, int] | None:
     """
     if (columns := edge_columns(row, place)) is None:
         return None
+    if column(row, sorted(OF_EDGES), place) is not None:
+        mend = "ptcc classify, certify, simulate and plot take it, and ptcc_certify.read_family"
+        raise FormatError(f"{place}: uncertain weights or optional edges, which make a family of graphs; {mend}")
     source, target, weight = columns
     if weight is not None:
         return source, target, weight
     try:
         parse_exact("".join(row[2:3]))
     except NumberError:
-        if column(row, ("weight_min", "weight_max"), place) is not None:
-            mend = "ptcc classify, certify, simulate and plot take it, and ptcc_certify.read_family"
-            raise FormatError(f"{place}: weights in intervals, which make a family of graphs; {mend}") from None
         raise FormatError(f"{place}: the header names no weight; name one column weight, sign or rating") from None
     return None
 
