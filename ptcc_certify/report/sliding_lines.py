@@ -26,6 +26,7 @@ def sliding_lines(
 
     Examples
     --------
+    >>> from ptcc_certify.protocols.reaching_time import ReachingTime
     >>> p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
     >>> list(sliding_lines(["a"], p, [Fraction(0)], [ReachingTime(p.T_r, Fraction(0))]))
     [('sigma(0)', '0: no reaching phase, the agents slide from the beginning')]
