@@ -126,13 +126,13 @@ def test_neither_signal_nor_disturbance_exceeds_what_is_proved():
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize("part", range(10))
-def test_on_a_hundred_families_many_signals_and_disturbances_exceed_nothing(part):
+@pytest.mark.parametrize("part", range(80))
+def test_on_eighty_families_many_signals_and_disturbances_exceed_nothing(part):
     rng = np.random.default_rng(300 + part)
-    families = [drawn_family(rng, 2 + (part + k) % 7) for k in range(10)]
-    worst, runs = worst_ratios(rng, families, 30, samples=40, remaining=1e-4, rtol=1e-9, atol=1e-9)
+    family = drawn_family(rng, 2 + part % 7)
+    worst, runs = worst_ratios(rng, [family], 6, samples=40, remaining=1e-4, rtol=1e-9, atol=1e-9)
     print(runs, "runs", worst)
-    assert runs >= 200
+    assert runs >= 4
 
 
 # ---------------------------------------------------------------------- the trap
