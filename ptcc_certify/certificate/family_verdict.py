@@ -117,8 +117,8 @@ def _judge_behaviour(certificate: FamilyContent, components: Sequence[FamilyComp
     for k, claim in last.items():
         family = components[k].family
         edges = [mode.sign for mode in family.modes] if isinstance(claim, LastModeClaim) else [family.union[2]]
-        told = zip(claim.behaviours, edges, strict=True)
-        shows = [last_mode_shows(one, expected, bool((signs > 0).all())) for one, signs in told]
+        pairs = zip(claim.behaviours, edges, strict=True)
+        shows = [last_mode_shows(one, expected, bool((signs > 0).all())) for one, signs in pairs]
         if False in shows and answer.status != REFUTED:
             number = shows.index(False)
             whose = f"{mode_name(certificate.family, number)} by itself: " * isinstance(claim, LastModeClaim)
@@ -132,8 +132,10 @@ def _judge_rate(certificate: FamilyContent, least: Fraction) -> Answer:
     """Tell whether a rate of at least so much is proved for every signal, or excluded by the upper bound."""
     what, rate, bound = f"rate >= {near(least, 12)}", certificate.rate_of_signal, certificate.upper_bound
     if certificate.signal != "any":
-        held = not isinstance(certificate.signal, ClockShares | JointWindows)  # a constant member is one of them
-        bound = certificate.member_bound if held else None
+        includes_constant = not isinstance(
+            certificate.signal, ClockShares | JointWindows
+        )  # a constant member is one of them
+        bound = certificate.member_bound if includes_constant else None
     alone = all(part.component.nodes.size == 1 for part in certificate.parts)
     if alone or (rate is not None and rate >= least):
         every = alone or (certificate.rate is not None and certificate.rate >= least)

@@ -447,7 +447,7 @@ def test_more_is_claimed_for_restricted_signals():
     Path("outage.csv").write_text("a,,\nb,,\nc,,\n")
     for words, line in (
         ((*BOTH, "--dwell", "0.2"), "dwell      at least 0.2 of time between switches: rate "),
-        ((*BOTH, "--clock-dwell", "3"), "dwell      at least 3 of clock between switches: rate "),
+        ((*BOTH, "--clock-dwell", "3"), "dwell      at least 3 of the clock between switches: rate "),
         ((*BOTH, "--signal", "constant"), "constant   if mode and weights never change: rate "),
         ((*spoiled, "--dwell", "0.2"), "dwell      at least 0.2 of time between switches: the last mode decides"),
         ((*spoiled, "--clock-dwell", "3"), "nothing more is proved"),

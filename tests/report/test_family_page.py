@@ -57,7 +57,7 @@ def test_what_is_proved_of_restricted_signals_is_told_too():
     saved = read_certificate(certify(SWITCHING, PROTOCOL, signal=DwellTime("0.2", clock="t")).to_dict())
     told = "t least 0.2 of time between switches"
     page = words(report_html(saved))
-    assert f"If signals are restricted A{told}: rate " in page and f"Signal Promised: a{told}." in page
+    assert f"If signals are restricted A{told}: rate " in page and f"is for those that keep a promise: a{told}." in page
     assert "holds for signals that keep the promise alone" in page
     assert f"Of signals that are restricted (a{told}) more is proved: rate " in family_latex(saved)
 
@@ -72,7 +72,7 @@ def test_ends_under_the_last_mode_stand_on_page_and_statement():
     assert "& -- & $2$ & $[-1, 2]$" in statement and "U+2013" not in statement
     assert "(at least 0.2 of time between switches) more is proved: the last mode decides, bip" in statement
     axes = [saved.plot(what) for what in ("states", "input")]
-    assert all("any signal" in ax.get_legend().get_title().get_text() for ax in axes)
+    assert all("of any kind" in ax.get_legend().get_title().get_text() for ax in axes)
 
 
 def test_an_expectation_that_is_refuted_is_told_and_its_counterexample_is_drawn():
@@ -86,7 +86,7 @@ def test_of_a_behaviour_that_depends_on_the_signal_the_page_tells_why_and_what_h
     page = report_html(read_certificate(certify(UNSURE, PROTOCOL, [3, 1, 2]).to_dict()))
     text = words(page)
     assert (
-        "Why The state ann=0, &lt;b&gt;=0, eve=1 rests at the least weights and moves with &lt;b&gt; -&gt; eve on"
+        "Why The state ann=0, &lt;b&gt;=0, eve=1 rests at the least weights and moves with &lt;b&gt; \N{RIGHTWARDS ARROW} eve on"
         in text
     )
     assert "no limit is claimed of eve" in text and 'id="figure-why0"' in page
