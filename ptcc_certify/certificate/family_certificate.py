@@ -89,7 +89,7 @@ class FamilyCertificate(FamilyContent, FromFile, Shown):
         What ``"graph"`` is called, and where ``"x(0)"`` comes from.
     scenario : mapping or None
         The scenario file that asked for it, as JSON; it is kept, and nothing is read from it.
-    signal : "any", "constant" or DwellTime
+    signal : "any", "constant", DwellTime, JointWindows or ClockShares
         The signals that it was asked for.
     restricted : tuple of Claim
         What holds for these beside what holds for every signal.
@@ -270,7 +270,7 @@ def certify_family(
         Sliding mode: ``sigma(0)``, like ``x0``; without it 0, which leaves no reaching phase.
     time_limit : float, optional
         Seconds of wall time for the searches; without it 60, and 1 more for every 1,000 nodes.
-    signal : {"any", "constant"} or DwellTime
+    signal : {"any", "constant"}, DwellTime, JointWindows or ClockShares
         Restricted signals of which more is claimed, beside what holds for every signal.
     expectations : Expectations or str, optional
     scenario, origins : mapping, optional

@@ -56,7 +56,7 @@ class ComponentProof:
     Attributes
     ----------
     component : FamilyComponent
-    functions : tuple of FamilyFunction
+    functions : tuple of FamilyFunction or FollowerFunction
         Proved, the largest rate first; nodes are numbered within the component.
     upper_bound : FamilyRateBound or None
         No rate for every signal is larger.

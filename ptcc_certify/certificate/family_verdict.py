@@ -1,7 +1,7 @@
 """The verdict of a family's certificate in one line: what became of what was asked, and the exit code that agrees.
 
-*Useful* is a bound that leaves at most 1 % at 0.99 T: of the largest ``|x_k(0)|``, for every agent; without an initial
-state, of the norm that decays.
+*Useful* is a bound that leaves at most 1 % at 0.99 T: of the largest ``|x_k(0)|``, for every agent, under the signals
+that were asked for; without an initial state, of the norm that decays under every signal.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.certificate.family_content import FamilyContent
+from ptcc_certify.certificate.restricted_bounds import deviation_of_signal
 from ptcc_certify.certificate.restricted_claims import LastModeClaim
 from ptcc_certify.certificate.verdict import CERTIFIED, LAST, MET, OPEN, REFUTED, UNDECIDED, Answer, Assessment
 from ptcc_certify.checker import CheckReport
@@ -215,7 +216,8 @@ def _usefulness(certificate: FamilyContent) -> bool | None:
     if certificate.initial_state is not None:
         sizes = map(abs, (*certificate.initial_state, *(certificate.sigma0 or ())))
         size, instant = float(max(sizes)), float(LAST) * certificate.settling_share
-        return size == 0 or bool(certificate.deviation_bound([instant]).max() <= size * float(LAST))
+        bounds = deviation_of_signal(certificate, [instant])
+        return size == 0 or bool(bounds.max() <= size * float(LAST))
     clock = float(certificate.protocol.gain.clock_at_remaining(float(LAST)))
     for part in certificate.parts:
         left = [math.sqrt(V.overshoot) * math.exp(-float(V.rate) / 2 * clock) for V in part.functions]

@@ -188,7 +188,7 @@ def bound_words(saved: FamilyCertificate) -> list[Markup]:
         name = texts.printable(member["name"]) if len(family.modes) > 1 else "the graph"
         how = {
             "word": Markup("for {} of the clock").format(rational(duration)),
-            "mixture": Markup("a share {} of the time").format(rational(duration)),
+            "mixture": Markup("for a share {} of the time").format(rational(duration)),
             "member": Markup("for ever"),
         }[bound.kind]
         some = [

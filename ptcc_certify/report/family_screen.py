@@ -407,7 +407,8 @@ def _error_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
     if nearer_for_signal(certificate):
         nearer = _error_text(certificate, partial(deviation_of_signal, certificate), long)
         if certificate.rate is None or nearer != _error_text(certificate, certificate.deviation_bound, long):
-            yield "error" if certificate.rate is None else "", f"{nearer} (these signals)"
+            again = nearer if certificate.rate is None else nearer.removesuffix(" of its final state")
+            yield "error" if certificate.rate is None else "", f"{again} (these signals)"
 
 
 def _error_text(certificate: FamilyCertificate, bound: Callable[[list[float]], np.ndarray], long: bool) -> str:

@@ -87,7 +87,8 @@ def _window_text(claim: WindowClaim) -> str:
     rate = claim.rate
     size = math.log10(rate.eta.numerator) - math.log10(rate.eta.denominator)
     left = math.floor(math.log10(rate.multiple) + rate.exponent * size)
-    return f"{claim.behaviour}; what is left shrinks by 1e{left} of it, or more, in every {near(rate.window, 6)} of the clock"
+    in_each = f"in every {near(rate.window, 6)} of the clock"
+    return f"{claim.behaviour}; what is left shrinks by 1e{left} of it, or more, {in_each}"
 
 
 def _share_text(certificate: FamilyContent, claim: ShareClaim) -> str:

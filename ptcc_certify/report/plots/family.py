@@ -106,7 +106,7 @@ def plot_family(
     groups = family_camps(subject.family)
     if groups is None or not all(part.component.behaviour == BIPARTITE_CONSENSUS for part in subject.parts):
         groups = family_groups(subject.family)
-    agents = _drawn_agents(first.states[:, 0])
+    agents = _extreme_agents(first.states[:, 0])
     named = {k: CAMP_STYLES[groups[k]][0] for k in agents}
     labels = set()
     for k in agents:
@@ -236,7 +236,7 @@ def count_of_signals(certificate: FamilyCertificate, runs: Sequence[FamilyTrajec
     return f"{len(runs)} signals" + " of any kind" * (certificate.signal != "any")
 
 
-def _drawn_agents(x: np.ndarray) -> list[int]:
+def _extreme_agents(x: np.ndarray) -> list[int]:
     """Return all agents, or those that begin highest and lowest."""
     order = np.argsort(x, kind="stable").tolist()
     if len(order) <= NAMED_AGENTS:

@@ -37,13 +37,8 @@ def plot_family_input(
 
     Parameters
     ----------
-    subject : FamilyCertificate
-        With an initial state.
-    ax : Axes, optional
-    runs : sequence of FamilyTrajectory, optional
-        By default under eight random signals and worst cases.
-    time_unit : str
-        Of the deadline, for the label of the axis: ``"s"``.
+    subject, ax, runs, time_unit
+        As :func:`~ptcc_certify.report.plots.family.plot_family` takes them.
 
     Returns
     -------
