@@ -156,7 +156,7 @@ class Certificate(Content, FromFile, Shown):
         """
         return deepcopy(dict(self.document))
 
-    def totext_of(self) -> str:
+    def to_json(self) -> str:
         """Return the certificate as one JSON object, without NaN or infinity."""
         return text_of(self.document)
 

@@ -88,8 +88,10 @@ def deviation_of_signal(certificate: FamilyContent, remaining: Sequence[float] |
     True
     """
     bounds = certificate.deviation_bound(remaining)
+    if not (claims := claims_with_forms(certificate)):
+        return bounds
     clock = np.asarray(certificate.protocol.gain.clock_at_remaining(np.atleast_1d(remaining)))
-    for claim in claims_with_forms(certificate):
+    for claim in claims:
         part = certificate.parts[claim.component]
         nodes = part.component.nodes
         x = [certificate.initial_state[v] for v in nodes.tolist()]  # type: ignore[index]
