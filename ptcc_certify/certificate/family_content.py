@@ -186,9 +186,13 @@ class FamilyContent:
 
     @property
     def rate_of_signal(self) -> Fraction | None:
-        """The rate that every component has for the signals that were asked for; None if some has none."""
+        """The rate that every component has for the signals that were asked for; None if some has none.
+
+        Each has at least that for every signal.
+        """
         own = {claim.component: claim.rate for claim in self.restricted if isinstance(claim, RateClaim | ShareClaim)}
-        rates = [own.get(k, part.rate) for k, part in enumerate(self.parts) if part.component.nodes.size > 1]
+        both = [(own.get(k), part.rate) for k, part in enumerate(self.parts) if part.component.nodes.size > 1]
+        rates = [max((r for r in pair if r is not None), default=None) for pair in both]
         return None if None in rates else min((r for r in rates if r is not None), default=None)
 
     @property

@@ -46,7 +46,7 @@ def require_nominal(signal: SignalClass, protocol: Protocol) -> None:
     if signal != "any" and protocol.reaching is not None:
         raise ParameterError(
             "restricted signals are certified under the nominal protocol; leave out signal (--signal, --dwell, "
-            "--clock-dwell, --clock-window, --share), or give NominalProtocol(..)"
+            "--clock-dwell, --clock-window, --share), or take the nominal protocol, NominalProtocol(..)"
         )
 
 
@@ -117,7 +117,8 @@ def _rate_claim(
 
 def _share_claim(number: int, signal: ClockShares, part: ComponentProof, notes: list[str]) -> ShareClaim | None:
     with share_of_time(1.0, STEP, notes):
-        form = search_share_form(part.component, signal.shares)
+        known = [V for V in part.functions if isinstance(V, FamilyFunction) and V.kind != "undirected"]
+        form = search_share_form(part.component, signal.shares, known)
         return None if form is None else ShareClaim(number, signal, form, form.mean(signal.shares))
     return None
 

@@ -51,10 +51,13 @@ class ShareForm:
         return sum((s * rate for s, rate in zip(shares, self.function.rates, strict=True)), Fraction(0))
 
 
-def search_share_form(component: FamilyComponent, shares: Sequence[Fraction]) -> ShareForm | None:
+def search_share_form(
+    component: FamilyComponent, shares: Sequence[Fraction], known: Sequence[FamilyFunction] = ()
+) -> ShareForm | None:
     """Search and prove a form with a large mean of its rates; None where nothing was found.
 
     The states at rest in it are those of the mode that has fewest: 0, or the camps that all edges of all modes keep.
+    Functions that are known for every signal are candidates, too: their means are no less than their rates.
 
     Examples
     --------
@@ -80,8 +83,7 @@ def search_share_form(component: FamilyComponent, shares: Sequence[Fraction]) ->
         if type(error).__name__ == "OutOfTime":
             raise
         return None
-    if not search.functions:
-        return None
     at_rest = tuple(mode.at_rest for mode in quotient.modes)
-    forms = [ShareForm(V, BIPARTITE_CONSENSUS if camps else STABILITY, at_rest) for V in search.functions]
-    return max(forms, key=lambda form: form.mean(shares))
+    functions = (*search.functions, *known)
+    forms = [ShareForm(V, BIPARTITE_CONSENSUS if camps else STABILITY, at_rest) for V in functions]
+    return max(forms, key=lambda form: form.mean(shares), default=None)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import random
+from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 from itertools import pairwise
@@ -20,16 +21,20 @@ from lmi.exact.decimal_rounding import up
 from ptcc_certify import Family, NominalProtocol, SignedDigraph, certify
 from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
+from ptcc_certify.certificate.family_verdict import assess_family
 from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.certificate.restricted_bounds import deviation_of_signal
-from ptcc_certify.certificate.restricted_claims import LastModeClaim, RateClaim
+from ptcc_certify.certificate.restricted_claims import LastModeClaim, RateClaim, ShareClaim
 from ptcc_certify.checker import check, digest
 from ptcc_certify.errors import ParameterError
+from ptcc_certify.lyapunov.clock_shares import search_share_form
+from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.report.family_screen import family_lines, family_summary
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.restricted_screen import restricted_entries
 from ptcc_certify.report.statement import family_latex
+from ptcc_certify.theorems.family_behaviour import decide
 from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
@@ -453,6 +458,26 @@ def test_shares_of_the_clock_weigh_the_rates_of_modes(kind: str):
             spent[mode] += step
             decay = np.exp(-np.array(V.rates, dtype=float) @ spent)
             assert xi @ P @ xi <= decay * first * (1 + 1e-9)
+
+
+def test_a_function_for_every_signal_stands_for_shares_where_their_own_search_finds_less():
+    family, shares = slowed_by_switches(), [Fraction(1, 2), Fraction(1, 2)]
+    (component,) = decide(family)
+    (V, *_) = certify_family(family, PROTOCOL).parts[0].functions
+    assert isinstance(V, FamilyFunction)
+    fast = replace(V, rates=tuple(100 * rate for rate in V.rates))
+    form = search_share_form(component, shares, [fast])
+    assert form is not None and form.function is fast
+
+
+def test_a_rate_that_is_asked_for_is_met_by_that_for_every_signal_where_shares_prove_less():
+    family = slowed_by_switches()
+    made = certify_family(family, PROTOCOL, signal=ClockShares(["0.5", "0.5"]))
+    (claim,) = made.restricted
+    assert isinstance(claim, ShareClaim) and made.rate is not None and claim.rate > made.rate
+    asked = Expectations(min_rate=made.rate)
+    less = replace(made, restricted=(replace(claim, rate=made.rate / 2),), expectations=asked)
+    assert less.rate_of_signal == made.rate and assess_family(less, made.checked).asked == "met"
 
 
 def test_what_shares_prove_is_judged_and_read_back(tmp_path: Path):
