@@ -92,7 +92,7 @@ def deviation_while_driven(
     with np.errstate(over="ignore", invalid="ignore"):
         v, rest = phase.driven(half, above(V.root(y)), c, at), phase.rest(at)
         own = np.multiply.outer(_floats(V.speeds, len(y)), (v + c * rest) / half)
-        own += np.multiply.outer([above(drive.pulls[k]) for k in nodes], rest)
+        own += np.multiply.outer([above(drive.sizes[k]) for k in nodes], rest)
         if stable:
             own = np.fmin(own, np.multiply.outer(_floats(V.sizes, len(y)), v))
         own += sliding_sizes(drive, phase, at)
@@ -109,7 +109,7 @@ def input_while_driven(
     with np.errstate(over="ignore", invalid="ignore"):
         v = phase.driven(half, above(V.root(y)), above(drive.constant(V)), at)
         own = np.multiply.outer(_floats(V.speeds, len(y)), gain * v)
-        own += np.multiply.outer([above(drive.pulls[k]) for k in range(len(y))], gain * phase.share_at(at))
+        own += np.multiply.outer([above(drive.sizes[k]) for k in range(len(y))], gain * phase.share_at(at))
     return np.nan_to_num(own * _SLACK, nan=np.inf, posinf=np.inf)
 
 

@@ -173,10 +173,10 @@ class Members:
         """Bound ``max_k |(L x)_k| / (2 D_k)`` over all members, or of one; nobody moves the agents with ``D_k = 0``."""
         worst = np.zeros(len(x)) if choice is None else np.abs(self.laplacian(choice) @ x)
         for own in self.arrays if choice is None else ():
-            pulls = x[own.target] - own.sign * x[own.source]
-            total = np.abs(np.bincount(own.target, own.lower * pulls, minlength=len(x)))
+            differences = x[own.target] - own.sign * x[own.source]
+            total = np.abs(np.bincount(own.target, own.lower * differences, minlength=len(x)))
             some = own.uncertain
-            total += np.bincount(own.target[some], own.gap * np.abs(pulls[some]), minlength=len(x))
+            total += np.bincount(own.target[some], own.gap * np.abs(differences[some]), minlength=len(x))
             worst = np.maximum(worst, total)
         listens = self.in_weight > 0
         return float((worst[listens] / (2 * self.in_weight[listens])).max(initial=0.0))
