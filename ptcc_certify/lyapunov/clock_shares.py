@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from lmi.errors import LMIError
+from lmi.errors import LMIError, OutOfTime
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
@@ -76,9 +76,9 @@ def search_share_form(component: FamilyComponent, shares: Sequence[Fraction]) ->
         return None
     try:
         search = search_family(quotient, ("diagonal", "full"), shares=[float(s) for s in shares])
-    except LMIError as error:
-        if type(error).__name__ == "OutOfTime":
-            raise
+    except OutOfTime:
+        raise
+    except LMIError:
         return None
     if not search.functions:
         return None

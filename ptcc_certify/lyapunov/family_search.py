@@ -20,7 +20,7 @@ import numpy as np
 
 from lmi.common import CommonCertificate, best_multipliers, common_lyapunov, least_condition
 from lmi.dyadic import round_to_bits
-from lmi.errors import LMIError
+from lmi.errors import LMIError, OutOfTime
 from lmi.search_time import checkpoint, seconds_left, share_of_time, time_limit
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.lyapunov.error_system import rounded_matrix
@@ -124,11 +124,11 @@ def search_family(
                 continue
             with share_of_time(share if limited else 1.0, f"class {kind}", cut_off):
                 try:
-                    for function in _common_functions(quotient, kind, notes, shares):
+                    for function in _common_functions(quotient, kind, notes, shares):  # kept, whatever comes after
                         functions.append(function)
+                except OutOfTime:
+                    raise
                 except (LMIError, np.linalg.LinAlgError) as error:
-                    if type(error).__name__ == "OutOfTime":
-                        raise
                     notes.append(f"class {kind}: {error}")
     functions.sort(key=lambda V: (-_worth(quotient, V, shares), V.overshoot))
     return FamilySearch(tuple(functions), tuple(notes), tuple(cut_off))
