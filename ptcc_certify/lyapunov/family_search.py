@@ -177,7 +177,7 @@ def prove_certificate(
     """Round a matrix and multipliers of the modes ``moving``, and prove their rates; None if a step fails."""
     P, top = certificate.matrix, float(np.abs(certificate.matrix).max())
     matrix = rounded_matrix(np.diag(np.diag(P)) if kind == "diagonal" else P, _MATRIX_BITS)
-    unit = 2.0 ** (_MATRIX_BITS - np.ceil(np.log2(top)))
+    unit = Fraction(2) ** (_MATRIX_BITS - math.ceil(math.log2(top)))
     ends = prove_ends(matrix)
     if ends is None:
         return None
@@ -185,7 +185,7 @@ def prove_certificate(
     multipliers: list[tuple[Fraction, ...]] = [()] * len(quotient.modes)
     for number, tau, guess in zip(moving, certificate.multipliers, certificate.rates, strict=True):
         checkpoint()
-        multipliers[number] = tuple(round_to_bits(float(t * unit), _MULTIPLIER_BITS) for t in tau)
+        multipliers[number] = tuple(unit * round_to_bits(float(t), _MULTIPLIER_BITS) for t in tau)
         rate = prove_mode(quotient.modes[number], matrix, multipliers[number], guess)
         if rate is None:
             return None

@@ -158,8 +158,8 @@ def prove_mode_forms(quotient: Quotient, found: SwitchedCertificate, ratios: boo
         checkpoint()
         factor = Fraction(2) ** (exponent - min(exponents))
         matrix = [[factor * x for x in row] for row in rounded_matrix(P, _MATRIX_BITS)]
-        unit = 2.0 ** (_MATRIX_BITS - min(exponents))
-        own = tuple(round_to_bits(float(t * unit), _MULTIPLIER_BITS) for t in tau)
+        unit = Fraction(2) ** (_MATRIX_BITS - min(exponents))
+        own = tuple(unit * round_to_bits(float(t), _MULTIPLIER_BITS) for t in tau)
         rate = prove_mode(mode, matrix, own, guess) if prove_ends(matrix) is not None else None
         if rate is None:
             return None
