@@ -152,7 +152,7 @@ def trap():
     family = Family.from_intervals(edges, nodes=["a", *camp, "c"])
     sigma0 = [0, 0, 0, 0, 0, 1]
     slow = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=3, mu1="1.001", mu2=1, mu3="1/2", delta=1)
-    certificate = certify_family(family, slow, sigma0, sigma0=sigma0, time_limit=3)  # x - sigma is 0 at first
+    certificate = certify_family(family, slow, sigma0, sigma0=sigma0, time_limit=30)  # x - sigma is 0 at first
     mode, ((_, quotient, _), *_) = family.modes[0], list(functions_of(certificate))
     C = [[Fraction(int(v == u)) - quotient.basis[v][0] * (u == 0) for u in range(6)] for v in quotient.nodes]
     largest = laplacian(mode, np.ones(mode.n_edges, dtype=bool))
