@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -79,8 +80,14 @@ class UncertainMatrix:
         """Return the matrices of ``y = R x`` with ``|f| = |h|`` and radii 1, and by what to divide multipliers."""
         A = np.linalg.solve(R.T, (R @ self.A).T).T
         F, H = R @ (self.F * self.radii), np.linalg.solve(R.T, self.H)
-        scale = np.sqrt(np.linalg.norm(H, axis=0) / np.linalg.norm(F, axis=0))
+        scale = np.sqrt(_column_norms(H) / _column_norms(F))
         return UncertainMatrix(A, F * scale, H / scale, np.ones(len(scale))), scale**2
+
+
+def _column_norms(X: np.ndarray) -> np.ndarray:
+    """Return the norms of columns that are not 0, also where squares of their entries are beyond floats."""
+    largest = np.abs(X).max(axis=0, initial=0.0)
+    return largest * np.linalg.norm(X / largest, axis=0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,7 +249,9 @@ class _Search:
         with contextlib.suppress(np.linalg.LinAlgError, ValueError):
             from scipy.linalg import solve_continuous_lyapunov
 
-            P = solve_continuous_lyapunov(mean.T, np.eye(n))
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # nearly singular: it is one start of a few
+                P = solve_continuous_lyapunov(mean.T, np.eye(n))
             P = np.diag(np.diag(P)) if self.diagonal else (P + P.T) / 2
             if np.isfinite(P).all() and np.linalg.eigvalsh(P)[0] > 1e-9 * np.abs(P).max():
                 yield P
@@ -311,8 +320,6 @@ def inequality(P: Any, mode: UncertainMatrix, tau: Any, b: Any, t: Any, unit: fl
 
 def run_program(problem: Any, rows: int, tolerance: float, diagonal: bool = False) -> None:
     """Solve a program of blocks of so many rows at most; whether it was solved is asked by the caller."""
-    import warnings
-
     options: dict[str, Any] = {"tol_gap_abs": tolerance * 1e-2, "tol_gap_rel": tolerance, "tol_feas": tolerance * 1e-2}
     options["chordal_decomposition_enable"] = rows > _WHOLE_ROWS[diagonal]
     options["chordal_decomposition_merge_method"] = "parent_child"

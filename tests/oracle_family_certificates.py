@@ -346,7 +346,7 @@ class FamilyOracle:
             free = [v for v in nodes if v not in first]
             C = self.lift(basis, nodes, free, first)
             for some in self.members:
-                pulls = [
+                sizes = [
                     max(
                         sum((abs(x) * abs(self.sigma0[j]) for j, x in enumerate(L[v]) if j in nodes), Fraction(0))
                         for L in some
@@ -355,7 +355,7 @@ class FamilyOracle:
                 ]
                 own = [self.sigma0[v] for v in nodes]
                 vectors = [[y for (y,) in times(self.part(L, nodes), [[x] for x in own])] for L in some]
-                vectors += [[p * self.draw.choice((-1, 1)) for p in pulls] for _ in range(8)]
+                vectors += [[p * self.draw.choice((-1, 1)) for p in sizes] for _ in range(8)]
                 for x in vectors:
                     xi = dict(zip(free, [y for (y,) in times(C, [[z] for z in x])], strict=True))
                     self.require(self.size(said, xi) <= c**2, "a drive")

@@ -50,16 +50,23 @@ def deviation_on_clock(V: Function, stable: bool, x: Sequence[Fraction], clock: 
     if stable:
         root = V.root(x)
         moves, unit = least([(moves, Fraction(1, unit)), *((vector, factor * root) for vector, factor in V.sizes)])
-    size = np.array([moves[k] / unit for k in range(len(x))]) * _SLACK
-    return np.multiply.outer(size, _decay(V, clock))
+    return _times([Fraction(moves[k], unit) for k in range(len(x))], _decay(V, clock))
 
 
 def input_on_clock(V: Function, x: Sequence[Fraction], clock: np.ndarray, gain: np.ndarray) -> np.ndarray:
     """Bound ``gain |(L x)_k|`` by a function of a component, (n, M)."""
     speeds, unit = least(V.speeds)
     root = V.root(x) / unit
-    size = np.array([float(speeds[k] * root) for k in range(len(x))]) * _SLACK
-    return np.multiply.outer(size, gain * _decay(V, clock))
+    return _times([speeds[k] * root for k in range(len(x))], gain * _decay(V, clock))
+
+
+def _times(sizes: Sequence[Fraction], factors: np.ndarray) -> np.ndarray:
+    """Return products in floats; infinity for sizes beyond their range."""
+    size = np.array([above(x) for x in sizes])
+    with np.errstate(invalid="ignore"):
+        products = np.multiply.outer(size, factors)
+    products[np.isinf(size)] = np.inf
+    return products
 
 
 def _decay(V: Function, clock: np.ndarray) -> np.ndarray:
@@ -92,7 +99,7 @@ def deviation_while_driven(
     with np.errstate(over="ignore", invalid="ignore"):
         v, rest = phase.driven(half, above(V.root(y)), c, at), phase.rest(at)
         own = np.multiply.outer(_floats(V.speeds, len(y)), (v + c * rest) / half)
-        own += np.multiply.outer([above(drive.pulls[k]) for k in nodes], rest)
+        own += np.multiply.outer([above(drive.sizes[k]) for k in nodes], rest)
         if stable:
             own = np.fmin(own, np.multiply.outer(_floats(V.sizes, len(y)), v))
         own += sliding_sizes(drive, phase, at)
@@ -109,7 +116,7 @@ def input_while_driven(
     with np.errstate(over="ignore", invalid="ignore"):
         v = phase.driven(half, above(V.root(y)), above(drive.constant(V)), at)
         own = np.multiply.outer(_floats(V.speeds, len(y)), gain * v)
-        own += np.multiply.outer([above(drive.pulls[k]) for k in range(len(y))], gain * phase.share_at(at))
+        own += np.multiply.outer([above(drive.sizes[k]) for k in range(len(y))], gain * phase.share_at(at))
     return np.nan_to_num(own * _SLACK, nan=np.inf, posinf=np.inf)
 
 

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
 Number = Fraction | float
 #: Weights of followers on components are stored up to this number.
-MANY_PULLS = 1_000_000
+MANY_WEIGHTS = 1_000_000
 #: Room for the rounding of a residual in floats, and the radius up to which it is narrow enough.
 _ROUNDING, _NARROW = 1e-12, 4e-7
 #: Residual of a witness in every row, relatively.
@@ -84,7 +84,7 @@ class Influence:
         component meets at ``c_k = sum left_null_vectors * X(0)`` times its gauge.
     containment_weights : tuple of tuple, or None
         For each follower, its weight on each balanced closed component (``varpi``; absolute sum at most 1). None where
-        followers times components are more than ``MANY_PULLS``.
+        followers times components are more than ``MANY_WEIGHTS``.
     exact : bool
         Whether the numbers are rationals.
     enclosure : Enclosure or None
@@ -283,7 +283,7 @@ def influence(graph: Any, *, exact: bool | None = None, orientation: str | None 
     weights: Sequence[Sequence[Number]] | None = None
     if exact:
         weights = exact_containment_weights(structure)
-    elif structure.followers.size * len(balanced) <= MANY_PULLS:
+    elif structure.followers.size * len(balanced) <= MANY_WEIGHTS:
         with suppress(RuntimeError):  # of a factor in floats that is exactly singular
             weights = containment_weights(structure).tolist()
     rows = None if weights is None else tuple(map(tuple, weights))

@@ -50,7 +50,8 @@ from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.base import refuse_no_protocol
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent, decide
-from ptcc_certify.theorems.restricted_signals import ClockShares, SignalClass, read_signal
+from ptcc_certify.theorems.joint_windows import refuse_impossible_windows
+from ptcc_certify.theorems.restricted_signals import ClockShares, JointWindows, SignalClass, read_signal
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -308,6 +309,8 @@ def certify_family(
         )
     signal = read_signal(signal)
     require_nominal(signal, protocol)
+    if isinstance(signal, JointWindows):
+        refuse_impossible_windows(family, signal)
     if isinstance(signal, ClockShares) and len(signal.shares) != len(family.modes):
         count, modes = len(signal.shares), len(family.modes)
         raise ParameterError(f"{count} share{'s' * (count > 1)} of the clock; give one for each of {modes} modes")

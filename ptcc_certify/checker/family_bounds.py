@@ -102,7 +102,7 @@ def deviations(
     some = [V for V in functions if V.rate > 0]
     if drive is None:
         return _multiples((V, 2 * V.root(x) / V.rate) for V in some)
-    return _added(_multiples((V, drive.sum(V, V.root(x))) for V in some), drive.pulls, drive.integral)
+    return _added(_multiples((V, drive.sum(V, V.root(x))) for V in some), drive.sizes, drive.integral)
 
 
 def mean_intervals(functions: Iterable[Function], x: Sequence[Fraction]) -> list[tuple[int, Interval]]:
@@ -129,7 +129,7 @@ def peaks(
     if drive is None:
         first = gain.value(Fraction(1))
         return _multiples((V, first * V.root(x)) for V in some)
-    return _added(_multiples((V, drive.peak(V, V.root(x))) for V in some), drive.pulls, drive.largest)
+    return _added(_multiples((V, drive.peak(V, V.root(x))) for V in some), drive.sizes, drive.largest)
 
 
 def final_states(
@@ -232,13 +232,13 @@ def _check_input(
         return
     if x is None or added is None:
         raise RejectedError("peaks without an initial state, or of a sliding part that is not bounded")
-    told = [
+    nominal = [
         exact(text) - more for text, more in zip(ordered(family.labels, entry, "peaks").values(), added, strict=True)
     ]
     for component in family.components:
         bounds, unit = peaks([V for V in functions if V.component is component], gains, x, drive)
-        bits = length(told[v] for v in component.nodes), max(longest(bounds.values()), unit.bit_length())
+        bits = length(nominal[v] for v in component.nodes), max(longest(bounds.values()), unit.bit_length())
         spend(2 * len(component.nodes), *bits, "peaks of many agents")
         for v in component.nodes:
-            need(told[v].numerator * unit >= bounds.get(v, 0) * told[v].denominator, "a peak is not proved")
-    doc.done(f"peaks of {len(told)} agents")
+            need(nominal[v].numerator * unit >= bounds.get(v, 0) * nominal[v].denominator, "a peak is not proved")
+    doc.done(f"peaks of {len(nominal)} agents")

@@ -186,9 +186,9 @@ def quotient_of(family: Family, number: int, component: Component, nodes: list[i
     parts = [_part(columns, place, edge, mode.tied) for edge in uncertain]
     bits = longest(x for row in rows.values() for x in row.values())
     own = longest_entry + scale.bit_length()
-    pulls = sum(len(rows[component.pivots[j]]) for v in nodes for j in kernel[v])
-    spend(sum(len(rows[v]) for v in nodes) + pulls, bits, own, "a quotient")
-    sized(min(len(nodes) ** 2, sum(map(len, rows.values())) + pulls), bits + own + len(nodes), "a quotient")
+    of_pivots = sum(len(rows[component.pivots[j]]) for v in nodes for j in kernel[v])
+    spend(sum(len(rows[v]) for v in nodes) + of_pivots, bits, own, "a quotient")
+    sized(min(len(nodes) ** 2, sum(map(len, rows.values())) + of_pivots), bits + own + len(nodes), "a quotient")
     center = []
     for v in nodes:
         factors = {v: scale, **{component.pivots[j]: -b for j, b in kernel[v].items()}}
@@ -242,13 +242,13 @@ def decreases(
     need_rows(n + q)
     (taus,), common = integers([[exact(x) for x in texts]])
     pushes = [_push(P, part) for part in parts]
-    diagonal, pulled = [[tau * (e == k) for k in range(q)] for e, tau in enumerate(taus)], _zeros(n)
+    diagonal, squares = [[tau * (e == k) for k in range(q)] for e, tau in enumerate(taus)], _zeros(n)
     for tau, part in zip(taus, parts, strict=True):
-        _add_square(pulled, tau, part)
+        _add_square(squares, tau, part)
     # Everything times b.denominator * common * scale * unit.
     p, d = b.as_integer_ratio()
     low = combined("a form of a family", (d, product), (d, transposed(product)), (-p * unit, P))
-    low = combined("a form of a family", (common, low), (-d * scale * unit, pulled))
+    low = combined("a form of a family", (common, low), (-d * scale * unit, squares))
     rounds = [[part.radius * x for x in push] for part, push in zip(parts, pushes, strict=True)]
     side = combined("a form of a family", (d * common, rounds)) if q else []
     corner = combined("a form of a family", (d * scale * unit, diagonal)) if q else []

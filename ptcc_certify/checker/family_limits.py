@@ -102,8 +102,8 @@ def limits(
             ways[j][0].append(middle - d)
             ways[j][1].append(middle + d)
     ends = dict(wide or {})
-    told = ((j, (Fraction(max(low), scale), Fraction(min(high), scale))) for j, (low, high) in ways.items() if low)
-    for j, (low, high) in (*told, *near, *((j, (c, c)) for j, c in means.items())):
+    ranges = ((j, (Fraction(max(low), scale), Fraction(min(high), scale))) for j, (low, high) in ways.items() if low)
+    for j, (low, high) in (*ranges, *near, *((j, (c, c)) for j, c in means.items())):
         first, last = ends.get(j, (low, high))
         ends[j] = max(low, first), min(high, last)
     result: dict[int, Interval] = {}

@@ -60,7 +60,7 @@ def nominal_gain(gains: Mapping[str, Fraction]) -> PrescribedGain:
     return PrescribedGain(T, gains["rho1"], gains["rho2"] * gains["kappa"])
 
 
-def pulls(edges: Iterable[tuple[int, int, Fraction]], sigma0: Sizes) -> dict[int, Fraction]:
+def drive_sizes(edges: Iterable[tuple[int, int, Fraction]], sigma0: Sizes) -> dict[int, Fraction]:
     """Return ``m_k = sum_l w+ (|sigma_k(0)| + |sigma_l(0)|)`` of sources, targets and largest sizes of edges.
 
     ``|(L sigma)_k| <= psi m_k`` for every member. Entries of ``C L`` may cancel at ``w+`` and not elsewhere, so that
@@ -68,7 +68,7 @@ def pulls(edges: Iterable[tuple[int, int, Fraction]], sigma0: Sizes) -> dict[int
 
     Examples
     --------
-    >>> pulls([(0, 1, Fraction(2))], {0: Fraction(3), 1: Fraction(-1)})
+    >>> drive_sizes([(0, 1, Fraction(2))], {0: Fraction(3), 1: Fraction(-1)})
     {0: Fraction(0, 1), 1: Fraction(8, 1)}
     """
     total = dict.fromkeys(sigma0, Fraction(0))
@@ -89,7 +89,7 @@ class Drive:
     sigma0 : mapping of int to Fraction
         By node.
     modes : sequence of mapping of int to Fraction
-        ``m_k`` of :func:`pulls` by node, of every mode.
+        ``m_k`` of :func:`drive_sizes` by node, of every mode.
     """
 
     gain: PrescribedGain
@@ -99,7 +99,7 @@ class Drive:
     _constants: dict[int, tuple[Function, Fraction]] = field(default_factory=dict)
 
     @cached_property
-    def pulls(self) -> dict[int, Fraction]:
+    def sizes(self) -> dict[int, Fraction]:
         """The largest ``m_k`` of all modes."""
         return {k: max(mode[k] for mode in self.modes) for k in self.sigma0}
 
@@ -149,7 +149,7 @@ class Drive:
         The extremes of ``g_k y_k`` move outwards by at most ``gain psi m_k``; and ``x(T)`` is a mean of ``g_k x_k(0)``
         plus means of what the ``g_k sigma_k`` lose, each of which goes to 0 without turning.
         """
-        values, reach = [g * y[k] for k, g in camps.items()], max(self.pulls[k] for k in camps) * self.integral
+        values, reach = [g * y[k] for k, g in camps.items()], max(self.sizes[k] for k in camps) * self.integral
         sigma, zero = [g * self.sigma0[k] for k, g in camps.items()], Fraction(0)
         first = [value + s for value, s in zip(values, sigma, strict=True)]
         lost, won = (sum((max(sign * s, zero) for s in sigma), zero) for sign in (1, -1))
@@ -179,7 +179,7 @@ class Drive:
         power, push = gains["mu3"] * gains["kappa"], gains["mu1"] + gains["delta"]
         own = list(sigma0.values())
         reaching = Reaching(own, gains["T_r"], gains["T_s"], gains["mu2"], power, push, quiet)
-        return cls(nominal_gain(gains), reaching, sigma0, [pulls(edges, sigma0) for edges in modes])
+        return cls(nominal_gain(gains), reaching, sigma0, [drive_sizes(edges, sigma0) for edges in modes])
 
 
 def last_time(times: Sequence[Fraction | None], sigma0: Iterable[Fraction]) -> Fraction | None:

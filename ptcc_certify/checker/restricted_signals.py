@@ -213,9 +213,9 @@ def _check_last_mode(doc: Document, family: Family, x: Sequence[Fraction] | None
     need(dwell is None or dwell[1] == "t", "modes that may change for ever")
     doc.open("last-mode", of)
     spend(EACH_EDGE * sum(1 + len(edges) for edges in component.part.edges), what="restricted signals")
-    told = entries(entry["modes"], "modes", len(family.modes))
+    behaviours = entries(entry["modes"], "modes", len(family.modes))
     known = [mode_behaviour(family, k, component) for k in range(len(family.modes))]
-    need(told == known, "another behaviour of a mode")
+    need(behaviours == known, "another behaviour of a mode")
     section = entry["final_state"]
     need((section is None) == (x is None), "final states are claimed iff there is an initial state")
     if x is not None:
@@ -370,9 +370,9 @@ def _check_shares(doc: Document, family: Family, entry: Any, of: str) -> None:
         need(len(pivots) == 1 and part.camps is not None, "states at rest that no camps tell")
         camps = part.camps or {}
         kernel = {v: {1: Fraction(camps[v] * camps[pivots[0]])} for v in part.nodes}
-        drawn = Component(part, CONSENSUS, kernel, {1: pivots[0]})
+        common = Component(part, CONSENSUS, kernel, {1: pivots[0]})
     else:
-        drawn = Component(part, STABILITY, {v: {} for v in part.nodes}, {})
+        common = Component(part, STABILITY, {v: {} for v in part.nodes}, {})
     need_rows(len(nodes))
     form = integers(triangle(entry["form"], len(nodes)))
     need(doc.exact.definite(form[0]), "P is not proved definite")
@@ -380,12 +380,12 @@ def _check_shares(doc: Document, family: Family, entry: Any, of: str) -> None:
     for k, share in enumerate(shares):
         numbers = doc.open("family-rate", f"{of}.modes[{k}]", ["b"], witness=True)
         decreases(
-            doc.exact, quotient_of(family, k, drawn, nodes), form, drawn.whole[1], numbers["b"], numbers["witness"]
+            doc.exact, quotient_of(family, k, common, nodes), form, common.whole[1], numbers["b"], numbers["witness"]
         )
         mean += share * numbers["b"]
         doc.done(f"b = {down(numbers['b'])}" if numbers["b"] > 0 else "nothing decays")
     doc.open("clock-shares", of)
     rate = exact(entry["rate"])
     need(rate <= mean, "the rate is not proved")
-    need(entry["behaviour"] == (drawn.behaviour if rate > 0 else None), "another behaviour")
+    need(entry["behaviour"] == (common.behaviour if rate > 0 else None), "another behaviour")
     doc.done(f"rate {down(rate)}" if rate > 0 else "nothing decays")

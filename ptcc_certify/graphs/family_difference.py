@@ -76,8 +76,8 @@ def _different_modes(one: Family, other: Family) -> list[tuple[int, int]]:
     order = _matches(one, other)
     mine = [k for k, place in enumerate(order) if place is None]
     theirs = [k for k in range(len(other.modes)) if k not in order]
-    named = {other.modes[k].name: k for k in theirs}
-    pairs = [(k, named[one.modes[k].name]) for k in mine if one.modes[k].name in named]
+    named = {other.modes[k].name: k for k in reversed(theirs)}
+    pairs = [(k, named.pop(one.modes[k].name)) for k in mine if one.modes[k].name in named]  # names may occur twice
     rest = [k for k in mine if k not in {first for first, _ in pairs}]
     return pairs + list(zip(rest, [k for k in theirs if k not in {second for _, second in pairs}], strict=True))
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from lmi.errors import LMIError
+from lmi.errors import LMIError, OutOfTime
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
@@ -79,9 +79,9 @@ def search_share_form(
         return None
     try:
         search = search_family(quotient, ("diagonal", "full"), shares=[float(s) for s in shares])
-    except LMIError as error:
-        if type(error).__name__ == "OutOfTime":
-            raise
+    except OutOfTime:
+        raise
+    except LMIError:
         return None
     at_rest = tuple(mode.at_rest for mode in quotient.modes)
     functions = (*search.functions, *known)

@@ -22,6 +22,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -58,8 +59,8 @@ class Member:
     ----------
     mode : int
     levels : tuple of Fraction
-        Of the uncertain parts of the quotient's mode: sizes are ``w- + level (w+ - w-)``. Those of two optional edges
-        of opposite signs on one pair of nodes sum to 1 at most; where both are 1/2, it is a convex combination.
+        Of the uncertain parts of the quotient's mode: sizes are ``w- + level (w+ - w-)``. Of two optional edges of
+        opposite signs on one pair of nodes one is on at most.
     """
 
     mode: int
@@ -134,8 +135,8 @@ def prove_family_rate_bound(
         return None
     candidates = rate_bounds(quotient, functions, seed)
     proved: list[FamilyRateBound] = []
-    members = [c for c in candidates if c.kind == "member"]  # what floats say of words may be wrong, of members hardly
-    for candidate in dict.fromkeys([*candidates[:_PROVED], members[0]]):
+    single = next(c for c in candidates if c.kind != "word")  # what floats say of words may be wrong, of others hardly
+    for candidate in dict.fromkeys([*candidates[:_PROVED], single]):
         checkpoint()
         if proved and candidate.value >= min(proved, key=lambda b: b.value).value:
             continue
@@ -146,18 +147,31 @@ def prove_family_rate_bound(
 
 def rate_bounds(quotient: Quotient, functions: Sequence[FamilyFunction] = (), seed: int = 0) -> list[Candidate]:
     """Return upper bounds as floating point has them, the least first: of members, mixtures and words."""
-    search = _CapSearch(quotient, np.random.default_rng(seed))
+    search = _BoundSearch(quotient, np.random.default_rng(seed))
     members = [m for number in range(len(quotient.modes)) for m in search.members(number)]
-    bounds = [*members, *search.mixtures(members)]
+    bounds = list(map(search.of_one_sign, [*members, *search.mixtures(members)]))
     best = min(c.value for c in bounds)
-    forms = [np.array([[float(x) for x in row] for row in V.matrix]) for V in functions[:_PLAYED]]
+    forms = [np.array([[float(x / V.highest) for x in row] for row in V.matrix]) for V in functions[:_PLAYED]]
     words = [*search.words(members), *(word for P in forms for word in search.played_words(P))]
     bounds += (word for word in words if word.value < best - _WORTH * abs(best))
     return sorted(bounds, key=lambda c: (c.value, len(c.members)))
 
 
+def rival_parts(quotient: Quotient, number: int) -> list[tuple[int, int]]:
+    """Return pairs of parts of a mode with opposite signs on one pair of nodes, of which members have one on."""
+    mode = quotient.family.modes[number]
+    first: dict[tuple[int, int], int] = {}
+    pairs = []
+    for place, part in enumerate(quotient.modes[number].parts):
+        ends = (int(mode.source[part.edge]), int(mode.target[part.edge]))
+        if ends in first:
+            pairs.append((first[ends], place))
+        first[ends] = place
+    return pairs
+
+
 @dataclass(eq=False)
-class _CapSearch:
+class _BoundSearch:
     quotient: Quotient
     rng: np.random.Generator
 
@@ -167,18 +181,32 @@ class _CapSearch:
 
     @cached_property
     def rivals(self) -> list[list[tuple[int, int]]]:
-        """Of each mode: pairs of parts of opposite signs on one pair of nodes, of which members have one on."""
-        result = []
-        for mode, own in zip(self.quotient.family.modes, self.quotient.modes, strict=True):
-            seen: dict[tuple[int, int], int] = {}
-            pairs = []
-            for number, part in enumerate(own.parts):
-                key = (int(mode.source[part.edge]), int(mode.target[part.edge]))
-                if key in seen:
-                    pairs.append((seen[key], number))
-                seen[key] = number
-            result.append(pairs)
-        return result
+        return [rival_parts(self.quotient, number) for number in range(len(self.quotient.modes))]
+
+    def pieces(self, member: Member) -> Iterator[tuple[Member, Fraction]]:
+        """Yield members of which levels are the mean, with their shares; each has one sign of a pair on at most.
+
+        Levels of two rivals are the shares of the time in which each is on; their sum is 1 at most.
+        """
+        levels = member.levels
+        pairs = [(one, other) for one, other in self.rivals[member.mode] if levels[one] and levels[other]]
+        ends = (end for one, other in pairs for end in (levels[one], levels[one] + levels[other]))
+        for begin, end in pairwise(sorted({Fraction(0), Fraction(1), *ends})):
+            own = list(levels)
+            for one, other in pairs:
+                own[one] = Fraction(end <= levels[one])
+                own[other] = Fraction(levels[one] <= begin and end <= levels[one] + levels[other])
+            yield Member(member.mode, tuple(own)), end - begin
+
+    def of_one_sign(self, candidate: Candidate) -> Candidate:
+        """Return the same bound of members in which no pair has both signs on: a mixture, if there are several."""
+        shares: dict[Member, float] = {}
+        for member, share in zip(candidate.members, candidate.durations, strict=True):
+            for piece, part in self.pieces(member):
+                shares[piece] = shares.get(piece, 0.0) + share * float(part)
+        if len(shares) == 1:
+            return candidate
+        return Candidate(candidate.value, "mixture", tuple(shares), tuple(shares.values()))
 
     def matrix(self, member: Member) -> np.ndarray:
         array = self.arrays[member.mode]
@@ -275,7 +303,8 @@ class _CapSearch:
 
         from scipy.linalg import expm
 
-        own = [c.members[0] for c in sorted(members, key=lambda c: c.value)][: 2 * _MIXED]
+        slowest = (c.members[0] for c in sorted(members, key=lambda c: c.value))
+        own = list(dict.fromkeys(piece for member in slowest for piece, _ in self.pieces(member)))[: 2 * _MIXED]
         matrices = [self.matrix(m) for m in own]
         unit = len(matrices[0]) / max(float(np.mean([np.trace(A) for A in matrices])), 1e-300)
         steps = {(i, h): expm(-A * (h * unit)) for i, A in enumerate(matrices) for h in _DURATIONS}
@@ -399,6 +428,8 @@ def prove_again(
 ) -> FamilyRateBound | None:
     """Prove the bound that given members make, with ``value`` as the aim; None if it fails.
 
+    None also where one of them has both signs of a pair of nodes on: the family has no such member.
+
     Examples
     --------
     >>> quotient = Quotient(Family.from_intervals([("a", "b", 1, 2)]))
@@ -406,6 +437,8 @@ def prove_again(
     Fraction(4, 1)
     """
     if not 0 < len(quotient.nodes) <= EXACT_NODES:
+        return None
+    if any(m.levels[one] and m.levels[other] for m in members for one, other in rival_parts(quotient, m.mode)):
         return None
     matrices = [quotient.modes[m.mode].member(m.levels) for m in members]
     if kind == "word":

@@ -20,7 +20,7 @@ import numpy as np
 
 from lmi.common import CommonCertificate, best_multipliers, common_lyapunov, least_condition
 from lmi.dyadic import round_to_bits
-from lmi.errors import LMIError
+from lmi.errors import LMIError, OutOfTime
 from lmi.search_time import checkpoint, seconds_left, share_of_time, time_limit
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.lyapunov.error_system import rounded_matrix
@@ -124,11 +124,11 @@ def search_family(
                 continue
             with share_of_time(share if limited else 1.0, f"class {kind}", cut_off):
                 try:
-                    for function in _common_functions(quotient, kind, notes, shares):
+                    for function in _common_functions(quotient, kind, notes, shares):  # kept, whatever comes after
                         functions.append(function)
+                except OutOfTime:
+                    raise
                 except (LMIError, np.linalg.LinAlgError) as error:
-                    if type(error).__name__ == "OutOfTime":
-                        raise
                     notes.append(f"class {kind}: {error}")
     functions.sort(key=lambda V: (-_worth(quotient, V, shares), V.overshoot))
     return FamilySearch(tuple(functions), tuple(notes), tuple(cut_off))
@@ -177,7 +177,7 @@ def prove_certificate(
     """Round a matrix and multipliers of the modes ``moving``, and prove their rates; None if a step fails."""
     P, top = certificate.matrix, float(np.abs(certificate.matrix).max())
     matrix = rounded_matrix(np.diag(np.diag(P)) if kind == "diagonal" else P, _MATRIX_BITS)
-    unit = 2.0 ** (_MATRIX_BITS - np.ceil(np.log2(top)))
+    unit = Fraction(2) ** (_MATRIX_BITS - math.ceil(math.log2(top)))
     ends = prove_ends(matrix)
     if ends is None:
         return None
@@ -185,7 +185,7 @@ def prove_certificate(
     multipliers: list[tuple[Fraction, ...]] = [()] * len(quotient.modes)
     for number, tau, guess in zip(moving, certificate.multipliers, certificate.rates, strict=True):
         checkpoint()
-        multipliers[number] = tuple(round_to_bits(float(t * unit), _MULTIPLIER_BITS) for t in tau)
+        multipliers[number] = tuple(unit * round_to_bits(float(t), _MULTIPLIER_BITS) for t in tau)
         rate = prove_mode(quotient.modes[number], matrix, multipliers[number], guess)
         if rate is None:
             return None

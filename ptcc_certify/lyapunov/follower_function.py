@@ -185,8 +185,8 @@ class FollowerFunction:
         pivots = [c.nodes[0] for c in self.kernel.structure.closed_components if c.balanced]
         rest = np.array([0, *state[pivots].tolist()], dtype=object)
         codes = self.kernel.codes[self.followers]
-        told = np.where(codes == UNKNOWN, 0, codes)
-        targets = rest[abs(told)] if sizes else rest[abs(told)] * np.sign(told).astype(object)
+        columns = np.where(codes == UNKNOWN, 0, codes)
+        targets = rest[abs(columns)] if sizes else rest[abs(columns)] * np.sign(columns).astype(object)
         for k in np.flatnonzero(codes == UNKNOWN).tolist():
             row = self.kernel.row(int(self.followers[k]))
             targets[k] = sum(map(mul, map(abs, row) if sizes else row, rest[1:].tolist()))
@@ -299,10 +299,12 @@ def _drifts(kernel: Kernel, followers: np.ndarray, parts: Sequence[LeadingPart])
     if not any(speeds.values()):
         return [zero] * followers.size
     own = [speeds.get(c.nodes[0], zero) for c in kernel.structure.closed_components if c.balanced]
-    told = [zero, *own]
+    by_code = [zero, *own]
     codes = zip(followers.tolist(), abs(kernel.codes[followers]).tolist(), strict=True)
     return [
-        sum((abs(b) * q for b, q in zip(kernel.row(k), own, strict=True) if b), zero) if code == UNKNOWN else told[code]
+        sum((abs(b) * q for b, q in zip(kernel.row(k), own, strict=True) if b), zero)
+        if code == UNKNOWN
+        else by_code[code]
         for k, code in codes
     ]
 

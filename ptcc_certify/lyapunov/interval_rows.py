@@ -132,7 +132,7 @@ class IntervalRows:
         """The most edges of a row."""
         return int(np.diff(self._starts[1], append=self.target.size).max(initial=0))
 
-    # ------------------------------------------------------------------ pulls
+    # ------------------------------------------------------------------ rows
 
     def pull(self, values: np.ndarray) -> np.ndarray:
         """Return the least ``sum_l |w_kl| (y_k - y_l)`` of every row, in every mode.
@@ -199,7 +199,7 @@ class IntervalRows:
         return Policy(mode, values[self.source] > values[self.target])
 
     def system(self, policy: Policy) -> tuple[Any, Any]:
-        """Return ``M`` (n, n) and ``N`` (n, outside), in floats: ``M y - N z`` are the pulls under a policy."""
+        """Return ``M`` (n, n) and ``N`` (n, outside), in floats: ``M y - N z`` are the rows under a policy."""
         from scipy import sparse
 
         low, high = self._floats

@@ -21,7 +21,7 @@ import numpy as np
 from lmi.common import CommonCertificate, UncertainMatrix, best_multipliers, common_lyapunov, evaluate
 from lmi.definiteness_proofs import prove_generalized_margin
 from lmi.dyadic import round_to_bits
-from lmi.errors import LMIError
+from lmi.errors import LMIError, OutOfTime
 from lmi.exact.elementary_enclosures import rounded
 from lmi.search_time import checkpoint
 from lmi.switched import SwitchedCertificate, switched_lyapunov
@@ -116,9 +116,9 @@ def search_mode_forms(quotient: Quotient, price: float, known: Sequence[FamilyFu
     try:
         with np.errstate(all="ignore"):
             return prove_mode_forms(quotient, switched_lyapunov(modes, price, start=_start(modes, known)))
-    except (LMIError, np.linalg.LinAlgError) as error:
-        if type(error).__name__ == "OutOfTime":
-            raise
+    except OutOfTime:
+        raise
+    except (LMIError, np.linalg.LinAlgError):
         return None
 
 
@@ -137,9 +137,9 @@ def search_single_forms(quotient: Quotient) -> ModeForms | None:
         try:
             with np.errstate(all="ignore"):
                 found.append(best_multipliers(common_lyapunov([mode.array]), [mode.array]))
-        except (LMIError, np.linalg.LinAlgError) as error:
-            if type(error).__name__ == "OutOfTime":
-                raise
+        except OutOfTime:
+            raise
+        except (LMIError, np.linalg.LinAlgError):
             return None
     certificate = SwitchedCertificate(
         tuple(c.matrix for c in found), tuple(c.rate for c in found), tuple(c.multipliers[0] for c in found), 1.0
@@ -180,8 +180,8 @@ def prove_mode_forms(quotient: Quotient, found: SwitchedCertificate, ratios: boo
         checkpoint()
         factor = Fraction(2) ** (exponent - min(exponents))
         matrix = [[factor * x for x in row] for row in rounded_matrix(P, _MATRIX_BITS)]
-        unit = 2.0 ** (_MATRIX_BITS - min(exponents))
-        own = tuple(round_to_bits(float(t * unit), _MULTIPLIER_BITS) for t in tau)
+        unit = Fraction(2) ** (_MATRIX_BITS - min(exponents))
+        own = tuple(unit * round_to_bits(float(t), _MULTIPLIER_BITS) for t in tau)
         rate = prove_mode(mode, matrix, own, guess) if prove_ends(matrix) is not None else None
         if rate is None:
             return None

@@ -171,15 +171,18 @@ class Members:
 
     def imbalance(self, x: np.ndarray, choice: Choice | None = None) -> float:
         """Bound ``max_k |(L x)_k| / (2 D_k)`` over all members, or of one; nobody moves the agents with ``D_k = 0``."""
-        worst = np.zeros(len(x)) if choice is None else np.abs(self.laplacian(choice) @ x)
-        for own in self.arrays if choice is None else ():
-            pulls = x[own.target] - own.sign * x[own.source]
-            total = np.abs(np.bincount(own.target, own.lower * pulls, minlength=len(x)))
-            some = own.uncertain
-            total += np.bincount(own.target[some], own.gap * np.abs(pulls[some]), minlength=len(x))
-            worst = np.maximum(worst, total)
-        listens = self.in_weight > 0
-        return float((worst[listens] / (2 * self.in_weight[listens])).max(initial=0.0))
+        if choice is not None:
+            listens = self.in_weight > 0
+            motion = np.abs(self.laplacian(choice) @ x)[listens]
+            return float((motion / (2 * self.in_weight[listens])).max(initial=0.0))
+        worst = 0.0
+        for own in self.arrays:
+            half = (x[own.target] - own.sign * x[own.source]) / 2
+            some, heaviest = own.uncertain, self.in_weight[own.target]  # shares of it times states stay within floats
+            total = np.abs(np.bincount(own.target, own.lower / heaviest * half, minlength=len(x)))
+            total += np.bincount(own.target[some], own.gap / heaviest[some] * np.abs(half[some]), minlength=len(x))
+            worst = max(worst, float(total.max(initial=0.0)))
+        return worst
 
     def worst(self, x: np.ndarray, gradient: np.ndarray) -> Choice:
         """Return the member by which a function falls least, of which the gradient at ``x`` is given.

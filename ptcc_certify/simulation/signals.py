@@ -228,7 +228,8 @@ class RandomSignal(Signal):
     ----------
     seed : int
     dwell : float, optional
-        Its mean, on the clock; by default the time in which agents move, 1 over the median in-weight.
+        Its mean, on the clock; by default the time in which agents move, 1 over the median in-weight, and once they
+        rest in all members as long again as the run so far.
     weights : {"both", "ends", "between"}
         Uncertain weights at ``w-`` or ``w+``, or uniform between, or either way from stretch to stretch.
 
@@ -248,12 +249,14 @@ class RandomSignal(Signal):
     def play(self, members: Members, gain: Gain, state: State) -> Iterator[Stretch]:
         """Yield them."""
         rng, clock = np.random.default_rng(self.seed), 0.0
+        rest = _largest_at_rest(state())
         while True:
             mode = int(rng.integers(len(members.arrays)))
             levels = rng.random(members.arrays[mode].q)
             if self.weights == "ends" or (self.weights == "both" and rng.random() < 0.5):
                 levels = levels.round()
-            clock += rng.exponential(self.dwell or members.unit)
+            moves = self.dwell is not None or members.imbalance(state()) > rest
+            clock = clock * (1 if moves else 2) + rng.exponential(self.dwell or members.unit)
             yield Stretch(members.choice(mode, levels), clock)
 
 
@@ -310,12 +313,17 @@ class WorstCaseSignal(Signal):
             raise ParameterError(f"the form of the worst case is {form.shape}, and the family has {n} nodes")
         step, clock = self.step or members.unit / _STEPS, 0.0
         groups = None if form is not None else _groups(members)
-        rest = _AT_REST * float(np.abs(state()).max())
+        rest = _largest_at_rest(state())
         while True:
             x = state()
             gradient = form @ x if form is not None else _slope_of_largest(x, groups or [])
             clock = clock + step if members.imbalance(x) > rest else 2 * clock + step
             yield Stretch(members.worst(x, gradient), clock)
+
+
+def _largest_at_rest(x0: np.ndarray) -> float:
+    """Return up to which imbalance agents rest, from their initial state."""
+    return _AT_REST * float(np.abs(x0).max())
 
 
 def _groups(members: Members) -> list[tuple[np.ndarray, np.ndarray | None]]:

@@ -47,7 +47,7 @@ DEPENDS = "depends on the signal"
 #: Mode and weights change arbitrarily, or are fixed and unknown.
 SIGNALS = ("any", "constant")
 #: Each implies those after it.
-_CHAIN = (BIPARTITE_CONSENSUS, INTERVAL_BIPARTITE_CONSENSUS, BIPARTITE_CONTAINMENT)
+CHAIN = (BIPARTITE_CONSENSUS, INTERVAL_BIPARTITE_CONSENSUS, BIPARTITE_CONTAINMENT)
 #: Kinds of counterexamples.
 CLOSED_SET, TWO_COMPONENTS, NO_CAMPS = "balanced closed set", "two closed components", "no camps"
 DIFFERENT, MOVING, STABLE = "different kernels", "moving rest state", "stable member"
@@ -159,9 +159,9 @@ class FamilyComponent(Shown):
         >>> pair.behaviour, pair.holds("bipartite containment")
         ('bipartite consensus', True)
         """
-        if self.behaviour is None and behaviour in _CHAIN[1:]:
+        if self.behaviour is None and behaviour in CHAIN[1:]:
             return False if self.refutation(behaviour) else None
-        chain = _CHAIN[_CHAIN.index(self.behaviour) :] if self.behaviour in _CHAIN else (self.behaviour,)
+        chain = CHAIN[CHAIN.index(self.behaviour) :] if self.behaviour in CHAIN else (self.behaviour,)
         return behaviour in chain
 
     def refutation(self, behaviour: str) -> Counterexample | None:

@@ -9,12 +9,10 @@ from ptcc_certify.graphs.structure import (
     BIPARTITE_CONTAINMENT,
     CONSENSUS,
     CONTAINMENT,
-    INTERVAL_BIPARTITE_CONSENSUS,
     SIGNED_AVERAGE_CONSENSUS,
 )
-from ptcc_certify.theorems.family_behaviour import Counterexample, FamilyComponent
+from ptcc_certify.theorems.family_behaviour import CHAIN, Counterexample, FamilyComponent
 
-_CHAIN = (BIPARTITE_CONSENSUS, INTERVAL_BIPARTITE_CONSENSUS, BIPARTITE_CONTAINMENT)
 #: The behaviour of which each special case is one.
 GENERAL = {
     CONSENSUS: BIPARTITE_CONSENSUS,
@@ -41,7 +39,7 @@ def special_behaviours(component: FamilyComponent) -> tuple[str, ...]:
     >>> special_behaviours(decide(Family.from_intervals([("a", "b", 1, 2)], undirected=True))[0])
     ('signed-average consensus', 'consensus')
     """
-    if component.behaviour not in _CHAIN:
+    if component.behaviour not in CHAIN:
         return ()
     positive = bool((component.family.union[2] > 0).all())
     if component.behaviour != BIPARTITE_CONSENSUS:

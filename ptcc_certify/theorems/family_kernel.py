@@ -180,13 +180,13 @@ class Kernel:
         differ = ~unknown & (ends != sign * np.where(unknown, 0, heard))
         # A row that no camp tells is a proper mean of others, and never a unit vector.
         unit = np.where(ends == UNKNOWN, heard, ends)
-        told = differ | (unknown & (unit != UNKNOWN) & (unit != 0))
-        for edge in np.flatnonzero(told).tolist():
+        by_edges = differ | (unknown & (unit != UNKNOWN) & (unit != 0))
+        for edge in np.flatnonzero(by_edges).tolist():
             k, one = int(target[edge]), int(source[edge])
             yield edge, self.combination({k: Fraction(1), one: Fraction(-int(sign[edge]))})
         if unknown.any():
             for edge in np.flatnonzero(
-                unknown & ~told & (self.numbers[target] != sign * self.numbers[source])
+                unknown & ~by_edges & (self.numbers[target] != sign * self.numbers[source])
             ).tolist():
                 k, one = int(target[edge]), int(source[edge])
                 yield edge, self.combination({k: Fraction(1), one: Fraction(-int(sign[edge]))})
@@ -208,14 +208,14 @@ class Kernel:
             spoiled = np.zeros_like(suspects)
             spoiled[graph.target[~agree]] = True
             suspects &= spoiled
-        told = suspects & (self.codes != UNKNOWN)
-        for some in (np.flatnonzero(told).tolist(), np.flatnonzero(suspects & ~told).tolist()):
+        by_edges = suspects & (self.codes != UNKNOWN)
+        for some in (np.flatnonzero(by_edges).tolist(), np.flatnonzero(suspects & ~by_edges).tolist()):
             rows = graph.exact_rows(some), self.structure.graph.exact_rows(some)
             for node, row, own_row in zip(some, *rows, strict=True):
                 if question := self._reduced(node, row, own_row):
                     yield question
 
-    def told_column(self, question: Combination) -> int | None:
+    def column_by_edges(self, question: Combination) -> int | None:
         """Return a column in which a combination is not 0 by the edges alone; None if these do not tell."""
         units = [c for c in question if c <= self.dimension]
         if len(units) == len(question):
@@ -224,7 +224,7 @@ class Kernel:
             return units[0] - 1  # a unit vector and a row that is none
         return None
 
-    def solved_column(self, question: Combination) -> int | None:
+    def column_by_rows(self, question: Combination) -> int | None:
         """Return a column in which a combination is not 0; None if it is 0.
 
         Raises
@@ -381,8 +381,8 @@ def _enclose(graph: SignedDigraph, codes: np.ndarray, dimension: int) -> StateEn
     n, unknown = graph.n_nodes, codes == UNKNOWN
     draw = random.Random(0)
     values = tuple(draw.randint(1, _LARGEST) for _ in range(dimension))
-    told = np.where(unknown, 0, codes)
-    state = np.sign(told) * np.array([0, *values], dtype=np.int64)[np.abs(told)]
+    columns = np.where(unknown, 0, codes)
+    state = np.sign(columns) * np.array([0, *values], dtype=np.int64)[np.abs(columns)]
     into = np.flatnonzero(unknown[graph.target])
     source, target = graph.source[into], graph.target[into]
     whole = _exact_sizes(graph, into)
@@ -459,12 +459,12 @@ def first_answer(
     for name, question in questions:
         if not question:
             continue
-        if (column := kernel.told_column(question)) is not None:
+        if (column := kernel.column_by_edges(question)) is not None:
             return name, column, question
         open_questions.append((name, question))
     try:
         for name, question in open_questions:
-            if (column := kernel.solved_column(question)) is not None:
+            if (column := kernel.column_by_rows(question)) is not None:
                 return name, column, question
     except TooLarge:
         for name, question in open_questions:

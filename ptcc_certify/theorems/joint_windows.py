@@ -9,9 +9,14 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+import numpy as np
+
 from lmi.exact.elementary_enclosures import rounded
 from ptcc_certify.checker.restricted_signals import closed_groups, contraction_below
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
+from ptcc_certify.protocols.parameters import readable
 from ptcc_certify.theorems.family_behaviour import FamilyComponent
 from ptcc_certify.theorems.family_rate import ExplicitRate, largest_sum, least_mandatory
 from ptcc_certify.theorems.restricted_signals import JointWindows
@@ -27,7 +32,6 @@ def joint_behaviour(component: FamilyComponent) -> str | None:
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.family import Family
     >>> from ptcc_certify.theorems.family_behaviour import decide
     >>> day, night = (SignedDigraph.from_edges([edge], nodes="abc") for edge in (("a", "b", 1), ("b", "c", -1)))
     >>> joint_behaviour(decide(Family.switching([day, night]))[0])
@@ -43,12 +47,70 @@ def joint_behaviour(component: FamilyComponent) -> str | None:
     return None if any(balanced for _, balanced in groups) else STABILITY
 
 
+def refuse_impossible_windows(family: Family, signal: JointWindows) -> None:
+    """Refuse windows that no signal keeps: the modes that turn all edges on need more than a window for it.
+
+    Raises
+    ------
+    ParameterError
+        The message tells which windows a signal may keep.
+
+    Examples
+    --------
+    >>> day, night = (SignedDigraph.from_edges([edge], nodes="abc") for edge in (("a", "b", 1), ("b", "c", -1)))
+    >>> refuse_impossible_windows(Family.switching([day, night]), JointWindows(1, on="0.5", clock="s"))
+    """
+    needed = signal.on * clock_for_all_edges(family)
+    if needed > signal.length:
+        most = signal.on * signal.length / needed
+        raise ParameterError(
+            f"no signal has every edge on for {readable(signal.on)} of every window of {readable(signal.length)}: the "
+            f"modes need {readable(needed)} for it, one after the other; let windows be as long, or on {readable(most)}"
+        )
+
+
+def clock_for_all_edges(family: Family) -> Fraction:
+    """Return a lower bound of the clock that it takes to have every edge on for 1, in modes in which it is mandatory.
+
+    With ``y_e >= 0``, of which the sum over the mandatory edges of any mode is at most 1, that is ``sum_e y_e``: let
+    mode ``i`` act for ``h_i``; then ``sum_e y_e <= sum_e y_e sum_(i with e) h_i <= sum_i h_i``. Floats propose ``y``.
+
+    Examples
+    --------
+    >>> ring = [(1, 2, 1), (2, 3, 1), (3, 1, 1)]
+    >>> pairs = [SignedDigraph.from_edges([e for e in ring if e != off], nodes=[1, 2, 3]) for off in ring]
+    >>> clock_for_all_edges(Family.switching(pairs))
+    Fraction(3, 2)
+    """
+    from scipy.optimize import linprog
+
+    where: dict[tuple[int, int, int], list[int]] = {}
+    for number, mode in enumerate(family.modes):
+        on = ~mode.optional
+        for edge in zip(mode.source[on].tolist(), mode.target[on].tolist(), mode.sign[on].tolist(), strict=True):
+            where.setdefault(edge, []).append(number)
+    modes_of_edges = sorted(set(map(tuple, where.values())))
+    if not modes_of_edges:
+        return Fraction(0)
+    table = np.zeros((len(family.modes), len(modes_of_edges)))
+    for k, numbers in enumerate(modes_of_edges):
+        table[list(numbers), k] = 1
+    proposal = linprog(-np.ones(table.shape[1]), A_ub=table, b_ub=np.ones(table.shape[0]))
+    if not proposal.success:
+        return Fraction(1)  # some edge is on for 1
+    y = [max(Fraction(float(x)).limit_denominator(10**6), Fraction(0)) for x in proposal.x]
+    sums = [Fraction(0)] * len(family.modes)
+    for value, numbers in zip(y, modes_of_edges, strict=True):
+        for number in numbers:
+            sums[number] += value
+    return max(Fraction(1), sum(y, Fraction(0)) / max(sums)) if any(sums) else Fraction(1)
+
+
 def window_rate(component: FamilyComponent, signal: JointWindows, behaviour: str) -> ExplicitRate | None:
     """Return the contraction of a component of more than one node; None if it is below every number that is written.
 
     Examples
     --------
-    >>> from ptcc_certify.graphs.family import Family
     >>> from ptcc_certify.theorems.family_behaviour import decide
     >>> day, night = (SignedDigraph.from_edges([edge], nodes="abc") for edge in (("a", "b", 1), ("b", "c", -1)))
     >>> component = decide(Family.switching([day, night]))[0]

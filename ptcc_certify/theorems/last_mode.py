@@ -15,11 +15,8 @@ from ptcc_certify.graphs.structure import (
     STABILITY,
     find_camps,
 )
-from ptcc_certify.theorems.family_behaviour import FamilyComponent
+from ptcc_certify.theorems.family_behaviour import CHAIN, FamilyComponent
 from ptcc_certify.theorems.family_claims import GENERAL
-
-#: Each implies those after it.
-_CHAIN = (BIPARTITE_CONSENSUS, INTERVAL_BIPARTITE_CONSENSUS, BIPARTITE_CONTAINMENT)
 
 
 def last_mode_behaviours(component: FamilyComponent) -> tuple[str | None, ...]:
@@ -51,14 +48,15 @@ def last_mode_behaviours(component: FamilyComponent) -> tuple[str | None, ...]:
     return tuple(result)
 
 
-def last_mode_shows(told: str | None, behaviour: str, positive: bool = False) -> bool | None:
-    """Tell whether agents that do what is told show a behaviour, special cases included; None if that is not known.
+def last_mode_shows(own: str | None, behaviour: str, positive: bool = False) -> bool | None:
+    """Tell whether a mode that does ``own`` shows a behaviour, special cases included; None if that is not known.
 
     Consensus and containment are bipartite ones without negative edges.
 
     Parameters
     ----------
-    told : str or None
+    own : str or None
+        One of :func:`last_mode_behaviours`.
     behaviour : str
     positive : bool
         Whether all edges by which they do it are positive.
@@ -70,10 +68,10 @@ def last_mode_shows(told: str | None, behaviour: str, positive: bool = False) ->
     >>> last_mode_shows("bipartite consensus", "consensus", positive=True)
     True
     """
-    if told is None:
+    if own is None:
         return None
     general = GENERAL.get(behaviour, behaviour)
-    if general not in (_CHAIN[_CHAIN.index(told) :] if told in _CHAIN else (told,)):
+    if general not in (CHAIN[CHAIN.index(own) :] if own in CHAIN else (own,)):
         return False
     if behaviour not in GENERAL or (positive and behaviour != SIGNED_AVERAGE_CONSENSUS):
         return True

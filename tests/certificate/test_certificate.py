@@ -927,7 +927,9 @@ def test_a_number_is_written_exactly_or_enclosed(numerator: int, power: int):
 
 
 def test_an_final_state_too_long_to_write_is_enclosed_and_proved():
-    """Weights of 250 digits: voices and pulls are balls, which hold the exact ones, and no distance is claimed.
+    """Of weights of 250 digits, left null vectors and containment weights are balls that hold the exact ones.
+
+    No distance is claimed.
 
     A ring of two camps leads another ring together with an agent that listens to nobody.
     """

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 
+import numpy as np
 import pytest
 
 from ptcc_certify import NominalProtocol
@@ -70,3 +71,13 @@ def test_what_only_one_graph_has_is_told_with_what_a_family_has():
         with pytest.raises(AttributeError, match=f"has no {name}; that of a family has {meant}"):
             getattr(cert, name)
     assert repr(cert.parts[0].component) == "FamilyComponent(2 nodes, bipartite consensus for every signal)"
+
+
+def test_bounds_beyond_all_floats_are_infinite():
+    size = 10**300
+    family = Family.from_intervals([("a", "b", size, 2 * size), ("b", "a", -size, -size)])
+    made = certify_family(family, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), x0=[10**299, -(10**299)])
+    assert made.verdict == "certified" and made.parts[0].rate > size
+    instants = np.array([0.0, 1e-3, 1.0])  # of 1 - t/T
+    assert np.isinf(made.input_bound(instants)).all()
+    assert made.deviation_bound(instants)[:, -1].max() < 1e301

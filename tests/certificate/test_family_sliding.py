@@ -16,7 +16,7 @@ from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate, certify_family
 from ptcc_certify.certificate.family_comparison import compare, functions_of, worst_case_signals
 from ptcc_certify.checker import check, digest
-from ptcc_certify.checker.family_sliding import Drive, pulls
+from ptcc_certify.checker.family_sliding import Drive, drive_sizes
 from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
@@ -152,7 +152,7 @@ def trap():
     family = Family.from_intervals(edges, nodes=["a", *camp, "c"])
     sigma0 = [0, 0, 0, 0, 0, 1]
     slow = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=3, mu1="1.001", mu2=1, mu3="1/2", delta=1)
-    certificate = certify_family(family, slow, sigma0, sigma0=sigma0, time_limit=3)  # x - sigma is 0 at first
+    certificate = certify_family(family, slow, sigma0, sigma0=sigma0, time_limit=30)  # x - sigma is 0 at first
     mode, ((_, quotient, _), *_) = family.modes[0], list(functions_of(certificate))
     C = [[Fraction(int(v == u)) - quotient.basis[v][0] * (u == 0) for u in range(6)] for v in quotient.nodes]
     largest = laplacian(mode, np.ones(mode.n_edges, dtype=bool))
@@ -224,7 +224,7 @@ def test_pulls_bound_what_any_member_makes_of_sliding_variables():
                 (int(s), int(t), mode.upper.fraction(e))
                 for e, (s, t) in enumerate(zip(mode.source, mode.target, strict=True))
             ]
-            bound = pulls(edges, sigma0)
+            bound = drive_sizes(edges, sigma0)
             for _ in range(5):
                 L = laplacian(mode, random_vertex(draw, mode))
                 moved = [sum(x * sigma0[j] for j, x in enumerate(row)) for row in L.tolist()]

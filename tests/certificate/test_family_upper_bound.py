@@ -13,6 +13,7 @@ FAMILIES = {
     "rivals": Family.from_intervals(
         [("a", "b", -1, 1), ("b", "a", 1, 2), ("b", "c", -3, -2), ("c", "b", 1, 1), ("c", "a", 1, 1)]
     ),
+    "mixture": Family.from_intervals([(2, 0, 3, 3), (2, 1, 3, 3), (0, 2, -3, -3), (1, 2, -3, 3)]),
     "undirected": Family.from_intervals([("a", "b", 1, 2), ("b", "c", 1, 3)], undirected=True),
 }
 
@@ -21,7 +22,7 @@ FAMILIES = {
 def test_a_bound_is_read_back_as_it_was_proved(name):
     made = certify(FAMILIES[name], PROTOCOL)
     bound = made.parts[0].upper_bound
-    assert bound is not None and (name not in ("word", "member") or bound.kind == name)
+    assert bound is not None and (name not in ("word", "member", "mixture") or bound.kind == name)
     assert read_certificate(made.to_dict()).parts[0].upper_bound == bound
 
 
@@ -44,3 +45,14 @@ def test_members_that_the_family_has_not_prove_nothing():
         document = made.to_dict()
         document["unverified"]["upper_bounds"] = junk
         assert read_certificate(document).upper_bound is None
+
+
+def test_members_with_both_signs_of_an_edge_on_make_a_mixture_of_those_with_one():
+    made = certify(FAMILIES["mixture"], PROTOCOL)
+    entry = made.to_dict()["unverified"]["upper_bounds"][0]
+    weights = [[x for *_, x in member["weights"] if x != "0"] for member in entry["members"]]
+    assert sorted(weights) == [["-3"], ["3"]] and entry["durations"] == ["1/2", "1/2"]
+    both = {"mode": 0, "name": "", "weights": [["1", "2", "-3/2"], ["1", "2", "3/2"]]}
+    document = made.to_dict()
+    document["unverified"]["upper_bounds"][0] |= {"kind": "member", "members": [both], "durations": ["1"]}
+    assert made.upper_bound is not None and read_certificate(document).upper_bound is None

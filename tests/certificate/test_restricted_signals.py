@@ -7,7 +7,7 @@ import random
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +35,7 @@ from ptcc_certify.report.page import report_html
 from ptcc_certify.report.restricted_screen import restricted_entries
 from ptcc_certify.report.statement import family_latex
 from ptcc_certify.theorems.family_behaviour import decide
+from ptcc_certify.theorems.joint_windows import clock_for_all_edges
 from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
@@ -360,6 +361,7 @@ def test_no_signal_leaves_the_ends_of_the_last_mode(seed: int):
 # ---------------------------------------------------------------------- windows
 
 WINDOWS = JointWindows(2, on="0.4", clock="s")
+NODES = [f"{end}{e}" for end in "st" for e in range(4)]
 
 
 def cut_up(rng: np.random.Generator, n: int, stable: bool) -> Family:
@@ -412,6 +414,29 @@ def test_windows_of_time_and_windows_that_are_none_are_refused():
     for length, on, clock in ((0, 1, "s"), (1, 2, "s"), (1, 0, "s"), (1, 1, None)):
         with pytest.raises(ParameterError):
             JointWindows(length, on=on, clock=clock)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_windows_that_no_signal_keeps_are_refused_and_those_that_one_just_keeps_are_not(seed: int):
+    family = cut_up(np.random.default_rng(seed), n := 3 + seed, False)
+    just = JointWindows(1, on=Fraction(1, n), clock="s")
+    assert certify_family(family, PROTOCOL, signal=just).restricted
+    with pytest.raises(ParameterError, match="no signal has every edge on"):
+        certify_family(family, PROTOCOL, signal=JointWindows(1, on=Fraction(1, n) + Fraction(1, 10**9), clock="s"))
+
+
+def test_what_all_edges_need_of_the_clock_is_the_least_of_all_plays():
+    rng = np.random.default_rng(5)
+    for _ in range(30):
+        on = rng.random((3, 4)) < 0.5
+        on[0, ~on.any(axis=0)] = True
+        graphs = [
+            SignedDigraph.from_edges([(f"s{e}", f"t{e}", 1) for e in np.flatnonzero(row)], nodes=NODES) for row in on
+        ]
+        needed = clock_for_all_edges(Family.switching(graphs))
+        plays = (np.array(h) / 12 for h in product(range(13), repeat=3))
+        least = min(h.sum() for h in plays if (on.T @ h >= 1 - 1e-9).all())
+        assert float(needed) == pytest.approx(least, abs=1e-9)
 
 
 def test_windows_are_read_back_and_judged(tmp_path: Path):

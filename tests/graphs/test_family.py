@@ -204,3 +204,12 @@ def test_a_weight_beside_an_interval_lies_in_it():
             else:
                 with pytest.raises(GraphError, match="weight 9 lies outside of its interval, 1/2 to 2"):
                     read(text)
+
+
+def test_modes_that_share_a_name_are_told_apart_one_by_one():
+    graphs = [SignedDigraph.from_edges([("a", "b", weight)]) for weight in range(1, 9)]
+    twice = Family.switching([Family.switching({"day": graphs[k], "x": graphs[k + 1]}) for k in (0, 2)])
+    other = Family.switching(dict(zip(("day", "u", "v", "w"), graphs[4:], strict=True)))
+    assert [mode.name for mode in twice.modes] == ["day", "x", "day", "x"]
+    expected = 'in mode day (one of 4 that differ) ["a", "b", "1"] is only in the certificate, and '
+    assert family_difference(twice, other) == expected + '["a", "b", "5"] is only in the files'

@@ -346,3 +346,16 @@ def test_families_of_every_kind_have_rates_below_their_bounds(seed):
         assert best.rate <= bound.value
         assert lmi.prove_positive_definite(best.matrix)
         assert replace(best, rates=(bound.value,)).rate == bound.value
+
+
+@pytest.mark.parametrize("exponent", [-250, 160, 300])
+def test_scaling_all_weights_scales_the_rate_however_far(exponent):
+    edges, unit = [("a", "b", 1, 2), ("b", "a", -1, -1)], Fraction(10) ** exponent
+    rates = []
+    for size in (1, unit):
+        family = Family.from_intervals([(s, t, size * low, size * high) for s, t, low, high in edges])
+        search = search_family(quotient := Quotient.of(decide(family)[0]), ("diagonal",))
+        bound = prove_family_rate_bound(quotient, search.functions)
+        rates.append((search.functions[0].rate / size, bound.value / size))
+    assert float(rates[1][0]) == pytest.approx(float(rates[0][0]), rel=1e-3)
+    assert rates[1][0] <= rates[1][1]

@@ -150,6 +150,16 @@ def test_equal_seeds_give_equal_runs_and_others_do_not():
     assert not np.array_equal(runs[0], runs[2])
 
 
+@pytest.mark.parametrize("size", [1, 10**4, 10**8])
+def test_random_members_act_longer_once_all_agents_rest(size):
+    """At weights of 10^4 the clock of a run holds more stretches of the agents' own time than any run may have."""
+    family = Family.from_intervals([("a", "b", size, 2 * size), ("b", "c", -2 * size, -size), ("c", "a", size, size)])
+    run = simulate_family(family, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2, 3], RandomSignal(1))
+    assert run.deadline_resolved and len(run.choices) < 500
+    before = np.searchsorted(run.switches, 5 / size)
+    assert before > 3 and np.abs(run.final_state).max() < 1e-9
+
+
 @pytest.mark.parametrize(
     ("call", "told"),
     [

@@ -64,10 +64,10 @@ def as_graph(graph: Any, orientation: str | None = None) -> SignedDigraph:
     >>> as_graph([("1", "2", -2)]) == as_graph(np.array([[0, -2], [0, 0]]), "information")
     True
     """
-    if isinstance(held := graph if isinstance(graph, SignedDigraph) else getattr(graph, "graph", None), SignedDigraph):
+    if isinstance(own := graph if isinstance(graph, SignedDigraph) else getattr(graph, "graph", None), SignedDigraph):
         if orientation is not None:
             raise ParameterError("a SignedDigraph has its orientation; leave out orientation=")
-        return held
+        return own
     if isinstance(graph, Family):
         raise GraphError(
             f"{graph!r} is several graphs, and one is asked for; certify, decide and simulate_family take families"

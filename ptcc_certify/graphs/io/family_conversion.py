@@ -93,7 +93,7 @@ def _mode_of(graph: Any, orientation: str | None, uncertainty: Any) -> Family:
     )
 
 
-def is_family(held: Any) -> bool:
+def is_family(graphs: Any) -> bool:
     """Tell whether a user holds a family rather than one graph.
 
     Examples
@@ -101,18 +101,18 @@ def is_family(held: Any) -> bool:
     >>> is_family(["fig1a", "fig1b"]), is_family([("a", "b", 1)]), is_family(Family.from_graph(as_graph("fig1a")))
     (True, False, False)
     """
-    if isinstance(held, Family):
-        return held.graph is None
-    if isinstance(held, str | os.PathLike):
-        return os.path.isfile(held) and is_family_file(held)  # noqa: PTH113 - Path.is_file may raise
-    return isinstance(held, Mapping) or _is_list_of_graphs(held) or _interval_edges(held) is not None
+    if isinstance(graphs, Family):
+        return graphs.graph is None
+    if isinstance(graphs, str | os.PathLike):
+        return os.path.isfile(graphs) and is_family_file(graphs)  # noqa: PTH113 - Path.is_file may raise
+    return isinstance(graphs, Mapping) or _is_list_of_graphs(graphs) or _interval_edges(graphs) is not None
 
 
-def _is_list_of_graphs(held: Any) -> bool:
-    if not isinstance(held, list | tuple) or not held:
+def _is_list_of_graphs(graphs: Any) -> bool:
+    if not isinstance(graphs, list | tuple) or not graphs:
         return False
     return all(
-        isinstance(one, SignedDigraph | Family | str | os.PathLike) or hasattr(one, "is_multigraph") for one in held
+        isinstance(one, SignedDigraph | Family | str | os.PathLike) or hasattr(one, "is_multigraph") for one in graphs
     )
 
 
@@ -147,20 +147,20 @@ class _Entry(NamedTuple):
         return (self.source, self.target, min(least, 0), max(largest, 0)) if answer else (*self[1:3], least, largest)
 
 
-def _interval_edges(held: Any, uncertainty: Any = 0) -> list[tuple[Any, Any, Any, Any]] | None:
+def _interval_edges(graphs: Any, uncertainty: Any = 0) -> list[tuple[Any, Any, Any, Any]] | None:
     """Return the edges of a DataFrame or networkx graph with intervals, or of a list of edges with four entries.
 
     None of others.
     """
-    if isinstance(held, list | tuple):
-        intervals = bool(held) and all(isinstance(row, tuple) and len(row) == 4 for row in held)
+    if isinstance(graphs, list | tuple):
+        intervals = bool(graphs) and all(isinstance(row, tuple) and len(row) == 4 for row in graphs)
         if intervals and read_share(uncertainty):
             raise ParameterError(_TWICE)
-        return [*held] if intervals else None
-    if hasattr(held, "is_multigraph"):
-        entries = _entries_of_networkx(held)
-    elif hasattr(held, "columns") and hasattr(held, "to_numpy"):
-        entries = _entries_of_table(held)
+        return [*graphs] if intervals else None
+    if hasattr(graphs, "is_multigraph"):
+        entries = _entries_of_networkx(graphs)
+    elif hasattr(graphs, "columns") and hasattr(graphs, "to_numpy"):
+        entries = _entries_of_table(graphs)
     else:
         return None
     share = read_share(uncertainty)
