@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Any
 
 from lmi.exact.decimal_rounding import down
 from ptcc_certify.certificate.certificate_data import Content, Source
+from ptcc_certify.certificate.certificate_file import FromFile, bytes_of, text_of, write_certificate
 from ptcc_certify.certificate.checking import check, read_and_check
 from ptcc_certify.certificate.format import certificate_document, read_document
 from ptcc_certify.certificate.format_vectors import Writer, read_side_files
 from ptcc_certify.certificate.verdict import CERTIFIED, Assessment, assess, verdict_of
 from ptcc_certify.checker import CheckReport
-from ptcc_certify.errors import FormatError, ParameterError, PTCCError, gated
+from ptcc_certify.errors import FormatError, PTCCError, gated
 from ptcc_certify.graphs.display_hook import Shown, plot, summary
-from ptcc_certify.graphs.io import write_atomically
 from ptcc_certify.graphs.io.files import refuse_no_path
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.size_limits import EXACT_NODES
@@ -65,7 +65,7 @@ class RejectedCertificate(PTCCError, ValueError):
 
 @gated
 @dataclass(frozen=True, eq=False, repr=False)
-class Certificate(Content, Shown):
+class Certificate(Content, FromFile, Shown):
     """A claim about a signed digraph under a protocol, with its proof.
 
     Made by :func:`ptcc_certify.certify`, or read from a file by :func:`read_certificate`.
@@ -121,30 +121,6 @@ class Certificate(Content, Shown):
         document, out = self._document(self.verdict)
         return document if not out.files else certificate_document(self, self.verdict)[0]
 
-    @property
-    def report(self) -> CheckReport:
-        """What the independent check says of a certificate that was read."""
-        return self._file.report
-
-    @property
-    def path(self) -> Path:
-        """The file that it was read from."""
-        return self._file.path
-
-    @property
-    def sha256(self) -> str:
-        """Of the file that it was read from."""
-        return self._file.sha256
-
-    @property
-    def _file(self) -> Source:
-        if self.source is None:
-            of = "report, path and sha256 are of a certificate that was read from a file"
-            raise ParameterError(
-                f"{of}; for a page or LaTeX: write_report(certificate, path); else save it, and read it"
-            )
-        return self.source
-
     @cached_property
     def checked(self) -> CheckReport | None:
         """What the independent check says of the certificate as it is written; None if nothing was proved."""
@@ -182,7 +158,7 @@ class Certificate(Content, Shown):
 
     def to_json(self) -> str:
         """Return the certificate as one JSON object, without NaN or infinity."""
-        return _json(self.document)
+        return text_of(self.document)
 
     @gated
     def save(self, path: str | Path) -> None:
@@ -202,15 +178,7 @@ class Certificate(Content, Shown):
         FormatError
             The file cannot be written.
         """
-        refuse_no_path(path)
-        path = Path(path)
-        if path.suffix.lower() not in ("", ".json"):
-            other = ", a page or LaTeX by write_report, a figure by save_figure"
-            raise ParameterError(f"{shorten(str(path), 200)}: a certificate is saved as .json{other}")
-        document, files = self.for_check()
-        for name, content in files.items():
-            write_atomically(path.parent / name, content)
-        write_atomically(path, _bytes(document))
+        write_certificate(path, *self.for_check())
 
     def for_check(self) -> tuple[Mapping[str, Any], Mapping[str, bytes]]:
         """Return the JSON and the contents of its side files, as the independent check takes them."""
@@ -314,11 +282,11 @@ def read_certificate(
         path, files = path.for_check()
     if isinstance(path, Mapping):
         try:
-            path = json.loads(_json(dict(path)))
+            path = json.loads(text_of(dict(path)))
         except (TypeError, ValueError, RecursionError):
             raise FormatError("the mapping is no JSON object; parse the file with json.load") from None
         document, report = read_and_check(path, files=files, stdlib=stdlib, memory=memory)
-        file, sha256 = Path("certificate.json"), hashlib.sha256(_bytes(document)).hexdigest()
+        file, sha256 = Path("certificate.json"), hashlib.sha256(bytes_of(document)).hexdigest()
         if not report.accepted:
             raise RejectedCertificate(file, report)
         return accepted_certificate(file, document, sha256, report, files or {})
@@ -350,12 +318,3 @@ def _file_hash(path: Path) -> str:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
         raise FormatError(f"{shorten(str(path), 200)}: not a readable certificate ({error.strerror})") from None
-
-
-def _json(document: Mapping[str, Any]) -> str:
-    return json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-
-
-def _bytes(document: Mapping[str, Any]) -> bytes:
-    """Return the file: what UTF-8 cannot hold, a lone surrogate in a label, becomes its JSON escape."""
-    return _json(document).encode("utf-8", "backslashreplace")

@@ -18,7 +18,7 @@ from lmi import search_time as deadline
 from lmi.exact.decimal_rounding import down, float_down, float_up
 from lmi.search_time import share_of_time
 from ptcc_certify.bounds.kept_means import with_means
-from ptcc_certify.certificate.certificate_data import Source
+from ptcc_certify.certificate.certificate_file import FromFile, write_certificate
 from ptcc_certify.certificate.checking import check
 from ptcc_certify.certificate.family_content import ComponentProof, FamilyContent
 from ptcc_certify.certificate.family_verdict import assess_family
@@ -39,7 +39,6 @@ from ptcc_certify.checker.family import MANY_MODES
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.display_hook import Shown, family_summary, plot_of_family
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.graphs.io import write_atomically
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.graphs.tables import import_pandas
@@ -67,7 +66,7 @@ _ENOUGH, _BOUND_SHARE = Fraction(99, 100), 0.3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FamilyCertificate(FamilyContent, Shown):
+class FamilyCertificate(FamilyContent, FromFile, Shown):
     """What a protocol does on a family of graphs, whatever the signal, with its proof.
 
     Attributes
@@ -91,7 +90,7 @@ class FamilyCertificate(FamilyContent, Shown):
         What ``"graph"`` is called, and where ``"x(0)"`` comes from.
     scenario : mapping or None
         The scenario file that asked for it, as JSON; it is kept, and nothing is read from it.
-    signal : "any", "constant" or DwellTime
+    signal : "any", "constant", DwellTime, JointWindows or ClockShares
         The signals that it was asked for.
     restricted : tuple of Claim
         What holds for these beside what holds for every signal.
@@ -187,15 +186,11 @@ class FamilyCertificate(FamilyContent, Shown):
         FormatError
             The file cannot be written.
         ParameterError
-            The certificate is undecided: there is nothing to check.
+            The certificate is undecided: there is nothing to check. Or the path ends in another way than ``.json``.
         """
         if self.verdict != "certified":
             raise ParameterError("nothing is certified of this family, so that no certificate is written")
-        document, files = self._document
-        for name, content in files.items():
-            write_atomically(Path(path).parent / name, content)
-        text = json.dumps(document, indent=1, ensure_ascii=False) + "\n"
-        write_atomically(Path(path), text.encode("utf-8", "backslashreplace"))
+        write_certificate(path, *self._document)
 
     def to_json(self) -> str:
         """Return the certificate as one JSON object, without NaN or infinity."""
@@ -222,30 +217,6 @@ class FamilyCertificate(FamilyContent, Shown):
         index = pandas.Index(self.family.labels, name="node")
         return pandas.DataFrame(ends, index=index, columns=["least", "largest"], dtype=float)
 
-    @property
-    def path(self) -> Path:
-        """The file that it was read from."""
-        return self._file.path
-
-    @property
-    def sha256(self) -> str:
-        """Of the file that it was read from."""
-        return self._file.sha256
-
-    @property
-    def report(self) -> CheckReport:
-        """What the independent check says of a certificate that was read."""
-        return self._file.report
-
-    @property
-    def _file(self) -> Source:
-        if self.source is None:
-            of = "report, path and sha256 are of a certificate that was read from a file"
-            raise ParameterError(
-                f"{of}; for a page or LaTeX: write_report(certificate, path); else save it, and read it"
-            )
-        return self.source
-
     if not TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Any:
@@ -265,10 +236,10 @@ class FamilyCertificate(FamilyContent, Shown):
         return str(self._document[0]["digest"])
 
     def __repr__(self) -> str:
-        behaviour = self.parts[0].component.behaviour if len(self.parts) == 1 else f"{len(self.parts)} components"
-        if behaviour is None:
-            behaviour = "not decided"
-        elif behaviour != DEPENDS:
+        behaviour = self.parts[0].component.behaviour or "not decided"
+        if len(self.parts) > 1:
+            behaviour = f"{len(self.parts):,} components"
+        elif behaviour in self.behaviours and behaviour != DEPENDS:
             behaviour += " for every signal"
         rate = "none" if self.rate is None else down(self.rate)
         return f"FamilyCertificate({behaviour}, rate {rate}, {self.verdict})"
@@ -300,7 +271,7 @@ def certify_family(
         Sliding mode: ``sigma(0)``, like ``x0``; without it 0, which leaves no reaching phase.
     time_limit : float, optional
         Seconds of wall time for the searches; without it 60, and 1 more for every 1,000 nodes.
-    signal : {"any", "constant"} or DwellTime
+    signal : {"any", "constant"}, DwellTime, JointWindows or ClockShares
         Restricted signals of which more is claimed, beside what holds for every signal.
     expectations : Expectations or str, optional
     scenario, origins : mapping, optional
@@ -362,8 +333,8 @@ def certify_family(
         }
     progress(STEPS[3])
     kept |= {"expectations": asked, "notes": tuple(dict.fromkeys(notes)), "scenario": scenario}
-    told = origins_of(None, x0, sigma0) | dict(origins or {})
-    return FamilyCertificate(family, protocol, tuple(parts), initial_state, sigma, reaching, origins=told, **kept)
+    names = origins_of(None, x0, sigma0) | dict(origins or {})
+    return FamilyCertificate(family, protocol, tuple(parts), initial_state, sigma, reaching, origins=names, **kept)
 
 
 def _with_means(part: ComponentProof) -> ComponentProof:

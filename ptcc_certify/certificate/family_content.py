@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from lmi.exact.numbers import integers
-from ptcc_certify.bounds.envelope import Instants
+from ptcc_certify.bounds.envelope import Instants, remaining_part
 from ptcc_certify.bounds.family_deviation import (
     deviation_on_clock,
     deviation_while_driven,
@@ -56,7 +56,7 @@ class ComponentProof:
     Attributes
     ----------
     component : FamilyComponent
-    functions : tuple of FamilyFunction
+    functions : tuple of FamilyFunction or FollowerFunction
         Proved, the largest rate first; nodes are numbered within the component.
     upper_bound : FamilyRateBound or None
         No rate for every signal is larger.
@@ -305,10 +305,10 @@ class FamilyContent:
         Under the sliding-mode protocol its nominal part; of the sliding part see :attr:`sliding_bounded`.
         """
         pole = self.protocol.gain.pole
-        held = (
+        each = (
             part.component.nodes.size == 1 or any(V.rate * pole >= 2 for V in part.functions) for part in self.parts
         )
-        return True if all(held) else None
+        return True if all(each) else None
 
     @property
     def sliding_bounded(self) -> bool | None:
@@ -363,10 +363,10 @@ class FamilyContent:
         Raises
         ------
         ParameterError
-            There is no initial state.
+            There is no initial state, or an instant is not from 0 to 1.
         """
         self._require_state()
-        at, gain = self._instants(remaining), np.asarray(self.protocol.gain.value_at_remaining(remaining))
+        at, gain = self._instants(remaining), self.protocol.gain.value_at_remaining(_row(remaining))
         bounds = np.full((self.family.n_nodes, at.clock.size), np.inf)
         for part, driven in zip(self.parts, self._drives, strict=True):
             nodes, x = part.component.nodes, self._state(part)
@@ -384,24 +384,12 @@ class FamilyContent:
         return np.asarray((bounds + np.array(added)[:, None]) * (1 + 1e-12))
 
     def deviation_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
-        """Bound of ``|x_k(t) - x_k(T)|`` for every agent and every signal, from the initial state.
-
-        Whatever the disturbances, under the sliding-mode protocol.
+        """Bound of ``|x_k(t) - x_k(T)|`` for every agent and every signal, as :meth:`input_bound` bounds the input.
 
         Parameters
         ----------
         remaining : (M,) array_like
             ``1 - t/T`` at the instants, in [0, 1].
-
-        Returns
-        -------
-        (N, M) array
-            Infinite where nothing is proved.
-
-        Raises
-        ------
-        ParameterError
-            There is no initial state.
         """
         self._require_state()
         return self._deviation(self._instants(remaining))
@@ -444,10 +432,15 @@ class FamilyContent:
     def _instants(self, remaining: Sequence[float] | np.ndarray) -> Instants:
         """Return values of the clock, and those of the reaching phase if there is one."""
         if not self.direct:
-            return self._phase.instants(np.asarray(remaining, dtype=float))
-        return Instants(np.asarray(self.protocol.gain.clock_at_remaining(remaining)))
+            return self._phase.instants(_row(remaining))
+        return Instants(np.asarray(self.protocol.gain.clock_at_remaining(_row(remaining))))
 
     @cached_property
     def _phase(self) -> ReachingPhase:
         assert self.protocol.reaching is not None and self.reaching is not None
         return ReachingPhase(self.protocol.reaching, self.reaching)
+
+
+def _row(remaining: Any) -> np.ndarray:
+    """Return values of ``1 - t/T``, (M,), or refuse them."""
+    return np.atleast_1d(remaining_part(remaining))

@@ -1,7 +1,7 @@
 """The verdict of a family's certificate in one line: what became of what was asked, and the exit code that agrees.
 
-*Useful* is a bound that leaves at most 1 % at 0.99 T: of the largest ``|x_k(0)|``, for every agent; without an initial
-state, of the norm that decays.
+*Useful* is a bound that leaves at most 1 % at 0.99 T: of the largest ``|x_k(0)|``, for every agent, under the signals
+that were asked for; without an initial state, of the norm that decays under every signal.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.certificate.family_content import FamilyContent
+from ptcc_certify.certificate.restricted_bounds import deviation_of_signal
 from ptcc_certify.certificate.restricted_claims import LastModeClaim
 from ptcc_certify.certificate.verdict import CERTIFIED, LAST, MET, OPEN, REFUTED, UNDECIDED, Answer, Assessment
 from ptcc_certify.checker import CheckReport
@@ -117,8 +118,8 @@ def _judge_behaviour(certificate: FamilyContent, components: Sequence[FamilyComp
     for k, claim in last.items():
         family = components[k].family
         edges = [mode.sign for mode in family.modes] if isinstance(claim, LastModeClaim) else [family.union[2]]
-        told = zip(claim.behaviours, edges, strict=True)
-        shows = [last_mode_shows(one, expected, bool((signs > 0).all())) for one, signs in told]
+        pairs = zip(claim.behaviours, edges, strict=True)
+        shows = [last_mode_shows(one, expected, bool((signs > 0).all())) for one, signs in pairs]
         if False in shows and answer.status != REFUTED:
             number = shows.index(False)
             whose = f"{mode_name(certificate.family, number)} by itself: " * isinstance(claim, LastModeClaim)
@@ -132,8 +133,10 @@ def _judge_rate(certificate: FamilyContent, least: Fraction) -> Answer:
     """Tell whether a rate of at least so much is proved for every signal, or excluded by the upper bound."""
     what, rate, bound = f"rate >= {near(least, 12)}", certificate.rate_of_signal, certificate.upper_bound
     if certificate.signal != "any":
-        held = not isinstance(certificate.signal, ClockShares | JointWindows)  # a constant member is one of them
-        bound = certificate.member_bound if held else None
+        includes_constant = not isinstance(
+            certificate.signal, ClockShares | JointWindows
+        )  # a constant member is one of them
+        bound = certificate.member_bound if includes_constant else None
     alone = all(part.component.nodes.size == 1 for part in certificate.parts)
     if alone or (rate is not None and rate >= least):
         every = alone or (certificate.rate is not None and certificate.rate >= least)
@@ -213,7 +216,8 @@ def _usefulness(certificate: FamilyContent) -> bool | None:
     if certificate.initial_state is not None:
         sizes = map(abs, (*certificate.initial_state, *(certificate.sigma0 or ())))
         size, instant = float(max(sizes)), float(LAST) * certificate.settling_share
-        return size == 0 or bool(certificate.deviation_bound([instant]).max() <= size * float(LAST))
+        bounds = deviation_of_signal(certificate, [instant])
+        return size == 0 or bool(bounds.max() <= size * float(LAST))
     clock = float(certificate.protocol.gain.clock_at_remaining(float(LAST)))
     for part in certificate.parts:
         left = [math.sqrt(V.overshoot) * math.exp(-float(V.rate) / 2 * clock) for V in part.functions]

@@ -80,8 +80,8 @@ def claim_entry(claim: Claim, labels: Sequence[str]) -> dict[str, Any]:
         final = None if ends is None else {v: enclosed(*pair) for v, pair in zip(labels, ends, strict=True)}
         if isinstance(claim, LastModeClaim):
             return {"claim": "last mode", **about, "modes": list(claim.behaviours), "final_state": final}
-        told = {"behaviour": claim.behaviour, "eta": format_exact(claim.rate.eta)}
-        return {"claim": "windows", **about, **told, "final_state": final}
+        more = {"behaviour": claim.behaviour, "eta": format_exact(claim.rate.eta)}
+        return {"claim": "windows", **about, **more, "final_state": final}
     forms = claim.forms
     return {
         "claim": "rate",

@@ -1,6 +1,7 @@
 """Searches what may be claimed of a family for restricted signals, dwell times or weights that never change, say.
 
-Each claim is about one component with common states at rest, and stands beside what is claimed for every signal.
+Each claim is about one component, and stands beside what is claimed for every signal: a rate where states at rest are
+common, an end where they differ.
 """
 
 from __future__ import annotations

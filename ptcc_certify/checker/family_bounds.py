@@ -196,7 +196,8 @@ def check_family_bounds(
             if (ends := known[v]) is not None:
                 middle, radius = interval(entry)
                 need(middle - radius <= ends[0] and ends[1] <= middle + radius, "a final state is not enclosed")
-        doc.done(f"{sum(ends is not None for ends in known.values())} agents")
+        count = sum(ends is not None for ends in known.values())
+        doc.done(f"{count} agents" if count else "none claimed: ends depend on the signal")
     _check_input(doc, family, functions, (protocol, begin, drive), x)
 
 

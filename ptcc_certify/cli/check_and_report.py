@@ -78,13 +78,16 @@ def _same_graph(
     from ptcc_certify.graphs.difference import difference
     from ptcc_certify.graphs.io.graph_files import read_graph_as, reading_flags
 
-    if (family := family_of_files(graph, document["graph"]["read"], options)) is not None:
+    family = family_of_files(graph, document["graph"]["read"], options)
+    if family is not None and family.graph is None:
         reason = f"one graph in the certificate, a family in the files: {family!r}"
         return replace(report, accepted=False, obligations=(), rejected="graph", reason=reason), {}
     source = click.get_current_context().get_parameter_source
     names = [name for name in shared.READING if source(name) is ParameterSource.COMMANDLINE]
     overrides = {"orientation" if name == "edges" else name: options[name] for name in names}
-    signed = read_graph_as(shared.graph_file(graph), document["graph"]["read"], **overrides)
+    signed = None if family is None else family.graph
+    if signed is None:
+        signed = read_graph_as(shared.graph_file(graph), document["graph"]["read"], **overrides)
     way = "as the options say" if overrides else "as the certificate says"
     how = {"graph_read": f"{graph}, read {way}: {reading_flags(signed.read)}"}
     if signed.sha256 == report.sha256:

@@ -266,10 +266,10 @@ def certify_family(
         return code or ExitCode.UNDECIDED
     name, read = _names(graphs, family, options)
     states = {"x(0)": options["x0"], "sigma(0)": options["sigma0"]}
-    drawn = {what: f"random, seed {options['seed']}" for what, text in states.items() if text == "random"}
+    random_states = {what: f"random, seed {options['seed']}" for what, text in states.items() if text == "random"}
     asked = Expectations(options["expect"], options["min_rate"], most)
     with progress(STEPS, screen.quiet) as begin:
-        origins = {"graph": Path(name).name, "read": read, **drawn}
+        origins = {"graph": Path(name).name, "read": read, **random_states}
         limit = {"time_limit": options["time_limit"], "expectations": asked, "scenario": scenario_record()}
         limit |= {"signal": signal, "sigma0": sigma0}
         certificate = run(family, protocol, x0, origins=origins, progress=begin, **limit)
@@ -340,17 +340,20 @@ def same_family(
     if order is None:
         reason = f"another family than {name}: {family_difference(meant, family)}"
         return replace(report, accepted=False, obligations=(), rejected="graph", reason=reason), {"graph_read": how}
-    told = {"graph_read": how}
+    facts = {"graph_read": how}
     named, own = ([mode.name for mode in modes] for modes in ([family.modes[k] for k in order], meant.modes))
     if len(order) > 1 and named != own:
-        told["modes"] = f"modes {', '.join(named)} are called {', '.join(own)} in the certificate"
+        facts["modes"] = f"modes {', '.join(named)} are called {', '.join(own)} in the certificate"
     elif order != tuple(range(len(order))):
-        told["modes"] = f"the same modes in another order than in the certificate, {', '.join(own)}"
-    return report, told
+        facts["modes"] = f"the same modes in another order than in the certificate, {', '.join(own)}"
+    return report, facts
 
 
 def family_of_files(graph: str, read: Any, options: shared.Options) -> Family | None:
-    """Return the family that a file makes with options or a scenario, read as a certificate says; None of one graph."""
+    """Return the family that a file makes with options or a scenario, read as a certificate says; None of a graph file.
+
+    It may be one graph: a file of intervals whose ends are equal.
+    """
     from ptcc_certify.graphs.io.family_files import is_family_file
 
     own = read_scenario(graph) if is_scenario(graph) else None
@@ -364,8 +367,7 @@ def family_of_files(graph: str, read: Any, options: shared.Options) -> Family | 
         "drop_self_loops": read["self_loops"] != "refused",
         "undirected": read["undirected"],
     }
-    family = _read_again(way, (graph,), options)[1]
-    return family if family.graph is None else None
+    return _read_again(way, (graph,), options)[1]
 
 
 def _read_again(read: Any, graphs: tuple[str, ...], options: shared.Options) -> tuple[tuple[str, ...], Family, str]:

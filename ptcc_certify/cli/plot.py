@@ -89,7 +89,7 @@ def plot(
     except RejectedCertificate as error:
         print_lines(f"rejected: {error}", err=True)
         return ExitCode.VIOLATED
-    save_figure(_drawn(what, subject, wide, time_unit), output)
+    save_figure(_draw(what, subject, wide, time_unit), output)
     print_lines(f"written    {output}")
     return ExitCode.OK
 
@@ -169,7 +169,7 @@ def _of_graph(
     return simulate(signed, protocol, x0, **shared.run_keywords(protocol, options, signed))
 
 
-def _drawn(what: str, subject: Any, wide: bool, time_unit: str) -> Any:
+def _draw(what: str, subject: Any, wide: bool, time_unit: str) -> Any:
     """Draw a figure of a certificate, a run, a family, or a graph with its protocol."""
     from ptcc_certify.certificate.family_certificate import FamilyCertificate
     from ptcc_certify.graphs.display_hook import plot_of_family

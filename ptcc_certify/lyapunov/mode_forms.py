@@ -25,8 +25,9 @@ from lmi.errors import LMIError, OutOfTime
 from lmi.exact.elementary_enclosures import rounded
 from lmi.search_time import checkpoint
 from lmi.switched import SwitchedCertificate, switched_lyapunov
+from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.error_system import rounded_matrix
-from ptcc_certify.lyapunov.family_function import FamilyFunction, prove_ends, prove_mode
+from ptcc_certify.lyapunov.family_function import FamilyFunction, prove_ends, prove_mode, with_constants
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.theorems.matrix_arithmetic import Matrix
 
@@ -66,6 +67,27 @@ def within_reach(quotient: Quotient) -> bool:
     """Tell whether forms of each mode are searched in a family of this size."""
     rows, modes = len(quotient.nodes), len(quotient.modes)
     return 0 < rows <= ROWS and modes <= MODES and rows * modes <= ALL_ROWS
+
+
+def mode_functions(quotient: Quotient, forms: ModeForms) -> list[tuple[Quotient, FamilyFunction]]:
+    """Return the form of each mode as a function of this mode alone, with the constants of its inputs.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graphs.family import Family
+    >>> day, night = SignedDigraph.from_edges([("a", "b", 3)]), SignedDigraph.from_edges([("a", "b", 1)])
+    >>> quotient = Quotient(Family.switching([day, night]))
+    >>> [round(float(V.rate), 3) for _, V in mode_functions(quotient, search_single_forms(quotient))]
+    [6.0, 2.0]
+    """
+    result = []
+    parts = zip(quotient.family.modes, forms.matrices, forms.rates, forms.multipliers, strict=True)
+    for mode, matrix, rate, multipliers in parts:
+        alone, ends = Quotient(Family((mode,)), quotient.kernel), prove_ends(matrix)
+        assert ends is not None, "the forms are proved definite"
+        V = FamilyFunction("full", quotient.pivots, quotient.nodes, matrix, (rate,), (multipliers,), *ends)
+        result.append((alone, with_constants(V, alone)))
+    return result
 
 
 def search_mode_forms(quotient: Quotient, price: float, known: Sequence[FamilyFunction] = ()) -> ModeForms | None:

@@ -16,13 +16,14 @@ from markupsafe import Markup
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.certificate.family_comparison import compare
+from ptcc_certify.certificate.restricted_bounds import deviation_of_signal, nearer_for_signal
 from ptcc_certify.certificate.verdict import REFUTED
 from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.graphs.family import Mode
 from ptcc_certify.graphs.size_limits import DRAWN_NODES, INPUT_NODES
 from ptcc_certify.protocols.reaching_time import ReachingTime
 from ptcc_certify.report import notation as texts
-from ptcc_certify.report.family_screen import groups_text, sharpest
+from ptcc_certify.report.family_screen import BOUND_KINDS, groups_text, sharpest
 from ptcc_certify.report.notation import above, rational
 from ptcc_certify.report.plots.counterexample import plot_counterexample
 from ptcc_certify.report.plots.family import plot_family, plot_family_decay
@@ -36,12 +37,6 @@ from ptcc_certify.theorems.family_behaviour import DEPENDS, Counterexample, Fami
 from ptcc_certify.theorems.family_claims import camps, component_holds, component_refutation
 from ptcc_certify.theorems.family_rate import explicit_rate
 
-#: What proves an upper bound on the rate, in words.
-BOUND_KINDS = {
-    "member": "a single graph of the family, held for ever",
-    "mixture": "a mixture of graphs of the family, between which a signal switches fast",
-    "word": "a periodic signal",
-}
 #: Modes, uncertain weights and parts of a proof that are listed.
 MODES, WEIGHTS = 12, 8
 #: How sentences begin that do not begin with a label.
@@ -86,12 +81,15 @@ def family_view(saved: FamilyCertificate, runs: Sequence[FamilyTrajectory]) -> d
         **{"title": _title(facts), "protocol": protocol, "figures": figures, "runs": runs, "why": why},
         "equations": texts.formula_svg(protocol.latex(), inline=False),
         "parameters": [(name, getattr(protocol, name)) for name in texts.parameter_names(protocol)],
-        "verdict_text": texts.typeset(saved.assessment.text.replace("--rho2 ", "rho2 = ").replace("--mu3 ", "mu3 = ")),
+        "verdict_text": texts.typeset(
+            _signs(saved.assessment.text).replace("--rho2 ", "rho2 = ").replace("--mu3 ", "mu3 = ")
+        ),
         "reaching": _reaching(saved),
         "modes": [_mode_row(saved, k) for k in range(min(len(saved.family.modes), MODES))],
         "states": _states(saved),
         "endings": endings(saved),
         "remaining": [(Markup("{}\u00a0T").format(f), bound) for f, bound in remaining(saved)],
+        "remaining_promised": [(Markup("{}\u00a0T").format(f), bound) for f, bound in remaining(saved, of_signal=True)],
         "functions": _functions(saved),
         "bound_words": bound_words(saved),
         "worst_ratio": max((ratio.worst_ratio for ratio in ratios), default=0.0),
@@ -101,7 +99,7 @@ def family_view(saved: FamilyCertificate, runs: Sequence[FamilyTrajectory]) -> d
         "groups": [
             _sentence(texts.printable(groups_text(c), 2000)) for c in facts["components"] if c.behaviour == DEPENDS
         ],
-        "answers": [(answer.status, texts.typeset(str(answer))) for answer in saved.assessment.answers],
+        "answers": [(answer.status, texts.typeset(_signs(str(answer)))) for answer in saved.assessment.answers],
         "commands": _commands(saved),
         "file_name": None if saved.source is None else saved.source.path.name,
         "sha256": None if saved.source is None else saved.source.sha256,
@@ -190,7 +188,7 @@ def bound_words(saved: FamilyCertificate) -> list[Markup]:
         name = texts.printable(member["name"]) if len(family.modes) > 1 else "the graph"
         how = {
             "word": Markup("for {} of the clock").format(rational(duration)),
-            "mixture": Markup("a share {} of the time").format(rational(duration)),
+            "mixture": Markup("for a share {} of the time").format(rational(duration)),
             "member": Markup("for ever"),
         }[bound.kind]
         some = [
@@ -258,19 +256,27 @@ def state_rows(saved: FamilyCertificate) -> list[tuple[str, str, str, str | None
 def _states(saved: FamilyCertificate) -> tuple[list[str], list[list[Any]]]:
     """Return head and rows of the table of initial and final states."""
     rows = state_rows(saved)[: 2 * texts.LISTED]
+    heads = ["Agent", "Camp", "Initial state"]
+    if all(last is None for *_, last in rows):
+        return heads, [[texts.label(name), camp, first] for name, camp, first, _ in rows]
     written = [[texts.label(name), camp, first, last or _ends(None)] for name, camp, first, last in rows]
     which = "every signal" if states_of_signal(saved) == list(saved.final_states or ()) else "these signals"
     which += " and disturbance" * (saved.protocol.reaching is not None)
     last = "State at the deadline" if rests(saved) else "State at any instant"
-    return ["Agent", "Camp", "Initial state", f"{last}, for {which}"], written
+    return [*heads, f"{last}, for {which}"], written
 
 
-def remaining(saved: FamilyCertificate) -> list[tuple[float, Markup]]:
-    """Return instants and the bound of the deviation of any agent from its final state there."""
-    if saved.initial_state is None or saved.rate is None or not saved.common:
+def remaining(saved: FamilyCertificate, of_signal: bool = False) -> list[tuple[float, Markup]]:
+    """Return instants and the bound of the deviation of any agent from its final state there.
+
+    For every signal, or for those that were asked for, where more is proved of these.
+    """
+    proved = nearer_for_signal(saved) if of_signal else saved.common and saved.rate is not None
+    if saved.initial_state is None or not proved:
         return []
-    bounds = saved.deviation_bound([float(1 - Fraction(str(f))) for f in FRACTIONS]).max(axis=0)
-    return [(f, above(float(x), 2)) for f, x in zip(FRACTIONS, bounds, strict=True)]
+    instants = [float(1 - Fraction(str(f))) for f in FRACTIONS]
+    bounds = deviation_of_signal(saved, instants) if of_signal else saved.deviation_bound(instants)
+    return [(f, above(float(x), 2)) for f, x in zip(FRACTIONS, bounds.max(axis=0), strict=True)]
 
 
 def _functions(saved: FamilyCertificate) -> list[tuple[Any, ...]]:
@@ -329,14 +335,14 @@ def _counterexamples(saved: FamilyCertificate) -> list[tuple[str, Markup, Family
                     result.append((asked, part.component, why))
                 break
     return [
-        (what, Markup("{}").format(_minus(texts.printable(counterexample_text(c, why), 500))), c, why)
+        (what, Markup("{}").format(_signs(texts.printable(counterexample_text(c, why), 500))), c, why)
         for what, c, why in result
     ]
 
 
-def _minus(text: str) -> str:
-    """Write minus signs of numbers as such."""
-    return re.sub(r"(?<=[= ])-(?=\d)", "\N{MINUS SIGN}", text)
+def _signs(text: str) -> str:
+    """Write minus signs of numbers, and arrows of edges, as such."""
+    return re.sub(r"(?<=[= ])-(?=\d)", "\N{MINUS SIGN}", text).replace(" -> ", " \N{RIGHTWARDS ARROW} ")
 
 
 def _sentence(text: str) -> str:

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
+from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from lmi.exact.decimal_rounding import down, near, up
+from ptcc_certify.certificate.restricted_bounds import deviation_of_signal, nearer_for_signal
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import STABILITY
-from ptcc_certify.report.restricted_screen import restricted_entries, rests, states_of_signal
+from ptcc_certify.report.restricted_screen import RESTS, restricted_entries, rests, states_of_signal
 from ptcc_certify.report.sliding_lines import sliding_lines
 from ptcc_certify.report.structure_text import Lines, structure_text
 from ptcc_certify.report.text_layout import (
@@ -43,6 +45,12 @@ _COMPONENTS, _LINES = 4, 2
 #: 1 - t/T and its name, where the long screen tells the error.
 _INSTANTS = ((0.5, "0.5 T"), (0.1, "0.9 T"), (0.01, "0.99 T"), (1e-6, "T(1-1e-6)"))
 _NOTHING: Mapping[str, str] = MappingProxyType({})
+#: What proves an upper bound on the rate, in words.
+BOUND_KINDS = {
+    "member": "a single graph of the family, held for ever",
+    "mixture": "a mixture of graphs of the family, between which a signal switches fast",
+    "word": "a periodic signal",
+}
 #: What is told of signals.
 WHATEVER = {"any": "for every signal", "constant": "if mode and weights never change"}
 
@@ -120,15 +128,15 @@ def family_lines(certificate: FamilyCertificate, name: str, origins: Mapping[str
     entries += _mode_entries(family, components)
     entries += [("protocol", _gains(certificate))]
     if certificate.initial_state is not None:
-        drawn = f" ({origins['x(0)']})" if "x(0)" in origins else ""
-        entries.append(("x(0)", value_list(family.labels, certificate.initial_state) + drawn))
+        origin = f" ({origins['x(0)']})" if "x(0)" in origins else ""
+        entries.append(("x(0)", value_list(family.labels, certificate.initial_state) + origin))
     entries += sliding_lines(family.labels, certificate.protocol.reaching, certificate.sigma0, certificate.reaching)
     disturbed = certificate.sigma0 is not None
     entries += _claim_entries(components, f" at T = {near(certificate.protocol.T)}", every=True, disturbed=disturbed)
     entries += [*_rate_entries(certificate), *restricted_entries(certificate), *_function_entries(certificate)]
     entries += _final_entries(certificate, long=True)
     entries += [*_error_entries(certificate, long=True), *_input_entries(certificate, long=True)]
-    entries += [("note", note) for note in certificate.notes]
+    entries += [("note", note) for note in certificate.notes if note not in family.notes]
     entries.append(("proof", _proof_text(certificate)))
     return format_lines([*entries, ("verdict", certificate.assessment.text)])
 
@@ -149,8 +157,8 @@ def family_text(family: Family, name: str) -> str:
     uncertain = sum(int((~mode.known).sum()) for mode in family.modes)
     optional = sum(int(mode.optional.sum()) for mode in family.modes)
     rest = f"{counted(family.n_nodes, 'node')}, {counted(edges, 'edge')}"
-    rest += f", {uncertain} uncertain" * (uncertain > optional)
-    rest += f", {optional}{' of them' * (uncertain > optional)} optional" * bool(optional)
+    rest += f", {uncertain:,} uncertain" * (uncertain > optional)
+    rest += f", {optional:,}{' of them' * (uncertain > optional)} optional" * bool(optional)
     if not (several or name):
         return rest
     if not several:
@@ -172,7 +180,7 @@ def _mode_entries(family: Family, components: Sequence[FamilyComponent]) -> Line
 
     for number, mode in enumerate(family.modes):
         structure = components[0].structures[number] if len(components) == 1 else analyse(mode.mandatory)
-        size = counted(mode.n_edges, "edge") + f" ({int((mode.sign < 0).sum())} negative)" + "; undirected" * mode.tied
+        size = f"{counted(mode.n_edges, 'edge')} ({int((mode.sign < 0).sum()):,} negative)" + "; undirected" * mode.tied
         yield "mode", f"{mode_name(family, number)}: {size}; mandatory edges: {structure_text(structure)}"
         if edges := _uncertain_edges(mode):
             yield "", f"uncertain: {edges}"
@@ -227,9 +235,9 @@ def _claim_entries(
             room = max(TEXT - len(text) - 2, 12)
             yield "claim" if not place else "", f"{shorten_list(names, room, components[k].nodes.size)}: {text}"
         if len(components) > _COMPONENTS:
-            yield "", f"... {len(components)} components in all"
-    told = [components[k] for k in order if components[k].behaviour == DEPENDS]
-    for component in told[: len(told) if every else 1]:
+            yield "", f"... {len(components):,} components in all"
+    depending = [components[k] for k in order if components[k].behaviour == DEPENDS]
+    for component in depending[: len(depending) if every else 1]:
         yield from _depends_entries(component, every)
 
 
@@ -259,8 +267,8 @@ def _depends_entries(component: FamilyComponent, every: bool) -> Lines:
         alone = (f"{mode_name(family, k)}: {_alone(mode)}" for k, mode in enumerate(family.modes))
         yield "alone", _cut("; ".join(alone), every)
     elif component.signal == "any":
-        (held, *_) = decide(family, "constant")
-        behaviour = "it depends on the weights" if held.behaviour == DEPENDS else sharpest(held)
+        (constant, *_) = decide(family, "constant")
+        behaviour = "it depends on the weights" if constant.behaviour == DEPENDS else sharpest(constant)
         yield "constant", f"where weights never change: {behaviour}"
     if component.signal == "any":
         yield "groups", _cut(groups_text(component), every)
@@ -268,9 +276,11 @@ def _depends_entries(component: FamilyComponent, every: bool) -> Lines:
 
 def _alone(mode: Mode) -> str:
     """Tell what a mode does if no other one acts."""
+    if not mode.n_edges:
+        return RESTS
     components = decide(Family((mode,)))
     text = ", ".join(dict.fromkeys(map(sharpest, components)))
-    return text if len(components) == 1 else f"{len(components)} separate parts, each by itself: {text}"
+    return text if len(components) == 1 else f"{len(components):,} separate parts, each by itself: {text}"
 
 
 def groups_text(component: FamilyComponent) -> str:
@@ -288,13 +298,13 @@ def groups_text(component: FamilyComponent) -> str:
     zero, near = groups.at_zero.tolist(), set(groups.bounded.tolist())
     known = {v for group in groups.agreeing for v in group.nodes.tolist()}.union(zero)
     others = [v for v in range(component.nodes.size) if v not in known]
-    drawn, free = ([v for v in others if (v in near) == wanted] for wanted in (True, False))
+    followers, free = ([v for v in others if (v in near) == wanted] for wanted in (True, False))
     if zero:
         parts.append(f"{_names(component, zero, 30)} {'end' if len(zero) > 1 else 'ends'} at 0")
-    if drawn:
-        ends = "end" if len(drawn) > 1 else "ends"
-        moves = "move" if len(drawn) > 1 else "moves"
-        parts.append(f"{_names(component, drawn, 30)} {ends} between these, up to signs, or {moves} there for ever")
+    if followers:
+        ends = "end" if len(followers) > 1 else "ends"
+        moves = "move" if len(followers) > 1 else "moves"
+        parts.append(f"{_names(component, followers, 30)} {ends} between these, up to signs, or {moves} there for ever")
     if free:
         parts.append(f"no limit is claimed of {_names(component, free, 30)}")
     return "; ".join(parts)
@@ -337,7 +347,7 @@ def _no_search(certificate: FamilyCertificate) -> str:
     """Tell why no rate was proved: too many agents for a search, or too little time; nothing where it is not known."""
     sizes = [part.component.nodes.size for part in certificate.parts if part.component.nodes.size > 1 and not part.rate]
     if max(sizes, default=0) > EXACT_NODES:
-        return f"{max(sizes)} agents are above the {EXACT_NODES} of the searches"
+        return f"{max(sizes):,} agents are above the {EXACT_NODES:,} of the searches"
     return "the searches took too long; raise --time-limit" * any(
         "cut off" in note or note == "Lyapunov functions" for note in certificate.notes
     )
@@ -352,13 +362,8 @@ def _function_entries(certificate: FamilyCertificate) -> Lines:
             alone = f"; of each mode: {rates}" * bool(own)
             yield "function", f"{V.kind}: decay rate {down(V.rate) if V.rate > 0 else 0}{alone}"
         if part.upper_bound is not None:
-            kinds = {
-                "member": "one graph",
-                "mixture": "a mixture of graphs, by fast switching",
-                "word": "a periodic signal",
-            }
             modes = dict.fromkeys(names[member.mode] for member in part.upper_bound.members)
-            what = f"{kinds[part.upper_bound.kind]}" + f" of {', '.join(modes)}" * (len(names) > 1)
+            what = BOUND_KINDS[part.upper_bound.kind] + f": {', '.join(modes)}" * (len(names) > 1)
             yield "bound", f"decay rate at most {up(part.upper_bound.value)}, proved by {what}"
 
 
@@ -394,20 +399,27 @@ def _interval_entries(labels: Sequence[str], states: Sequence[tuple[Fraction, Fr
 
 
 def _error_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
-    """Tell how near the agents are to their final states by when."""
-    if not certificate.common or certificate.rate is None or certificate.initial_state is None:
+    """Tell how near the agents are to their final states by when, for every signal and those that were asked for."""
+    if certificate.initial_state is None:
         return
+    if certificate.common and certificate.rate is not None:
+        yield "error", _error_text(certificate, certificate.deviation_bound, long) + _every(certificate)
+    if nearer_for_signal(certificate):
+        nearer = _error_text(certificate, partial(deviation_of_signal, certificate), long)
+        if certificate.rate is None or nearer != _error_text(certificate, certificate.deviation_bound, long):
+            again = nearer if certificate.rate is None else nearer.removesuffix(" of its final state")
+            yield "error" if certificate.rate is None else "", f"{again} (these signals)"
+
+
+def _error_text(certificate: FamilyCertificate, bound: Callable[[list[float]], np.ndarray], long: bool) -> str:
     share = certificate.settling_share
     if not long:
-        bound = certificate.deviation_bound([0.01 * share]).max()
         when = "0.99 T" if certificate.direct else "T_r + 0.99 T_s"
-        within = f"{up(float(bound), 2)} of its final state{_every(certificate)}"
-        yield "error", f"at {when}: every agent within {within}"
-        return
+        return f"at {when}: every agent within {up(float(bound([0.01 * share]).max()), 2)} of its final state"
     instants = [(q, name) for q, name in _INSTANTS if q <= share]
-    bounds = certificate.deviation_bound([remaining for remaining, _ in instants]).max(axis=0)
-    told = (f"{up(float(bound), 2)} at {when}" for (_, when), bound in zip(instants, bounds, strict=True))
-    yield "error", f"every agent is within so much of its final state: {', '.join(told)}{_every(certificate)}"
+    bounds = bound([remaining for remaining, _ in instants]).max(axis=0)
+    texts = (f"{up(float(most), 2)} at {when}" for (_, when), most in zip(instants, bounds, strict=True))
+    return f"every agent is within so much of its final state: {', '.join(texts)}"
 
 
 def _input_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
@@ -433,8 +445,8 @@ def _input_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
         return
     yield from _peak_entries(labels, peaks or (), _every(certificate))
     if long and peaks is not None:
-        told = [f"{shorten_label(label)} {up(peak, 4)}" for label, peak in zip(labels, peaks, strict=True)]
-        yield "", f"|u_k| <= {shorten_list(told, 4 * TEXT)}"
+        each = [f"{shorten_label(label)} {up(peak, 4)}" for label, peak in zip(labels, peaks, strict=True)]
+        yield "", f"|u_k| <= {shorten_list(each, 4 * TEXT)}"
 
 
 def _every(certificate: FamilyCertificate) -> str:

@@ -1,4 +1,4 @@
-"""What a notebook shows of a graph, a structure, a certificate, a trajectory and a design: a table and a figure.
+"""What a notebook shows of a graph, a family, a structure, a certificate, a trajectory, a design: a table, a figure.
 
 Registered with :mod:`ptcc_certify.graphs.display_hook`, which calls them for ``_repr_html_``; elsewhere the plain
 ``repr`` is shown. Labels are escaped, figures are inline SVG images with a text in their place for those who
@@ -29,7 +29,7 @@ from ptcc_certify.report.plots.trade_off import plot_trade_off
 from ptcc_certify.report.plots.trajectory import plot_run
 from ptcc_certify.report.screen import certificate_lines, structure_lines
 from ptcc_certify.simulation.trajectory import Trajectory
-from ptcc_certify.theorems.family_behaviour import decide
+from ptcc_certify.theorems.family_behaviour import FamilyComponent, decide
 
 # Where the text of a line of a screen begins, after its head.
 _HEAD = 11
@@ -70,6 +70,12 @@ def family_html(family: Family) -> str:
     if family.n_nodes > SHOWN_NODES:
         return _page([f"{'family':<{_HEAD}}{family_text(family, '')}"], None, "")
     return _page(decision_lines(decide(family), family, ""), *_family_figure(family))
+
+
+@shows(FamilyComponent)
+def component_html(component: FamilyComponent) -> str:
+    """Show what a component of a family does: the screen of ``ptcc classify``, and a drawing, up to 120 nodes."""
+    return _page(decision_lines([component], component.family, ""), *_family_figure(component.family))
 
 
 def _family_figure(family: Family) -> tuple[Any, str]:

@@ -17,7 +17,9 @@ from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, Joi
 if TYPE_CHECKING:
     from ptcc_certify.certificate.family_content import FamilyContent
 
-CLOCK = {"t": "time", "s": "clock"}
+#: What agents do in a mode without edges, an outage.
+RESTS = "every agent keeps its value"
+CLOCK = {"t": "time", "s": "the clock"}
 
 
 def restricted_entries(certificate: FamilyContent) -> Iterator[tuple[str, str]]:
@@ -68,21 +70,25 @@ def signal_text(signal: SignalClass) -> tuple[str, str]:
 def _last_mode_text(certificate: FamilyContent, claim: LastModeClaim) -> str:
     """Tell what the last mode does, of each mode where they differ."""
     begin = "the last mode decides" if len(claim.behaviours) > 1 and claim.signal != "constant" else ""
-    untold = "rest where the weights say" if claim.signal == "constant" else "no limit while weights move"
-    told = [behaviour or untold for behaviour in claim.behaviours]
-    if len(set(told)) == 1:
-        camps = ", camps of that mode" if begin and told[0] == BIPARTITE_CONSENSUS else ""
-        return f"{begin}: {told[0]}{camps}".removeprefix(": ")
-    names = (printable(mode_name(certificate.family, k)) for k in range(len(told)))
-    each = "; ".join(f"{name} {behaviour}" for name, behaviour in zip(names, told, strict=True))
-    return f"{begin}: {each}".removeprefix(": ")
+    unknown = "rest where the weights say" if claim.signal == "constant" else "no limit while weights move"
+    modes = certificate.parts[claim.component].component.family.modes
+    pairs = zip(claim.behaviours, modes, strict=True)
+    behaviours = [(behaviour or unknown) if mode.n_edges else RESTS for behaviour, mode in pairs]
+    late = "; how near by when depends on the last switch" if begin else "; how near by when is not proved"
+    if len(set(behaviours)) == 1:
+        camps = ", camps of that mode" if begin and behaviours[0] == BIPARTITE_CONSENSUS else ""
+        return f"{begin}: {behaviours[0]}{camps}{late}".removeprefix(": ")
+    names = (printable(mode_name(certificate.family, k)) for k in range(len(behaviours)))
+    each = "; ".join(f"{name} {behaviour}" for name, behaviour in zip(names, behaviours, strict=True))
+    return f"{begin}: {each}{late}".removeprefix(": ")
 
 
 def _window_text(claim: WindowClaim) -> str:
     rate = claim.rate
     size = math.log10(rate.eta.numerator) - math.log10(rate.eta.denominator)
     left = math.floor(math.log10(rate.multiple) + rate.exponent * size)
-    return f"{claim.behaviour}; what is left shrinks by 1e{left} of it in {near(rate.window, 6)} of the clock"
+    in_each = f"in every {near(rate.window, 6)} of the clock"
+    return f"{claim.behaviour}; what is left shrinks by 1e{left} of it, or more, {in_each}"
 
 
 def _share_text(certificate: FamilyContent, claim: ShareClaim) -> str:
@@ -91,7 +97,8 @@ def _share_text(certificate: FamilyContent, claim: ShareClaim) -> str:
     names = (printable(mode_name(certificate.family, k)) for k in range(len(certificate.family.modes)))
     own = map(down, claim.form.function.rates)
     each = ", ".join(f"{name} {rate}" for name, rate in zip(names, own, strict=True))
-    return f"{claim.behaviour}, rate {down(claim.rate)}; of each: {each}"
+    late = "how near by when depends on how far the shares stray"
+    return f"{claim.behaviour}, rate {down(claim.rate)}; of each: {each}; {late}"
 
 
 def last_states(certificate: FamilyContent) -> list[Interval | None]:

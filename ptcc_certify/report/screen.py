@@ -364,7 +364,7 @@ def certificate_lines(
 
 def _graph_lines(structure: Structure, name: str) -> Lines:
     graph, negative = structure.graph, int((structure.graph.sign < 0).sum())
-    yield "graph", f"{name}: {counted(graph.n_nodes, 'node')}, {counted(graph.n_edges, 'edge')}, {negative} negative"
+    yield "graph", f"{name}: {counted(graph.n_nodes, 'node')}, {counted(graph.n_edges, 'edge')}, {negative:,} negative"
     yield "read", "; ".join([ORIENTATION[graph.read["orientation"]], *remarks_on(structure)])
 
 

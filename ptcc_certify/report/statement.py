@@ -19,7 +19,8 @@ from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.protocols.casadi_latex import symbol_latex
 from ptcc_certify.report import notation as texts
-from ptcc_certify.report.family_page import BOUND_KINDS, THEOREM, family_facts, remaining, state_rows
+from ptcc_certify.report.family_page import THEOREM, family_facts, remaining, state_rows
+from ptcc_certify.report.family_screen import BOUND_KINDS
 from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_name
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
 
@@ -135,8 +136,10 @@ def family_latex(saved: FamilyCertificate, figures: dict[str, str] | None = None
         "parameters": [(Markup(symbol_latex(name)), getattr(saved.protocol, name)) for name in names],
         **{"named": _named(saved.family.labels), "listed": _intervals(saved), "rows": rows},
         "remaining": [(f, _number(bound)) for f, bound in remaining(saved)],
+        "remaining_promised": [(f, _number(bound)) for f, bound in remaining(saved, of_signal=True)],
         **{"sigma0": saved.sigma0, "last_time": _last_time(saved)},
         "why": [counterexample_text(c, c.counterexample) for c in _depending(saved) if c.counterexample is not None],
+        "ends_known": any(last is not None for *_, last in rows),
         **{"figures": figures or {}, "stem": _stem(saved.source.path.stem), "report": saved.checked},
         **{"sha256": _broken(saved.source.sha256), "sha256_plain": saved.source.sha256},
         **{"bound_kinds": BOUND_KINDS, "theorem": THEOREM, "captions": _family_captions(saved)},
@@ -268,6 +271,7 @@ def _environment() -> jinja2.Environment:
         "below": lambda x, digits: _number(texts.below(x, digits)),
         "equals": lambda x: ("= " + _rational(x)).replace(r"= \approx", r"\approx"),
     }
+    environment.filters["arrows"] = lambda text: Markup(_tex(text).replace("-$>$", r"$\to$"))
     environment.globals |= {"captions": _CAPTIONS, "meanings": _MEANINGS}
     return environment
 

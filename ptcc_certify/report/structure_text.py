@@ -35,7 +35,7 @@ def graph_entries(structure: Structure, name: str) -> list[tuple[str, str]]:
 def _graph_text(structure: Structure, name: str) -> str:
     """Tell the size and the connectivity of a graph, its name as long as fits beside them."""
     graph, negative = structure.graph, int((structure.graph.sign < 0).sum())
-    size = f"{counted(graph.n_nodes, 'node')}, {counted(graph.n_edges, 'edge')} ({negative} negative)"
+    size = f"{counted(graph.n_nodes, 'node')}, {counted(graph.n_edges, 'edge')} ({negative:,} negative)"
     rest = f": {size}, {_connectivity(structure)}"
     if len(rest) + columns(name) > TEXT:
         rest, name = rest.replace("ly connected", "").replace("disconnected, ", ""), PurePath(name).name
@@ -44,7 +44,7 @@ def _graph_text(structure: Structure, name: str) -> str:
 
 def _connectivity(structure: Structure) -> str:
     words = {"strong": "strongly connected", "quasi-strong": "quasi-strongly connected", "weak": "weakly connected"}
-    return words.get(structure.connectivity, f"disconnected, {len(structure.components)} components")
+    return words.get(structure.connectivity, f"disconnected, {len(structure.components):,} components")
 
 
 def _reading_text(structure: Structure) -> str:
@@ -97,7 +97,7 @@ def camps(component: ClosedComponent) -> list[list[int]]:
 def structure_text(structure: Structure) -> str:
     """Return connectivity, closed components, leaders and followers, and balance in one line."""
     closed = structure.closed_components
-    groups = f"{counted(len(closed), 'closed component')} ({sum(c.balanced for c in closed)} balanced)"
+    groups = f"{counted(len(closed), 'closed component')} ({sum(c.balanced for c in closed):,} balanced)"
     followers = f"{counted(structure.leaders.size, 'leader')}, {counted(structure.followers.size, 'follower')}"
     whole = f"whole graph {'balanced' if structure.balanced else 'unbalanced'}"
     return f"{_connectivity(structure)}; {groups}; {followers}; {whole}"

@@ -41,8 +41,10 @@ def counted(number: int, noun: str) -> str:
     --------
     >>> counted(1, "edge"), counted(0, "edge")
     ('1 edge', '0 edges')
+    >>> counted(1005, "closed component")
+    '1,005 closed components'
     """
-    return f"{number} {noun}{'' if number == 1 else 's'}"
+    return f"{number:,} {noun}{'' if number == 1 else 's'}"
 
 
 def shorten_text(text: str, width: int) -> str:

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.graphs.display_hook import plot_of_counterexample
+from ptcc_certify.graphs.display_hook import Shown, plot_of_counterexample
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.io import as_family
 from ptcc_certify.graphs.rationals import shorten
@@ -108,7 +108,7 @@ class Counterexample:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FamilyComponent:
+class FamilyComponent(Shown):
     """One weakly connected component of the union of all modes, and what it does under every signal.
 
     Attributes
@@ -142,7 +142,7 @@ class FamilyComponent:
         signals = {"any": "every signal", "constant": "constant signals"}[self.signal]
         whom = "" if self.behaviour in (None, DEPENDS) else f" for {signals}"
         n, modes = self.nodes.size, len(self.family.modes)
-        parts = [f"{n} node{'s' * (n > 1)}"] + [f"{modes} modes"] * (modes > 1)
+        parts = [f"{n:,} node{'s' * (n > 1)}"] + [f"{modes} modes"] * (modes > 1)
         return f"FamilyComponent({', '.join(parts)}, {self.behaviour or 'not decided'}{whom})"
 
     @cached_property

@@ -46,6 +46,24 @@ def test_what_is_decided_on_edges_alone_is_told_and_not_certified():
     assert "containment at T = 1 for every signal" in text
 
 
+def test_what_is_no_instant_and_no_certificates_name_is_refused(tmp_path):
+    made = certify_family(Family.from_intervals([("a", "b", 1, 2)]), PROTOCOL, [1, 2])
+    for wrong in ([2], [-1], ["x"], [float("nan")]):
+        for bound in (made.deviation_bound, made.input_bound):
+            with pytest.raises(ParameterError, match="remaining"):
+                bound(wrong)
+    assert made.deviation_bound(0.5).shape == made.input_bound(0.5).shape == (2, 1)
+    with pytest.raises(ParameterError, match=r"a certificate is saved as \.json"):
+        made.save(tmp_path / "c.html")
+    assert not list(tmp_path.iterdir())
+
+
+def test_where_ends_depend_on_the_signal_the_obligation_says_so():
+    made = certify_family(Family.from_intervals([("a", "b", 0, 1)]), PROTOCOL, [1, 2])
+    (step,) = (step for step in made.checked.obligations if step.kind == "family-final-state")
+    assert step.detail == "none claimed: ends depend on the signal"
+
+
 def test_what_only_one_graph_has_is_told_with_what_a_family_has():
     cert = certify_family(Family.from_intervals([("a", "b", 1, 2)]), NominalProtocol(T=1, rho1=1, rho2=1, kappa=3))
     for name, meant in (("final_state", "final_states"), ("behaviour", "behaviours"), ("envelope", "deviation_bound")):

@@ -16,15 +16,20 @@ from common_kernel_families import random_family
 from families import random_family as any_family
 from scipy.linalg import expm
 
+from lmi.exact.decimal_rounding import up
 from ptcc_certify import Family, NominalProtocol, SignedDigraph, certify
 from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
 from ptcc_certify.certificate.request import Expectations
+from ptcc_certify.certificate.restricted_bounds import deviation_of_signal
 from ptcc_certify.certificate.restricted_claims import LastModeClaim, RateClaim
 from ptcc_certify.checker import check, digest
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.report.family_screen import family_lines, family_summary
+from ptcc_certify.report.page import report_html
 from ptcc_certify.report.restricted_screen import restricted_entries
+from ptcc_certify.report.statement import family_latex
 from ptcc_certify.theorems.joint_windows import clock_for_all_edges
 from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows
 
@@ -119,6 +124,65 @@ def test_more_is_proved_for_seldom_switches_than_for_any():
         for signal in ("any", DwellTime("0.1", clock="s"), DwellTime(10, clock="s"), IN_TIME, "constant")
     ]
     assert rates[0] <= rates[1] < rates[2] < rates[4] and rates[3] > rates[0]
+
+
+def laplacian(mode: Any, rng: np.random.Generator) -> np.ndarray:
+    """That of a member of a mode."""
+    L = np.zeros((len(mode.labels),) * 2)
+    for edge in range(mode.n_edges):
+        ends = [float(end.fraction(edge)) for end in (mode.lower, mode.upper)]
+        weight, source, target = ends[rng.integers(2)], int(mode.source[edge]), int(mode.target[edge])
+        L[target, target] += weight
+        L[target, source] -= int(mode.sign[edge]) * weight
+    return L
+
+
+def deviation_ratio(certificate: FamilyCertificate, rng: np.random.Generator) -> float:
+    """The largest ratio of a deviation from the final state to its bound, along a random signal that is admissible."""
+    t = np.linspace(0, 0.95, 12)
+    clock = PROTOCOL.gain.clock(t)
+    modes = certificate.family.modes
+    ends = [*switches(rng, certificate.signal), 1e3]
+    x, s, number = np.array(certificate.initial_state, dtype=float), 0.0, int(rng.integers(len(modes)))
+    states = np.zeros((x.size, t.size))
+    for end in ends:
+        L = laplacian(modes[number], rng)
+        for k in np.flatnonzero((clock >= s) & (clock < end)):
+            states[:, k] = expm(-L * (clock[k] - s)) @ x
+        x, s, number = expm(-L * (end - s)) @ x, end, (number + 1) % len(modes)
+    moved = np.abs(states - x[:, None]) - 1e-9
+    return float((moved / deviation_of_signal(certificate, 1 - t)).max())
+
+
+def test_no_admissible_signal_leaves_the_error_bound_of_these_signals():
+    rng = np.random.default_rng(5)
+    for family in (slowed_by_switches(), families()[2], families()[4]):
+        x0 = [3, -1, 2, -2, 1][: family.n_nodes]
+        for signal in (IN_TIME, ON_CLOCK, "constant"):
+            certificate = certify_family(family, PROTOCOL, x0, signal=signal)
+            assert max(deviation_ratio(certificate, rng) for _ in range(10)) <= 1, (family, signal)
+            remaining = [1, 0.1, 1e-4]
+            assert (deviation_of_signal(certificate, remaining) <= certificate.deviation_bound(remaining)).all()
+
+
+def test_the_error_bound_of_seldom_switches_is_told_beside_that_of_every_signal():
+    certificate = certify_family(slowed_by_switches(), PROTOCOL, [1, 2, -3], signal=IN_TIME)
+    every = float(certificate.deviation_bound([0.01]).max())
+    these = float(deviation_of_signal(certificate, [0.01]).max())
+    assert these < 1e-6 * every
+    short, long = "\n".join(family_summary(certificate, "f")), "\n".join(family_lines(certificate, "f"))
+    for text in (short, long):
+        assert f"{up(these, 2)} " in text and text.count("(these signals)") == 1
+    saved = read_certificate(certificate.to_dict())
+    page, statement = report_html(saved), family_latex(saved)
+    assert "Bounds under the promise, rounded up" in page and "Nor are the error bounds under the promise" in page
+    assert "Under these, from the initial state below, every agent differs" in statement
+
+
+def test_so_many_switches_that_nothing_would_be_said_leave_the_bound_of_every_signal():
+    often = DwellTime("1e-6", clock="t")
+    certificate = certify_family(slowed_by_switches(), PROTOCOL, [1, 2, -3], signal=often)
+    assert (deviation_of_signal(certificate, [0.01]) == certificate.deviation_bound([0.01])).all()
 
 
 def test_a_rate_for_restricted_signals_is_never_below_that_for_any():

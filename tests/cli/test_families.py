@@ -99,6 +99,20 @@ def test_a_certificate_of_one_graph_is_of_no_family():
     for words in (("day.csv", "--uncertainty", "10%"), ("day.csv", "--optional", "a,b"), ("s.toml",), ("unsure.csv",)):
         run = ptcc("check", "one.json", *words)
         assert run.code == 1 and "one graph in the certificate, a family in the files" in " ".join(run.out.split()), run
+
+
+def test_intervals_with_equal_ends_are_the_graph_of_a_certificate():
+    """A file of intervals may hold one graph, which certify takes for one, and check compares as one."""
+    rows = [row.split(",") for row in FILES["day.csv"].split() if "source" not in row]
+    equal = "\n".join(f"{source},{target},{weight},{weight}" for source, target, weight in rows)
+    Path("equal.csv").write_text(f"{INTERVALS}\n{equal}\n")
+    Path("other.csv").write_text(f"{INTERVALS}\n{equal.replace('1,1', '3,3')}\n")
+    for own, other in (("day.csv", "equal.csv"), ("equal.csv", "day.csv"), ("equal.csv", "equal.csv")):
+        assert ptcc("certify", own, "--no-simulation", "-o", "one.json").code == 0
+        run = ptcc("check", "one.json", other)
+        assert run.code == 0 and f"{other}, read as the certificate says" in run.out, run
+    run = ptcc("check", "one.json", "other.csv")
+    assert run.code == 1 and "another graph than other.csv" in " ".join(run.out.split()), run
     for words in (("day.csv",), ("day.csv", "--uncertainty", "0"), ("day.csv", "--switching")):
         assert ptcc("check", "one.json", *words).code == 0
     assert ptcc("check", "one.json", "day.csv", "--signal", "constant").code == 2
@@ -447,7 +461,7 @@ def test_more_is_claimed_for_restricted_signals():
     Path("outage.csv").write_text("a,,\nb,,\nc,,\n")
     for words, line in (
         ((*BOTH, "--dwell", "0.2"), "dwell      at least 0.2 of time between switches: rate "),
-        ((*BOTH, "--clock-dwell", "3"), "dwell      at least 3 of clock between switches: rate "),
+        ((*BOTH, "--clock-dwell", "3"), "dwell      at least 3 of the clock between switches: rate "),
         ((*BOTH, "--signal", "constant"), "constant   if mode and weights never change: rate "),
         ((*spoiled, "--dwell", "0.2"), "dwell      at least 0.2 of time between switches: the last mode decides"),
         ((*spoiled, "--clock-dwell", "3"), "nothing more is proved"),

@@ -90,6 +90,14 @@ def test_families_are_told_in_words_and_drawn() -> None:
         assert "drawing of the family" in page.images[0]["alt"] and "depends on the signal" in page.text
 
 
+def test_a_component_of_a_family_is_shown_with_its_own_claim() -> None:
+    family = ptcc.as_family([("a", "b", 1, 2), ("b", "a", -1, 0), ("c", "d", 1, 2)])
+    first, second = ptcc.decide(family)
+    assert "depends on the signal" in shown(first).text and "c, d" not in shown(first).text
+    assert "consensus for every signal" in shown(second).text and shown(second).images
+    assert repr(second) == "FamilyComponent(2 nodes, bipartite consensus for every signal)"
+
+
 def test_what_cannot_be_drawn_is_told_in_words() -> None:
     many = SignedDigraph.from_edges([(k, k % (SHOWN_NODES + 1) + 1, 1) for k in range(1, SHOWN_NODES + 2)])
     pair = load_graph("fig1b")

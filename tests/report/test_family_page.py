@@ -57,7 +57,7 @@ def test_what_is_proved_of_restricted_signals_is_told_too():
     saved = read_certificate(certify(SWITCHING, PROTOCOL, signal=DwellTime("0.2", clock="t")).to_dict())
     told = "t least 0.2 of time between switches"
     page = words(report_html(saved))
-    assert f"If signals are restricted A{told}: rate " in page and f"Signal Promised: a{told}." in page
+    assert f"If signals are restricted A{told}: rate " in page and f"is for those that keep a promise: a{told}." in page
     assert "holds for signals that keep the promise alone" in page
     assert f"Of signals that are restricted (a{told}) more is proved: rate " in family_latex(saved)
 
@@ -72,7 +72,7 @@ def test_ends_under_the_last_mode_stand_on_page_and_statement():
     assert "& -- & $2$ & $[-1, 2]$" in statement and "U+2013" not in statement
     assert "(at least 0.2 of time between switches) more is proved: the last mode decides, bip" in statement
     axes = [saved.plot(what) for what in ("states", "input")]
-    assert all("any signal" in ax.get_legend().get_title().get_text() for ax in axes)
+    assert all("of any kind" in ax.get_legend().get_title().get_text() for ax in axes)
 
 
 def test_an_expectation_that_is_refuted_is_told_and_its_counterexample_is_drawn():
@@ -83,13 +83,17 @@ def test_an_expectation_that_is_refuted_is_told_and_its_counterexample_is_drawn(
 
 
 def test_of_a_behaviour_that_depends_on_the_signal_the_page_tells_why_and_what_holds_all_the_same():
-    page = report_html(read_certificate(certify(UNSURE, PROTOCOL, [3, 1, 2]).to_dict()))
+    saved = read_certificate(certify(UNSURE, PROTOCOL, [3, 1, 2]).to_dict())
+    page = report_html(saved)
     text = words(page)
     assert (
-        "Why The state ann=0, &lt;b&gt;=0, eve=1 rests at the least weights and moves with &lt;b&gt; -&gt; eve on"
-        in text
+        "Why The state ann=0, &lt;b&gt;=0, eve=1 rests at the least weights and moves with &lt;b&gt; → eve on" in text
     )
     assert "no limit is claimed of eve" in text and 'id="figure-why0"' in page
+    assert "no limit is claimed" not in text.partition("What was proved")[2].partition("What is refuted")[0]
+    assert "What holds all the same is not part of what the independent check verifies" in text
+    assert "corroborate the bounds" not in text and "The theorem" not in family_latex(saved)
+    assert r"b$>$ $\to$ eve on" in family_latex(saved)
     assert "for every signal and every initial state" not in text.partition("What was asked")[0]
 
 
@@ -151,3 +155,11 @@ def test_what_there_is_nothing_to_draw_of_is_left_out(family, x0, figures):
     drawn = set(re.findall('id="figure-([a-z0-9]+)"', page))
     assert drawn == ({"graph", "states", "input", "why0"} if figures is None else figures)
     assert r"\end{proposition}" in family_latex(saved)
+
+
+def test_a_statement_of_which_one_component_depends_on_the_signal_claims_the_others():
+    family = Family.from_intervals([("a", "b", 0, 1), ("c", "d", 1, 2), ("e", "f", -2, -1)])
+    text = " ".join(family_latex(read_certificate(certify(family, PROTOCOL, [1, 2, 3, 4, 5, 6]).to_dict())).split())
+    assert "so it is on 1 of the 3 components of the union of all graphs. Counterexample: the state" in text
+    assert "On 1 component of the union of all graphs, consensus occurs at $T$ for every such choice" in text
+    assert "& no limit claimed" in text and "The theorem" not in text

@@ -104,8 +104,8 @@ def plot_counterexample(
             ax.axvline(share * T, color="black", linewidth=0.8)
         end = rows[place + 1][0] if place + 1 < len(rows) else 1.0
         name = shorten_text(printable(mode_name(subject.family, mode)), 18)
-        looks: dict[str, Any] = {"ha": "center", "va": "top", "fontsize": NAME_SIZE, "parse_math": False}
-        ax.text((share + end) / 2 * T, high + 0.2 * room, _member_text(subject, why, place, name), **looks)
+        style: dict[str, Any] = {"ha": "center", "va": "top", "fontsize": NAME_SIZE, "parse_math": False}
+        ax.text((share + end) / 2 * T, high + 0.2 * room, _member_text(subject, why, place, name), **style)
     name_agents(ax, run, run.states, {k: CAMP_STYLES[groups[k]][0] for k in agents}, until=float(run.t[-1]))
     return finished(ax, time_label("time $t$", time_unit), "state $x_k$")
 
@@ -129,22 +129,22 @@ def _state_and_signal(
     """Return the state, and rows of share of ``T``, mode and levels."""
     family, structure = component.family, component.structures[why.mode]
     x = np.zeros(component.nodes.size)
-    held: list[tuple[float, int, Any]] = [(0.0, why.mode, 0.0)]
+    signal: list[tuple[float, int, Any]] = [(0.0, why.mode, 0.0)]
     if why.kind == CLOSED_SET:
         x[list(why.nodes)] = why.camps
-        return x.tolist(), held
+        return x.tolist(), signal
     if why.kind == TWO_COMPONENTS:
         for size, node in zip((1.0, _SECOND), why.nodes, strict=True):
             closed = next(c for c in structure.closed_components if node in c.nodes)
             x[list(closed.nodes)] = size * np.array(closed.gauge or [1] * len(closed.nodes))
-        return x.tolist(), held
+        return x.tolist(), signal
     if why.kind == DIFFERENT:
-        return _moving_column(component, why), [*held, (0.5, why.other, 0.0)]
+        return _moving_column(component, why), [*signal, (0.5, why.other, 0.0)]
     if why.kind == MOVING:
         levels = np.zeros(family.modes[why.other].parameters.size)
         if why.edge is not None:
             levels[_parameter(family.modes[why.other], why.edge)] = 1.0
-        return _rest_state(why), [*held, (0.5, why.other, levels)]
+        return _rest_state(why), [*signal, (0.5, why.other, levels)]
     mode = family.modes[why.mode]
     levels = np.ones(mode.parameters.size)
     levels[[_parameter(mode, edge) for edge in why.off]] = 0.0

@@ -106,15 +106,15 @@ def plot_family(
     groups = family_camps(subject.family)
     if groups is None or not all(part.component.behaviour == BIPARTITE_CONSENSUS for part in subject.parts):
         groups = family_groups(subject.family)
-    agents = _drawn_agents(first.states[:, 0])
+    agents = _extreme_agents(first.states[:, 0])
     named = {k: CAMP_STYLES[groups[k]][0] for k in agents}
     labels = set()
     for k in agents:
         for run in runs:
             worst = run.signal.startswith("worst")
-            looks: dict[str, Any] = {"linewidth": 1.1 if worst else 0.5, "alpha": 1.0 if worst else 0.7}
-            looks |= {"color": named[k], "linestyle": CAMP_STYLES[groups[k]][1]}
-            ax.plot(run.t, run.states[k], **looks, label=None if groups[k] in labels else groups[k])
+            style: dict[str, Any] = {"linewidth": 1.1 if worst else 0.5, "alpha": 1.0 if worst else 0.7}
+            style |= {"color": named[k], "linestyle": CAMP_STYLES[groups[k]][1]}
+            ax.plot(run.t, run.states[k], **style, label=None if groups[k] in labels else groups[k])
             labels.add(groups[k])
     bars = _draw_tubes(ax, subject, first, agents, groups)
     draw_deadlines(ax, first)
@@ -143,7 +143,8 @@ def plot_family_decay(
         With an initial state and a proved rate.
     ax : Axes, optional
     runs : sequence of FamilyTrajectory, optional
-        By default under eight random signals and worst cases; those that have settled at ``T`` are drawn.
+        By default under eight random signals and worst cases; those are drawn that have settled at ``T``, or of which
+        it is proved where they end.
     axis : {"left", "time", "clock"}
         As in :func:`~ptcc_certify.plot_decay`.
     time_unit : str
@@ -180,15 +181,18 @@ def plot_family_decay(
     if not (bound >= floor).any():
         raise ParameterError("every agent begins where it ends: there is no decay to draw")
     label: str | None = "random signals" if subject.signal == "any" else "any signal (random)"
+    any_worst, known = False, _known_end(subject)
     for run in runs:
-        if run.deadline_resolved and np.array_equal(run.t, first.t):
-            gap = np.abs(run.states[:, before] - run.final_state[:, None]).max(axis=0)
+        end = run.final_state if run.deadline_resolved else known
+        if end is not None and np.array_equal(run.t, first.t):
+            gap = np.abs(run.states[:, before] - end[:, None]).max(axis=0)
             worst = run.signal.startswith("worst")
-            looks: dict[str, Any] = {"color": "black" if worst else RUN, "linewidth": 0.9 if worst else 0.6}
-            ax.plot(places, np.where(gap > floor, gap, np.nan), **looks, label=None if worst else label)
+            style: dict[str, Any] = {"color": "black" if worst else RUN, "linewidth": 0.9 if worst else 0.6}
+            ax.plot(places, np.where(gap > floor, gap, np.nan), **style, label=None if worst else label)
             label = label if worst else None
-    if any(run.signal.startswith("worst") and run.deadline_resolved for run in runs):
-        ax.plot([], [], color="black", linewidth=0.9, label="worst cases")
+            any_worst |= worst
+    if any_worst:
+        ax.plot([], [], color="black", linewidth=0.9, label="worst cases found")
     ax.plot(places, bound, color=BOUND, linewidth=1.8, label="proved for every signal")
     bottom = floor / 10
     ax.axhspan(bottom, floor, color=BEHIND, alpha=0.12, linewidth=0)
@@ -220,12 +224,19 @@ def runs_of(subject: Any, runs: Sequence[FamilyTrajectory] | None) -> list[Famil
     return result
 
 
+def _known_end(certificate: FamilyCertificate) -> np.ndarray | None:
+    """Return the state at ``T`` if it is proved to be the same for every signal."""
+    ends = [] if certificate.final_states is None else [one for one in certificate.final_states if one is not None]
+    same = len(ends) == certificate.family.n_nodes and all(low == high for low, high in ends)
+    return np.array([float(low) for low, _ in ends]) if same else None
+
+
 def count_of_signals(certificate: FamilyCertificate, runs: Sequence[FamilyTrajectory]) -> str:
     """Tell how many signals are drawn, and where some are promised, that these are any."""
-    return f"{len(runs)} signals" + ", any signal" * (certificate.signal != "any")
+    return f"{len(runs)} signals" + " of any kind" * (certificate.signal != "any")
 
 
-def _drawn_agents(x: np.ndarray) -> list[int]:
+def _extreme_agents(x: np.ndarray) -> list[int]:
     """Return all agents, or those that begin highest and lowest."""
     order = np.argsort(x, kind="stable").tolist()
     if len(order) <= NAMED_AGENTS:
@@ -259,8 +270,8 @@ def _draw_tubes(
         if name != "single leaders" and tubes:
             tubes = [(np.min([low for low, _ in tubes], axis=0), np.max([high for _, high in tubes], axis=0))]
         for least, most in tubes:
-            looks: dict[str, Any] = {"color": CAMP_STYLES[name][0], "alpha": 0.12, "linewidth": 0}
-            ax.fill_between(run.t[before], least, most, **looks, label=label)
+            style: dict[str, Any] = {"color": CAMP_STYLES[name][0], "alpha": 0.12, "linewidth": 0}
+            ax.fill_between(run.t[before], least, most, **style, label=label)
             label = ""
     for number, (low, high, colour) in enumerate(places, 1):
         place = T + number * (float(run.t[-1]) - T) / (len(places) + 1)

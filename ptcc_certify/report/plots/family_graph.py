@@ -15,18 +15,10 @@ from ptcc_certify.graphs.io import as_family
 from ptcc_certify.graphs.size_limits import LABELLED_NODES
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.report.plots.adjacency import draw_adjacency
-from ptcc_certify.report.plots.agents import CAMP_STYLES, NAME_SIZE, family_groups, text_width
+from ptcc_certify.report.plots.agents import CAMP_STYLES, family_groups
 from ptcc_certify.report.plots.family import family_camps
-from ptcc_certify.report.plots.graph_labels import (
-    INSIDE,
-    NEAR_ENDS,
-    WEIGHED_ARROWS,
-    WEIGHT_SHARES,
-    boxes_along,
-    draw_labels,
-    least_covered,
-)
-from ptcc_certify.report.plots.graph_layout import FREE_NODES, Arrow, arc, places_and_bends
+from ptcc_certify.report.plots.graph_labels import INSIDE, boxes_along, draw_labels, draw_sizes
+from ptcc_certify.report.plots.graph_layout import FREE_NODES, Arrow, places_and_bends
 from ptcc_certify.report.plots.style import EDGE_STYLES, SINGLE_COLUMN, axes_of, styled
 from ptcc_certify.report.text_layout import columns, printable, shorten_text
 from ptcc_certify.theorems.counterexample_text import mode_name
@@ -91,31 +83,32 @@ def plot_family_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
     (['a', 'b', 'c'], 5)
     """
     family = as_family(getattr(subject, "family", subject))
-    drawn = family.modes[:PANELS]
-    side = 2 if len(drawn) > 1 and family.n_nodes <= BESIDE_NODES else 1
-    rows, title = math.ceil(len(drawn) / side), _TITLE * (len(drawn) > 1)
+    modes = family.modes[:PANELS]
+    side = 2 if len(modes) > 1 and family.n_nodes <= BESIDE_NODES else 1
+    rows, title = math.ceil(len(modes) / side), _TITLE * (len(modes) > 1)
     width = SINGLE_COLUMN[0] / side if ax is None else ax.get_window_extent().width / ax.figure.dpi / side
     room = 72 * width * np.array([1.0, _SHAPE])
-    layout = _Layout.of(family, drawn, room) if family.n_nodes <= LABELLED_NODES else None
+    layout = _Layout.of(family, modes, room) if family.n_nodes <= LABELLED_NODES else None
     high = width * _SHAPE if layout is None else layout.size[1] / 72
     title *= 2 if layout is None else 1  # matrices name their axes
     ax = axes_of(ax, (SINGLE_COLUMN[0], _LEGEND + rows * (high + title)))
     ax.set_axis_off()
     panels = [ax]
-    if len(drawn) > 1:
+    if len(modes) > 1:
         share = high / (high + title)
-        places = (divmod(number, side) for number in range(len(drawn)))
+        places = (divmod(number, side) for number in range(len(modes)))
         panels = [ax.inset_axes((c / side, 1 - (r + 1) / rows, 1 / side, share / rows)) for r, c in places]
-    _draw_modes(panels, family, drawn, layout)
+    _draw_modes(panels, family, modes, layout)
     seen: dict[str, Any] = {}
     for number, panel in enumerate(panels):
         for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
             seen.setdefault(label, handle)
-        if len(drawn) > 1:
+        if len(modes) > 1:
             panel.set_title(shorten_text(printable(mode_name(family, number)), _NAME), pad=2, parse_math=False)
-    left = len(family.modes) - len(drawn)
-    looks: dict[str, Any] = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "frameon": False, "ncols": 2}
-    ax.legend(seen.values(), seen.keys(), borderaxespad=0.2, title=f"{left} more modes" if left else "", **looks)
+    left = len(family.modes) - len(modes)
+    style: dict[str, Any] = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "frameon": False, "ncols": 2}
+    more = f"{left:,} more mode{'s' * (left > 1)}" if left else ""
+    ax.legend(seen.values(), seen.keys(), borderaxespad=0.2, title=more, **style)
     return ax
 
 
@@ -128,21 +121,21 @@ class _Layout(NamedTuple):
     size: np.ndarray
 
     @classmethod
-    def of(cls, family: Family, drawn: Sequence[Mode], room: np.ndarray) -> _Layout:
+    def of(cls, family: Family, modes: Sequence[Mode], room: np.ndarray) -> _Layout:
         """Lay out all edges of the modes that are drawn, in a room in points; a flat drawing takes less height."""
         n = family.n_nodes
         inside = max(map(columns, family.labels)) <= INSIDE and n <= FREE_NODES
         radius = float(np.clip(32 / np.sqrt(n), 7.5, 10)) if inside else 4.5
-        pairs = {(a.source, a.target, a.sign): a for mode in drawn for a, _ in _ranges(mode)}
+        pairs = {(a.source, a.target, a.sign): a for mode in modes for a, _ in _ranges(mode)}
         margin = np.array([4 * radius + 4 if inside else 60, 4 * radius + 4])
         place, _ = places_and_bends(list(pairs.values()), np.full(n, -1), radius, room - margin)
         high = min(room[1], float(np.ptp(place[:, 1])) + margin[1] + 16)  # for bent arrows, and labels
         return cls(place, radius, inside, np.array([room[0], high]))
 
 
-def _draw_modes(panels: Sequence[Axes], family: Family, drawn: Sequence[Mode], layout: _Layout | None) -> None:
+def _draw_modes(panels: Sequence[Axes], family: Family, modes: Sequence[Mode], layout: _Layout | None) -> None:
     """Draw modes with nodes in the same places; as matrices where there is no layout."""
-    structures = [analyse(mode.mandatory) for mode in drawn]
+    structures = [analyse(mode.mandatory) for mode in modes]
     if layout is None:
         for panel, structure in zip(panels, structures, strict=True):
             draw_adjacency(panel, structure)
@@ -150,7 +143,7 @@ def _draw_modes(panels: Sequence[Axes], family: Family, drawn: Sequence[Mode], l
                 legend.remove()
         return
     place, radius, inside, size = layout
-    camps, edges = family_camps(family), [_ranges(mode) for mode in drawn]
+    camps, edges = family_camps(family), [_ranges(mode) for mode in modes]
     groups = family_groups(family) if camps is None else camps
     largest = max((arrow.size for some in edges for arrow, _ in some), default=1.0)
     for panel, structure, some in zip(panels, structures, edges, strict=True):
@@ -160,7 +153,8 @@ def _draw_modes(panels: Sequence[Axes], family: Family, drawn: Sequence[Mode], l
         lines = boxes_along([arrow for arrow, _ in some], place, bends)
         taken = None if inside else [box for line in lines for box in line]
         written = draw_labels(panel, family.labels, place, radius, taken)
-        _draw_ranges(panel, some, place, bends, written, lines)
+        arrows, texts = [arrow for arrow, _ in some], [edge.text for edge in some]
+        draw_sizes(panel, arrows, texts, place, bends, written, lines)
         panel.set_aspect("equal")
         panel.set_xlim(-size[0] / 2, size[0] / 2)
         panel.set_ylim(-size[1] / 2, size[1] / 2)
@@ -230,14 +224,14 @@ def _draw_arrows(
                 "linewidth": 2 + widths[1],
             }
             ax.add_artist(FancyArrowPatch(start, end, connectionstyle=curve, capstyle="butt", **band, **shrink))
-        looks: dict[str, Any] = {
+        style: dict[str, Any] = {
             "arrowstyle": "<|-|>" if arrow.mutual else "-|>",
             "mutation_scale": 7,
             "zorder": 2,
             "color": colour,
         }
-        looks |= {"linestyle": line if least else ":", "linewidth": widths[0]}
-        ax.add_artist(FancyArrowPatch(start, end, connectionstyle=curve, **looks, **shrink))
+        style |= {"linestyle": line if least else ":", "linewidth": widths[0]}
+        ax.add_artist(FancyArrowPatch(start, end, connectionstyle=curve, **style, **shrink))
     for sign, (colour, line, name) in EDGE_STYLES.items():
         if any(arrow.sign == sign for arrow, _ in edges):
             ax.plot([], [], color=colour, linestyle=line, linewidth=1.1, label=name)
@@ -247,29 +241,3 @@ def _draw_arrows(
         ax.plot([], [], color="black", alpha=0.3, linewidth=4, label=f"uncertain weight{alone}")
     if any(not least for _, least in edges):
         ax.plot([], [], color="black", linestyle=":", linewidth=1.1, label="may fail")
-
-
-def _draw_ranges(
-    ax: Axes,
-    edges: Sequence[WeightRange],
-    place: np.ndarray,
-    bends: np.ndarray,
-    taken: list[np.ndarray],
-    lines: list[list[np.ndarray]],
-) -> None:
-    """Write sizes and ranges at their arrows, if there are few and they are not all the same."""
-    if len({edge.text for edge in edges}) < 2 or len(edges) > WEIGHED_ARROWS:
-        return
-    ground = {"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
-    for k, (edge, bend) in enumerate(zip(edges, bends, strict=True)):
-        start, end = place[edge.arrow.source], place[edge.arrow.target]
-        half = np.array([text_width(edge.text) / 2, 0.6 * NAME_SIZE]) + 1
-        spots = list(arc(start, end, bend, WEIGHT_SHARES))
-        along = end - start
-        beside = along[::-1] * [1, -1] / max(float(np.linalg.norm(along)), 1e-9) * (np.linalg.norm(half) + 1)
-        spots += [spots[0] + beside, spots[0] - beside]
-        others = [*lines[:k], lines[k][:NEAR_ENDS], lines[k][-NEAR_ENDS:], *lines[k + 1 :]]
-        box = least_covered(spots, half, [*taken, *(one for line in others for one in line)])
-        taken.append(box)
-        (x, y), colour = (box[:2] + box[2:]) / 2, EDGE_STYLES[edge.arrow.sign][0]
-        ax.text(x, y, edge.text, fontsize=NAME_SIZE, color=colour, ha="center", va="center", bbox=ground, zorder=4)

@@ -31,19 +31,14 @@ def plot_family_input(
 ) -> Axes:
     """Draw ``max_k |u_k(t)|`` under many signals below its bound for every signal, and the proved peak.
 
-    Signals of a search for worst cases keep the error large, and their inputs need not be: they are called slowest.
+    Signals of a search for worst cases keep the error large, and their inputs need not be: "slowest found".
     Nothing of a run is drawn where the integrator no longer resolves what the gain multiplies. A bound that grows much
     towards the deadline is drawn on a logarithmic axis.
 
     Parameters
     ----------
-    subject : FamilyCertificate
-        With an initial state.
-    ax : Axes, optional
-    runs : sequence of FamilyTrajectory, optional
-        By default under eight random signals and worst cases.
-    time_unit : str
-        Of the deadline, for the label of the axis: ``"s"``.
+    subject, ax, runs, time_unit
+        As :func:`~ptcc_certify.report.plots.family.plot_family` takes them.
 
     Returns
     -------
@@ -74,13 +69,13 @@ def plot_family_input(
         own = run.remaining > 0
         size = np.abs(run.input[:, own]).max(axis=0)
         resolved = np.where(size > noise * gain.value_at_remaining(run.remaining[own]), size, np.nan)
-        label = "slowest" if (worst := run.signal.startswith("worst")) else "other signals"
-        looks: dict[str, Any] = {
+        label = "slowest found" if (worst := run.signal.startswith("worst")) else "other signals"
+        style: dict[str, Any] = {
             "color": "black" if worst else RUN,
             "linewidth": 0.9 if worst else 0.6,
             "zorder": 3 if worst else 2,
         }
-        ax.plot(run.t[own], resolved, **looks, label=None if label in labels else label)
+        ax.plot(run.t[own], resolved, **style, label=None if label in labels else label)
         labels.add(label)
         top, start = max(top, float(np.nanmax(resolved, initial=0.0))), max(start, float(size[:1].max(initial=0.0)))
     bound = subject.input_bound(left).max(axis=0)

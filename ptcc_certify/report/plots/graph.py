@@ -15,18 +15,10 @@ from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.size_limits import LABELLED_NODES
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.report.plots.adjacency import draw_adjacency
-from ptcc_certify.report.plots.agents import CAMP_STYLES, NAME_SIZE, camp_groups, text_width
+from ptcc_certify.report.plots.agents import CAMP_STYLES, camp_groups
 from ptcc_certify.report.plots.family_graph import plot_family_graph
-from ptcc_certify.report.plots.graph_labels import (
-    INSIDE,
-    NEAR_ENDS,
-    WEIGHED_ARROWS,
-    WEIGHT_SHARES,
-    boxes_along,
-    draw_labels,
-    least_covered,
-)
-from ptcc_certify.report.plots.graph_layout import FREE_NODES, Arrow, arc, arrows_of, places_and_bends, triangles_of
+from ptcc_certify.report.plots.graph_labels import INSIDE, boxes_along, draw_labels, draw_sizes
+from ptcc_certify.report.plots.graph_layout import FREE_NODES, Arrow, arrows_of, places_and_bends, triangles_of
 from ptcc_certify.report.plots.style import EDGE_STYLES, SINGLE_COLUMN, axes_of, finished, styled
 from ptcc_certify.report.plots.subject import structure_of
 from ptcc_certify.report.text_layout import columns
@@ -93,7 +85,8 @@ def plot_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
     _draw_arrows(ax, arrows, place, bends, radius)
     lines = boxes_along(arrows, place, bends)
     written = draw_labels(ax, graph.labels, place, radius, None if inside else [box for line in lines for box in line])
-    _draw_weights(ax, arrows, place, bends, written, lines)
+    sizes = [f"{arrow.size:.3g}" for arrow in arrows]
+    draw_sizes(ax, arrows, sizes, place, bends, written, lines)
     ax.set_aspect("equal")
     ax.set_xlim(-width / 2, width / 2)
     ax.set_ylim(-height / 2, height / 2)
@@ -141,32 +134,6 @@ def _draw_arrows(ax: Axes, arrows: Sequence[Arrow], place: np.ndarray, bends: np
     for sign, (colour, line, name) in EDGE_STYLES.items():
         if any(arrow.sign == sign for arrow in arrows):
             ax.plot([], [], color=colour, linestyle=line, linewidth=1.1, label=name)
-
-
-def _draw_weights(
-    ax: Axes,
-    arrows: Sequence[Arrow],
-    place: np.ndarray,
-    bends: np.ndarray,
-    taken: list[np.ndarray],
-    lines: list[list[np.ndarray]],
-) -> None:
-    """Write the sizes of the weights at their arrows, where no other one crosses, if they differ and there are few."""
-    if len({arrow.size for arrow in arrows}) < 2 or len(arrows) > WEIGHED_ARROWS:
-        return
-    ground = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none"}
-    for k, (arrow, bend) in enumerate(zip(arrows, bends, strict=True)):
-        text = f"{arrow.size:.3g}"
-        half = np.array([text_width(text) / 2, 0.6 * NAME_SIZE]) + 2
-        spots = list(arc(place[arrow.source], place[arrow.target], bend, WEIGHT_SHARES))
-        along = place[arrow.target] - place[arrow.source]
-        beside = along[::-1] * [1, -1] / np.linalg.norm(along) * (np.linalg.norm(half) + 1)
-        spots += [spots[0] + beside, spots[0] - beside]
-        others = [*lines[:k], lines[k][:NEAR_ENDS], lines[k][-NEAR_ENDS:], *lines[k + 1 :]]
-        box = least_covered(spots, half, [*taken, *(box for line in others for box in line)])
-        taken.append(box)
-        (x, y), colour = (box[:2] + box[2:]) / 2, EDGE_STYLES[arrow.sign][0]
-        ax.text(x, y, text, fontsize=NAME_SIZE, color=colour, ha="center", va="center", bbox=ground, zorder=4)
 
 
 def draw_ground(ax: Axes, graph: SignedDigraph, place: np.ndarray, nodes: Sequence[int], radius: float) -> None:

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 
 from ptcc_certify.report.plots.agents import HALO, NAME_SIZE, text_width
 from ptcc_certify.report.plots.graph_layout import Arrow, arc
+from ptcc_certify.report.plots.style import EDGE_STYLES
 from ptcc_certify.report.text_layout import printable, shorten_text
 
 #: Columns of a label that fit into a node, and that are written beside one.
@@ -53,6 +54,33 @@ def boxes_along(arrows: Sequence[Arrow], place: np.ndarray, bends: np.ndarray) -
         along = np.linspace(0.06, 0.94, 2 + int(np.linalg.norm(place[b] - place[a]) / BOX))
         boxes.append([np.array([*(p - BOX / 2), *(p + BOX / 2)]) for p in arc(place[a], place[b], bend, along)])
     return boxes
+
+
+def draw_sizes(
+    ax: Axes,
+    arrows: Sequence[Arrow],
+    texts: Sequence[str],
+    place: np.ndarray,
+    bends: np.ndarray,
+    taken: list[np.ndarray],
+    lines: list[list[np.ndarray]],
+) -> None:
+    """Write the sizes of weights at their arrows, where no other one crosses, if they differ and there are few."""
+    if len(set(texts)) < 2 or len(arrows) > WEIGHED_ARROWS:
+        return
+    ground = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none"}
+    for k, (arrow, text, bend) in enumerate(zip(arrows, texts, bends, strict=True)):
+        half = np.array([text_width(text) / 2, 0.6 * NAME_SIZE]) + 2
+        spots = list(arc(place[arrow.source], place[arrow.target], bend, WEIGHT_SHARES))
+        along = place[arrow.target] - place[arrow.source]
+        length = max(float(np.linalg.norm(along)), 1e-9)
+        beside = along[::-1] * [1, -1] / length * (np.linalg.norm(half) + 1)
+        spots += [spots[0] + beside, spots[0] - beside]
+        others = [*lines[:k], lines[k][:NEAR_ENDS], lines[k][-NEAR_ENDS:], *lines[k + 1 :]]
+        box = least_covered(spots, half, [*taken, *(box for line in others for box in line)])
+        taken.append(box)
+        (x, y), colour = (box[:2] + box[2:]) / 2, EDGE_STYLES[arrow.sign][0]
+        ax.text(x, y, text, fontsize=NAME_SIZE, color=colour, ha="center", va="center", bbox=ground, zorder=4)
 
 
 def least_covered(spots: Sequence[np.ndarray], half: np.ndarray, taken: list[np.ndarray]) -> np.ndarray:

@@ -1,0 +1,142 @@
+"""How near agents are to where they end, for restricted signals: from the forms of the modes that are claimed.
+
+References
+----------
+docs/theory/families.md, "Dwell times".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from lmi.exact.numbers import integers
+from ptcc_certify.bounds.family_deviation import deviation_on_clock
+from ptcc_certify.certificate.family_content import BoundFunction, ComponentProof, FamilyContent
+from ptcc_certify.certificate.restricted_claims import RateClaim
+from ptcc_certify.checker.family_function import Scaled
+from ptcc_certify.checker.family_limits import WeightedMean
+from ptcc_certify.checker.input_formulas import root_above
+from ptcc_certify.graphs.structure import STABILITY
+from ptcc_certify.lyapunov.mode_forms import mode_functions
+from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.theorems.restricted_signals import DwellTime
+
+#: Longest product of the factors at all switches, in bits.
+_BITS = 2000
+
+
+@dataclass(frozen=True)
+class SwitchedFunction:
+    """``V`` of the present mode, as the formulas of bounds take a function: ``V <= factor e^(-rate s) V(0)``.
+
+    Attributes
+    ----------
+    functions : sequence of BoundFunction
+        Of each mode its form.
+    rate, factor : Fraction
+    """
+
+    functions: Sequence[BoundFunction]
+    rate: Fraction
+    factor: Fraction
+
+    @property
+    def speeds(self) -> list[Scaled]:
+        """Bounds of ``|(L X)_k| / sqrt(V)`` in every mode."""
+        return [_largest([scaled for V in self.functions for scaled in V.speeds])]
+
+    @property
+    def sizes(self) -> list[Scaled]:
+        """Bounds of ``|xi_k| / sqrt(V)`` in every mode."""
+        return [_largest([scaled for V in self.functions for scaled in V.sizes])]
+
+    @property
+    def means(self) -> list[WeightedMean]:
+        """None: final states are those of every signal."""
+        return []
+
+    def root(self, x: Sequence[Fraction]) -> Fraction:
+        """Bound ``sqrt(factor V(0))`` of a state, whatever the first mode."""
+        return root_above(self.factor) * max(V.root(x) for V in self.functions)
+
+    def largest(self, sizes: Mapping[int, Fraction]) -> Fraction:
+        """Bound ``factor V(0)`` of all states with ``|x_k| <= sizes_k``."""
+        return self.factor * max(V.largest(sizes) for V in self.functions)
+
+
+def deviation_of_signal(certificate: FamilyContent, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
+    """Bound ``|x_k(t) - x_k(T)|`` for the signals that were asked for, (N, M); what holds for every signal counts.
+
+    Parameters
+    ----------
+    certificate : FamilyContent
+        With an initial state.
+    remaining : (M,) array_like
+        ``1 - t/T`` at the instants, in [0, 1].
+
+    Examples
+    --------
+    >>> from ptcc_certify.theorems.restricted_signals import DwellTime
+    >>> one, other = [("a", "b", 1), ("b", "c", -4)], [("b", "a", 1), ("a", "c", -1)]
+    >>> modes = {"one": SignedDigraph.from_edges(one), "other": SignedDigraph.from_edges(other)}
+    >>> cert = certify(modes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2, 3], signal=DwellTime(1, clock="t"))
+    >>> bool((deviation_of_signal(cert, [0.01]) <= cert.deviation_bound([0.01])).all())
+    True
+    """
+    bounds = certificate.deviation_bound(remaining)
+    if not (claims := claims_with_forms(certificate)):
+        return bounds
+    clock = np.asarray(certificate.protocol.gain.clock_at_remaining(np.atleast_1d(remaining)))
+    for claim in claims:
+        part = certificate.parts[claim.component]
+        nodes = part.component.nodes
+        x = [certificate.initial_state[v] for v in nodes.tolist()]  # type: ignore[index]
+        own = _deviation(certificate, claim, part, x, clock)
+        if own is not None:
+            bounds[nodes] = np.minimum(bounds[nodes], own)
+    return bounds
+
+
+def nearer_for_signal(certificate: FamilyContent) -> bool:
+    """Tell whether more is proved of the decay for the signals that were asked for than for every signal."""
+    return certificate.common and certificate.rate_of_signal is not None and bool(claims_with_forms(certificate))
+
+
+def claims_with_forms(certificate: FamilyContent) -> list[RateClaim]:
+    """Return the claims of rates that no function for every signal proves."""
+    rates = (claim for claim in certificate.restricted if isinstance(claim, RateClaim))
+    return [claim for claim in rates if claim.forms is not None and claim.rate > 0]
+
+
+def _deviation(
+    certificate: FamilyContent, claim: RateClaim, part: ComponentProof, x: Sequence[Fraction], clock: np.ndarray
+) -> np.ndarray | None:
+    """Bound the agents of a component; None where so many switches are allowed that nothing would be said."""
+    assert claim.forms is not None
+    stable = part.component.behaviour == STABILITY
+    pairs = mode_functions(Quotient.of(part.component), claim.forms)
+    functions = [BoundFunction(quotient, V) for quotient, V in pairs if V.input_constants]
+    if len(functions) < len(pairs):
+        return None
+    if not isinstance(claim.signal, DwellTime):  # one mode acts for ever
+        own = [deviation_on_clock(V, stable, x, clock) for V in functions]
+        return np.max([one for one in own if one is not None], axis=0)
+    switches = claim.signal.switches(certificate.protocol.T) if claim.signal.clock == "t" else 1
+    if switches * max(map(int.bit_length, claim.ratio.as_integer_ratio())) > _BITS:
+        return None
+    V = SwitchedFunction(functions, claim.rate, claim.ratio**switches)
+    return deviation_on_clock(V, stable, x, clock)
+
+
+def _largest(some: Sequence[Scaled]) -> Scaled:
+    """Return the largest of the bounds of every node."""
+    largest: dict[int, Fraction] = {}
+    for vector, unit in some:
+        for k, value in vector.items():
+            largest[k] = max(largest.get(k, Fraction(0)), value * unit)
+    (values,), scale = integers([list(largest.values())])
+    return dict(zip(largest, values, strict=True)), Fraction(1, scale)
