@@ -474,7 +474,7 @@ def test_only_what_the_independent_check_accepts_is_certified(monkeypatch: pytes
 
 
 #: Larger ones of kinds that others show too.
-REAL_CAMPAIGN = ("regulatory_114", "regulatory_192")
+REAL_CAMPAIGN = ("regulatory_114", "regulatory_123", "regulatory_143", "regulatory_192")
 REAL = {
     "bales": "2.1",
     "highland_tribes": "1.2",
