@@ -56,12 +56,18 @@ def of_slowed(signal: Any) -> FamilyCertificate:
 
 
 @cache
+def random_families() -> list[Family]:
+    """A stable one, one of consensus, one of containment, and one of consensus whose weights are uncertain."""
+    draw = np.random.default_rng(11)
+    known = [random_family(draw, kind, 4, 2) for kind in ("stability", "consensus", "containment")]
+    return [*known, random_family(draw, "consensus", 3, 2, Fraction(1, 5), 0.3)]
+
+
+@cache
 def certificates(more: bool = False) -> list[FamilyCertificate]:
     """Of three families and three signals; or of two families more."""
-    draw, signals = np.random.default_rng(11), (IN_TIME, ON_CLOCK, "constant")
-    known = [random_family(draw, kind, 4, 2) for kind in ("stability", "consensus", "containment")]
-    unsure = random_family(draw, "consensus", 3, 2, Fraction(1, 5), 0.3)
-    families = known[:2] if more else [known[2], unsure]
+    signals = (IN_TIME, ON_CLOCK, "constant")
+    families = random_families()[:2] if more else random_families()[2:]
     own = [] if more else [of_slowed(signal) for signal in signals]
     return own + [certify_family(family, PROTOCOL, signal=signal) for family in families for signal in signals]
 
@@ -168,7 +174,7 @@ def deviation_ratio(certificate: FamilyCertificate, rng: np.random.Generator) ->
 
 def test_no_admissible_signal_leaves_the_error_bound_of_these_signals():
     rng = np.random.default_rng(5)
-    for family in (slowed_by_switches(), families()[2], families()[4]):
+    for family in (slowed_by_switches(), random_families()[1], random_families()[3]):
         x0 = [3, -1, 2, -2, 1][: family.n_nodes]
         for signal in (IN_TIME, ON_CLOCK, "constant"):
             certificate = certify_family(family, PROTOCOL, x0, signal=signal)
