@@ -8,12 +8,10 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from families import random_family
 from row_families import bounds_of, laplacian, random_followers, random_led, random_vertex, vertices
 from scipy.linalg import expm
 
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.lyapunov.family_diagonal import FormTable, diagonal_decay, prove_form
 from ptcc_certify.lyapunov.family_rows import (
     FollowerDecay,
     follower_decay,
@@ -169,50 +167,6 @@ def test_one_uncertain_direction_keeps_no_left_vector():
     assert common_left_vector(single) is None
     slowest = min(sorted(np.linalg.eigvals(laplacian(apart.modes[0], v)).real)[1] for v in vertices(apart.modes[0]))
     assert slowest < 0.2 < 0.58 < sorted(np.linalg.eigvals(laplacian(apart.modes[0], np.zeros(6, bool))).real)[1]
-
-
-# ---------------------------------------------------------------------- diagonal functions of stable families
-
-
-def stable_family(seed: int) -> Family:
-    return random_family(random.Random(seed), "stability", nodes=random.Random(seed).randint(2, 6)).family
-
-
-def decays_of(family: Family, p: np.ndarray, rng: random.Random, count: int) -> list[float]:
-    """The least ``r`` with ``P L + L'P >= r P`` of some members."""
-    half, found = np.sqrt(p), []
-    for _ in range(count):
-        mode = rng.choice(family.modes)
-        A = half[:, None] * laplacian(mode, random_vertex(rng, mode)) / half
-        found.append(float(np.linalg.eigvalsh(A + A.T)[0]))
-    return found
-
-
-def test_diagonal_functions_decay_in_all_members():
-    proved = 0
-    for seed in range(30):
-        decay = diagonal_decay(family := stable_family(seed))
-        if decay is not None:
-            proved += 1
-            assert min(decays_of(family, decay.weights, random.Random(seed), 30)) >= float(decay.rate) * (1 - 1e-9)
-    assert proved > 8
-
-
-def test_no_form_proves_a_rate_that_a_member_contradicts():
-    for seed in range(10):
-        family = stable_family(seed)
-        n = family.n_nodes
-        p = np.random.default_rng(seed).uniform(0.1, 1, n)
-        worst = min(decays_of(family, p, random.Random(seed), 60))
-        proofs = [prove_form(FormTable.of(mode), p, Fraction(worst) + Fraction(1, 10**6)) for mode in family.modes]
-        assert None in proofs
-
-
-def test_known_weights_keep_the_perron_rate_of_a_ring():
-    ring = Family.from_intervals([("a", "b", 2, 2), ("b", "c", 2, 2), ("c", "a", -2, -2)])
-    assert float(diagonal_decay(ring).rate) == pytest.approx(2, rel=1e-5)
-    wide = Family.from_intervals([("a", "b", 1, 5), ("b", "c", 1, 5), ("c", "a", -5, -1)])
-    assert diagonal_decay(wide) is None
 
 
 # ---------------------------------------------------------------------- functions of followers
