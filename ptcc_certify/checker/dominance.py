@@ -122,6 +122,7 @@ def read_factor(doc: Document, section: Any, n: int) -> tuple[SparseFactor, int]
     vector = None if section["weights"] is None else read(section["weights"], "weights", n)
     few = 0 <= indptr[-1] <= n * (n + 1) // 2 and fits(indptr[-1], LARGEST_FACTOR)
     need(few, "the factor has too many entries")
+    need(all(0 <= b - a <= n for a, b in pairwise(indptr)), "indptr has no columns of a factor")
     work, most = sum((b - a) ** 2 for a, b in pairwise(indptr)), arithmetic.products
     need(work <= most, f"a factor of {work} products; {arithmetic.name} takes {most}")
     indices, data = (read(section[key], key, indptr[-1]) for key in ("indices", "data"))

@@ -89,6 +89,7 @@ class WeightedSquares:
         sized(3 * len(p), 2 * bits + power, "bounds of many agents")
         spend(3 * (count + len(p)), bits, bits + power, "bounds of many agents")
         spend(EACH_ROOT * len(p), what="bounds of many agents")
+        spend(20 * len(p), bits + power, bits + power, "bounds of many agents")
         inverse = {v: -(-(1 << power) // weight) for v, weight in p.items()}
         for edges, unit in self.modes:
             heard: dict[tuple[int, int], int] = {}  # both signs of a pair

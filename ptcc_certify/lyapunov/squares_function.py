@@ -7,7 +7,7 @@ With ``P = diag(p)``, ``x'(P L + L'P) x = sum |w_kl| 2 p_k x_k (x_k - sgn(w_kl) 
 
 and a rate ``r`` of every signal is proved if the right side minus ``r P`` is positive definite in every mode. ``p`` is
 taken from ``p'(M + t I) = t 1'`` with the comparison matrix ``M`` of the middles of all weights: for small ``t`` near
-to the left null vector of what leads, with small weights of what follows.
+to the left null vector of what leads, with small weights of what follows; for larger ones nearer to equal weights.
 
 Floats propose ``p``, the rate and a sparse factor; the exact matrix, in integers as the check forms it, and the kernel
 decide.
@@ -28,6 +28,7 @@ import numpy as np
 
 from lmi.dyadic import dyadic_array, round_to_bits
 from lmi.exact import arithmetic
+from lmi.exact.decimal_rounding import down
 from lmi.exact.definite import SparseFactor
 from lmi.exact.numbers import integers
 from lmi.search_time import checkpoint
@@ -43,7 +44,9 @@ from ptcc_certify.lyapunov.dominance import round_array
 from ptcc_certify.lyapunov.interval_rows import IntervalRows
 
 #: Values of ``t`` over the largest in-weight, and losses of the rate that are tried.
-_SHIFTS, _LOSSES = (1e-6, 1e-3, 1e-2, 0.1, 1.0), (1e-6, 1e-4, 1e-2, 0.1, 0.3)
+_SHIFTS, _LOSSES = (1e-6, 1e-2, 0.03, 0.1, 0.3, 1.0), (1e-6, 1e-4, 1e-2, 0.1, 0.3)
+#: Of the weights whose rate is at least this share of the largest, those of the least overshoot constant are taken.
+_NEARLY = 0.98
 #: What is taken off the diagonal for the rounding of the matrix, against the entries of its row.
 _ROUNDING = 1e-14
 #: Rows up to which eigenvalues are those of a dense matrix, and the least over the largest ``p``.
@@ -118,19 +121,21 @@ def squares_function(family: Family, notes: list[str] | None = None) -> SquaresF
     top = max(mode.upper.fraction(int(np.argmax(mode.upper.table))) for mode in family.modes if mode.n_edges)
     shift = top.numerator.bit_length() - top.denominator.bit_length()
     tables = [FormTable.of(mode, shift) for mode in family.modes]
-    largest, weights = 0.0, np.ones(n)
+    tried: list[tuple[float, np.ndarray]] = []
     with np.errstate(all="ignore"):
         for p in _candidates(tables, n):
             checkpoint()
-            guess = min(_smallest(_form(table, p), p) for table in tables)
-            if guess > largest:
-                largest, weights = guess, p
+            tried.append((min(_smallest(_form(table, p), p) for table in tables), p))
+        best = max((rate for rate, _ in tried), default=0.0)
+        near = [one for one in tried if one[0] >= _NEARLY * best > 0]
+        largest, weights = max(near, key=lambda one: one[1].min(), default=(0.0, np.ones(n)))
         for loss in _LOSSES if largest else ():
             checkpoint()
             if (function := prove_squares(tables, weights, round_to_bits(largest * (1 - loss), 40), shift)) is not None:
                 return function
     if notes is not None:
-        notes.append(f"class squares: {f'the rate {largest * 2.0**shift:.6g} is not proved' if largest else 'no rate'}")
+        rate = down(Fraction(largest) * Fraction(2) ** shift)
+        notes.append(f"class squares: the rate {rate} is not proved" if largest else "class squares: no rate")
     return None
 
 
