@@ -287,6 +287,7 @@ def _functions(saved: FamilyCertificate) -> list[tuple[Any, ...]]:
         "diagonal": "diagonal",
         "undirected": "diagonal, least weights",
         "rows": "row by row",
+        "squares": "weighted squares",
     }
     rows = []
     for part in saved.parts:

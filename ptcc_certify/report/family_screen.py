@@ -345,12 +345,15 @@ def _rate_entries(certificate: FamilyCertificate) -> Lines:
 
 def _no_search(certificate: FamilyCertificate) -> str:
     """Tell why no rate was proved: too many agents for a search, or too little time; nothing where it is not known."""
-    sizes = [part.component.nodes.size for part in certificate.parts if part.component.nodes.size > 1 and not part.rate]
-    if max(sizes, default=0) > EXACT_NODES:
-        return f"{max(sizes):,} agents are above the {EXACT_NODES:,} of the searches"
-    return "the searches took too long; raise --time-limit" * any(
-        "cut off" in note or note == "Lyapunov functions" for note in certificate.notes
-    )
+    without = [part.component for part in certificate.parts if part.component.nodes.size > 1 and not part.rate]
+    largest = max(without, key=lambda component: component.nodes.size, default=None)
+    late = any("cut off" in note or note == "Lyapunov functions" for note in certificate.notes)
+    if largest is not None and largest.nodes.size > EXACT_NODES:
+        if largest.behaviour != STABILITY:
+            return f"{largest.nodes.size:,} agents are above the {EXACT_NODES:,} of the searches"
+        if not late:
+            return f"weighted squares of {largest.nodes.size:,} agents prove none"
+    return "the searches took too long; raise --time-limit" * late
 
 
 def _function_entries(certificate: FamilyCertificate) -> Lines:

@@ -33,9 +33,10 @@ from ptcc_certify.checker import check
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.follower_function import follower_functions
+from ptcc_certify.lyapunov.squares_function import SquaresFunction, squares_function
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.reaching_time import certified_reaching_times
-from ptcc_certify.theorems.family_behaviour import decide
+from ptcc_certify.theorems.family_behaviour import FamilyComponent, decide
 from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows
 
 SEED = int(os.environ.get("PTCC_FUZZ_SEED", "0"))
@@ -61,6 +62,30 @@ def document_of_rows(family: Family) -> Json:
     return {**FamilyCertificate(family, PROTOCOL, parts, state).to_dict(), "unverified": {}}
 
 
+def function_of_squares(component: FamilyComponent) -> SquaresFunction:
+    V = squares_function(component.family)
+    assert V is not None
+    return V
+
+
+def document_of_squares(family: Family, sigma0: tuple[Fraction, ...] | None = None) -> Json:
+    """The same with weighted sums of squares alone, under the sliding-mode protocol if there is a ``sigma(0)``."""
+    parts = tuple(ComponentProof(c, (function_of_squares(c),)) for c in decide(family))
+    state = tuple(Fraction(k) for k in range(1, family.n_nodes + 1))
+    if sigma0 is None:
+        return {**FamilyCertificate(family, PROTOCOL, parts, state).to_dict(), "unverified": {}}
+    protocol = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=3, mu1=2, mu2=1, mu3=1, delta=1)
+    reaching = certified_reaching_times(protocol, sigma0)
+    return {**FamilyCertificate(family, protocol, parts, state, sigma0, reaching).to_dict(), "unverified": {}}
+
+
+def two_rings() -> Family:
+    """Two modes in which one opponent keeps camps apart, and one that may hear by either sign."""
+    day = [("a", "b", 3, "3.3"), ("b", "c", 2, 2), ("c", "a", "-4.2", -4), ("b", "a", "-0.1", 0), ("b", "a", 0, "0.2")]
+    night = [("a", "c", 3, "3.1"), ("c", "b", 2, "2.1"), ("b", "a", -4, -4)]
+    return Family.switching({"day": Family.from_intervals(day), "night": Family.from_intervals(night, nodes="abc")})
+
+
 @cache
 def cases() -> list[tuple[str, Json]]:
     """True certificates of families of every behaviour, small."""
@@ -82,6 +107,12 @@ def cases() -> list[tuple[str, Json]]:
     found.append(("rows", document_of_rows(Family.from_intervals(led))))
     heard = [("a", "b", 1, 2), ("b", "a", 1, 1), ("b", "c", 1, 3), ("a", "d", 1, 1), ("c", "d", 1, 2)]
     found.append(("rows of camps", document_of_rows(Family.from_intervals(heard))))
+    foes = [("a", "b", -3, -3), ("b", "c", 2, "2.1"), ("c", "a", 2, 2)]
+    found.append(("squares", document_of_squares(Family.from_intervals(foes))))
+    found.append(("squares of modes", document_of_squares(two_rings())))
+    undirected = Family.from_intervals([("a", "b", -3, -2), ("b", "c", 2, 3), ("c", "a", 2, 3)], undirected=True)
+    found.append(("undirected squares", document_of_squares(undirected)))
+    found.append(("sliding squares", document_of_squares(two_rings(), tuple(map(Fraction, (1, 0, -2))))))
     day, night = ([("a", "b", 1, 1)], [("b", "a", 1, 1)])
     modes = {"day": Family.from_intervals(day), "night": Family.from_intervals(night, nodes="ab")}
     found.append(("leaders change", document(Family.switching(modes))))
