@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lmi.exact.decimal_rounding import down, near, up
-from ptcc_certify.certificate.restricted_bounds import deviation_of_signal, nearer_for_signal
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import STABILITY
@@ -403,6 +402,8 @@ def _interval_entries(labels: Sequence[str], states: Sequence[tuple[Fraction, Fr
 
 def _error_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
     """Tell how near the agents are to their final states by when, for every signal and those that were asked for."""
+    from ptcc_certify.certificate.restricted_bounds import deviation_of_signal, nearer_for_signal  # slow to load
+
     if certificate.initial_state is None:
         return
     if certificate.common and certificate.rate is not None:
