@@ -130,9 +130,8 @@ def _constants(F: Integers, D: Integers) -> list[Fraction] | None:
             return None
         values = exact
     norm = sum(values, Fraction(0))
-    if apart <= FAR:
-        factor = 1 + max(NORM_RAISE, Fraction(64 * apart))
-        norm = min(norm, Fraction(float(np.linalg.norm(image, 2))) ** 2 * unit * factor)
+    if apart <= FAR and (size := float(np.linalg.norm(image, 2)) if image.size else 0.0) ** 2 > LEAST:
+        norm = min(norm, Fraction(size) ** 2 * unit * (1 + max(NORM_RAISE, Fraction(64 * apart))))
     return [x * (1 + RAISE) for x in (*values, norm)]
 
 
@@ -145,7 +144,8 @@ def _factor(F: Integers, D: Integers) -> tuple[np.ndarray, int, float]:
             Z = np.linalg.inv(np.linalg.cholesky(T)).T
         except np.linalg.LinAlgError:
             return np.zeros_like(rows), 0, math.inf
-        image = np.ldexp(rows, [-half for half in halves]) @ Z
+        least = min(halves, default=0)
+        image, power = np.ldexp(rows, [least - half for half in halves]) @ Z, power - least
         apart = float(np.abs(Z.T @ T @ Z - np.eye(len(T))).sum(axis=1).max(initial=0.0))
         finite = bool(np.isfinite((image**2).sum()))
     return (image, power, apart) if finite else (np.zeros_like(rows), 0, math.inf)

@@ -17,6 +17,7 @@ from generators import all_classes, random_graph
 
 from lmi.exact.definite import Arithmetic
 from lmi.exact.fast import SMALL_ROWS, FastArithmetic
+from ptcc_certify.bounds.deviation_from_final_state import _constants
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.procedure import certify
@@ -211,6 +212,15 @@ def test_both_arithmetics_bound_the_inverse_from_above_and_sharply(n: int):
         for k, value in enumerate(values[:-1]):
             least = Fraction(int(exact[k][k].p), int(exact[k][k].q))
             assert least < value <= least * (1 + Fraction(1, 2**29))
+
+
+@pytest.mark.parametrize("bits", [0, 900, 2700])
+def test_constants_scale_with_a_form_beyond_the_range_of_floats(bits: int):
+    F, D, scale = [[2, 1], [1, 3]], [[1, 0], [1, 1], [0, 0]], 2**bits
+    constants = _constants([[x * scale for x in row] for row in F], D)
+    assert constants is not None
+    exact = [Fraction(3, 5), Fraction(3, 5), Fraction(0), Fraction(1)]  # 1 is the eigenvalue of [[3, 2], [2, 3]] / 5
+    assert all(0 <= x * scale - y <= y / 10**6 for x, y in zip(constants, exact, strict=True))
 
 
 def test_nothing_is_bounded_by_a_matrix_that_is_not_definite():
