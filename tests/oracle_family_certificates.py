@@ -498,6 +498,9 @@ class FamilyOracle:
             if said["claim"] == "shares":
                 self.shares(nodes, said, f"restricted[{place}]")
                 continue
+            if said["claim"] == "final value":
+                self.final_values(nodes, said)
+                continue
             if said["claim"] != "rate":
                 (self.last_mode if said["claim"] == "last mode" else self.windows)(nodes, said)
                 continue
@@ -542,6 +545,35 @@ class FamilyOracle:
                 PA = times(P, A)
                 S = [[PA[i][j] + PA[j][i] - rate * P[i][j] for j in range(len(P))] for i in range(len(P))]
                 self.require(semidefinite(S), "a rate of restricted signals")
+
+    def final_values(self, nodes: list[int], said: Json) -> None:
+        """The consensus values of members, in rationals; of few uncertain weights all vertices."""
+        self.require(said["signals"] == "constant" and any(said["modes"]), "a final value")
+        self.require(self.start is not None and not any(self.sigma0), "a final value without a state")
+        for k, told in enumerate(said["modes"]):
+            if told is None or self.start is None:
+                continue
+            edges, tied = self.modes[k]
+            names = {self.parameter(e, tied) for e in edges if e[2] < e[3] and e[0] in nodes}
+            few = len(names) <= 6
+            sets = [{x for x in names if self.draw.random() < 0.5} for _ in range(VERTICES)]
+            if few:
+                order = sorted(names, key=str)
+                sets = [{x for i, x in enumerate(order) if far >> i & 1} for far in range(2 ** len(order))]
+            values = []
+            for L in (self.part(self.member(k, far), nodes) for far in sets):
+                camps, left = kernel(L), kernel(transposed(L))
+                if len(camps) != 1 or len(set(map(abs, camps[0]))) != 1:
+                    self.require(False, "a final value where there is no consensus")
+                    return
+                signs = [x / camps[0][0] for x in camps[0]]
+                weight = sum((p * g for p, g in zip(left[0], signs, strict=True)), Fraction(0))
+                pairs = zip(left[0], nodes, strict=True)
+                values.append(sum((p * self.start[v] for p, v in pairs), Fraction(0)) / weight)
+            low, high, within = (number(told[key]) for key in ("lower", "upper", "within"))
+            self.require(low <= min(values) and max(values) <= high, "a final value is outside")
+            near = min(values) <= low + within and max(values) >= high - within
+            self.require(near or not few, "no member is so near to an end")
 
     def last_mode(self, nodes: list[int], said: Json) -> None:
         """What each mode does by itself, by kernels of its members, and where agents are under signals that switch."""

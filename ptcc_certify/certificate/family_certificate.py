@@ -286,8 +286,8 @@ def certify_family(
     Raises
     ------
     ParameterError
-        No protocol, a state that does not fit, restricted signals under the sliding-mode protocol, or more than 1,000
-        modes.
+        No protocol, a state that does not fit, restricted signals that are not constant under the sliding-mode
+        protocol, or more than 1,000 modes.
 
     Examples
     --------
@@ -320,16 +320,16 @@ def certify_family(
     sigma, reaching = read_sliding_variable(structure, protocol, sigma0)
     progress(STEPS[0])
     components = decide(family)
-    parts, notes = [], list(family.notes)
+    parts, notes, still = [], list(family.notes), sigma is None or not any(sigma)
     with deadline.time_limit(seconds):
         for component in components:
             part = _prove(component, notes, progress)
-            parts.append(part if initial_state is None or (sigma is not None and any(sigma)) else _with_means(part))
+            parts.append(_with_means(part) if initial_state is not None and still else part)
         if signal != "any":
             progress(STEP)
         kept: dict[str, Any] = {
             "signal": signal,
-            "restricted": claims_for(signal, parts, protocol, initial_state, notes, asked.min_rate),
+            "restricted": claims_for(signal, parts, protocol, initial_state if still else None, notes, asked.min_rate),
         }
     progress(STEPS[3])
     kept |= {"expectations": asked, "notes": tuple(dict.fromkeys(notes)), "scenario": scenario}

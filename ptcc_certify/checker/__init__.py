@@ -193,9 +193,7 @@ def _family_verdict(doc: Document, protocol: Protocol) -> str:
     functions = check_family_functions(doc, family)
     drive = check_drive(doc, family, functions, protocol, begin)
     check_family_bounds(doc, family, functions, protocol, begin, drive)
-    need(not (protocol.sliding and "restricted" in doc.data), "restricted signals under the sliding-mode protocol")
-    state = None if begin.state is None else list(begin.state)
-    check_restricted(doc, family, functions, protocol.gains, state)
+    check_restricted(doc, family, functions, protocol, begin)
     for key in NOT_OF_FAMILIES:
         need(doc.section(key) is None, "a part that certificates of families do not have")
     return _close(doc, True)

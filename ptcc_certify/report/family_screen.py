@@ -15,7 +15,13 @@ from ptcc_certify.certificate.restricted_bounds import deviation_of_signal, near
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import STABILITY
-from ptcc_certify.report.restricted_screen import RESTS, restricted_entries, rests, states_of_signal
+from ptcc_certify.report.restricted_screen import (
+    RESTS,
+    constant_states,
+    restricted_entries,
+    rests,
+    states_of_signal,
+)
 from ptcc_certify.report.sliding_lines import sliding_lines
 from ptcc_certify.report.structure_text import Lines, structure_text
 from ptcc_certify.report.text_layout import (
@@ -39,6 +45,7 @@ from ptcc_certify.theorems.family_rate import explicit_rate
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.family_certificate import FamilyCertificate
+    from ptcc_certify.certificate.family_content import FamilyContent
 
 #: Components of which a screen tells, and lines of a text on the short one.
 _COMPONENTS, _LINES = 4, 2
@@ -385,6 +392,28 @@ def _final_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
         ends = _interval_entries(certificate.family.labels, states_of_signal(certificate), width)
         what = "x(T)" if rests(certificate) else "x(t)"
         yield from ((name and what, f"{text} (these signals)") for name, text in ends)
+    if text := constant_text(certificate, 12 * TEXT if long else 2 * TEXT - 20):
+        yield "" if certificate.common else "x(T)", f"{text} (constant weights)"
+
+
+def constant_text(certificate: FamilyContent, width: int = 12 * TEXT) -> str:
+    """Tell between which ends agents are at the deadline if mode and weights never change; "" if that says no more.
+
+    Of agents whose end depends on the signal nothing is told here.
+
+    Examples
+    --------
+    >>> unsure = Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 1)])
+    >>> constant_text(certify(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [0, 6], signal="constant"))
+    'every agent in [2, 3]'
+    """
+    columns = certificate.family.labels, constant_states(certificate), certificate.final_states or ()
+    rows = [row for row in zip(*columns, strict=False) if None not in row]
+    if all(_interval(own) == _interval(every) for _, own, every in rows):
+        return ""
+    ((_, text),) = _interval_entries([label for label, *_ in rows], [own for _, own, _ in rows], width)
+    whole = len(rows) == certificate.family.n_nodes
+    return text if whole else text.replace("every agent", shorten_list([label for label, *_ in rows], 4 * TEXT), 1)
 
 
 def _interval_entries(labels: Sequence[str], states: Sequence[tuple[Fraction, Fraction] | None], width: int) -> Lines:
