@@ -34,7 +34,7 @@ def false_family_claims(data: Json, files: Mapping[str, bytes] | None = None) ->
     """Say what is false in an accepted certificate of a family; an empty list if nothing is."""
     oracle = FamilyOracle(data, files or {})
     claims = (oracle.graph, oracle.structures, oracle.behaviours, oracle.functions, oracle.sliding, oracle.drives)
-    for claim in (*claims, oracle.finals, oracle.inputs, oracle.restricted):
+    for claim in (*claims, oracle.finals, oracle.inputs, oracle.boxes, oracle.restricted):
         claim()
     return oracle.false
 
@@ -488,6 +488,44 @@ class FamilyOracle:
             if s * abs(L).max() < 300:
                 u = (rho1 + pole / T * np.exp(z)) * L @ expm(-L * s) @ np.array([float(x) for x in self.start or ()])
                 self.require((abs(u) <= bounds * (1 + SLACK) + 1e-9 * bounds.max(initial=0)).all(), "a later peak")
+
+    # ------------------------------------------------------------------ boxes
+
+    def boxes(self) -> None:
+        """Boxes: no signal that is played leaves the distance above its bound; greedy ones push outwards."""
+        for said in self.data.get("boxes", ()):
+            nodes = self.pieces[said["component"]]
+            self.require(self.depends(nodes) and self.start is not None and not any(self.sigma0), "a box")
+            if self.start is None or not isinstance(said["vector"], list):
+                continue
+            own = [self.index[label] for label in said["nodes"]]
+            self.require(own == sorted(set(own)) and set(own) <= set(nodes), "followers of a box")
+            low, high, d = (np.array([float(number(x)) for x in said[key]]) for key in ("lower", "upper", "vector"))
+            rate, places = float(number(said["rate"])), [nodes.index(v) for v in own]
+            members = [np.array(self.part(L, nodes), dtype=float) for some in self.members for L in some]
+            largest = max(float(np.abs(L).max()) for L in members) or 1.0
+            begin = np.array([float(self.start[v]) for v in nodes])
+            size = max(1.0, float(np.abs(begin).max()))
+            self.require(rate > 0 and (d > 0).all(), "a box without a rate")
+
+            def rho(x: np.ndarray) -> float:
+                f = x[places]  # noqa: B023
+                return float(max(0.0, ((f - high) / d).max(), ((low - f) / d).max()))  # noqa: B023
+
+            first = rho(begin)
+            for run in range(2 * SIGNALS):
+                x, s = begin, 0.0
+                target = self.draw.choice(places)
+                for _ in range(60):
+                    h = self.draw.choice((0.1, 1.0, 10.0)) / largest
+                    if run % 2:
+                        L = self.draw.choice(members)
+                    else:  # push one follower up, or down
+                        side = 1 if run % 4 else -1
+                        L = max(members, key=lambda L: side * float((expm(-L * h) @ x)[target]))
+                    x, s = expm(-L * h) @ x, s + h
+                    bound = first * np.exp(-rate * s / 2) * (1 + SLACK) + 1e-9 * size / d.min()
+                    self.require(rho(x) <= bound, "an agent outside of a box")
 
     # ------------------------------------------------------------------ restricted signals
 

@@ -212,27 +212,6 @@ def _short_above(x: Fraction) -> Fraction:
     return x if _is_short(x) else rounded(x, _BITS, up=True)
 
 
-def constant_final_states(family: Family, x0: Sequence[Fraction]) -> tuple[Interval, ...]:
-    """Return ends of ``x_k(T)`` of every node, under constant weights of any one mode; attained if all values are.
-
-    Raises
-    ------
-    HypothesisError
-        Some mode does not come to bipartite consensus.
-
-    Examples
-    --------
-    >>> pair = Family.from_intervals([("a", "b", -2, -1), ("b", "a", -1, -1)])
-    >>> [tuple(map(str, ends)) for ends in constant_final_states(pair, [Fraction(0), Fraction(6)])]
-    [('-3', '-2'), ('2', '3')]
-    """
-    values = [final_value(mode, x0) for mode in family.modes]
-    ends = [
-        [(v.lower, v.upper) if v.camps[k] > 0 else (-v.upper, -v.lower) for v in values] for k in range(family.n_nodes)
-    ]
-    return tuple((min(low for low, _ in one), max(high for _, high in one)) for one in ends)
-
-
 def largest_row(
     rows: IntervalRows, z: Sequence[Fraction], h: Sequence[Fraction], policy: Policy | None = None
 ) -> Fraction:

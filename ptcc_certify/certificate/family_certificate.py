@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from lmi import search_time as deadline
 from lmi.exact.decimal_rounding import down, float_down, float_up
 from lmi.search_time import share_of_time
+from ptcc_certify.bounds.attracting_box import AttractingBox, box_of_family
 from ptcc_certify.bounds.kept_means import with_means
 from ptcc_certify.certificate.certificate_file import FromFile, write_certificate
 from ptcc_certify.certificate.checking import check
@@ -57,6 +58,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 STEPS = ("the decision", "upper bound on the decay rate", "Lyapunov functions", STEP, "independent check")
+BOXES = "boxes of followers"
 #: GB that the check may take for families whose members have more nodes than are solved for exactly.
 LARGE_MEMORY = 16
 #: What certificates of one graph have, and what is in its place here.
@@ -94,6 +96,8 @@ class FamilyCertificate(FamilyContent, FromFile, Shown):
         The signals that it was asked for.
     restricted : tuple of Claim
         What holds for these beside what holds for every signal.
+    boxes : mapping of int to AttractingBox
+        Where every signal brings the followers of components that depend on it, by the numbers of these.
 
     References
     ----------
@@ -327,14 +331,32 @@ def certify_family(
             parts.append(_with_means(part) if initial_state is not None and still else part)
         if signal != "any":
             progress(STEP)
+        begin = initial_state if still else None
         kept: dict[str, Any] = {
+            "boxes": _boxes(parts, begin, notes),
             "signal": signal,
-            "restricted": claims_for(signal, parts, protocol, initial_state if still else None, notes, asked.min_rate),
+            "restricted": claims_for(signal, parts, protocol, begin, notes, asked.min_rate),
         }
     progress(STEPS[3])
     kept |= {"expectations": asked, "notes": tuple(dict.fromkeys(notes)), "scenario": scenario}
     names = origins_of(None, x0, sigma0) | dict(origins or {})
     return FamilyCertificate(family, protocol, tuple(parts), initial_state, sigma, reaching, origins=names, **kept)
+
+
+def _boxes(
+    parts: Sequence[ComponentProof], state: Sequence[Fraction] | None, notes: list[str]
+) -> dict[int, AttractingBox]:
+    """Return the boxes of components that depend on the signal and have followers."""
+    boxes: dict[int, AttractingBox] = {}
+    if state is None:
+        return boxes
+    for number, part in enumerate(parts):
+        if part.component.behaviour == DEPENDS:
+            with share_of_time(1.0, BOXES, notes):
+                x = [state[v] for v in part.component.nodes.tolist()]
+                if (box := box_of_family(part.component.family, x)) is not None:
+                    boxes[number] = box
+    return boxes
 
 
 def _with_means(part: ComponentProof) -> ComponentProof:

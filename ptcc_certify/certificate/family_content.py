@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from lmi.exact.numbers import integers
+from ptcc_certify.bounds.attracting_box import AttractingBox
 from ptcc_certify.bounds.envelope import Instants, remaining_part
 from ptcc_certify.bounds.family_deviation import (
     deviation_on_clock,
@@ -164,6 +165,7 @@ class FamilyContent:
     scenario: Mapping[str, Any] | None = None
     signal: SignalClass = "any"
     restricted: tuple[Claim, ...] = ()
+    boxes: Mapping[int, AttractingBox] = field(default_factory=dict)
 
     @property
     def common(self) -> bool:

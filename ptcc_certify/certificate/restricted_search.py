@@ -11,6 +11,7 @@ from fractions import Fraction
 
 from lmi.exact.elementary_enclosures import log, rounded
 from lmi.search_time import share_of_time
+from ptcc_certify.bounds.attracting_box import have_common_denominator
 from ptcc_certify.bounds.family_final_state import ValueEnds, value_ends
 from ptcc_certify.certificate.family_content import ComponentProof
 from ptcc_certify.certificate.restricted_claims import (
@@ -115,7 +116,7 @@ def _final_value_claim(number: int, part: ComponentProof, state: Sequence[Fracti
     component, x = part.component, [state[v] for v in part.component.nodes.tolist()]
     if component.nodes.size == 1 or component.behaviour not in (BIPARTITE_CONSENSUS, DEPENDS):
         return None
-    if any(group.final_value(x) is not None for group in part.leading_groups):
+    if not have_common_denominator(x) or any(group.final_value(x) is not None for group in part.leading_groups):
         return None
     values = tuple(_value_ends(mode, x) for mode in component.family.modes)
     return FinalValueClaim(number, values) if any(values) else None

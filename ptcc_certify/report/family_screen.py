@@ -44,6 +44,7 @@ from ptcc_certify.theorems.family_groups import FamilyGroups
 from ptcc_certify.theorems.family_rate import explicit_rate
 
 if TYPE_CHECKING:
+    from ptcc_certify.bounds.attracting_box import AttractingBox
     from ptcc_certify.certificate.family_certificate import FamilyCertificate
     from ptcc_certify.certificate.family_content import FamilyContent
 
@@ -93,7 +94,7 @@ def family_summary(certificate: FamilyCertificate, name: str, origins: Mapping[s
     entries = [
         *_family_entries(certificate.family, name, origins),
         ("protocol", _protocol_text(certificate, origins)),
-        *_claim_entries(components, f" at T = {near(T)}", disturbed=certificate.sigma0 is not None),
+        *_claim_entries(components, f" at T = {near(T)}", False, certificate.sigma0 is not None, certificate.boxes),
         *_rate_entries(certificate),
         *restricted_entries(certificate),
         *_final_entries(certificate),
@@ -139,7 +140,8 @@ def family_lines(certificate: FamilyCertificate, name: str, origins: Mapping[str
         entries.append(("x(0)", value_list(family.labels, certificate.initial_state) + origin))
     entries += sliding_lines(family.labels, certificate.protocol.reaching, certificate.sigma0, certificate.reaching)
     disturbed = certificate.sigma0 is not None
-    entries += _claim_entries(components, f" at T = {near(certificate.protocol.T)}", every=True, disturbed=disturbed)
+    when = f" at T = {near(certificate.protocol.T)}"
+    entries += _claim_entries(components, when, True, disturbed, certificate.boxes)
     entries += [*_rate_entries(certificate), *restricted_entries(certificate), *_function_entries(certificate)]
     entries += _final_entries(certificate, long=True)
     entries += [*_error_entries(certificate, long=True), *_input_entries(certificate, long=True)]
@@ -229,7 +231,11 @@ def sharpest(component: FamilyComponent) -> str:
 
 
 def _claim_entries(
-    components: Sequence[FamilyComponent], when: str = "", every: bool = False, disturbed: bool = False
+    components: Sequence[FamilyComponent],
+    when: str = "",
+    every: bool = False,
+    disturbed: bool = False,
+    boxes: Mapping[int, AttractingBox] = MappingProxyType({}),
 ) -> Lines:
     """Tell what every component does; where that depends on the signal, why, and what holds all the same."""
     order = sorted(range(len(components)), key=lambda k: -components[k].nodes.size)
@@ -243,9 +249,11 @@ def _claim_entries(
             yield "claim" if not place else "", f"{shorten_list(names, room, components[k].nodes.size)}: {text}"
         if len(components) > _COMPONENTS:
             yield "", f"... {len(components):,} components in all"
-    depending = [components[k] for k in order if components[k].behaviour == DEPENDS]
-    for component in depending[: len(depending) if every else 1]:
-        yield from _depends_entries(component, every)
+    depending = [k for k in order if components[k].behaviour == DEPENDS]
+    for k in depending[: len(depending) if every else 1]:
+        yield from _depends_entries(components[k], every)
+        if k in boxes:
+            yield "box", _cut(box_text(components[k], boxes[k]), every)
 
 
 def _claim_text(component: FamilyComponent, when: str, every: bool, disturbed: bool) -> str:
@@ -315,6 +323,26 @@ def groups_text(component: FamilyComponent) -> str:
     if free:
         parts.append(f"no limit is claimed of {_names(component, free, 30)}")
     return "; ".join(parts)
+
+
+def box_text(component: FamilyComponent, box: AttractingBox) -> str:
+    """Tell into which intervals every signal draws followers, whether or not they come to rest, and at what rate.
+
+    Examples
+    --------
+    >>> moved = Family.from_intervals([(1, 3, 1, 3), (2, 3, 1, 1)])
+    >>> cert = certify(moved, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), {1: 0, 2: 4, 3: 100})
+    >>> box_text(cert.parts[0].component, cert.boxes[0])
+    'every signal draws 3 into [1, 2], at the rate 4; no limit is claimed'
+    """
+    groups: dict[str, list[int]] = {}
+    for v, *ends in zip(box.decay.nodes.tolist(), box.lower, box.upper, strict=True):
+        text = _interval((ends[0], ends[1])).replace("in [", "into [").replace("at ", "to ")
+        groups.setdefault(text, []).append(v)
+    drawn = [f"{_names(component, nodes, 30)} {text}" for text, nodes in groups.items()]
+    return (
+        f"every signal draws {shorten_list(drawn, TEXT)}, at the rate {down(2 * box.decay.rate)}; no limit is claimed"
+    )
 
 
 def _cut(text: str, every: bool) -> str:

@@ -85,7 +85,22 @@ def cases() -> list[tuple[str, Json]]:
     day, night = ([("a", "b", 1, 1)], [("b", "a", 1, 1)])
     modes = {"day": Family.from_intervals(day), "night": Family.from_intervals(night, nodes="ab")}
     found.append(("leaders change", document(Family.switching(modes))))
-    return found + restricted_cases() + sliding_cases()
+    return found + box_cases() + restricted_cases() + sliding_cases()
+
+
+def box_cases() -> list[tuple[str, Json]]:
+    """True certificates with boxes: targets that uncertain weights move, two modes, foes, two components."""
+    moved = [("a", "c", 1, 3), ("b", "c", -1, -1), ("c", "d", 1, 2), ("a", "d", -1, 0)]
+    modes = [[("a", "c", 1, 1), ("b", "c", 1, 2)], [("a", "c", -2, -1), ("b", "c", 1, 1)]]
+    led = [("a", "b", -2, -1), ("b", "a", -1, -1), ("b", "d", 1, 2), ("c", "d", 1, 2), ("d", "e", 1, 1)]
+    families = [
+        Family.from_intervals(moved, nodes="abcd"),
+        Family.switching([Family.from_intervals(edges, nodes="abc") for edges in modes]),
+        Family.from_intervals([*led, ("f", "g", 1, 2), ("h", "g", 1, 1)]),
+    ]
+    made = [document(family, k + 1) for k, family in enumerate(families)]
+    assert [len(one["boxes"]) for one in made] == [1, 1, 2]
+    return [(f"box {k}", one) for k, one in enumerate(made)]
 
 
 def restricted_cases() -> list[tuple[str, Json]]:
