@@ -38,7 +38,7 @@ def compare(seed: int) -> int:
     x = [Fraction(rng.randint(-20, 20), rng.randint(1, 7)) for _ in range(family.n_nodes)]
     certificate = made(family, x)
     assert certificate.verdict == "certified" and check(certificate.to_dict(), stdlib=True).accepted
-    assert false_family_claims(certificate.to_dict()) == []
+    assert not certificate.boxes or false_family_claims(certificate.to_dict()) == []
     for number, box in certificate.boxes.items():
         nodes = certificate.parts[number].component.nodes
         inside = nodes[box.decay.nodes]
