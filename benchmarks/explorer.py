@@ -1,8 +1,9 @@
 """Seconds from the move of a control of the explorer to the new image and text, and to the verdict of the check.
 
-Every control is moved twice on every packaged graph and on one of 40 nodes, through the server of the page: settings
-in, text and figures out, both in one answer. With a browser (playwright and Chromium) a slider is moved there besides,
-and the seconds are those until image and text on the page have changed.
+Wall time, and beside it CPU time of the server and of the processes that it has ended, which other work on the machine
+changes little. Every control is moved twice on every packaged graph and on one of 40 nodes, through the server of the
+page: settings in, text and figures out, both in one answer. With a browser (playwright and Chromium) a slider is moved
+there besides, and the seconds are those until image and text on the page have changed.
 
 Usage
 -----
@@ -70,23 +71,30 @@ class Client:
         self.connection = http.client.HTTPConnection("127.0.0.1", server.server_port)
         self.move("seed", 0)
 
-    def move(self, name: str, value: Any) -> tuple[float, float]:
-        """Return the seconds to image and text, and to the verdict."""
+    def move(self, name: str, value: Any) -> tuple[float, float, float, float]:
+        """Return the seconds to image and text and to the verdict, of the wall, then of the CPU."""
         self.settings[name] = value
         gc.collect()
-        began, seconds = time.perf_counter(), []
+        began, wall, cpu = (time.perf_counter(), cpu_seconds()), [], []
         for what in ("preview", "view"):
             self.connection.request("GET", f"{self.server.root}{what}?{urlencode(self.settings)}")
             answer = self.connection.getresponse()
             if b'"panels"' not in answer.read():
                 raise RuntimeError(f"{name} = {value} drew nothing")
-            seconds.append(time.perf_counter() - began)
-        return seconds[0], seconds[1]
+            wall.append(time.perf_counter() - began[0])
+            cpu.append(cpu_seconds() - began[1])
+        return wall[0], wall[1], cpu[0], cpu[1]
 
 
-def tell(label: str, pairs: Sequence[tuple[float, ...]]) -> None:
-    columns = [f"{statistics.median(seconds):7.2f} {max(seconds):7.2f}" for seconds in zip(*pairs, strict=True)]
-    print(f"{label:<34}{len(pairs):>6}   {'   '.join(columns)}", flush=True)
+def cpu_seconds() -> float:
+    """Return the CPU time of this process and of its children that have ended."""
+    spent = os.times()
+    return spent.user + spent.system + spent.children_user + spent.children_system
+
+
+def tell(label: str, moves: Sequence[tuple[float, ...]]) -> None:
+    columns = [f"{statistics.median(seconds):7.2f} {max(seconds):7.2f}" for seconds in zip(*moves, strict=True)]
+    print(f"{label:<34}{len(moves):>6}   {'   '.join(columns)}", flush=True)
 
 
 def in_browser(server: ExplorerServer) -> None:
@@ -128,16 +136,17 @@ def main() -> None:
     browser = arguments.parse_args().browser
     versions = ", ".join(f"{name} {version(name)}" for name in ("matplotlib", "numpy", "casadi"))
     print(f"Python {platform.python_version()}, {versions}; {os.cpu_count()} CPUs, load {os.getloadavg()[0]:.1f}\n")
-    print(f"{'seconds: median, max':<34}{'moves':>6}   {'image and text':<15}   verdict")
+    heads = ("image and text", "verdict", "image: CPU", "verdict: CPU")
+    print(f"{'seconds: median, max':<34}{'moves':>6}   {'   '.join(f'{head:<15}' for head in heads)}".rstrip())
     server = ExplorerServer(Explorer(random_graph(40), FORTY), Settings(FORTY), 0)
     threading.Thread(target=server.serve_forever, daemon=True).start()
-    everything: list[tuple[float, float]] = []
+    everything: list[tuple[float, ...]] = []
     for kind in KINDS:
         for graph in (*GRAPHS, FORTY):
             client = Client(server, graph, kind)
-            pairs = [client.move(name, value) for name, values in MOVES[kind].items() for value in values]
-            tell(f"{graph}, {kind}", pairs)
-            everything += pairs
+            moves = [client.move(name, value) for name, values in MOVES[kind].items() for value in values]
+            tell(f"{graph}, {kind}", moves)
+            everything += moves
     tell("all", everything)
     if browser:
         in_browser(server)

@@ -11,6 +11,7 @@ from math import prod
 import flint
 import networkx as nx
 import numpy as np
+from oracle import kernel
 from scipy.linalg import expm
 
 from ptcc_certify.graphs.family import Family, Mode
@@ -99,6 +100,23 @@ def has_common_kernel(members: list[list[Row]], n: int) -> tuple[bool, int]:
     return all(n - rank(L) == dimension for L in members), dimension
 
 
+def rest_behaviour(family: Family, dimension: int) -> str:
+    """Return what a common kernel of a dimension means, from one state in it and the graphs of mandatory edges."""
+    if dimension == 0:
+        return "stability"
+    (first, *others) = kernel(mandatory(family.modes[0]))
+    if not others and len({abs(x) for x in first}) == 1:
+        return "bipartite consensus"
+    single = all(len(_closed(mode, family.n_nodes)) == 1 for mode in family.modes)
+    return "interval bipartite consensus" if single else "bipartite containment"
+
+
+def _closed(mode: Mode, n: int) -> list[set[int]]:
+    """Return the strong components that no mandatory edge enters."""
+    graph = _digraph(mode, n).reverse()
+    return [set(c) for c in nx.attracting_components(graph)]
+
+
 # ---------------------------------------------------------------------- products
 
 
@@ -164,9 +182,7 @@ def _no_camps(component: FamilyComponent, witness: Counterexample) -> bool:
     modes = component.family.modes
     if component.signal == "constant":
         modes = (modes[witness.mode],)
-        ends = [set(c) for c in nx.strongly_connected_components(_digraph(modes[0], component.family.n_nodes))]
-        sources = [c for c in ends if all(_heard(modes[0], v) <= c for v in c)]
-        if len(sources) != 1:
+        if len(_closed(modes[0], component.family.n_nodes)) != 1:
             return False
     signs: dict[tuple[int, int], set[int]] = {}
     for mode in modes:
@@ -228,22 +244,16 @@ def _moves_enclosed(component: FamilyComponent, witness: Counterexample) -> bool
     modes, q = component.family.modes, witness.enclosure
     assert q is not None
     first, other = modes[witness.mode], modes[witness.other]
-    leaders: dict[int, int] = {}
-    values = iter(q.values)
-    for c in component.structures[witness.mode].closed_components:
-        value = next(values) if c.gauge else 0
-        for v, g in zip(c.nodes, c.gauge or [0] * len(c.nodes), strict=True):
-            leaders[v] = g * value
+    leaders = set().union(*_closed(first, component.family.n_nodes))
     rows = [dict[int, Fraction]() for _ in q.middle]
     for s, t, w in signed_edges(first, ~first.optional):
         rows[t][s] = w
     for k, row in enumerate(rows):
-        if k in leaders:
-            if q.middle[k] * q.unit != leaders[k] or q.radius[k]:
-                return False
-            continue
         defect = abs(sum(abs(w) * q.middle[k] - w * q.middle[v] for v, w in row.items()))
-        if sum(abs(w) * (q.radius[k] - q.radius[v]) for v, w in row.items()) < defect or q.radius[k] < 0:
+        if k in leaders:  # at rest exactly
+            if defect or q.radius[k]:
+                return False
+        elif sum(abs(w) * (q.radius[k] - q.radius[v]) for v, w in row.items()) < defect or q.radius[k] < 0:
             return False
     if witness.edge is not None:
         s, t, sign = (int(a[witness.edge]) for a in (other.source, other.target, other.sign))

@@ -197,6 +197,9 @@ class FamilyOracle:
             if said["class"] == "rows":
                 self.rows(said)
                 continue
+            if said["class"] == "squares":
+                self.squares(said)
+                continue
             nodes = self.pieces[said["component"]]
             basis = self.common_kernel(nodes)
             if basis is None:
@@ -270,6 +273,22 @@ class FamilyOracle:
                     for s in (1e-3 / size, 0.1 / size, 1 / size):
                         later = value(expm(-M * s) @ x)
                         self.require(later <= np.exp(-rate * s) * value(x) * (1 + 1e-7) + 1e-12, "a rate of rows")
+
+    def squares(self, said: Json) -> None:
+        """A weighted sum of squares, by the matrices of members."""
+        nodes, p = self.pieces[said["component"]], [number(x) for x in said["vector"]]
+        self.require(self.common_kernel(nodes) == [], "a sum of squares of agents that do not end at 0")
+        self.require(len(p) == len(nodes) and min(p) > 0, "weights of a function")
+        if len(p) != len(nodes):
+            return
+        rate, n = number(said["rate"]), len(p)
+        for some in self.members:
+            for L in (self.part(one, nodes) for one in some):
+                S = [
+                    [p[i] * L[i][j] + p[j] * L[j][i] - (rate * p[i] if i == j else 0) for j in range(n)]
+                    for i in range(n)
+                ]
+                self.require(semidefinite(S), "a rate of squares")
 
     def balanced_first(self, nodes: list[int]) -> list[list[int]]:
         said = self.data["structure"]["modes"][0]["closed_components"]
@@ -362,6 +381,8 @@ class FamilyOracle:
 
     def size(self, said: Json, xi: dict[int, Fraction]) -> Fraction:
         """``V`` of coordinates by node."""
+        if said["class"] == "squares":
+            return sum((number(p) * x**2 for p, x in zip(said["vector"], xi.values(), strict=True)), Fraction(0))
         if said["class"] != "rows":
             z = [xi[self.index[label]] for label in said["nodes"]]
             return self.form(self.symmetric(said["lower_triangle"]), z)

@@ -71,7 +71,7 @@ def random_led(rng: random.Random, kind: str) -> Family:
     ``stability``: one unbalanced pair; ``bipartite consensus``: a balanced one; ``bipartite containment``: two, of
     which every follower hears one, but the last.
     """
-    pairs = 2 if kind == "bipartite containment" else 1
+    pairs = {"stability": 1, "bipartite consensus": 1, "bipartite containment": 2}[kind]
     first = 2 * pairs
     n = first + rng.randint(1, 3)
     camps = [rng.choice([1, -1]) for _ in range(n)]

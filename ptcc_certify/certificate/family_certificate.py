@@ -21,7 +21,7 @@ from ptcc_certify.bounds.attracting_box import AttractingBox, box_of_family
 from ptcc_certify.bounds.kept_means import with_means
 from ptcc_certify.certificate.certificate_file import FromFile, write_certificate
 from ptcc_certify.certificate.checking import check
-from ptcc_certify.certificate.family_content import ComponentProof, FamilyContent
+from ptcc_certify.certificate.family_content import ComponentProof, FamilyContent, ProvedFunction
 from ptcc_certify.certificate.family_verdict import assess_family
 from ptcc_certify.certificate.format_family import family_document
 from ptcc_certify.certificate.request import (
@@ -41,13 +41,14 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.display_hook import Shown, family_summary, plot_of_family
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.size_limits import EXACT_NODES
-from ptcc_certify.graphs.structure import analyse
+from ptcc_certify.graphs.structure import STABILITY, analyse
 from ptcc_certify.graphs.tables import import_pandas
 from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.family_rate_upper_bound import prove_family_rate_bound
 from ptcc_certify.lyapunov.family_search import FamilySearch, search_family
 from ptcc_certify.lyapunov.follower_function import follower_functions
 from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.lyapunov.squares_function import SquaresFunction, squares_function
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.base import refuse_no_protocol
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent, decide
@@ -372,22 +373,34 @@ def _with_means(part: ComponentProof) -> ComponentProof:
     return replace(part, functions=tuple(functions))
 
 
+def _squares(component: FamilyComponent, notes: list[str] | None = None) -> list[SquaresFunction]:
+    """Return the weighted sum of squares of a component whose agents end at 0, if one is proved."""
+    if component.behaviour != STABILITY:
+        return []
+    found = squares_function(component.family, notes)
+    return [] if found is None else [found]
+
+
 def _prove(component: FamilyComponent, notes: list[str], progress: Callable[[str], None]) -> ComponentProof:
     bare = ComponentProof(component)
     if component.kernel is None or component.nodes.size == 1 or not bare.certifiable:
         return bare
     if component.nodes.size > EXACT_NODES:
         progress(STEPS[2])
+        functions: list[ProvedFunction] = []
         with share_of_time(1.0, STEPS[2], notes):
-            return ComponentProof(component, tuple(follower_functions(component, notes=notes)))
-        return ComponentProof(component)
+            functions += follower_functions(component, notes=notes)
+            functions += _squares(component, notes) if not functions else []
+        return ComponentProof(component, tuple(functions))
     quotient = Quotient.of(component)
     bound, search = None, FamilySearch()
     progress(STEPS[1])
     with share_of_time(_BOUND_SHARE, STEPS[1], notes):
         bound = prove_family_rate_bound(quotient)
     progress(STEPS[2])
+    squares: list[SquaresFunction] = []
     with share_of_time(1.0, STEPS[2], notes):
+        squares = _squares(component)  # which takes no time to speak of
         search = search_family(quotient, enough=None if bound is None else _ENOUGH * bound.value)
     notes += [*search.notes, *(f"{name}: cut off by the time limit" for name in search.cut_off)]
     rate = max((V.rate for V in search.functions), default=Fraction(0))
@@ -395,4 +408,5 @@ def _prove(component: FamilyComponent, notes: list[str], progress: Callable[[str
         with share_of_time(1.0, STEPS[1], notes):  # signals played against what was found
             again = prove_family_rate_bound(quotient, search.functions)
             bound = bound if again is None else min(bound, again, key=lambda b: b.value)
-    return ComponentProof(component, search.functions, bound)
+    better = [V for V in squares if _ENOUGH * V.rate > rate]
+    return ComponentProof(component, (*better, *search.functions), bound)

@@ -50,11 +50,14 @@ from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound
 from ptcc_certify.lyapunov.follower_function import FollowerFunction
 from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.lyapunov.squares_function import SquaresFunction
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.reaching_time import ReachingTime
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
 from ptcc_certify.theorems.family_kernel import UNKNOWN
 from ptcc_certify.theorems.restricted_signals import SignalClass
+
+ProvedFunction = FamilyFunction | FollowerFunction | SquaresFunction
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,14 +67,14 @@ class ComponentProof:
     Attributes
     ----------
     component : FamilyComponent
-    functions : tuple of FamilyFunction or FollowerFunction
+    functions : tuple of FamilyFunction, FollowerFunction or SquaresFunction
         Proved, the largest rate first; nodes are numbered within the component.
     upper_bound : FamilyRateBound or None
         No rate for every signal is larger.
     """
 
     component: FamilyComponent
-    functions: tuple[FamilyFunction | FollowerFunction, ...] = ()
+    functions: tuple[ProvedFunction, ...] = ()
     upper_bound: FamilyRateBound | None = None
 
     @property
@@ -274,11 +277,11 @@ class FamilyContent:
         pairs = zip(self.parts, self._drives, strict=True)
         return tuple(own.constant(V) for part, own in pairs if own is not None for V in self._bound_functions(part))
 
-    def _bound_functions(self, part: ComponentProof) -> Sequence[BoundFunction | FollowerFunction]:
+    def _bound_functions(self, part: ComponentProof) -> Sequence[BoundFunction | FollowerFunction | SquaresFunction]:
         return self.bound_functions[self.parts.index(part)]
 
     @cached_property
-    def bound_functions(self) -> tuple[tuple[BoundFunction | FollowerFunction, ...], ...]:
+    def bound_functions(self) -> tuple[tuple[BoundFunction | FollowerFunction | SquaresFunction, ...], ...]:
         """The functions of every part, as the formulas of the bounds take them."""
         return tuple(
             tuple(

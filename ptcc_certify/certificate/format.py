@@ -25,6 +25,7 @@ from ptcc_certify.certificate.format_vectors import (
     Reader,
     Writer,
     exact_or_ball,
+    factor_entry,
     finite,
     influence_balls,
     interval_text,
@@ -393,17 +394,8 @@ def _dominance_witness(proof: Dominance, out: Writer) -> dict[str, Any]:
             groups.append(rate)
         else:
             # The factor is that of the group's own weights, of which those of the function are a power of two.
-            factor = {
-                key: out.integers(key, getattr(group.factor, key))
-                for key in ("order", "indptr", "indices", "data", "exponents")
-            }
-            weights = group.factor.weights
-            factor |= {
-                "bits": group.factor.bits,
-                "power": group.power + 1 - math.frexp(scale)[1],
-                "weights": None if weights is None else out.integers("weights", weights),
-                "parents": None if group.parents is None else out.integers("parents", group.parents),
-            }
+            power = group.power + 1 - math.frexp(scale)[1]
+            factor = factor_entry(group.factor, power, out, group.parents)
             groups.append({"rate": rate, "factor": factor})
         first += group.weights.size
     return {"vector": out.floats("vector", proof.vector), "groups": groups}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,16 @@ import numpy as np
 from lmi.exact.elementary_enclosures import rounded
 from ptcc_certify.certificate.family_content import FamilyContent
 from ptcc_certify.certificate.format import producer, protocol_section, reaching_section
-from ptcc_certify.certificate.format_family_rows import box_entry, form_entry, form_steps, rows_entry, rows_steps
+from ptcc_certify.certificate.format_family_rows import (
+    Step,
+    box_entry,
+    form_entry,
+    form_steps,
+    rows_entry,
+    rows_steps,
+    squares_entry,
+    squares_steps,
+)
 from ptcc_certify.certificate.format_graph import structure_section
 from ptcc_certify.certificate.format_restricted import claim_entry, claim_steps, enclosed
 from ptcc_certify.certificate.format_upper_bound import upper_bound_entry
@@ -58,7 +67,7 @@ def family_document(certificate: FamilyContent, files: bool = False) -> tuple[di
             "peaks": None if peaks is None else dict(zip(labels, map(_up, peaks), strict=True)),
             **_sliding_part(certificate),
         },
-        "proof": _proof(certificate, components, functions),
+        "proof": _proof(certificate, components, functions, out),
         "verdict": "certified",
     }
     if certificate.boxes:
@@ -71,7 +80,15 @@ def family_document(certificate: FamilyContent, files: bool = False) -> tuple[di
 
 def _function(family: Family, component: FamilyComponent, number: int, V: Any, out: Writer) -> dict[str, Any]:
     labels = [family.labels[v] for v in component.nodes.tolist()]
+    if V.kind == "squares":
+        return squares_entry(number, V, out)
     return rows_entry(labels, number, V, out) if V.kind == "rows" else form_entry(labels, number, V)
+
+
+def _steps(of: str, V: Any, out: Writer) -> Iterator[Step]:
+    if V.kind == "squares":
+        return squares_steps(of, V, out)
+    return (rows_steps if V.kind == "rows" else form_steps)(of, V)
 
 
 def _labels(certificate: FamilyContent, claim: Claim) -> Sequence[str]:
@@ -96,12 +113,13 @@ def _proof(
     certificate: FamilyContent,
     components: Sequence[FamilyComponent],
     functions: Sequence[tuple[int, Any]],
+    out: Writer,
 ) -> list[dict[str, Any]]:
     family = certificate.family
     steps = [_step("structure", f"graph.modes[{k}]") for k in range(len(family.modes))]
     steps.append(_step("family-claim", "graph", claim_witnesses(family, components)))
     for k, (_, V) in enumerate(functions):
-        own = (rows_steps if V.kind == "rows" else form_steps)(f"lyapunov.functions[{k}]", V)
+        own = _steps(f"lyapunov.functions[{k}]", V, out)
         steps += [_step(kind, of, witness, **numbers) for kind, of, witness, numbers in own]
     steps += [_step("sliding-bound", "protocol")] * (certificate.sigma0 is not None)
     if certificate.drives is not None:

@@ -1,4 +1,4 @@
-"""Functions of followers in the file of a family's certificate, and their obligations."""
+"""Lyapunov functions in the file of a family's certificate, and their obligations."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 
 from ptcc_certify.bounds.attracting_box import AttractingBox
-from ptcc_certify.certificate.format_vectors import Writer
+from ptcc_certify.certificate.format_vectors import Writer, factor_entry
 from ptcc_certify.checker.reading import exact
 from ptcc_certify.checker.side_files import SideFiles
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.family_rows import FollowerDecay
 from ptcc_certify.lyapunov.follower_function import FollowerFunction, LeadingPart
+from ptcc_certify.lyapunov.squares_function import SquaresFunction
 
 #: Bits of integers that floats hold.
 _FLOAT_BITS = 53
@@ -92,7 +93,16 @@ def _part(labels: list[str], number: int, part: LeadingPart) -> dict[str, Any]:
     }
 
 
-def form_steps(of: str, V: FamilyFunction) -> Iterator[tuple[str, str, Any, dict[str, str]]]:
+def squares_entry(number: int, V: SquaresFunction, out: Writer) -> dict[str, Any]:
+    """Return a weighted sum of squares."""
+    vector = out.floats("vector", V.vector)
+    return {"class": V.kind, "component": number, "vector": vector, "rate": format_exact(V.rate)}
+
+
+Step = tuple[str, str, Any, dict[str, str]]
+
+
+def form_steps(of: str, V: FamilyFunction) -> Iterator[Step]:
     """Yield kind, place, witness and numbers of the obligations of a quadratic form."""
     for mode, rate in enumerate(V.rates):
         multipliers = V.multipliers[mode] if V.multipliers else ()
@@ -101,8 +111,15 @@ def form_steps(of: str, V: FamilyFunction) -> Iterator[tuple[str, str, Any, dict
     yield "family-constants", of, None, {}
 
 
-def rows_steps(of: str, V: FollowerFunction) -> Iterator[tuple[str, str, Any, dict[str, str]]]:
+def rows_steps(of: str, V: FollowerFunction) -> Iterator[Step]:
     """Yield the same of a function of followers: of its parts, then of its rows."""
     for j, part in enumerate(V.parts):
         yield from form_steps(f"{of}.parts[{j}]", part.function)
     yield "family-rows", of, None, {"b": format_exact(V.rate)}
+
+
+def squares_steps(of: str, V: SquaresFunction, out: Writer) -> Iterator[Step]:
+    """Yield the same of a weighted sum of squares: of every mode."""
+    for mode, factor in enumerate(V.factors):
+        witness = {"factor": factor_entry(factor, V.power, out)}
+        yield "family-squares", f"{of}.modes[{mode}]", witness, {"b": format_exact(V.rate)}

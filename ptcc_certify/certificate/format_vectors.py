@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from lmi.exact.definite import SparseFactor
 from ptcc_certify.bounds.final_state import Influence
 from ptcc_certify.checker.reading import exact
 from ptcc_certify.checker.side_files import SideFiles, beside
@@ -159,6 +160,18 @@ def _side_files(value: Any) -> Iterator[tuple[str, str]]:
         yield value["file"], value["sha256"]
     for part in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
         yield from _side_files(part)
+
+
+def factor_entry(factor: SparseFactor, power: int, out: Writer, parents: np.ndarray | None = None) -> dict[str, Any]:
+    """Write a sparse factor of ``2^power`` times a matrix."""
+    keys = ("order", "indptr", "indices", "data", "exponents")
+    weights = None if factor.weights is None else out.integers("weights", factor.weights)
+    return {key: out.integers(key, getattr(factor, key)) for key in keys} | {
+        "bits": factor.bits,
+        "power": power,
+        "weights": weights,
+        "parents": None if parents is None else out.integers("parents", parents),
+    }
 
 
 def text(value: Fraction | None) -> str | None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from ptcc_certify.certificate.certificate_data import Source
 from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate
+from ptcc_certify.certificate.family_content import ProvedFunction
 from ptcc_certify.certificate.format import read_protocol, read_reaching
 from ptcc_certify.certificate.format_family import certificate_family
 from ptcc_certify.certificate.format_family_rows import read_box
@@ -22,10 +23,12 @@ from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.checker.reading import exact, triangle
 from ptcc_certify.checker.side_files import SideFiles
 from ptcc_certify.errors import FormatError, ParameterError
+from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.family_function import FamilyFunction, prove_ends
 from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound
 from ptcc_certify.lyapunov.follower_function import FollowerFunction, LeadingPart
 from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.lyapunov.squares_function import FormTable, SquaresFunction
 from ptcc_certify.theorems.family_behaviour import FamilyComponent, decide
 
 
@@ -42,7 +45,7 @@ def read_family_certificate(source: Source) -> FamilyCertificate:
         for component, claim in zip(decide(family), claims, strict=True)
     ]
     files = SideFiles(Path(), source.files)
-    functions: list[list[FamilyFunction | FollowerFunction]] = [[] for _ in components]
+    functions: list[list[ProvedFunction]] = [[] for _ in components]
     for k, section in enumerate(document["lyapunov"]["functions"]):
         number = section["component"]
         of = f"lyapunov.functions[{k}]"
@@ -84,7 +87,9 @@ def _read_expectations(asked: Any) -> Expectations:
 
 def _read_function(
     of: str, section: Mapping[str, Any], component: FamilyComponent, proof: Any, files: SideFiles
-) -> FamilyFunction | FollowerFunction:
+) -> ProvedFunction:
+    if section["class"] == "squares":
+        return _read_squares(section, component.family, files)
     if section["class"] == "rows":
         return _read_rows(of, section, component, proof, files)
     return _read_form(of, section, component.family.labels, proof)
@@ -136,3 +141,10 @@ def _read_rows(
         ends |= {v: ceil(bound * scale) for v, bound in bounds if v not in pivots}
     vectors = np.array(d, dtype=object), np.array(list(ends.values()), dtype=object)
     return FollowerFunction(family, kernel, followers, *vectors, tuple(parts), exact(section["rate"]))
+
+
+def _read_squares(section: Mapping[str, Any], family: Family, files: SideFiles) -> SquaresFunction:
+    n = family.n_nodes
+    own, scale = files.numbers(section["vector"], "vector", n).over(range(n))
+    modes = [(table.edges, table.unit) for table in map(FormTable.of, family.modes)]
+    return SquaresFunction(dict(enumerate(own)), scale, exact(section["rate"]), modes)

@@ -95,31 +95,38 @@ def _factor(
     doc: Document, structure: Structure, k: int, times: Fraction, ratios: Sequence[int], g: Fraction, section: Any
 ) -> None:
     """Verify the decay of a leader group, of weights ``times ratios``, by the sparse factor of its form."""
+    gauge, unit = structure.gauges[k], structure.graph.unit
+    group = structure.closed[k]
+    factor, power = read_factor(doc, section, len(group) - (gauge is not None))
+    n = len(factor.exponents)
+    A, basis = block(structure.graph, group), None
+    if section["parents"] is not None:
+        need(gauge is not None, "parents of a group that is not balanced")
+        basis = _differences(A, ratios, gauge or (), doc.files.integers(section["parents"], "parents", len(group)))
+    elif gauge is not None:
+        basis = [{j - 1: x for j, x in row.items() if j} for row in A]
+    lower, scale = _form(A, [times.numerator * w for w in ratios], g, unit, basis)
+    if gauge is not None and section["parents"] is None:
+        scale *= unit**2
+    definite = doc.exact.residual_definite(n, lower, factor, power, scale * times.denominator)
+    need(definite, "a leader group is not proved by its factor")
+
+
+def read_factor(doc: Document, section: Any, n: int) -> tuple[SparseFactor, int]:
+    """Return the factor of a matrix of ``n`` rows as a certificate has it, and its power; refuse a large one."""
     keys = ("order", "indptr", "indices", "data", "exponents", "bits", "power", "weights", "parents")
     section, read, arithmetic = fields(section, keys, "factor"), doc.files.integers, doc.exact
-    group, gauge = structure.closed[k], structure.gauges[k]
-    n = len(group) - (gauge is not None)
     order, exponents, indptr = (
         read(section[key], key, m) for key, m in (("order", n), ("exponents", n), ("indptr", n + 1))
     )
     vector = None if section["weights"] is None else read(section["weights"], "weights", n)
     few = 0 <= indptr[-1] <= n * (n + 1) // 2 and fits(indptr[-1], LARGEST_FACTOR)
     need(few, "the factor has too many entries")
+    need(all(0 <= b - a <= n for a, b in pairwise(indptr)), "indptr has no columns of a factor")
     work, most = sum((b - a) ** 2 for a, b in pairwise(indptr)), arithmetic.products
     need(work <= most, f"a factor of {work} products; {arithmetic.name} takes {most}")
     indices, data = (read(section[key], key, indptr[-1]) for key in ("indices", "data"))
-    A, basis, unit = block(structure.graph, group), None, structure.graph.unit
-    if section["parents"] is not None:
-        need(gauge is not None, "parents of a group that is not balanced")
-        basis = _differences(A, ratios, gauge or (), read(section["parents"], "parents", len(group)))
-    elif gauge is not None:
-        basis = [{j - 1: x for j, x in row.items() if j} for row in A]
-    lower, scale = _form(A, [times.numerator * w for w in ratios], g, unit, basis)
-    if gauge is not None and section["parents"] is None:
-        scale *= unit**2
-    factor = SparseFactor(order, indptr, indices, data, exponents, section["bits"], vector)
-    definite = arithmetic.residual_definite(n, lower, factor, section["power"], scale * times.denominator)
-    need(definite, "a leader group is not proved by its factor")
+    return SparseFactor(order, indptr, indices, data, exponents, section["bits"], vector), section["power"]
 
 
 def _differences(A: Sparse, w: Sequence[int], gauge: Sequence[int], parents: Sequence[int]) -> Sparse:

@@ -1,4 +1,4 @@
-"""Verifies the Lyapunov functions of a family: quadratic forms, and functions of followers by one pass over the rows.
+"""Verifies the Lyapunov functions of a family: forms, sums of squares, and functions of followers, row by row.
 
 Section 19 of the format. A function of rows belongs to a component with common states at rest, in which the followers
 ``F`` are heard by nobody else. Parts ``j`` of the others have forms ``V_j`` of rates ``r_j``; agents in no part hear
@@ -25,6 +25,7 @@ from lmi.exact.work import spend
 from ptcc_certify.checker.family import Component, Family, Part
 from ptcc_certify.checker.family_function import FamilyFunction, Scaled, check_form
 from ptcc_certify.checker.family_limits import WeightedMean
+from ptcc_certify.checker.family_squares import SquaresFunction, check_squares
 from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import entries, exact, fields, need, same
@@ -97,7 +98,7 @@ class FollowerFunction:
         return Fraction(top * self.scale, bottom)
 
 
-Function = FamilyFunction | FollowerFunction
+Function = FamilyFunction | FollowerFunction | SquaresFunction
 
 
 def check_family_functions(doc: Document, family: Family) -> list[Function]:
@@ -115,7 +116,8 @@ def check_family_functions(doc: Document, family: Family) -> list[Function]:
         need(type(number) is int and 0 <= number < len(family.components), "an unknown component")
         component = family.components[number]
         need(not component.depends, "a Lyapunov function where there is no common kernel")
-        check = check_rows if entry["class"] == "rows" else check_form
+        kind = entry["class"]
+        check = check_rows if kind == "rows" else check_squares if kind == "squares" else check_form
         result.append(check(doc, family, component, entry, of))
     return result
 

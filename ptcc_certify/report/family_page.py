@@ -299,6 +299,7 @@ def _functions(saved: FamilyCertificate) -> list[tuple[Any, ...]]:
         "diagonal": "diagonal",
         "undirected": "diagonal, least weights",
         "rows": "row by row",
+        "squares": "weighted squares",
     }
     rows = []
     for part in saved.parts:

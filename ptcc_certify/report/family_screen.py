@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lmi.exact.decimal_rounding import down, near, up
-from ptcc_certify.certificate.restricted_bounds import deviation_of_signal, nearer_for_signal
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import STABILITY
@@ -380,12 +379,15 @@ def _rate_entries(certificate: FamilyCertificate) -> Lines:
 
 def _no_search(certificate: FamilyCertificate) -> str:
     """Tell why no rate was proved: too many agents for a search, or too little time; nothing where it is not known."""
-    sizes = [part.component.nodes.size for part in certificate.parts if part.component.nodes.size > 1 and not part.rate]
-    if max(sizes, default=0) > EXACT_NODES:
-        return f"{max(sizes):,} agents are above the {EXACT_NODES:,} of the searches"
-    return "the searches took too long; raise --time-limit" * any(
-        "cut off" in note or note == "Lyapunov functions" for note in certificate.notes
-    )
+    without = [part.component for part in certificate.parts if part.component.nodes.size > 1 and not part.rate]
+    largest = max(without, key=lambda component: component.nodes.size, default=None)
+    late = any("cut off" in note or note == "Lyapunov functions" for note in certificate.notes)
+    if largest is not None and largest.nodes.size > EXACT_NODES:
+        if largest.behaviour != STABILITY:
+            return f"{largest.nodes.size:,} agents are above the {EXACT_NODES:,} of the searches"
+        if not late:
+            return f"weighted squares of {largest.nodes.size:,} agents prove none"
+    return "the searches took too long; raise --time-limit" * late
 
 
 def _function_entries(certificate: FamilyCertificate) -> Lines:
@@ -457,6 +459,8 @@ def _interval_entries(labels: Sequence[str], states: Sequence[tuple[Fraction, Fr
 
 def _error_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
     """Tell how near the agents are to their final states by when, for every signal and those that were asked for."""
+    from ptcc_certify.certificate.restricted_bounds import deviation_of_signal, nearer_for_signal  # slow to load
+
     if certificate.initial_state is None:
         return
     if certificate.common and certificate.rate is not None:

@@ -215,7 +215,7 @@ class Kernel:
                 if question := self._reduced(node, row, own_row):
                     yield question
 
-    def column_by_edges(self, question: Combination) -> int | None:
+    def told_column(self, question: Combination) -> int | None:
         """Return a column in which a combination is not 0 by the edges alone; None if these do not tell."""
         units = [c for c in question if c <= self.dimension]
         if len(units) == len(question):
@@ -224,7 +224,7 @@ class Kernel:
             return units[0] - 1  # a unit vector and a row that is none
         return None
 
-    def column_by_rows(self, question: Combination) -> int | None:
+    def solved_column(self, question: Combination) -> int | None:
         """Return a column in which a combination is not 0; None if it is 0.
 
         Raises
@@ -459,12 +459,12 @@ def first_answer(
     for name, question in questions:
         if not question:
             continue
-        if (column := kernel.column_by_edges(question)) is not None:
+        if (column := kernel.told_column(question)) is not None:
             return name, column, question
         open_questions.append((name, question))
     try:
         for name, question in open_questions:
-            if (column := kernel.column_by_rows(question)) is not None:
+            if (column := kernel.solved_column(question)) is not None:
                 return name, column, question
     except TooLarge:
         for name, question in open_questions:

@@ -410,6 +410,7 @@ def die_twice(deaths: Path, edges: Any) -> SignedDigraph:
     return SignedDigraph.from_edges(edges)
 
 
+@pytest.mark.campaign
 def test_a_graph_is_to_blame_only_for_two_processes_that_died_with_it_alone():
     """It dies once among others, and once alone, which may be chance."""
     unlucky = Unlucky(TRIANGLE.labels, TRIANGLE.source, TRIANGLE.target, TRIANGLE._weights)
@@ -436,13 +437,13 @@ def test_rows_are_the_same_wherever_they_are_computed(monkeypatch: pytest.Monkey
     here = facts(quickly(sources))
     assert [row["error"] is None for row in here] == [True, False] + [True] * 9
     assert facts(quickly(sources, workers=2)) == here
-    with LocalCluster(n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
-        assert facts(quickly(sources, scheduler=cluster.scheduler_address, output="dask.csv")) == here
-        scale(cluster, 0)
-        monkeypatch.setattr(backends, "PATIENCE", 3)
-        with pytest.raises(ParameterError, match="no workers"):
+    with LocalCluster(n_workers=0, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+        with monkeypatch.context() as patch, pytest.raises(ParameterError, match="no workers"):
+            patch.setattr(backends, "PATIENCE", 3)
             quickly(sources, scheduler=cluster.scheduler_address)
         scale(cluster, 1)
+        assert facts(quickly(sources, scheduler=cluster.scheduler_address, output="dask.csv")) == here
+        monkeypatch.setattr(backends, "PATIENCE", 3)
 
         def lose(done: int, total: int, errors: int) -> None:
             if done == 2:
@@ -1030,7 +1031,10 @@ def test_a_failure_leaves_the_table_so_far_and_says_how_it_goes_on(suffix: str, 
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
-@pytest.mark.parametrize(("number", "workers"), [(signal.SIGINT, 2), (signal.SIGTERM, 1)])
+@pytest.mark.parametrize(
+    ("number", "workers"),
+    [(signal.SIGINT, 1), (signal.SIGTERM, 1), pytest.param(signal.SIGINT, 2, marks=pytest.mark.campaign)],
+)
 def test_a_process_that_is_stopped_leaves_the_table_so_far(killed: Any, number: int, workers: int):
     Path("many.toml").write_text(TINY.replace("8", "400"))
     args = ["batch", "many.toml", "-o", "t.csv", *QUICK[:-1], str(workers)]

@@ -668,7 +668,10 @@ def assert_no_forgery_passes(data: dict[str, Any]) -> set[str]:
     return tried
 
 
-@pytest.mark.parametrize("name", ["1.1", "1.2", "3.1 mixed", "disconnected mixed"])
+@pytest.mark.parametrize(
+    "name",
+    ["1.1", "disconnected mixed", *(pytest.param(name, marks=pytest.mark.campaign) for name in ("1.2", "3.1 mixed"))],
+)
 def test_certificates_of_the_input_are_checked(name: str):
     data = written(nominal_certificate(name))
     effort = data["input"]

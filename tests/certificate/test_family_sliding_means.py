@@ -36,7 +36,7 @@ def runs(certificate, played=3, **options):
 
 def test_means_that_every_signal_keeps_are_those_of_x_minus_sigma():
     x0, sigma0 = [3, 1, 2], ["1", "-2", "1/2"]
-    certificate = certify_family(PATH, PROTOCOL, x0, sigma0=sigma0, time_limit=3)
+    certificate = certify_family(PATH, PROTOCOL, x0, sigma0=sigma0, time_limit=60)
     mean = Fraction(2 + 3, 3) - Fraction(3, 2) / 3
     assert certificate.final_states == ((mean, mean), (mean, mean), (-mean, -mean))
     assert certificate.checked.accepted
@@ -46,7 +46,7 @@ def test_means_that_every_signal_keeps_are_those_of_x_minus_sigma():
 
 
 def test_a_mean_of_x_in_place_of_x_minus_sigma_is_refused():
-    certificate = certify_family(PATH, PROTOCOL, [3, 1, 2], sigma0=[1, -2, 0], time_limit=3)
+    certificate = certify_family(PATH, PROTOCOL, [3, 1, 2], sigma0=[1, -2, 0], time_limit=60)
     data = certificate.to_dict()
     low = Fraction(3 + 1 - 2, 3)
     data["final_state"] = {"a": str(low), "b": str(low), "c": str(-low)}
@@ -58,7 +58,7 @@ def test_groups_and_followers_end_within_what_is_proved():
     for n in (4, 5, 6, 5):
         family = random_family(rng, "containment", n, 2, Fraction(1, 5), 0.3)
         sigma0, x0 = (rng.integers(-6, 7, n).tolist() for _ in range(2))
-        certificate = certify_family(family, PROTOCOL, x0, sigma0=sigma0, time_limit=3)
+        certificate = certify_family(family, PROTOCOL, x0, sigma0=sigma0, time_limit=60)
         assert certificate.checked.accepted
         for run in runs(certificate, 2):
             assert not compare(certificate, run).violated
@@ -66,7 +66,7 @@ def test_groups_and_followers_end_within_what_is_proved():
 
 def test_narrower_ends_than_sliding_variables_leave_are_refused():
     family = Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 3), ("b", "c", 1, 2)])
-    certificate = certify_family(family, PROTOCOL, [5, 6, 3], sigma0=[9, 8, 1], time_limit=3)
+    certificate = certify_family(family, PROTOCOL, [5, 6, 3], sigma0=[9, 8, 1], time_limit=60)
     data = certificate.to_dict()
     assert check(data).accepted
     y = [Fraction(5) - 9, Fraction(6) - 8]
@@ -79,7 +79,7 @@ def test_narrower_ends_than_sliding_variables_leave_are_refused():
 @pytest.mark.parametrize("sigma0", [[0, 0, 0], [1, -2, 3]])
 def test_inputs_are_below_their_curve(sigma0):
     family = Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 1), ("b", "c", -2, -1)])
-    certificate = certify_family(family, PROTOCOL, [3, 1, 2], sigma0=sigma0, time_limit=3)
+    certificate = certify_family(family, PROTOCOL, [3, 1, 2], sigma0=sigma0, time_limit=60)
     for run in runs(certificate):
         own = run.remaining > 1e-3
         bound = certificate.input_bound(run.remaining[own])
@@ -91,7 +91,7 @@ def test_inputs_are_below_their_curve(sigma0):
 
 def test_where_the_sliding_part_may_grow_there_is_no_curve_of_the_input():
     gains = {"T_r": 1, "T_s": 1, "rho1": 1, "rho2": 1, "kappa": 3, "mu1": 2, "mu2": 1, "mu3": "0.1", "delta": 1}
-    certificate = certify_family(PATH, SlidingModeProtocol(**gains), [3, 1, 2], sigma0=[1, 0, 2], time_limit=3)
+    certificate = certify_family(PATH, SlidingModeProtocol(**gains), [3, 1, 2], sigma0=[1, 0, 2], time_limit=60)
     assert certificate.bounded and certificate.input_peaks is None
     assert np.isinf(certificate.input_bound([1.0, 0.3])).all()
     assert np.isfinite(certificate.deviation_bound([1.0, 0.3])).all()
@@ -111,8 +111,8 @@ def test_restricted_signals_are_for_the_nominal_protocol(signal):
 def test_a_file_that_adds_restricted_signals_is_refused(sigma0):
     nominal = NominalProtocol(T=2, rho1=1, rho2=1, kappa=3)
     family = Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 1), ("b", "c", -2, -1)])
-    told = certify_family(family, nominal, [3, 1, 2], signal="constant", time_limit=3).to_dict()
-    data = certify_family(family, PROTOCOL, [3, 1, 2], sigma0=sigma0, time_limit=3).to_dict()
+    told = certify_family(family, nominal, [3, 1, 2], signal="constant", time_limit=60).to_dict()
+    data = certify_family(family, PROTOCOL, [3, 1, 2], sigma0=sigma0, time_limit=60).to_dict()
     assert told["restricted"] and check(told).accepted and check(data).accepted
     data["restricted"] = told["restricted"]
     data["proof"] += [step for step in told["proof"] if step["of"].startswith("restricted")]
@@ -122,7 +122,7 @@ def test_a_file_that_adds_restricted_signals_is_refused(sigma0):
 
 
 def test_pages_and_statements_say_what_slides(tmp_path):
-    made = certify_family(PATH, PROTOCOL, [3, 1, 2], sigma0=[1, -2, 0], time_limit=3)
+    made = certify_family(PATH, PROTOCOL, [3, 1, 2], sigma0=[1, -2, 0], time_limit=60)
     made.save(tmp_path / "c.json")
     saved = read_certificate(tmp_path / "c.json")
     assert saved == made == copy.deepcopy(saved) and saved.upper_bound == made.upper_bound
@@ -135,5 +135,5 @@ def test_pages_and_statements_say_what_slides(tmp_path):
     assert "the mean of the initial states" not in statement
     text = "\n".join(family_lines(saved, "path", {}))
     assert "sigma(0)" in text and "for every signal and disturbance" in text
-    certify_family(PATH, PROTOCOL, sigma0=[1, -2, 0], time_limit=3).save(tmp_path / "d.json")
+    certify_family(PATH, PROTOCOL, sigma0=[1, -2, 0], time_limit=60).save(tmp_path / "d.json")
     assert "V(T<sub>r</sub>)" in report_html(read_certificate(tmp_path / "d.json"))

@@ -378,7 +378,13 @@ SLOW = {
 }
 
 
-@pytest.mark.parametrize("name", SLOW)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.campaign if name in ("path", "ring", "tiny weights") else ())
+        for name in SLOW
+    ],
+)
 def test_undirected_groups_that_mix_slowly_are_certified(name: str):
     """Their left vector is exact, so that the proof needs no cube of the Laplacian, and the end is exact too."""
     graph = SLOW[name]

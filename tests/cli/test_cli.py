@@ -12,6 +12,7 @@ import shlex
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -872,21 +873,23 @@ def test_the_command_that_design_prints_is_one_for_a_shell(folder: Path):
 # ---------------------------------------------------------------------- examples, cite, imports
 
 
-def test_all_examples_behave_as_the_paper_reports(folder: Path):
-    run = ptcc("examples", "all", "-o", "new/results")
+REPORTED = [
+    (str(example.number), graph, behaviour)
+    for example in EXAMPLES.values()
+    for graph, behaviour in zip(example.graphs, example.behaviours, strict=True)
+]
+
+
+def rows_of_examples(run: Run) -> Iterator[tuple[str, str, str, re.Match[str]]]:
+    """Number, graph, reported behaviour and printed columns of each run, which are as the paper reports."""
     assert run.code == 0, run
     header, *rows = run.out.splitlines()
     assert header.split() == [
         *("example", "theorem", "behaviour", "rate", "optimality", "worst", "reached", "proved", "by", "T_r"),
         *("final", "state", "verdict"),
     ]
-    reported = [
-        (str(example.number), graph, behaviour)
-        for example in EXAMPLES.values()
-        for graph, behaviour in zip(example.graphs, example.behaviours, strict=True)
-    ]
-    assert len(rows) == len(reported) == 12
-    for row, (number, graph, behaviour) in zip(rows, reported, strict=True):
+    assert len(rows) == len(REPORTED) == 12
+    for row, (number, graph, behaviour) in zip(rows, REPORTED, strict=True):
         columns = [r"(\d) (\w+)", r"([\d.]+)", r"(\D+?)", *[r"([\d.]+)"] * 3, *[r"(\S+)"] * 3]
         match = re.fullmatch(f"{' +'.join(columns)}  (\\S.*?) +(\\w+)(?:, says little by T)?", row)
         assert match is not None, row
@@ -895,17 +898,27 @@ def test_all_examples_behave_as_the_paper_reports(folder: Path):
         assert match[11].startswith("+-") == (behaviour == "bipartite consensus")
         if number in "456":
             assert 0 < float(match[8]) < float(match[9]) < float(match[10])
-            graph += "_sliding"
         else:
             assert match.group(8, 9, 10) == ("-", "-", "-")
         rate, ratio, worst = (float(x) for x in match.group(5, 6, 7))
         assert rate > 0 and 0 < ratio <= 1 and 0 < worst <= 1
-        data = read(f"new/results/{graph}.json")
+        yield number, graph, behaviour, match
+
+
+def test_all_examples_behave_as_the_paper_reports():
+    assert len(list(rows_of_examples(ptcc("examples", "all")))) == 12
+
+
+@pytest.mark.campaign
+def test_all_examples_are_written_with_their_figures(folder: Path):
+    for number, graph, behaviour, match in rows_of_examples(ptcc("examples", "all", "-o", "new/results")):
+        data = read(f"new/results/{graph}{'_sliding' if number in '456' else ''}.json")
         assert data["claim"]["theorem"] == match[3]
         assert data["claim"]["behaviour"] == behaviour
+        rate = float(match[5])
         assert rate <= Fraction(data["rates"]["proved"]) < rate + 1e-4
     table = list(csv.DictReader(Path("new/results/examples.csv").read_text().splitlines()))
-    assert [(row["example"], row["graph"], row["claim"]) for row in table] == reported
+    assert [(row["example"], row["graph"], row["claim"]) for row in table] == REPORTED
     assert {row["verdict"] for row in table} == {"certified"}
     assert [bool(row["reached_by"]) for row in table] == [bool(row["simulated_reached"]) for row in table]
     assert [bool(row["reached_by"]) for row in table] == [row["example"] in "456" for row in table]
@@ -920,12 +933,19 @@ def test_all_examples_behave_as_the_paper_reports(folder: Path):
     assert len(listing(folder / "new" / "results")) == 12 + 24 + 1
 
 
-def test_examples_are_drawn_as_vectors_too_and_the_same_again(folder: Path):
-    for again in ("one", "two"):
-        assert ptcc("examples", "fig1b", "-o", again, "--format", "svg").code == 0
-    first, second = ({p.name: p.read_bytes() for p in (folder / name).glob("*.svg")} for name in ("one", "two"))
-    assert len(first) == 2 + 2 + 4 and first == second
-    assert all(b"<svg" in content for content in first.values())
+def vectors_of_examples(folder: Path, name: str) -> dict[str, bytes]:
+    assert ptcc("examples", "fig1b", "-o", name, "--format", "svg").code == 0
+    return {p.name: p.read_bytes() for p in (folder / name).glob("*.svg")}
+
+
+def test_examples_are_drawn_as_vectors_too(folder: Path):
+    drawn = vectors_of_examples(folder, "one")
+    assert len(drawn) == 2 + 2 + 4 and all(b"<svg" in content for content in drawn.values())
+
+
+@pytest.mark.campaign
+def test_examples_are_drawn_the_same_again(folder: Path):
+    assert vectors_of_examples(folder, "one") == vectors_of_examples(folder, "two")
 
 
 def test_examples_can_be_chosen():

@@ -73,11 +73,12 @@ def certified(request):
 # ---------------------------------------------------------------------- the quotient
 
 
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("n", [1, 2, 3, 6, 8])
+#: But for stability of one agent: who hears nobody keeps its state.
+SIZES = [(kind, n) for kind in KINDS for n in (1, 2, 3, 6, 8) if (kind, n) != ("stability", 1)]
+
+
+@pytest.mark.parametrize(("kind", "n"), SIZES)
 def test_the_quotient_of_every_member_is_that_of_its_laplacian(kind, n):
-    if kind == "stability" and n == 1:
-        return  # an agent that hears nobody is never stable
     rng = np.random.default_rng(n)
     quotient = Quotient(random_family(rng, kind, n, int(rng.integers(1, 5)), Fraction(3, 10), 0.4))
     for number, L, levels in members(rng, quotient, 8):

@@ -10,9 +10,11 @@ from ptcc_certify import Expectations, Family, NominalProtocol, SignedDigraph, c
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.io import as_family
 from ptcc_certify.report.page import report_html
-from ptcc_certify.report.plots.family import sample_runs
+from ptcc_certify.report.plots.family import plot_family, sample_runs
+from ptcc_certify.report.plots.family_input import plot_family_input
 from ptcc_certify.report.report_file import write_report
 from ptcc_certify.report.statement import family_latex
+from ptcc_certify.simulation.family_run import simulate_family
 from ptcc_certify.simulation.signals import RandomSignal
 from ptcc_certify.theorems.restricted_signals import DwellTime
 
@@ -71,7 +73,8 @@ def test_ends_under_the_last_mode_stand_on_page_and_statement():
     assert "State at the deadline, for these signals" in page
     assert "& -- & $2$ & $[-1, 2]$" in statement and "U+2013" not in statement
     assert "(at least 0.2 of time between switches) more is proved: the last mode decides, bip" in statement
-    axes = [saved.plot(what) for what in ("states", "input")]
+    runs = [simulate_family(saved.family, PROTOCOL, [1, 2, 3], RandomSignal(1), times=[0, 0.5])]
+    axes = [plot_family(saved, runs=runs), plot_family_input(saved, runs=runs)]
     assert all("of any kind" in ax.get_legend().get_title().get_text() for ax in axes)
 
 

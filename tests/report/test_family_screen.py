@@ -99,8 +99,13 @@ def test_the_gain_that_is_proposed_makes_the_bound_useful_and_bounds_the_input()
 
 
 def test_where_no_rate_is_proved_the_line_says_why():
-    for size, seconds, told in ((130, 9, "(130 agents are above the 120"), (60, 0.01, "raise --time-limit)")):
-        ring = [(k, (k + 1) % size, 1 - 2 * (k == 0)) for k in range(size)]
+    cases = (
+        (130, 1, 9, "(130 agents are above the 120"),
+        (130, -1, 9, "(weighted squares of 130 agents prove none)"),
+        (60, -1, 0.01, "raise --time-limit)"),
+    )
+    for size, sign, seconds, told in cases:
+        ring = [(k, (k + 1) % size, 1 if k else sign) for k in range(size)]
         family = Family.from_graph(ptcc.SignedDigraph.from_edges(ring), uncertainty="10%")
         lines = family_lines(certify_family(family, PROTOCOL, time_limit=seconds), "g.csv")
         assert told in next(line for line in lines if line.startswith("rate"))

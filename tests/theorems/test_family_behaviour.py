@@ -7,6 +7,16 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from families import KINDS, random_family
+from oracle_families import (
+    has_common_kernel,
+    member_laplacians,
+    member_masks,
+    replay,
+    rest_behaviour,
+    signed_edges,
+    slowest_product,
+)
 from scipy.linalg import expm
 
 from ptcc_certify.graphs.digraph import SignedDigraph
@@ -15,15 +25,6 @@ from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent, decide
 from ptcc_certify.theorems.family_groups import FamilyGroups
 from ptcc_certify.theorems.family_rate import explicit_rate
-from tests.families import KINDS, random_family
-from tests.oracle_families import (
-    has_common_kernel,
-    member_laplacians,
-    member_masks,
-    replay,
-    signed_edges,
-    slowest_product,
-)
 
 CHAIN = ("bipartite consensus", "interval bipartite consensus", "bipartite containment")
 ALL = ("stability", *CHAIN)
@@ -51,9 +52,7 @@ def agrees_with_members(rng: random.Random, component: FamilyComponent, products
     common, dimension = has_common_kernel(members, component.family.n_nodes)
     if component.behaviour == DEPENDS:
         return not common
-    if not common or (component.behaviour == "stability") != (dimension == 0):
-        return False
-    if component.behaviour in CHAIN[:2] and dimension != 1:
+    if not common or component.behaviour != rest_behaviour(component.family, dimension):
         return False
     if products:
         few = members if len(members) <= 8 else [members[0], *rng.sample(members[1:], 7)]

@@ -1,0 +1,21 @@
+"""The certificates of the paper's examples, made once: for all tests of the checker that take the twelve."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.examples import load_graph, select
+
+
+@cache
+def paper_examples() -> tuple[str, ...]:
+    """Return their JSON; those with a disturbance have a simulated run."""
+    found = []
+    for example, name, _ in select("all"):
+        x0, sigma0, push = example.x0.split(","), example.sigma0 and example.sigma0.split(","), example.disturbance
+        more = {"sigma0": sigma0, "disturbance": push, "simulation": push is not None}
+        cert = certify(load_graph(name), example.protocol(), x0, **more)
+        assert cert.verdict == "certified" and cert.checked is not None and cert.checked.accepted
+        found.append(cert.to_json())
+    return tuple(found)
