@@ -34,7 +34,7 @@ def false_family_claims(data: Json, files: Mapping[str, bytes] | None = None) ->
     """Say what is false in an accepted certificate of a family; an empty list if nothing is."""
     oracle = FamilyOracle(data, files or {})
     claims = (oracle.graph, oracle.structures, oracle.behaviours, oracle.functions, oracle.sliding, oracle.drives)
-    for claim in (*claims, oracle.finals, oracle.inputs, oracle.restricted):
+    for claim in (*claims, oracle.finals, oracle.inputs, oracle.boxes, oracle.restricted):
         claim()
     return oracle.false
 
@@ -510,6 +510,44 @@ class FamilyOracle:
                 u = (rho1 + pole / T * np.exp(z)) * L @ expm(-L * s) @ np.array([float(x) for x in self.start or ()])
                 self.require((abs(u) <= bounds * (1 + SLACK) + 1e-9 * bounds.max(initial=0)).all(), "a later peak")
 
+    # ------------------------------------------------------------------ boxes
+
+    def boxes(self) -> None:
+        """Boxes: no signal that is played leaves the distance above its bound; greedy ones push outwards."""
+        for said in self.data.get("boxes", ()):
+            nodes = self.pieces[said["component"]]
+            self.require(self.depends(nodes) and self.start is not None and not any(self.sigma0), "a box")
+            if self.start is None or not isinstance(said["vector"], list):
+                continue
+            own = [self.index[label] for label in said["nodes"]]
+            self.require(own == sorted(set(own)) and set(own) <= set(nodes), "followers of a box")
+            low, high, d = (np.array([float(number(x)) for x in said[key]]) for key in ("lower", "upper", "vector"))
+            rate, places = float(number(said["rate"])), [nodes.index(v) for v in own]
+            members = [np.array(self.part(L, nodes), dtype=float) for some in self.members for L in some]
+            largest = max(float(np.abs(L).max()) for L in members) or 1.0
+            begin = np.array([float(self.start[v]) for v in nodes])
+            size = max(1.0, float(np.abs(begin).max()))
+            self.require(rate > 0 and (d > 0).all(), "a box without a rate")
+
+            def rho(x: np.ndarray) -> float:
+                f = x[places]  # noqa: B023
+                return float(max(0.0, ((f - high) / d).max(), ((low - f) / d).max()))  # noqa: B023
+
+            first = rho(begin)
+            for run in range(2 * SIGNALS):
+                x, s = begin, 0.0
+                target = self.draw.choice(places)
+                for _ in range(60):
+                    h = self.draw.choice((0.1, 1.0, 10.0)) / largest
+                    if run % 2:
+                        L = self.draw.choice(members)
+                    else:  # push one follower up, or down
+                        side = 1 if run % 4 else -1
+                        L = max(members, key=lambda L: side * float((expm(-L * h) @ x)[target]))
+                    x, s = expm(-L * h) @ x, s + h
+                    bound = first * np.exp(-rate * s / 2) * (1 + SLACK) + 1e-9 * size / d.min()
+                    self.require(rho(x) <= bound, "an agent outside of a box")
+
     # ------------------------------------------------------------------ restricted signals
 
     def restricted(self) -> None:
@@ -518,6 +556,9 @@ class FamilyOracle:
             nodes = self.pieces[said["component"]]
             if said["claim"] == "shares":
                 self.shares(nodes, said, f"restricted[{place}]")
+                continue
+            if said["claim"] == "final value":
+                self.final_values(nodes, said)
                 continue
             if said["claim"] != "rate":
                 (self.last_mode if said["claim"] == "last mode" else self.windows)(nodes, said)
@@ -563,6 +604,35 @@ class FamilyOracle:
                 PA = times(P, A)
                 S = [[PA[i][j] + PA[j][i] - rate * P[i][j] for j in range(len(P))] for i in range(len(P))]
                 self.require(semidefinite(S), "a rate of restricted signals")
+
+    def final_values(self, nodes: list[int], said: Json) -> None:
+        """The consensus values of members, in rationals; of few uncertain weights all vertices."""
+        self.require(said["signals"] == "constant" and any(said["modes"]), "a final value")
+        self.require(self.start is not None and not any(self.sigma0), "a final value without a state")
+        for k, told in enumerate(said["modes"]):
+            if told is None or self.start is None:
+                continue
+            edges, tied = self.modes[k]
+            names = {self.parameter(e, tied) for e in edges if e[2] < e[3] and e[0] in nodes}
+            few = len(names) <= 6
+            sets = [{x for x in names if self.draw.random() < 0.5} for _ in range(VERTICES)]
+            if few:
+                order = sorted(names, key=str)
+                sets = [{x for i, x in enumerate(order) if far >> i & 1} for far in range(2 ** len(order))]
+            values = []
+            for L in (self.part(self.member(k, far), nodes) for far in sets):
+                camps, left = kernel(L), kernel(transposed(L))
+                if len(camps) != 1 or len(set(map(abs, camps[0]))) != 1:
+                    self.require(False, "a final value where there is no consensus")
+                    return
+                signs = [x / camps[0][0] for x in camps[0]]
+                weight = sum((p * g for p, g in zip(left[0], signs, strict=True)), Fraction(0))
+                pairs = zip(left[0], nodes, strict=True)
+                values.append(sum((p * self.start[v] for p, v in pairs), Fraction(0)) / weight)
+            low, high, within = (number(told[key]) for key in ("lower", "upper", "within"))
+            self.require(low <= min(values) and max(values) <= high, "a final value is outside")
+            near = min(values) <= low + within and max(values) >= high - within
+            self.require(near or not few, "no member is so near to an end")
 
     def last_mode(self, nodes: list[int], said: Json) -> None:
         """What each mode does by itself, by kernels of its members, and where agents are under signals that switch."""

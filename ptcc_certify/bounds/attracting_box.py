@@ -29,12 +29,15 @@ from math import frexp
 import numpy as np
 
 from lmi.dyadic import dyadic_array
+from lmi.exact.numbers import integers
+from lmi.exact.work import WorkError
 from lmi.sparse_h_matrix import solve
+from ptcc_certify.checker.restricted_signals import reachable_bounds
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import nearest_float
-from ptcc_certify.graphs.structure import find_camps, weak_components
+from ptcc_certify.graphs.structure import find_camps
 from ptcc_certify.lyapunov.dominance import round_array
-from ptcc_certify.lyapunov.family_rows import FollowerDecay, least_rate
+from ptcc_certify.lyapunov.family_rows import FollowerDecay, follower_decays, least_rate
 from ptcc_certify.lyapunov.interval_rows import IntervalRows, Policy, least_quotient
 
 _ROUNDS = 60
@@ -44,6 +47,10 @@ _BITS = 50
 _PLACES = 70
 #: Relative accuracy of a solve.
 _RESIDUAL = 1e-12
+#: Share of the largest rate that is given up, so that ``rho(0)`` is not much larger; denominators of short ends.
+_LOSS, _DENOMINATORS = 0.01, (1, 1000, 10**6)
+#: Short ends are no farther from those that were found, relatively.
+_SAME = Fraction(1, 10**10)
 Interval = tuple[Fraction, Fraction]
 
 
@@ -82,12 +89,73 @@ class AttractingBox:
         return max(max(Fraction(0), (x[k] - high) / d, (low - x[k]) / d) for k, d, low, high in rows)
 
 
+def box_of_family(family: Family, x0: Sequence[Fraction]) -> AttractingBox | None:
+    """Return the box that attracts the followers of a family from an initial state.
+
+    None if no decay is proved, or the state has no common denominator of moderate length, which the check needs.
+
+    The agents that they follow stay in their :func:`invariant_intervals`. Ends are short numbers where those prove the
+    rows.
+
+    Parameters
+    ----------
+    family : Family
+    x0 : sequence of N Fraction
+
+    Examples
+    --------
+    >>> family = Family.from_intervals([("a", "c", 1, 3), ("b", "c", 1, 1)], nodes="abc")
+    >>> box = box_of_family(family, [Fraction(0), Fraction(4), Fraction(100)])
+    >>> str(box.lower[0]), str(box.upper[0]), float(box.decay.rate)
+    ('1', '2', 2.0)
+    """
+    decay = next(follower_decays(family, None, [_LOSS]), None) if have_common_denominator(x0) else None
+    if decay is None:
+        return None
+    intervals = invariant_intervals(family, decay.nodes, x0)
+    return _with_short_ends(attracting_box(family, decay, intervals), family, intervals)
+
+
+def have_common_denominator(x: Sequence[Fraction]) -> bool:
+    """Tell whether numbers are integers over one scale of moderate length.
+
+    Examples
+    --------
+    >>> have_common_denominator([Fraction(1, 2), Fraction(1, 3)])
+    True
+    """
+    try:
+        integers([list(x)])
+    except WorkError:
+        return False
+    return True
+
+
+def _with_short_ends(box: AttractingBox, family: Family, intervals: dict[int, Interval]) -> AttractingBox:
+    lifted = IntervalRows.of(family.modes, box.decay.nodes).lifted()
+    values = [intervals[k] for k in sorted(intervals)]
+    z = [high for _, high in values] + [-low for low, _ in values]
+    ends = [*box.upper, *(-v for v in box.lower)]
+    near = max(map(abs, z), default=Fraction(0)) * _SAME
+    for most in _DENOMINATORS:
+        y = [v.limit_denominator(most) for v in ends]
+        if any(abs(v - short) > near for v, short in zip(ends, y, strict=True)):
+            continue
+        if not have_common_denominator(y + z):
+            break
+        (whole,), _ = integers([y + z])
+        if (lifted.pull(np.array(whole, dtype=object)) >= 0).all():
+            n = len(box.upper)
+            return replace(box, lower=tuple(-v for v in y[n:]), upper=tuple(y[:n]))
+    return box
+
+
 def invariant_intervals(family: Family, followers: np.ndarray, x0: Sequence[Fraction]) -> dict[int, Interval]:
     """Return intervals that the agents that are no followers never leave, under any signal.
 
-    Of a part that hears nobody else and whose edges keep camps ``g``, these are ``g`` times the range of ``g X(0)``;
-    of another part, plus and minus its largest ``|x_k(0)|``. Limits, or narrower intervals about them, are not
-    invariant, and a box that is built on them attracts nobody at once.
+    Each stays within what reaches it of ``+-x_l(0)``: in a part that hears nobody else and whose edges keep camps
+    ``g``, within ``g`` times the range of ``g X(0)`` of those that it hears. Limits, or narrower intervals about them,
+    are not invariant, and a box that is built on them attracts nobody at once.
 
     Parameters
     ----------
@@ -103,23 +171,10 @@ def invariant_intervals(family: Family, followers: np.ndarray, x0: Sequence[Frac
     >>> {k: tuple(map(str, pair)) for k, pair in ends.items()}
     {0: ('-2', '1'), 1: ('-1', '2')}
     """
-    rest = np.setdiff1d(np.arange(family.n_nodes), followers)
-    if not rest.size:
-        return {}
-    part = family.restricted(rest)
-    source, target, sign = part.union
-    camps, violated, _ = find_camps(rest.size, source, target, sign)
-    spoiled = np.zeros(rest.size, dtype=bool)
-    spoiled[target[violated]] = True
-    result = {}
-    for own in weak_components(rest.size, source, target):
-        values = [int(camps[v]) * Fraction(x0[int(rest[v])]) for v in own.tolist()]
-        low, high = min(values), max(values)
-        if spoiled[own].any():
-            low, high = -max(-low, high), max(-low, high)
-        for v in own.tolist():
-            result[int(rest[v])] = (low, high) if camps[v] > 0 else (-high, -low)
-    return dict(sorted(result.items()))
+    edges = zip(*(end.tolist() for end in family.union), strict=True)
+    bounds = reachable_bounds(range(family.n_nodes), edges, x0)
+    inside = set(followers.tolist())
+    return {v: ends for v, ends in bounds.items() if v not in inside}
 
 
 def attracting_box(family: Family, decay: FollowerDecay, intervals: dict[int, Interval]) -> AttractingBox:

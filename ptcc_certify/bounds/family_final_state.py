@@ -26,6 +26,7 @@ from fractions import Fraction
 import numpy as np
 
 from lmi.dyadic import dyadic_array, round_to_bits
+from lmi.exact.elementary_enclosures import rounded
 from lmi.sparse_h_matrix import solve
 from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.errors import HypothesisError
@@ -40,6 +41,8 @@ from ptcc_certify.theorems.family_kernel import reached
 from ptcc_certify.theorems.lemmas import solve_exact
 
 _ROUNDS = 60
+#: Longest numerators and denominators, in bits, that are written as they are; bits of others, about.
+_SHORT, _BITS = 256, 64
 Interval = tuple[Fraction, Fraction]
 
 
@@ -78,6 +81,37 @@ class FinalValue:
     def exact(self) -> bool:
         """Whether constant weights attain both ends."""
         return self.reached_lower == self.lower and self.reached_upper == self.upper
+
+
+@dataclass(frozen=True, eq=False)
+class ValueEnds:
+    """Ends of the consensus value of one mode over all constant weights, in short numbers, and what proves them.
+
+    Attributes
+    ----------
+    camps : tuple of N +1/-1
+        ``x_k(T) = camps_k c``, the first node +1.
+    nodes : tuple of int
+        The closed set that decides.
+    lower, upper : Fraction
+    within : Fraction
+        Members have values at most so far from either end.
+    vectors : tuple of two tuples of Fraction, or None
+        ``h`` of the upper end, and of the lower end, which is that of ``-z``. None of weights that change together,
+        where ``c`` is the mean of ``z``.
+    """
+
+    camps: tuple[int, ...]
+    nodes: tuple[int, ...]
+    lower: Fraction
+    upper: Fraction
+    within: Fraction
+    vectors: tuple[tuple[Fraction, ...], tuple[Fraction, ...]] | None
+
+    @property
+    def final_states(self) -> list[Interval]:
+        """The ends of ``x_k(T)`` of every node."""
+        return [(self.lower, self.upper) if g > 0 else (-self.upper, -self.lower) for g in self.camps]
 
 
 def final_value(mode: Mode, x0: Sequence[Fraction]) -> FinalValue:
@@ -125,25 +159,57 @@ def final_value(mode: Mode, x0: Sequence[Fraction]) -> FinalValue:
     return FinalValue(camps, tuple(nodes.tolist()), -low, high, -most_low, least_high, (fewest, most), (above, below))
 
 
-def constant_final_states(family: Family, x0: Sequence[Fraction]) -> tuple[Interval, ...]:
-    """Return ends of ``x_k(T)`` of every node, under constant weights of any one mode; attained if all values are.
+def value_ends(mode: Mode, x0: Sequence[Fraction]) -> ValueEnds:
+    """Return the ends of :func:`final_value` in numbers that a file holds, rounded outwards where they are long.
 
     Raises
     ------
     HypothesisError
-        Some mode does not come to bipartite consensus.
+        The mode does not come to bipartite consensus.
 
     Examples
     --------
-    >>> pair = Family.from_intervals([("a", "b", -2, -1), ("b", "a", -1, -1)])
-    >>> [tuple(map(str, ends)) for ends in constant_final_states(pair, [Fraction(0), Fraction(6)])]
-    [('-3', '-2'), ('2', '3')]
+    >>> ends = value_ends(Family.from_intervals([("a", "b", -2, -1), ("b", "a", -1, -1)]).modes[0], [0, Fraction(6)])
+    >>> str(ends.lower), str(ends.upper), str(ends.within), ends.camps
+    ('-3', '-2', '0', (1, -1))
     """
-    values = [final_value(mode, x0) for mode in family.modes]
-    ends = [
-        [(v.lower, v.upper) if v.camps[k] > 0 else (-v.upper, -v.lower) for v in values] for k in range(family.n_nodes)
-    ]
-    return tuple((min(low for low, _ in one), max(high for _, high in one)) for one in ends)
+    value = final_value(mode, x0)
+    camps, nodes = tuple(value.camps.tolist()), value.nodes
+    if mode.tied:
+        low, high = -_short_above(-value.lower), _short_above(value.upper)
+        return ValueEnds(camps, nodes, low, high, high - low, None)
+    rows = IntervalRows.of([mode], np.array(nodes))
+    z = [camps[v] * Fraction(x0[v]) for v in nodes]
+    (above, high, over), (below, low, under) = (
+        _short_end(rows, side, h) for side, h in zip((z, [-x for x in z]), value.vectors, strict=True)
+    )
+    return ValueEnds(camps, nodes, -low, high, max(over, under), (above, below))
+
+
+def _short_end(
+    rows: IntervalRows, z: Sequence[Fraction], h: tuple[Fraction, ...]
+) -> tuple[tuple[Fraction, ...], Fraction, Fraction]:
+    """Return short ``h``, the bound of all values that it proves, and how far below some value is at most."""
+    spread = max(z) - min(z)
+    if spread and not all(map(_is_short, h)):
+        largest = int(rows.largest_sums(np.ones(rows.n + rows.outside, dtype=np.int64)).max())
+        share = spread / (rows.unit * largest)
+        unit = Fraction(2) ** (share.numerator.bit_length() - share.denominator.bit_length() - _BITS)
+        h = tuple(round(x / unit) * unit for x in h)
+    values = row_values(rows, z, h)
+    if not spread or max(values) - max(z) > spread / 2**20:  # floats failed
+        h, values = (Fraction(0),) * rows.n, list(z)
+    bound = _short_above(max(values))
+    return h, bound, _short_above(bound - min(values))
+
+
+def _is_short(x: Fraction) -> bool:
+    return max(map(int.bit_length, x.as_integer_ratio())) <= _SHORT
+
+
+def _short_above(x: Fraction) -> Fraction:
+    """Return a number, or where it is long a short one that is a little larger."""
+    return x if _is_short(x) else rounded(x, _BITS, up=True)
 
 
 def largest_row(
@@ -159,12 +225,26 @@ def largest_row(
     >>> str(largest_row(rows, [Fraction(0), Fraction(6)], [Fraction(0), Fraction(3)]))
     '3'
     """
+    values = row_values(rows, z, h, policy)
+    return max(values) if policy is None else min(values)
+
+
+def row_values(
+    rows: IntervalRows, z: Sequence[Fraction], h: Sequence[Fraction], policy: Policy | None = None
+) -> list[Fraction]:
+    """Return ``z_k + sum_l |w_kl| (h_l - h_k)`` of every row of one mode, the largest over all weights or of a policy.
+
+    Examples
+    --------
+    >>> rows = IntervalRows.of(Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 1)]).modes, np.array([0, 1]))
+    >>> list(map(str, row_values(rows, [Fraction(0), Fraction(6)], [Fraction(0), Fraction(2)])))
+    ['2', '4']
+    """
     scale = math.lcm(*(x.denominator for x in h))
     whole = np.array([x.numerator * (scale // x.denominator) for x in h] + [0] * rows.outside, dtype=object)
     pull = rows.pull(whole).ravel() if policy is None else rows.pull_of(policy, whole)
     unit = rows.unit / scale
-    values = (x - unit * p for x, p in zip(z, pull.tolist(), strict=True))
-    return max(values) if policy is None else min(values)
+    return [x - unit * p for x, p in zip(z, pull.tolist(), strict=True)]
 
 
 # ---------------------------------------------------------------------- policy iteration

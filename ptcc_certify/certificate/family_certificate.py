@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from lmi import search_time as deadline
 from lmi.exact.decimal_rounding import down, float_down, float_up
 from lmi.search_time import share_of_time
+from ptcc_certify.bounds.attracting_box import AttractingBox, box_of_family
 from ptcc_certify.bounds.kept_means import with_means
 from ptcc_certify.certificate.certificate_file import FromFile, write_certificate
 from ptcc_certify.certificate.checking import check
@@ -58,6 +59,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 STEPS = ("the decision", "upper bound on the decay rate", "Lyapunov functions", STEP, "independent check")
+BOXES = "boxes of followers"
 #: GB that the check may take for families whose members have more nodes than are solved for exactly.
 LARGE_MEMORY = 16
 #: What certificates of one graph have, and what is in its place here.
@@ -95,6 +97,8 @@ class FamilyCertificate(FamilyContent, FromFile, Shown):
         The signals that it was asked for.
     restricted : tuple of Claim
         What holds for these beside what holds for every signal.
+    boxes : mapping of int to AttractingBox
+        Where every signal brings the followers of components that depend on it, by the numbers of these.
 
     References
     ----------
@@ -287,8 +291,8 @@ def certify_family(
     Raises
     ------
     ParameterError
-        No protocol, a state that does not fit, restricted signals under the sliding-mode protocol, or more than 1,000
-        modes.
+        No protocol, a state that does not fit, restricted signals that are not constant under the sliding-mode
+        protocol, or more than 1,000 modes.
 
     Examples
     --------
@@ -321,21 +325,39 @@ def certify_family(
     sigma, reaching = read_sliding_variable(structure, protocol, sigma0)
     progress(STEPS[0])
     components = decide(family)
-    parts, notes = [], list(family.notes)
+    parts, notes, still = [], list(family.notes), sigma is None or not any(sigma)
     with deadline.time_limit(seconds):
         for component in components:
             part = _prove(component, notes, progress)
-            parts.append(part if initial_state is None or (sigma is not None and any(sigma)) else _with_means(part))
+            parts.append(_with_means(part) if initial_state is not None and still else part)
         if signal != "any":
             progress(STEP)
+        begin = initial_state if still else None
         kept: dict[str, Any] = {
+            "boxes": _boxes(parts, begin, notes),
             "signal": signal,
-            "restricted": claims_for(signal, parts, protocol, initial_state, notes, asked.min_rate),
+            "restricted": claims_for(signal, parts, protocol, begin, notes, asked.min_rate),
         }
     progress(STEPS[3])
     kept |= {"expectations": asked, "notes": tuple(dict.fromkeys(notes)), "scenario": scenario}
     names = origins_of(None, x0, sigma0) | dict(origins or {})
     return FamilyCertificate(family, protocol, tuple(parts), initial_state, sigma, reaching, origins=names, **kept)
+
+
+def _boxes(
+    parts: Sequence[ComponentProof], state: Sequence[Fraction] | None, notes: list[str]
+) -> dict[int, AttractingBox]:
+    """Return the boxes of components that depend on the signal and have followers."""
+    boxes: dict[int, AttractingBox] = {}
+    if state is None:
+        return boxes
+    for number, part in enumerate(parts):
+        if part.component.behaviour == DEPENDS:
+            with share_of_time(1.0, BOXES, notes):
+                x = [state[v] for v in part.component.nodes.tolist()]
+                if (box := box_of_family(part.component.family, x)) is not None:
+                    boxes[number] = box
+    return boxes
 
 
 def _with_means(part: ComponentProof) -> ComponentProof:

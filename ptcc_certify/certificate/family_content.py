@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from lmi.exact.numbers import integers
+from ptcc_certify.bounds.attracting_box import AttractingBox
 from ptcc_certify.bounds.envelope import Instants, remaining_part
 from ptcc_certify.bounds.family_deviation import (
     deviation_on_clock,
@@ -26,7 +27,14 @@ from ptcc_certify.bounds.kept_means import LeadingGroup, leading_groups
 from ptcc_certify.bounds.reaching_phase import ReachingPhase
 from ptcc_certify.certificate.certificate_data import Source
 from ptcc_certify.certificate.request import Expectations
-from ptcc_certify.certificate.restricted_claims import Claim, LastModeClaim, RateClaim, ShareClaim, WindowClaim
+from ptcc_certify.certificate.restricted_claims import (
+    Claim,
+    FinalValueClaim,
+    LastModeClaim,
+    RateClaim,
+    ShareClaim,
+    WindowClaim,
+)
 from ptcc_certify.checker.family_bounds import deviations, ends_near, peaks
 from ptcc_certify.checker.family_function import Scaled
 from ptcc_certify.checker.family_limits import WeightedMean, limits
@@ -160,6 +168,7 @@ class FamilyContent:
     scenario: Mapping[str, Any] | None = None
     signal: SignalClass = "any"
     restricted: tuple[Claim, ...] = ()
+    boxes: Mapping[int, AttractingBox] = field(default_factory=dict)
 
     @property
     def common(self) -> bool:
@@ -202,8 +211,13 @@ class FamilyContent:
     def ends_of_signal(self) -> Mapping[int, LastModeClaim | WindowClaim | ShareClaim]:
         """Where agents end under restricted signals, by the numbers of components that depend on the signal."""
         own = {k for k, part in enumerate(self.parts) if part.component.behaviour == DEPENDS}
-        claims = (claim for claim in self.restricted if not isinstance(claim, RateClaim))
+        claims = (claim for claim in self.restricted if not isinstance(claim, RateClaim | FinalValueClaim))
         return {claim.component: claim for claim in claims if claim.component in own}
+
+    @property
+    def final_values(self) -> Mapping[int, FinalValueClaim]:
+        """Where agents end if mode and weights never change, by the numbers of components of which it is claimed."""
+        return {claim.component: claim for claim in self.restricted if isinstance(claim, FinalValueClaim)}
 
     @property
     def member_bound(self) -> Fraction | None:

@@ -14,6 +14,7 @@ from ptcc_certify.certificate.family_content import FamilyContent
 from ptcc_certify.certificate.format import producer, protocol_section, reaching_section
 from ptcc_certify.certificate.format_family_rows import (
     Step,
+    box_entry,
     form_entry,
     form_steps,
     rows_entry,
@@ -69,6 +70,9 @@ def family_document(certificate: FamilyContent, files: bool = False) -> tuple[di
         "proof": _proof(certificate, components, functions, out),
         "verdict": "certified",
     }
+    if certificate.boxes:
+        labelled = ((k, box, list(components[k].family.labels)) for k, box in sorted(certificate.boxes.items()))
+        document["boxes"] = [box_entry(own, k, box, out) for k, box, own in labelled]
     if certificate.restricted:
         document["restricted"] = [claim_entry(claim, _labels(certificate, claim)) for claim in certificate.restricted]
     return document | {"digest": digest(document), "unverified": _unverified(certificate)}, out
@@ -126,6 +130,7 @@ def _proof(
         steps.append(_step("family-final-state", "final_state", _means(certificate)))
     steps += [_step("input-sliding", "input")] * (certificate.sliding_peaks is not None)
     steps += [_step("family-input", "input")] * (certificate.bounded is not None)
+    steps += [_step("attracting-box", f"boxes[{k}]") for k in range(len(certificate.boxes))]
     for k, claim in enumerate(certificate.restricted):
         own = claim_steps(f"restricted[{k}]", claim)
         steps += [_step(kind, of, witness, **numbers) for kind, of, witness, numbers in own]

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from ptcc_certify.bounds.attracting_box import AttractingBox
 from ptcc_certify.certificate.format_vectors import Writer, factor_entry
+from ptcc_certify.checker.reading import exact
+from ptcc_certify.checker.side_files import SideFiles
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.lyapunov.family_function import FamilyFunction
+from ptcc_certify.lyapunov.family_rows import FollowerDecay
 from ptcc_certify.lyapunov.follower_function import FollowerFunction, LeadingPart
 from ptcc_certify.lyapunov.squares_function import SquaresFunction
 
@@ -54,6 +58,28 @@ def _vector(d: np.ndarray, out: Writer) -> Any:
     if out.aside(d.size) and odd < _FLOAT_BITS and int(d.max()).bit_length() < 1000:
         return out.floats("vector", d.astype(float))
     return [str(x) for x in d.tolist()]
+
+
+def box_entry(labels: list[str], number: int, box: AttractingBox, out: Writer) -> dict[str, Any]:
+    """Return a box of the followers of a component of the agents ``labels``."""
+    return {
+        "component": number,
+        "nodes": [labels[v] for v in box.decay.nodes.tolist()],
+        "vector": _vector(box.decay.vector, out),
+        "lower": list(map(format_exact, box.lower)),
+        "upper": list(map(format_exact, box.upper)),
+        "rate": format_exact(2 * box.decay.rate),
+    }
+
+
+def read_box(entry: Mapping[str, Any], labels: Sequence[str], files: SideFiles) -> AttractingBox:
+    """Return a box of an accepted file."""
+    index = {label: v for v, label in enumerate(labels)}
+    nodes = np.array([index[label] for label in entry["nodes"]], dtype=np.int64)
+    d, _ = files.numbers(entry["vector"], "vector", nodes.size).over(range(nodes.size))
+    decay = FollowerDecay(nodes, np.array(d, dtype=object), exact(entry["rate"]) / 2)
+    lower, upper = (tuple(map(exact, entry[key])) for key in ("lower", "upper"))
+    return AttractingBox(decay, lower, upper)
 
 
 def _part(labels: list[str], number: int, part: LeadingPart) -> dict[str, Any]:

@@ -8,10 +8,19 @@ from functools import lru_cache
 from typing import Any
 
 from lmi.exact.numbers import longest
-from ptcc_certify.certificate.restricted_claims import Claim, LastModeClaim, RateClaim, ShareClaim, WindowClaim
+from ptcc_certify.bounds.family_final_state import ValueEnds
+from ptcc_certify.certificate.restricted_claims import (
+    Claim,
+    FinalValueClaim,
+    LastModeClaim,
+    RateClaim,
+    ShareClaim,
+    WindowClaim,
+)
 from ptcc_certify.checker.reading import exact, interval, triangle
+from ptcc_certify.graphs.family import Mode
 from ptcc_certify.graphs.rationals import format_exact
-from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
+from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY, find_camps
 from ptcc_certify.lyapunov.clock_shares import ShareForm
 from ptcc_certify.lyapunov.family_function import FamilyFunction, prove_ends
 from ptcc_certify.lyapunov.mode_forms import ModeForms
@@ -74,6 +83,10 @@ def claim_entry(claim: Claim, labels: Sequence[str]) -> dict[str, Any]:
             "rate": format_exact(claim.rate),
             "behaviour": claim.behaviour,
         }
+    if isinstance(claim, FinalValueClaim):
+        modes = [None if ends is None else _value_entry(ends, labels) for ends in claim.values]
+        signals = {"claim": "final value", "signals": signal_entry(claim.signal)}
+        return {**signals, "component": claim.component, "modes": modes}
     if not isinstance(claim, RateClaim):
         ends = claim.final_states
         about = {"signals": signal_entry(claim.signal), "component": claim.component}
@@ -94,6 +107,14 @@ def claim_entry(claim: Claim, labels: Sequence[str]) -> dict[str, Any]:
     }
 
 
+def _value_entry(ends: ValueEnds, labels: Sequence[str]) -> dict[str, Any]:
+    names = [labels[v] for v in ends.nodes]
+    entry: dict[str, Any] = {key: format_exact(getattr(ends, key)) for key in ("lower", "upper", "within")}
+    for key, h in zip(("above", "below"), ends.vectors or (None, None), strict=True):
+        entry[key] = None if h is None else dict(zip(names, map(format_exact, h), strict=True))
+    return entry
+
+
 def _lower_triangle(P: Sequence[Sequence[Any]]) -> list[list[str]]:
     return [[format_exact(x) for x in row[: i + 1]] for i, row in enumerate(P)]
 
@@ -106,6 +127,9 @@ def claim_steps(of: str, claim: Claim) -> Iterator[Step]:
             witness = None if rests else {"multipliers": [format_exact(x) for x in tau]}
             yield "family-rate", f"{of}.modes[{mode}]", witness, {"b": format_exact(rate)}
         yield "clock-shares", of, None, {}
+        return
+    if isinstance(claim, FinalValueClaim):
+        yield "final-value", of, None, {}
         return
     if not isinstance(claim, RateClaim):
         yield "last-mode" if isinstance(claim, LastModeClaim) else "joint-windows", of, None, {}
@@ -137,6 +161,9 @@ def read_claim(
     if entry["claim"] == "shares":
         assert isinstance(signal, ClockShares), "the check has verified what a claim is about"
         return ShareClaim(number, signal, _read_share_form(entry, steps, components[number]), exact(entry["rate"]))
+    if entry["claim"] == "final value":
+        pairs = zip(entry["modes"], components[number].family.modes, strict=True)
+        return FinalValueClaim(number, tuple(None if said is None else _read_value(said, mode) for said, mode in pairs))
     if entry["claim"] != "rate":
         ends = entry["final_state"] and tuple((m - r, m + r) for m, r in map(interval, entry["final_state"].values()))
         if entry["claim"] == "last mode":
@@ -152,6 +179,17 @@ def read_claim(
             exact(entry["ratio"]),
         )
     return RateClaim(entry["component"], signal, forms, exact(entry["rate"]), bool(entry["bounded"]))
+
+
+def _read_value(said: Mapping[str, Any], mode: Mode) -> ValueEnds:
+    index, n = {label: v for v, label in enumerate(mode.labels)}, len(mode.labels)
+    camps, _, _ = find_camps(n, mode.source, mode.target, mode.sign)
+    lower, upper, within = (exact(said[key]) for key in ("lower", "upper", "within"))
+    if said["above"] is None:
+        return ValueEnds(tuple(camps.tolist()), tuple(range(n)), lower, upper, within, None)
+    vectors = tuple(tuple(map(exact, said[key].values())) for key in ("above", "below"))
+    nodes = tuple(index[label] for label in said["above"])
+    return ValueEnds(tuple(camps.tolist()), nodes, lower, upper, within, (vectors[0], vectors[1]))
 
 
 def _read_share_form(

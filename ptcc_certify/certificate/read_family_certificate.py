@@ -15,6 +15,7 @@ from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCe
 from ptcc_certify.certificate.family_content import ProvedFunction
 from ptcc_certify.certificate.format import read_protocol, read_reaching
 from ptcc_certify.certificate.format_family import certificate_family
+from ptcc_certify.certificate.format_family_rows import read_box
 from ptcc_certify.certificate.format_restricted import read_claim
 from ptcc_certify.certificate.format_upper_bound import read_upper_bound
 from ptcc_certify.certificate.format_vectors import Reader
@@ -57,6 +58,10 @@ def read_family_certificate(source: Source) -> FamilyCertificate:
     said = tuple(read_claim(f"restricted[{k}]", entry, document["proof"], components) for k, entry in restricted)
     protocol, disturbance = read_protocol(document["protocol"]), document["protocol"].get("disturbance")
     kept: dict[str, Any] = {"signal": said[0].signal if said else "any", "restricted": said, "disturbance": disturbance}
+    kept["boxes"] = {
+        entry["component"]: read_box(entry, components[entry["component"]].family.labels, files)
+        for entry in document.get("boxes", ())
+    }
     kept |= {"expectations": _read_expectations(document["unverified"].get("asked")), "source": source}
     return FamilyCertificate(
         family, protocol, parts, state, sigma0, read_reaching(document["reaching_time"], protocol), **kept

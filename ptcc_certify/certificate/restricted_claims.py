@@ -10,6 +10,7 @@ from ptcc_certify.theorems.family_rate import ExplicitRate
 from ptcc_certify.theorems.restricted_signals import ClockShares, JointWindows, SignalClass
 
 if TYPE_CHECKING:  # classes of signals are told without the solvers
+    from ptcc_certify.bounds.family_final_state import ValueEnds
     from ptcc_certify.checker.reading import Interval
     from ptcc_certify.lyapunov.clock_shares import ShareForm
     from ptcc_certify.lyapunov.mode_forms import ModeForms
@@ -129,4 +130,29 @@ class ShareClaim:
         return self.form.behaviour if self.rate > 0 else None
 
 
-Claim = RateClaim | LastModeClaim | WindowClaim | ShareClaim
+@dataclass(frozen=True, eq=False)
+class FinalValueClaim:
+    """Where the agents of a component end if mode and weights never change: each mode has ends of its own.
+
+    Attributes
+    ----------
+    component : int
+        Its number.
+    values : tuple of ValueEnds or None
+        Of each mode; None where it does not come to bipartite consensus.
+    """
+
+    component: int
+    values: tuple[ValueEnds | None, ...]
+    signal: SignalClass = "constant"
+
+    @property
+    def final_states(self) -> tuple[Interval, ...] | None:
+        """Of each node of the component the ends over all modes; None if some mode has none."""
+        each = [ends.final_states for ends in self.values if ends is not None]
+        if len(each) < len(self.values):
+            return None
+        return tuple((min(low for low, _ in one), max(high for _, high in one)) for one in zip(*each, strict=True))
+
+
+Claim = RateClaim | LastModeClaim | WindowClaim | ShareClaim | FinalValueClaim

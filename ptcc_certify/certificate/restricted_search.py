@@ -11,12 +11,22 @@ from fractions import Fraction
 
 from lmi.exact.elementary_enclosures import log, rounded
 from lmi.search_time import share_of_time
+from ptcc_certify.bounds.attracting_box import have_common_denominator
+from ptcc_certify.bounds.family_final_state import ValueEnds, value_ends
 from ptcc_certify.certificate.family_content import ComponentProof
-from ptcc_certify.certificate.restricted_claims import Claim, LastModeClaim, RateClaim, ShareClaim, WindowClaim
-from ptcc_certify.checker.restricted_signals import agreed_bounds, reachable_bounds
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.certificate.restricted_claims import (
+    Claim,
+    FinalValueClaim,
+    LastModeClaim,
+    RateClaim,
+    ShareClaim,
+    WindowClaim,
+)
+from ptcc_certify.checker.restricted_signals import MANY_CLAIMS, agreed_bounds, reachable_bounds
+from ptcc_certify.errors import HypothesisError, ParameterError
+from ptcc_certify.graphs.family import Mode
 from ptcc_certify.graphs.size_limits import EXACT_NODES
-from ptcc_certify.graphs.structure import STABILITY
+from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
 from ptcc_certify.lyapunov.clock_shares import search_share_form
 from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.mode_forms import ModeForms, search_mode_forms, search_single_forms, within_reach
@@ -42,8 +52,8 @@ _OF_THE_CLOCK = (
 
 
 def require_nominal(signal: SignalClass, protocol: Protocol) -> None:
-    """Refuse restricted signals under the sliding-mode protocol."""
-    if signal != "any" and protocol.reaching is not None:
+    """Refuse restricted signals under the sliding-mode protocol; of constant ones it is said where agents end."""
+    if signal not in ("any", "constant") and protocol.reaching is not None:
         raise ParameterError(
             "restricted signals are certified under the nominal protocol; leave out signal (--signal, --dwell, "
             "--clock-dwell, --clock-window, --share), or take the nominal protocol, NominalProtocol(..)"
@@ -65,8 +75,10 @@ def claims_for(
     signal : SignalClass
     parts : sequence of ComponentProof
         What was proved for every signal.
-    protocol : NominalProtocol
+    protocol : NominalProtocol or SlidingModeProtocol
+        Under the latter only final values are claimed.
     state : sequence of N Fraction, or None
+        None also where sliding variables move.
     notes : list of str
         Is told what the time limit cut off.
     least : Fraction, optional
@@ -75,7 +87,7 @@ def claims_for(
     if signal == "any":
         return ()
     claims: list[Claim] = []
-    for number, part in enumerate(parts):
+    for number, part in enumerate(parts if protocol.reaching is None else ()):
         if part.component.nodes.size == 1 or part.component.behaviour is None:
             continue
         if isinstance(signal, ClockShares):
@@ -91,7 +103,30 @@ def claims_for(
             claims.append(claim)
     if any(isinstance(claim, WindowClaim) for claim in claims):
         notes.append(_OF_THE_CLOCK)
-    return tuple(claims)
+    if signal == "constant" and state is not None:
+        with share_of_time(1.0, STEP, notes):
+            claims += filter(None, (_final_value_claim(number, part, state) for number, part in enumerate(parts)))
+    if len(claims) > MANY_CLAIMS:
+        notes.append(f"{len(claims):,} claims for restricted signals: the first {MANY_CLAIMS} are written")
+    return tuple(claims[:MANY_CLAIMS])
+
+
+def _final_value_claim(number: int, part: ComponentProof, state: Sequence[Fraction]) -> FinalValueClaim | None:
+    """Return where a component ends if nothing changes; None where that is nowhere known, or for every signal."""
+    component, x = part.component, [state[v] for v in part.component.nodes.tolist()]
+    if component.nodes.size == 1 or component.behaviour not in (BIPARTITE_CONSENSUS, DEPENDS):
+        return None
+    if not have_common_denominator(x) or any(group.final_value(x) is not None for group in part.leading_groups):
+        return None
+    values = tuple(_value_ends(mode, x) for mode in component.family.modes)
+    return FinalValueClaim(number, values) if any(values) else None
+
+
+def _value_ends(mode: Mode, x: Sequence[Fraction]) -> ValueEnds | None:
+    try:
+        return value_ends(mode, x)
+    except HypothesisError:
+        return None
 
 
 def _rate_claim(

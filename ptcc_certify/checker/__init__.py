@@ -22,6 +22,7 @@ from typing import Any
 
 from lmi.exact import arithmetic
 from lmi.exact.work import WorkError, limited
+from ptcc_certify.checker.attracting_boxes import check_boxes
 from ptcc_certify.checker.family import check_family
 from ptcc_certify.checker.family_bounds import check_family_bounds
 from ptcc_certify.checker.family_rows import check_family_functions
@@ -54,10 +55,10 @@ GRAPH = "a graph file is not read: compare the SHA-256 that is printed, or use p
 KEYS = (
     *("schema", "producer", "graph", "structure", "claim", "components", "protocol", "paper", "lyapunov", "rates"),
     *("overshoot", "initial_state", "sliding_variable", "influence", "final_state", "reaching_time", "input", "proof"),
-    *("verdict", "digest", "unverified", "restricted"),
+    *("verdict", "digest", "unverified", "boxes", "restricted"),
 )
 #: Parts that need not be there.
-OPTIONAL = ("components", "restricted")
+OPTIONAL = ("components", "boxes", "restricted")
 
 #: Parts that are null in a certificate of a family.
 NOT_OF_FAMILIES = ("paper", "rates", "overshoot", "influence")
@@ -162,6 +163,7 @@ def _verdict(doc: Document) -> str:
     if isinstance(data["graph"], dict) and "modes" in data["graph"]:
         return _family_verdict(doc, protocol)
     need("restricted" not in data, "restricted signals of one graph")
+    need("boxes" not in data, "boxes of one graph")
     graph = check_graph(doc)
     structure = check_structure(doc, graph, data["structure"])
     claim = check_claim(doc, structure, protocol.sliding)
@@ -193,9 +195,8 @@ def _family_verdict(doc: Document, protocol: Protocol) -> str:
     functions = check_family_functions(doc, family)
     drive = check_drive(doc, family, functions, protocol, begin)
     check_family_bounds(doc, family, functions, protocol, begin, drive)
-    need(not (protocol.sliding and "restricted" in doc.data), "restricted signals under the sliding-mode protocol")
-    state = None if begin.state is None else list(begin.state)
-    check_restricted(doc, family, functions, protocol.gains, state)
+    check_boxes(doc, family, begin)
+    check_restricted(doc, family, functions, protocol, begin)
     for key in NOT_OF_FAMILIES:
         need(doc.section(key) is None, "a part that certificates of families do not have")
     return _close(doc, True)

@@ -150,7 +150,7 @@ def check_rows(doc: Document, family: Family, component: Component, entry: Any, 
     others = {v: b * scale for v, b in zip(led, bounds, strict=True)}
     speeds = {v: b for v, b in others.items() if v in pivots}
     sizes |= {v: 0 if v in pivots else b for v, b in others.items()} | dict.fromkeys(resting, 0)
-    pushes = _rows(family, component, followers, sizes, speeds, (rate, scale * common))
+    pushes = check_follower_rows(family, component, followers, sizes, speeds, (rate, scale * common))
     doc.done(f"b = {down(rate)}, {len(followers)} rows")
     all_speeds: list[Scaled] = [pushes, (dict.fromkeys(resting, 0), Fraction(1))]
     all_speeds += [(own, unit * part.times) for part in parts for own, unit in part.function.speeds]
@@ -191,7 +191,7 @@ def _closed(component: Component, parts: Sequence[set[int]], resting: set[int]) 
                 need(home[t] >= 0 and home.get(s) == home[t], "an agent that is no follower hears others")
 
 
-def _rows(
+def check_follower_rows(
     family: Family,
     component: Component,
     followers: Sequence[int],

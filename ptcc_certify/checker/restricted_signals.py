@@ -15,12 +15,14 @@ from lmi.exact.definite import Arithmetic
 from lmi.exact.elementary_enclosures import exp, log
 from lmi.exact.numbers import integers
 from lmi.exact.work import spend
-from ptcc_certify.checker.family import CONSENSUS, CONTAINMENT, INTERVAL, STABILITY, Component, Edge, Family
+from ptcc_certify.checker.constant_weights import check_final_value, fitting_camps
+from ptcc_certify.checker.family import CONSENSUS, CONTAINMENT, INTERVAL, STABILITY, Component, Family
 from ptcc_certify.checker.family_function import decreases, quotient_of
 from ptcc_certify.checker.family_rows import Function
 from ptcc_certify.checker.graph import ordered, positions
 from ptcc_certify.checker.matrix_products import Matrix, combined, need_rows
 from ptcc_certify.checker.proof_cursor import Document
+from ptcc_certify.checker.protocol import Begin, Protocol
 from ptcc_certify.checker.reading import Interval, entries, exact, fields, interval, need, triangle
 
 #: Claims that are read.
@@ -41,19 +43,25 @@ def check_restricted(
     doc: Document,
     family: Family,
     functions: Sequence[Function],
-    gains: dict[str, Fraction],
-    x: Sequence[Fraction] | None,
+    protocol: Protocol,
+    begin: Begin,
 ) -> None:
     """Verify every claim for restricted signals."""
     if "restricted" not in doc.data:
         return
     items = entries(doc.section("restricted"), "restricted")
     need(0 < len(items) <= MANY_CLAIMS, f"no claim for restricted signals, or more than {MANY_CLAIMS}")
+    gains, x = protocol.gains, None if begin.state is None else list(begin.state)
+    need(not (begin.sigma and any(begin.sigma)), "restricted signals while sliding variables move")
     said = [entry.get("signals") if isinstance(entry, dict) else None for entry in items]
     need(all(signals == said[0] for signals in said), "claims about different signals")
     for k, entry in enumerate(items):
         doc.at = of = f"restricted[{k}]"
         kind = entry.get("claim") if isinstance(entry, dict) else None
+        if kind == "final value":
+            check_final_value(doc, family, _component(family, entry.get("component")), x, entry, of)
+            continue
+        need(not protocol.sliding, "restricted signals under the sliding-mode protocol")
         if kind == "rate":
             _check_rate(doc, family, functions, gains, entry, of)
         elif kind == "last mode":
@@ -181,28 +189,11 @@ def mode_behaviour(family: Family, number: int, component: Component) -> str | N
     closed = component.part.closed[number]
     if not any(structure.gauges[k] is not None for k in closed):
         return STABILITY
-    if len(closed) == 1 and _camps_fit(component.nodes, edges):
+    if len(closed) == 1 and fitting_camps(component.nodes, edges) is not None:
         return CONSENSUS
     if any(low < high for _, _, _, low, high in edges):
         return None
     return INTERVAL if len(closed) == 1 else CONTAINMENT
-
-
-def _camps_fit(nodes: Sequence[int], edges: Sequence[Edge]) -> bool:
-    near: dict[int, list[tuple[int, int]]] = {v: [] for v in nodes}
-    for s, t, sign, _, _ in edges:
-        near[s].append((t, sign))
-        near[t].append((s, sign))
-    camp: dict[int, int] = {}
-    for root in nodes:
-        found = [] if root in camp else [root]
-        camp.setdefault(root, 1)
-        for v in found:
-            for u, sign in near[v]:
-                if u not in camp:
-                    camp[u] = sign * camp[v]
-                    found.append(u)
-    return all(camp[t] == sign * camp[s] for s, t, sign, _, _ in edges)
 
 
 def _check_last_mode(doc: Document, family: Family, x: Sequence[Fraction] | None, entry: Any, of: str) -> None:

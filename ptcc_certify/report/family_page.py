@@ -13,6 +13,7 @@ from typing import Any
 
 from markupsafe import Markup
 
+from lmi.exact.decimal_rounding import up
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.certificate.family_comparison import compare
@@ -23,7 +24,7 @@ from ptcc_certify.graphs.family import Mode
 from ptcc_certify.graphs.size_limits import DRAWN_NODES, INPUT_NODES
 from ptcc_certify.protocols.reaching_time import ReachingTime
 from ptcc_certify.report import notation as texts
-from ptcc_certify.report.family_screen import BOUND_KINDS, groups_text, sharpest
+from ptcc_certify.report.family_screen import BOUND_KINDS, box_text, constant_text, groups_text, sharpest
 from ptcc_certify.report.notation import above, rational
 from ptcc_certify.report.plots.counterexample import plot_counterexample
 from ptcc_certify.report.plots.family import plot_family, plot_family_decay
@@ -62,13 +63,24 @@ def family_facts(saved: FamilyCertificate) -> dict[str, Any]:
         "mode_names": [texts.printable(mode_name(family, k)) for k in range(len(family.modes))],
         "rate_bound": min((p.upper_bound for p in saved.parts if p.upper_bound), key=lambda b: b.value, default=None),
         "constant": all(component.nodes.size == 1 for component in components),
-        "restricted": [text for _, text in restricted_entries(saved)] if certified else [],
+        "restricted": _restricted(saved) if certified else [],
+        "boxes": [box_text(components[k], box) for k, box in sorted(saved.boxes.items())] if certified else [],
         "promise": "" if saved.signal == "any" else signal_text(saved.signal)[1],
         "these": states_of_signal(saved) != list(saved.final_states or ()),
         "explicit_power": _explicit_power(saved),
         "sliding": saved.protocol.reaching is not None,
         "peak_agent": None if not saved.input_peaks else family.labels[saved.input_peaks.index(max(saved.input_peaks))],
     }
+
+
+def _restricted(saved: FamilyCertificate) -> list[str]:
+    """Tell what is proved of restricted signals, with the ends of constant weights."""
+    told = [text for _, text in restricted_entries(saved)]
+    if text := constant_text(saved):
+        within = max(ends.within for claim in saved.final_values.values() for ends in claim.values if ends is not None)
+        near = f"some weights come within {up(within, 2)} of either end" if within else "some weights attain these ends"
+        told.append(f"{signal_text('constant')[1]}: at the deadline {text}; {near}")
+    return told
 
 
 def family_view(saved: FamilyCertificate, runs: Sequence[FamilyTrajectory]) -> dict[str, Any]:

@@ -14,7 +14,13 @@ from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import STABILITY
-from ptcc_certify.report.restricted_screen import RESTS, restricted_entries, rests, states_of_signal
+from ptcc_certify.report.restricted_screen import (
+    RESTS,
+    constant_states,
+    restricted_entries,
+    rests,
+    states_of_signal,
+)
 from ptcc_certify.report.sliding_lines import sliding_lines
 from ptcc_certify.report.structure_text import Lines, structure_text
 from ptcc_certify.report.text_layout import (
@@ -37,7 +43,9 @@ from ptcc_certify.theorems.family_groups import FamilyGroups
 from ptcc_certify.theorems.family_rate import explicit_rate
 
 if TYPE_CHECKING:
+    from ptcc_certify.bounds.attracting_box import AttractingBox
     from ptcc_certify.certificate.family_certificate import FamilyCertificate
+    from ptcc_certify.certificate.family_content import FamilyContent
 
 #: Components of which a screen tells, and lines of a text on the short one.
 _COMPONENTS, _LINES = 4, 2
@@ -85,7 +93,7 @@ def family_summary(certificate: FamilyCertificate, name: str, origins: Mapping[s
     entries = [
         *_family_entries(certificate.family, name, origins),
         ("protocol", _protocol_text(certificate, origins)),
-        *_claim_entries(components, f" at T = {near(T)}", disturbed=certificate.sigma0 is not None),
+        *_claim_entries(components, f" at T = {near(T)}", False, certificate.sigma0 is not None, certificate.boxes),
         *_rate_entries(certificate),
         *restricted_entries(certificate),
         *_final_entries(certificate),
@@ -131,7 +139,8 @@ def family_lines(certificate: FamilyCertificate, name: str, origins: Mapping[str
         entries.append(("x(0)", value_list(family.labels, certificate.initial_state) + origin))
     entries += sliding_lines(family.labels, certificate.protocol.reaching, certificate.sigma0, certificate.reaching)
     disturbed = certificate.sigma0 is not None
-    entries += _claim_entries(components, f" at T = {near(certificate.protocol.T)}", every=True, disturbed=disturbed)
+    when = f" at T = {near(certificate.protocol.T)}"
+    entries += _claim_entries(components, when, True, disturbed, certificate.boxes)
     entries += [*_rate_entries(certificate), *restricted_entries(certificate), *_function_entries(certificate)]
     entries += _final_entries(certificate, long=True)
     entries += [*_error_entries(certificate, long=True), *_input_entries(certificate, long=True)]
@@ -221,7 +230,11 @@ def sharpest(component: FamilyComponent) -> str:
 
 
 def _claim_entries(
-    components: Sequence[FamilyComponent], when: str = "", every: bool = False, disturbed: bool = False
+    components: Sequence[FamilyComponent],
+    when: str = "",
+    every: bool = False,
+    disturbed: bool = False,
+    boxes: Mapping[int, AttractingBox] = MappingProxyType({}),
 ) -> Lines:
     """Tell what every component does; where that depends on the signal, why, and what holds all the same."""
     order = sorted(range(len(components)), key=lambda k: -components[k].nodes.size)
@@ -235,9 +248,11 @@ def _claim_entries(
             yield "claim" if not place else "", f"{shorten_list(names, room, components[k].nodes.size)}: {text}"
         if len(components) > _COMPONENTS:
             yield "", f"... {len(components):,} components in all"
-    depending = [components[k] for k in order if components[k].behaviour == DEPENDS]
-    for component in depending[: len(depending) if every else 1]:
-        yield from _depends_entries(component, every)
+    depending = [k for k in order if components[k].behaviour == DEPENDS]
+    for k in depending[: len(depending) if every else 1]:
+        yield from _depends_entries(components[k], every)
+        if k in boxes:
+            yield "box", _cut(box_text(components[k], boxes[k]), every)
 
 
 def _claim_text(component: FamilyComponent, when: str, every: bool, disturbed: bool) -> str:
@@ -307,6 +322,26 @@ def groups_text(component: FamilyComponent) -> str:
     if free:
         parts.append(f"no limit is claimed of {_names(component, free, 30)}")
     return "; ".join(parts)
+
+
+def box_text(component: FamilyComponent, box: AttractingBox) -> str:
+    """Tell into which intervals every signal draws followers, whether or not they come to rest, and at what rate.
+
+    Examples
+    --------
+    >>> moved = Family.from_intervals([(1, 3, 1, 3), (2, 3, 1, 1)])
+    >>> cert = certify(moved, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), {1: 0, 2: 4, 3: 100})
+    >>> box_text(cert.parts[0].component, cert.boxes[0])
+    'every signal draws 3 into [1, 2], at the rate 4; no limit is claimed'
+    """
+    groups: dict[str, list[int]] = {}
+    for v, *ends in zip(box.decay.nodes.tolist(), box.lower, box.upper, strict=True):
+        text = _interval((ends[0], ends[1])).replace("in [", "into [").replace("at ", "to ")
+        groups.setdefault(text, []).append(v)
+    drawn = [f"{_names(component, nodes, 30)} {text}" for text, nodes in groups.items()]
+    return (
+        f"every signal draws {shorten_list(drawn, TEXT)}, at the rate {down(2 * box.decay.rate)}; no limit is claimed"
+    )
 
 
 def _cut(text: str, every: bool) -> str:
@@ -387,6 +422,28 @@ def _final_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
         ends = _interval_entries(certificate.family.labels, states_of_signal(certificate), width)
         what = "x(T)" if rests(certificate) else "x(t)"
         yield from ((name and what, f"{text} (these signals)") for name, text in ends)
+    if text := constant_text(certificate, 12 * TEXT if long else 2 * TEXT - 20):
+        yield "" if certificate.common else "x(T)", f"{text} (constant weights)"
+
+
+def constant_text(certificate: FamilyContent, width: int = 12 * TEXT) -> str:
+    """Tell between which ends agents are at the deadline if mode and weights never change; "" if that says no more.
+
+    Of agents whose end depends on the signal nothing is told here.
+
+    Examples
+    --------
+    >>> unsure = Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 1)])
+    >>> constant_text(certify(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [0, 6], signal="constant"))
+    'every agent in [2, 3]'
+    """
+    columns = certificate.family.labels, constant_states(certificate), certificate.final_states or ()
+    rows = [row for row in zip(*columns, strict=False) if None not in row]
+    if all(_interval(own) == _interval(every) for _, own, every in rows):
+        return ""
+    ((_, text),) = _interval_entries([label for label, *_ in rows], [own for _, own, _ in rows], width)
+    whole = len(rows) == certificate.family.n_nodes
+    return text if whole else text.replace("every agent", shorten_list([label for label, *_ in rows], 4 * TEXT), 1)
 
 
 def _interval_entries(labels: Sequence[str], states: Sequence[tuple[Fraction, Fraction] | None], width: int) -> Lines:

@@ -7,7 +7,13 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from lmi.exact.decimal_rounding import down, near, up
-from ptcc_certify.certificate.restricted_claims import LastModeClaim, RateClaim, ShareClaim, WindowClaim
+from ptcc_certify.certificate.restricted_claims import (
+    FinalValueClaim,
+    LastModeClaim,
+    RateClaim,
+    ShareClaim,
+    WindowClaim,
+)
 from ptcc_certify.checker.reading import Interval
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS
 from ptcc_certify.report.text_layout import printable, shorten_label
@@ -31,6 +37,8 @@ def restricted_entries(certificate: FamilyContent) -> Iterator[tuple[str, str]]:
     >>> cert = certify(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), signal="constant")
     >>> print(*next(restricted_entries(cert)), sep=": ")
     constant: if mode and weights never change: rate 1.58578, as for every signal; nothing more is proved
+
+    Where agents end is told by :func:`constant_states`.
     """
     if certificate.signal == "any":
         return
@@ -39,6 +47,8 @@ def restricted_entries(certificate: FamilyContent) -> Iterator[tuple[str, str]]:
     if not certificate.restricted:
         yield *head[:1], f"{head[1]}: nothing more is proved"  # type: ignore[misc]
     for claim in certificate.restricted:
+        if isinstance(claim, FinalValueClaim):
+            continue
         name = shorten_label(certificate.parts[claim.component].component.family.labels[0])
         where = f"component of {printable(name)}: " if several else ""
         if isinstance(claim, LastModeClaim):
@@ -108,6 +118,24 @@ def last_states(certificate: FamilyContent) -> list[Interval | None]:
         nodes = certificate.parts[number].component.nodes.tolist()
         for v, ends in zip(nodes, claim.final_states or (), strict=False):
             result[v] = ends
+    return [other if ends is None else ends for ends, other in zip(constant_states(certificate), result, strict=True)]
+
+
+def constant_states(certificate: FamilyContent) -> list[Interval | None]:
+    """Return the ends between which agents end if mode and weights never change; None where these are not claimed.
+
+    Examples
+    --------
+    >>> unsure = Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 1)])
+    >>> cert = certify(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [0, 6], signal="constant")
+    >>> [str(x) for x in constant_states(cert)[0]]
+    ['2', '3']
+    """
+    result: list[Interval | None] = [None] * certificate.family.n_nodes
+    for number, claim in certificate.final_values.items():
+        nodes = certificate.parts[number].component.nodes.tolist()
+        for v, ends in zip(nodes, claim.final_states or (), strict=False):
+            result[v] = ends
     return result
 
 
@@ -125,7 +153,8 @@ def rests(certificate: FamilyContent) -> bool:
 
 def _rate_text(certificate: FamilyContent, claim: RateClaim) -> str:
     if claim.forms is None:
-        return f"rate {down(claim.rate)}, as for every signal; nothing more is proved"
+        more = "" if claim.component in certificate.final_values else "; nothing more is proved"
+        return f"rate {down(claim.rate)}, as for every signal{more}"
     text = f"rate {down(claim.rate)}" if claim.rate > 0 else "no rate is proved"
     if claim.ratio > 1 and isinstance(claim.signal, DwellTime):
         text += f", V up to {up(claim.ratio, 3)} times"

@@ -13,7 +13,7 @@ from scipy.linalg import expm
 
 import ptcc_certify.bounds.family_final_state as module
 from ptcc_certify.bounds.attracting_box import attracting_box, invariant_intervals
-from ptcc_certify.bounds.family_final_state import constant_final_states, final_value, weighted_mean_interval
+from ptcc_certify.bounds.family_final_state import final_value, value_ends, weighted_mean_interval
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.family_rows import follower_decay
@@ -75,15 +75,8 @@ def test_final_values_of_large_groups_enclose_the_vertices_closely(seed, monkeyp
 
 def test_followers_have_no_say_and_camps_turn_the_interval():
     family = Family.from_intervals([("a", "b", -2, -1), ("b", "a", -1, -1), ("b", "c", 5, 9)])
-    states = constant_final_states(family, [Fraction(0), Fraction(6), Fraction(100)])
-    assert states == ((Fraction(-3), Fraction(-2)), (Fraction(2), Fraction(3)), (Fraction(2), Fraction(3)))
-
-
-def test_several_constant_modes_end_between_the_ends_of_all():
-    one = Family.from_intervals([("a", "b", 1, 1), ("b", "a", 1, 1)])
-    other = Family.from_intervals([("a", "b", 3, 3), ("b", "a", 1, 1)])
-    ends = constant_final_states(Family.switching([one, other]), [Fraction(0), Fraction(4)])
-    assert ends == ((Fraction(1), Fraction(2)),) * 2
+    ends = value_ends(family.modes[0], [Fraction(0), Fraction(6), Fraction(100)])
+    assert ends.final_states == [(-3, -2), (2, 3), (2, 3)] and ends.nodes == (0, 1)
 
 
 def test_undirected_edges_keep_the_mean_where_directions_apart_would_not():

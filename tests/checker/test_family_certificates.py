@@ -116,7 +116,22 @@ def cases() -> list[tuple[str, Json]]:
     day, night = ([("a", "b", 1, 1)], [("b", "a", 1, 1)])
     modes = {"day": Family.from_intervals(day), "night": Family.from_intervals(night, nodes="ab")}
     found.append(("leaders change", document(Family.switching(modes))))
-    return found + rate_cases(own=True) + restricted_cases() + sliding_cases()
+    return found + rate_cases(own=True) + box_cases() + restricted_cases() + sliding_cases()
+
+
+def box_cases() -> list[tuple[str, Json]]:
+    """True certificates with boxes: targets that uncertain weights move, two modes, foes, two components."""
+    moved = [("a", "c", 1, 3), ("b", "c", -1, -1), ("c", "d", 1, 2), ("a", "d", -1, 0)]
+    modes = [[("a", "c", 1, 1), ("b", "c", 1, 2)], [("a", "c", -2, -1), ("b", "c", 1, 1)]]
+    led = [("a", "b", -2, -1), ("b", "a", -1, -1), ("b", "d", 1, 2), ("c", "d", 1, 2), ("d", "e", 1, 1)]
+    families = [
+        Family.from_intervals(moved, nodes="abcd"),
+        Family.switching([Family.from_intervals(edges, nodes="abc") for edges in modes]),
+        Family.from_intervals([*led, ("f", "g", 1, 2), ("h", "g", 1, 1)]),
+    ]
+    made = [document(family, k + 1) for k, family in enumerate(families)]
+    assert [len(one["boxes"]) for one in made] == [1, 1, 2]
+    return [(f"box {k}", one) for k, one in enumerate(made)]
 
 
 @cache
@@ -167,7 +182,24 @@ def restricted_cases() -> list[tuple[str, Json]]:
         made = certify_family(modes, PROTOCOL, None, signal=ClockShares(["0.8", "0.1", "0.1"]))
         assert made.restricted
         found.append((f"shares {k}", {**made.to_dict(), "unverified": {}}))
-    return found
+    return found + final_value_cases()
+
+
+def final_value_cases() -> list[tuple[str, Json]]:
+    """True certificates of where agents end under constant weights: one mode, several, undirected, at rest before."""
+    pair = [("a", "b", -2, -1), ("b", "a", -1, -1), ("b", "c", 1, 3), ("c", "b", 0, 1)]
+    other = Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 3), ("b", "c", 1, 1)])
+    tied = Family.from_intervals([("a", "b", 1, 2), ("b", "c", -3, -1)], undirected=True)
+    gains = {"T_r": 1, "T_s": 1, "rho1": 1, "rho2": 1, "kappa": 3, "mu1": 2, "mu2": 1, "mu3": 1, "delta": 1}
+    apart = Family.from_intervals([*pair, ("d", "e", 1, 2), ("e", "d", 1, 1), ("f", "g", 1, 2)])
+    made = [
+        certify_family(Family.from_intervals(pair), PROTOCOL, [1, "-5/3", 4], signal="constant", time_limit=3),
+        certify_family(Family.switching([other, tied]), PROTOCOL, [1, 5, -2], signal="constant", time_limit=3),
+        certify_family(other, SlidingModeProtocol(**gains), [1, 5, -2], signal="constant", time_limit=3),
+        certify_family(apart, PROTOCOL, range(1, 8), signal="constant", time_limit=3),
+    ]
+    assert all(one.final_values for one in made)
+    return [(f"final value {k}", {**one.to_dict(), "unverified": {}}) for k, one in enumerate(made)]
 
 
 def sliding_cases() -> list[tuple[str, Json]]:

@@ -1,0 +1,92 @@
+"""Verifies boxes to which followers come under every signal, where what they follow need not come to rest.
+
+Section 19 of the format. Agents that are no followers hear none of these, and stay within what reaches them of
+``+-x_l(0)`` at all times. With these ends, ``u`` and ``l`` of the followers, ``y_l = u_l`` for positive and ``-l_l``
+for negative edges, let for every follower ``k`` in every mode
+
+    sum_l |w_kl| (u_k - y_l)  >=  0        at w+ where y_l > u_k, at w- elsewhere,
+
+and the mirror image for ``-l_k``. With ``d`` of followers whose rows decay, ``rho``, the largest of 0,
+``(x_k - u_k) / d_k`` and ``(l_k - x_k) / d_k``, decays likewise: where it is taken, add both rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any
+
+from lmi.exact.decimal_rounding import down
+from lmi.exact.numbers import integers, longest, sized
+from lmi.exact.work import spend
+from ptcc_certify.checker.family import Component, Family
+from ptcc_certify.checker.family_rows import check_follower_rows
+from ptcc_certify.checker.graph import positions
+from ptcc_certify.checker.proof_cursor import Document
+from ptcc_certify.checker.protocol import Begin
+from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, need
+from ptcc_certify.checker.restricted_signals import reachable_bounds
+
+KEYS = ("component", "nodes", "vector", "lower", "upper", "rate")
+
+
+def check_boxes(doc: Document, family: Family, begin: Begin) -> None:
+    """Verify every box."""
+    if "boxes" not in doc.data:
+        return
+    items = entries(doc.section("boxes"), "boxes")
+    need(bool(items), "no box")
+    need(not (begin.sigma and any(begin.sigma)), "a box while sliding variables move")
+    if begin.state is None:
+        raise RejectedError("a box without an initial state")
+    x, last = list(begin.state), -1
+    for k, entry in enumerate(items):
+        doc.at = of = f"boxes[{k}]"
+        number = fields(entry, KEYS, "a box")["component"]
+        need(type(number) is int and last < number < len(family.components), "an unknown component, or out of order")
+        need(family.components[number].depends, "a box where all agents come to rest")
+        doc.open("attracting-box", of)
+        _check_box(doc, family, family.components[number], x, entry)
+        last = number
+
+
+def _check_box(doc: Document, family: Family, component: Component, x: Sequence[Fraction], entry: Any) -> None:
+    edges = component.part.edges
+    spend(100 * sum(1 + len(some) for some in edges), what="boxes")
+    nodes = positions(doc, family.modes[0].structure.graph, entry["nodes"], "followers")
+    inside = set(nodes)
+    need(bool(nodes) and nodes == [v for v in component.nodes if v in inside], "followers")
+    need(all(t in inside for some in edges for s, t, *_ in some if s in inside), "a follower is heard by another agent")
+    rate, n = exact(entry["rate"]), len(nodes)
+    need(rate > 0, "the rate is not positive")
+    vector = doc.files.numbers(entry["vector"], "vector", n)
+    need(vector.positive(), "the vector is not positive")
+    d, scale = vector.over(range(n))
+    rest = [v for v in component.nodes if v not in inside]
+    sizes = dict(zip(nodes, d, strict=True)) | dict.fromkeys(rest, 0)
+    check_follower_rows(family, component, nodes, sizes, {}, (rate, scale))
+    reach = reachable_bounds(component.nodes, {edge[:3] for some in edges for edge in some}, x)
+    lower, upper = ([exact(value) for value in entries(entry[key], key, n)] for key in ("lower", "upper"))
+    (low, high), _ = integers([lower + [reach[v][0] for v in rest], upper + [reach[v][1] for v in rest]])
+    top = dict(zip([*nodes, *rest], high, strict=True))
+    bottom = dict(zip([*nodes, *rest], [-y for y in low], strict=True))
+    _check_ends(family, component, nodes, top, bottom)
+    doc.done(f"rate {down(rate)}, {n} followers")
+
+
+def _check_ends(
+    family: Family, component: Component, nodes: Sequence[int], top: dict[int, int], bottom: dict[int, int]
+) -> None:
+    """Verify the rows of ``u`` and ``-l`` in every mode."""
+    long = max(longest(top.values()), longest(bottom.values()))
+    for edges in component.part.edges:
+        bits = longest(edge[4] for edge in edges)
+        spend(4 * len(edges), long, bits, "boxes")
+        sized(2 * len(nodes), long + bits + 64, "boxes")
+        pulls = dict.fromkeys(nodes, 0), dict.fromkeys(nodes, 0)
+        for s, t, sign, low, high in edges:
+            if t in pulls[0]:
+                for pull, own, same, other in ((pulls[0], top, top, bottom), (pulls[1], bottom, bottom, top)):
+                    gap = own[t] - (same if sign > 0 else other)[s]
+                    pull[t] += (high if gap < 0 else low) * gap
+        need(all(y >= 0 for pull in pulls for y in pull.values()), "an agent may leave the box")

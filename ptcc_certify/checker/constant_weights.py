@@ -1,0 +1,117 @@
+"""Verifies where a mode that comes to bipartite consensus ends if its weights are constant, and nobody knows them.
+
+Section 19 of the format. Let ``R`` be the leaders of the mandatory graph and all that they hear through edges of the
+mode; ``c = eta' z``, with ``z_k = g_k x_k(0)`` and ``eta >= 0`` of sum 1 on ``R`` with ``eta' M(L) = 0``. If
+
+    z_k + sum_l |w_kl| (h_l - h_k)  <=  upper        at w+ where h_l > h_k, at w- elsewhere,
+
+for every ``k`` in ``R``, then ``c <= upper`` for all weights: multiply by ``eta_k`` and add. By the same sum the member
+with these very weights has ``c`` at least the least of these rows. The lower end is that of ``-z``. Where both
+directions of every edge change together, ``eta`` is equal on ``R``, and ``c`` the mean of ``z``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any
+
+from lmi.exact.decimal_rounding import down, up
+from lmi.exact.numbers import integers, longest, sized
+from lmi.exact.work import spend
+from ptcc_certify.checker.family import Component, Edge, Family, Mode
+from ptcc_certify.checker.family_limits import agents_heard
+from ptcc_certify.checker.graph import ordered
+from ptcc_certify.checker.proof_cursor import Document
+from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, need
+
+KEYS = ("claim", "signals", "component", "modes")
+VALUE = ("lower", "upper", "within", "above", "below")
+
+
+def fitting_camps(nodes: Sequence[int], edges: Sequence[Edge]) -> dict[int, int] | None:
+    """Return camps that all edges fit, the first node of every piece +1; None if there are none.
+
+    Examples
+    --------
+    >>> fitting_camps([0, 1], [(0, 1, -1, 0, 1)]), fitting_camps([0, 1], [(0, 1, -1, 0, 1), (1, 0, 1, 1, 1)])
+    ({0: 1, 1: -1}, None)
+    """
+    near: dict[int, list[tuple[int, int]]] = {v: [] for v in nodes}
+    for s, t, sign, _, _ in edges:
+        near[s].append((t, sign))
+        near[t].append((s, sign))
+    camp: dict[int, int] = {}
+    for root in nodes:
+        found = [] if root in camp else [root]
+        camp.setdefault(root, 1)
+        for v in found:
+            for u, sign in near[v]:
+                if u not in camp:
+                    camp[u] = sign * camp[v]
+                    found.append(u)
+    return camp if all(camp[t] == sign * camp[s] for s, t, sign, _, _ in edges) else None
+
+
+def check_final_value(
+    doc: Document, family: Family, component: Component, x: Sequence[Fraction] | None, entry: Any, of: str
+) -> None:
+    """Verify the ends of the consensus value of every mode of which it is claimed."""
+    fields(entry, KEYS, "a claim")
+    need(entry["signals"] == "constant", "a final value of weights that may change")
+    if x is None:
+        raise RejectedError("a final value without an initial state")
+    doc.open("final-value", of)
+    said = entries(entry["modes"], "modes", len(family.modes))
+    need(any(one is not None for one in said), "no final value of any mode")
+    found = [_check_mode(family, component, k, x, one) for k, one in enumerate(said) if one is not None]
+    low, high, within = min(v[0] for v in found), max(v[1] for v in found), max(v[2] for v in found)
+    doc.done(f"camps times {down(low)} to {up(high)}, attained within {up(within, 2)}")
+
+
+def _check_mode(
+    family: Family, component: Component, number: int, x: Sequence[Fraction], entry: Any
+) -> tuple[Fraction, Fraction, Fraction]:
+    fields(entry, VALUE, "a final value")
+    mode, edges, closed = family.modes[number], component.part.edges[number], component.part.closed[number]
+    spend(100 * (len(edges) + len(component.nodes)), what="final values")
+    camps = fitting_camps(component.nodes, edges)
+    if camps is None or len(closed) != 1:
+        raise RejectedError("a mode that does not come to bipartite consensus")
+    pivot = mode.structure.closed[closed[0]][0]
+    nodes = agents_heard(((s, t) for s, t, *_ in edges), {0: pivot})[0]
+    (z,), scale = integers([[camps[v] * x[v] for v in nodes]])
+    lower, upper, within = (exact(entry[key]) for key in ("lower", "upper", "within"))
+    need(lower <= upper, "the lower end is the larger")
+    if mode.tied:
+        need(entry["above"] is None and entry["below"] is None, "vectors of weights that change together")
+        mean = Fraction(sum(z), scale * len(z))
+        need(lower <= mean <= upper and mean + within >= upper and mean - within <= lower, "the mean is not enclosed")
+        return lower, upper, within
+    labels, into = [family.labels[v] for v in nodes], set(nodes)
+    own = [edge for edge in edges if edge[1] in into]
+    for key, side, end in (("above", 1, upper), ("below", -1, -lower)):
+        h = [exact(value) for value in ordered(labels, entry[key], key).values()]
+        most, least = _row_ends(mode, own, nodes, [side * y for y in z], scale, h)
+        need(most <= end, "a row exceeds the end")
+        need(end <= least + within, "no weights are known to come so near to the end")
+    return lower, upper, within
+
+
+def _row_ends(
+    mode: Mode, edges: Sequence[Edge], nodes: Sequence[int], z: Sequence[int], scale: int, h: Sequence[Fraction]
+) -> tuple[Fraction, Fraction]:
+    """Return the largest and the least row at the weights that are the largest for it; ``z`` is over ``scale``."""
+    (whole,), divisor = integers([h])
+    bits = longest(edge[4] for edge in edges) + longest(whole)
+    unit = mode.unit * divisor
+    spend(2 * len(edges), longest(whole), longest(edge[4] for edge in edges), "final values")
+    spend(2 * len(nodes), bits + longest(z), unit.bit_length() + scale.bit_length(), "final values")
+    sized(2 * len(nodes), bits + longest(z) + unit.bit_length() + scale.bit_length(), "final values")
+    place = dict(zip(nodes, whole, strict=True))
+    pull = dict.fromkeys(nodes, 0)
+    for s, t, _, low, high in edges:
+        gap = place[s] - place[t]
+        pull[t] += (high if gap > 0 else low) * gap
+    rows = [unit * y + scale * p for y, p in zip(z, pull.values(), strict=True)]
+    return Fraction(max(rows), unit * scale), Fraction(min(rows), unit * scale)

@@ -1,0 +1,231 @@
+"""Where agents end under constant weights that nobody knows: all vertices, forged files, screens, what is read back."""
+
+from __future__ import annotations
+
+import itertools
+import random
+import re
+from fractions import Fraction
+from typing import Any
+
+import pytest
+from mutations import changed, leaves, resealed
+from row_families import exact_value, random_consensus, vertices
+
+from ptcc_certify import Family, NominalProtocol, SlidingModeProtocol
+from ptcc_certify.bounds.family_final_state import value_ends
+from ptcc_certify.certificate.certificate import read_certificate
+from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
+from ptcc_certify.certificate.restricted_claims import FinalValueClaim
+from ptcc_certify.checker import check
+from ptcc_certify.report.family_screen import family_lines, family_summary
+from ptcc_certify.report.page import report_html
+from ptcc_certify.report.restricted_screen import constant_states
+from ptcc_certify.report.statement import family_latex
+
+PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
+GAINS = {"T_r": 1, "T_s": 1, "rho1": 1, "rho2": 1, "kappa": 3, "mu1": 2, "mu2": 1, "mu3": 1, "delta": 1}
+PAIR = [("a", "b", -2, -1), ("b", "a", -1, -1), ("b", "c", 5, 9)]
+
+
+def made(family: Family, x0: Any, protocol: Any = PROTOCOL, **more: Any) -> FamilyCertificate:
+    return certify_family(family, protocol, x0, signal="constant", time_limit=3, **more)
+
+
+def claim_of(certificate: FamilyCertificate) -> FinalValueClaim:
+    (claim,) = certificate.final_values.values()
+    return claim
+
+
+def random_state(rng: random.Random, n: int) -> list[Fraction]:
+    return [Fraction(rng.randint(-20, 20), rng.randint(1, 7)) for _ in range(n)]
+
+
+def values_of_vertices(family: Family, x: list[Fraction], camps: tuple[int, ...]) -> list[Fraction]:
+    """The consensus values of all members with weights at ends of their intervals, in rationals."""
+    mode = family.modes[0]
+    z, values = [g * y for g, y in zip(camps, x, strict=True)], []
+    for largest in vertices(mode):
+        sizes = [(mode.upper if up else mode.lower).fraction(e) for e, up in enumerate(largest.tolist())]
+        edges = zip(mode.source.tolist(), mode.target.tolist(), sizes, strict=True)
+        values.append(exact_value(len(z), [edge for edge in edges if edge[2]], z))
+    return values
+
+
+def compare(seed: int) -> int:
+    rng = random.Random(seed)
+    family = random_consensus(rng)
+    x = random_state(rng, family.n_nodes)
+    certificate = made(family, x)
+    assert certificate.verdict == "certified" and check(certificate.to_dict(), stdlib=True).accepted
+    if not certificate.final_values:
+        assert family.n_nodes == 1 or certificate.final_states[0][0] == certificate.final_states[0][1]
+        return 0
+    (ends,) = claim_of(certificate).values
+    values = values_of_vertices(family, x, ends.camps)
+    assert (ends.lower, ends.upper, ends.within) == (min(values), max(values), 0)
+    for (low, high), (wide_low, wide_high) in zip(ends.final_states, certificate.final_states, strict=True):
+        assert wide_low <= high and low <= wide_high
+    return 1
+
+
+def test_the_ends_that_are_certified_are_those_of_all_vertices():
+    assert sum(map(compare, range(8))) >= 4
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("start", range(8, 128, 12))
+def test_the_ends_that_are_certified_are_those_of_all_vertices_of_more_graphs(start: int):
+    assert sum(map(compare, range(start, start + 12))) >= 4
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_long_numbers_are_rounded_outwards_and_some_weights_come_as_near_as_is_said(seed: int, monkeypatch: Any):
+    monkeypatch.setattr("ptcc_certify.bounds.family_final_state._SHORT", 8)
+    rng = random.Random(seed)
+    family = random_consensus(rng)
+    x = random_state(rng, family.n_nodes)
+    ends = value_ends(family.modes[0], x)
+    values = values_of_vertices(family, x, ends.camps)
+    assert ends.lower <= min(values) <= ends.lower + ends.within
+    assert ends.upper - ends.within <= max(values) <= ends.upper
+    assert ends.within <= max(map(abs, values)) * Fraction(1, 10**15)
+
+
+def test_a_group_of_more_agents_than_are_solved_for_exactly_is_certified_all_the_same():
+    rng, n = random.Random(5), 150
+    edges = {(k, (k + 1) % n): (rng.randint(1, 9), rng.randint(10, 19)) for k in range(n)}
+    edges |= {pair: (0, 5) for _ in range(n) if (pair := (rng.randrange(n), rng.randrange(n))) not in edges}
+    family = Family.from_intervals([(s, t, *ends) for (s, t), ends in edges.items() if s != t])
+    certificate = made(family, [rng.randint(-9, 9) for _ in range(n)])
+    (ends,) = claim_of(certificate).values
+    assert certificate.verdict == "certified" and ends.within < (ends.upper - ends.lower) / 10**9
+    assert ends.upper - ends.lower < 18
+
+
+def test_modes_have_ends_of_their_own_and_undirected_ones_their_mean():
+    directed = Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 1)])
+    tied = Family.from_intervals([("a", "b", -2, -1)], undirected=True)
+    certificate = made(Family.switching([directed, tied]), [0, 6])
+    first, second = claim_of(certificate).values
+    assert (first.lower, first.upper) == (2, 3) and (second.lower, second.upper, second.vectors) == (-3, -3, None)
+    assert constant_states(certificate) == [(-3, 3), (2, 3)] and certificate.verdict == "certified"
+    other = Family.switching([directed, Family.from_intervals([("a", "b", 1, 1), ("b", "a", -1, -1)])])
+    assert claim_of(made(other, [0, 6])).values[1] is None and constant_states(made(other, [0, 6])) == [None, None]
+
+
+def test_nothing_is_claimed_where_it_would_say_no_more():
+    a_leader, unbalanced = [("a", "b", 1, 2)], [("a", "b", 1, 1), ("b", "a", -1, -1)]
+    for edges in (a_leader, unbalanced, [("a", "c", 1, 1), ("b", "c", 1, 2)]):
+        family = Family.from_intervals(edges)
+        assert not made(family, range(family.n_nodes)).final_values
+    assert not made(Family.from_intervals(a_leader, undirected=True), [0, 1]).final_values
+    assert not made(Family.from_intervals(PAIR), None).final_values
+    assert not certify_family(Family.from_intervals(PAIR), PROTOCOL, [0, 6, 1], time_limit=3).restricted
+
+
+def test_at_rest_in_the_sliding_mode_the_ends_are_the_same_and_none_are_claimed_otherwise():
+    family, protocol = Family.from_intervals(PAIR), SlidingModeProtocol(**GAINS)
+    certificate = made(family, [0, 6, 100], protocol)
+    assert certificate.verdict == "certified" and constant_states(certificate) == [(-3, -2), (2, 3), (2, 3)]
+    assert read_certificate(certificate.to_dict()) == certificate and len(certificate.restricted) == 1
+    moving = made(family, [0, 6, 100], protocol, sigma0=[1, 0, 0])
+    assert moving.verdict == "certified" and not moving.restricted
+    forged = {**moving.to_dict(), "restricted": certificate.to_dict()["restricted"]}
+    assert "while sliding variables move" in (check(resealed(forged)).reason or "")
+
+
+def test_what_is_read_back_says_the_same():
+    certificate = made(Family.from_intervals(PAIR), [0, 6, 100])
+    again = read_certificate(certificate.to_dict())
+    assert again == certificate and family_lines(again, "f")[2:] == family_lines(certificate, "f")[2:]
+    (own,), (other,) = claim_of(certificate).values, claim_of(again).values
+    assert own.__dict__ == other.__dict__
+
+
+def test_screen_page_and_statement_tell_the_ends_of_constant_weights():
+    saved = read_certificate(made(Family.from_intervals(PAIR), [0, 6, 100]).to_dict())
+    text = "\n".join(family_summary(saved, "pair"))
+    assert "           a in [-3, -2], b, c in [2, 3] (constant weights)" in text and "(every signal)" in text
+    assert "as for every signal\n" in text and "nothing more is proved" not in text
+    page = " ".join(re.sub("<[^>]*>", " ", report_html(saved)).split())
+    told = (
+        "f mode and weights never change: at the deadline a in [-3, -2], b, c in [2, 3]; some weights attain these ends"
+    )
+    assert f"I{told}." in page
+    assert f"(i{told.replace(': ', ') more is proved: ', 1)}." in family_latex(saved)
+
+
+def test_where_modes_have_camps_of_their_own_each_ends_within_the_ends_of_all():
+    modes = [[("a", "b", 1, 2), ("b", "a", 1, 1)], [("a", "b", -2, -1), ("b", "a", -1, -1)]]
+    certificate = made(Family.switching([Family.from_intervals(edges) for edges in modes]), [0, 6])
+    saved = read_certificate(certificate.to_dict())
+    assert "x(T)       a in [-3, 3], b in [2, 3] (these signals)" in "\n".join(family_summary(saved, "pair"))
+    assert "constant weights" not in "\n".join(family_summary(saved, "pair"))
+    assert "each stays within: a [\N{MINUS SIGN}3,\N{NO-BREAK SPACE}3]; b" in re.sub(
+        " +", " ", re.sub("<[^>]*>", " ", report_html(saved))
+    )
+
+
+# ---------------------------------------------------------------------- forged files
+
+
+def test_no_other_number_of_a_final_value_is_accepted_unless_it_is_true():
+    """Every number of the claim nudged: what is accepted claims no less than the truth."""
+    data = made(Family.from_intervals(PAIR), [0, 6, 100]).to_dict()
+    (place,) = [k for k, claim in enumerate(data["restricted"]) if claim["claim"] == "final value"]
+    count = 0
+    for path, value in leaves(data["restricted"][place]["modes"]):
+        for step in ("-1", "1", "-1/1000000", "1/1000000"):
+            new = str(Fraction(value) + Fraction(step))
+            mutant = resealed(changed(data, ("restricted", place, "modes", *path), new))
+            report = check(mutant, stdlib=True)
+            said = mutant["restricted"][place]["modes"][0]
+            low, high, within = (Fraction(said[key]) for key in ("lower", "upper", "within"))
+            assert not report.accepted or (low <= -3 and high >= -2 and within >= max(-3 - low, high + 2)), path
+            count += not report.accepted
+    assert count >= 20
+
+
+@pytest.mark.parametrize(
+    ("path", "new"),
+    [
+        (("signals",), {"dwell": "1", "clock": "t"}),
+        (("component",), 1),
+        (("modes",), [None]),
+        (("modes",), []),
+        (("modes", 0, "above"), None),
+        (("modes", 0, "above"), {"a": "0"}),
+        (("modes", 0, "above"), {"b": "0", "a": "0"}),
+        (("modes", 0, "below"), {"a": "0", "b": "0", "c": "0"}),
+        (("modes", 0, "within"), "-1"),
+        (("modes", 0, "lower"), "-1"),
+    ],
+)
+def test_what_does_not_fit_is_rejected(path: tuple[Any, ...], new: Any):
+    data = made(Family.from_intervals(PAIR), [0, 6, 100]).to_dict()
+    assert check(data).accepted
+    assert check(resealed(changed(data, ("restricted", 1, *path), new))).rejected
+
+
+def test_optional_edges_count_for_who_decides():
+    """``c`` is heard only at times; then its state counts, and a claim about ``a``, ``b`` alone is refused."""
+    edges = [("a", "b", 1, 1), ("b", "a", 1, 1), ("b", "c", 1, 1), ("c", "b", 0, 1)]
+    data = made(Family.from_intervals(edges), [0, 2, 10]).to_dict()
+    (place,) = [k for k, claim in enumerate(data["restricted"]) if claim["claim"] == "final value"]
+    said = data["restricted"][place]["modes"][0]
+    assert list(said["above"]) == ["a", "b", "c"] and said["lower"] == "1" and said["upper"] == "4"
+    for key in ("above", "below"):
+        short = {k: v for k, v in said[key].items() if k != "c"}
+        assert check(resealed(changed(data, ("restricted", place, "modes", 0, key), short))).rejected
+
+
+def test_a_vector_of_another_mode_proves_nothing():
+    one, other = ([("a", "b", 1, 2), ("b", "a", 1, 1)], [("a", "b", 5, 6), ("b", "a", 1, 1)])
+    data = made(Family.switching([Family.from_intervals(one), Family.from_intervals(other)]), [0, 6]).to_dict()
+    (place,) = [k for k, claim in enumerate(data["restricted"]) if claim["claim"] == "final value"]
+    modes = data["restricted"][place]["modes"]
+    for some in itertools.permutations([*modes, None], 2):
+        mutant = resealed(changed(data, ("restricted", place, "modes"), list(some)))
+        right = all(said is None or said == modes[k] for k, said in enumerate(some))
+        assert check(mutant).accepted == right
