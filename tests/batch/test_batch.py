@@ -507,8 +507,17 @@ def test_a_script_without_a_main_part_is_told_so(tmp_path: Path):
 
 
 def test_an_unknown_setting_is_refused():
-    with pytest.raises(ParameterError, match="speed"):
+    with pytest.raises(ParameterError, match="certify_many has no parameter speed"):
         quickly(TRIANGLE, speed=3)
+
+
+def test_uncertain_weights_of_many_graphs_are_refused_with_the_way_round():
+    with pytest.raises(
+        ParameterError, match=r'one graph each: \[ptcc.certify\(g, p, uncertainty="20%"\) for g in graphs\]'
+    ):
+        quickly([TRIANGLE, "fig1a"], uncertainty="20%")
+    run = ptcc("batch", "fig1a", "fig1b", "--uncertainty", "20%")
+    assert run.code == 2 and run.err.endswith("of many graphs certify each: ptcc certify GRAPH --uncertainty\n")
 
 
 def test_csv_and_parquet_hold_the_same():
