@@ -188,6 +188,8 @@ _PLACES |= dict.fromkeys(("behaviour", "min_rate", "max_input"), "Expectations")
 _ALSO_CALLED = {"edges": "orientation", "direction": "orientation", "initial_state": "x0", "t": "times"}
 _ALSO_CALLED |= {"expect": "expectations", "initial_bound": "initial_set"}
 
+#: How else an object of a class is made, from what one has at hand.
+_MAKERS = {"SignedDigraph": ", or SignedDigraph.from_edges([(source, target, weight), ...])"}
 #: Restricted signals, by what may be taken for keywords of certify.
 _SIGNALS = dict.fromkeys(("dwell", "dwell_time", "clock_dwell"), "DwellTime(...)")
 _SIGNALS |= dict.fromkeys(("window", "windows", "clock_window", "window_on"), "JointWindows(...)")
@@ -234,7 +236,8 @@ def _misfit(called: Any, signature: inspect.Signature, args: tuple[Any, ...], ke
     required = [key for key, one in parameters.items() if one.default is one.empty and one.kind is not one.VAR_KEYWORD]
     if missing := [key for key in required if key not in given and key not in keywords]:
         call = [f"{key}=..." if parameters[key].kind is inspect.Parameter.KEYWORD_ONLY else key for key in required]
-        return f"{name} asks for {', '.join(missing)}; write {name}({', '.join(call)})"
+        also = _MAKERS.get(name, "")
+        return f"{name} asks for {', '.join(missing)}; write {name}({', '.join(call)}){also}"
     return f"{name} takes {', '.join(places) or 'nothing'} without a name, each once; write any other as name=value"
 
 
