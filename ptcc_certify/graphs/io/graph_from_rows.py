@@ -16,6 +16,8 @@ from ptcc_certify.graphs.rationals import MINUS, nearest_float, parse_exact, sho
 
 #: What the first row of a table without a header may be.
 HEADER_MEND = "; if this row is a header, name its columns source, target, weight"
+#: What is said at once of a table with such a row and decimal commas.
+DECIMALS = "; write decimals with a point, too"
 
 
 @dataclass
@@ -127,7 +129,7 @@ class _Draft:
             elif MINUS in text:
                 mend = f"write {text.replace(MINUS, '-')[:40]}"
             elif code == 0 and self.rows.headerless and "finite" not in message:
-                mend += HEADER_MEND
+                mend += HEADER_MEND + DECIMALS * any("," in other for other in self.rows.weights[1:])
         edge = int(np.argmax(self.codes == code))
         return self.refuse(edge, f"weight {quoted} of edge {self.edge(edge)}{message}; {mend}")
 
@@ -135,7 +137,8 @@ class _Draft:
         loops = np.flatnonzero(self.source == self.target)
         if loops.size and not allowed:
             which = f"{shorten(self.rows.labels[self.source[loops[0]]])}{_in_all(loops.size)}"
-            self.refuse(loops[0], f"self-loop at node {which}; remove it, or drop all with --drop-self-loops")
+            mend = "remove these rows" if loops.size > 1 and self.rows.where(0).startswith("line") else "remove it"
+            self.refuse(loops[0], f"self-loop at node {which}; {mend}, or drop all with --drop-self-loops")
         self.keep(self.source != self.target)
         return int(loops.size)
 
