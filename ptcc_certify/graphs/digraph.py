@@ -100,15 +100,14 @@ def _common_scale(values: Sequence[Fraction]) -> int | None:
     return scale if all(abs(v * scale) <= _INT64_LIMIT for v in values) else None
 
 
-def in_all(which: np.ndarray) -> str:
+def in_all(count: int) -> str:
     """Tell how many there are of which a refusal names one.
 
     Examples
     --------
-    >>> in_all(np.array([True, False])), in_all(np.array([True, True]))
+    >>> in_all(1), in_all(2)
     ('', ' (2 in all)')
     """
-    count = int(np.count_nonzero(which))
     return f" ({count} in all)" if count > 1 else ""
 
 
@@ -197,7 +196,7 @@ class SignedDigraph(ReadOnly, Shown):
         loops = source == target
         odd = ~((size >= SMALLEST_WEIGHT) & (size <= LARGEST_WEIGHT))
         for bad, message in (
-            (loops, f"self-loop at node {{0}}{in_all(loops)}; remove {'them' if loops.sum() > 1 else 'it'}"),
+            (loops, f"self-loop at node {{0}}{in_all(loops.sum())}; remove {'them' if loops.sum() > 1 else 'it'}"),
             (again, "two edges {0} -> {1}; keep one"),
             (table == 0, "weight 0 of edge {0} -> {1}: neither ally nor opponent; remove it or give a weight"),
             (long, "weight of edge {0} -> {1} has too many digits to keep; round it"),

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ptcc_certify.errors import FormatError, GraphError, ParameterError, did_you_mean
-from ptcc_certify.graphs.digraph import WAY, SignedDigraph, labels_beside, refuse_unnamed
+from ptcc_certify.graphs.digraph import WAY, SignedDigraph, in_all, labels_beside, refuse_unnamed
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io.edge_list import header
 from ptcc_certify.graphs.io.files import name_and_ending
@@ -124,9 +124,8 @@ def _edges_of_table(table: Any) -> tuple[list[tuple[Any, Any, Any]], tuple[str, 
 def _refuse_self_loops(sources: list[Any], targets: list[Any], first: str, second: str) -> None:
     loops = [str(a) for a, b in zip(sources, targets, strict=True) if str(a) == str(b)]
     if loops:
-        many = f" ({len(loops)} in all)" * (len(loops) > 1)
-        mend = f'remove {"them" if many else "it"}: df[df["{shorten(first)}"] != df["{shorten(second)}"]]'
-        raise GraphError(f"self-loop at node {shorten(loops[0])}{many}; {mend}")
+        mend = f'remove {"them" if len(loops) > 1 else "it"}: df[df["{shorten(first)}"] != df["{shorten(second)}"]]'
+        raise GraphError(f"self-loop at node {shorten(loops[0])}{in_all(len(loops))}; {mend}")
 
 
 def _refuse_edge_array(array: Any) -> None:
