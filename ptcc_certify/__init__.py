@@ -171,7 +171,13 @@ def _export(name: str) -> Any:
     """Return what is public; a function with the gate for its calls, which belongs to this module, as pickle asks."""
     from ptcc_certify.errors import gated
 
-    public = getattr(import_module(f"{__name__}.{_EXPORTS[name]}"), name)
+    try:
+        public = getattr(import_module(f"{__name__}.{_EXPORTS[name]}"), name)
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] in ("", __name__, "lmi"):
+            raise
+        mend = "install ptcc-certify with its dependencies, without --no-deps"
+        raise ModuleNotFoundError(f"{__name__}.{name} needs {error.name}; {mend}", name=error.name) from None
     if isinstance(public, FunctionType):
         public = gated(public)
         public.__module__ = __name__

@@ -188,6 +188,13 @@ _PLACES |= dict.fromkeys(("behaviour", "min_rate", "max_input"), "Expectations")
 _ALSO_CALLED = {"edges": "orientation", "direction": "orientation", "initial_state": "x0", "t": "times"}
 _ALSO_CALLED |= {"expect": "expectations", "initial_bound": "initial_set"}
 
+#: How else an object of a class is made, from what one has at hand.
+_MAKERS = {"SignedDigraph": ", or SignedDigraph.from_edges([(source, target, weight), ...])"}
+#: Restricted signals, by what may be taken for keywords of certify.
+_SIGNALS = dict.fromkeys(("dwell", "dwell_time", "clock_dwell"), "DwellTime(...)")
+_SIGNALS |= dict.fromkeys(("window", "windows", "clock_window", "window_on"), "JointWindows(...)")
+_SIGNALS |= dict.fromkeys(("share", "shares"), "ClockShares(...)")
+
 
 def gated(called: Called) -> Called:
     """Decorate a function, or a class: a call that does not fit its parameters is a :class:`ParameterError`.
@@ -225,17 +232,32 @@ def _misfit(called: Any, signature: inspect.Signature, args: tuple[Any, ...], ke
     places = [key for key, one in parameters.items() if one.kind is one.POSITIONAL_OR_KEYWORD]
     given = places[: len(args) - (len(parameters) < len(signature.parameters))]
     if unknown := next((key for key in keywords if key not in parameters), None):
-        hint = did_you_mean(unknown, parameters) or f"; it has {', '.join(parameters)}"
-        if (meant := _ALSO_CALLED.get(unknown)) in parameters:
-            hint = f"; did you mean {meant}?"
-        elif (place := _PLACES.get(unknown)) and name not in _PLACES.values():
-            hint = f"; give it to {place}({unknown}=...)"
-        return f"{name} has no parameter {unknown}{hint}"
+        return unknown_parameter(name, unknown, parameters)
     required = [key for key, one in parameters.items() if one.default is one.empty and one.kind is not one.VAR_KEYWORD]
     if missing := [key for key in required if key not in given and key not in keywords]:
         call = [f"{key}=..." if parameters[key].kind is inspect.Parameter.KEYWORD_ONLY else key for key in required]
-        return f"{name} asks for {', '.join(missing)}; write {name}({', '.join(call)})"
+        also = _MAKERS.get(name, "")
+        return f"{name} asks for {', '.join(missing)}; write {name}({', '.join(call)}){also}"
     return f"{name} takes {', '.join(places) or 'nothing'} without a name, each once; write any other as name=value"
+
+
+def unknown_parameter(name: str, unknown: str, parameters: Iterable[str]) -> str:
+    """Return the refusal of a keyword that a function does not have, with where it belongs or what it may mean.
+
+    Examples
+    --------
+    >>> unknown_parameter("certify", "dwell", ["graph", "delta", "signal"])
+    'certify has no parameter dwell; say signal=DwellTime(...) of ptcc_certify.theorems.restricted_signals'
+    """
+    parameters = list(parameters)
+    hint = did_you_mean(unknown, parameters) or f"; it has {', '.join(parameters)}"
+    if (meant := _ALSO_CALLED.get(unknown)) in parameters:
+        hint = f"; did you mean {meant}?"
+    elif "signal" in parameters and (signal := _SIGNALS.get(unknown)):
+        hint = f"; say signal={signal} of ptcc_certify.theorems.restricted_signals"
+    elif (place := _PLACES.get(unknown)) and name not in _PLACES.values():
+        hint = f"; give it to {place}({unknown}=...)"
+    return f"{name} has no parameter {unknown}{hint}"
 
 
 def explain(error: Exception) -> str:

@@ -167,6 +167,20 @@ def test_graphs_go_to_networkx_and_pandas_and_back():
     assert (ptcc.as_graph(TEAM.adjacency(), "listens").adjacency() != TEAM.adjacency()).nnz == 0
 
 
+def test_a_certificate_is_a_table_of_agents_whose_types_do_not_depend_on_what_was_asked(cert):
+    frame, bare = cert.to_pandas(), ptcc.certify(TEAM, PROTOCOL).to_pandas()
+    assert (frame.dtypes == bare.dtypes).all() and list(frame.index) == list(cert.graph.labels)
+    assert list(frame.columns) == ["role", "group", "camp", "component", "x(0)", "x(T)", "deviation"]
+    assert frame["x(T)"].to_dict() == {k: float(x) for k, x in dict(cert.final_state).items()}
+    assert (frame["deviation"] == cert.deviation_bound([0.01])[:, 0]).all()
+    assert bare[["x(0)", "x(T)", "deviation"]].isna().all(axis=None) and (bare["role"] == frame["role"]).all()
+    alone = ptcc.certify(ptcc.SignedDigraph.from_edges([], nodes="ab"), PROTOCOL, [1, 2]).to_pandas()
+    assert alone["x(T)"].tolist() == [1, 2] and (alone.dtypes == bare.dtypes).all()
+    robust = ptcc.SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
+    slid = ptcc.certify(TEAM, robust, [5, 2, -4], sigma0=[1, 0, -3], simulation=False)
+    assert (slid.to_pandas()["deviation"] == slid.deviation_bound([0.005])[:, 0]).all()
+
+
 def test_results_go_to_pandas(cert):
     pytest.importorskip("pandas")
     run = cert.trajectory

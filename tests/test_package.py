@@ -6,6 +6,7 @@ import pkgutil
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -42,6 +43,16 @@ def test_rooms_are_loaded_when_they_are_named():
         _ = ptcc_certify.bounds.nothing
     for name in ("a.b", "errors.GraphError", "graphs.digraph", "a b", "", "\0"):
         assert not hasattr(ptcc_certify, name) and not hasattr(ptcc_certify.graphs, name), name
+
+
+def test_where_a_package_is_missing_a_name_at_the_top_tells_how_to_install_it():
+    """As where only the checker was installed, without dependencies."""
+    root = str(Path(ptcc_certify.__file__).parents[1])
+    code = f"import sys; sys.path.insert(0, {root!r}); import ptcc_certify; ptcc_certify.read_graph"
+    run = subprocess.run([sys.executable, "-I", "-S", "-c", code], capture_output=True, text=True)
+    last = run.stderr.splitlines()[-1]
+    assert last.startswith("ModuleNotFoundError: ptcc_certify.read_graph needs numpy; install"), run.stderr
+    assert "During handling" not in run.stderr
 
 
 def test_no_module_bears_the_name_of_an_export():

@@ -95,8 +95,9 @@ def certify_many(
     Raises
     ------
     FormatError
-        A file that is named is not there or is no regular file, a pattern matches none, or a ``.toml`` file cannot be
-        read.
+        A file that is named is no regular file, a pattern matches none, or a ``.toml`` file cannot be read.
+    GraphError
+        What is given, not in a list, is no graph; or a FormatError, the only file is not there.
     ParameterError
         No graph, a setting outside its domain, a table that is there already, a journal of other settings or of a
         batch that still runs, a missing package, or a cluster that answers no longer or has no workers.

@@ -10,7 +10,7 @@ from fractions import Fraction
 from typing import Any, Literal
 
 from ptcc_certify.certificate.request import refuse
-from ptcc_certify.errors import NumberError, ParameterError, gated
+from ptcc_certify.errors import NumberError, ParameterError, gated, unknown_parameter
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import by_label
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, shorten, whole_number
@@ -108,6 +108,13 @@ class Settings:
     @classmethod
     def of(cls, protocol: Protocol, **settings: Any) -> Settings:
         """Return the settings of these keywords: the names of the fields, and those of :class:`Reading`."""
+        known = [*list(cls.__dataclass_fields__)[1:-1], *Reading.__dataclass_fields__]
+        if unknown := next((name for name in settings if name not in known), None):
+            if unknown in ("uncertainty", "signal"):
+                value = '"20%"' if unknown == "uncertainty" else "..."
+                mend = f"one graph each: [ptcc.certify(g, p, {unknown}={value}) for g in graphs]"
+                raise ParameterError(f"certify_many has no parameter {unknown}, which makes families; {mend}")
+            raise ParameterError(unknown_parameter("certify_many", unknown, known))
         reading = {name: settings.pop(name) for name in Reading.__dataclass_fields__ if name in settings}
         return cls(protocol, **settings, reading=Reading(**reading))
 

@@ -21,8 +21,8 @@ from ptcc_certify.graphs.io.files import read_bytes
 from ptcc_certify.graphs.io.packaged import GRAPHS, file_or_packaged, graph_path
 from ptcc_certify.graphs.rationals import shorten
 
-#: Where a graph comes from: a path, an ensemble and a number in it, or the graph itself.
-Origin = str | tuple[Ensemble, int] | SignedDigraph
+#: Where a graph comes from: a path, an ensemble and a number in it, or the graph itself; or why there is none.
+Origin = str | tuple[Ensemble, int] | SignedDigraph | PTCCError
 
 
 class Task(NamedTuple):
@@ -36,7 +36,7 @@ class Task(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """Where a graph comes from: a path, an ensemble and a number in it, or the graph itself.
+    """Where a graph comes from: a path, an ensemble and a number in it, or the graph itself; or why there is none.
 
     Sources of one ``key`` are one graph; their names may differ, and those of different graphs may be equal. ``mark``
     tells what graph it is, whatever else is in the list; that of a file, ``""`` here, depends on its content.
@@ -68,15 +68,18 @@ class Source:
 
 
 def chosen_sources(sources: Any, reading: Reading, own: Sequence[Path] = ()) -> list[Source]:
-    """Return what ``sources`` stand for, each once; patterns leave out the files that the batch writes itself."""
+    """Return what ``sources`` stand for, each once; patterns leave out the files that the batch writes itself.
+
+    What is wrong with a graph of a list is an error of its row; a graph or a path alone is refused.
+    """
     several = Sequence | Set | Mapping | ValuesView | Iterator  # graphs, matrices and tables are none of these
-    if isinstance(sources, str) or not isinstance(sources, several):
-        sources = [sources]
+    alone = isinstance(sources, str) or not isinstance(sources, several)
+    sources = [sources] if alone else sources if isinstance(sources, Mapping) else list(sources)
     selection: dict[Hashable, Source] = {}
     graphs = ensembles = 0
     named = sources if isinstance(sources, Mapping) else {}
     for name, graph in named.items():
-        graph = _given(graph, reading)
+        graph = _given(graph, reading, alone)
         key = ("named", str(name))
         selection[key] = Source(str(name), graph, key, _mark_of_graph(graph))
     for source in () if named else sources:
@@ -85,9 +88,9 @@ def chosen_sources(sources: Any, reading: Reading, own: Sequence[Path] = ()) -> 
             name = "ensemble" if ensembles == 1 else f"ensemble{ensembles}"
             own_sources = _graphs_of(name, source, ("ensemble", ensembles))
         elif isinstance(source, str | os.PathLike):
-            own_sources = _expand(os.fspath(source), own)
+            own_sources = _expand(os.fspath(source), own, len(sources) == 1)
         else:
-            graph = _given(source, reading)
+            graph = _given(source, reading, alone)
             own_sources = [Source(f"graph#{graphs}", graph, ("graph", graphs), _mark_of_graph(graph))]
             graphs += 1
         for one in own_sources:
@@ -99,17 +102,28 @@ def chosen_sources(sources: Any, reading: Reading, own: Sequence[Path] = ()) -> 
     return list(selection.values())
 
 
-def _given(graph: Any, reading: Reading) -> SignedDigraph:
-    """Return a graph that has a name, or is in memory; of the latter only its orientation can be told."""
-    if isinstance(graph, str | os.PathLike):
-        return read_graph(file_or_packaged(os.fspath(graph)), **asdict(reading))
-    for name in ("duplicates", "drop_self_loops", "undirected"):
+def _given(graph: Any, reading: Reading, alone: bool) -> SignedDigraph | PTCCError:
+    """Return a graph that has a name, or is in memory, or of one of several why it is none.
+
+    Of a graph in memory only its orientation can be told.
+    """
+    file = isinstance(graph, str | os.PathLike)
+    for name in () if file else ("duplicates", "drop_self_loops", "undirected"):
         if getattr(reading, name) != getattr(Reading, name):
             raise ParameterError(f"{name} tells how files are read; beside graphs in memory leave it out")
-    return as_graph(graph, reading.orientation)
+    try:
+        if file:
+            return read_graph(file_or_packaged(os.fspath(graph)), **asdict(reading))
+        return as_graph(graph, reading.orientation)
+    except ParameterError:  # a setting of the batch
+        raise
+    except PTCCError as error:
+        if alone:
+            raise
+        return error
 
 
-def _expand(text: str, own: Sequence[Path]) -> list[Source]:
+def _expand(text: str, own: Sequence[Path], alone: bool) -> list[Source]:
     """Return what a text stands for."""
     name, path = shorten(text, 200), Path(text)
     try:
@@ -126,7 +140,9 @@ def _expand(text: str, own: Sequence[Path]) -> list[Source]:
     if folder:
         raise ParameterError(f"{name}: is a folder; write a pattern such as {Path(name, '*.csv')}")
     if not has_magic(text):
-        raise FormatError(f"{name}: no such file; check the path")
+        if alone or text.lower().endswith(".toml"):  # of how many graphs is not known
+            raise FormatError(f"{name}: no such file; check the path")
+        return _file(text)
     mine = {os.path.realpath(one) for one in own}
     matches = sorted(glob(text, recursive=True))  # noqa: PTH207 - Path.glob takes no absolute patterns
     # Links to nowhere stay: each is a row that tells so.
@@ -149,7 +165,9 @@ def _graphs_of(name: str, ensemble: Ensemble, key: Hashable) -> list[Source]:
     return [Source(f"{name}#{i}", (ensemble, i), (key, i), f"ensemble {mark} {i}") for i in range(len(ensemble))]
 
 
-def _mark_of_graph(graph: SignedDigraph) -> str:
+def _mark_of_graph(graph: SignedDigraph | PTCCError) -> str:
     """Tell a graph from others, and from itself with its nodes in another order, which initial states obey."""
+    if isinstance(graph, PTCCError):
+        return f"no graph: {graph}"
     order = hashlib.sha256(json.dumps(graph.labels).encode()).hexdigest()
     return f"graph {graph.sha256} {order}"

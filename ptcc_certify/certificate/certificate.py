@@ -11,6 +11,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from lmi.exact.decimal_rounding import down
 from ptcc_certify.certificate.certificate_data import Content, Source
 from ptcc_certify.certificate.certificate_file import FromFile, bytes_of, text_of, write_certificate
@@ -26,6 +28,8 @@ from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from ptcc_certify.certificate.family_certificate import FamilyCertificate
 
 #: GB that the check of a large graph may take while it is certified.
@@ -186,6 +190,34 @@ class Certificate(Content, FromFile, Shown):
             return self.source.document, self.source.files
         document, out = self._document(self.verdict)
         return document, out.files
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return one row per agent: its place in the graph, where it begins and ends, how near its end it is proved.
+
+        ``role``, ``group``, ``camp`` and ``component`` are those of :meth:`Structure.to_pandas`; ``x(0)`` and ``x(T)``
+        are rounded to floats; ``deviation`` bounds ``|x_k - x_k(T)|`` at 0.99 T, or at T_r + 0.99 T_s. The last three
+        are NaN where the certificate has no initial state, or nothing is proved.
+
+        Raises
+        ------
+        ParameterError
+            pandas is not installed.
+
+        Examples
+        --------
+        >>> pair = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
+        >>> certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5]).to_pandas()["x(T)"].to_dict()
+        {'a': -1.0, 'b': 1.0}
+        """
+        table, unknown = self.structure.to_pandas(), np.full(self.graph.n_nodes, np.nan)
+        start, deviation = self.initial_state, unknown
+        if start is not None and self.functions:
+            share = 1 if self.direct else float(self.protocol.span / self.protocol.T)
+            deviation = self.deviation_bound([0.01 * share])[:, 0]
+        table["x(0)"] = unknown if start is None else [float(x) for x in start]
+        table["x(T)"] = unknown if self.final_state is None else np.asarray(self.final_state, dtype=float)
+        table["deviation"] = np.where(np.isfinite(deviation), deviation, np.nan)
+        return table
 
     def plot(self, what: str = "decay", **keywords: Any) -> Any:
         """Draw a figure of the certificate.

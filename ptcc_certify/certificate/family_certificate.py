@@ -204,10 +204,12 @@ class FamilyCertificate(FamilyContent, FromFile, Shown):
     def to_pandas(self) -> pd.DataFrame:
         """Return the ends between which every agent is at the deadline, rounded outwards to floats; NaN where unknown.
 
+        All are unknown of a certificate without an initial state.
+
         Raises
         ------
         ParameterError
-            There is no initial state, or pandas is not installed.
+            pandas is not installed.
 
         Examples
         --------
@@ -215,10 +217,9 @@ class FamilyCertificate(FamilyContent, FromFile, Shown):
         >>> certify_family(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2]).to_pandas().loc["b"].tolist()
         [-1.0, -1.0]
         """
-        if self.final_states is None:
-            raise ParameterError("the certificate has no initial state; certify the family with x0")
         pandas, unknown = import_pandas(), (math.nan, math.nan)
-        ends = [unknown if one is None else (float_down(one[0]), float_up(one[1])) for one in self.final_states]
+        states = self.final_states or (None,) * self.family.n_nodes
+        ends = [unknown if one is None else (float_down(one[0]), float_up(one[1])) for one in states]
         index = pandas.Index(self.family.labels, name="node")
         return pandas.DataFrame(ends, index=index, columns=["least", "largest"], dtype=float)
 

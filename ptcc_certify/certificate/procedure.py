@@ -155,8 +155,9 @@ def certify(
     noise : number, optional
         Nominal protocol: bound of the measurement noise ``|n_k|``, ``u = -gain L (X + n)``, whose effect is bounded
         under each of ``limits`` but sampling. Noise times an infinite gain is bounded by nothing.
-    signal : {"any", "constant"} or DwellTime
-        Of a family: restricted signals of which more is claimed, beside what holds for every signal.
+    signal : {"any", "constant"}, DwellTime, JointWindows or ClockShares
+        Of a family: restricted signals of which more is claimed, beside what holds for every signal; the three classes
+        are in :mod:`ptcc_certify.theorems.restricted_signals`.
     time_limit : float, optional
         Seconds of wall time. Simulation and searches may take 40 % together, each its share of what is left; what is
         proved by then stands and is checked, and ``cut_off`` names what was ended. Without it they have 60 s, and 1 s
@@ -217,6 +218,8 @@ def certify(
         "scenario": scenario,
     }
     options["origins"] = origins_of(graph, x0, sigma0) | dict(origins or {})
+    if isinstance(graph, Protocol):
+        raise ParameterError("graph and protocol are exchanged; write certify(graph, protocol)")
     if uncertainty or is_family(graph):
         options |= {"simulation": simulation, "sigma0": sigma0, "disturbance": disturbance, "progress": progress}
         family = _family(graph, orientation, uncertainty, options)

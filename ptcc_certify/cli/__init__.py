@@ -95,7 +95,8 @@ class _Commands(click.Group):
                 options = [p for p in error.possibilities or () if did_you_mean(flag.lstrip("-"), [p.lstrip("-")])]
                 hint = f" Did you mean {' or '.join(options)}?" if options else ""  # click's counts the dashes as alike
                 raise click.UsageError(error.message + hint) from None
-            raise click.UsageError(f"{error.message} It is an option of {', '.join(having)}") from None
+            each = f"; of many graphs certify each: ptcc certify GRAPH {flag}" * (ctx.invoked_subcommand == "batch")
+            raise click.UsageError(f"{error.message} It is an option of {', '.join(having)}{each}") from None
 
 
 @click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"], "show_default": True})

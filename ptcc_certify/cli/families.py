@@ -257,13 +257,7 @@ def certify_family(
         if most is not None or options["min_rate"] is not None:
             raise ParameterError("--min-rate and --max-input: no rate is certified of members that end differently")
         _show_decision(graphs, family, left, as_json, screen, options)
-        code = _expected(left, options["expect"])
-        if output:
-            click.echo("note: of fixed weights that are unknown no certificate is made; nothing was written", err=True)
-        click.echo(
-            "undecided: of fixed weights that are unknown the behaviour is decided, no rate is certified", err=True
-        )
-        return code or ExitCode.UNDECIDED
+        return _judged_alone(left, options["expect"], output)
     name, read = _names(graphs, family, options)
     states = {"x(0)": options["x0"], "sigma(0)": options["sigma0"]}
     random_states = {what: f"random, seed {options['seed']}" for what, text in states.items() if text == "random"}
@@ -287,6 +281,20 @@ def certify_family(
     if output:
         screen.note(f"written    {output}" if saved else "note       nothing is certified, and nothing was written")
     return assessment.exit_code
+
+
+def _judged_alone(components: Sequence[FamilyComponent], expect: str | None, output: str | None) -> int:
+    """Tell what became of an expectation of fixed weights, of which no certificate is made; return the exit code."""
+    from ptcc_certify.certificate.family_verdict import judge_family_behaviour
+    from ptcc_certify.certificate.verdict import MET
+
+    code = _expected(components, expect)
+    met = expect is not None and judge_family_behaviour(components, expect).status == MET and not output
+    if output:
+        click.echo("note: of fixed weights that are unknown no certificate is made; nothing was written", err=True)
+    status = f"met: {expect}" if met else "undecided"
+    click.echo(f"{status}: of fixed weights that are unknown the behaviour is decided, no rate is certified", err=True)
+    return ExitCode.OK if met else code or ExitCode.UNDECIDED
 
 
 def _refuse_disturbance(options: shared.Options) -> None:

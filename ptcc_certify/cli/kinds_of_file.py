@@ -110,8 +110,8 @@ def refuse_as_graph(path: str) -> None:
         raise FormatError(f"{name}: is {kind}, not a graph; {mends.get(kind, 'write rows source,target,weight')}")
 
 
-def refuse_as_certificate(path: str) -> None:
-    """Refuse what is no certificate.
+def refuse_as_certificate(path: str, before_graph: bool = False) -> None:
+    """Refuse what is no certificate; ``before_graph``, where a graph may follow it.
 
     Raises
     ------
@@ -124,6 +124,7 @@ def refuse_as_certificate(path: str) -> None:
     if path == "-" or kind in ("a certificate", "JSON"):
         return
     made = f"ptcc certify {shell_word(path)} -o {shell_word(Path(path).stem + '.json')} makes one"
+    made += "; the certificate comes first: ptcc check CERTIFICATE GRAPH" * before_graph
     if path in GRAPHS and kind in ("missing", "a folder"):
         raise FormatError(f"{name}: is a packaged graph, not a certificate; {made}")
     if kind == "missing":

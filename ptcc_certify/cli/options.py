@@ -86,7 +86,7 @@ def _behaviour(context: click.Context, parameter: click.Parameter, text: str | N
 def _certificate(context: click.Context, parameter: click.Parameter, path: str) -> str:
     """Return the path of a certificate, or refuse what is none."""
     if not context.resilient_parsing:
-        refuse_as_certificate(path)
+        refuse_as_certificate(path, context.info_name == "check")
     return path
 
 

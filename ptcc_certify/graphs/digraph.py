@@ -100,6 +100,17 @@ def _common_scale(values: Sequence[Fraction]) -> int | None:
     return scale if all(abs(v * scale) <= _INT64_LIMIT for v in values) else None
 
 
+def in_all(count: int) -> str:
+    """Tell how many there are of which a refusal names one.
+
+    Examples
+    --------
+    >>> in_all(1), in_all(2)
+    ('', ' (2 in all)')
+    """
+    return f" ({count} in all)" if count > 1 else ""
+
+
 #: Edges whose lines are hashed at a time.
 _HASHED = 65_536
 
@@ -182,9 +193,10 @@ class SignedDigraph(ReadOnly, Shown):
         source, target, table, size = self.source, self.target, self._weights.table, np.abs(self.weights)
         again = (source[1:] == source[:-1]) & (target[1:] == target[:-1])
         long = np.array([not writable(w) for w in table.tolist()] if table.dtype == object else [], dtype=bool)
+        loops = source == target
         odd = ~((size >= SMALLEST_WEIGHT) & (size <= LARGEST_WEIGHT))
         for bad, message in (
-            (source == target, "self-loop at node {0}; remove it"),
+            (loops, f"self-loop at node {{0}}{in_all(loops.sum())}; remove {'them' if loops.sum() > 1 else 'it'}"),
             (again, "two edges {0} -> {1}; keep one"),
             (table == 0, "weight 0 of edge {0} -> {1}: neither ally nor opponent; remove it or give a weight"),
             (long, "weight of edge {0} -> {1} has too many digits to keep; round it"),

@@ -10,10 +10,12 @@ from __future__ import annotations
 import base64
 import html
 from collections.abc import Iterable
+from contextlib import suppress
 from typing import Any
 
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
+from ptcc_certify.errors import PTCCError
 from ptcc_certify.gain_design import Design
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.display_hook import shows
@@ -51,9 +53,23 @@ def structure_html(structure: Structure) -> str:
 
 @shows(Certificate)
 def certificate_html(certificate: Certificate) -> str:
-    """Show a certificate: the screen of ``ptcc certify``, and the simulated decay under its proved bound."""
+    """Show a certificate: the screen of ``ptcc certify``, and the simulated decay under its proved bound.
+
+    Of one that was read, up to 120 nodes, the run is made for the figure.
+    """
     alt = "simulated decay of the error under its proved bound, over the time left to the deadline"
-    return _page(certificate_lines(certificate, "signed digraph"), draw(certificate, ["decay"]).get("decay"), alt)
+    return _page(
+        certificate_lines(certificate, "signed digraph"), draw(_with_run(certificate), ["decay"]).get("decay"), alt
+    )
+
+
+def _with_run(certificate: Certificate) -> Certificate:
+    """Return a small certificate that was read with a run, which its file does not hold."""
+    made = certificate.source is None or certificate.trajectory is not None
+    if not (made or certificate.initial_state is None or certificate.graph.n_nodes > SHOWN_NODES):
+        with suppress(PTCCError):
+            return certificate.with_simulation(samples=201)
+    return certificate
 
 
 @shows(FamilyCertificate)

@@ -60,7 +60,9 @@ _INSTANTS = ((0.5, "0.5 T"), (0.1, "0.9 T"), (0.01, "0.99 T"), (1e-6, "T(1-1e-6)
 _LONG_LIST = 12 * TEXT
 
 
-def summary_lines(certificate: Certificate, name: str, origins: Mapping[str, str] = MappingProxyType({})) -> list[str]:
+def summary_lines(
+    certificate: Certificate, name: str, origins: Mapping[str, str] = MappingProxyType({}), *, spare: int = 0
+) -> list[str]:
     r"""Return the short screen of ``ptcc certify``: 8 lines of 80 columns, 10 or so rather than cut an answer.
 
     Of a disconnected graph there are up to 4 more.
@@ -72,6 +74,8 @@ def summary_lines(certificate: Certificate, name: str, origins: Mapping[str, str
         What the graph is called.
     origins : mapping of str to str, optional
         Where ``x(0)`` and ``sigma(0)`` come from, by these names; ``given`` unless told.
+    spare : int
+        How many of the lines are not shown.
 
     Returns
     -------
@@ -108,7 +112,7 @@ def summary_lines(certificate: Certificate, name: str, origins: Mapping[str, str
             ("verdict", _short_verdict(certificate)),
         ]
         lines = wrap_lines(format_lines(entries))
-        if len(lines) < SHORT + len(claims):
+        if len(lines) < SHORT + len(claims) + spare:
             break
     return lines
 
@@ -159,7 +163,7 @@ def _file_summary(path: str, document: Mapping[str, Any], report: CheckReport) -
     files = read_side_files(document, Path(path).parent)
     certificate = accepted_certificate(Path(path), document, "", report, files)
     if isinstance(certificate, Certificate):
-        return summary_lines(certificate, path, origins)
+        return summary_lines(certificate, path, origins, spare=2)  # of graph, read and verdict one is in their place
     return family_summary(certificate, path, origins)
 
 

@@ -48,12 +48,12 @@ class DwellTime:
 
     Examples
     --------
-    >>> DwellTime("0.3", clock="t").switches(Fraction(1))
+    >>> DwellTime("0.3").switches(Fraction(1))
     4
     """
 
     least: Fraction
-    clock: str
+    clock: str = "t"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "least", parameter("dwell", self.least))
@@ -106,7 +106,7 @@ class JointWindows:
 
     length: Fraction
     on: Fraction
-    clock: str
+    clock: str = "s"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "length", parameter("window", self.length))

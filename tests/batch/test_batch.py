@@ -32,7 +32,7 @@ from ptcc_certify import Ensemble, NominalProtocol, SignedDigraph, analyse, batc
 from ptcc_certify.batch import COLUMNS, Row, backends, table_bytes
 from ptcc_certify.batch import rows as rows_module
 from ptcc_certify.batch.settings import Settings
-from ptcc_certify.errors import FormatError, ParameterError, PTCCError
+from ptcc_certify.errors import FormatError, GraphError, ParameterError, PTCCError
 from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.ensembles import CONNECTIVITIES
 from ptcc_certify.graphs.io import random_states, read_graph, write_graph
@@ -360,6 +360,29 @@ def test_bad_graphs_are_rows_and_stop_nothing():
         assert (row["verdict"] == "certified") == (refusal.code == 0) == bool(row["rate"])
 
 
+def test_bad_graphs_in_memory_and_missing_files_are_rows_and_stop_nothing():
+    loop = nx.DiGraph()
+    loop.add_edge(0, 0, weight=1)
+    rows = quickly([TRIANGLE, loop, nx.DiGraph(), "nothing.csv", "fig1a"])
+    assert [row["graph"] for row in rows] == ["graph#0", "graph#1", "graph#2", "nothing.csv", "fig1a"]
+    assert [row["verdict"] for row in rows] == ["certified", None, None, None, "certified"]
+    for row, says in zip(rows[1:4], ("self-loop at node 0", "no nodes", "nothing.csv: no such file"), strict=True):
+        assert says in row["error"]
+    named = quickly({"team": TRIANGLE, "loop": loop, "gone": "nothing.csv"})
+    assert [(row["graph"], row["error"] is None) for row in named] == [("team", True), ("loop", False), ("gone", False)]
+    with pytest.raises(GraphError, match="self-loop at node 0"):
+        quickly(loop)
+
+
+def test_rows_of_bad_graphs_in_memory_are_kept_as_they_come(computed: list[str]):
+    graphs = [TRIANGLE, [("a", "a", 1)]]
+    with pytest.raises(KeyboardInterrupt):
+        quickly(graphs, output="t.csv", progress=interrupted_after(1))
+    computed.clear()
+    assert [row["graph"] for row in quickly(graphs, output="t.csv")] == ["graph#0", "graph#1"]
+    assert computed == ["graph#1"]
+
+
 def test_a_start_that_does_not_fit_is_an_error_of_its_row():
     fits, other = quickly([TRIANGLE, "fig1a"], x0="5,-2,1")
     assert fits["verdict"] == "certified" and fits["error"] is None
@@ -484,8 +507,17 @@ def test_a_script_without_a_main_part_is_told_so(tmp_path: Path):
 
 
 def test_an_unknown_setting_is_refused():
-    with pytest.raises(ParameterError, match="speed"):
+    with pytest.raises(ParameterError, match="certify_many has no parameter speed"):
         quickly(TRIANGLE, speed=3)
+
+
+def test_uncertain_weights_of_many_graphs_are_refused_with_the_way_round():
+    with pytest.raises(
+        ParameterError, match=r'one graph each: \[ptcc.certify\(g, p, uncertainty="20%"\) for g in graphs\]'
+    ):
+        quickly([TRIANGLE, "fig1a"], uncertainty="20%")
+    run = ptcc("batch", "fig1a", "fig1b", "--uncertainty", "20%")
+    assert run.code == 2 and run.err.endswith("of many graphs certify each: ptcc certify GRAPH --uncertainty\n")
 
 
 def test_csv_and_parquet_hold_the_same():

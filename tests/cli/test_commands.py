@@ -165,6 +165,7 @@ def test_a_graph_and_a_certificate_in_the_place_of_the_other_are_told_with_the_c
         for words in (("check", graph), ("report", graph, "-o", "r.html")):
             run = ptcc(*words)
             assert run.code == 2 and f"ptcc certify {graph} -o {graph.removesuffix('.csv')}.json makes one" in run.err
+            assert ("the certificate comes first" in run.err) == (words[0] == "check")
     run = ptcc("certify", ".")
     assert run.code == 2 and "is a folder, not a graph" in run.err and "ptcc batch '*.csv'" in run.err
     Path("odd.csv").write_text("{a,b,1\nb,{a,1\n")  # begins like JSON

@@ -25,6 +25,7 @@ FILES = {
     "s.toml": '[graph]\nfile = ["day.csv", "night.csv"]\nuncertainty = "5%"\n[protocol]\nkappa = 3\n',
 }
 BOTH = ("day.csv", "night.csv", "--switching")
+FIXED = ("day.csv", "--optional", "a,b", "--signal", "constant")
 SPOILED = ("day.csv", "spoiled.csv", "--switching")
 
 
@@ -68,6 +69,11 @@ def test_standard_input_holds_intervals_or_a_mode():
     unsure = ptcc("classify", "-", stdin=FILES["unsure.csv"].encode())
     assert unsure.code == 0 and "for every signal" in unsure.out
     assert "for every signal" in ptcc("classify", "day.csv", "-", "--switching", stdin=FILES["night.csv"].encode()).out
+    switching = ("day.csv", "-", "--switching", "--json")
+    assert (
+        json.loads(ptcc("certify", *switching, stdin=FILES["night.csv"].encode()).out)["graph"]["modes"][1]["name"]
+        == "stdin"
+    )
     assert "Theorem 2.1" in ptcc("classify", "-", stdin=FILES["day.csv"].encode()).out
     assert "standard input, line 1" in ptcc("classify", "-", stdin=b"a,a,1").err
 
@@ -190,7 +196,10 @@ def test_the_json_is_the_certificate_or_the_decision():
         ((*SPOILED, "--signal", "constant"), 0, "if mode and weights never change: bipartite consensus"),
         ((*SPOILED, "--signal", "constant", "--expect", "bipartite-consensus"), 0, "met: bipartite consensus"),
         ((*SPOILED, "--signal", "constant", "--min-rate", "1"), 4, "modes that end differently"),
-        (("day.csv", "--optional", "a,b", "--signal", "constant"), 4, "no rate is certified"),
+        (FIXED, 4, "no rate is certified"),
+        ((*FIXED, "--expect", "bipartite-containment"), 0, "met: bipartite containment: of fixed weights"),
+        ((*FIXED, "--expect", "bipartite-containment", "-o", "c.json"), 4, "nothing was written"),
+        ((*FIXED, "--expect", "stability"), 3, "refuted: stability"),
         ((*BOTH, "--signal", "constant"), 0, "certified"),
     ],
 )

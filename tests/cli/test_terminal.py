@@ -163,6 +163,15 @@ def test_check_tells_deadline_bounds_and_input_as_certify_does():
     assert [line.split()[0] for line in ptcc("check", "c.json", "--stdlib").out.splitlines()] == ["claim", "accepted"]
 
 
+def test_check_names_the_agent_of_the_largest_input_of_a_design():
+    rows = ("source,target,weight", "m1,m2,1", "m2,m1,-1", "m2,m3,1", "m3,m4,-2", "m4,m5,1", "m5,m3,-1")
+    Path("team.csv").write_text("\n".join(rows))
+    design = ("--max-input", "50", "--initial-bound", "5", "--shortest-deadline")
+    ptcc("design", "team.csv", *design, "-o", "design.json")
+    (line,) = [line for line in ptcc("check", "design.json").out.splitlines() if line.startswith("input")]
+    assert line.endswith("the largest of agent m4")
+
+
 def test_gains_whose_proof_is_the_certificate_alone_are_printed(monkeypatch):
     from ptcc_certify.gain_design import Design
 

@@ -81,6 +81,9 @@ def test_each_is_shown_with_what_it_says_and_a_figure() -> None:
         assert said in page.text, (type(value), page.text)
         assert len(page.images) == 1
     assert "certified" in shown(cert).text
+    read = ptcc.read_certificate(cert.to_dict())
+    assert shown(read).images[0]["alt"] == shown(cert).images[0]["alt"] and read.trajectory is None
+    assert not shown(ptcc.read_certificate(certify(graph, PROTOCOL).to_dict())).images
 
 
 def test_families_are_told_in_words_and_drawn() -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ptcc_certify.errors import FormatError, GraphError, ParameterError, did_you_mean
-from ptcc_certify.graphs.digraph import WAY, SignedDigraph, labels_beside, refuse_unnamed
+from ptcc_certify.graphs.digraph import WAY, SignedDigraph, in_all, labels_beside, refuse_unnamed
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io.edge_list import header
 from ptcc_certify.graphs.io.files import name_and_ending
@@ -115,9 +115,17 @@ def _edges_of_table(table: Any) -> tuple[list[tuple[Any, Any, Any]], tuple[str, 
     for what, column in zip(("source", "target"), parts, strict=False):
         for row, label in enumerate(column, 1):
             refuse_unnamed(label, f"row {row}, {what} of the DataFrame")
+    _refuse_self_loops(parts[0], parts[1], names[columns[0]], names[columns[1]])
     ignored = [f'"{shorten(name)}"' for i, name in enumerate(names) if i not in columns]
     notes = ("columns ignored: " + ", ".join(ignored[:20]),) if ignored else ()
     return list(zip(*parts, strict=True)), notes
+
+
+def _refuse_self_loops(sources: list[Any], targets: list[Any], first: str, second: str) -> None:
+    loops = [str(a) for a, b in zip(sources, targets, strict=True) if str(a) == str(b)]
+    if loops:
+        mend = f'remove {"them" if len(loops) > 1 else "it"}: df[df["{shorten(first)}"] != df["{shorten(second)}"]]'
+        raise GraphError(f"self-loop at node {shorten(loops[0])}{in_all(len(loops))}; {mend}")
 
 
 def _refuse_edge_array(array: Any) -> None:

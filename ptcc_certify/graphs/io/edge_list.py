@@ -13,7 +13,7 @@ import numpy as np
 from ptcc_certify.errors import FormatError, NumberError
 from ptcc_certify.graphs.digraph import OF_EDGES, SignedDigraph, ordered_labels
 from ptcc_certify.graphs.io.files import lines_of
-from ptcc_certify.graphs.io.graph_from_rows import HEADER_MEND, Numbers, Rows
+from ptcc_certify.graphs.io.graph_from_rows import DECIMALS, HEADER_MEND, Numbers, Rows
 from ptcc_certify.graphs.rationals import parse_exact, shorten
 from ptcc_certify.graphs.size_limits import MAX_LINE
 
@@ -132,6 +132,7 @@ def read_edge_list(data: bytes, name: str) -> Rows:
             if "".join(row[2:3]).strip().lower() in _WEIGHT:
                 titles = ", ".join(shorten(field.strip()) for field in row[:3])
                 mend = "name the column of who is heard source, that of who listens target"
+                mend += DECIMALS * (re.search(rb"[;\t]\s*[+-]?\d+,\d+\s*$", data, re.MULTILINE) is not None)
                 raise FormatError(f"{name}, line {number}: the header {titles} names no source and target; {mend}")
         if len(row) > width and any(map(str.strip, row[width:])):
             ignored["beyond the header" if named else "after the third"] = None

@@ -93,7 +93,7 @@ def read_family(
     missing = set(wanted)
     for number, path in enumerate(sources, 1):
         rows = _interval_rows(path, orientation or "information", share, undirected)
-        name = stem = Path(re.sub(r"\.gz$", "", str(path))).stem if isinstance(path, str | Path) else str(number)
+        name = stem = _mode_name(path, number)
         again = number
         while name in named:  # no mode may take the place of another
             name, again = f"{stem} ({again})", again + 1
@@ -165,6 +165,13 @@ def family_flags(read: Mapping[str, Any], path: str = "") -> str:
     words += ["--undirected"] * bool(read.get("undirected"))
     words += [f"--uncertainty {read['uncertainty']}"] * (read.get("uncertainty", "0") not in ("0", 0))
     return " ".join(words + [f"--optional {','.join(pair)}" for pair in read.get("optional", ())])
+
+
+def _mode_name(path: Source, number: int) -> str:
+    """Return what the mode of a file is called: as the file, ``stdin``, or by its number."""
+    if path == "-" or getattr(path, "name", None) in ("standard input", "<stdin>"):
+        return "stdin"
+    return Path(re.sub(r"\.gz$", "", str(path))).stem if isinstance(path, str | Path) else str(number)
 
 
 def is_family_file(path: Source) -> bool:

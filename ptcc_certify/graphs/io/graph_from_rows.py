@@ -11,11 +11,20 @@ from typing import NoReturn
 import numpy as np
 
 from ptcc_certify.errors import FormatError, GraphError, NumberError
-from ptcc_certify.graphs.digraph import LARGEST_WEIGHT, SMALLEST_WEIGHT, SignedDigraph, Weights, ordered_labels
+from ptcc_certify.graphs.digraph import (
+    LARGEST_WEIGHT,
+    SMALLEST_WEIGHT,
+    SignedDigraph,
+    Weights,
+    in_all,
+    ordered_labels,
+)
 from ptcc_certify.graphs.rationals import MINUS, nearest_float, parse_exact, shorten
 
 #: What the first row of a table without a header may be.
 HEADER_MEND = "; if this row is a header, name its columns source, target, weight"
+#: What is said at once of a table with such a row and decimal commas.
+DECIMALS = "; write decimals with a point, too"
 
 
 @dataclass
@@ -127,15 +136,16 @@ class _Draft:
             elif MINUS in text:
                 mend = f"write {text.replace(MINUS, '-')[:40]}"
             elif code == 0 and self.rows.headerless and "finite" not in message:
-                mend += HEADER_MEND
+                mend += HEADER_MEND + DECIMALS * any("," in other for other in self.rows.weights[1:])
         edge = int(np.argmax(self.codes == code))
         return self.refuse(edge, f"weight {quoted} of edge {self.edge(edge)}{message}; {mend}")
 
     def drop_self_loops(self, allowed: bool) -> int:
         loops = np.flatnonzero(self.source == self.target)
         if loops.size and not allowed:
-            which = f"{shorten(self.rows.labels[self.source[loops[0]]])}{_in_all(loops.size)}"
-            self.refuse(loops[0], f"self-loop at node {which}; remove it, or drop all with --drop-self-loops")
+            which = f"{shorten(self.rows.labels[self.source[loops[0]]])}{in_all(loops.size)}"
+            mend = "remove these rows" if loops.size > 1 and self.rows.where(0).startswith("line") else "remove it"
+            self.refuse(loops[0], f"self-loop at node {which}; {mend}, or drop all with --drop-self-loops")
         self.keep(self.source != self.target)
         return int(loops.size)
 
@@ -143,7 +153,7 @@ class _Draft:
         edges = np.flatnonzero(np.array([not value for value in self.values], dtype=bool)[self.codes])
         if edges.size:
             named = ", ".join(self.edge(edge) for edge in edges[:5].tolist())
-            which = f"{what} of edge {named}{_in_all(edges.size)}"
+            which = f"{what} of edge {named}{in_all(edges.size)}"
             self.refuse(edges[0], f"{which}: neither ally nor opponent; remove it or give a weight")
 
     def merge_duplicates(self, duplicates: str, undirected: bool) -> tuple[str, ...]:
@@ -158,7 +168,7 @@ class _Draft:
         if duplicates == "refuse":
             second = int(np.argmax(first[pair] != np.arange(key.size)))
             earlier = self.rows.where(int(self.row[first[pair[second]]])) or "an earlier one"
-            which = f"{self.edge(second)} (the first is {earlier}){_in_all(repeated)}"
+            which = f"{self.edge(second)} (the first is {earlier}){in_all(repeated)}"
             self.refuse(second, f"second row for edge {which}; keep one, or merge with --duplicates sum|last")
         if duplicates == "last":
             if undirected and not self.rows.undirected and not self.rows.in_order:
@@ -174,7 +184,3 @@ class _Draft:
             self.keep(np.sort(first))
             self.refuse_zeros("sum 0 of the weights")
         return (f"{repeated} repeated rows were merged ({duplicates})",)
-
-
-def _in_all(count: int) -> str:
-    return f" ({count} in all)" if count > 1 else ""
