@@ -31,6 +31,7 @@ from ptcc_certify.report.plots.family_graph import plot_family_graph
 from ptcc_certify.report.plots.family_input import plot_family_input
 from ptcc_certify.report.restricted_screen import restricted_entries, rests, signal_text, states_of_signal
 from ptcc_certify.report.structure_text import structure_text
+from ptcc_certify.report.text_layout import arithmetic
 from ptcc_certify.simulation.family_run import FamilyTrajectory
 from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_name
 from ptcc_certify.theorems.family_behaviour import DEPENDS, Counterexample, FamilyComponent
@@ -66,7 +67,7 @@ def family_facts(saved: FamilyCertificate) -> dict[str, Any]:
         "promise": "" if saved.signal == "any" else signal_text(saved.signal)[1],
         "these": states_of_signal(saved) != list(saved.final_states or ()),
         "explicit_power": _explicit_power(saved),
-        "sliding": saved.protocol.reaching is not None,
+        **{"sliding": saved.protocol.reaching is not None, "arithmetic": arithmetic(saved.direct)},
         "peak_agent": None if not saved.input_peaks else family.labels[saved.input_peaks.index(max(saved.input_peaks))],
     }
 
