@@ -26,7 +26,7 @@ from ptcc_certify.report import notation as texts
 from ptcc_certify.report.family_screen import BOUND_KINDS, groups_text, sharpest
 from ptcc_certify.report.notation import above, rational
 from ptcc_certify.report.plots.counterexample import plot_counterexample
-from ptcc_certify.report.plots.family import plot_family, plot_family_decay
+from ptcc_certify.report.plots.family import keeps_dwell, plot_family, plot_family_decay
 from ptcc_certify.report.plots.family_graph import plot_family_graph
 from ptcc_certify.report.plots.family_input import plot_family_input
 from ptcc_certify.report.restricted_screen import restricted_entries, rests, signal_text, states_of_signal
@@ -96,6 +96,7 @@ def family_view(saved: FamilyCertificate, runs: Sequence[FamilyTrajectory]) -> d
         "worst_ratio": max((ratio.worst_ratio for ratio in ratios), default=0.0),
         "violated": any(ratio.violated for ratio in ratios),
         "judged": sum(ratio.judged for ratio in ratios),
+        "dwelling": keeps_dwell(saved, runs),
         "worst_runs": sum(run.signal.startswith("worst") for run in runs),
         "groups": [
             _sentence(texts.printable(groups_text(c), 2000)) for c in facts["components"] if c.behaviour == DEPENDS

@@ -17,7 +17,9 @@ from markupsafe import Markup
 from ptcc_certify.bounds.envelope import FRACTIONS, Envelope
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
+from ptcc_certify.certificate.restricted_claims import WindowClaim
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.structure import STABILITY
 from ptcc_certify.protocols.casadi_latex import symbol_latex
 from ptcc_certify.report import notation as texts
 from ptcc_certify.report.family_page import THEOREM, family_facts, remaining, state_rows
@@ -136,7 +138,8 @@ def family_latex(saved: FamilyCertificate, figures: dict[str, str] | None = None
         (_cut(label), Markup("--") if camp == "\N{EN DASH}" else camp, *ends)
         for label, camp, *ends in state_rows(saved)[: texts.LISTED]
     ]
-    view = family_facts(saved) | {
+    facts = family_facts(saved)
+    view = facts | {
         "comment": _comment(saved.source.path.name),
         "parameters": [(Markup(symbol_latex(name)), getattr(saved.protocol, name)) for name in names],
         **{"named": _named(saved.family.labels), "listed": _intervals(saved), "rows": rows},
@@ -144,12 +147,28 @@ def family_latex(saved: FamilyCertificate, figures: dict[str, str] | None = None
         "remaining_promised": [(f, _number(bound)) for f, bound in remaining(saved, of_signal=True)],
         **{"sigma0": saved.sigma0, "last_time": _last_time(saved)},
         "why": [counterexample_text(c, c.counterexample) for c in _depending(saved) if c.counterexample is not None],
+        "restricted_tex": [_powers(text) for text in facts["restricted"]],
+        "left_by_windows": _left_by_windows(saved),
         "ends_known": any(last is not None for *_, last in rows),
         **{"figures": figures or {}, "stem": _stem(saved.source.path.stem), "report": saved.checked},
         **{"sha256": _broken(saved.source.sha256), "sha256_plain": saved.source.sha256},
         **{"bound_kinds": BOUND_KINDS, "theorem": THEOREM, "captions": _family_captions(saved)},
     }
     return _environment().get_template("family_statement.tex").render(view)
+
+
+def _powers(text: str) -> Markup:
+    """Return a text of the screen whose powers of ten are set as such."""
+    return Markup(re.sub(r"\b1e(-?\d+)", r"$10^{\1}$", _tex(text)))
+
+
+def _left_by_windows(saved: FamilyCertificate) -> str:
+    """Return what joint windows leave less and less of, in symbols; nothing where no such claim is made."""
+    claims = [claim for claim in saved.restricted if isinstance(claim, WindowClaim)]
+    sizes = {STABILITY: r"$\max_{k} |x_{k}(t)|$"}
+    spread = r"$\max_{k} g_{k} x_{k}(t) - \min_{k} g_{k} x_{k}(t)$, where $g_{k} = \pm 1$ is the camp of agent $k$"
+    within = " over the agents of a component" if len(saved.parts) > 1 else ""
+    return "; or ".join(dict.fromkeys(sizes.get(claim.behaviour, spread) + within for claim in claims))
 
 
 def _last_time(saved: FamilyCertificate) -> float | None:

@@ -65,11 +65,12 @@ def plot_family_input(
     floor = FLOOR_FACTOR * first.rtol * (float(np.abs(first.states[:, 0]).max()) or 1.0)
     noise = 2 * float(Members(subject.family).in_weight.max(initial=0.0)) * floor
     top, start, labels = 0.0, 0.0, set[str]()
+    others = "other signals" if any(run.signal.startswith("worst") for run in runs) else "random signals"
     for run in runs:
         own = run.remaining > 0
         size = np.abs(run.input[:, own]).max(axis=0)
         resolved = np.where(size > noise * gain.value_at_remaining(run.remaining[own]), size, np.nan)
-        label = "slowest found" if (worst := run.signal.startswith("worst")) else "other signals"
+        label = "slowest found" if (worst := run.signal.startswith("worst")) else others
         style: dict[str, Any] = {
             "color": "black" if worst else RUN,
             "linewidth": 0.9 if worst else 0.6,
@@ -88,7 +89,7 @@ def plot_family_input(
             ax.axhline(peak, color=BOUND, linewidth=0.8, linestyle="--")
             top = max(top, peak)
         ax.annotate(
-            f"certified peak {up(max(subject.input_peaks), 3)}",
+            f"certified peak {up(max(subject.input_peaks), 4)}",
             (0, peak),
             (4, 2),
             textcoords="offset points",
