@@ -56,7 +56,7 @@ def plot_family_input(
     >>> unsure = Family.from_intervals([("a", "b", "0.8", "1.2"), ("b", "a", "0.5", "1.5")])
     >>> ax = plot_family_input(certify_family(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2]))
     >>> ax.texts[0].get_text()
-    'certified peak 6.01'
+    'certified peak 6.001'
     """
     runs, ax = runs_of(subject, runs), axes_of(ax)
     first, gain = runs[0], subject.protocol.gain

@@ -71,7 +71,7 @@ def plot_input(
     >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5])
     >>> ax = plot_input(cert)
     >>> ax.get_ylabel(), ax.texts[0].get_text()
-    ('input $|u_k|$', 'certified peak 16.1')
+    ('input $|u_k|$', 'certified peak 16.01')
     """
     if isinstance(subject, FamilyCertificate):
         return plot_family_input(subject, ax=ax, time_unit=time_unit)
