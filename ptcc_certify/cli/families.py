@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.family import Family
     from ptcc_certify.theorems.family_behaviour import FamilyComponent
-    from ptcc_certify.theorems.restricted_signals import SignalClass
+    from ptcc_certify.theorems.restricted_signals import DwellTime, SignalClass
 
 #: Options of certify that families do not take.
 _NOT_OF_FAMILIES = ("noise", *shared.LIMITS, "method", "at", "initial_bound", "simulation")
@@ -77,6 +77,13 @@ def mode_options(command: Any) -> Any:
     return command
 
 
+#: Of ptcc simulate, in the words of ptcc certify, which claims more for such signals.
+dwell_options = shared.options_of(
+    shared.number_option("--dwell", metavar="THETA", help="Families: at least so much time between switches."),
+    shared.number_option(
+        "--clock-dwell", metavar="TAU", help="Families: the same on the stretched clock, which is infinite at T."
+    ),
+)
 restricted_options = shared.options_of(
     shared.number_option(
         "--dwell", metavar="THETA", help="Families: at least so much time between switches; claim more for these."
@@ -102,16 +109,25 @@ restricted_options = shared.options_of(
 )
 
 
+def dwell_of(options: shared.Options) -> DwellTime | None:
+    """Return the dwell time of time or of the clock, or refuse both at once; None if there is none."""
+    from ptcc_certify.theorems.restricted_signals import DwellTime
+
+    dwells = {"t": options["dwell"], "s": options["clock_dwell"]}
+    given = [DwellTime(least, clock=clock) for clock, least in dwells.items() if least is not None]
+    if len(given) > 1:
+        raise ParameterError("--dwell is of time, --clock-dwell of the clock: give one of them")
+    return given[0] if given else None
+
+
 def signals_of(options: shared.Options) -> SignalClass:
     """Return the signals of which more is asked, or refuse two kinds of them at once."""
-    from ptcc_certify.theorems.restricted_signals import WINDOWS_OF_TIME, ClockShares, DwellTime, JointWindows
+    from ptcc_certify.theorems.restricted_signals import WINDOWS_OF_TIME, ClockShares, JointWindows
 
     if options["window"] is not None:
         raise ParameterError(f"--window: {WINDOWS_OF_TIME}: --clock-window")
-    dwells = {"t": options["dwell"], "s": options["clock_dwell"]}
-    given: list[Any] = [DwellTime(least, clock=clock) for clock, least in dwells.items() if least is not None]
-    if len(given) > 1:
-        raise ParameterError("--dwell is of time, --clock-dwell of the clock: give one of them")
+    dwell = dwell_of(options)
+    given: list[Any] = [] if dwell is None else [dwell]
     length, on = options["clock_window"], options["window_on"]
     if (length is None) != (on is None):
         raise ParameterError(
@@ -129,7 +145,7 @@ def signals_of(options: shared.Options) -> SignalClass:
 def refuse_restricted(options: shared.Options) -> None:
     """Refuse restricted signals where one graph acts for ever."""
     for name in ("dwell", "clock_dwell", "window", "clock_window", "window_on", "share"):
-        if options[name]:
+        if options.get(name):
             raise ParameterError(f"{shared.flag_of(name)} is for families of graphs; this is one graph: leave it out")
 
 

@@ -208,6 +208,8 @@ method_option = click.option(
 initial_bound_option = number_option(
     "--initial-bound", metavar="R", help="Bound the input for all initial states within |x_k(0)| <= R, not --x0."
 )
+#: Of a scenario, for commands that only draw x(0): where it is random, it begins within the set.
+drawn_within_option = number_option("--initial-bound", hidden=True)
 memory_option = click.option(
     "--memory",
     type=click.FloatRange(min=0, min_open=True, max=1000),
@@ -331,12 +333,18 @@ def _sigma0(text: str | None, seed: int, graph: SignedDigraph) -> list[Fraction]
     return read_initial_state(text, [seed, 1], graph, "--sigma0: sigma(0)")
 
 
-def read_initial_state(x0: str, seed: Any, graph: SignedDigraph, name: str = "initial state") -> list[Fraction]:
-    """Return the initial state that ``--x0`` gives, or ``sigma(0)`` that ``--sigma0`` gives, or draw one."""
+def read_initial_state(
+    x0: str, seed: Any, graph: SignedDigraph, name: str = "initial state", within: Fraction | None = None
+) -> list[Fraction]:
+    """Return the initial state that ``--x0`` gives, or ``sigma(0)`` that ``--sigma0`` gives, or draw one.
+
+    A random one is at most 10 in size, and at most ``within``.
+    """
     from ptcc_certify.graphs.io import random_states, read_state
 
     if x0 == "random":
-        return [x for (x,) in random_states(seed, graph.n_nodes)]
+        scale = Fraction(1) if within is None else min(Fraction(1), abs(within) / 10)
+        return [scale * x for (x,) in random_states(seed, graph.n_nodes)]
     return read_state(x0, graph, name)
 
 
@@ -348,7 +356,7 @@ def read_initial_states(options: Options, graph: SignedDigraph) -> Any:
 
     x0, seed, n, dimension = options["x0"], options["seed"], graph.n_nodes, options["dimension"]
     if dimension == 1:
-        return read_initial_state(x0, seed, graph)
+        return read_initial_state(x0, seed, graph, within=options["initial_bound"])
     if x0 == "random":
         return random_states(seed, n, dimension)
     texts = x0.split(",")

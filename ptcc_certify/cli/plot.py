@@ -58,6 +58,7 @@ OF_A_RUN = ("states", "input", "decay")
 @mode_options
 @shared.protocol_options
 @shared.limit_options
+@shared.drawn_within_option
 @shared.method_option
 @shared.time_limit_option
 @shared.memory_option
@@ -158,7 +159,7 @@ def _of_graph(
     protocol = shared.protocol_of(options, () if what == "decay" else ("delta", "disturbance"))
     if what in ("graph", "spectrum"):
         return signed, protocol
-    x0 = shared.read_initial_state(options["x0"], options["seed"], signed)
+    x0 = shared.read_initial_state(options["x0"], options["seed"], signed, within=options["initial_bound"])
     if what == "decay":
         if shared.actuator_of(options) is not None:
             raise ParameterError("decay is drawn without limits of the gain; leave them out, or ask for --what states")
@@ -182,7 +183,9 @@ def _draw(what: str, subject: Any, wide: bool, time_unit: str) -> Any:
 
     if isinstance(subject, Family | FamilyCertificate):
         if wide:
-            raise ParameterError("--wide is for one graph, not for families yet; leave it out")
+            raise ParameterError(
+                "--wide is for the states of one graph; figures of families are one column wide: leave it out"
+            )
         return plot_of_family(subject, what, **({"time_unit": time_unit} if what in OF_A_RUN else {}))
     subject, protocol = subject if isinstance(subject, tuple) else (subject, None)
     if what == "graph":

@@ -10,9 +10,17 @@ import click
 from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
-from ptcc_certify.cli.families import mode_options, read_graph_or_family, refuse_options
+from ptcc_certify.cli.families import (
+    dwell_of,
+    dwell_options,
+    mode_options,
+    read_graph_or_family,
+    refuse_options,
+    refuse_restricted,
+)
 from ptcc_certify.cli.terminal import FIGURES, print_lines, refuse_output
 from ptcc_certify.errors import ExitCode, ParameterError
+from ptcc_certify.graphs.rationals import shorten
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -30,7 +38,9 @@ _TABLES = ("", ".csv", ".txt")
 @shared.reading_options
 @shared.protocol_options
 @shared.limit_options
+@shared.drawn_within_option
 @mode_options
+@dwell_options
 @click.option(
     "--signal",
     metavar="SIGNAL",
@@ -100,6 +110,7 @@ def _run(graphs: tuple[str, ...], protocol: Protocol, options: shared.Options) -
         return _run_family(signed, protocol, times, options)
     if click.get_current_context().get_parameter_source("signal") == ParameterSource.COMMANDLINE:
         raise ParameterError("--signal is for families (--switching, --uncertainty, intervals); this is one graph")
+    refuse_restricted(options)
     more = shared.run_keywords(protocol, options, signed) | {n: options[n] for n in ("samples", "boundary_layer")}
     if options["noise"] is not None:
         more |= {"noise": "telegraph", "noise_bound": options["noise"]}
@@ -111,7 +122,7 @@ def _run_family(
 ) -> FamilyTrajectory:
     """Return the run of a family under a signal."""
     from ptcc_certify.simulation.family_run import simulate_family
-    from ptcc_certify.simulation.signals import as_signal
+    from ptcc_certify.simulation.signals import RandomDwellSignal, as_signal
 
     refuse_options(options)
     if options["dimension"] > 1 or options["boundary_layer"] is not None:
@@ -119,6 +130,9 @@ def _run_family(
         raise ParameterError(f"{flag} is for one graph, not for families yet; leave it out")
     signal = "random" if options["signal"] == "any" else options["signal"]  # of a scenario for ptcc certify
     x0 = shared.read_initial_state(options["x0"], options["seed"], family.modes[0].mandatory)
-    played = as_signal(signal, options["seed"])
+    promise = dwell_of(options)
+    if promise is not None and signal != "random":
+        raise ParameterError(f"--dwell and --clock-dwell are of random signals; leave out --signal {shorten(signal)}")
+    played = as_signal(signal, options["seed"]) if promise is None else RandomDwellSignal(promise, options["seed"])
     more = shared.sliding_keywords(protocol, options, family.modes[0].mandatory)
     return simulate_family(family, protocol, x0, played, times=times, samples=options["samples"], **more)

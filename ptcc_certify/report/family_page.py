@@ -27,11 +27,12 @@ from ptcc_certify.report import notation as texts
 from ptcc_certify.report.family_screen import BOUND_KINDS, box_text, constant_text, groups_text, sharpest
 from ptcc_certify.report.notation import above, rational
 from ptcc_certify.report.plots.counterexample import plot_counterexample
-from ptcc_certify.report.plots.family import plot_family, plot_family_decay
+from ptcc_certify.report.plots.family import keeps_dwell, plot_family, plot_family_decay
 from ptcc_certify.report.plots.family_graph import plot_family_graph
 from ptcc_certify.report.plots.family_input import plot_family_input
 from ptcc_certify.report.restricted_screen import restricted_entries, rests, signal_text, states_of_signal
 from ptcc_certify.report.structure_text import structure_text
+from ptcc_certify.report.text_layout import arithmetic
 from ptcc_certify.simulation.family_run import FamilyTrajectory
 from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_name
 from ptcc_certify.theorems.family_behaviour import DEPENDS, Counterexample, FamilyComponent
@@ -68,7 +69,7 @@ def family_facts(saved: FamilyCertificate) -> dict[str, Any]:
         "promise": "" if saved.signal == "any" else signal_text(saved.signal)[1],
         "these": states_of_signal(saved) != list(saved.final_states or ()),
         "explicit_power": _explicit_power(saved),
-        "sliding": saved.protocol.reaching is not None,
+        **{"sliding": saved.protocol.reaching is not None, "arithmetic": arithmetic(saved.direct)},
         "peak_agent": None if not saved.input_peaks else family.labels[saved.input_peaks.index(max(saved.input_peaks))],
     }
 
@@ -107,6 +108,7 @@ def family_view(saved: FamilyCertificate, runs: Sequence[FamilyTrajectory]) -> d
         "worst_ratio": max((ratio.worst_ratio for ratio in ratios), default=0.0),
         "violated": any(ratio.violated for ratio in ratios),
         "judged": sum(ratio.judged for ratio in ratios),
+        "dwelling": keeps_dwell(saved, runs),
         "worst_runs": sum(run.signal.startswith("worst") for run in runs),
         "groups": [
             _sentence(texts.printable(groups_text(c), 2000)) for c in facts["components"] if c.behaviour == DEPENDS

@@ -308,7 +308,8 @@ def groups_text(component: FamilyComponent) -> str:
     groups, parts = FamilyGroups(component), []
     for group in groups.agreeing:
         names = _names(component, group.nodes.tolist(), 30)
-        parts.append(f"{names} keeps its value" if group.nodes.size == 1 else f"{names} agree up to camps")
+        camps = " up to camps" * (len(set(group.camps.tolist())) > 1)
+        parts.append(f"{names} keeps its value" if group.nodes.size == 1 else f"{names} agree{camps}")
     zero, near = groups.at_zero.tolist(), set(groups.bounded.tolist())
     known = {v for group in groups.agreeing for v in group.nodes.tolist()}.union(zero)
     others = [v for v in range(component.nodes.size) if v not in known]

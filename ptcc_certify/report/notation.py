@@ -24,6 +24,7 @@ from ptcc_certify.checker.input_formulas import InitialSet
 from ptcc_certify.graphs.rationals import format_exact, nearest_float, writable
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.report.structure_text import structure_text
+from ptcc_certify.report.text_layout import arithmetic
 
 #: Labels of a list that are written out, and characters of a label.
 LISTED, CHARACTERS = 30, 48
@@ -267,6 +268,7 @@ def facts(saved: Certificate) -> dict[str, Any]:
     return {
         **{"saved": saved, "graph": saved.graph, "effort": effort, "certified": saved.verdict == "certified"},
         "sliding": saved.protocol.reaching is not None,
+        "arithmetic": arithmetic(saved.direct),
         "negative": int((saved.graph.sign < 0).sum()),
         "structure_words": structure_text(saved.structure),
         "claims": sorted(Counter(saved.claims).items(), key=lambda item: item[0].theorem),

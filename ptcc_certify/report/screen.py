@@ -29,6 +29,7 @@ from ptcc_certify.report.structure_text import (
 )
 from ptcc_certify.report.text_layout import (
     TEXT,
+    arithmetic,
     columns,
     counted,
     format_lines,
@@ -410,8 +411,8 @@ def _rate_lines(certificate: Certificate) -> Lines:
     yield "rate", f"{down(rate)} per unit of the stretched clock s, proved: V <= e^(-rate s) V(0){best}{ratio}"
     yield from _class_lines(certificate)
     yield from _residual_lines(certificate) if certificate.direct else _reaching_lines(certificate)
-    arithmetic = "exact arithmetic" if certificate.direct else "exact or ball arithmetic"
-    text, report = f"{len(certificate.obligations)} proof obligations proved in {arithmetic}", certificate.checked
+    proved = f"{len(certificate.obligations)} proof obligations proved in {arithmetic(certificate.direct)}"
+    text, report = proved, certificate.checked
     if report is not None:
         text += "; checked without a solver: " + ("accepted" if report.accepted else f"{report.rejected} REJECTED")
     yield "proof", text

@@ -5,6 +5,7 @@ Its sentences are in ``templates/statement.tex``; what is not LaTeX already is e
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from fractions import Fraction
@@ -13,10 +14,12 @@ from functools import cache
 import jinja2
 from markupsafe import Markup
 
-from ptcc_certify.bounds.envelope import FRACTIONS
+from ptcc_certify.bounds.envelope import FRACTIONS, Envelope
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
+from ptcc_certify.certificate.restricted_claims import WindowClaim
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.structure import STABILITY
 from ptcc_certify.protocols.casadi_latex import symbol_latex
 from ptcc_certify.report import notation as texts
 from ptcc_certify.report.family_page import THEOREM, family_facts, remaining, state_rows
@@ -26,12 +29,15 @@ from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
 
 #: Agents up to which ``W`` is printed (a matrix of amsmath has 10 columns), and edges up to which these are.
 _MATRIX, _EDGES = 10, 60
+#: Width in pt of a column of ``article`` in two columns, and of ``W = (w_kl) =`` with the brackets.
+_COLUMN, _HEAD = 229, 78
 _CAPTIONS = {
     "graph": "The signed digraph: arrows point to who listens, solid from allies, dashed from opponents.",
     "decay": (
-        "What is left of the error against the time left, both logarithmic. Thick line: the proved bound, the least of"
-        " those of the Lyapunov functions, which are the thin lines; dashed: that of the theorem's own. With circles: a"
-        " simulated run (numerical), down to the dotted line, below which the integrator resolves nothing."
+        "What is left of the error against the time left, both logarithmic. Thick line: the %s from the initial state"
+        " of the table, the least of those of the Lyapunov functions, which are the thin lines; dashed: that of the"
+        " theorem's own. With circles: a simulated run (numerical), down to the dotted line, below which the integrator"
+        " resolves nothing."
     ),
 }
 _FAMILY_CAPTIONS = {
@@ -95,12 +101,13 @@ def report_latex(saved: Certificate, figures: dict[str, str] | None = None) -> s
         "comment": _comment(saved.path.name),
         "parameters": [(Markup(symbol_latex(name)), getattr(saved.protocol, name)) for name in names],
         **{"structure": saved.structure, "named": _named(saved.graph.labels)},
-        **{"matrix": _matrix(saved.graph), "edges": _edges(saved.graph)},
+        **dict(zip(("matrix", "small"), _matrix(saved.graph), strict=True)),
+        "edges": _edges(saved.graph),
         **{"connectivity": texts.structure_text(saved.structure).partition(";")[0], "bounds": _bounds(saved)},
         "shares": _shares(saved),
         "times": [0.0, *(r.time for r in saved.reaching or () if r.z is not None)],
         **dict(zip(("columns", "rows"), _states(saved), strict=True)),
-        **{"figures": figures or {}, "stem": _stem(saved.path.stem)},
+        **{"figures": figures or {}, "stem": _stem(saved.path.stem), "captions": _captions(saved)},
         "sha256": _broken(saved.sha256),
     }
     return _environment().get_template("statement.tex").render(view)
@@ -131,7 +138,8 @@ def family_latex(saved: FamilyCertificate, figures: dict[str, str] | None = None
         (_cut(label), Markup("--") if camp == "\N{EN DASH}" else camp, *ends)
         for label, camp, *ends in state_rows(saved)[: texts.LISTED]
     ]
-    view = family_facts(saved) | {
+    facts = family_facts(saved)
+    view = facts | {
         "comment": _comment(saved.source.path.name),
         "parameters": [(Markup(symbol_latex(name)), getattr(saved.protocol, name)) for name in names],
         **{"named": _named(saved.family.labels), "listed": _intervals(saved), "rows": rows},
@@ -139,6 +147,8 @@ def family_latex(saved: FamilyCertificate, figures: dict[str, str] | None = None
         "remaining_promised": [(f, _number(bound)) for f, bound in remaining(saved, of_signal=True)],
         **{"sigma0": saved.sigma0, "last_time": _last_time(saved)},
         "why": [counterexample_text(c, c.counterexample) for c in _depending(saved) if c.counterexample is not None],
+        "restricted_tex": [_powers(text) for text in facts["restricted"]],
+        "left_by_windows": _left_by_windows(saved),
         "ends_known": any(last is not None for *_, last in rows),
         **{"figures": figures or {}, "stem": _stem(saved.source.path.stem), "report": saved.checked},
         **{"sha256": _broken(saved.source.sha256), "sha256_plain": saved.source.sha256},
@@ -147,10 +157,30 @@ def family_latex(saved: FamilyCertificate, figures: dict[str, str] | None = None
     return _environment().get_template("family_statement.tex").render(view)
 
 
+def _powers(text: str) -> Markup:
+    """Return a text of the screen whose powers of ten are set as such."""
+    return Markup(re.sub(r"\b1e(-?\d+)", r"$10^{\1}$", _tex(text)))
+
+
+def _left_by_windows(saved: FamilyCertificate) -> str:
+    """Return what joint windows leave less and less of, in symbols; nothing where no such claim is made."""
+    claims = [claim for claim in saved.restricted if isinstance(claim, WindowClaim)]
+    sizes = {STABILITY: r"$\max_{k} |x_{k}(t)|$"}
+    spread = r"$\max_{k} g_{k} x_{k}(t) - \min_{k} g_{k} x_{k}(t)$, where $g_{k} = \pm 1$ is the camp of agent $k$"
+    within = " over the agents of a component" if len(saved.parts) > 1 else ""
+    return "; or ".join(dict.fromkeys(sizes.get(claim.behaviour, spread) + within for claim in claims))
+
+
 def _last_time(saved: FamilyCertificate) -> float | None:
     """Return an instant from which on all sliding variables are proved 0; None if that is ``T_r``."""
     times = [None if r.z is None else r.time for r in saved.reaching or ()]
     return None if None in times else max((t for t in times if t is not None), default=0.0)
+
+
+def _captions(saved: Certificate) -> dict[str, str]:
+    """Return captions that say whether the bound is proved; through a reaching phase it is integrated in floats."""
+    bound = "proved bound" if saved.direct else "bound (numerical)"
+    return _CAPTIONS | {"decay": _CAPTIONS["decay"].replace("%s", bound)}
 
 
 def _family_captions(saved: FamilyCertificate) -> dict[str, str]:
@@ -206,14 +236,23 @@ def _named(labels: Sequence[str]) -> list[str]:
     return cut if len(labels) <= texts.LISTED and cut != numbers else []
 
 
-def _matrix(graph: SignedDigraph) -> list[list[Fraction]]:
-    """Return ``W`` of a small graph."""
+def _matrix(graph: SignedDigraph) -> tuple[list[list[Fraction]], bool]:
+    """Return ``W`` of a small graph and whether it is set small; nothing if it is wider than a column of two."""
     weights = {(t, s): w for s, t, w in graph.edges} if graph.n_nodes <= _MATRIX else {}
-    return (
-        [[weights.get((target, source), Fraction(0)) for source in graph.labels] for target in graph.labels]
-        if weights
-        else []
-    )
+    if not weights:
+        return [], False
+    rows = [[weights.get((target, source), Fraction(0)) for source in graph.labels] for target in graph.labels]
+    entries = sum(max(_width(_rational(w)) for w in column) for column in zip(*rows, strict=True))
+    gaps = 2 * (graph.n_nodes - 1)
+    if _HEAD + entries + 5 * gaps <= _COLUMN:
+        return rows, False
+    return (rows, True) if 0.85 * (_HEAD + entries) + 3 * gaps <= _COLUMN else ([], False)  # \footnotesize is 0.8
+
+
+def _width(number: str) -> float:
+    """Estimate the width in pt of a number in LaTeX, set in 10 pt."""
+    points = {"-": 7.8, ".": 2.8, ",": 2.8, "{": 0, "}": 0, " ": 0}
+    return sum(points.get(c, 5) for c in re.sub(r"\\[a-z]+", "00", number))
 
 
 def _edges(graph: SignedDigraph) -> list[tuple[int, int, Fraction]]:
@@ -235,10 +274,15 @@ def _bounds(saved: Certificate) -> list[tuple[Fraction, Fraction]]:
 
 
 def _shares(saved: Certificate) -> list[tuple[float, float]]:
-    """Return the share of the initial norm that may be left at fractions of the deadline."""
-    if not saved.direct or saved.rate is None or saved.overshoot is None:
+    """Return the share of the norm where the decay begins that may be left at fractions of the time from there."""
+    if saved.rate is None or saved.overshoot is None:
         return []
-    return [(f, saved.envelope.residual(float(1 - Fraction(str(f))))) for f in FRACTIONS]
+    envelope, p = saved.envelope, saved.protocol
+    if saved.direct:
+        return [(f, envelope.residual(float(1 - Fraction(str(f))))) for f in FRACTIONS]
+    sliding = Envelope(envelope.structure, envelope.gain, envelope.functions)
+    clocks = [float(p.rho1 * p.span) * f - float(p.rho2 * p.kappa) * math.log(1 - f) for f in FRACTIONS]
+    return [(f, float(sliding.norm_factor(s * (1 - 1e-12)))) for f, s in zip(FRACTIONS, clocks, strict=True)]
 
 
 def _states(saved: Certificate) -> tuple[list[str], list[tuple[str, str, tuple[str, ...]]]]:
@@ -272,7 +316,7 @@ def _environment() -> jinja2.Environment:
         "equals": lambda x: ("= " + _rational(x)).replace(r"= \approx", r"\approx"),
     }
     environment.filters["arrows"] = lambda text: Markup(_tex(text).replace("-$>$", r"$\to$"))
-    environment.globals |= {"captions": _CAPTIONS, "meanings": _MEANINGS}
+    environment.globals |= {"meanings": _MEANINGS}
     return environment
 
 

@@ -186,3 +186,8 @@ def _cut(text: str, width: int) -> str:
     while end < len(text) and (used := used + columns(text[end])) <= width:
         end += 1
     return text[:end]
+
+
+def arithmetic(direct: bool) -> str:
+    """Name the arithmetic of a proof: reaching times are enclosed in balls, unless the decay begins at 0."""
+    return "exact arithmetic" if direct else "exact or ball arithmetic"

@@ -23,6 +23,7 @@ from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.protocols.gain import Gain
 from ptcc_certify.simulation.family_members import MIDDLE, Choice, Members
 from ptcc_certify.theorems.family_behaviour import decide
+from ptcc_certify.theorems.restricted_signals import DwellTime
 
 #: How random weights lie in their intervals.
 WEIGHTS = ("both", "ends", "between")
@@ -257,6 +258,46 @@ class RandomSignal(Signal):
                 levels = levels.round()
             moves = self.dwell is not None or members.imbalance(state()) > rest
             clock = clock * (1 if moves else 2) + rng.exponential(self.dwell or members.unit)
+            yield Stretch(members.choice(mode, levels), clock)
+
+
+class RandomDwellSignal(Signal):
+    """Random modes that keep a dwell time: each acts for it and an exponentially distributed time more.
+
+    Weights change at random meanwhile, as under :class:`RandomSignal`.
+
+    Parameters
+    ----------
+    promise : DwellTime
+        Of time or of the clock.
+    seed : int
+
+    Examples
+    --------
+    >>> RandomDwellSignal(DwellTime("0.3", clock="t"), 2)
+    RandomDwellSignal(random, seed 2, at least 0.3 of time between switches)
+    """
+
+    def __init__(self, promise: DwellTime, seed: int = 0):
+        self.promise, self.seed = promise, whole_number(seed, "seed", 0, 2**63 - 1)
+        of = "time" if promise.clock == "t" else "the clock"
+        self.text = f"random, seed {self.seed}, at least {float(promise.least):.4g} of {of} between switches"
+
+    def play(self, members: Members, gain: Gain, state: State) -> Iterator[Stretch]:
+        """Yield them."""
+        rng, clock, until, instant = np.random.default_rng(self.seed), 0.0, 0.0, 0.0
+        least, T, on_clock = float(self.promise.least) * (1 + 1e-9), float(gain.T), self.promise.clock == "s"
+        rest, mode = _largest_at_rest(state()), 0
+        while True:
+            doubled = 1 if members.imbalance(state()) > rest else 2
+            if clock >= until:
+                mode = int(rng.integers(len(members.arrays)))
+                hold = least + rng.exponential(max(least, members.unit if on_clock else T / 10))
+                instant += hold
+                until = doubled * clock + hold if on_clock else float(gain.clock(instant)) if instant < T else math.inf
+            levels = rng.random(members.arrays[mode].q)
+            step = rng.exponential(members.unit) if levels.size else math.inf
+            clock = min(until, doubled * clock + step)
             yield Stretch(members.choice(mode, levels), clock)
 
 

@@ -284,7 +284,7 @@ def test_figures_are_made_of_the_files_of_a_family():
         (("plot", *BOTH, "--what", "spectrum"), "eigenvalues of single graphs do not tell"),
         (("plot", "day.csv", "night.csv"), "2 graphs; add --switching"),
         (("plot", *BOTH, "--what", "states", "--gain-cap", "3"), "--gain-cap is for one graph"),
-        (("plot", *BOTH, "--wide"), "--wide is for one graph"),
+        (("plot", *BOTH, "--wide"), "--wide is for the states of one graph; figures of families are one column wide"),
     ):
         run = ptcc(*words)
         assert (run.code, run.out) == (2, "") and told in run.err, run

@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import pytest
 from bad_inputs import ptcc
+from matplotlib.figure import Figure
 
 from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.cli import cli
@@ -238,3 +240,14 @@ def test_without_its_comments_every_line_of_the_template_is_toml():
     assert tomllib.loads(next(line for line in lines if line not in once)) == {
         "x0": {"é": 1, 'say "x"': 1, "a\x7fb": 1}
     }
+
+
+def test_a_random_state_of_a_scenario_begins_within_its_initial_bound(monkeypatch: pytest.MonkeyPatch):
+    Path("s.toml").write_text('[graph]\nfile = "fig1a"\n[initial_state]\nx0 = "random"\ninitial_bound = 1\n')
+    rows = ptcc("simulate", "s.toml", "--steps", "2").out.splitlines()
+    first = [float(cell) for cell in rows[1].split(",")[2:8]]
+    assert 0.1 < max(map(abs, first)) <= 1
+    drawn: list[Any] = []
+    monkeypatch.setattr("ptcc_certify.report.plots.input.plot_input", lambda run, **_: drawn.append(run) or Figure())
+    assert ptcc("plot", "s.toml", "--what", "input", "-o", "u.png").code == 0
+    assert drawn[0].states[:, 0].tolist() == first

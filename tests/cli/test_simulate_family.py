@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -33,6 +34,14 @@ def test_the_seed_of_a_random_signal_tells_the_run():
     assert runs[0] == runs[1] != runs[2]
 
 
+def test_a_random_signal_keeps_a_dwell_time():
+    rows = csv.DictReader(ptcc(*FAMILY, "--dwell", "0.3", "--seed", "3", "--steps", "200").out.splitlines())
+    modes = [(float(row["t"]), row["mode"]) for row in rows]
+    changes = [t for (_, before), (t, after) in pairwise(modes) if before != after]
+    assert changes
+    assert all(b - a > 0.29 for a, b in pairwise([0, *changes]))
+
+
 def test_a_family_slides_under_disturbances():
     sliding = ("--protocol", "sliding-mode", "--sigma0", "1,0.5,-1", "--disturbance", "sin(9*k*t)")
     rows = list(csv.DictReader(ptcc(*FAMILY, *sliding, "--steps", "4").out.splitlines()))
@@ -51,6 +60,9 @@ def test_figures_of_families_are_drawn():
         ((*FAMILY, "--signal", "dusk.csv"), "dusk.csv: no such file"),
         ((*FAMILY, "--dimension", "2"), "--dimension is for one graph"),
         ((*FAMILY, "--gain-cap", "5"), "--gain-cap is for one graph"),
+        ((*FAMILY, "--dwell", "0.1", "--clock-dwell", "0.1"), "give one of them"),
+        ((*FAMILY, "--dwell", "0.1", "--signal", "worst-case"), "leave out --signal worst-case"),
+        (("simulate", "day.csv", "--dwell", "0.1"), "--dwell is for families of graphs"),
         (("simulate", "day.csv", "night.csv"), "add --switching"),
         (("simulate", "day.csv", "--signal", "random"), "--signal is for families"),
     ],

@@ -1,14 +1,18 @@
 """Facts about the page and the statement of a family: what they say is what is certified, and a refutation is drawn."""
 
+import math
 import re
 from dataclasses import replace
 from datetime import date
+from itertools import pairwise
 
+import numpy as np
 import pytest
 
 from ptcc_certify import Expectations, Family, NominalProtocol, SignedDigraph, certify, read_certificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.io import as_family
+from ptcc_certify.report.family_screen import groups_text
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.plots.family import plot_family, sample_runs
 from ptcc_certify.report.plots.family_input import plot_family_input
@@ -16,7 +20,8 @@ from ptcc_certify.report.report_file import write_report
 from ptcc_certify.report.statement import family_latex
 from ptcc_certify.simulation.family_run import simulate_family
 from ptcc_certify.simulation.signals import RandomSignal
-from ptcc_certify.theorems.restricted_signals import DwellTime
+from ptcc_certify.theorems.family_behaviour import decide
+from ptcc_certify.theorems.restricted_signals import DwellTime, JointWindows
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
 DAY = SignedDigraph.from_edges([("ann", "<b>", 1), ("<b>", "eve", -1)])
@@ -166,3 +171,48 @@ def test_a_statement_of_which_one_component_depends_on_the_signal_claims_the_oth
     assert "so it is on 1 of the 3 components of the union of all graphs. Counterexample: the state" in text
     assert "On 1 component of the union of all graphs, consensus occurs at $T$ for every such choice" in text
     assert "& no limit claimed" in text and "The theorem" not in text
+
+
+@pytest.mark.parametrize("clock", ["t", "s"])
+def test_under_a_dwell_time_the_page_shows_signals_that_keep_it(clock: str):
+    promise = DwellTime("0.3", clock=clock)
+    saved = read_certificate(certify(SWITCHING, PROTOCOL, [1, 2, 3], signal=promise).to_dict())
+    runs = sample_runs(saved)
+    for run in runs:
+        instants = [x for x in run.switches.tolist() if math.isfinite(x)]
+        grid = np.linspace(0, 1, 200_000, endpoint=False)
+        times = instants if clock == "s" else np.interp(instants, run.protocol.gain.clock(grid), grid).tolist()
+        assert all(b - a >= 0.2999 for a, b in pairwise(times))
+    assert sum(len(run.switches) > 1 for run in runs) > 2
+    page = words(report_html(saved, runs=runs))
+    assert "8 runs from the initial state of the certificate under random signals that keep the promise." in page
+    assert f"under 8 signals, which keep the promise: at least 0.3 of {'time' if clock == 't' else 'the clock'}" in page
+    assert "need not keep" not in page
+    for drawn in (plot_family(saved, runs=runs), plot_family_input(saved, runs=runs)):
+        assert drawn.get_legend().get_title().get_text() == "8 signals with this dwell time"
+
+
+def test_the_statement_defines_the_clock_and_what_windows_leave_less_of():
+    one = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)], ["c"])
+    other = SignedDigraph.from_edges([("b", "c", 1), ("c", "b", 1)], ["a"])
+    signal = JointWindows(2, on="0.5", clock="s")
+    saved = read_certificate(certify(Family.switching([one, other]), PROTOCOL, [1, 2, 4], signal=signal).to_dict())
+    text = family_latex(saved)
+    assert r"The clock is $s(t) = \rho_{1} t + \rho_{2} \kappa \ln\frac{T}{T - t}$" in text
+    assert r"What is left is $\max_{k} g_{k} x_{k}(t) - \min_{k} g_{k} x_{k}(t)$" in text
+    assert re.search(r"what is left shrinks by \$10\^\{-\d+\}\$ of it", text)
+    with_rate = read_certificate(certify(SWITCHING, PROTOCOL, signal=DwellTime("0.2", clock="t")).to_dict())
+    assert family_latex(with_rate).count(r"\ln\frac") == 1 and "What is left is" not in family_latex(with_rate)
+
+
+def test_a_page_whose_ends_depend_on_the_signal_says_so_in_its_verdict():
+    leaders = as_family([(1, 3, 1, 2), (2, 3, 1, 1)])
+    page = words(report_html(read_certificate(certify(leaders, PROTOCOL, [1, 2, 3]).to_dict())))
+    assert "CERTIFIED: depends on the signal" in page
+
+
+def test_groups_without_negative_edges_agree_and_others_up_to_camps():
+    for sign, told in ((1, "a, b agree;"), (-1, "a, b agree up to camps;")):
+        pair = [("a", "b", sign, 2 * sign) if sign > 0 else ("a", "b", -2, -1), ("b", "a", sign, sign)]
+        (component,) = decide([*pair, ("a", "d", 1, 2), ("c", "d", 1, 1)])
+        assert groups_text(component).startswith(told)

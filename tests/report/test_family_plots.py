@@ -8,6 +8,7 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.report.family_screen import family_lines
 from ptcc_certify.report.plots.agents import CAMP_STYLES
 from ptcc_certify.report.plots.counterexample import plot_counterexample
 from ptcc_certify.report.plots.family import plot_family, plot_family_decay, sample_runs
@@ -158,3 +159,10 @@ def test_a_certificate_draws_its_figures_by_name(drawn):
     for what, told in (("spectrum", "eigenvalues of single graphs"), ("picture", "is unknown")):
         with pytest.raises(ParameterError, match=told):
             certificate.plot(what)
+
+
+def test_the_certified_peak_has_the_digits_of_the_screen(drawn):
+    certificate, runs = drawn
+    peak = plot_family_input(certificate, runs=runs).texts[0].get_text().removeprefix("certified peak ")
+    assert f"|u_k| <= {peak}, " in "\n".join(family_lines(certificate, "day"))
+    assert len(peak.replace(".", "").lstrip("0")) == 4

@@ -507,7 +507,7 @@ def test_the_decay_lies_under_the_bound_and_the_bound_is_the_best_of_all(axis: s
     before = run.remaining > 0
     T = float(run.protocol.T)
     place = {"left": run.remaining, "time": T * (1 - run.remaining), "clock": run.clock}[axis][before]
-    bound, seen = shown["proved bound"], shown["simulated (CVODES)"]
+    bound, seen = shown["proved bound from $x(0)$"], shown["simulated (CVODES)"]
     floor = shown["integrator's floor"].get_ydata()[0]  # type: ignore[attr-defined]
     assert np.array_equal(bound.get_xdata(), place)  # type: ignore[attr-defined]
     height, size = bound.get_ydata(), seen.get_ydata()  # type: ignore[attr-defined]
@@ -527,7 +527,7 @@ def test_the_decay_lies_under_the_bound_and_the_bound_is_the_best_of_all(axis: s
 def test_no_run_is_drawn_above_a_bound(name: str) -> None:
     cert = certified(name)
     shown = labelled(plot_decay(cert))
-    seen, bound = (np.asarray(shown[which].get_ydata()) for which in ("simulated (CVODES)", "proved bound"))  # type: ignore[attr-defined]
+    seen, bound = (np.asarray(shown[which].get_ydata()) for which in ("simulated (CVODES)", "proved bound from $x(0)$"))  # type: ignore[attr-defined]
     assert np.isfinite(seen).sum() > 20 and not (seen > bound * (1 + 1e-6)).any()
     norm = np.linalg.norm(cert.trajectory.error, axis=0) if cert.trajectory else np.zeros(0)
     alone = np.asarray(labelled(plot_decay(cert.trajectory))["simulated (CVODES)"].get_ydata())  # type: ignore[attr-defined]
@@ -544,7 +544,7 @@ def test_a_run_that_violates_its_bound_is_seen_to_do_so(first: float, factor: fl
     states = np.where(late, run.states[:, -1:] + factor * (run.states[:, :1] - run.states[:, -1:]), run.states)
     ax = plot_decay(replace(run, states=states), certificate=cert)
     x, y = labelled(ax)["simulated (CVODES)"].get_data()  # type: ignore[attr-defined]
-    inside = (y > labelled(ax)["proved bound"].get_ydata()) & (y < ax.get_ylim()[1])  # type: ignore[attr-defined]
+    inside = (y > labelled(ax)["proved bound from $x(0)$"].get_ydata()) & (y < ax.get_ylim()[1])  # type: ignore[attr-defined]
     inside &= (x <= max(ax.get_xlim())) & (x >= min(ax.get_xlim()))
     assert inside.sum() > 20
 

@@ -38,7 +38,9 @@ from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.io import read_graph
 from ptcc_certify.report.notation import LISTED, formula_svg, printable, typeset
 from ptcc_certify.report.page import EXTREMES, _environment, report_html
+from ptcc_certify.report.plots.decay import plot_decay
 from ptcc_certify.report.report_file import write_report
+from ptcc_certify.report.screen import certificate_lines
 from ptcc_certify.report.statement import _tex, report_latex
 
 #: What a page needs, and nothing that loads, runs or leaves it.
@@ -516,6 +518,40 @@ def test_a_statement_compiles(name: str, tmp_path: Path):
     assert (tmp_path / "state_ment_graph.pdf").exists()
 
 
+def dense_digraph(n: int, size: Any = 1) -> SignedDigraph:
+    """A ring with chords to every third agent, every other one negative."""
+    pairs = [(i, j) for i in range(n) for j in range(n) if (j - i) % n in (1, 4)]
+    return SignedDigraph.from_edges([(f"a{i}", f"a{j}", size * (-1) ** (i * j)) for i, j in pairs])
+
+
+@pytest.mark.skipif(shutil.which("pdflatex") is None, reason="no pdflatex to compile with")
+@pytest.mark.parametrize("sliding", [False, True])
+@pytest.mark.parametrize(
+    ("n", "size"),
+    [(8, 1), *(pytest.param(*case, marks=pytest.mark.campaign) for case in ((4, 1), (10, 1), (10, 1.25)))],
+)
+def test_a_statement_fits_a_column_of_two(n: int, size: Any, sliding: bool, tmp_path: Path):
+    protocol: Any = SLIDING if sliding else NOMINAL
+    more: Any = {"sigma0": [Fraction(2 * k - 9, 7) for k in range(n)]} if sliding else {}
+    start = [Fraction(10 * k - 31, 7) for k in range(n)]
+    made = certify(dense_digraph(n, size), protocol, start, simulation=False, **more)
+    write_report(made, tmp_path / "s.tex", simulation=False)
+    begin = r"\documentclass[twocolumn]{article}\usepackage{amsmath,graphicx}\begin{document}"
+    (tmp_path / "main.tex").write_text(begin + r"\input{s}\end{document}")
+    command = ["pdflatex", "-interaction=batchmode", "-halt-on-error", "-no-shell-escape", "main.tex"]
+    assert subprocess.run(command, cwd=tmp_path, capture_output=True, timeout=60).returncode == 0
+    log = (tmp_path / "main.log").read_text(errors="replace")
+    assert all(float(excess) <= 2 for excess in re.findall(r"Overfull \\hbox \(([0-9.]+)pt", log)), log
+
+
+def test_a_matrix_too_wide_for_a_column_of_two_is_a_list_of_weights(tmp_path: Path):
+    for size, fits in ((1, True), ("1.25", False)):
+        graph = dense_digraph(10, Fraction(size))
+        text = report_latex(read_certificate(certify(graph, NOMINAL, simulation=False).to_dict()))
+        assert (r"\begin{bmatrix}" in text) == fits == (r"\footnotesize\setlength\arraycolsep" in text)
+        assert ("$w_{2,1} = 1.25$" in text) != fits
+
+
 @pytest.mark.skipif(shutil.which("pdflatex") is None, reason="no pdflatex to compile with")
 def test_a_label_in_brackets_is_no_argument_of_latex(tmp_path: Path):
     graph = SignedDigraph.from_edges([("a", "[2cm]", 1), ("[2cm]", "[br]", -1), ("[br]", "*", 1)])
@@ -594,6 +630,34 @@ def test_a_statement_holds_hypotheses_claim_and_numbers(tmp_path: Path):
     assert r"\includegraphics[width=\linewidth]{g.pdf}" in text and "{d.pdf}" in text
     assert text.count("\\begin{") == text.count("\\end{")
     assert "the gain is at most $50$" in text and r"|n_{k}| \le 0.01" in text and r"|d_{k}| \le 1/3" in text
+
+
+def test_through_a_reaching_phase_the_statement_tells_what_is_left_from_T_r_on(tmp_path: Path):
+    saved = read_certificate(example("sliding").to_dict())
+    text, p = report_latex(saved, {"decay": "d.pdf"}), saved.protocol
+    assert r"Hence of $\|E(T_{r})\|$ at most" in text and r"at $t = T_{r} + 0.99\,T_{s}$." in text
+    own = [m for m in saved.envelope.functions if m.coordinates == saved.envelope.coordinates]
+    line = text[text.index("Hence of") :].partition("\n")[0].replace("T_{r} + ", "")
+    for instant, share in shares_of(line).items():
+        s = p.rho1 * p.span * Fraction(instant) - p.rho2 * p.kappa * Fraction(math.log(1 - instant))  # type: ignore[attr-defined]
+        least = min(math.sqrt(m.overshoot) * math.exp(-m.proved_rate * s / 2) for m in own)  # type: ignore[type-var]
+        assert least * 0.999 <= share <= least * 1.12
+
+
+def test_the_bound_through_a_reaching_phase_is_called_numerical_everywhere(tmp_path: Path):
+    for name, word, arithmetic in (
+        ("nominal", "proved bound", "exact arithmetic"),
+        ("sliding", "bound (numerical)", "exact or ball arithmetic"),
+    ):
+        made = example(name)
+        saved = read_certificate(made.to_dict())
+        text, page = report_latex(saved, {"decay": "d.pdf"}), sound(report_html(saved.with_simulation())).text
+        assert f"Thick line: the {word} from the initial state of the table" in text
+        assert f"verified in {arithmetic};" in text and f"obligations in {arithmetic} (" in page
+        assert ("Bounds (numerical) of" in page) == (not made.direct) == ("Proved bounds of" not in page)
+        labels = [text.get_text() for text in plot_decay(made).get_legend().get_texts()]
+        assert ("proved bound from $x(0)$" in labels) == made.direct != ("bound from $x(0)$ (numerical)" in labels)
+        assert f"proved in {arithmetic}" in "\n".join(certificate_lines(made, name))
 
 
 def test_a_statement_holds_the_weights_and_says_that_it_is_without_disturbances(tmp_path: Path):

@@ -41,8 +41,9 @@ def plot_decay(
 
     Thick: the bound ``min_i sqrt(e^(-rate_i s(t)) V_i(0) / lmin(P_i))``, the best of all proved Lyapunov functions at
     every instant. Thin: each of them. Dashed: the theorem's own. If only Theorem 1.1's own coordinates were proved,
-    ``||eps(t)||`` instead. The run, with circles, is drawn down to the integrator's floor, its tolerance times the
-    size of the states times what ``E`` multiplies them by: below, a run says nothing.
+    ``||eps(t)||`` instead. Through a reaching phase the bounds are integrated in floating point: numerical. The run,
+    with circles, is drawn down to the integrator's floor, its tolerance times the size of the states times what ``E``
+    multiplies them by: below, a run says nothing.
 
     Parameters
     ----------
@@ -174,7 +175,8 @@ def _bounds(
             label = None
         bounds[function.name] = values, looks
     best = envelope.norm_bound(remaining, x0) / unit
-    return bounds | {_BEST: (best, {"color": BOUND, "linewidth": 1.8, "label": "proved bound"})}
+    label = "proved bound from $x(0)$" if certificate.direct else "bound from $x(0)$ (numerical)"
+    return bounds | {_BEST: (best, {"color": BOUND, "linewidth": 1.8, "label": label})}
 
 
 def _draw_run(ax: Axes, place: np.ndarray, seen: np.ndarray, floor: float, bottom: float) -> None:

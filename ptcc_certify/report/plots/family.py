@@ -17,7 +17,8 @@ from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, find_camps
 from ptcc_certify.report.plots.agents import CAMP_STYLES, NAMED_AGENTS, draw_deadlines, family_groups, name_agents
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled, time_label
 from ptcc_certify.simulation.family_run import FamilyTrajectory, simulate_family
-from ptcc_certify.simulation.signals import RandomSignal, Signal
+from ptcc_certify.simulation.signals import RandomDwellSignal, RandomSignal, Signal
+from ptcc_certify.theorems.restricted_signals import DwellTime
 
 #: Random signals that are drawn beside the worst cases.
 _RANDOM = 8
@@ -31,7 +32,7 @@ def sample_runs(certificate: FamilyCertificate, signals: Iterable[Signal] | None
     ----------
     certificate : FamilyCertificate
     signals : iterable of Signal, optional
-        By default eight random ones, and worst cases.
+        By default eight random ones, and worst cases; of a certificate for a dwell time random ones that keep it.
 
     Raises
     ------
@@ -40,10 +41,25 @@ def sample_runs(certificate: FamilyCertificate, signals: Iterable[Signal] | None
     """
     if certificate.initial_state is None:
         raise ParameterError("the certificate has no initial state; certify the family with x0")
-    chosen = [*map(RandomSignal, range(_RANDOM)), *worst_case_signals(certificate)] if signals is None else signals
+    chosen = _signals(certificate) if signals is None else signals
     start = [float(x) for x in certificate.initial_state]
     more: dict[str, Any] = {} if certificate.sigma0 is None else {"sigma0": [float(s) for s in certificate.sigma0]}
     return [simulate_family(certificate.family, certificate.protocol, start, signal, **more) for signal in chosen]
+
+
+def _signals(certificate: FamilyCertificate) -> list[Signal]:
+    """Return random signals and worst cases; under a dwell time random ones that keep it."""
+    if isinstance(certificate.signal, DwellTime):
+        return [RandomDwellSignal(certificate.signal, seed) for seed in range(_RANDOM)]
+    return [*map(RandomSignal, range(_RANDOM)), *worst_case_signals(certificate)]
+
+
+def keeps_dwell(certificate: FamilyCertificate, runs: Sequence[FamilyTrajectory]) -> bool:
+    """Tell whether runs are those under random signals that keep the dwell time of a certificate."""
+    if not isinstance(certificate.signal, DwellTime):
+        return False
+    own = {RandomDwellSignal(certificate.signal, seed).text for seed in range(_RANDOM)}
+    return all(run.signal in own for run in runs)
 
 
 def family_camps(family: Family) -> np.ndarray | None:
@@ -180,7 +196,8 @@ def plot_family_decay(
     floor = FLOOR_FACTOR * first.rtol * scale
     if not (bound >= floor).any():
         raise ParameterError("every agent begins where it ends: there is no decay to draw")
-    label: str | None = "random signals" if subject.signal == "any" else "any signal (random)"
+    own = subject.signal == "any" or keeps_dwell(subject, runs)
+    label: str | None = "random signals" if own else "any signal (random)"
     any_worst, known = False, _known_end(subject)
     for run in runs:
         end = run.final_state if run.deadline_resolved else known
@@ -232,8 +249,9 @@ def _known_end(certificate: FamilyCertificate) -> np.ndarray | None:
 
 
 def count_of_signals(certificate: FamilyCertificate, runs: Sequence[FamilyTrajectory]) -> str:
-    """Tell how many signals are drawn, and where some are promised, that these are any."""
-    return f"{len(runs)} signals" + " of any kind" * (certificate.signal != "any")
+    """Tell how many signals are drawn, and where some are promised, whether these keep the promise or are any."""
+    kept = " with this dwell time" if keeps_dwell(certificate, runs) else " of any kind"
+    return f"{len(runs)} signals" + kept * (certificate.signal != "any")
 
 
 def _extreme_agents(x: np.ndarray) -> list[int]:

@@ -56,7 +56,7 @@ def plot_family_input(
     >>> unsure = Family.from_intervals([("a", "b", "0.8", "1.2"), ("b", "a", "0.5", "1.5")])
     >>> ax = plot_family_input(certify_family(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2]))
     >>> ax.texts[0].get_text()
-    'certified peak 6.01'
+    'certified peak 6.001'
     """
     runs, ax = runs_of(subject, runs), axes_of(ax)
     first, gain = runs[0], subject.protocol.gain
@@ -65,11 +65,12 @@ def plot_family_input(
     floor = FLOOR_FACTOR * first.rtol * (float(np.abs(first.states[:, 0]).max()) or 1.0)
     noise = 2 * float(Members(subject.family).in_weight.max(initial=0.0)) * floor
     top, start, labels = 0.0, 0.0, set[str]()
+    others = "other signals" if any(run.signal.startswith("worst") for run in runs) else "random signals"
     for run in runs:
         own = run.remaining > 0
         size = np.abs(run.input[:, own]).max(axis=0)
         resolved = np.where(size > noise * gain.value_at_remaining(run.remaining[own]), size, np.nan)
-        label = "slowest found" if (worst := run.signal.startswith("worst")) else "other signals"
+        label = "slowest found" if (worst := run.signal.startswith("worst")) else others
         style: dict[str, Any] = {
             "color": "black" if worst else RUN,
             "linewidth": 0.9 if worst else 0.6,
@@ -88,7 +89,7 @@ def plot_family_input(
             ax.axhline(peak, color=BOUND, linewidth=0.8, linestyle="--")
             top = max(top, peak)
         ax.annotate(
-            f"certified peak {up(max(subject.input_peaks), 3)}",
+            f"certified peak {up(max(subject.input_peaks), 4)}",
             (0, peak),
             (4, 2),
             textcoords="offset points",

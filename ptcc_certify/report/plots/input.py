@@ -71,7 +71,7 @@ def plot_input(
     >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5])
     >>> ax = plot_input(cert)
     >>> ax.get_ylabel(), ax.texts[0].get_text()
-    ('input $|u_k|$', 'certified peak 16.1')
+    ('input $|u_k|$', 'certified peak 16.01')
     """
     if isinstance(subject, FamilyCertificate):
         return plot_family_input(subject, ax=ax, time_unit=time_unit)
@@ -131,11 +131,11 @@ def _draw_peak(ax: Axes, peak: float, shown: bool, whom: str) -> None:
     ground = {"boxstyle": "square,pad=0.05", "facecolor": "white", "edgecolor": "none"}
     looks: dict[str, Any] = {"ha": "right", "fontsize": NAME_SIZE, "textcoords": "offset points", "bbox": ground}
     if not shown:
-        text = f"certified peak {up(peak, 3)}{whom}, above"
+        text = f"certified peak {up(peak, 4)}{whom}, above"
         ax.annotate(text, (1, 1), (0, -2), xycoords="axes fraction", va="top", **looks)
         return
     ax.axhline(peak, color="black", linewidth=0.9, linestyle="--")
-    text = f"certified peak {up(peak, 3)}{whom}"
+    text = f"certified peak {up(peak, 4)}{whom}"
     ax.annotate(text, (1, peak), (0, 2), xycoords=("axes fraction", "data"), va="bottom", **looks)
 
 
