@@ -12,6 +12,7 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.certificate.restricted_bounds import deviation_of_signal, nearer_for_signal
+from ptcc_certify.certificate.verdict import CERTIFIED
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import STABILITY
@@ -326,6 +327,12 @@ def _rate_entries(certificate: FamilyCertificate) -> Lines:
         return
     rate, bound = certificate.rate, certificate.upper_bound
     limit = "" if bound is None else f"upper bound {up(bound)}"
+    if rate is not None and certificate.verdict != CERTIFIED:
+        yield (
+            "rate",
+            "none is proved: the independent check does not accept what was found" + f"; {limit}" * bool(limit),
+        )
+        return
     if rate is not None:
         ratio = "" if bound is None else f": both proved, ratio {down(rate / bound)}"
         which = f"{down(rate)}{_every(certificate)}"
@@ -345,9 +352,13 @@ def _rate_entries(certificate: FamilyCertificate) -> Lines:
 
 def _no_search(certificate: FamilyCertificate) -> str:
     """Tell why no rate was proved: too many agents for a search, or too little time; nothing where it is not known."""
+    from ptcc_certify.lyapunov.family_search import TOO_MANY_ROWS
+
     sizes = [part.component.nodes.size for part in certificate.parts if part.component.nodes.size > 1 and not part.rate]
     if max(sizes, default=0) > EXACT_NODES:
         return f"{max(sizes):,} agents are above the {EXACT_NODES:,} of the searches"
+    if large := next((note for note in certificate.notes if TOO_MANY_ROWS in note), ""):
+        return large.partition(": ")[2]
     return "the searches took too long; raise --time-limit" * any(
         "cut off" in note or note == "Lyapunov functions" for note in certificate.notes
     )
