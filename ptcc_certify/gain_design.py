@@ -705,8 +705,9 @@ def _answer_with_gains(blank: Design, fit: Fit) -> Design:
         when = f"{nearest_float(fit.deadline) * -math.expm1(-nearest_float(how.z)):.4g}"
         binding = f"{whose}, largest about t = {when}, {_percent(fit.peak, limit)}"
     if blank.asked.input_norm is None:  # an expectation is one of every |u_k|
-        fit = fit._replace(certificate=cert.changed(expectations=Expectations(max_input=limit)))
-    return replace(blank, binding=binding, product=fit.peak * fit.deadline, **fit._asdict())
+        cert = cert.changed(expectations=Expectations(max_input=limit))
+    product = fit.peak * fit.deadline
+    return replace(blank, binding=binding, product=product, **fit._replace(certificate=cert)._asdict())
 
 
 def _answer_without_gains(answer: Design) -> Design:
