@@ -323,7 +323,7 @@ def test_the_page_of_a_design_says_what_was_asked_and_of_which_states_its_bounds
     graph = SignedDigraph.from_edges([(1, 2, 3), (2, 3, -1), (3, 1, 1)])
     asked = {"max_input": 20, "initial_bound": 3, "deadline": "2.5"}
     text = plain(reported(design(graph, **asked).certificate, tmp_path, simulation=False))
-    assert "met: |u k | \u2264 20" in text
+    assert "met: |uk| \u2264 20" in text
     assert "there is no final state. Bounds of the input are for the set of initial states." in text
     assert "no bound of the input in numbers" not in text
     text = plain(reported(design(graph, **asked, input_norm=2).certificate, tmp_path, simulation=False))
