@@ -52,6 +52,7 @@ from ptcc_certify.bounds.input.tightest_bound import decaying, log, usable_funct
 from ptcc_certify.bounds.input.worst_initial_state import WorstInitialState, worst_initial_state
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.checker import INPUT_NODES
 from ptcc_certify.checker.input_formulas import BITS, InitialSet, InputBounds, Limits, Linear
 from ptcc_certify.errors import ParameterError
@@ -703,7 +704,10 @@ def _answer_with_gains(blank: Design, fit: Fit) -> Design:
         whose = "||u||" if by_norm else f"the input of agent {shorten(cert.graph.labels[v])}"
         when = f"{nearest_float(fit.deadline) * -math.expm1(-nearest_float(how.z)):.4g}"
         binding = f"{whose}, largest about t = {when}, {_percent(fit.peak, limit)}"
-    return replace(blank, binding=binding, product=fit.peak * fit.deadline, **fit._asdict())
+    if blank.asked.input_norm is None:  # an expectation is one of every |u_k|
+        cert = cert.changed(expectations=Expectations(max_input=limit))
+    product = fit.peak * fit.deadline
+    return replace(blank, binding=binding, product=product, **fit._replace(certificate=cert)._asdict())
 
 
 def _answer_without_gains(answer: Design) -> Design:

@@ -33,10 +33,12 @@ from ptcc_certify.certificate.request import (
     read_seconds,
     read_sliding_variable,
 )
+from ptcc_certify.certificate.restricted_claims import RateClaim
 from ptcc_certify.certificate.restricted_search import STEP, claims_for, require_nominal
 from ptcc_certify.certificate.verdict import Assessment
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.family import MANY_MODES
+from ptcc_certify.checker.matrix_products import LARGEST_ROWS
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.display_hook import Shown, family_summary, plot_of_family
 from ptcc_certify.graphs.family import Family
@@ -339,10 +341,31 @@ def certify_family(
             "signal": signal,
             "restricted": claims_for(signal, parts, protocol, begin, notes, asked.min_rate),
         }
-    progress(STEPS[3])
+    progress(STEPS[-1])
     kept |= {"expectations": asked, "notes": tuple(dict.fromkeys(notes)), "scenario": scenario}
-    names = origins_of(None, x0, sigma0) | dict(origins or {})
-    return FamilyCertificate(family, protocol, tuple(parts), initial_state, sigma, reaching, origins=names, **kept)
+    kept["origins"] = origins_of(None, x0, sigma0) | dict(origins or {})
+    return _fewer_functions(FamilyCertificate(family, protocol, tuple(parts), initial_state, sigma, reaching, **kept))
+
+
+def _fewer_functions(certificate: FamilyCertificate) -> FamilyCertificate:
+    """Leave out functions, slower ones first, that the check refuses since their proofs are large.
+
+    Claims for restricted signals that rest on a function left out are left out with it.
+    """
+    functions = [(part, V) for part in certificate.parts for V in part.functions if isinstance(V, FamilyFunction)]
+    work = sum((len(V.nodes) + len(tau)) ** 3 for _, V in functions for tau in V.multipliers)
+    if work <= LARGEST_ROWS**3 or not all(part.certifiable for part in certificate.parts):
+        return certificate
+    for most in (1, 0):
+        report = certificate.checked
+        if report is None or report.accepted:
+            break
+        parts = tuple(replace(part, functions=part.functions[:most]) for part in certificate.parts)
+        note = f"the independent check does not take all functions that were found: {report.reason}"
+        claims = (c for c in certificate.restricted if most or not (isinstance(c, RateClaim) and c.forms is None))
+        notes = tuple(dict.fromkeys((*certificate.notes, note)))
+        certificate = replace(certificate, parts=parts, restricted=tuple(claims), notes=notes)
+    return certificate
 
 
 def _boxes(

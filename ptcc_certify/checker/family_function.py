@@ -23,7 +23,14 @@ from ptcc_certify.checker.family import Component, Edge, Family, combination
 from ptcc_certify.checker.family_limits import WeightedMean
 from ptcc_certify.checker.graph import ordered, positions
 from ptcc_certify.checker.input_formulas import root_above
-from ptcc_certify.checker.matrix_products import Matrix, combined, need_rows, times, transposed
+from ptcc_certify.checker.matrix_products import (
+    Matrix,
+    combined,
+    need_rows,
+    need_rows_with_multipliers,
+    times,
+    transposed,
+)
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, need, triangle
 
@@ -239,7 +246,7 @@ def decreases(
         return
     texts = entries(fields(witness, ("multipliers",), "the witness")["multipliers"], "multipliers", len(parts))
     q = len(texts)
-    need_rows(n + q)
+    need_rows_with_multipliers(n + q)
     (taus,), common = integers([[exact(x) for x in texts]])
     pushes = [_push(P, part) for part in parts]
     diagonal, squares = [[tau * (e == k) for k in range(q)] for e, tau in enumerate(taus)], _zeros(n)

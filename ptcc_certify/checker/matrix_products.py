@@ -22,6 +22,8 @@ Matrix = list[list[int]]
 Sparse = list[dict[int, int]]
 #: Rows of a dense matrix.
 LARGEST_ROWS = 400
+#: Rows of a form of a family with its multipliers, one for each uncertain weight; above ``LARGEST_ROWS`` they are work.
+WITH_MULTIPLIERS = 800
 #: Above so many entries, a quarter of them not 0, a product is formed as that of dense matrices.
 DENSE_SIZE = 400
 
@@ -29,6 +31,13 @@ DENSE_SIZE = 400
 def need_rows(rows: int) -> None:
     """Refuse dense matrices that would take long."""
     need(rows <= LARGEST_ROWS, f"a matrix of {rows} rows; {LARGEST_ROWS} are taken")
+
+
+def need_rows_with_multipliers(rows: int) -> None:
+    """Refuse forms of families with more multipliers than are taken, and count what many of them cost."""
+    need(rows <= WITH_MULTIPLIERS, f"a matrix of {rows} rows; {WITH_MULTIPLIERS} are taken")
+    if rows > LARGEST_ROWS:
+        spend(rows**3 // 20, what="a proof of definiteness")
 
 
 def block(graph: Digraph, nodes: Sequence[int]) -> Sparse:

@@ -22,6 +22,7 @@ from lmi.common import CommonCertificate, best_multipliers, common_lyapunov, lea
 from lmi.dyadic import round_to_bits
 from lmi.errors import LMIError, OutOfTime
 from lmi.search_time import checkpoint, seconds_left, share_of_time, time_limit
+from ptcc_certify.checker.matrix_products import WITH_MULTIPLIERS
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.lyapunov.error_system import rounded_matrix
 from ptcc_certify.lyapunov.family_function import FamilyFunction, prove_ends, prove_mode, with_constants
@@ -32,6 +33,8 @@ from ptcc_certify.lyapunov.undirected_family import undirected_function
 KINDS = ("undirected", "diagonal", "full")
 #: Rows up to which a full matrix, and a diagonal one, is searched.
 FULL_ROWS, DIAGONAL_ROWS = 24, EXACT_NODES
+#: What is told where the check would refuse a proof, between the rows that it takes and those that there may be.
+TOO_MANY_ROWS = "agents and uncertain edges in one mode are above the rows of a proof"
 #: Share of the time of the search for the diagonal matrix, which comes first, where there is a limit.
 _DIAGONAL_SHARE = 0.3
 #: Share of the time of a class for the climb to the largest rate.
@@ -111,6 +114,7 @@ def search_family(
     if "undirected" in kinds:
         with share_of_time(1.0, "undirected", cut_off):
             functions += filter(None, [undirected_function(quotient)])
+    most = max(mode.proof_rows for mode in quotient.modes)
     if shares is not None or not any(V.optimal for V in functions):
         small = "full" in kinds and len(quotient.nodes) <= FULL_ROWS
         limited = np.isfinite(seconds_left()) and small  # else nothing comes after the diagonal one
@@ -118,6 +122,9 @@ def search_family(
             if kind not in kinds or (
                 enough is not None and any(_worth(quotient, V, shares) >= enough for V in functions)
             ):
+                continue
+            if most > WITH_MULTIPLIERS:
+                notes.append(f"class {kind}: {most:,} {TOO_MANY_ROWS}, {WITH_MULTIPLIERS} at most")
                 continue
             if len(quotient.nodes) > rows:
                 notes.append(f"class {kind} is searched up to {rows} rows; these are {len(quotient.nodes)}")

@@ -84,6 +84,11 @@ class QuotientMode:
         return UncertainMatrix(A, F, H, np.array([float(part.radius) for part in self.parts]))
 
     @property
+    def proof_rows(self) -> int:
+        """Rows of the matrix that proves a rate: one for each coordinate and each multiplier."""
+        return len(self.center) + len(self.parts)
+
+    @property
     def at_rest(self) -> bool:
         """Whether nothing moves in this mode: a mode without edges, an outage."""
         return not self.parts and not any(map(any, self.center))

@@ -361,6 +361,12 @@ def _rate_entries(certificate: FamilyCertificate) -> Lines:
         return
     rate, bound = certificate.rate, certificate.upper_bound
     limit = "" if bound is None else f"upper bound {up(bound)}"
+    if rate is not None and certificate.verdict != "certified":
+        yield (
+            "rate",
+            "none is proved: the independent check does not accept what was found" + f"; {limit}" * bool(limit),
+        )
+        return
     if rate is not None:
         ratio = "" if bound is None else f": both proved, ratio {down(rate / bound)}"
         which = f"{down(rate)}{_every(certificate)}"
@@ -380,6 +386,8 @@ def _rate_entries(certificate: FamilyCertificate) -> Lines:
 
 def _no_search(certificate: FamilyCertificate) -> str:
     """Tell why no rate was proved: too many agents for a search, or too little time; nothing where it is not known."""
+    from ptcc_certify.lyapunov.family_search import TOO_MANY_ROWS
+
     without = [part.component for part in certificate.parts if part.component.nodes.size > 1 and not part.rate]
     largest = max(without, key=lambda component: component.nodes.size, default=None)
     late = any("cut off" in note or note == "Lyapunov functions" for note in certificate.notes)
@@ -388,6 +396,8 @@ def _no_search(certificate: FamilyCertificate) -> str:
             return f"{largest.nodes.size:,} agents are above the {EXACT_NODES:,} of the searches"
         if not late:
             return f"weighted squares of {largest.nodes.size:,} agents prove none"
+    if large := next((note for note in certificate.notes if TOO_MANY_ROWS in note), ""):
+        return large.partition(": ")[2]
     return "the searches took too long; raise --time-limit" * late
 
 

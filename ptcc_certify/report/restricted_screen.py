@@ -43,6 +43,9 @@ def restricted_entries(certificate: FamilyContent) -> Iterator[tuple[str, str]]:
     if certificate.signal == "any":
         return
     head = signal_text(certificate.signal)
+    if isinstance(certificate.signal, DwellTime) and certificate.signal.clock == "t":
+        longer = certificate.signal.least > certificate.protocol.T
+        head = head[0], head[1] + ", longer than T: at most one switch" * longer
     several = len(certificate.parts) > 1
     if not certificate.restricted:
         yield *head[:1], f"{head[1]}: nothing more is proved"  # type: ignore[misc]

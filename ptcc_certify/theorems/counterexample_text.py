@@ -19,6 +19,8 @@ from ptcc_certify.theorems.family_behaviour import (
 
 #: Names that are listed, edges of a closed walk, and characters of a name.
 _LISTED, _STEPS, _WIDTH = 4, 8, 24
+#: Characters of a sentence about a state, of which fewer values are listed rather than that its end is cut off.
+_SENTENCE = 105
 
 
 def counterexample_text(component: FamilyComponent, why: Counterexample) -> str:
@@ -100,9 +102,12 @@ def _moving(family: Family, names: Sequence[str], why: Counterexample) -> str:
         one += "at the least weights " * (why.mode == why.other)
     if why.state is not None:
         size = max(map(abs, why.state)) or Fraction(1)
-        state = ", ".join(f"{name}={_number(x / size)}" for name, x in zip(names[:_LISTED], why.state, strict=False))
-        state += ", ..." * (len(names) > _LISTED)
-        return f"the state {state} rests {one}and moves {two}".rstrip()
+        values = [f"{name}={_number(x / size)}" for name, x in zip(names[:_LISTED], why.state, strict=False)]
+        for listed in range(len(values), 0, -1):
+            state = ", ".join(values[:listed]) + ", ..." * (len(names) > listed)
+            sentence = f"the state {state} rests {one}and moves {two}".rstrip()
+            if len(sentence) <= _SENTENCE:
+                return sentence
     group = "" if why.column is None else f" at the camps of leader group {why.column + 1}"
     return f"a state{group} rests {one}and moves {two}".rstrip()
 

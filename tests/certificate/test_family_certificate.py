@@ -7,10 +7,19 @@ import time
 import numpy as np
 import pytest
 
+from lmi.common import evaluate
+from lmi.exact.work import WorkError, limited
 from ptcc_certify import NominalProtocol
-from ptcc_certify.certificate.family_certificate import certify_family
+from ptcc_certify.certificate import family_certificate
+from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate, certify_family
+from ptcc_certify.checker import family_function
+from ptcc_certify.checker.matrix_products import WITH_MULTIPLIERS, need_rows_with_multipliers
+from ptcc_certify.checker.reading import RejectedError
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
+from ptcc_certify.lyapunov import family_search
+from ptcc_certify.lyapunov.family_search import prove_certificate
+from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.report.family_screen import family_lines, family_summary
 from ptcc_certify.theorems.family_behaviour import decide
 
@@ -81,3 +90,66 @@ def test_bounds_beyond_all_floats_are_infinite():
     instants = np.array([0.0, 1e-3, 1.0])  # of 1 - t/T
     assert np.isinf(made.input_bound(instants)).all()
     assert made.deviation_bound(instants)[:, -1].max() < 1e301
+
+
+def test_a_proof_of_441_rows_is_taken():
+    """21 agents that all hear one another, with 420 uncertain edges."""
+    names = [f"v{i}" for i in range(21)]
+    ends = {True: ("-1.01", "-0.99"), False: ("0.99", "1.01")}
+    family = Family.from_intervals([(s, t, *ends[s == "v1"]) for s in names for t in names if s != t])
+    (component,) = decide(family)
+    quotient = Quotient.of(component)
+    found = evaluate(np.eye(21), [quotient.modes[0].array], [np.full(420, 0.02)])
+    function = prove_certificate(quotient, "diagonal", found, [0])
+    assert function is not None and function.rate > 1.8 and quotient.modes[0].proof_rows == 441
+    made = FamilyCertificate(family, PROTOCOL, (ComponentProof(component, (function,)),))
+    assert made.verdict == "certified" and made.rate == function.rate
+
+
+def test_more_rows_than_are_taken_are_refused_and_many_are_work():
+    with pytest.raises(RejectedError, match="a matrix of 801 rows; 800 are taken"):
+        need_rows_with_multipliers(WITH_MULTIPLIERS + 1)
+    with limited(0.1), pytest.raises(WorkError, match="a proof of definiteness would take too long"):
+        need_rows_with_multipliers(WITH_MULTIPLIERS)
+
+
+def _three_uncertain_edges() -> Family:
+    return Family.from_intervals([("a", "b", 1, 2), ("b", "c", 1, 3), ("c", "a", -2, -1)])
+
+
+def test_no_function_is_searched_whose_proof_has_more_rows_than_the_check_takes(monkeypatch):
+    """3 agents and 3 uncertain edges."""
+    monkeypatch.setattr(family_search, "WITH_MULTIPLIERS", 5)
+    made = certify_family(_three_uncertain_edges(), PROTOCOL, [1, 2, 3])
+    assert made.verdict == "certified" and made.rate is None
+    text = " ".join("\n".join(family_summary(made, "net")).split())
+    assert (
+        "in closed form; no larger one was proved (6 agents and uncertain edges in one mode are above the rows" in text
+    )
+    monkeypatch.setattr(family_search, "WITH_MULTIPLIERS", 6)
+    assert certify_family(_three_uncertain_edges(), PROTOCOL).rate
+
+
+def test_functions_that_the_check_refuses_are_left_out(monkeypatch):
+    def refuse(rows: int) -> None:
+        raise RejectedError("too many rows")
+
+    monkeypatch.setattr(family_function, "need_rows_with_multipliers", refuse)
+    monkeypatch.setattr(family_certificate, "LARGEST_ROWS", 5)
+    made = certify_family(_three_uncertain_edges(), PROTOCOL, [1, 2, 3])
+    assert made.verdict == "certified" and made.rate is None and made.parts[0].functions == ()
+    assert made.notes[-1] == "the independent check does not take all functions that were found: too many rows"
+
+
+def test_what_the_check_refuses_is_not_called_proved(monkeypatch):
+    made = certify_family(_three_uncertain_edges(), PROTOCOL, [1, 2, 3])
+    text = " ".join("\n".join(family_summary(made, "net")).split())
+    assert "both proved" in text and made.verdict == "certified"
+
+    def refuse(rows: int) -> None:
+        raise RejectedError("too many rows")
+
+    monkeypatch.setattr(family_function, "need_rows_with_multipliers", refuse)
+    made = certify_family(_three_uncertain_edges(), PROTOCOL, [1, 2, 3])
+    text = " ".join("\n".join(family_summary(made, "net")).split())
+    assert "both proved" not in text and "none is proved: the independent check does not accept what was found" in text

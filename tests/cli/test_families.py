@@ -470,6 +470,7 @@ def test_more_is_claimed_for_restricted_signals():
     Path("outage.csv").write_text("a,,\nb,,\nc,,\n")
     for words, line in (
         ((*BOTH, "--dwell", "0.2"), "dwell      at least 0.2 of time between switches: rate "),
+        ((*BOTH, "--dwell", "5"), "dwell      at least 5 of time between switches, longer than T: at most"),
         ((*BOTH, "--clock-dwell", "3"), "dwell      at least 3 of the clock between switches: rate "),
         ((*BOTH, "--signal", "constant"), "constant   if mode and weights never change: rate "),
         ((*spoiled, "--dwell", "0.2"), "dwell      at least 0.2 of time between switches: the last mode decides"),

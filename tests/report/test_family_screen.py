@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import random
 import re
 from fractions import Fraction
@@ -127,6 +128,23 @@ def test_every_refutation_is_told_in_words():
                         ), text
                         assert "Fraction" not in text and "  " not in text and text == text.strip()
     assert len(kinds) == 6
+
+
+@pytest.mark.parametrize(
+    "kind, told",
+    [
+        ("p", "the state p0=1, p1=1, p2=1, p3=1, ..."),
+        ("v_protein", "the state v_protein0=1, ..."),
+        ("v_protein_of_the_cell_", "a state at the camps of leader group 1"),
+    ],
+)
+def test_the_edge_that_moves_a_state_is_told_however_long_the_names_are(kind, told):
+    names = [f"{kind}{k}" for k in range(5)]
+    rows = [(s, t, 1, 2) for s, t in itertools.pairwise(names)]
+    family = Family.from_intervals([*rows, (names[4], names[0], 1, 2), (names[0], names[2], -1, 0)])
+    (component,) = ptcc.decide(family)
+    text = " ".join(" ".join(decision_summary([component], family, "net")).split())
+    assert f"{told} rests at the least weights and moves with {names[0]} -> {names[2]} on" in text
 
 
 def test_groups_are_told_once_each():

@@ -31,7 +31,7 @@ from jinja2 import UndefinedError
 from report_examples import HOSTILE, MADE, NOMINAL, SLIDING, example, forged, undecided
 
 import ptcc_certify
-from ptcc_certify import Certificate, GainLimits, NominalProtocol, SignedDigraph, certify
+from ptcc_certify import Certificate, GainLimits, NominalProtocol, SignedDigraph, certify, design
 from ptcc_certify.certificate.certificate import RejectedCertificate, read_certificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import load_graph
@@ -319,6 +319,17 @@ def test_what_a_certificate_does_not_say_is_said():
     assert "sampled and held" in nominal and "Sampling is certified with the periods" in caveats("initial_set")
     assert "\u03b4 must be known" in caveats("sliding") and "No initial state was given" in caveats("no start")
     assert "article leaves disconnected graphs out" in caveats("disconnected")
+
+
+def test_the_page_of_a_design_says_what_was_asked_and_of_which_states_its_bounds_are(tmp_path: Path):
+    graph = SignedDigraph.from_edges([(1, 2, 3), (2, 3, -1), (3, 1, 1)])
+    asked = {"max_input": 20, "initial_bound": 3, "deadline": "2.5"}
+    text = plain(reported(design(graph, **asked).certificate, tmp_path, simulation=False))
+    assert "met: |uk| \u2264 20" in text
+    assert "there is no final state. Bounds of the input are for the set of initial states." in text
+    assert "no bound of the input in numbers" not in text
+    text = plain(reported(design(graph, **asked, input_norm=2).certificate, tmp_path, simulation=False))
+    assert "met:" not in text
 
 
 def test_hostile_texts_are_shown_as_texts(tmp_path: Path):
