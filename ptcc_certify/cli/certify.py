@@ -87,7 +87,7 @@ def _certify_graph(
     from ptcc_certify.report.screen import certificate_lines, summary_lines
 
     LOG.info("%s", one_line(f"read {graph}: {signed.n_nodes} nodes, {signed.n_edges} edges"))
-    x0 = shared.read_initial_state(options["x0"], options["seed"], signed, within=options["initial_bound"])
+    x0 = shared.read_initial_state(options["x0"], options["seed"], signed)
     more = shared.sliding_keywords(protocol, options, signed) | _requests(options)
     origins = _origins(options)
     with progress(STEPS, screen.quiet) as begin:

@@ -120,6 +120,7 @@ def _three_uncertain_edges() -> Family:
 def test_no_function_is_searched_whose_proof_has_more_rows_than_the_check_takes(monkeypatch):
     """3 agents and 3 uncertain edges."""
     monkeypatch.setattr(family_search, "WITH_MULTIPLIERS", 5)
+    monkeypatch.setattr(family_certificate, "squares_function", lambda *_: None)
     made = certify_family(_three_uncertain_edges(), PROTOCOL, [1, 2, 3])
     assert made.verdict == "certified" and made.rate is None
     text = " ".join("\n".join(family_summary(made, "net")).split())
