@@ -83,10 +83,10 @@ def _check_ends(
         bits = longest(edge[4] for edge in edges)
         spend(4 * len(edges), long, bits, "boxes")
         sized(2 * len(nodes), long + bits + 64, "boxes")
-        pulls = dict.fromkeys(nodes, 0), dict.fromkeys(nodes, 0)
+        margins = dict.fromkeys(nodes, 0), dict.fromkeys(nodes, 0)
         for s, t, sign, low, high in edges:
-            if t in pulls[0]:
-                for pull, own, same, other in ((pulls[0], top, top, bottom), (pulls[1], bottom, bottom, top)):
+            if t in margins[0]:
+                for margin, own, same, other in ((margins[0], top, top, bottom), (margins[1], bottom, bottom, top)):
                     gap = own[t] - (same if sign > 0 else other)[s]
-                    pull[t] += (high if gap < 0 else low) * gap
-        need(all(y >= 0 for pull in pulls for y in pull.values()), "an agent may leave the box")
+                    margin[t] += (high if gap < 0 else low) * gap
+        need(all(y >= 0 for margin in margins for y in margin.values()), "an agent may leave the box")

@@ -214,7 +214,7 @@ def test_a_run_exceeds_what_cancelled_entries_would_prove():
         assert (root <= own * (1 + 1e-6)).all() and (root[1:] > wrong[1:] * 1.05).any()
 
 
-def test_pulls_bound_what_any_member_makes_of_sliding_variables():
+def test_drive_sizes_bound_what_any_member_makes_of_sliding_variables():
     draw = random.Random(5)
     for k in range(20):
         family = random_led(draw, ("stability", "bipartite consensus")[k % 2])
