@@ -114,6 +114,7 @@ _ALSO_CALLED = {
     "plot_states": "plot_trajectory",
     "load_graph": "as_graph",
 }
+_ALSO_CALLED |= {name: f"theorems.restricted_signals.{name}" for name in ("DwellTime", "JointWindows", "ClockShares")}
 
 
 class Room(ModuleType):

@@ -190,6 +190,9 @@ _ALSO_CALLED |= {"expect": "expectations", "initial_bound": "initial_set"}
 
 #: How else an object of a class is made, from what one has at hand.
 _MAKERS = {"SignedDigraph": ", or SignedDigraph.from_edges([(source, target, weight), ...])"}
+_MAKERS |= dict.fromkeys(("certify", "certify_vectors"), ", such as ptcc.NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)")
+#: What is given at once, where one gives more.
+_AT_ONCE = {"switching": "give one list or dict of graphs"}
 #: Restricted signals, by what may be taken for keywords of certify.
 _SIGNALS = dict.fromkeys(("dwell", "dwell_time", "clock_dwell"), "DwellTime(...)")
 _SIGNALS |= dict.fromkeys(("window", "windows", "clock_window", "window_on"), "JointWindows(...)")
@@ -236,9 +239,10 @@ def _misfit(called: Any, signature: inspect.Signature, args: tuple[Any, ...], ke
     required = [key for key, one in parameters.items() if one.default is one.empty and one.kind is not one.VAR_KEYWORD]
     if missing := [key for key in required if key not in given and key not in keywords]:
         call = [f"{key}=..." if parameters[key].kind is inspect.Parameter.KEYWORD_ONLY else key for key in required]
-        also = _MAKERS.get(name, "")
+        also = _MAKERS.get(name, "") if name == "SignedDigraph" or "protocol" in missing else ""
         return f"{name} asks for {', '.join(missing)}; write {name}({', '.join(call)}){also}"
-    return f"{name} takes {', '.join(places) or 'nothing'} without a name, each once; write any other as name=value"
+    mend = _AT_ONCE.get(name, "write any other as name=value")
+    return f"{name} takes {', '.join(places) or 'nothing'} without a name, each once; {mend}"
 
 
 def unknown_parameter(name: str, unknown: str, parameters: Iterable[str]) -> str:
@@ -255,6 +259,8 @@ def unknown_parameter(name: str, unknown: str, parameters: Iterable[str]) -> str
         hint = f"; did you mean {meant}?"
     elif "signal" in parameters and (signal := _SIGNALS.get(unknown)):
         hint = f"; say signal={signal} of ptcc_certify.theorems.restricted_signals"
+    elif unknown == "optional" and "uncertainty" in parameters:
+        hint = "; an edge that may fail has 0 at one end: Family.from_intervals([(source, target, 0, weight), ...])"
     elif (place := _PLACES.get(unknown)) and name not in _PLACES.values():
         hint = f"; give it to {place}({unknown}=...)"
     return f"{name} has no parameter {unknown}{hint}"

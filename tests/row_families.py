@@ -143,6 +143,21 @@ def exact_value(n: int, edges: list[tuple[int, int, Fraction]], z: list[Fraction
     return sum((row[n] * x for row, x in zip(rows[:n], z, strict=True)), Fraction(0))
 
 
+def random_state(rng: random.Random, n: int) -> list[Fraction]:
+    """Return a state of short fractions."""
+    return [Fraction(rng.randint(-20, 20), rng.randint(1, 7)) for _ in range(n)]
+
+
+def values_of_vertices(mode: Mode, z: list[Fraction]) -> list[Fraction]:
+    """Return the consensus values of all members with weights at ends of their intervals, ``z`` camps times states."""
+    values = []
+    for largest in vertices(mode):
+        sizes = [(mode.upper if up else mode.lower).fraction(e) for e, up in enumerate(largest.tolist())]
+        edges = zip(mode.source.tolist(), mode.target.tolist(), sizes, strict=True)
+        values.append(exact_value(len(z), [edge for edge in edges if edge[2]], z))
+    return values
+
+
 def bounds_of(vectors: Iterable[Scaled]) -> dict[int, Fraction]:
     """Return what some vectors say of every node."""
     whole, scale = least(vectors)

@@ -32,6 +32,7 @@ IN_ROOMS = {
     "graphs.io": ("read_state",),
     "graphs.structure": ("ClosedComponent", "WeakComponent"),
     "theorems.claims": ("Claim",),
+    "theorems.restricted_signals": ("DwellTime", "JointWindows", "ClockShares"),
     "theorems.table": ("THEOREMS", "theorem_for"),
     "theorems.lemmas": (
         "gauge",
@@ -68,7 +69,6 @@ IN_ROOMS = {
     "checker.input_formulas": ("InitialSet",),
     "gain_design": ("Design",),
     "report.page": ("report_html",),
-    "theorems.restricted_signals": ("DwellTime", "JointWindows", "ClockShares"),
     "report.statement": ("report_latex",),
 }
 PUBLIC = [(package, name) for package in (ptcc_certify, lmi) for name in package.__all__ if name != "__version__"]

@@ -4,6 +4,7 @@ Five people share one small certificate: a control researcher, a network scienti
 with limits of actuators, a student, and a reviewer.
 """
 
+import copy
 from contextlib import nullcontext
 from fractions import Fraction
 from io import StringIO
@@ -177,7 +178,7 @@ MISTAKES = {
     "ptcc.certify(G, p, initial_state=x0)": "ParameterError: certify has no parameter initial_state; did you mean x0?",
     "ptcc.certify(G, p, x0, 'listens')": "ParameterError: certify takes graph, protocol, x0 without a name, each once",
     "ptcc.certify(G, p, x0, x0=x0)": "ParameterError: certify takes graph, protocol, x0 without a name, each once",
-    "ptcc.certify(G)": "ParameterError: certify asks for protocol; write certify(graph, protocol)",
+    "ptcc.certify(G)": "ParameterError: certify asks for protocol; write certify(graph, protocol), such as ptcc.Nom",
     "ptcc.certify(G, p, progress=None, **fast)": "Certificate(bipartite consensus",
     "ptcc.certify(G, p, progress=True, **fast)": "ParameterError: progress = True is no function; give print, say",
     "ptcc.certify(G, p, scenario='s.toml')": "ParameterError: scenario = 's.toml' is none; give the mapping that",
@@ -191,6 +192,12 @@ MISTAKES = {
     "ptcc.certify(p, G)": "ParameterError: graph and protocol are exchanged; write certify(graph, protocol)",
     "ptcc.theorems.restricted_signals.DwellTime(0.5)": "DwellTime(0.5, clock='t')",
     "ptcc.theorems.restricted_signals.JointWindows(2, on=0.5)": "JointWindows(2, on=0.5, clock='s')",
+    "ptcc.DwellTime(0.5)": "... no attribute 'DwellTime'; did you mean theorems.restricted_signals.DwellTime?",
+    "ptcc.JointWindows": "... did you mean theorems.restricted_signals.JointWindows?",
+    "ptcc.ClockShares": "... did you mean theorems.restricted_signals.ClockShares?",
+    "ptcc.certify(G, p, optional=[('ann', 'bob')])": "... 0 at one end: Family.from_intervals([(source, target, 0, wei",
+    "ptcc.certify({'ann': ['bob'], 'bob': ['eve']}, p)": "... a dict is a family of graphs by name; give the edges",
+    "ptcc.certify({'ann': {'bob': 1}}, p)": "... a dict is a family of graphs by name; give the edges",
     "ptcc.certify(G, p, shares=[1])": "ParameterError: certify has no parameter shares; say signal=ClockShares(...) of",
     "ptcc.certify(G, p, clock_window=1)": "ParameterError: certify has no parameter clock_window; say signal=JointWin",
     "ptcc.certify_many(G, p, output=5)": "FormatError: 5 names no file; give a path",
@@ -244,6 +251,22 @@ FAMILIES = {
     "day == ptcc.as_family(day) and hash(day) == hash(ptcc.as_family(day))": "True",
     "day.to_pandas().iloc[1].astype(str).tolist()": "['', 'ann', 'bob', '-2.0', '-1.0']",
     "ptcc.Family.switching({'day': day, 'day two': day}).modes[0] == day.modes[0]": "True",
+    "ptcc.Family.switching([day, day]), ptcc.Family.switching({'on': g, 'off': g})": "Family(3 nodes, 2 modes)",
+    "ptcc.Family.switching({'day': edges, 'night': edges})": "GraphError: mode day: [('ann', 'bob', -2), ('bob', 'ann'",
+    "ptcc.Family.switching([edges, edges])": '... SignedDigraph; ptcc_certify.as_family({"day": edges, "night": edg',
+    "ptcc.Family.switching(g, g)": "... switching takes modes without a name, each once; give one list or dict of gra",
+    "ptcc.Family.switching(modes=[day])": "Family(2 nodes",
+    "ptcc.certify([edges, edges], p)": '... a dict, {"day": edges, "night": edges2}',
+    "ptcc.certify([edges, edges, edges], p)": '... a dict, {"day": edges, "night": edges2}',
+    "ptcc.certify({'day': edges, 'night': edges}, p)": "FamilyCertificate(bipartite consensus for every signal",
+    "ptcc.as_family({'day': edges, 'typo': [('ann', 'bbo', 1), ('ann', 'eve', 1)]})": "... has; did you mean bob?",
+    "ptcc.certify(day, p, [1, 2]).final_states": "FinalEnds(ann in [-0.500001, 0.100001], bob in [-0.10",
+    "ptcc.certify(day, p, [1, 2]).final_states['ann'] == ptcc.certify(day, p, [1, 2]).final_states[0]": "True",
+    "ptcc.certify(day, p, [1, 2]).final_states['joe']": "UnknownAgentError: no agent is called 'joe'",
+    "ptcc.certify(day, p, [1, 2]).final_states[::-1][0] == ptcc.certify(day, p, [1, 2]).final_states['bob']": "True",
+    "copy.deepcopy(ptcc.certify(day, p, [1, 2]).final_states)['bob'] == ptcc.certify(day, p, [1, 2]).final_states[1]": (
+        "True"
+    ),
     "ptcc.certify(day, p)": "FamilyCertificate(bipartite consensus for every signal",
     "ptcc.certify(day, p).plot()": "ParameterError: the certificate has no initial state; certify the family with x0",
     "ptcc.certify(day, p, [1, 2]).plot('graph')": "Axes",
@@ -280,7 +303,17 @@ def names(tmp_path_factory) -> dict[str, Any]:
     cert.save(folder / "c.json")
     return {
         **{"ptcc": ptcc, "np": np, "nx": nx, "pd": pd, "sparse": sparse, "Fraction": Fraction, "StringIO": StringIO},
-        **{"g": g, "G": digraph, "p": p, "x0": x0, "cert": cert, "folder": folder, "Path": Path},
+        **{
+            "copy": copy,
+            "edges": edges,
+            "g": g,
+            "G": digraph,
+            "p": p,
+            "x0": x0,
+            "cert": cert,
+            "folder": folder,
+            "Path": Path,
+        },
         "df": pd.DataFrame(edges, columns=["source", "target", "weight"]),
         "day": ptcc.as_family([("ann", "bob", -2, -1), ("bob", "ann", -1, -1)]),
         "W": np.array([[0, -2.0], [-1, 0]]),

@@ -40,14 +40,10 @@ class ReachingPhase:
     protocol: ReachingProtocol
     reaching: tuple[ReachingTime, ...]
 
-    @property
-    def spans(self) -> tuple[float, float, float]:
-        """``T``, ``T_r`` and ``T_s`` in floats."""
-        return float(self.protocol.T), float(self.protocol.T_r), float(self.protocol.T_s)
-
     def instants(self, remaining: Any) -> Instants:
         """Return ``s`` and ``z`` where ``1 - t/(T_r + T_s)`` is ``remaining``, or refuse it."""
-        q, (T, T_r, T_s) = remaining_part(remaining), self.spans
+        q, T_r, T_s = remaining_part(remaining), float(self.protocol.T_r), float(self.protocol.T_s)
+        T = float(self.protocol.T)
         with np.errstate(divide="ignore"):
             z = -np.log(np.maximum((q - T_s / T) * (T / T_r), 0.0))
             return Instants(np.asarray(self.protocol.gain.clock_at_remaining(q)), z)
@@ -59,11 +55,6 @@ class ReachingPhase:
         fine = np.concatenate([[0.0], np.geomspace(1e-9, 1, 2000) * max(certain)])
         levels = self.protocol.reaching_gain.clock_at_tau(fine)
         return np.interp(np.linspace(0, levels[-1], _PIECES), levels, fine)
-
-    def clock(self, z: np.ndarray) -> np.ndarray:
-        """Return ``s`` at instants ``z`` before ``T_r``, and at ``T_r`` where ``z`` is infinite."""
-        T, T_r, T_s = self.spans
-        return self.protocol.gain.clock_at_remaining((T_s + T_r * np.exp(-z)) / T)
 
     @cached_property
     def _quiet(self) -> float:
@@ -81,7 +72,7 @@ class ReachingPhase:
     @cached_property
     def _knots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The clock where the pieces begin, and at ``T_r``; ``psi`` there; ``int gain psi dt`` from there on."""
-        clock = np.append(self.clock(self.pieces), self.clock(np.array(np.inf)))
+        clock = self.protocol.clock_while_reaching(np.append(self.pieces, np.inf))
         share = np.append(self.share(self.pieces), 0.0)
         if self._quiet <= LAST_Z:  # the last piece begins when all are 0
             share[-2] = 0.0

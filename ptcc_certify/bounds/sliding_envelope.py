@@ -215,7 +215,7 @@ class SlidingEnvelope(Envelope):
         reaching = np.isfinite(at.z)
         knots = np.unique(np.concatenate([self._phase.pieces, at.z[reaching]]))
         place = np.where(reaching, np.searchsorted(knots, at.z), knots.size)
-        size, s, last = self._sliding(knots) / unit, self._phase.clock(knots), self._phase.clock(np.array(np.inf))
+        size, s, last = self._sliding(knots) / unit, *map(self.protocol.clock_while_reaching, (knots, np.array(np.inf)))
         later = np.where(reaching, 0.0, np.maximum(at.clock - last, 0.0))
         y0 = [x / Fraction(unit) for x in self._nominal_state(x0)]
         for function, root in self._initial_values((m for m in functions if m.rate_below > 0), y0):

@@ -38,6 +38,7 @@ from ptcc_certify.certificate.restricted_search import STEP, claims_for, require
 from ptcc_certify.certificate.verdict import Assessment
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.family import MANY_MODES
+from ptcc_certify.checker.family_rows import MANY_FUNCTIONS
 from ptcc_certify.checker.matrix_products import LARGEST_ROWS
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.display_hook import Shown, family_summary, plot_of_family
@@ -342,19 +343,21 @@ def certify_family(
             "restricted": claims_for(signal, parts, protocol, begin, notes, asked.min_rate),
         }
     progress(STEPS[-1])
+    notes = [f"{note}: cut off by the time limit" if note in (*STEPS, BOXES) else note for note in notes]
     kept |= {"expectations": asked, "notes": tuple(dict.fromkeys(notes)), "scenario": scenario}
     kept["origins"] = origins_of(None, x0, sigma0) | dict(origins or {})
     return _fewer_functions(FamilyCertificate(family, protocol, tuple(parts), initial_state, sigma, reaching, **kept))
 
 
 def _fewer_functions(certificate: FamilyCertificate) -> FamilyCertificate:
-    """Leave out functions, slower ones first, that the check refuses since their proofs are large.
+    """Leave out functions, slower ones first, that the check refuses since they are many or their proofs large.
 
     Claims for restricted signals that rest on a function left out are left out with it.
     """
     functions = [(part, V) for part in certificate.parts for V in part.functions if isinstance(V, FamilyFunction)]
     work = sum((len(V.nodes) + len(tau)) ** 3 for _, V in functions for tau in V.multipliers)
-    if work <= LARGEST_ROWS**3 or not all(part.certifiable for part in certificate.parts):
+    few = sum(len(part.functions) for part in certificate.parts) <= MANY_FUNCTIONS
+    if (few and work <= LARGEST_ROWS**3) or not all(part.certifiable for part in certificate.parts):
         return certificate
     for most in (1, 0):
         report = certificate.checked

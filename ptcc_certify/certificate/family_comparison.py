@@ -214,15 +214,15 @@ def _input_ratio(certificate: FamilyCertificate, run: FamilyTrajectory, floor: f
 
 def _sliding_ratio(certificate: FamilyCertificate, run: FamilyTrajectory) -> float | None:
     """Return the worst ratio of sliding variables to ``psi |sigma_k(0)|``."""
-    slid, reaching, protocol = run.sliding, certificate.reaching, certificate.protocol.reaching
-    if slid is None or reaching is None or protocol is None or certificate.direct:
+    sliding, reaching, protocol = run.sliding, certificate.reaching, certificate.protocol.reaching
+    if sliding is None or reaching is None or protocol is None or certificate.direct:
         return None
     certain = np.array([np.inf if r.z is None else float(r.z) for r in reaching])
-    if not (slid.reaching_z <= certain * (1 + 1e-9)).all():
+    if not (sliding.reaching_z <= certain * (1 + 1e-9)).all():
         return float("inf")
     with np.errstate(divide="ignore"):
-        share = ReachingPhase(protocol, reaching).share(-np.log(slid.reaching_remaining))
-    return _worst(np.abs(slid.sigma), np.multiply.outer(np.abs(slid.sigma0), share))
+        share = ReachingPhase(protocol, reaching).share(-np.log(sliding.reaching_remaining))
+    return _worst(np.abs(sliding.sigma), np.multiply.outer(np.abs(sliding.sigma0), share))
 
 
 def _driven_ratios(certificate: FamilyCertificate, run: FamilyTrajectory, floor: float) -> Iterator[float]:

@@ -5,7 +5,7 @@ Nothing here writes, reads or checks.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
@@ -23,6 +23,7 @@ from ptcc_certify.bounds.family_deviation import (
     input_while_driven,
     sliding_sizes,
 )
+from ptcc_certify.bounds.final_ends import FinalEnds
 from ptcc_certify.bounds.kept_means import LeadingGroup, leading_groups
 from ptcc_certify.bounds.reaching_phase import ReachingPhase
 from ptcc_certify.certificate.certificate_data import Source
@@ -150,6 +151,9 @@ class BoundFunction:
         return self.function.largest(self.quotient.coordinate_sizes(sizes))
 
 
+AnyBoundFunction = BoundFunction | FollowerFunction | SquaresFunction
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class FamilyContent:
     """The parts of a certificate of a family, and what follows from them."""
@@ -254,34 +258,30 @@ class FamilyContent:
         """What sliding variables do to every component; its nodes are numbered within it."""
         if self.sigma0 is None or self.reaching is None or self.direct:
             return (None,) * len(self.parts)
-        return tuple(self._drive(part.component) for part in self.parts)
-
-    def _drive(self, component: FamilyComponent) -> Drive:
-        assert self.sigma0 is not None and self.reaching is not None
-        sigma0 = dict(enumerate(self.sigma0[v] for v in component.nodes.tolist()))
+        ends = (zip(mode.source.tolist(), mode.target.tolist(), strict=True) for mode in self.family.modes)
         edges = [
-            [
-                (int(s), int(t), mode.upper.fraction(e))
-                for e, (s, t) in enumerate(zip(mode.source, mode.target, strict=True))
-            ]
-            for mode in component.family.modes
+            [(s, t, mode.upper.fraction(e)) for e, (s, t) in enumerate(pairs)]
+            for mode, pairs in zip(self.family.modes, ends, strict=True)
         ]
         quiet = last_time([r.z for r in self.reaching], self.sigma0)
-        return Drive.of(self.protocol.parameters, sigma0, quiet, edges)
+        whole = Drive.of(self.protocol.parameters, dict(enumerate(self.sigma0)), quiet, edges)
+        return tuple(whole.restricted(part.component.nodes.tolist()) for part in self.parts)
 
     @cached_property
     def drives(self) -> tuple[Fraction, ...] | None:
         """``c`` of every function, part after part: how much sliding variables drive it; None if none moves."""
         if self.direct:
             return None
-        pairs = zip(self.parts, self._drives, strict=True)
-        return tuple(own.constant(V) for part, own in pairs if own is not None for V in self._bound_functions(part))
+        pairs = zip(self.bound_functions, self._drives, strict=True)
+        return tuple(own.constant(V) for functions, own in pairs if own is not None for V in functions)
 
-    def _bound_functions(self, part: ComponentProof) -> Sequence[BoundFunction | FollowerFunction | SquaresFunction]:
-        return self.bound_functions[self.parts.index(part)]
+    @property
+    def _driven_parts(self) -> Iterator[tuple[ComponentProof, Sequence[AnyBoundFunction], Drive | None]]:
+        """Of every part its functions, and what sliding variables do to it."""
+        return zip(self.parts, self.bound_functions, self._drives, strict=True)
 
     @cached_property
-    def bound_functions(self) -> tuple[tuple[BoundFunction | FollowerFunction | SquaresFunction, ...], ...]:
+    def bound_functions(self) -> tuple[tuple[AnyBoundFunction, ...], ...]:
         """The functions of every part, as the formulas of the bounds take them."""
         return tuple(
             tuple(
@@ -292,30 +292,36 @@ class FamilyContent:
         )
 
     @cached_property
-    def final_states(self) -> tuple[Interval | None, ...] | None:
-        """Ends between which each agent is at the deadline, for every signal; None where no limit is claimed."""
+    def final_states(self) -> FinalEnds | None:
+        """Ends between which each agent is at the deadline, for every signal; None where no limit is claimed.
+
+        By place, or by label: ``final_states["ann"]``.
+        """
         if self.initial_state is None:
             return None
         result: list[Interval | None] = [None] * self.family.n_nodes
-        for part, driven in zip(self.parts, self._drives, strict=True):
-            for k, ends in self._final(part, self._state(part), driven).items():
+        for part, functions, driven in self._driven_parts:
+            for k, ends in self._final(part, functions, driven).items():
                 result[int(part.component.nodes[k])] = ends
-        return tuple(result)
+        return FinalEnds(result, self.family.labels)
 
     def _state(self, part: ComponentProof) -> list[Fraction]:
         """Return ``x(0) - sigma(0)`` of a component."""
         assert self.nominal_state is not None
         return [self.nominal_state[v] for v in part.component.nodes.tolist()]
 
-    def _final(self, part: ComponentProof, x: list[Fraction], driven: Drive | None) -> Mapping[int, Interval | None]:
-        component, n = part.component, len(x)
+    def _final(
+        self, part: ComponentProof, functions: Sequence[AnyBoundFunction], driven: Drive | None
+    ) -> Mapping[int, Interval | None]:
+        component, x = part.component, self._state(part)
+        n = len(x)
         if component.behaviour == STABILITY:
             return dict.fromkeys(range(n), (Fraction(0), Fraction(0)))
         if component.behaviour in (None, DEPENDS) or not part.certifiable:
             return dict.fromkeys(range(n))
         means = {j: c for j, group in enumerate(part.leading_groups) if (c := group.final_value(x)) is not None}
         groups = {j: group.nodes for j, group in enumerate(part.leading_groups)}
-        functions, kernel = self._bound_functions(part), part.kernel_rows
+        kernel = part.kernel_rows
         near, wide = ends_near(kernel, groups, functions, x, driven)
         return dict(limits(kernel, groups, means, near, deviations(functions, x, driven), x, wide))
 
@@ -349,9 +355,9 @@ class FamilyContent:
             return None
         result = [Fraction(0)] * self.family.n_nodes
         gains = self.protocol.parameters
-        for part, driven in zip(self.parts, self._drives, strict=True):
+        for part, functions, driven in self._driven_parts:
             nodes = part.component.nodes.tolist()
-            bounds, unit = peaks(self._bound_functions(part), gains, self._state(part), driven)
+            bounds, unit = peaks(functions, gains, self._state(part), driven)
             for k, bound in bounds.items():
                 result[nodes[k]] = Fraction(bound, unit)
         return tuple(result)
@@ -389,11 +395,11 @@ class FamilyContent:
         self._require_state()
         at, gain = self._instants(remaining), self.protocol.gain.value_at_remaining(_row(remaining))
         bounds = np.full((self.family.n_nodes, at.clock.size), np.inf)
-        for part, driven in zip(self.parts, self._drives, strict=True):
+        for part, functions, driven in self._driven_parts:
             nodes, x = part.component.nodes, self._state(part)
             if nodes.size == 1:
                 bounds[nodes] = 0
-            for V in self._bound_functions(part):
+            for V in functions:
                 if driven is None:
                     own = input_on_clock(V, x, at.clock, gain)
                 else:
@@ -422,11 +428,11 @@ class FamilyContent:
 
     def _deviation(self, at: Instants) -> np.ndarray:
         bounds = np.full((self.family.n_nodes, at.clock.size), np.inf)
-        for part, driven in zip(self.parts, self._drives, strict=True):
+        for part, functions, driven in self._driven_parts:
             nodes, x, stable = part.component.nodes, self._state(part), part.component.behaviour == STABILITY
             if nodes.size == 1:
                 bounds[nodes] = 0 if driven is None else sliding_sizes(driven, self._phase, at)
-            for V in self._bound_functions(part):
+            for V in functions:
                 if driven is None:
                     own = deviation_on_clock(V, stable, x, at.clock)
                 else:

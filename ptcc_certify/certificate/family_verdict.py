@@ -133,10 +133,9 @@ def _judge_rate(certificate: FamilyContent, least: Fraction) -> Answer:
     """Tell whether a rate of at least so much is proved for every signal, or excluded by the upper bound."""
     what, rate, bound = f"rate >= {near(least, 12)}", certificate.rate_of_signal, certificate.upper_bound
     if certificate.signal != "any":
-        includes_constant = not isinstance(
-            certificate.signal, ClockShares | JointWindows
-        )  # a constant member is one of them
-        bound = certificate.member_bound if includes_constant else None
+        # No constant member is one of these signals.
+        narrow = isinstance(certificate.signal, ClockShares | JointWindows)
+        bound = None if narrow else certificate.member_bound
     alone = all(part.component.nodes.size == 1 for part in certificate.parts)
     if alone or (rate is not None and rate >= least):
         every = alone or (certificate.rate is not None and certificate.rate >= least)

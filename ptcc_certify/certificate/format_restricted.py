@@ -141,14 +141,14 @@ def claim_steps(of: str, claim: Claim) -> Iterator[Step]:
     yield "restricted-rate", of, None, {}
 
 
-def _read_signal(said: Any) -> SignalClass:
-    if isinstance(said, str):
-        return said
-    if "shares" in said:
-        return ClockShares(tuple(map(exact, said["shares"])))
-    if "window" in said:
-        return JointWindows(exact(said["window"]), on=exact(said["on"]), clock="s")
-    return DwellTime(exact(said["dwell"]), clock=said["clock"])
+def _read_signal(entry: Any) -> SignalClass:
+    if isinstance(entry, str):
+        return entry
+    if "shares" in entry:
+        return ClockShares(tuple(map(exact, entry["shares"])))
+    if "window" in entry:
+        return JointWindows(exact(entry["window"]), on=exact(entry["on"]), clock="s")
+    return DwellTime(exact(entry["dwell"]), clock=entry["clock"])
 
 
 def read_claim(
@@ -163,7 +163,9 @@ def read_claim(
         return ShareClaim(number, signal, _read_share_form(entry, steps, components[number]), exact(entry["rate"]))
     if entry["claim"] == "final value":
         pairs = zip(entry["modes"], components[number].family.modes, strict=True)
-        return FinalValueClaim(number, tuple(None if said is None else _read_value(said, mode) for said, mode in pairs))
+        return FinalValueClaim(
+            number, tuple(None if value is None else _read_value(value, mode) for value, mode in pairs)
+        )
     if entry["claim"] != "rate":
         ends = entry["final_state"] and tuple((m - r, m + r) for m, r in map(interval, entry["final_state"].values()))
         if entry["claim"] == "last mode":
@@ -181,14 +183,14 @@ def read_claim(
     return RateClaim(entry["component"], signal, forms, exact(entry["rate"]), bool(entry["bounded"]))
 
 
-def _read_value(said: Mapping[str, Any], mode: Mode) -> ValueEnds:
+def _read_value(entry: Mapping[str, Any], mode: Mode) -> ValueEnds:
     index, n = {label: v for v, label in enumerate(mode.labels)}, len(mode.labels)
     camps, _, _ = find_camps(n, mode.source, mode.target, mode.sign)
-    lower, upper, within = (exact(said[key]) for key in ("lower", "upper", "within"))
-    if said["above"] is None:
+    lower, upper, within = (exact(entry[key]) for key in ("lower", "upper", "within"))
+    if entry["above"] is None:
         return ValueEnds(tuple(camps.tolist()), tuple(range(n)), lower, upper, within, None)
-    vectors = tuple(tuple(map(exact, said[key].values())) for key in ("above", "below"))
-    nodes = tuple(index[label] for label in said["above"])
+    vectors = tuple(tuple(map(exact, entry[key].values())) for key in ("above", "below"))
+    nodes = tuple(index[label] for label in entry["above"])
     return ValueEnds(tuple(camps.tolist()), nodes, lower, upper, within, (vectors[0], vectors[1]))
 
 

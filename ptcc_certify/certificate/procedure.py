@@ -57,6 +57,7 @@ from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.lyapunov.rate_upper_bound import RateBound, mean_bound, prove_rate_bound
 from ptcc_certify.lyapunov.search import APART_NODES, Search, search_functions, search_large
 from ptcc_certify.protocols import Protocol
+from ptcc_certify.protocols.base import ReachingProtocol
 from ptcc_certify.protocols.disturbance import as_disturbance
 from ptcc_certify.simulation.filippov import rounding_slack
 from ptcc_certify.simulation.instants import PAST
@@ -236,10 +237,8 @@ def certify(
     manifold, reaching = read_sliding_variable(structure, protocol, sigma0)
     case = Case(structure, protocol, request, initial_state, manifold, progress)
     runs = case.needs_run(simulation) and initial_state is not None
-    if not runs and disturbance is not None and (sliding := protocol.reaching) is not None:
-        horizon = float(protocol.T) * (1 + PAST)  # as far as a run would go
-        source = as_disturbance(disturbance, graph.n_nodes, sliding.delta, horizon)
-        source.check(sliding.delta, graph.labels, horizon, rounding_slack(sliding))
+    if not runs and disturbance is not None and protocol.reaching is not None:
+        _check_disturbance(disturbance, protocol.reaching, graph)
     with deadline.time_limit(SEARCHING * request.time_limit):
         trajectory = case.simulation(disturbance) if runs else None
         lyapunov, proof, numerical = case.paper()
@@ -271,6 +270,13 @@ def certify(
     )
     progress(STEPS[5])
     return _with_word_of_check(certificate)
+
+
+def _check_disturbance(disturbance: Any, protocol: ReachingProtocol, graph: SignedDigraph) -> None:
+    """Refuse a disturbance that no run will meet as a run would refuse it."""
+    horizon = float(protocol.T) * (1 + PAST)  # as far as a run would go
+    source = as_disturbance(disturbance, graph.n_nodes, protocol.delta, horizon)
+    source.check(protocol.delta, graph.labels, horizon, rounding_slack(protocol))
 
 
 def _family(graph: Any, orientation: str | None, uncertainty: Any, options: Mapping[str, Any]) -> Family:

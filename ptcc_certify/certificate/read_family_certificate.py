@@ -55,9 +55,10 @@ def read_family_certificate(source: Source) -> FamilyCertificate:
     data = Reader(family.labels, source.files)
     state, sigma0 = (data.state(document[key]) for key in ("initial_state", "sliding_variable"))
     restricted = enumerate(document.get("restricted", ()))
-    said = tuple(read_claim(f"restricted[{k}]", entry, document["proof"], components) for k, entry in restricted)
+    promised = tuple(read_claim(f"restricted[{k}]", entry, document["proof"], components) for k, entry in restricted)
     protocol, disturbance = read_protocol(document["protocol"]), document["protocol"].get("disturbance")
-    kept: dict[str, Any] = {"signal": said[0].signal if said else "any", "restricted": said, "disturbance": disturbance}
+    kept: dict[str, Any] = {"signal": promised[0].signal if promised else "any", "restricted": promised}
+    kept["disturbance"] = disturbance
     kept["boxes"] = {
         entry["component"]: read_box(entry, components[entry["component"]].family.labels, files)
         for entry in document.get("boxes", ())

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
+from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS
 from ptcc_certify.theorems.family_rate import ExplicitRate
 from ptcc_certify.theorems.restricted_signals import ClockShares, JointWindows, SignalClass
 
@@ -145,6 +146,11 @@ class FinalValueClaim:
     component: int
     values: tuple[ValueEnds | None, ...]
     signal: SignalClass = "constant"
+
+    @property
+    def behaviours(self) -> tuple[str | None, ...]:
+        """Bipartite consensus of each mode that comes to it; None of the others."""
+        return tuple(None if ends is None else BIPARTITE_CONSENSUS for ends in self.values)
 
     @property
     def final_states(self) -> tuple[Interval, ...] | None:

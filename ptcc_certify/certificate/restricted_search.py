@@ -107,6 +107,7 @@ def claims_for(
         with share_of_time(1.0, STEP, notes):
             claims += filter(None, (_final_value_claim(number, part, state) for number, part in enumerate(parts)))
     if len(claims) > MANY_CLAIMS:
+        claims.sort(key=lambda claim: isinstance(claim, RateClaim) and claim.forms is None)  # those say least
         notes.append(f"{len(claims):,} claims for restricted signals: the first {MANY_CLAIMS} are written")
     return tuple(claims[:MANY_CLAIMS])
 

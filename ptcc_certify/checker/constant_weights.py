@@ -62,9 +62,9 @@ def check_final_value(
     if x is None:
         raise RejectedError("a final value without an initial state")
     doc.open("final-value", of)
-    said = entries(entry["modes"], "modes", len(family.modes))
-    need(any(one is not None for one in said), "no final value of any mode")
-    found = [_check_mode(family, component, k, x, one) for k, one in enumerate(said) if one is not None]
+    values = entries(entry["modes"], "modes", len(family.modes))
+    need(any(one is not None for one in values), "no final value of any mode")
+    found = [_check_mode(family, component, k, x, one) for k, one in enumerate(values) if one is not None]
     low, high, within = min(v[0] for v in found), max(v[1] for v in found), max(v[2] for v in found)
     doc.done(f"camps times {down(low)} to {up(high)}, attained within {up(within, 2)}")
 

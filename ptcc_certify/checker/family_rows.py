@@ -31,7 +31,7 @@ from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import entries, exact, fields, need, same
 
 #: Lyapunov functions that are read.
-MANY_FUNCTIONS = 100
+MANY_FUNCTIONS = 1000
 #: Bits of constants and values, which are rounded up.
 BITS = 64
 KEYS = ("class", "component", "vector", "parts", "rate")

@@ -15,7 +15,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from lmi.exact.decimal_rounding import up
 from lmi.exact.elementary_enclosures import rounded
@@ -33,7 +33,7 @@ from ptcc_certify.checker.input_formulas import (
 )
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.protocol import Begin, check_sliding
-from ptcc_certify.checker.protocol import Protocol as Gains
+from ptcc_certify.checker.protocol import Protocol as Parameters
 from ptcc_certify.checker.reading import Interval, entries, exact, need
 
 Sizes = Mapping[int, Fraction]
@@ -77,23 +77,48 @@ def drive_sizes(edges: Iterable[tuple[int, int, Fraction]], sigma0: Sizes) -> di
     return total
 
 
+class Stretch(NamedTuple):
+    """A stretch of the time while sliding variables move.
+
+    The gain at its two ends and ``psi`` at its begin, from above; how far the clock goes, at least and at most.
+    """
+
+    first: Fraction
+    last: Fraction
+    psi: Fraction
+    least: Fraction
+    most: Fraction
+
+
+def reaching_stretches(gains: Mapping[str, Fraction], quiet: Fraction | None) -> list[Stretch]:
+    """Cut the time until all sliding variables are 0, ``quiet`` or ``T_r``, into stretches."""
+    power, push = gains["mu3"] * gains["kappa"], gains["mu1"] + gains["delta"]
+    reaching = Reaching((), gains["T_r"], gains["T_s"], gains["mu2"], power, push, quiet)
+    result = []
+    for part in stretches(nominal_gain(gains), reaching, reaching.quiet, STRETCHES):
+        low, high = part.clock
+        first, last, psi, most = (
+            rounded(x, BITS, up=True) for x in (part.first, part.last, max(part.psi[1], LEAST), high)
+        )
+        result.append(Stretch(first, last, psi, rounded(low, BITS, up=False), most))
+    return result
+
+
 @dataclass(frozen=True, eq=False)
 class Drive:
     """What sliding variables that are not 0 at first do to the agents of a family, or of a component of it.
 
     Attributes
     ----------
-    gain : PrescribedGain
-        Of the nominal part of the input.
-    reaching : Reaching
+    stretches : sequence of Stretch
+        Of the time while some sliding variable of the family moves, rounded outwards.
     sigma0 : mapping of int to Fraction
         By node.
     modes : sequence of mapping of int to Fraction
         ``m_k`` of :func:`drive_sizes` by node, of every mode.
     """
 
-    gain: PrescribedGain
-    reaching: Reaching
+    stretches: Sequence[Stretch]
     sigma0: Sizes
     modes: Sequence[Sizes]
     _constants: dict[int, tuple[Function, Fraction]] = field(default_factory=dict)
@@ -104,21 +129,14 @@ class Drive:
         return {k: max(mode[k] for mode in self.modes) for k in self.sigma0}
 
     @cached_property
-    def _stretches(self) -> list[tuple[Fraction, Fraction, Fraction, Fraction, Fraction]]:
-        """The gain at both ends, ``psi`` at the begin and the clock, from above, the clock from below."""
-        parts = stretches(self.gain, self.reaching, self.reaching.quiet, STRETCHES)
-        sizes = ((part.first, part.last, max(part.psi[1], LEAST), part.clock[1], -part.clock[0]) for part in parts)
-        return [tuple(rounded(x, BITS, up=True) for x in own) for own in sizes]  # type: ignore[misc]
-
-    @cached_property
     def integral(self) -> Fraction:
         """``int gain psi dt`` from above."""
-        return sum((psi * clock for _, _, psi, clock, _ in self._stretches), Fraction(0))
+        return sum((part.psi * part.most for part in self.stretches), Fraction(0))
 
     @cached_property
     def largest(self) -> Fraction:
         """``max gain psi`` from above."""
-        return max(last * psi for _, last, psi, _, _ in self._stretches)
+        return max(part.last * part.psi for part in self.stretches)
 
     def constant(self, V: Function) -> Fraction:
         """Return ``c`` of a function, rounded up."""
@@ -137,11 +155,11 @@ class Drive:
         root there, and the gain at its end times what the stretch adds.
         """
         half, most, v, c = V.rate / 2, Fraction(0), root, self.constant(V)
-        for first, last, psi, clock, passed in self._stretches:
-            added = c * psi * min(clock, 1 / half)
-            most = max(most, first * v + last * added)
-            v = rounded(v * decay_above(min(-half * passed, MOST_DECAY)) + added, BITS, up=True)
-        return rounded(max(most, self._stretches[-1][1] * v), BITS, up=True)
+        for part in self.stretches:
+            added = c * part.psi * min(part.most, 1 / half)
+            most = max(most, part.first * v + part.last * added)
+            v = rounded(v * decay_above(min(half * part.least, MOST_DECAY)) + added, BITS, up=True)
+        return rounded(max(most, self.stretches[-1].last * v), BITS, up=True)
 
     def ends(self, camps: Mapping[int, int], y: Sequence[Fraction]) -> Interval:
         """Return ends of ``g_k x_k(T)`` from ``y(0)``, of agents that hear nobody else and all end at the same number.
@@ -163,7 +181,7 @@ class Drive:
         quiet: Fraction | None,
         modes: Sequence[Iterable[tuple[int, int, Fraction]]],
     ) -> Drive:
-        """Return what sliding variables do.
+        """Return what sliding variables do to all agents.
 
         Parameters
         ----------
@@ -176,10 +194,12 @@ class Drive:
         modes : sequence of edges
             Source, target and largest size, of every mode.
         """
-        power, push = gains["mu3"] * gains["kappa"], gains["mu1"] + gains["delta"]
-        own = list(sigma0.values())
-        reaching = Reaching(own, gains["T_r"], gains["T_s"], gains["mu2"], power, push, quiet)
-        return cls(nominal_gain(gains), reaching, sigma0, [drive_sizes(edges, sigma0) for edges in modes])
+        return cls(reaching_stretches(gains, quiet), sigma0, [drive_sizes(edges, sigma0) for edges in modes])
+
+    def restricted(self, nodes: Sequence[int]) -> Drive:
+        """Return what they do to agents that hear nobody else, numbered anew."""
+        sigma0, *modes = ({k: of[v] for k, v in enumerate(nodes)} for of in (self.sigma0, *self.modes))
+        return Drive(self.stretches, sigma0, modes)
 
 
 def last_time(times: Sequence[Fraction | None], sigma0: Iterable[Fraction]) -> Fraction | None:
@@ -192,7 +212,7 @@ def last_time(times: Sequence[Fraction | None], sigma0: Iterable[Fraction]) -> F
 
 
 def check_drive(
-    doc: Document, family: Family, functions: Sequence[VerifiedFunction], protocol: Gains, begin: Begin
+    doc: Document, family: Family, functions: Sequence[VerifiedFunction], protocol: Parameters, begin: Begin
 ) -> Drive | None:
     """Verify the sliding variables, and how they drive every Lyapunov function."""
     graph = family.modes[0].structure.graph

@@ -53,8 +53,8 @@ def check_restricted(
     need(0 < len(items) <= MANY_CLAIMS, f"no claim for restricted signals, or more than {MANY_CLAIMS}")
     gains, x = protocol.gains, None if begin.state is None else list(begin.state)
     need(not (begin.sigma and any(begin.sigma)), "restricted signals while sliding variables move")
-    said = [entry.get("signals") if isinstance(entry, dict) else None for entry in items]
-    need(all(signals == said[0] for signals in said), "claims about different signals")
+    classes = [entry.get("signals") if isinstance(entry, dict) else None for entry in items]
+    need(all(signals == classes[0] for signals in classes), "claims about different signals")
     for k, entry in enumerate(items):
         doc.at = of = f"restricted[{k}]"
         kind = entry.get("claim") if isinstance(entry, dict) else None

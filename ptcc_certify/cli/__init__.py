@@ -39,6 +39,12 @@ __all__ = ["cli", "main"]
 _NO_ARGUMENTS = getattr(click.exceptions, "NoArgsIsHelpError", ())  # its message is the help; new in click 8.2
 
 
+#: What is no command, and where it is told.
+_TOLD = {"why": "; the line why of classify and certify tells the counterexample of a family"}
+#: What design calls options of other commands.
+_OF_DESIGN = {"--T": "--deadline", "--x0": "--initial-bound", "--seed": "--initial-bound"}
+
+
 #: The commands, and what the help says of each, in this order.
 GROUPS = {
     "Ask about a graph": {
@@ -78,7 +84,7 @@ class _Commands(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         if not args[0].startswith("-") and args[0] not in self.commands:
-            hint = did_you_mean(args[0], self.commands) or "; ptcc --help lists the commands"
+            hint = _TOLD.get(args[0]) or did_you_mean(args[0], self.commands) or "; ptcc --help lists the commands"
             raise click.UsageError(f'there is no command "{shorten(args[0])}"{hint}', ctx)
         return super().resolve_command(ctx, args)
 
@@ -91,6 +97,8 @@ class _Commands(click.Group):
             if files := [word for word in sys.argv[1:] if word[:1] == "-" and os.path.exists(word)]:  # noqa: PTH110
                 raise click.UsageError(f"{error.message} A file of this name is written ./{files[0]}") from None
             flag, others = error.option_name, self.commands.items()
+            if ctx.invoked_subcommand == "design" and flag in _OF_DESIGN:
+                raise click.UsageError(f"{error.message.rstrip('.')}; here it is {_OF_DESIGN[flag]}") from None
             if not (having := [f"ptcc {name}" for name, c in others if any(flag in p.opts for p in c.params)]):
                 options = [p for p in error.possibilities or () if did_you_mean(flag.lstrip("-"), [p.lstrip("-")])]
                 hint = f" Did you mean {' or '.join(options)}?" if options else ""  # click's counts the dashes as alike

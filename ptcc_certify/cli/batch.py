@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -86,10 +86,11 @@ def batch(pattern: tuple[str, ...], output: str | None, restart: bool, write_gra
     protocol, total = shared.protocol_of(options, ()), 0
     where: dict[str, Any] = {"workers": workers or many.default_workers(), "scheduler": scheduler}
     try:
-        with counting() as show, _interrupt_on_term():
+        with counting() as show, _interrupts() as ask:
 
             def progress(*counts: int) -> None:
                 nonlocal total
+                ask()
                 if output and total == 0 and counts[0]:
                     click.echo(f"note: {counts[0]} of {counts[1]} rows were there already", err=True)
                 total = counts[1]
@@ -116,16 +117,30 @@ def batch(pattern: tuple[str, ...], output: str | None, restart: bool, write_gra
 
 
 @contextmanager
-def _interrupt_on_term() -> Iterator[None]:
-    """Let SIGTERM, by which schedulers and shutdowns end a process, do what Ctrl-C does."""
-    if threading.current_thread() is not threading.main_thread():  # which alone handles signals
-        yield
-        return
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+def _interrupts() -> Iterator[Callable[[], None]]:
+    """Let SIGTERM, by which schedulers and shutdowns end a process, do what Ctrl-C does; yield what asks between rows.
+
+    What a handler raises in a callback from C is lost: then the next row raises it.
+    """
+    received: list[int] = []
+
+    def interrupt(number: int, frame: Any) -> None:
+        received.append(number)
+        raise KeyboardInterrupt
+
+    def ask() -> None:
+        if received:
+            raise KeyboardInterrupt
+
+    numbers: list[int] = []
+    if threading.current_thread() is threading.main_thread():  # which alone handles signals
+        numbers = [signal.SIGTERM, *[signal.SIGINT] * (signal.getsignal(signal.SIGINT) is signal.default_int_handler)]
+    before = {number: signal.signal(number, interrupt) for number in numbers}
     try:
-        yield
+        yield ask
     finally:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL if before is None else before)
+        for number, handler in before.items():
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)
 
 
 def _tell_rows(rows: list[dict[str, Any]], total: int, output: str | None, restart: bool) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -59,7 +60,7 @@ def check(
     if as_json:
         print_json(report.to_dict() | how)
     else:
-        lines = [f"graph      {how[key]}" for key in how]
+        lines = [f"graph      {text}" for text in how.values() or _own_graph(document, report)]
         screen.show(
             lambda: wrap_lines(lines) + check_summary("" if stdlib else certificate, document, report),
             lambda: lines + report.lines(),
@@ -67,6 +68,28 @@ def check(
     if not report.accepted:
         return ExitCode.VIOLATED
     return ExitCode.OK if report.verdict == "certified" else ExitCode.UNDECIDED
+
+
+def _own_graph(document: dict[str, Any], report: CheckReport) -> list[str]:
+    """Tell the size of the graph, or family, that an accepted certificate holds, and how to know it for the one meant.
+
+    Examples
+    --------
+    >>> cert = certify([("a", "b", -1)], NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), simulation=False)
+    >>> [text.partition(" SHA")[0] for text in _own_graph(cert.to_dict(), cert.checked)]
+    ['2 nodes, 1 edge, as in the file; name yours to compare;']
+    """
+    from ptcc_certify.report.text_layout import counted
+
+    if not report.accepted:
+        return []
+    graph = document["graph"]
+    modes = graph.get("modes", [graph])
+    edges = [mode["edges"] for mode in modes]
+    count = sum(one["count"] if isinstance(one, dict) else len(one) for one in edges)
+    parts = [counted(len(modes), "mode")] * (len(modes) > 1)
+    parts += [counted(len(graph["nodes"]), "node"), counted(count, "edge")]
+    return [f"{', '.join(parts)}, as in the file; name yours to compare; SHA-256 {report.sha256}"]
 
 
 def _same_graph(
@@ -122,4 +145,7 @@ def report(certificate: str, output: str, simulation: bool | None, memory: float
         print_lines(f"rejected: {error}", err=True)
         return ExitCode.VIOLATED
     print_lines(f"{verdict:<10} {output}")
+    if (path := Path(output)).suffix.lower() == ".tex":
+        figures = re.findall(rf"{re.escape(path.stem)}_\w+\.pdf", path.read_text(encoding="utf-8"))
+        print_lines(f"{'written':<10} {', '.join(dict.fromkeys([path.name, *figures]))}")
     return {"certified": ExitCode.OK, "undecided": ExitCode.UNDECIDED}.get(verdict, ExitCode.VIOLATED)

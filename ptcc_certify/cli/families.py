@@ -86,15 +86,19 @@ dwell_options = shared.options_of(
 )
 restricted_options = shared.options_of(
     shared.number_option(
-        "--dwell", metavar="THETA", help="Families: at least so much time between switches; claim more for these."
+        "--dwell",
+        metavar="THETA",
+        help="Families, nominal: at least so much time between switches; claim more for these.",
     ),
     shared.number_option(
-        "--clock-dwell", metavar="TAU", help="Families: the same on the stretched clock, which is infinite at T."
+        "--clock-dwell",
+        metavar="TAU",
+        help="Families, nominal: the same on the stretched clock, which is infinite at T.",
     ),
     shared.number_option(
         "--clock-window",
         metavar="H",
-        help="Families: the length of windows of stretched clock; every edge is on in each.",
+        help="Families, nominal: the length of windows of stretched clock; every edge is on in each.",
     ),
     shared.number_option(
         "--window-on", metavar="DELTA", help="Families: for how much of every window an edge is on, at least."
@@ -104,7 +108,7 @@ restricted_options = shared.options_of(
         "--share",
         multiple=True,
         metavar="NU",
-        help="Families: the share of the stretched clock that a mode acts, an outage too; one for each graph.",
+        help="Families, nominal: the share of the stretched clock that a mode acts, an outage too; one for each graph.",
     ),
 )
 
@@ -158,6 +162,8 @@ def read_graph_or_family(graphs: tuple[str, ...], options: shared.Options) -> Si
         named = shorten(", ".join(graphs), 200)
         mend = "add --switching if any of them may act at any time; ptcc batch takes many, each by itself"
         raise ParameterError(f"{named}: {len(graphs)} graphs; {mend}")
+    if len(graphs) == 1 and options["switching"] and not click.get_current_context().params.get("quiet"):
+        click.echo("note: --switching with one graph changes nothing; name the other modes beside it", err=True)
     files = _files(graphs)
     uncertain = options["uncertainty"] is not None or options["optional"]
     if len(files) == 1 and not uncertain and not is_family_file(files[0]):
@@ -192,7 +198,7 @@ def _names(graphs: tuple[str, ...], family: Family, options: shared.Options) -> 
 
     way = options["edges"] or ("matrix" if PurePath(graphs[0]).suffix[1:] in MATRICES else "information")
     tied = "; undirected, both directions change together" * any(mode.tied for mode in family.modes)
-    return ", ".join(graphs), SHORT_ORIENTATION[way] + tied
+    return ", ".join(PurePath(graph).name for graph in graphs), SHORT_ORIENTATION[way] + tied
 
 
 def classify_family(

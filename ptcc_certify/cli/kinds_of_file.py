@@ -149,6 +149,8 @@ def near_files(path: str, names: tuple[str, ...] = ()) -> str:
     except (OSError, ValueError):
         files = []
     stem = Path(path).name.partition(".")[0].lower()
+    if len(stem) > 2 and (same := sorted(n for n in (*names, *files) if n.lower().startswith(stem))[:3]):
+        return f"; did you mean {' or '.join(same)}?"
     near = [n for n in (*names, *files) if get_close_matches(stem, [n.partition(".")[0].lower()], cutoff=0.7)]
     return did_you_mean(Path(path).name, near)
 

@@ -209,7 +209,7 @@ initial_bound_option = number_option(
     "--initial-bound", metavar="R", help="Bound the input for all initial states within |x_k(0)| <= R, not --x0."
 )
 #: Of a scenario, for commands that only draw x(0): where it is random, it begins within the set.
-drawn_within_option = number_option("--initial-bound", hidden=True)
+random_within_option = number_option("--initial-bound", hidden=True)
 memory_option = click.option(
     "--memory",
     type=click.FloatRange(min=0, min_open=True, max=1000),
@@ -224,7 +224,8 @@ time_limit_option = click.option(
     "--time-limit",
     type=float,
     metavar="SECONDS",
-    help="For simulation and searches of a graph together.  [default: 60, and 1 more for every 1,000 nodes]",
+    help="For simulation and searches of a graph together, not for decisions and checks; near it what is found may "
+    "differ from run to run.  [default: 60, and 1 more for every 1,000 nodes]",
 )
 output_option = click.option(
     "-o",

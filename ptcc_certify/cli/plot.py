@@ -30,6 +30,15 @@ _OF_CERTIFICATES = ("graph", "what", "output", "wide", "time_unit", "memory", "x
 OF_A_RUN = ("states", "input", "decay")
 
 
+class _Figure(click.Choice):  # type: ignore[type-arg]  # no generic class before click 8.2
+    """The name of a figure; of what another one shows it tells which."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        if value == "sliding":
+            self.fail("the sliding variables are under states", param, ctx)
+        return str(super().convert(value, param, ctx))
+
+
 @click.command()
 @click.argument(
     "graph",
@@ -42,7 +51,7 @@ OF_A_RUN = ("states", "input", "decay")
 )
 @click.option(
     "--what",
-    type=click.Choice([*OF_A_RUN, "graph", "spectrum"]),
+    type=_Figure([*OF_A_RUN, "graph", "spectrum"]),
     help="States, input, or error under its proved bounds over time; the graph; its eigenvalues."
     "  [default: of a certificate decay, else graph]",
 )
@@ -58,7 +67,7 @@ OF_A_RUN = ("states", "input", "decay")
 @mode_options
 @shared.protocol_options
 @shared.limit_options
-@shared.drawn_within_option
+@shared.random_within_option
 @shared.method_option
 @shared.time_limit_option
 @shared.memory_option
@@ -69,7 +78,7 @@ def plot(
 
     A certificate is checked first, and its run is repeated; that of one without an initial state, as `design` makes,
     begins at --x0. A graph is simulated, for its decay certified, with the options about protocol and initial state
-    that `certify` has too.
+    that `certify` has too: only a certificate shows the input's bound.
 
     Of a family - its certificate, or several graphs with --switching, weights in intervals, --uncertainty, --optional -
     runs under many signals are drawn within what is proved for every signal.

@@ -38,7 +38,7 @@ _TABLES = ("", ".csv", ".txt")
 @shared.reading_options
 @shared.protocol_options
 @shared.limit_options
-@shared.drawn_within_option
+@shared.random_within_option
 @mode_options
 @dwell_options
 @click.option(

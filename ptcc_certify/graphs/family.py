@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ptcc_certify.errors import GraphError, NumberError
+from ptcc_certify.errors import GraphError, NumberError, did_you_mean, gated
 from ptcc_certify.graphs.digraph import Exact, SignedDigraph, Weights, ordered_labels, refuse_unknown_orientation
 from ptcc_certify.graphs.display_hook import Shown
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, shorten
@@ -367,6 +367,7 @@ class Family(Shown):
         return cls((_mode(rows, nodes, orientation, undirected),), _note(unsure))
 
     @classmethod
+    @gated
     def switching(cls, modes: Any) -> Family:
         """Return the family of several modes, of which any may act at any instant.
 
@@ -378,11 +379,15 @@ class Family(Shown):
         Raises
         ------
         GraphError
-            There is none, or two have different nodes: a missing node is not an isolated one.
+            There is none, one is no graph, or two have different nodes: a missing node is not an isolated one.
         """
         named = list(modes.items()) if hasattr(modes, "items") else [(str(k), one) for k, one in enumerate(modes, 1)]
         if not named:
             raise GraphError("a family has at least one mode; give one graph or several")
+        for name, one in named:
+            if not isinstance(one, SignedDigraph | Family):
+                mend = 'ptcc_certify.as_family({"day": edges, "night": edges2}) takes edges, tables and files'
+                raise GraphError(f"mode {shorten(str(name))}: {shorten(repr(one))} is no SignedDigraph; {mend}")
         families = [(name, one if isinstance(one, Family) else cls.from_graph(one)) for name, one in named]
         labels = families[0][1].labels
         joint: list[Mode] = []
@@ -574,7 +579,10 @@ def _in_order(mode: Mode, labels: tuple[str, ...], name: str, first: str) -> Mod
     if odd := sorted(set(labels) ^ set(mode.labels)):
         lacks = name if odd[0] in index else first
         mend = "declare it in a row of its own if it is isolated there"
-        raise GraphError(f"mode {shorten(lacks)} has no node {shorten(odd[0])}, which another mode has; {mend}")
+        near = did_you_mean(odd[0], sorted({*labels, *mode.labels} - {odd[0]}))
+        raise GraphError(
+            f"mode {shorten(lacks)} has no node {shorten(odd[0])}, which another mode has{near or ';'} {mend}"
+        )
     place = np.array([index[label] for label in mode.labels], dtype=np.int64)
     source, target = place[mode.source], place[mode.target]
     order = np.lexsort((mode.sign, source, target))

@@ -12,6 +12,8 @@ from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
+import numpy as np
+
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import format_exact, shorten
 from ptcc_certify.protocols.gain import Gain
@@ -152,6 +154,11 @@ class ReachingProtocol(Protocol):
     def reaching_gain(self) -> Gain:
         """``mu2 + mu3 kappa/(T_r - t)``; by its clock ``c``, ``||sigma|| <= e^-c ||sigma(0)||`` (Proposition 1)."""
         return Gain(self.T_r, self.mu2, self.mu3, self.kappa)
+
+    def clock_while_reaching(self, z: np.ndarray) -> np.ndarray:
+        """Return the stretched clock at instants ``z = ln(T_r/(T_r - t))``; an infinite one is ``T_r``."""
+        T, T_r, T_s = float(self.T), float(self.T_r), float(self.T_s)
+        return self.gain.clock_at_remaining((T_s + T_r * np.exp(-z)) / T)
 
 
 def refuse_no_protocol(protocol: Any) -> None:

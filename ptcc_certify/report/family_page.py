@@ -76,12 +76,12 @@ def family_facts(saved: FamilyCertificate) -> dict[str, Any]:
 
 def _restricted(saved: FamilyCertificate) -> list[str]:
     """Tell what is proved of restricted signals, with the ends of constant weights."""
-    told = [text for _, text in restricted_entries(saved)]
+    entries = [text for _, text in restricted_entries(saved)]
     if text := constant_text(saved):
         within = max(ends.within for claim in saved.final_values.values() for ends in claim.values if ends is not None)
         near = f"some weights come within {up(within, 2)} of either end" if within else "some weights attain these ends"
-        told.append(f"{signal_text('constant')[1]}: at the deadline {text}; {near}")
-    return told
+        entries.append(f"{signal_text('constant')[1]}: at the deadline {text}; {near}")
+    return entries
 
 
 def family_view(saved: FamilyCertificate, runs: Sequence[FamilyTrajectory]) -> dict[str, Any]:
@@ -111,7 +111,9 @@ def family_view(saved: FamilyCertificate, runs: Sequence[FamilyTrajectory]) -> d
         "dwelling": keeps_dwell(saved, runs),
         "worst_runs": sum(run.signal.startswith("worst") for run in runs),
         "groups": [
-            _sentence(texts.printable(groups_text(c), 2000)) for c in facts["components"] if c.behaviour == DEPENDS
+            _sentence(texts.printable(groups_text(c, saved.direct), 2000))
+            for c in facts["components"]
+            if c.behaviour == DEPENDS
         ],
         "answers": [(answer.status, texts.typeset(_signs(str(answer)))) for answer in saved.assessment.answers],
         "commands": _commands(saved),

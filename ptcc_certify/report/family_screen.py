@@ -17,6 +17,7 @@ from ptcc_certify.graphs.structure import STABILITY
 from ptcc_certify.report.restricted_screen import (
     RESTS,
     constant_states,
+    last_states,
     restricted_entries,
     rests,
     states_of_signal,
@@ -49,6 +50,8 @@ if TYPE_CHECKING:
 
 #: Components of which a screen tells, and lines of a text on the short one.
 _COMPONENTS, _LINES = 4, 2
+#: Where sliding variables bring an agent that listens to nobody.
+DRIVEN = "ends at x(0) - sigma(0)"
 #: 1 - t/T and its name, where the long screen tells the error.
 _INSTANTS = ((0.5, "0.5 T"), (0.1, "0.9 T"), (0.01, "0.99 T"), (1e-6, "T(1-1e-6)"))
 _NOTHING: Mapping[str, str] = MappingProxyType({})
@@ -93,7 +96,7 @@ def family_summary(certificate: FamilyCertificate, name: str, origins: Mapping[s
     entries = [
         *_family_entries(certificate.family, name, origins),
         ("protocol", _protocol_text(certificate, origins)),
-        *_claim_entries(components, f" at T = {near(T)}", False, certificate.sigma0 is not None, certificate.boxes),
+        *_claim_entries(components, f" at T = {near(T)}", False, certificate),
         *_rate_entries(certificate),
         *restricted_entries(certificate),
         *_final_entries(certificate),
@@ -138,9 +141,8 @@ def family_lines(certificate: FamilyCertificate, name: str, origins: Mapping[str
         origin = f" ({origins['x(0)']})" if "x(0)" in origins else ""
         entries.append(("x(0)", value_list(family.labels, certificate.initial_state) + origin))
     entries += sliding_lines(family.labels, certificate.protocol.reaching, certificate.sigma0, certificate.reaching)
-    disturbed = certificate.sigma0 is not None
     when = f" at T = {near(certificate.protocol.T)}"
-    entries += _claim_entries(components, when, True, disturbed, certificate.boxes)
+    entries += _claim_entries(components, when, True, certificate)
     entries += [*_rate_entries(certificate), *restricted_entries(certificate), *_function_entries(certificate)]
     entries += _final_entries(certificate, long=True)
     entries += [*_error_entries(certificate, long=True), *_input_entries(certificate, long=True)]
@@ -233,10 +235,11 @@ def _claim_entries(
     components: Sequence[FamilyComponent],
     when: str = "",
     every: bool = False,
-    disturbed: bool = False,
-    boxes: Mapping[int, AttractingBox] = MappingProxyType({}),
+    certificate: FamilyContent | None = None,
 ) -> Lines:
     """Tell what every component does; where that depends on the signal, why, and what holds all the same."""
+    disturbed = certificate is not None and certificate.sigma0 is not None
+    direct, boxes = (True, {}) if certificate is None else (certificate.direct, certificate.boxes)
     order = sorted(range(len(components)), key=lambda k: -components[k].nodes.size)
     if len(components) == 1:
         yield "claim", _claim_text(components[0], when, every, disturbed)
@@ -250,7 +253,7 @@ def _claim_entries(
             yield "", f"... {len(components):,} components in all"
     depending = [k for k in order if components[k].behaviour == DEPENDS]
     for k in depending[: len(depending) if every else 1]:
-        yield from _depends_entries(components[k], every)
+        yield from _depends_entries(components[k], every, direct)
         if k in boxes:
             yield "box", _cut(box_text(components[k], boxes[k]), every)
 
@@ -273,32 +276,34 @@ def _names(component: FamilyComponent, nodes: Sequence[int], width: int) -> str:
     return shorten_list([printable(shorten_label(component.family.labels[v])) for v in nodes], width)
 
 
-def _depends_entries(component: FamilyComponent, every: bool) -> Lines:
+def _depends_entries(component: FamilyComponent, every: bool, direct: bool) -> Lines:
     if component.counterexample is not None:
         yield "why", _cut(printable(counterexample_text(component, component.counterexample)), every)
     family = component.family
     if len(family.modes) > 1:
-        alone = (f"{mode_name(family, k)}: {_alone(mode)}" for k, mode in enumerate(family.modes))
+        alone = (f"{mode_name(family, k)}: {_alone(mode, direct)}" for k, mode in enumerate(family.modes))
         yield "alone", _cut("; ".join(alone), every)
     elif component.signal == "any":
         (constant, *_) = decide(family, "constant")
         behaviour = "it depends on the weights" if constant.behaviour == DEPENDS else sharpest(constant)
         yield "constant", f"where weights never change: {behaviour}"
     if component.signal == "any":
-        yield "groups", _cut(groups_text(component), every)
+        yield "groups", _cut(groups_text(component, direct), every)
 
 
-def _alone(mode: Mode) -> str:
+def _alone(mode: Mode, direct: bool) -> str:
     """Tell what a mode does if no other one acts."""
     if not mode.n_edges:
-        return RESTS
+        return RESTS if direct else f"every agent {DRIVEN}"
     components = decide(Family((mode,)))
     text = ", ".join(dict.fromkeys(map(sharpest, components)))
     return text if len(components) == 1 else f"{len(components):,} separate parts, each by itself: {text}"
 
 
-def groups_text(component: FamilyComponent) -> str:
+def groups_text(component: FamilyComponent, direct: bool = True) -> str:
     """Tell which agents agree, follow or end at 0 under every signal, where the behaviour depends on it.
+
+    An agent that listens to nobody keeps its value where no sliding variable moves (``direct``).
 
     Examples
     --------
@@ -309,7 +314,9 @@ def groups_text(component: FamilyComponent) -> str:
     for group in groups.agreeing:
         names = _names(component, group.nodes.tolist(), 30)
         camps = " up to camps" * (len(set(group.camps.tolist())) > 1)
-        parts.append(f"{names} keeps its value" if group.nodes.size == 1 else f"{names} agree{camps}")
+        parts.append(
+            f"{names} {'keeps its value' if direct else DRIVEN}" if group.nodes.size == 1 else f"{names} agree{camps}"
+        )
     zero, near = groups.at_zero.tolist(), set(groups.bounded.tolist())
     known = {v for group in groups.agreeing for v in group.nodes.tolist()}.union(zero)
     others = [v for v in range(component.nodes.size) if v not in known]
@@ -339,9 +346,9 @@ def box_text(component: FamilyComponent, box: AttractingBox) -> str:
     for v, *ends in zip(box.decay.nodes.tolist(), box.lower, box.upper, strict=True):
         text = _interval((ends[0], ends[1])).replace("in [", "into [").replace("at ", "to ")
         groups.setdefault(text, []).append(v)
-    drawn = [f"{_names(component, nodes, 30)} {text}" for text, nodes in groups.items()]
+    texts = [f"{_names(component, nodes, 30)} {text}" for text, nodes in groups.items()]
     return (
-        f"every signal draws {shorten_list(drawn, TEXT)}, at the rate {down(2 * box.decay.rate)}; no limit is claimed"
+        f"every signal draws {shorten_list(texts, TEXT)}, at the rate {down(2 * box.decay.rate)}; no limit is claimed"
     )
 
 
@@ -349,7 +356,8 @@ def _cut(text: str, every: bool) -> str:
     lines = wrap_text(text)
     if every or len(lines) <= _LINES:
         return text
-    return " ".join([*lines[: _LINES - 1], shorten_text(f"{lines[_LINES - 1]} ...", TEXT)])
+    (last, *_) = wrap_text(lines[_LINES - 1], TEXT - len(" ..."))
+    return " ".join([*lines[: _LINES - 1], f"{last} ..."])
 
 
 # ---------------------------------------------------------------------- what is proved
@@ -361,7 +369,7 @@ def _rate_entries(certificate: FamilyCertificate) -> Lines:
         return
     rate, bound = certificate.rate, certificate.upper_bound
     limit = "" if bound is None else f"upper bound {up(bound)}"
-    if rate is not None and certificate.verdict != "certified":
+    if rate is not None and _is_refused(certificate):
         yield (
             "rate",
             "none is proved: the independent check does not accept what was found" + f"; {limit}" * bool(limit),
@@ -390,7 +398,7 @@ def _no_search(certificate: FamilyCertificate) -> str:
 
     without = [part.component for part in certificate.parts if part.component.nodes.size > 1 and not part.rate]
     largest = max(without, key=lambda component: component.nodes.size, default=None)
-    late = any("cut off" in note or note == "Lyapunov functions" for note in certificate.notes)
+    late = any("cut off" in note for note in certificate.notes)
     if largest is not None and largest.nodes.size > EXACT_NODES:
         if largest.behaviour != STABILITY:
             return f"{largest.nodes.size:,} agents are above the {EXACT_NODES:,} of the searches"
@@ -422,13 +430,20 @@ def _interval(ends: tuple[Fraction, Fraction] | None) -> str:
     return f"at {short_number(low)}" if low == high else f"in [{down(low, 5)}, {up(high, 5)}]"
 
 
+def _is_refused(certificate: FamilyCertificate) -> bool:
+    """Tell whether the check does not accept the functions that were found: nothing that follows from them is told."""
+    return certificate.verdict != "certified" and any(part.functions for part in certificate.parts)
+
+
 def _final_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
     """Tell between which ends every agent is at the deadline, agents with the same ends together."""
+    if _is_refused(certificate):
+        return
     if certificate.final_states is not None and certificate.common:
         width = 12 * TEXT if long else 2 * TEXT - 20
         states = _interval_entries(certificate.family.labels, certificate.final_states, width)
         yield from ((name, f"{text}{_every(certificate)}") for name, text in states)
-    elif certificate.final_states is not None and any(c.final_states for c in certificate.ends_of_signal.values()):
+    elif certificate.final_states is not None and any(ends is not None for ends in last_states(certificate)):
         width = 12 * TEXT if long else 2 * TEXT - 20
         ends = _interval_entries(certificate.family.labels, states_of_signal(certificate), width)
         what = "x(T)" if rests(certificate) else "x(t)"
@@ -472,7 +487,7 @@ def _error_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
     """Tell how near the agents are to their final states by when, for every signal and those that were asked for."""
     from ptcc_certify.certificate.restricted_bounds import deviation_of_signal, nearer_for_signal  # slow to load
 
-    if certificate.initial_state is None:
+    if certificate.initial_state is None or _is_refused(certificate):
         return
     if certificate.common and certificate.rate is not None:
         yield "error", _error_text(certificate, certificate.deviation_bound, long) + _every(certificate)
@@ -486,20 +501,21 @@ def _error_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
 def _error_text(certificate: FamilyCertificate, bound: Callable[[list[float]], np.ndarray], long: bool) -> str:
     share = certificate.settling_share
     if not long:
-        when = "0.99 T" if certificate.direct else "T_r + 0.99 T_s"
+        when = "0.99 T" if certificate.direct else "T_r + 0.99 T_s, numerical"
         return f"at {when}: every agent within {up(float(bound([0.01 * share]).max()), 2)} of its final state"
     instants = [(q, name) for q, name in _INSTANTS if q <= share]
     bounds = bound([remaining for remaining, _ in instants]).max(axis=0)
     texts = (f"{up(float(most), 2)} at {when}" for (_, when), most in zip(instants, bounds, strict=True))
-    return f"every agent is within so much of its final state: {', '.join(texts)}"
+    numerical = "" if certificate.direct else " (numerical)"
+    return f"every agent is within so much of its final state{numerical}: {', '.join(texts)}"
 
 
 def _input_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
     if any(part.component.behaviour is None for part in certificate.parts):
         return
-    if not certificate.bounded:
+    if not certificate.bounded or _is_refused(certificate):
         if not certificate.common:
-            yield "INPUT", "no bound for all signals and x(0): a switch near T may meet any gain"
+            yield "INPUT", f"no bound for all signals and x(0): a switch near T may meet any gain{_every(certificate)}"
         elif certificate.unbounded:
             yield "INPUT", "NOT BOUNDED for some signal from some initial states"
         else:

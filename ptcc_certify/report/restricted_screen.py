@@ -15,9 +15,12 @@ from ptcc_certify.certificate.restricted_claims import (
     WindowClaim,
 )
 from ptcc_certify.checker.reading import Interval
-from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS
+from ptcc_certify.graphs.family import Mode
+from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, CONSENSUS, CONTAINMENT
 from ptcc_certify.report.text_layout import printable, shorten_label
 from ptcc_certify.theorems.counterexample_text import mode_name
+from ptcc_certify.theorems.family_behaviour import DEPENDS
+from ptcc_certify.theorems.family_claims import GENERAL
 from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows, SignalClass
 
 if TYPE_CHECKING:
@@ -50,11 +53,11 @@ def restricted_entries(certificate: FamilyContent) -> Iterator[tuple[str, str]]:
     if not certificate.restricted:
         yield *head[:1], f"{head[1]}: nothing more is proved"  # type: ignore[misc]
     for claim in certificate.restricted:
-        if isinstance(claim, FinalValueClaim):
+        if isinstance(claim, FinalValueClaim) and not _stands_alone(certificate, claim):
             continue
         name = shorten_label(certificate.parts[claim.component].component.family.labels[0])
         where = f"component of {printable(name)}: " if several else ""
-        if isinstance(claim, LastModeClaim):
+        if isinstance(claim, LastModeClaim | FinalValueClaim):
             text = _last_mode_text(certificate, claim)
         elif isinstance(claim, ShareClaim):
             text = _share_text(certificate, claim)
@@ -80,20 +83,38 @@ def signal_text(signal: SignalClass) -> tuple[str, str]:
     return "constant", "if mode and weights never change"
 
 
-def _last_mode_text(certificate: FamilyContent, claim: LastModeClaim) -> str:
+def _stands_alone(certificate: FamilyContent, claim: FinalValueClaim) -> bool:
+    """Tell whether no other claim says what single modes do to a component whose end depends on the signal."""
+    depends = certificate.parts[claim.component].component.behaviour == DEPENDS
+    return depends and claim.component not in certificate.ends_of_signal
+
+
+def _last_mode_text(certificate: FamilyContent, claim: LastModeClaim | FinalValueClaim) -> str:
     """Tell what the last mode does, of each mode where they differ."""
-    begin = "the last mode decides" if len(claim.behaviours) > 1 and claim.signal != "constant" else ""
+    own = claim.behaviours
+    begin = "the last mode decides" if len(own) > 1 and claim.signal != "constant" else ""
     unknown = "rest where the weights say" if claim.signal == "constant" else "no limit while weights move"
+    if isinstance(claim, FinalValueClaim):
+        unknown = "nothing is claimed"
     modes = certificate.parts[claim.component].component.family.modes
-    pairs = zip(claim.behaviours, modes, strict=True)
-    behaviours = [(behaviour or unknown) if mode.n_edges else RESTS for behaviour, mode in pairs]
+    pairs = zip(own, modes, strict=True)
+    behaviours = [_of_mode(behaviour, mode, unknown) for behaviour, mode in pairs]
     late = "; how near by when depends on the last switch" if begin else "; how near by when is not proved"
     if len(set(behaviours)) == 1:
-        camps = ", camps of that mode" if begin and behaviours[0] == BIPARTITE_CONSENSUS else ""
+        camps = ", camps of that mode" if begin and own[0] == BIPARTITE_CONSENSUS else ""
         return f"{begin}: {behaviours[0]}{camps}{late}".removeprefix(": ")
     names = (printable(mode_name(certificate.family, k)) for k in range(len(behaviours)))
-    each = "; ".join(f"{name} {behaviour}" for name, behaviour in zip(names, behaviours, strict=True))
+    each = "; ".join(f"{name}: {behaviour}" for name, behaviour in zip(names, behaviours, strict=True))
     return f"{begin}: {each}{late}".removeprefix(": ")
+
+
+def _of_mode(behaviour: str | None, mode: Mode, unknown: str) -> str:
+    """Name what the last mode does; no average of ``x(0)``, which is not where it begins."""
+    if not mode.n_edges:
+        return RESTS
+    if behaviour is None or (mode.sign < 0).any():
+        return behaviour or unknown
+    return {GENERAL[name]: name for name in (CONSENSUS, CONTAINMENT)}.get(behaviour, behaviour)
 
 
 def _window_text(claim: WindowClaim) -> str:
@@ -162,7 +183,8 @@ def _rate_text(certificate: FamilyContent, claim: RateClaim) -> str:
     if claim.ratio > 1 and isinstance(claim.signal, DwellTime):
         text += f", V up to {up(claim.ratio, 3)} times"
         if claim.signal.clock == "t":
-            text += f" at each of {claim.signal.switches(certificate.protocol.T)} switches at most"
+            most = claim.signal.switches(certificate.protocol.T)
+            text += " at the one switch" if most == 1 else f" at each of {most} switches at most"
         else:
             text += " V(0)"
     return text + ", input bounded" * claim.bounded

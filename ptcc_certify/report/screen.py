@@ -100,6 +100,8 @@ def summary_lines(
     """
     p = certificate.protocol
     whatever = "" if p.reaching is None else f", any |d_k| <= {down(p.reaching.delta, 12)}"
+    if p.reaching is not None and p.reaching.delta == 0:
+        whatever = ", without disturbances"
     claims = _claim_texts(certificate.structure, certificate.claims, f" at T = {near(p.T)}", whatever)
     drawn = _is_set_asked(certificate)
     for agents in (True, False):

@@ -43,8 +43,8 @@ _CAPTIONS = {
 _FAMILY_CAPTIONS = {
     "graph": "The graphs: arrows point to who listens, solid from allies, dashed from opponents.",
     "decay": (
-        "How far agents are from their final states, against the time left, both logarithmic. Thick line: the proved"
-        " bound for every signal. Thin: simulated runs (numerical), down to the dotted line, below which the integrator"
+        "How far agents are from their final states, against the time left, both logarithmic. Thick line: the %s"
+        " for every signal. Thin: simulated runs (numerical), down to the dotted line, below which the integrator"
         " resolves nothing."
     ),
 }
@@ -179,18 +179,21 @@ def _last_time(saved: FamilyCertificate) -> float | None:
 
 def _captions(saved: Certificate) -> dict[str, str]:
     """Return captions that say whether the bound is proved; through a reaching phase it is integrated in floats."""
-    bound = "proved bound" if saved.direct else "bound (numerical)"
-    return _CAPTIONS | {"decay": _CAPTIONS["decay"].replace("%s", bound)}
+    return _CAPTIONS | {"decay": _CAPTIONS["decay"].replace("%s", _bound_word(saved))}
+
+
+def _bound_word(saved: Certificate | FamilyCertificate) -> str:
+    return "proved bound" if saved.direct else "bound (numerical)"
 
 
 def _family_captions(saved: FamilyCertificate) -> dict[str, str]:
-    """Return captions that speak of bands and dotted edges where there are some."""
+    """Return captions that speak of bands and dotted edges where there are some, and of the bound as of one graph."""
     caption = _FAMILY_CAPTIONS["graph"]
     if any(mode.parameters.size for mode in saved.family.modes):
         caption += " A pale band is as wide as the largest weight, the line on it as the least."
     if any(mode.optional.any() for mode in saved.family.modes):
         caption += " Dotted ones may fail."
-    return _FAMILY_CAPTIONS | {"graph": caption}
+    return _FAMILY_CAPTIONS | {"graph": caption, "decay": _FAMILY_CAPTIONS["decay"].replace("%s", _bound_word(saved))}
 
 
 def _depending(saved: FamilyCertificate) -> list[FamilyComponent]:
@@ -293,7 +296,8 @@ def _states(saved: Certificate) -> tuple[list[str], list[tuple[str, str, tuple[s
     agents = range(min(saved.graph.n_nodes, texts.LISTED))
     numbers = texts.state_columns(saved, heads, agents, lambda x: texts.enclosed(x) if x[1] else texts.rational(x[0]))
     labels = [_cut(label) for label in saved.graph.labels[: texts.LISTED]]
-    return list(numbers), list(zip(labels, texts.agent_parts(saved), zip(*numbers.values(), strict=True), strict=False))
+    parts = [part.removeprefix("leader of ") for part in texts.agent_parts(saved)]  # a column of two has little room
+    return list(numbers), list(zip(labels, parts, zip(*numbers.values(), strict=True), strict=False))
 
 
 @cache

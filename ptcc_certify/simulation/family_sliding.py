@@ -72,11 +72,6 @@ class SlidingRun:
         """The scalar equations."""
         return ReachingProblem(self.protocol, self.sigma0, self.disturbance)
 
-    def clock(self, z: np.ndarray) -> np.ndarray:
-        """Return the stretched clock at instants ``z = ln(T_r/(T_r - t))``, infinite at ``T_r``."""
-        T, T_r, T_s = (float(x) for x in (self.protocol.T, self.protocol.T_r, self.protocol.T_s))
-        return self.protocol.gain.clock_at_remaining((T_s + T_r * np.exp(-z)) / T)
-
     @cached_property
     def events(self) -> np.ndarray:
         """The clock where a sliding variable reaches 0 or the disturbance jumps; the last one ends all motion."""
@@ -87,7 +82,7 @@ class SlidingRun:
         jumps = self.disturbance.breaks(T_r)
         jumps = jumps[(jumps > 0) & (jumps < T_r)]
         z = np.concatenate([self.problem.z, -np.log1p(-jumps / T_r)])
-        return np.unique(self.clock(z[z <= last]))
+        return np.unique(self.protocol.clock_while_reaching(z[z <= last]))
 
     def sigma_at(self, clock: np.ndarray) -> np.ndarray:
         """Return the (N, M) sliding variables at increasing values of the clock."""

@@ -17,6 +17,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -1079,6 +1080,21 @@ def test_a_process_that_is_stopped_leaves_the_table_so_far(killed: Any, number: 
     Path("few.toml").write_text(TINY.replace("8", "1"))
     run = ptcc("batch", "few.toml", "fig1a", "-o", "t.csv", *QUICK)  # a list that has nothing of the other
     assert run.code == 0 and len(read_csv("t.csv")) == 2
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_an_interrupt_that_a_library_loses_ends_the_batch_at_the_next_row(
+    number: signal.Signals, monkeypatch: pytest.MonkeyPatch
+):
+    def lose(*_: Any, progress: Callable[[int, int, int], None], **__: Any) -> None:
+        with suppress(KeyboardInterrupt):
+            signal.raise_signal(number)
+        progress(1, 2, 0)
+        raise AssertionError("the batch went on")
+
+    monkeypatch.setattr("ptcc_certify.batch.certify_many", lose)
+    before = signal.getsignal(number)
+    assert ptcc("batch", "fig1a").code == 130 and signal.getsignal(number) is before
 
 
 def rows_in(journal: Path) -> int:

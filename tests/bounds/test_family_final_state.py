@@ -8,7 +8,15 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from row_families import exact_value, laplacian, random_consensus, random_followers, random_vertex, vertices
+from row_families import (
+    laplacian,
+    random_consensus,
+    random_followers,
+    random_state,
+    random_vertex,
+    values_of_vertices,
+    vertices,
+)
 from scipy.linalg import expm
 
 import ptcc_certify.bounds.family_final_state as module
@@ -21,22 +29,6 @@ from ptcc_certify.lyapunov.family_search import search_family
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.theorems.family_behaviour import decide
 
-
-def random_state(rng: random.Random, n: int) -> list[Fraction]:
-    return [Fraction(rng.randint(-20, 20), rng.randint(1, 7)) for _ in range(n)]
-
-
-def all_values(family: Family, z: list[Fraction]) -> list[Fraction]:
-    """The consensus values of all vertices, in rationals."""
-    mode = family.modes[0]
-    values = []
-    for largest in vertices(mode):
-        sizes = [(mode.upper if up else mode.lower).fraction(e) for e, up in enumerate(largest.tolist())]
-        edges = zip(mode.source.tolist(), mode.target.tolist(), sizes, strict=True)
-        values.append(exact_value(len(z), [edge for edge in edges if edge[2]], z))
-    return values
-
-
 # ---------------------------------------------------------------------- constant weights
 
 
@@ -45,7 +37,7 @@ def compare_with_vertices(seed: int) -> None:
     family = random_consensus(rng)
     x = random_state(rng, family.n_nodes)
     value = final_value(family.modes[0], x)
-    values = all_values(family, [int(g) * v for g, v in zip(value.camps, x, strict=True)])
+    values = values_of_vertices(family.modes[0], [int(g) * v for g, v in zip(value.camps, x, strict=True)])
     assert value.exact and (value.lower, value.upper) == (min(values), max(values))
 
 
@@ -67,7 +59,7 @@ def test_final_values_of_large_groups_enclose_the_vertices_closely(seed, monkeyp
     family = random_consensus(rng)
     x = random_state(rng, family.n_nodes)
     value = final_value(family.modes[0], x)
-    values = all_values(family, [int(g) * v for g, v in zip(value.camps, x, strict=True)])
+    values = values_of_vertices(family.modes[0], [int(g) * v for g, v in zip(value.camps, x, strict=True)])
     low, high = min(values), max(values)
     assert value.lower <= low <= value.reached_lower and value.reached_upper <= high <= value.upper
     assert max(value.reached_lower - value.lower, value.upper - value.reached_upper) < 1e-6

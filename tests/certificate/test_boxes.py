@@ -133,25 +133,32 @@ def test_no_mutant_of_a_box_is_accepted_that_is_false():
 
 
 @pytest.mark.parametrize(
-    ("path", "new"),
+    ("path", "new", "reason"),
     [
-        (("component",), 1),
-        (("nodes",), ["d", "c"]),
-        (("nodes",), ["c"]),  # d hears c
-        (("nodes",), []),
-        (("nodes",), ["b", "c", "d"]),
-        (("lower",), ["1", "501/1000"]),
-        (("upper",), ["1999/1000", "2"]),
-        (("upper",), ["2", "2", "2"]),
-        (("vector",), ["1", "0"]),
-        (("rate",), "0"),
-        (("rate",), "2"),
+        (("component",), 1, "an unknown component, or out of order"),
+        (("nodes",), ["d", "c"], "followers"),
+        (("nodes",), ["c"], "a follower is heard by another agent"),  # d hears c
+        (("nodes",), [], "followers"),
+        (("nodes",), ["b", "c", "d"], "vector has not 3 entries"),
+        (("lower",), ["1", "501/1000"], "an agent may leave the box"),
+        (("upper",), ["1999/1000", "2"], "an agent may leave the box"),
+        (("upper",), ["2", "2", "2"], "upper has not 2 entries"),
+        (("vector",), ["1", "0"], "the vector is not positive"),
+        (("rate",), "0", "the rate is not positive"),
+        (("rate",), "2", "a row does not decay fast enough"),
     ],
 )
-def test_what_does_not_fit_is_rejected(path: tuple[Any, ...], new: Any):
+def test_what_does_not_fit_is_rejected(path: tuple[Any, ...], new: Any, reason: str):
     data = made(MOVED, [0, 4, 100, 3]).to_dict()
     assert check(data).accepted
-    assert check(resealed(changed(data, ("boxes", 0, *path), new))).rejected
+    assert check(resealed(changed(data, ("boxes", 0, *path), new))).reason == reason
+
+
+def test_a_leader_is_no_follower():
+    data = made(MOVED, [0, 4, 100, 3]).to_dict()
+    box = {"nodes": ["b", "c", "d"], "vector": ["1", "1", "1"], "lower": ["4", "1", "1"], "upper": ["4", "2", "2"]}
+    wrong = data | {"boxes": [data["boxes"][0] | box]}
+    assert check(resealed(wrong)).reason == "a row does not decay fast enough"
 
 
 def test_a_box_of_agents_that_come_to_rest_is_none():

@@ -333,3 +333,25 @@ def test_the_script_of_each_shell_is_printed_with_what_click_leaves_out(shell: s
     values = [item.value for item in kind(cli, {}, "ptcc", "_PTCC_COMPLETE").get_completions(["certify"], "--method=p")]
     assert values == [f"{'' if shell == 'bash' else '--method='}{name}" for name in ("paper", "perron")]
     assert isinstance(cli, click.Group)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("why", "fig1a"), 'there is no command "why"; the line why of classify and certify tells the counterexample'),
+        (("design", "fig1a", "--max-input", "3", "--T", "2"), "; here it is --deadline"),
+        (("design", "fig1a", "--max-input", "3", "--x0", "1"), "; here it is --initial-bound"),
+        (("plot", "fig1a", "--what", "sliding"), "the sliding variables are under states"),
+        (("plot", "fig1a", "--what", "slides"), "'slides' is not one of"),
+    ],
+)
+def test_a_word_of_another_place_is_refused_with_its_place(words: tuple[str, ...], says: str):
+    run = process("-m", "ptcc_certify", *words)
+    assert run.code == 2 and says in run.err and run.err.count("\n") == 1, run
+
+
+def test_a_missing_file_names_first_what_begins_alike(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("crew_of_monday_morning.csv", "screw.csv", "other.csv"):
+        Path(name).write_text("a,b,1\n")
+    assert "did you mean crew_of_monday_morning.csv?" in ptcc("classify", "crew.csv").err

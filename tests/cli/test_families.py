@@ -12,6 +12,8 @@ from bad_inputs import ptcc
 from ptcc_certify import NominalProtocol, certify
 from ptcc_certify.certificate.verdict import CERTIFIED
 from ptcc_certify.graphs.io import read_family
+from ptcc_certify.report.family_screen import _cut
+from ptcc_certify.report.text_layout import wrap_text
 
 INTERVALS = "source,target,weight_min,weight_max"
 #: "day" and "night" keep the same camps, "spoiled" others.
@@ -144,7 +146,7 @@ def test_files_are_read_as_the_certificate_says():
     options = ("--uncertainty", "5%", "--edges", "listens", "--optional", "c,b", "--undirected")
     assert ptcc("certify", *BOTH, *options, "-o", "c.json").code == 0
     run = ptcc("check", "c.json", "day.csv", "night.csv")
-    said = "read as the certificate says: --edges listens --undirected --uncertainty 1/20 --optional c,b"
+    said = "read as the certificate says: --edges listens --undirected --uncertainty 5% --optional c,b"
     assert run.code == 0 and said in " ".join(run.out.split())
     assert ptcc("check", "c.json", *BOTH, *options[:3], "listens").code == 0
     for other in (("--uncertainty", "1%"), ("--optional", "a,b")):
@@ -193,7 +195,7 @@ def test_the_json_is_the_certificate_or_the_decision():
         ((*BOTH, "--kappa", "3", "--max-input", "59"), 4, "left open: |u_k| <= 59"),
         (("day.csv", "spoiled.csv", "--switching", "--min-rate", "1"), 3, "no rate holds for every signal"),
         (("day.csv", "spoiled.csv", "--switching", "--expect", "bipartite-consensus"), 3, "multiply to -1"),
-        ((*SPOILED, "--signal", "constant"), 0, "if mode and weights never change: bipartite consensus"),
+        ((*SPOILED, "--signal", "constant"), 0, "never change: day: bipartite consensus; spoiled: consensus"),
         ((*SPOILED, "--signal", "constant", "--expect", "bipartite-consensus"), 0, "met: bipartite consensus"),
         ((*SPOILED, "--signal", "constant", "--min-rate", "1"), 4, "modes that end differently"),
         (FIXED, 4, "no rate is certified"),
@@ -258,7 +260,8 @@ def test_help_names_the_commands_that_take_families():
 def test_pages_statements_and_figures_are_made_of_the_certificate_of_a_family():
     assert ptcc("certify", *BOTH, "--kappa", "3", "--x0", "3,1,2", "-o", "c.json").code == 0
     for name in ("p.html", "p.tex"):
-        assert ptcc("report", "c.json", "-o", name, "--no-simulation").out == f"certified  {name}\n"
+        files = "written    p.tex, p_graph.pdf\n" * (name == "p.tex")
+        assert ptcc("report", "c.json", "-o", name, "--no-simulation").out == f"certified  {name}\n{files}"
     assert "Bipartite consensus at T = 1 for every signal" in Path("p.html").read_text("utf-8")
     for what in ("decay", "graph"):
         assert ptcc("plot", "c.json", "--what", what).out == f"written    c-{what}.png\n"
@@ -271,7 +274,8 @@ def test_the_sliding_mode_protocol_has_pages_statements_and_figures_of_families(
     checked = ptcc("check", "c.json", *BOTH)
     assert checked.code == 0 and "for every signal and disturbance" in checked.out
     for name in ("p.html", "p.tex"):
-        assert ptcc("report", "c.json", "-o", name, "--no-simulation").out == f"certified  {name}\n"
+        files = "written    p.tex, p_graph.pdf\n" * (name == "p.tex")
+        assert ptcc("report", "c.json", "-o", name, "--no-simulation").out == f"certified  {name}\n{files}"
     assert "Sliding-mode protocol" in Path("p.html").read_text("utf-8")
     assert ptcc("plot", "c.json", "--what", "input").out == "written    c-input.png\n"
     assert "--disturbance: runs of a family" in ptcc("plot", *BOTH, *slide, "--disturbance", "sin(t)").err
@@ -516,3 +520,66 @@ def test_restricted_signals_are_keys_of_scenarios():
     Path("t.toml").write_text(FILES["s.toml"].replace("[protocol]", 'dwell = "0.2"\n[protocol]'))
     run = ptcc("certify", "t.toml")
     assert run.code == 0 and "at least 0.2 of time between switches" in run.out, run
+
+
+def test_one_graph_that_switches_is_told_that_nothing_changes():
+    run = ptcc("certify", "day.csv", "--switching", "--no-simulation")
+    assert run.code == 0 and run.err == (
+        "note: --switching with one graph changes nothing; name the other modes beside it\n"
+    )
+    assert ptcc("certify", "day.csv", "--switching", "--no-simulation", "-q").err == ""
+    assert ptcc("classify", *BOTH).err == ""
+
+
+def test_a_family_is_called_by_its_files_without_their_folders(tmp_path: Path):
+    (line, *_) = ptcc("classify", str(tmp_path / "unsure.csv")).out.splitlines()
+    assert line.startswith("family     unsure.csv: 3 nodes"), line
+
+
+def test_a_check_without_graphs_tells_of_which_family_the_certificate_speaks():
+    assert ptcc("certify", *BOTH, "-o", "c.json", "-q").code == 0
+    digest = json.loads(Path("c.json").read_text())["graph"]["sha256"]
+    told = f"graph 2 modes, 3 nodes, 4 edges, as in the file; name yours to compare; SHA-256 {digest} "
+    assert " ".join(ptcc("check", "c.json").out.split()).startswith(told)
+    assert "as in the file; name" not in ptcc("check", "c.json", *BOTH).out
+
+
+def test_a_share_that_was_typed_as_a_percentage_is_one_in_the_check():
+    assert ptcc("certify", "day.csv", "--uncertainty", "20%", "-o", "c.json", "-q").code == 0
+    assert "--uncertainty 20%" in ptcc("check", "c.json", "day.csv").out
+    assert ptcc("certify", "day.csv", "--uncertainty", "1/3", "-o", "third.json", "-q").code == 0
+    assert "--uncertainty 1/3" in ptcc("check", "third.json", "day.csv").out
+
+
+def test_a_misprint_in_a_mode_names_the_node_that_is_near():
+    Path("one.csv").write_text("ann,bob,1\nbob,eve,1\n")
+    Path("two.csv").write_text("anne,bob,1\nbob,eve,1\n")
+    run = ptcc("classify", "one.csv", "two.csv", "--switching")
+    assert run.code == 2 and "two has no node ann, which another mode has; did you mean anne? declare it" in run.err
+
+
+def test_what_the_time_limit_cut_off_of_a_family_is_a_sentence(monkeypatch: pytest.MonkeyPatch):
+    from lmi.errors import OutOfTime
+    from ptcc_certify.certificate import family_certificate
+
+    def late(*_: object) -> None:
+        raise OutOfTime("late")
+
+    monkeypatch.setattr(family_certificate, "prove_family_rate_bound", late)
+    assert "note       upper bound on the decay rate: cut off by the time limit" in ptcc("certify", *BOTH, "-v").out
+
+
+def test_what_is_cut_on_the_short_screen_ends_at_a_word():
+    text = "end between these " * 20
+    for start in range(18):
+        whole = text[start:].strip()
+        cut = _cut(whole, every=False)
+        assert cut.endswith(" ...") and whole.startswith(cut.removesuffix("...")), cut
+        assert len(wrap_text(cut)) == 2
+
+
+def test_one_switch_is_called_one():
+    Path("one.csv").write_text("c,b,1\nb,a,1\na,c,9\n")
+    Path("two.csv").write_text("c,b,1\nb,a,9\na,c,1\n")
+    run = ptcc("certify", "one.csv", "two.csv", "--switching", "--dwell", "1")
+    assert "times at the one switch" in " ".join(run.out.split()), run.out

@@ -9,12 +9,20 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from ptcc_certify import Expectations, Family, NominalProtocol, SignedDigraph, certify, read_certificate
+from ptcc_certify import (
+    Expectations,
+    Family,
+    NominalProtocol,
+    SignedDigraph,
+    SlidingModeProtocol,
+    certify,
+    read_certificate,
+)
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.io import as_family
-from ptcc_certify.report.family_screen import groups_text
+from ptcc_certify.report.family_screen import family_lines, family_summary, groups_text
 from ptcc_certify.report.page import report_html
-from ptcc_certify.report.plots.family import plot_family, sample_runs
+from ptcc_certify.report.plots.family import plot_family, plot_family_decay, sample_runs
 from ptcc_certify.report.plots.family_input import plot_family_input
 from ptcc_certify.report.report_file import write_report
 from ptcc_certify.report.statement import family_latex
@@ -24,6 +32,7 @@ from ptcc_certify.theorems.family_behaviour import decide
 from ptcc_certify.theorems.restricted_signals import DwellTime, JointWindows
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
+SLIDING = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=3, mu1=2, mu2=1, mu3=1, delta=1)
 DAY = SignedDigraph.from_edges([("ann", "<b>", 1), ("<b>", "eve", -1)])
 NIGHT = SignedDigraph.from_edges([("eve", "ann", -2), ("ann", "<b>", 1)])
 SWITCHING = Family.switching({"day": DAY, "night": NIGHT})
@@ -198,7 +207,7 @@ def test_the_statement_defines_the_clock_and_what_windows_leave_less_of():
     signal = JointWindows(2, on="0.5", clock="s")
     saved = read_certificate(certify(Family.switching([one, other]), PROTOCOL, [1, 2, 4], signal=signal).to_dict())
     text = family_latex(saved)
-    assert r"The clock is $s(t) = \rho_{1} t + \rho_{2} \kappa \ln\frac{T}{T - t}$" in text
+    assert r"The (stretched) clock is $s(t) = \rho_{1} t + \rho_{2} \kappa \ln\frac{T}{T - t}$" in text
     assert r"What is left is $\max_{k} g_{k} x_{k}(t) - \min_{k} g_{k} x_{k}(t)$" in text
     assert re.search(r"what is left shrinks by \$10\^\{-\d+\}\$ of it", text)
     with_rate = read_certificate(certify(SWITCHING, PROTOCOL, signal=DwellTime("0.2", clock="t")).to_dict())
@@ -216,3 +225,55 @@ def test_groups_without_negative_edges_agree_and_others_up_to_camps():
         pair = [("a", "b", sign, 2 * sign) if sign > 0 else ("a", "b", -2, -1), ("b", "a", sign, sign)]
         (component,) = decide([*pair, ("a", "d", 1, 2), ("c", "d", 1, 1)])
         assert groups_text(component).startswith(told)
+
+
+@pytest.mark.parametrize("sigma0", [[0, 0, 0], [1, 0, "-1/2"]])
+def test_the_bound_of_a_family_through_a_reaching_phase_is_called_numerical_everywhere(sigma0):
+    unsure = Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 1), ("b", "c", -2, -1)])
+    made = certify(unsure, SLIDING, [1, 2, 3], sigma0=sigma0)
+    saved = read_certificate(made.to_dict())
+    page, statement = words(report_html(saved)), family_latex(saved, {"decay": "d.pdf"})
+    inside, outside = " ".join(statement.split()).split(r"\end{proposition}")
+    proved = made.direct
+    assert ("every agent differs from its final state" in inside) == proved
+    assert ("Numerical, by integration in floating point, and no part of the certificate" in outside) == (not proved)
+    assert ("Thick line: the proved bound for every signal" in outside) == proved != ("bound (numerical)" in outside)
+    assert ("final state at most (numerical)" in page) == ("(Numerical, rounded up.)" in page) == (not proved)
+    runs = sample_runs(made, [RandomSignal(1)])
+    for plot in (plot_family, plot_family_decay, plot_family_input):
+        labels = [text.get_text() for text in plot(made, runs=runs).figure.axes[0].get_legend().get_texts()]
+        assert ("proved for every signal" in labels) == proved != ("bound for every signal (numerical)" in labels)
+    assert all(("numerical" in " ".join(told(made, "f"))) != proved for told in (family_summary, family_lines))
+
+
+def test_ends_of_constant_weights_under_disturbances_stand_on_screen_page_and_statement():
+    one, other = ([("a", "b", g, g * 2), ("b", "a", g, g)] for g in (1, -1))
+    other = [(s, t, *sorted((low, high))) for s, t, low, high in other]
+    family = Family.switching({"m1": Family.from_intervals(one), "m2": Family.from_intervals(other)})
+    made = certify(family, SLIDING, [0, 6], sigma0=[0, 0], signal="constant")
+    saved = read_certificate(made.to_dict())
+    screen, told = " ".join(" ".join(family_summary(saved, "f")).split()), "m1: consensus; m2: bipartite consensus"
+    assert f"constant if mode and weights never change: {told}" in screen
+    assert "x(T) a in [-3, 3], b in [2, 3] (these signals)" in screen
+    assert told in words(report_html(saved)) and told in family_latex(saved)
+
+
+def test_a_statement_that_speaks_of_the_stretched_clock_defines_it():
+    moved = Family.from_intervals([("a", "c", 1, 3), ("b", "c", 1, 1), ("c", "d", 1, 2)])
+    for protocol, T in ((PROTOCOL, "T"), (SLIDING, "T_{r} + T_{s}")):
+        text = family_latex(read_certificate(certify(moved, protocol, [0, 4, 100, 3]).to_dict()))
+        clock = f"\\rho_{{1}} t + \\rho_{{2}} \\kappa \\ln\\frac{{{T}}}{{{T} - t}}"
+        assert f"The (stretched) clock is $s(t) = {clock}$" in text
+        assert text.count(r"\ln\frac{") == 1
+
+
+@pytest.mark.parametrize("sigma0", [[0, 0, 0], [1, 0, 2]])
+def test_agents_that_listen_to_nobody_end_where_sliding_variables_bring_them(sigma0):
+    moved = Family.from_intervals([("a", "c", 1, 3), ("b", "c", 1, 1)])
+    made = certify(moved, SLIDING, [0, 4, 100], sigma0=sigma0)
+    page, screen = words(report_html(read_certificate(made.to_dict()))), "\n".join(family_summary(made, "moved"))
+    for text in (page, screen):
+        assert ("b keeps its value" in text) == made.direct != ("b ends at x(0) - sigma(0)" in text)
+    run = simulate_family(moved, SLIDING, [0, 4, 100], RandomSignal(1), sigma0=sigma0)
+    leaders = [run.labels.index(label) for label in "ab"]
+    assert np.allclose(run.states[leaders, -1], [[0, 4, 100][v] - sigma0[v] for v in leaders])

@@ -167,7 +167,7 @@ def assert_once(component: FamilyComponent, text: str) -> None:
 def test_the_screen_of_a_family_that_slides_is_short_and_tells_of_disturbances(sigma0, mu3):
     unsure = Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 1), ("b", "c", -2, -1)])
     protocol = ptcc.SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=3, mu1=2, mu2=1, mu3=mu3, delta=1)
-    certificate = certify_family(unsure, protocol, [1, 2, 3], sigma0=sigma0, time_limit=2)
+    certificate = certify_family(unsure, protocol, [1, 2, 3], sigma0=sigma0, time_limit=60)
     lines, more = family_summary(certificate, "unsure"), "\n".join(family_lines(certificate, "unsure"))
     text = "\n".join(lines)
     assert len(lines) <= 10 and max(map(len, lines)) <= 80
@@ -260,3 +260,17 @@ def test_a_family_without_a_name_is_told_by_its_size():
     assert repr(unsure) == "Family(2 nodes, 1 of 1 weights uncertain, 1 edge optional)"
     cert = certify_family(unsure, ptcc.NominalProtocol(T=1, rho1=1, rho2=1, kappa=3))
     assert cert.summary().splitlines()[0].split() == ["family", "2", "nodes,", "1", "edge,", "1", "optional"]
+
+
+def test_more_functions_than_the_check_takes_are_left_out_and_nothing_rests_on_them(monkeypatch: pytest.MonkeyPatch):
+    pairs = [(s, t, 1, high) for k in range(3) for s, t, high in ((f"a{k}", f"b{k}", 2), (f"b{k}", f"a{k}", 1))]
+    monkeypatch.setattr("ptcc_certify.checker.family_rows.MANY_FUNCTIONS", 2)
+    refused = certify_family(Family.from_intervals(pairs), PROTOCOL, range(6), time_limit=60)
+    told = "\n".join(family_summary(refused, "pairs")).replace("\n           ", " ")
+    assert refused.verdict == "undecided" and "more than 2 Lyapunov functions" in told
+    assert not any(f"\n{entry}" in told for entry in ("x(T)", "error")) and "input      not proved bounded" in told
+    monkeypatch.setattr("ptcc_certify.certificate.family_certificate.MANY_FUNCTIONS", 2)
+    fewer = certify_family(Family.from_intervals(pairs), PROTOCOL, range(6), time_limit=60)
+    assert fewer.verdict == "certified" and not any(part.functions for part in fewer.parts)
+    assert any("more than 2 Lyapunov functions" in note for note in fewer.notes)
+    assert set(fewer.behaviours) == {"bipartite consensus"}

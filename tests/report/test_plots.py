@@ -205,7 +205,7 @@ def test_beside_the_peak_of_a_set_the_set_is_named(radius: int) -> None:
     region = certify(graph, EXAMPLES[2].protocol(), start, initial_set=radius)
     assert region.effort is not None and region.effort.peak is not None
     text = peak_of(drawn(plot_input(region)))
-    assert text is not None and f"(all |x_k(0)| <= {radius}" in text.get_text()
+    assert text is not None and f"(all $|x_k(0)| \\leq$ {radius}" in text.get_text()
     assert float(text.get_text().split()[2]) >= region.effort.peak.largest
     assert ("not from where this run begins" in text.get_text()) == (radius < 5)
 

@@ -779,3 +779,13 @@ def test_the_command_writes_a_page(tmp_path: Path):
     done = ptcc("report", str(tmp_path / "c.json"), "-o", str(tmp_path / "c.html"), "--no-simulation")
     assert (done.code, done.err) == (0, "") and done.out.split() == ["certified", str(tmp_path / "c.html")]
     sound((tmp_path / "c.html").read_text(encoding="utf-8"))
+
+
+def test_the_command_names_every_file_of_a_statement(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    certify([("a", "b", -1), ("b", "a", -1)], NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5]).save("c.json")
+    run = ptcc("report", "c.json", "-o", "mine.tex")
+    certified, written = run.out.splitlines()
+    assert certified == "certified  mine.tex"
+    assert set(written.removeprefix("written    ").split(", ")) == {path.name for path in tmp_path.glob("mine*")}
+    assert len(ptcc("report", "c.json", "-o", "mine.html").out.splitlines()) == 1

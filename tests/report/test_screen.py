@@ -258,3 +258,10 @@ def test_wrapping_loses_nothing_and_keeps_to_the_width(text: str, width: int):
     lines = wrap_lines([f"{'head':<11}{text}"], width)
     assert all(columns(line) <= width for line in lines)
     assert "".join(line[11:] for line in lines).replace(" ", "") == text.replace(" ", "")
+
+
+def test_a_delta_of_0_is_called_no_disturbances():
+    pair = [("a", "b", -1), ("b", "a", -1)]
+    for delta, told in (("0", "at T = 2, without disturbances"), ("1", "at T = 2, any |d_k| <= 1")):
+        protocol = ptcc.SlidingModeProtocol(T_r=1, T_s=1, mu1=2, delta=delta)
+        assert told in ptcc.certify(pair, protocol, [3, 5], simulation=False).summary()

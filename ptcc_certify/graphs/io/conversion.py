@@ -94,6 +94,8 @@ def as_graph(graph: Any, orientation: str | None = None) -> SignedDigraph:
     if isinstance(graph, dict | set | frozenset | bytes | bytearray) or not isinstance(graph, Iterable):
         raise GraphError(f"{shorten(repr(graph))} is not read as a graph; give {TAKEN}")
     rows = list(graph)
+    if rows and all(isinstance(row, list) and row and all(isinstance(edge, tuple) for edge in row) for row in rows):
+        raise GraphError('a list of edge lists is no graph; of a family give a dict, {"day": edges, "night": edges2}')
     if _rows_of_matrix(rows):
         return SignedDigraph.from_matrix(rows, orientation=orientation)
     return SignedDigraph.from_edges(rows, orientation=way)

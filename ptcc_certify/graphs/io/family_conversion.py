@@ -18,6 +18,8 @@ from ptcc_certify.graphs.rationals import as_fraction, shorten
 
 #: Of weights in intervals.
 _TWICE = "the edges give intervals themselves; leave out the uncertainty"
+#: What a mapping is.
+_BY_NAME = "a dict is a family of graphs by name; give the edges of one graph as a list of (source, target, weight)"
 
 
 def as_family(family: Any, orientation: str | None = None, *, uncertainty: Any = 0) -> Family:
@@ -86,11 +88,15 @@ def as_family(family: Any, orientation: str | None = None, *, uncertainty: Any =
 
 def _mode_of(graph: Any, orientation: str | None, uncertainty: Any) -> Family:
     """Return a mode of several, which may be a family itself."""
-    return (
-        graph
-        if isinstance(graph, Family) and not uncertainty
-        else as_family(graph, orientation, uncertainty=uncertainty)
-    )
+    if isinstance(graph, Family) and not uncertainty:
+        return graph
+    try:
+        return as_family(graph, orientation, uncertainty=uncertainty)
+    except GraphError as error:
+        neighbours = isinstance(graph, Mapping | list | tuple) and all(isinstance(one, str) for one in graph)
+        if not neighbours or _BY_NAME in str(error):
+            raise
+        raise type(error)(f"{error}; {_BY_NAME}") from None
 
 
 def is_family(graphs: Any) -> bool:

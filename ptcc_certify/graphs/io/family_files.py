@@ -9,6 +9,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+from lmi.exact.decimal_rounding import near
 from ptcc_certify.errors import FormatError, GraphError, NumberError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family, Mode, read_share
@@ -154,7 +155,7 @@ def family_flags(read: Mapping[str, Any], path: str = "") -> str:
     Examples
     --------
     >>> family_flags(read_family(StringIO("a,b,1"), uncertainty="10%", optional=[("a", "b")]).read)
-    '--edges information --uncertainty 1/10 --optional a,b'
+    '--edges information --uncertainty 10% --optional a,b'
     """
     way = read.get("orientation")
     matrix = way is None and name_and_ending(path)[1] in MATRICES
@@ -163,8 +164,15 @@ def family_flags(read: Mapping[str, Any], path: str = "") -> str:
     words += [f"--duplicates {merged}"] * (merged != "refuse")
     words += ["--drop-self-loops"] * bool(read.get("drop_self_loops"))
     words += ["--undirected"] * bool(read.get("undirected"))
-    words += [f"--uncertainty {read['uncertainty']}"] * (read.get("uncertainty", "0") not in ("0", 0))
+    if (share := read.get("uncertainty", "0")) not in ("0", 0):
+        words.append(f"--uncertainty {_percent(share)}")
     return " ".join(words + [f"--optional {','.join(pair)}" for pair in read.get("optional", ())])
+
+
+def _percent(share: str) -> str:
+    """Write a share as a percentage, if that is a short decimal."""
+    short = near(100 * read_share(share), 6)
+    return share if "/" in short or short.startswith("~") else f"{short}%"
 
 
 def _mode_name(path: Source, number: int) -> str:

@@ -57,9 +57,9 @@ def command_of(question: Question) -> str:
 
 
 def reading_of(path: str, orientation: str | None, **how: str | bool) -> dict[str, str | bool]:
-    """Return where a graph was read from and how, but for what is so unless it is said."""
-    said = {key: value for key, value in how.items() if value != _READING[key]}
-    return {"path": path} | ({} if orientation is None else {"orientation": orientation}) | said
+    """Return where a graph was read from and how, but for what is so unless it is told."""
+    options = {key: value for key, value in how.items() if value != _READING[key]}
+    return {"path": path} | ({} if orientation is None else {"orientation": orientation}) | options
 
 
 def _texts(question: Question) -> dict[str, str]:

@@ -51,10 +51,10 @@ def draw_adjacency(ax: Axes, structure: Structure) -> Axes:
         ax.axhline(end, color="black", linewidth=0.7)
         ax.axvline(end, color="black", linewidth=0.7)
     for name, low, high in zip(parts, [0, *ends[:-1]], ends, strict=True):
-        looks: dict[str, Any] = {"color": CAMP_STYLES[name][0], "linewidth": 5, "solid_capstyle": "butt"}
-        ax.plot([-margin / 2] * 2, [low, high], **looks)
-        ax.plot([low, high], [-margin / 2] * 2, **looks)
-        ax.plot([], [], **looks, label=f"{name} ({high - low:,})")
+        style: dict[str, Any] = {"color": CAMP_STYLES[name][0], "linewidth": 5, "solid_capstyle": "butt"}
+        ax.plot([-margin / 2] * 2, [low, high], **style)
+        ax.plot([low, high], [-margin / 2] * 2, **style)
+        ax.plot([], [], **style, label=f"{name} ({high - low:,})")
     for sign, (colour, _, name) in EDGE_STYLES.items():
         if (graph.sign == sign).any():
             ax.plot([], [], "s", color=colour, markersize=4, label=name)

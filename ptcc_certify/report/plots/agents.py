@@ -70,7 +70,7 @@ def text_width(text: str) -> float:
 
 
 def draw_agents(
-    ax: Axes, run: Trajectory, values: np.ndarray, structure: Structure, *, size: bool = False, **looks: Any
+    ax: Axes, run: Trajectory, values: np.ndarray, structure: Structure, *, size: bool = False, **style: Any
 ) -> dict[int, str]:
     """Draw a quantity of every agent, (N, M), in the colours and lines of camps; return the colours of single lines.
 
@@ -80,7 +80,7 @@ def draw_agents(
     """
     group = family_groups(run.family) if isinstance(run, FamilyTrajectory) else camp_groups(structure)
     single: dict[int, str] = {}
-    step: Any = "post" if looks.get("drawstyle") == "steps-post" else None
+    step: Any = "post" if style.get("drawstyle") == "steps-post" else None
     for name, (colour, line) in CAMP_STYLES.items():
         own = np.flatnonzero(group == name)
         width, label = 0.9 if name == "followers" else 1.5, name
@@ -91,12 +91,12 @@ def draw_agents(
             middle, label = (
                 (high, f"{name} (largest)") if size else (np.median(rows, axis=0), f"{name} (median, range)")
             )
-            ax.plot(run.t, middle, color=colour, linestyle=line, linewidth=2, label=label, **looks)
+            ax.plot(run.t, middle, color=colour, linestyle=line, linewidth=2, label=label, **style)
             ends = {int(rows[:, 0].argmax())} | (set() if size else {int(rows[:, 0].argmin())})
             own, width, label = own[sorted(ends)], 0.7, ""
         for v in own:
             drawn = {"color": colour, "linestyle": line, "linewidth": width}
-            ax.plot(run.t, values[v], label=label or None, **drawn, **looks)
+            ax.plot(run.t, values[v], label=label or None, **drawn, **style)
             label, single[int(v)] = "", colour
     return single
 
@@ -133,11 +133,11 @@ def name_agents(
     for side, column in zip((-1, 1), texts, strict=False):
         for height, place, name, colour in column:
             line = {"arrowstyle": "-", "color": colour, "linewidth": 0.4, "shrinkA": 0, "shrinkB": 0, "clip_on": False}
-            looks: dict[str, Any] = {"ha": "right" if side < 0 else "left", "va": "center_baseline", "color": colour}
-            looks |= {"fontsize": NAME_SIZE, "parse_math": False, "annotation_clip": False, "arrowprops": line}
-            looks["path_effects"] = HALO
+            style: dict[str, Any] = {"ha": "right" if side < 0 else "left", "va": "center_baseline", "color": colour}
+            style |= {"fontsize": NAME_SIZE, "parse_math": False, "annotation_clip": False, "arrowprops": line}
+            style["path_effects"] = HALO
             start, moved = ((first, last)[side > 0], height), (side * 8, place)
-            ax.annotate(name, start, moved, textcoords=("offset points", "data"), **looks)
+            ax.annotate(name, start, moved, textcoords=("offset points", "data"), **style)
     rooms = [10 + max(text_width(name) for _, _, name, _ in column) for column in texts]
     width = ax.get_window_extent().width / ax.figure.dpi * 72
     width = min([0.8 * width, *(width - room for room in rooms[1:])])  # without names at the end, in any panel

@@ -94,8 +94,8 @@ def plot_decay(
         raise ParameterError("the agents begin where they end: nothing decays")
     place = _places(subject.protocol.gain, run, remaining)[axis]
     ax = axes_of(ax)
-    for values, looks in bounds.values():
-        ax.plot(place, values / scale, **looks)
+    for values, style in bounds.values():
+        ax.plot(place, values / scale, **style)
     bottom, last = max(float(np.nanmin(best)), 1e-16 * scale), remaining.size - 1
     top = float(max(scale, best[np.isfinite(best)].max(initial=0.0)))
     if run is not None and norm.any():
@@ -168,12 +168,12 @@ def _bounds(
     for function in functions if each and len(functions) > 1 else ():
         values = replace(envelope, functions=(function,)).norm_bound(remaining, x0) / unit
         if function.kind == "paper":
-            looks: dict[str, Any] = {"color": "black", "linewidth": 0.9, "linestyle": "--", "zorder": 2.1}
-            looks["label"] = f"bound of Theorem {certificate.theorem.number}"
+            style: dict[str, Any] = {"color": "black", "linewidth": 0.9, "linestyle": "--", "zorder": 2.1}
+            style["label"] = f"bound of Theorem {certificate.theorem.number}"
         else:
-            looks = {"color": BOUND, "linewidth": 0.6, "alpha": 0.6, "linestyle": "-.", "label": label}
+            style = {"color": BOUND, "linewidth": 0.6, "alpha": 0.6, "linestyle": "-.", "label": label}
             label = None
-        bounds[function.name] = values, looks
+        bounds[function.name] = values, style
     best = envelope.norm_bound(remaining, x0) / unit
     label = "proved bound from $x(0)$" if certificate.direct else "bound from $x(0)$ (numerical)"
     return bounds | {_BEST: (best, {"color": BOUND, "linewidth": 1.8, "label": label})}

@@ -12,7 +12,7 @@ from lmi.exact.decimal_rounding import up
 from ptcc_certify.bounds.envelope import FLOOR_FACTOR
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.report.plots.agents import NAME_SIZE
-from ptcc_certify.report.plots.family import count_of_signals, runs_of
+from ptcc_certify.report.plots.family import bound_label, count_of_signals, runs_of
 from ptcc_certify.report.plots.style import BOUND, RUN, axes_of, finished, styled, time_label
 from ptcc_certify.simulation.family_members import Members
 from ptcc_certify.simulation.family_run import FamilyTrajectory
@@ -81,7 +81,7 @@ def plot_family_input(
         top, start = max(top, float(np.nanmax(resolved, initial=0.0))), max(start, float(size[:1].max(initial=0.0)))
     bound = subject.input_bound(left).max(axis=0)
     if np.isfinite(bound).all():
-        ax.plot(t, bound, color=BOUND, linewidth=1.8, label="proved for every signal")
+        ax.plot(t, bound, color=BOUND, linewidth=1.8, label=bound_label(subject))
         top = max(top, float(bound.max()))
     if subject.input_peaks:
         peak = float(bound[0]) if subject.direct else float(max(subject.input_peaks))

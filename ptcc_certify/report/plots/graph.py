@@ -114,23 +114,23 @@ def draw_nodes(ax: Axes, structure: Structure, place: np.ndarray, radius: float)
         own = group == name
         if own.any():
             edge, width = (colour, 0.5) if name == "followers" else ("black", 1.2)
-            looks: dict[str, Any] = {"color": colour, "markeredgecolor": edge, "markeredgewidth": width, "zorder": 3}
+            style: dict[str, Any] = {"color": colour, "markeredgecolor": edge, "markeredgewidth": width, "zorder": 3}
             x, y = place[own].T
-            ax.plot(x, y, "o", markersize=2 * radius, **looks)
-            ax.plot([], [], "o", markersize=6, label=name, **looks)
+            ax.plot(x, y, "o", markersize=2 * radius, **style)
+            ax.plot([], [], "o", markersize=6, label=name, **style)
 
 
 def _draw_arrows(ax: Axes, arrows: Sequence[Arrow], place: np.ndarray, bends: np.ndarray, radius: float) -> None:
     """Draw the arrows, wide where the weight is large."""
     largest = max((a.size for a in arrows), default=1.0)
     differ = min((a.size for a in arrows), default=1.0) < largest
-    looks: dict[str, Any] = {"shrinkA": radius + 1, "shrinkB": radius + 1, "mutation_scale": 7, "zorder": 2}
+    style: dict[str, Any] = {"shrinkA": radius + 1, "shrinkB": radius + 1, "mutation_scale": 7, "zorder": 2}
     for arrow, bend in zip(arrows, bends, strict=True):
         colour, line, _ = EDGE_STYLES[arrow.sign]
-        looks |= {"color": colour, "linestyle": line, "arrowstyle": "<|-|>" if arrow.mutual else "-|>"}
+        style |= {"color": colour, "linestyle": line, "arrowstyle": "<|-|>" if arrow.mutual else "-|>"}
         width = 0.6 + 1.0 * arrow.size / largest if differ else 0.9
         ends = place[arrow.source], place[arrow.target]
-        ax.add_artist(FancyArrowPatch(*ends, connectionstyle=f"arc3,rad={bend}", linewidth=width, **looks))
+        ax.add_artist(FancyArrowPatch(*ends, connectionstyle=f"arc3,rad={bend}", linewidth=width, **style))
     for sign, (colour, line, name) in EDGE_STYLES.items():
         if any(arrow.sign == sign for arrow in arrows):
             ax.plot([], [], color=colour, linestyle=line, linewidth=1.1, label=name)
@@ -138,7 +138,7 @@ def _draw_arrows(ax: Axes, arrows: Sequence[Arrow], place: np.ndarray, bends: np
 
 def draw_ground(ax: Axes, graph: SignedDigraph, place: np.ndarray, nodes: Sequence[int], radius: float) -> None:
     """Draw a ground under a leader group: under its nodes, along its edges, and between them where no other node is."""
-    inside, looks = np.zeros(graph.n_nodes, dtype=bool), {"color": GROUND, "zorder": 0}
+    inside, style = np.zeros(graph.n_nodes, dtype=bool), {"color": GROUND, "zorder": 0}
     inside[list(nodes)] = True
     own, foreign = inside[graph.source] & inside[graph.target], place[~inside]
     parts = [place[[v, v]] for v in nodes] + list(place[np.stack([graph.source[own], graph.target[own]], axis=1)])
@@ -147,4 +147,4 @@ def draw_ground(ax: Axes, graph: SignedDigraph, place: np.ndarray, nodes: Sequen
         parts += list(triangles.points[triangles.simplices[free]])
     for part in parts:
         width = 2 * REACH * radius
-        ax.add_patch(Polygon(part, linewidth=width, joinstyle="round", capstyle="round", **looks))  # type: ignore[arg-type]
+        ax.add_patch(Polygon(part, linewidth=width, joinstyle="round", capstyle="round", **style))  # type: ignore[arg-type]

@@ -27,11 +27,11 @@ def draw_labels(
     ax: Axes, labels: Sequence[str], place: np.ndarray, radius: float, lines: list[np.ndarray] | None
 ) -> list[np.ndarray]:
     """Write labels into the nodes, or, given lines, around where they cover least; return the boxes that are taken."""
-    looks: dict[str, Any] = {"fontsize": NAME_SIZE, "parse_math": False, "ha": "center", "zorder": 5}
+    style: dict[str, Any] = {"fontsize": NAME_SIZE, "parse_math": False, "ha": "center", "zorder": 5}
     nodes = [np.array([*(p - radius), *(p + radius)]) for p in place]
     if lines is None:
         for label, p in zip(labels, place, strict=True):
-            ax.annotate(printable(label), p, color="white", va="center_baseline", **looks)
+            ax.annotate(printable(label), p, color="white", va="center_baseline", **style)
         return nodes
     taken = nodes + lines
     for label, p in zip(labels, place, strict=True):
@@ -43,7 +43,7 @@ def draw_labels(
         taken.append(box := least_covered(spots, half, taken))
         if (np.maximum(box[:2] - p, p - box[2:]) > 3 * radius).any():  # far from its node
             ax.plot(*np.stack([p, np.clip(p, box[:2], box[2:])], axis=1), color="0.6", linewidth=0.5, zorder=1)
-        ax.annotate(text, p, (box[:2] + box[2:]) / 2, va="center", color="black", path_effects=HALO, **looks)
+        ax.annotate(text, p, (box[:2] + box[2:]) / 2, va="center", color="black", path_effects=HALO, **style)
     return nodes + taken[len(nodes) + len(lines) :]
 
 

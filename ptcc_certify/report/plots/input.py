@@ -123,20 +123,21 @@ def _set_text(run: Trajectory, certificate: Certificate) -> str:
     if region.radius:
         center, radius = (np.array(list(map(float, numbers))) for numbers in (region.center, region.radius))
         outside = bool((np.abs(run.states[:, 0] - center) > radius * (1 + 1e-12)).any())
-    return f" ({initial_states_text(region)}" + (",\nnot from where this run begins)" if outside else ")")
+    states = initial_states_text(region).replace("|x_k(0)| <=", r"$|x_k(0)| \leq$")
+    return f" ({states}" + (",\nnot from where this run begins)" if outside else ")")
 
 
 def _draw_peak(ax: Axes, peak: float, shown: bool, whom: str) -> None:
     """Draw the certified peak with its value, rounded up; at the top, if it is far above what is drawn."""
     ground = {"boxstyle": "square,pad=0.05", "facecolor": "white", "edgecolor": "none"}
-    looks: dict[str, Any] = {"ha": "right", "fontsize": NAME_SIZE, "textcoords": "offset points", "bbox": ground}
+    style: dict[str, Any] = {"ha": "right", "fontsize": NAME_SIZE, "textcoords": "offset points", "bbox": ground}
     if not shown:
         text = f"certified peak {up(peak, 4)}{whom}, above"
-        ax.annotate(text, (1, 1), (0, -2), xycoords="axes fraction", va="top", **looks)
+        ax.annotate(text, (1, 1), (0, -2), xycoords="axes fraction", va="top", **style)
         return
     ax.axhline(peak, color="black", linewidth=0.9, linestyle="--")
     text = f"certified peak {up(peak, 4)}{whom}"
-    ax.annotate(text, (1, peak), (0, 2), xycoords=("axes fraction", "data"), va="bottom", **looks)
+    ax.annotate(text, (1, peak), (0, 2), xycoords=("axes fraction", "data"), va="bottom", **style)
 
 
 @styled
