@@ -851,10 +851,14 @@ UNDIRECTED = [name for name, kwargs in CLASSES if kwargs.get("special") == "undi
 @pytest.mark.parametrize("weights", ["small ints", "log6"])
 @pytest.mark.parametrize("name", UNDIRECTED)
 def test_the_perron_vector_alone_is_tight_on_undirected_graphs(name: str, weights: str):
-    """``L`` is symmetric but for a gauge: the identity reaches every eigenvalue."""
+    """``L`` is symmetric but for a gauge: the identity reaches every eigenvalue.
+
+    Weights of six magnitudes need a gap of a millionth between what floats find and the upper bound that is proved;
+    which of the gaps 1e-7 and 1e-6 proves hangs on the last digits. The rate itself loses 2e-10.
+    """
     for seed in range(3):
         cert = functions_of(of_size(name, 9, seed, weights), method="perron")
-        assert cert.optimality_ratio is not None and 1 - 1e-6 <= cert.optimality_ratio <= 1
+        assert cert.optimality_ratio is not None and (1 - 2.1e-10) / (1 + 1e-6) <= cert.optimality_ratio <= 1
         assert cert.search.functions
 
 
