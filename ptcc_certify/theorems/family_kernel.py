@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.graphs.size_limits import DENSE_NODES, EXACT_NODES
+from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.theorems.lemmas import solve_exact
 
@@ -417,7 +417,8 @@ def _propose(
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Return floats: the state on ``free`` nodes, and expected numbers of steps until the others are reached."""
     from scipy import sparse
-    from scipy.sparse.linalg import bicgstab, spsolve
+
+    from lmi.sparse_h_matrix import solve
 
     place = np.cumsum(free) - 1
     m = int(free.sum())
@@ -427,11 +428,8 @@ def _propose(
     pull = np.bincount(place[target[~inner]], (sizes * sign)[~inner] * state[source[~inner]], minlength=m)
     results = []
     for entries, right in (((sizes * sign)[inner], pull), (sizes[inner], np.ones(m))):
-        matrix = sparse.csc_array(sparse.eye_array(m) - sparse.coo_array((entries, ends), shape=(m, m)))
-        if m <= DENSE_NODES:
-            results.append(np.atleast_1d(spsolve(matrix, right)))
-        else:
-            results.append(bicgstab(matrix, right, rtol=1e-14, maxiter=2000)[0])
+        matrix = sparse.csr_array(sparse.eye_array(m) - sparse.coo_array((entries, ends), shape=(m, m)))
+        results.append(solve(matrix, right, np.ones(m), tolerance=1e-14))
     return (results[0], results[1]) if all(np.isfinite(r).all() for r in results) else None
 
 

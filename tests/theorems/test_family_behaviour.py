@@ -149,7 +149,7 @@ def test_rows_in_equal_shares_are_common_however_many_they_are():
     assert decide(chain_of_followers(300))[0].behaviour == "bipartite containment"
 
 
-@pytest.mark.parametrize("n", [20, 300, pytest.param(1500, marks=pytest.mark.campaign)])
+@pytest.mark.parametrize("n", [20, 300, 1500, pytest.param(20_000, marks=pytest.mark.campaign)])
 @pytest.mark.parametrize(("change", "uncertain"), [(Fraction(1, 10), None), (Fraction(0), (3, 9))])
 def test_other_shares_or_an_edge_between_other_rows_are_refuted_at_any_size(n, change, uncertain):
     component = decide(chain_of_followers(n, change, uncertain))[0]
