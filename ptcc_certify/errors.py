@@ -193,6 +193,9 @@ _MAKERS = {"SignedDigraph": ", or SignedDigraph.from_edges([(source, target, wei
 _MAKERS |= dict.fromkeys(("certify", "certify_vectors"), ", such as ptcc.NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)")
 #: What is given at once, where one gives more.
 _AT_ONCE = {"switching": "give one list or dict of graphs"}
+#: What a check is asked for besides: the graph that a certificate should be about.
+_COMPARE = "it reads no graph: compare report.sha256 with as_graph(...).sha256, or use ptcc check CERT GRAPH"
+_AT_ONCE |= {"check": _COMPARE}
 #: Restricted signals, by what may be taken for keywords of certify.
 _SIGNALS = dict.fromkeys(("dwell", "dwell_time", "clock_dwell"), "DwellTime(...)")
 _SIGNALS |= dict.fromkeys(("window", "windows", "clock_window", "window_on"), "JointWindows(...)")
@@ -261,6 +264,8 @@ def unknown_parameter(name: str, unknown: str, parameters: Iterable[str]) -> str
         hint = f"; say signal={signal} of ptcc_certify.theorems.restricted_signals"
     elif unknown == "optional" and "uncertainty" in parameters:
         hint = "; an edge that may fail has 0 at one end: Family.from_intervals([(source, target, 0, weight), ...])"
+    elif name == "check" and unknown in ("graph", "family"):
+        hint = f"; {_COMPARE}"
     elif (place := _PLACES.get(unknown)) and name not in _PLACES.values():
         hint = f"; give it to {place}({unknown}=...)"
     return f"{name} has no parameter {unknown}{hint}"

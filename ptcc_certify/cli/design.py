@@ -20,7 +20,7 @@ from ptcc_certify.cli.options import (
     read,
     reading_options,
 )
-from ptcc_certify.cli.scenario import scenario_record
+from ptcc_certify.cli.scenario import places_of, scenario_record
 from ptcc_certify.cli.terminal import FIGURES, LOG, Screen, print_json, progress, refuse_output, screen_options
 from ptcc_certify.errors import ExitCode, ParameterError, one_line
 from ptcc_certify.report.text_layout import wrap_command
@@ -28,6 +28,8 @@ from ptcc_certify.report.text_layout import wrap_command
 if TYPE_CHECKING:
     from ptcc_certify.gain_design import Design
 
+#: What a scenario may ask that no gains are searched under.
+_NOT_SEARCHED = ("gain_cap", "stop_before", "sample_period", "delta", "noise")
 _EXAMPLE = "ptcc design fig5b --max-input 10 --initial-bound 1 --shortest-deadline"
 
 
@@ -48,7 +50,7 @@ def design(graph: str, curve: str | None, output: str | None, as_json: bool, scr
     """Find gains of the nominal protocol whose input is proved to stay within a limit.
 
     The numbers printed are exact, and the last lines are the command that proves them again with exit code 0.
-    A saturation, a sample period and noise are not searched under: give them to that command.
+    A saturation, a sample period, disturbances and noise are not searched under: give them to that command.
 
     Exit code 0: met, with a certificate. 3: no gains of this protocol can, proved. 4: not with this certificate.
     """
@@ -80,6 +82,8 @@ def design(graph: str, curve: str | None, output: str | None, as_json: bool, scr
         screen.show(lambda: design_summary(answer, signed, graph), lambda: design_lines(answer, signed, graph))
         if output and answer.certificate is not None:
             screen.note(f"written    {output}")
+        if ignored := places_of(_NOT_SEARCHED):
+            screen.note(f"note       not designed for: {', '.join(ignored)}; ask ptcc certify about them")
         if command is not None:
             again = " (give it the graph again, on standard input)" if graph == "-" else ""
             again += "; of the deviation see its line error" * (answer.gain_cap is not None)

@@ -10,7 +10,7 @@ import csv
 import io
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -392,6 +392,12 @@ def scenario_record() -> dict[str, Any] | None:
     given = [name for name in scenario.options if name in context.params and name != "graph"]
     flags = [name for name in given if context.get_parameter_source(name) is ParameterSource.COMMANDLINE]
     return scenario.document() | {"overridden": {name: str(context.params[name]) for name in flags}}
+
+
+def places_of(options: Iterable[str]) -> list[str]:
+    """Return where the scenario of this call gives some of these options: ``plant.toml: [limits] gain_cap``."""
+    scenario: Scenario | None = click.get_current_context().meta.get(MEMORY)
+    return [] if scenario is None else [scenario.place(name) for name in options if name in scenario.options]
 
 
 def placed(context: click.Context, error: PTCCError | click.BadParameter) -> Exception:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import fields, replace
 from fractions import Fraction
 from typing import Any, Self, overload
@@ -122,9 +123,10 @@ def parameter(name: str, number: Any, zero_allowed: bool = False) -> Fraction:
     try:
         value = as_fraction(number, name)
     except NumberError:
-        raise ParameterError(
-            f"{name} = {shorten(str(number))} is not a finite number; {name} must be a number {domain}"
-        ) from None
+        text = shorten(str(number))
+        comma = isinstance(number, str) and re.fullmatch(r"\s*[-+]?\d+,\d+\s*", number)
+        mend = f"write {text.strip().replace(',', '.')}" if comma else f"{name} must be a number {domain}"
+        raise ParameterError(f"{name} = {text} is not a finite number; {mend}") from None
     refuse_out_of_range(name, value)
     if value.numerator.bit_length() + value.denominator.bit_length() > LONGEST_BITS:
         raise ParameterError(f"{name} has too many digits for exact proofs; round it, to 17 digits say")

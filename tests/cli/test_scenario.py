@@ -65,6 +65,16 @@ def test_a_scenario_stands_for_a_graph_with_all_that_is_asked_about_it():
     assert ptcc("check", "c.json", "my data/s.toml").code == 0
 
 
+def test_design_names_what_a_scenario_asks_beside_it():
+    Path("plant.toml").write_text(
+        '[graph]\nfile = "fig1b"\n[limits]\ngain_cap = 60\n[disturbance]\nnoise = 0.1\n'
+        "[expectations]\nmax_input = 50\n[initial_state]\ninitial_bound = 1\n[design]\ndeadline = 1\n"
+    )
+    run = ptcc("design", "plant.toml")
+    places = "plant.toml: [limits] gain_cap, plant.toml: [disturbance] noise"
+    assert run.code == 0 and f"not designed for: {places}; ask ptcc certify about them" in run.out.replace("\n", " ")
+
+
 def test_the_certificate_records_its_scenario_and_what_overrode_it():
     assert ptcc("certify", write(), "--T", "0.5", "--rho2", "2", "-o", "c.json").code == 0
     section = json.loads(Path("c.json").read_text())["unverified"]["scenario"]
