@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -27,6 +28,8 @@ from ptcc_certify.theorems.restricted_signals import ClockShares, JointWindows
 
 #: Up to which multiple of ``rho2`` one is looked for that makes the bound useful.
 _LARGEST = 2e4
+#: How often its interval is halved, to within a digit that is told.
+_HALVINGS = 7
 #: What to try where edges do not tell whether rest states agree.
 NEXT_STEP = (
     "whether rest states agree is not decided: it takes exact rows of more than 120 agents; round the weights to few "
@@ -62,8 +65,9 @@ def assess_family(certificate: FamilyContent, report: CheckReport | None) -> Ass
         )
         return Assessment(UNDECIDED, False, None, why, "", tuple(answers))
     useful, caveat, rho2, effects = _usefulness(certificate), "", Fraction(0), []
-    if useful is False and certificate.direct and (gain := _useful_rho2(certificate)) is not None:
-        rho2, effects = gain, ["leaves 1 %"]
+    if useful is False:
+        gain = _useful_rho2(certificate) if certificate.direct else _useful_rho2_while_driven(certificate)
+        rho2, effects = (rho2, effects) if gain is None else (gain, ["leaves 1 %"])
     if certificate.common and not certificate.bounded:
         grows = certificate.unbounded
         caveat = "the input is not bounded for some signal" if grows else "the input is not proved bounded"
@@ -208,15 +212,45 @@ def _useful_rho2(certificate: FamilyContent) -> Fraction | None:
     return Fraction(up(float(candidates[enough.argmax()]), 3)) if enough.any() else None
 
 
+def _useful_rho2_while_driven(certificate: FamilyContent) -> Fraction | None:
+    """Return the same at ``T_r + 0.99 T_s`` where sliding variables move; None without an initial state.
+
+    They drive the agents with the gain, too: the bound for every signal is formed anew with every ``rho2``.
+    """
+    protocol = certificate.protocol
+    if certificate.initial_state is None or certificate.rate is None:
+        return None
+
+    def suffices(rho2: float) -> bool:
+        other = replace(certificate, protocol=replace(protocol, rho2=Fraction(up(rho2, 3))))
+        left, enough = _target(other)
+        return bool(other.deviation_bound([left]).max() <= enough)
+
+    low = float(protocol.parameters["rho2"])
+    high, largest = 2 * low, _LARGEST * low
+    while not suffices(high):
+        low, high = high, 2 * high
+        if high > largest:
+            return None
+    for _ in range(_HALVINGS):
+        middle = math.sqrt(low * high)
+        low, high = (low, middle) if suffices(middle) else (middle, high)
+    return Fraction(up(high, 3))
+
+
+def _target(certificate: FamilyContent) -> tuple[float, float]:
+    """Return ``1 - t/T`` where the bound is judged, and what of the largest state it may leave there."""
+    sizes = map(abs, (*(certificate.initial_state or ()), *(certificate.sigma0 or ())))
+    return float(LAST) * certificate.settling_share, float(max(sizes) * LAST)
+
+
 def _usefulness(certificate: FamilyContent) -> bool | None:
     """Tell whether the bound leaves at most 1 % at 0.99 T; None where no state is approached by every signal."""
     if not certificate.common:
         return None
     if certificate.initial_state is not None:
-        sizes = map(abs, (*certificate.initial_state, *(certificate.sigma0 or ())))
-        size, instant = float(max(sizes)), float(LAST) * certificate.settling_share
-        bounds = deviation_of_signal(certificate, [instant])
-        return size == 0 or bool(bounds.max() <= size * float(LAST))
+        instant, enough = _target(certificate)
+        return enough == 0 or bool(deviation_of_signal(certificate, [instant]).max() <= enough)
     clock = float(certificate.protocol.gain.clock_at_remaining(float(LAST)))
     for part in certificate.parts:
         left = [math.sqrt(V.overshoot) * math.exp(-float(V.rate) / 2 * clock) for V in part.functions]

@@ -37,6 +37,8 @@ LAST = Fraction(1, 100)
 #: Digits of the gain that is proposed.
 _DIGITS = 3
 _LARGEST_CLOCK = 1e12
+#: Steps of :func:`certify` without which there may be a rate; the time limit may end the others, which seek one.
+NO_SEARCHES = ("simulation", "upper bound on the decay rate")
 #: From so many decades between weights on, they are named as the reason that nothing was proved.
 MANY_DECADES = 8
 
@@ -426,9 +428,9 @@ def _next_step(certificate: Content, report: CheckReport | None) -> str:
     if report is not None and not report.accepted:
         return f"the independent check rejects {report.rejected}; please report this graph"
     method, notes, n = certificate.method, certificate.notes, certificate.graph.n_nodes
-    if certificate.cut_off:
-        return f"{certificate.cut_off[0]} took its share of {certificate.time_limit:g} s; raise --time-limit"
     if certificate.rate is None:
+        if any(name not in NO_SEARCHES for name in certificate.cut_off):
+            return f"no rate is proved, the search took its share of {certificate.time_limit:g} s; raise --time-limit"
         if method != "best":
             return f"--method {method} proves no rate; try --method best"
         if (decades := certificate.graph.weight_decades) >= MANY_DECADES:

@@ -14,7 +14,6 @@ from typing import Any
 from markupsafe import Markup
 
 from lmi.exact.decimal_rounding import up
-from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.certificate.family_comparison import compare
 from ptcc_certify.certificate.restricted_bounds import deviation_of_signal, nearer_for_signal
@@ -33,6 +32,7 @@ from ptcc_certify.report.plots.family_input import plot_family_input
 from ptcc_certify.report.restricted_screen import restricted_entries, rests, signal_text, states_of_signal
 from ptcc_certify.report.structure_text import structure_text
 from ptcc_certify.report.text_layout import arithmetic
+from ptcc_certify.report.told_instants import FEW, told_instants
 from ptcc_certify.simulation.family_run import FamilyTrajectory
 from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_name
 from ptcc_certify.theorems.family_behaviour import DEPENDS, Counterexample, FamilyComponent
@@ -101,8 +101,8 @@ def family_view(saved: FamilyCertificate, runs: Sequence[FamilyTrajectory]) -> d
         "modes": [_mode_row(saved, k) for k in range(min(len(saved.family.modes), MODES))],
         "states": _states(saved),
         "endings": endings(saved),
-        "remaining": [(Markup("{}\u00a0T").format(f), bound) for f, bound in remaining(saved)],
-        "remaining_promised": [(Markup("{}\u00a0T").format(f), bound) for f, bound in remaining(saved, of_signal=True)],
+        "remaining": [(texts.instant(name), bound) for name, bound in remaining(saved)],
+        "remaining_promised": [(texts.instant(name), bound) for name, bound in remaining(saved, of_signal=True)],
         "functions": _functions(saved),
         "bound_words": bound_words(saved),
         "worst_ratio": max((ratio.worst_ratio for ratio in ratios), default=0.0),
@@ -282,17 +282,18 @@ def _states(saved: FamilyCertificate) -> tuple[list[str], list[list[Any]]]:
     return [*heads, f"{last}, for {which}"], written
 
 
-def remaining(saved: FamilyCertificate, of_signal: bool = False) -> list[tuple[float, Markup]]:
-    """Return instants and the bound of the deviation of any agent from its final state there.
+def remaining(saved: FamilyCertificate, of_signal: bool = False) -> list[tuple[str, Markup]]:
+    """Return the names of instants and the bound of the deviation of any agent from its final state there.
 
     For every signal, or for those that were asked for, where more is proved of these.
     """
     proved = nearer_for_signal(saved) if of_signal else saved.common and saved.rate is not None
     if saved.initial_state is None or not proved:
         return []
-    instants = [float(1 - Fraction(str(f))) for f in FRACTIONS]
-    bounds = deviation_of_signal(saved, instants) if of_signal else saved.deviation_bound(instants)
-    return [(f, above(float(x), 2)) for f, x in zip(FRACTIONS, bounds.max(axis=0), strict=True)]
+    instants = told_instants(saved.protocol, saved.direct)[:FEW]
+    left = [share for share, _ in instants]
+    bounds = deviation_of_signal(saved, left) if of_signal else saved.deviation_bound(left)
+    return [(name, above(float(x), 2)) for (_, name), x in zip(instants, bounds.max(axis=0), strict=True)]
 
 
 def _functions(saved: FamilyCertificate) -> list[tuple[Any, ...]]:

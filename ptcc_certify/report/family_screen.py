@@ -37,6 +37,7 @@ from ptcc_certify.report.text_layout import (
     wrap_lines,
     wrap_text,
 )
+from ptcc_certify.report.told_instants import SHORT, told_instants
 from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_name
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent, decide
 from ptcc_certify.theorems.family_claims import camps, special_behaviours
@@ -52,8 +53,6 @@ if TYPE_CHECKING:
 _COMPONENTS, _LINES = 4, 2
 #: Where sliding variables bring an agent that listens to nobody.
 DRIVEN = "ends at x(0) - sigma(0)"
-#: 1 - t/T and its name, where the long screen tells the error.
-_INSTANTS = ((0.5, "0.5 T"), (0.1, "0.9 T"), (0.01, "0.99 T"), (1e-6, "T(1-1e-6)"))
 _NOTHING: Mapping[str, str] = MappingProxyType({})
 #: What proves an upper bound on the rate, in words.
 BOUND_KINDS = {
@@ -499,11 +498,11 @@ def _error_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
 
 
 def _error_text(certificate: FamilyCertificate, bound: Callable[[list[float]], np.ndarray], long: bool) -> str:
-    share = certificate.settling_share
+    instants = told_instants(certificate.protocol, certificate.direct)[:4]
     if not long:
-        when = "0.99 T" if certificate.direct else "T_r + 0.99 T_s, numerical"
-        return f"at {when}: every agent within {up(float(bound([0.01 * share]).max()), 2)} of its final state"
-    instants = [(q, name) for q, name in _INSTANTS if q <= share]
+        left, when = instants[SHORT]
+        when += ", numerical" * (not certificate.direct)
+        return f"at {when}: every agent within {up(float(bound([left]).max()), 2)} of its final state"
     bounds = bound([remaining for remaining, _ in instants]).max(axis=0)
     texts = (f"{up(float(most), 2)} at {when}" for (_, when), most in zip(instants, bounds, strict=True))
     numerical = "" if certificate.direct else " (numerical)"

@@ -127,6 +127,11 @@ def indexed(text: str) -> Markup:
     return Markup(re.sub(r"\b(\w)_(\w)\b", r"\1<sub>\2</sub>", str(escape(text))))
 
 
+def instant(name: str) -> Markup:
+    """Set the name of an instant, which is not broken before a letter: ``T_r + 0.99 T_s``."""
+    return indexed(re.sub(r"(?<=\d) (?=T)", "\u00a0", name))
+
+
 def symbol(name: str) -> Markup:
     """Return a parameter's letter with its index: ``rho1``."""
     letters, index = re.fullmatch(r"([A-Za-z]+?)_?([0-9rs]?)", name).groups()  # type: ignore[union-attr]

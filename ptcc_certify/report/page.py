@@ -20,7 +20,6 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
-from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.checker import CheckReport
@@ -35,6 +34,8 @@ from ptcc_certify.report.notation import above, agent_parts, enclosed, printable
 from ptcc_certify.report.plots.agents import camp_groups
 from ptcc_certify.report.plots.distributions import plot_degrees, plot_final_states
 from ptcc_certify.report.structure_text import camps, remarks_on
+from ptcc_certify.report.told_instants import FEW as FEW_INSTANTS
+from ptcc_certify.report.told_instants import told_instants
 from ptcc_certify.simulation.family_run import FamilyTrajectory
 from ptcc_certify.theorems.table import THEOREMS
 
@@ -247,16 +248,15 @@ def _remaining(saved: Certificate) -> list[tuple[str, ...]]:
     """Return the instants, what may be left then of the norm, and of the deviation from the final state, rounded up."""
     if not saved.envelope.functions or saved.rate is None or (not saved.direct and saved.initial_state is None):
         return []
-    instants = [(Fraction(str(f)), Markup(f"{f}\u00a0T")) for f in FRACTIONS]
-    if not saved.direct:
-        share = 1 - saved.protocol.span / saved.protocol.T
-        instants = [(share, texts.indexed("T_r")), *(pair for pair in instants if pair[0] > share)]
-    remaining = [float(1 - f) for f, _ in instants]
+    p = saved.protocol
+    instants = [] if saved.direct else [(float(p.span / p.T), "T_r")]
+    instants += told_instants(p, saved.direct)[:FEW_INSTANTS]
+    remaining = [left for left, _ in instants]
     bounds = map(saved.envelope.residual, remaining) if saved.direct else saved.norm_bound(remaining).tolist()
     columns = [[above(x, 2) for x in bounds]]
     if saved.initial_state is not None and any(m.deviation is not None for m in saved.envelope.functions):
         columns.append([above(float(x), 2) for x in saved.deviation_bound(remaining).max(axis=0)])
-    return list(zip((name for _, name in instants), *columns, strict=True))
+    return list(zip((texts.instant(name) for _, name in instants), *columns, strict=True))
 
 
 def _gap(saved: Certificate) -> Fraction | None:

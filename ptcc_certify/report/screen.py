@@ -42,6 +42,7 @@ from ptcc_certify.report.text_layout import (
     wrap_lines,
     wrap_text,
 )
+from ptcc_certify.report.told_instants import SHORT, told_instants
 from ptcc_certify.theorems.claims import Claim
 from ptcc_certify.theorems.family_behaviour import DEPENDS
 
@@ -52,18 +53,11 @@ if TYPE_CHECKING:
     from ptcc_certify.checker import CheckReport
     from ptcc_certify.protocols.base import Protocol
 
-#: Lines of a short screen of a connected graph, if its answers do not take more.
-SHORT = 8
-
-#: 1 - t/T and its name, where the screen tells what may be left.
-_INSTANTS = ((0.5, "0.5 T"), (0.1, "0.9 T"), (0.01, "0.99 T"), (1e-6, "T(1-1e-6)"), (1e-9, "T(1-1e-9)"))
 #: Columns of a list of nodes on the long screen: twelve lines.
 _LONG_LIST = 12 * TEXT
 
 
-def summary_lines(
-    certificate: Certificate, name: str, origins: Mapping[str, str] = MappingProxyType({}), *, spare: int = 0
-) -> list[str]:
+def summary_lines(certificate: Certificate, name: str, origins: Mapping[str, str] = MappingProxyType({})) -> list[str]:
     r"""Return the short screen of ``ptcc certify``: 8 lines of 80 columns, 10 or so rather than cut an answer.
 
     Of a disconnected graph there are up to 4 more.
@@ -75,14 +69,12 @@ def summary_lines(
         What the graph is called.
     origins : mapping of str to str, optional
         Where ``x(0)`` and ``sigma(0)`` come from, by these names; ``given`` unless told.
-    spare : int
-        How many of the lines are not shown.
 
     Returns
     -------
     list of str
-        Graph, how it was read, protocol, claim, final state, error bound, input, disturbances, verdict. Where that
-        takes more than 8 lines, error bound and input tell of no single agent.
+        Graph, how it was read, protocol, claim, final state, error bound, input, disturbances, verdict. Error
+        bound and input tell of single agents where their line has room.
 
     Examples
     --------
@@ -104,20 +96,16 @@ def summary_lines(
         whatever = ", without disturbances"
     claims = _claim_texts(certificate.structure, certificate.claims, f" at T = {near(p.T)}", whatever)
     drawn = _is_set_asked(certificate)
-    for agents in (True, False):
-        entries = [
-            *graph_entries(certificate.structure, name),
-            ("protocol", _protocol_text(certificate, origins)),
-            *_headed("claim", claims),
-            *([] if drawn else _short_final_state(certificate)),
-            *_bounds(certificate, agents, drawn),
-            *disturbed_lines(certificate),
-            ("verdict", _short_verdict(certificate)),
-        ]
-        lines = wrap_lines(format_lines(entries))
-        if len(lines) < SHORT + len(claims) + spare:
-            break
-    return lines
+    entries = [
+        *graph_entries(certificate.structure, name),
+        ("protocol", _protocol_text(certificate, origins)),
+        *_headed("claim", claims),
+        *([] if drawn else _short_final_state(certificate)),
+        *_bounds(certificate, drawn),
+        *disturbed_lines(certificate),
+        ("verdict", _short_verdict(certificate)),
+    ]
+    return wrap_lines(format_lines(entries))
 
 
 def structure_summary(structure: Structure, name: str) -> list[str]:
@@ -166,7 +154,7 @@ def _file_summary(path: str, document: Mapping[str, Any], report: CheckReport) -
     files = read_side_files(document, Path(path).parent)
     certificate = accepted_certificate(Path(path), document, "", report, files)
     if isinstance(certificate, Certificate):
-        return summary_lines(certificate, path, origins, spare=2)  # of graph, read and verdict one is in their place
+        return summary_lines(certificate, path, origins)
     return family_summary(certificate, path, origins)
 
 
@@ -240,33 +228,36 @@ def _is_set_asked(certificate: Certificate) -> bool:
     return certificate.initial_set is not None and "x(0)" in certificate.request.origins
 
 
-def _bounds(certificate: Certificate, single: bool, drawn: bool) -> Lines:
-    """Tell how near the agents are by when, and how large the input gets, with or without single agents."""
+def _bounds(certificate: Certificate, drawn: bool) -> Lines:
+    """Tell how near the agents are by when, and how large the input gets; of single agents where the line has room."""
     if certificate.constant:
         invariant = "its state" if certificate.direct else "x - sigma"
         yield "error", f"none: no agent listens to another, each keeps {invariant}"
         return
-    norm, agents = _error_texts(certificate)
+    norm, agents, more = _error_texts(certificate)
     if norm:
-        yield "error", norm + agents * (single and not drawn)
+        texts = [f"{norm}{single}{more}" for single in (agents, agents.replace("every agent", "agents"))]
+        fitting = (text for text in texts if columns(text) <= TEXT and not drawn)
+        yield "error", next(fitting, norm + more)
     if certificate.effort is not None:
         loud = certificate.effort.bounded is False and not certificate.effort.residual
-        yield "INPUT" if loud else "input", _input_text(certificate, certificate.effort, single)
+        text, agent = _input_texts(certificate, certificate.effort)
+        yield "INPUT" if loud else "input", text + agent * (columns(text + agent) <= TEXT)
 
 
-def _error_texts(certificate: Certificate) -> tuple[str, str]:
+def _error_texts(certificate: Certificate) -> tuple[str, str, str]:
     """Return bounds of the error and of every agent's deviation at 0.99 T, at the instant asked for, or under limits.
 
-    Empty texts where nothing is proved.
+    Empty texts where nothing is proved; the last one tells that there are more limits.
     """
     if certificate.effort is not None and certificate.effort.residual:
         entry, *others = certificate.effort.residual
         noise = "" if entry.noise is None else f", |n_k| <= {down(entry.noise, 12)}"
         norm = f"{limits_text(entry)}{noise}: at T ||E|| <= {up(entry.noisy_norm or entry.norm, 2)}"
         agents = "" if entry.agents is None or entry.noisy_norm else f", every agent within {up(max(entry.agents), 2)}"
-        return norm, agents + f"; ... {len(others) + 1} limits in all" * bool(others)
+        return norm, agents, f"; ... {len(others) + 1} limits in all" * bool(others)
     if certificate.rate is None:
-        return "", ""
+        return "", "", ""
     remaining, when = _instant(certificate)
     z = certificate.envelope.coordinates
     if certificate.direct:
@@ -274,24 +265,22 @@ def _error_texts(certificate: Certificate) -> tuple[str, str]:
     elif certificate.initial_state is not None:
         norm = f"||{z}|| <= {up(float(certificate.norm_bound([remaining])[0]), 2)}"
     else:
-        return "", ""
+        return "", "", ""
     agents = ""
     if certificate.initial_state is not None and any(V.deviation for V in certificate.functions):
         agents = f", every agent within {up(float(certificate.deviation_bound([remaining]).max()), 2)}"
-    return f"at {when}{', numerical' * (not certificate.direct)}: {norm}", agents
+    return f"at {when}{', numerical' * (not certificate.direct)}: {norm}", agents, ""
 
 
 def _instant(certificate: Certificate) -> tuple[float, str]:
     """Return ``1 - t/T`` where the short screen tells the error, and the name of that instant."""
     if certificate.at is not None:
         return float(1 - certificate.at / certificate.protocol.T), f"t = {near(certificate.at)}"
-    if certificate.direct:
-        return 0.01, "0.99 T"
-    return 0.01 * _sliding_share(certificate), "T_r + 0.99 T_s"
+    return told_instants(certificate.protocol, certificate.direct)[SHORT]
 
 
-def _input_text(certificate: Certificate, effort: Effort, single: bool) -> str:
-    """Tell whether the input is bounded, its proved size, and whose it is."""
+def _input_texts(certificate: Certificate, effort: Effort) -> tuple[str, str]:
+    """Tell whether the input is bounded and its proved size, and whose it is."""
     entry = effort.residual[0] if effort.residual else None
     if entry is not None:
         text, largest = "bounded under these limits", entry.largest if entry.noise is None else entry.noisy_largest
@@ -303,13 +292,13 @@ def _input_text(certificate: Certificate, effort: Effort, single: bool) -> str:
         if largest is None and effort.bounded and effort.sliding is not None and not effort.sliding.bounded:
             text, nothing = "the nominal part is bounded", ", of the sliding part nothing is proved"
     if largest is None:
-        return text + nothing
+        return text + nothing, ""
     whom = "" if effort.initial_set is None else f" for {initial_states_text(effort.initial_set)}"
     agent = ""
-    if single and entry is None and effort.peak is not None:
+    if entry is None and effort.peak is not None:
         label = certificate.graph.labels[effort.peak.agents.index(largest)]
         agent = f", the largest of agent {shorten_label(label, 22)}"
-    return f"{text}; |u_k| <= {up(largest, 4)}{whom}{agent}"
+    return f"{text}; |u_k| <= {up(largest, 4)}{whom}", agent
 
 
 def _short_verdict(certificate: Certificate) -> str:
@@ -445,32 +434,26 @@ def _deviation_lines(certificate: Certificate) -> Lines:
     """Tell how far from its final state the farthest agent may be, and every agent at the instant asked for."""
     if certificate.initial_state is None or not any(V.deviation for V in certificate.functions):
         return
-    instants = [(q, name) for q, name in _INSTANTS[:4] if certificate.direct or q <= _sliding_share(certificate)]
+    instants = told_instants(certificate.protocol, certificate.direct)[:4]
     worst = certificate.deviation_bound([q for q, _ in instants]).max(axis=0, initial=0.0)
-    if instants:
-        numerical = "" if certificate.direct else " (numerical, rounded up)"
-        bounds = _at_instants(worst, (name for _, name in instants))
-        yield "deviation", f"of every agent from its final state at most {bounds}{numerical}"
+    numerical = "" if certificate.direct else " (numerical, rounded up)"
+    bounds = _at_instants(worst, (name for _, name in instants))
+    yield "deviation", f"of every agent from its final state at most {bounds}{numerical}"
     if certificate.at is not None:
         each = certificate.deviation_bound([float(1 - certificate.at / certificate.protocol.T)])[:, 0]
         entries = [f"{label} {up(float(x), 2)}" for label, x in zip(certificate.graph.labels, each, strict=True)]
         yield "", f"at t = {near(certificate.at, 12)}: {shorten_list(entries)}"
 
 
-def _sliding_share(certificate: Certificate) -> float:
-    """Return ``1 - t/T`` at ``T_r``."""
-    p = certificate.protocol
-    return float(p.span / p.T)
-
-
 def _residual_lines(certificate: Certificate) -> Lines:
     envelope, at = certificate.envelope, certificate.at
-    proved = _at_instants((envelope.residual(q) for q, _ in _INSTANTS), (name for _, name in _INSTANTS))
+    instants = told_instants(certificate.protocol, certificate.direct)
+    proved = _at_instants((envelope.residual(q) for q, _ in instants), (name for _, name in instants))
     if at is not None:
         own = envelope.residual(float(1 - at / certificate.protocol.T))
         proved = f"{up(own, 3)} at t = {near(at, 12)}, {proved}"
     yield "error", f"||{envelope.coordinates}(t)|| / ||{envelope.coordinates}(0)|| at most {proved}"
-    slowest = [certificate.best_possible_residual(q) for q, _ in _INSTANTS]
+    slowest = [certificate.best_possible_residual(q) for q, _ in instants]
     if slowest[-1] is not None:
         yield "", "slowest mode (numerical) " + ", ".join(f"{x or 0.0:.2g}" for x in slowest)
 
@@ -479,11 +462,11 @@ def _reaching_lines(certificate: Certificate) -> Lines:
     """Tell what the proved rate leaves where the sliding variables drive the agents until ``T_r``."""
     if certificate.initial_state is None:
         return
-    share = _sliding_share(certificate)
-    instants = [(share, "T_r"), *((q, name) for q, name in _INSTANTS if q < share)]
+    p = certificate.protocol
+    instants = [(float(p.span / p.T), "T_r"), *told_instants(p, certificate.direct)]
     bounds = _at_instants(certificate.norm_bound([q for q, _ in instants]), (name for _, name in instants))
     z = certificate.envelope.coordinates
-    yield "error", f"||{z}(t)|| at most {bounds}; T = T_r + T_s (numerical, rounded up)"
+    yield "error", f"||{z}(t)|| at most {bounds} (numerical, rounded up)"
 
 
 def _simulated(certificate: Certificate) -> Iterator[str]:

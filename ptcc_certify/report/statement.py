@@ -143,8 +143,10 @@ def family_latex(saved: FamilyCertificate, figures: dict[str, str] | None = None
         "comment": _comment(saved.source.path.name),
         "parameters": [(Markup(symbol_latex(name)), getattr(saved.protocol, name)) for name in names],
         **{"named": _named(saved.family.labels), "listed": _intervals(saved), "rows": rows},
-        "remaining": [(f, _number(bound)) for f, bound in remaining(saved)],
-        "remaining_promised": [(f, _number(bound)) for f, bound in remaining(saved, of_signal=True)],
+        "remaining": [(_instant(saved, name), _number(bound)) for name, bound in remaining(saved)],
+        "remaining_promised": [
+            (_instant(saved, name), _number(bound)) for name, bound in remaining(saved, of_signal=True)
+        ],
         **{"sigma0": saved.sigma0, "last_time": _last_time(saved)},
         "why": [counterexample_text(c, c.counterexample) for c in _depending(saved) if c.counterexample is not None],
         "restricted_tex": [_powers(text) for text in facts["restricted"]],
@@ -175,6 +177,13 @@ def _last_time(saved: FamilyCertificate) -> float | None:
     """Return an instant from which on all sliding variables are proved 0; None if that is ``T_r``."""
     times = [None if r.z is None else r.time for r in saved.reaching or ()]
     return None if None in times else max((t for t in times if t is not None), default=0.0)
+
+
+def _instant(saved: FamilyCertificate, name: str) -> Markup:
+    """Return the name of an instant in symbols; without a reaching phase ``T`` is the sum of two parameters."""
+    if saved.protocol.reaching is not None and saved.direct:
+        name = name.replace("T", "(T_r + T_s)")
+    return Markup(re.sub(r"_(\w)", r"_{\1}", re.sub(r"(?<=\d) (?=\(?T)", r"\,", name)))
 
 
 def _captions(saved: Certificate) -> dict[str, str]:

@@ -154,6 +154,8 @@ class DrivenFamilyMotion(FamilyMotion):
 
     def agents(self) -> np.ndarray:
         """Return the (N,) state ``x = y + sigma``."""
+        if self._clock >= self._sliding.events[-1]:
+            return self.state[:, 0]
         return self.state[:, 0] + self._sliding.sigma_at(np.array([self._clock]))[:, 0] / self._unit
 
     def slope(self, x: ca.MX, phase: Phase, clock: ca.MX, ends: tuple[float, float]) -> ca.MX:

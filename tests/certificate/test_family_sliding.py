@@ -19,6 +19,7 @@ from ptcc_certify.checker import check, digest
 from ptcc_certify.checker.family_sliding import Drive, drive_sizes
 from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.follower_function import follower_functions
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
@@ -338,3 +339,14 @@ def test_where_the_sliding_part_may_grow_no_peak_is_claimed():
     assert certificate.verdict == "certified" and certificate.bounded and not certificate.sliding_bounded
     assert certificate.nominal_peaks is not None and certificate.input_peaks is None
     assert "--mu3 0.334" in certificate.assessment.advice
+
+
+def test_the_gain_that_is_named_where_the_bound_says_little_is_enough():
+    path = [("a", "b", 1), ("b", "a", 1), ("b", "c", -1), ("c", "b", -1)]
+    modes = {"one": SignedDigraph.from_edges(path), "two": SignedDigraph.from_edges([*path, ("a", "c", -1)])}
+    gains = {"T_r": 1, "T_s": 1, "rho1": 1, "kappa": 1, "mu1": 2, "mu2": 1, "mu3": 1, "delta": 1}
+    asked = {"x0": [1, 2, 3], "sigma0": ["0.1", 0, 0]}
+    weak = certify_family(modes, SlidingModeProtocol(rho2="0.1", **gains), **asked)
+    assert weak.assessment.useful is False and "leaves 1 %" in weak.assessment.advice
+    rho2 = weak.assessment.advice.split()[1]
+    assert certify_family(modes, SlidingModeProtocol(rho2=rho2, **gains), **asked).assessment.useful

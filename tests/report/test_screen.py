@@ -14,14 +14,19 @@ from hypothesis import strategies as st
 from rich.cells import cell_len
 
 import ptcc_certify as ptcc
+from ptcc_certify.certificate.certificate import read_certificate
+from ptcc_certify.certificate.procedure import STEPS
 from ptcc_certify.certificate.request import Expectations
+from ptcc_certify.certificate.verdict import NO_SEARCHES
 from ptcc_certify.errors import ExitCode
 from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.protocols.gain_limits import GainLimits
-from ptcc_certify.report.screen import certificate_lines, structure_summary, summary_lines
+from ptcc_certify.report.page import report_html
+from ptcc_certify.report.screen import certificate_lines, check_summary, structure_summary, summary_lines
 from ptcc_certify.report.text_layout import columns, shorten_list, wrap_lines
+from ptcc_certify.report.told_instants import told_instants
 
 NOMINAL = ptcc.NominalProtocol(T="0.6", rho1="0.1", rho2="0.6", kappa=1)
 STRONG = ptcc.NominalProtocol(T=1, rho1=1, rho2=2, kappa=2)
@@ -265,3 +270,30 @@ def test_a_delta_of_0_is_called_no_disturbances():
     for delta, told in (("0", "at T = 2, without disturbances"), ("1", "at T = 2, any |d_k| <= 1")):
         protocol = ptcc.SlidingModeProtocol(T_r=1, T_s=1, mu1=2, delta=delta)
         assert told in ptcc.certify(pair, protocol, [3, 5], simulation=False).summary()
+
+
+def test_certify_and_check_tell_the_same_of_single_agents(tmp_path):
+    certificate = ptcc.certify(load_graph("fig1b"), SLIDING, "random", sigma0="random", simulation=False)
+    certificate.save(tmp_path / "c.json")
+    report = ptcc.check(tmp_path / "c.json")
+    told = summary_lines(certificate, "fig1b", {"x(0)": "random, seed 0", "sigma(0)": "random, seed 0"})
+    checked = check_summary(str(tmp_path / "c.json"), certificate.to_dict(), report)
+    answers = [line for line in told if line.startswith(("error", "input"))]
+    assert len(answers) == 2 and set(answers) <= set(checked) and len(told) <= 9
+    assert "agents within" in answers[0] and "the largest of agent" in answers[1]
+
+
+def test_instants_of_the_page_are_those_of_the_screen():
+    certificate = ptcc.certify(PAIR, SLIDING, [5, 1], sigma0=[1, 0], simulation=False)
+    bounds = certificate.norm_bound([left for left, _ in told_instants(SLIDING, certificate.direct)])
+    assert np.all(np.diff(bounds) < 0)
+    (line,) = [line for line in summary_lines(certificate, "g") if line.startswith("error")]
+    page = report_html(read_certificate(certificate.to_dict()))
+    assert "at T_r + 0.99 T_s" in line and "T<sub>r</sub> + 0.99\N{NO-BREAK SPACE}T<sub>s</sub>" in page
+    assert "0.99\N{NO-BREAK SPACE}T<" not in page.replace("0.99\N{NO-BREAK SPACE}T<sub>s", "")
+
+
+def test_undecided_for_want_of_time_names_the_search():
+    assert set(NO_SEARCHES) <= set(STEPS)
+    text = ptcc.certify(PAIR, NOMINAL, [5, 1], time_limit=1e-9).assessment.text
+    assert text == "undecided: no rate is proved, the search took its share of 1e-09 s; raise --time-limit"
