@@ -6,7 +6,6 @@ A family of one mode with known weights is a graph, and :func:`ptcc_certify.cert
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -15,13 +14,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lmi import search_time as deadline
-from lmi.exact.decimal_rounding import down, float_down, float_up
+from lmi.exact.decimal_rounding import down
 from lmi.search_time import share_of_time
 from ptcc_certify.bounds.attracting_box import AttractingBox, box_of_family
 from ptcc_certify.bounds.kept_means import with_means
 from ptcc_certify.certificate.certificate_file import FromFile, write_certificate
 from ptcc_certify.certificate.checking import check
 from ptcc_certify.certificate.family_content import ComponentProof, FamilyContent, ProvedFunction
+from ptcc_certify.certificate.family_table import family_table
 from ptcc_certify.certificate.family_verdict import assess_family
 from ptcc_certify.certificate.format_family import family_document
 from ptcc_certify.certificate.request import (
@@ -45,7 +45,6 @@ from ptcc_certify.graphs.display_hook import Shown, family_summary, plot_of_fami
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import STABILITY, analyse
-from ptcc_certify.graphs.tables import import_pandas
 from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.family_rate_upper_bound import prove_family_rate_bound
 from ptcc_certify.lyapunov.family_search import FamilySearch, search_family
@@ -205,9 +204,19 @@ class FamilyCertificate(FamilyContent, FromFile, Shown):
         return json.dumps(self.to_dict(), ensure_ascii=False, allow_nan=False)
 
     def to_pandas(self) -> pd.DataFrame:
-        """Return the ends between which every agent is at the deadline, rounded outwards to floats; NaN where unknown.
+        """Return one row per agent, with ends that are rounded outwards to floats; NaN where nothing is proved.
 
-        All are unknown of a certificate without an initial state.
+        - ``least``, ``largest``: of the state at the deadline, for every signal.
+        - ``restricted_least``, ``restricted_largest``: the same for the signals that were asked for, if not all were;
+          ``restricted_to`` names these, ``"constant"`` or ``"DwellTime(1/5, clock='t')"`` say, and is empty where there
+          are no such ends. Where the last mode decides, an agent stays between them at all times, whether or not it
+          comes to rest.
+        - ``box_least``, ``box_largest``: the interval into which every signal draws a follower whose end depends on the
+          signal. It may move there for ever: these are no ends at the deadline.
+        - ``keeps``: whether no edge of any mode leads to the agent and no sliding variable moves, so that it stays at
+          ``x(0)`` under every signal. Edges alone decide this, and it is no part of the claim that is checked.
+
+        Without an initial state ``keeps`` alone is known, of an undecided certificate no restricted ends and no boxes.
 
         Raises
         ------
@@ -217,14 +226,11 @@ class FamilyCertificate(FamilyContent, FromFile, Shown):
         Examples
         --------
         >>> pair = Family.from_intervals([("a", "b", -2, -1)])
-        >>> certify_family(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2]).to_pandas().loc["b"].tolist()
-        [-1.0, -1.0]
+        >>> table = certify_family(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2]).to_pandas()
+        >>> table.loc["b", ["least", "largest"]].tolist(), table["keeps"].tolist()
+        ([-1.0, -1.0], [True, False])
         """
-        pandas, unknown = import_pandas(), (math.nan, math.nan)
-        states = self.final_states or (None,) * self.family.n_nodes
-        ends = [unknown if one is None else (float_down(one[0]), float_up(one[1])) for one in states]
-        index = pandas.Index(self.family.labels, name="node")
-        return pandas.DataFrame(ends, index=index, columns=["least", "largest"], dtype=float)
+        return family_table(self, self.verdict == "certified")
 
     if not TYPE_CHECKING:
 

@@ -17,6 +17,7 @@ from lmi.exact.decimal_rounding import up
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.certificate.family_comparison import compare
 from ptcc_certify.certificate.restricted_bounds import deviation_of_signal, nearer_for_signal
+from ptcc_certify.certificate.restricted_states import states_of_signal
 from ptcc_certify.certificate.verdict import REFUTED
 from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.graphs.family import Mode
@@ -29,7 +30,7 @@ from ptcc_certify.report.plots.counterexample import plot_counterexample
 from ptcc_certify.report.plots.family import keeps_dwell, plot_family, plot_family_decay
 from ptcc_certify.report.plots.family_graph import plot_family_graph
 from ptcc_certify.report.plots.family_input import plot_family_input
-from ptcc_certify.report.restricted_screen import restricted_entries, rests, signal_text, states_of_signal
+from ptcc_certify.report.restricted_screen import restricted_entries, rests, signal_text
 from ptcc_certify.report.structure_text import structure_text
 from ptcc_certify.report.text_layout import arithmetic
 from ptcc_certify.report.told_instants import FEW, told_instants

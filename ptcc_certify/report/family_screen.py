@@ -11,21 +11,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lmi.exact.decimal_rounding import down, near, up
+from ptcc_certify.certificate.restricted_states import constant_states, last_states, states_of_signal
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import STABILITY
-from ptcc_certify.report.restricted_screen import (
-    RESTS,
-    constant_states,
-    last_states,
-    restricted_entries,
-    rests,
-    states_of_signal,
-)
+from ptcc_certify.report.restricted_screen import RESTS, restricted_entries, rests
 from ptcc_certify.report.sliding_lines import sliding_lines
 from ptcc_certify.report.structure_text import Lines, structure_text
 from ptcc_certify.report.text_layout import (
     TEXT,
+    columns,
     counted,
     format_lines,
     printable,
@@ -41,7 +36,7 @@ from ptcc_certify.report.told_instants import SHORT, told_instants
 from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_name
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent, decide
 from ptcc_certify.theorems.family_claims import camps, special_behaviours
-from ptcc_certify.theorems.family_groups import FamilyGroups
+from ptcc_certify.theorems.family_groups import AgreeingGroup, FamilyGroups
 from ptcc_certify.theorems.family_rate import explicit_rate
 
 if TYPE_CHECKING:
@@ -51,6 +46,8 @@ if TYPE_CHECKING:
 
 #: Components of which a screen tells, and lines of a text on the short one.
 _COMPONENTS, _LINES = 4, 2
+#: Columns of names within a phrase, and groups that agree of which each is named.
+_NAMES, _GROUPS = 30, 3
 #: Where sliding variables bring an agent that listens to nobody.
 DRIVEN = "ends at x(0) - sigma(0)"
 _NOTHING: Mapping[str, str] = MappingProxyType({})
@@ -254,7 +251,7 @@ def _claim_entries(
     for k in depending[: len(depending) if every else 1]:
         yield from _depends_entries(components[k], every, direct)
         if k in boxes:
-            yield "box", _cut(box_text(components[k], boxes[k]), every)
+            yield "box", box_text(components[k], boxes[k], 12 * TEXT if every else TEXT)
 
 
 def _claim_text(component: FamilyComponent, when: str, every: bool, disturbed: bool) -> str:
@@ -287,7 +284,7 @@ def _depends_entries(component: FamilyComponent, every: bool, direct: bool) -> L
         behaviour = "it depends on the weights" if constant.behaviour == DEPENDS else sharpest(constant)
         yield "constant", f"where weights never change: {behaviour}"
     if component.signal == "any":
-        yield "groups", _cut(groups_text(component, direct), every)
+        yield "groups", groups_text(component, direct)
 
 
 def _alone(mode: Mode, direct: bool) -> str:
@@ -302,53 +299,84 @@ def _alone(mode: Mode, direct: bool) -> str:
 def groups_text(component: FamilyComponent, direct: bool = True) -> str:
     """Tell which agents agree, follow or end at 0 under every signal, where the behaviour depends on it.
 
-    An agent that listens to nobody keeps its value where no sliding variable moves (``direct``).
+    An agent that listens to nobody keeps its value where no sliding variable moves (``direct``). Many such agents, and
+    many groups that agree, are counted.
 
     Examples
     --------
     >>> groups_text(ptcc.decide([(1, 3, 1, 2), (2, 3, 1, 1)])[0])
-    '1 keeps its value; 2 keeps its value; 3 ends between these, up to signs, or moves there for ever'
+    '1, 2 keep their value; 3 ends between these, up to signs, or moves there for ever'
     """
-    groups, parts = FamilyGroups(component), []
-    for group in groups.agreeing:
-        names = _names(component, group.nodes.tolist(), 30)
-        camps = " up to camps" * (len(set(group.camps.tolist())) > 1)
-        parts.append(
-            f"{names} {'keeps its value' if direct else DRIVEN}" if group.nodes.size == 1 else f"{names} agree{camps}"
-        )
+    groups = FamilyGroups(component)
+    parts = _keeping(component, groups.agreeing, direct) + _agreeing(component, groups.agreeing)
     zero, near = groups.at_zero.tolist(), set(groups.bounded.tolist())
     known = {v for group in groups.agreeing for v in group.nodes.tolist()}.union(zero)
     others = [v for v in range(component.nodes.size) if v not in known]
     followers, free = ([v for v in others if (v in near) == wanted] for wanted in (True, False))
     if zero:
-        parts.append(f"{_names(component, zero, 30)} {'end' if len(zero) > 1 else 'ends'} at 0")
+        parts.append(f"{_names(component, zero, _NAMES)} {'end' if len(zero) > 1 else 'ends'} at 0")
     if followers:
-        ends = "end" if len(followers) > 1 else "ends"
-        moves = "move" if len(followers) > 1 else "moves"
-        parts.append(f"{_names(component, followers, 30)} {ends} between these, up to signs, or {moves} there for ever")
+        ends, moves = ("end", "move") if len(followers) > 1 else ("ends", "moves")
+        names = _names(component, followers, _NAMES)
+        parts.append(f"{names} {ends} between these, up to signs, or {moves} there for ever")
     if free:
-        parts.append(f"no limit is claimed of {_names(component, free, 30)}")
+        parts.append(f"no limit is claimed of {_names(component, free, _NAMES)}")
     return "; ".join(parts)
 
 
-def box_text(component: FamilyComponent, box: AttractingBox) -> str:
+def _keeping(component: FamilyComponent, groups: Sequence[AgreeingGroup], direct: bool) -> list[str]:
+    """Tell of agents that listen to nobody: names of those that nobody agrees with if these are short, else how many.
+
+    Of the many, those count too with whom others agree.
+    """
+    alone = [int(group.nodes[0]) for group in groups if group.nodes.size == 1]
+    if not alone:
+        return []
+    names = ", ".join(printable(shorten_label(component.family.labels[v])) for v in alone)
+    if columns(names) > _NAMES:
+        _, target, _ = component.family.union
+        names = f"{counted(component.nodes.size - np.unique(target).size, 'agent')} that listen to nobody"
+    if direct:
+        return [f"{names} {'keeps its value' if len(alone) == 1 else 'keep their value'}"]
+    return [f"{names} {DRIVEN if len(alone) == 1 else DRIVEN.replace('ends', 'end')}"]
+
+
+def _agreeing(component: FamilyComponent, groups: Sequence[AgreeingGroup]) -> list[str]:
+    """Tell of groups of two agents or more that agree, of many only how many there are."""
+    several = [group for group in groups if group.nodes.size > 1]
+    if len(several) > _GROUPS:
+        agents = sum(group.nodes.size for group in several)
+        camps = ", up to camps" * any((group.camps < 0).any() for group in several)
+        return [f"{len(several):,} groups, of {agents:,} agents in all, agree each within itself{camps}"]
+    return [
+        f"{_names(component, group.nodes.tolist(), _NAMES)} agree{' up to camps' * bool((group.camps < 0).any())}"
+        for group in several
+    ]
+
+
+def box_text(component: FamilyComponent, box: AttractingBox, width: int = 12 * TEXT) -> str:
     """Tell into which intervals every signal draws followers, whether or not they come to rest, and at what rate.
+
+    Intervals that take more columns than ``width`` are counted, and the one that holds them all is told.
 
     Examples
     --------
-    >>> moved = Family.from_intervals([(1, 3, 1, 3), (2, 3, 1, 1)])
-    >>> cert = certify(moved, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), {1: 0, 2: 4, 3: 100})
+    >>> moved = Family.from_intervals([(1, 3, 1, 3), (2, 3, 1, 1), (1, 4, 1, 1), (2, 4, 1, 4)])
+    >>> cert = certify(moved, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), {1: 0, 2: 4, 3: 100, 4: 0})
     >>> box_text(cert.parts[0].component, cert.boxes[0])
-    'every signal draws 3 into [1, 2], at the rate 4; no limit is claimed'
+    'every signal draws 3 into [1, 2], 4 into [2, 3.2], at the rate 4; no limit is claimed'
+    >>> box_text(cert.parts[0].component, cert.boxes[0], 20)
+    'every signal draws 2 agents into 2 intervals in all, within [1, 3.2], at the rate 4; no limit is claimed'
     """
     groups: dict[str, list[int]] = {}
     for v, *ends in zip(box.decay.nodes.tolist(), box.lower, box.upper, strict=True):
         text = _interval((ends[0], ends[1])).replace("in [", "into [").replace("at ", "to ")
         groups.setdefault(text, []).append(v)
-    texts = [f"{_names(component, nodes, 30)} {text}" for text, nodes in groups.items()]
-    return (
-        f"every signal draws {shorten_list(texts, TEXT)}, at the rate {down(2 * box.decay.rate)}; no limit is claimed"
-    )
+    told = ", ".join(f"{_names(component, nodes, _NAMES)} {text}" for text, nodes in groups.items())
+    if columns(told) > width:
+        hull = _interval((min(box.lower), max(box.upper))).removeprefix("in ")
+        told = f"{counted(len(box.lower), 'agent')} into {len(groups):,} intervals in all, within {hull}"
+    return f"every signal draws {told}, at the rate {down(2 * box.decay.rate)}; no limit is claimed"
 
 
 def _cut(text: str, every: bool) -> str:

@@ -14,7 +14,6 @@ from ptcc_certify.certificate.restricted_claims import (
     ShareClaim,
     WindowClaim,
 )
-from ptcc_certify.checker.reading import Interval
 from ptcc_certify.graphs.family import Mode
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, CONSENSUS, CONTAINMENT
 from ptcc_certify.report.text_layout import printable, shorten_label
@@ -41,7 +40,7 @@ def restricted_entries(certificate: FamilyContent) -> Iterator[tuple[str, str]]:
     >>> print(*next(restricted_entries(cert)), sep=": ")
     constant: if mode and weights never change: rate 1.58578, as for every signal; nothing more is proved
 
-    Where agents end is told by :func:`constant_states`.
+    Where agents end then is told by :mod:`ptcc_certify.certificate.restricted_states`.
     """
     if certificate.signal == "any":
         return
@@ -133,40 +132,6 @@ def _share_text(certificate: FamilyContent, claim: ShareClaim) -> str:
     each = ", ".join(f"{name} {rate}" for name, rate in zip(names, own, strict=True))
     late = "how near by when depends on how far the shares stray"
     return f"{claim.behaviour}, rate {down(claim.rate)}; of each: {each}; {late}"
-
-
-def last_states(certificate: FamilyContent) -> list[Interval | None]:
-    """Return the ends between which agents stay whose last mode decides; None of the others."""
-    result: list[Interval | None] = [None] * certificate.family.n_nodes
-    for number, claim in certificate.ends_of_signal.items():
-        nodes = certificate.parts[number].component.nodes.tolist()
-        for v, ends in zip(nodes, claim.final_states or (), strict=False):
-            result[v] = ends
-    return [other if ends is None else ends for ends, other in zip(constant_states(certificate), result, strict=True)]
-
-
-def constant_states(certificate: FamilyContent) -> list[Interval | None]:
-    """Return the ends between which agents end if mode and weights never change; None where these are not claimed.
-
-    Examples
-    --------
-    >>> unsure = Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 1)])
-    >>> cert = certify(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [0, 6], signal="constant")
-    >>> [str(x) for x in constant_states(cert)[0]]
-    ['2', '3']
-    """
-    result: list[Interval | None] = [None] * certificate.family.n_nodes
-    for number, claim in certificate.final_values.items():
-        nodes = certificate.parts[number].component.nodes.tolist()
-        for v, ends in zip(nodes, claim.final_states or (), strict=False):
-            result[v] = ends
-    return result
-
-
-def states_of_signal(certificate: FamilyContent) -> list[Interval | None]:
-    """Return the final states for every signal, and where there are none, those for the signals that were asked for."""
-    pairs = zip(certificate.final_states or (), last_states(certificate), strict=False)
-    return [other if ends is None else ends for ends, other in pairs]
 
 
 def rests(certificate: FamilyContent) -> bool:

@@ -77,7 +77,7 @@ def shorten_list(words: Sequence[str], width: int = 90, total: int = 0) -> str:
     >>> shorten_list(["ann", "bob", "eve", "daniel", "zoe"], 25), shorten_list(["ann"], 25)
     ('ann, ... (5 in all)', 'ann')
     """
-    rest = f", ... ({max(total, len(words))} in all)"
+    rest = f", ... ({max(total, len(words)):,} in all)"
     room, used, fitting = width - columns(rest), 0, 0
     for number, word in enumerate(words, start=1):
         used += columns(word) + 2 * (number > 1)

@@ -17,10 +17,10 @@ from ptcc_certify.bounds.family_final_state import value_ends
 from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
 from ptcc_certify.certificate.restricted_claims import FinalValueClaim
+from ptcc_certify.certificate.restricted_states import constant_states
 from ptcc_certify.checker import check
 from ptcc_certify.report.family_screen import family_lines, family_summary
 from ptcc_certify.report.page import report_html
-from ptcc_certify.report.restricted_screen import constant_states
 from ptcc_certify.report.statement import family_latex
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)

@@ -23,6 +23,7 @@ from ptcc_certify.report.family_screen import (
     family_summary,
     groups_text,
 )
+from ptcc_certify.report.page import report_html
 from ptcc_certify.theorems.counterexample_text import counterexample_text
 from ptcc_certify.theorems.family_behaviour import FamilyComponent
 from ptcc_certify.theorems.restricted_signals import DwellTime
@@ -154,6 +155,56 @@ def test_groups_are_told_once_each():
         for component in ptcc.decide(random_family(rng, "depends").family):
             if component.behaviour == "depends on the signal":
                 assert_once(component, groups_text(component))
+
+
+def many_followers(n: int) -> Family:
+    """Return ``n`` followers, each of two leaders of its own, and one of all leaders, whose edge joins all."""
+    own = [(f"{name}{k}", f"follower{k}", 1, 2) for k in range(n) for name in ("ann", "bob")]
+    return Family.from_intervals([*own, *((s, "last", 1, 2) for s, *_ in own)])
+
+
+def told(lines: list[str], head: str) -> str:
+    """Return the text of an entry of a screen."""
+    text = "\n".join(lines).replace("\n" + " " * 11, " ")
+    return next(line[11:] for line in text.splitlines() if line.startswith(head))
+
+
+def test_many_agents_that_keep_their_value_and_many_intervals_are_counted_and_nothing_is_cut():
+    family = many_followers(40)
+    x0 = {label: k % 7 - k for k, label in enumerate(family.labels)}
+    certificate = ptcc.read_certificate(certify_family(family, PROTOCOL, x0).to_dict())
+    box = certificate.boxes[0]
+    keep, intervals = (
+        "80 agents that listen to nobody keep their value; ",
+        len(set(zip(box.lower, box.upper, strict=True))),
+    )
+    assert intervals > 20
+    page = re.sub(r"\s+", " ", re.sub("<[^>]+>", "", report_html(certificate)))
+    short, long = family_summary(certificate, "net"), family_lines(certificate, "net")
+    for groups in (told(short, "groups"), told(long, "groups"), page):
+        assert keep in groups and "(41 in all) end between these, up to signs, or move there for ever" in groups
+    for boxes in (told(short, "box"), told(long, "box"), page):
+        assert f"every signal draws 41 agents into {intervals} intervals in all, within [" in boxes
+        assert "; no limit is claimed" in boxes and "... ..." not in boxes and "......" not in boxes
+    for text in (told(lines, head) for lines in (short, long) for head in ("groups", "box")):
+        assert not re.search(r"\.\.\. ?\.\.\.|\.\.\.$", text), text
+    hull = [Fraction(x) for x in re.search(r"within \[(.*), (.*)\], at", told(short, "box")).groups()]
+    assert hull[0] <= min(box.lower) and max(box.upper) <= hull[1]
+
+
+def test_intervals_that_do_not_fit_the_short_screen_are_listed_on_the_long_one():
+    family = many_followers(3)
+    certificate = certify_family(family, PROTOCOL, range(family.n_nodes))
+    assert "4 agents into " in told(family_summary(certificate, "net"), "box")
+    assert all(f"follower{k} into [" in told(family_lines(certificate, "net"), "box") for k in range(3))
+
+
+def test_many_groups_that_agree_are_counted():
+    pairs = [(f"a{k}", f"b{k}", 1, 2) for k in range(5)] + [(f"b{k}", f"a{k}", 1, 2) for k in range(5)]
+    (component,) = ptcc.decide([*pairs, *((f"a{k}", "last", 1, 2) for k in range(5))])
+    assert groups_text(component).startswith(
+        "5 groups, of 10 agents in all, agree each within itself; last ends between"
+    )
 
 
 def assert_once(component: FamilyComponent, text: str) -> None:
