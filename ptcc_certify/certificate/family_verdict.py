@@ -64,7 +64,8 @@ def assess_family(certificate: FamilyContent, report: CheckReport | None) -> Ass
             else f"the independent check does not accept {report.rejected}: {report.reason}"
         )
         return Assessment(UNDECIDED, False, None, why, "", tuple(answers))
-    useful, caveat, rho2, effects = _usefulness(certificate), "", Fraction(0), []
+    useful, caveat, rho2 = _usefulness(certificate), "", Fraction(0)
+    effects: list[str] = []
     if useful is False:
         gain = _useful_rho2(certificate) if certificate.direct else _useful_rho2_while_driven(certificate)
         rho2, effects = (rho2, effects) if gain is None else (gain, ["leaves 1 %"])
@@ -222,7 +223,7 @@ def _useful_rho2_while_driven(certificate: FamilyContent) -> Fraction | None:
         return None
 
     def suffices(rho2: float) -> bool:
-        other = replace(certificate, protocol=replace(protocol, rho2=Fraction(up(rho2, 3))))
+        other = replace(certificate, protocol=protocol.replace(rho2=Fraction(up(rho2, 3))))
         left, enough = _target(other)
         return bool(other.deviation_bound([left]).max() <= enough)
 

@@ -343,7 +343,7 @@ def test_where_the_sliding_part_may_grow_no_peak_is_claimed():
 
 def test_the_gain_that_is_named_where_the_bound_says_little_is_enough():
     path = [("a", "b", 1), ("b", "a", 1), ("b", "c", -1), ("c", "b", -1)]
-    modes = {"one": SignedDigraph.from_edges(path), "two": SignedDigraph.from_edges([*path, ("a", "c", -1)])}
+    modes = Family.switching([SignedDigraph.from_edges(path), SignedDigraph.from_edges([*path, ("a", "c", -1)])])
     gains = {"T_r": 1, "T_s": 1, "rho1": 1, "kappa": 1, "mu1": 2, "mu2": 1, "mu3": 1, "delta": 1}
     asked = {"x0": [1, 2, 3], "sigma0": ["0.1", 0, 0]}
     weak = certify_family(modes, SlidingModeProtocol(rho2="0.1", **gains), **asked)
