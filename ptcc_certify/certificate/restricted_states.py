@@ -7,8 +7,11 @@ docs/theory/families.md, "Restricted signals".
 
 from __future__ import annotations
 
-from ptcc_certify.certificate.family_content import FamilyContent
-from ptcc_certify.checker.reading import Interval
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ptcc_certify.certificate.family_content import FamilyContent
+    from ptcc_certify.checker.reading import Interval
 
 
 def last_states(certificate: FamilyContent) -> list[Interval | None]:

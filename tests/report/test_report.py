@@ -238,10 +238,11 @@ def test_numbers_are_rounded_to_the_safe_side():
         assert made.effort.peak.largest <= number(peak) <= made.effort.peak.largest * Fraction(1001, 1000)
         energy = next(value for key, value in bounds.items() if key.startswith("Energy")).partition("\u2264")[2]
         assert made.effort.energy.value <= number(energy)
-        for instant, left, deviation in rows(source, "Bounds, rounded up"):
-            if instant == "Tr":
-                continue
-            q = float(1 - number(instant))
+        share = 1 if made.direct else float(made.protocol.span / made.protocol.T)
+        begin, unit = ("", "T") if made.direct else ("Tr + ", "Ts")
+        left_at = rows(source, "Bounds, rounded up")[-3:]
+        assert [row[0] for row in left_at] == [f"{begin}{f}\u00a0{unit}" for f in (0.5, 0.9, 0.99)]
+        for q, (_, left, deviation) in zip((0.5 * share, 0.1 * share, 0.01 * share), left_at, strict=True):
             bound = made.envelope.residual(q) if made.direct else float(made.norm_bound([q])[0])
             assert Fraction(bound) <= number(left) <= Fraction(bound) * Fraction(12, 10)
             assert float(made.deviation_bound([q]).max()) <= float(number(deviation))
