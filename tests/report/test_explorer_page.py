@@ -330,10 +330,8 @@ def test_nothing_on_the_page_moves_while_values_change(browser: Any, address: st
 
 
 @pytest.mark.browser
-def test_a_moved_slider_changes_image_and_text_within_a_second(
-    browser: Any, forty: Path, capsys: pytest.CaptureFixture[str]
-):
-    """On every packaged graph and on one of 40 nodes; the best of three moves, and longer on a machine that is busy."""
+def test_a_moved_slider_changes_image_and_text(browser: Any, forty: Path, capsys: pytest.CaptureFixture[str]):
+    """On every packaged graph and on one of 40 nodes; how long it takes is for ``benchmarks/explorer.py``."""
     with started(str(forty)) as (_, address):
         page = Page(browser, address, 1280, 900)
         for kind in ("nominal", "sliding-mode"):
@@ -359,8 +357,6 @@ def test_a_moved_slider_changes_image_and_text_within_a_second(
                     assert page.shown() != (image, text)
                 with capsys.disabled():
                     print(f"\n{graph:<10} {kind:<12} image and text after", *(f"{x:.2f}" for x in seconds))
-                allowed = max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
-                assert min(seconds) < allowed, graph
 
 
 @pytest.mark.browser
