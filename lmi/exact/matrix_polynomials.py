@@ -1,8 +1,8 @@
 """Symmetric matrix polynomials that are nonnegative on an interval, decided exactly, with the standard library.
 
-On ``[low, high]`` a polynomial of degree ``m`` is ``F(x) = sum_i C(m, i) t^i (1 - t)^(m - i) B_i``, a convex combination
-of its Bernstein coefficients ``B_i``, where ``t`` goes from 0 to 1. If all of them are nonnegative, so is ``F``; where
-``F > 0`` that holds on all short pieces of the interval.
+On ``[low, high]`` a polynomial of degree ``m`` is ``F(x) = sum_i C(m, i) t^i (1 - t)^(m - i) B_i``, a convex
+combination of its Bernstein coefficients ``B_i``, where ``t`` goes from 0 to 1. If all of them are nonnegative, so is
+``F``; where ``F > 0`` that holds on all short pieces of the interval.
 
 References
 ----------
