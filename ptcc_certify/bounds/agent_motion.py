@@ -14,8 +14,8 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.protocols.gain import Gain
 
 Interval = tuple[Fraction, Fraction]
-#: Bits after the point that are kept of a common motion that is not rational.
-BITS = 200
+#: Bits after the point that are kept of a common motion that is not rational, and that are computed.
+KEPT_BITS, BITS = 80, 120
 #: Terms of a series at most, and the largest ``w`` of one.
 MOST_TERMS, LARGEST_DECAY = 10_000, 100
 
@@ -32,21 +32,29 @@ def common_motion(plant: Sequence[Fraction], own: Sequence[Fraction], gain: Gain
     >>> [[str(x) for x, _ in row] for row in common_motion([zero, zero], [zero, zero], gain)]
     [['1', '2'], ['0', '1']]
     >>> at_rest = common_motion([zero, zero], [zero, Fraction(1)], gain)
-    >>> float(at_rest[0][1][0]).__round__(6), float(at_rest[0][1][1]) < 1e-50  # int e^(-t) (1 - t/2) dt
+    >>> float(at_rest[0][1][0]).__round__(6), float(at_rest[0][1][1]) < 1e-20  # int e^(-t) (1 - t/2) dt
     (0.567668, True)
     """
     n, T, zero = len(plant), gain.T, (Fraction(0), Fraction(0))
     if any(own):
         w = (plant[1] + own[1] * gain.rho1) * T
         middle, radius = decay_integral(w, own[1] * gain.pole)
-        return ((Fraction(1), Fraction(0)), (T * middle, T * radius)), (zero, zero)
+        return ((Fraction(1), Fraction(0)), _wide(T * middle, T * radius)), (zero, zero)
     if not any(plant):
         return tuple(
             tuple((T ** (j - i) / math.factorial(j - i), Fraction(0)) if j >= i else zero for j in range(n))
             for i in range(n)
         )
     middle, radius = expm([[T * x for x in row] for row in companion(plant)], BITS)
-    return tuple(tuple((x, radius) for x in row) for row in middle)
+    return tuple(tuple(_wide(x, radius) for x in row) for row in middle)
+
+
+def _wide(middle: Fraction, radius: Fraction) -> Interval:
+    """Return an interval of few digits, wide enough for whoever encloses the same to a few digits more."""
+    if not radius:
+        return middle, radius
+    unit = 2**KEPT_BITS
+    return Fraction(round(middle * unit), unit), radius + Fraction(1 + math.ceil(abs(middle)), unit)
 
 
 def companion(plant: Sequence[Fraction]) -> list[list[Fraction]]:
