@@ -22,6 +22,7 @@ from ptcc_certify.bounds.input.effort import Effort
 from ptcc_certify.bounds.input.effort_bounds import InputRequest, bound_effort
 from ptcc_certify.bounds.input.worst_initial_state import WorstInitialState, worst_initial_state
 from ptcc_certify.bounds.sliding_envelope import SlidingEnvelope
+from ptcc_certify.certificate.agents_part import AgentsPart
 from ptcc_certify.certificate.format_vectors import final_state_witness
 from ptcc_certify.certificate.request import Expectations, Request
 from ptcc_certify.checker import CheckReport
@@ -127,6 +128,7 @@ class Content:
     request: Request
     observed: Observations
     source: Source | None = None
+    agents: AgentsPart | None = None
 
     def changed(self, **values: Any) -> Self:
         """Return the certificate with other parts, in whichever group they are; what follows is computed anew.
@@ -150,6 +152,8 @@ class Content:
         """
         if self.source is not None and values.keys() - _OF_NO_FILE:
             raise ParameterError("a certificate that was read is what its file says; certify the graph again")
+        if self.agents is not None and values.keys() & {"protocol", "initial_state", "sigma0"}:
+            raise ParameterError("gains and bounds of agents of order n belong to their protocol; certify them again")
         if (search := values.pop("search", None)) is not None:
             values |= {"searched_functions": search.functions, "search": replace(search, functions=())}
         if values.keys() & {"protocol", "initial_state", "sigma0"}:
@@ -446,7 +450,7 @@ class Content:
         """What is proved about the input; None if no decay was proved."""
         if self.source is not None:
             return self.source.effort
-        if self.rate is None and not self.constant:
+        if self.agents is not None or (self.rate is None and not self.constant):
             return None
         request = InputRequest(
             self.structure,
@@ -505,6 +509,8 @@ class Content:
                 obligations.append(Obligation("reaching-time", "reaching_time"))
         if self.effort is not None:
             obligations += self.effort.obligations
+        if self.agents is not None:
+            obligations += self.agents.obligations
         return tuple(obligations)
 
     # ------------------------------------------------------------------ simulation

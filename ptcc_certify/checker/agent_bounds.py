@@ -176,8 +176,8 @@ def _adjugate(W: Matrix) -> tuple[Matrix, int]:
     bits = n * longest(chain.from_iterable(W))
     spend(2 * n**3, bits, bits, "the inverse of W")
     rows = [[*row, *(int(i == j) for j in range(n))] for i, row in enumerate(W)]
-    for k, own in enumerate(rows):
-        pivot = own[k]
+    for k in range(n):
+        own, pivot = rows[k], rows[k][k]
         rows = [
             row if i == k else [(pivot * x - row[k] * y) // before for x, y in zip(row, own, strict=True)]
             for i, row in enumerate(rows)
