@@ -75,7 +75,14 @@ class AgentOracle(Oracle):
         if self.false:
             return
         self.used = [(e, self.data["lyapunov"]["functions"][e["function"]]) for e in self.agents["functions"]]
-        for claim in (self.decrease, self.spectrum, self.error_constants, self.common, self.ends, self.bounds_of_motion):
+        for claim in (
+            self.decrease,
+            self.spectrum,
+            self.error_constants,
+            self.common,
+            self.ends,
+            self.bounds_of_motion,
+        ):
             claim()
 
     # ------------------------------------------------------------------ decrease
@@ -133,7 +140,10 @@ class AgentOracle(Oracle):
                 continue
             _, P, _, nodes = self.form(function)
             for v, c in enumerate(self.vector(entry["inputs"])):
-                S = [[c * x - (u == v) * (w == v) for x, w in zip(row, nodes, strict=True)] for row, u in zip(P, nodes, strict=True)]
+                S = [
+                    [c * x - (u == v) * (w == v) for x, w in zip(row, nodes, strict=True)]
+                    for row, u in zip(P, nodes, strict=True)
+                ]
                 self.require(c >= 0 and semidefinite(S), "a constant of the input")
 
     # ------------------------------------------------------------------ common motion
@@ -318,7 +328,8 @@ def eliminated(left: list[list[Any]]) -> bool:
         pivot = left[k]
         rest = [i for i in range(len(left)) if i != k]
         left = [
-            [left[i][j] - left[i][k] * pivot[j] / pivot[k] if left[i][k] != 0 else left[i][j] for j in rest] for i in rest
+            [left[i][j] - left[i][k] * pivot[j] / pivot[k] if left[i][k] != 0 else left[i][j] for j in rest]
+            for i in rest
         ]
     return True
 

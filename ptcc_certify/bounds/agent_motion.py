@@ -45,16 +45,17 @@ def common_motion(plant: Sequence[Fraction], own: Sequence[Fraction], gain: Gain
             tuple((T ** (j - i) / math.factorial(j - i), Fraction(0)) if j >= i else zero for j in range(n))
             for i in range(n)
         )
-    middle, radius = expm([[T * x for x in row] for row in companion(plant)], BITS)
-    return tuple(tuple(_wide(x, radius) for x in row) for row in middle)
+    rows, wide = expm([[T * x for x in row] for row in companion(plant)], BITS)
+    return tuple(tuple(_wide(x, wide) for x in row) for row in rows)
 
 
 def _wide(middle: Fraction, radius: Fraction) -> Interval:
     """Return an interval of few digits, wide enough for whoever encloses the same to a few digits more."""
     if not radius:
         return middle, radius
-    unit = 2**KEPT_BITS
-    return Fraction(round(middle * unit), unit), radius + Fraction(1 + math.ceil(abs(middle)), unit)
+    unit, finer = 2**KEPT_BITS, 2 ** (KEPT_BITS + 16)
+    wide = radius + Fraction(1 + math.ceil(abs(middle)), unit)
+    return Fraction(round(middle * unit), unit), Fraction(math.ceil(wide * finer), finer)
 
 
 def companion(plant: Sequence[Fraction]) -> list[list[Fraction]]:

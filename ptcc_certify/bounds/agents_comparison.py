@@ -63,7 +63,7 @@ def compare_agents(
     """Compare a run with what the functions and the matrix prove of it; None where nothing disagrees."""
     later = np.isfinite(run.scaled).all(axis=(0, 1, 2)) & (run.t > 0)
     z, L = run.scaled[..., later], structure.graph.laplacian()
-    N, d, n, M = z.shape
+    N, n = len(z), z.shape[2]
     P = np.linalg.cholesky(np.array([[float(x) for x in row] for row in matrix.inverse])).T
     decay, deviation, relative = 0.0, np.full((N, n), np.inf), np.full(N, np.inf)
     for V, value, own in zip(functions, initial_values, inputs, strict=True):

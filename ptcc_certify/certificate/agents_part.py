@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from lmi.exact.decimal_rounding import float_down, float_up, up
 from ptcc_certify.bounds.agent_motion import Interval, common_motion
 from ptcc_certify.bounds.agents import States, error_constants, initial_value, root_product, scaled_states
+from ptcc_certify.bounds.agents_comparison import AgentsComparison, compare_agents
 from ptcc_certify.bounds.final_state import Influence
 from ptcc_certify.bounds.input.tightest_bound import round_up
 from ptcc_certify.certificate.format_vectors import agents_ends, weighted_sum
 from ptcc_certify.checker.input_formulas import Limits, decay_above
+from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.agents import Agents, AgentsProtocol
+from ptcc_certify.simulation.agents import AgentsTrajectory, simulate_agents
 from ptcc_certify.theorems.agent_decrease import AgentMatrix, ScaledAgent, agent_matrix
 from ptcc_certify.theorems.theorem import Obligation
 
@@ -109,6 +114,16 @@ class AgentsPart:
         """Whether some derivative of a final state is not 0."""
         return any(m or r for agent in self.final_state or () for chain in agent for m, r in chain[1:])
 
+    @property
+    def longest_way(self) -> float:
+        """The longest way of an agent from its initial to its final position (numerical); 0 without a final state."""
+        begin, end = self.initial_state or (), self.final_state or ()
+        squares = [
+            sum(float(x[0] - m[0][0]) ** 2 for x, m in zip(agent, place, strict=True))
+            for agent, place in zip(begin, end, strict=False)
+        ]
+        return math.sqrt(max(squares, default=0.0))
+
     @cached_property
     def initial_values(self) -> tuple[Fraction, ...]:
         """``V(0)`` of every function used."""
@@ -136,16 +151,6 @@ class AgentsPart:
 
     # ------------------------------------------------------------------ bounds over time
 
-    def clock(self, remaining: np.ndarray) -> np.ndarray:
-        """Return ``s`` where ``1 - t/T`` is ``remaining``, under the cap if there is one."""
-        gain, cap = self.protocol.gain, self.protocol.gain_cap
-        q = np.asarray(remaining, dtype=float)
-        if cap is None:
-            return gain.clock_at_remaining(q)
-        T = float(gain.T)
-        turn = 1.0 if cap <= gain.first else float(gain.pole / (gain.T * (cap - gain.rho1)))
-        return gain.clock_at_remaining(np.maximum(q, turn)) + float(cap) * T * np.maximum(turn - q, 0)
-
     def deviation_bound(self, remaining: np.ndarray) -> np.ndarray:
         """Return (N, n, M) bounds of the deviation of each derivative from the common motion.
 
@@ -162,8 +167,30 @@ class AgentsPart:
                 roots = np.minimum(roots, np.array(rows))
         eta = np.array([self.protocol.value(x) for x in q])
         with np.errstate(over="ignore", invalid="ignore"):
-            fall = -float_down(self.matrix.rate) / 2 * self.clock(q) + np.outer(np.arange(self.order), np.log(eta))
+            fall = -float_down(self.matrix.rate) / 2 * self.protocol.clock(q) + np.outer(
+                np.arange(self.order), np.log(eta)
+            )
             return roots[:, :, None] * np.exp(fall + 1e-9)
+
+    def simulate(self, **options: Any) -> AgentsTrajectory:
+        """Run the agents from their initial states; options are those of :func:`simulate_agents`.
+
+        Raises
+        ------
+        ParameterError
+            There are no initial states.
+        SimulationError
+            The integrator failed.
+        """
+        if self.initial_state is None:
+            raise ParameterError("the certificate has no initial state; certify the graph with x0")
+        states = [[[float(x) for x in chain] for chain in agent] for agent in self.initial_state]
+        return simulate_agents(self.structure.graph, self.protocol, states, float(self.matrix.rate), **options)
+
+    def compare(self, run: AgentsTrajectory) -> AgentsComparison | None:
+        """Compare a run with what is proved of it; None where nothing disagrees."""
+        inputs = [one.inputs for one in self.used]
+        return compare_agents(self.structure, self.matrix, self.functions, self.initial_values, inputs, self.input, run)
 
     def __repr__(self) -> str:
         size = "" if self.input is None else f", |u_k| <= {up(max(self.input), 4)}"
@@ -198,7 +225,7 @@ def prove_agents(
     NoCertificate
         No matrix for one agent was found.
     """
-    gain, n = base.gain, agents.degree
+    gain = base.gain
     proved = [V.proved_rate for V in functions]
     best = max((rate for rate in proved if rate > 0), default=None)
     coupling = Fraction(1) if best is None else Fraction(up(1 / best, 6))
@@ -208,7 +235,6 @@ def prove_agents(
     protocol = AgentsProtocol(
         base, agents.coefficients, agents.own, matrix.gains, tuple(map(tuple, offsets)), agents.cap
     )
-    exact = structure.graph.n_nodes and influence.exact
     constants = [error_constants(structure, functions[k]) if functions[k].matrix is not None else None for k in used]
     part = AgentsPart(
         structure,
@@ -219,7 +245,8 @@ def prove_agents(
         initial_state,
         common_motion(agents.coefficients, agents.own, gain),
     )
-    final = _final_state(part, influence) if exact and initial_state is not None else None
+    decided = initial_state is not None and bool(used or not structure.graph.n_edges)
+    final = _final_state(part, influence) if influence.exact and decided else None
     return replace(part, final_state=final, residual=_residual(part), input=_input(part))
 
 

@@ -12,7 +12,7 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io.initial_state import as_states, random_states
 from ptcc_certify.graphs.rationals import shorten, writable
 from ptcc_certify.protocols import Protocol
-from ptcc_certify.protocols.agents import DERIVATIVES, MOST_DIMENSION, Agents
+from ptcc_certify.protocols.agents import DERIVATIVES, MOST_DIMENSION, PLURALS, Agents
 
 #: What is asked of single integrators alone.
 _NOT_OF_AGENTS = {
@@ -106,7 +106,7 @@ def read_chains(agents: Agents, graph: SignedDigraph, x0: Any, v0: Any, derivati
             columns.append([[Fraction(0)] * d for _ in positions])
         else:
             columns.append(_states(value, graph, "v0" if i == 1 else f"derivatives[{i - 1}] ({name})", d))
-    missing = [DERIVATIVES[i] for i in range(1, min(n, len(DERIVATIVES))) if i > len(given) or given[i - 1] is None]
+    missing = [PLURALS[i] for i in range(1, min(n, len(PLURALS))) if i > len(given) or given[i - 1] is None]
     if missing and v0 is None and derivatives is None:
         notes.append(f"no {' and '.join(missing)} given: taken for 0")
     chains = tuple(tuple(tuple(columns[i][k][q] for i in range(n)) for q in range(d)) for k in range(graph.n_nodes))

@@ -15,6 +15,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from ptcc_certify.bounds.agents_comparison import AgentsComparison
 from ptcc_certify.bounds.deviation_from_final_state import DeviationGeometry
 from ptcc_certify.bounds.envelope import Comparison, Envelope, remaining_part
 from ptcc_certify.bounds.final_state import FinalState, Influence, final_state, influence
@@ -38,6 +39,7 @@ from ptcc_certify.lyapunov.search import DIAGONAL, Search
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.disturbance import ExpressionDisturbance
 from ptcc_certify.protocols.reaching_time import ReachingTime
+from ptcc_certify.simulation.agents import AgentsTrajectory
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.trajectory import Trajectory
 from ptcc_certify.theorems.claims import Claim, sliding_claim
@@ -66,6 +68,8 @@ class Observations:
         The searches that the time limit ended; what they had proved by then stands.
     notes : tuple of str
         What kept the verdict from ``certified``, and other remarks.
+    agents_run : AgentsTrajectory or None
+        A simulated run of agents of order n.
     """
 
     trajectory: Trajectory | None = None
@@ -74,6 +78,7 @@ class Observations:
     search: Search = field(default_factory=Search)
     cut_off: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    agents_run: AgentsTrajectory | None = None
 
 
 #: What may be put to a certificate that was read: what is asked, and what was seen.
@@ -521,6 +526,17 @@ class Content:
         if self.trajectory is None or not (self.envelope.functions or self.protocol.reaching):
             return None
         return self.envelope.compare(self.trajectory)
+
+    @cached_property
+    def agents_comparison(self) -> AgentsComparison | None:
+        """The simulated run of agents of order n against the proved bounds; None without a run."""
+        run = self.observed.agents_run
+        return None if self.agents is None or run is None else self.agents.compare(run)
+
+    @property
+    def violated(self) -> bool:
+        """Whether a simulated run exceeds a proved bound."""
+        return any(seen is not None and seen.violated for seen in (self.comparison, self.agents_comparison))
 
     @property
     def disturbance(self) -> str | None:

@@ -253,7 +253,8 @@ def certify(
     initial_state = None if x0 is None or chains else read_initial_state(structure, x0, "x0")
     manifold, reaching = read_sliding_variable(structure, protocol, sigma0)
     case = Case(structure, protocol, request, initial_state, manifold, progress)
-    runs = case.needs_run(simulation) and initial_state is not None
+    wanted = case.needs_run(simulation)
+    runs = wanted and initial_state is not None
     if not runs and disturbance is not None and protocol.reaching is not None:
         _check_disturbance(disturbance, protocol.reaching, graph)
     with deadline.time_limit(SEARCHING * request.time_limit):
@@ -286,7 +287,7 @@ def certify(
         ),
     )
     if of_agents is not None and chains is not None:
-        certificate = _with_agents(certificate, of_agents, chains, simulation is not False)
+        certificate = _with_agents(certificate, of_agents, chains, wanted)
     progress(STEPS[5])
     return _with_word_of_check(certificate)
 
@@ -318,7 +319,13 @@ def _with_agents(certificate: Certificate, agents: Agents, chains: Chains, run: 
         )
     except NoCertificate as error:
         raise ParameterError(f"agents: {error}; ask for a smaller decay or a lower order") from None
-    return certificate.changed(agents=part, notes=(*certificate.notes, *chains.notes))
+    notes, motion = [*certificate.notes, *chains.notes], None
+    if run and part.initial_state is not None:
+        try:
+            motion = part.simulate()
+        except SimulationError as error:
+            notes.append(f"simulation: {error}")
+    return certificate.changed(agents=part, notes=tuple(notes), agents_run=motion)
 
 
 def _check_disturbance(disturbance: Any, protocol: ReachingProtocol, graph: SignedDigraph) -> None:

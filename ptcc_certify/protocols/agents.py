@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ptcc_certify.errors import NumberError, ParameterError, gated
 from ptcc_certify.graphs.digraph import Exact
 from ptcc_certify.graphs.io import as_graph
@@ -26,6 +28,7 @@ MOST_ORDER, MOST_DIMENSION = 8, 8
 MOST_MOTION, LONGEST_BITS = 100, 2000
 #: Derivatives of a position by their names.
 DERIVATIVES = ("position", "velocity", "acceleration", "jerk")
+PLURALS = ("positions", "velocities", "accelerations", "jerks")
 
 
 @gated
@@ -100,8 +103,7 @@ give 4, from which on the input is bounded
         """Refuse what does not fit together."""
         n, decay = self.degree, self.decay_rate
         if decay <= 2 * (n - 1) and self.gain_cap is None:
-            name = DERIVATIVES[n - 1] if n <= len(DERIVATIVES) else f"derivative {n - 1}"
-            plural = {"velocity": "velocities"}.get(name, f"{name}s")
+            plural = PLURALS[n - 1] if n <= len(PLURALS) else f"derivatives {n - 1}"
             raise ParameterError(
                 f"decay = {readable(decay)} is not above 2 (n - 1) = {2 * (n - 1)}: {plural} would not agree at T; "
                 f"give {2 * n}, from which on the input is bounded"
@@ -216,8 +218,8 @@ class AgentsProtocol:
     Examples
     --------
     >>> from ptcc_certify.protocols import NominalProtocol
-    >>> base, zero = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), Fraction(0)
-    >>> protocol = AgentsProtocol(base, (zero, zero), (zero, zero), (Fraction(3), Fraction(2)), ((zero,), (zero,)), None)
+    >>> base, zero, K = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), Fraction(0), (Fraction(3), Fraction(2))
+    >>> protocol = AgentsProtocol(base, (zero, zero), (zero, zero), K, ((zero,), (zero,)), None)
     >>> loop = protocol.closed_loop(SignedDigraph.from_edges([(1, 2, 1)]))
     >>> loop["x"], loop["ode"].shape
     (SX([x1, x2, x1_1, x2_1]), (4, 1))
@@ -241,9 +243,25 @@ class AgentsProtocol:
         return self.base.gain
 
     def value(self, remaining: float) -> float:
-        """Return ``eta`` where ``1 - t/T`` is ``remaining``."""
-        free = float(self.gain.value_at_remaining(remaining))
-        return free if self.gain_cap is None else min(free, float(self.gain_cap))
+        """Return ``eta`` where ``1 - t/T`` is ``remaining``, before ``T``, or at ``T`` under a cap."""
+        cap, free = self.gain_cap, float(self.gain.value_at_remaining(remaining))
+        if cap is None:
+            return free
+        return float(cap) if remaining <= self.capped_from else min(free, float(cap))
+
+    @property
+    def capped_from(self) -> float:
+        """``1 - t/T`` from which on the gain is capped; 0 if it never is."""
+        cap, gain = self.gain_cap, self.gain
+        if cap is None:
+            return 0.0
+        return 1.0 if cap <= gain.first else float(gain.pole / (gain.T * (cap - gain.rho1)))
+
+    def clock(self, remaining: np.ndarray) -> np.ndarray:
+        """Return ``s``, the integral of ``eta``, where ``1 - t/T`` is ``remaining``."""
+        q, turn = np.asarray(remaining, dtype=float), self.capped_from
+        cap = 0.0 if self.gain_cap is None else float(self.gain_cap)
+        return self.gain.clock_at_remaining(np.maximum(q, turn)) + cap * float(self.gain.T) * np.maximum(turn - q, 0)
 
     def _gain(self, t: ca.SX) -> ca.SX:
         import casadi as ca
@@ -273,10 +291,10 @@ class AgentsProtocol:
 
         graph, eta, n = as_graph(graph), self._gain(t), self.order
         h = ca.vertcat(*(float(row[coordinate]) for row in self.offsets))
-        total = float(self.plant[0]) * h
+        total = float(self.plant[0]) * ca.SX(h)
         for i in range(n):
             y = states[i] - h if i == 0 else states[i]
-            total += eta ** (n - i) * (float(self.gains[i]) * coupling(graph, y) - float(self.own[i]) * y)
+            total = total + eta ** (n - i) * (float(self.gains[i]) * coupling(graph, y) - float(self.own[i]) * y)
         return total
 
     def closed_loop(self, graph: Any, coordinate: int = 0) -> dict[str, ca.SX]:
@@ -320,7 +338,8 @@ class AgentsProtocol:
             total -= float(f) * g ** (n - i) * ca.SX.sym(_derivative(own if i == 0 else "x_{k}", i)) if f else 0
         total += float(self.plant[0]) * ca.SX.sym("h_{k}") if self.plant[0] and shown else 0
         listener, source = (f"\\left(x_{{{v}}} - h_{{{v}}}\\right)" if shown else f"x_{{{v}}}" for v in "kl")
-        error = rf"\sum_{{l=1}}^{{N}} w_{{kl}} \left({source} - \operatorname{{sign}}\left(w_{{kl}}\right) {listener}\right)"
+        pull = rf"\left({source} - \operatorname{{sign}}\left(w_{{kl}}\right) {listener}\right)"
+        error = rf"\sum_{{l=1}}^{{N}} w_{{kl}} {pull}"
         gain = self.gain.latex(numbers=True)
         if self.gain_cap is not None:
             gain = rf"\min\left({float(self.gain_cap):g}, {gain}\right)"

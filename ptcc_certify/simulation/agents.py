@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 MOST_STATES = 3000
 #: Singular values of ``L`` below this, relatively, are 0.
 _ZERO = 1e-9
+#: ``1 - t/T`` that stands for 0 in the common motion.
+_NEXT = 1e-17
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,6 +152,7 @@ def simulate_agents(
     if N * d * n > MOST_STATES:
         raise SimulationError(f"more than {MOST_STATES} numbers to integrate; simulate fewer agents")
     q = np.unique(np.concatenate([np.geomspace(remaining, 1, samples), np.linspace(remaining, 1, samples // 2)]))[::-1]
+    q = q if protocol.gain_cap is None else np.append(q, 0.0)
     h = np.array([[float(x) for x in row] for row in protocol.offsets])
     xi[:, :, 0] -= h
     U, kernel, block = _split(graph)
@@ -157,7 +160,7 @@ def simulate_agents(
     common = kernel @ coordinates[U.shape[1] :]
     zeta0 = 1 / protocol.value(1.0)
     scale = np.tile(zeta0 ** np.arange(n), d)
-    clock = _clock(protocol, q)
+    clock = protocol.clock(q)
     z = _integrate(graph, protocol, coordinates[: U.shape[1]] * scale, block, rate, q, rtol)
     scaled = np.moveaxis(np.einsum("km,imc->ikc", U, z).reshape(len(q), N, d, n), 0, -1)
     free = np.einsum("mij,kdj->kdim", _free_motion(protocol, q), common.reshape(N, d, n))
@@ -168,7 +171,8 @@ def simulate_agents(
     control = _input(graph, protocol, scaled * np.exp(-rate * clock / 2), free, eta)
     all_states[:, :, 0] += h[:, :, None]
     control += float(protocol.plant[0]) * h[:, :, None]
-    run = AgentsTrajectory(graph, protocol, float(protocol.gain.T) * (1 - q), q, clock, all_states, scaled, control, rtol)
+    t = float(protocol.gain.T) * (1 - q)
+    run = AgentsTrajectory(graph, protocol, t, q, clock, all_states, scaled, control, rtol)
     return run if protocol.gain_cap is not None else _with_deadline(run, common.reshape(N, d, n), h)
 
 
@@ -179,21 +183,6 @@ def _split(graph: SignedDigraph) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     rank = int((sizes > _ZERO * max(sizes.max(initial=0.0), 1e-300)).sum())
     U, kernel = left[:, :rank], right[rank:].T
     return U, kernel, U.T @ L @ U
-
-
-def _clock(protocol: AgentsProtocol, q: np.ndarray) -> np.ndarray:
-    """Return ``s`` where ``1 - t/T`` is ``q``."""
-    gain, turn = protocol.gain, _turn(protocol)
-    cap = 0.0 if protocol.gain_cap is None else float(protocol.gain_cap)
-    return gain.clock_at_remaining(np.maximum(q, turn)) + cap * float(gain.T) * np.maximum(turn - q, 0)
-
-
-def _turn(protocol: AgentsProtocol) -> float:
-    """Return ``1 - t/T`` from which on the gain is capped; 0 if it never is."""
-    cap, gain = protocol.gain_cap, protocol.gain
-    if cap is None:
-        return 0.0
-    return 1.0 if cap <= gain.first else float(gain.pole / (gain.T * (cap - gain.rho1)))
 
 
 def _integrate(
@@ -209,7 +198,7 @@ def _integrate(
     z = np.zeros((len(q), *state.shape))
     if not state.size or not np.abs(state).max():
         return z
-    motion, gain, turn = _Deviations(graph, state, block, protocol, rate, rtol), protocol.gain, _turn(protocol)
+    motion, gain, turn = _Deviations(graph, state, block, protocol, rate, rtol), protocol.gain, protocol.capped_from
     T, early = float(gain.T), q >= turn
     if turn < 1:
         end = -math.log(max(turn, float(q[-1])))
@@ -232,7 +221,7 @@ def _free_motion(protocol: AgentsProtocol, q: np.ndarray) -> np.ndarray:
     A = np.eye(n, k=1)
     A[-1] = [-float(a) for a in protocol.plant]
     if not any(protocol.own):
-        return np.array([expm(A * T * (1 - x)) for x in q])
+        return np.array([expm(A * T * (1 - x)) for x in q.tolist()])
     own, gain = list(map(float, protocol.own)), protocol.gain
 
     def slope(tau: float, flat: np.ndarray) -> np.ndarray:
@@ -254,7 +243,7 @@ def _input(
     graph: SignedDigraph, protocol: AgentsProtocol, deviations: np.ndarray, free: np.ndarray, eta: np.ndarray
 ) -> np.ndarray:
     """Return ``eta^n (K eps - f'y)``, (N, d, M), of deviations in the coordinates ``y`` and the common motion."""
-    n, (N, d, _, M) = protocol.order, deviations.shape
+    n, N = protocol.order, len(deviations)
     gains, own = (np.array(list(map(float, part))) for part in (protocol.gains, protocol.own))
     eps = -(graph.laplacian() @ deviations.reshape(N, -1)).reshape(deviations.shape)
     y = deviations + free / eta ** np.arange(n)[:, None]
@@ -263,7 +252,9 @@ def _input(
 
 def _with_deadline(run: AgentsTrajectory, common: np.ndarray, h: np.ndarray) -> AgentsTrajectory:
     """Return the run with ``T`` itself, where deviations are 0."""
-    last = np.einsum("ij,kdj->kdi", _free_motion(run.protocol, np.array([1.0, 1e-300]))[-1], common)
+    last = np.einsum("ij,kdj->kdi", _free_motion(run.protocol, np.array([1.0, _NEXT]))[-1], common)
+    if any(run.protocol.own):
+        last[:, :, 1:] = 0.0  # they rest
     last[:, :, 0] += h
     gone = np.full(run.scaled.shape[:3], np.nan)
     parts: Sequence[tuple[np.ndarray, Any]] = (

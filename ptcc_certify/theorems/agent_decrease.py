@@ -106,7 +106,7 @@ class ScaledAgent:
         return powers
 
     def vertices(self, points: Sequence[Fraction]) -> list[np.ndarray]:
-        """Return matrices in floats whose convex hull holds every ``A_z``: Bernstein matrices between points, the cap."""
+        """Return matrices in floats whose convex hull holds every ``A_z``: those of Bernstein, and that of the cap."""
         matrices = [A for low, high in pairwise(map(float, points)) for A in self._bernstein(low, high)]
         return matrices + ([] if self.cap is None else [_floats(self.matrix(Fraction(0), 1 / self.cap))])
 
@@ -116,7 +116,8 @@ class ScaledAgent:
         shifted = [
             (high - low) ** j * sum(comb(p, j) * low ** (p - j) * C[p] for p in range(j, m + 1)) for j in range(m + 1)
         ]
-        return [sum((comb(i, j) / comb(m, j) * shifted[j] for j in range(i + 1)), 0 * C[0]) for i in range(m + 1)]
+        shares = np.array([[comb(i, j) / comb(m, j) for j in range(m + 1)] for i in range(m + 1)])
+        return list(np.einsum("ij,jab->iab", shares, np.array(shifted)))
 
 
 def _floats(A: Matrix) -> np.ndarray:
