@@ -122,7 +122,7 @@ class AgentOracle(Oracle):
         """At constant gain nothing decays more slowly than the rate says."""
         if not self.used:
             return
-        T, _, k = self.gain
+        _T, _, k = self.gain
         theta = 1 / k if self.cap is None else Fraction(0)
         zeta = Fraction(0) if self.cap is None else 1 / self.cap
         A = np.array([[float(x) for x in row] for row in self.chain(zeta, theta)])

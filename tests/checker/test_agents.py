@@ -229,6 +229,16 @@ def smaller(part: str, *path: Any) -> Change:
     return change
 
 
+def clocked(factor: Fraction) -> Change:
+    """Another clock beside what is left."""
+
+    def change(data: Json) -> Json:
+        old = data["agents"]["residual"]
+        return with_agents(data, residual={**old, "clock": str(F(old["clock"]) * factor)})
+
+    return change
+
+
 def faster(data: Json) -> Json:
     return with_agents(data, rate=str(F(data["agents"]["rate"]) * F(11, 10)))
 
@@ -307,7 +317,8 @@ FORGERIES: dict[str, tuple[str, Change, str, str]] = {
     "one point": ("double integrators", points(lambda p: p[-1:]), "agent-decrease", "fewer than two"),
     "no points": ("double integrators", points(lambda p: []), "agent-decrease", "fewer than two"),
     "many points": (
-        "double integrators", points(lambda p: [str(F(p[1]) * j / 257) for j in range(258)]), "agents", "more than 257"),
+        "double integrators", points(lambda p: [str(F(p[1]) * j / 257) for j in range(258)]), "agents",
+        "more than 257"),
     "points where there are none": (
         "capped from the beginning", agents(points=["0", "4/5"]), "agent-decrease", "capped from the beginning"),
     "a cap that was not thought of": ("double integrators", agents(gain_cap="9"), "agent-decrease", "begin elsewhere"),
@@ -343,14 +354,11 @@ FORGERIES: dict[str, tuple[str, Change, str, str]] = {
         "capped later", smaller("residual", "agents", "f", 1), "agent-residual", "left of agent f"),
     "a longer clock": (
         "capped later",
-        lambda data: with_agents(
-            data, residual={**data["agents"]["residual"], "clock": str(F(data["agents"]["residual"]["clock"]) * F(1001, 1000))}),
-        "agent-residual", "clock is not proved"),
+        clocked(F(1001, 1000)), "agent-residual", "clock is not proved"),
     "a negative clock": (
-        "capped later", lambda data: with_agents(data, residual={**data["agents"]["residual"], "clock": "-1"}),
-        "agent-residual", "clock is negative"),
+        "capped later", clocked(F(-1)), "agent-residual", "clock is negative"),
     "nothing left without a cap": (
-        "double integrators", agents(residual={"clock": "1", "agents": dict.fromkeys("abcf", ["1", "1"])}),
+        "double integrators", agents(residual={"clock": "1", "agents": {key: ["1", "1"] for key in "abcf"}}),
         "agents.residual", "iff"),
     "what is left is not told": ("capped later", agents(residual=None), "agents.residual", "iff"),
     "no such function": ("double integrators", used(7), "agents.functions", "none such"),
@@ -387,9 +395,9 @@ FORGERIES: dict[str, tuple[str, Change, str, str]] = {
     "inputs in a side file": (
         "double integrators", agents(input={"agents": SIDE, "largest": "1"}), "agent-input", "in a side file"),
     "an agent less": (
-        "double integrators", agents(offsets=dict.fromkeys("abc", ["0"])), "agents", 'the key "f" is missing'),
+        "double integrators", agents(offsets={key: ["0"] for key in "abc"}), "agents", 'the key "f" is missing'),
     "agents in another order": (
-        "double integrators", agents(offsets=dict.fromkeys("fcba", ["0"])), "agents", "agents are in another order"),
+        "double integrators", agents(offsets={key: ["0"] for key in "fcba"}), "agents", "agents are in another order"),
     "an obligation less": ("double integrators", proof_without_the_last, "agent-input", "does not list"),
     "an obligation twice": ("double integrators", proof_with_one_twice, "proof", "nothing asks for"),
     "a witness": ("double integrators", with_witness, "agent-", "a witness that nothing asks for"),
@@ -415,7 +423,7 @@ def test_a_wrong_one_stays_wrong_in_the_eyes_of_the_oracle():
     false["a low input"] = false_claims_of_agents(with_agents(made(), input=low))
     left = with_agents(
         made("capped later"),
-        residual={**made("capped later")["agents"]["residual"], "agents": dict.fromkeys("abcf", ["0", "0"])},
+        residual={**made("capped later")["agents"]["residual"], "agents": {key: ["0", "0"] for key in "abcf"}},
     )
     false["nothing left"] = false_claims_of_agents(left)
     assert all(false.values()), false
@@ -469,7 +477,7 @@ def test_an_undecided_certificate_says_nothing_of_the_end():
 def test_nothing_takes_long(monkeypatch: pytest.MonkeyPatch):
     """Numbers of the longest kind, the most points, the largest order: answered or refused in seconds."""
     big = str(F(10**600 + 7, 10**600 + 9))
-    small = dict.fromkeys("abcf", [["1"] * 8])
+    small = {key: [["1"] * 8] for key in "abcf"}
     eight = Setting(order=8, rho1=F(0))
     base = of_graph(graph_of(CAMPS), replace(eight, order=1))
     points = [str(F(4, 3) * F(big) ** 0 * j / 256) for j in range(257)]
@@ -479,7 +487,7 @@ def test_nothing_takes_long(monkeypatch: pytest.MonkeyPatch):
     told = {
         **made()["agents"], "order": 8, "plant": [str(F(big) / (i + 1)) for i in range(8)], "own": ["0"] * 8,
         "gains": [big] * 8, "coupling": big, "lower_triangle": triangle, "rate": "100", "points": points,
-        "offsets": dict.fromkeys("abcf", ["0"]), "initial_state": small, "motion": [["0"] * 8] * 8,
+        "offsets": {key: ["0"] for key in "abcf"}, "initial_state": small, "motion": [["0"] * 8] * 8,
         "final_state": None, "input": None,
     }  # fmt: skip
     begin = time.process_time()
