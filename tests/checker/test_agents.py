@@ -139,8 +139,8 @@ def test_disconnected_graphs_and_single_nodes_are_accepted_and_true():
 
 
 def test_the_meeting_in_flight_of_the_theory():
-    """Camps ab and cd, ``x(0) = 5,2,4,-1``, ``v(0) = 1,0,0,-2``, T = 2: they meet at 4.5, flying at +-1/2."""
-    edges = [("a", "b", 1), ("b", "a", 1), ("a", "c", -1), ("c", "a", -1), ("c", "d", 1), ("d", "c", 1)]
+    """Allies ab, and allies cd who are enemies of a: they meet at 4.5 and -4.5 and fly on at 1/2 and -1/2."""
+    edges = [("a", "b", 1), ("b", "a", 1), ("a", "c", -1), ("c", "d", 1), ("d", "c", 1)]
     data = copy.deepcopy(document(graph_of(edges), replace(PLAIN, offsets=False)))
     begins = zip("abcd", ("5", "2", "4", "-1"), ("1", "0", "0", "-2"), strict=True)
     data["agents"]["initial_state"] = {label: [[x, v]] for label, x, v in begins}
@@ -412,14 +412,14 @@ def test_a_forged_certificate_is_rejected_for_its_reason(name: str):
 
 def test_a_wrong_one_stays_wrong_in_the_eyes_of_the_oracle():
     """The oracle is no rubber stamp: what the check rejects as false is false to it."""
-    judged = ("a negative coupling", "a faster rate", "another final position", "a smaller input", "another offset")
-    false = {name: false_claims_of_agents(FORGERIES[name][1](made(FORGERIES[name][0]))) for name in judged[:1]}
-    for name in ("another final position", "another offset", "another common motion", "another largest input"):
+    false = dict[str, list[str]]()
+    names = ("another final position", "another offset", "another common motion", "another largest input")
+    for name in ("a negative coupling", *names):
         setting, change, _, _ = FORGERIES[name]
         false[name] = false_claims_of_agents(change(made(setting)))
-    half = with_agents(made(), gains=numbers(made()["agents"]["gains"], F(1, 2)))
+    slack = with_agents(made(), gains=numbers(made()["agents"]["gains"], F(1, 20)))
     low = {"agents": dict.fromkeys("abcf", "1/10"), "largest": "1/10"}
-    false["half the gains"] = false_claims_of_agents(half)
+    false["low gains"] = false_claims_of_agents(slack)
     false["a low input"] = false_claims_of_agents(with_agents(made(), input=low))
     left = with_agents(
         made("capped later"),
@@ -461,7 +461,7 @@ def test_only_agents_of_order_n_may_do_without_rho1():
 
 
 def test_agents_of_order_n_on_a_family_are_refused():
-    one = Family([graph_of(CAMPS), graph_of([*CAMPS[:-1], ("a", "f", 1)])])
+    one = Family.switching([graph_of(CAMPS), graph_of([*CAMPS[:-1], ("a", "f", 1)])])
     data = json.loads(certify_family(one, NominalProtocol(T=2, rho1="1/2", rho2="3/4", kappa=2)).to_json())
     assert check(data).accepted
     rejected({**data, "agents": made()["agents"]}, "protocol|format", "on a family")
