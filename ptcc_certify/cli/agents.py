@@ -49,8 +49,8 @@ def agents_of(options: Options) -> Agents | None:
         if not given:
             return None
         kind = "integrator"
-    order = NAMES.get(kind, kind)
-    if isinstance(order, str) and not order.isdecimal():
+    order = str(NAMES.get(kind, kind))
+    if not order.isdecimal():
         raise ParameterError(f'--agents "{kind}" is unknown; one of {", ".join(NAMES)}, or an order such as 4')
     plant = None
     if options["plant"] is not None:
