@@ -245,7 +245,8 @@ def prove_agents(
         initial_state,
         common_motion(agents.coefficients, agents.own, gain),
     )
-    final = _final_state(part, influence) if influence.exact and initial_state is not None else None
+    decided = initial_state is not None and bool(used or not structure.graph.n_edges)
+    final = _final_state(part, influence) if influence.exact and decided else None
     return replace(part, final_state=final, residual=_residual(part), input=_input(part))
 
 

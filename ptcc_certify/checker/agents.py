@@ -40,12 +40,13 @@ def check_agents(doc: Document, verified: Verified) -> bool:
     M = check_motion(doc, agents, section["motion"])
     doc.at = "agents.final_state"
     final = verified.final
-    known = begin is not None and doc.data["influence"] is not None and final.weights is not None
-    need((section["final_state"] is not None) == known, "a final state iff there are initial states and weights")
-    if begin is not None and known:
+    proved = doc.data["influence"] is not None and (bool(used) or not graph.listening)
+    known = begin is not None and proved and final.weights is not None
+    need(known or section["final_state"] is None, "a final state without initial states, weights, or a proof")
+    if begin is not None and section["final_state"] is not None:
         check_final_states(doc, agents, final, M, begin.states, offsets)
     _bounds(doc, verified, agents, begin, used)
-    return doc.data["influence"] is not None and (bool(used) or not graph.listening)
+    return proved
 
 
 def _check_document(doc: Document, verified: Verified) -> None:
