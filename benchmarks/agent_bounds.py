@@ -15,10 +15,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
-from agent_cases import agent_case  # noqa: E402
+from agent_cases import agent_case
 
-from ptcc_certify.certificate.agents_part import AgentsPart  # noqa: E402
-from ptcc_certify.certificate.procedure import certify  # noqa: E402
+from ptcc_certify.certificate.agents_part import AgentsPart
+from ptcc_certify.certificate.procedure import certify
 
 
 def spectral_ratio(part: AgentsPart) -> float | None:

@@ -76,6 +76,7 @@ _EXPORTS = {
     # Bounds and design
     "final_state": "bounds.final_state",
     "influence": "bounds.final_state",
+    "formation_of_biases": "bounds.formation",
     "box": "bounds.input.initial_set",
     "ellipsoid": "bounds.input.initial_set",
     "worst_initial_state": "bounds.input.worst_initial_state",
