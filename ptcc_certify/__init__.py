@@ -11,8 +11,8 @@ The names at the top, by topic:
 
 - Graphs: ``SignedDigraph``, ``as_graph``, ``as_state``, ``read_graph``, ``write_graph``, ``analyse``, ``Structure``
 - Families of graphs: ``Family``, ``as_family``, ``read_family``, ``decide``
-- Protocols, disturbances, actuators: ``NominalProtocol``, ``SlidingModeProtocol``, ``ExpressionDisturbance``,
-  ``SampledDisturbance``, ``StateDependent``, ``telegraph_noise``, ``GainLimits``
+- Protocols, disturbances, actuators: ``Agents``, ``NominalProtocol``, ``SlidingModeProtocol``,
+  ``ExpressionDisturbance``, ``SampledDisturbance``, ``StateDependent``, ``telegraph_noise``, ``GainLimits``
 - Runs: ``simulate``, ``simulate_family``, ``Trajectory``
 - Certificates: ``certify``, ``certify_vectors``, ``Certificate``, ``Expectations``, ``read_certificate``, ``check``
 - Bounds and design: ``final_state``, ``influence``, ``box``, ``ellipsoid``, ``worst_initial_state``, ``design``
@@ -54,6 +54,7 @@ _EXPORTS = {
     "read_family": "graphs.io",
     "decide": "theorems.family_behaviour",
     # Protocols, disturbances, actuators
+    "Agents": "protocols.agents",
     "NominalProtocol": "protocols",
     "SlidingModeProtocol": "protocols",
     "ExpressionDisturbance": "protocols.disturbance",
@@ -75,6 +76,7 @@ _EXPORTS = {
     # Bounds and design
     "final_state": "bounds.final_state",
     "influence": "bounds.final_state",
+    "formation_of_biases": "bounds.formation",
     "box": "bounds.input.initial_set",
     "ellipsoid": "bounds.input.initial_set",
     "worst_initial_state": "bounds.input.worst_initial_state",

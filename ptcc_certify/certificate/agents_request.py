@@ -7,6 +7,7 @@ from fractions import Fraction
 from typing import Any, NamedTuple
 
 from ptcc_certify.bounds.agents import States
+from ptcc_certify.bounds.formation import formation_of_biases
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io.initial_state import as_states, random_states
@@ -68,10 +69,25 @@ def _entries(values: Any) -> list[Any]:
 
 
 def read_offsets(agents: Agents, graph: SignedDigraph, dimension: int) -> tuple[tuple[Fraction, ...], ...]:
-    """Return ``h_k`` of every agent; 0 unless they are given."""
-    if agents.offsets is None:
-        return ((Fraction(0),) * dimension,) * graph.n_nodes
-    rows = _states(agents.offsets, graph, "offsets", dimension)
+    """Return ``h_k`` of every agent: those that are given, and the places that biases make.
+
+    Raises
+    ------
+    ParameterError
+        They do not fit the graph, or biases fit no formation: who drifts, and how fast.
+    """
+    rows = [[Fraction(0)] * dimension for _ in graph.labels]
+    if agents.offsets is not None:
+        rows = _states(agents.offsets, graph, "offsets", dimension)
+    if agents.biases is not None:
+        made = formation_of_biases(graph, _states(agents.biases, graph, "biases", dimension))
+        if made.offsets is None:
+            named = "; ".join(map(str, made.groups[:3])) + "; ..." * (len(made.groups) > 3)
+            raise ParameterError(
+                f"biases fit no formation: leader group {named} per unit of the clock, without bound before T; "
+                "change them so that their weighted signed sum over each leader group is 0"
+            )
+        rows = [[x + y for x, y in zip(*pair, strict=True)] for pair in zip(rows, made.offsets, strict=True)]
     return tuple(map(tuple, rows))
 
 
@@ -114,7 +130,8 @@ def read_chains(agents: Agents, graph: SignedDigraph, x0: Any, v0: Any, derivati
 
 
 def _dimension_of(agents: Agents, graph: SignedDigraph) -> int:
-    return 1 if agents.offsets is None else len(_states(agents.offsets, graph, "offsets")[0])
+    given = {"offsets": agents.offsets, "biases": agents.biases}
+    return next((len(_states(rows, graph, name)[0]) for name, rows in given.items() if rows is not None), 1)
 
 
 def _states(values: Any, graph: SignedDigraph, name: str, dimension: int | None = None) -> list[list[Fraction]]:

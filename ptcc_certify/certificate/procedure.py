@@ -62,6 +62,7 @@ from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.agents import Agents
 from ptcc_certify.protocols.base import ReachingProtocol
 from ptcc_certify.protocols.disturbance import as_disturbance
+from ptcc_certify.protocols.reaching_time import ReachingTime
 from ptcc_certify.simulation.filippov import rounding_slack
 from ptcc_certify.simulation.instants import PAST
 from ptcc_certify.simulation.run import simulate
@@ -257,35 +258,7 @@ def certify(
     runs = wanted and initial_state is not None
     if not runs and disturbance is not None and protocol.reaching is not None:
         _check_disturbance(disturbance, protocol.reaching, graph)
-    with deadline.time_limit(SEARCHING * request.time_limit):
-        trajectory = case.simulation(disturbance) if runs else None
-        lyapunov, proof, numerical = case.paper()
-        search = case.search(proof)
-        limit = case.upper_bound()
-    matrix, result = case.final_state(trajectory)
-    proved = [proof.rate, *(V.rate for V in search.functions)]
-    certificate = Certificate(
-        structure=structure,
-        protocol=protocol,
-        initial_state=initial_state,
-        sigma0=manifold,
-        reaching=reaching,
-        lyapunov=lyapunov,
-        proof=proof,
-        searched_functions=search.functions,
-        limit=limit,
-        final_state=result,
-        matrix=matrix,
-        request=request,
-        observed=Observations(
-            trajectory=trajectory,
-            numerical_rate=numerical,
-            spectral_rate=_spectral_rate(structure, proved, case.notes),
-            search=replace(search, functions=()),
-            cut_off=tuple(case.cut_off),
-            notes=tuple(case.notes),
-        ),
-    )
+    certificate = case.certificate(disturbance, runs, reaching)
     if of_agents is not None and chains is not None:
         certificate = _with_agents(certificate, of_agents, chains, wanted)
     progress(STEPS[5])
@@ -385,6 +358,38 @@ class Case:
     progress: Callable[[str], None]
     notes: list[str] = field(default_factory=list)
     cut_off: list[str] = field(default_factory=list)
+
+    def certificate(self, disturbance: Any, runs: bool, reaching: tuple[ReachingTime, ...] | None) -> Certificate:
+        """Return what the steps find and prove, before the independent check."""
+        with deadline.time_limit(SEARCHING * self.request.time_limit):
+            trajectory = self.simulation(disturbance) if runs else None
+            lyapunov, proof, numerical = self.paper()
+            search = self.search(proof)
+            limit = self.upper_bound()
+        matrix, result = self.final_state(trajectory)
+        proved = [proof.rate, *(V.rate for V in search.functions)]
+        return Certificate(
+            structure=self.structure,
+            protocol=self.protocol,
+            initial_state=self.initial_state,
+            sigma0=self.sigma0,
+            reaching=reaching,
+            lyapunov=lyapunov,
+            proof=proof,
+            searched_functions=search.functions,
+            limit=limit,
+            final_state=result,
+            matrix=matrix,
+            request=self.request,
+            observed=Observations(
+                trajectory=trajectory,
+                numerical_rate=numerical,
+                spectral_rate=_spectral_rate(self.structure, proved, self.notes),
+                search=replace(search, functions=()),
+                cut_off=tuple(self.cut_off),
+                notes=tuple(self.notes),
+            ),
+        )
 
     def needs_run(self, simulation: bool | None) -> bool:
         """Tell whether there is to be a run."""

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 #: Agents by their names, and their orders.
 NAMES = {"integrator": 1, "double-integrator": 2, "triple-integrator": 3}
 #: Options that need ``--agents``.
-_OWN = ("drag", "plant", "v0", "a0", "offsets", "rest", "decay")
+_OWN = ("drag", "plant", "v0", "a0", "offsets", "biases", "rest", "decay")
 
 agents_options = options_of(
     click.option(
@@ -31,6 +31,7 @@ agents_options = options_of(
     click.option("--drag", metavar="NUMBER", help="Agents: the force -drag times the highest velocity.  [default: 0]"),
     click.option("--plant", metavar="LIST", help="Agents: a_1,..,a_n of x^(n) + a_n x^(n-1) + .. + a_1 x = u."),
     click.option("--offsets", metavar="STATE", help="Agents: their places in a formation, like --x0."),
+    click.option("--biases", metavar="STATE", help="Agents: what is added to their relative positions, like --x0."),
     click.option("--rest", metavar="ALPHA", help="Double integrators meet at rest: damping of their own velocity."),
     click.option("--decay", metavar="R", help="Agents: deviations fall like (1 - t/T)^(R/2).  [default: 2 n]"),
     click.option("--dimension", metavar="d", help="Agents: coordinates of space; --x0 agent after agent."),
@@ -44,13 +45,13 @@ def agents_of(options: Options) -> Agents | None:
     kind = options["agents"]
     if kind is None:
         given = [name for name in (*_OWN, "dimension") if options[name] is not None and options[name] != "1"]
-        if given and given[0] != "offsets":
+        if given and given[0] not in ("offsets", "biases"):
             raise ParameterError(f"{flag_of(given[0])} is for agents of order n; give --agents double-integrator, say")
         if not given:
             return None
         kind = "integrator"
-    order = NAMES.get(kind, kind)
-    if isinstance(order, str) and not order.isdecimal():
+    order = str(NAMES.get(kind, kind))
+    if not order.isdecimal():
         raise ParameterError(f'--agents "{kind}" is unknown; one of {", ".join(NAMES)}, or an order such as 4')
     plant = None
     if options["plant"] is not None:
@@ -59,7 +60,9 @@ def agents_of(options: Options) -> Agents | None:
         name: None if options[name] is None else exact_number(options[name], flag_of(name))
         for name in ("drag", "rest", "decay")
     }
-    return Agents(int(order), plant, offsets=options["offsets"], gain_cap=options["gain_cap"], **numbers)
+    return Agents(
+        int(order), plant, offsets=options["offsets"], biases=options["biases"], gain_cap=options["gain_cap"], **numbers
+    )
 
 
 def agents_keywords(options: Options, graph: SignedDigraph) -> dict[str, Any]:
@@ -73,8 +76,10 @@ def agents_keywords(options: Options, graph: SignedDigraph) -> dict[str, Any]:
         if options[name] is not None:
             raise ParameterError(f"{flag_of(name)} is not proved of agents of order n; leave it out, or cap the gain")
     d = 1 if options["dimension"] is None else int(exact_number(options["dimension"], "--dimension"))
-    if agents.offsets is not None:
-        agents = replace(agents, offsets=read_vectors(options["offsets"], [options["seed"], 3], graph, d, "--offsets"))
+    for i, name in enumerate(("offsets", "biases")):
+        if options[name] is not None:
+            rows = read_vectors(options[name], [options["seed"], 4 + i], graph, d, f"--{name}")
+            agents = replace(agents, **{name: rows})
     given = [options["v0"], options["a0"]]
     later = [
         None if text is None or text.strip() == "0" else read_vectors(text, [options["seed"], i + 2], graph, d, flag)

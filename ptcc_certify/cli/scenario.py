@@ -84,6 +84,7 @@ SECTIONS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
             "drag": ("drag", "0.1"),
             "plant": ("plant", '"0,0.1"'),
             "offsets": ("offsets", '"offsets.csv"'),
+            "biases": ("biases", "0"),
             "rest": ("rest", "1"),
             "decay": ("decay", "4"),
         },
@@ -131,7 +132,7 @@ SECTIONS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
         },
     ),
 }
-_STATES = ("x0", "sigma0", "v0", "a0", "offsets")
+_STATES = ("x0", "sigma0", "v0", "a0", "offsets", "biases")
 #: Keys that make a family of a graph.
 OF_FAMILIES = ("uncertainty", "optional")
 #: Options of the other protocol: a flag that chooses the protocol leaves such keys out.

@@ -53,6 +53,8 @@ class Agents:
         ``2 n``, from which on the input is bounded.
     offsets : state-like, or N rows of numbers, optional
         Places ``h_k`` in a formation, by label or in node order.
+    biases : state-like, or N rows of numbers, optional
+        What is added to the relative positions ``e_k``, by sensors or by hand: they make a formation, or are refused.
     gain_cap : number, optional
         What the gain is at most; then something is left at ``T``.
 
@@ -77,6 +79,7 @@ give 4, from which on the input is bounded
     rest: Exact | None = None
     decay: Exact | None = None
     offsets: Any = None
+    biases: Any = None
     gain_cap: Exact | None = None
 
     def __post_init__(self) -> None:
@@ -108,6 +111,8 @@ give 4, from which on the input is bounded
                 f"decay = {readable(decay)} is not above 2 (n - 1) = {2 * (n - 1)}: {plural} would not agree at T; "
                 f"give {2 * n}, from which on the input is bounded"
             )
+        if self.biases is not None and self.coefficients[0]:
+            raise ParameterError("biases: agents with a force towards 0 (a_1) take no formation by them; give offsets")
         if self.rest is not None:
             why = "" if n == 2 else f"agents of order 2; these are of order {n}"
             why = why or "agents without a force towards 0 (a_1 = 0)" * bool(self.coefficients[0])
@@ -148,7 +153,8 @@ give 4, from which on the input is bounded
     @property
     def plain(self) -> bool:
         """Whether these are the paper's agents, ``x' = u``, of which the plain certificate tells everything."""
-        return self.degree == 1 and not any(self.coefficients) and self.offsets is None and self.cap is None
+        formation = self.offsets is not None or self.biases is not None
+        return self.degree == 1 and not any(self.coefficients) and not formation and self.cap is None
 
     def text(self) -> str:
         """Tell the agents in a few words.

@@ -12,8 +12,7 @@ near to ``T``. The common motion is that of one agent without neighbours.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -257,13 +256,7 @@ def _with_deadline(run: AgentsTrajectory, common: np.ndarray, h: np.ndarray) -> 
         last[:, :, 1:] = 0.0  # they rest
     last[:, :, 0] += h
     gone = np.full(run.scaled.shape[:3], np.nan)
-    parts: Sequence[tuple[np.ndarray, Any]] = (
-        (run.t, [float(run.protocol.gain.T)]),
-        (run.remaining, [0.0]),
-        (run.clock, [np.inf]),
-        (run.states, last[..., None]),
-        (run.scaled, gone[..., None]),
-        (run.input, gone[:, :, 0, None]),
-    )
-    joined = [np.concatenate([a, b], axis=-1) for a, b in parts]
-    return AgentsTrajectory(run.graph, run.protocol, *joined, run.rtol)
+    at_T: dict[str, Any] = {"t": [float(run.protocol.gain.T)], "remaining": [0.0], "clock": [np.inf]}
+    at_T |= {"states": last[..., None], "scaled": gone[..., None], "input": gone[:, :, 0, None]}
+    longer: dict[str, Any] = {name: np.concatenate([getattr(run, name), x], axis=-1) for name, x in at_T.items()}
+    return replace(run, **longer)
