@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from agent_cases import agent_case
 from agent_documents import Setting, document, final_state, obligations, of_graph
 from generators import all_classes, random_graph
 from jsonschema import Draft202012Validator  # type: ignore[import-untyped]
@@ -498,7 +499,6 @@ def test_nothing_takes_long(monkeypatch: pytest.MonkeyPatch):
 # ---------------------------------------------------------------------- mutants
 
 
-#: Fields whose changes may leave what is true: other protocols of which the numbers still hold, bounds that are larger.
 def judged(data: Json, changes: Iterator[tuple[Any, Json]]) -> tuple[int, Counter[str]]:
     """Check mutants, with digests that fit; whatever is accepted must be true. Return their number, and what was."""
     count, passed = 0, Counter[str]()
@@ -562,3 +562,34 @@ def test_agents_on_every_class_of_graphs_are_accepted_and_true(name: str):
         data = document(graph, SETTINGS[setting], int(rng.integers(1000)))
         accepted(data)
         assert false_claims_of_agents(data) == [], setting
+
+
+# ---------------------------------------------------------------------- what the program makes
+
+
+def made_by_the_program(seed: int, method: str) -> Json:
+    """A certificate of a random case."""
+    case = agent_case(seed)
+    options: Json = {"agents": case.agents, "derivatives": case.derivatives, "method": method, "simulation": False}
+    return json.loads(certify(case.graph, case.protocol, case.x0, **options).to_json())
+
+
+@pytest.mark.parametrize("seed", [3, 11])
+def test_what_the_program_makes_is_true(seed: int):
+    data = made_by_the_program(seed, "paper")
+    assert data["verdict"] == "certified" and VALIDATOR.is_valid(data)
+    accepted(data)
+    assert false_claims_of_agents(data) == []
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("seed", range(60))
+def test_what_the_program_makes_is_true_and_stays_so(seed: int):
+    """Every class of graphs; mutants of each that are accepted are true."""
+    data = {**made_by_the_program(seed, ("paper", "best")[seed % 2]), "unverified": {}}
+    assert data["verdict"] == "certified" and VALIDATOR.is_valid(data)
+    accepted(data)
+    assert false_claims_of_agents(data) == []
+    own = ((path, x) for path, x in mutants(data, 29, seed) if path[0] in ("agents", "protocol", "proof"))
+    for changes in (own, nudges(data, seed, 20)):
+        judged(data, changes)
