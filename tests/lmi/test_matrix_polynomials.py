@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from itertools import combinations
+from itertools import combinations, pairwise
 from math import comb
 
 import flint
@@ -68,8 +68,8 @@ def test_halving_proves_what_is_positive_and_nothing_proves_what_is_not():
     above, below = ([[[100 * touching[0][0][0] + d]], [[-200]], [[100]]] for d in (1, -1))
     assert not nonnegative_between(above, F(0), F(2))
     pieces = [F(2) * j / 64 for j in range(65)]
-    assert all(nonnegative_between(above, low, high) for low, high in zip(pieces, pieces[1:], strict=False))
-    assert not all(nonnegative_between(below, low, high) for low, high in zip(pieces, pieces[1:], strict=False))
+    assert all(nonnegative_between(above, low, high) for low, high in pairwise(pieces))
+    assert not all(nonnegative_between(below, low, high) for low, high in pairwise(pieces))
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -106,12 +106,8 @@ def test_the_integral_of_agents_that_come_to_rest_is_enclosed(w: Fraction, p: Fr
     try:
         one, two, x = (flint.arb(flint.fmpq(y.numerator, y.denominator)) for y in (p + 1, p + 2, w))
         true = (-x).exp() * x.hypgeom_1f1(one, two) / one
-        for below, above in ((low, true), (true, high)):
-            ends = [
-                x if isinstance(x, flint.arb) else flint.arb(flint.fmpq(x.numerator, x.denominator))
-                for x in (below, above)
-            ]
-            assert not ends[0] > ends[1]
+        below, above = (flint.arb(flint.fmpq(y.numerator, y.denominator)) for y in (low, high))
+        assert not below > true and not true > above
         assert high - low <= F(1, 2**90)
     finally:
         flint.ctx.prec = before
