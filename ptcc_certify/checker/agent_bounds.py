@@ -11,7 +11,7 @@ from operator import mul
 from typing import Any
 
 from lmi.exact.decimal_rounding import up
-from lmi.exact.elementary_enclosures import exp
+from lmi.exact.elementary_enclosures import exp, rounded
 from lmi.exact.numbers import integers, longest, shorten, sized
 from lmi.exact.work import spend
 from ptcc_certify.checker.agent_model import Agents
@@ -25,6 +25,8 @@ from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import entries, exact, fields, need
 from ptcc_certify.checker.side_files import Numbers
 
+#: Bits to which long numbers are rounded, upwards, before they bound every agent.
+BITS = 256
 #: Up to ``r clock`` of this size exponentials are formed; beyond it they are not made smaller.
 LARGEST_DECAY = 100_000
 
@@ -49,9 +51,10 @@ class Used:
         if self.inputs is not None or (form is not None and form.diagonal is None):
             return self.inputs
         if form is not None and form.coordinates == "eps":
-            weight = dict(zip(form.nodes, form.diagonal or (), strict=True))
+            each = {v: rounded(1 / w, BITS, up=True) for v, w in zip(form.nodes, form.diagonal or (), strict=True)}
             rows = (graph.row(v) for v in range(graph.n))
-            return [sum((x * x / (weight[j] * graph.unit**2) for j, x in row.items()), Fraction(0)) for row in rows]
+            spend(graph.n + graph.n_edges, 2 * graph.bits, BITS, "constants of the input")
+            return [sum((x * x * each[j] for j, x in row.items()), Fraction(0)) / graph.unit**2 for row in rows]
         nodes, weights = (form.nodes, form.diagonal or ()) if form is not None else function.by_rows or ((), ())
         own = dict(zip(nodes, weights, strict=True))
         return [1 / own[v] if v in own else Fraction(0) for v in range(graph.n)]
@@ -99,7 +102,7 @@ class Begin:
         return adjugate, Fraction(determinant, scale)
 
     def value(self, function: Function) -> Fraction:
-        """Return ``V(0) = sum_kl Om_kl z_k'P z_l``, summed over the coordinates of space."""
+        """Bound ``V(0) = sum_kl Om_kl z_k'P z_l``, summed over the coordinates of space, from above, to many bits."""
         n, (P, times), (columns, scale) = self.agents.n, self.inverse, self.columns
         form, total, unit = Weights.of(function), 0, 1
         for each in columns:
@@ -112,7 +115,7 @@ class Begin:
             spend(n**2 * len(Z[0]), *bits, "initial values")
             spend(n**2, sum(bits), longest(chain.from_iterable(P)), "initial values")
             total += sum(P[i][j] * sum(map(mul, Z[i], U[j])) for i in range(n) for j in range(n))
-        return Fraction(total, form.scale * (scale * unit) ** 2) / times
+        return rounded(Fraction(total, form.scale * (scale * unit) ** 2) / times, BITS, up=True)
 
 
 @dataclass(frozen=True)
@@ -197,11 +200,12 @@ def check_residual(doc: Document, begin: Begin, used: Sequence[Used], section: A
     values = ordered(labels, section["agents"], "residual")
     numbers = [[exact(x) for x in entries(row, "derivatives", agents.n)] for row in values.values()]
     decay = exp(-min(agents.rate * clock, Fraction(LARGEST_DECAY)))[1]
+    powers = [rounded(cap ** (2 * i) * agents.W[i][i] * decay, BITS, up=True) for i in range(agents.n)]
     known = [(use.function.deviation, begin.value(use.function)) for use in used if use.function.deviation is not None]
     for v, row in enumerate(numbers):
         least = min(c[v] * value for c, value in known if c is not None)
         for i, x in enumerate(row):
-            holds = x >= 0 and x**2 >= cap ** (2 * i) * agents.W[i][i] * least * decay
+            holds = x >= 0 and x**2 >= powers[i] * least
             need(holds, f"what is left of agent {shorten(labels[v])} is not proved")
     doc.done(f"positions within {up(max(row[0] for row in numbers))}")
 
@@ -221,7 +225,7 @@ def check_input(doc: Document, begin: Begin, used: Sequence[Used], section: Any,
     fields(section, ("agents", "largest"), "input")
     values = by_agent(doc, graph, section["agents"], "the input", files=False)
     (P, times), gain = begin.inverse, agents.eta_0 if agents.bounded else agents.cap or Fraction(0)
-    common = gain ** (2 * agents.n) * agents.coupling**2 * (P[-1][-1] / times)
+    common = rounded(gain ** (2 * agents.n) * agents.coupling**2 * P[-1][-1] / times, BITS, up=True)
     known = [(c, begin.value(use.function)) for use in used if (c := use.error_constants(graph)) is not None]
     for v, x in enumerate(values):
         rest = x - abs(agents.plant[0]) * sum(map(abs, begin.offsets[v]), Fraction(0)) - mu1 * agents.d

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
+from lmi.exact.work import spend
 from ptcc_certify.checker.agent_bounds import Begin, Used, check_input, check_residual
 from ptcc_certify.checker.agent_decrease import check_decrease
 from ptcc_certify.checker.agent_model import Agents, read_agents
@@ -13,7 +14,7 @@ from ptcc_certify.checker.agent_motion import check_final_states, check_motion, 
 from ptcc_certify.checker.graph import ordered
 from ptcc_certify.checker.input import Verified, check_constants
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import entries, exact, fields, need
+from ptcc_certify.checker.reading import entries, exact, fields, length, need
 
 KEYS = (
     *("order", "dimension", "plant", "own", "gains", "coupling", "lower_triangle", "rate", "gain_cap", "points"),
@@ -34,6 +35,8 @@ def check_agents(doc: Document, verified: Verified) -> bool:
     begin = None
     if states is not None:
         begin = Begin(agents, graph, read_states(graph.labels, states, "initial_state", agents), offsets)
+        longest = length(x for part in (*begin.states, offsets) for row in part for x in row)
+        spend(20 * agents.d * agents.n * graph.n, longest, longest, "the initial states")
     used = _functions(doc, verified, section["functions"])
     check_decrease(doc, agents, [use.function for use in used])
     doc.at = "agents.motion"
