@@ -122,7 +122,7 @@ class AgentOracle(Oracle):
         """At constant gain nothing decays more slowly than the rate says."""
         if not self.used:
             return
-        T, _, k = self.gain
+        _T, _, k = self.gain
         theta = 1 / k if self.cap is None else Fraction(0)
         zeta = Fraction(0) if self.cap is None else 1 / self.cap
         A = np.array([[float(x) for x in row] for row in self.chain(zeta, theta)])
@@ -155,7 +155,7 @@ class AgentOracle(Oracle):
         flint.ctx.prec = 1500
         if not any(self.f):
             A = [[Fraction(int(j == i + 1)) for j in range(n)] for i in range(n - 1)] + [[-x for x in self.a]]
-            return [[x for x in row] for row in flint.arb_mat([[ball(x * T) for x in row] for row in A]).exp().tolist()]
+            return flint.arb_mat([[ball(x * T) for x in row] for row in A]).exp().tolist()
         # x'' + a_2 x' + f_2 eta x' = 0: the integral of exp(-w (1 - q)) q^p by Kummer's transformation
         w, p = (self.a[1] + self.f[1] * rho1) * T, self.f[1] * k
         m = ball(T / (p + 1)) * ball(-w).exp() * ball(w).hypgeom_1f1(ball(p + 1), ball(p + 2))
@@ -353,8 +353,8 @@ def decreases(L: Any, Z: Any, P: Any, A: Matrix, K: list[Fraction], r: Fraction)
     pulled = forms * laplacian
     rows = [
         [
-            -forms[k, l] * both[i, j] + pulled[k, l] * other[i, j] + pulled[l, k] * other[j, i]
-            for l in range(N)
+            -forms[k, m] * both[i, j] + pulled[k, m] * other[i, j] + pulled[m, k] * other[j, i]
+            for m in range(N)
             for j in range(n)
         ]
         for k in range(N)
@@ -367,7 +367,7 @@ def decreases(L: Any, Z: Any, P: Any, A: Matrix, K: list[Fraction], r: Fraction)
 def integrated(L: Any, text: str, gain: tuple[float, float, float], cap: float | None) -> list[Motion]:
     """Integrate ``x^(n) + sum a_i x^(i-1) = u`` up to ``LATEST``, or up to the deadline if the gain is capped."""
     told, (T, rho1, k) = json.loads(text), gain
-    n, d, labels = told["order"], told["dimension"], told["labels"]
+    n, labels = told["order"], told["labels"]
     read = lambda values: np.array([float(number(x)) for x in values])  # noqa: E731
     a, f, K = (read(told[key]) for key in ("plant", "own", "gains"))
     H = np.array([read(told["offsets"][label]) for label in labels])
