@@ -42,7 +42,7 @@ def main() -> None:
     accepted, begin = 0, time.perf_counter()
     for seed in range(first, last):
         case = agent_case(seed)
-        options = {"agents": case.agents, "derivatives": case.derivatives, "method": "perron"}
+        options = {"agents": case.agents, "derivatives": case.derivatives, "method": "paper"}
         certificate = certify(case.graph, case.protocol, case.x0, **options)
         part, seen = certificate.agents, certificate.agents_comparison
         accepted += certificate.verdict == "certified"
@@ -53,10 +53,18 @@ def main() -> None:
             ratios[name].append(value)
         for name, value in (("K eps", seen.relative_input), ("u", seen.input), ("rate", spectral_ratio(part))):
             ratios[name] += [] if value is None else [value]
-    print(f"{last - first} cases, {accepted} certified, {time.perf_counter() - begin:.0f} s")
+        if seed % 20 == 19 or seed == last - 1:
+            tell(ratios, seed + 1 - first, accepted, time.perf_counter() - begin)
+
+
+def tell(ratios: dict[str, list[float]], cases: int, accepted: int, seconds: float) -> None:
+    """Print what was met so far."""
+    print(f"{cases} cases, {accepted} certified, {seconds:.0f} s")
     for name, values in ratios.items():
+        if not values:
+            continue
         quartiles = ", ".join(f"{x:.4f}" for x in np.quantile(values, [0, 0.25, 0.5, 0.75, 1]))
-        print(f"{name:6} {len(values):4}  {quartiles}")
+        print(f"{name:6} {len(values):4}  {quartiles}", flush=True)
 
 
 if __name__ == "__main__":

@@ -15,10 +15,12 @@ The names at the top, by topic:
   ``ExpressionDisturbance``, ``SampledDisturbance``, ``StateDependent``, ``telegraph_noise``, ``GainLimits``
 - Runs: ``simulate``, ``simulate_family``, ``Trajectory``
 - Certificates: ``certify``, ``certify_vectors``, ``Certificate``, ``Expectations``, ``read_certificate``, ``check``
-- Bounds and design: ``final_state``, ``influence``, ``box``, ``ellipsoid``, ``worst_initial_state``, ``design``
+- Bounds and design: ``final_state``, ``influence``, ``formation_of_biases``, ``box``, ``ellipsoid``,
+  ``worst_initial_state``, ``design``
 - Many graphs: ``Ensemble``, ``certify_many``
 - Figures: ``plot_trajectory``, ``plot_decay``, ``plot_run``, ``plot_sliding``, ``plot_trade_off``, ``plot_input``,
   ``plot_effort``, ``plot_graph``, ``plot_spectrum``, ``plot_frontier``, ``plot_family``, ``plot_family_decay``,
+  ``plot_motion``, ``plot_formation``,
   ``save_figure``, ``SINGLE_COLUMN``, ``DOUBLE_COLUMN``
 - Reports: ``write_report``, ``explore``, ``cite``
 - Errors: ``PTCCError``
@@ -85,6 +87,8 @@ _EXPORTS = {
     "Ensemble": "graphs.ensembles",
     "certify_many": "batch",
     # Figures
+    "plot_motion": "report.plots.agents_motion",
+    "plot_formation": "report.plots.agents_motion",
     "plot_trajectory": "report.plots.trajectory",
     "plot_decay": "report.plots.decay",
     "plot_run": "report.plots.trajectory",

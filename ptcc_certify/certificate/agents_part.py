@@ -172,6 +172,19 @@ class AgentsPart:
             )
             return roots[:, :, None] * np.exp(fall + 1e-9)
 
+    def columns(self) -> dict[str, list[float]]:
+        """Return initial and final states in floats, and bounds of the input, one number for each agent."""
+        names = ["x", "v", "a", *(f"x^({i})_" for i in range(3, self.order))][: self.order]
+        marks = [""] if self.dimension == 1 else [f"_{q + 1}" for q in range(self.dimension)]
+        table: dict[str, list[float]] = {}
+        for i, name in enumerate(names):
+            for q, mark in enumerate(marks):
+                if self.initial_state is not None:
+                    table[f"{name}{mark}(0)"] = [float(agent[q][i]) for agent in self.initial_state]
+                if self.final_state is not None:
+                    table[f"{name}{mark}(T)"] = [float(agent[q][i][0]) for agent in self.final_state]
+        return table | ({} if self.input is None else {"input": [float_up(x) for x in self.input]})
+
     def simulate(self, **options: Any) -> AgentsTrajectory:
         """Run the agents from their initial states; options are those of :func:`simulate_agents`.
 

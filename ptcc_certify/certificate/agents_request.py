@@ -27,10 +27,11 @@ _NOT_OF_AGENTS = {
 
 
 class Chains(NamedTuple):
-    """Position, velocity and so on of every agent in every coordinate, the dimension of space, and remarks."""
+    """Position, velocity and so on of every agent in every coordinate, the dimension of space, places, and remarks."""
 
     states: States | None
     dimension: int
+    offsets: tuple[tuple[Fraction, ...], ...]
     notes: tuple[str, ...] = ()
 
 
@@ -92,7 +93,7 @@ def read_offsets(agents: Agents, graph: SignedDigraph, dimension: int) -> tuple[
 
 
 def read_chains(agents: Agents, graph: SignedDigraph, x0: Any, v0: Any, derivatives: Any) -> Chains:
-    """Return position, velocity and so on of every agent, the dimension of space, and remarks.
+    """Return position, velocity and so on of every agent, the dimension of space, places, and remarks.
 
     Velocities that are not given are 0.
     """
@@ -109,7 +110,8 @@ def read_chains(agents: Agents, graph: SignedDigraph, x0: Any, v0: Any, derivati
     if x0 is None:
         if any(one is not None for one in given):
             raise ParameterError("v0 without x0: give the positions, too")
-        return Chains(None, _dimension_of(agents, graph))
+        d = _dimension_of(agents, graph)
+        return Chains(None, d, read_offsets(agents, graph, d))
     positions = _states(x0, graph, "x0")
     d = len(positions[0])
     if d > MOST_DIMENSION:
@@ -126,7 +128,7 @@ def read_chains(agents: Agents, graph: SignedDigraph, x0: Any, v0: Any, derivati
     if missing and v0 is None and derivatives is None:
         notes.append(f"no {' and '.join(missing)} given: taken for 0")
     chains = tuple(tuple(tuple(columns[i][k][q] for i in range(n)) for q in range(d)) for k in range(graph.n_nodes))
-    return Chains(chains, d, tuple(notes))
+    return Chains(chains, d, read_offsets(agents, graph, d), tuple(notes))
 
 
 def _dimension_of(agents: Agents, graph: SignedDigraph) -> int:

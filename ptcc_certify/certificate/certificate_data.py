@@ -434,6 +434,8 @@ class Content:
         return self.envelope.deviation_bound(remaining, self._require_initial_state())
 
     def _require_initial_state(self) -> tuple[Fraction, ...]:
+        if self.agents is not None:
+            raise ParameterError("this certificate is of agents of order n; ask its attribute agents")
         if self.initial_state is None:
             raise ParameterError("the certificate has no initial state; certify the graph with x0")
         return self.initial_state

@@ -31,7 +31,7 @@ from ptcc_certify.bounds.final_state import (
     influence,
 )
 from ptcc_certify.certificate.agents_part import prove_agents
-from ptcc_certify.certificate.agents_request import Chains, read_chains, read_offsets, refuse_agents
+from ptcc_certify.certificate.agents_request import Chains, read_chains, refuse_agents
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.certificate_data import Observations
 from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
@@ -278,7 +278,6 @@ def _agents_options(agents: Any, protocol: Protocol, asked: dict[str, Any], v0: 
 
 def _with_agents(certificate: Certificate, agents: Agents, chains: Chains, run: bool) -> Certificate:
     """Return the certificate of a graph as one of agents of order n on it."""
-    offsets = read_offsets(agents, certificate.graph, chains.dimension)
     functions = certificate.functions
     try:
         part = prove_agents(
@@ -287,7 +286,7 @@ def _with_agents(certificate: Certificate, agents: Agents, chains: Chains, run: 
             agents,
             functions,
             certificate.influence,
-            offsets,
+            chains.offsets,
             chains.states,
         )
     except NoCertificate as error:
