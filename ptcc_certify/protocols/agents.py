@@ -56,7 +56,7 @@ class Agents:
     biases : state-like, or N rows of numbers, optional
         What is added to the relative positions ``e_k``, by sensors or by hand: they make a formation, or are refused.
     gain_cap : number, optional
-        What the gain is at most; then something is left at ``T``.
+        What the gain is at most, in 1/time/weight; then something is left at ``T``.
 
     Raises
     ------
