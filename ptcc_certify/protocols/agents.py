@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 MOST_ORDER, MOST_DIMENSION = 8, 8
 #: Largest ``T (1 + max |a_i|)`` of agents that move by themselves, and longest numbers, in bits.
 MOST_MOTION, LONGEST_BITS = 100, 2000
+#: Largest ``R`` that is asked for.
+MOST_DECAY = 1000
 #: Derivatives of a position by their names.
 DERIVATIVES = ("position", "velocity", "acceleration", "jerk")
 PLURALS = ("positions", "velocities", "accelerations", "jerks")
@@ -105,6 +107,8 @@ give 4, from which on the input is bounded
     def _refuse(self) -> None:
         """Refuse what does not fit together."""
         n, decay = self.degree, self.decay_rate
+        if decay > MOST_DECAY:
+            raise ParameterError(f"decay = {float(decay):.6g} is above {MOST_DECAY}; no input follows such gains")
         if decay <= 2 * (n - 1) and self.gain_cap is None:
             plural = PLURALS[n - 1] if n <= len(PLURALS) else f"derivatives {n - 1}"
             raise ParameterError(
