@@ -83,8 +83,8 @@ def plot_motion(subject: Any, *, wide: bool = False, time_unit: str = "") -> Fig
                 name = _NAMES[i] if i < len(_NAMES) else f"derivative {i}"
                 label = f"{name} {q + 1}" if d > 1 else name
                 finished(ax, time_label("time $t$", time_unit) if i == n - 1 else "", label)
-                if ax.get_legend() is not None and (i or q):
-                    ax.get_legend().remove()
+                if (legend := ax.get_legend()) is not None and (i or q):
+                    legend.remove()
         return shown(figure)
 
 
@@ -137,6 +137,6 @@ def plot_formation(subject: Any, *, ax: Axes | None = None) -> Axes:
         if run.graph.n_nodes <= 2 * NAMED_AGENTS:
             name = shorten_text(printable(run.graph.labels[k]), 12)
             text = ax.annotate(name, (x[-1], y[-1]), (3, 3), textcoords="offset points", fontsize=NAME_SIZE)
-            text.set_path_effects(HALO)
+            text.set_path_effects([*HALO])
     ax.set_aspect("equal", adjustable="datalim")
     return finished(ax, "coordinate 1", "coordinate 2")
