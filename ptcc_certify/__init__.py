@@ -11,7 +11,7 @@ The names at the top, by topic:
 
 - Graphs: ``SignedDigraph``, ``as_graph``, ``as_state``, ``read_graph``, ``write_graph``, ``analyse``, ``Structure``
 - Families of graphs: ``Family``, ``as_family``, ``read_family``, ``decide``
-- Protocols, disturbances, actuators: ``Agents``, ``NominalProtocol``, ``SlidingModeProtocol``,
+- Protocols, disturbances, actuators: ``Agents``, ``companion_form``, ``NominalProtocol``, ``SlidingModeProtocol``,
   ``ExpressionDisturbance``, ``SampledDisturbance``, ``StateDependent``, ``telegraph_noise``, ``GainLimits``
 - Runs: ``simulate``, ``simulate_family``, ``Trajectory``
 - Certificates: ``certify``, ``certify_vectors``, ``Certificate``, ``Expectations``, ``read_certificate``, ``check``
@@ -20,8 +20,7 @@ The names at the top, by topic:
 - Many graphs: ``Ensemble``, ``certify_many``
 - Figures: ``plot_trajectory``, ``plot_decay``, ``plot_run``, ``plot_sliding``, ``plot_trade_off``, ``plot_input``,
   ``plot_effort``, ``plot_graph``, ``plot_spectrum``, ``plot_frontier``, ``plot_family``, ``plot_family_decay``,
-  ``plot_motion``, ``plot_formation``,
-  ``save_figure``, ``SINGLE_COLUMN``, ``DOUBLE_COLUMN``
+  ``plot_motion``, ``plot_formation``, ``save_figure``, ``SINGLE_COLUMN``, ``DOUBLE_COLUMN``
 - Reports: ``write_report``, ``explore``, ``cite``
 - Errors: ``PTCCError``
 
@@ -57,6 +56,7 @@ _EXPORTS = {
     "decide": "theorems.family_behaviour",
     # Protocols, disturbances, actuators
     "Agents": "protocols.agents",
+    "companion_form": "protocols.companion",
     "NominalProtocol": "protocols",
     "SlidingModeProtocol": "protocols",
     "ExpressionDisturbance": "protocols.disturbance",

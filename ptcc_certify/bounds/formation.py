@@ -58,16 +58,6 @@ class Biases:
         ``Q b``: how far each agent drifts per unit of the clock.
     groups : tuple of GroupDrift
         The leader groups that drift, and how fast; empty if the biases fit a formation.
-
-    Examples
-    --------
-    >>> pair = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)])
-    >>> fit = formation_of_biases(pair, [1, -1])
-    >>> [str(h) for (h,) in fit.offsets]
-    ['1/2', '-1/2']
-    >>> odd = formation_of_biases(pair, [1, 0])
-    >>> odd.offsets, str(odd.groups[0])
-    (None, 'a, b by 1/2')
     """
 
     labels: tuple[str, ...]
@@ -95,6 +85,16 @@ def formation_of_biases(graph: Any, biases: Any) -> Biases:
     ------
     ParameterError
         The biases do not fit the graph, or it has more than 400 agents.
+
+    Examples
+    --------
+    >>> pair = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)])
+    >>> fit = formation_of_biases(pair, [1, -1])
+    >>> [str(h) for (h,) in fit.offsets]
+    ['1/2', '-1/2']
+    >>> odd = formation_of_biases(pair, [1, 0])
+    >>> odd.offsets, str(odd.groups[0])
+    (None, 'a, b by 1/2')
     """
     graph = as_graph(graph)
     if graph.n_nodes > MOST_NODES:

@@ -45,6 +45,9 @@ def agents_of(options: Options) -> Agents | None:
     kind = options["agents"]
     if kind is None:
         given = [name for name in (*_OWN, "dimension") if options[name] is not None and options[name] != "1"]
+        if given == ["dimension"]:
+            why = "ptcc certify takes scalar agents, unless --agents tells others"
+            raise ParameterError(f"--dimension: {why}; what is proved of one component holds for each: leave it out")
         if given and given[0] not in ("offsets", "biases"):
             raise ParameterError(f"{flag_of(given[0])} is for agents of order n; give --agents double-integrator, say")
         if not given:

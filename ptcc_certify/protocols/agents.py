@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 MOST_ORDER, MOST_DIMENSION = 8, 8
 #: Largest ``T (1 + max |a_i|)`` of agents that move by themselves, and longest numbers, in bits.
 MOST_MOTION, LONGEST_BITS = 100, 2000
+#: Largest ``R`` that is asked for.
+MOST_DECAY = 1000
 #: Derivatives of a position by their names.
 DERIVATIVES = ("position", "velocity", "acceleration", "jerk")
 PLURALS = ("positions", "velocities", "accelerations", "jerks")
@@ -44,19 +46,19 @@ class Agents:
         ``n``, 1 to 8; 2 are double integrators, if ``plant`` does not tell.
     plant : n numbers, optional
         ``a_1`` to ``a_n``; without it 0: chains of integrators.
-    drag : number, optional
+    drag : number or str, optional
         ``a_n`` alone, such as the drag of a vehicle; may be negative.
-    rest : number, optional
+    rest : number or str, optional
         ``alpha > 0``: agents of order 2 meet at rest, by ``-alpha eta`` times their own velocity.
-    decay : number, optional
+    decay : number or str, optional
         ``R = r rho2 kappa``: deviations decay like ``(1 - t/T)^(R/2)`` near ``T``; above ``2 (n - 1)``. By default
         ``2 n``, from which on the input is bounded.
     offsets : state-like, or N rows of numbers, optional
         Places ``h_k`` in a formation, by label or in node order.
     biases : state-like, or N rows of numbers, optional
         What is added to the relative positions ``e_k``, by sensors or by hand: they make a formation, or are refused.
-    gain_cap : number, optional
-        What the gain is at most; then something is left at ``T``.
+    gain_cap : number or str, optional
+        What the gain is at most, in 1/time/weight; then something is left at ``T``.
 
     Raises
     ------
@@ -105,6 +107,8 @@ give 4, from which on the input is bounded
     def _refuse(self) -> None:
         """Refuse what does not fit together."""
         n, decay = self.degree, self.decay_rate
+        if decay > MOST_DECAY:
+            raise ParameterError(f"decay = {float(decay):.6g} is above {MOST_DECAY}; no input follows such gains")
         if decay <= 2 * (n - 1) and self.gain_cap is None:
             plural = PLURALS[n - 1] if n <= len(PLURALS) else f"derivatives {n - 1}"
             raise ParameterError(
@@ -167,7 +171,13 @@ give 4, from which on the input is bounded
         return plant_text(self.coefficients)
 
     def refuse_motion(self, T: Fraction) -> None:
-        """Refuse agents that move too far by themselves until ``T``."""
+        """Refuse agents that move too far by themselves until ``T``.
+
+        Raises
+        ------
+        ParameterError
+            ``T (1 + max |a_i|)`` is above 100.
+        """
         size = T * (1 + max(map(abs, self.coefficients)))
         if any(self.coefficients) and size > MOST_MOTION:
             raise ParameterError(
