@@ -102,6 +102,8 @@ class Certificate(Content, FromFile, Shown):
         What was seen, and is not claimed.
     source : Source or None
         The file that it was read from.
+    agents : AgentsPart or None
+        What is proved of agents of order n; then initial and final states are there, and not above.
 
     References
     ----------
