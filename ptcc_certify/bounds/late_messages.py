@@ -18,14 +18,14 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cached_property
 
 import numpy as np
 
 from lmi.dyadic import round_to_bits
 from lmi.errors import LMIError, NoCertificate
+from lmi.exact.decimal_rounding import float_up
 from lmi.exact.elementary_enclosures import exp, log, rounded
-from ptcc_certify.bounds.late_steps import Steps, bound_steps
+from ptcc_certify.bounds.late_steps import Steps, search_steps
 from ptcc_certify.checker.input_formulas import BITS, Limits, decay_above
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.rationals import shorten
@@ -109,6 +109,8 @@ class LateBounds:
     missed : Missed or None
     staged : tuple of Fraction, or None
         Of every follower the deadline at which it is at its final state exactly.
+    residual : (N,) array or None
+        What bounds ``|x_k(T) - x_k*|``, in floats from above; None where nothing does.
     """
 
     messages: LateMessages
@@ -119,17 +121,12 @@ class LateBounds:
     steps: Steps | None = None
     missed: Missed | None = None
     staged: tuple[Fraction, ...] | None = None
+    residual: np.ndarray | None = None
 
-    @cached_property
-    def residual(self) -> np.ndarray | None:
-        """What bounds ``|x_k(T) - x_k*|`` of every agent, in floats from above; None where nothing does."""
-        bounds = [row.residual() for row in self.rows]
-        bounds += [] if self.steps is None else [self.steps.bounds[-1] * _MORE + 1e-300]
-        if not bounds:
-            return None
-        whole = np.zeros(self.structure.graph.n_nodes)
-        whole[self.structure.followers] = np.minimum.reduce(bounds)
-        return whole
+    @property
+    def largest(self) -> float:
+        """The largest of ``residual``; infinite where nothing is bounded."""
+        return math.inf if self.residual is None else float(self.residual.max())
 
     def deviation_bound(self, t: np.ndarray) -> np.ndarray:
         """Return what bounds ``|x_k - x_k*|`` at instants, ``(F, M)`` floats; infinite where nothing does."""
@@ -186,19 +183,30 @@ def bound_late(
     gain = GainLimits(gain_cap=messages.gain_cap).limit(protocol.gain)
     first = np.ones(rows.D.size)
     if initial_state is not None and ends is not None:
-        first = np.array([_float_up(abs(initial_state[v] - ends[v][0]) + ends[v][1]) for v in rows.followers])
+        first = np.array([float_up(abs(initial_state[v] - ends[v][0]) + ends[v][1]) for v in rows.followers])
     bounds = LateBounds(messages, structure, gain, initial_state is None or ends is None)
     found = search_rows(rows, gain, messages, first)
     steps = None
     if messages.age:
         with suppress(LMIError):
-            steps = bound_steps(rows, gain, messages.age, float(messages.value_error) * _MORE, first)
-    bounds = replace(bounds, rows=found, steps=steps)
+            steps = search_steps(rows, gain, messages.age, float(messages.value_error) * _MORE, first)
+    each = [row.residual() for row in found]
+    each += [] if steps is None else [steps.bounds[-1] * _MORE + 1e-300]
+    bounds = replace(bounds, rows=found, steps=steps, residual=_least(structure, each))
     if messages.value_error or messages.gain_cap is not None:
         return bounds
     if initial_state is not None and ends is not None:
         bounds = replace(bounds, missed=find_missed(rows, protocol, latencies, initial_state, ends))
     return replace(bounds, staged=stage_deadlines(rows, protocol.T, messages.age))
+
+
+def _least(structure: Structure, bounds: Sequence[np.ndarray]) -> np.ndarray | None:
+    """Return the least of bounds of followers, for all agents."""
+    if not bounds:
+        return None
+    whole = np.zeros(structure.graph.n_nodes)
+    whole[structure.followers] = np.minimum.reduce(bounds)
+    return whole
 
 
 def search_rows(
@@ -278,11 +286,6 @@ def row_bound(
         floor = float((rows.D / slack).max()) * float(messages.value_error)
     initial = float((first / witness.u).max())
     return RowBound(witness, cap, clock, left, Fraction(initial * _MORE), Fraction(floor * _MORE))
-
-
-def _float_up(x: Fraction) -> float:
-    nearest = float(x)
-    return nearest if nearest >= x else math.nextafter(nearest, math.inf)
 
 
 # ---------------------------------------------------------------------- who misses the deadline

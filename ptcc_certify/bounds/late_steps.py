@@ -27,6 +27,8 @@ from ptcc_certify.protocols.gain_limits import LimitedGain
 MOST_INSTANTS, MOST_PRODUCTS = 2000, 20_000_000
 #: Instants in one delay, at most, and in each e-fold of the time that is left.
 _IN_DELAY, _IN_E_FOLD = 32, 120
+#: Fewer instants than this say nothing.
+_FEWEST = 20
 #: Integers over ``2^30`` by which the check may form what is formed here in floats.
 _UNIT = 2.0**-30
 #: What is added so that the start obeys its inequality for certain, relatively.
@@ -76,8 +78,10 @@ def instants_of(T: Fraction, delay: Fraction, most: int) -> tuple[Fraction, ...]
     return tuple(T * i / count for i in range(count + 1))
 
 
-def bound_steps(rows: FollowerRows, gain: LimitedGain, delay: Fraction, error: float, first: np.ndarray) -> Steps | None:
-    """Bound followers from instant to instant; None where the graph is too large.
+def search_steps(
+    rows: FollowerRows, gain: LimitedGain, delay: Fraction, error: float, first: np.ndarray
+) -> Steps | None:
+    """Choose instants and start, and bound followers from instant to instant; None where the graph is too large.
 
     Parameters
     ----------
@@ -90,26 +94,49 @@ def bound_steps(rows: FollowerRows, gain: LimitedGain, delay: Fraction, error: f
         Of a value that is heard, from above.
     first : (F,) array
         ``|eps(0)|`` from above.
+
+    Raises
+    ------
+    NoCertificate
+        No vector for the followers was found.
     """
     most = min(MOST_INSTANTS, MOST_PRODUCTS // (rows.W.nnz + 4 * rows.D.size))
-    if most < 20:
+    if most < _FEWEST:
         return None
-    instants = instants_of(gain.gain.T, delay, most)
     start = _start(rows, error, first)
-    size = float(start.max())
-    if not 0 < size < np.inf:
+    if not 0 < float(start.max()) < np.inf:
         return None
-    hearing = np.searchsorted(_floats(instants), _floats([t - delay for t in instants]), side="right") - 1
-    hearing = np.array([_exactly(instants, t - delay, int(j)) for t, j in zip(instants, hearing, strict=True)])
-    clock = _clock(gain, instants)
-    counts = np.diff(rows.W.indptr)
-    room, bounds = _UNIT * size * (counts + 4.0), [start]
+    return bound_steps(rows, gain, delay, error, instants_of(gain.gain.T, delay, most), start)
+
+
+def bound_steps(
+    rows: FollowerRows,
+    gain: LimitedGain,
+    delay: Fraction,
+    error: float,
+    instants: tuple[Fraction, ...],
+    start: np.ndarray,
+) -> Steps:
+    """Bound followers from instant to instant, in floats that leave room for the integers of the check."""
+    heard_at = _hearing(instants, delay)
+    clock, size = _clock(gain, instants), float(start.max())
+    room, bounds = _UNIT * size * (np.diff(rows.W.indptr) + 4.0), [start]
     for i in range(1, len(instants)):
-        before, heard = bounds[-1], (rows.W @ bounds[max(hearing[i - 1], 0)]) / rows.D + error + room
+        before, heard = bounds[-1], (rows.W @ bounds[heard_at[i - 1]]) / rows.D + error + room
         step = clock[i] - clock[i - 1] if np.isfinite(clock[i]) else np.inf
         left = _decay_above(rows.D * max(step, 0.0) * (1 - 1e-9))
         bounds.append(np.minimum(before, heard + np.maximum(before - heard, 0) * left + 4 * _UNIT * size))
     return Steps(instants, start, np.array(bounds))
+
+
+def _hearing(instants: Sequence[Fraction], delay: Fraction) -> list[int]:
+    """Return for every instant the number of the last one that is a delay before it, 0 if there is none."""
+    heard, j = [], 0
+    for t in instants:
+        while j + 1 < len(instants) and instants[j + 1] <= t - delay:
+            j += 1
+        heard.append(j)
+    return heard
 
 
 def _decay_above(x: np.ndarray) -> np.ndarray:
@@ -137,15 +164,6 @@ def _clock(gain: LimitedGain, instants: Sequence[Fraction]) -> np.ndarray:
     T = gain.gain.T
     left = np.array([float((T - t) / T) for t in instants])
     return gain.clock(_floats(instants), remaining=left)
-
-
-def _exactly(instants: Sequence[Fraction], t: Fraction, guess: int) -> int:
-    """Return the number of the last instant that is not after ``t``, near to a guess; -1 if there is none."""
-    while guess + 1 < len(instants) and instants[guess + 1] <= t:
-        guess += 1
-    while guess >= 0 and instants[guess] > t:
-        guess -= 1
-    return guess
 
 
 def _floats(values: Sequence[Fraction]) -> np.ndarray:
