@@ -100,6 +100,8 @@ class Certificate(Content, FromFile, Shown):
         What was asked.
     observed : Observations
         What was seen, and is not claimed.
+    late : LateBounds or None
+        What holds with late messages; None where nothing was asked of them.
     source : Source or None
         The file that it was read from.
 

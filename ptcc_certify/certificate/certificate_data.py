@@ -21,7 +21,9 @@ from ptcc_certify.bounds.final_state import FinalState, Influence, final_state, 
 from ptcc_certify.bounds.input.effort import Effort
 from ptcc_certify.bounds.input.effort_bounds import InputRequest, bound_effort
 from ptcc_certify.bounds.input.worst_initial_state import WorstInitialState, worst_initial_state
+from ptcc_certify.bounds.late_messages import LateBounds
 from ptcc_certify.bounds.sliding_envelope import SlidingEnvelope
+from ptcc_certify.certificate.format_messages import late_obligations
 from ptcc_certify.certificate.format_vectors import final_state_witness
 from ptcc_certify.certificate.request import Expectations, Request
 from ptcc_certify.checker import CheckReport
@@ -126,6 +128,7 @@ class Content:
     matrix: Influence | None
     request: Request
     observed: Observations
+    late: LateBounds | None = None
     source: Source | None = None
 
     def changed(self, **values: Any) -> Self:
@@ -154,6 +157,7 @@ class Content:
             values |= {"searched_functions": search.functions, "search": replace(search, functions=())}
         if values.keys() & {"protocol", "initial_state", "sigma0"}:
             values.setdefault("trajectory", None)
+            values.setdefault("late", None)
         if values.keys() & {"initial_state", "sigma0"} and "final_state" not in values:
             x0, sigma0 = (values.get(name, getattr(self, name)) for name in ("initial_state", "sigma0"))
             first = x0 and [x - s for x, s in zip(x0, sigma0 or [0] * len(x0), strict=True)]
@@ -505,7 +509,7 @@ class Content:
                 obligations.append(Obligation("reaching-time", "reaching_time"))
         if self.effort is not None:
             obligations += self.effort.obligations
-        return tuple(obligations)
+        return (*obligations, *late_obligations(self.late))
 
     # ------------------------------------------------------------------ simulation
 

@@ -21,6 +21,7 @@ from ptcc_certify.bounds.input.effort import EnergyIntegral, Peak
 from ptcc_certify.certificate.certificate_data import Content, Observations, Source
 from ptcc_certify.certificate.format_effort import LIMITS, effort_section, energy_witness, peak_witness, read_effort
 from ptcc_certify.certificate.format_graph import certificate_graph, claim_sections, graph_section, structure_section
+from ptcc_certify.certificate.format_messages import Vectors, messages_section, read_late
 from ptcc_certify.certificate.format_vectors import (
     Reader,
     Writer,
@@ -82,6 +83,8 @@ def certificate_document(content: Content, verdict: str, files: bool = False) ->
         "proof": [_write_obligation(o, out) for o in content.obligations],
         "verdict": verdict,
     }
+    if content.late is not None:
+        document["messages"] = messages_section(content.late, out)
     return document | {"digest": digest(document), "unverified": _write_unverified(content)}, out
 
 
@@ -117,6 +120,7 @@ def read_document(
         "limit": _read_limit(steps, data),
         "final_state": _read_final_state(document, structure, data),
         "matrix": None,
+        "late": read_late(document, structure, protocol, data, steps),
         "request": _read_request(document["unverified"], None if effort is None else effort.initial_set),
         "observed": _read_observations(document["unverified"]),
         "source": Source(path, sha256, document, report, effort, proof, files),
@@ -360,6 +364,8 @@ def _write_obligation(obligation: Obligation, out: Writer) -> dict[str, Any]:
         witness = energy_witness(witness)
     elif isinstance(witness, Peak):
         witness = peak_witness(witness, out)
+    elif isinstance(witness, Vectors):
+        witness = witness.written(out)
     elif isinstance(witness, tuple):
         witness = {"u": dict(zip(out.labels, map(format_exact, witness), strict=True))}
     elif isinstance(witness, np.ndarray):

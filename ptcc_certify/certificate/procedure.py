@@ -30,6 +30,7 @@ from ptcc_certify.bounds.final_state import (
     final_state,
     influence,
 )
+from ptcc_certify.bounds.late_messages import LateBounds, bound_late
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.certificate_data import Observations
 from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
@@ -59,6 +60,7 @@ from ptcc_certify.lyapunov.search import APART_NODES, Search, search_functions, 
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.base import ReachingProtocol
 from ptcc_certify.protocols.disturbance import as_disturbance
+from ptcc_certify.protocols.late_messages import LateMessages
 from ptcc_certify.simulation.filippov import rounding_slack
 from ptcc_certify.simulation.instants import PAST
 from ptcc_certify.simulation.run import simulate
@@ -111,6 +113,7 @@ def certify(
     limits: Limits | Sequence[Limits] = (),
     delta: Any = None,
     noise: Any = None,
+    messages: LateMessages | None = None,
     signal: SignalClass = "any",
     time_limit: float | None = None,
     expectations: Expectations | str | None = None,
@@ -156,6 +159,9 @@ def certify(
     noise : number, optional
         Nominal protocol: bound of the measurement noise ``|n_k|``, ``u = -gain L (X + n)``, whose effect is bounded
         under each of ``limits`` but sampling. Noise times an infinite gain is bounded by nothing.
+    messages : LateMessages, optional
+        How late, how often lost and how inexact is what agents hear; what is left at the deadline then is bounded. With
+        single leaders, and ``sigma(0) = 0`` under the sliding-mode protocol.
     signal : {"any", "constant"}, DwellTime, JointWindows or ClockShares
         Of a family: restricted signals of which more is claimed, beside what holds for every signal; the three classes
         are in :mod:`ptcc_certify.theorems.restricted_signals`.
@@ -213,6 +219,7 @@ def certify(
     options: dict[str, Any] = {"method": method, "at": at, "initial_set": initial_set, "limits": limits, "delta": delta}
     options |= {
         "noise": noise,
+        "messages": messages,
         "signal": signal,
         "time_limit": time_limit,
         "expectations": expectations,
@@ -245,6 +252,7 @@ def certify(
         search = case.search(proof)
         limit = case.upper_bound()
     matrix, result = case.final_state(trajectory)
+    late = case.late_messages(result)
     proved = [proof.rate, *(V.rate for V in search.functions)]
     certificate = Certificate(
         structure=structure,
@@ -259,6 +267,7 @@ def certify(
         final_state=result,
         matrix=matrix,
         request=request,
+        late=late,
         observed=Observations(
             trajectory=trajectory,
             numerical_rate=numerical,
@@ -404,6 +413,17 @@ class Case:
                     f"the simulated run is still {gap:.1e} from the final state: its slowest modes had not settled"
                 )
         return matrix, result
+
+
+    def late_messages(self, result: FinalState | None) -> LateBounds | None:
+        """Bound what late messages leave at the deadline; None if nothing is asked of them."""
+        messages = self.request.messages
+        if messages is None:
+            return None
+        if any(self.sigma0 or ()):
+            raise ParameterError("late messages ask for sigma(0) = 0, so that no sliding variable moves; leave sigma0 out")
+        ends = None if result is None else result.intervals
+        return bound_late(self.structure, self.protocol, messages, self.initial_state, ends)
 
 
 def _search_and_prove(

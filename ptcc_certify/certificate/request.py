@@ -25,6 +25,7 @@ from ptcc_certify.lyapunov.search import METHODS
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.base import refuse_no_protocol
 from ptcc_certify.protocols.gain_limits import GainLimits
+from ptcc_certify.protocols.late_messages import LateMessages
 from ptcc_certify.protocols.parameters import parameter
 from ptcc_certify.protocols.reaching_time import ReachingTime, certified_reaching_times
 
@@ -97,6 +98,8 @@ class Request:
         Nominal protocol: bound of the disturbances that are judged besides, in units of the input.
     noise : Fraction or None
         Nominal protocol: bound of the measurement noise that is judged under each of the limits.
+    messages : LateMessages or None
+        How late is what agents hear.
     time_limit : float
         Seconds that the searches were given, infinity for no limit.
     expectations : Expectations
@@ -114,6 +117,7 @@ class Request:
     limits: tuple[Limits, ...] = ()
     delta: Fraction | None = None
     noise: Fraction | None = None
+    messages: LateMessages | None = None
     time_limit: float = math.inf
     expectations: Expectations = field(default_factory=Expectations)
     scenario: Mapping[str, Any] | None = None
@@ -163,6 +167,7 @@ def read_request(structure: Structure, protocol: Protocol, arguments: Mapping[st
         at=None if arguments["at"] is None else _instant(arguments["at"], protocol),
         initial_set=None if (region := arguments["initial_set"]) is None else read_initial_set(structure, region),
         limits=tuple(_limits(entry, protocol) for entry in arguments["limits"]),
+        messages=_messages(arguments["messages"]),
         time_limit=read_seconds(arguments["time_limit"], structure.graph),
         expectations=read_expectations(arguments["expectations"]),
         scenario=scenario,
@@ -208,6 +213,12 @@ def read_expectations(asked: Any) -> Expectations:
     if not isinstance(asked, Expectations):
         raise ParameterError(f"expectations = {shorten(repr(asked))} is none; give Expectations('stability'), say")
     return asked
+
+
+def _messages(messages: Any) -> LateMessages | None:
+    if not isinstance(messages, LateMessages | None):
+        raise ParameterError(f"messages = {shorten(repr(messages))} is none; give LateMessages(delay='0.01'), say")
+    return messages
 
 
 def _limits(entry: Any, protocol: Protocol) -> GainLimits:
