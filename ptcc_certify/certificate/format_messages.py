@@ -141,4 +141,3 @@ def read_messages(section: Mapping[str, Any], structure: Structure, data: Reader
         own_delay=section["own"] == "late",
         gain_cap=number(section["gain_cap"]),
     )
-

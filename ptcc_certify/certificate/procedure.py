@@ -414,14 +414,15 @@ class Case:
                 )
         return matrix, result
 
-
     def late_messages(self, result: FinalState | None) -> LateBounds | None:
         """Bound what late messages leave at the deadline; None if nothing is asked of them."""
         messages = self.request.messages
         if messages is None:
             return None
         if any(self.sigma0 or ()):
-            raise ParameterError("late messages ask for sigma(0) = 0, so that no sliding variable moves; leave sigma0 out")
+            raise ParameterError(
+                "late messages ask for sigma(0) = 0, so that no sliding variable moves; leave sigma0 out"
+            )
         ends = None if result is None else result.intervals
         return bound_late(self.structure, self.protocol, messages, self.initial_state, ends)
 
