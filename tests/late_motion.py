@@ -55,7 +55,7 @@ def grid(T: float, longest: float, nearest: float, count: int) -> Vector:
 
 
 def instants(T: float, taubar: float, nearest: float = 1e-7, count: int = 60) -> Vector:
-    """A grid up to ``T`` itself, finer at ``T - taubar`` and ``T - 2 taubar``, where what is heard at the end was said."""
+    """A grid up to ``T`` itself, finer at ``T - taubar`` and ``T - 2 taubar``, from which the end hears."""
     whole = grid(T, min(taubar, T) / 8, nearest, count)
     extra = [T * (1 - x) - j * taubar for j in (1, 2) for x in np.geomspace(1e-3, nearest, 12)]
     return np.unique(np.concatenate([whole, [t for t in extra if 0 < t < whole[-1]], [T]]))
@@ -96,8 +96,8 @@ class LateMotion:
         history : (N,) array
             The states at 0 and before.
         ages : callable
-            ``ages(states, oldest, j)``: the numbers of the instants, from ``oldest`` to ``j``, at which what ``k`` hears
-            of ``l`` in step ``j`` was said, (N, N).
+            ``ages(states, oldest, j)``: the numbers of the instants, from ``oldest`` to ``j``, at which what ``k``
+            hears of ``l`` in step ``j`` was said, (N, N).
         errors : callable, optional
             What is off in what each agent hears, added to every term of its sum, with the sign of the weight.
         """

@@ -23,7 +23,7 @@ from ptcc_certify.protocols import NominalProtocol
 ROOT = Path(ptcc_certify.__file__).parents[1]
 LISTED = (ROOT / "ptcc_certify/checker/TRUSTED").read_text(encoding="utf-8").splitlines()
 ALL = [line for line in LISTED if not line.startswith("#")]
-TWINS = [line for line in ALL if line.endswith(("/fast.py", "/array_digraph.py"))]
+TWINS = [line for line in ALL if line.endswith(("/fast.py", "/array_digraph.py", "/array_steps.py"))]
 PLAIN = [line for line in ALL if line not in TWINS]
 MODULES = [line for line in PLAIN if line.endswith(".py")]
 
@@ -102,7 +102,8 @@ def test_the_list_is_what_the_checker_imports():
 
 
 def test_each_file_of_the_list_is_there_once():
-    assert TWINS == ["lmi/exact/fast.py", "ptcc_certify/checker/array_digraph.py"] and ALL[-2:] == TWINS
+    arrays = [f"ptcc_certify/checker/array_{name}.py" for name in ("digraph", "steps")]
+    assert ["lmi/exact/fast.py", *arrays] == TWINS and ALL[-3:] == TWINS
     assert len(set(ALL)) == len(ALL) and all((ROOT / name).is_file() for name in ALL)
 
 
