@@ -477,6 +477,7 @@ def _write_request(request: Request) -> dict[str, Any]:
         "behaviour": expectations.behaviour,
         "min_rate": text(expectations.min_rate),
         "max_input": text(expectations.max_input),
+        "max_residual": text(expectations.max_residual),
         "limits": [{name: text(getattr(entry, name)) for name in LIMITS} for entry in request.limits],
         "delta": text(request.delta),
         "noise": text(request.noise),
@@ -503,7 +504,7 @@ def _read_request(unverified: Mapping[str, Any], initial_set: InitialSet | None)
         delta=_positive(section, "delta"),
         noise=_positive(section, "noise"),
         time_limit=float(seconds) if isinstance(seconds, int | float) and seconds is not True else math.inf,
-        expectations=Expectations(behaviour, _positive(section, "min_rate"), _positive(section, "max_input")),
+        expectations=Expectations(behaviour, *(_positive(section, key) for key in ("min_rate", "max_input", "max_residual"))),
         scenario=scenario if isinstance(scenario, dict) else None,
         origins={key: one_line(origin)[:200] for key, origin in origins if isinstance(origin, str)},
     )

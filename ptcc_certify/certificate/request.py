@@ -46,6 +46,8 @@ class Expectations:
         A proved rate of at least so much, per unit of the stretched clock.
     max_input : Fraction or None
         A proved peak of every ``|u_k|`` of at most so much, in units of the input.
+    max_residual : Fraction or None
+        With late messages: every agent proved within so much of its final state at ``T``.
 
     Raises
     ------
@@ -68,6 +70,7 @@ class Expectations:
     behaviour: str | None = None
     min_rate: Fraction | None = None
     max_input: Fraction | None = None
+    max_residual: Fraction | None = None
 
     def __post_init__(self) -> None:
         try:
@@ -75,7 +78,7 @@ class Expectations:
         except ValueError as error:
             raise ParameterError(f"expected behaviour: {error}") from None
         object.__setattr__(self, "behaviour", behaviour)
-        for name in ("min_rate", "max_input"):
+        for name in ("min_rate", "max_input", "max_residual"):
             if (value := getattr(self, name)) is not None:
                 object.__setattr__(self, name, parameter(name, value, zero_allowed=True))
 

@@ -80,7 +80,7 @@ class FollowerRows:
     """
 
     def __init__(self, structure: Structure):
-        refuse_leader_groups(structure, "late messages of followers, and leaders that move,")
+        refuse_leader_groups(structure, "a bound row by row")
         if not structure.followers.size:
             raise HypothesisError("nobody listens to anybody, so there is nothing that could be late; add edges")
         graph = structure.graph
@@ -153,14 +153,14 @@ def refuse_leader_groups(structure: Structure, what: str) -> None:
     --------
     >>> refuse_leader_groups(analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1), (2, 3, 1)])), "this")
     Traceback (most recent call last):
-    ptcc_certify.errors.HypothesisError: this needs leaders that listen to nobody; 1 and 2 are leaders that listen to \
-each other
+    ptcc_certify.errors.HypothesisError: this needs leaders that listen to nobody; 1 and 2 are leaders of \
+one group
     """
     group = next((c for c in structure.closed_components if len(c.nodes) > 1), None)
     if group is not None:
         first, second = (shorten(structure.graph.labels[v]) for v in group.nodes[:2])
         raise HypothesisError(
-            f"{what} needs leaders that listen to nobody; {first} and {second} are leaders that listen to each other"
+            f"{what} needs leaders that listen to nobody; {first} and {second} are leaders of one group"
         )
 
 

@@ -1,0 +1,66 @@
+"""What screens tell of late messages: how late, what is left at the deadline, who misses it."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+from lmi.exact.decimal_rounding import down, near, up
+from ptcc_certify.report.structure_text import Lines
+from ptcc_certify.report.text_layout import shorten_label
+
+if TYPE_CHECKING:
+    from ptcc_certify.bounds.late_messages import LateBounds
+    from ptcc_certify.certificate.certificate import Certificate
+    from ptcc_certify.protocols.late_messages import LateMessages
+
+
+def late_lines(certificate: Certificate) -> Lines:
+    """Tell how late messages are, what is left then, and who is certain to miss the deadline."""
+    late = certificate.late
+    if late is None:
+        return
+    yield "messages", messages_text(late.messages)
+    yield "late", "; ".join([*_left(late), *_missed(late)])
+    if late.staged is not None:
+        first = min(late.staged)
+        when = f"from {near(first)} to {near(certificate.protocol.T)}, {near(late.messages.age)} apart"
+        yield "", f"exactly at x(T) by T if agents have deadlines of their own, {when}"
+
+
+def messages_text(messages: LateMessages) -> str:
+    """Tell how late, how often lost and how inexact messages are.
+
+    Examples
+    --------
+    >>> from ptcc_certify.protocols.late_messages import LateMessages
+    >>> messages_text(LateMessages(delay="0.01", period="0.005", losses=3))
+    'up to 0.03 old: 0.01 late, every 0.005, 3 in a row lost'
+    """
+    parts = [f"{near(messages.largest_delay)} late"] * (messages.largest_delay > 0)
+    if messages.period is not None:
+        parts.append(f"every {near(Fraction(messages.period))}")
+        parts += [f"{messages.losses} in a row lost"] * (messages.losses > 0)
+    old = f"up to {near(messages.age)} old" + f": {', '.join(parts)}" * (messages.period is not None)
+    told = [old] * (messages.age > 0)
+    told += [f"off by up to {near(Fraction(messages.value_error))}"] * (messages.value_error != 0)
+    told += [f"gain <= {near(Fraction(messages.gain_cap))}"] if messages.gain_cap is not None else []
+    return "; ".join(told + ["the own state as well"] * messages.own_delay)
+
+
+def _left(late: LateBounds) -> list[str]:
+    """Tell what is left at T at most."""
+    if math.isinf(late.largest):
+        return ["nothing is proved of what is left at T"]
+    whole = "for every 1 at first, " * late.relative
+    settled = "" if late.messages.gain_cap is None else ", nothing settles under a cap"
+    return [f"{whole}at T every agent within {up(late.largest, 2)} of its final state{settled}"]
+
+
+def _missed(late: LateBounds) -> list[str]:
+    """Tell who misses the deadline."""
+    if late.missed is None:
+        return []
+    label = shorten_label(late.structure.graph.labels[late.missed.agent], 22)
+    return [f"agent {label} is away from it by {down(late.missed.bound, 2)} at least"]
