@@ -100,9 +100,7 @@ class Late:
         if rate < 1e-3:
             return None
         u = np.linalg.solve(A - rate * np.eye(len(A)), np.ones(len(A)))
-        values = {
-            v: Fraction(float(x)).limit_denominator(10**6) for v, x in zip(self.followers, u / u.max(), strict=True)
-        }
+        values = {v: Fraction(round(float(x) * 2**30), 2**30) for v, x in zip(self.followers, u / u.max(), strict=True)}
         own = [
             (self.D[v] * values[v] - q * sum((w * values[s] for s, w in self.heard[v]), Fraction(0))) / values[v]
             for v in self.followers
@@ -157,8 +155,7 @@ class Late:
         base = np.linalg.solve(A, np.array([float(self.D[v]) for v in self.followers]))
         share = max(max(float(self.away(v)) / base[place[v]] for v in self.followers), float(error)) + 1e-9
         y0 = {
-            v: Fraction(float(base[place[v]] * share * (1 + 1e-6))).limit_denominator(10**9) + Fraction(1, 10**6)
-            for v in self.followers
+            v: Fraction(math.ceil(base[place[v]] * share * (1 + 1e-6) * 2**30) + 2**10, 2**30) for v in self.followers
         }
         near = [self.T * (1 - Fraction(1, 2**j)) for j in range(1, 12)]
         instants = sorted(

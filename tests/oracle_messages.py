@@ -403,6 +403,8 @@ class LateOracle(Oracle):
         T, rho1, k = self.gain
         self.require(speed >= 0 and delta >= 0 and a > 0 and min(u.values()) > 0, "leaders: signs")
         self.require(sign is None or sign >= speed + delta, "sign_gain")
+        if self.false:
+            return
         push, p, least = speed + delta, a * k, min(u.values())
         inputs = None if said["input"] is None else self.vector(said["input"])
         for v, x in u.items():
@@ -417,8 +419,6 @@ class LateOracle(Oracle):
                 bound = (self.L[v][v] * x + heard) * y + (sign or 0)
                 self.require(inputs[v] >= bound, f"leaders: input of {v}")
         self.require(after == 0 if sign is not None else after >= push / (a * rho1 * least), "leaders: after")
-        if self.false:
-            return
         for x0, _ in self.starts():
             self.tracked(x0, np.array([float(u[v]) for v in self.follow]), float(a), inputs)
 
