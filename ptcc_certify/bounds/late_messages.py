@@ -177,7 +177,9 @@ def bound_late(
     np.True_
     """
     if messages.own_delay:
-        raise HypothesisError("an own state that is late is not certified row by row; measure the own state without delay")
+        raise HypothesisError(
+            "an own state that is late is not certified row by row; measure the own state without delay"
+        )
     rows = FollowerRows(structure)
     latencies = messages.latencies(structure.graph)
     gain = GainLimits(gain_cap=messages.gain_cap).limit(protocol.gain)
@@ -403,4 +405,6 @@ def refuse_stages(structure: Structure, T: Fraction, delay: Fraction) -> None:
         raise HypothesisError("deadlines of stages need followers that form no cycle; leave --staged out")
     if stage_deadlines(rows, T, delay) is None:
         first = shorten(structure.graph.labels[int(rows.followers[0])])
-        raise HypothesisError(f"the deadline is too early: information takes longer to arrive at all agents (of {first})")
+        raise HypothesisError(
+            f"the deadline is too early: information takes longer to arrive at all agents (of {first})"
+        )

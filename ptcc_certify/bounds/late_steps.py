@@ -168,4 +168,3 @@ def _clock(gain: LimitedGain, instants: Sequence[Fraction]) -> np.ndarray:
 
 def _floats(values: Sequence[Fraction]) -> np.ndarray:
     return np.array([float(x) for x in values])
-

@@ -23,6 +23,8 @@ from ptcc_certify.bounds.input.effort_bounds import InputRequest, bound_effort
 from ptcc_certify.bounds.input.worst_initial_state import WorstInitialState, worst_initial_state
 from ptcc_certify.bounds.late_messages import LateBounds
 from ptcc_certify.bounds.sliding_envelope import SlidingEnvelope
+from ptcc_certify.bounds.tracking import Tracking
+from ptcc_certify.certificate.format_leaders import tracking_obligations
 from ptcc_certify.certificate.format_messages import late_obligations
 from ptcc_certify.certificate.format_vectors import final_state_witness
 from ptcc_certify.certificate.request import Expectations, Request
@@ -129,6 +131,7 @@ class Content:
     request: Request
     observed: Observations
     late: LateBounds | None = None
+    tracking: Tracking | None = None
     source: Source | None = None
 
     def changed(self, **values: Any) -> Self:
@@ -157,7 +160,7 @@ class Content:
             values |= {"searched_functions": search.functions, "search": replace(search, functions=())}
         if values.keys() & {"protocol", "initial_state", "sigma0"}:
             values.setdefault("trajectory", None)
-            values.setdefault("late", None)
+            values |= {"late": values.get("late"), "tracking": values.get("tracking")}
         if values.keys() & {"initial_state", "sigma0"} and "final_state" not in values:
             x0, sigma0 = (values.get(name, getattr(self, name)) for name in ("initial_state", "sigma0"))
             first = x0 and [x - s for x, s in zip(x0, sigma0 or [0] * len(x0), strict=True)]
@@ -509,7 +512,7 @@ class Content:
                 obligations.append(Obligation("reaching-time", "reaching_time"))
         if self.effort is not None:
             obligations += self.effort.obligations
-        return (*obligations, *late_obligations(self.late))
+        return (*obligations, *late_obligations(self.late), *tracking_obligations(self.tracking))
 
     # ------------------------------------------------------------------ simulation
 

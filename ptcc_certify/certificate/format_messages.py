@@ -104,7 +104,8 @@ def read_late(
         rows.append(RowBound(witness, cap, clock, *(exact(row[name]) for name in ("left", "initial", "floor"))))
     gain, missed = GainLimits(gain_cap=messages.gain_cap).limit(protocol.gain), section["missed"]
     if missed is not None:
-        gauge = data.floats(steps["late-missed", "messages.missed"].witness["gauge"], F).astype(np.int64)
+        signs = steps["late-missed", "messages.missed"].witness["gauge"]
+        gauge = np.array(data.files.integers(signs, "gauge", F))
         missed = Missed(structure.graph.index[missed["agent"]], exact(missed["bound"]), gauge)
     staged = section["staged"]
     residual, instants = section["residual"], None
@@ -141,4 +142,3 @@ def read_messages(section: Mapping[str, Any], structure: Structure, data: Reader
         own_delay=section["own"] == "late",
         gain_cap=number(section["gain_cap"]),
     )
-

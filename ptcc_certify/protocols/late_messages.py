@@ -83,7 +83,9 @@ diverge, for its gain grows without limit before T; give gain_cap, or measure th
             put(self, name, None if getattr(self, name) is None else parameter(name, getattr(self, name)))
         put(self, "value_error", parameter("value_error", self.value_error, True))
         if isinstance(self.losses, bool) or not isinstance(self.losses, int) or not 0 <= self.losses <= MOST_LOSSES:
-            raise ParameterError(f"losses = {shorten(repr(self.losses))} is not a number of messages, 0 to {MOST_LOSSES:,}")
+            raise ParameterError(
+                f"losses = {shorten(repr(self.losses))} is not a number of messages, 0 to {MOST_LOSSES:,}"
+            )
         if self.losses and self.period is None:
             raise ParameterError("losses without a period: tell how long it is from one message to the next")
         if self.own_delay and self.gain_cap is None:
@@ -92,12 +94,16 @@ diverge, for its gain grows without limit before T; give gain_cap, or measure th
                 "without limit before T; give gain_cap, or measure the own state without delay"
             )
         if not self.age and not self.value_error:
-            raise ParameterError("messages that are neither late, nor lost, nor rounded; give delay, period or value_error")
+            raise ParameterError(
+                "messages that are neither late, nor lost, nor rounded; give delay, period or value_error"
+            )
 
     @property
     def largest_delay(self) -> Fraction:
         """What a message takes at most, in units of time."""
-        return max(self.delay.values(), default=Fraction(0)) if isinstance(self.delay, Mapping) else Fraction(self.delay)
+        return (
+            max(self.delay.values(), default=Fraction(0)) if isinstance(self.delay, Mapping) else Fraction(self.delay)
+        )
 
     @property
     def held(self) -> Fraction:

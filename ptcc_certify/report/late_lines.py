@@ -6,12 +6,15 @@ import math
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.report.structure_text import Lines
 from ptcc_certify.report.text_layout import shorten_label
 
 if TYPE_CHECKING:
     from ptcc_certify.bounds.late_messages import LateBounds
+    from ptcc_certify.bounds.tracking import Tracking
     from ptcc_certify.certificate.certificate import Certificate
     from ptcc_certify.protocols.late_messages import LateMessages
 
@@ -27,6 +30,32 @@ def late_lines(certificate: Certificate) -> Lines:
         first = min(late.staged)
         when = f"from {near(first)} to {near(certificate.protocol.T)}, {near(late.messages.age)} apart"
         yield "", f"exactly at x(T) by T if agents have deadlines of their own, {when}"
+
+
+def tracking_lines(certificate: Certificate) -> Lines:
+    """Tell how followers track leaders that move."""
+    tracking = certificate.tracking
+    if tracking is None:
+        return
+    leaders, T = tracking.leaders, near(certificate.protocol.T)
+    sign = "" if leaders.sign_gain is None else f"; followers add {near(leaders.sign_gain)} sign(e_k)"
+    pushed = f"; any |d_k| <= {near(leaders.disturbance)}" * (leaders.disturbance > 0)
+    yield "leaders", f"move, |x_j'| <= {near(leaders.speed)}{pushed}{sign}"
+    early, late = (up(float(tracking.distance_bound(np.array([q])).max()), 2) for q in (0.1, 0.01))
+    after = "ever after" if not tracking.after else f"from T on within {up(_after(tracking), 2)}"
+    whole = "for every 1 at first: " * tracking.relative
+    yield (
+        "tracking",
+        f"{whole}every follower within {early} at 0.9 T, {late} at 0.99 T; on its target at T = {T}, {after}",
+    )
+    if tracking.input is None:
+        yield "", "the input is not proved bounded: rho2 kappa is too small"
+    else:
+        yield "", f"|gain e_k| <= {up(float(tracking.input.max()), 4)}"
+
+
+def _after(tracking: Tracking) -> float:
+    return float(tracking.after) * float(tracking.witness.u.max())
 
 
 def messages_text(messages: LateMessages) -> str:

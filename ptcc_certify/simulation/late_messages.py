@@ -132,7 +132,11 @@ def _grid(T: float, age: float, steps: int) -> np.ndarray:
 
 
 def _clocks(
-    graph: SignedDigraph, protocol: Protocol, messages: LateMessages, t: np.ndarray, deadlines: Sequence[Fraction] | None
+    graph: SignedDigraph,
+    protocol: Protocol,
+    messages: LateMessages,
+    t: np.ndarray,
+    deadlines: Sequence[Fraction] | None,
 ) -> np.ndarray:
     """Return the clock at every instant, one for all agents or ``(M, N)``; infinite from a deadline on."""
     limits = GainLimits(gain_cap=messages.gain_cap)

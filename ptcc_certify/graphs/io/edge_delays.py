@@ -60,7 +60,9 @@ def read_delays(path: Source, graph: SignedDigraph, title: str = "delay") -> dic
             value = parse_exact(text)
         except NumberError:
             edge = f"{shorten(source)} -> {shorten(target)}"
-            raise FormatError(f'{place}: delay "{shorten(text)}" of edge {edge} is not a number; give one >= 0') from None
+            raise FormatError(
+                f'{place}: delay "{shorten(text)}" of edge {edge} is not a number; give one >= 0'
+            ) from None
         if value < 0:
             edge = f"{shorten(source)} -> {shorten(target)}"
             raise FormatError(f"{place}: delay {shorten(text)} of edge {edge} is negative; give a number >= 0")
