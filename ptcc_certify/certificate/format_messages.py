@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from lmi.exact.decimal_rounding import float_up
-from ptcc_certify.bounds.late_messages import LateBounds, Missed, RowBound
+from ptcc_certify.bounds.late_messages import LateBounds, RowBound
 from ptcc_certify.bounds.late_steps import bound_steps
+from ptcc_certify.bounds.missed_deadline import Missed
 from ptcc_certify.certificate.format_vectors import Reader, Writer, number, text
 from ptcc_certify.checker.reading import exact
 from ptcc_certify.graphs.rationals import format_exact

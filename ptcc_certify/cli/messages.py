@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import TYPE_CHECKING
 
 import click
@@ -68,7 +69,7 @@ def messages_of(graph: str, signed: SignedDigraph, options: Options) -> LateMess
     )
 
 
-def _delay(graph: str, signed: SignedDigraph, text: str) -> object:
+def _delay(graph: str, signed: SignedDigraph, text: str) -> Fraction | dict[tuple[str, str], Fraction]:
     """Return a delay, or those of a column."""
     from ptcc_certify.graphs.io.edge_delays import read_delays
     from ptcc_certify.graphs.rationals import parse_exact

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from fractions import Fraction
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -69,12 +68,12 @@ def messages_text(messages: LateMessages) -> str:
     """
     parts = [f"{near(messages.largest_delay)} late"] * (messages.largest_delay > 0)
     if messages.period is not None:
-        parts.append(f"every {near(Fraction(messages.period))}")
+        parts.append(f"every {near(messages.period)}")
         parts += [f"{messages.losses} in a row lost"] * (messages.losses > 0)
     old = f"up to {near(messages.age)} old" + f": {', '.join(parts)}" * (messages.period is not None)
     told = [old] * (messages.age > 0)
-    told += [f"off by up to {near(Fraction(messages.value_error))}"] * (messages.value_error != 0)
-    told += [f"gain <= {near(Fraction(messages.gain_cap))}"] if messages.gain_cap is not None else []
+    told += [f"off by up to {near(messages.value_error)}"] * (messages.value_error != 0)
+    told += [f"gain <= {near(messages.gain_cap)}"] if messages.gain_cap is not None else []
     return "; ".join(told + ["the own state as well"] * messages.own_delay)
 
 

@@ -12,7 +12,7 @@ from ptcc_certify.graphs.rationals import parse_exact, shorten
 
 
 def read_delays(path: Source, graph: SignedDigraph, title: str = "delay") -> dict[tuple[str, str], Fraction]:
-    """Read what messages take over every edge from a column of an edge list with a header.
+    r"""Read what messages take over every edge from a column of an edge list with a header.
 
     Parameters
     ----------
