@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import expm
@@ -104,7 +105,7 @@ class LateMotion:
         N, D = len(self.W), np.abs(self.W).sum(axis=1)
         X, own = np.empty((N, len(self.times))), np.arange(N)[None, :]
         X[:, 0] = history
-        moved = [[g.between(a, b) for g in self.gains] for a, b in zip(self.times, self.times[1:], strict=False)]
+        moved = [[g.between(a, b) for g in self.gains] for a, b in pairwise(self.times)]
         for j, ds in enumerate(np.array(moved)):
             # the first instant that is not older than taubar at the end of the step
             oldest = int(np.searchsorted(self.times[: j + 1], self.times[j + 1] - self.taubar * (1 - 1e-12)))
@@ -115,8 +116,10 @@ class LateMotion:
             if self.own_late:
                 X[:, j + 1] = X[:, j] - ds * ((np.abs(self.W) * X[own.T, which]).sum(axis=1) - pull)
                 continue
-            end = pull / np.where(D > 0, D, 1)
-            X[:, j + 1] = np.where(D > 0, end + (X[:, j] - end) * np.exp(-np.where(D > 0, D * ds, 0)), X[:, j])
+            end, moves = pull / np.where(D > 0, D, 1), D > 0
+            decay = np.exp(-D[moves] * ds[moves])
+            X[:, j + 1] = X[:, j]
+            X[moves, j + 1] = end[moves] + (X[moves, j] - end[moves]) * decay
         return X
 
 
@@ -156,7 +159,7 @@ def worst_errors(nu: float, target: Vector) -> Callable[[Vector], Vector]:
 
 @dataclass(frozen=True)
 class Moving:
-    """Followers of leaders that move, ``x_F' = gain e_F + d + mu sat(e_F/layer)``, without delay.
+    """Followers of leaders that move, ``x_F' = gain e_F + d``, without delay.
 
     Speeds and disturbances are a constant times the gain within a step, never above their limits: the equation is one
     with constant coefficients on the clock.
@@ -169,31 +172,62 @@ class Moving:
     speed: float
     delta: float
 
+    @property
+    def targets(self) -> Matrix:
+        """``-L_F^-1 L_FL``."""
+        F, A = self.followers, self.leaders
+        return -np.linalg.solve(self.L[np.ix_(F, F)], self.L[np.ix_(F, A)])
+
     def run(self, x0: Vector, times: Vector, u: Vector) -> tuple[Matrix, Matrix]:
         """Return states and targets at all instants, the worst row pushed out at each step."""
-        F, A = self.followers, self.leaders
-        LF, LA = self.L[np.ix_(F, F)], self.L[np.ix_(F, A)]
-        targets = -np.linalg.solve(LF, LA)
-        X = np.empty((len(x0), len(times)))
-        X[:, 0] = x0
-        aims = np.empty((len(F), len(times)))
-        aims[:, 0] = targets @ x0[A]
-        m = len(F)
-        for j in range(len(times) - 1):
-            top = max(self.gain.value(times[j]), self.gain.value(times[j + 1]))
-            ds = self.gain.between(times[j], times[j + 1])
-            off = X[F, j] - aims[:, j]
-            row = int(np.argmax(np.abs(off) / u))
-            side = 1.0 if off[row] >= 0 else -1.0
-            velocity = -side * self.speed / top * np.where(targets[row] >= 0, 1.0, -1.0)
-            push = np.zeros(m)
-            push[:] = self.delta / top * np.where(off >= 0, 1.0, -1.0)
-            # d eps/ds = -L_F eps + push - targets velocity, with constant right side
-            forcing = push - targets @ velocity
+        F, A, targets = self.followers, self.leaders, self.targets
+        LF, m = self.L[np.ix_(F, F)], len(self.followers)
+        X, aims = np.empty((len(x0), len(times))), np.empty((m, len(times)))
+        X[:, 0], aims[:, 0] = x0, targets @ x0[A]
+        for j, (a, b) in enumerate(pairwise(times)):
+            top, ds = max(self.gain.value(a), self.gain.value(b)), self.gain.between(a, b)
+            velocity, push = self._worst(X[F, j] - aims[:, j], u, targets)
+            # d eps/ds = -L_F eps + forcing
             B = np.zeros((m + 1, m + 1))
-            B[:m, :m], B[:m, m] = -LF * ds, forcing * ds
-            eps = (expm(B) @ np.append(off, 1.0))[:m]
-            X[A, j + 1] = X[A, j] + velocity * ds
+            B[:m, :m], B[:m, m] = -LF * ds, (push - targets @ velocity) * ds / top
+            eps = (expm(B) @ np.append(X[F, j] - aims[:, j], 1.0))[:m]
+            X[A, j + 1] = X[A, j] + velocity * ds / top
             aims[:, j + 1] = targets @ X[A, j + 1]
             X[F, j + 1] = aims[:, j + 1] + eps
         return X, aims
+
+    def run_sign(self, x0: Vector, u: Vector, mu: float, layer: float) -> tuple[Vector, Matrix, Matrix]:
+        """Return instants, states and targets with ``mu sat(e/layer)`` besides, up to ``1.2 T``, by Heun's method."""
+        F, A, targets = self.followers, self.leaders, self.targets
+        LF, D, T = self.L[np.ix_(F, F)], float(np.diag(self.L).max()), self.gain.T
+        t, X = 0.0, [x0.copy()]
+        times, aims = [0.0], [targets @ x0[A]]
+        while t < 1.2 * T:
+            dt = min(0.05 / (D * self.gain.value(t)), 0.2 * layer / (mu * D), T / 50)
+            if t < T < t + dt + 1e-3 * T:
+                dt = max(T - t, 1e-3 * T)  # the last thousandth before T is left out
+            eps = X[-1][F] - aims[-1]
+            velocity, push = self._worst(eps, u, targets)
+
+            def slope(eps: Vector, t: float, velocity: Vector = velocity, push: Vector = push) -> Vector:
+                e = -LF @ eps
+                return self.gain.value(t) * e + mu * np.clip(e / layer, -1, 1) + push - targets @ velocity
+
+            if t >= T or t + dt < T:
+                first = slope(eps, t)
+                eps = eps + dt / 2 * (first + slope(eps + dt * first, t + dt))
+                x = X[-1].copy()
+                x[A] += velocity * dt
+                x[F] = targets @ x[A] + eps
+                X.append(x)
+                times.append(t + dt)
+                aims.append(targets @ x[A])
+            t += dt
+        return np.array(times), np.array(X).T, np.array(aims).T
+
+    def _worst(self, off: Vector, u: Vector, targets: Matrix) -> tuple[Vector, Vector]:
+        """Return velocities of leaders and disturbances that drive the worst row out."""
+        row = int(np.argmax(np.abs(off) / u))
+        side = 1.0 if off[row] >= 0 else -1.0
+        velocity = -side * self.speed * np.where(targets[row] >= 0, 1.0, -1.0)
+        return velocity, self.delta * np.where(off >= 0, 1.0, -1.0)

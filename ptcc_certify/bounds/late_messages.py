@@ -25,9 +25,9 @@ from lmi.exact.decimal_rounding import float_up
 from lmi.exact.elementary_enclosures import log, rounded
 from ptcc_certify.bounds.late_steps import Steps, search_steps
 from ptcc_certify.bounds.missed_deadline import Missed, find_missed
+from ptcc_certify.bounds.small_delays import SmallDelays
 from ptcc_certify.bounds.staged_deadlines import stage_deadlines
 from ptcc_certify.checker.input_formulas import BITS, Limits, decay_above
-from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness
 from ptcc_certify.protocols.base import Protocol
@@ -88,7 +88,11 @@ class LateBounds:
     staged : tuple of Fraction, or None
         Of every follower the deadline at which it is at its final state exactly.
     residual : (N,) array or None
-        What bounds ``|x_k(T) - x_k*|``, in floats from above; None where nothing does.
+        What bounds ``|x_k(T) - x_k*|`` row by row, in floats from above; None where nothing does.
+    form : SmallDelays or None
+        What a Lyapunov function of the whole graph proves under a capped gain.
+    longest_delay : float or None
+        About the longest delay that such functions forgive: this certificate's limit. None if it was not asked.
     """
 
     messages: LateMessages
@@ -100,11 +104,19 @@ class LateBounds:
     missed: Missed | None = None
     staged: tuple[Fraction, ...] | None = None
     residual: np.ndarray | None = None
+    form: SmallDelays | None = None
+    longest_delay: float | None = None
+
+    @property
+    def says_something(self) -> bool:
+        """Whether anything is proved."""
+        return bool(self.rows or self.steps or self.missed or self.staged or self.form)
 
     @property
     def largest(self) -> float:
-        """The largest of ``residual``; infinite where nothing is bounded."""
-        return math.inf if self.residual is None else float(self.residual.max())
+        """The largest of the bounds of ``|x_k(T) - x_k*|``; infinite where nothing is bounded."""
+        largest = math.inf if self.residual is None else float(self.residual.max())
+        return largest if self.form is None else min(largest, float_up(max(self.form.residual)))
 
     def deviation_bound(self, t: np.ndarray) -> np.ndarray:
         """Return what bounds ``|x_k - x_k*|`` at instants, ``(F, M)`` floats; infinite where nothing does."""
@@ -140,10 +152,13 @@ def bound_late(
     ends : sequence of N (middle, radius), optional
         Of ``Q X(0)``; without it bounds are for every initial state within 1 of its final one.
 
+    Returns
+    -------
+    LateBounds
+        Without bounds by rows where a leader belongs to a group, or the own state is late, too.
+
     Raises
     ------
-    HypothesisError
-        A leader belongs to a group, or the own state is late, too.
     ParameterError
         A delay is of an edge that is not there.
 
@@ -154,13 +169,11 @@ def bound_late(
     >>> bounds.residual.max() < 0.5
     np.True_
     """
-    if messages.own_delay:
-        raise HypothesisError(
-            "an own state that is late is not certified row by row; measure the own state without delay"
-        )
-    rows = FollowerRows(structure)
     latencies = messages.latencies(structure.graph)
     gain = GainLimits(gain_cap=messages.gain_cap).limit(protocol.gain)
+    if messages.own_delay or any(len(c.nodes) > 1 for c in structure.closed_components):
+        return LateBounds(messages, structure, gain, initial_state is None or ends is None)
+    rows = FollowerRows(structure)
     first = np.ones(rows.D.size)
     if initial_state is not None and ends is not None:
         first = np.array([float_up(abs(initial_state[v] - ends[v][0]) + ends[v][1]) for v in rows.followers])

@@ -23,6 +23,7 @@ from ptcc_certify.bounds.input.effort_bounds import InputRequest, bound_effort
 from ptcc_certify.bounds.input.worst_initial_state import WorstInitialState, worst_initial_state
 from ptcc_certify.bounds.late_messages import LateBounds
 from ptcc_certify.bounds.sliding_envelope import SlidingEnvelope
+from ptcc_certify.bounds.small_delays import DecayingForm
 from ptcc_certify.bounds.tracking import Tracking
 from ptcc_certify.certificate.format_leaders import tracking_obligations
 from ptcc_certify.certificate.format_messages import late_obligations
@@ -472,6 +473,23 @@ class Content:
             noise=self.noise,
         )
         return bound_effort(request)
+
+    @property
+    def decaying_forms(self) -> list[DecayingForm]:
+        """The Lyapunov functions in the coordinates ``E`` with all their constants; none without an exact ``Q``."""
+        effort, found = self.effort, []
+        if effort is None or not self.influence.exact or self._geometry is None:
+            return []
+        for k, (V, constants) in enumerate(zip(self.functions, effort.constants, strict=True)):
+            form = V.form
+            if form is None or form.coordinates != "E" or V.deviation is None or not V.proved_rate > 0:
+                continue
+            if form.diagonal is not None:
+                weight = dict(zip(form.nodes, form.diagonal, strict=True))
+                constants = tuple(1 / weight[v] if v in weight else Fraction(0) for v in range(self.graph.n_nodes))
+            if constants is not None:
+                found.append(DecayingForm(k, form, constants, V.deviation.agents))
+        return found
 
     @cached_property
     def worst_initial_state(self) -> WorstInitialState | None:

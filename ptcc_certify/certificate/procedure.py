@@ -31,6 +31,7 @@ from ptcc_certify.bounds.final_state import (
     influence,
 )
 from ptcc_certify.bounds.late_messages import LateBounds, bound_late
+from ptcc_certify.bounds.small_delays import SmallDelayBounds
 from ptcc_certify.bounds.tracking import Tracking, bound_tracking
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.certificate_data import Observations
@@ -287,8 +288,27 @@ def certify(
             notes=tuple(case.notes),
         ),
     )
+    certificate = _with_small_delays(certificate)
     progress(STEPS[5])
     return _with_word_of_check(certificate)
+
+
+def _with_small_delays(certificate: Certificate) -> Certificate:
+    """Add what Lyapunov functions of the whole graph prove with late messages under a capped gain."""
+    late, x0 = certificate.late, certificate.initial_state
+    if late is None:
+        return certificate
+    forms = certificate.decaying_forms
+    if late.messages.gain_cap is not None and not late.messages.value_error and x0 is not None and forms:
+        bounds = SmallDelayBounds(
+            certificate.structure, certificate.protocol.gain, late.messages, certificate.influence, x0
+        )
+        late = replace(late, form=bounds.best(forms), longest_delay=bounds.longest_delay(forms))
+    if late.says_something:
+        return certificate.changed(late=late)
+    limit = "" if not late.longest_delay else f"; this certificate's limit is a delay of {late.longest_delay:.3g}"
+    note = f"late messages: nothing is proved of what is left at the deadline{limit}"
+    return certificate.changed(late=None, notes=(note, *certificate.notes))
 
 
 def _check_disturbance(disturbance: Any, protocol: ReachingProtocol, graph: SignedDigraph) -> None:

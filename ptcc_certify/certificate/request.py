@@ -174,9 +174,16 @@ def refuse_beside(
         raise ParameterError("leaders that move are certified under the nominal protocol; change it, or leave them out")
     if leaders is not None:
         refuse_leader_groups(structure, "leaders that move as they like: a bound")
-    if isinstance(messages, LateMessages) and not messages.own_delay:
-        refuse_leader_groups(structure, "what late messages leave at the deadline: a bound")
+    if isinstance(messages, LateMessages):
         messages.latencies(structure.graph)
+        if messages.gain_cap is None:
+            refuse_leader_groups(structure, "what late messages leave without --gain-cap: a bound")
+        if messages.value_error and messages.own_delay:
+            raise ParameterError(
+                "values that are off are not certified where the own state is late; leave one of them out"
+            )
+        if messages.value_error:
+            refuse_leader_groups(structure, "what values that are off add: a bound")
     if (messages is not None or leaders is not None) and not structure.followers.size:
         raise ParameterError("nobody listens to a leader, so nothing is late and nobody tracks; leave it out")
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lmi.exact.decimal_rounding import down, near, up
+from ptcc_certify.bounds.small_delays import delay_threshold
 from ptcc_certify.report.structure_text import Lines
 from ptcc_certify.report.text_layout import shorten_label
 
@@ -83,6 +84,12 @@ def _left(late: LateBounds) -> list[str]:
         return ["nothing is proved of what is left at T"]
     whole = "for every 1 at first, " * late.relative
     settled = "" if late.messages.gain_cap is None else ", nothing settles under a cap"
+    if late.form is not None and float(max(late.form.residual)) <= late.largest:
+        threshold = delay_threshold(late.structure, float(late.messages.gain_cap or 1))
+        limit = "" if late.longest_delay is None else f" certificate's limit {late.longest_delay:.2g}"
+        if late.messages.own_delay:
+            limit += f", loop's {threshold:.3g} at constant gain"
+        settled += f"; delay:{limit}" * bool(limit)
     return [f"{whole}at T every agent within {up(late.largest, 2)} of its final state{settled}"]
 
 
