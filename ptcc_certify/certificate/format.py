@@ -84,7 +84,7 @@ def certificate_document(content: Content, verdict: str, files: bool = False) ->
         "proof": [_write_obligation(o, out) for o in content.obligations],
         "verdict": verdict,
     }
-    if content.late is not None:
+    if content.late is not None and content.late.says_something:
         document["messages"] = messages_section(content.late, out)
     if content.tracking is not None:
         document["leaders"] = leaders_section(content.tracking, out)

@@ -304,11 +304,7 @@ def _with_small_delays(certificate: Certificate) -> Certificate:
             certificate.structure, certificate.protocol.gain, late.messages, certificate.influence, x0
         )
         late = replace(late, form=bounds.best(forms), longest_delay=bounds.longest_delay(forms))
-    if late.says_something:
-        return certificate.changed(late=late)
-    limit = "" if not late.longest_delay else f"; this certificate's limit is a delay of {late.longest_delay:.3g}"
-    note = f"late messages: nothing is proved of what is left at the deadline{limit}"
-    return certificate.changed(late=None, notes=(note, *certificate.notes))
+    return certificate.changed(late=late)
 
 
 def _check_disturbance(disturbance: Any, protocol: ReachingProtocol, graph: SignedDigraph) -> None:

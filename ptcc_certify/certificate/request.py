@@ -184,7 +184,8 @@ def refuse_beside(
             )
         if messages.value_error:
             refuse_leader_groups(structure, "what values that are off add: a bound")
-    if (messages is not None or leaders is not None) and not structure.followers.size:
+    alone = structure.followers.size == 0 if leaders is not None else structure.graph.n_edges == 0
+    if (messages is not None or leaders is not None) and alone:
         raise ParameterError("nobody listens to a leader, so nothing is late and nobody tracks; leave it out")
 
 

@@ -25,7 +25,7 @@ def late_lines(certificate: Certificate) -> Lines:
     if late is None:
         return
     yield "messages", messages_text(late.messages)
-    yield "late", "; ".join([*_left(late), *_missed(late)])
+    yield "late" if late.says_something else "LATE", "; ".join([*_left(late), *_missed(late)])
     if late.staged is not None:
         first = min(late.staged)
         when = f"from {near(first)} to {near(certificate.protocol.T)}, {near(late.messages.age)} apart"
@@ -86,10 +86,9 @@ def _left(late: LateBounds) -> list[str]:
     settled = "" if late.messages.gain_cap is None else ", nothing settles under a cap"
     if late.form is not None and float(max(late.form.residual)) <= late.largest:
         threshold = delay_threshold(late.structure, float(late.messages.gain_cap or 1))
-        limit = "" if late.longest_delay is None else f" certificate's limit {late.longest_delay:.2g}"
-        if late.messages.own_delay:
-            limit += f", loop's {threshold:.3g} at constant gain"
-        settled += f"; delay:{limit}" * bool(limit)
+        limits = [] if late.longest_delay is None else [f"this certificate's limit {late.longest_delay:.2g}"]
+        limits += [f"the loop's {threshold:.3g} at constant gain"] * late.messages.own_delay
+        settled += f"; of delays {', '.join(limits)}" * bool(limits)
     return [f"{whole}at T every agent within {up(late.largest, 2)} of its final state{settled}"]
 
 
