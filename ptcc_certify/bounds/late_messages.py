@@ -1,14 +1,12 @@
 """What holds with late messages: what is left at the deadline, row by row; who misses it; deadlines of stages.
 
-Agents obey :mod:`ptcc_certify.protocols.late_messages`, leaders listen to nobody. With ``D_k u_k - q sum_l |w_kl| u_l >=
-b u_k``, ``cap <= ln q / (b age)`` and ``s_c`` the integral of ``min(gain, cap)``
+Agents obey :mod:`ptcc_certify.protocols.late_messages`, leaders listen to nobody. With ``D_k u_k - q sum_l |w_kl| u_l
+>= b u_k``, ``cap <= ln q / (b age)`` and ``s_c`` the integral of ``min(gain, cap)``
 
     |x_k(t) - x_k*| <= u_k (initial e^(-b s_c(t)) + floor)
 
-for every gain that acts and all delays up to ``age``; ``initial`` is the largest ``|x_k(0) - x_k*| / u_k``, and ``floor``
-what errors of values add. With a gain that grows without limit an agent that hears of followers late *misses* its
-deadline, by an amount that is bounded from below; where followers form no cycle, agents with deadlines of their own, one
-delay apart, meet them exactly.
+for every gain that acts and all delays up to ``age``; ``initial`` is the largest ``|x_k(0) - x_k*| / u_k``, and
+``floor`` what errors of values add.
 """
 
 from __future__ import annotations
@@ -24,11 +22,12 @@ import numpy as np
 from lmi.dyadic import round_to_bits
 from lmi.errors import LMIError, NoCertificate
 from lmi.exact.decimal_rounding import float_up
-from lmi.exact.elementary_enclosures import exp, log, rounded
+from lmi.exact.elementary_enclosures import log, rounded
 from ptcc_certify.bounds.late_steps import Steps, search_steps
+from ptcc_certify.bounds.missed_deadline import Missed, find_missed
+from ptcc_certify.bounds.small_delays import SmallDelays
+from ptcc_certify.bounds.staged_deadlines import stage_deadlines
 from ptcc_certify.checker.input_formulas import BITS, Limits, decay_above
-from ptcc_certify.errors import HypothesisError
-from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness
 from ptcc_certify.protocols.base import Protocol
@@ -39,8 +38,6 @@ from ptcc_certify.protocols.late_messages import LateMessages
 SEARCHED_FOLLOWERS = 3000
 #: Values of ``q`` that are tried, and the largest one; losses of ``b`` for a more even vector.
 _TRIED, _LARGEST_Q, _LOSSES = 16, 1e9, (0.01, 0.2, 0.6)
-#: Followers up to which it is searched who misses the deadline.
-_MISSED_FOLLOWERS = 400
 #: What is added to a bound in floats, relatively, so that it holds.
 _MORE = 1 + 1e-9
 
@@ -74,25 +71,6 @@ class RowBound:
 
 
 @dataclass(frozen=True, eq=False)
-class Missed:
-    """An agent that is away from its final state at ``T`` by ``bound`` at least, however old what it hears.
-
-    Attributes
-    ----------
-    agent : int
-        Its node.
-    bound : Fraction
-        Positive.
-    gauge : (F,) int array
-        Signs of the followers that the agent hears of, and its own; 0 for others.
-    """
-
-    agent: int
-    bound: Fraction
-    gauge: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
 class LateBounds:
     """What is proved of a graph whose messages are late.
 
@@ -110,7 +88,11 @@ class LateBounds:
     staged : tuple of Fraction, or None
         Of every follower the deadline at which it is at its final state exactly.
     residual : (N,) array or None
-        What bounds ``|x_k(T) - x_k*|``, in floats from above; None where nothing does.
+        What bounds ``|x_k(T) - x_k*|`` row by row, in floats from above; None where nothing does.
+    form : SmallDelays or None
+        What a Lyapunov function of the whole graph proves under a capped gain.
+    longest_delay : float or None
+        About the longest delay that such functions forgive: this certificate's limit. None if it was not asked.
     """
 
     messages: LateMessages
@@ -122,11 +104,19 @@ class LateBounds:
     missed: Missed | None = None
     staged: tuple[Fraction, ...] | None = None
     residual: np.ndarray | None = None
+    form: SmallDelays | None = None
+    longest_delay: float | None = None
+
+    @property
+    def says_something(self) -> bool:
+        """Whether anything is proved."""
+        return bool(self.rows or self.steps or self.missed or self.staged or self.form)
 
     @property
     def largest(self) -> float:
-        """The largest of ``residual``; infinite where nothing is bounded."""
-        return math.inf if self.residual is None else float(self.residual.max())
+        """The largest of the bounds of ``|x_k(T) - x_k*|``; infinite where nothing is bounded."""
+        largest = math.inf if self.residual is None else float(self.residual.max())
+        return largest if self.form is None else min(largest, float_up(max(self.form.residual)))
 
     def deviation_bound(self, t: np.ndarray) -> np.ndarray:
         """Return what bounds ``|x_k - x_k*|`` at instants, ``(F, M)`` floats; infinite where nothing does."""
@@ -162,10 +152,13 @@ def bound_late(
     ends : sequence of N (middle, radius), optional
         Of ``Q X(0)``; without it bounds are for every initial state within 1 of its final one.
 
+    Returns
+    -------
+    LateBounds
+        Without bounds by rows where a leader belongs to a group, or the own state is late, too.
+
     Raises
     ------
-    HypothesisError
-        A leader belongs to a group, or the own state is late, too.
     ParameterError
         A delay is of an edge that is not there.
 
@@ -176,13 +169,11 @@ def bound_late(
     >>> bounds.residual.max() < 0.5
     np.True_
     """
-    if messages.own_delay:
-        raise HypothesisError(
-            "an own state that is late is not certified row by row; measure the own state without delay"
-        )
-    rows = FollowerRows(structure)
     latencies = messages.latencies(structure.graph)
     gain = GainLimits(gain_cap=messages.gain_cap).limit(protocol.gain)
+    if messages.own_delay or any(len(c.nodes) > 1 for c in structure.closed_components):
+        return LateBounds(messages, structure, gain, initial_state is None or ends is None)
+    rows = FollowerRows(structure)
     first = np.ones(rows.D.size)
     if initial_state is not None and ends is not None:
         first = np.array([float_up(abs(initial_state[v] - ends[v][0]) + ends[v][1]) for v in rows.followers])
@@ -255,7 +246,7 @@ def _best_q(rows: FollowerRows, gain: LimitedGain, messages: LateMessages, most:
         b = rows.decay(witness, float(q))
         if b > 0:
             cap = Fraction(math.log(q) / (b * age))
-            caps = [cap, *([] if messages.gain_cap is None else [Fraction(messages.gain_cap)])]
+            caps = [cap, *([] if messages.gain_cap is None else [messages.gain_cap])]
             value = -b * float(GainLimits(gain_cap=min(caps)).limit(gain.gain).clock([float(gain.gain.T)])[0])
             best, least = (float(q), value) if value < least else (best, least)
     return best
@@ -271,7 +262,7 @@ def row_bound(
     NoCertificate
         ``q`` is 1, which serves no delay.
     """
-    caps = [] if messages.gain_cap is None else [Fraction(messages.gain_cap)]
+    caps = [] if messages.gain_cap is None else [messages.gain_cap]
     cap = None
     if messages.age:
         if witness.q <= 1:
@@ -288,123 +279,3 @@ def row_bound(
         floor = float((rows.D / slack).max()) * float(messages.value_error)
     initial = float((first / witness.u).max())
     return RowBound(witness, cap, clock, left, Fraction(initial * _MORE), Fraction(floor * _MORE))
-
-
-# ---------------------------------------------------------------------- who misses the deadline
-
-
-def find_missed(
-    rows: FollowerRows,
-    protocol: Protocol,
-    latencies: Fraction | tuple[Fraction, ...],
-    initial_state: Sequence[Fraction],
-    ends: Sequence[tuple[Fraction, Fraction]],
-) -> Missed | None:
-    """Return the agent that is certain to miss the deadline by most; None if none is found.
-
-    With signs ``g`` that fit the weights among all followers that agent ``k`` hears of, also by others, and
-    ``g_l eps_l(0) >= 0``,
-
-        |eps_k(T)| >= sum_l (|w_kl|/D_k) e^(-D_l s(T - tau_kl)) |eps_l(0)|.
-    """
-    if rows.D.size > _MISSED_FOLLOWERS:
-        return None
-    graph = rows.structure.graph
-    delays = latencies if isinstance(latencies, tuple) else (latencies,) * graph.n_edges
-    of = {(s, t): x for s, t, x in zip(graph.source.tolist(), graph.target.tolist(), delays, strict=True)}
-    followers = [int(v) for v in rows.followers]
-    exact = dict(zip(followers, graph.exact_rows(followers), strict=True))
-    heard = {k: [l for l in exact[k] if l != k and l in exact] for k in followers}
-    best: Missed | None = None
-    for k in followers:
-        if not heard[k] or not all(of[l, k] > 0 for l in heard[k]):
-            continue
-        signs = _signs(k, heard, exact, initial_state, ends)
-        if signs is None:
-            continue
-        bound = Fraction(0)
-        for l in heard[k]:
-            size = max(abs(initial_state[l] - ends[l][0]) - ends[l][1], Fraction(0))
-            bound += abs(exact[k][l]) / exact[k][k] * _kept(protocol, exact[l][l], of[l, k]) * size
-        bound = rounded(bound, BITS) if bound > 0 else bound
-        if bound > 0 and (best is None or bound > best.bound):
-            best = Missed(k, bound, np.array([signs.get(v, 0) for v in followers]))
-    return best
-
-
-def _kept(protocol: Protocol, rate: Fraction, delay: Fraction) -> Fraction:
-    """Bound ``e^(-rate s(T - delay))`` from below."""
-    share = delay / protocol.T
-    if share >= 1:
-        return Fraction(1)
-    return exp(-rate * protocol.gain.exact.clock(log(1 / share)[1], share))[0]
-
-
-def _signs(
-    k: int,
-    heard: dict[int, list[int]],
-    rows: dict[int, dict[int, Fraction]],
-    initial_state: Sequence[Fraction],
-    ends: Sequence[tuple[Fraction, Fraction]],
-) -> dict[int, int] | None:
-    """Return signs of an agent and of all that it hears of that fit weights and initial deviations; None: there are none."""
-    signs, todo = {k: 1}, [k]
-    for v in todo:
-        for l in heard[v]:
-            sign = signs[v] * (1 if rows[v][l] < 0 else -1)  # the Laplacian's entry is minus the weight
-            if l not in signs:
-                todo.append(l)
-            if signs.setdefault(l, sign) != sign:
-                return None
-    judged = {l for v in todo for l in heard[v]}
-    for sign in (1, -1):
-        if all(
-            sign * signs[v] * (initial_state[v] - ends[v][0]) >= ends[v][1]
-            or (ends[v][1] == 0 and initial_state[v] == ends[v][0])
-            for v in judged
-        ):
-            return {v: sign * s for v, s in signs.items()}
-    return None
-
-
-# ---------------------------------------------------------------------- deadlines of stages
-
-
-def stage_deadlines(rows: FollowerRows, T: Fraction, delay: Fraction) -> tuple[Fraction, ...] | None:
-    """Return the deadline of every follower, ``T - (levels - level) delay``; None where followers form a cycle.
-
-    The level of an agent is the longest path from leaders to it.
-
-    Raises
-    ------
-    HypothesisError
-        The last deadline leaves the first none: information has not arrived.
-    """
-    level = np.ones(rows.D.size, dtype=np.int64)
-    W = rows.W.tocoo()
-    for _ in range(rows.D.size + 1):
-        new = level.copy()
-        np.maximum.at(new, W.row, level[W.col] + 1)
-        if (new == level).all():
-            break
-        if new.max() > rows.D.size:
-            return None
-        level = new
-    else:
-        return None
-    most = int(level.max())
-    if T - (most - 1) * delay <= 0:
-        return None
-    return tuple(T - (most - int(x)) * delay for x in level)
-
-
-def refuse_stages(structure: Structure, T: Fraction, delay: Fraction) -> None:
-    """Refuse deadlines of stages that the graph, or the delay, does not admit."""
-    rows = FollowerRows(structure)
-    if stage_deadlines(rows, T, Fraction(0)) is None:
-        raise HypothesisError("deadlines of stages need followers that form no cycle; leave --staged out")
-    if stage_deadlines(rows, T, delay) is None:
-        first = shorten(structure.graph.labels[int(rows.followers[0])])
-        raise HypothesisError(
-            f"the deadline is too early: information takes longer to arrive at all agents (of {first})"
-        )

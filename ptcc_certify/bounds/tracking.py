@@ -1,7 +1,7 @@
 """How followers track leaders that move: exactly at the deadline, and with a sign term ever after.
 
-The target of the followers is ``X_F*(t) = -L_F^-1 L_FL X_L(t)``. With ``D_k u_k - sum_l |w_kl| u_l >= a u_k``, ``u > 0``,
-``m = max_k |x_k - x_k*| / u_k``, ``p = a rho2 kappa`` and ``c = (speed + disturbance) / min u``
+The target of the followers is ``X_F*(t) = -L_F^-1 L_FL X_L(t)``. With ``D_k u_k - sum_l |w_kl| u_l >= a u_k``, ``u >
+0``, ``m = max_k |x_k - x_k*| / u_k``, ``p = a rho2 kappa`` and ``c = (speed + disturbance) / min u``
 
     m(t) <= e^(-a s(t)) m(0) + c (T - t) (1 - ((T - t)/T)^(p - 1)) / (p - 1)    before T,    m(T) = 0;
 

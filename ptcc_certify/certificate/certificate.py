@@ -102,6 +102,8 @@ class Certificate(Content, FromFile, Shown):
         What was seen, and is not claimed.
     late : LateBounds or None
         What holds with late messages; None where nothing was asked of them.
+    tracking : Tracking or None
+        What holds while leaders move; None where nothing was asked of that.
     source : Source or None
         The file that it was read from.
 

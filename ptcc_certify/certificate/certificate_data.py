@@ -23,6 +23,9 @@ from ptcc_certify.bounds.input.effort_bounds import InputRequest, bound_effort
 from ptcc_certify.bounds.input.worst_initial_state import WorstInitialState, worst_initial_state
 from ptcc_certify.bounds.late_messages import LateBounds
 from ptcc_certify.bounds.sliding_envelope import SlidingEnvelope
+from ptcc_certify.bounds.small_delays import DecayingForm
+from ptcc_certify.bounds.tracking import Tracking
+from ptcc_certify.certificate.format_leaders import tracking_obligations
 from ptcc_certify.certificate.format_messages import late_obligations
 from ptcc_certify.certificate.format_vectors import final_state_witness
 from ptcc_certify.certificate.request import Expectations, Request
@@ -129,6 +132,7 @@ class Content:
     request: Request
     observed: Observations
     late: LateBounds | None = None
+    tracking: Tracking | None = None
     source: Source | None = None
 
     def changed(self, **values: Any) -> Self:
@@ -157,7 +161,7 @@ class Content:
             values |= {"searched_functions": search.functions, "search": replace(search, functions=())}
         if values.keys() & {"protocol", "initial_state", "sigma0"}:
             values.setdefault("trajectory", None)
-            values.setdefault("late", None)
+            values |= {"late": values.get("late"), "tracking": values.get("tracking")}
         if values.keys() & {"initial_state", "sigma0"} and "final_state" not in values:
             x0, sigma0 = (values.get(name, getattr(self, name)) for name in ("initial_state", "sigma0"))
             first = x0 and [x - s for x, s in zip(x0, sigma0 or [0] * len(x0), strict=True)]
@@ -470,6 +474,23 @@ class Content:
         )
         return bound_effort(request)
 
+    @property
+    def decaying_forms(self) -> list[DecayingForm]:
+        """The Lyapunov functions in the coordinates ``E`` with all their constants; none without an exact ``Q``."""
+        effort, found = self.effort, []
+        if effort is None or not self.influence.exact or self._geometry is None:
+            return []
+        for k, (V, constants) in enumerate(zip(self.functions, effort.constants, strict=True)):
+            form = V.form
+            if form is None or form.coordinates != "E" or V.deviation is None or not V.proved_rate > 0:
+                continue
+            if form.diagonal is not None:
+                weight = dict(zip(form.nodes, form.diagonal, strict=True))
+                constants = tuple(1 / weight[v] if v in weight else Fraction(0) for v in range(self.graph.n_nodes))
+            if constants is not None:
+                found.append(DecayingForm(k, form, constants, V.deviation.agents))
+        return found
+
     @cached_property
     def worst_initial_state(self) -> WorstInitialState | None:
         """The state of ``initial_set`` from which the input gets largest (numerical); None without such a set."""
@@ -509,7 +530,7 @@ class Content:
                 obligations.append(Obligation("reaching-time", "reaching_time"))
         if self.effort is not None:
             obligations += self.effort.obligations
-        return (*obligations, *late_obligations(self.late))
+        return (*obligations, *late_obligations(self.late), *tracking_obligations(self.tracking))
 
     # ------------------------------------------------------------------ simulation
 

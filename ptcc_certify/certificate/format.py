@@ -21,6 +21,7 @@ from ptcc_certify.bounds.input.effort import EnergyIntegral, Peak
 from ptcc_certify.certificate.certificate_data import Content, Observations, Source
 from ptcc_certify.certificate.format_effort import LIMITS, effort_section, energy_witness, peak_witness, read_effort
 from ptcc_certify.certificate.format_graph import certificate_graph, claim_sections, graph_section, structure_section
+from ptcc_certify.certificate.format_leaders import leaders_section, read_tracking
 from ptcc_certify.certificate.format_messages import Vectors, messages_section, read_late
 from ptcc_certify.certificate.format_vectors import (
     Reader,
@@ -83,8 +84,10 @@ def certificate_document(content: Content, verdict: str, files: bool = False) ->
         "proof": [_write_obligation(o, out) for o in content.obligations],
         "verdict": verdict,
     }
-    if content.late is not None:
+    if content.late is not None and content.late.says_something:
         document["messages"] = messages_section(content.late, out)
+    if content.tracking is not None:
+        document["leaders"] = leaders_section(content.tracking, out)
     return document | {"digest": digest(document), "unverified": _write_unverified(content)}, out
 
 
@@ -121,6 +124,7 @@ def read_document(
         "final_state": _read_final_state(document, structure, data),
         "matrix": None,
         "late": read_late(document, structure, protocol, data, steps),
+        "tracking": read_tracking(document, structure, protocol, data, steps),
         "request": _read_request(document["unverified"], None if effort is None else effort.initial_set),
         "observed": _read_observations(document["unverified"]),
         "source": Source(path, sha256, document, report, effort, proof, files),
@@ -504,7 +508,9 @@ def _read_request(unverified: Mapping[str, Any], initial_set: InitialSet | None)
         delta=_positive(section, "delta"),
         noise=_positive(section, "noise"),
         time_limit=float(seconds) if isinstance(seconds, int | float) and seconds is not True else math.inf,
-        expectations=Expectations(behaviour, *(_positive(section, key) for key in ("min_rate", "max_input", "max_residual"))),
+        expectations=Expectations(
+            behaviour, *(_positive(section, key) for key in ("min_rate", "max_input", "max_residual"))
+        ),
         scenario=scenario if isinstance(scenario, dict) else None,
         origins={key: one_line(origin)[:200] for key, origin in origins if isinstance(origin, str)},
     )

@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 
 from lmi.exact.decimal_rounding import float_up
-from ptcc_certify.bounds.late_messages import LateBounds, Missed, RowBound
+from ptcc_certify.bounds.late_messages import LateBounds, RowBound
 from ptcc_certify.bounds.late_steps import bound_steps
+from ptcc_certify.bounds.missed_deadline import Missed
+from ptcc_certify.bounds.small_delays import SmallDelays
 from ptcc_certify.certificate.format_vectors import Reader, Writer, number, text
 from ptcc_certify.checker.reading import exact
 from ptcc_certify.graphs.rationals import format_exact
@@ -50,6 +52,10 @@ def late_obligations(late: LateBounds | None) -> Iterator[Obligation]:
         yield Obligation("late-missed", "messages.missed", witness=Vectors({"gauge": late.missed.gauge}))
     if late.staged is not None:
         yield Obligation("late-staged", "messages.staged")
+    if (form := late.form) is not None:
+        phi = dict(zip(late.structure.graph.labels, map(format_exact, form.phi), strict=True))
+        numbers = {"q": form.q, "b": form.b, "kap": form.kap}
+        yield Obligation("late-form", "messages.form", numbers, {"function": form.function, "phi": phi})
 
 
 def messages_section(late: LateBounds, out: Writer) -> dict[str, Any]:
@@ -73,8 +79,31 @@ def messages_section(late: LateBounds, out: Writer) -> dict[str, Any]:
         "residual": None if late.residual is None else agents_section(graph.labels, "late", late.residual, out),
         "missed": missed and {"agent": graph.labels[missed.agent], "bound": format_exact(missed.bound)},
         "staged": staged and dict(zip(followers, map(format_exact, staged), strict=True)),
-        "form": None,
+        "form": None if late.form is None else _form_section(late.form, graph.labels),
     }
+
+
+def _form_section(form: SmallDelays, labels: tuple[str, ...]) -> dict[str, Any]:
+    agents = {
+        name: dict(zip(labels, map(format_exact, getattr(form, name)), strict=True)) for name in ("moved", "residual")
+    }
+    return {"left": format_exact(form.left), **agents}
+
+
+def _read_form(section: Mapping[str, Any] | None, step: Obligation | None, data: Reader) -> SmallDelays | None:
+    if section is None or step is None:
+        return None
+    numbers, witness = step.numbers, step.witness
+    return SmallDelays(
+        witness["function"],
+        numbers["q"],
+        numbers["b"],
+        numbers["kap"],
+        data.agents(witness["phi"]),
+        exact(section["left"]),
+        data.agents(section["moved"]),
+        data.agents(section["residual"]),
+    )
 
 
 def agents_section(labels: tuple[str, ...], name: str, values: np.ndarray, out: Writer) -> Any:
@@ -104,7 +133,8 @@ def read_late(
         rows.append(RowBound(witness, cap, clock, *(exact(row[name]) for name in ("left", "initial", "floor"))))
     gain, missed = GainLimits(gain_cap=messages.gain_cap).limit(protocol.gain), section["missed"]
     if missed is not None:
-        gauge = data.floats(steps["late-missed", "messages.missed"].witness["gauge"], F).astype(np.int64)
+        signs = steps["late-missed", "messages.missed"].witness["gauge"]
+        gauge = np.array(data.files.integers(signs, "gauge", F))
         missed = Missed(structure.graph.index[missed["agent"]], exact(missed["bound"]), gauge)
     staged = section["staged"]
     residual, instants = section["residual"], None
@@ -123,6 +153,7 @@ def read_late(
         missed,
         staged and tuple(map(exact, staged.values())),
         None if residual is None else np.array([float_up(x) for x in data.agents(residual)]),
+        _read_form(section["form"], steps.get(("late-form", "messages.form")), data),
     )
 
 

@@ -31,6 +31,8 @@ from ptcc_certify.bounds.final_state import (
     influence,
 )
 from ptcc_certify.bounds.late_messages import LateBounds, bound_late
+from ptcc_certify.bounds.small_delays import SmallDelayBounds
+from ptcc_certify.bounds.tracking import Tracking, bound_tracking
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.certificate_data import Observations
 from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
@@ -43,6 +45,7 @@ from ptcc_certify.certificate.request import (
     read_request,
     read_sliding_variable,
     refuse,
+    refuse_beside,
 )
 from ptcc_certify.certificate.verdict import MANY_DECADES
 from ptcc_certify.checker.input_formulas import Limits
@@ -61,6 +64,7 @@ from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.base import ReachingProtocol
 from ptcc_certify.protocols.disturbance import as_disturbance
 from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.protocols.moving_leaders import MovingLeaders
 from ptcc_certify.simulation.filippov import rounding_slack
 from ptcc_certify.simulation.instants import PAST
 from ptcc_certify.simulation.run import simulate
@@ -114,6 +118,7 @@ def certify(
     delta: Any = None,
     noise: Any = None,
     messages: LateMessages | None = None,
+    leaders: MovingLeaders | None = None,
     signal: SignalClass = "any",
     time_limit: float | None = None,
     expectations: Expectations | str | None = None,
@@ -162,6 +167,9 @@ def certify(
     messages : LateMessages, optional
         How late, how often lost and how inexact is what agents hear; what is left at the deadline then is bounded. With
         single leaders, and ``sigma(0) = 0`` under the sliding-mode protocol.
+    leaders : MovingLeaders, optional
+        Nominal protocol, single leaders: how fast these move; how followers track them is bounded. Not with
+        ``messages``.
     signal : {"any", "constant"}, DwellTime, JointWindows or ClockShares
         Of a family: restricted signals of which more is claimed, beside what holds for every signal; the three classes
         are in :mod:`ptcc_certify.theorems.restricted_signals`.
@@ -220,6 +228,7 @@ def certify(
     options |= {
         "noise": noise,
         "messages": messages,
+        "leaders": leaders,
         "signal": signal,
         "time_limit": time_limit,
         "expectations": expectations,
@@ -239,6 +248,7 @@ def certify(
     graph = as_graph(graph, orientation)
     refuse(graph, protocol, method, {"sigma0": sigma0, "disturbance": disturbance}, [*limits, delta, noise])
     structure = analyse(graph)
+    refuse_beside(structure, protocol, messages, leaders)
     request = read_request(structure, protocol, options)
     initial_state = None if x0 is None else read_initial_state(structure, x0, "x0")
     manifold, reaching = read_sliding_variable(structure, protocol, sigma0)
@@ -252,7 +262,7 @@ def certify(
         search = case.search(proof)
         limit = case.upper_bound()
     matrix, result = case.final_state(trajectory)
-    late = case.late_messages(result)
+    late, tracking = case.late_messages(result), case.tracking(result)
     proved = [proof.rate, *(V.rate for V in search.functions)]
     certificate = Certificate(
         structure=structure,
@@ -268,6 +278,7 @@ def certify(
         matrix=matrix,
         request=request,
         late=late,
+        tracking=tracking,
         observed=Observations(
             trajectory=trajectory,
             numerical_rate=numerical,
@@ -277,8 +288,23 @@ def certify(
             notes=tuple(case.notes),
         ),
     )
+    certificate = _with_small_delays(certificate)
     progress(STEPS[5])
     return _with_word_of_check(certificate)
+
+
+def _with_small_delays(certificate: Certificate) -> Certificate:
+    """Add what Lyapunov functions of the whole graph prove with late messages under a capped gain."""
+    late, x0 = certificate.late, certificate.initial_state
+    if late is None:
+        return certificate
+    forms = certificate.decaying_forms
+    if late.messages.gain_cap is not None and not late.messages.value_error and x0 is not None and forms:
+        bounds = SmallDelayBounds(
+            certificate.structure, certificate.protocol.gain, late.messages, certificate.influence, x0
+        )
+        late = replace(late, form=bounds.best(forms), longest_delay=bounds.longest_delay(forms))
+    return certificate.changed(late=late)
 
 
 def _check_disturbance(disturbance: Any, protocol: ReachingProtocol, graph: SignedDigraph) -> None:
@@ -425,6 +451,17 @@ class Case:
             )
         ends = None if result is None else result.intervals
         return bound_late(self.structure, self.protocol, messages, self.initial_state, ends)
+
+    def tracking(self, result: FinalState | None) -> Tracking | None:
+        """Bound how followers track leaders that move; None if nothing is asked of that."""
+        leaders, ends = self.request.leaders, None if result is None else result.intervals
+        if leaders is None:
+            return None
+        try:
+            return bound_tracking(self.structure, self.protocol, leaders, self.initial_state, ends)
+        except LMIError as error:
+            self.notes.append(f"moving leaders: {error}")
+            return None
 
 
 def _search_and_prove(

@@ -314,6 +314,9 @@ def judge_late(certificate: Content) -> list[Answer]:
     late, asked = certificate.late, certificate.expectations
     if late is None:
         return [] if asked.max_residual is None else [Answer(OPEN, "max_residual", "no messages are late")]
+    if not late.says_something:
+        limit = f"; this certificate's limit is a delay of {late.longest_delay:.3g}" if late.longest_delay else ""
+        return [Answer(OPEN, "late messages", f"nothing is proved of what is left at T{limit}")]
     answers, missed = [], late.missed
     label = "" if missed is None else certificate.graph.labels[missed.agent]
     if missed is not None and asked.behaviour is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import TYPE_CHECKING
 
 import click
@@ -12,6 +13,7 @@ from ptcc_certify.errors import NumberError, ParameterError
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.protocols.late_messages import LateMessages
+    from ptcc_certify.protocols.moving_leaders import MovingLeaders
 
 message_options = options_of(
     click.option(
@@ -32,6 +34,12 @@ message_options = options_of(
         default=False,
         show_default=False,
         help="The own state is as late as what is heard; asks for --gain-cap.",
+    ),
+)
+leader_options = options_of(
+    number_option("--leader-speed", metavar="V", help="Leaders move, as fast as V: how followers track them."),
+    number_option(
+        "--sign-gain", metavar="MU", help="With --leader-speed: followers add MU sign(e_k), and stay on their targets."
     ),
 )
 #: What asks for bounds with late messages; --own-delay belongs to these.
@@ -61,7 +69,7 @@ def messages_of(graph: str, signed: SignedDigraph, options: Options) -> LateMess
     )
 
 
-def _delay(graph: str, signed: SignedDigraph, text: str) -> object:
+def _delay(graph: str, signed: SignedDigraph, text: str) -> Fraction | dict[tuple[str, str], Fraction]:
     """Return a delay, or those of a column."""
     from ptcc_certify.graphs.io.edge_delays import read_delays
     from ptcc_certify.graphs.rationals import parse_exact
@@ -70,7 +78,21 @@ def _delay(graph: str, signed: SignedDigraph, text: str) -> object:
         return parse_exact(text)
     except NumberError as error:
         if not text.isidentifier():
-            raise ParameterError(f"--delay: {error}; give a number in your unit of time, or the name of a column") from None
+            raise ParameterError(
+                f"--delay: {error}; give a number in your unit of time, or the name of a column"
+            ) from None
     if graph == "-":
         raise ParameterError("--delay names a column, but standard input is read once; save the edge list to a file")
     return read_delays(graph_file(graph), signed, text)
+
+
+def leaders_of(options: Options) -> MovingLeaders | None:
+    """Return how leaders move; None if nothing is asked of that. ``--delta`` is what disturbs the followers."""
+    from ptcc_certify.protocols.moving_leaders import MovingLeaders
+
+    speed, sign = options["leader_speed"], options["sign_gain"]
+    if speed is None:
+        if sign is not None:
+            raise ParameterError("--sign-gain belongs to leaders that move; give --leader-speed")
+        return None
+    return MovingLeaders(speed=speed, disturbance=options["delta"] or 0, sign_gain=sign)

@@ -97,6 +97,10 @@ SECTIONS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
             "own_delay": ("own_delay", "false"),
         },
     ),
+    "leaders": (
+        "Leaders that move (nominal protocol).",
+        {"speed": ("leader_speed", "0.5"), "sign_gain": ("sign_gain", "1")},
+    ),
     "expectations": (
         "What is asked: exit code 3 if it is refuted, 4 if it is left open.",
         {

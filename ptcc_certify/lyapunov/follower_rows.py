@@ -4,8 +4,9 @@
 
     D_k u_k - q sum_l |w_kl| u_l >= b u_k    for every follower k
 
-has a solution with ``b > 0`` iff ``q`` is below ``1 / spectral radius of D^-1 |W_F|``: ``u = (D - q |W_F| - t I)^-1 1``,
-``t`` just below the smallest eigenvalue of ``D - q |W_F|``. With ``q = 1`` it is the row-wise decay rate of followers.
+has a solution with ``b > 0`` iff ``q`` is below 1 over the spectral radius of ``D^-1 |W_F|``: ``u = (D - q |W_F| - t
+I)^-1 1``, ``t`` just below the smallest eigenvalue of ``D - q |W_F|``. With ``q = 1`` it is the
+row-wise decay rate of followers.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.dominance import round_array
 
-#: What floats may have lost in a row: a share of ``b``, and of the terms that cancel. The check forms every row exactly.
+#: What floats may have lost in a row: a share of ``b``, and of the terms that cancel. The check forms rows exactly.
 _SLACK, _ROUNDING = 1e-9, 1e-13
 #: Residual of a solve for ``u``, in every row.
 _LOOSE = 0.05

@@ -16,7 +16,7 @@ from typing import Any
 from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.graphs.digraph import Exact, SignedDigraph
 from ptcc_certify.graphs.rationals import shorten
-from ptcc_certify.protocols.parameters import parameter, readable
+from ptcc_certify.protocols.parameters import Given, NotNegative, parameter, readable
 
 #: Most losses in a row.
 MOST_LOSSES = 10**6
@@ -67,11 +67,11 @@ diverge, for its gain grows without limit before T; give gain_cap, or measure th
     """
 
     delay: Exact | Mapping[tuple[str, str], Exact] = 0
-    period: Exact | None = None
+    period: Given = Given()
     losses: int = 0
-    value_error: Exact = 0
+    value_error: NotNegative = NotNegative(0)
     own_delay: bool = False
-    gain_cap: Exact | None = None
+    gain_cap: Given = Given()
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -79,9 +79,6 @@ diverge, for its gain grows without limit before T; give gain_cap, or measure th
             put(self, "delay", {edge: parameter(_of(edge), x, True) for edge, x in self.delay.items()})
         else:
             put(self, "delay", parameter("delay", self.delay, True))
-        for name in ("period", "gain_cap"):
-            put(self, name, None if getattr(self, name) is None else parameter(name, getattr(self, name)))
-        put(self, "value_error", parameter("value_error", self.value_error, True))
         if isinstance(self.losses, bool) or not isinstance(self.losses, int) or not 0 <= self.losses <= MOST_LOSSES:
             raise ParameterError(
                 f"losses = {shorten(repr(self.losses))} is not a number of messages, 0 to {MOST_LOSSES:,}"
@@ -108,7 +105,7 @@ diverge, for its gain grows without limit before T; give gain_cap, or measure th
     @property
     def held(self) -> Fraction:
         """How long a value is held at most, until the next one comes: ``(losses + 1) period``."""
-        return Fraction(0) if self.period is None else (self.losses + 1) * Fraction(self.period)
+        return Fraction(0) if self.period is None else (self.losses + 1) * self.period
 
     @property
     def age(self) -> Fraction:
@@ -136,10 +133,10 @@ diverge, for its gain grows without limit before T; give gain_cap, or measure th
 
     def __repr__(self) -> str:
         parts = [f"delay={readable(self.largest_delay)}"]
-        parts += [] if self.period is None else [f"period={readable(Fraction(self.period))}, losses={self.losses}"]
-        parts += [f"value_error={readable(Fraction(self.value_error))}"] * (self.value_error != 0)
+        parts += [] if self.period is None else [f"period={readable(self.period)}, losses={self.losses}"]
+        parts += [f"value_error={readable(self.value_error)}"] * (self.value_error != 0)
         parts += ["own_delay=True"] * self.own_delay
-        parts += [] if self.gain_cap is None else [f"gain_cap={readable(Fraction(self.gain_cap))}"]
+        parts += [] if self.gain_cap is None else [f"gain_cap={readable(self.gain_cap)}"]
         return f"LateMessages({', '.join(parts)})"
 
 

@@ -1,7 +1,7 @@
 """Leaders that move: how fast, what disturbs the followers, and the sign term that keeps them on their targets.
 
-    x_j' = v_j,  |v_j| <= speed                                              a leader, which listens to nobody
-    x_k' = -gain(t) (L x)_k + d_k [ + sign_gain sign(e_k) ],  |d_k| <= disturbance,  e = -L x      a follower
+x_j' = v_j,  |v_j| <= speed                                              a leader, which listens to nobody
+x_k' = -gain(t) (L x)_k + d_k [ + sign_gain sign(e_k) ],  |d_k| <= disturbance,  e = -L x      a follower
 """
 
 from __future__ import annotations

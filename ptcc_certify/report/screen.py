@@ -18,7 +18,7 @@ from ptcc_certify.errors import PTCCError
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.report.family_screen import WHATEVER, family_summary
 from ptcc_certify.report.input_lines import disturbed_lines, initial_states_text, input_lines, limits_text
-from ptcc_certify.report.late_lines import late_lines
+from ptcc_certify.report.late_lines import late_lines, tracking_lines
 from ptcc_certify.report.sliding_lines import sliding_lines
 from ptcc_certify.report.structure_text import (
     ORIENTATION,
@@ -105,6 +105,8 @@ def summary_lines(
         whatever = ", without disturbances"
     if certificate.late is not None:
         whatever = f", nothing late{whatever}"
+    if certificate.tracking is not None:
+        whatever = f", leaders at rest{whatever}"
     claims = _claim_texts(certificate.structure, certificate.claims, f" at T = {near(p.T)}", whatever)
     drawn = _is_set_asked(certificate)
     for agents in (True, False):
@@ -116,6 +118,7 @@ def summary_lines(
             *_bounds(certificate, agents, drawn),
             *disturbed_lines(certificate),
             *late_lines(certificate),
+            *tracking_lines(certificate),
             ("verdict", _short_verdict(certificate)),
         ]
         lines = wrap_lines(format_lines(entries))

@@ -1,7 +1,7 @@
 """Runs with leaders that move as badly as they may, without an ODE solver.
 
-Over a step from ``s_i`` to ``s_(i+1)`` of the clock, in which the gain grows to ``g``, leaders move at ``v gain(t)/g``, and
-followers are pushed by ``d gain(t)/g``: within the limits of ``v`` and ``d``, and with a step in closed form,
+Over a step from ``s_i`` to ``s_(i+1)`` of the clock, in which the gain grows to ``g``, leaders move at ``v gain(t)/g``,
+and followers are pushed by ``d gain(t)/g``: within the limits of ``v`` and ``d``, and with a step in closed form,
 
     eps_(i+1) = E eps_i + (I - E) L_F^-1 (d - X*') / g,    E = e^(-L_F (s_(i+1) - s_i)).
 

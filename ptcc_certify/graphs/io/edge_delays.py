@@ -12,7 +12,7 @@ from ptcc_certify.graphs.rationals import parse_exact, shorten
 
 
 def read_delays(path: Source, graph: SignedDigraph, title: str = "delay") -> dict[tuple[str, str], Fraction]:
-    """Read what messages take over every edge from a column of an edge list with a header.
+    r"""Read what messages take over every edge from a column of an edge list with a header.
 
     Parameters
     ----------
@@ -60,7 +60,9 @@ def read_delays(path: Source, graph: SignedDigraph, title: str = "delay") -> dic
             value = parse_exact(text)
         except NumberError:
             edge = f"{shorten(source)} -> {shorten(target)}"
-            raise FormatError(f'{place}: delay "{shorten(text)}" of edge {edge} is not a number; give one >= 0') from None
+            raise FormatError(
+                f'{place}: delay "{shorten(text)}" of edge {edge} is not a number; give one >= 0'
+            ) from None
         if value < 0:
             edge = f"{shorten(source)} -> {shorten(target)}"
             raise FormatError(f"{place}: delay {shorten(text)} of edge {edge} is negative; give a number >= 0")
