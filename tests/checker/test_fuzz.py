@@ -29,7 +29,7 @@ import random_mutants
 from generators import all_classes, random_graph, smallest
 from mutations import Json, at, changed, containers, leaves, resealed, same_claim
 from oracle import false_claims
-from random_mutants import Rng, mutant, pick
+from random_mutants import Rng, fraction, mutant, pick, with_hash
 from side_files import with_factors, with_side_files
 
 import ptcc_certify
