@@ -228,7 +228,9 @@ def search_rows(
                 for loss in _LOSSES[1:]:
                     offer(float(best.witness.q), loss)
         else:
-            offer(_best_q(rows, gain, messages, most), _LOSSES[1])
+            best_q = _best_q(rows, gain, messages, most)
+            for loss in _LOSSES[1:]:
+                offer(best_q, loss)
     return (min(candidates, key=_largest),) if candidates else ()
 
 
