@@ -37,7 +37,7 @@ from ptcc_certify.protocols.late_messages import LateMessages
 #: Up to so many followers many ``q`` are tried; beyond, the best of those that one vector proves.
 SEARCHED_FOLLOWERS = 3000
 #: Values of ``q`` that are tried, and the largest one; losses of ``b`` for a more even vector.
-_TRIED, _LARGEST_Q, _LOSSES = 16, 1e9, (0.01, 0.2, 0.6)
+_TRIED, _LARGEST_Q, _LOSSES = 10, 1e9, (0.01, 0.2, 0.6)
 #: What is added to a bound in floats, relatively, so that it holds.
 _MORE = 1 + 1e-9
 
@@ -228,7 +228,9 @@ def search_rows(
                 for loss in _LOSSES[1:]:
                     offer(float(best.witness.q), loss)
         else:
-            offer(_best_q(rows, gain, messages, most), _LOSSES[1])
+            best_q = _best_q(rows, gain, messages, most)
+            for loss in _LOSSES[1:]:
+                offer(best_q, loss)
     return (min(candidates, key=_largest),) if candidates else ()
 
 

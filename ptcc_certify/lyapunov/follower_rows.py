@@ -20,7 +20,7 @@ import numpy as np
 
 from lmi.dyadic import round_to_bits
 from lmi.errors import NoCertificate
-from lmi.sparse_h_matrix import SparseHMatrix, solve
+from lmi.sparse_h_matrix import DIRECT_ROWS, SparseHMatrix, solve
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.structure import Structure
@@ -30,6 +30,8 @@ from ptcc_certify.lyapunov.dominance import round_array
 _SLACK, _ROUNDING = 1e-9, 1e-13
 #: Residual of a solve for ``u``, in every row.
 _LOOSE = 0.05
+#: Inverse iterations for many followers.
+_ROUNDS = 3
 #: Products by which the largest ``q`` is found.
 _PRODUCTS = 30
 
@@ -118,13 +120,25 @@ class FollowerRows:
         """
         A = SparseHMatrix(_with_diagonal(self.D, float(q) * self.W))
         if q not in self._smallest:
-            self._smallest[q] = A.smallest()
+            self._smallest[q] = A.smallest() if self.D.size <= DIRECT_ROWS else self._roughly_smallest(A)
         t, ones = self._smallest[q] * (1 - loss), np.ones(self.D.size)
         shifted = A.M - t * _identity(ones.size)
         u = solve(shifted, ones, np.maximum(self.D - t, self.D * 1e-3), _LOOSE / math.sqrt(ones.size))
         if not (np.isfinite(u).all() and u.min() > 1e-280 * u.max()):
             raise NoCertificate(f"no positive vector for q = {float(q):.6g}")
         return self.rounded(q, u)
+
+    def _roughly_smallest(self, A: SparseHMatrix) -> float:
+        """Bound the smallest eigenvalue from below by a few loose solves, for many followers."""
+        y, low = np.ones(self.D.size), 0.0
+        for _ in range(_ROUNDS):
+            y = np.abs(solve(A.M, y / y.max(), self.D, _LOOSE / math.sqrt(y.size)))
+            if not (np.isfinite(y).all() and y.min() > 0):
+                break
+            low = max(low, float(((A.M @ y) / y).min()))
+        if not low > 0:
+            raise NoCertificate("followers decay too slowly for Krylov solves to tell")
+        return low
 
     def rounded(self, q: Fraction, u: np.ndarray) -> RowWitness:
         """Return the witness of a vector, rounded, with the largest ``b`` that leaves room for rounding.

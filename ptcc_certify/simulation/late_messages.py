@@ -100,13 +100,15 @@ def simulate_late(
         raise ParameterError(f'pattern "{shorten(str(pattern))}" is unknown; one of {", ".join(PATTERNS)}')
     t = _grid(float(protocol.T), float(messages.age), steps)
     clocks = _clocks(graph, protocol, messages, t, deadlines)
+    with np.errstate(invalid="ignore"):
+        steps_of_clock = np.where(np.isinf(clocks[1:]), np.inf, clocks[1:] - clocks[:-1])
     hearing = _Hearing(graph, messages, t, pattern, np.random.default_rng(seed))
     states = np.empty((t.size, graph.n_nodes))
     states[0] = np.asarray(x0, dtype=float)
     D = graph.in_weight()
     for i in range(t.size - 1):
         pushes, pulls = hearing.sums(i, states)
-        step = clocks[i + 1] - clocks[i]
+        step = steps_of_clock[i]
         if messages.own_delay:
             states[i + 1] = states[i] + step * (pushes - pulls)
             continue
