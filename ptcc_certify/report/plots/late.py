@@ -131,4 +131,6 @@ def plot_tracking(certificate: Certificate, *, ax: Axes | None = None, time_unit
 def _tracking_bound(tracking: Tracking, t: np.ndarray, T: float) -> np.ndarray:
     """Return the bound before T, and from there on."""
     before = tracking.distance_bound(np.maximum(1 - t / T, 0)).max(axis=0)
-    return np.where(t <= T, before, float(tracking.after) * float(tracking.witness.u.max()))
+    rate = float(tracking.witness.b * tracking.protocol.gain.rho1)
+    later = -np.expm1(-rate * np.maximum(t - T, 0))  # m' <= -a rho1 m + c from m(T) = 0
+    return np.where(t <= T, before, float(tracking.after) * float(tracking.witness.u.max()) * later)
