@@ -93,6 +93,8 @@ class LateBounds:
         What a Lyapunov function of the whole graph proves under a capped gain.
     longest_delay : float or None
         About the longest delay that such functions forgive: this certificate's limit. None if it was not asked.
+    unarrived : bool
+        Whether deadlines of stages fail since information takes longer than ``T`` to come from leaders to all.
     """
 
     messages: LateMessages
@@ -106,6 +108,7 @@ class LateBounds:
     residual: np.ndarray | None = None
     form: SmallDelays | None = None
     longest_delay: float | None = None
+    unarrived: bool = False
 
     @property
     def says_something(self) -> bool:
@@ -190,7 +193,9 @@ def bound_late(
         return bounds
     if initial_state is not None and ends is not None:
         bounds = replace(bounds, missed=find_missed(rows, protocol, latencies, initial_state, ends))
-    return replace(bounds, staged=stage_deadlines(rows, protocol.T, messages.age))
+    staged = stage_deadlines(rows, protocol.T, messages.age)
+    unarrived = staged is None and stage_deadlines(rows, protocol.T, Fraction(0)) is not None
+    return replace(bounds, staged=staged, unarrived=unarrived)
 
 
 def _least(structure: Structure, bounds: Sequence[np.ndarray]) -> np.ndarray | None:

@@ -98,9 +98,8 @@ diverge, for its gain grows without limit before T; give gain_cap, or measure th
     @property
     def largest_delay(self) -> Fraction:
         """What a message takes at most, in units of time."""
-        return (
-            max(self.delay.values(), default=Fraction(0)) if isinstance(self.delay, Mapping) else Fraction(self.delay)
-        )
+        each = self.delay.values() if isinstance(self.delay, Mapping) else [self.delay]
+        return max(map(Fraction, each), default=Fraction(0))
 
     @property
     def held(self) -> Fraction:

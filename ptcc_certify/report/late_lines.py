@@ -26,6 +26,8 @@ def late_lines(certificate: Certificate) -> Lines:
         return
     yield "messages", messages_text(late.messages)
     yield "late" if late.says_something else "LATE", "; ".join([*_left(late), *_missed(late)])
+    if late.unarrived:
+        yield "", "no deadlines of stages: information takes longer than T from the leaders to the last agent"
     if late.staged is not None:
         first = min(late.staged)
         when = f"from {near(first)} to {near(certificate.protocol.T)}, {near(late.messages.age)} apart"
