@@ -203,7 +203,7 @@ class Moving:
         t, X = 0.0, [x0.copy()]
         times, aims = [0.0], [targets @ x0[A]]
         while t < 1.2 * T:
-            dt = min(0.05 / (D * self.gain.value(t)), 0.2 * layer / (mu * D), T / 50)
+            dt = min(0.05 / (D * self.gain.value(t)), 0.2 * layer / max(mu * D, 1e-9), T / 50)
             if t < T < t + dt + 1e-3 * T:
                 dt = max(T - t, 1e-3 * T)  # the last thousandth before T is left out
             eps = X[-1][F] - aims[-1]
