@@ -95,6 +95,8 @@ class LateBounds:
         About the longest delay that such functions forgive: this certificate's limit. None if it was not asked.
     unarrived : bool
         Whether deadlines of stages fail since information takes longer than ``T`` to come from leaders to all.
+    enough : Fraction or None
+        A delay with which no more is left than was asked, near to the longest one that is proved.
     """
 
     messages: LateMessages
@@ -109,6 +111,7 @@ class LateBounds:
     form: SmallDelays | None = None
     longest_delay: float | None = None
     unarrived: bool = False
+    enough: Fraction | None = None
 
     @property
     def says_something(self) -> bool:

@@ -31,6 +31,7 @@ from ptcc_certify.bounds.final_state import (
     influence,
 )
 from ptcc_certify.bounds.late_messages import LateBounds, bound_late
+from ptcc_certify.bounds.longest_delay import longest_delay
 from ptcc_certify.bounds.small_delays import SmallDelayBounds
 from ptcc_certify.bounds.tracking import Tracking, bound_tracking
 from ptcc_certify.certificate.certificate import Certificate
@@ -304,6 +305,12 @@ def _with_small_delays(certificate: Certificate) -> Certificate:
             certificate.structure, certificate.protocol.gain, late.messages, certificate.influence, x0
         )
         late = replace(late, form=bounds.best(forms), longest_delay=bounds.longest_delay(forms))
+    asked, final = certificate.expectations.max_residual, certificate.final_state
+    if asked is not None and late.rows and late.largest > asked and late.messages.age:
+        ends = None if final is None else final.intervals
+        case = certificate.structure, certificate.protocol, asked, late.messages, x0, ends
+        if certificate.graph.n_nodes <= EXACT_NODES:
+            late = replace(late, enough=longest_delay(*case))
     return certificate.changed(late=late)
 
 

@@ -329,7 +329,8 @@ def judge_late(certificate: Content) -> list[Answer]:
         elif missed is not None and missed.bound > asked.max_residual:
             answers.append(Answer(REFUTED, what, f"agent {label} is away by {down(missed.bound, 2)} at least, proved"))
         else:
-            answers.append(Answer(OPEN, what, f"this certificate's limit is {up(late.largest, 3)}"))
+            shorter = "" if late.enough is None else f"; certified with a delay of {down(late.enough, 4)}"
+            answers.append(Answer(OPEN, what, f"this certificate's limit is {up(late.largest, 3)}{shorter}"))
     return answers
 
 

@@ -66,7 +66,7 @@ def plot_late(certificate: Certificate, *, ax: Axes | None = None, time_unit: st
         ax.plot(t, np.abs(run.states - goal[:, None])[nodes].max(axis=0), **style)
     _draw_bound(ax, late, t)
     if late.missed is not None:
-        marks = {"marker": "v", "color": BOUND, "linestyle": "none", "markersize": 4, "clip_on": False}
+        marks: dict[str, Any] = {"marker": "v", "color": BOUND, "linestyle": "none", "markersize": 4, "clip_on": False}
         ax.plot(t[-1:], [float(late.missed.bound)], label="not nearer at $T$, proved", **marks)
     ax.set_yscale("log")
     ax.set_xlim(0, t[-1])
