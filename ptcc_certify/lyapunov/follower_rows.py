@@ -79,7 +79,7 @@ class FollowerRows:
     >>> chain = FollowerRows(analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 3, -1), (3, 2, 1)])))
     >>> witness = chain.witness(Fraction(5, 4))
     >>> round(float(witness.b), 3), chain.largest_q() > 1.4
-    (0.152, True)
+    (0.154, True)
     """
 
     def __init__(self, structure: Structure):

@@ -99,7 +99,7 @@ diverge, for its gain grows without limit before T; give gain_cap, or measure th
     def largest_delay(self) -> Fraction:
         """What a message takes at most, in units of time."""
         each = self.delay.values() if isinstance(self.delay, Mapping) else [self.delay]
-        return max(map(Fraction, each), default=Fraction(0))
+        return max((Fraction(x) for x in each), default=Fraction(0))
 
     @property
     def held(self) -> Fraction:
