@@ -94,7 +94,7 @@ def simulate_late(
     >>> protocol = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
     >>> run = simulate_late(pair, protocol, LateMessages(delay="0.1"), [1, 0, 0])
     >>> run.states[:, -1].round(3)
-    array([1.   , 1.   , 0.986])
+    array([1.   , 1.   , 0.996])
     """
     if pattern not in PATTERNS:
         raise ParameterError(f'pattern "{shorten(str(pattern))}" is unknown; one of {", ".join(PATTERNS)}')

@@ -249,7 +249,7 @@ def _judge_sign(seed: int) -> float:
     away = np.abs(run.states - run.targets)[F] / tracking.witness.u[:, None]
     at = 1 - run.t / T
     bound = tracking.distance_bound(np.maximum(at, 0)) / tracking.witness.u[:, None]
-    # Within the layer |e_k| <= 2 mu dt sum_l |L_kl|, and |e_k| >= a u_k m at the row of the maximum; dt is T/200 at most.
+    # Within the layer |e_k| <= 2 mu dt sum_l |L_kl|; at the row of the maximum |e_k| >= a u_k m; dt <= T/200.
     rows = np.abs(structure.graph.dense_laplacian()[np.ix_(F, F)]).sum(axis=1)
     width, dt = 2 * 1.5 * rows / (float(tracking.witness.b) * tracking.witness.u), T / 200
     layer = dt * float(width.max() + 4 * 1.5 / tracking.witness.u.min())

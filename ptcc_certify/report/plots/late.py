@@ -49,7 +49,7 @@ def plot_late(certificate: Certificate, *, ax: Axes | None = None, time_unit: st
     >>> p = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
     >>> cert = certify(graph, p, [1, 0, 2], messages=LateMessages(delay="0.05"), simulation=False)
     >>> [line.get_label() for line in plot_late(cert).lines]
-    ['as late as allowed', 'now late, now not', 'proved bound']
+    ['as late as allowed', 'now late, now not', 'proved bound', 'not nearer at $T$, proved']
     """
     late, x0, ends = certificate.late, certificate.initial_state, certificate.final_state
     if late is None or not late.says_something:
