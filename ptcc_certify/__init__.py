@@ -13,13 +13,13 @@ The names at the top, by topic:
 - Families of graphs: ``Family``, ``as_family``, ``read_family``, ``decide``
 - Protocols, disturbances, actuators: ``NominalProtocol``, ``SlidingModeProtocol``, ``ExpressionDisturbance``,
   ``SampledDisturbance``, ``StateDependent``, ``telegraph_noise``, ``GainLimits``, ``LateMessages``, ``MovingLeaders``
-- Runs: ``simulate``, ``simulate_family``, ``Trajectory``
+- Runs: ``simulate``, ``simulate_family``, ``simulate_late``, ``simulate_tracking``, ``Trajectory``
 - Certificates: ``certify``, ``certify_vectors``, ``Certificate``, ``Expectations``, ``read_certificate``, ``check``
 - Bounds and design: ``final_state``, ``influence``, ``box``, ``ellipsoid``, ``worst_initial_state``, ``design``
 - Many graphs: ``Ensemble``, ``certify_many``
 - Figures: ``plot_trajectory``, ``plot_decay``, ``plot_run``, ``plot_sliding``, ``plot_trade_off``, ``plot_input``,
   ``plot_effort``, ``plot_graph``, ``plot_spectrum``, ``plot_frontier``, ``plot_family``, ``plot_family_decay``,
-  ``save_figure``, ``SINGLE_COLUMN``, ``DOUBLE_COLUMN``
+  ``plot_late``, ``plot_tracking``, ``save_figure``, ``SINGLE_COLUMN``, ``DOUBLE_COLUMN``
 - Reports: ``write_report``, ``explore``, ``cite``
 - Errors: ``PTCCError``
 
@@ -66,6 +66,8 @@ _EXPORTS = {
     # Runs
     "simulate": "simulation.run",
     "simulate_family": "simulation.family_run",
+    "simulate_late": "simulation.late_messages",
+    "simulate_tracking": "simulation.moving_leaders",
     "Trajectory": "simulation.trajectory",
     # Certificates
     "certify": "certificate.procedure",
@@ -97,6 +99,8 @@ _EXPORTS = {
     "plot_frontier": "report.plots.spectrum",
     "plot_family": "report.plots.family",
     "plot_family_decay": "report.plots.family",
+    "plot_late": "report.plots.late",
+    "plot_tracking": "report.plots.late",
     "save_figure": "report.plots.style",
     "SINGLE_COLUMN": "report.plots.style",
     "DOUBLE_COLUMN": "report.plots.style",
@@ -117,12 +121,6 @@ _ALSO_CALLED = {
     "load_graph": "as_graph",
 }
 _ALSO_CALLED |= {name: f"theorems.restricted_signals.{name}" for name in ("DwellTime", "JointWindows", "ClockShares")}
-_ALSO_CALLED |= {
-    "simulate_late": "simulation.late_messages.simulate_late",
-    "simulate_tracking": "simulation.moving_leaders.simulate_tracking",
-    "plot_late": "report.plots.late.plot_late",
-    "plot_tracking": "report.plots.late.plot_tracking",
-}
 
 
 class Room(ModuleType):
