@@ -19,12 +19,17 @@ Record func := Func {
   ly : lyap; diagonal : bool; rate : Q; lowest : Q; highest : Q; overshoot : Q;
   deviation : option (Q * list Q);     (* of the norm, of each agent *)
   constants : option (list Q) }.       (* of each agent's input *)
+(** [S(x) > m |x|^2] for [x] on some nodes, [S(x) = sum_i gamma_i x_i^2] where [gamma_i] is given, else
+    [2 sum_i w_i x_i (L x)_i]: the matrix whose least eigenvalue the paper's rate takes *)
+Record margin := Margin { on : list nat; weights : list Q; gammas : list (option Q); least : Q }.
 Inductive protocol :=
 | Nominal (T : Q)
 | SlidingMode (T_r T_s mu1 mu2 mu3 delta : Q).
 Record cert := Cert {
   order : nat; edges : list edge; kind : protocol; rho1 : Q; rho2 : Q; kappa : Q;
   comps : list comp; funcs : list func; start : list Q; sliding : list Q; final : list (Q * Q); (* middle, radius *)
+  margins : list margin;
+  leaders : list (list Q * Q);         (* weights of a leader group, 0 elsewhere; its rate *)
   proved : option Q; best_diagonal : option Q; best_overshoot : option Q; bounded_input : bool }.
 
 (** * Words *)
@@ -96,6 +101,18 @@ Definition function_claim (c : cert) (f : func) : Prop := forall X S t0, moves c
   | Some cs => forall i, (i < order c)%nat ->
       sq (lap (edges c) (X t) i) <= Q2R (nth i cs 0%Q) * V (edges c) (ly f) (X t)
   | None => True end.
+(** the inequalities of the paper's own function *)
+Definition margin_form (es : list edge) (n : nat) (m : margin) (x : nat -> R) : R :=
+  fold_right (fun i a => match nth i (gammas m) None with
+    | Some g => Q2R g * sq (x i)
+    | None => 2 * Q2R (nth i (weights m) 0%Q) * (x i * lap es x i) end + a) 0 (seq 0 n).
+Definition margin_claim (c : cert) (m : margin) : Prop := forall x, (forall i, (i < order c)%nat -> ~ In i (on m) -> x i = 0) ->
+  Q2R (least m) * norm2 (order c) x <= margin_form (edges c) (order c) m x /\
+  (Q2R (least m) * norm2 (order c) x = margin_form (edges c) (order c) m x -> forall i, (i < order c)%nat -> x i = 0).
+Definition leader_claim (c : cert) (l : list Q * Q) : Prop := forall X S t0, moves c X S t0 ->
+  forall t, t0 <= t < deadline c ->
+  let W x := qdot (fst l) (fun i => sq (lap (edges c) x i)) in
+  W (X t) <= exp (- (Q2R (snd l) * (s c t - s c t0))) * W (X t0).
 (** the end is reached at the deadline *)
 Definition limit_claim (c : cert) : Prop := forall X S t0, moves c X S t0 -> forall i, (i < order c)%nat ->
   filterlim (fun t => X t i) (at_left (deadline c)) (locally (end_state c (fun j => X 0 j - S 0 j) i)).
@@ -117,4 +134,5 @@ Definition rates_claim (c : cert) : Prop :=
 
 Definition true_certificate (c : cert) : Prop :=
   structure c /\ behaviour c /\ final_claim c /\ (forall f, In f (funcs c) -> function_claim c f) /\
-  limit_claim c /\ input_claim c /\ rates_claim c.
+  limit_claim c /\ input_claim c /\ rates_claim c /\
+  (forall m, In m (margins c) -> margin_claim c m) /\ (forall l, In l (leaders c) -> leader_claim c l).

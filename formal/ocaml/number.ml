@@ -13,6 +13,10 @@ let div a b = (* b is not 0 *)
   let p = Z.mul a.qnum b.qden and d = Z.mul a.qden b.qnum in
   if Z.sign d > 0 then make p d else make (Z.neg p) (Z.neg d)
 let compare a b = Z.compare (Z.mul a.qnum b.qden) (Z.mul b.qnum a.qden)
+let add a b = make (Z.add (Z.mul a.qnum b.qden) (Z.mul b.qnum a.qden)) (Z.mul a.qden b.qden)
+let sub a b = add a { b with qnum = Z.neg b.qnum }
+let min a b = if compare a b <= 0 then a else b
+let max a b = if compare a b >= 0 then a else b
 let equal a b = compare a b = 0
 let text q = if Z.equal q.qden Z.one then Z.to_string q.qnum else Z.to_string q.qnum ^ "/" ^ Z.to_string q.qden
 

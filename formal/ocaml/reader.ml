@@ -131,43 +131,17 @@ let ends weights = match weights with
   | (_, w) :: l -> List.fold_left (fun (a, b) (_, x) ->
       (if Number.compare x a < 0 then x else a), (if Number.compare x b > 0 then x else b)) (w, w) l
 
-(* the Lyapunov function of the theorem's row, as it is written; its obligations are taken here *)
-type paper = { coordinates : string; weights : (int * q) list; own_rate : q option; section : string -> Json.t }
 let block nodes shape v =
   let get = fields "a block" [ "name"; "nodes"; shape; "times_rho" ] v in
   let own = positions nodes "nodes of a block" (get "nodes") in
   need (List.sort_uniq compare own |> List.length = List.length own) "nodes of a block: one occurs twice";
   text "name" (get "name"), own, get shape, truth "times_rho" (get "times_rho")
-let paper nodes proof v =
-  let section = fields "paper" [ "theorem"; "objective"; "coordinates"; "blocks"; "rho"; "rho_interval"; "rate"; "overshoot" ] v in
-  let rho = optional number "paper.rho" (section "rho") in
-  let blocks = List.map (block nodes "diagonal") (entries "blocks" (section "blocks")) in
-  let weights = List.concat_map (fun (_, own, d, times_rho) ->
-    let d = List.map (number "diagonal") (entries "diagonal" d) in
-    need (List.length d = List.length own) "diagonal: a number for each node";
-    let f = if not times_rho then Fun.id else match rho with Some r -> Number.mul r | None -> bad "a block times rho without rho" in
-    List.map2 (fun i x -> need (Z.sign x.qnum > 0) "a weight is not positive"; i, f x) own d) blocks in
-  let own_rate = optional number "paper.rate" (section "rate") in
-  let coordinates = text "coordinates" (section "coordinates") in
-  need (List.mem coordinates [ "E"; "eps" ]) "other coordinates";
-  (match own_rate with
-   | None -> ()
-   | Some r when coordinates = "eps" ->
-       need (Number.equal (bare proof "deviation-decrease" "paper" [ "b" ] "b") r) "deviation-decrease: b is not the rate"
-   | Some _ ->
-       List.iter (fun (name, _, _, _) ->
-         if List.mem (following proof) [ "leader-decrease"; "leader-margin" ] then
-           skipped proof (following proof) ("paper." ^ name)) blocks;
-       skipped proof "margin" "paper";
-       if following proof = "rho-interval" then skipped proof "rho-interval" "paper");
-  { coordinates; weights; own_rate; section }
-
 let function_ nodes proof gauge influence_exact paper number_of v =
   let of_ = Printf.sprintf "lyapunov.functions[%d]" number_of in
   let get = fields "a Lyapunov function" [ "class"; "coordinates"; "blocks"; "rho"; "rate"; "overshoot"; "deviation" ] v in
   let rate = number "rate" (get "rate") and overshoot = number "overshoot" (get "overshoot") in
   let ly, diagonal, lowest, highest = match paper with
-    | Some p when p.own_rate <> None && number_of = 0 ->
+    | Some (p : Paper.t) when p.own_rate <> None && number_of = 0 ->
         need (get "class" = Str "paper") "the first Lyapunov function is not the paper's";
         List.iter (fun k -> need (get k = p.section k) "the first Lyapunov function is not the paper's")
           [ "coordinates"; "blocks"; "rho"; "rate"; "overshoot" ];
@@ -232,7 +206,11 @@ let certificate (j : Json.t) : t =
   skipped proof "claim" "graph";
   not_checked "claim"; not_checked "structure.connectivity, .balanced, .sign_symmetric";
   if get "influence" = Null then unsupported "an undecided certificate, without influence";
-  let comps, _, degenerate = components nodes structure (get "influence") in
+  let theorem = text "claim.theorem" ((fields "claim" [ "theorem"; "behaviour"; "corollaries" ] (get "claim")) "theorem") in
+  let numbers = if is_sliding then "456" else "123" in
+  need (String.length theorem = 3 && String.contains numbers theorem.[0] && List.mem (String.sub theorem 1 2) [ ".1"; ".2" ])
+    "claim: an unknown theorem";
+  let comps, followers, degenerate = components nodes structure (get "influence") in
   let start = match get "initial_state" with Null -> None | v -> Some (by_agent nodes number "initial_state" v) in
   let sliding = match get "sliding_variable" with Null -> [] | v -> by_agent nodes number "sliding_variable" v in
   need (is_sliding = (get "sliding_variable" <> Null)) "sigma(0) belongs to the sliding-mode protocol, and is part of it";
@@ -245,14 +223,15 @@ let certificate (j : Json.t) : t =
   else not_checked "influence.degenerate";
   (match proved proof "final-state" "graph" [] with
    | _, Null -> () | _ -> unsupported "a final state that is enclosed by a witness");
-  let paper = optional (fun _ v -> paper nodes proof v) "paper" (get "paper") in
-  if paper <> None then not_checked "paper.theorem, .objective, .rho_interval, names of its blocks";
+  let closed = List.mapi (fun k (one : Checker.comp) -> k + 1, one.nodes, (match one.wit with Bal _ -> true | Unbal _ -> false)) comps in
+  let setting = { Paper.n = Array.length nodes.labels; edges; closed; followers; theorem } in
+  let paper = optional (fun _ v -> Paper.read setting nodes proof v) "paper" (get "paper") in
   let gauge () = match comps with [ { wit = Bal (g, _, _); _ } ] -> g | _ -> bad "coordinates eps of another graph" in
   let functions = (fields "lyapunov" [ "functions" ] (get "lyapunov")) "functions" in
   let functions = List.mapi (function_ nodes proof gauge true paper) (entries "functions" functions) in
   let rates = fields "rates" [ "paper"; "diagonal"; "proved"; "upper_bound" ] (get "rates") in
   let rate k = optional number ("rates." ^ k) (rates k) in
-  (match rate "paper", Option.bind paper (fun p -> p.own_rate) with
+  (match rate "paper", Option.bind paper (fun (p : Paper.t) -> p.own_rate) with
    | None, None -> () | Some a, Some b when Number.equal a b -> () | _ -> bad "rates.paper is not that of the paper's function");
   let best_overshoot = match get "overshoot" with
     | Null -> None
@@ -301,9 +280,10 @@ let certificate (j : Json.t) : t =
   let verdict = text "verdict" (get "verdict") in
   let certified = rate "proved" <> None || edges = [] in
   need (verdict = (if certified then "certified" else "undecided")) "what was proved makes another verdict";
-  let theorem = match get "claim" with Obj l -> (match List.assoc_opt "theorem" l with Some (Str s) -> s | _ -> "") | _ -> "" in
   { nodes; sha256; verdict; theorem; checked = List.rev proof.checked; unchecked = List.rev proof.unchecked;
     sections = List.rev !left_out;
     cert = { order = Array.length nodes.labels; edges; kind; rho1; rho2; kappa; comps; funcs = functions;
       start = Option.value start ~default:[]; sliding = (if start = None then [] else sliding); final;
+      margins = (match paper with Some p -> p.inequalities | None -> []);
+      leaders = (match paper with Some p -> p.groups | None -> []);
       proved = rate "proved"; best_diagonal = rate "diagonal"; best_overshoot; bounded_input } }
