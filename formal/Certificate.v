@@ -22,6 +22,8 @@ Record func := Func {
 (** [S(x) > m |x|^2] for [x] on some nodes, [S(x) = sum_i gamma_i x_i^2] where [gamma_i] is given, else
     [2 sum_i w_i x_i (L x)_i]: the matrix whose least eigenvalue the paper's rate takes *)
 Record margin := Margin { on : list nat; weights : list Q; gammas : list (option Q); least : Q }.
+(** the upper bound on the rate, and what proves it: a strong component, a form on it, where that is negative *)
+Record upper := Upper { bound : Q; inside : list nat; form_H : list (list Q); vector_y : list Q }.
 Inductive protocol :=
 | Nominal (T : Q)
 | SlidingMode (T_r T_s mu1 mu2 mu3 delta : Q).
@@ -29,6 +31,7 @@ Record cert := Cert {
   order : nat; edges : list edge; kind : protocol; rho1 : Q; rho2 : Q; kappa : Q;
   comps : list comp; funcs : list func; start : list Q; sliding : list Q; final : list (Q * Q); (* middle, radius *)
   margins : list margin;
+  upper_bound : option upper;
   leaders : list (list Q * Q);         (* weights of a leader group, 0 elsewhere; its rate *)
   proved : option Q; best_diagonal : option Q; best_overshoot : option Q; bounded_input : bool }.
 
@@ -132,7 +135,15 @@ Definition rates_claim (c : cert) : Prop :=
     (exists f, In f (funcs c) /\ (rate f == q)%Q /\ (overshoot f == o)%Q) /\
     forall f, In f (funcs c) -> (rate f == q)%Q -> (o <= overshoot f)%Q.
 
+(** no quadratic form of the state that vanishes only where nothing moves decays faster than the upper bound *)
+Definition upper_claim (c : cert) (u : upper) : Prop := forall (F : (nat -> R) -> (nat -> R) -> R) (b : R),
+  (forall x y, F x y = F y x) -> (forall x y z, F (fun i => x i + y i) z = F x z + F y z) ->
+  (forall a x z, F (fun i => a * x i) z = a * F x z) ->
+  (forall x, 0 <= F x x) -> (forall x, F x x = 0 -> forall i, (i < order c)%nat -> lap (edges c) x i = 0) ->
+  (forall x, b * F x x <= 2 * F x (lap (edges c) x)) -> b <= Q2R (bound u).
+
 Definition true_certificate (c : cert) : Prop :=
   structure c /\ behaviour c /\ final_claim c /\ (forall f, In f (funcs c) -> function_claim c f) /\
   limit_claim c /\ input_claim c /\ rates_claim c /\
-  (forall m, In m (margins c) -> margin_claim c m) /\ (forall l, In l (leaders c) -> leader_claim c l).
+  (forall m, In m (margins c) -> margin_claim c m) /\ (forall l, In l (leaders c) -> leader_claim c l) /\
+  (forall u, upper_bound c = Some u -> upper_claim c u).

@@ -13,3 +13,5 @@ let of_check c d : (string * (unit -> bool)) list =
       "rates, or overshoot, are not what was proved", (fun () -> check_rates c) ]
   @ List.mapi (fun k m -> Printf.sprintf "paper: inequality %d of its own function" (k + 1), (fun () -> check_margin c d m)) c.margins
   @ List.mapi (fun k l -> Printf.sprintf "leader-decrease of paper, group %d" (k + 1), (fun () -> check_leader c d l)) c.leaders
+  @ (match c.upper_bound with
+     | Some u -> [ "rate-upper-bound of rates", (fun () -> check_upper c d u) ] | None -> [])

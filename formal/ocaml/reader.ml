@@ -183,6 +183,31 @@ let function_ nodes proof gauge influence_exact paper number_of v =
         Some (number "deviation.norm" (d "norm"), by_agent nodes number "deviation.agents" (d "agents")) in
   { ly; diagonal; rate; lowest; highest; overshoot; deviation; constants = None }
 
+(* some function tells that a state at which nothing moves is one at which agents end *)
+let has_kernel = List.exists (fun f -> f.deviation <> None && (match f.ly with InE _ -> true | InEps _ -> false))
+(* the upper bound on the rate: of two vectors, the combination that the left null vector annihilates *)
+let upper nodes comps proof bound =
+  let numbers, witness = proved proof "rate-upper-bound" "rates" [ "upper_bound" ] in
+  need (Number.equal (numbers "upper_bound") bound) "rate-upper-bound: another upper bound";
+  let get = fields "the witness" [ "nodes"; "lower_triangle"; "vectors" ] witness in
+  let inside = positions nodes "nodes" (get "nodes") in
+  need (inside <> [] && List.sort_uniq compare inside = inside) "rate-upper-bound: nodes are in another order";
+  let vector v =
+    let own = List.map (number "a vector") (entries "a vector" v) in
+    need (List.length own = List.length inside) "a vector: a number for each node";
+    List.init (Array.length nodes.labels) (fun i -> Option.value (List.assoc_opt i (List.combine inside own)) ~default:Number.zero) in
+  let dot = List.fold_left2 (fun a x y -> Number.add a (Number.mul x y)) Number.zero in
+  let null = List.find_map (fun one -> match (one : comp).wit with
+    | Bal (_, _, v) when List.mem (List.hd one.nodes) inside -> Some v | _ -> None) comps in
+  let vector_y = match List.map vector (entries "vectors" (get "vectors")), null with
+    | [ y ], None -> y
+    | [ y; z ], Some v ->
+        let a = dot v y and b = dot v z in
+        if Z.sign a.qnum = 0 then y else List.map2 (fun y z -> Number.sub (Number.mul b y) (Number.mul a z)) y z
+    | _ -> bad "rate-upper-bound: two vectors iff the component is closed and balanced" in
+  { bound; inside; form_H = matrix nodes "lower_triangle" (Array.of_list inside) (entries "lower_triangle" (get "lower_triangle"));
+    vector_y }
+
 let certificate (j : Json.t) : t =
   (match j with
    | Obj l when List.assoc_opt "schema" l = Some (Str "ptcc-certificate/2") ->
@@ -240,9 +265,13 @@ let certificate (j : Json.t) : t =
         need (List.mem of_ [ "||E||^2"; "||eps||^2" ]) "overshoot.of";
         not_checked "overshoot.of";
         Some (number "overshoot.value" (o "value")) in
-  if rate "upper_bound" <> None then begin
-    skipped proof (if following proof = "rate-mean" then "rate-mean" else "rate-upper-bound") "rates";
-    not_checked "rates.upper_bound" end;
+  let upper_bound = match rate "upper_bound" with
+    | None -> None
+    | Some bound when following proof = "rate-upper-bound" && has_kernel functions ->
+        Some (upper nodes comps proof bound)
+    | Some _ ->
+        skipped proof (if following proof = "rate-mean" then "rate-mean" else "rate-upper-bound") "rates";
+        not_checked "rates.upper_bound"; None in
   if is_sliding then begin
     skipped proof "sliding-bound" "protocol"; not_checked "reaching_time";
     if following proof = "reaching-time" then skipped proof "reaching-time" "reaching_time" end
@@ -286,4 +315,5 @@ let certificate (j : Json.t) : t =
       start = Option.value start ~default:[]; sliding = (if start = None then [] else sliding); final;
       margins = (match paper with Some p -> p.inequalities | None -> []);
       leaders = (match paper with Some p -> p.groups | None -> []);
+      upper_bound;
       proved = rate "proved"; best_diagonal = rate "diagonal"; best_overshoot; bounded_input } }
