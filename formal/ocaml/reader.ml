@@ -281,6 +281,13 @@ let certificate (j : Json.t) : t =
     | v ->
         let input = fields "input" [ "bounded"; "threshold"; "initial_set"; "constants"; "peak"; "energy"; "path_length";
           "sliding"; "residual"; "disturbed" ] v in
+        let threshold = fields "threshold" [ "lower"; "upper" ] (input "threshold") in
+        List.iter (fun (key, of_) ->
+          let half = Number.div (Number.mul rho2 kappa) (Number.of_z (Z.of_int 2)) in
+          match optional number "threshold" (threshold key), rate of_ with
+          | None, None -> ()
+          | Some a, Some r when Number.equal a (Number.mul half r) -> ()
+          | _ -> bad "input.threshold: not what the rates say") [ ("lower", "proved"); ("upper", "upper_bound") ];
         let bounded = match input "bounded" with
           | Null -> false
           | b when following proof = "input-threshold" ->
@@ -296,7 +303,7 @@ let certificate (j : Json.t) : t =
           | Null -> f
           | v -> bare_of proof "input-constants" (Printf.sprintf "lyapunov.functions[%d]" k);
               { f with constants = Some (by_agent nodes number "constants" v) }) (List.combine functions constants) in
-        not_checked "input.threshold, .initial_set, .peak, .energy, .path_length, .sliding, .residual, .disturbed";
+        not_checked "input.initial_set, .peak, .energy, .path_length, .sliding, .residual, .disturbed";
         bounded, functions in
   while proof.rest <> [] do
     match proof.rest with

@@ -23,7 +23,7 @@ UNCHECKED: tuple[Path_, ...] = (
     *(("claim", "behaviour"), ("claim", "corollaries"), ("claim", "theorem")),
     *(("structure", "connectivity"), ("structure", "balanced"), ("structure", "sign_symmetric")),
     *(("influence", "degenerate"), ("overshoot", "of"), ("reaching_time",)),
-    *(("input", key) for key in ("threshold", "initial_set", "peak", "energy", "path_length", "sliding", "residual")),
+    *(("input", key) for key in ("initial_set", "peak", "energy", "path_length", "sliding", "residual")),
     *(("input", "disturbed"), ("input", "bounded")),
 )
 #: What the executable says of a form that it does not read.
