@@ -11,15 +11,16 @@ The names at the top, by topic:
 
 - Graphs: ``SignedDigraph``, ``as_graph``, ``as_state``, ``read_graph``, ``write_graph``, ``analyse``, ``Structure``
 - Families of graphs: ``Family``, ``as_family``, ``read_family``, ``decide``
-- Protocols, disturbances, actuators: ``NominalProtocol``, ``SlidingModeProtocol``, ``ExpressionDisturbance``,
-  ``SampledDisturbance``, ``StateDependent``, ``telegraph_noise``, ``GainLimits``
+- Protocols, disturbances, actuators: ``Agents``, ``companion_form``, ``NominalProtocol``, ``SlidingModeProtocol``,
+  ``ExpressionDisturbance``, ``SampledDisturbance``, ``StateDependent``, ``telegraph_noise``, ``GainLimits``
 - Runs: ``simulate``, ``simulate_family``, ``Trajectory``
 - Certificates: ``certify``, ``certify_vectors``, ``Certificate``, ``Expectations``, ``read_certificate``, ``check``
-- Bounds and design: ``final_state``, ``influence``, ``box``, ``ellipsoid``, ``worst_initial_state``, ``design``
+- Bounds and design: ``final_state``, ``influence``, ``formation_of_biases``, ``box``, ``ellipsoid``,
+  ``worst_initial_state``, ``design``
 - Many graphs: ``Ensemble``, ``certify_many``
 - Figures: ``plot_trajectory``, ``plot_decay``, ``plot_run``, ``plot_sliding``, ``plot_trade_off``, ``plot_input``,
   ``plot_effort``, ``plot_graph``, ``plot_spectrum``, ``plot_frontier``, ``plot_family``, ``plot_family_decay``,
-  ``save_figure``, ``SINGLE_COLUMN``, ``DOUBLE_COLUMN``
+  ``plot_motion``, ``plot_formation``, ``save_figure``, ``SINGLE_COLUMN``, ``DOUBLE_COLUMN``
 - Reports: ``write_report``, ``explore``, ``cite``
 - Errors: ``PTCCError``
 
@@ -54,6 +55,8 @@ _EXPORTS = {
     "read_family": "graphs.io",
     "decide": "theorems.family_behaviour",
     # Protocols, disturbances, actuators
+    "Agents": "protocols.agents",
+    "companion_form": "protocols.companion",
     "NominalProtocol": "protocols",
     "SlidingModeProtocol": "protocols",
     "ExpressionDisturbance": "protocols.disturbance",
@@ -75,6 +78,7 @@ _EXPORTS = {
     # Bounds and design
     "final_state": "bounds.final_state",
     "influence": "bounds.final_state",
+    "formation_of_biases": "bounds.formation",
     "box": "bounds.input.initial_set",
     "ellipsoid": "bounds.input.initial_set",
     "worst_initial_state": "bounds.input.worst_initial_state",
@@ -83,6 +87,8 @@ _EXPORTS = {
     "Ensemble": "graphs.ensembles",
     "certify_many": "batch",
     # Figures
+    "plot_motion": "report.plots.agents_motion",
+    "plot_formation": "report.plots.agents_motion",
     "plot_trajectory": "report.plots.trajectory",
     "plot_decay": "report.plots.decay",
     "plot_run": "report.plots.trajectory",

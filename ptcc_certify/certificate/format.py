@@ -19,11 +19,13 @@ from ptcc_certify.bounds.envelope import FRACTIONS, LAST_INSTANTS
 from ptcc_certify.bounds.final_state import FinalState, rounding_radius
 from ptcc_certify.bounds.input.effort import EnergyIntegral, Peak
 from ptcc_certify.certificate.certificate_data import Content, Observations, Source
+from ptcc_certify.certificate.format_agents import agents_section, read_agents
 from ptcc_certify.certificate.format_effort import LIMITS, effort_section, energy_witness, peak_witness, read_effort
 from ptcc_certify.certificate.format_graph import certificate_graph, claim_sections, graph_section, structure_section
 from ptcc_certify.certificate.format_vectors import (
     Reader,
     Writer,
+    agents_ends,
     exact_or_ball,
     factor_entry,
     finite,
@@ -31,7 +33,6 @@ from ptcc_certify.certificate.format_vectors import (
     interval_text,
     number,
     text,
-    weighted_sum,
 )
 from ptcc_certify.certificate.request import Expectations, Request
 from ptcc_certify.checker import SCHEMA, SLIDING_BOUND, SLIDING_CLOCK, CheckReport, digest
@@ -82,6 +83,8 @@ def certificate_document(content: Content, verdict: str, files: bool = False) ->
         "proof": [_write_obligation(o, out) for o in content.obligations],
         "verdict": verdict,
     }
+    if content.agents is not None:
+        document["agents"] = agents_section(content.agents, out)
     return document | {"digest": digest(document), "unverified": _write_unverified(content)}, out
 
 
@@ -120,6 +123,7 @@ def read_document(
         "request": _read_request(document["unverified"], None if effort is None else effort.initial_set),
         "observed": _read_observations(document["unverified"]),
         "source": Source(path, sha256, document, report, effort, proof, files),
+        "agents": read_agents(document.get("agents"), structure, protocol, functions),
     }
 
 
@@ -277,12 +281,7 @@ def _exact_final_state(content: Content) -> tuple[dict[str, Any], dict[str, Any]
     if content.final_state is not None and content.initial_state is not None:
         sigma0 = content.sigma0 or [Fraction(0)] * len(labels)
         first = [(x - s, Fraction(0)) for x, s in zip(content.initial_state, sigma0, strict=True)]
-        groups = list(zip(matrix.balanced, left_null_vectors, strict=True))
-        values = [weighted_sum(null_vector, [first[v] for v in c.nodes]) for c, null_vector in groups]
-        final = dict.fromkeys(range(len(labels)), (Fraction(0), Fraction(0)))
-        for component, (middle, radius) in zip(matrix.balanced, values, strict=True):
-            final |= {v: (g * middle, radius) for v, g in zip(component.nodes, component.gauge or (), strict=True)}
-        final |= {v: weighted_sum(row, values) for v, row in zip(followers, containment_weights, strict=True)}
+        final = agents_ends(matrix, first)
         ends = {label: interval_text(final[v]) for v, label in enumerate(labels)}
     section = {
         "components": [

@@ -20,8 +20,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
 
+import numpy as np
+
 from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.bounds.envelope import Envelope
+from ptcc_certify.certificate.agents_part import AgentsPart
 from ptcc_certify.certificate.certificate_data import Content
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.input_formulas import InitialSet, root_above
@@ -218,7 +221,7 @@ the input is not bounded; --rho2 0.501 (rho2 kappa 0.501) leaves 1 % and bounds 
     >>> assessment.useful, int(assessment.exit_code)
     (True, 0)
     """
-    expectations, comparison = certificate.expectations, certificate.comparison
+    expectations = certificate.expectations
     answers = [] if expectations.behaviour is None else [judge_behaviour(certificate.structure, expectations.behaviour)]
     answers += [] if expectations.min_rate is None else [judge_rate(certificate, expectations.min_rate)]
     answers += [] if expectations.max_input is None else [judge_input(certificate, expectations.max_input)]
@@ -229,11 +232,13 @@ the input is not bounded; --rho2 0.501 (rho2 kappa 0.501) leaves 1 % and bounds 
         remark = _next_step(certificate, report)
     elif certificate.constant:
         useful, remark = True, "nothing to decay"
+    elif certificate.agents is not None:
+        useful, remark, caveat, advice = _assess_agents(certificate.agents)
     else:
         limited = certificate.effort is not None and certificate.effort.residual
         useful, remark, rho2 = (_limited_usefulness if limited else _usefulness)(certificate)
         caveat, advice = ("", "") if limited else _advise(certificate, rho2)
-    violated = comparison is not None and comparison.violated
+    violated = certificate.violated
     ignored = sorted({answer.what for answer in answers if answer.status == OPEN} & {"limits", "noise"})
     ignored += ["disturbances"] * (certificate.delta is not None)
     without = f" without {' and '.join(ignored)}" if ignored else ""
@@ -254,6 +259,8 @@ def judge_behaviour(structure: Structure, expected: str) -> Answer:
 def judge_rate(certificate: Content, least: Fraction) -> Answer:
     """Tell whether a rate of at least so much is proved, or excluded by the proved upper bound."""
     what, rate, bound = f"rate >= {near(least, 12)}", certificate.rate, certificate.upper_bound
+    if certificate.agents is not None:
+        rate, bound = certificate.agents.matrix.rate if certificate.agents.functions else None, None
     if certificate.constant or (rate is not None and rate >= least):
         return Answer(MET, what)
     if bound is not None and least > bound:
@@ -265,6 +272,10 @@ def judge_rate(certificate: Content, least: Fraction) -> Answer:
 def judge_input(certificate: Content, most: Fraction) -> Answer:
     """Tell whether every input is proved to stay within so much, under all that was asked for besides."""
     effort, what = certificate.effort, f"|u_k| <= {near(most, 12)}"
+    if certificate.agents is not None:
+        proved = certificate.agents.input
+        least_bound = "no bound is proved" if proved is None else f"proved: {up(max(proved))}"
+        return Answer(MET, what) if proved is not None and max(proved) <= most else Answer(OPEN, what, least_bound)
     if certificate.constant:
         return Answer(MET, what)
     least, bound = input_range(certificate)
@@ -355,6 +366,21 @@ def _usefulness(certificate: Content) -> tuple[bool, str, Fraction | None]:
         if worst <= USEFUL * way:
             return True, f"every agent within {up(worst, 2)} of its final state at {instant}", None
     return False, remark, _useful_rho2(envelope, constant, p.kappa)
+
+
+def _assess_agents(part: AgentsPart) -> tuple[bool | None, str, str, str]:
+    """Return whether bounds of agents of order n say something by ``T``, what, what is not proved, and a mend."""
+    n, capped, caveat, advice = part.order, part.protocol.gain_cap is not None, "", ""
+    if part.decay < 2 * n and not capped:
+        caveat, advice = "the input is not certified bounded", f"--decay {2 * n} bounds it"
+    last = np.array([0.0 if capped else float(LAST)])
+    fall = math.exp(-float(part.matrix.rate) * float(part.protocol.clock(last)[0]) / 2)
+    worst = float(part.deviation_bound(last)[:, 0].max(initial=0.0))
+    when = "T" if capped else "0.99 T"
+    remark = f"every position within {up(worst, 2)} of its place at {when}"
+    if part.initial_state is None or not math.isfinite(worst):
+        return fall <= USEFUL, f"deviations at {when} are {up(fall, 2)} of the first ones", caveat, advice
+    return fall <= USEFUL or worst <= USEFUL * part.longest_way, remark, caveat, advice
 
 
 def _limited_usefulness(certificate: Content) -> tuple[bool, str, None]:

@@ -22,6 +22,7 @@ from typing import Any
 
 from lmi.exact import arithmetic
 from lmi.exact.work import WorkError, limited
+from ptcc_certify.checker.agents import check_agents
 from ptcc_certify.checker.attracting_boxes import check_boxes
 from ptcc_certify.checker.family import check_family
 from ptcc_certify.checker.family_bounds import check_family_bounds
@@ -55,10 +56,10 @@ GRAPH = "a graph file is not read: compare the SHA-256 that is printed, or use p
 KEYS = (
     *("schema", "producer", "graph", "structure", "claim", "components", "protocol", "paper", "lyapunov", "rates"),
     *("overshoot", "initial_state", "sliding_variable", "influence", "final_state", "reaching_time", "input", "proof"),
-    *("verdict", "digest", "unverified", "boxes", "restricted"),
+    *("verdict", "digest", "unverified", "boxes", "restricted", "agents"),
 )
 #: Parts that need not be there.
-OPTIONAL = ("components", "boxes", "restricted")
+OPTIONAL = ("components", "boxes", "restricted", "agents")
 
 #: Parts that are null in a certificate of a family.
 NOT_OF_FAMILIES = ("paper", "rates", "overshoot", "influence")
@@ -174,7 +175,10 @@ def _verdict(doc: Document) -> str:
     rate = check_rates(doc, paper, functions)
     bound = check_rate_bound(doc, structure)
     check_sliding(doc, graph, protocol, begin)
-    check_input(doc, Verified(structure, protocol, begin, final, functions, rate, bound))
+    verified = Verified(structure, protocol, begin, final, functions, rate, bound)
+    if "agents" in data:
+        return _close(doc, check_agents(doc, verified))
+    check_input(doc, verified)
     return _close(doc, data["influence"] is not None and (rate is not None or not graph.listening))
 
 
@@ -190,6 +194,7 @@ def _close(doc: Document, proved: bool) -> str:
 
 def _family_verdict(doc: Document, protocol: Protocol) -> str:
     """Verify a certificate of a family, part after part; return its verdict."""
+    need("agents" not in doc.data, "agents of order n on a family")
     family = check_family(doc)
     begin = check_begin(doc, family.modes[0].structure.graph, protocol)
     functions = check_family_functions(doc, family)

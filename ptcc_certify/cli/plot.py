@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 _OF_CERTIFICATES = ("graph", "what", "output", "wide", "time_unit", "memory", "x0", "seed")
 #: Figures of a simulated run.
 OF_A_RUN = ("states", "input", "decay")
+#: Figures of agents of order n.
+OF_AGENTS = ("motion", "formation")
 
 
 class _Figure(click.Choice):  # type: ignore[type-arg]  # no generic class before click 8.2
@@ -51,9 +53,9 @@ class _Figure(click.Choice):  # type: ignore[type-arg]  # no generic class befor
 )
 @click.option(
     "--what",
-    type=_Figure([*OF_A_RUN, "graph", "spectrum"]),
-    help="States, input, or error under its proved bounds over time; the graph; its eigenvalues."
-    "  [default: of a certificate decay, else graph]",
+    type=_Figure([*OF_A_RUN, "graph", "spectrum", *OF_AGENTS]),
+    help="States, input, or error under its proved bounds over time; the graph; its eigenvalues; of agents of order n "
+    "positions and velocities, or their ways in the plane.  [default: of a certificate decay or motion, else graph]",
 )
 @click.option(
     "-o",
@@ -119,6 +121,10 @@ def _of_certificate(path: str, what: str, options: shared.Options) -> Certificat
         certificate = read_certificate(path, memory=options["memory"])
         if begins and certificate.initial_state is not None:
             raise ParameterError(f"--x0 is for what holds no initial state; the certificate {path} has its own")
+        of_agents = isinstance(certificate, Certificate) and certificate.agents is not None
+        if what in (*OF_A_RUN, *OF_AGENTS) and of_agents != (what in OF_AGENTS):
+            other = " or ".join(OF_AGENTS if of_agents else OF_A_RUN)
+            raise ParameterError(f"--what {what} is not drawn of {path}; ask for --what {other}")
         if what not in OF_A_RUN:
             return certificate
         if begins:
@@ -184,6 +190,7 @@ def _draw(what: str, subject: Any, wide: bool, time_unit: str) -> Any:
     from ptcc_certify.certificate.family_certificate import FamilyCertificate
     from ptcc_certify.graphs.display_hook import plot_of_family
     from ptcc_certify.graphs.family import Family
+    from ptcc_certify.report.plots.agents_motion import plot_formation, plot_motion
     from ptcc_certify.report.plots.decay import plot_decay
     from ptcc_certify.report.plots.graph import plot_graph
     from ptcc_certify.report.plots.input import plot_input
@@ -197,6 +204,8 @@ def _draw(what: str, subject: Any, wide: bool, time_unit: str) -> Any:
             )
         return plot_of_family(subject, what, **({"time_unit": time_unit} if what in OF_A_RUN else {}))
     subject, protocol = subject if isinstance(subject, tuple) else (subject, None)
+    if what in OF_AGENTS:
+        return plot_motion(subject, wide=wide, time_unit=time_unit) if what == "motion" else plot_formation(subject)
     if what == "graph":
         return plot_graph(subject)
     if what == "spectrum":

@@ -75,6 +75,20 @@ SECTIONS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
             "dimension": ("dimension", "1"),
         },
     ),
+    "agents": (
+        "Agents of order n, their first velocities, and a formation.",
+        {
+            "kind": ("agents", '"double-integrator"'),
+            "v0": ("v0", '"0"'),
+            "a0": ("a0", '"0"'),
+            "drag": ("drag", "0.1"),
+            "plant": ("plant", '"0,0.1"'),
+            "offsets": ("offsets", '"offsets.csv"'),
+            "biases": ("biases", "0"),
+            "rest": ("rest", "1"),
+            "decay": ("decay", "4"),
+        },
+    ),
     "disturbance": (
         "What disturbs the agents.",
         {"delta": ("delta", "1"), "signal": ("disturbance", '"worst-case"'), "noise": ("noise", "0.01")},
@@ -118,7 +132,7 @@ SECTIONS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
         },
     ),
 }
-_STATES = ("x0", "sigma0")
+_STATES = ("x0", "sigma0", "v0", "a0", "offsets", "biases")
 #: Keys that make a family of a graph.
 OF_FAMILIES = ("uncertainty", "optional")
 #: Options of the other protocol: a flag that chooses the protocol leaves such keys out.

@@ -28,6 +28,7 @@ from ptcc_certify.graphs.io.graph_files import reading_flags
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.size_limits import DRAWN_NODES, LABELLED_NODES
 from ptcc_certify.report import notation as texts
+from ptcc_certify.report.agents_page import agents_view
 from ptcc_certify.report.family_page import family_view
 from ptcc_certify.report.figures import draw, inline_figure
 from ptcc_certify.report.notation import above, agent_parts, enclosed, printable, rational
@@ -83,9 +84,13 @@ def report_html(
     (True, True, False)
     """
     template = "family_page.html" if isinstance(saved, FamilyCertificate) else "page.html"
+    part = None if isinstance(saved, FamilyCertificate) else saved.agents
     report = saved.checked
     more = {"no_run": no_run, "obligations": [] if report is None else _obligations(report)}
-    shown = family_view(saved, runs) if isinstance(saved, FamilyCertificate) else _view(saved)
+    if part is not None:
+        template, shown = "agents_page.html", agents_view(saved, part)  # type: ignore[arg-type]
+    else:
+        shown = family_view(saved, runs) if isinstance(saved, FamilyCertificate) else _view(saved)
     return _environment().get_template(template).render(shown | _written(day) | more)
 
 

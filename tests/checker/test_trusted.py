@@ -8,10 +8,12 @@ import os
 import shutil
 import subprocess
 import sys
+from fractions import Fraction
 from functools import cache
 from pathlib import Path
 
 import pytest
+from agent_documents import Setting, document
 from paper_examples import paper_examples
 
 import ptcc_certify
@@ -45,7 +47,7 @@ STANDARD = {
     *("re", "sys", "typing"),
 }
 #: Functions of ``math`` that give integers.
-EXACT_MATH = {"ceil", "floor", "gcd", "isqrt", "lcm", "prod"}
+EXACT_MATH = {"ceil", "comb", "factorial", "floor", "gcd", "isqrt", "lcm", "prod"}
 #: Where floats may stand, and what for. Nothing that is decided depends on one, but for limits of time and memory.
 FLOATS = {
     ("lmi/exact/decimal_rounding.py", "float_up"): "the float next to a number",
@@ -190,6 +192,19 @@ def families() -> list[str]:
     return found
 
 
+@cache
+def agents() -> list[str]:
+    """The JSON of certificates of agents of order n: drag, at rest, capped, and what is used of full matrices."""
+    pair = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", -2), ("a", "f", 3)])
+    half = Fraction(1, 2)
+    settings = (
+        Setting(plant=(Fraction(0), half)),
+        Setting(damping=half, plant=(Fraction(0), half)),
+        Setting(cap=Fraction(5), method="full"),
+    )
+    return [json.dumps(document(pair, setting)) for setting in settings]
+
+
 @pytest.mark.parametrize("watched", [False, True])
 def test_the_examples_are_accepted_by_these_files_alone(watched: bool, tmp_path: Path):
     """Copied into an empty folder, isolated from all that is installed: no NumPy, no flint, no solver.
@@ -223,7 +238,7 @@ def test_the_examples_are_accepted_by_these_files_alone(watched: bool, tmp_path:
     ):
         assert "ModuleNotFoundError" in run(f"import {name}").stderr
     check = "import runpy; sys.argv[0] = 'checker'; runpy.run_module('ptcc_certify.checker', run_name='__main__')"
-    for text in (*families(), *paper_examples()):
+    for text in (*families(), *agents(), *paper_examples()):
         (tmp_path / "c.json").write_text(text, encoding="utf-8")
         done = run(check, "c.json")
         assert done.returncode == 0, done.stdout + done.stderr
