@@ -12,15 +12,17 @@ The names at the top, by topic:
 - Graphs: ``SignedDigraph``, ``as_graph``, ``as_state``, ``read_graph``, ``write_graph``, ``analyse``, ``Structure``
 - Families of graphs: ``Family``, ``as_family``, ``read_family``, ``decide``
 - Protocols, disturbances, actuators: ``Agents``, ``companion_form``, ``NominalProtocol``, ``SlidingModeProtocol``,
-  ``ExpressionDisturbance``, ``SampledDisturbance``, ``StateDependent``, ``telegraph_noise``, ``GainLimits``
-- Runs: ``simulate``, ``simulate_family``, ``Trajectory``
+  ``ExpressionDisturbance``, ``SampledDisturbance``, ``StateDependent``, ``telegraph_noise``, ``GainLimits``,
+  ``LateMessages``, ``MovingLeaders``
+- Runs: ``simulate``, ``simulate_family``, ``simulate_late``, ``simulate_tracking``, ``Trajectory``
 - Certificates: ``certify``, ``certify_vectors``, ``Certificate``, ``Expectations``, ``read_certificate``, ``check``
 - Bounds and design: ``final_state``, ``influence``, ``formation_of_biases``, ``box``, ``ellipsoid``,
   ``worst_initial_state``, ``design``
 - Many graphs: ``Ensemble``, ``certify_many``
 - Figures: ``plot_trajectory``, ``plot_decay``, ``plot_run``, ``plot_sliding``, ``plot_trade_off``, ``plot_input``,
   ``plot_effort``, ``plot_graph``, ``plot_spectrum``, ``plot_frontier``, ``plot_family``, ``plot_family_decay``,
-  ``plot_motion``, ``plot_formation``, ``save_figure``, ``SINGLE_COLUMN``, ``DOUBLE_COLUMN``
+  ``plot_motion``, ``plot_formation``, ``plot_late``, ``plot_tracking``, ``save_figure``, ``SINGLE_COLUMN``,
+  ``DOUBLE_COLUMN``
 - Reports: ``write_report``, ``explore``, ``cite``
 - Errors: ``PTCCError``
 
@@ -64,9 +66,13 @@ _EXPORTS = {
     "StateDependent": "protocols.disturbance",
     "telegraph_noise": "protocols.disturbance",
     "GainLimits": "protocols.gain_limits",
+    "LateMessages": "protocols.late_messages",
+    "MovingLeaders": "protocols.moving_leaders",
     # Runs
     "simulate": "simulation.run",
     "simulate_family": "simulation.family_run",
+    "simulate_late": "simulation.late_messages",
+    "simulate_tracking": "simulation.moving_leaders",
     "Trajectory": "simulation.trajectory",
     # Certificates
     "certify": "certificate.procedure",
@@ -101,6 +107,8 @@ _EXPORTS = {
     "plot_frontier": "report.plots.spectrum",
     "plot_family": "report.plots.family",
     "plot_family_decay": "report.plots.family",
+    "plot_late": "report.plots.late",
+    "plot_tracking": "report.plots.late",
     "save_figure": "report.plots.style",
     "SINGLE_COLUMN": "report.plots.style",
     "DOUBLE_COLUMN": "report.plots.style",

@@ -100,6 +100,10 @@ class Certificate(Content, FromFile, Shown):
         What was asked.
     observed : Observations
         What was seen, and is not claimed.
+    late : LateBounds or None
+        What holds with late messages; None where nothing was asked of them.
+    tracking : Tracking or None
+        What holds while leaders move; None where nothing was asked of that.
     source : Source or None
         The file that it was read from.
     agents : AgentsPart or None

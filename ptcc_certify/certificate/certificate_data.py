@@ -22,8 +22,13 @@ from ptcc_certify.bounds.final_state import FinalState, Influence, final_state, 
 from ptcc_certify.bounds.input.effort import Effort
 from ptcc_certify.bounds.input.effort_bounds import InputRequest, bound_effort
 from ptcc_certify.bounds.input.worst_initial_state import WorstInitialState, worst_initial_state
+from ptcc_certify.bounds.late_messages import LateBounds
 from ptcc_certify.bounds.sliding_envelope import SlidingEnvelope
+from ptcc_certify.bounds.small_delays import DecayingForm
+from ptcc_certify.bounds.tracking import Tracking
 from ptcc_certify.certificate.agents_part import AgentsPart
+from ptcc_certify.certificate.format_leaders import tracking_obligations
+from ptcc_certify.certificate.format_messages import late_obligations
 from ptcc_certify.certificate.format_vectors import final_state_witness
 from ptcc_certify.certificate.request import Expectations, Request
 from ptcc_certify.checker import CheckReport
@@ -132,6 +137,8 @@ class Content:
     matrix: Influence | None
     request: Request
     observed: Observations
+    late: LateBounds | None = None
+    tracking: Tracking | None = None
     source: Source | None = None
     agents: AgentsPart | None = None
 
@@ -163,6 +170,7 @@ class Content:
             values |= {"searched_functions": search.functions, "search": replace(search, functions=())}
         if values.keys() & {"protocol", "initial_state", "sigma0"}:
             values.setdefault("trajectory", None)
+            values |= {"late": values.get("late"), "tracking": values.get("tracking")}
         if values.keys() & {"initial_state", "sigma0"} and "final_state" not in values:
             x0, sigma0 = (values.get(name, getattr(self, name)) for name in ("initial_state", "sigma0"))
             first = x0 and [x - s for x, s in zip(x0, sigma0 or [0] * len(x0), strict=True)]
@@ -477,6 +485,23 @@ class Content:
         )
         return bound_effort(request)
 
+    @property
+    def decaying_forms(self) -> list[DecayingForm]:
+        """The Lyapunov functions in the coordinates ``E`` with all their constants; none without an exact ``Q``."""
+        effort, found = self.effort, []
+        if effort is None or not self.influence.exact or self._geometry is None:
+            return []
+        for k, (V, constants) in enumerate(zip(self.functions, effort.constants, strict=True)):
+            form = V.form
+            if form is None or form.coordinates != "E" or V.deviation is None or not V.proved_rate > 0:
+                continue
+            if form.diagonal is not None:
+                weight = dict(zip(form.nodes, form.diagonal, strict=True))
+                constants = tuple(1 / weight[v] if v in weight else Fraction(0) for v in range(self.graph.n_nodes))
+            if constants is not None:
+                found.append(DecayingForm(k, form, constants, V.deviation.agents))
+        return found
+
     @cached_property
     def worst_initial_state(self) -> WorstInitialState | None:
         """The state of ``initial_set`` from which the input gets largest (numerical); None without such a set."""
@@ -518,7 +543,7 @@ class Content:
             obligations += self.effort.obligations
         if self.agents is not None:
             obligations += self.agents.obligations
-        return tuple(obligations)
+        return (*obligations, *late_obligations(self.late), *tracking_obligations(self.tracking))
 
     # ------------------------------------------------------------------ simulation
 

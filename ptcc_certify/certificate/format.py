@@ -22,6 +22,8 @@ from ptcc_certify.certificate.certificate_data import Content, Observations, Sou
 from ptcc_certify.certificate.format_agents import agents_section, read_agents
 from ptcc_certify.certificate.format_effort import LIMITS, effort_section, energy_witness, peak_witness, read_effort
 from ptcc_certify.certificate.format_graph import certificate_graph, claim_sections, graph_section, structure_section
+from ptcc_certify.certificate.format_leaders import leaders_section, read_tracking
+from ptcc_certify.certificate.format_messages import Vectors, messages_section, read_late
 from ptcc_certify.certificate.format_vectors import (
     Reader,
     Writer,
@@ -85,6 +87,10 @@ def certificate_document(content: Content, verdict: str, files: bool = False) ->
     }
     if content.agents is not None:
         document["agents"] = agents_section(content.agents, out)
+    if content.late is not None and content.late.says_something:
+        document["messages"] = messages_section(content.late, out)
+    if content.tracking is not None:
+        document["leaders"] = leaders_section(content.tracking, out)
     return document | {"digest": digest(document), "unverified": _write_unverified(content)}, out
 
 
@@ -120,6 +126,8 @@ def read_document(
         "limit": _read_limit(steps, data),
         "final_state": _read_final_state(document, structure, data),
         "matrix": None,
+        "late": read_late(document, structure, protocol, data, steps),
+        "tracking": read_tracking(document, structure, protocol, data, steps),
         "request": _read_request(document["unverified"], None if effort is None else effort.initial_set),
         "observed": _read_observations(document["unverified"]),
         "source": Source(path, sha256, document, report, effort, proof, files),
@@ -359,6 +367,8 @@ def _write_obligation(obligation: Obligation, out: Writer) -> dict[str, Any]:
         witness = energy_witness(witness)
     elif isinstance(witness, Peak):
         witness = peak_witness(witness, out)
+    elif isinstance(witness, Vectors):
+        witness = witness.written(out)
     elif isinstance(witness, tuple):
         witness = {"u": dict(zip(out.labels, map(format_exact, witness), strict=True))}
     elif isinstance(witness, np.ndarray):
@@ -470,6 +480,7 @@ def _write_request(request: Request) -> dict[str, Any]:
         "behaviour": expectations.behaviour,
         "min_rate": text(expectations.min_rate),
         "max_input": text(expectations.max_input),
+        "max_residual": text(expectations.max_residual),
         "limits": [{name: text(getattr(entry, name)) for name in LIMITS} for entry in request.limits],
         "delta": text(request.delta),
         "noise": text(request.noise),
@@ -496,7 +507,9 @@ def _read_request(unverified: Mapping[str, Any], initial_set: InitialSet | None)
         delta=_positive(section, "delta"),
         noise=_positive(section, "noise"),
         time_limit=float(seconds) if isinstance(seconds, int | float) and seconds is not True else math.inf,
-        expectations=Expectations(behaviour, _positive(section, "min_rate"), _positive(section, "max_input")),
+        expectations=Expectations(
+            behaviour, *(_positive(section, key) for key in ("min_rate", "max_input", "max_residual"))
+        ),
         scenario=scenario if isinstance(scenario, dict) else None,
         origins={key: one_line(origin)[:200] for key, origin in origins if isinstance(origin, str)},
     )

@@ -30,6 +30,10 @@ from ptcc_certify.bounds.final_state import (
     final_state,
     influence,
 )
+from ptcc_certify.bounds.late_messages import LateBounds, bound_late
+from ptcc_certify.bounds.longest_delay import longest_delay
+from ptcc_certify.bounds.small_delays import SmallDelayBounds
+from ptcc_certify.bounds.tracking import Tracking, bound_tracking
 from ptcc_certify.certificate.agents_part import prove_agents
 from ptcc_certify.certificate.agents_request import Chains, read_chains, refuse_agents
 from ptcc_certify.certificate.certificate import Certificate
@@ -44,6 +48,7 @@ from ptcc_certify.certificate.request import (
     read_request,
     read_sliding_variable,
     refuse,
+    refuse_beside,
 )
 from ptcc_certify.certificate.verdict import MANY_DECADES
 from ptcc_certify.checker.input_formulas import Limits
@@ -62,6 +67,8 @@ from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.agents import Agents
 from ptcc_certify.protocols.base import ReachingProtocol
 from ptcc_certify.protocols.disturbance import as_disturbance
+from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.protocols.moving_leaders import MovingLeaders
 from ptcc_certify.protocols.reaching_time import ReachingTime
 from ptcc_certify.simulation.filippov import rounding_slack
 from ptcc_certify.simulation.instants import PAST
@@ -115,6 +122,8 @@ def certify(
     limits: Limits | Sequence[Limits] = (),
     delta: Any = None,
     noise: Any = None,
+    messages: LateMessages | None = None,
+    leaders: MovingLeaders | None = None,
     signal: SignalClass = "any",
     time_limit: float | None = None,
     expectations: Expectations | str | None = None,
@@ -163,6 +172,12 @@ def certify(
     noise : number, optional
         Nominal protocol: bound of the measurement noise ``|n_k|``, ``u = -gain L (X + n)``, whose effect is bounded
         under each of ``limits`` but sampling. Noise times an infinite gain is bounded by nothing.
+    messages : LateMessages, optional
+        How late, how often lost and how inexact is what agents hear; what is left at the deadline then is bounded. With
+        single leaders, and ``sigma(0) = 0`` under the sliding-mode protocol.
+    leaders : MovingLeaders, optional
+        Nominal protocol, single leaders: how fast these move; how followers track them is bounded. Not with
+        ``messages``.
     signal : {"any", "constant"}, DwellTime, JointWindows or ClockShares
         Of a family: restricted signals of which more is claimed, beside what holds for every signal; the three classes
         are in :mod:`ptcc_certify.theorems.restricted_signals`.
@@ -226,6 +241,8 @@ def certify(
     options: dict[str, Any] = {"method": method, "at": at, "initial_set": initial_set, "limits": limits, "delta": delta}
     options |= {
         "noise": noise,
+        "messages": messages,
+        "leaders": leaders,
         "signal": signal,
         "time_limit": time_limit,
         "expectations": expectations,
@@ -249,6 +266,7 @@ def certify(
     graph = as_graph(graph, orientation)
     refuse(graph, protocol, method, {"sigma0": sigma0, "disturbance": disturbance}, [*limits, delta, noise])
     structure = analyse(graph)
+    refuse_beside(structure, protocol, messages, leaders)
     request = read_request(structure, protocol, options)
     chains = None if of_agents is None else read_chains(of_agents, graph, x0, v0, derivatives)
     initial_state = None if x0 is None or chains else read_initial_state(structure, x0, "x0")
@@ -261,6 +279,7 @@ def certify(
     certificate = case.certificate(disturbance, runs, reaching)
     if of_agents is not None and chains is not None:
         certificate = _with_agents(certificate, of_agents, chains, wanted)
+    certificate = _with_small_delays(certificate)
     progress(STEPS[5])
     return _with_word_of_check(certificate)
 
@@ -298,6 +317,26 @@ def _with_agents(certificate: Certificate, agents: Agents, chains: Chains, run: 
         except SimulationError as error:
             notes.append(f"simulation: {error}")
     return certificate.changed(agents=part, notes=tuple(notes), agents_run=motion)
+
+
+def _with_small_delays(certificate: Certificate) -> Certificate:
+    """Add what Lyapunov functions of the whole graph prove with late messages under a capped gain."""
+    late, x0 = certificate.late, certificate.initial_state
+    if late is None:
+        return certificate
+    forms = certificate.decaying_forms
+    if late.messages.gain_cap is not None and not late.messages.value_error and x0 is not None and forms:
+        bounds = SmallDelayBounds(
+            certificate.structure, certificate.protocol.gain, late.messages, certificate.influence, x0
+        )
+        late = replace(late, form=bounds.best(forms), longest_delay=bounds.longest_delay(forms))
+    asked, final = certificate.expectations.max_residual, certificate.final_state
+    if asked is not None and late.rows and late.largest > asked and late.messages.age:
+        ends = None if final is None else final.intervals
+        case = certificate.structure, certificate.protocol, asked, late.messages, x0, ends
+        if certificate.graph.n_nodes <= EXACT_NODES:
+            late = replace(late, enough=longest_delay(*case))
+    return certificate.changed(late=late)
 
 
 def _check_disturbance(disturbance: Any, protocol: ReachingProtocol, graph: SignedDigraph) -> None:
@@ -366,6 +405,7 @@ class Case:
             search = self.search(proof)
             limit = self.upper_bound()
         matrix, result = self.final_state(trajectory)
+        late, tracking = self.late_messages(result), self.tracking(result)
         proved = [proof.rate, *(V.rate for V in search.functions)]
         return Certificate(
             structure=self.structure,
@@ -380,6 +420,8 @@ class Case:
             final_state=result,
             matrix=matrix,
             request=self.request,
+            late=late,
+            tracking=tracking,
             observed=Observations(
                 trajectory=trajectory,
                 numerical_rate=numerical,
@@ -464,6 +506,29 @@ class Case:
                     f"the simulated run is still {gap:.1e} from the final state: its slowest modes had not settled"
                 )
         return matrix, result
+
+    def late_messages(self, result: FinalState | None) -> LateBounds | None:
+        """Bound what late messages leave at the deadline; None if nothing is asked of them."""
+        messages = self.request.messages
+        if messages is None:
+            return None
+        if any(self.sigma0 or ()):
+            raise ParameterError(
+                "late messages ask for sigma(0) = 0, so that no sliding variable moves; leave sigma0 out"
+            )
+        ends = None if result is None else result.intervals
+        return bound_late(self.structure, self.protocol, messages, self.initial_state, ends)
+
+    def tracking(self, result: FinalState | None) -> Tracking | None:
+        """Bound how followers track leaders that move; None if nothing is asked of that."""
+        leaders, ends = self.request.leaders, None if result is None else result.intervals
+        if leaders is None:
+            return None
+        try:
+            return bound_tracking(self.structure, self.protocol, leaders, self.initial_state, ends)
+        except LMIError as error:
+            self.notes.append(f"moving leaders: {error}")
+            return None
 
 
 def _search_and_prove(

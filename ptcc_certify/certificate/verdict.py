@@ -226,6 +226,7 @@ the input is not bounded; --rho2 0.501 (rho2 kappa 0.501) leaves 1 % and bounds 
     answers += [] if expectations.min_rate is None else [judge_rate(certificate, expectations.min_rate)]
     answers += [] if expectations.max_input is None else [judge_input(certificate, expectations.max_input)]
     answers += judge_limits(certificate)
+    answers += judge_late(certificate)
     useful, remark, caveat, advice = None, "", "", ""
     verdict = verdict_of(report)
     if verdict != CERTIFIED:
@@ -319,6 +320,31 @@ def input_range(certificate: Content) -> tuple[Fraction | float, Fraction | None
     if most is not None and certificate.delta is not None:
         most = None if effort.disturbed is None else most + max(effort.disturbed.inputs)
     return least, most
+
+
+def judge_late(certificate: Content) -> list[Answer]:
+    """Tell what becomes with late messages of a behaviour that is asked for at ``T``, and of what may be left there."""
+    late, asked = certificate.late, certificate.expectations
+    if late is None:
+        return [] if asked.max_residual is None else [Answer(OPEN, "max_residual", "no messages are late")]
+    if not late.says_something:
+        limit = f"; this certificate's limit is a delay of {late.longest_delay:.3g}" if late.longest_delay else ""
+        return [Answer(OPEN, "late messages", f"nothing is proved of what is left at T{limit}")]
+    answers, missed = [], late.missed
+    label = "" if missed is None else certificate.graph.labels[missed.agent]
+    if missed is not None and asked.behaviour is not None:
+        away = f"agent {label} is away by {down(missed.bound, 2)} at least, proved"
+        answers.append(Answer(REFUTED, f"{asked.behaviour} at T with late messages", away))
+    if asked.max_residual is not None:
+        what = f"within {near(asked.max_residual, 12)} at T"
+        if late.largest <= asked.max_residual:
+            answers.append(Answer(MET, what))
+        elif missed is not None and missed.bound > asked.max_residual:
+            answers.append(Answer(REFUTED, what, f"agent {label} is away by {down(missed.bound, 2)} at least, proved"))
+        else:
+            shorter = "" if late.enough is None else f"; certified with a delay of {down(late.enough, 4)}"
+            answers.append(Answer(OPEN, what, f"this certificate's limit is {up(late.largest, 3)}{shorter}"))
+    return answers
 
 
 def judge_limits(certificate: Content) -> list[Answer]:

@@ -249,7 +249,7 @@ def _final(doc: Document, final: FinalState, section: Any, degenerate: Any, begi
     values = final.values(shifted)
     need(all(abs(x) > r or r == 0 for x, r in values.values()), "a value that may or may not be 0")
     need(same(degenerate, [k for k, (x, _) in values.items() if x == 0]), "which components meet at 0")
-    intervals, spare = _intervals(doc, structure.graph, section), WIDEST * shifted.largest()
+    intervals, spare = state_intervals(doc, structure.graph, section), WIDEST * shifted.largest()
     enclosures = final.enclosures(values)
     for v, (x, r) in enclosures.items():
         mid, radius = intervals[0][v], intervals[1][v]
@@ -267,7 +267,7 @@ def _narrow(label: str, off: Any, error: Any, radius: Any, spare: Any) -> None:
         raise RejectedError(f"the interval of agent {shorten(label)} is wider than what is proved")
 
 
-def _intervals(doc: Document, graph: Digraph, section: Any) -> tuple[Numbers, Numbers]:
+def state_intervals(doc: Document, graph: Digraph, section: Any) -> tuple[Numbers, Numbers]:
     """Read middles and radii of the final state: two side vectors, or intervals by agent."""
     if isinstance(section, dict) and beside(section.get("mid")):
         fields(section, ("mid", "radius"), "final_state")

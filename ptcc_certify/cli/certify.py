@@ -17,6 +17,7 @@ from ptcc_certify.cli.families import (
     refuse_restricted,
     restricted_options,
 )
+from ptcc_certify.cli.messages import leader_options, leaders_of, message_options, messages_of
 from ptcc_certify.cli.scenario import scenario_record
 from ptcc_certify.cli.terminal import LOG, Screen, print_json, progress, refuse_output, screen_options
 from ptcc_certify.errors import ParameterError, one_line
@@ -47,6 +48,11 @@ if TYPE_CHECKING:
 @shared.method_option
 @shared.limit_options
 @agents_options
+@message_options
+@leader_options
+@shared.number_option(
+    "--max-residual", metavar="R", help="With late messages: ask for every agent within R of its final state at T."
+)
 @shared.initial_bound_option
 @shared.number_option(
     "--noise", metavar="NU", help="Nominal: bound the effect of measurement noise |n_k| <= NU under a limit."
@@ -96,6 +102,7 @@ def _certify_graph(
     x0 = of_agents.pop("x0", None) or shared.read_initial_state(options["x0"], options["seed"], signed)
     if of_agents:
         more = {name: value for name, value in more.items() if name not in ("limits", "disturbance")} | of_agents
+    more |= {"messages": messages_of(graph, signed, options), "leaders": leaders_of(options)}
     origins = _origins(options)
     with progress(STEPS, screen.quiet) as begin:
         named = {"graph": Path(graph).name, **origins}
@@ -126,7 +133,10 @@ def _requests(options: shared.Options) -> dict[str, Any]:
         raise ParameterError("--max-input is outside its domain; it must be > 0")
     more: dict[str, Any] = {name: options[name] for name in ("method", "simulation", "time_limit", "at")}
     more |= {"initial_set": options["initial_bound"]}
-    more |= {"expectations": Expectations(options["expect"], options["min_rate"], most), "scenario": scenario_record()}
+    more |= {
+        "expectations": Expectations(options["expect"], options["min_rate"], most, options["max_residual"]),
+        "scenario": scenario_record(),
+    }
     if options["kind"] == "nominal":
         own = {name: options[name] for name in ("delta", "noise")}
         return more | own | {"limits": [*filter(None, [shared.actuator_of(options)])]}

@@ -32,6 +32,10 @@ OF_A_RUN = ("states", "input", "decay")
 OF_AGENTS = ("motion", "formation")
 
 
+#: Figures of a certificate with late messages, or with moving leaders.
+OF_A_CERTIFICATE = ("late", "tracking")
+
+
 class _Figure(click.Choice):  # type: ignore[type-arg]  # no generic class before click 8.2
     """The name of a figure; of what another one shows it tells which."""
 
@@ -53,9 +57,10 @@ class _Figure(click.Choice):  # type: ignore[type-arg]  # no generic class befor
 )
 @click.option(
     "--what",
-    type=_Figure([*OF_A_RUN, "graph", "spectrum", *OF_AGENTS]),
+    type=_Figure([*OF_A_RUN, "graph", "spectrum", *OF_AGENTS, *OF_A_CERTIFICATE]),
     help="States, input, or error under its proved bounds over time; the graph; its eigenvalues; of agents of order n "
-    "positions and velocities, or their ways in the plane.  [default: of a certificate decay or motion, else graph]",
+    "positions and velocities, or their ways in the plane; of a certificate with late messages, or moving leaders, "
+    "what is proved then.  [default: of a certificate decay or motion, else graph]",
 )
 @click.option(
     "-o",
@@ -96,6 +101,9 @@ def plot(
     if PurePath(output).suffix.lower() not in FIGURES:
         raise ParameterError(f"{output}: figures are written to {', '.join(FIGURES)}; choose one of these")
     refuse_output(output)
+    if what in OF_A_CERTIFICATE and not certified:
+        flag = "--delay" if what == "late" else "--leader-speed"
+        raise ParameterError(f"--what {what} is of a certificate; make one with ptcc certify GRAPH {flag} .. -o c.json")
     try:
         subject = _of_certificate(graph[0], what, options) if certified else _of_graphs(graph, what, options)
     except RejectedCertificate as error:
@@ -194,10 +202,13 @@ def _draw(what: str, subject: Any, wide: bool, time_unit: str) -> Any:
     from ptcc_certify.report.plots.decay import plot_decay
     from ptcc_certify.report.plots.graph import plot_graph
     from ptcc_certify.report.plots.input import plot_input
+    from ptcc_certify.report.plots.late import plot_late, plot_tracking
     from ptcc_certify.report.plots.spectrum import plot_spectrum
     from ptcc_certify.report.plots.trajectory import plot_run
 
     if isinstance(subject, Family | FamilyCertificate):
+        if what in OF_A_CERTIFICATE:
+            raise ParameterError(f"--what {what} is of the certificate of one graph; this one is of a family")
         if wide:
             raise ParameterError(
                 "--wide is for the states of one graph; figures of families are one column wide: leave it out"
@@ -212,4 +223,5 @@ def _draw(what: str, subject: Any, wide: bool, time_unit: str) -> Any:
         return plot_spectrum(subject, protocol=protocol)
     if what == "states":
         return plot_run(subject, wide=wide, time_unit=time_unit)
-    return {"input": plot_input, "decay": plot_decay}[what](subject, time_unit=time_unit)
+    figures = {"input": plot_input, "decay": plot_decay, "late": plot_late, "tracking": plot_tracking}
+    return figures[what](subject, time_unit=time_unit)

@@ -101,12 +101,27 @@ SECTIONS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
             "sample_period": ("sample_period", "0.001"),
         },
     ),
+    "messages": (
+        "Messages that arrive late, get lost or are rounded.",
+        {
+            "delay": ("delay", "0.02"),
+            "period": ("period", "0.01"),
+            "packet_loss": ("packet_loss", "3"),
+            "quantisation": ("quantisation", "0.1"),
+            "own_delay": ("own_delay", "false"),
+        },
+    ),
+    "leaders": (
+        "Leaders that move (nominal protocol).",
+        {"speed": ("leader_speed", "0.5"), "sign_gain": ("sign_gain", "1")},
+    ),
     "expectations": (
         "What is asked: exit code 3 if it is refuted, 4 if it is left open.",
         {
             "behaviour": ("expect", '"bipartite-consensus"'),
             "min_rate": ("min_rate", "1"),
             "max_input": ("max_input", "100"),
+            "max_residual": ("max_residual", "0.05"),
         },
     ),
     "certificate": (

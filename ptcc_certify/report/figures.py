@@ -11,10 +11,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.graphs.size_limits import DRAWN_NODES, INPUT_NODES
+from ptcc_certify.graphs.size_limits import DRAWN_NODES, EXACT_NODES, INPUT_NODES
 from ptcc_certify.report.plots.decay import plot_decay
 from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.plots.input import plot_input
+from ptcc_certify.report.plots.late import plot_late, plot_tracking
 from ptcc_certify.report.plots.style import figure_bytes
 from ptcc_certify.report.plots.trajectory import plot_sliding, plot_trajectory
 
@@ -25,6 +26,8 @@ PLOTS: dict[str, Callable[..., Axes]] = {
     "sliding": plot_sliding,
     "decay": plot_decay,
     "input": plot_input,
+    "late": plot_late,
+    "tracking": plot_tracking,
 }
 
 
@@ -32,6 +35,9 @@ def draw(saved: Certificate, wanted: Sequence[str]) -> dict[str, Any]:
     """Draw those of the wanted figures for which there is something to draw."""
     run, n = saved.trajectory, saved.graph.n_nodes
     there = {"graph": n <= DRAWN_NODES}
+    if saved.initial_state is not None and n <= EXACT_NODES:
+        there["late"] = saved.late is not None and saved.late.says_something
+        there["tracking"] = saved.tracking is not None
     if run is not None:
         slid = run.sliding is not None
         there["states"] = n <= INPUT_NODES and not saved.constant

@@ -31,6 +31,7 @@ from ptcc_certify.report import notation as texts
 from ptcc_certify.report.agents_page import agents_view
 from ptcc_certify.report.family_page import family_view
 from ptcc_certify.report.figures import draw, inline_figure
+from ptcc_certify.report.late_lines import late_lines, tracking_lines
 from ptcc_certify.report.notation import above, agent_parts, enclosed, printable, rational
 from ptcc_certify.report.plots.agents import camp_groups
 from ptcc_certify.report.plots.distributions import plot_degrees, plot_final_states
@@ -176,9 +177,11 @@ def _view(saved: Certificate) -> dict[str, Any]:
         "kinds": Counter(m.kind for m in saved.envelope.functions).items(),
         "remaining": _remaining(saved),
         "reaching": list(islice(zip(labels, saved.sigma0 or (), saved.reaching or (), strict=False), ROWS)),
-        "figures": draw(saved, ("graph", "states", "sliding", "decay", "input")) | _distributions(saved),
+        "figures": draw(saved, ("graph", "states", "sliding", "decay", "input", "late", "tracking"))
+        | _distributions(saved),
         "camp_counts": Counter(camp_groups(saved.structure)[saved.structure.leaders]).items(),
         "gap": _gap(saved),
+        "late_lines": [*late_lines(saved), *tracking_lines(saved)],
         "peak_agent": labels[max(range(len(peaks)), key=peaks.__getitem__)] if peaks else None,
         "commands": commands,
         "notes": [note for note in notes[:5] if isinstance(note, str)] if isinstance(notes, list) else [],

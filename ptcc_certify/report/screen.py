@@ -19,6 +19,7 @@ from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.report.agents_lines import answers, long_lines
 from ptcc_certify.report.family_screen import WHATEVER, family_summary
 from ptcc_certify.report.input_lines import disturbed_lines, initial_states_text, input_lines, limits_text
+from ptcc_certify.report.late_lines import late_lines, tracking_lines
 from ptcc_certify.report.sliding_lines import sliding_lines
 from ptcc_certify.report.structure_text import (
     ORIENTATION,
@@ -95,6 +96,10 @@ def summary_lines(certificate: Certificate, name: str, origins: Mapping[str, str
     whatever = "" if p.reaching is None else f", any |d_k| <= {down(p.reaching.delta, 12)}"
     if p.reaching is not None and p.reaching.delta == 0:
         whatever = ", without disturbances"
+    if certificate.late is not None:
+        whatever = f", nothing late{whatever}"
+    if certificate.tracking is not None:
+        whatever = f", leaders at rest{whatever}"
     claims = _claim_texts(certificate.structure, certificate.claims, f" at T = {near(p.T)}", whatever)
     drawn = _is_set_asked(certificate)
     entries = [
@@ -238,6 +243,8 @@ def _answers(certificate: Certificate, drawn: bool) -> Lines:
     yield from () if drawn else _short_final_state(certificate)
     yield from _bounds(certificate, drawn)
     yield from disturbed_lines(certificate)
+    yield from late_lines(certificate)
+    yield from tracking_lines(certificate)
 
 
 def _bounds(certificate: Certificate, drawn: bool) -> Lines:

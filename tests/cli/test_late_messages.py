@@ -1,0 +1,154 @@
+"""Late messages and moving leaders on the command line, from certify to check, plot and the page."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bad_inputs import ptcc
+
+from ptcc_certify import LateMessages, MovingLeaders, NominalProtocol, SignedDigraph, certify, read_certificate
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.simulation.late_messages import simulate_late
+
+TEAM = "source,target,weight,delay\na,b,1,0.01\nb,c,1,0.02\nc,b,1,0.01\nc,d,-2,0.005\n"
+CHAIN = "source,target,weight\na,b,1\nb,c,-1\n"
+SCENARIO = """[graph]
+file = "team.csv"
+[protocol]
+rho2 = 4
+kappa = 1
+[initial_state]
+x0 = [1, 3, 4, -4]
+[certificate]
+method = "perron"
+simulation = false
+"""
+QUICK = ("--rho2", "4", "--kappa", "1", "--method", "perron", "--no-simulation")
+START = ("--x0", "1,3,4,-4")
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    Path("team.csv").write_text(TEAM)
+    Path("chain.csv").write_text(CHAIN)
+    Path("group.csv").write_text("a,b,1\nb,a,1\nb,c,1\n")
+    return tmp_path
+
+
+def test_a_certificate_with_late_messages_is_accepted_and_read_back_as_it_was_made() -> None:
+    run = ptcc("certify", "team.csv", "--delay", "delay", *START, *QUICK, "-o", "c.json")
+    assert run.code == 0, run
+    assert "messages   up to 0.02 old" in run.out
+    assert "certified" in run.out
+    assert ptcc("check", "c.json").code == 0
+    late, section = read_certificate("c.json").late, json.loads(Path("c.json").read_text())["messages"]
+    assert late is not None
+    assert late.steps is not None
+    assert section["latency"] == ["1/100", "1/100", "1/50", "1/200"]  # in the order of listeners: b from a and c, c, d
+    assert float(max(late.residual)) == late.largest  # type: ignore[arg-type]
+    saved = read_certificate("c.json")
+    motion = simulate_late(saved.graph, saved.protocol, LateMessages(delay="0.02"), [1, 3, 4, -4], steps=300)
+    assert np.abs(motion.states[:, -1] - [1, 1, 1, -1]).max() <= late.largest
+
+
+def test_a_behaviour_asked_for_at_T_is_refuted_where_an_agent_is_proved_to_miss_it() -> None:
+    run = ptcc("certify", "team.csv", "--delay", "0.02", *START, *QUICK, "--expect", "bipartite-consensus")
+    assert run.code == 3, run
+    words = " ".join(run.out.split())
+    assert "refuted: bipartite consensus at T with late messages (agent" in words
+    assert "at least, proved)" in words
+    met = ptcc("certify", "team.csv", "--delay", "0.02", *START, *QUICK, "--max-residual", "0.1")
+    assert met.code == 0, met
+    left = ptcc("certify", "team.csv", "--delay", "0.02", *START, *QUICK, "--max-residual", "0.001")
+    assert left.code == 4, left
+    assert "this certificate's limit is" in " ".join(left.out.split())
+
+
+def test_followers_without_a_cycle_are_told_deadlines_of_stages() -> None:
+    run = ptcc("certify", "chain.csv", "--delay", "0.1", "--x0", "1,0,2", *QUICK)
+    assert run.code == 0, run
+    assert "deadlines of their own, from 0.9 to 1, 0.1 apart" in " ".join(run.out.split())
+    late = ptcc("certify", "chain.csv", "--delay", "2", "--x0", "1,0,2", *QUICK)
+    assert "information takes longer than T" in " ".join(late.out.split())
+
+
+def test_a_scenario_holds_what_the_flags_say() -> None:
+    flags = ("--delay", "0.005", "--period", "0.01", "--packet-loss", "3", "--quantisation", "0.1")
+    Path("s.toml").write_text(
+        SCENARIO + "[messages]\ndelay = 0.005\nperiod = 0.01\npacket_loss = 3\nquantisation = 0.1\n"
+    )
+    one, other = ptcc("certify", "s.toml", "--json"), ptcc("certify", "team.csv", *flags, *START, *QUICK, "--json")
+    assert one.code == other.code == 0, (one, other)
+    sections = [json.loads(run.out)["messages"] for run in (one, other)]
+    assert sections[0] == sections[1]
+    assert sections[0]["delay"] == "9/200"
+    assert sections[0]["value_error"] == "1/20"
+
+
+def test_followers_track_leaders_that_move_and_the_file_says_so() -> None:
+    run = ptcc("certify", "team.csv", "--leader-speed", "1", *START, *QUICK, "-o", "l.json")
+    assert run.code == 0, run
+    assert "on its target at T = 1, from T on within" in " ".join(run.out.split())
+    assert ptcc("check", "l.json").code == 0
+    tracking = read_certificate("l.json").tracking
+    assert tracking is not None
+    assert tracking.distance_bound(np.array([0.0])).max() == 0
+    sign = ptcc("certify", "team.csv", "--leader-speed", "1", "--sign-gain", "1", *START, *QUICK)
+    assert "ever after" in sign.out
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("team.csv", "--delay=-1"), "delay = -1 is outside its domain; delay must be >= 0"),
+        (("team.csv", "--delay", "nan"), 'no column "nan"'),
+        (("team.csv", "--delay", "1e"), "give a number in your unit of time, or the name of a column"),
+        (("team.csv", "--delay", "latency"), 'team.csv, line 1: no column "latency"; begin with a header'),
+        (("team.csv", "--packet-loss", "3"), "--packet-loss says nothing by itself; give --period"),
+        (("team.csv", "--own-delay"), "--own-delay says nothing by itself; give --delay"),
+        (("team.csv", "--delay", "0.1", "--own-delay"), "makes the protocol diverge"),
+        (("group.csv", "--delay", "0.1"), "needs leaders that listen to nobody; a and b are leaders of one group"),
+        (("group.csv", "--leader-speed", "1"), "needs leaders that listen to nobody; a and b are leaders of one group"),
+        (("team.csv", "--sign-gain", "1"), "--sign-gain belongs to leaders that move; give --leader-speed"),
+        (("team.csv", "--leader-speed", "1", "--sign-gain", "0.5"), "is below speed + disturbance = 1"),
+        (("team.csv", "--leader-speed=-1"), "speed = -1 is outside its domain"),
+        (("team.csv", "--leader-speed", "1", "--delay", "1"), "messages and leaders together are not certified yet"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_line_that_tells_what_to_do(words: tuple[str, ...], said: str) -> None:
+    run = ptcc("certify", *words)
+    assert run.code == 2, run
+    assert said in run.err
+    assert len(run.err.strip().splitlines()) == 1
+
+
+def test_a_delay_of_a_row_that_is_no_number_is_named_by_its_line() -> None:
+    Path("odd.csv").write_text("source,target,weight,delay\na,b,1,soon\n")
+    run = ptcc("certify", "odd.csv", "--delay", "delay")
+    assert run.code == 2
+    assert 'odd.csv, line 2: delay "soon" of edge a -> b is not a number; give one >= 0' in run.err
+
+
+def test_small_delays_of_a_leader_group_are_certified_under_a_cap_up_to_a_limit_that_is_told() -> None:
+    group, protocol = SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1), (2, 3, -1)]), NominalProtocol(1, 1, 2, 1)
+    cert = certify(
+        group, protocol, [3, 1, 2], messages=LateMessages(delay="0.0002", own_delay=True, gain_cap=20), simulation=False
+    )
+    assert cert.verdict == "certified"
+    assert cert.late is not None
+    assert cert.late.form is not None
+    assert 0.0002 < (cert.late.longest_delay or 0) < 0.1
+    long = certify(group, protocol, [3, 1, 2], messages=LateMessages(delay="0.5", gain_cap=20), simulation=False)
+    assert int(long.assessment.exit_code) == 4
+    assert "this certificate's limit is a delay of" in long.assessment.text
+
+
+def test_late_messages_ask_for_sliding_variables_at_0() -> None:
+    with pytest.raises(ParameterError, match="is none; give LateMessages"):
+        certify(SignedDigraph.from_edges([(1, 2, 1)]), NominalProtocol(1, 1, 2, 1), messages=0.1)
+    with pytest.raises(ParameterError, match="is none; give MovingLeaders"):
+        certify(SignedDigraph.from_edges([(1, 2, 1)]), NominalProtocol(1, 1, 2, 1), leaders=MovingLeaders)
