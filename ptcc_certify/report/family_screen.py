@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from ptcc_certify.certificate.family_content import FamilyContent
 
 #: Components of which a screen tells, and lines of a text on the short one.
-_COMPONENTS, _LINES = 4, 4
+_COMPONENTS, _LINES = 4, 3
 #: Columns of names within a phrase, and groups that agree of which each is named.
 _NAMES, _GROUPS = 30, 3
 #: Where sliding variables bring an agent that listens to nobody.
