@@ -19,6 +19,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
+from itertools import accumulate
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -222,11 +223,9 @@ class SlidingEnvelope(Envelope):
             half = function.rate_below / 2
             C, B = self._drive(function)
             forcing, step = _column_norms(B @ size), half * np.diff(s, append=last)
-            decay, share = np.exp(-step), -np.expm1(-step) / half
-            v = np.empty(knots.size + 1)
-            v[0] = root
-            for i in range(knots.size):
-                v[i + 1] = decay[i] * v[i] + forcing[i] * share[i]
+            gained = forcing * (-np.expm1(-step) / half)
+            pieces = zip(np.exp(-step).tolist(), gained.tolist(), strict=True)
+            v = np.array(list(accumulate(pieces, lambda v, piece: piece[0] * v + piece[1], initial=root)))
             yield function, v[place] * np.exp(-half * later), np.append(_column_norms(C @ size), 0.0)[place]
 
     @cached_property

@@ -337,6 +337,7 @@ def _instant(at: Any, protocol: Protocol) -> Fraction:
         raise ParameterError(f"at: {error}") from None
     if not 0 <= instant < protocol.T:
         raise ParameterError(
-            f"at = {float(instant):.12g} is not an instant before the deadline {float(protocol.T):.12g}"
+            f"at = {float(instant):.12g} is not an instant before the deadline {float(protocol.T):.12g}; "
+            "give one from 0 on and below it"
         )
     return instant

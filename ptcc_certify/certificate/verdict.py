@@ -254,7 +254,7 @@ def judge_behaviour(structure: Structure, expected: str) -> Answer:
     if structure.holds(expected):
         return Answer(MET, expected)
     claims = [component.claim for component in structure.components]
-    return Answer(REFUTED, expected, f"it is {claims[0].behaviour}" if len(claims) == 1 else "not in every component")
+    return Answer(REFUTED, expected, f"it is {claims[0].sharpest}" if len(claims) == 1 else "not in every component")
 
 
 def judge_rate(certificate: Content, least: Fraction) -> Answer:

@@ -608,7 +608,9 @@ class InputBounds:
         gain, form, v, pieces = self.gain, self.form(k), self.initial_root(k), list[Piece]()
         pushes = zip(*map(self.reaching.pushes, self._coordinates(form)), strict=True)
         w, f = (root_above(form.value(own, sizes=True)) for own in pushes)
-        for part in stretches(gain, self.reaching, z, PIECES):
+        if ("stretches", z) not in self._cache:
+            self._cache["stretches", z] = stretches(gain, self.reaching, z, PIECES)
+        for part in self._cache["stretches", z]:
             added = w * (part.psi[1] - part.psi[0]) + f * part.length
             above = (v, added, part.first, part.last, part.clock[1], part.square)
             pieces.append(Piece(*(rounded(x, BITS, up=True) for x in above)))

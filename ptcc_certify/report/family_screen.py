@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from ptcc_certify.certificate.family_content import FamilyContent
 
 #: Components of which a screen tells, and lines of a text on the short one.
-_COMPONENTS, _LINES = 4, 2
+_COMPONENTS, _LINES = 4, 3
 #: Columns of names within a phrase, and groups that agree of which each is named.
 _NAMES, _GROUPS = 30, 3
 #: Where sliding variables bring an agent that listens to nobody.
@@ -383,8 +383,9 @@ def _cut(text: str, every: bool) -> str:
     lines = wrap_text(text)
     if every or len(lines) <= _LINES:
         return text
-    (last, *_) = wrap_text(lines[_LINES - 1], TEXT - len(" ..."))
-    return " ".join([*lines[: _LINES - 1], f"{last} ..."])
+    more = "... (all with -v)"
+    (last, *_) = wrap_text(lines[_LINES - 1], TEXT - len(more) - 1)
+    return " ".join([*lines[: _LINES - 1], last, more])
 
 
 # ---------------------------------------------------------------------- what is proved

@@ -188,7 +188,7 @@ def _headed(head: str, texts: Iterable[str]) -> Lines:
 
 def _claim_texts(structure: Structure, claims: Sequence[Claim], when: str = "", also: str = "") -> list[str]:
     """Name the sharpest behaviour of every component, of the largest four of many; ``also`` where there is room."""
-    sharpest = [claim.special[-1] if claim.special else claim.behaviour for claim in claims]
+    sharpest = [claim.sharpest for claim in claims]
     if len(claims) == 1:
         (claim,) = claims
         corollary = f", Corollary {claim.corollaries[-1]}" if claim.special else ""
@@ -255,7 +255,7 @@ def _bounds(certificate: Certificate, drawn: bool) -> Lines:
         return
     norm, agents, more = _error_texts(certificate)
     if norm:
-        texts = [f"{norm}{single}{more}" for single in (agents, agents.replace("every agent", "agents"))]
+        texts = (norm + agents.replace("every agent", whom) + more for whom in ("every agent", "agents", "each"))
         fitting = (text for text in texts if columns(text) <= TEXT and not drawn)
         yield "error", next(fitting, norm + more)
     if certificate.effort is not None:

@@ -75,6 +75,17 @@ class Claim:
     corollaries: tuple[str, ...]
     special: tuple[str, ...]
 
+    @property
+    def sharpest(self) -> str:
+        """The sharpest behaviour: the last of the special ones, if there are any.
+
+        Examples
+        --------
+        >>> Claim("2.1", "interval bipartite consensus", ("3",), ("bipartite consensus",)).sharpest
+        'bipartite consensus'
+        """
+        return (self.behaviour, *self.special)[-1]
+
     def holds(self, behaviour: str) -> bool:
         """Tell whether ``behaviour`` (words joined by blanks or hyphens) follows from this claim.
 

@@ -574,8 +574,8 @@ def test_what_is_cut_on_the_short_screen_ends_at_a_word():
     for start in range(18):
         whole = text[start:].strip()
         cut = _cut(whole, every=False)
-        assert cut.endswith(" ...") and whole.startswith(cut.removesuffix("...")), cut
-        assert len(wrap_text(cut)) == 2
+        assert whole.startswith(cut.removesuffix("... (all with -v)")) and cut != whole, cut
+        assert len(wrap_text(cut)) == 3
 
 
 def test_one_switch_is_called_one():

@@ -29,7 +29,7 @@ from ptcc_certify.graphs.size_limits import EXPLORED_NODES
 from ptcc_certify.protocols.disturbance import as_disturbance
 from ptcc_certify.protocols.reaching_time import certified_reaching_times
 from ptcc_certify.report.explorer.facts import UNCHECKED, facts_of, run_of, without_flags
-from ptcc_certify.report.explorer.panels import PANELS, draw_panels, message_figure, panel_svg, png
+from ptcc_certify.report.explorer.panels import PANELS, draw_panels, message_figure, panel_svg, png, shown_in
 from ptcc_certify.report.explorer.question import Question
 from ptcc_certify.report.explorer.reproduction import command_of, python_of
 from ptcc_certify.report.explorer.settings import GIVEN, Settings, refuse_unknown
@@ -165,7 +165,7 @@ class Explorer:
         self.graphs = given | {packaged: load_graph(packaged) for packaged in GRAPHS if packaged not in given}
         self._sources = {name: source}
         self._latest: dict[tuple[str, str], Certificate] = {}
-        self._drawn: dict[str, str] = {}
+        self._drawn: dict[tuple[str, str], tuple[Any, str]] = {}
 
     def preview(self, settings: Settings) -> View:
         """Return a view at once: the bound is that of Lyapunov functions found before, and nothing is checked.
@@ -196,13 +196,14 @@ class Explorer:
         return self._view(settings, lambda question: self._certificate(question, progress), checked=True)
 
     def svg(self, view: View, name: str) -> str:
-        """Return a panel of a view as SVG; that of the graph is drawn once."""
+        """Return a panel of a view as SVG; what it shows is drawn again only if that has changed."""
         assert view.certificate is not None
-        if name != "graph":
+        place, shows = (view.settings.graph, name), shown_in(view.certificate, name)
+        if shows is None:
             return panel_svg(view.certificate, name)
-        if view.settings.graph not in self._drawn:
-            self._drawn[view.settings.graph] = panel_svg(view.certificate, name)
-        return self._drawn[view.settings.graph]
+        if self._drawn.get(place, (None, ""))[0] != shows:
+            self._drawn[place] = shows, panel_svg(view.certificate, name)
+        return self._drawn[place][1]
 
     def question(self, settings: Settings) -> Question:
         """Return what ``certify`` is asked for settings; initial states are drawn from their seed.

@@ -39,7 +39,11 @@ function showWords(place, text) {
   place.replaceChildren(...words.flatMap((word) => [word, " "]).slice(0, -1));
 }
 
+const drawn = {}; // the panels as they are shown
+
 async function showPanel(name, svg) {
+  if (drawn[name] === svg) return;
+  drawn[name] = svg;
   const image = document.querySelector(`#panel-${name} img`);
   const old = image.src;
   if (svg === undefined) {

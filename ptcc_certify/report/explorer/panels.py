@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+from typing import Any
 
 import numpy as np
 from matplotlib import style
@@ -37,14 +38,27 @@ def panel_svg(certificate: Certificate, name: str) -> str:
     return figure_bytes(draw_panels(certificate, (name,)), ".svg").decode()
 
 
+def shown_in(certificate: Certificate, name: str) -> Any:
+    """Return all that a panel shows of a graph, if it does not change with every control; None if it does.
+
+    Sliding variables move by their own gain: those of the protocol's states leave them as they are.
+    """
+    run = certificate.trajectory
+    if name == "graph":
+        return name
+    if name != "sliding" or run is None or run.sliding is None:
+        return None
+    moved = tuple(part.tobytes() for part in (run.t, run.sliding.sigma, run.sliding.reaching_times))
+    return moved, run.sliding.protocol.T_r, certificate.reaching
+
+
 def draw_panels(certificate: Certificate, names: tuple[str, ...]) -> Figure:
     """Return panels in one figure, two beside each other."""
     columns = min(2, len(names))
     rows = math.ceil(len(names) / columns)
     size = np.array([columns * _SIZE[0], rows * _SIZE[1]])
     with style.context(STYLE):
-        figure = Figure(size.tolist())
-        figure.set_layout_engine("none")
+        figure = Figure(size.tolist(), layout="none")  # type: ignore[arg-type]  # with one all is drawn twice
         for place, name in enumerate(names, start=1):
             ax = new_axes(figure, (rows, columns, place))
             row, column = divmod(place - 1, columns)

@@ -133,6 +133,8 @@ def name_agents(
     for side, column in zip((-1, 1), texts, strict=False):
         for height, place, name, colour in column:
             line = {"arrowstyle": "-", "color": colour, "linewidth": 0.4, "shrinkA": 0, "shrinkB": 0, "clip_on": False}
+            gap = 2 / text_width(name)  # the line begins beside the name: nothing is to be cut off
+            line |= {"patchA": None, "relpos": (1 + gap if side < 0 else -gap, 0.5)}
             style: dict[str, Any] = {"ha": "right" if side < 0 else "left", "va": "center_baseline", "color": colour}
             style |= {"fontsize": NAME_SIZE, "parse_math": False, "annotation_clip": False, "arrowprops": line}
             style["path_effects"] = HALO

@@ -22,6 +22,8 @@ from ptcc_certify.theorems.restricted_signals import DwellTime
 
 #: Random signals that are drawn beside the worst cases.
 _RANDOM = 8
+#: Samples of runs that begin off the sliding manifold: half as many, since there are as many again before ``T_r``.
+_SAMPLES = 101
 _AXES = {"left": "remaining time, $1 - t/T$", "time": "time $t$", "clock": "stretched clock $s(t)$"}
 
 
@@ -43,7 +45,9 @@ def sample_runs(certificate: FamilyCertificate, signals: Iterable[Signal] | None
         raise ParameterError("the certificate has no initial state; certify the family with x0")
     chosen = _signals(certificate) if signals is None else signals
     start = [float(x) for x in certificate.initial_state]
-    more: dict[str, Any] = {} if certificate.sigma0 is None else {"sigma0": [float(s) for s in certificate.sigma0]}
+    more: dict[str, Any] = {}
+    if certificate.sigma0 is not None:
+        more = {"sigma0": [float(s) for s in certificate.sigma0], "samples": _SAMPLES}
     return [simulate_family(certificate.family, certificate.protocol, start, signal, **more) for signal in chosen]
 
 
