@@ -95,7 +95,9 @@ def summary_lines(certificate: Certificate, name: str, origins: Mapping[str, str
     whatever = "" if p.reaching is None else f", any |d_k| <= {down(p.reaching.delta, 12)}"
     if p.reaching is not None and p.reaching.delta == 0:
         whatever = ", without disturbances"
-    claims = _claim_texts(certificate.structure, certificate.claims, _when(certificate, f"at T = {near(p.T)}"), whatever)
+    claims = _claim_texts(
+        certificate.structure, certificate.claims, _when(certificate, f"at T = {near(p.T)}"), whatever
+    )
     drawn = _is_set_asked(certificate)
     entries = [
         *graph_entries(certificate.structure, name),
