@@ -26,6 +26,8 @@ from ptcc_certify.report.screen import summary_lines
 
 TEAM = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("c", "a", -1), ("c", "d", 1), ("d", "c", 1)])
 PAIR = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
+ENEMIES = SignedDigraph.from_edges([("a", "b", -1), ("b", "c", -2), ("c", "a", -1), ("b", "a", -1)])
+CAMPS = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -2), ("c", "a", "-1/2"), ("c", "f", -1), ("a", "f", 2)])
 NOMINAL = NominalProtocol(T=2, rho1=1, rho2=1, kappa=2)
 SLIDING = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
 
@@ -125,6 +127,43 @@ def test_one_integrator_is_the_plain_certificate():
     assert same == plain and same.agents is None and "agents" not in same.document
 
 
+@pytest.mark.parametrize("graph", [TEAM, ENEMIES, CAMPS], ids=["team", "enemies", "camps"])
+def test_single_integrators_in_a_formation_have_the_plain_bounds_about_their_places(graph: SignedDigraph):
+    """Order 1 of the agents is the paper's protocol: gains, final states and bounds are those of ``x - h``."""
+    N, strong = graph.n_nodes, NominalProtocol(T=2, rho1=1, rho2=5, kappa=2)
+    x0, h = [5, 2, 4, -1][:N], [1, -3, 2, 2][:N]
+    ours = certify(graph, strong, x0, agents=Agents(order=1, offsets=h), method="paper")
+    plain = certify(graph, strong, [x - y for x, y in zip(x0, h, strict=True)], method="paper", simulation=False)
+    part = ours.agents
+    assert isinstance(plain, Certificate) and plain.final_state is not None and part is not None
+    assert check(ours.to_dict()).accepted and ours.verdict == "certified"
+    assert part.protocol.gains == (1,) and part.matrix.rate == plain.rate
+    ends = [chain[0][0] - y for (chain,), y in zip(part.final_state or (), h, strict=True)]
+    assert ends == list(plain.final_state.states)
+    late = np.array([0.01, 1e-6])  # before, theirs is no larger than the largest state, either
+    assert np.allclose(part.deviation_bound(late)[:, 0], plain.deviation_bound(late), rtol=1e-7, atol=0)
+    assert part.input is not None and plain.effort is not None and plain.effort.peak is not None
+    for bound, peak in zip(part.input, plain.effort.peak.agents, strict=True):
+        assert peak <= bound * (1 + Fraction(1, 10**9))  # theirs is the least over several instants, ours at 0
+    assert ours.agents_comparison.worst <= 1 + 1e-7
+
+
+def test_single_integrators_run_the_equation_of_the_plain_protocol():
+    import casadi as ca
+
+    part = made(TEAM, NOMINAL, [5, 2, 4, -1], Agents(order=1, offsets=[0] * 4)).agents
+    loops = [protocol.closed_loop(TEAM) for protocol in (part.protocol, NOMINAL)]
+    slopes = [ca.Function("f", [loop["t"], loop["x"]], [loop["ode"]]) for loop in loops]
+    for t in (0.0, 1.3, 1.999):
+        one, other = (np.array(slope(t, [5, 2, 4, -1])).ravel() for slope in slopes)
+        assert np.allclose(one, other, rtol=1e-12)
+
+
+def test_a_decay_of_single_integrators_is_not_dropped():
+    part = made(PAIR, NOMINAL, [3, 1], Agents(order=1, decay=6)).agents
+    assert part is not None and part.decay == 6
+
+
 def test_gains_come_near_those_in_closed_form_for_a_small_constant_gain():
     for n in (2, 3, 4):
         base = NominalProtocol(T=1, rho1="1e-9", rho2=1, kappa=1)
@@ -210,7 +249,6 @@ def test_one_agent_and_single_leaders_and_disconnected_graphs():
     assert [chain[0][0] for (chain,) in certificate.agents.final_state or ()] == [1, 1, 3, -3]
 
 
-ENEMIES = SignedDigraph.from_edges([("a", "b", -1), ("b", "c", -2), ("c", "a", -1), ("b", "a", -1)])
 DECADES = SignedDigraph.from_edges([("a", "b", "1e-30"), ("b", "a", "1e30"), ("b", "c", "-1e40"), ("c", "a", 1)])
 
 
