@@ -11,6 +11,7 @@ import warnings
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.linalg import solve_continuous_lyapunov
 
 from lmi import child_process
 from lmi.diagonal import run_solver
@@ -18,6 +19,8 @@ from lmi.errors import NoCertificate
 
 #: By how much of ``W`` the inequalities hold strictly, so that rounding keeps them: the first that the solver reaches.
 SLACKS = (1e-3, 1e-5, 1e-7)
+#: Real parts from which on a Lyapunov equation is solved for coordinates.
+LEAST = 0.02
 
 
 def feedback_matrix(systems: Sequence[np.ndarray], rate: float) -> np.ndarray:
@@ -25,7 +28,7 @@ def feedback_matrix(systems: Sequence[np.ndarray], rate: float) -> np.ndarray:
 
         minimise b'W^-1 b   subject to   A_i W + W A_i' - b b' + rate W <= -slack rate W
 
-    The program is solved in coordinates in which chains of integrators have entries of size 1.
+    The program is solved in coordinates in which the ``W`` of one of the systems alone is the identity.
 
     Parameters
     ----------
@@ -59,23 +62,45 @@ def feedback_matrix(systems: Sequence[np.ndarray], rate: float) -> np.ndarray:
     n = len(systems[0])
     scale = rate ** (np.arange(n) + 1.0 - n) / np.sqrt(rate)
     scaled = [A * scale / scale[:, None] / rate for A in systems]
+    C = _frame(scaled)
+    back = np.linalg.inv(C)
+    turned, last = [back @ A @ C for A in scaled], back[:, -1]
     for slack in SLACKS:
         try:
-            W = _solve(scaled, 1 + slack)
+            W = _solve(turned, last, 1 + slack)
         except NoCertificate:
             continue
-        return scale[:, None] * W * scale
+        return scale[:, None] * (C @ W @ C.T) * scale
     raise NoCertificate(f"no feedback of rate {rate:.6g} was found")
 
 
-def _solve(systems: Sequence[np.ndarray], rate: float) -> np.ndarray:
-    """Return the ``W`` of systems whose entries are of size 1."""
+def _frame(systems: Sequence[np.ndarray]) -> np.ndarray:
+    """Return a factor of the ``W`` with ``A W + W A' + W = b b'``, of the first system that has one; else the identity.
+
+    It is positive definite if ``A + I/2`` has its spectrum on the right, and near the ``W`` of the others then.
+    """
+    n = len(systems[0])
+    unit = np.eye(n)[:, [-1]]
+    for A in systems:
+        moved = A + np.eye(n) / 2
+        if np.linalg.eigvals(moved).real.min() <= LEAST:
+            continue
+        W = solve_continuous_lyapunov(moved, unit @ unit.T)
+        try:
+            return np.asarray(np.linalg.cholesky((W + W.T) / 2))
+        except np.linalg.LinAlgError:
+            continue
+    return np.eye(n)
+
+
+def _solve(systems: Sequence[np.ndarray], last: np.ndarray, rate: float) -> np.ndarray:
+    """Return the ``W`` of systems whose entries are of size 1, ``last`` in the place of ``b``."""
     import cvxpy as cp
 
-    n = len(systems[0])
-    W, unit = cp.Variable((n, n), symmetric=True), np.eye(n)[:, [-1]]
-    gap = [unit @ unit.T - rate * W - A @ W - W @ A.T for A in systems]
-    cost = cp.matrix_frac(unit[:, 0], W)
+    n = len(last)
+    W, square = cp.Variable((n, n), symmetric=True), np.outer(last, last)
+    gap = [square - rate * W - A @ W - W @ A.T for A in systems]
+    cost = cp.matrix_frac(last, W)
     problem = cp.Problem(cp.Minimize(cost), [(F + F.T) / 2 >> 0 for F in gap])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # "solution may be inaccurate": what is found is proved by the caller

@@ -314,24 +314,14 @@ def rational(x: Fraction) -> Any:
 
 
 def semidefinite(S: Matrix) -> bool:
-    """Whether ``x'S x >= 0`` for all ``x``, by symmetric elimination in rationals."""
-    return eliminated([[rational(x) for x in row] for row in S])
+    """Whether ``x'S x >= 0`` for all ``x``, of a symmetric matrix in rationals."""
+    return no_negative_root([[rational(x) for x in row] for row in S])
 
 
-def eliminated(left: list[list[Any]]) -> bool:
-    while left:
-        k = next((i for i in range(len(left)) if left[i][i] != 0), None)
-        if k is None:
-            return all(x == 0 for row in left for x in row)
-        if left[k][k] < 0:
-            return False
-        pivot = left[k]
-        rest = [i for i in range(len(left)) if i != k]
-        left = [
-            [left[i][j] - left[i][k] * pivot[j] / pivot[k] if left[i][k] != 0 else left[i][j] for j in rest]
-            for i in rest
-        ]
-    return True
+def no_negative_root(S: list[list[Any]]) -> bool:
+    """Whether no eigenvalue of a symmetric matrix is negative: all are real, so Descartes' rule of signs decides it."""
+    n, polynomial = len(S), flint.fmpq_mat(S).numer_denom()[0].charpoly()
+    return all(polynomial[k] * (-1) ** (n - k) >= 0 for k in range(n + 1))
 
 
 def definite(W: Matrix) -> bool:
@@ -360,7 +350,7 @@ def decreases(L: Any, Z: Any, P: Any, A: Matrix, K: list[Fraction], r: Fraction)
         for k in range(N)
         for i in range(n)
     ]
-    return eliminated(rows)
+    return no_negative_root(rows)
 
 
 @lru_cache(maxsize=200)

@@ -25,7 +25,7 @@ from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.agents import Agents, AgentsProtocol
 from ptcc_certify.simulation.agents import AgentsTrajectory, simulate_agents
-from ptcc_certify.theorems.agent_decrease import AgentMatrix, ScaledAgent, agent_matrix
+from ptcc_certify.theorems.agent_decrease import AgentMatrix, ScaledAgent, agent_matrix, paper_matrix
 from ptcc_certify.theorems.theorem import Obligation
 
 Intervals = tuple[tuple[tuple[Interval, ...], ...], ...]
@@ -108,6 +108,14 @@ class AgentsPart:
     def formation(self) -> bool:
         """Whether an agent has a place other than 0."""
         return any(any(row) for row in self.protocol.offsets)
+
+    @property
+    def settles(self) -> bool:
+        """Whether the behaviour of the claim is proved at ``T`` itself, of positions less their places in a formation.
+
+        A capped gain leaves something there, and gains without a Lyapunov function prove nothing.
+        """
+        return self.structure.graph.n_edges == 0 or (bool(self.functions) and self.protocol.gain_cap is None)
 
     @property
     def moving(self) -> bool:
@@ -241,10 +249,13 @@ def prove_agents(
     gain = base.gain
     proved = [V.proved_rate for V in functions]
     best = max((rate for rate in proved if rate > 0), default=None)
-    coupling = Fraction(1) if best is None else Fraction(up(1 / best, 6))
-    used = [k for k, rate in enumerate(proved) if rate > 0 and coupling * rate >= 1]
     scaled = ScaledAgent(agents.coefficients, agents.own, gain.rho1, gain.pole, gain.first, agents.cap)
-    matrix = agent_matrix(scaled, agents.decay_rate / gain.pole, coupling)
+    if agents.of_paper:
+        matrix = paper_matrix(scaled, best or Fraction(1))
+    else:
+        coupling = Fraction(1) if best is None else Fraction(up(1 / best, 6))
+        matrix = agent_matrix(scaled, agents.decay_rate / gain.pole, coupling)
+    used = [k for k, rate in enumerate(proved) if rate > 0 and matrix.coupling * rate >= 1]
     protocol = AgentsProtocol(
         base, agents.coefficients, agents.own, matrix.gains, tuple(map(tuple, offsets)), agents.cap
     )

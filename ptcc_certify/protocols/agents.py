@@ -52,7 +52,7 @@ class Agents:
         ``alpha > 0``: agents of order 2 meet at rest, by ``-alpha eta`` times their own velocity.
     decay : number or str, optional
         ``R = r rho2 kappa``: deviations decay like ``(1 - t/T)^(R/2)`` near ``T``; above ``2 (n - 1)``. By default
-        ``2 n``, from which on the input is bounded.
+        ``2 n``, from which on the input is bounded; single integrators without it run the paper's protocol, ``K = 1``.
     offsets : state-like, or N rows of numbers, optional
         Places ``h_k`` in a formation, by label or in node order.
     biases : state-like, or N rows of numbers, optional
@@ -158,7 +158,12 @@ give 4, from which on the input is bounded
     def plain(self) -> bool:
         """Whether these are the paper's agents, ``x' = u``, of which the plain certificate tells everything."""
         formation = self.offsets is not None or self.biases is not None
-        return self.degree == 1 and not any(self.coefficients) and not formation and self.cap is None
+        return self.of_paper and not formation and self.cap is None
+
+    @property
+    def of_paper(self) -> bool:
+        """Whether these are single integrators that run the paper's protocol, about their places if they have any."""
+        return self.degree == 1 and not any(self.coefficients) and self.decay is None
 
     def text(self) -> str:
         """Tell the agents in a few words.

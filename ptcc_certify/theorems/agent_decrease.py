@@ -243,6 +243,24 @@ def agent_matrix(agent: ScaledAgent, rate: Fraction, coupling: Fraction) -> Agen
     raise NoCertificate(f"no matrix for agents of order {agent.order} was proved at the rate {float(rate):.6g}")
 
 
+def paper_matrix(agent: ScaledAgent, beta: Fraction) -> AgentMatrix:
+    """Return the matrix of single integrators under the paper's protocol: ``K = 1``, ``W = c = 1/beta``, ``r = beta``.
+
+    Then ``F = 1 - r W = 0``, ``V`` is ``beta`` times the Lyapunov function of the graph, and every bound is the same.
+
+    Examples
+    --------
+    >>> zero, one = Fraction(0), Fraction(1)
+    >>> paper_matrix(ScaledAgent((zero,), (zero,), one, one, 2 * one, None), Fraction(3)).gains
+    (Fraction(1, 1),)
+    """
+    W = ((1 / beta,),)
+    points = prove_decrease(agent, W, beta)
+    if points is None:
+        raise NoCertificate("the paper's protocol is that of single integrators")
+    return AgentMatrix(W, beta, points, 1 / beta, (Fraction(1),))
+
+
 def round_and_prove(agent: ScaledAgent, found: np.ndarray, rate: Fraction, coupling: Fraction) -> AgentMatrix | None:
     """Round a matrix so that ``K = c b'W^-1`` has few digits, and prove it; None if no rounding proves."""
     W = [[round_to_bits(float(x), BITS) for x in row] for row in found]
