@@ -21,7 +21,9 @@ from ptcc_certify.protocols.agents import Agents
 CLASSES = all_classes()
 
 
-@pytest.mark.parametrize("seed", range(0, len(CLASSES), 2))
+@pytest.mark.parametrize(
+    "seed", [pytest.param(k, marks=pytest.mark.campaign if k % 4 else ()) for k in range(len(CLASSES))]
+)
 def test_biases_move_the_agents_as_told(seed: int):
     rng = np.random.default_rng(seed)
     graph = random_graph(rng, **{"weights": "decimals", **CLASSES[seed][1]}).graph

@@ -71,13 +71,13 @@ def holds(certificate: Certificate, comparison: Any) -> None:
     assert np.abs(end - claimed).max() <= 1e-7 * max(1.0, np.abs(end).max())
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(4))
 def test_bounds_hold_on_random_graphs_and_agents(seed: int):
     holds(*seen(seed))
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize("seed", range(6, 330))
+@pytest.mark.parametrize("seed", range(4, 330))
 def test_bounds_hold_on_many_random_graphs_and_agents(seed: int):
     holds(*seen(seed))
 

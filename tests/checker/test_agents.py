@@ -546,7 +546,7 @@ def test_mutants_of_every_kind_of_agents_that_are_accepted_are_true(name: str):
     for kind in ("camps", "singles"):
         data = made(name, kind)
         own = ((path, x) for path, x in mutants(data, 3, 1) if path[0] in ("agents", "protocol", "proof", "verdict"))
-        for changes in (own, nudges(data, len(name), int(os.environ.get("PTCC_FUZZ_COUNT", "120")))):
+        for changes in (own, nudges(data, len(name), int(os.environ.get("PTCC_FUZZ_COUNT", "60")))):
             count, through = judged(data, changes)
             total, passed = total + count, passed + through
     print(f"\n{name}: {total} mutants, none accepted but true; {sum(passed.values())} true: {dict(passed)}")
@@ -574,7 +574,7 @@ def made_by_the_program(seed: int, method: str) -> Json:
     return json.loads(certify(case.graph, case.protocol, case.x0, **options).to_json())
 
 
-@pytest.mark.parametrize("seed", [3, 11])
+@pytest.mark.parametrize("seed", [3, 13])
 def test_what_the_program_makes_is_true(seed: int):
     data = made_by_the_program(seed, "paper")
     assert data["verdict"] == "certified" and VALIDATOR.is_valid(data)
