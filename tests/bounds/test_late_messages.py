@@ -14,6 +14,7 @@ from ptcc_certify.bounds.final_state import final_state
 from ptcc_certify.bounds.late_messages import LateBounds, bound_late
 from ptcc_certify.bounds.small_delays import delay_threshold
 from ptcc_certify.bounds.tracking import bound_tracking
+from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.errors import HypothesisError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import Structure, analyse
@@ -87,6 +88,16 @@ def test_no_run_with_late_lost_or_rounded_messages_exceeds_what_is_proved(seed: 
 def test_220_graphs_of_constant_varying_and_square_delays_keep_their_bounds(block: int) -> None:
     worst = [max(_judge_late(1000 + 20 * block + k)) for k in range(20)]
     assert max(worst) <= 1 + ROUNDING
+
+
+@pytest.mark.parametrize("seed", [1, 7])
+def test_a_bound_that_no_longer_falls_leaves_room_for_how_the_check_rounds(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    graph, x0 = led_graph(rng, 2, 4), [Fraction(int(v), 10) for v in rng.integers(-100, 100, 6)]
+    protocol, messages = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1), LateMessages(delay=1)
+    cert = certify(graph, protocol, x0, messages=messages, simulation=False, method="perron")
+    assert cert.checked is not None
+    assert cert.checked.accepted, cert.checked.reason
 
 
 def _missing(seeds: range) -> Iterator[tuple[Structure, NominalProtocol, list[Fraction], LateBounds]]:
