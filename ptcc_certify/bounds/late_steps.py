@@ -120,7 +120,7 @@ def bound_steps(
     """Bound followers from instant to instant, in floats that leave room for the integers of the check."""
     heard_at = _hearing(instants, delay)
     clock, size = _clock(gain, instants), float(start.max())
-    room, bounds = _UNIT * size * (np.diff(rows.W.indptr) + 4.0), [start]
+    room, bounds = _UNIT * size * (np.diff(rows.W.indptr) + 4.0), [start + _UNIT * size]
     for i in range(1, len(instants)):
         before, heard = bounds[-1], (rows.W @ bounds[heard_at[i - 1]]) / rows.D + error + room
         step = clock[i] - clock[i - 1] if np.isfinite(clock[i]) else np.inf

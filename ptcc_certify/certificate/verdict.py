@@ -25,7 +25,9 @@ import numpy as np
 from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.bounds.envelope import Envelope
 from ptcc_certify.certificate.agents_part import AgentsPart
+from ptcc_certify.certificate.answer import MET, OPEN, REFUTED, Answer
 from ptcc_certify.certificate.certificate_data import Content
+from ptcc_certify.certificate.late_answers import at_deadline, judge_input_beside, judge_messages
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.input_formulas import InitialSet, root_above
 from ptcc_certify.errors import ExitCode
@@ -33,8 +35,6 @@ from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.search import USEFUL
 
-#: What became of an expectation.
-MET, REFUTED, OPEN = "met", "refuted", "left open"
 #: The share of the time that is left where the bound is judged.
 LAST = Fraction(1, 100)
 #: Digits of the gain that is proposed.
@@ -47,18 +47,6 @@ MANY_DECADES = 8
 
 CERTIFIED, UNDECIDED = "certified", "undecided"
 VIOLATED = "VIOLATED: the simulated run exceeds the proved bound; please report this graph"
-
-
-@dataclass(frozen=True)
-class Answer:
-    """What became of one expectation: ``met``, ``refuted`` or ``left open``, of what, and why."""
-
-    status: str
-    what: str
-    why: str = ""
-
-    def __str__(self) -> str:
-        return f"{self.what} ({self.why})" if self.why else self.what
 
 
 @dataclass(frozen=True)
@@ -222,11 +210,13 @@ the input is not bounded; --rho2 0.501 (rho2 kappa 0.501) leaves 1 % and bounds 
     (True, 0)
     """
     expectations = certificate.expectations
-    answers = [] if expectations.behaviour is None else [_judge_behaviour(certificate, expectations.behaviour)]
+    answers = []
+    if expectations.behaviour is not None:
+        answers.append(at_deadline(certificate, _judge_behaviour(certificate, expectations.behaviour)))
     answers += [] if expectations.min_rate is None else [judge_rate(certificate, expectations.min_rate)]
     answers += [] if expectations.max_input is None else [judge_input(certificate, expectations.max_input)]
     answers += judge_limits(certificate)
-    answers += judge_late(certificate)
+    answers += judge_messages(certificate)
     useful, remark, caveat, advice = None, "", "", ""
     verdict = verdict_of(report)
     if verdict != CERTIFIED:
@@ -290,6 +280,9 @@ def judge_input(certificate: Content, most: Fraction) -> Answer:
         return Answer(MET, what) if proved is not None and max(proved) <= most else Answer(OPEN, what, least_bound)
     if certificate.constant:
         return Answer(MET, what)
+    beside = (certificate.late, certificate.tracking, certificate.request.leaders)
+    if any(part is not None for part in beside):
+        return judge_input_beside(certificate, most, what, _first_input(certificate))
     least, bound = input_range(certificate)
     if bound is not None and bound <= most:
         return Answer(MET, what)
@@ -333,29 +326,14 @@ def input_range(certificate: Content) -> tuple[Fraction | float, Fraction | None
     return least, most
 
 
-def judge_late(certificate: Content) -> list[Answer]:
-    """Tell what becomes with late messages of a behaviour that is asked for at ``T``, and of what may be left there."""
-    late, asked = certificate.late, certificate.expectations
-    if late is None:
-        return [] if asked.max_residual is None else [Answer(OPEN, "max_residual", "no messages are late")]
-    if not late.says_something:
-        limit = f"; this certificate's limit is a delay of {late.longest_delay:.3g}" if late.longest_delay else ""
-        return [Answer(OPEN, "late messages", f"nothing is proved of what is left at T{limit}")]
-    answers, missed = [], late.missed
-    label = "" if missed is None else certificate.graph.labels[missed.agent]
-    if missed is not None and asked.behaviour is not None:
-        away = f"agent {label} is away by {down(missed.bound, 2)} at least, proved"
-        answers.append(Answer(REFUTED, f"{asked.behaviour} at T with late messages", away))
-    if asked.max_residual is not None:
-        what = f"within {near(asked.max_residual, 12)} at T"
-        if late.largest <= asked.max_residual:
-            answers.append(Answer(MET, what))
-        elif missed is not None and missed.bound > asked.max_residual:
-            answers.append(Answer(REFUTED, what, f"agent {label} is away by {down(missed.bound, 2)} at least, proved"))
-        else:
-            shorter = "" if late.enough is None else f"; certified with a delay of {down(late.enough, 4)}"
-            answers.append(Answer(OPEN, what, f"this certificate's limit is {up(late.largest, 3)}{shorter}"))
-    return answers
+def _first_input(certificate: Content) -> Fraction:
+    """Return what the largest ``|u_k(0)|`` is at least under the limits of the gain; 0 where nothing is known."""
+    effort, gain, late = certificate.effort, certificate.protocol.gain.exact, certificate.late
+    if effort is None or effort.first is None:
+        return Fraction(0)
+    caps = [] if late is None or late.messages.gain_cap is None else [late.messages.gain_cap]
+    tops = [*caps, *(entry.largest_gain(gain) for entry in certificate.limits)]
+    return effort.first * min([Fraction(1), *(top / certificate.protocol.gain.first for top in tops)])
 
 
 def judge_limits(certificate: Content) -> list[Answer]:

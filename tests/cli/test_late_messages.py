@@ -23,10 +23,10 @@ kappa = 1
 [initial_state]
 x0 = [1, 3, 4, -4]
 [certificate]
-method = "perron"
+method = "paper"
 simulation = false
 """
-QUICK = ("--rho2", "4", "--kappa", "1", "--method", "perron", "--no-simulation")
+QUICK = ("--rho2", "4", "--kappa", "1", "--method", "paper", "--no-simulation")
 START = ("--x0", "1,3,4,-4")
 
 
@@ -66,6 +66,38 @@ def test_a_behaviour_asked_for_at_T_is_refuted_where_an_agent_is_proved_to_miss_
     left = ptcc("certify", "team.csv", "--delay", "0.02", *START, *QUICK, "--max-residual", "0.001")
     assert left.code == 4, left
     assert "this certificate's limit is" in " ".join(left.out.split())
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (
+            ("--delay", "0.005", "--gain-cap", "50"),
+            "left open: bipartite consensus at T with late messages (nothing settles under",
+        ),
+        (
+            ("--quantisation", "0.1"),
+            "left open: bipartite consensus at T with late messages (nobody is proved to settle at T)",
+        ),
+        (("--delay", "0.005", "--gain-cap", "50", "--max-input", "1e6"), "(no bound is proved with late messages)"),
+        (("--leader-speed", "1", "--max-input", "100"), "left open: |u_k| <= 100 (proved: "),
+        (("--leader-speed", "1", "--max-input", "1"), "refuted: |u_k| <= 1 (it is up to"),
+    ],
+)
+def test_what_holds_without_late_messages_and_with_leaders_at_rest_is_not_said_to_be_met(
+    words: tuple[str, ...], said: str
+) -> None:
+    run = ptcc("certify", "team.csv", *words, *START, *QUICK, *("--expect", "bipartite-consensus") * ("left" in said))
+    assert said in " ".join(run.out.split()), run
+    assert run.code == (3 if said.startswith("refuted") else 4), run
+
+
+def test_a_behaviour_and_an_input_are_met_where_they_are_proved_of_late_messages_and_moving_leaders() -> None:
+    star = ("--delay", "0.1", "--expect", "bipartite-consensus")  # all listen to a leader at rest alone
+    Path("star.csv").write_text("a,b,1\na,c,-1\n")
+    assert ptcc("certify", "star.csv", *star, "--x0", "1,0,2", *QUICK).code == 0
+    moving = ("--leader-speed", "1", "--expect", "bipartite-consensus", "--max-input", "1e6")
+    assert ptcc("certify", "team.csv", *moving, *START, *QUICK).code == 0
 
 
 def test_followers_without_a_cycle_are_told_deadlines_of_stages() -> None:
@@ -117,6 +149,8 @@ def test_followers_track_leaders_that_move_and_the_file_says_so() -> None:
         (("team.csv", "--leader-speed", "1", "--sign-gain", "0.5"), "is below speed + disturbance = 1"),
         (("team.csv", "--leader-speed=-1"), "speed = -1 is outside its domain"),
         (("team.csv", "--leader-speed", "1", "--delay", "1"), "messages and leaders together are not certified yet"),
+        (("team.csv", "--delay", "1", "--agents", "double-integrator"), "messages is for single integrators"),
+        (("team.csv", "--leader-speed", "1", "--agents", "double-integrator"), "leaders is for single integrators"),
     ],
 )
 def test_what_cannot_be_is_refused_in_one_line_that_tells_what_to_do(words: tuple[str, ...], said: str) -> None:
