@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from typing import Any, NamedTuple
 
@@ -102,6 +102,8 @@ def read_chains(agents: Agents, graph: SignedDigraph, x0: Any, v0: Any, derivati
     n = agents.degree
     if v0 is not None and derivatives is not None:
         raise ParameterError("v0 is the first of derivatives; give one of them")
+    if isinstance(derivatives, str) or not isinstance(derivatives, Iterable | None):
+        raise ParameterError(f"derivatives = {shorten(repr(derivatives))} is no list; give [v0], or [v0, a0] and so on")
     given = [v0] if derivatives is None else list(derivatives)
     given = [None if isinstance(one, str) and one.strip() == "0" else one for one in given]
     if any(one is not None for one in given[n - 1 :]):

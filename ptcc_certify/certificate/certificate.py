@@ -228,14 +228,15 @@ class Certificate(Content, FromFile, Shown):
         table["deviation"] = np.where(np.isfinite(deviation), deviation, np.nan)
         return table
 
-    def plot(self, what: str = "decay", **keywords: Any) -> Any:
+    def plot(self, what: str | None = None, **keywords: Any) -> Any:
         """Draw a figure of the certificate.
 
         Parameters
         ----------
-        what : {"decay", "input", "graph", "spectrum", "states", "motion", "formation"}
+        what : {"decay", "input", "graph", "spectrum", "states", "motion", "formation", None}
             Run and bound, inputs and their proved peaks, the graph, the eigenvalues, or the states; of agents of order
-            n positions and velocities, or their ways in the plane.
+            n positions and velocities, or their ways in the plane. None: the decay, of agents of
+            order n the motion.
         **keywords : Any
             ``ax`` and others of the function ``ptcc_certify.plot_<what>``.
 
@@ -248,7 +249,7 @@ class Certificate(Content, FromFile, Shown):
         ParameterError
             No figure is called so, or there is nothing to draw.
         """
-        return plot(self, what, **keywords)
+        return plot(self, what or ("decay" if self.agents is None else "motion"), **keywords)
 
     def summary(self) -> str:
         """Return what ``ptcc certify`` prints of it."""

@@ -9,7 +9,7 @@ import click
 
 from lmi.exact.decimal_rounding import down
 from ptcc_certify.cli import options as shared
-from ptcc_certify.cli.agents import agents_keywords, agents_of, agents_options
+from ptcc_certify.cli.agents import agents_keywords, agents_of, agents_options, dimension_option, refuse_dimension
 from ptcc_certify.cli.families import (
     certify_family,
     family_options,
@@ -53,6 +53,7 @@ if TYPE_CHECKING:
 @shared.number_option(
     "--max-residual", metavar="R", help="With late messages: ask for every agent within R of its final state at T."
 )
+@dimension_option
 @shared.initial_bound_option
 @shared.number_option(
     "--noise", metavar="NU", help="Nominal: bound the effect of measurement noise |n_k| <= NU under a limit."
@@ -73,10 +74,11 @@ def certify(graph: tuple[str, ...], output: str | None, as_json: bool, screen: S
     from ptcc_certify.graphs.family import Family
 
     refuse_output(output)
+    refuse_dimension(options, "certify")
     protocol, given = shared.protocol_of(options), read_graph_or_family(graph, options)
     if isinstance(given, Family):
         if agents_of(options) is not None:
-            raise ParameterError("--agents is not for families of graphs yet; certify one graph")
+            raise ParameterError("--agents: is not for families of graphs yet; certify one graph")
         return certify_family(graph, given, output, as_json, screen, options)
     refuse_restricted(options)
     return _certify_graph(graph[0], given, protocol, output, as_json, screen, options)

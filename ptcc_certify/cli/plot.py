@@ -10,6 +10,7 @@ import click
 from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
+from ptcc_certify.cli.agents import agents_keywords, agents_of, agents_options, dimension_option, refuse_dimension
 from ptcc_certify.cli.completion import CERTIFICATES, GRAPHS, PACKAGED, complete
 from ptcc_certify.cli.families import mode_options, read_graph_or_family, refuse_options
 from ptcc_certify.cli.kinds_of_file import kind_of
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from ptcc_certify.certificate.family_certificate import FamilyCertificate
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.family import Family
+    from ptcc_certify.protocols import Protocol
     from ptcc_certify.simulation.trajectory import Trajectory
 
 #: Options that a certificate takes; the others are for graphs.
@@ -75,6 +77,8 @@ class _Figure(click.Choice):  # type: ignore[type-arg]  # no generic class befor
 @shared.protocol_options
 @shared.limit_options
 @shared.random_within_option
+@agents_options
+@dimension_option
 @shared.method_option
 @shared.time_limit_option
 @shared.memory_option
@@ -96,26 +100,37 @@ def plot(
     certified = kind_of(graph[0]) in ("a certificate", "JSON")
     if certified and len(graph) > 1:
         raise ParameterError(f"{graph[0]}: is a certificate, which is drawn by itself; leave out {graph[1]}")
-    what = what or ("decay" if certified else "graph")
-    output = output or f"{PurePath(graph[0]).stem.lstrip('-') or 'graph'}-{what}.png"
-    if PurePath(output).suffix.lower() not in FIGURES:
+    if output is not None and PurePath(output).suffix.lower() not in FIGURES:
         raise ParameterError(f"{output}: figures are written to {', '.join(FIGURES)}; choose one of these")
     refuse_output(output)
     if what in OF_A_CERTIFICATE and not certified:
         flag = "--delay" if what == "late" else "--leader-speed"
         raise ParameterError(f"--what {what} is of a certificate; make one with ptcc certify GRAPH {flag} .. -o c.json")
+    refuse_dimension(options, "plot")
     try:
-        subject = _of_certificate(graph[0], what, options) if certified else _of_graphs(graph, what, options)
+        if certified:
+            what, subject = _of_certificate(graph[0], what, options)
+        else:
+            what = what or "graph"
+            subject = _of_graphs(graph, what, options)
     except RejectedCertificate as error:
         print_lines(f"rejected: {error}", err=True)
         return ExitCode.VIOLATED
+    if output is None:
+        output = f"{PurePath(graph[0]).stem.lstrip('-') or 'graph'}-{what}.png"
+        refuse_output(output)
     save_figure(_draw(what, subject, wide, time_unit), output)
     print_lines(f"written    {output}")
     return ExitCode.OK
 
 
-def _of_certificate(path: str, what: str, options: shared.Options) -> Certificate | FamilyCertificate:
-    """Read a certificate's file, and repeat its run if that is drawn; refuse options that are about a graph."""
+def _of_certificate(
+    path: str, what: str | None, options: shared.Options
+) -> tuple[str, Certificate | FamilyCertificate]:
+    """Read a certificate's file, and repeat its run if that is drawn; refuse options that are about a graph.
+
+    Which figure comes first: ``what``, or the one that is drawn where none is named.
+    """
     from ptcc_certify.certificate.certificate import Certificate, read_certificate
 
     context = click.get_current_context()
@@ -130,11 +145,12 @@ def _of_certificate(path: str, what: str, options: shared.Options) -> Certificat
         if begins and certificate.initial_state is not None:
             raise ParameterError(f"--x0 is for what holds no initial state; the certificate {path} has its own")
         of_agents = isinstance(certificate, Certificate) and certificate.agents is not None
+        what = what or ("motion" if of_agents else "decay")
         if what in (*OF_A_RUN, *OF_AGENTS) and of_agents != (what in OF_AGENTS):
             other = " or ".join(OF_AGENTS if of_agents else OF_A_RUN)
             raise ParameterError(f"--what {what} is not drawn of {path}; ask for --what {other}")
         if what not in OF_A_RUN:
-            return certificate
+            return what, certificate
         if begins:
             one = certificate.graph if isinstance(certificate, Certificate) else certificate.family.modes[0].mandatory
             x0 = shared.read_initial_state(options["x0"], options["seed"], one)
@@ -142,7 +158,7 @@ def _of_certificate(path: str, what: str, options: shared.Options) -> Certificat
         elif certificate.initial_state is None:
             raise ParameterError(f"{path}: the certificate holds no initial state; give one with --x0")
         begin("simulation")
-        return certificate.with_simulation() if isinstance(certificate, Certificate) else certificate
+        return what, certificate.with_simulation() if isinstance(certificate, Certificate) else certificate
 
 
 def _of_graphs(graphs: tuple[str, ...], what: str, options: shared.Options) -> Any:
@@ -158,6 +174,8 @@ def _of_family(family: Family, what: str, options: shared.Options) -> Family | F
     from ptcc_certify.certificate.family_certificate import STEPS, certify_family
 
     refuse_options(options)
+    if what in OF_AGENTS or agents_of(options) is not None:
+        raise ParameterError("--agents: is not for families of graphs yet; draw one graph")
     given = click.get_current_context().get_parameter_source("disturbance") is ParameterSource.COMMANDLINE
     if given and options["disturbance"] is not None:
         raise ParameterError("--disturbance: runs of a family are drawn under the worst one; leave it out")
@@ -182,6 +200,8 @@ def _of_graph(
     protocol = shared.protocol_of(options, () if what == "decay" else ("delta", "disturbance"))
     if what in ("graph", "spectrum"):
         return signed, protocol
+    if what in OF_AGENTS or agents_of(options) is not None:
+        return _of_agents(signed, protocol, what, options)
     x0 = shared.read_initial_state(options["x0"], options["seed"], signed, within=options["initial_bound"])
     if what == "decay":
         if shared.actuator_of(options) is not None:
@@ -191,6 +211,26 @@ def _of_graph(
         with progress(STEPS) as begin:
             return certify(signed, protocol, x0, simulation=True, progress=begin, **more, **search)
     return simulate(signed, protocol, x0, **shared.run_keywords(protocol, options, signed))
+
+
+def _of_agents(signed: SignedDigraph, protocol: Protocol, what: str, options: shared.Options) -> Certificate:
+    """Return what the figure of agents of order n is drawn from: a certificate of theirs."""
+    from ptcc_certify.certificate.procedure import STEPS, certify
+
+    of_agents = agents_keywords(options, signed)
+    if not of_agents:
+        raise ParameterError(f"--what {what}: is of agents of order n; add --agents double-integrator, say")
+    if what not in OF_AGENTS:
+        raise ParameterError(
+            f"--what {what}: is not drawn of agents of order n; ask for --what {' or '.join(OF_AGENTS)}"
+        )
+    if what == "formation" and options["dimension"] != 2:
+        raise ParameterError("--what formation: is drawn in the plane; add --dimension 2")
+    search = {name: options[name] for name in ("method", "time_limit")}
+    if protocol.reaching is not None:
+        search |= {"sigma0": shared.sliding_keywords(protocol, options, signed)["sigma0"]}
+    with progress(STEPS) as begin:
+        return certify(signed, protocol, simulation=False, progress=begin, **of_agents, **search)
 
 
 def _draw(what: str, subject: Any, wide: bool, time_unit: str) -> Any:

@@ -27,6 +27,8 @@ from ptcc_certify.graphs.rationals import shorten
 MAX_BYTES = 1_000_000
 #: Where the scenario of a call is kept: ``context.meta[MEMORY]``.
 MEMORY = "ptcc_certify.scenario"
+#: Commands for which it does not matter what the agents are.
+_OF_THE_GRAPH_ALONE = ("classify", "check")
 #: Where the context of its command is kept.
 COMMAND = "ptcc_certify.command"
 
@@ -84,7 +86,7 @@ SECTIONS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
             "drag": ("drag", "0.1"),
             "plant": ("plant", '"0,0.1"'),
             "offsets": ("offsets", '"offsets.csv"'),
-            "biases": ("biases", "0"),
+            "biases": ("biases", '"biases.csv"'),
             "rest": ("rest", "1"),
             "decay": ("decay", "4"),
         },
@@ -237,7 +239,9 @@ def read_scenario(path: str) -> Scenario:
             if key not in known:
                 raise ParameterError(f"{place}: no such key{_where(key) or did_you_mean(key, known)}")
             option = known[key][0]
-            if option in _STATES:
+            if option == "plant":
+                options[option] = _numbers(value if isinstance(value, list) else [value], place)
+            elif option in _STATES:
                 options[option] = _state(value, folder, place)
             elif option == "graph" and isinstance(value, list):
                 options[option] = _texts_of(value, place, '["day.csv", "night.csv"]') or None
@@ -301,6 +305,13 @@ def _texts_of(value: list[Any], place: str, example: str) -> list[str]:
     return value
 
 
+def _numbers(value: list[Any], place: str) -> str:
+    """Return a list of numbers as an option takes it."""
+    if not all(isinstance(x, int | str) and not isinstance(x, bool) for x in value):
+        raise ParameterError(f"{place}: write a list of numbers, such as [0, 0.1]")
+    return ",".join(map(str, value))
+
+
 def _value(value: Any, example: str, place: str) -> Any:
     """Return a value as an option takes it: true or false, or a text."""
     if example.startswith("["):
@@ -362,6 +373,13 @@ def graph_of(context: click.Context, parameter: click.Parameter, graph: Any) -> 
     scenario = _scenario_of(named[0])
     context.meta.update({MEMORY: scenario, COMMAND: context, SCENARIO: named[0]})
     own = {parameter.name for parameter in context.command.params}
+    if "agents" not in own and context.command.name not in _OF_THE_GRAPH_ALONE:
+        for key in ("agents", "offsets", "biases"):
+            if scenario.options.get(key) not in (None, "integrator", "1"):
+                why = (
+                    f"ptcc {context.command.name} takes single integrators; ptcc certify, simulate and plot take others"
+                )
+                raise ParameterError(f"{scenario.place(key)}: {why}")
     if "x0" in own and "dimension" not in own and scenario.options.get("dimension", "1") != "1":
         why = f"ptcc {context.command.name} takes scalar agents; what is proved of one component holds for each"
         raise ParameterError(f"{scenario.place('dimension')}: {why}: leave it out, and let x0 be one component")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
@@ -85,13 +85,18 @@ give 4, from which on the input is bounded
     gain_cap: Exact | None = None
 
     def __post_init__(self) -> None:
-        if isinstance(self.plant, str | bytes) or not isinstance(self.plant, Sequence | None):
+        listed = getattr(self.plant, "ndim", 1) == 1 and isinstance(self.plant, Collection)
+        if self.plant is not None and (isinstance(self.plant, str | bytes) or not listed):
             raise ParameterError(f"plant = {shorten(repr(self.plant))} is no list; give a_1 to a_n, [0, 0.1] say")
-        given = 2 if self.plant is None else len(self.plant)
+        numbers = None if self.plant is None else list(self.plant)
+        given = 2 if numbers is None else len(numbers)
+        if not given:
+            raise ParameterError("plant is empty; give a_1 to a_n, or leave it out for chains of integrators")
         order = whole_number(given if self.order is None else self.order, "order", 1, MOST_ORDER)
-        plant = [Fraction(0)] * order if self.plant is None else list(map(_number, ["plant"] * given, self.plant))
-        if len(plant) != order:
-            raise ParameterError(f"plant has {len(plant)} numbers for agents of order {order}; give a_1 to a_{order}")
+        if given != order and numbers is not None:
+            count = f"{given} number{'s' * (given > 1)}"
+            raise ParameterError(f"plant has {count} for agents of order {order}; give a_1 to a_{order}")
+        plant = [Fraction(0)] * order if numbers is None else [_number("plant", x) for x in numbers]
         if self.drag is not None:
             if plant[-1]:
                 raise ParameterError("drag is the last number of plant; give one of them")

@@ -41,9 +41,9 @@ class CompanionForm:
         ParameterError
             A state has not n numbers.
         """
-        rows = [[_exact(x, "a state") for x in state] for state in states]
+        rows = _rows(states, "states")
         if any(len(row) != len(self.plant) for row in rows):
-            raise ParameterError(f"a state of these agents has {len(self.plant)} numbers")
+            raise ParameterError(f"a state of these agents has {len(self.plant)} numbers; give N rows of so many")
         return [[_dot(r, row) for row in rows] for r in self.transformation]
 
 
@@ -57,7 +57,7 @@ def companion_form(A: Sequence[Sequence[Any]], B: Sequence[Any]) -> CompanionFor
     Parameters
     ----------
     A : n rows of n numbers
-    B : n numbers
+    B : n numbers, or one column of them
 
     Returns
     -------
@@ -78,9 +78,11 @@ def companion_form(A: Sequence[Sequence[Any]], B: Sequence[Any]) -> CompanionFor
     ptcc_certify.errors.ParameterError: (A, B) is not controllable: with q = (0, 1), q'B = 0 and q'A = 2 q', so that \
 no input moves q'x; leave that part out
     """
-    n = len(A)
-    matrix = [[_exact(x, "an entry of A") for x in row] for row in A]
-    column = [_exact(x, "an entry of B") for x in B]
+    matrix, columns = _rows(A, "A"), _rows(_as_column(B), "B")
+    n = len(matrix)
+    if any(len(row) != 1 for row in columns):
+        raise ParameterError("B has several columns; agents have one input each, in every coordinate of space")
+    column = [row[0] for row in columns]
     if not 1 <= n <= MOST_ORDER or any(len(row) != n for row in matrix) or len(column) != n:
         raise ParameterError(f"A is n x n and B has n numbers, n = 1 to {MOST_ORDER}")
     powers = [column]
@@ -95,6 +97,25 @@ no input moves q'x; leave that part out
     for _ in range(n - 1):
         rows.append([_dot(rows[-1], part) for part in zip(*matrix, strict=True)])
     return CompanionForm(tuple(plant), tuple(map(tuple, rows)))
+
+
+def _as_column(B: Any) -> Any:
+    """Return a list of numbers as a column, and a column as it is."""
+    try:
+        return [x if hasattr(x, "__len__") and not isinstance(x, str) else [x] for x in B]
+    except TypeError:
+        raise ParameterError(f"B = {shorten(repr(B))} is no list; give n numbers") from None
+
+
+def _rows(values: Any, name: str) -> list[list[Fraction]]:
+    """Return rows of numbers, or refuse them."""
+    if isinstance(values, str):
+        raise ParameterError(f"{name} = {shorten(repr(values))} is no list; give rows of numbers")
+    try:
+        rows = [list(row) for row in values]
+    except TypeError:
+        raise ParameterError(f"{name} = {shorten(repr(values))} is no matrix; give rows of numbers") from None
+    return [[_exact(x, f"an entry of {name}") for x in row] for row in rows]
 
 
 def _uncontrollable(A: Sequence[Sequence[Fraction]], q: Sequence[Fraction]) -> str:

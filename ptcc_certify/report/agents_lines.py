@@ -43,8 +43,12 @@ def agents_text(part: AgentsPart) -> str:
     more = ["in formation"] * part.formation
     more += [f"in {part.dimension} dimensions"] * (part.dimension > 1)
     more += ["meeting at rest"] * any(protocol.own)
-    more += [f"gain at most {near(protocol.gain_cap)}"] if protocol.gain_cap is not None else []
-    return "; ".join([" ".join([plant_text(protocol.plant), *([", ".join(more)] if more else [])]), f"u = {law}"])
+    texts = [
+        f"{plant_text(protocol.plant)} {', '.join(more)}".strip(),
+        *([] if protocol.gain_cap is None else [f"gain at most {near(protocol.gain_cap)}"]),
+    ]
+    driven = part.functions or not part.structure.graph.n_edges  # else no gains are proved
+    return "; ".join([*texts, *[f"u = {law}"] * bool(driven)])
 
 
 def _power(m: int) -> str:
@@ -94,7 +98,7 @@ def _accuracy(ends: Sequence[Sequence[Interval]]) -> str:
     widest = max(r for row in ends for _, r in row)
     if widest > Fraction(1, 10**12):
         return f"to within {up(widest, 2)}, proved"
-    cut = any(Fraction(short_number(m)) != m for row in ends for m, _ in row)
+    cut = widest > 0 or any(Fraction(short_number(m)) != m for row in ends for m, _ in row)
     return "rounded" if cut else "exact"
 
 

@@ -11,13 +11,16 @@ near to ``T``. The common motion is that of one agent without neighbours.
 
 from __future__ import annotations
 
+import csv
+import io
 import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ptcc_certify.errors import SimulationError
+from ptcc_certify.errors import ParameterError, SimulationError
+from ptcc_certify.graphs.rationals import shorten, whole_number
 from ptcc_certify.protocols.agents import AgentsProtocol
 from ptcc_certify.simulation.cvodes import Motion, Phase, Tolerances
 
@@ -34,7 +37,7 @@ _ZERO = 1e-9
 _NEXT = 1e-17
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class AgentsTrajectory:
     """A run of agents of order n.
 
@@ -79,6 +82,39 @@ class AgentsTrajectory:
     def final_state(self) -> np.ndarray:
         """(N, d, n) array: at the last instant, ``T`` or next to it."""
         return self.states[..., -1]
+
+    def to_csv(self) -> str:
+        r"""Return ``t,remaining,<label>,..,v(<label>),..,u(<label>),..`` as text, one row per instant, floats in full.
+
+        Positions, velocities ``v(..)``, accelerations ``a(..)``, derivatives ``x^(3)(..)`` and so on, and the input
+        ``u(..)``, which is ``nan`` at ``T`` itself under an infinite gain; of several coordinates ``<label>[1]`` and so
+        on.
+
+        Examples
+        --------
+        >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
+        >>> protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
+        >>> run = certify(foes, protocol, [3, 1], agents=Agents(order=2), method="paper").agents.simulate()
+        >>> run.to_csv().partition("\n")[0]
+        't,remaining,a,b,v(a),v(b),u(a),u(b)'
+        """
+        N, d, n, _ = self.states.shape
+        marks = [""] if d == 1 else [f"[{q + 1}]" for q in range(d)]
+        names = [f"{label}{mark}" for label in self.graph.labels for mark in marks]
+        letters = ["v", "a", *(f"x^({i})" for i in range(3, n))][: n - 1]
+        heads = [*names, *(f"{letter}({name})" for letter in (*letters, "u") for name in names)]
+        parts = [self.states[:, :, i].reshape(N * d, -1) for i in range(n)]
+        table = np.vstack([self.t, self.remaining, *parts, self.input.reshape(N * d, -1) + 0.0])
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(["t", "remaining", *heads])
+        writer.writerows(table.T.tolist())
+        return text.getvalue()
+
+    def __repr__(self) -> str:
+        N, d, n, M = self.states.shape
+        space = f" in {d} dimensions" if d > 1 else ""
+        return f"AgentsTrajectory({N} agents of order {n}{space}, {M} instants, t = 0 .. {self.t[-1]:.6g})"
 
 
 class _Deviations(Motion):
@@ -143,9 +179,14 @@ def simulate_agents(
 
     Raises
     ------
+    ParameterError
+        ``remaining`` is not between 0 and 1, or ``samples`` below 2.
     SimulationError
         The integrator failed, or there are too many agents.
     """
+    samples = whole_number(samples, "samples", 2, 100_000)
+    if not (isinstance(remaining, float | int) and 0 < remaining < 1):
+        raise ParameterError(f"remaining = {shorten(str(remaining))} is not between 0 and 1; give 1e-6, say")
     xi = np.array(states, dtype=float)
     N, d, n = xi.shape
     if N * d * n > MOST_STATES:

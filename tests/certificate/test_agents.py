@@ -209,7 +209,7 @@ REFUSED: list[tuple[dict[str, Any], dict[str, Any], str]] = [
     ({"plant": [1, 0], "rest": 1}, {}, "agents without a force towards 0"),
     ({"order": 2, "rest": 1, "gain_cap": 30}, {}, "an unlimited gain"),
     ({"order": 9}, {}, "order = 9 is outside its domain"),
-    ({"order": 2, "plant": [1]}, {}, "plant has 1 numbers for agents of order 2"),
+    ({"order": 2, "plant": [1]}, {}, "plant has 1 number for agents of order 2"),
     ({"plant": [0, 1e6]}, {}, "take a shorter deadline or another unit of time"),
     ({"order": 2}, {"v0": [[1, 2]] * 4}, "v0 has 2 numbers for each agent, x0 has 1: give 4 x 1"),
     ({"order": 2}, {"v0": [1, 2]}, "2 values for 4 agents"),

@@ -34,3 +34,13 @@ def test_what_no_input_moves_is_named():
         companion_form([[0, 1, 0], [0, 0, 0], [0, 0, 0]], [0, 1, 0])
     with pytest.raises(ParameterError, match="A is n x n"):
         companion_form([[1, 2]], [1])
+
+
+def test_one_input_may_stand_in_a_column_and_several_are_refused():
+    A = [[0, 1], [-2, "0.5"]]
+    assert companion_form(np.array([[0, 1], [-2, 0.5]]), np.array([[0], [1]])) == companion_form(A, [0, 1])
+    with pytest.raises(ParameterError, match="B has several columns"):
+        companion_form(A, np.eye(2))
+    for states in (3, "x", [[1, 2, 3]]):
+        with pytest.raises(ParameterError, match="state"):
+            companion_form(A, [0, 1]).derivatives(states)  # type: ignore[arg-type]  # wrong on purpose

@@ -126,7 +126,10 @@ def plot_formation(subject: Any, *, ax: Axes | None = None) -> Axes:
     """
     run = agents_run(subject)
     if run.states.shape[1] != 2:
-        raise ParameterError("a formation is drawn in the plane; these agents have another number of coordinates")
+        d = run.states.shape[1]
+        raise ParameterError(
+            f"a formation is drawn in the plane; these agents have {d} coordinate{'s' * (d > 1)}: certify them with 2"
+        )
     ax, groups, width = axes_of(ax, (SINGLE_COLUMN[0], SINGLE_COLUMN[0])), camp_groups(analyse(run.graph)), 1.0
     for k, (x, y) in enumerate(run.positions):
         color, line = CAMP_STYLES[groups[k]]
