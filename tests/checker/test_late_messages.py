@@ -44,9 +44,9 @@ def base(seed: int = 1, signs: str = "positive", acyclic: bool = False, state: b
     drawn = led_graph(rng, 2, 4, acyclic=acyclic, signs=signs)
     x0 = [F(int(v), 10) for v in rng.integers(-50, 50, drawn.n_nodes)] if state else None
     if sigma is None:
-        return plain(drawn, nominal(), x0)
+        return plain(drawn, nominal(), x0, method="paper")
     protocol = SlidingModeProtocol(T_r="0.5", T_s="0.5", rho1=1, rho2=3, kappa=1, mu1=2, mu2=1, mu3=1, delta=1)
-    return plain(drawn, protocol, x0, sigma0=[sigma] * drawn.n_nodes)
+    return plain(drawn, protocol, x0, sigma0=[sigma] * drawn.n_nodes, method="paper")
 
 
 @cache

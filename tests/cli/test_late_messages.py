@@ -23,10 +23,10 @@ kappa = 1
 [initial_state]
 x0 = [1, 3, 4, -4]
 [certificate]
-method = "perron"
+method = "paper"
 simulation = false
 """
-QUICK = ("--rho2", "4", "--kappa", "1", "--method", "perron", "--no-simulation")
+QUICK = ("--rho2", "4", "--kappa", "1", "--method", "paper", "--no-simulation")
 START = ("--x0", "1,3,4,-4")
 
 
