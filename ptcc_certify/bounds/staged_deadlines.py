@@ -34,19 +34,32 @@ def stage_deadlines(rows: FollowerRows, T: Fraction, delay: Fraction) -> tuple[F
     >>> stage_deadlines(chain, Fraction(1), Fraction(1, 10))
     (Fraction(9, 10), Fraction(1, 1))
     """
-    level = np.ones(rows.D.size, dtype=np.int64)
-    W = rows.W.tocoo()
-    for _ in range(rows.D.size + 1):
-        new = level.copy()
-        np.maximum.at(new, W.row, level[W.col] + 1)
-        if (new == level).all():
-            break
-        if new.max() > rows.D.size:
-            return None
-        level = new
-    else:
+    level = levels(rows)
+    if level is None or T - (int(level.max()) - 1) * delay <= 0:
         return None
     most = int(level.max())
-    if T - (most - 1) * delay <= 0:
+    due = {x: T - (most - x) * delay for x in np.unique(level).tolist()}
+    return tuple(due[x] for x in level.tolist())
+
+
+def levels(rows: FollowerRows) -> np.ndarray | None:
+    """Return the edges of the longest path from leaders to every follower; None where followers form a cycle.
+
+    Examples
+    --------
+    >>> levels(FollowerRows(analyse(SignedDigraph.from_edges([(1, 2, 1), (1, 3, 1), (2, 3, -1)])))).tolist()
+    [1, 2]
+    """
+    components = rows.structure.strong_component[rows.followers]
+    if np.bincount(components).max() > 1:
         return None
-    return tuple(T - (most - int(x)) * delay for x in level)
+    out, waiting = rows.W.tocsc(), np.diff(rows.W.indptr).tolist()
+    first, listeners, level = out.indptr.tolist(), out.indices.tolist(), [1] * rows.D.size
+    todo = [k for k, count in enumerate(waiting) if not count]
+    for k in todo:
+        for j in listeners[first[k] : first[k + 1]]:
+            level[j] = max(level[j], level[k] + 1)
+            waiting[j] -= 1
+            if not waiting[j]:
+                todo.append(j)
+    return np.array(level)

@@ -13,11 +13,13 @@ from late_certificates import led_graph
 from ptcc_certify.bounds.final_state import final_state
 from ptcc_certify.bounds.late_messages import LateBounds, bound_late
 from ptcc_certify.bounds.small_delays import delay_threshold
+from ptcc_certify.bounds.staged_deadlines import levels
 from ptcc_certify.bounds.tracking import bound_tracking
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.errors import HypothesisError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import Structure, analyse
+from ptcc_certify.lyapunov.follower_rows import FollowerRows
 from ptcc_certify.protocols import NominalProtocol
 from ptcc_certify.protocols.late_messages import LateMessages
 from ptcc_certify.protocols.moving_leaders import MovingLeaders
@@ -145,6 +147,29 @@ def test_agents_with_deadlines_one_delay_apart_are_at_their_final_states_exactly
         run = simulate_late(structure.graph, protocol, messages, start, pattern=pattern, deadlines=deadlines, steps=200)
         away = np.abs(run.states[:, -1] - np.asarray(ends, dtype=float))
         assert away.max() <= 1e-9 * max(1, max(map(abs, x0)))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_levels_are_longest_paths_from_leaders_and_a_cycle_has_none(seed: int) -> None:
+    rows = FollowerRows(analyse(led_graph(np.random.default_rng(seed), 2, 6, acyclic=seed % 2 == 0)))
+    heard = (rows.W.toarray() > 0).astype(float)
+    found, count = levels(rows), len(heard)
+    if np.linalg.matrix_power(heard, count).any():  # a path of so many edges goes round
+        assert found is None
+        return
+    paths = [length for length in range(count) if np.linalg.matrix_power(heard, length).any()]
+    longest = [
+        1 + max(length for length in paths if np.linalg.matrix_power(heard, length)[k].any()) for k in range(count)
+    ]
+    assert found is not None
+    assert found.tolist() == longest
+
+
+def test_levels_of_many_followers_are_found_along_every_edge_once() -> None:
+    chain = FollowerRows(analyse(SignedDigraph.from_edges([(k, k + 1, 1) for k in range(20_000)])))
+    found = levels(chain)
+    assert found is not None
+    assert found.max() == 20_000
 
 
 def test_one_common_deadline_is_missed_where_deadlines_of_stages_are_met() -> None:
