@@ -50,11 +50,11 @@ def messages_of(graph: str, signed: SignedDigraph, options: Options) -> LateMess
     """Return how late messages are; None if nothing is asked of them."""
     from ptcc_certify.protocols.late_messages import LateMessages
 
+    if options["packet_loss"] and options["period"] is None:
+        raise ParameterError("--packet-loss says nothing by itself; give --period, the time between two messages")
     if all(options[name] is None for name in _ASKING):
-        for name, flag in (("packet_loss", "--packet-loss"), ("own_delay", "--own-delay")):
-            if options[name]:
-                mend = "--period, the time between two messages" if name == "packet_loss" else "--delay"
-                raise ParameterError(f"{flag} says nothing by itself; give {mend}")
+        if options["own_delay"]:
+            raise ParameterError("--own-delay says nothing by itself; give --delay")
         return None
     step = options["quantisation"]
     if step is not None and step < 0:
@@ -77,7 +77,7 @@ def _delay(graph: str, signed: SignedDigraph, text: str) -> Fraction | dict[tupl
     try:
         return parse_exact(text)
     except NumberError as error:
-        if not text.isidentifier():
+        if not text.isidentifier() or "finite" in str(error):
             raise ParameterError(
                 f"--delay: {error}; give a number in your unit of time, or the name of a column"
             ) from None

@@ -458,7 +458,9 @@ def placed(context: click.Context, error: PTCCError | click.BadParameter) -> Exc
         text = str(error)
         match = re.match(r"(?:--)?([A-Za-z][\w-]*)(: | = | )", text)
         option = match[1].replace("-", "_") if match else ""
-        option = {"initial_state": "x0", "initial": "x0", "behaviour": "expect"}.get(option, option)
+        option = {"initial_state": "x0", "initial": "x0", "behaviour": "expect", "speed": "leader_speed"}.get(
+            option, option
+        )
         if match and match[0].startswith("--"):
             text = text[match.end() :]
     if context.meta[COMMAND].get_parameter_source(option) is ParameterSource.DEFAULT_MAP:

@@ -92,7 +92,7 @@ diverge, for its gain grows without limit before T; give gain_cap, or measure th
             )
         if not self.age and not self.value_error:
             raise ParameterError(
-                "messages that are neither late, nor lost, nor rounded; give delay, period or value_error"
+                "messages that are neither late, nor lost, nor rounded; give a delay, a period or a value error above 0"
             )
 
     @property

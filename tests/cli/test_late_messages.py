@@ -9,7 +9,16 @@ import numpy as np
 import pytest
 from bad_inputs import ptcc
 
-from ptcc_certify import LateMessages, MovingLeaders, NominalProtocol, SignedDigraph, certify, read_certificate
+from ptcc_certify import (
+    Expectations,
+    GainLimits,
+    LateMessages,
+    MovingLeaders,
+    NominalProtocol,
+    SignedDigraph,
+    certify,
+    read_certificate,
+)
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.simulation.late_messages import simulate_late
 
@@ -137,7 +146,20 @@ def test_followers_track_leaders_that_move_and_the_file_says_so() -> None:
     ("words", "said"),
     [
         (("team.csv", "--delay=-1"), "delay = -1 is outside its domain; delay must be >= 0"),
-        (("team.csv", "--delay", "nan"), 'no column "nan"'),
+        (("team.csv", "--delay", "nan"), '--delay: "nan" is not a finite number'),
+        (("team.csv", "--delay", "0"), "neither late, nor lost, nor rounded"),
+        (("team.csv", "--delay", "0.1", "--packet-loss", "3"), "--packet-loss says nothing by itself; give --period"),
+        (("team.csv", "--max-residual", "1"), "max_residual: is asked of late messages"),
+        (("team.csv", "--delay", "0.1", "--stop-before", "0.1"), "stop_before: late messages are certified under a"),
+        (("team.csv", "--delay", "0.1", "--sample-period", "0.1"), "sample_period: of late messages a period tells"),
+        (("team.csv", "--delay", "0.1", "--gain-cap", "9", "--noise", "1"), "a quantisation of 4 NU"),
+        (("team.csv", "--delay", "0.1", "--delta", "1"), "delta: is not proved of late messages under the nominal"),
+        (("team.csv", "--leader-speed", "1", "--gain-cap", "9"), "gain_cap: leaders that move are tracked at T by a"),
+        (("team.csv", "--leader-speed", "1", "--stop-before", "0.1"), "stop_before: leaders that move are tracked"),
+        (("team.csv", "--leader-speed", "1", "--noise", "1"), "noise: is not proved while leaders move"),
+        (("team.csv", "--uncertainty", "1%", "--delay", "0.1"), "--delay is for one graph, not for families yet"),
+        (("team.csv", "--uncertainty", "1%", "--leader-speed", "1"), "--leader-speed is for one graph, not for"),
+        (("team.csv", "--uncertainty", "1%", "--max-residual", "1"), "--max-residual is for one graph, not for"),
         (("team.csv", "--delay", "1e"), "give a number in your unit of time, or the name of a column"),
         (("team.csv", "--delay", "latency"), 'team.csv, line 1: no column "latency"; begin with a header'),
         (("team.csv", "--packet-loss", "3"), "--packet-loss says nothing by itself; give --period"),
@@ -179,6 +201,24 @@ def test_small_delays_of_a_leader_group_are_certified_under_a_cap_up_to_a_limit_
     long = certify(group, protocol, [3, 1, 2], messages=LateMessages(delay="0.5", gain_cap=20), simulation=False)
     assert int(long.assessment.exit_code) == 4
     assert "this certificate's limit is a delay of" in long.assessment.text
+
+
+def test_messages_that_take_longer_than_the_deadline_are_certified_to_leave_what_was_there_at_first() -> None:
+    run = ptcc("certify", "chain.csv", "--delay", "5", "--x0", "1,0,2", *QUICK)
+    assert run.code == 0, run
+
+
+def test_families_and_other_limits_are_refused_in_python_too() -> None:
+    pair, protocol = SignedDigraph.from_edges([(1, 2, 1)]), NominalProtocol(1, 1, 2, 1)
+    each, same = LateMessages(delay={(1, 2): "0.1"}), GainLimits(gain_cap=20)
+    with pytest.raises(ParameterError, match="messages is not for families of graphs yet"):
+        certify(pair, protocol, uncertainty="10%", messages=each)
+    with pytest.raises(ParameterError, match="max_residual: is asked of late messages, which families"):
+        certify(pair, protocol, uncertainty="10%", expectations=Expectations(max_residual=1))
+    with pytest.raises(ParameterError, match="gain_cap: limits and late messages have two"):
+        certify(pair, protocol, messages=each, limits=same)
+    with pytest.raises(ParameterError, match=r"MovingLeaders\(disturbance=..\)"):
+        certify(pair, protocol, leaders=MovingLeaders(speed=1), delta=1)
 
 
 def test_late_messages_ask_for_sliding_variables_at_0() -> None:
