@@ -124,8 +124,14 @@ class LateBounds:
         largest = math.inf if self.residual is None else float(self.residual.max())
         return largest if self.form is None else min(largest, float_up(max(self.form.residual)))
 
-    def deviation_bound(self, t: np.ndarray) -> np.ndarray:
+    @property
+    def direct(self) -> bool:
+        """Whether all followers hear of leaders alone, so that they settle at ``T`` exactly."""
+        return self.staged is not None and len(set(self.staged)) == 1
+
+    def deviation_bound(self, t: Sequence[float] | np.ndarray) -> np.ndarray:
         """Return what bounds ``|x_k - x_k*|`` at instants, ``(F, M)`` floats; infinite where nothing does."""
+        t = np.asarray(t, dtype=float)
         whole = np.full((self.structure.followers.size, len(t)), np.inf)
         for row in self.rows:
             cap = [x for x in (row.cap, self.gain.limits.gain_cap) if x is not None]

@@ -164,8 +164,10 @@ def refuse(
     _refuse_long(_distinct_weights(graph), graph.n_nodes, "the weights", lambda: f"edge {_longest_edge(graph)}")
 
 
+_NO_SET = "(--initial-bound) is not taken up here, bounds are from one initial state; give x0 alone"
 #: What is not certified beside late messages, and what to do instead.
 _NOT_LATE = {
+    "initial_set": _NO_SET,
     "stop_before": "late messages are certified under a gain cap alone; leave it out",
     "sample_period": "of late messages a period tells how often they are sent; give that instead",
     "noise": "of late messages an error of values tells it: noise within NU is one of 2 NU, a quantisation of 4 NU; "
@@ -175,6 +177,7 @@ _NOT_LATE = {
 }
 #: What is not certified beside leaders that move.
 _NOT_TRACKING = {
+    "initial_set": _NO_SET,
     "gain_cap": "leaders that move are tracked at T by a gain without limits; leave it out",
     "stop_before": "leaders that move are tracked at T by a gain without limits; leave it out",
     "sample_period": "leaders that move are tracked at T by a gain without limits; leave it out",
@@ -210,7 +213,7 @@ def _refuse_more(refused: Mapping[str, str], request: Request) -> None:
     """Refuse limits of the gain, noise and disturbances of which nothing is certified beside."""
     for name, mend in refused.items():
         if any(getattr(one, name, None) is not None for one in (request, *request.limits)):
-            raise ParameterError(f"{name}: {mend}")
+            raise ParameterError(f"{name}{' ' if mend is _NO_SET else ': '}{mend}")
 
 
 def _refuse_messages(structure: Structure, messages: LateMessages, caps: Sequence[Fraction | None]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
@@ -83,7 +84,18 @@ def _delay(graph: str, signed: SignedDigraph, text: str) -> Fraction | dict[tupl
             ) from None
     if graph == "-":
         raise ParameterError("--delay names a column, but standard input is read once; save the edge list to a file")
-    return read_delays(graph_file(graph), signed, text)
+    delays = read_delays(graph_file(graph), signed, text)
+    signed.read["notes"] = (f'delays of column "{text}"', *_without(signed.read["notes"], text))
+    return delays
+
+
+def _without(notes: Iterable[str], title: str) -> Iterator[str]:
+    """Leave a column that is read out of the note on columns that are ignored."""
+    for note in notes:
+        head, _, names = note.partition("columns ignored: ")
+        left = [name for name in names.split(", ") if name.strip('"').lower() != title.lower()]
+        if head or left:
+            yield note if head else f"columns ignored: {', '.join(left)}"
 
 
 def leaders_of(options: Options) -> MovingLeaders | None:
