@@ -70,6 +70,11 @@ class Tracking:
         """``(speed + disturbance) / min u``; 0 with the sign term, which takes it up."""
         return 0.0 if self.leaders.sign_gain is not None else float(self.leaders.total) / float(self.witness.u.min())
 
+    @property
+    def distance_after(self) -> float:
+        """What bounds ``|x_k - x_k*|`` of every follower from ``T`` on."""
+        return float(self.after) * float(self.witness.u.max()) * _MORE
+
     def distance_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
         """Return what bounds ``|x_k - x_k*|`` of followers where ``1 - t/T`` is ``remaining``, ``(F, M)`` floats."""
         q, T, p = np.asarray(remaining, dtype=float), float(self.protocol.T), self.pole

@@ -17,7 +17,6 @@ from ptcc_certify.report.text_layout import shorten_label, shorten_list
 
 if TYPE_CHECKING:
     from ptcc_certify.bounds.late_messages import LateBounds
-    from ptcc_certify.bounds.tracking import Tracking
     from ptcc_certify.certificate.certificate import Certificate
     from ptcc_certify.protocols.base import Protocol
     from ptcc_certify.protocols.late_messages import LateMessages
@@ -44,12 +43,12 @@ def tracking_lines(certificate: Certificate) -> Lines:
     leaders, T = tracking.leaders, near(certificate.protocol.T)
     sign = "" if leaders.sign_gain is None else f"; followers add {near(leaders.sign_gain)} sign(e_k)"
     pushed = f"; any |d_k| <= {near(leaders.disturbance)}" * (leaders.disturbance > 0)
-    yield "leaders", f"move, |x_j'| <= {near(leaders.speed)}{pushed}{sign}"
+    yield "leaders", f"speed |x_j'| <= {near(leaders.speed)}{pushed}{sign}"
     instants = {"0.9 T": Fraction(1, 10), "0.99 T": Fraction(1, 100)}
     if (at := certificate.at) is not None:
         instants = {f"t = {near(at)}": 1 - at / certificate.protocol.T}
     bounds = {when: up(float(tracking.distance_bound([float(q)]).max()), 2) for when, q in instants.items()}
-    after = "and ever after" if not tracking.after else f"within {up(_after(tracking), 2)} of it from then on"
+    after = "and ever after" if not tracking.after else f"within {up(tracking.distance_after, 2)} of it from then on"
     yield "tracking", f"every follower on its target at T = {T}, {after}"
     whole = " from within 1 of it at first" * tracking.relative
     yield "", f"before T within {', '.join(f'{x} of it at {when}' for when, x in bounds.items())}{whole}"
@@ -58,10 +57,6 @@ def tracking_lines(certificate: Certificate) -> Lines:
     else:
         least = up(1 / (tracking.witness.b * certificate.protocol.kappa) * Fraction(1001, 1000), 3)
         yield "INPUT", f"not proved bounded while leaders move; rho2 = {least} bounds it"
-
-
-def _after(tracking: Tracking) -> float:
-    return float(tracking.after) * float(tracking.witness.u.max())
 
 
 def messages_text(messages: LateMessages, protocol: Protocol | None = None) -> str:

@@ -258,6 +258,37 @@ def test_an_input_that_is_not_bounded_while_leaders_move_is_told_with_the_gain_t
     assert "input      bounded up to T" in strong.out, strong
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("simulate",), "s.toml: [messages] delay: ptcc simulate does not take late messages; ptcc certify -o c.json"),
+        (("design", "--max-input", "9", "--initial-bound", "1", "--deadline", "1"), "ptcc design does not take late"),
+        (("plot", "--what", "states"), "ptcc plot --what states does not take late messages"),
+    ],
+)
+def test_commands_that_would_leave_late_messages_out_refuse_their_scenario(words: tuple[str, ...], said: str) -> None:
+    Path("s.toml").write_text(SCENARIO + "[messages]\ndelay = 0.005\n")
+    run = ptcc(words[0], "s.toml", *words[1:])
+    assert run.code == 2, run
+    assert said in run.err
+    assert ptcc("classify", "s.toml").code == ptcc("plot", "s.toml", "--what", "graph").code == 0
+
+
+def test_page_and_statement_tell_of_late_messages_and_moving_leaders() -> None:
+    assert ptcc("certify", "chain.csv", "--delay", "0.1", "--x0", "1,0,2", *QUICK, "-o", "c.json").code == 0
+    assert ptcc("certify", "team.csv", "--leader-speed", "1", *START, *QUICK, "-o", "l.json").code == 0
+    for name in ("c", "l"):
+        for ending in ("html", "tex"):
+            assert ptcc("report", f"{name}.json", "-o", f"{name}.{ending}").code == 0
+    page, statement = Path("c.html").read_text(), Path("c.tex").read_text()
+    assert "consensus at T = 1, nothing late</h1>" in page
+    assert "With messages at once: By the deadline" in page
+    assert "If what agents hear is up to $0.1$ old, then every agent is within" in statement
+    assert "If no message comes sooner than after its delay, agent c is off its final state" in statement
+    assert "With leaders at rest: By the deadline" in Path("l.html").read_text()
+    assert "then at $T$ every follower is on its target" in Path("l.tex").read_text()
+
+
 def test_families_and_other_limits_are_refused_in_python_too() -> None:
     pair, protocol = SignedDigraph.from_edges([(1, 2, 1)]), NominalProtocol(1, 1, 2, 1)
     each, same = LateMessages(delay={(1, 2): "0.1"}), GainLimits(gain_cap=20)
