@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -61,16 +61,29 @@ def _title(saved: Certificate) -> str:
 
 def _states(saved: Certificate, part: AgentsPart) -> tuple[list[str], list[list[str]]]:
     """Return head and rows of the table of initial and final states, and inputs."""
-    columns = part.columns()
-    agents = range(min(saved.graph.n_nodes, ROWS))
-    rows = [
-        [
-            texts.label(saved.graph.labels[k]),
-            *(texts.above(x[k], 6) if name == "input" else f"{x[k]:.6g}" for name, x in columns.items()),
-        ]
-        for k in agents
-    ]
-    return ["Agent", *("|u| at most" if name == "input" else name for name in columns)], rows if columns else []
+    agents, letters = (
+        range(min(saved.graph.n_nodes, ROWS)),
+        ["x", "v", "a", *(f"x^({i})" for i in range(3, part.order))],
+    )
+    columns: dict[str, list[str]] = {}
+    for i, letter in enumerate(letters[: part.order]):
+        if part.initial_state is not None:
+            columns[f"{letter}(0)"] = [_vector([float(c[i]) for c in part.initial_state[k]]) for k in agents]
+        if part.final_state is not None:
+            columns[f"{letter}(T)"] = [_vector([float(c[i][0]) for c in part.final_state[k]]) for k in agents]
+    if part.input is not None:
+        bound = part.input
+        columns[
+            "|u| at most" if part.dimension == 1 else "\N{DOUBLE VERTICAL LINE}u\N{DOUBLE VERTICAL LINE} at most"
+        ] = [texts.above(bound[k], 6) for k in agents]
+    rows = [[texts.label(saved.graph.labels[k]), *(column[k] for column in columns.values())] for k in agents]
+    return ["Agent", *columns], rows if columns else []
+
+
+def _vector(numbers: Sequence[float]) -> str:
+    """Write a number for each coordinate of space, rounded."""
+    told = [f"{x:.6g}" for x in numbers]
+    return told[0] if len(told) == 1 else f"({', '.join(told)})"
 
 
 def _remaining(part: AgentsPart) -> tuple[list[str], list[list[str]]] | None:

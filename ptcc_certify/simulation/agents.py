@@ -173,7 +173,7 @@ def simulate_agents(
     remaining : float
         Instants uniform in ``tau`` go from ``1 - t/T = 1`` to this; then comes ``T``.
     samples : int
-        So many of these, and half as many uniform in ``t``.
+        So many of these, and as many uniform in ``t``.
     rtol : float
         Of CVODES.
 
@@ -191,7 +191,7 @@ def simulate_agents(
     N, d, n = xi.shape
     if N * d * n > MOST_STATES:
         raise SimulationError(f"more than {MOST_STATES} numbers to integrate; simulate fewer agents")
-    q = np.unique(np.concatenate([np.geomspace(remaining, 1, samples), np.linspace(remaining, 1, samples // 2)]))[::-1]
+    q = np.unique(np.concatenate([np.geomspace(remaining, 1, samples), np.linspace(remaining, 1, samples)]))[::-1]
     q = q if protocol.gain_cap is None else np.append(q, 0.0)
     h = np.array([[float(x) for x in row] for row in protocol.offsets])
     xi[:, :, 0] -= h

@@ -127,3 +127,13 @@ def test_nothing_that_is_rounded_is_called_exact():
     done = ptcc("certify", "fig1b", "--method", "paper", "--agents", "2", "--drag", "0.2", "--no-simulation")
     (line,) = [line for line in done.out.splitlines() if line.startswith("v(T)")]
     assert "(rounded)" in line
+
+
+def test_the_page_writes_a_vector_in_one_cell(tmp_path: Path):
+    saved, page = tmp_path / "team.json", tmp_path / "team.html"
+    state = ",".join(map(str, range(12)))
+    ptcc(*CERTIFY, "--agents", "2", "--dimension", "2", "--x0", state, "--gain-cap", "20", "-o", str(saved))
+    assert ptcc("report", str(saved), "-o", str(page)).code == 0
+    text = page.read_text(encoding="utf-8")
+    assert "(10, 11)" in text and "\N{DOUBLE VERTICAL LINE}u\N{DOUBLE VERTICAL LINE} at most" in text
+    assert "fall like" not in text  # which they do under an unlimited gain alone

@@ -36,7 +36,7 @@ from ptcc_certify.graphs.size_limits import LABELLED_NODES
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.protocols.nominal import NominalProtocol
-from ptcc_certify.report.plots.agents import CAMP_STYLES, NAMED_AGENTS, NAMED_OF_PART
+from ptcc_certify.report.plots.agents import CAMP_STYLES, NAME_SIZE, NAMED_AGENTS, NAMED_OF_PART
 from ptcc_certify.report.plots.decay import plot_decay
 from ptcc_certify.report.plots.graph import GROUND, plot_graph
 from ptcc_certify.report.plots.graph_layout import FREE_NODES, arc, arrows_of
@@ -659,12 +659,12 @@ def test_every_figure_names_the_unit_of_time() -> None:
 
 def test_every_figure_has_one_signature() -> None:
     names = [name for name in ptcc_certify.__all__ if name.startswith("plot_")]
-    assert len(names) == 12
+    assert len(names) == 14
     for name in names:
         subject, *keywords = inspect.signature(getattr(ptcc_certify, name)).parameters.values()
         assert subject.name == "subject" and subject.default is inspect.Parameter.empty
         assert all(one.kind is inspect.Parameter.KEYWORD_ONLY for one in keywords)
-        assert name == "plot_run" or (keywords[0].name, keywords[0].default) == ("ax", None)
+        assert name in ("plot_run", "plot_motion") or (keywords[0].name, keywords[0].default) == ("ax", None)
 
 
 def test_a_subject_that_leads_to_no_figure_is_refused_with_the_mend() -> None:
@@ -817,3 +817,25 @@ def test_ticks_of_time_do_not_overlap_beside_long_names():
     FigureCanvasAgg(ax.figure).draw()
     boxes = [label.get_window_extent() for label in ax.get_xticklabels()]
     assert len(boxes) > 1 and all(a.x1 < b.x0 for a, b in pairwise(boxes))
+
+
+def test_names_of_agents_that_end_at_one_place_do_not_cover_each_other():
+    pair = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)])
+    protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
+    cert = ptcc_certify.certify(
+        pair, protocol, [[3, 1], [1, 0]], agents=ptcc_certify.Agents(order=2), method="paper", simulation=False
+    )
+    first, second = (np.array(text.xyann) for text in ptcc_certify.plot_formation(cert).texts)
+    assert np.hypot(*(first - second)) > NAME_SIZE
+
+
+def test_coordinates_of_agents_stand_below_each_other_and_side_by_side_in_a_wide_figure():
+    pair = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)])
+    protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
+    cert = ptcc_certify.certify(
+        pair, protocol, [[3, 1], [1, 0]], agents=ptcc_certify.Agents(order=2), method="paper", simulation=False
+    )
+    for wide, shape in ((False, (4, 1)), (True, (2, 2))):
+        axes = ptcc_certify.plot_motion(cert, wide=wide).axes
+        assert axes[0].get_subplotspec().get_gridspec().get_geometry() == shape
+        assert {ax.get_ylabel() for ax in axes} == {"position 1", "position 2", "velocity 1", "velocity 2"}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,8 @@ from ptcc_certify.simulation.agents import AgentsTrajectory
 
 #: Labels of axes.
 _NAMES = ("position", "velocity", "acceleration")
+#: How far a name stands from the mark that it names, in points.
+_AWAY = 8
 
 
 def agents_run(subject: Any) -> AgentsTrajectory:
@@ -39,13 +42,13 @@ def agents_run(subject: Any) -> AgentsTrajectory:
 
 
 def plot_motion(subject: Any, *, wide: bool = False, time_unit: str = "") -> Figure:
-    """Draw positions, velocities and so on over time, a row for each and a column for each coordinate.
+    """Draw positions, velocities and so on over time, of each coordinate below each other.
 
     Parameters
     ----------
     subject : AgentsTrajectory, or Certificate of agents of order n
     wide : bool
-        As wide as two columns of a journal.
+        As wide as two columns of a journal, the coordinates side by side.
     time_unit : str
         Of the deadline, for the labels of the axes.
 
@@ -74,15 +77,17 @@ def plot_motion(subject: Any, *, wide: bool = False, time_unit: str = "") -> Fig
     _, d, n, _ = run.states.shape
     width, height = SINGLE_COLUMN
     with style.context(STYLE):
-        figure = Figure((width * (d if wide or d > 1 else 1), 0.75 * height * n), layout="constrained")
+        rows, columns = (n, d) if wide else (n * d, 1)
+        figure = Figure((2 * width if wide else width, 0.75 * height * rows), layout="constrained")
         groups = camp_groups(analyse(run.graph))
         for i in range(n):
             for q in range(d):
-                ax = new_axes(figure, (n, d, 1 + i * d + q))
+                place = i * d + q if wide else q * n + i
+                ax = new_axes(figure, (rows, columns, 1 + place))
                 _lines(ax, run, run.states[:, q, i], groups)
                 name = _NAMES[i] if i < len(_NAMES) else f"derivative {i}"
                 label = f"{name} {q + 1}" if d > 1 else name
-                finished(ax, time_label("time $t$", time_unit) if i == n - 1 else "", label)
+                finished(ax, time_label("time $t$", time_unit) if place // columns == rows - 1 else "", label)
                 if (legend := ax.get_legend()) is not None and (i or q):
                     legend.remove()
         return shown(figure)
@@ -135,11 +140,26 @@ def plot_formation(subject: Any, *, ax: Axes | None = None) -> Axes:
         color, line = CAMP_STYLES[groups[k]]
         first = k == int(np.flatnonzero(groups == groups[k])[0])
         ax.plot(x, y, color=color, linestyle=line, linewidth=width, label=groups[k] if first else None)
-        ax.plot(x[0], y[0], "o", markersize=3.5, markerfacecolor="white", markeredgecolor=color)
-        ax.plot(x[-1], y[-1], "o", markersize=4.5, color=color)
-        if run.graph.n_nodes <= 2 * NAMED_AGENTS:
-            name = shorten_text(printable(run.graph.labels[k]), 12)
-            text = ax.annotate(name, (x[-1], y[-1]), (3, 3), textcoords="offset points", fontsize=NAME_SIZE)
-            text.set_path_effects([*HALO])
+        ax.plot(x[0], y[0], "o", markersize=3.5, markerfacecolor="white", markeredgecolor=color, zorder=4)
+        ax.plot(x[-1], y[-1], "o", markersize=4.5, color=color, zorder=5)
     ax.set_aspect("equal", adjustable="datalim")
+    if run.graph.n_nodes <= 2 * NAMED_AGENTS:
+        _name_ends(ax, run)
     return finished(ax, "coordinate 1", "coordinate 2")
+
+
+def _name_ends(ax: Axes, run: AgentsTrajectory) -> None:
+    """Write every agent's name beside the end of its way, on the side where other marks and names are farthest."""
+    ends, begins = run.positions[:, :, -1], run.positions[:, :, 0]
+    points = 72 * min(SINGLE_COLUMN) * 0.8
+    unit = float(np.ptp(np.vstack([ends, begins]), axis=0).max() or 1) * 1.1 / points  # of data, for one point of print
+    sides = [np.array([math.cos(a), math.sin(a)]) * _AWAY for a in np.arange(16) * math.pi / 8]
+    taken: list[np.ndarray] = [*ends, *begins]
+    for k, end in enumerate(ends):
+        others = np.array([*taken[:k], *taken[k + 1 :]])
+        free = [float(np.hypot(*(others - end - unit * side).T).min()) for side in sides]
+        side = sides[int(np.argmax(np.round(free, 9)))]
+        taken.append(end + unit * side)
+        name = shorten_text(printable(run.graph.labels[k]), 12)
+        how: dict[str, Any] = {"textcoords": "offset points", "fontsize": NAME_SIZE, "ha": "center", "va": "center"}
+        ax.annotate(name, (end[0], end[1]), (side[0], side[1]), zorder=6, **how).set_path_effects([*HALO])
