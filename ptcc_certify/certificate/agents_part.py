@@ -110,6 +110,14 @@ class AgentsPart:
         return any(any(row) for row in self.protocol.offsets)
 
     @property
+    def settles(self) -> bool:
+        """Whether the behaviour of the claim is proved at ``T`` itself, of positions less their places in a formation.
+
+        A capped gain leaves something there, and gains without a Lyapunov function prove nothing.
+        """
+        return self.structure.graph.n_edges == 0 or (bool(self.functions) and self.protocol.gain_cap is None)
+
+    @property
     def moving(self) -> bool:
         """Whether some derivative of a final state is not 0."""
         return any(m or r for agent in self.final_state or () for chain in agent for m, r in chain[1:])

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
@@ -212,7 +212,7 @@ the input is not bounded; --rho2 0.501 (rho2 kappa 0.501) leaves 1 % and bounds 
     expectations = certificate.expectations
     answers = []
     if expectations.behaviour is not None:
-        answers.append(at_deadline(certificate, judge_behaviour(certificate.structure, expectations.behaviour)))
+        answers.append(at_deadline(certificate, _judge_behaviour(certificate, expectations.behaviour)))
     answers += [] if expectations.min_rate is None else [judge_rate(certificate, expectations.min_rate)]
     answers += [] if expectations.max_input is None else [judge_input(certificate, expectations.max_input)]
     answers += judge_limits(certificate)
@@ -245,6 +245,17 @@ def judge_behaviour(structure: Structure, expected: str) -> Answer:
         return Answer(MET, expected)
     claims = [component.claim for component in structure.components]
     return Answer(REFUTED, expected, f"it is {claims[0].behaviour}" if len(claims) == 1 else "not in every component")
+
+
+def _judge_behaviour(certificate: Content, expected: str) -> Answer:
+    """Tell the same of what the agents are, which may be of order n, and have places or a capped gain."""
+    answer, part = judge_behaviour(certificate.structure, expected), certificate.agents
+    if part is None:
+        return answer
+    what = f"{expected} of x - h" if part.formation else expected
+    if part.settles:
+        return replace(answer, what=what)
+    return Answer(OPEN, what, "the capped gain leaves something at T" if part.functions else "no decay is proved")
 
 
 def judge_rate(certificate: Content, least: Fraction) -> Answer:

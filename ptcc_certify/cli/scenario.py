@@ -414,7 +414,9 @@ def _scenario_of(path: str) -> Scenario:
 
 def refuse_beside(scenario: Scenario | None, command: str) -> None:
     """Refuse late messages and moving leaders of a scenario where they would be left out without a word."""
-    for option in BESIDE if scenario is not None else ():
+    if scenario is None:
+        return
+    for option in BESIDE:
         if scenario.options.get(option) not in (None, False):
             what = "leaders that move" if option in ("leader_speed", "sign_gain") else "late messages"
             figure = "tracking" if option in ("leader_speed", "sign_gain") else "late"

@@ -161,3 +161,10 @@ def long_lines(part: AgentsPart) -> Iterator[tuple[str, str]]:
         yield "left", _error_text(part)
     if part.functions:
         yield _input_line(part)
+
+
+def claimed_of(part: AgentsPart) -> str:
+    """Tell of what the claim of the graph holds, where it is not just of the positions."""
+    if part.settles:
+        return " of x - h" * part.formation
+    return f"{' of x - h' * part.formation} but for what the cap leaves" if part.functions else " of x' = u"

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.errors import PTCCError
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.report.agents_lines import answers, long_lines
+from ptcc_certify.report.agents_lines import answers, claimed_of, long_lines
 from ptcc_certify.report.family_screen import WHATEVER, family_summary
 from ptcc_certify.report.input_lines import disturbed_lines, initial_states_text, input_lines, limits_text
 from ptcc_certify.report.late_lines import late_lines, residual_text, tracking_lines
@@ -101,7 +101,9 @@ def summary_lines(certificate: Certificate, name: str, origins: Mapping[str, str
         whatever = ", nothing late"
     if certificate.tracking is not None:
         whatever = ", leaders at rest"
-    claims = _claim_texts(certificate.structure, certificate.claims, f" at T = {near(p.T)}", whatever)
+    claims = _claim_texts(
+        certificate.structure, certificate.claims, _when(certificate, f"at T = {near(p.T)}"), whatever
+    )
     drawn = _is_set_asked(certificate)
     entries = [
         *graph_entries(certificate.structure, name),
@@ -163,6 +165,11 @@ def _file_summary(path: str, document: Mapping[str, Any], report: CheckReport) -
     if isinstance(certificate, Certificate):
         return summary_lines(certificate, path, origins)
     return family_summary(certificate, path, origins)
+
+
+def _when(certificate: Certificate, when: str) -> str:
+    """Tell of what a claim is, and when."""
+    return f" {when}" if certificate.agents is None else f"{claimed_of(certificate.agents)} {when}"
 
 
 def _protocol_text(certificate: Certificate, origins: Mapping[str, str]) -> str:
@@ -359,7 +366,7 @@ def certificate_lines(
     def lines() -> Lines:
         yield from _graph_lines(structure, name)
         yield "structure", structure_text(structure)
-        yield from _claim_lines(structure, certificate.claims, f" {when}")
+        yield from _claim_lines(structure, certificate.claims, _when(certificate, when))
         yield "protocol", _gains_text(p)
         if certificate.limits or certificate.noise is not None or certificate.delta is not None:
             yield "", "a line that names no limits, noise or disturbances is without them"

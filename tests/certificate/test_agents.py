@@ -15,6 +15,8 @@ from scipy.linalg import expm
 
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.request import Expectations
+from ptcc_certify.certificate.verdict import MET
 from ptcc_certify.checker import check
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
@@ -201,6 +203,34 @@ def test_one_agent_and_single_leaders_and_disconnected_graphs():
     certificate = made(apart, NOMINAL, [1, 2, 3, 4], Agents(order=3))
     assert certificate.verdict == "certified" and certificate.agents is not None
     assert [chain[0][0] for (chain,) in certificate.agents.final_state or ()] == [1, 1, 3, -3]
+
+
+ENEMIES = SignedDigraph.from_edges([("a", "b", -1), ("b", "c", -2), ("c", "a", -1), ("b", "a", -1)])
+DECADES = SignedDigraph.from_edges([("a", "b", "1e-30"), ("b", "a", "1e30"), ("b", "c", "-1e40"), ("c", "a", 1)])
+
+
+@pytest.mark.parametrize(
+    ("graph", "agents", "answer", "claim"),
+    [
+        (ENEMIES, {}, "stability", "stability at T = 2"),
+        (ENEMIES, {"offsets": [5, 0, 0]}, "stability of x - h", "stability of x - h at T = 2"),
+        (
+            ENEMIES,
+            {"gain_cap": 3},
+            "stability (the capped gain leaves something at T)",
+            "stability but for what the cap leaves at T = 2",
+        ),
+        (DECADES, {}, "stability (no decay is proved)", "stability of x' = u at T = 2"),
+    ],
+    ids=["plain", "formation", "capped", "undecided"],
+)
+def test_a_behaviour_is_met_only_where_it_is_proved_of_these_agents(graph: Any, agents: Any, answer: str, claim: str):
+    """In a formation, under a cap, or undecided, agents do not end at 0 at T, whatever single integrators would do."""
+    wish = Expectations(behaviour="stability")
+    certificate = made(graph, NOMINAL, [1, 2, 3], Agents(order=2, **agents), expectations=wish)
+    (judged,) = certificate.assessment.answers
+    assert str(judged) == answer and (judged.status == MET) == ("(" not in answer)
+    assert claim in told(certificate) and check(certificate.to_dict()).accepted
 
 
 REFUSED: list[tuple[dict[str, Any], dict[str, Any], str]] = [
