@@ -289,6 +289,11 @@ def test_page_and_statement_tell_of_late_messages_and_moving_leaders() -> None:
     assert "then at $T$ every follower is on its target" in Path("l.tex").read_text()
 
 
+def test_delays_that_are_too_short_to_run_have_a_page_and_a_figure_of_the_bound() -> None:
+    assert ptcc("certify", "chain.csv", "--delay", "1e-5", "--x0", "1,0,2", *QUICK, "-o", "c.json").code == 0
+    assert ptcc("report", "c.json", "-o", "c.html").code == ptcc("plot", "c.json", "--what", "late").code == 0
+
+
 def test_families_and_other_limits_are_refused_in_python_too() -> None:
     pair, protocol = SignedDigraph.from_edges([(1, 2, 1)]), NominalProtocol(1, 1, 2, 1)
     each, same = LateMessages(delay={(1, 2): "0.1"}), GainLimits(gain_cap=20)

@@ -12,7 +12,7 @@ from ptcc_certify.bounds.tracking import Tracking
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled, time_label
 from ptcc_certify.report.plots.subject import certificate_of
-from ptcc_certify.simulation.late_messages import simulate_late
+from ptcc_certify.simulation.late_messages import can_run, simulate_late
 from ptcc_certify.simulation.moving_leaders import simulate_tracking
 
 #: How runs with late messages are drawn, by how old is what agents hear.
@@ -25,6 +25,8 @@ _RUNS: dict[str, dict[str, Any]] = {
 @styled
 def plot_late(subject: Any, *, ax: Axes | None = None, time_unit: str = "") -> Axes:
     """Draw how far the farthest agent is from its final state while messages are late, under the proved bound.
+
+    Where delays are too short for runs, the bound alone.
 
     Parameters
     ----------
@@ -60,8 +62,8 @@ def plot_late(subject: Any, *, ax: Axes | None = None, time_unit: str = "") -> A
     ax, F = axes_of(ax), certificate.structure.followers
     nodes = F if F.size else np.arange(certificate.graph.n_nodes)
     start, goal = [float(x) for x in x0], np.asarray(ends, dtype=float)
-    t = np.zeros(1)
-    for pattern, style in _RUNS.items():
+    t = np.linspace(0, float(certificate.protocol.T), 401)
+    for pattern, style in _RUNS.items() if can_run(certificate.protocol, late.messages) else ():
         run = simulate_late(certificate.graph, certificate.protocol, late.messages, start, pattern=pattern)  # type: ignore[arg-type]
         t = run.t
         ax.plot(t, np.abs(run.states - goal[:, None])[nodes].max(axis=0), **style)
@@ -119,7 +121,7 @@ def plot_tracking(subject: Any, *, ax: Axes | None = None, time_unit: str = "") 
         raise ParameterError("the certificate has no initial state to run from; certify with x0")
     ax, T, u = axes_of(ax), float(certificate.protocol.T), tracking.witness.u
     run = simulate_tracking(
-        certificate.structure, certificate.protocol, tracking.leaders, [float(x) for x in x0], u=u, steps=400
+        certificate.graph, certificate.protocol, tracking.leaders, [float(x) for x in x0], u=u, steps=400
     )
     away = np.abs(run.states - run.targets)[certificate.structure.followers]
     ax.plot(run.t, away.max(axis=0), color=RUN, linewidth=1.1, label="worst leaders")
