@@ -73,8 +73,11 @@ def messages_of(graph: str, signed: SignedDigraph, options: Options) -> LateMess
 def _delay(graph: str, signed: SignedDigraph, text: str) -> Fraction | dict[tuple[str, str], Fraction]:
     """Return a delay, or those of a column."""
     from ptcc_certify.graphs.io.edge_delays import read_delays
+    from ptcc_certify.graphs.io.files import name_and_ending
+    from ptcc_certify.graphs.io.graph_files import OTHER_FORMATS
     from ptcc_certify.graphs.rationals import parse_exact
 
+    text = text.strip()
     try:
         return parse_exact(text)
     except NumberError as error:
@@ -84,6 +87,9 @@ def _delay(graph: str, signed: SignedDigraph, text: str) -> Fraction | dict[tupl
             ) from None
     if graph == "-":
         raise ParameterError("--delay names a column, but standard input is read once; save the edge list to a file")
+    if (ending := name_and_ending(graph)[1]) in OTHER_FORMATS:
+        mend = "save it as one, or give one delay for all"
+        raise ParameterError(f"--delay {text}: names a column of an edge list, and .{ending} is none; {mend}")
     delays = read_delays(graph_file(graph), signed, text)
     signed.read["notes"] = (f'delays of column "{text}"', *_without(signed.read["notes"], text))
     return delays

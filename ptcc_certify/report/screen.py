@@ -104,6 +104,8 @@ def summary_lines(certificate: Certificate, name: str, origins: Mapping[str, str
     claims = _claim_texts(
         certificate.structure, certificate.claims, _when(certificate, f"at T = {near(p.T)}"), whatever
     )
+    if len(certificate.claims) > 1 and (certificate.late or certificate.tracking):
+        claims.append(whatever.removeprefix(", "))
     drawn = _is_set_asked(certificate)
     entries = [
         *graph_entries(certificate.structure, name),

@@ -294,6 +294,19 @@ def test_delays_that_are_too_short_to_run_have_a_page_and_a_figure_of_the_bound(
     assert ptcc("report", "c.json", "-o", "c.html").code == ptcc("plot", "c.json", "--what", "late").code == 0
 
 
+def test_components_are_claimed_of_messages_at_once_too() -> None:
+    Path("two.csv").write_text("source,target,weight\na,b,1\nc,d,-1\nd,e,1\n")
+    assert "\n           nothing late\n" in ptcc("certify", "two.csv", "--delay", "0.1", *QUICK).out
+    assert "\n           leaders at rest\n" in ptcc("certify", "two.csv", "--leader-speed", "1", *QUICK).out
+
+
+def test_a_column_of_a_file_without_columns_is_refused() -> None:
+    Path("g.gml").write_text("graph [ directed 1 node [ id 0 ] node [ id 1 ] edge [ source 0 target 1 weight 1 ] ]")
+    run = ptcc("certify", "g.gml", "--delay", "delay")
+    assert run.code == 2
+    assert "--delay delay: names a column of an edge list, and .gml is none" in run.err
+
+
 def test_families_and_other_limits_are_refused_in_python_too() -> None:
     pair, protocol = SignedDigraph.from_edges([(1, 2, 1)]), NominalProtocol(1, 1, 2, 1)
     each, same = LateMessages(delay={(1, 2): "0.1"}), GainLimits(gain_cap=20)
