@@ -21,7 +21,7 @@ import numpy as np
 
 from lmi.dyadic import round_to_bits
 from lmi.errors import LMIError, NoCertificate
-from lmi.exact.decimal_rounding import float_up
+from lmi.exact.decimal_rounding import float_up, up
 from lmi.exact.elementary_enclosures import log, rounded
 from ptcc_certify.bounds.late_steps import Steps, search_steps
 from ptcc_certify.bounds.missed_deadline import Missed, find_missed
@@ -70,7 +70,7 @@ class RowBound:
         return self.witness.u * float(self.initial * self.left + self.floor) * _MORE + 1e-300
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class LateBounds:
     """What is proved of a graph whose messages are late.
 
@@ -123,6 +123,10 @@ class LateBounds:
         """The largest of the bounds of ``|x_k(T) - x_k*|``; infinite where nothing is bounded."""
         largest = math.inf if self.residual is None else float(self.residual.max())
         return largest if self.form is None else min(largest, float_up(max(self.form.residual)))
+
+    def __repr__(self) -> str:
+        within = "nothing" if math.isinf(self.largest) else f"every agent within {up(self.largest, 2)}"
+        return f"LateBounds({self.messages!r}: {within} at T)"
 
     @property
     def direct(self) -> bool:

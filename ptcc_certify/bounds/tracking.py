@@ -18,7 +18,7 @@ from fractions import Fraction
 import numpy as np
 
 from lmi.errors import LMIError, NoCertificate
-from lmi.exact.decimal_rounding import float_up
+from lmi.exact.decimal_rounding import float_up, up
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness, refuse_leader_groups
 from ptcc_certify.protocols.base import Protocol
@@ -30,7 +30,7 @@ _LOSSES, _JUDGED = (0.01, 0.2, 0.6), 0.05
 _MORE = 1 + 1e-9
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Tracking:
     """What is proved of followers of moving leaders.
 
@@ -59,6 +59,9 @@ class Tracking:
     relative: bool
     after: Fraction
     input: np.ndarray | None
+
+    def __repr__(self) -> str:
+        return f"Tracking({self.leaders!r}: exact at T, within {up(self.distance_after, 2)} after it)"
 
     @property
     def pole(self) -> float:

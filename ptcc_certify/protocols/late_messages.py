@@ -91,6 +91,8 @@ diverge, for its gain grows without limit before T; give gain_cap, or measure th
         put(self, "losses", int(self.losses))
         if self.losses and self.period is None:
             raise ParameterError("losses without a period: tell how long it is from one message to the next")
+        if not isinstance(self.own_delay, bool):
+            raise ParameterError(f"own_delay = {shorten(repr(self.own_delay))} is neither True nor False")
         if self.own_delay and self.gain_cap is None:
             raise ParameterError(
                 "own_delay without gain_cap: an own state that is late makes the protocol diverge, for its gain grows "

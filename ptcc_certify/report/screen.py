@@ -368,16 +368,16 @@ def certificate_lines(
     def lines() -> Lines:
         yield from _graph_lines(structure, name)
         yield "structure", structure_text(structure)
-        yield from _claim_lines(structure, certificate.claims, _when(certificate, when))
-        yield "protocol", _gains_text(p)
-        if certificate.limits or certificate.noise is not None or certificate.delta is not None:
-            yield "", "a line that names no limits, noise or disturbances is without them"
         yield from late_lines(certificate)
         if by_agent := residual_text(certificate):
             yield "", f"by agent: {by_agent}"
         yield from tracking_lines(certificate)
         if certificate.late is not None or certificate.tracking is not None:
-            yield "", f"all lines below are of {'messages at once' if certificate.late else 'leaders at rest'}"
+            yield "", f"the lines below are of {'messages at once' if certificate.late else 'leaders at rest'}"
+        yield from _claim_lines(structure, certificate.claims, _when(certificate, when))
+        yield "protocol", _gains_text(p)
+        if certificate.limits or certificate.noise is not None or certificate.delta is not None:
+            yield "", "a line that names no limits, noise or disturbances is without them"
         if certificate.initial_state is not None:
             drawn = f" ({origins['x(0)']})" if "x(0)" in origins else ""
             alone = ", of the simulated run alone" * _is_set_asked(certificate)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from fractions import Fraction
 from typing import Any
 
+import networkx as nx
 import numpy as np
 import pytest
 from late_certificates import led_graph
@@ -332,8 +333,18 @@ def test_runs_refuse_what_they_cannot_run_by_name() -> None:
         (pair, moving, [1], {}, "x0"),
         (pair, moving, [1, 0], {"steps": 0}, "steps"),
         (pair, moving, [1, 0], {"u": [0]}, "u is not 1 positive numbers"),
-        ([[0]], moving, [1], {}, "nobody tracks"),
+        (SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1)]), moving, [1, 1], {}, "one group"),
     ):
-        with pytest.raises(ParameterError, match=said):
+        with pytest.raises((ParameterError, HypothesisError), match=said):
             simulate_tracking(graph, p, leaders, x0, **more)
-    assert simulate_late([[0, 0], [1, 0]], p, late, [1, 0]).states.shape[0] == 2
+    assert simulate_late(nx.DiGraph([(1, 2, {"weight": 1})]), p, late, [1, 0]).states.shape[0] == 2
+
+
+def test_certificates_show_and_draw_late_messages_and_moving_leaders() -> None:
+    chain, p = SignedDigraph.from_edges([(1, 2, 1), (2, 3, -1)]), NominalProtocol(1, 1, 2, 1)
+    for name, asked in (("late", {"messages": LateMessages(delay="0.1")}), ("tracking", {"leaders": MovingLeaders(1)})):
+        cert = certify(chain, p, [1, 0, 2], method="perron", simulation=False, **asked)
+        assert cert.plot(name).lines
+        assert len(repr(getattr(cert, name))) < 120
+        assert "<svg" in cert._repr_html_() or "<img" in cert._repr_html_()
+    assert certify(chain, p, method="perron", messages=LateMessages(delay="0.1")).late.relative
