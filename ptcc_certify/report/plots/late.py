@@ -21,6 +21,9 @@ _RUNS: dict[str, dict[str, Any]] = {
     "square": {"color": BEHIND, "linewidth": 0.8, "linestyle": "--", "label": "now late, now not"},
 }
 
+#: A lower bound at ``T`` is drawn from this share of the upper one on.
+_SEEN = 1e-3
+
 
 @styled
 def plot_late(subject: Any, *, ax: Axes | None = None, time_unit: str = "") -> Axes:
@@ -68,7 +71,7 @@ def plot_late(subject: Any, *, ax: Axes | None = None, time_unit: str = "") -> A
         t = run.t
         ax.plot(t, np.abs(run.states - goal[:, None])[nodes].max(axis=0), **style)
     _draw_bound(ax, late, t)
-    if late.missed is not None:
+    if late.missed is not None and late.missed.bound >= _SEEN * late.largest:
         marks: dict[str, Any] = {"marker": "v", "color": BOUND, "linestyle": "none", "markersize": 4, "clip_on": False}
         ax.plot(t[-1:], [float(late.missed.bound)], label="at least, if as late as allowed", **marks)
     ax.set_yscale("log")
