@@ -21,7 +21,7 @@ import numpy as np
 
 from lmi.dyadic import round_to_bits
 from lmi.errors import LMIError, NoCertificate
-from lmi.exact.decimal_rounding import float_up
+from lmi.exact.decimal_rounding import float_up, up
 from lmi.exact.elementary_enclosures import log, rounded
 from ptcc_certify.bounds.late_steps import Steps, search_steps
 from ptcc_certify.bounds.missed_deadline import Missed, find_missed
@@ -70,7 +70,7 @@ class RowBound:
         return self.witness.u * float(self.initial * self.left + self.floor) * _MORE + 1e-300
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class LateBounds:
     """What is proved of a graph whose messages are late.
 
@@ -124,8 +124,18 @@ class LateBounds:
         largest = math.inf if self.residual is None else float(self.residual.max())
         return largest if self.form is None else min(largest, float_up(max(self.form.residual)))
 
-    def deviation_bound(self, t: np.ndarray) -> np.ndarray:
+    def __repr__(self) -> str:
+        within = "nothing" if math.isinf(self.largest) else f"every agent within {up(self.largest, 2)}"
+        return f"LateBounds({self.messages!r}: {within} at T)"
+
+    @property
+    def direct(self) -> bool:
+        """Whether all followers hear of leaders alone, so that they settle at ``T`` exactly."""
+        return self.staged is not None and len(set(self.staged)) == 1
+
+    def deviation_bound(self, t: Sequence[float] | np.ndarray) -> np.ndarray:
         """Return what bounds ``|x_k - x_k*|`` at instants, ``(F, M)`` floats; infinite where nothing does."""
+        t = np.asarray(t, dtype=float)
         whole = np.full((self.structure.followers.size, len(t)), np.inf)
         for row in self.rows:
             cap = [x for x in (row.cap, self.gain.limits.gain_cap) if x is not None]

@@ -26,7 +26,7 @@ _MISSED_FOLLOWERS = 400
 
 @dataclass(frozen=True, eq=False)
 class Missed:
-    """An agent that is away from its final state at ``T`` by ``bound`` at least, however old what it hears.
+    """An agent that is off its final state at ``T`` by ``bound`` at least, if no message comes sooner than told.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ def _kept(protocol: Protocol, rate: Fraction, delay: Fraction) -> Fraction:
     """Bound ``e^(-rate s(T - delay))`` from below."""
     share = delay / protocol.T
     if share >= 1:
-        return Fraction(1)
+        return exp(Fraction(0))[0]  # as the check encloses it
     return exp(-rate * protocol.gain.exact.clock(log(1 / share)[1], share))[0]
 
 

@@ -159,7 +159,10 @@ class SmallDelayBounds:
     def _phi(self, one: DecayingForm, lag: float) -> np.ndarray | None:
         """Return ``phi`` with some room; None if ``lag B`` is no contraction."""
         first = np.sqrt([float(c) for c in one.errors]) * (1 + _MORE)
-        phi = np.linalg.solve(np.eye(first.size) - lag * self._B, first + _MORE * first.max())
+        try:
+            phi = np.linalg.solve(np.eye(first.size) - lag * self._B, first + _MORE * first.max())
+        except np.linalg.LinAlgError:  # an eigenvalue of ``lag B`` is 1
+            return None
         good = (
             np.isfinite(phi).all()
             and (phi >= first).all()

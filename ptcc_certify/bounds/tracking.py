@@ -18,7 +18,7 @@ from fractions import Fraction
 import numpy as np
 
 from lmi.errors import LMIError, NoCertificate
-from lmi.exact.decimal_rounding import float_up
+from lmi.exact.decimal_rounding import float_up, up
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness, refuse_leader_groups
 from ptcc_certify.protocols.base import Protocol
@@ -30,7 +30,7 @@ _LOSSES, _JUDGED = (0.01, 0.2, 0.6), 0.05
 _MORE = 1 + 1e-9
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Tracking:
     """What is proved of followers of moving leaders.
 
@@ -60,6 +60,9 @@ class Tracking:
     after: Fraction
     input: np.ndarray | None
 
+    def __repr__(self) -> str:
+        return f"Tracking({self.leaders!r}: exact at T, within {up(self.distance_after, 2)} after it)"
+
     @property
     def pole(self) -> float:
         """``p = a rho2 kappa``: above 1 the input stays bounded."""
@@ -70,7 +73,12 @@ class Tracking:
         """``(speed + disturbance) / min u``; 0 with the sign term, which takes it up."""
         return 0.0 if self.leaders.sign_gain is not None else float(self.leaders.total) / float(self.witness.u.min())
 
-    def distance_bound(self, remaining: np.ndarray) -> np.ndarray:
+    @property
+    def distance_after(self) -> float:
+        """What bounds ``|x_k - x_k*|`` of every follower from ``T`` on."""
+        return float(self.after) * float(self.witness.u.max()) * _MORE
+
+    def distance_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
         """Return what bounds ``|x_k - x_k*|`` of followers where ``1 - t/T`` is ``remaining``, ``(F, M)`` floats."""
         q, T, p = np.asarray(remaining, dtype=float), float(self.protocol.T), self.pole
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -17,8 +17,8 @@ def at_deadline(certificate: Content, answer: Answer) -> Answer:
     late = certificate.late
     if late is None or answer.status != MET or certificate.constant:
         return answer
-    if late.staged is not None and set(late.staged) == {certificate.protocol.T}:
-        return answer  # all listen to leaders alone
+    if late.direct:
+        return answer
     what = f"{answer.what} at T with late messages"
     if late.missed is not None:
         return Answer(REFUTED, what, _misses(certificate, late.missed))

@@ -164,29 +164,69 @@ def refuse(
     _refuse_long(_distinct_weights(graph), graph.n_nodes, "the weights", lambda: f"edge {_longest_edge(graph)}")
 
 
-def refuse_beside(
-    structure: Structure, protocol: Protocol, messages: LateMessages | None, leaders: MovingLeaders | None
-) -> None:
+_NO_SET = "(--initial-bound) is not taken up here, bounds are from one initial state; give x0 alone"
+#: What is not certified beside late messages, and what to do instead.
+_NOT_LATE = {
+    "initial_set": _NO_SET,
+    "stop_before": "late messages are certified under a gain cap alone; leave it out",
+    "sample_period": "of late messages a period tells how often they are sent; give that instead",
+    "noise": "of late messages an error of values tells it: noise within NU is one of 2 NU, a quantisation of 4 NU; "
+    "give that instead",
+    "delta": "is not proved of late messages under the nominal protocol; take the sliding-mode protocol, under which "
+    "disturbances within delta move nothing",
+}
+#: What is not certified beside leaders that move.
+_NOT_TRACKING = {
+    "initial_set": _NO_SET,
+    "gain_cap": "leaders that move are tracked at T by a gain without limits; leave it out",
+    "stop_before": "leaders that move are tracked at T by a gain without limits; leave it out",
+    "sample_period": "leaders that move are tracked at T by a gain without limits; leave it out",
+    "noise": "is not proved while leaders move; leave it out",
+    "delta": "of leaders that move MovingLeaders(disturbance=..) tells what disturbs the followers; give that instead",
+}
+
+
+def refuse_beside(structure: Structure, protocol: Protocol, request: Request) -> None:
     """Refuse late messages and moving leaders where nothing could be certified, before anything is searched."""
+    messages, leaders = request.messages, request.leaders
+    if messages is None and request.expectations.max_residual is not None:
+        raise ParameterError("max_residual: is asked of late messages; tell how late they are, or leave it out")
+    if messages is None and leaders is None:
+        return
     if messages is not None and leaders is not None:
         raise ParameterError("messages and leaders together are not certified yet; ask for one of them")
-    if isinstance(leaders, MovingLeaders) and protocol.reaching:
-        raise ParameterError("leaders that move are certified under the nominal protocol; change it, or leave them out")
+    _refuse_more(_NOT_TRACKING if messages is None else _NOT_LATE, request)
     if leaders is not None:
-        refuse_leader_groups(structure, "leaders that move as they like: a bound")
-    if isinstance(messages, LateMessages):
-        messages.latencies(structure.graph)
-        if messages.gain_cap is None:
-            refuse_leader_groups(structure, "what late messages leave without --gain-cap: a bound")
-        if messages.value_error and messages.own_delay:
+        if protocol.reaching:
             raise ParameterError(
-                "values that are off are not certified where the own state is late; leave one of them out"
+                "leaders that move are certified under the nominal protocol; change it, or leave them out"
             )
-        if messages.value_error:
-            refuse_leader_groups(structure, "what values that are off add: a bound")
+        refuse_leader_groups(structure, "leaders that move as they like: a bound")
+    if messages is not None:
+        _refuse_messages(structure, messages, [limit.gain_cap for limit in request.limits])
     alone = structure.followers.size == 0 if leaders is not None else structure.graph.n_edges == 0
-    if (messages is not None or leaders is not None) and alone:
+    if alone:
         raise ParameterError("nobody listens to a leader, so nothing is late and nobody tracks; leave it out")
+
+
+def _refuse_more(refused: Mapping[str, str], request: Request) -> None:
+    """Refuse limits of the gain, noise and disturbances of which nothing is certified beside."""
+    for name, mend in refused.items():
+        if any(getattr(one, name, None) is not None for one in (request, *request.limits)):
+            raise ParameterError(f"{name}{' ' if mend is _NO_SET else ': '}{mend}")
+
+
+def _refuse_messages(structure: Structure, messages: LateMessages, caps: Sequence[Fraction | None]) -> None:
+    """Refuse late messages that do not fit the graph, or a cap of the gain that is another than theirs."""
+    messages.latencies(structure.graph)
+    if any(cap != messages.gain_cap for cap in caps):
+        raise ParameterError("gain_cap: limits and late messages have two; give both the same, or messages alone")
+    if messages.gain_cap is None:
+        refuse_leader_groups(structure, "late messages: add a gain cap; without one a bound")
+    if messages.value_error and messages.own_delay:
+        raise ParameterError("values that are off are not certified where the own state is late; leave one of them out")
+    if messages.value_error:
+        refuse_leader_groups(structure, "what values that are off add: a bound")
 
 
 def read_request(structure: Structure, protocol: Protocol, arguments: Mapping[str, Any]) -> Request:

@@ -140,7 +140,8 @@ def _requests(options: shared.Options) -> dict[str, Any]:
         "scenario": scenario_record(),
     }
     if options["kind"] == "nominal":
-        own = {name: options[name] for name in ("delta", "noise")}
+        own = {"noise": options["noise"]}
+        own |= {"delta": options["delta"]} if options["leader_speed"] is None else {}  # else it disturbs the followers
         return more | own | {"limits": [*filter(None, [shared.actuator_of(options)])]}
     return more
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
@@ -50,11 +51,11 @@ def messages_of(graph: str, signed: SignedDigraph, options: Options) -> LateMess
     """Return how late messages are; None if nothing is asked of them."""
     from ptcc_certify.protocols.late_messages import LateMessages
 
+    if options["packet_loss"] and options["period"] is None:
+        raise ParameterError("--packet-loss says nothing by itself; give --period, the time between two messages")
     if all(options[name] is None for name in _ASKING):
-        for name, flag in (("packet_loss", "--packet-loss"), ("own_delay", "--own-delay")):
-            if options[name]:
-                mend = "--period, the time between two messages" if name == "packet_loss" else "--delay"
-                raise ParameterError(f"{flag} says nothing by itself; give {mend}")
+        if options["own_delay"]:
+            raise ParameterError("--own-delay says nothing by itself; give --delay")
         return None
     step = options["quantisation"]
     if step is not None and step < 0:
@@ -72,18 +73,35 @@ def messages_of(graph: str, signed: SignedDigraph, options: Options) -> LateMess
 def _delay(graph: str, signed: SignedDigraph, text: str) -> Fraction | dict[tuple[str, str], Fraction]:
     """Return a delay, or those of a column."""
     from ptcc_certify.graphs.io.edge_delays import read_delays
+    from ptcc_certify.graphs.io.files import name_and_ending
+    from ptcc_certify.graphs.io.graph_files import OTHER_FORMATS
     from ptcc_certify.graphs.rationals import parse_exact
 
+    text = text.strip()
     try:
         return parse_exact(text)
     except NumberError as error:
-        if not text.isidentifier():
+        if not text.isidentifier() or "finite" in str(error):
             raise ParameterError(
                 f"--delay: {error}; give a number in your unit of time, or the name of a column"
             ) from None
     if graph == "-":
         raise ParameterError("--delay names a column, but standard input is read once; save the edge list to a file")
-    return read_delays(graph_file(graph), signed, text)
+    if (ending := name_and_ending(graph)[1]) in OTHER_FORMATS:
+        mend = "save it as one, or give one delay for all"
+        raise ParameterError(f"--delay {text}: names a column of an edge list, and .{ending} is none; {mend}")
+    delays = read_delays(graph_file(graph), signed, text)
+    signed.read["notes"] = (f'delays of column "{text}"', *_without(signed.read["notes"], text))
+    return delays
+
+
+def _without(notes: Iterable[str], title: str) -> Iterator[str]:
+    """Leave a column that is read out of the note on columns that are ignored."""
+    for note in notes:
+        head, _, names = note.partition("columns ignored: ")
+        left = [name for name in names.split(", ") if name.strip('"').lower() != title.lower()]
+        if head or left:
+            yield note if head else f"columns ignored: {', '.join(left)}"
 
 
 def leaders_of(options: Options) -> MovingLeaders | None:

@@ -14,7 +14,7 @@ from ptcc_certify.cli.agents import agents_keywords, agents_of, agents_options, 
 from ptcc_certify.cli.completion import CERTIFICATES, GRAPHS, PACKAGED, complete
 from ptcc_certify.cli.families import mode_options, read_graph_or_family, refuse_options
 from ptcc_certify.cli.kinds_of_file import kind_of
-from ptcc_certify.cli.scenario import graph_of
+from ptcc_certify.cli.scenario import MEMORY, graph_of, refuse_beside
 from ptcc_certify.cli.terminal import FIGURES, print_lines, progress, refuse_output
 from ptcc_certify.errors import ExitCode, ParameterError
 
@@ -200,6 +200,7 @@ def _of_graph(
     protocol = shared.protocol_of(options, () if what == "decay" else ("delta", "disturbance"))
     if what in ("graph", "spectrum"):
         return signed, protocol
+    refuse_beside(click.get_current_context().meta.get(MEMORY), f"plot --what {what}")
     if what in OF_AGENTS or agents_of(options) is not None:
         return _of_agents(signed, protocol, what, options)
     x0 = shared.read_initial_state(options["x0"], options["seed"], signed, within=options["initial_bound"])

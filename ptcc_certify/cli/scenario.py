@@ -29,6 +29,8 @@ MAX_BYTES = 1_000_000
 MEMORY = "ptcc_certify.scenario"
 #: Commands for which it does not matter what the agents are.
 _OF_THE_GRAPH_ALONE = ("classify", "check")
+#: Options of late messages and moving leaders, under which ``ptcc certify`` alone works.
+BESIDE = ("delay", "period", "packet_loss", "quantisation", "own_delay", "leader_speed", "sign_gain")
 #: Where the context of its command is kept.
 COMMAND = "ptcc_certify.command"
 
@@ -380,6 +382,8 @@ def graph_of(context: click.Context, parameter: click.Parameter, graph: Any) -> 
                     f"ptcc {context.command.name} takes single integrators; ptcc certify, simulate and plot take others"
                 )
                 raise ParameterError(f"{scenario.place(key)}: {why}")
+    if context.command.name in ("simulate", "design"):
+        refuse_beside(scenario, context.command.name)
     if "x0" in own and "dimension" not in own and scenario.options.get("dimension", "1") != "1":
         why = f"ptcc {context.command.name} takes scalar agents; what is proved of one component holds for each"
         raise ParameterError(f"{scenario.place('dimension')}: {why}: leave it out, and let x0 be one component")
@@ -406,6 +410,18 @@ def _scenario_of(path: str) -> Scenario:
             except FormatError as error:
                 raise FormatError(f"{scenario.place('graph')}: {error}") from None
     return scenario
+
+
+def refuse_beside(scenario: Scenario | None, command: str) -> None:
+    """Refuse late messages and moving leaders of a scenario where they would be left out without a word."""
+    if scenario is None:
+        return
+    for option in BESIDE:
+        if scenario.options.get(option) not in (None, False):
+            what = "leaders that move" if option in ("leader_speed", "sign_gain") else "late messages"
+            figure = "tracking" if option in ("leader_speed", "sign_gain") else "late"
+            mend = f"ptcc certify -o c.json proves it, ptcc plot c.json --what {figure} runs it"
+            raise ParameterError(f"{scenario.place(option)}: ptcc {command} does not take {what}; {mend}")
 
 
 def takes_one_graph(name: str | None) -> str:
@@ -458,7 +474,9 @@ def placed(context: click.Context, error: PTCCError | click.BadParameter) -> Exc
         text = str(error)
         match = re.match(r"(?:--)?([A-Za-z][\w-]*)(: | = | )", text)
         option = match[1].replace("-", "_") if match else ""
-        option = {"initial_state": "x0", "initial": "x0", "behaviour": "expect"}.get(option, option)
+        option = {"initial_state": "x0", "initial": "x0", "behaviour": "expect", "speed": "leader_speed"}.get(
+            option, option
+        )
         if match and match[0].startswith("--"):
             text = text[match.end() :]
     if context.meta[COMMAND].get_parameter_source(option) is ParameterSource.DEFAULT_MAP:

@@ -51,6 +51,8 @@ _FIGURES = {
     "states": "plot_trajectory",
     "motion": "plot_motion",
     "formation": "plot_formation",
+    "late": "plot_late",
+    "tracking": "plot_tracking",
 }
 
 
@@ -67,7 +69,7 @@ def plot(subject: Any, what: str, **keywords: Any) -> Any:
     >>> plot(None, "picture")
     Traceback (most recent call last):
     ptcc_certify.errors.ParameterError: what = 'picture' is unknown; one of decay, input, graph, spectrum, states, \
-motion, formation
+motion, formation, late, tracking
     """
     if what not in _FIGURES:
         raise ParameterError(f"what = {what!r} is unknown; one of {', '.join(_FIGURES)}")

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from numbers import Integral
 from typing import Any
 
 from ptcc_certify.errors import ParameterError, gated
@@ -29,19 +30,19 @@ class LateMessages:
 
     Parameters
     ----------
-    delay : number, or mapping of (source, target) to number
+    delay : number or str, or mapping of (source, target) to number
         What every message takes, or that over each edge by itself, in units of time, not negative. Over an edge that
         a mapping does not name messages take no time.
-    period : number, optional
+    period : number or str, optional
         Between two messages, positive, in units of time; without it messages are sent all the time.
     losses : int
         Messages in a row that may get lost; asks for a ``period``.
-    value_error : number
+    value_error : number or str
         What a value that is heard is off by at most, in units of the state: half the step of a quantiser, the
         threshold of an event trigger, noise.
     own_delay : bool
         Whether the own state is as old as what is heard: a relative position that is measured late.
-    gain_cap : number, optional
+    gain_cap : number or str, optional
         The gain is at most this, 1/time/weight; ``own_delay`` asks for it.
 
     Raises
@@ -79,12 +80,19 @@ diverge, for its gain grows without limit before T; give gain_cap, or measure th
             put(self, "delay", {edge: parameter(_of(edge), x, True) for edge, x in self.delay.items()})
         else:
             put(self, "delay", parameter("delay", self.delay, True))
-        if isinstance(self.losses, bool) or not isinstance(self.losses, int) or not 0 <= self.losses <= MOST_LOSSES:
+        if (
+            isinstance(self.losses, bool)
+            or not isinstance(self.losses, Integral)
+            or not 0 <= self.losses <= MOST_LOSSES
+        ):
             raise ParameterError(
                 f"losses = {shorten(repr(self.losses))} is not a number of messages, 0 to {MOST_LOSSES:,}"
             )
+        put(self, "losses", int(self.losses))
         if self.losses and self.period is None:
             raise ParameterError("losses without a period: tell how long it is from one message to the next")
+        if not isinstance(self.own_delay, bool):
+            raise ParameterError(f"own_delay = {shorten(repr(self.own_delay))} is neither True nor False")
         if self.own_delay and self.gain_cap is None:
             raise ParameterError(
                 "own_delay without gain_cap: an own state that is late makes the protocol diverge, for its gain grows "
@@ -92,7 +100,7 @@ diverge, for its gain grows without limit before T; give gain_cap, or measure th
             )
         if not self.age and not self.value_error:
             raise ParameterError(
-                "messages that are neither late, nor lost, nor rounded; give delay, period or value_error"
+                "messages that are neither late, nor lost, nor rounded; give a delay, a period or a value error above 0"
             )
 
     @property
@@ -113,6 +121,10 @@ diverge, for its gain grows without limit before T; give gain_cap, or measure th
 
     def latencies(self, graph: SignedDigraph) -> Fraction | tuple[Fraction, ...]:
         """Return what messages take: one number, or one for every edge of a graph, in the order of its edges.
+
+        Parameters
+        ----------
+        graph : SignedDigraph
 
         Raises
         ------

@@ -20,11 +20,11 @@ class MovingLeaders(Parameters):
 
     Parameters
     ----------
-    speed : number
+    speed : number or str
         Of every leader, at most; in units of the state over time, not negative.
-    disturbance : number
+    disturbance : number or str
         Of every follower, at most; in units of the input, not negative.
-    sign_gain : number, optional
+    sign_gain : number or str, optional
         What followers add times ``sign(e_k)``, at least ``speed + disturbance``: they stay on their targets after
         ``T``. Without it they are there at ``T``.
 
@@ -32,6 +32,10 @@ class MovingLeaders(Parameters):
     ------
     ParameterError
         A number is outside its domain, or ``sign_gain`` is below ``speed + disturbance``.
+
+    References
+    ----------
+    The sliding-mode term is that of protocol (8) of [Zhu]_, with ``e_k`` in place of ``sigma_k``.
 
     Examples
     --------

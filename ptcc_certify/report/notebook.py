@@ -63,10 +63,12 @@ def certificate_html(certificate: Certificate) -> str:
         drawn = part.initial_state is not None and certificate.graph.n_nodes <= SHOWN_NODES
         alt = "positions, velocities and so on over time"
         return _page(certificate_lines(certificate, "signed digraph"), plot_motion(certificate) if drawn else None, alt)
+    lines = certificate_lines(certificate, "signed digraph")
+    if figures := draw(certificate, ["late", "tracking"]):
+        (figure,) = figures.values()
+        return _page(lines, figure, "distance of the farthest agent under its proved bound, over time")
     alt = "simulated decay of the error under its proved bound, over the time left to the deadline"
-    return _page(
-        certificate_lines(certificate, "signed digraph"), draw(_with_run(certificate), ["decay"]).get("decay"), alt
-    )
+    return _page(lines, draw(_with_run(certificate), ["decay"]).get("decay"), alt)
 
 
 def _with_run(certificate: Certificate) -> Certificate:

@@ -19,7 +19,7 @@ from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.report.agents_lines import answers, claimed_of, long_lines
 from ptcc_certify.report.family_screen import WHATEVER, family_summary
 from ptcc_certify.report.input_lines import disturbed_lines, initial_states_text, input_lines, limits_text
-from ptcc_certify.report.late_lines import late_lines, tracking_lines
+from ptcc_certify.report.late_lines import late_lines, residual_text, tracking_lines
 from ptcc_certify.report.sliding_lines import sliding_lines
 from ptcc_certify.report.structure_text import (
     ORIENTATION,
@@ -76,7 +76,8 @@ def summary_lines(certificate: Certificate, name: str, origins: Mapping[str, str
     -------
     list of str
         Graph, how it was read, protocol, claim, final state, error bound, input, disturbances, verdict. Error
-        bound and input tell of single agents where their line has room.
+        bound and input tell of single agents where their line has room. Where messages are late, or leaders move, what
+        holds then stands before the claim, in place of error bound and input.
 
     Examples
     --------
@@ -97,16 +98,20 @@ def summary_lines(certificate: Certificate, name: str, origins: Mapping[str, str
     if p.reaching is not None and p.reaching.delta == 0:
         whatever = ", without disturbances"
     if certificate.late is not None:
-        whatever = f", nothing late{whatever}"
+        whatever = ", nothing late"
     if certificate.tracking is not None:
-        whatever = f", leaders at rest{whatever}"
+        whatever = ", leaders at rest"
     claims = _claim_texts(
         certificate.structure, certificate.claims, _when(certificate, f"at T = {near(p.T)}"), whatever
     )
+    if len(certificate.claims) > 1 and (certificate.late or certificate.tracking):
+        claims.append(whatever.removeprefix(", "))
     drawn = _is_set_asked(certificate)
     entries = [
         *graph_entries(certificate.structure, name),
         ("protocol", _protocol_text(certificate, origins)),
+        *late_lines(certificate),
+        *tracking_lines(certificate),
         *_headed("claim", claims),
         *_answers(certificate, drawn),
         ("verdict", _short_verdict(certificate)),
@@ -247,11 +252,11 @@ def _answers(certificate: Certificate, drawn: bool) -> Lines:
     if certificate.agents is not None:
         yield from answers(certificate.agents)
         return
-    yield from () if drawn else _short_final_state(certificate)
-    yield from _bounds(certificate, drawn)
-    yield from disturbed_lines(certificate)
-    yield from late_lines(certificate)
-    yield from tracking_lines(certificate)
+    if certificate.tracking is None and not drawn:
+        yield from _short_final_state(certificate)
+    if certificate.late is None and certificate.tracking is None:
+        yield from _bounds(certificate, drawn)
+        yield from disturbed_lines(certificate)
 
 
 def _bounds(certificate: Certificate, drawn: bool) -> Lines:
@@ -363,6 +368,12 @@ def certificate_lines(
     def lines() -> Lines:
         yield from _graph_lines(structure, name)
         yield "structure", structure_text(structure)
+        yield from late_lines(certificate)
+        if by_agent := residual_text(certificate):
+            yield "", f"by agent: {by_agent}"
+        yield from tracking_lines(certificate)
+        if certificate.late is not None or certificate.tracking is not None:
+            yield "", f"the lines below are of {'messages at once' if certificate.late else 'leaders at rest'}"
         yield from _claim_lines(structure, certificate.claims, _when(certificate, when))
         yield "protocol", _gains_text(p)
         if certificate.limits or certificate.noise is not None or certificate.delta is not None:

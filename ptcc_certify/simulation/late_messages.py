@@ -19,8 +19,9 @@ import numpy as np
 
 from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.graphs.rationals import shorten
-from ptcc_certify.protocols.base import Protocol
+from ptcc_certify.graphs.io import as_graph, as_state
+from ptcc_certify.graphs.rationals import shorten, whole_number
+from ptcc_certify.protocols.base import Protocol, refuse_no_protocol
 from ptcc_certify.protocols.gain import Gain
 from ptcc_certify.protocols.gain_limits import GainLimits, LimitedGain
 from ptcc_certify.protocols.late_messages import LateMessages
@@ -53,7 +54,7 @@ class LateRun:
 
 @gated
 def simulate_late(
-    graph: SignedDigraph,
+    graph: Any,
     protocol: Protocol,
     messages: LateMessages,
     x0: Any,
@@ -67,12 +68,13 @@ def simulate_late(
 
     Parameters
     ----------
-    graph : SignedDigraph
+    graph : graph-like
+        N agents, in whatever form :func:`ptcc_certify.as_graph` takes.
     protocol : Protocol
     messages : LateMessages
         Values are off by the whole ``value_error``, to either side.
-    x0 : (N,) array_like
-        The state up to 0.
+    x0 : state-like
+        The state up to 0, whatever :func:`ptcc_certify.as_state` takes.
     pattern : {"oldest", "fresh", "varying", "square"}
         As old as allowed; as fresh as allowed, but for the step; between the two like a sine of its own for every edge;
         from the one to the other and back at random instants.
@@ -81,12 +83,22 @@ def simulate_late(
     steps : int
         Instants, about.
     deadlines : sequence of N Fraction, optional
-        Of every agent by itself, in place of ``T``.
+        Of every agent by itself, in place of ``T``; in units of time.
+
+    Returns
+    -------
+    LateRun
 
     Raises
     ------
     ParameterError
-        The pattern is unknown, or the delay is so short that the run would take more than 20,000 steps.
+        The pattern is unknown, a number is outside its domain, the state does not fit the graph, or the delay is so
+        short that the run would take more than 20,000 steps.
+
+    References
+    ----------
+    Feyzmahdavian, Charalambous, Johansson, Exponential stability of homogeneous positive systems of degree one with
+    time-varying delays, IEEE Trans. Automat. Control 59 (2014).
 
     Examples
     --------
@@ -98,13 +110,21 @@ def simulate_late(
     """
     if pattern not in PATTERNS:
         raise ParameterError(f'pattern "{shorten(str(pattern))}" is unknown; one of {", ".join(PATTERNS)}')
+    refuse_no_protocol(protocol)
+    if not isinstance(messages, LateMessages):
+        raise ParameterError(f"messages = {shorten(repr(messages))} is none; give LateMessages(delay='0.01'), say")
+    graph = as_graph(graph)
+    steps, seed = whole_number(steps, "steps", 2, MOST_STEPS), whole_number(seed, "seed", 0, 2**63)
+    if deadlines is not None and len(deadlines) != graph.n_nodes:
+        raise ParameterError(f"deadlines are {len(deadlines)} for {graph.n_nodes} agents; give one for each")
+    first = [float(x) for x in as_state(x0, graph, "x0")]
     t = _grid(float(protocol.T), float(messages.age), steps)
     clocks = _clocks(graph, protocol, messages, t, deadlines)
     with np.errstate(invalid="ignore"):
         steps_of_clock = np.where(np.isinf(clocks[1:]), np.inf, clocks[1:] - clocks[:-1])
     hearing = _Hearing(graph, messages, t, pattern, np.random.default_rng(seed))
     states = np.empty((t.size, graph.n_nodes))
-    states[0] = np.asarray(x0, dtype=float)
+    states[0] = first
     D = graph.in_weight()
     for i in range(t.size - 1):
         pushes, pulls = hearing.sums(i, states)
@@ -119,11 +139,24 @@ def simulate_late(
     return LateRun(t, states.T, pattern)
 
 
+def can_run(protocol: Protocol, messages: LateMessages) -> bool:
+    """Tell whether delays are long enough for a run of at most 20,000 steps.
+
+    Parameters
+    ----------
+    protocol : Protocol
+    messages : LateMessages
+    """
+    return not messages.age or MOST_STEPS * messages.age >= protocol.T * IN_DELAY
+
+
 def _grid(T: float, age: float, steps: int) -> np.ndarray:
     """Return instants that come near to ``T``, at least some in every delay."""
     longest = min(T / steps, age / IN_DELAY) if age else T / steps
     if T / longest > MOST_STEPS:
-        raise ParameterError(f"a delay of {age:.3g} in a run of {T:.6g} takes more than {MOST_STEPS:,} steps")
+        raise ParameterError(
+            f"a delay of {age:.3g} in a run of {T:.6g} takes more than {MOST_STEPS:,} steps; the bound needs no run"
+        )
     share = 0.02
     left, each = [0.0, NEAREST * T], NEAREST * T
     while left[-1] < T:

@@ -18,14 +18,18 @@ from typing import Any
 import numpy as np
 
 from ptcc_certify.errors import ParameterError, gated
+from ptcc_certify.graphs.io import as_graph, as_state
+from ptcc_certify.graphs.rationals import whole_number
 from ptcc_certify.graphs.size_limits import EXACT_NODES
-from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.lyapunov.follower_rows import refuse_leader_groups
-from ptcc_certify.protocols.base import Protocol
+from ptcc_certify.protocols.base import Protocol, refuse_no_protocol
 from ptcc_certify.protocols.moving_leaders import MovingLeaders
 
 #: Steps up to T; the share of what is left of T that a step takes; how near they come; where a run with sign term ends.
 STEPS, SHARE, NEAREST, PAST = 800, 0.02, 1e-7, 0.5
+#: Most steps of a run.
+MOST_STEPS = 20_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +51,7 @@ class TrackingRun:
 
 @gated
 def simulate_tracking(
-    structure: Structure,
+    graph: Any,
     protocol: Protocol,
     leaders: MovingLeaders,
     x0: Any,
@@ -59,45 +63,65 @@ def simulate_tracking(
 
     Parameters
     ----------
-    structure : Structure
-        All leaders are single nodes.
+    graph : graph-like
+        N agents, in whatever form :func:`ptcc_certify.as_graph` takes; all leaders are single nodes.
     protocol : Protocol
         The nominal one.
     leaders : MovingLeaders
-    x0 : (N,) array_like
+    x0 : state-like
+        The initial state, whatever :func:`ptcc_certify.as_state` takes.
     u : (F,) array, optional
-        By which distances are compared.
+        By which distances are compared, positive; dimensionless.
     steps : int
         Up to ``T``, about.
+
+    Returns
+    -------
+    TrackingRun
 
     Raises
     ------
     HypothesisError
         A leader belongs to a group.
     ParameterError
-        There are more than a few hundred agents.
+        There are more than 120 agents, the protocol is not the nominal one, a number is outside its domain, or the
+        state does not fit the graph.
+
+    References
+    ----------
+    The sliding-mode term is that of protocol (8) of [Zhu]_, with ``e_k`` in place of ``sigma_k``.
 
     Examples
     --------
-    >>> structure = analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 3, -1)]))
+    >>> graph = SignedDigraph.from_edges([(1, 2, 1), (2, 3, -1)])
     >>> p = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
-    >>> run = simulate_tracking(structure, p, MovingLeaders(speed=1), [1, 0, 0])
+    >>> run = simulate_tracking(graph, p, MovingLeaders(speed=1), [1, 0, 0])
     >>> at = int(np.argmin(abs(run.t - 1)))
     >>> abs(run.states - run.targets)[:, at].max() < 1e-6
     np.True_
     """
+    refuse_no_protocol(protocol)
+    if not isinstance(leaders, MovingLeaders) or protocol.reaching:
+        raise ParameterError(
+            "leaders that move run under the nominal protocol; give it, and MovingLeaders(speed=1), say"
+        )
+    structure, steps = analyse(as_graph(graph)), whole_number(steps, "steps", 2, MOST_STEPS)
     refuse_leader_groups(structure, "leaders that move as they like: a run")
     n, F = structure.graph.n_nodes, structure.followers
     if n > EXACT_NODES:
         raise ParameterError(f"runs with moving leaders are of up to {EXACT_NODES} agents; the graph has {n}")
+    if not F.size:
+        raise ParameterError("nobody listens to a leader, so nobody tracks; add edges")
+    x = np.array([float(value) for value in as_state(x0, structure.graph, "x0")])
     heads = np.setdiff1d(np.arange(n), F)
     L = structure.graph.dense_laplacian()
     L_F, Q = L[np.ix_(F, F)], -np.linalg.solve(L[np.ix_(F, F)], L[np.ix_(F, heads)])
-    weights = np.ones(F.size) if u is None else u
+    weights = np.ones(F.size) if u is None else np.asarray(u, dtype=float)
+    if weights.shape != (F.size,) or not (weights > 0).all():
+        raise ParameterError(f"u is not {F.size} positive numbers, one for each follower; leave it out")
     t, clock, last = _grid(protocol, steps)
     step_of = _Step(L_F, leaders, Q)
     states, targets = np.empty((t.size, n)), np.empty((t.size, n))
-    x = np.asarray(x0, dtype=float)
     lead, eps = x[heads], x[F] - Q @ x[heads]
     for i in range(t.size):
         states[i, heads] = targets[i, heads] = lead

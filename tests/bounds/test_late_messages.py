@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from fractions import Fraction
 from typing import Any
 
+import networkx as nx
 import numpy as np
 import pytest
 from late_certificates import led_graph
@@ -217,7 +219,7 @@ BAD = [
     ({"delay": 1, "losses": 3}, "losses without a period: tell how long it is from one message to the next"),
     ({"delay": 1, "period": 0}, "period = 0 is outside its domain"),
     ({"delay": 1, "period": 1, "losses": -1}, "losses = -1 is not a number of messages, 0 to 1,000,000"),
-    ({"delay": 0}, "messages that are neither late, nor lost, nor rounded; give delay, period or value_error"),
+    ({"delay": 0}, "messages that are neither late, nor lost, nor rounded; give a delay, a period or a value error"),
     ({"delay": {"a": 1}}, "a delay of 'a', which is no edge; name it as (source, target)"),
 ]
 
@@ -246,7 +248,7 @@ def _judge_tracking(seed: int) -> tuple[float, float]:
     speed, delta = Fraction(int(rng.integers(0, 30)), 10), Fraction(int(rng.integers(1, 20)), 10)
     leaders = MovingLeaders(speed=speed, disturbance=delta)
     tracking = bound_tracking(structure, protocol, leaders, x0, ends.intervals)
-    run = simulate_tracking(structure, protocol, leaders, [float(x) for x in x0], u=tracking.witness.u, steps=300)
+    run = simulate_tracking(structure.graph, protocol, leaders, [float(x) for x in x0], u=tracking.witness.u, steps=300)
     F, T = structure.followers, float(protocol.T)
     away = np.abs(run.states - run.targets)[F]
     before, after = run.t < T * (1 - 1e-8), run.t > T * (1 + 1e-8)
@@ -279,7 +281,7 @@ def _judge_sign(seed: int) -> float:
     _, structure, protocol, x0, ends = _case(seed)
     leaders = MovingLeaders(speed=1, disturbance="1/2", sign_gain="3/2")
     tracking = bound_tracking(structure, protocol, leaders, x0, ends.intervals)
-    run = simulate_tracking(structure, protocol, leaders, [float(x) for x in x0], u=tracking.witness.u, steps=400)
+    run = simulate_tracking(structure.graph, protocol, leaders, [float(x) for x in x0], u=tracking.witness.u, steps=400)
     F, T = structure.followers, float(protocol.T)
     away = np.abs(run.states - run.targets)[F] / tracking.witness.u[:, None]
     at = 1 - run.t / T
@@ -309,3 +311,40 @@ def test_a_sign_gain_below_what_pushes_is_refused_and_leaders_in_a_group_too() -
     protocol = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
     with pytest.raises(HypothesisError, match="1 and 2 are leaders of one group"):
         bound_tracking(group, protocol, MovingLeaders(speed=1))
+
+
+def test_runs_refuse_what_they_cannot_run_by_name() -> None:
+    pair, p = SignedDigraph.from_edges([(1, 2, 1)]), NominalProtocol(1, 1, 2, 1)
+    late, moving = LateMessages(delay="0.1"), MovingLeaders(speed=1)
+    for messages, x0, more, said in (
+        (0.1, [1, 0], {}, "messages = 0.1 is none"),
+        (late, [1, 0, 0], {}, "x0"),
+        (late, [1, math.nan], {}, "x0"),
+        (late, [1, 0], {"steps": 0}, "steps"),
+        (late, [1, 0], {"seed": -1}, "seed"),
+        (late, [1, 0], {"pattern": "never"}, "pattern"),
+        (late, [1, 0], {"deadlines": [1]}, "deadlines are 1 for 2 agents"),
+        (LateMessages(delay="1e-9"), [1, 0], {}, "more than 20,000 steps"),
+    ):
+        with pytest.raises(ParameterError, match=said):
+            simulate_late(pair, p, messages, x0, **more)
+    for graph, leaders, x0, more, said in (
+        (pair, 1, [1, 0], {}, "leaders that move run under the nominal protocol"),
+        (pair, moving, [1], {}, "x0"),
+        (pair, moving, [1, 0], {"steps": 0}, "steps"),
+        (pair, moving, [1, 0], {"u": [0]}, "u is not 1 positive numbers"),
+        (SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1)]), moving, [1, 1], {}, "one group"),
+    ):
+        with pytest.raises((ParameterError, HypothesisError), match=said):
+            simulate_tracking(graph, p, leaders, x0, **more)
+    assert simulate_late(nx.DiGraph([(1, 2, {"weight": 1})]), p, late, [1, 0]).states.shape[0] == 2
+
+
+def test_certificates_show_and_draw_late_messages_and_moving_leaders() -> None:
+    chain, p = SignedDigraph.from_edges([(1, 2, 1), (2, 3, -1)]), NominalProtocol(1, 1, 2, 1)
+    for name, asked in (("late", {"messages": LateMessages(delay="0.1")}), ("tracking", {"leaders": MovingLeaders(1)})):
+        cert = certify(chain, p, [1, 0, 2], method="perron", simulation=False, **asked)
+        assert cert.plot(name).lines
+        assert len(repr(getattr(cert, name))) < 120
+        assert "<svg" in cert._repr_html_() or "<img" in cert._repr_html_()
+    assert certify(chain, p, method="perron", messages=LateMessages(delay="0.1")).late.relative

@@ -9,10 +9,10 @@ from matplotlib.axes import Axes
 
 from ptcc_certify.bounds.late_messages import LateBounds
 from ptcc_certify.bounds.tracking import Tracking
-from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled, time_label
-from ptcc_certify.simulation.late_messages import simulate_late
+from ptcc_certify.report.plots.subject import certificate_of
+from ptcc_certify.simulation.late_messages import can_run, simulate_late
 from ptcc_certify.simulation.moving_leaders import simulate_tracking
 
 #: How runs with late messages are drawn, by how old is what agents hear.
@@ -21,14 +21,19 @@ _RUNS: dict[str, dict[str, Any]] = {
     "square": {"color": BEHIND, "linewidth": 0.8, "linestyle": "--", "label": "now late, now not"},
 }
 
+#: A lower bound at ``T`` is drawn from this share of the upper one on.
+_SEEN = 1e-3
+
 
 @styled
-def plot_late(certificate: Certificate, *, ax: Axes | None = None, time_unit: str = "") -> Axes:
+def plot_late(subject: Any, *, ax: Axes | None = None, time_unit: str = "") -> Axes:
     """Draw how far the farthest agent is from its final state while messages are late, under the proved bound.
+
+    Where delays are too short for runs, the bound alone.
 
     Parameters
     ----------
-    certificate : Certificate
+    subject : Certificate
         With late messages and an initial state.
     ax : Axes, optional
     time_unit : str
@@ -41,7 +46,7 @@ def plot_late(certificate: Certificate, *, ax: Axes | None = None, time_unit: st
     Raises
     ------
     ParameterError
-        The certificate says nothing of late messages, or has no initial state.
+        No certificate, or one that says nothing of late messages, or has no initial state.
 
     Examples
     --------
@@ -49,8 +54,9 @@ def plot_late(certificate: Certificate, *, ax: Axes | None = None, time_unit: st
     >>> p = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
     >>> cert = certify(graph, p, [1, 0, 2], messages=LateMessages(delay="0.05"), simulation=False)
     >>> [line.get_label() for line in plot_late(cert).lines]
-    ['as late as allowed', 'now late, now not', 'proved bound', 'not nearer at $T$, proved']
+    ['as late as allowed', 'now late, now not', 'proved bound', 'at least, if as late as allowed']
     """
+    certificate = certificate_of(subject)
     late, x0, ends = certificate.late, certificate.initial_state, certificate.final_state
     if late is None or not late.says_something:
         raise ParameterError("the certificate says nothing of late messages; certify with messages, or --delay")
@@ -59,18 +65,18 @@ def plot_late(certificate: Certificate, *, ax: Axes | None = None, time_unit: st
     ax, F = axes_of(ax), certificate.structure.followers
     nodes = F if F.size else np.arange(certificate.graph.n_nodes)
     start, goal = [float(x) for x in x0], np.asarray(ends, dtype=float)
-    t = np.zeros(1)
-    for pattern, style in _RUNS.items():
+    t = np.linspace(0, float(certificate.protocol.T), 401)
+    for pattern, style in _RUNS.items() if can_run(certificate.protocol, late.messages) else ():
         run = simulate_late(certificate.graph, certificate.protocol, late.messages, start, pattern=pattern)  # type: ignore[arg-type]
         t = run.t
         ax.plot(t, np.abs(run.states - goal[:, None])[nodes].max(axis=0), **style)
     _draw_bound(ax, late, t)
-    if late.missed is not None:
+    if late.missed is not None and late.missed.bound >= _SEEN * late.largest:
         marks: dict[str, Any] = {"marker": "v", "color": BOUND, "linestyle": "none", "markersize": 4, "clip_on": False}
-        ax.plot(t[-1:], [float(late.missed.bound)], label="not nearer at $T$, proved", **marks)
+        ax.plot(t[-1:], [float(late.missed.bound)], label="at least, if as late as allowed", **marks)
     ax.set_yscale("log")
     ax.set_xlim(0, t[-1])
-    return finished(ax, time_label("t", time_unit), r"$\max_k |x_k(t) - x_k^*|$")
+    return finished(ax, time_label("time $t$", time_unit), r"$\max_k |x_k(t) - x_k^*|$")
 
 
 def _draw_bound(ax: Axes, late: LateBounds, t: np.ndarray) -> None:
@@ -82,12 +88,12 @@ def _draw_bound(ax: Axes, late: LateBounds, t: np.ndarray) -> None:
 
 
 @styled
-def plot_tracking(certificate: Certificate, *, ax: Axes | None = None, time_unit: str = "") -> Axes:
+def plot_tracking(subject: Any, *, ax: Axes | None = None, time_unit: str = "") -> Axes:
     """Draw how far the farthest follower is from its target while leaders move away as fast as they may.
 
     Parameters
     ----------
-    certificate : Certificate
+    subject : Certificate
         With moving leaders and an initial state.
     ax : Axes, optional
     time_unit : str
@@ -100,7 +106,7 @@ def plot_tracking(certificate: Certificate, *, ax: Axes | None = None, time_unit
     Raises
     ------
     ParameterError
-        The certificate says nothing of moving leaders, or has no initial state.
+        No certificate, or one that says nothing of moving leaders, or has no initial state.
 
     Examples
     --------
@@ -110,6 +116,7 @@ def plot_tracking(certificate: Certificate, *, ax: Axes | None = None, time_unit
     >>> [line.get_label() for line in plot_tracking(cert).lines]
     ['worst leaders', 'proved bound', '$T$']
     """
+    certificate = certificate_of(subject)
     tracking, x0 = certificate.tracking, certificate.initial_state
     if tracking is None:
         raise ParameterError("the certificate says nothing of moving leaders; certify with leaders, or --leader-speed")
@@ -117,7 +124,7 @@ def plot_tracking(certificate: Certificate, *, ax: Axes | None = None, time_unit
         raise ParameterError("the certificate has no initial state to run from; certify with x0")
     ax, T, u = axes_of(ax), float(certificate.protocol.T), tracking.witness.u
     run = simulate_tracking(
-        certificate.structure, certificate.protocol, tracking.leaders, [float(x) for x in x0], u=u, steps=400
+        certificate.graph, certificate.protocol, tracking.leaders, [float(x) for x in x0], u=u, steps=400
     )
     away = np.abs(run.states - run.targets)[certificate.structure.followers]
     ax.plot(run.t, away.max(axis=0), color=RUN, linewidth=1.1, label="worst leaders")
@@ -125,7 +132,7 @@ def plot_tracking(certificate: Certificate, *, ax: Axes | None = None, time_unit
     ax.axvline(T, color=BEHIND, linewidth=0.8, linestyle=":", label="$T$")
     ax.set_xlim(0, run.t[-1])
     ax.set_ylim(bottom=0)
-    return finished(ax, time_label("t", time_unit), r"$\max_k |x_k(t) - x_k^*(t)|$")
+    return finished(ax, time_label("time $t$", time_unit), r"$\max_k |x_k(t) - x_k^*(t)|$")
 
 
 def _tracking_bound(tracking: Tracking, t: np.ndarray, T: float) -> np.ndarray:
@@ -133,4 +140,4 @@ def _tracking_bound(tracking: Tracking, t: np.ndarray, T: float) -> np.ndarray:
     before = tracking.distance_bound(np.maximum(1 - t / T, 0)).max(axis=0)
     rate = float(tracking.witness.b * tracking.protocol.gain.rho1)
     later = -np.expm1(-rate * np.maximum(t - T, 0))  # m' <= -a rho1 m + c from m(T) = 0
-    return np.where(t <= T, before, float(tracking.after) * float(tracking.witness.u.max()) * later)
+    return np.where(t <= T, before, tracking.distance_after * later)
