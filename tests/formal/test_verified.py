@@ -1,0 +1,124 @@
+"""The checker that is itself proved: what it accepts is what ``ptcc check`` accepts, but for causes that it names."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from generators import all_classes, random_graph, smallest
+from mutations import mutants, resealed
+from paper_examples import paper_examples
+from verified import SKIPPED, UNREAD, program, said, unchecked
+
+from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.checker import check
+from ptcc_certify.checker.obligations import OBLIGATIONS
+from ptcc_certify.cli.verified import VARIABLE, executable, verified_check
+from ptcc_certify.errors import FormatError, ParameterError
+from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
+
+SOURCES = Path(__file__).resolve().parents[2] / "formal"
+
+
+def test_nothing_is_admitted_and_no_axiom_is_added() -> None:
+    words = re.compile(r"\b(Admitted|admit|Axioms?|Parameters?|Conjecture|give_up|bypass_check|Unset Guard)\b")
+    files = sorted(SOURCES.glob("*.v"))
+    assert files
+    for file in files:
+        text = re.sub(r"\(\*.*?\*\)", "", file.read_text("utf-8"), flags=re.DOTALL)
+        assert not words.search(text), file.name
+
+
+def test_the_fixed_texts_of_the_reader_are_those_of_the_format() -> None:
+    text = (SOURCES / "ocaml" / "texts.ml").read_text("utf-8")
+    rows = re.findall(r'\("([a-z-]+)", \("([^"]*)",\s*"([^"]*)"\)\)|"([a-z-]+)", \("([^"]*)",\s*"([^"]*)"\)', text)
+    read = {(a or d): (b or e, c or f) for a, b, c, d, e, f in rows}
+    assert len(read) > 20 and all(OBLIGATIONS[kind] == texts for kind, texts in read.items())
+
+
+def test_where_the_executable_is_absent_one_line_says_how_to_build_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(VARIABLE, "no-such-file")
+    with pytest.raises(ParameterError, match="make") as caught:
+        executable()
+    assert "\n" not in str(caught.value)
+
+
+def test_the_paper_s_examples_are_accepted_and_every_obligation_is_verified_or_named(tmp_path: Path) -> None:
+    program()
+    for text in paper_examples():
+        document = json.loads(text)
+        (tmp_path / "c.json").write_text(text)
+        proved = verified_check(str(tmp_path / "c.json"))
+        assert proved.report.accepted and proved.report.verdict == "certified", proved.report.reason
+        assert proved.report.sha256 == document["graph"]["sha256"]
+        listed = [f"{o['kind']} of {o['of']}" for o in document["proof"]]
+        verified = [f"{o.kind} of {o.of}" for o in proved.report.obligations]
+        left = [line for line in proved.not_checked if line in listed]
+        assert sorted(verified + left) == sorted(listed)
+        assert {o["kind"] for o in document["proof"]} - {o.kind for o in proved.report.obligations} <= SKIPPED
+
+
+def test_a_file_that_is_no_certificate_is_unreadable(tmp_path: Path) -> None:
+    program()
+    for text in ("", "[]", '{"schema": "ptcc-certificate/1"}', "{" * 1000, '{"a": 1, "a": 2}', "\xff"):
+        (tmp_path / "c.json").write_bytes(text.encode("latin-1"))
+        with pytest.raises(FormatError):
+            verified_check(str(tmp_path / "c.json"))
+
+
+def compare(document: dict, path: tuple, folder: Path) -> str:
+    """The cause of a difference between the two checkers on a mutant; empty if they agree."""
+    python, (code, text) = check(resealed(document)), said(resealed(document), folder)
+    accepted = code in (0, 4)
+    if python.accepted == accepted:
+        return ""
+    if accepted:
+        at = str(python.rejected).partition(" of ")[0]  # what Python found false, if it is of a part that is named
+        assert at in SKIPPED or at.startswith("input") or unchecked(document, path), (path, at, python.reason)
+        return "a part that is not checked"
+    assert code == 2 and any(word in text for word in UNREAD), (path, text)
+    return "a form that is not read"
+
+
+@pytest.mark.parametrize("number", range(12))
+def test_of_some_mutants_none_is_accepted_unless_true_or_not_checked(number: int, tmp_path: Path) -> None:
+    program()
+    document = {**json.loads(paper_examples()[number]), "unverified": {}}
+    for path, mutant in mutants(document, every=331, start=number):
+        compare(mutant, path, tmp_path)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("number", range(12))
+def test_of_thousands_of_mutants_none_is_accepted_unless_true_or_not_checked(number: int, tmp_path: Path) -> None:
+    program()
+    document = {**json.loads(paper_examples()[number]), "unverified": {}}
+    every = int(os.environ.get("PTCC_MUTANTS_EVERY", 12))
+    count = sum(1 for path, mutant in mutants(document, every=every) if compare(mutant, path, tmp_path) is not None)
+    assert count > 3000 // every
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize(("name", "kwargs"), all_classes())
+def test_what_the_checker_accepts_of_random_graphs_the_verified_one_accepts(
+    name: str, kwargs: dict, tmp_path: Path
+) -> None:
+    program()
+    for seed in range(int(os.environ.get("PTCC_VERIFIED_GRAPHS", 14))):
+        rng = np.random.default_rng(seed)
+        settings = {"n": smallest(**kwargs) + seed % 5, **kwargs}
+        graph = random_graph(rng, **settings).graph
+        protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
+        more = {}
+        if seed % 2:
+            protocol = SlidingModeProtocol(T_r="0.5", T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
+            more = {"sigma0": [int(v) for v in rng.integers(-2, 3, graph.n_nodes)]}
+        start = [int(v) for v in rng.integers(-9, 10, graph.n_nodes)]
+        document = json.loads(certify(graph, protocol, start, simulation=False, **more).to_json())
+        code, text = said(document, tmp_path)
+        assert check(document).accepted
+        assert code in (0, 4) or (code == 2 and any(word in text for word in UNREAD)), (name, seed, text)
