@@ -119,3 +119,5 @@ let bare p kind of_ keys =
 (* without numbers and witness *)
 let bare_of p kind of_ = let _ : string -> Checker.q = bare p kind of_ [] in ()
 let skipped p kind of_ = ignore (take p kind of_ None); p.unchecked <- (kind, of_) :: p.unchecked
+(* of a part that is not read *)
+let unknown p kind of_ = p.rest <- List.tl p.rest; p.unchecked <- (kind, of_) :: p.unchecked

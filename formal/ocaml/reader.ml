@@ -12,11 +12,15 @@ type t = {
 let keys = [ "schema"; "producer"; "graph"; "structure"; "claim"; "protocol"; "paper"; "lyapunov"; "rates"; "overshoot";
   "initial_state"; "sliding_variable"; "influence"; "final_state"; "reaching_time"; "input"; "proof"; "verdict"; "digest";
   "unverified" ]
+(* keys of some certificates alone: their claims are of other motions, and are not read; or they are claims besides the
+   others, which keep their meaning: named, and not believed, with their obligations *)
+let not_read = [ "components", "a disconnected graph"; "boxes", "a certificate of a family";
+  "restricted", "a certificate of a family"; "agents", "a certificate of agents of order n, section agents" ]
+let besides = [ "messages", "messages that are late, lost or rounded"; "leaders", "leaders that move" ]
+let of_besides kind = kind = "tracking" || (String.length kind > 5 && String.sub kind 0 5 = "late-")
 
 let graph v =
-  let get = match v with
-    | Obj l when List.mem_assoc "modes" l -> unsupported "a certificate of a family"
-    | _ -> fields "graph" [ "nodes"; "edges"; "read"; "sha256" ] v in
+  let get = fields "graph" [ "nodes"; "edges"; "read"; "sha256" ] v in
   let nodes = nodes_of (get "nodes") in
   let read = fields "graph.read" [ "orientation"; "duplicates"; "self_loops"; "undirected" ] (get "read") in
   need (List.mem (text "orientation" (read "orientation")) [ "information"; "listens"; "matrix" ]) "graph.read: orientation";
@@ -211,12 +215,15 @@ let upper nodes comps proof bound =
 let certificate (j : Json.t) : t =
   (match j with
    | Obj l when List.assoc_opt "schema" l = Some (Str "ptcc-certificate/2") ->
-       if List.mem_assoc "components" l then unsupported "a disconnected graph";
-       if List.mem_assoc "boxes" l || List.mem_assoc "restricted" l then unsupported "a certificate of a family"
+       List.iter (fun (key, what) -> if List.mem_assoc key l then unsupported what) not_read;
+       (match List.assoc_opt "graph" l with
+        | Some (Obj g) when List.mem_assoc "modes" g -> unsupported "a certificate of a family" | _ -> ())
    | _ -> bad "not a certificate of schema \"ptcc-certificate/2\"");
-  let get = fields "the certificate" keys j in
+  let more = List.filter (fun (key, _) -> match j with Obj l -> List.mem_assoc key l | _ -> false) besides in
+  let get = fields "the certificate" (keys @ List.map fst more) j in
   let left_out = ref [] in
   let not_checked s = left_out := s :: !left_out in
+  List.iter (fun (key, what) -> not_checked (Printf.sprintf "%s, all that is said of %s" key what)) more;
   ignore (text "producer" (get "producer"));
   ignore (match get "unverified" with Obj _ -> () | _ -> bad "unverified is not an object");
   let outside = match j with Obj l -> List.filter (fun (k, _) -> k <> "digest" && k <> "unverified") l | _ -> [] in
@@ -310,6 +317,7 @@ let certificate (j : Json.t) : t =
     | Obj l :: _ -> (match List.assoc_opt "kind" l, List.assoc_opt "of" l with
         | Some (Str k), Some (Str o) when List.mem k [ "input-sliding"; "input-peak"; "input-energy"; "input-length";
             "limited-gain"; "nominal-disturbed" ] -> skipped proof k o
+        | Some (Str k), Some (Str o) when more <> [] && of_besides k -> unknown proof k o
         | _ -> bad "an obligation that nothing asks for")
     | _ -> bad "an obligation is not an object"
   done;

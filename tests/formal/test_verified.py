@@ -5,20 +5,26 @@ from __future__ import annotations
 import json
 import os
 import re
+import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
+from agent_documents import Setting
+from agent_documents import document as agents_document
 from generators import all_classes, random_graph, smallest
 from mutations import mutants, resealed
 from paper_examples import paper_examples
 from verified import SKIPPED, UNREAD, program, said, unchecked
 
+from ptcc_certify.certificate.family_certificate import certify_family
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
 from ptcc_certify.checker.obligations import OBLIGATIONS
 from ptcc_certify.cli.verified import VARIABLE, executable, verified_check
 from ptcc_certify.errors import FormatError, ParameterError
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.family import Family
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 
 SOURCES = Path(__file__).resolve().parents[2] / "formal"
@@ -64,10 +70,45 @@ def test_the_paper_s_examples_are_accepted_and_every_obligation_is_verified_or_n
 
 def test_a_file_that_is_no_certificate_is_unreadable(tmp_path: Path) -> None:
     program()
-    for text in ("", "[]", '{"schema": "ptcc-certificate/1"}', "{" * 1000, '{"a": 1, "a": 2}', "\xff"):
-        (tmp_path / "c.json").write_bytes(text.encode("latin-1"))
+    for text in ("", "[]", '{"schema": "ptcc-certificate/1"}', "{" * 1000, '{"a": 1, "a": 2}', '"\xff"', '"\xc0\x80"'):
+        file = tmp_path / "c.json"
+        file.write_bytes(text.encode("latin-1"))
         with pytest.raises(FormatError):
-            verified_check(str(tmp_path / "c.json"))
+            verified_check(str(file))
+        assert subprocess.run([program(), file], capture_output=True, check=False).returncode == 2
+
+
+def test_claims_besides_those_of_the_graph_are_named_and_not_believed(tmp_path: Path) -> None:
+    program()
+    document = json.loads(paper_examples()[0])
+    for key, kind in (("messages", "late-rows"), ("leaders", "tracking")):
+        false = {"kind": kind, "of": key, "proves": "", "lemma": "", "numbers": {}, "witness": None}
+        more = {**document, key: {"delay": "0"}, "proof": [*document["proof"], false]}
+        code, text = said(resealed(more), tmp_path)
+        assert (
+            code == 0 and f"not checked {key}, all that is said of" in text and f"not checked {kind} of {key}" in text
+        )
+        code, text = said(resealed({**more, key: None, "more": None}), tmp_path)
+        assert code == 1 and "unknown" in text
+        code, text = said(resealed({**document, "proof": more["proof"]}), tmp_path)
+        assert code == 1 and "nothing asks for" in text
+
+
+def test_agents_of_order_n_and_families_are_not_read_as_agents_of_order_1(tmp_path: Path) -> None:
+    program()
+    family = certify_family(
+        Family.switching([SignedDigraph.from_edges([("a", "b", w)]) for w in (1, 2)]), NominalProtocol(1, 1, 1, 1)
+    )
+    of_agents = agents_document(SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)]), Setting())
+    apart = certify([("a", "b", 1), ("c", "d", 1)], NominalProtocol(1, 1, 1, 1), simulation=False)
+    for document, what in (
+        (json.loads(family.to_json()), "family"),
+        (of_agents, "agents of order n, section agents"),
+        (json.loads(apart.to_json()), "disconnected"),
+    ):
+        assert check(document).accepted
+        code, text = said(document, tmp_path)
+        assert code == 2 and what in text and "use ptcc check" in text
 
 
 def compare(document: dict, path: tuple, folder: Path) -> str:
@@ -88,7 +129,7 @@ def compare(document: dict, path: tuple, folder: Path) -> str:
 def test_of_some_mutants_none_is_accepted_unless_true_or_not_checked(number: int, tmp_path: Path) -> None:
     program()
     document = {**json.loads(paper_examples()[number]), "unverified": {}}
-    for path, mutant in mutants(document, every=331, start=number):
+    for path, mutant in mutants(document, every=997, start=number):
         compare(mutant, path, tmp_path)
 
 
