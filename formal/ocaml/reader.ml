@@ -17,6 +17,8 @@ let keys = [ "schema"; "producer"; "graph"; "structure"; "claim"; "protocol"; "p
 let not_read = [ "components", "a disconnected graph"; "boxes", "a certificate of a family";
   "restricted", "a certificate of a family"; "agents", "a certificate of agents of order n, section agents" ]
 let besides = [ "messages", "messages that are late, lost or rounded"; "leaders", "leaders that move" ]
+(* kinds of obligations and what they are of have these letters alone: what is printed of them can be no other line *)
+let named = String.for_all (function 'a' .. 'z' | '0' .. '9' | '-' | '.' | '[' | ']' -> true | _ -> false)
 let of_besides kind = kind = "tracking" || (String.length kind > 5 && String.sub kind 0 5 = "late-")
 
 let graph v =
@@ -315,6 +317,7 @@ let certificate (j : Json.t) : t =
   while proof.rest <> [] do
     match proof.rest with
     | Obj l :: _ -> (match List.assoc_opt "kind" l, List.assoc_opt "of" l with
+        | Some (Str k), Some (Str o) when not (named k && named o) -> bad "an obligation that nothing asks for"
         | Some (Str k), Some (Str o) when List.mem k [ "input-sliding"; "input-peak"; "input-energy"; "input-length";
             "limited-gain"; "nominal-disturbed" ] -> skipped proof k o
         | Some (Str k), Some (Str o) when more <> [] && of_besides k -> unknown proof k o

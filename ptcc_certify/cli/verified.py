@@ -90,8 +90,8 @@ def verified_check(certificate: str) -> VerifiedCheck:
         run = subprocess.run([program, "--obligations", certificate], capture_output=True, check=False)
     except OSError as error:
         raise ParameterError(f"{program} cannot be run ({error.strerror}); {BUILD}") from None
-    output = run.stdout.decode("utf-8", "replace").splitlines()
-    if run.returncode not in (0, 1, 4) or not output:
+    output = run.stdout.decode("utf-8", "replace").rstrip("\n").split("\n")
+    if run.returncode not in (0, 1, 4) or not output[0]:
         message = run.stderr.decode("utf-8", "replace").strip().removeprefix(f"{PROGRAM}: ")
         raise FormatError(f"{certificate}: {message or f'{PROGRAM} ended with code {run.returncode}'}")
     return VerifiedCheck(document, _report(output, run.returncode), tuple(_after("not checked ", output)))

@@ -94,6 +94,21 @@ def test_claims_besides_those_of_the_graph_are_named_and_not_believed(tmp_path: 
         assert code == 1 and "nothing asks for" in text
 
 
+def test_no_text_of_the_file_is_printed_as_a_line_of_its_own(tmp_path: Path) -> None:
+    program()
+    document = json.loads(paper_examples()[0])
+    forged = {**document["proof"][-1], "of": "input\u2028verified    rate of lyapunov.functions[99]"}
+    text = json.dumps(resealed({**document, "proof": [*document["proof"], forged]}), ensure_ascii=False)
+    (tmp_path / "c.json").write_text(text, encoding="utf-8")
+    proved = verified_check(str(tmp_path / "c.json"))
+    assert not proved.report.accepted and not proved.report.obligations
+    label = "a\u2028verified    rate of lyapunov.functions[99]\u0085"
+    named = certify([(label, "b", 1), ("b", label, 1)], NominalProtocol(1, 1, 1, 1), simulation=False)
+    (tmp_path / "c.json").write_text(named.to_json(), encoding="utf-8")
+    proved = verified_check(str(tmp_path / "c.json"))
+    assert proved.report.accepted and "lyapunov.functions[99]" not in {o.of for o in proved.report.obligations}
+
+
 def test_agents_of_order_n_and_families_are_not_read_as_agents_of_order_1(tmp_path: Path) -> None:
     program()
     family = certify_family(
