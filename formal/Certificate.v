@@ -24,12 +24,16 @@ Record func := Func {
 Record margin := Margin { on : list nat; weights : list Q; gammas : list (option Q); least : Q }.
 (** the upper bound on the rate, and what proves it: a strong component, a form on it, where that is negative *)
 Record upper := Upper { bound : Q; inside : list nat; form_H : list (list Q); vector_y : list Q }.
+Inductive balance := Gauge (g : list Z) | Cycle (c : list (nat * nat)).
+(** a weak component: [row] 1, 2, 3 if one closed component is all of it, if there is one, if there are several *)
+Record piece := Piece { members : list nat; row : nat; some_balanced : bool; undirected : bool; cooperative : bool;
+  whole : balance }.
 Inductive protocol :=
 | Nominal (T : Q)
 | SlidingMode (T_r T_s mu1 mu2 mu3 delta : Q).
 Record cert := Cert {
   order : nat; edges : list edge; kind : protocol; rho1 : Q; rho2 : Q; kappa : Q;
-  comps : list comp; funcs : list func; start : list Q; sliding : list Q; final : list (Q * Q); (* middle, radius *)
+  comps : list comp; pieces : list piece; all_balanced : balance; sign_symmetric : bool; funcs : list func; start : list Q; sliding : list Q; final : list (Q * Q); (* middle, radius *)
   margins : list margin;
   upper_bound : option upper;
   leaders : list (list Q * Q);         (* weights of a leader group, 0 elsewhere; its rate *)
@@ -77,13 +81,36 @@ Definition structure (c : cert) : Prop :=
   (forall C, In C (comps c) -> match wit C with
      | Bal g _ _ => balanced (edges c) (nodes C) (signs g)
      | Unbal _ => forall g, ~ balanced (edges c) (nodes C) g end).
-(** balanced components end at [c_k] or [-c_k] by camps, unbalanced ones at 0, nobody beyond the largest [|c_k|] *)
+(** balanced components end at [c_k] or [-c_k] by camps, unbalanced ones at 0 *)
 Definition behaviour (c : cert) : Prop := forall x,
   (forall C g w v, In C (comps c) -> wit C = Bal g w v ->
      forall i, In i (nodes C) -> end_state c x i = sgn g i * qdot v x) /\
-  (forall C cy, In C (comps c) -> wit C = Unbal cy -> forall i, In i (nodes C) -> end_state c x i = 0) /\
-  (forall M, (forall C g w v, In C (comps c) -> wit C = Bal g w v -> Rabs (qdot v x) <= M) ->
-     0 <= M -> forall i, (i < order c)%nat -> Rabs (end_state c x i) <= M).
+  (forall C cy, In C (comps c) -> wit C = Unbal cy -> forall i, In i (nodes C) -> end_state c x i = 0).
+(** the hypotheses of the theorem and of the corollaries, by weak component; nobody ends beyond the largest [|c_k|] of its
+    own: all at 0 where no closed component is balanced *)
+Definition balance_claim (es : list edge) (C : list nat) (b : balance) : Prop :=
+  match b with Gauge g => balanced es C (signs g) | Cycle _ => forall g, ~ balanced es C g end.
+Definition own (c : cert) (P : piece) : list comp := filter (fun C => mem (hd O (nodes C)) (members P)) (comps c).
+Definition is_balanced (C : comp) : bool := match wit C with Bal _ _ _ => true | Unbal _ => false end.
+Definition piece_claim (c : cert) (P : piece) : Prop :=
+  (exists i, In i (members P)) /\ (forall i j, In i (members P) -> (In j (members P) <-> linked (edges c) i j)) /\
+  match row P, own c P with
+  | 1%nat, [C] => forall i, In i (members P) -> In i (nodes C)
+  | 2%nat, [C] => exists i, In i (members P) /\ ~ In i (nodes C)
+  | 3%nat, _ :: _ :: _ => True
+  | _, _ => False end /\
+  some_balanced P = existsb is_balanced (own c P) /\
+  (undirected P = true <-> forall e, In e (edges c) -> In (tgt e) (members P) ->
+     exists f, In f (edges c) /\ src f = tgt e /\ tgt f = src e /\ (wt f == wt e)%Q) /\
+  (cooperative P = true <-> forall e, In e (edges c) -> In (tgt e) (members P) -> (0 < wt e)%Q) /\
+  balance_claim (edges c) (members P) (whole P) /\
+  forall x M, 0 <= M -> (forall C g w v, In C (own c P) -> wit C = Bal g w v -> Rabs (qdot v x) <= M) ->
+    forall i, In i (members P) -> (i < order c)%nat -> Rabs (end_state c x i) <= M.
+Definition claims (c : cert) : Prop := (forall P, In P (pieces c) -> piece_claim c P) /\
+  (forall i, (i < order c)%nat -> exists P, In P (pieces c) /\ In i (members P)) /\
+  balance_claim (edges c) (seq 0 (order c)) (all_balanced c) /\
+  (sign_symmetric c = true <-> forall e f, In e (edges c) -> In f (edges c) -> src f = tgt e -> tgt f = src e ->
+     (0 < wt e * wt f)%Q).
 (** the intervals of the final state hold [Q (X(0) - sigma(0))] *)
 Definition begin (c : cert) (j : nat) : R := Q2R (nth j (start c) 0%Q) - Q2R (nth j (sliding c) 0%Q).
 Definition final_claim (c : cert) : Prop := forall i, (i < length (final c))%nat -> (i < order c)%nat ->
@@ -143,7 +170,7 @@ Definition upper_claim (c : cert) (u : upper) : Prop := forall (F : (nat -> R) -
   (forall x, b * F x x <= 2 * F x (lap (edges c) x)) -> b <= Q2R (bound u).
 
 Definition true_certificate (c : cert) : Prop :=
-  structure c /\ behaviour c /\ final_claim c /\ (forall f, In f (funcs c) -> function_claim c f) /\
+  structure c /\ behaviour c /\ claims c /\ final_claim c /\ (forall f, In f (funcs c) -> function_claim c f) /\
   limit_claim c /\ input_claim c /\ rates_claim c /\
   (forall m, In m (margins c) -> margin_claim c m) /\ (forall l, In l (leaders c) -> leader_claim c l) /\
   (forall u, upper_bound c = Some u -> upper_claim c u).

@@ -5,7 +5,8 @@ let of_check c d : (string * (unit -> bool)) list =
     "protocol: a parameter", (fun () -> check_protocol c);
     "structure of graph", (fun () -> check_structure c);
     "final-state of graph", (fun () -> check_end c d);
-    "final-state of graph: where the components end", (fun () -> check_behaviour c d) ]
+    "final-state of graph: where the components end", (fun () -> check_behaviour c d);
+    "claim of graph", (fun () -> check_claims c d) ]
   @ List.mapi (fun k f -> Printf.sprintf "lyapunov.functions[%d]" k, (fun () -> check_function c d f)) c.funcs
   @ [ "final-state of graph: no Lyapunov function proves that it is reached", (fun () -> check_reached c d);
       "final_state: not what was proved", (fun () -> check_final c d);

@@ -14,7 +14,7 @@ let keys = [ "schema"; "producer"; "graph"; "structure"; "claim"; "protocol"; "p
   "unverified" ]
 (* keys of some certificates alone: their claims are of other motions, and are not read; or they are claims besides the
    others, which keep their meaning: named, and not believed, with their obligations *)
-let not_read = [ "components", "a disconnected graph"; "boxes", "a certificate of a family";
+let not_read = [ "boxes", "a certificate of a family";
   "restricted", "a certificate of a family"; "agents", "a certificate of agents of order n, section agents" ]
 let besides = [ "messages", "messages that are late, lost or rounded"; "leaders", "leaders that move" ]
 (* kinds of obligations and what they are of have these letters alone: what is printed of them can be no other line *)
@@ -222,7 +222,8 @@ let certificate (j : Json.t) : t =
         | Some (Obj g) when List.mem_assoc "modes" g -> unsupported "a certificate of a family" | _ -> ())
    | _ -> bad "not a certificate of schema \"ptcc-certificate/2\"");
   let more = List.filter (fun (key, _) -> match j with Obj l -> List.mem_assoc key l | _ -> false) besides in
-  let get = fields "the certificate" (keys @ List.map fst more) j in
+  let apart = match j with Obj l -> List.mem_assoc "components" l | _ -> false in
+  let get = fields "the certificate" (keys @ List.map fst more @ (if apart then [ "components" ] else [])) j in
   let left_out = ref [] in
   let not_checked s = left_out := s :: !left_out in
   List.iter (fun (key, what) -> not_checked (Printf.sprintf "%s, all that is said of %s" key what)) more;
@@ -237,14 +238,17 @@ let certificate (j : Json.t) : t =
   let is_sliding = match kind with SlidingMode _ -> true | Nominal _ -> false in
   let proof = proof_of (get "proof") in
   bare_of proof "structure" "graph";
-  skipped proof "claim" "graph";
-  not_checked "claim"; not_checked "structure.connectivity, .balanced, .sign_symmetric";
+  bare_of proof "claim" "graph";
   if get "influence" = Null then unsupported "an undecided certificate, without influence";
-  let theorem = text "claim.theorem" ((fields "claim" [ "theorem"; "behaviour"; "corollaries" ] (get "claim")) "theorem") in
-  let numbers = if is_sliding then "456" else "123" in
-  need (String.length theorem = 3 && String.contains numbers theorem.[0] && List.mem (String.sub theorem 1 2) [ ".1"; ".2" ])
-    "claim: an unknown theorem";
   let comps, followers, degenerate = components nodes structure (get "influence") in
+  let all = Pieces.graph (Array.length nodes.labels) edges in
+  let found = Pieces.find all in
+  let pieces = List.map (Pieces.piece all comps) found.pieces in
+  let final_text = match get "final_state" with Obj l when List.length l = Array.length nodes.labels -> Obj l | _ -> Null in
+  let theorem = Pieces.compare_claims nodes is_sliding pieces (structure "connectivity") (get "claim")
+    (match j with Obj l -> List.assoc_opt "components" l | _ -> None) final_text in
+  need (structure "balanced" = Bool (match found.balance with Gauge _ -> true | Cycle _ -> false)) "structure: balance of the graph";
+  need (structure "sign_symmetric" = Bool (Pieces.sign_symmetric all)) "structure: sign symmetry";
   let start = match get "initial_state" with Null -> None | v -> Some (by_agent nodes number "initial_state" v) in
   let sliding = match get "sliding_variable" with Null -> [] | v -> by_agent nodes number "sliding_variable" v in
   need (is_sliding = (get "sliding_variable" <> Null)) "sigma(0) belongs to the sliding-mode protocol, and is part of it";
@@ -271,16 +275,18 @@ let certificate (j : Json.t) : t =
     | Null -> None
     | v -> let o = fields "overshoot" [ "value"; "of" ] v in
         let of_ = text "overshoot.of" (o "of") in
-        need (List.mem of_ [ "||E||^2"; "||eps||^2" ]) "overshoot.of";
-        not_checked "overshoot.of";
-        Some (number "overshoot.value" (o "value")) in
+        let value = number "overshoot.value" (o "value") in
+        need (List.exists (fun f -> (match rate "proved" with Some r -> Number.equal f.rate r | None -> false)
+          && Number.equal f.overshoot value && of_ = (match f.ly with InE _ -> "||E||^2" | InEps _ -> "||eps||^2")) functions)
+          "overshoot.of: other coordinates than those of a Lyapunov function with the largest rate";
+        Some value in
   let upper_bound = match rate "upper_bound" with
     | None -> None
     | Some bound when following proof = "rate-upper-bound" && has_kernel functions ->
         Some (upper nodes comps proof bound)
     | Some _ ->
         skipped proof (if following proof = "rate-mean" then "rate-mean" else "rate-upper-bound") "rates";
-        not_checked "rates.upper_bound"; None in
+        not_checked "rates.upper_bound, input.threshold.upper"; None in
   if is_sliding then begin
     skipped proof "sliding-bound" "protocol"; not_checked "reaching_time";
     if following proof = "reaching-time" then skipped proof "reaching-time" "reaching_time" end
@@ -329,7 +335,8 @@ let certificate (j : Json.t) : t =
   need (verdict = (if certified then "certified" else "undecided")) "what was proved makes another verdict";
   { nodes; sha256; verdict; theorem; checked = List.rev proof.checked; unchecked = List.rev proof.unchecked;
     sections = List.rev !left_out;
-    cert = { order = Array.length nodes.labels; edges; kind; rho1; rho2; kappa; comps; funcs = functions;
+    cert = { order = Array.length nodes.labels; edges; kind; rho1; rho2; kappa; comps; pieces; all_balanced = found.balance;
+      sign_symmetric = Pieces.sign_symmetric all; funcs = functions;
       start = Option.value start ~default:[]; sliding = (if start = None then [] else sliding); final;
       margins = (match paper with Some p -> p.inequalities | None -> []);
       leaders = (match paper with Some p -> p.groups | None -> []);

@@ -13,7 +13,7 @@ import pytest
 from agent_documents import Setting
 from agent_documents import document as agents_document
 from generators import all_classes, random_graph, smallest
-from mutations import mutants, resealed
+from mutations import changed, mutants, resealed
 from paper_examples import paper_examples
 from verified import SKIPPED, UNREAD, program, said, unchecked
 
@@ -94,6 +94,31 @@ def test_claims_besides_those_of_the_graph_are_named_and_not_believed(tmp_path: 
         assert code == 1 and "nothing asks for" in text
 
 
+def test_the_claim_of_every_weak_component_is_verified(tmp_path: Path) -> None:
+    program()
+    edges = [("a", "b", 1), ("b", "a", 1), ("b", "f", -1), ("c", "d", -1), ("d", "c", 2), ("c", "d2", 1)]
+    cert = certify(edges, NominalProtocol(1, 1, 1, 1), [1, 2, 3, 4, 5, 6], simulation=False)
+    document = json.loads(cert.to_json())
+    code, text = said(document, tmp_path)
+    assert code == 0 and "verified    claim of graph" in text and len(document["components"]) == 2
+    for path, new in (
+        (("components", 0, "claim", "theorem"), "3.1"),
+        (("components", 0, "claim", "behaviour"), "bipartite consensus"),
+        (("components", 0, "claim", "corollaries"), ["3", "4"]),
+        (("components", 1, "claim", "behaviour"), "interval bipartite consensus"),
+        (("components", 1, "nodes"), document["components"][1]["nodes"][:-1]),
+        (("components", 0, "final_state", "f"), "9"),
+        (("components", 0, "connectivity"), "strong"),
+        (("components",), document["components"][:1]),
+        (("structure", "balanced"), True),
+        (("structure", "sign_symmetric"), True),
+    ):
+        forged = resealed(changed(document, path, new))
+        assert not check(forged).accepted
+        code, text = said(forged, tmp_path)
+        assert code == 1, (path, text)
+
+
 def test_no_text_of_the_file_is_printed_as_a_line_of_its_own(tmp_path: Path) -> None:
     program()
     document = json.loads(paper_examples()[0])
@@ -115,11 +140,9 @@ def test_agents_of_order_n_and_families_are_not_read_as_agents_of_order_1(tmp_pa
         Family.switching([SignedDigraph.from_edges([("a", "b", w)]) for w in (1, 2)]), NominalProtocol(1, 1, 1, 1)
     )
     of_agents = agents_document(SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)]), Setting())
-    apart = certify([("a", "b", 1), ("c", "d", 1)], NominalProtocol(1, 1, 1, 1), simulation=False)
     for document, what in (
         (json.loads(family.to_json()), "family"),
         (of_agents, "agents of order n, section agents"),
-        (json.loads(apart.to_json()), "disconnected"),
     ):
         assert check(document).accepted
         code, text = said(document, tmp_path)
