@@ -22,8 +22,9 @@ Record func := Func {
 (** [S(x) > m |x|^2] for [x] on some nodes, [S(x) = sum_i gamma_i x_i^2] where [gamma_i] is given, else
     [2 sum_i w_i x_i (L x)_i]: the matrix whose least eigenvalue the paper's rate takes *)
 Record margin := Margin { on : list nat; weights : list Q; gammas : list (option Q); least : Q }.
-(** the upper bound on the rate, and what proves it: a strong component, a form on it, where that is negative *)
-Record upper := Upper { bound : Q; inside : list nat; form_H : list (list Q); vector_y : list Q }.
+(** the upper bound on the rate, and what proves it of a strong component: a form, and where that is negative; its trace *)
+Inductive reason := ByForm (H : list (list Q)) (y : list Q) | ByTrace.
+Record upper := Upper { bound : Q; inside : list nat; because : reason }.
 Inductive balance := Gauge (g : list Z) | Cycle (c : list (nat * nat)).
 (** a weak component: [row] 1, 2, 3 if one closed component is all of it, if there is one, if there are several *)
 Record piece := Piece { members : list nat; row : nat; some_balanced : bool; undirected : bool; cooperative : bool;

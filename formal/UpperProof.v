@@ -183,28 +183,50 @@ Proof.
   - intros i. destruct (in_dec Nat.eq_dec i R) as [I|I]; [left; apply Z.eqb_eq; auto|right; apply Hx; exact I].
 Qed.
 
-Lemma upper_ok : check_upper c d u = true -> upper_claim c u.
+Section Reached.
+Variable C : list nat.
+Let R := reach n es C.
+Hypothesis Hregion : check_region c d C R = true.
+Lemma region_parts :
+  (forall a, In a es -> mem (tgt a) C = true -> mem (src a) C = true \/ ~ In (src a) R) /\
+  (forall a, In a es -> In (src a) R -> In (tgt a) R) /\ (forall i, In i C -> In i R) /\ (forall i, In i R -> (i < n)%nat) /\
+  (forall p, In p (balanced_comps (comps c)) ->
+    In p (ends_of c C) \/ forall x, supported R x -> qdot (snd (snd p)) x = 0) /\
+  (forall p, In p (ends_of c C) -> In p (balanced_comps (comps c)) /\ In (fst p) C).
 Proof.
-  unfold check_upper. cbv zeta. fold n es. set (C := inside u). set (off := filter (fun i => negb (mem i C)) (seq 0 n)).
-  set (R := reach n es C). set (e := common (concat (form_H u))). set (A := map (map (scaled e)) (form_H u)).
-  set (yz := map (scaled (common (vector_y u))) (vector_y u)). intros H.
-  apply andb_prop in H as [H _]. apply andb_prop in H as [H Hy]. apply andb_prop in H as [H Hyo].
-  apply andb_prop in H as [H Hly]. apply andb_prop in H as [H He]. apply andb_prop in H as [H Hz].
-  apply andb_prop in H as [H Hd]. apply andb_prop in H as [H Hn].
-  apply andb_prop in H as [H HCR]. apply andb_prop in H as [H Hout]. apply andb_prop in H as [H Hin].
+  pose proof Hregion as H. unfold check_region in H. fold es n in H.
+  apply andb_prop in H as [H _]. apply andb_prop in H as [H Hz]. apply andb_prop in H as [H Hn].
+  apply andb_prop in H as [H HCR]. apply andb_prop in H as [Hin Hout].
+  rewrite forallb_forall in Hin, Hout, HCR, Hz, Hn. split; [|split; [|split; [|split; [|split]]]].
+  - intros a Ha HC. specialize (Hin a Ha). rewrite HC in Hin. simpl in Hin. apply orb_prop in Hin as [K|K]; [left; exact K|right].
+    intros A. apply mem_In in A. rewrite A in K. discriminate.
+  - intros a Ha Hi. specialize (Hout a Ha). apply mem_In in Hi. rewrite Hi in Hout. apply mem_In. exact Hout.
+  - intros i Hi. apply mem_In. auto.
+  - intros i Hi. apply Nat.ltb_lt. auto.
+  - intros p Hp. specialize (Hz p Hp). apply orb_prop in Hz as [Hz|Hz].
+    + left. unfold ends_of. apply filter_In. split; [exact Hp|exact Hz].
+    + right. apply null_outside; assumption.
+  - intros p Hp. unfold ends_of in Hp. apply filter_In in Hp as [Hp HC]. split; [exact Hp|apply mem_In; exact HC].
+Qed.
+
+Lemma form_upper Hq yq : because u = ByForm Hq yq -> inside u = C -> check_form c d (bound u) C R Hq yq = true -> upper_claim c u.
+Proof.
+  intros _ _. unfold check_form. cbv zeta. fold n. set (off := filter (fun i => negb (mem i C)) (seq 0 n)).
+  set (e := common (concat Hq)). set (A := map (map (scaled e)) Hq).
+  set (yz := map (scaled (common yq)) yq). intros H.
+  destruct region_parts as [Hin [RR [HCR [Rn [Own Sub]]]]].
+  apply andb_prop in H as [H Hy]. apply andb_prop in H as [H Hyo].
+  apply andb_prop in H as [H Hly]. apply andb_prop in H as [H He]. apply andb_prop in H as [H Hd].
   apply andb_prop in H as [H Hs]. apply andb_prop in H as [H Ho]. apply andb_prop in H as [_ Hfit].
-  apply Nat.leb_le in Hs, Hly. apply Z.ltb_lt in Hy. rewrite forallb_forall in Hin, Hout, HCR, Hz, Hyo, Hn.
+  apply Nat.leb_le in Hs, Hly. apply Z.ltb_lt in Hy. rewrite forallb_forall in Hyo.
   set (y := vec_of yz).
   assert (Off : forall i, mem i off = true <-> ((i < n)%nat /\ mem i C = false)).
   { intros i. rewrite mem_In. unfold off. rewrite filter_In, in_seq, negb_true_iff. intuition lia. }
-  assert (RR : forall a, In a es -> In (src a) R -> In (tgt a) R).
-  { intros a Ha Hi. specialize (Hout a Ha). apply mem_In in Hi. rewrite Hi in Hout. simpl in Hout. apply mem_In. exact Hout. }
-  assert (Rn : forall i, In i R -> (i < n)%nat) by (intros i Hi; apply Nat.ltb_lt; auto).
   assert (yR : supported R y).
   { intros i Hi. unfold y, vec_of. destruct (le_lt_dec n i) as [L|L].
     - rewrite nth_overflow by lia. reflexivity.
     - assert (M : In i off).
-      { apply mem_In, Off. split; [exact L|]. destruct (mem i C) eqn:E; [|reflexivity]. exfalso. apply Hi. apply mem_In.
+      { apply mem_In, Off. split; [exact L|]. destruct (mem i C) eqn:E; [|reflexivity]. exfalso. apply Hi.
         apply HCR. apply mem_In. exact E. }
       specialize (Hyo i M). apply Z.eqb_eq in Hyo. rewrite Hyo. reflexivity. }
   assert (yneg : bil A y y < 0).
@@ -219,21 +241,14 @@ Proof.
       - intros j Hj. apply E. apply negb_true_iff. exact Hj.
       - intros a Ha Ht. apply negb_true_iff in Ht. assert (TC : mem (tgt a) C = true).
         { destruct (mem (tgt a) C) eqn:EC; [reflexivity|]. assert (mem (tgt a) off = true) by (apply Off; auto). congruence. }
-        specialize (Hin a Ha). rewrite TC in Hin. simpl in Hin. unfold x'. destruct (mem (src a) C); [reflexivity|].
-        simpl in Hin. apply negb_true_iff in Hin. apply Hx. intros K. apply mem_In in K. congruence.
+        unfold x'. destruct (mem (src a) C) eqn:SC; [reflexivity|].
+        destruct (Hin a Ha TC) as [K|K]; [congruence|apply Hx; exact K].
       - rewrite Hi. reflexivity. }
     rewrite (outside_ok off A 0 x x' x x' Ho E E), (outside_ok off A 0 (lap es x) (lap es x') x x' Ho EL E),
       (outside_ok off A 0 x x' (lap es x) (lap es x') Ho E EL).
     apply Hrate; [exact Hfit|]. apply (definite_off_ok n off _ Hd). intros i Hi. apply Off in Hi as [_ Hi].
     unfold x'. rewrite Hi. reflexivity. }
   assert (Rlap : forall x, supported R x -> supported R (lap es x)) by (apply lap_supported; exact RR).
-  assert (Own : forall p, In p (balanced_comps (comps c)) ->
-    In p (ends_of c C) \/ forall x, supported R x -> qdot (snd (snd p)) x = 0).
-  { intros p Hp. specialize (Hz p Hp). apply orb_prop in Hz as [Hz|Hz].
-    - left. unfold ends_of. apply filter_In. split; [exact Hp|exact Hz].
-    - right. apply null_outside; assumption. }
-  assert (Sub : forall p, In p (ends_of c C) -> In p (balanced_comps (comps c)))
-    by (intros p Hp; unfold ends_of in Hp; apply filter_In in Hp; apply Hp).
   revert He Own Sub. destruct (ends_of c C) as [|b [|b' l']]; intros He Own Sub; [| |discriminate].
   - apply (projected R (fun _ => 0) 0%nat A y).
     + intros; ring.
@@ -248,8 +263,9 @@ Proof.
     + exact yR.
     + reflexivity.
     + exact yneg.
-  - assert (Hb : In b (balanced_comps (comps c))) by (apply Sub; left; reflexivity).
-    apply andb_prop in He as [He Hyb]. apply andb_prop in He as [Ht Hv]. apply Z.eqb_eq in Hyb. apply mem_In in Ht.
+  - assert (Hb : In b (balanced_comps (comps c))) by (apply (Sub b); left; reflexivity).
+    assert (Ht : In (fst b) R) by (apply HCR; apply (Sub b); left; reflexivity).
+    apply andb_prop in He as [Hv Hyb]. apply Z.eqb_eq in Hyb. unfold null_of in Hv, Hyb.
     apply negb_true_iff, Z.eqb_neq in Hv. set (v := snd (snd b)) in *. set (t := fst b) in *.
     pose proof (sv_pos b Hb) as Sp. set (vt := Q2R (nth t v 0%Q)).
     assert (Vt : vt <> 0).
@@ -279,4 +295,5 @@ Proof.
       rewrite <- E, zdot_ok, Hyb. ring.
     + exact yneg.
 Qed.
+End Reached.
 End Upper.

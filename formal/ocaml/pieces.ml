@@ -37,6 +37,15 @@ let find g =
   let within own = let inside = Array.make g.n false in List.iter (fun i -> inside.(i) <- true) own; fun i -> inside.(i) in
   { pieces = List.map (fun own -> own, balance g camps back (within own)) groups; balance = balance g camps back (fun _ -> true) }
 
+let strong_component g i =
+  let reached next =
+    let seen = Array.make g.n false in
+    let rec go i = if not seen.(i) then begin seen.(i) <- true; List.iter (fun e -> match next i e with Some j -> go j | None -> ()) g.beside.(i) end in
+    go i; seen in
+  let there = reached (fun i e -> if e.src = i then Some e.tgt else None)
+  and back = reached (fun i e -> if e.tgt = i then Some e.src else None) in
+  List.filter (fun j -> there.(j) && back.(j)) (List.init g.n Fun.id)
+
 let twin e f = f.src = e.tgt && f.tgt = e.src
 let undirected g own = List.for_all (fun e -> not (List.mem e.tgt own)
   || List.exists (fun f -> twin e f && Number.equal f.wt e.wt) g.beside.(e.tgt)) g.edges

@@ -211,8 +211,16 @@ let upper nodes comps proof bound =
         let a = dot v y and b = dot v z in
         if Z.sign a.qnum = 0 then y else List.map2 (fun y z -> Number.sub (Number.mul b y) (Number.mul a z)) y z
     | _ -> bad "rate-upper-bound: two vectors iff the component is closed and balanced" in
-  { bound; inside; form_H = matrix nodes "lower_triangle" (Array.of_list inside) (entries "lower_triangle" (get "lower_triangle"));
-    vector_y }
+  let form = matrix nodes "lower_triangle" (Array.of_list inside) (entries "lower_triangle" (get "lower_triangle")) in
+  { bound; inside; because = ByForm (form, vector_y) }
+(* the same by the trace of a strong component, named by its first node *)
+let mean nodes all proof bound =
+  let numbers, witness = proved proof "rate-mean" "rates" [ "upper_bound" ] in
+  need (Number.equal (numbers "upper_bound") bound) "rate-mean: another upper bound";
+  let first = node nodes "rate-mean" ((fields "the witness" [ "node" ] witness) "node") in
+  let inside = Pieces.strong_component all first in
+  need (List.hd inside = first) "rate-mean: not the first node of its component";
+  { bound; inside; because = ByTrace }
 
 let certificate (j : Json.t) : t =
   (match j with
@@ -284,6 +292,7 @@ let certificate (j : Json.t) : t =
     | None -> None
     | Some bound when following proof = "rate-upper-bound" && has_kernel functions ->
         Some (upper nodes comps proof bound)
+    | Some bound when following proof = "rate-mean" && has_kernel functions -> Some (mean nodes all proof bound)
     | Some _ ->
         skipped proof (if following proof = "rate-mean" then "rate-mean" else "rate-upper-bound") "rates";
         not_checked "rates.upper_bound, input.threshold.upper"; None in

@@ -6,6 +6,7 @@ import json
 import os
 import re
 import subprocess
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -119,6 +120,26 @@ def test_the_claim_of_every_weak_component_is_verified(tmp_path: Path) -> None:
         assert code == 1, (path, text)
 
 
+@pytest.mark.parametrize("kind", ["rate-mean", "rate-upper-bound"])
+def test_a_lower_bound_on_all_rates_than_is_proved_is_rejected(kind: str, tmp_path: Path) -> None:
+    program()
+    documents = [json.loads(text) for text in paper_examples()]
+    document = next(d for d in documents if any(o["kind"] == kind for o in d["proof"]))
+    place = next(i for i, o in enumerate(document["proof"]) if o["kind"] == kind)
+    code, text = said(document, tmp_path)
+    assert code == 0 and f"verified    {kind} of rates" in text
+    protocol = {key: Fraction(value) for key, value in document["protocol"].items() if key in ("rho2", "kappa")}
+    bound = (Fraction(document["rates"]["upper_bound"]) + Fraction(document["rates"]["proved"])) / 2
+    bound = Fraction(document["rates"]["proved"]) if kind == "rate-upper-bound" else bound
+    forged = changed(document, ("rates", "upper_bound"), str(bound))
+    forged = changed(forged, ("proof", place, "numbers", "upper_bound"), str(bound))
+    upper = str(protocol["rho2"] * protocol["kappa"] * bound / 2)
+    forged = resealed(changed(forged, ("input", "threshold", "upper"), upper))
+    assert check(forged).rejected == f"{kind} of rates"
+    code, text = said(forged, tmp_path)
+    assert code == 1 and "rate-upper-bound of rates" in text
+
+
 def test_no_text_of_the_file_is_printed_as_a_line_of_its_own(tmp_path: Path) -> None:
     program()
     document = json.loads(paper_examples()[0])
@@ -189,7 +210,8 @@ def test_what_the_checker_accepts_of_random_graphs_the_verified_one_accepts(
     program()
     for seed in range(int(os.environ.get("PTCC_VERIFIED_GRAPHS", 14))):
         rng = np.random.default_rng(seed)
-        settings = {"n": smallest(**kwargs) + seed % 5, **kwargs}
+        fixed = "isolated" in kwargs and not kwargs["parts"]
+        settings = {"n": smallest(**kwargs) + (0 if fixed else seed % 5), **kwargs}
         graph = random_graph(rng, **settings).graph
         protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
         more = {}
