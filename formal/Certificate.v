@@ -20,8 +20,8 @@ Record func := Func {
   deviation : option (Q * list Q);     (* of the norm, of each agent *)
   constants : option (list Q) }.       (* of each agent's input *)
 (** [S(x) > m |x|^2] for [x] on some nodes, [S(x) = sum_i gamma_i x_i^2] where [gamma_i] is given, else
-    [2 sum_i w_i x_i (L x)_i]: the matrix whose least eigenvalue the paper's rate takes *)
-Record margin := Margin { on : list nat; weights : list Q; gammas : list (option Q); least : Q }.
+    [2 sum_i w_i x_i (L x)_i]: the matrix whose least eigenvalue the paper's rate takes; the weights of [upto] times a factor *)
+Record margin := Margin { on : list nat; weights : list Q; gammas : list (option Q); least : Q; upto : list nat }.
 (** the upper bound on the rate, and what proves it of a strong component: a form, and where that is negative; its trace *)
 Inductive reason := ByForm (H : list (list Q)) (y : list Q) | ByTrace.
 Record upper := Upper { bound : Q; inside : list nat; because : reason }.
@@ -133,13 +133,15 @@ Definition function_claim (c : cert) (f : func) : Prop := forall X S t0, moves c
       sq (lap (edges c) (X t) i) <= Q2R (nth i cs 0%Q) * V (edges c) (ly f) (X t)
   | None => True end.
 (** the inequalities of the paper's own function *)
-Definition margin_form (es : list edge) (n : nat) (m : margin) (x : nat -> R) : R :=
+Definition margin_form (es : list edge) (n : nat) (m : margin) (r : R) (x : nat -> R) : R :=
   fold_right (fun i a => match nth i (gammas m) None with
     | Some g => Q2R g * sq (x i)
-    | None => 2 * Q2R (nth i (weights m) 0%Q) * (x i * lap es x i) end + a) 0 (seq 0 n).
+    | None => 2 * (Q2R (nth i (weights m) 0%Q) * if mem i (upto m) then r else 1) * (x i * lap es x i) end + a) 0 (seq 0 n).
 Definition margin_claim (c : cert) (m : margin) : Prop := forall x, (forall i, (i < order c)%nat -> ~ In i (on m) -> x i = 0) ->
-  Q2R (least m) * norm2 (order c) x <= margin_form (edges c) (order c) m x /\
-  (Q2R (least m) * norm2 (order c) x = margin_form (edges c) (order c) m x -> forall i, (i < order c)%nat -> x i = 0).
+  let S r := margin_form (edges c) (order c) m r x in
+  Q2R (least m) * norm2 (order c) x <= S 1 /\
+  (Q2R (least m) * norm2 (order c) x = S 1 -> forall i, (i < order c)%nat -> x i = 0) /\
+  (Q2R (least m) = 0 -> forall r, 0 < r <= 1 -> 0 <= S r /\ (S r = 0 -> forall i, (i < order c)%nat -> x i = 0)).
 Definition leader_claim (c : cert) (l : list Q * Q) : Prop := forall X S t0, moves c X S t0 ->
   forall t, t0 <= t < deadline c ->
   let W x := qdot (fst l) (fun i => sq (lap (edges c) x i)) in

@@ -38,23 +38,26 @@ Let n := order c.
 Let es := edges c.
 Hypothesis Hls : good (dls d) (map wt es) = true.
 
-Lemma margin_ok : check_margin c d m = true -> margin_claim c m.
+(** the inequality itself *)
+Lemma margin_one : check_margin c d m = true -> forall x, (forall i, (i < n)%nat -> ~ In i (on m) -> x i = 0) ->
+  Q2R (least m) * norm2 n x <= margin_form es n m 1 x /\
+  (Q2R (least m) * norm2 n x = margin_form es n m 1 x -> forall i, (i < n)%nat -> x i = 0).
 Proof.
   intros H x Hx. unfold check_margin in H. cbv zeta in H. fold n in H. revert H.
   set (e := common (weights m ++ some_of (gammas m))). set (M := map (margin_row e (dls d) (dL d) m) (seq 0 n)).
   set (T := madd _ _). intros H.
-  apply andb_prop in H as [H D]. apply andb_prop in H as [H F]. apply andb_prop in H as [G1 G2].
+  apply andb_prop in H as [H D]. apply andb_prop in H as [H _]. apply andb_prop in H as [H _]. apply andb_prop in H as [H F]. apply andb_prop in H as [G1 G2].
   destruct (fits_ok _ _ F) as [F1 _]. destruct (good_ok _ _ G2) as [Pe G3]. destruct (good_ok _ _ Hls) as [Pl _].
   assert (Z : forall i, mem i (filter (fun i => negb (mem i (on m))) (seq 0 n)) = true -> x i = 0).
   { intros i Hi. apply mem_In, filter_In in Hi as [Hs Hi]. apply in_seq in Hs. apply Hx; [fold n; lia|].
     intros Hin. apply mem_In in Hin. rewrite Hin in Hi. discriminate. }
   destruct (definite_off_ok _ _ _ D x Z) as [P0 P1]. rewrite bil_symmetric in P0, P1 by assumption.
-  assert (EM : bil M x x = IZR e * IZR (dls d) * margin_form es n m x).
+  assert (EM : bil M x x = IZR e * IZR (dls d) * margin_form es n m 1 x).
   { unfold M. rewrite bil_map_seq. unfold margin_form.
     assert (K : forall l, (forall i, In i l -> (i < n)%nat) ->
       fold_right (fun i a => x i * dot (margin_row e (dls d) (dL d) m i) x + a) 0 l = IZR e * IZR (dls d) *
       fold_right (fun i a => match nth i (gammas m) None with Some g => Q2R g * sq (x i)
-        | None => 2 * Q2R (nth i (weights m) 0%Q) * (x i * lap es x i) end + a) 0 l).
+        | None => 2 * (Q2R (nth i (weights m) 0%Q) * if mem i (upto m) then 1 else 1) * (x i * lap es x i) end + a) 0 l).
     { induction l as [|i l IH]; intros Hl; cbn [fold_right]; [ring|]. rewrite IH by (intros; apply Hl; right; assumption).
       rewrite Rmult_plus_distr_l. f_equal. unfold margin_row.
       destruct (nth i (gammas m) None) as [g|] eqn:E.
@@ -66,10 +69,10 @@ Proof.
         assert (W : IZR (scaled e (nth i (weights m) 0%Q)) = IZR e * Q2R (nth i (weights m) 0%Q)).
         { destruct (good_ok _ _ G1) as [_ G4]. apply scaled_ok; [exact Pe|]. apply G4.
           destruct (nth_in_or_default i (weights m) 0%Q) as [I|I]; [right; exact I|left; symmetry; exact I]. }
-        rewrite W. ring. }
+        rewrite W. destruct (mem i (upto m)); ring. }
     apply K. intros i Hi. apply in_seq in Hi. lia. }
   assert (ET : bil T x x = IZR e * IZR (dls d) * IZR (Zpos (Qden (least m))) *
-    (margin_form es n m x - Q2R (least m) * norm2 n x)).
+    (margin_form es n m 1 x - Q2R (least m) * norm2 n x)).
   { unfold T. rewrite bil_madd, !bil_mscale, EM, bil_ones, opp_IZR, !mult_IZR. unfold Q2R. field. apply IZR_neq. discriminate. }
   rewrite ET in P0, P1. apply IZR_lt in Pe, Pl.
   assert (Pd : 0 < IZR (Zpos (Qden (least m)))) by (apply IZR_lt; reflexivity).
@@ -77,6 +80,35 @@ Proof.
   assert (Q0 : 0 < q) by (unfold q; repeat apply Rmult_lt_0_compat; assumption). fold es n. split.
   - apply (Rmult_le_reg_l (2 * q)); [lra|]. lra.
   - intros E. apply P1. fold es n in E. rewrite E. ring.
+Qed.
+(** of smaller weights on agents to whom no other listens: [S_r(x) = (1 - r) S_1(x') + r S_1(x)], [x' = 0] on them *)
+Lemma margin_convex x r : check_margin c d m = true ->
+  let x' i := if mem i (upto m) then 0 else x i in
+  margin_form es n m r x = (1 - r) * margin_form es n m 1 x' + r * margin_form es n m 1 x.
+Proof.
+  intros H x'. unfold check_margin in H. cbv zeta in H. apply andb_prop in H as [H _]. apply andb_prop in H as [H He].
+  apply andb_prop in H as [_ Hg]. rewrite forallb_forall in He, Hg. unfold margin_form.
+  induction (seq 0 n) as [|i l IH]; cbn [fold_right]; [ring|]. rewrite IH. destruct (mem i (upto m)) eqn:E.
+  - specialize (Hg i ltac:(apply mem_In; exact E)). destruct (nth i (gammas m) None); [discriminate|].
+    assert (X : x' i = 0) by (unfold x'; rewrite E; reflexivity). rewrite X. ring.
+  - assert (X : x' i = x i) by (unfold x'; rewrite E; reflexivity).
+    assert (Lx : lap es x' i = lap es x i).
+    { unfold lap. fold es in He. clear IH Hg Hls. induction es as [|e k' IHe]; simpl; [reflexivity|].
+      rewrite IHe by (intros; apply He; right; assumption). f_equal. unfold lap_edge.
+      destruct (Nat.eqb_spec (tgt e) i) as [T|T]; [|reflexivity]. specialize (He e (or_introl eq_refl)). rewrite T, E in He.
+      simpl in He. apply negb_true_iff in He. rewrite X. unfold x'. rewrite He. reflexivity. }
+    rewrite X, Lx. destruct (nth i (gammas m) None); ring.
+Qed.
+Lemma margin_ok : check_margin c d m = true -> margin_claim c m.
+Proof.
+  intros H x Hx S. destruct (margin_one H x Hx) as [A B]. fold n es in S. split; [exact A|]. split; [exact B|].
+  intros L0 r [R0 R1]. set (x' := fun i => if mem i (upto m) then 0 else x i).
+  destruct (margin_one H x') as [A' _].
+  { intros i Hi Hn. unfold x'. destruct (mem i (upto m)); [reflexivity|apply Hx; assumption]. }
+  rewrite L0, Rmult_0_l in A, A', B. unfold S. rewrite (margin_convex x r H). fold x'.
+  assert (P : 0 <= (1 - r) * margin_form es n m 1 x') by (apply Rmult_le_pos; lra).
+  assert (Q : 0 <= r * margin_form es n m 1 x) by (apply Rmult_le_pos; lra). split; [lra|].
+  intros Z. apply B. symmetry. apply (Rmult_eq_reg_l r); lra.
 Qed.
 End Margin.
 

@@ -7,7 +7,8 @@ module Z = Number.Z
 
 type t = {
   coordinates : string; weights : (int * q) list; own_rate : q option; section : string -> Json.t;
-  inequalities : margin list; groups : (q list * q) list }
+  inequalities : margin list; groups : (q list * q) list;
+  any_rho : bool (* said of every positive rho; not checked *) }
 
 (* what the row is of: closed components from 1 on with their nodes and whether they are balanced *)
 type setting = { n : int; edges : edge list; closed : (int * int list * bool) list; followers : int list; theorem : string }
@@ -67,7 +68,7 @@ let leaders s proof blocks =
       else begin
         let m = bare proof "leader-margin" ("paper." ^ name) [ "m" ] "m" in
         need (Z.sign m.qnum > 0) "leader-margin: m is not positive";
-        gammas @ List.map (fun i -> (i, m)) own, inequalities @ [ { on = own; weights; gammas = []; least = m } ], groups end)
+        gammas @ List.map (fun i -> (i, m)) own, inequalities @ [ { on = own; weights; gammas = []; least = m; upto = [] } ], groups end)
     ([], [], []) blocks
 
 let read s nodes proof v =
@@ -110,7 +111,8 @@ let read s nodes proof v =
         let gammas, inequalities, groups = leaders s proof blocks in
         let gammas = List.init s.n (fun i -> List.assoc_opt i gammas) in
         let on = List.map fst own in
-        let at rho least = { on; weights = by_node s (weights rho); gammas; least } in
+        let upto = if rho = None then [] else s.followers in
+        let at rho least = { on; weights = by_node s (weights rho); gammas; least; upto } in
         let numbers = bare proof "margin" "paper" (if rho = None then [ "m" ] else [ "m"; "rho" ]) in
         if rho <> None then need (Number.equal (numbers "rho") rho_value) "margin: another rho";
         let m = numbers "m" in
@@ -134,4 +136,5 @@ let read s nodes proof v =
                    [ at printed Number.zero; at exact Number.zero ]
                | _ -> bad "rho_interval: one end without the other") in
         inequalities @ (at rho_value m :: ends), groups in
-  { coordinates; weights = own; own_rate; section; inequalities; groups }
+  let any_rho = section "rho_interval" <> Null && not (List.exists (fun (m : margin) -> Number.equal m.least Number.zero) inequalities) in
+  { coordinates; weights = own; own_rate; section; inequalities; groups; any_rho }

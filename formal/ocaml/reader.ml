@@ -272,6 +272,7 @@ let certificate (j : Json.t) : t =
   let closed = List.mapi (fun k (one : Checker.comp) -> k + 1, one.nodes, (match one.wit with Bal _ -> true | Unbal _ -> false)) comps in
   let setting = { Paper.n = Array.length nodes.labels; edges; closed; followers; theorem } in
   let paper = optional (fun _ v -> Paper.read setting nodes proof v) "paper" (get "paper") in
+  (match paper with Some { Paper.any_rho = true; _ } -> not_checked "paper.rho_interval, that every rho is admissible" | _ -> ());
   let gauge () = match comps with [ { wit = Bal (g, _, _); _ } ] -> g | _ -> bad "coordinates eps of another graph" in
   let functions = (fields "lyapunov" [ "functions" ] (get "lyapunov")) "functions" in
   let functions = List.mapi (function_ nodes proof gauge true paper) (entries "functions" functions) in
