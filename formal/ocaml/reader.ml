@@ -137,12 +137,13 @@ let ends weights = match weights with
   | (_, w) :: l -> List.fold_left (fun (a, b) (_, x) ->
       (if Number.compare x a < 0 then x else a), (if Number.compare x b > 0 then x else b)) (w, w) l
 
-let block nodes shape v =
+let block nodes listening shape v =
   let get = fields "a block" [ "name"; "nodes"; shape; "times_rho" ] v in
   let own = positions nodes "nodes of a block" (get "nodes") in
   need (List.sort_uniq compare own |> List.length = List.length own) "nodes of a block: one occurs twice";
+  need (List.sort compare own = listening) "nodes of a block: not those that listen to somebody";
   text "name" (get "name"), own, get shape, truth "times_rho" (get "times_rho")
-let function_ nodes proof gauge influence_exact paper number_of v =
+let function_ nodes listening proof gauge paper number_of v =
   let of_ = Printf.sprintf "lyapunov.functions[%d]" number_of in
   let get = fields "a Lyapunov function" [ "class"; "coordinates"; "blocks"; "rho"; "rate"; "overshoot"; "deviation" ] v in
   let rate = number "rate" (get "rate") and overshoot = number "overshoot" (get "overshoot") in
@@ -163,7 +164,7 @@ let function_ nodes proof gauge influence_exact paper number_of v =
         let one = match entries "blocks" (get "blocks") with [ b ] -> b | _ -> bad "blocks: one is due" in
         (match text "class" (get "class") with
          | "full" ->
-             let name, own, rows, times_rho = block nodes "lower_triangle" one in
+             let name, own, rows, times_rho = block nodes listening "lower_triangle" one in
              need (name = "P" && not times_rho) "another block";
              if following proof <> "rate" then bad (of_ ^ ": its rate is not proved");
              need (Number.equal (bare proof "rate" of_ [ "b" ] "b") rate) (of_ ^ ": b is not the rate");
@@ -171,7 +172,7 @@ let function_ nodes proof gauge influence_exact paper number_of v =
              InE (matrix nodes "lower_triangle" (Array.of_list own) (entries "lower_triangle" rows)), false, e "lowest", e "highest"
          | "perron" | "lmi" ->
              if following proof = "dominance" then unsupported "dominance";
-             let name, own, d, times_rho = block nodes "diagonal" one in
+             let name, own, d, times_rho = block nodes listening "diagonal" one in
              need (name = "P" && not times_rho) "another block";
              let d = List.map (number "diagonal") (entries "diagonal" d) in
              need (List.length d = List.length own) "diagonal: a number for each node";
@@ -183,7 +184,6 @@ let function_ nodes proof gauge influence_exact paper number_of v =
   let deviation = match get "deviation" with
     | Null -> None
     | d ->
-        ignore influence_exact;
         let d = fields "deviation" [ "agents"; "norm" ] d in
         bare_of proof "deviation" of_;
         Some (number "deviation.norm" (d "norm"), by_agent nodes number "deviation.agents" (d "agents")) in
@@ -274,8 +274,9 @@ let certificate (j : Json.t) : t =
   let paper = optional (fun _ v -> Paper.read setting nodes proof v) "paper" (get "paper") in
   (match paper with Some { Paper.any_rho = true; _ } -> not_checked "paper.rho_interval, that every rho is admissible" | _ -> ());
   let gauge () = match comps with [ { wit = Bal (g, _, _); _ } ] -> g | _ -> bad "coordinates eps of another graph" in
-  let functions = (fields "lyapunov" [ "functions" ] (get "lyapunov")) "functions" in
-  let functions = List.mapi (function_ nodes proof gauge true paper) (entries "functions" functions) in
+  let listening = List.filter (fun i -> List.exists (fun e -> e.tgt = i) edges) (List.init (Array.length nodes.labels) Fun.id) in
+  let listed = entries "functions" ((fields "lyapunov" [ "functions" ] (get "lyapunov")) "functions") in
+  let functions = List.mapi (function_ nodes listening proof gauge paper) listed in
   let rates = fields "rates" [ "paper"; "diagonal"; "proved"; "upper_bound" ] (get "rates") in
   let rate k = optional number ("rates." ^ k) (rates k) in
   (match rate "paper", Option.bind paper (fun (p : Paper.t) -> p.own_rate) with
@@ -324,22 +325,29 @@ let certificate (j : Json.t) : t =
           | _ -> bad "input.bounded without a proof" in
         let constants = entries "constants" (input "constants") in
         need (List.length constants = List.length functions) "constants: one for each Lyapunov function";
+        let is_full = function Obj l -> List.assoc_opt "class" l = Some (Str "full") | _ -> false in
         let functions = List.mapi (fun k (f, v) -> match v with
           | Null -> f
-          | v -> bare_of proof "input-constants" (Printf.sprintf "lyapunov.functions[%d]" k);
+          | v ->
+              need (is_full (List.nth listed k)) "constants: of a Lyapunov function that is not full";
+              bare_of proof "input-constants" (Printf.sprintf "lyapunov.functions[%d]" k);
               { f with constants = Some (by_agent nodes number "constants" v) }) (List.combine functions constants) in
+        let there v = v <> Null in
+        let agents = match input "sliding" with Obj l -> Option.value (List.assoc_opt "agents" l) ~default:Null | _ -> Null in
+        List.iter (fun (listed, kind) -> if listed then skipped proof kind "input")
+          [ there agents, "input-sliding"; there (input "peak"), "input-peak"; there (input "energy"), "input-energy";
+            there (input "path_length"), "input-length" ];
+        List.iteri (fun i _ -> skipped proof "limited-gain" (Printf.sprintf "input.residual[%d]" i))
+          (entries "residual" (input "residual"));
+        if there (input "disturbed") then skipped proof "nominal-disturbed" "input";
         not_checked "input.initial_set, .peak, .energy, .path_length, .sliding, .residual, .disturbed";
         bounded, functions in
-  while proof.rest <> [] do
-    match proof.rest with
-    | Obj l :: _ -> (match List.assoc_opt "kind" l, List.assoc_opt "of" l with
-        | Some (Str k), Some (Str o) when not (named k && named o) -> bad "an obligation that nothing asks for"
-        | Some (Str k), Some (Str o) when List.mem k [ "input-sliding"; "input-peak"; "input-energy"; "input-length";
-            "limited-gain"; "nominal-disturbed" ] -> skipped proof k o
-        | Some (Str k), Some (Str o) when more <> [] && of_besides k -> unknown proof k o
+  let and_besides o = match o with
+    | Obj l -> (match List.assoc_opt "kind" l, List.assoc_opt "of" l with
+        | Some (Str k), Some (Str o) when more <> [] && of_besides k && named k && named o -> unknown proof k o
         | _ -> bad "an obligation that nothing asks for")
-    | _ -> bad "an obligation is not an object"
-  done;
+    | _ -> bad "an obligation is not an object" in
+  while proof.rest <> [] do and_besides (List.hd proof.rest) done;
   let verdict = text "verdict" (get "verdict") in
   let certified = rate "proved" <> None || edges = [] in
   need (verdict = (if certified then "certified" else "undecided")) "what was proved makes another verdict";

@@ -27,6 +27,7 @@ from ptcc_certify.errors import FormatError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.protocols.gain_limits import GainLimits
 
 SOURCES = Path(__file__).resolve().parents[2] / "formal"
 
@@ -138,6 +139,23 @@ def test_a_lower_bound_on_all_rates_than_is_proved_is_rejected(kind: str, tmp_pa
     assert check(forged).rejected == f"{kind} of rates"
     code, text = said(forged, tmp_path)
     assert code == 1 and "rate-upper-bound of rates" in text
+
+
+def test_limits_disturbance_and_noise_are_named_and_none_can_be_added(tmp_path: Path) -> None:
+    program()
+    limits = [GainLimits(gain_cap=10), GainLimits(stop_before="0.1"), GainLimits(sample_period="0.001")]
+    edges, protocol = [("a", "b", 1), ("b", "a", 1), ("b", "c", -2)], NominalProtocol(1, 1, 1, 3)
+    cert = certify(edges, protocol, [1, 2, 3], limits=limits, delta=1, simulation=False)
+    document = json.loads(cert.to_json())
+    kinds = [o["kind"] for o in document["proof"]]
+    assert kinds.count("limited-gain") == 3 and "nominal-disturbed" in kinds
+    code, text = said(document, tmp_path)
+    assert code == 0 and "not checked limited-gain of input.residual[2]" in text
+    assert "not checked nominal-disturbed of input" in text
+    proof = document["proof"]
+    for forged in (proof[:-1], [*proof, proof[-1]], [*proof[:-2], proof[-1], proof[-2]]):
+        mutant = resealed({**document, "proof": forged})
+        assert not check(mutant).accepted and said(mutant, tmp_path).code == 1
 
 
 def test_no_text_of_the_file_is_printed_as_a_line_of_its_own(tmp_path: Path) -> None:
