@@ -34,7 +34,8 @@ class ArrayDigraph(Digraph):
     @cached_property
     def degree_bits(self) -> int:
         """Bits of the largest number of edges that enter a node, or leave one."""
-        return max(int(np.bincount(np.asarray(ends)).max()) for ends in (self.source, self.target)).bit_length()
+        degrees = [int(np.bincount(np.asarray(ends)).max(initial=0)) for ends in (self.source, self.target)]
+        return max(degrees).bit_length()
 
     def _add_over_edges(self, of: Any, to: Any, values: Sequence[int], x: Sequence[int]) -> list[int]:
         short = longest(values) + longest(x) + self.degree_bits <= INT64_BITS

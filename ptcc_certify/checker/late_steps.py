@@ -56,7 +56,7 @@ def decay_above(x: int) -> int:
     Examples
     --------
     >>> decay_above(ONE) / ONE  # 24/65
-    0.36923076957464218
+    0.3692307695746422
     """
     total = ONE
     for n in (4, 3, 2, 1):
