@@ -19,11 +19,15 @@ from ptcc_certify.bounds.envelope import FRACTIONS, LAST_INSTANTS
 from ptcc_certify.bounds.final_state import FinalState, rounding_radius
 from ptcc_certify.bounds.input.effort import EnergyIntegral, Peak
 from ptcc_certify.certificate.certificate_data import Content, Observations, Source
+from ptcc_certify.certificate.format_agents import agents_section, read_agents
 from ptcc_certify.certificate.format_effort import LIMITS, effort_section, energy_witness, peak_witness, read_effort
 from ptcc_certify.certificate.format_graph import certificate_graph, claim_sections, graph_section, structure_section
+from ptcc_certify.certificate.format_leaders import leaders_section, read_tracking
+from ptcc_certify.certificate.format_messages import Vectors, messages_section, read_late
 from ptcc_certify.certificate.format_vectors import (
     Reader,
     Writer,
+    agents_ends,
     exact_or_ball,
     factor_entry,
     finite,
@@ -31,7 +35,6 @@ from ptcc_certify.certificate.format_vectors import (
     interval_text,
     number,
     text,
-    weighted_sum,
 )
 from ptcc_certify.certificate.request import Expectations, Request
 from ptcc_certify.checker import SCHEMA, SLIDING_BOUND, SLIDING_CLOCK, CheckReport, digest
@@ -82,6 +85,12 @@ def certificate_document(content: Content, verdict: str, files: bool = False) ->
         "proof": [_write_obligation(o, out) for o in content.obligations],
         "verdict": verdict,
     }
+    if content.agents is not None:
+        document["agents"] = agents_section(content.agents, out)
+    if content.late is not None and content.late.says_something:
+        document["messages"] = messages_section(content.late, out)
+    if content.tracking is not None:
+        document["leaders"] = leaders_section(content.tracking, out)
     return document | {"digest": digest(document), "unverified": _write_unverified(content)}, out
 
 
@@ -117,9 +126,12 @@ def read_document(
         "limit": _read_limit(steps, data),
         "final_state": _read_final_state(document, structure, data),
         "matrix": None,
+        "late": read_late(document, structure, protocol, data, steps),
+        "tracking": read_tracking(document, structure, protocol, data, steps),
         "request": _read_request(document["unverified"], None if effort is None else effort.initial_set),
         "observed": _read_observations(document["unverified"]),
         "source": Source(path, sha256, document, report, effort, proof, files),
+        "agents": read_agents(document.get("agents"), structure, protocol, functions),
     }
 
 
@@ -277,12 +289,7 @@ def _exact_final_state(content: Content) -> tuple[dict[str, Any], dict[str, Any]
     if content.final_state is not None and content.initial_state is not None:
         sigma0 = content.sigma0 or [Fraction(0)] * len(labels)
         first = [(x - s, Fraction(0)) for x, s in zip(content.initial_state, sigma0, strict=True)]
-        groups = list(zip(matrix.balanced, left_null_vectors, strict=True))
-        values = [weighted_sum(null_vector, [first[v] for v in c.nodes]) for c, null_vector in groups]
-        final = dict.fromkeys(range(len(labels)), (Fraction(0), Fraction(0)))
-        for component, (middle, radius) in zip(matrix.balanced, values, strict=True):
-            final |= {v: (g * middle, radius) for v, g in zip(component.nodes, component.gauge or (), strict=True)}
-        final |= {v: weighted_sum(row, values) for v, row in zip(followers, containment_weights, strict=True)}
+        final = agents_ends(matrix, first)
         ends = {label: interval_text(final[v]) for v, label in enumerate(labels)}
     section = {
         "components": [
@@ -360,6 +367,8 @@ def _write_obligation(obligation: Obligation, out: Writer) -> dict[str, Any]:
         witness = energy_witness(witness)
     elif isinstance(witness, Peak):
         witness = peak_witness(witness, out)
+    elif isinstance(witness, Vectors):
+        witness = witness.written(out)
     elif isinstance(witness, tuple):
         witness = {"u": dict(zip(out.labels, map(format_exact, witness), strict=True))}
     elif isinstance(witness, np.ndarray):
@@ -471,6 +480,7 @@ def _write_request(request: Request) -> dict[str, Any]:
         "behaviour": expectations.behaviour,
         "min_rate": text(expectations.min_rate),
         "max_input": text(expectations.max_input),
+        "max_residual": text(expectations.max_residual),
         "limits": [{name: text(getattr(entry, name)) for name in LIMITS} for entry in request.limits],
         "delta": text(request.delta),
         "noise": text(request.noise),
@@ -497,7 +507,9 @@ def _read_request(unverified: Mapping[str, Any], initial_set: InitialSet | None)
         delta=_positive(section, "delta"),
         noise=_positive(section, "noise"),
         time_limit=float(seconds) if isinstance(seconds, int | float) and seconds is not True else math.inf,
-        expectations=Expectations(behaviour, _positive(section, "min_rate"), _positive(section, "max_input")),
+        expectations=Expectations(
+            behaviour, *(_positive(section, key) for key in ("min_rate", "max_input", "max_residual"))
+        ),
         scenario=scenario if isinstance(scenario, dict) else None,
         origins={key: one_line(origin)[:200] for key, origin in origins if isinstance(origin, str)},
     )

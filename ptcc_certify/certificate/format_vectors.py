@@ -242,6 +242,20 @@ def influence_balls(matrix: Influence) -> tuple[list[list[Interval]], list[list[
     return left_null_vectors, containment_weights
 
 
+def agents_ends(matrix: Influence, begin: Sequence[Interval]) -> list[Interval]:
+    """Return ``Q x`` for intervals ``x`` of the agents."""
+    left_null_vectors, containment_weights = influence_balls(matrix)
+    groups = list(zip(matrix.balanced, left_null_vectors, strict=True))
+    values = [weighted_sum(null_vector, [begin[v] for v in c.nodes]) for c, null_vector in groups]
+    ends = [(Fraction(0), Fraction(0))] * len(begin)
+    for component, (middle, radius) in zip(matrix.balanced, values, strict=True):
+        for v, g in zip(component.nodes, component.gauge or (), strict=True):
+            ends[v] = g * middle, radius
+    for v, row in zip(matrix.structure.followers.tolist(), containment_weights, strict=True):
+        ends[v] = weighted_sum(row, values)
+    return ends
+
+
 def _balls(values: Sequence[Fraction]) -> list[Interval]:
     if all(map(writable, values)):
         return [(x, Fraction(0)) for x in values]

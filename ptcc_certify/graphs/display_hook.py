@@ -49,6 +49,10 @@ _FIGURES = {
     "graph": "plot_graph",
     "spectrum": "plot_spectrum",
     "states": "plot_trajectory",
+    "motion": "plot_motion",
+    "formation": "plot_formation",
+    "late": "plot_late",
+    "tracking": "plot_tracking",
 }
 
 
@@ -64,7 +68,8 @@ def plot(subject: Any, what: str, **keywords: Any) -> Any:
     --------
     >>> plot(None, "picture")
     Traceback (most recent call last):
-    ptcc_certify.errors.ParameterError: what = 'picture' is unknown; one of decay, input, graph, spectrum, states
+    ptcc_certify.errors.ParameterError: what = 'picture' is unknown; one of decay, input, graph, spectrum, states, \
+motion, formation, late, tracking
     """
     if what not in _FIGURES:
         raise ParameterError(f"what = {what!r} is unknown; one of {', '.join(_FIGURES)}")

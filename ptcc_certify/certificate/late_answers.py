@@ -1,0 +1,88 @@
+"""What becomes of expectations where messages are late, or leaders move: the rest of a certificate knows of neither."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from lmi.exact.decimal_rounding import down, near, up
+from ptcc_certify.bounds.late_messages import LateBounds
+from ptcc_certify.bounds.missed_deadline import Missed
+from ptcc_certify.bounds.tracking import Tracking
+from ptcc_certify.certificate.answer import MET, OPEN, REFUTED, Answer
+from ptcc_certify.certificate.certificate_data import Content
+
+
+def at_deadline(certificate: Content, answer: Answer) -> Answer:
+    """Return what becomes at ``T``, where messages are late, of a behaviour that follows where none are."""
+    late = certificate.late
+    if late is None or answer.status != MET or certificate.constant:
+        return answer
+    if late.direct:
+        return answer
+    what = f"{answer.what} at T with late messages"
+    if late.missed is not None:
+        return Answer(REFUTED, what, _misses(certificate, late.missed))
+    if late.staged is not None:
+        return Answer(OPEN, what, "with deadlines of stages it holds, with one for all none is proved to hold it")
+    if late.messages.gain_cap is not None:
+        return Answer(OPEN, what, "nothing settles under a cap")
+    return Answer(OPEN, what, "nobody is proved to settle at T")
+
+
+def judge_messages(certificate: Content) -> list[Answer]:
+    """Tell what becomes of what may be left at ``T`` with late messages, and whether anything is proved of these."""
+    late, most = certificate.late, certificate.expectations.max_residual
+    if late is None:
+        answers = [] if most is None else [Answer(OPEN, "max_residual", "no messages are late")]
+        if certificate.request.leaders is not None and certificate.tracking is None:
+            answers.append(Answer(OPEN, "leaders that move", "no vector for their followers was found"))
+        return answers
+    if not late.says_something:
+        limit = f"; this certificate's limit is a delay of {late.longest_delay:.3g}" if late.longest_delay else ""
+        return [Answer(OPEN, "late messages", f"nothing is proved of what is left at T{limit}")]
+    return [] if most is None else [_judge_residual(certificate, late, most)]
+
+
+def _judge_residual(certificate: Content, late: LateBounds, most: Fraction) -> Answer:
+    """Tell whether no more than ``most`` is left at ``T``."""
+    what, missed = f"within {near(most, 12)} at T" + " from within 1 of it" * late.relative, late.missed
+    if late.largest <= most:
+        return Answer(MET, what)
+    if missed is not None and missed.bound > most:
+        return Answer(REFUTED, what, _misses(certificate, missed))
+    shorter = "" if late.enough is None else f"; certified with a delay of {down(late.enough, 4)}"
+    return Answer(OPEN, what, f"this certificate's limit is {up(late.largest, 3)}{shorter}")
+
+
+def _misses(certificate: Content, missed: Missed) -> str:
+    """Tell who misses the deadline by how much."""
+    return f"agent {certificate.graph.labels[missed.agent]} is away by {down(missed.bound, 2)} at least, proved"
+
+
+def judge_input_beside(certificate: Content, most: Fraction, what: str, first: Fraction | float) -> Answer:
+    """Tell whether every input stays within so much where messages are late, or leaders move.
+
+    Parameters
+    ----------
+    certificate : Certificate
+    most : Fraction
+    what : str
+        What is asked, in words.
+    first : Fraction or float
+        What the largest ``|u_k(0)|`` is at least where nobody hears of anything wrong.
+    """
+    late, tracking = certificate.late, certificate.tracking
+    if first > most and not (late is not None and late.messages.value_error):
+        return Answer(REFUTED, what, f"it is up to {down(first)} at the start, proved")
+    if late is not None:
+        return Answer(OPEN, what, "no bound is proved with late messages")
+    return _judge_tracking(tracking, most, what)
+
+
+def _judge_tracking(tracking: Tracking | None, most: Fraction, what: str) -> Answer:
+    """Tell whether every input stays within so much while leaders move."""
+    if tracking is None or tracking.input is None:
+        return Answer(OPEN, what, "no bound is proved while leaders move")
+    what += " from within 1 of the targets" * tracking.relative
+    largest = Fraction(float(tracking.input.max()))
+    return Answer(MET, what) if largest <= most else Answer(OPEN, what, f"proved: {up(largest)}")
