@@ -33,7 +33,7 @@ ROOMS = {
         "Theorems and lemmas",
         "theorems.claims theorems.table theorems.theorem theorems.lemmas theorems.symbolic",
     ),
-    "gain_design": ("Design of gains and deadlines", "gain_design"),
+    "gain_design": ("Design of gains and deadlines", "gain_design agents_design"),
     "batch": ("Many graphs", "batch"),
     "report": ("Pages, statements, figures", "report.explorer"),
     "examples": ("The examples of the paper", "examples"),

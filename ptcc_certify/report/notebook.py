@@ -13,6 +13,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 from typing import Any
 
+from ptcc_certify.agents_design import AgentsDesign
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.errors import PTCCError
@@ -123,6 +124,12 @@ def design_html(answer: Design) -> str:
     """Show a design: the screen of ``ptcc design``, and its peak input against the deadline."""
     alt = "certified peak input against the deadline, and what no gains can stay below"
     return _page(answer.lines(), plot_trade_off(answer).figure, alt)
+
+
+@shows(AgentsDesign)
+def agents_design_html(answer: AgentsDesign) -> str:
+    """Show a design of agents of order n: the screen of ``ptcc design``."""
+    return _page(answer.lines(), None, "")
 
 
 def _structure_page(lines: Iterable[str], structure: Structure) -> str:

@@ -111,9 +111,43 @@ def test_a_figure_of_agents_is_drawn_of_a_certificate_and_of_a_graph(tmp_path: P
         assert ptcc("plot", *subject, "-o", str(figure)).code == 0 and figure.stat().st_size
 
 
-def test_design_refuses_a_scenario_of_agents_instead_of_taking_them_for_single_integrators(tmp_path: Path):
-    done = ptcc("design", _scenario(tmp_path, '[agents]\nkind = "double-integrator"'))
-    assert done.code == 2 and "[agents] kind: ptcc design takes single integrators" in done.err
+def test_design_takes_a_scenario_of_agents_and_prints_the_command_that_proves_it_again(tmp_path: Path):
+    text = (
+        '[agents]\nkind = "double-integrator"\nv0 = [1, 0, 0, 0, 0, -1]\n[initial_state]\nx0 = [5, 2, -4, 3, -2, 1]\n'
+    )
+    text += "[expectations]\nmax_input = 30\n[design]\nshortest_deadline = true\n[limits]\nstop_before = 0.1\n"
+    scenario, saved = _scenario(tmp_path, text), tmp_path / "d.json"
+    done = ptcc("design", scenario, "-o", str(saved))
+    assert done.code == 0 and "verdict    met: ||u_k|| <= " in done.out and "not by these bounds" in done.out
+    assert "not designed for" in done.err and "[limits] stop_before" in done.err
+    command = done.err.split("to prove it again:")[1].replace("\\\n", " ").split()
+    again = ptcc(*command[1:], "--no-simulation")
+    assert again.code == 0 and "verdict    met: |u_k| <= 30" in again.out
+    assert ptcc("check", str(saved)).code == 0
+    assert json.loads(saved.read_text())["unverified"]["scenario"]["design"] == {"shortest_deadline": True}
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (("--agents", "2"), "design needs --max-input U and one of --deadline T, --shortest-deadline"),
+        (("--agents", "2", "--initial-bound", "1"), "--initial-bound: is not proved of agents of order n; give"),
+        (("--agents", "2", "--curve", "c.csv"), "--curve: is drawn of single integrators; leave it out"),
+        (("--agents", "2", "--input-norm", "2"), "--input-norm: is of single integrators"),
+        (("--agents", "2", "--rest", "1"), "rest: no number is proved of the input of agents that meet at rest"),
+        (("--agents", "2", "--decay", "3"), "decay: below 2 n = 4 no input is proved to be bounded"),
+        (("--agents", "2", "--residual", "1"), "residual: nothing is left at T without a gain cap"),
+        (("--agents", "2", "--gain-cap", "9"), "gain_cap: leaves something at every deadline; give residual"),
+        (("--agents", "2", "--delta", "1"), "--delta: is not proved of agents of order n under the nominal"),
+        (("--initial-bound", "1", "--protocol", "sliding-mode"), "--protocol: is not searched for single integrators"),
+        (("--initial-bound", "1", "--x0", "1,2"), "--x0: is not searched for single integrators"),
+        (("--initial-bound", "1", "--v0", "1,2"), "--v0: is for agents of order n"),
+    ],
+)
+def test_what_design_does_not_search_of_agents_is_refused_in_one_line(options: tuple[str, ...], says: str):
+    asked = () if "needs" in says else ("--max-input", "30", "--shortest-deadline")
+    done = ptcc("design", "fig1a", *options, *asked)
+    assert done.code == 2 and says in done.err and len(done.err.splitlines()) == 1
 
 
 @pytest.mark.parametrize("plant", ["[0, 0.1]", '"0,0.1"'])
