@@ -119,8 +119,8 @@ def test_design_takes_a_scenario_of_agents_and_prints_the_command_that_proves_it
     scenario, saved = _scenario(tmp_path, text), tmp_path / "d.json"
     done = ptcc("design", scenario, "-o", str(saved))
     assert done.code == 0 and "verdict    met: ||u_k|| <= " in done.out and "not by these bounds" in done.out
-    assert "not designed for" in done.err and "[limits] stop_before" in done.err
-    command = done.err.split("to prove it again:")[1].replace("\\\n", " ").split()
+    assert "not designed for" in done.out and "[limits] stop_before" in " ".join(done.out.split())
+    command = done.out.split("to prove it again:")[1].replace("\\\n", " ").split()
     again = ptcc(*command[1:], "--no-simulation")
     assert again.code == 0 and "verdict    met: |u_k| <= 30" in again.out
     assert ptcc("check", str(saved)).code == 0
