@@ -11,8 +11,12 @@ All norms are Euclidean over the coordinates of space.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from contextlib import suppress
 from fractions import Fraction
+
+import numpy as np
 
 from ptcc_certify.bounds.input.effort_bounds import full_constants
 from ptcc_certify.checker.input_formulas import root_above
@@ -78,6 +82,37 @@ def error_constants(structure: Structure, V: LyapunovFunction) -> tuple[Fraction
         return tuple(1 / weight[v] if v in weight else Fraction(0) for v in range(n))
     rows = structure.graph.exact_rows(range(n))
     return tuple(sum((x * x / weight[j] for j, x in row.items()), Fraction(0)) for row in rows)
+
+
+def least_input(
+    structure: Structure, functions: Sequence[LyapunovFunction], P: Matrix, scaled: States | None
+) -> Fraction | None:
+    """Return the proved rate of the function by which the bound of the input is least, in floats; None without one.
+
+    That bound is ``sqrt(max_k c_k^E V(0))/rate``, up to what all functions share. Without an initial state ``V(0)``
+    stands for the largest of errors of size 1. The fastest functions of followers may have huge constants.
+    """
+    decaying = [V for V in functions if V.proved_rate > 0]
+    if len(decaying) < 2:
+        return decaying[0].proved_rate if decaying else None
+    L, inner = structure.graph.laplacian(), np.array([[float(x) for x in row] for row in P])
+    states = None if scaled is None else np.array([[[float(x) for x in row] for row in agent] for agent in scaled])
+
+    def size(V: LyapunovFunction) -> float:
+        with np.errstate(all="ignore"), suppress(np.linalg.LinAlgError):
+            if V.matrix is None:
+                constant = max(map(float, error_constants(structure, V) or ()))
+            else:
+                constant = float(np.linalg.inv(V.array).diagonal().max())
+            value = float(V.highest)
+            if states is not None:
+                z = V.scaled(V.coordinates_of(states, L))
+                value = float(np.einsum("kqi,ij,kqj", z, inner, z))
+            bound = math.sqrt(max(constant * value, 0.0)) / float(V.proved_rate)
+            return bound if math.isfinite(bound) else math.inf
+        return math.inf
+
+    return min(decaying, key=lambda V: (size(V), -V.proved_rate)).proved_rate
 
 
 def root_product(*factors: Fraction) -> Fraction:

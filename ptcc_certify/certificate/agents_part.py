@@ -13,7 +13,14 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import float_down, float_up, up
 from ptcc_certify.bounds.agent_motion import Interval, common_motion
-from ptcc_certify.bounds.agents import States, error_constants, initial_value, root_product, scaled_states
+from ptcc_certify.bounds.agents import (
+    States,
+    error_constants,
+    initial_value,
+    least_input,
+    root_product,
+    scaled_states,
+)
 from ptcc_certify.bounds.agents_comparison import AgentsComparison, compare_agents
 from ptcc_certify.bounds.final_state import Influence
 from ptcc_certify.bounds.input.tightest_bound import round_up
@@ -25,7 +32,7 @@ from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.agents import Agents, AgentsProtocol
 from ptcc_certify.simulation.agents import AgentsTrajectory, simulate_agents
-from ptcc_certify.theorems.agent_decrease import AgentMatrix, ScaledAgent, agent_matrix, paper_matrix
+from ptcc_certify.theorems.agent_decrease import AgentMatrix, ScaledAgent, agent_matrix, paper_matrix, round_and_prove
 from ptcc_certify.theorems.theorem import Obligation
 
 Intervals = tuple[tuple[tuple[Interval, ...], ...], ...]
@@ -236,7 +243,7 @@ def prove_agents(
         Gain, clock and deadline.
     agents : Agents
     functions : sequence of LyapunovFunction
-        Proved; the fastest decides the coupling.
+        Proved; the one that makes inputs smallest decides the coupling, and faster ones are used besides.
     influence : Influence
     offsets : N rows of d Fraction
     initial_state : N tuples of d tuples of n Fraction, or None
@@ -253,8 +260,15 @@ def prove_agents(
     if agents.of_paper:
         matrix = paper_matrix(scaled, best or Fraction(1))
     else:
-        coupling = Fraction(1) if best is None else Fraction(up(1 / best, 6))
-        matrix = agent_matrix(scaled, agents.decay_rate / gain.pole, coupling)
+        rate = agents.decay_rate / gain.pole
+        matrix = agent_matrix(scaled, rate, Fraction(1) if best is None else _coupling(best))
+        first = gain.first if agents.cap is None else min(gain.first, agents.cap)
+        states = None if initial_state is None else scaled_states(initial_state, offsets, 1 / first)
+        chosen = least_input(structure, functions, matrix.inverse, states)
+        if chosen is not None and best is not None and chosen < best:
+            found = np.array([[float(x) for x in row] for row in matrix.W])
+            slower = round_and_prove(scaled, found, rate, _coupling(chosen))
+            matrix = matrix if slower is None else slower
     used = [k for k, rate in enumerate(proved) if rate > 0 and matrix.coupling * rate >= 1]
     protocol = AgentsProtocol(
         base, agents.coefficients, agents.own, matrix.gains, tuple(map(tuple, offsets)), agents.cap
@@ -272,6 +286,11 @@ def prove_agents(
     decided = initial_state is not None and bool(used or not structure.graph.n_edges)
     final = _final_state(part, influence) if influence.exact and decided else None
     return replace(part, final_state=final, residual=_residual(part), input=_input(part))
+
+
+def _coupling(rate: Fraction) -> Fraction:
+    """Return a short number not below the reciprocal of a rate."""
+    return Fraction(up(1 / rate, 6))
 
 
 def _final_state(part: AgentsPart, influence: Influence) -> Intervals:

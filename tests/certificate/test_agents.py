@@ -305,3 +305,17 @@ def test_sliding_variables_that_begin_elsewhere_are_refused():
         made(TEAM, SLIDING, [5, 2, 4, -1], Agents(order=2), sigma0=[1, 0, 0, 0])
     with pytest.raises(ParameterError, match="velocity to begin with"):
         certify(TEAM, NOMINAL, [5, 2, 4, -1], v0=[1, 1, 1, 1])
+
+
+def test_a_faster_function_with_a_huge_constant_does_not_decide_the_coupling():
+    follower = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("a", "c", -1), ("c", "a", -1), ("c", "d", 1)])
+    agents, begin = Agents(order=2), {"x0": [5, 2, 4, -1], "v0": [1, 0, 0, -2]}
+    sizes = {}
+    for method in ("paper", "lmi"):  # the latter finds a rate near its supremum, where the follower counts for little
+        part = certify(follower, NOMINAL, agents=agents, method=method, simulation=False, **begin).agents
+        assert part is not None and part.input is not None
+        assert len(part.used) == sum(V.proved_rate * part.matrix.coupling >= 1 for V in part.functions)
+        sizes[method] = max(part.input)
+    assert sizes["lmi"] <= sizes["paper"] * Fraction(1001, 1000)
+    without = certify(follower, NOMINAL, agents=agents, method="lmi", simulation=False).agents
+    assert without is not None and without.matrix.coupling <= Fraction(1001, 1000)
