@@ -2,8 +2,9 @@
 
 Of chains of integrators gain and bound scale with the deadline alone: the Lyapunov function of the graph fixes the
 gains ``K`` up to the decay ``R``, which is least at ``R = 2 n``, where the input is bounded; multiplying ``rho1`` and
-``rho2`` by one number changes ``K`` and nothing else; and the constant part ``rho1`` of the gain only adds to the input
-at time 0, where its bound is largest. So the deadline is sought, with ``rho1 T``, ``rho2 kappa`` and ``R`` as they are.
+``rho2`` by one number changes ``K`` and nothing else; and a larger share ``rho1 T/(rho2 kappa)`` of the constant
+part of the gain raised the bound wherever it was tried. So the deadline is sought, with ``rho1 T``, ``rho2 kappa`` and
+``R`` as they are.
 
 The search is bisection with secants in the logarithms of deadline and bound. Every candidate is proved, by
 :func:`~ptcc_certify.certificate.agents_part.prove_agents`, and compared with the limit exactly; it ends where a
@@ -255,8 +256,12 @@ def design_agents(
         In whatever form :func:`ptcc_certify.as_graph` takes.
     agents : Agents
         Of order n, or in a formation; their ``decay`` is ``2 n`` unless it is given.
-    x0, v0, derivatives
-        The initial state, as :func:`ptcc_certify.certify` takes it.
+    x0 : state-like, or N rows of coordinates
+        Initial positions, in node order or by label, in units of length.
+    v0 : state-like, optional
+        Initial velocities, like ``x0``; without them 0.
+    derivatives : sequence of state-like, optional
+        Instead of ``v0``: velocities, accelerations and so on.
     max_input : int, float, str or Fraction
         Positive: bound of the Euclidean norm of every agent's input at all times, sliding terms included.
     deadline : int, float, str or Fraction, optional
