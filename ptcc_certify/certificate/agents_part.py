@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from lmi.exact.decimal_rounding import float_down, float_up, up
+from lmi.exact.decimal_rounding import down, float_down, float_up, up
 from ptcc_certify.bounds.agent_motion import Interval, common_motion
 from ptcc_certify.bounds.agents import States, error_constants, initial_value, root_product, scaled_states
 from ptcc_certify.bounds.agents_comparison import AgentsComparison, compare_agents
@@ -121,6 +121,26 @@ class AgentsPart:
     def moving(self) -> bool:
         """Whether some derivative of a final state is not 0."""
         return any(m or r for agent in self.final_state or () for chain in agent for m, r in chain[1:])
+
+    @property
+    def unbounded(self) -> tuple[tuple[str, str], ...]:
+        """What leaves the input without a bound, and what mends it; empty where nothing does.
+
+        The deviations' part is ``eta^n e^(-r s/2)`` of what it is at 0; that of the common velocity at rest
+        ``eta e^(-alpha s - a_2 t)``, whose logarithm grows by at most ``eta (1/k - alpha) - a_2``.
+        """
+        n, gain = self.order, self.protocol.gain
+        if self.protocol.gain_cap is not None:
+            return ()
+        found = []
+        if self.decay < 2 * n:
+            found.append((f"decay {down(self.decay)} is below 2 n = {2 * n}", f"--decay {2 * n}"))
+        if any(self.protocol.own):
+            alpha = self.protocol.own[1]
+            least = 1 / gain.pole + max(Fraction(0), -self.protocol.plant[1]) / gain.first
+            if alpha < least:
+                found.append((f"rest {down(alpha)} is below {up(least, 4)}", f"--rest {up(least, 4)}"))
+        return tuple(found)
 
     @property
     def longest_way(self) -> float:
