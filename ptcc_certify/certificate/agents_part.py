@@ -291,7 +291,7 @@ def prove_agents(
     )
     decided = initial_state is not None and bool(used or not structure.graph.n_edges)
     final = _final_state(part, influence) if influence.exact and decided else None
-    return replace(part, final_state=final, residual=_residual(part), input=_input(part))
+    return replace(part, final_state=final, residual=_residual(part), input=_input(part, influence))
 
 
 def _final_state(part: AgentsPart, influence: Influence) -> Intervals:
@@ -332,24 +332,42 @@ def _residual(part: AgentsPart) -> Residual | None:
     return Residual(clock, tuple(rows))
 
 
-def _input(part: AgentsPart) -> tuple[Fraction, ...] | None:
+def _input(part: AgentsPart, influence: Influence) -> tuple[Fraction, ...] | None:
     """Return bounds of the whole input; None where none is proved."""
     n, cap, base = part.order, part.protocol.gain_cap, part.protocol.base
-    bounded = part.decay >= 2 * n
-    if part.initial_state is None or any(part.protocol.own) or (cap is None and not bounded) or not part.functions:
+    if part.initial_state is None or part.unbounded or not part.functions:
         return None
-    eta = part.first_gain if bounded or cap is None else cap
+    eta = part.first_gain if part.decay >= 2 * n or cap is None else cap
     pairs = [
         (one.inputs if V.matrix is not None else error_constants(part.structure, V), value)
         for one, V, value in zip(part.used, part.functions, part.initial_values, strict=True)
     ]
-    if all(constants is None for constants, _ in pairs):
+    damped = _damping(part, influence)
+    if damped is None or all(constants is None for constants, _ in pairs):
         return None
     gain = part.matrix.gains[-1] * part.matrix.coupling  # c^2 b'P b
     extra = base.reaching.mu1 * part.dimension if base.reaching is not None else Fraction(0)
     bounds = []
     for k, h in enumerate(part.protocol.offsets):
         square = min(constants[k] * value for constants, value in pairs if constants is not None)
-        own = abs(part.protocol.plant[0]) * sum(map(abs, h))
+        own = abs(part.protocol.plant[0]) * sum(map(abs, h)) + damped[k]
         bounds.append(round_up(eta**n * root_product(gain, square) + own + extra))
     return tuple(bounds)
+
+
+def _damping(part: AgentsPart, influence: Influence) -> list[Fraction] | None:
+    """Return bounds of ``eta f_2 |x_k'|`` of agents that meet at rest, else 0; None where none is proved."""
+    N, eta = part.structure.graph.n_nodes, part.first_gain
+    if not any(part.protocol.own):
+        return [Fraction(0)] * N
+    known = [(V.deviation.agents, x) for V, x in zip(part.functions, part.initial_values, strict=True) if V.deviation]
+    if not known or not influence.exact:
+        return None
+    begin = [[(agent[q][1], Fraction(0)) for agent in part.initial_state or ()] for q in range(part.dimension)]
+    common = list(zip(*(agents_ends(influence, column) for column in begin), strict=True))
+    bounds = []
+    for k in range(N):
+        away = root_product(part.matrix.W[1][1], min(c[k] * value for c, value in known))
+        along = root_product(sum(((abs(m) + r) ** 2 for m, r in common[k]), Fraction(0)))
+        bounds.append(part.protocol.own[1] * eta * (eta * away + along))
+    return bounds

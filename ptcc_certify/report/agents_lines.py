@@ -127,8 +127,6 @@ def _input_line(part: AgentsPart) -> tuple[str, str]:
     if part.input is None:
         if part.unbounded:
             return "INPUT", f"NOT CERTIFIED BOUNDED: {', '.join(why for why, _ in part.unbounded)}"
-        if any(part.protocol.own):
-            return "input", "no number is proved of agents that meet at rest"
         return "input", "bounded; no number is proved" + " without x(0)" * (part.initial_state is None)
     largest = max(part.input)
     label = part.structure.graph.labels[part.input.index(largest)]
