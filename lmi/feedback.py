@@ -19,8 +19,10 @@ from lmi.errors import NoCertificate
 
 #: By how much of ``W`` the inequalities hold strictly, so that rounding keeps them: the first that the solver reaches.
 SLACKS = (1e-3, 1e-5, 1e-7)
-#: Real parts from which on a Lyapunov equation is solved for coordinates.
+#: Real parts from which on a Lyapunov equation is solved for coordinates; otherwise they are shifted to 1/2.
 LEAST = 0.02
+#: Largest ``W`` in these coordinates: where a system decays by itself, the least gain is reached at no finite ``W``.
+LARGEST = 1e4
 
 
 def feedback_matrix(systems: Sequence[np.ndarray], rate: float) -> np.ndarray:
@@ -75,16 +77,16 @@ def feedback_matrix(systems: Sequence[np.ndarray], rate: float) -> np.ndarray:
 
 
 def _frame(systems: Sequence[np.ndarray]) -> np.ndarray:
-    """Return a factor of the ``W`` with ``A W + W A' + W = b b'``, of the first system that has one; else the identity.
+    """Return a factor of the ``W`` with ``A W + W A' + 2 s W = b b'``, of the first system that has one.
 
-    It is positive definite if ``A + I/2`` has its spectrum on the right, and near the ``W`` of the others then.
+    ``s`` is 1/2 if ``A + I/2`` has its spectrum on the right, and so large that ``A + s I`` has otherwise: ``W`` is
+    positive definite, and near those of the others. The identity if rounding leaves none.
     """
     n = len(systems[0])
     unit = np.eye(n)[:, [-1]]
     for A in systems:
-        moved = A + np.eye(n) / 2
-        if np.linalg.eigvals(moved).real.min() <= LEAST:
-            continue
+        least = np.linalg.eigvals(A).real.min()
+        moved = A + np.eye(n) * (0.5 if least > LEAST - 0.5 else 0.5 - least)
         W = solve_continuous_lyapunov(moved, unit @ unit.T)
         try:
             return np.asarray(np.linalg.cholesky((W + W.T) / 2))
@@ -101,7 +103,8 @@ def _solve(systems: Sequence[np.ndarray], last: np.ndarray, rate: float) -> np.n
     W, square = cp.Variable((n, n), symmetric=True), np.outer(last, last)
     gap = [square - rate * W - A @ W - W @ A.T for A in systems]
     cost = cp.matrix_frac(last, W)
-    problem = cp.Problem(cp.Minimize(cost), [(F + F.T) / 2 >> 0 for F in gap])
+    limits = [(F + F.T) / 2 >> 0 for F in gap]
+    problem = cp.Problem(cp.Minimize(cost), [*limits, LARGEST * np.eye(n) - W >> 0])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # "solution may be inaccurate": what is found is proved by the caller
         run_solver(problem, "clarabel", {})

@@ -395,7 +395,10 @@ def input_bound(data: Json, s: Setting) -> Json | None:
     agents, labels = data["agents"], data["graph"]["nodes"]
     known = {e["function"]: c for e in agents["functions"] if (c := error_constants(data, e["function"])) is not None}
     large = s.rate * s.k >= 2 * s.order
-    if not known or s.damping or (s.cap is None and not large):
+    if not known or (s.cap is None and not large):
+        return None
+    damped = damping_bound(data, s) if s.damping else [ZERO] * len(labels)
+    if damped is None:
         return None
     values = {k: initial_value(data, s, k) for k in known}
     W = lyapunov_matrix(replace(s, dimension=1, slides=False, method="paper", offsets=True))
@@ -404,6 +407,25 @@ def input_bound(data: Json, s: Setting) -> Json | None:
     found = {}
     for v, label in enumerate(labels):
         size = number(above(common * min(c[v] * values[k] for k, c in known.items())))
-        size += abs(s.a[0]) * sum(abs(number(h)) for h in agents["offsets"][label])
+        size += abs(s.a[0]) * sum(abs(number(h)) for h in agents["offsets"][label]) + damped[v]
         found[label] = str(size + (2 * s.dimension if s.slides else 0))
     return {"agents": found, "largest": max(found.values(), key=Fraction)}
+
+
+def damping_bound(data: Json, s: Setting) -> list[Fraction] | None:
+    """Bound ``f_2 eta |x_k'|`` by its value at 0, of agents that meet at rest."""
+    agents, functions, oracle = data["agents"], data["lyapunov"]["functions"], Oracle(data, {})
+    used = [e["function"] for e in agents["functions"] if functions[e["function"]]["deviation"] is not None]
+    falls = s.damping * s.k >= 1 and s.a[1] + (s.damping - 1 / s.k) * s.eta_0 >= 0
+    if not used or not falls or agents["final_state"] is None:
+        return None
+    values, G, found = {k: initial_value(data, s, k) for k in used}, read_states(data), []
+    w = number(agents["lower_triangle"][1][1])
+    for v, label in enumerate(data["graph"]["nodes"]):
+        least = min(number(functions[k]["deviation"]["agents"][label]) * values[k] for k in used)
+        speeds = [
+            sum((q * row[axis][1] for q, row in zip(oracle.Q[v], G, strict=True)), ZERO) for axis in range(s.dimension)
+        ]
+        away, along = number(above(w * least)), number(above(sum((x * x for x in speeds), ZERO)))
+        found.append(s.damping * s.eta_0 * (s.eta_0 * away + along))
+    return found

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from lmi.exact.decimal_rounding import float_down, float_up, up
+from lmi.exact.decimal_rounding import down, float_down, float_up, up
 from ptcc_certify.bounds.agent_motion import Interval, common_motion
 from ptcc_certify.bounds.agents import (
     States,
@@ -128,6 +128,26 @@ class AgentsPart:
     def moving(self) -> bool:
         """Whether some derivative of a final state is not 0."""
         return any(m or r for agent in self.final_state or () for chain in agent for m, r in chain[1:])
+
+    @property
+    def unbounded(self) -> tuple[tuple[str, str], ...]:
+        """What leaves the input without a bound, and what mends it; empty where nothing does.
+
+        The deviations' part is ``eta^n e^(-r s/2)`` of what it is at 0; that of the common velocity at rest
+        ``eta e^(-alpha s - a_2 t)``, whose logarithm grows by at most ``eta (1/k - alpha) - a_2``.
+        """
+        n, gain = self.order, self.protocol.gain
+        if self.protocol.gain_cap is not None:
+            return ()
+        found = []
+        if self.decay < 2 * n:
+            found.append((f"decay {down(self.decay)} is below 2 n = {2 * n}", f"--decay {2 * n}"))
+        if any(self.protocol.own):
+            alpha = self.protocol.own[1]
+            least = 1 / gain.pole + max(Fraction(0), -self.protocol.plant[1]) / gain.first
+            if alpha < least:
+                found.append((f"rest {down(alpha)} is below {up(least, 4)}", f"--rest {up(least, 4)}"))
+        return tuple(found)
 
     @property
     def longest_way(self) -> float:
@@ -285,7 +305,7 @@ def prove_agents(
     )
     decided = initial_state is not None and bool(used or not structure.graph.n_edges)
     final = _final_state(part, influence) if influence.exact and decided else None
-    return replace(part, final_state=final, residual=_residual(part), input=_input(part))
+    return replace(part, final_state=final, residual=_residual(part), input=_input(part, influence))
 
 
 def _coupling(rate: Fraction) -> Fraction:
@@ -331,24 +351,42 @@ def _residual(part: AgentsPart) -> Residual | None:
     return Residual(clock, tuple(rows))
 
 
-def _input(part: AgentsPart) -> tuple[Fraction, ...] | None:
+def _input(part: AgentsPart, influence: Influence) -> tuple[Fraction, ...] | None:
     """Return bounds of the whole input; None where none is proved."""
     n, cap, base = part.order, part.protocol.gain_cap, part.protocol.base
-    bounded = part.decay >= 2 * n
-    if part.initial_state is None or any(part.protocol.own) or (cap is None and not bounded) or not part.functions:
+    if part.initial_state is None or part.unbounded or not part.functions:
         return None
-    eta = part.first_gain if bounded or cap is None else cap
+    eta = part.first_gain if part.decay >= 2 * n or cap is None else cap
     pairs = [
         (one.inputs if V.matrix is not None else error_constants(part.structure, V), value)
         for one, V, value in zip(part.used, part.functions, part.initial_values, strict=True)
     ]
-    if all(constants is None for constants, _ in pairs):
+    damped = _damping(part, influence)
+    if damped is None or all(constants is None for constants, _ in pairs):
         return None
     gain = part.matrix.gains[-1] * part.matrix.coupling  # c^2 b'P b
     extra = base.reaching.mu1 * part.dimension if base.reaching is not None else Fraction(0)
     bounds = []
     for k, h in enumerate(part.protocol.offsets):
         square = min(constants[k] * value for constants, value in pairs if constants is not None)
-        own = abs(part.protocol.plant[0]) * sum(map(abs, h))
+        own = abs(part.protocol.plant[0]) * sum(map(abs, h)) + damped[k]
         bounds.append(round_up(eta**n * root_product(gain, square) + own + extra))
     return tuple(bounds)
+
+
+def _damping(part: AgentsPart, influence: Influence) -> list[Fraction] | None:
+    """Return bounds of ``eta f_2 |x_k'|`` of agents that meet at rest, else 0; None where none is proved."""
+    N, eta = part.structure.graph.n_nodes, part.first_gain
+    if not any(part.protocol.own):
+        return [Fraction(0)] * N
+    known = [(V.deviation.agents, x) for V, x in zip(part.functions, part.initial_values, strict=True) if V.deviation]
+    if not known or not influence.exact:
+        return None
+    begin = [[(agent[q][1], Fraction(0)) for agent in part.initial_state or ()] for q in range(part.dimension)]
+    common = list(zip(*(agents_ends(influence, column) for column in begin), strict=True))
+    bounds = []
+    for k in range(N):
+        away = root_product(part.matrix.W[1][1], min(c[k] * value for c, value in known))
+        along = root_product(sum(((abs(m) + r) ** 2 for m, r in common[k]), Fraction(0)))
+        bounds.append(part.protocol.own[1] * eta * (eta * away + along))
+    return bounds

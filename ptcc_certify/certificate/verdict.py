@@ -385,9 +385,11 @@ def _usefulness(certificate: Content) -> tuple[bool, str, Fraction | None]:
 
 def _assess_agents(part: AgentsPart) -> tuple[bool | None, str, str, str]:
     """Return whether bounds of agents of order n say something by ``T``, what, what is not proved, and a mend."""
-    n, capped, caveat, advice = part.order, part.protocol.gain_cap is not None, "", ""
-    if part.decay < 2 * n and not capped:
-        caveat, advice = "the input is not certified bounded", f"--decay {2 * n} bounds it"
+    capped, caveat, advice = part.protocol.gain_cap is not None, "", ""
+    if part.unbounded:
+        mends = [mend for _, mend in part.unbounded]
+        caveat = "the input is not certified bounded"
+        advice = f"{' and '.join(mends)} bound{'s' * (len(mends) == 1)} it"
     last = np.array([0.0 if capped else float(LAST)])
     fall = math.exp(-float(part.matrix.rate) * float(part.protocol.clock(last)[0]) / 2)
     worst = float(part.deviation_bound(last)[:, 0].max(initial=0.0))

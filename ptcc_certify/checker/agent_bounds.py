@@ -17,8 +17,9 @@ from lmi.exact.work import spend
 from ptcc_certify.checker.agent_model import Agents
 from ptcc_certify.checker.agent_motion import States
 from ptcc_certify.checker.digraph import Digraph
+from ptcc_certify.checker.final_state import FinalState
 from ptcc_certify.checker.graph import by_agent, ordered
-from ptcc_certify.checker.input_formulas import Limits
+from ptcc_certify.checker.input_formulas import Limits, root_above
 from ptcc_certify.checker.lyapunov import Function
 from ptcc_certify.checker.matrix_products import Matrix
 from ptcc_certify.checker.proof_cursor import Document
@@ -218,7 +219,9 @@ def _clock_below(agents: Agents) -> Fraction:
     return Limits(gain_cap=cap).integrals(gain)[0]
 
 
-def check_input(doc: Document, begin: Begin, used: Sequence[Used], section: Any, mu1: Fraction) -> None:
+def check_input(
+    doc: Document, begin: Begin, used: Sequence[Used], section: Any, final: FinalState, mu1: Fraction
+) -> None:
     """Verify the bound of every agent's input, in Euclidean norm over space; ``mu1`` is 0 without sliding variables."""
     doc.open("agent-input", "agents")
     agents, graph = begin.agents, begin.graph
@@ -227,9 +230,28 @@ def check_input(doc: Document, begin: Begin, used: Sequence[Used], section: Any,
     (P, times), gain = begin.inverse, agents.eta_0 if agents.bounded else agents.cap or Fraction(0)
     common = rounded(gain ** (2 * agents.n) * agents.coupling**2 * P[-1][-1] / times, BITS, up=True)
     known = [(c, begin.value(use.function)) for use in used if (c := use.error_constants(graph)) is not None]
+    damped = _damping(begin, used, final)
     for v, x in enumerate(values):
-        rest = x - abs(agents.plant[0]) * sum(map(abs, begin.offsets[v]), Fraction(0)) - mu1 * agents.d
+        own = abs(agents.plant[0]) * sum(map(abs, begin.offsets[v]), Fraction(0)) + damped[v]
+        rest = x - own - mu1 * agents.d
         holds = rest >= 0 and rest**2 >= common * min(c[v] * value for c, value in known)
         need(holds, f"the input of agent {shorten(graph.labels[v])} is not proved")
     need(exact(section["largest"]) == max(values), "the largest input is another")
     doc.done(f"at most {up(max(values))}")
+
+
+def _damping(begin: Begin, used: Sequence[Used], final: FinalState) -> list[Fraction]:
+    """Bound ``eta f_2 |x_k'|`` of every agent that meets others at rest, by the common velocity and its deviation."""
+    agents, n, eta = begin.agents, begin.graph.n, begin.agents.eta_0
+    if not any(agents.own):
+        return [Fraction(0)] * n
+    known = [(use.function.deviation, begin.value(use.function)) for use in used if use.function.deviation is not None]
+    spend(40 * n * (agents.d + len(known)), BITS, BITS, "the common velocity")
+    columns = [[row[axis][1] for row in begin.states] for axis in range(agents.d)]
+    speeds = [final.enclosures(final.values(Numbers(column))) for column in columns]
+    bounds = []
+    for v in range(n):
+        away = root_above(agents.W[1][1] * min(c[v] * value for c, value in known))
+        along = root_above(sum(((abs(x) + r) ** 2 for x, r in (speed[v] for speed in speeds)), Fraction(0)))
+        bounds.append(agents.own[1] * eta * (eta * away + along))
+    return bounds

@@ -75,6 +75,12 @@ class Agents:
         """Whether ``eta^n e^(-r s / 2)`` never grows."""
         return self.rate * self.gain.k >= 2 * self.n
 
+    @property
+    def damped(self) -> bool:
+        """Whether ``eta e^(-f_2 s - a_2 t)`` never grows, of agents that meet at rest."""
+        spare = self.own[1] - 1 / self.gain.k
+        return spare >= 0 and self.plant[1] + spare * self.first_gain >= 0
+
 
 def read_agents(section: Any, gain: PrescribedGain) -> Agents:
     """Return what the section says of one agent, within its limits; the section has its keys."""

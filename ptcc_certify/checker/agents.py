@@ -96,9 +96,14 @@ def _bounds(doc: Document, verified: Verified, agents: Agents, begin: Begin | No
     if section["input"] is None:
         return
     need(begin is not None and bool(used), "a bound of the input without initial states or Lyapunov functions")
-    need(not any(agents.own), "a bound of the input of agents that use their own state")
+    if any(agents.own):
+        need(agents.damped, "a bound of the input of agents whose common velocity falls too slowly")
+        need(
+            deviates and verified.final.weights is not None,
+            "a bound of the input at rest without deviations or weights",
+        )
     need(agents.cap is not None or agents.bounded, "a bound of the input though r k is below 2 n")
     need(any(use.error_constants(graph) is not None for use in used), "a bound of the input without its constants")
     if begin is not None:
         mu1 = verified.protocol.gains["mu1"] if verified.protocol.sliding else Fraction(0)
-        check_input(doc, begin, used, section["input"], mu1)
+        check_input(doc, begin, used, section["input"], verified.final, mu1)

@@ -124,12 +124,9 @@ def _error_text(part: AgentsPart) -> str:
 
 def _input_line(part: AgentsPart) -> tuple[str, str]:
     """Tell whether the input is bounded, its proved size, and whose it is."""
-    n = part.order
     if part.input is None:
-        if part.decay < 2 * n and part.protocol.gain_cap is None:
-            return "INPUT", f"NOT CERTIFIED BOUNDED: decay {down(part.decay)} is below 2 n = {2 * n}"
-        if any(part.protocol.own):
-            return "input", "no number is proved of agents that meet at rest"
+        if part.unbounded:
+            return "INPUT", f"NOT CERTIFIED BOUNDED: {', '.join(why for why, _ in part.unbounded)}"
         return "input", "bounded; no number is proved" + " without x(0)" * (part.initial_state is None)
     largest = max(part.input)
     label = part.structure.graph.labels[part.input.index(largest)]

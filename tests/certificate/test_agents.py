@@ -115,8 +115,9 @@ def test_agents_meet_in_flight_and_fly_on_as_mirror_images():
 
 def test_agents_meet_at_rest_where_their_own_velocity_is_damped():
     part = made(TEAM, NOMINAL, [5, 2, 4, -1], Agents(order=2, rest=1), v0=[1, 0, 0, -2]).agents
-    assert part is not None and part.final_state is not None and part.input is None
+    assert part is not None and part.final_state is not None and part.input is not None
     run = part.simulate(remaining=1e-9)
+    assert (np.nanmax(np.abs(run.input[:, 0]), axis=1) <= np.array([float(x) for x in part.input])).all()
     assert [chain[1] for (chain,) in part.final_state] == [(0, 0)] * 4
     claimed = [float(chain[0][0]) for (chain,) in part.final_state]
     assert np.abs(run.positions[:, 0, -2] - claimed).max() < 1e-8
@@ -224,6 +225,29 @@ def test_just_above_the_least_decay_the_input_is_told_not_to_be_certified_bounde
     assert certificate.verdict == "certified" and certificate.agents is not None and certificate.agents.input is None
     assert "INPUT NOT CERTIFIED BOUNDED: decay 2.01 is below 2 n = 4" in told(certificate)
     assert "--decay 4 bounds it" in certificate.assessment.text
+
+
+@pytest.mark.parametrize(
+    ("agents", "why", "mend"),
+    [
+        ({"rest": "2/5"}, "rest 0.4 is below 0.5", "--rest 0.5 bounds it"),  # 1/k, k = 2
+        ({"rest": 1, "drag": -2}, "rest 1 is below 1.5", "--rest 1.5 bounds it"),  # 1/k + 2/eta(0), eta(0) = 2
+        (
+            {"rest": "2/5", "decay": 3},
+            "decay 3 is below 2 n = 4, rest 0.4 is below 0.5",
+            "--decay 4 and --rest 0.5 bound it",
+        ),
+    ],
+)
+def test_the_input_at_rest_is_bounded_iff_the_common_velocity_falls_fast_enough(agents: Any, why: str, mend: str):
+    certificate = made(TEAM, NOMINAL, [5, 2, 4, -1], Agents(order=2, **agents), v0=[1, 0, 0, -2])
+    assert certificate.agents is not None and certificate.agents.input is None
+    assert f"INPUT NOT CERTIFIED BOUNDED: {why}" in told(certificate) and mend in certificate.assessment.text
+    words = mend.replace("--", "").split()
+    mended = Agents(order=2, **{**agents, **{name: words[words.index(name) + 1] for name in agents if name in words}})
+    certificate = made(TEAM, NOMINAL, [5, 2, 4, -1], mended, v0=[1, 0, 0, -2])
+    assert certificate.agents is not None and certificate.agents.input is not None
+    assert check(certificate.to_dict()).accepted and certificate.agents_comparison.worst <= 1 + 1e-7
 
 
 def test_at_twice_the_order_the_input_is_bounded():

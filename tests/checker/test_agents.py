@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 import pytest
 from agent_cases import agent_case
-from agent_documents import Setting, document, final_state, obligations, of_graph
+from agent_documents import Setting, damping_bound, document, final_state, obligations, of_graph
 from generators import all_classes, random_graph
 from jsonschema import Draft202012Validator  # type: ignore[import-untyped]
 from mutations import Json, at, changed, leaves, mutants, resealed, same_claim
@@ -55,6 +55,8 @@ SETTINGS = {
     "order 1": Setting(order=1),
     "at rest": Setting(damping=F(2), plant=(F(0), F(1, 3))),
     "at rest without drag or rho1": Setting(damping=F(1), rho1=F(0)),
+    "damped too little": Setting(damping=F(1, 2)),
+    "damped and driven": Setting(damping=F(1), plant=(F(0), F(-1))),
     "capped later": Setting(cap=F(7), R=F(5)),
     "capped from the beginning": Setting(cap=F(1, 2), plant=(F(1, 2), F(1))),
     "sliding variables": Setting(slides=True, dimension=2, plant=(F(1), F(0))),
@@ -95,6 +97,17 @@ def rejected(data: Json, where: str, reason: str) -> None:
         assert not report.accepted
         assert re.match(where, report.rejected or ""), (report.rejected, report.reason)
         assert reason in (report.reason or ""), (report.rejected, report.reason)
+
+
+#: Bounds of inputs that are never reached.
+LARGE = {"agents": dict.fromkeys("abcf", "10000000"), "largest": "10000000"}
+
+
+def undamped(data: Json) -> Json:
+    """Its input as far as it is of relative positions and velocities."""
+    less, labels = damping_bound(data, SETTINGS["at rest"]) or [], data["graph"]["nodes"]
+    rest = {label: str(F(data["agents"]["input"]["agents"][label]) - x) for label, x in zip(labels, less, strict=True)}
+    return {"agents": rest, "largest": max(rest.values(), key=F)}
 
 
 def numbers(values: list[str], factor: Fraction | int) -> list[str]:
@@ -344,9 +357,13 @@ FORGERIES: dict[str, tuple[str, Change, str, str]] = {
         "double integrators",
         lambda data: with_agents(data, input={**data["agents"]["input"], "largest": "1"}), "agent-input", "largest"),
     "an input at a slow rate": ("double integrators", agents(rate="2"), "agents.input", "below 2 n"),
-    "an input at rest": (
-        "at rest", agents(input={"agents": dict.fromkeys("abcf", "10000"), "largest": "10000"}), "agents.input",
-        "use their own state"),
+    "a smaller input at rest": ("at rest", smaller("input", "agents", "a"), "agent-input", "input of agent a"),
+    "an input at rest without its damping": (
+        "at rest", lambda data: with_agents(data, input=undamped(data)), "agent-input", "input of agent"),
+    "an input of agents that are damped too little": (
+        "damped too little", agents(input=LARGE), "agents.input", "falls too slowly"),
+    "an input of agents that are driven too much": (
+        "damped and driven", agents(input=LARGE), "agents.input", "falls too slowly"),
     "an input without states": (
         "no states", agents(input={"agents": dict.fromkeys("abcf", "10000"), "largest": "10000"}), "agents.input",
         "without initial states"),

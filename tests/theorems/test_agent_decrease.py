@@ -34,6 +34,17 @@ def test_the_decrease_holds_at_every_instant(seed: int):
         assert values[0] >= -1e-12 * max(1.0, values[-1])
 
 
+@pytest.mark.parametrize(
+    ("k", "damping", "R"), [("1/2", 3, "2.1"), ("1/2", 10, 4), (4, "1/2", "2.1"), ("5/2", "2.7", "5.2")]
+)
+def test_agents_that_slow_down_by_themselves_faster_than_is_asked_have_a_matrix(k: str, damping: str, R: str):
+    """Then the least gain is reached at no finite ``W``: the search must stay at a finite one."""
+    zero, small = Fraction(0), Fraction(1, 10**6)
+    agent = ScaledAgent((zero, zero), (zero, Fraction(damping)), small, Fraction(k), small + Fraction(k), None)
+    proved = agent_matrix(agent, Fraction(R) / Fraction(k), Fraction(1))
+    assert prove_decrease(agent, proved.W, proved.rate) == proved.points
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_the_scaled_matrix_is_the_derivative_of_the_scaled_states(seed: int):
     agent, _ = drawn(seed)
