@@ -15,6 +15,7 @@ from ptcc_certify.bounds.missed_deadline import Missed
 from ptcc_certify.bounds.small_delays import SmallDelays
 from ptcc_certify.certificate.format_vectors import Reader, Writer, number, text
 from ptcc_certify.checker.reading import exact
+from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness
@@ -58,12 +59,9 @@ def late_obligations(late: LateBounds | None) -> Iterator[Obligation]:
         yield Obligation("late-form", "messages.form", numbers, {"function": form.function, "phi": phi})
 
 
-def messages_section(late: LateBounds, out: Writer) -> dict[str, Any]:
-    """Return what is proved with late messages, as files have it."""
-    messages, graph = late.messages, late.structure.graph
-    latencies = messages.latencies(graph)
-    followers = [graph.labels[v] for v in late.structure.followers]
-    period, missed, staged = messages.period, late.missed, late.staged
+def asked_messages(messages: LateMessages, graph: SignedDigraph) -> dict[str, Any]:
+    """Return how late, how often lost and how inexact messages are, as files have it."""
+    latencies, period = messages.latencies(graph), messages.period
     return {
         "latency": [format_exact(x) for x in latencies] if isinstance(latencies, tuple) else format_exact(latencies),
         "packets": None if period is None else {"period": format_exact(period), "losses": str(messages.losses)},
@@ -71,6 +69,15 @@ def messages_section(late: LateBounds, out: Writer) -> dict[str, Any]:
         "own": "late" if messages.own_delay else "fresh",
         "value_error": format_exact(messages.value_error),
         "gain_cap": text(messages.gain_cap),
+    }
+
+
+def messages_section(late: LateBounds, out: Writer) -> dict[str, Any]:
+    """Return what is proved with late messages, as files have it."""
+    graph, missed, staged = late.structure.graph, late.missed, late.staged
+    followers = [graph.labels[v] for v in late.structure.followers]
+    return {
+        **asked_messages(late.messages, graph),
         "rows": [
             {name: text(getattr(row, name)) for name in ("cap", "clock", "left", "initial", "floor")}
             for row in late.rows
@@ -111,6 +118,24 @@ def agents_section(labels: tuple[str, ...], name: str, values: np.ndarray, out: 
     if out.aside(values.size):
         return out.vector(name, values)
     return dict(zip(labels, (x.hex() if x else "0" for x in values.tolist()), strict=True))
+
+
+def nothing_proved(
+    messages: LateMessages | None, structure: Structure, protocol: Protocol, relative: bool
+) -> LateBounds | None:
+    """Return that nothing is proved of late messages that were asked for; None if none were.
+
+    Parameters
+    ----------
+    messages : LateMessages or None
+    structure : Structure
+    protocol : Protocol
+    relative : bool
+        Whether no initial state was given.
+    """
+    if messages is None:
+        return None
+    return LateBounds(messages, structure, GainLimits(gain_cap=messages.gain_cap).limit(protocol.gain), relative)
 
 
 def read_late(
@@ -158,7 +183,7 @@ def read_late(
 
 
 def read_messages(section: Mapping[str, Any], structure: Structure, data: Reader) -> LateMessages:
-    """Return what an accepted certificate says of how late messages are."""
+    """Return what a certificate says of how late messages are."""
     latency, packets = section["latency"], section["packets"]
     delay: Any = exact(latency) if isinstance(latency, str) else None
     if delay is None:
