@@ -22,15 +22,9 @@ from ptcc_certify.certificate.certificate_data import Content, Observations, Sou
 from ptcc_certify.certificate.format_agents import agents_section, read_agents
 from ptcc_certify.certificate.format_effort import LIMITS, effort_section, energy_witness, peak_witness, read_effort
 from ptcc_certify.certificate.format_graph import certificate_graph, claim_sections, graph_section, structure_section
-from ptcc_certify.certificate.format_leaders import asked_leaders, leaders_section, read_leaders, read_tracking
-from ptcc_certify.certificate.format_messages import (
-    Vectors,
-    asked_messages,
-    messages_section,
-    nothing_proved,
-    read_late,
-    read_messages,
-)
+from ptcc_certify.certificate.format_leaders import leaders_section, read_tracking
+from ptcc_certify.certificate.format_messages import Vectors, messages_section, read_late
+from ptcc_certify.certificate.format_unproved import nothing_proved, read_unproved, write_unproved
 from ptcc_certify.certificate.format_vectors import (
     Reader,
     Writer,
@@ -41,7 +35,6 @@ from ptcc_certify.certificate.format_vectors import (
     influence_balls,
     interval_text,
     number,
-    readable,
     text,
 )
 from ptcc_certify.certificate.request import Expectations, Request
@@ -121,7 +114,7 @@ def read_document(
         rho = ExactInterval(*(number(paper["rho_interval"][key]) for key in ("printed", "exact")))
     effort = read_effort(document, structure, protocol, data, steps)
     request = _read_request(document["unverified"], None if effort is None else effort.initial_set)
-    request = replace(request, **_read_unproved(document, structure))
+    request = replace(request, **read_unproved(document, structure))
     return {
         "structure": structure,
         "protocol": protocol,
@@ -444,7 +437,7 @@ def _write_unverified(content: Content) -> dict[str, Any]:
         },
         "residual": {name: finite(envelope.residual(q)) for name, q in residual.items()} if content.direct else None,
         "final_state": floats,
-        "asked": _write_request(content.request) | _write_unproved(content),
+        "asked": _write_request(content.request) | write_unproved(content),
         "scenario": None if content.request.scenario is None else dict(content.request.scenario),
         "origins": dict(content.request.origins),
         "simulation": _write_run(content),
@@ -495,28 +488,6 @@ def _write_request(request: Request) -> dict[str, Any]:
         "limits": [{name: text(getattr(entry, name)) for name in LIMITS} for entry in request.limits],
         "delta": text(request.delta),
         "noise": text(request.noise),
-    }
-
-
-def _write_unproved(content: Content) -> dict[str, Any]:
-    """Return the late messages or moving leaders that were asked for where nothing is proved of them."""
-    messages, leaders, late = content.request.messages, content.request.leaders, content.late
-    if messages is not None and not (late is not None and late.says_something):
-        return {"messages": asked_messages(messages, content.graph)}
-    if leaders is not None and content.tracking is None:
-        return {"leaders": asked_leaders(leaders)}
-    return {}
-
-
-def _read_unproved(document: Mapping[str, Any], structure: Structure) -> dict[str, Any]:
-    """Read what :func:`_write_unproved` wrote, unless something of the kind is proved."""
-    asked, data = document["unverified"].get("asked"), Reader(structure.graph.labels, {})
-    if not isinstance(asked, dict) or "messages" in document or "leaders" in document:
-        return {}
-    messages, leaders = asked.get("messages"), asked.get("leaders")
-    return {
-        "messages": readable(lambda: read_messages(messages, structure, data)),
-        "leaders": None if messages is not None else readable(lambda: read_leaders(leaders)),
     }
 
 

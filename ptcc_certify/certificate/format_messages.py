@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from lmi.exact.decimal_rounding import float_up
-from ptcc_certify.bounds.late_messages import LateBounds, RowBound
+from ptcc_certify.bounds.late_messages import LateBounds, RowBound, late_rows
 from ptcc_certify.bounds.late_steps import bound_steps
 from ptcc_certify.bounds.missed_deadline import Missed
 from ptcc_certify.bounds.small_delays import SmallDelays
@@ -18,7 +18,7 @@ from ptcc_certify.checker.reading import exact
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness
+from ptcc_certify.lyapunov.follower_rows import RowWitness
 from ptcc_certify.protocols.base import Protocol
 from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.protocols.late_messages import LateMessages
@@ -120,24 +120,6 @@ def agents_section(labels: tuple[str, ...], name: str, values: np.ndarray, out: 
     return dict(zip(labels, (x.hex() if x else "0" for x in values.tolist()), strict=True))
 
 
-def nothing_proved(
-    messages: LateMessages | None, structure: Structure, protocol: Protocol, relative: bool
-) -> LateBounds | None:
-    """Return that nothing is proved of late messages that were asked for; None if none were.
-
-    Parameters
-    ----------
-    messages : LateMessages or None
-    structure : Structure
-    protocol : Protocol
-    relative : bool
-        Whether no initial state was given.
-    """
-    if messages is None:
-        return None
-    return LateBounds(messages, structure, GainLimits(gain_cap=messages.gain_cap).limit(protocol.gain), relative)
-
-
 def read_late(
     document: Mapping[str, Any],
     structure: Structure,
@@ -167,7 +149,7 @@ def read_late(
         start = data.floats(steps["late-steps", "messages.steps"].witness["start"], F)
         times = tuple(map(exact, section["steps"]["instants"]))
         error = float_up(messages.value_error)
-        instants = bound_steps(FollowerRows(structure), gain, messages.age, error, times, start)
+        instants = bound_steps(late_rows(structure, messages), gain, messages.age, error, times, start)
     return LateBounds(
         messages,
         structure,
