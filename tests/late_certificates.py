@@ -60,7 +60,7 @@ def nominal(T: Any = 1, rho1: Any = 1, k: Any = 3) -> NominalProtocol:
 class Late:
     """What late messages of a certificate are made from, in rationals."""
 
-    def __init__(self, data: Json):
+    def __init__(self, data: Json, latencies: Sequence[Fraction] = (), delay: Fraction = Fraction(0)):
         self.data = data
         self.labels = data["graph"]["nodes"]
         index = {label: v for v, label in enumerate(self.labels)}
@@ -70,6 +70,12 @@ class Late:
         g = {key: number(x) for key, x in data["protocol"].items() if key not in ("kind", "disturbance")}
         self.T = g["T"] if "T" in g else g["T_r"] + g["T_s"]
         self.rho1, self.k = g["rho1"], g["rho2"] * g["kappa"]
+        # ages of what is heard, by source and listener, in 64ths of the largest one, rounded up
+        self.parts = dict.fromkeys(((s, t) for s, t, _ in self.edges), 64)
+        if len(latencies) > 1:
+            held = delay - max(latencies)
+            ages = (math.ceil(64 * (x + held) / delay) for x in latencies)
+            self.parts = dict(zip(self.parts, ages, strict=True))
 
     @cached_property
     def heard(self) -> dict[int, list[tuple[int, Fraction]]]:
@@ -88,6 +94,11 @@ class Late:
         mid, radius = self.interval(v)
         return abs(number(self.data["initial_state"][self.labels[v]]) - mid) + radius
 
+    def power(self, q: Fraction, s: int, v: int) -> Fraction:
+        """``q`` to the power of the age of what is heard over an edge, a little above."""
+        part = self.parts[s, v]
+        return q if part == 64 else Fraction(float(q) ** (part / 64) * (1 + 1e-12))
+
     def witness(self, q: Fraction) -> tuple[dict[int, Fraction], Fraction] | None:
         """``u`` and ``b`` with ``D u - q |W_F| u >= b u``; None if there are none."""
         place = {v: i for i, v in enumerate(self.followers)}
@@ -95,14 +106,14 @@ class Late:
         for v, sources in self.heard.items():
             A[place[v], place[v]] = float(self.D[v])
             for s, w in sources:
-                A[place[v], place[s]] -= float(q * w)
+                A[place[v], place[s]] -= float(self.power(q, s, v) * w)
         rate = float(np.linalg.eigvals(A).real.min()) * 0.98
         if rate < 1e-3:
             return None
         u = np.linalg.solve(A - rate * np.eye(len(A)), np.ones(len(A)))
         values = {v: Fraction(round(float(x) * 2**30), 2**30) for v, x in zip(self.followers, u / u.max(), strict=True)}
         own = [
-            (self.D[v] * values[v] - q * sum((w * values[s] for s, w in self.heard[v]), Fraction(0))) / values[v]
+            self.D[v] - sum((self.power(q, s, v) * w * values[s] for s, w in self.heard[v]), Fraction(0)) / values[v]
             for v in self.followers
         ]
         return (values, min(own)) if min(values.values()) > 0 and min(own) > 0 else None
@@ -165,11 +176,15 @@ class Late:
         )
         y = [{v: float(x) for v, x in y0.items()}]
         for i, (a, b) in enumerate(pairwise(instants)):
-            j = max((m for m, t in enumerate(instants) if t <= a - delay), default=0)
+            at = {
+                p: max((m for m, t in enumerate(instants) if t <= a - delay * p / 64), default=0)
+                for p in set(self.parts.values())
+            }
             way = self.way(float(a), float(b), gain_cap)
             new = {}
             for v in self.followers:
-                h = sum(float(w) * y[j][s] for s, w in self.heard[v]) / float(self.D[v]) + float(error)
+                told = sum(float(w) * y[at[self.parts[s, v]]][s] for s, w in self.heard[v])
+                h = told / float(self.D[v]) + float(error)
                 x = float(self.D[v]) * way
                 decay = 1 / (1 + x + x**2 / 2 + x**3 / 6 + x**4 / 24)
                 new[v] = min(y[i][v], h + max(y[i][v] - h, 0) * decay)
@@ -326,11 +341,11 @@ def with_messages(
 ) -> Json:
     """The certificate with late messages: as many of the parts as there are."""
     data = copy.deepcopy(data)
-    case = Late(data)
     each = latency if isinstance(latency, list) else [latency]
     delay = max(map(Fraction, each))
     if packets is not None:
         delay += (Fraction(packets["losses"]) + 1) * Fraction(packets["period"])
+    case = Late(data, list(map(Fraction, each)), delay)
     error, cap = Fraction(value_error), None if gain_cap is None else Fraction(gain_cap)
     said: Json = {
         "latency": [text(x) for x in latency] if isinstance(latency, list) else text(latency),

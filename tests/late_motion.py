@@ -62,7 +62,7 @@ def instants(T: float, taubar: float, nearest: float = 1e-7, count: int = 60) ->
     return np.unique(np.concatenate([whole, [t for t in extra if 0 < t < whole[-1]], [T]]))
 
 
-Ages = Callable[[Matrix, int, int], Matrix]
+Ages = Callable[[Matrix, Matrix, int], Matrix]
 
 
 @dataclass(frozen=True)
@@ -75,17 +75,17 @@ class LateMotion:
         ``W[k, l]`` is the weight with which ``k`` listens to ``l``.
     gains : list of Gain
         Of each agent, who may have a deadline of its own.
-    taubar : float
-        No message is older.
+    taubar : float or (N, N) array
+        No message is older: one age for all, or that of what ``k`` hears of ``l``.
     times : array
-        From 0 on, by steps of ``taubar`` at most.
+        From 0 on, by steps of the least ``taubar`` at most.
     own_late : bool
         The own state is heard late too, as old as each message.
     """
 
     W: Matrix
     gains: list[Gain]
-    taubar: float
+    taubar: float | Matrix
     times: Vector
     own_late: bool = False
 
@@ -98,7 +98,7 @@ class LateMotion:
             The states at 0 and before.
         ages : callable
             ``ages(states, oldest, j)``: the numbers of the instants, from ``oldest`` to ``j``, at which what ``k``
-            hears of ``l`` in step ``j`` was said, (N, N).
+            hears of ``l`` in step ``j`` was said, (N, N) as ``oldest``.
         errors : callable, optional
             What is off in what each agent hears, added to every term of its sum, with the sign of the weight.
         """
@@ -108,8 +108,9 @@ class LateMotion:
         moved = [[g.between(a, b) for g in self.gains] for a, b in pairwise(self.times)]
         for j, ds in enumerate(np.array(moved)):
             # the first instant that is not older than taubar at the end of the step
-            oldest = int(np.searchsorted(self.times[: j + 1], self.times[j + 1] - self.taubar * (1 - 1e-12)))
-            if oldest > j:
+            taubar = np.broadcast_to(self.taubar, (N, N))
+            oldest = np.searchsorted(self.times[: j + 1], self.times[j + 1] - taubar * (1 - 1e-12))
+            if oldest.max() > j:
                 raise ValueError("a step longer than the largest delay")
             which = ages(X[:, : j + 1], oldest, j)
             pull = (self.W * X[own, which]).sum(axis=1) + (D * errors(X[:, j]) if errors is not None else 0)
@@ -123,9 +124,9 @@ class LateMotion:
         return X
 
 
-def oldest_of_all(X: Matrix, oldest: int, j: int) -> Matrix:
+def oldest_of_all(X: Matrix, oldest: Matrix, j: int) -> Matrix:
     """Every message as late as may be."""
-    return np.full((len(X), len(X)), oldest)
+    return oldest
 
 
 def by_chance(rng: np.random.Generator) -> Ages:
@@ -141,10 +142,13 @@ def square_wave(period: int, phases: Matrix) -> Ages:
 def worst(W: Matrix, target: Vector) -> Ages:
     """The message of each neighbour that drives the listener farthest from its target, on the side where it is."""
 
-    def ages(X: Matrix, oldest: int, j: int) -> Matrix:
-        side = np.sign(W) * np.where(X[:, j] >= target, 1.0, -1.0)[:, None]
-        window = X[:, oldest:]
-        return oldest + np.where(side > 0, window.argmax(axis=1)[None, :], window.argmin(axis=1)[None, :])
+    def ages(X: Matrix, oldest: Matrix, j: int) -> Matrix:
+        side, which = np.sign(W) * np.where(X[:, j] >= target, 1.0, -1.0)[:, None], oldest.copy()
+        for first in np.unique(oldest):
+            window = X[:, first:]
+            far = np.where(side > 0, window.argmax(axis=1)[None, :], window.argmin(axis=1)[None, :])
+            which = np.where(oldest == first, first + far, which)
+        return which
 
     return ages
 

@@ -45,18 +45,19 @@ class Runs:
 
 @lru_cache(maxsize=400)
 def late_runs(
-    W: bytes, x0: bytes, target: bytes, gains: tuple[Gain, ...], delay: float, error: float, late: bool, end: float
+    W: bytes, x0: bytes, target: bytes, gains: tuple[Gain, ...], oldest: bytes, error: float, late: bool, end: float
 ) -> Runs:
-    """Motions for delays up to ``delay`` and errors up to ``error``."""
+    """Motions for delays up to the ages of ``oldest``, by listener and source, and errors up to ``error``."""
     start, aim = np.frombuffer(x0), np.frombuffer(target)
     N = len(start)
-    weights = np.frombuffer(W).reshape(N, N)
+    weights, taubar = np.frombuffer(W).reshape(N, N), np.frombuffer(oldest).reshape(N, N)
+    delay = float(taubar.min())
     T = max(g.T for g in gains)
     capped = max(g.cap for g in gains) < math.inf
     times = np.arange(0, T, min(delay, T) / 3) if capped else late_motion.instants(T, delay)
     times = np.unique(np.concatenate([times, [g.T for g in gains], np.arange(T, end, min(delay, T) / 3)]))
     rng = np.random.default_rng(0)
-    motion = LateMotion(weights, list(gains), delay, times, late)
+    motion = LateMotion(weights, list(gains), taubar, times, late)
     patterns = [
         late_motion.oldest_of_all,
         late_motion.by_chance(rng),
@@ -154,6 +155,12 @@ class LateOracle(Oracle):
         return oldest + ((number(packets["losses"]) + 1) * number(packets["period"]) if packets else 0)
 
     @cached_property
+    def ages(self) -> dict[tuple[int, int], Fraction]:
+        """How old is what is heard over every edge, at most."""
+        held = self.delay - max(self.latencies.values())
+        return {pair: latency + held for pair, latency in self.latencies.items()}
+
+    @cached_property
     def error(self) -> Fraction:
         return number(self.said["value_error"])
 
@@ -200,7 +207,11 @@ class LateOracle(Oracle):
         """Motions under the delays of the file, and where they are to end."""
         T, rho1, k = map(float, self.gain)
         gain = Gain(T, rho1, k, math.inf if self.cap is None else float(self.cap))
-        if not self.delay or float(self.delay) < T / 400:
+        # what leaders at rest said is never old
+        ages = np.full((self.n, self.n), float(self.delay))
+        for (s, t), age in self.ages.items():
+            ages[t, s] = float(age) if self.L[s][s] or not self.single else float(self.delay)
+        if ages.min() < T / 400:
             return  # what is held for so short a time takes too many steps
         for x0, target in self.starts():
             yield (
@@ -209,13 +220,18 @@ class LateOracle(Oracle):
                     x0.tobytes(),
                     target.tobytes(),
                     gains or (gain,) * self.n,
-                    float(self.delay),
+                    ages.tobytes(),
                     float(self.error) if error else 0.0,
                     self.said["own"] == "late",
                     runs_to or T,
                 ),
                 target,
             )
+
+    def power(self, q: Fraction, s: int, v: int) -> Any:
+        """``q`` to the power of the age of what ``v`` hears of ``s`` over the largest age."""
+        share = self.ages[s, v] / self.delay if self.delay else Fraction(1)
+        return ball(q) if share == 1 else (ball(q).log() * ball(share)).exp()
 
     def above_rows(self) -> None:
         for i, entry in enumerate(self.said["rows"]):
@@ -229,7 +245,8 @@ class LateOracle(Oracle):
             for v, x in u.items():
                 heard = sum((w * u[s] for s, w in self.among[v]), Fraction(0))
                 D = self.L[v][v]
-                self.require(D * x - q * heard >= b * x, f"{at}: row {v}")
+                later = sum((self.power(q, s, v) * ball(w * u[s]) for s, w in self.among[v]), ball(Fraction(0)))
+                self.require(not ball(D * x - b * x) < later, f"{at}: row {v}")
                 self.require(initial * x >= self.far(v), f"{at}: initial of {v}")
                 self.require(floor * (D * x - heard) >= self.error * D, f"{at}: floor of {v}")
             self.require(initial >= 0 and floor >= 0, f"{at}: negative")
@@ -326,9 +343,9 @@ class LateOracle(Oracle):
         )
         x0, target = (np.array(list(map(float, x or []))) for x in (self.start, self.target))
 
-        def ages(X: np.ndarray, oldest: int, j: int) -> np.ndarray:
+        def ages(X: np.ndarray, oldest: np.ndarray, j: int) -> np.ndarray:
             newest = max(int(np.searchsorted(times, times[j] - young * (1 - 1e-12), side="right")) - 1, 0)
-            return np.full((len(X), len(X)), min(max(newest, oldest), j))
+            return np.minimum(np.maximum(newest, oldest), j)
 
         X = LateMotion(self.weight_array, [Gain(T, rho1, k)] * self.n, float(self.delay), times).run(x0, ages)
         gain, D = Gain(T, rho1, k), max(float(self.L[v][v]) for v in self.follow)

@@ -28,6 +28,7 @@ from ptcc_certify.bounds.missed_deadline import Missed, find_missed
 from ptcc_certify.bounds.small_delays import SmallDelays
 from ptcc_certify.bounds.staged_deadlines import stage_deadlines
 from ptcc_certify.checker.input_formulas import BITS, Limits, decay_above
+from ptcc_certify.checker.late_messages import PARTS
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness
 from ptcc_certify.protocols.base import Protocol
@@ -189,7 +190,7 @@ def bound_late(
     gain = GainLimits(gain_cap=messages.gain_cap).limit(protocol.gain)
     if messages.own_delay or any(len(c.nodes) > 1 for c in structure.closed_components):
         return LateBounds(messages, structure, gain, initial_state is None or ends is None)
-    rows = FollowerRows(structure)
+    rows = late_rows(structure, messages)
     first = np.ones(rows.D.size)
     if initial_state is not None and ends is not None:
         first = np.array([float_up(abs(initial_state[v] - ends[v][0]) + ends[v][1]) for v in rows.followers])
@@ -209,6 +210,24 @@ def bound_late(
     staged = stage_deadlines(rows, protocol.T, messages.age)
     unarrived = staged is None and stage_deadlines(rows, protocol.T, Fraction(0)) is not None
     return replace(bounds, staged=staged, unarrived=unarrived)
+
+
+def late_rows(structure: Structure, messages: LateMessages) -> FollowerRows:
+    """Return the rows of the followers, with ages of what is heard by edge, in 64ths of the oldest, rounded up.
+
+    Parameters
+    ----------
+    structure : Structure
+        All leaders are single nodes.
+    messages : LateMessages
+    """
+    latencies = messages.latencies(structure.graph)
+    if not isinstance(latencies, tuple) or not messages.age:
+        return FollowerRows(structure)
+    part = {x: math.ceil(PARTS * (x + messages.held) / messages.age) for x in set(latencies)}
+    if min(part.values()) == PARTS:
+        return FollowerRows(structure)
+    return FollowerRows(structure, np.array([part[x] / PARTS for x in latencies]))
 
 
 def _least(structure: Structure, bounds: Sequence[np.ndarray]) -> np.ndarray | None:

@@ -5,7 +5,8 @@ With ``y_0 >= |eps(0)|`` and ``D y_0 >= |W_F| y_0 + nu D`` the solution of
     y' = -gain (D y - |W_F| y(t - delay) - nu D),    y = y_0 up to 0,
 
 never grows, so that ``|eps(t)| <= y(t)`` whatever the delays up to ``delay`` and the value errors up to ``nu``. Between
-instants ``t_(i-1)`` and ``t_i`` what it hears is at most ``y`` at an instant ``t_j <= t_(i-1) - delay``, hence
+instants ``t_(i-1)`` and ``t_i`` what it hears over an edge is at most ``y`` at an instant ``t_j <= t_(i-1) - age`` with
+the age of the edge, hence
 
     y_i = h + (y_(i-1) - h)_+ e^(-D (s(t_i) - s(t_(i-1)))),    h = D^-1 |W_F| y_j + nu.
 
@@ -106,7 +107,7 @@ def search_steps(
     start = _start(rows, error, first)
     if not 0 < float(start.max()) < np.inf:
         return None
-    return bound_steps(rows, gain, delay, error, instants_of(gain.gain.T, delay, most), start)
+    return bound_steps(rows, gain, delay, error, instants_of(gain.gain.T, delay * rows.least_share, most), start)
 
 
 def bound_steps(
@@ -118,11 +119,11 @@ def bound_steps(
     start: np.ndarray,
 ) -> Steps:
     """Bound followers from instant to instant, in floats that leave room for the integers of the check."""
-    heard_at = _hearing(instants, delay)
+    parts = [(W, _hearing(instants, delay * Fraction(share))) for share, W in rows.by_age().items()]
     clock, size = _clock(gain, instants), float(start.max())
     room, bounds = _UNIT * size * (np.diff(rows.W.indptr) + 4.0), [start + _UNIT * size]
     for i in range(1, len(instants)):
-        before, heard = bounds[-1], (rows.W @ bounds[heard_at[i - 1]]) / rows.D + error + room
+        before, heard = bounds[-1], sum(W @ bounds[at[i - 1]] for W, at in parts) / rows.D + error + room
         step = clock[i] - clock[i - 1] if np.isfinite(clock[i]) else np.inf
         left = _decay_above(rows.D * max(step, 0.0) * (1 - 1e-9))
         bounds.append(np.minimum(before, heard + np.maximum(before - heard, 0) * left + 4 * _UNIT * size))

@@ -24,6 +24,7 @@ from ptcc_certify.certificate.format_effort import LIMITS, effort_section, energ
 from ptcc_certify.certificate.format_graph import certificate_graph, claim_sections, graph_section, structure_section
 from ptcc_certify.certificate.format_leaders import leaders_section, read_tracking
 from ptcc_certify.certificate.format_messages import Vectors, messages_section, read_late
+from ptcc_certify.certificate.format_unproved import nothing_proved, read_unproved, write_unproved
 from ptcc_certify.certificate.format_vectors import (
     Reader,
     Writer,
@@ -112,6 +113,8 @@ def read_document(
     if paper is not None and paper["rho_interval"] is not None:
         rho = ExactInterval(*(number(paper["rho_interval"][key]) for key in ("printed", "exact")))
     effort = read_effort(document, structure, protocol, data, steps)
+    request = _read_request(document["unverified"], None if effort is None else effort.initial_set)
+    request = replace(request, **read_unproved(document, structure))
     return {
         "structure": structure,
         "protocol": protocol,
@@ -126,9 +129,10 @@ def read_document(
         "limit": _read_limit(steps, data),
         "final_state": _read_final_state(document, structure, data),
         "matrix": None,
-        "late": read_late(document, structure, protocol, data, steps),
+        "late": read_late(document, structure, protocol, data, steps)
+        or nothing_proved(request.messages, structure, protocol, initial_state is None),
         "tracking": read_tracking(document, structure, protocol, data, steps),
-        "request": _read_request(document["unverified"], None if effort is None else effort.initial_set),
+        "request": request,
         "observed": _read_observations(document["unverified"]),
         "source": Source(path, sha256, document, report, effort, proof, files),
         "agents": read_agents(document.get("agents"), structure, protocol, functions),
@@ -433,7 +437,7 @@ def _write_unverified(content: Content) -> dict[str, Any]:
         },
         "residual": {name: finite(envelope.residual(q)) for name, q in residual.items()} if content.direct else None,
         "final_state": floats,
-        "asked": _write_request(content.request),
+        "asked": _write_request(content.request) | write_unproved(content),
         "scenario": None if content.request.scenario is None else dict(content.request.scenario),
         "origins": dict(content.request.origins),
         "simulation": _write_run(content),

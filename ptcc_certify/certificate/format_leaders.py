@@ -28,13 +28,25 @@ def tracking_obligations(tracking: Tracking | None) -> Iterator[Obligation]:
         yield Obligation("tracking", "leaders", {"a": witness.b}, Vectors({"u": witness.u}))
 
 
-def leaders_section(tracking: Tracking, out: Writer) -> dict[str, Any]:
-    """Return what is proved with moving leaders, as files have it."""
-    leaders, labels, bound = tracking.leaders, tracking.structure.graph.labels, tracking.input
+def asked_leaders(leaders: MovingLeaders) -> dict[str, Any]:
+    """Return how leaders move, as files have it."""
     return {
         "speed": format_exact(leaders.speed),
         "disturbance": format_exact(leaders.disturbance),
         "sign_gain": text(leaders.sign_gain),
+    }
+
+
+def read_leaders(section: Mapping[str, Any]) -> MovingLeaders:
+    """Return what a certificate says of how leaders move."""
+    return MovingLeaders(exact(section["speed"]), exact(section["disturbance"]), number(section["sign_gain"]))
+
+
+def leaders_section(tracking: Tracking, out: Writer) -> dict[str, Any]:
+    """Return what is proved with moving leaders, as files have it."""
+    leaders, labels, bound = tracking.leaders, tracking.structure.graph.labels, tracking.input
+    return {
+        **asked_leaders(leaders),
         "initial": format_exact(tracking.initial),
         "input": None if bound is None else agents_section(labels, "tracking", bound, out),
         "after": format_exact(tracking.after),
@@ -55,7 +67,7 @@ def read_tracking(
     step, bound = steps["tracking", "leaders"], section["input"]
     u = data.floats(step.witness["u"], structure.followers.size)
     return Tracking(
-        MovingLeaders(exact(section["speed"]), exact(section["disturbance"]), number(section["sign_gain"])),
+        read_leaders(section),
         structure,
         protocol,
         RowWitness(Fraction(1), step.numbers["a"], u),

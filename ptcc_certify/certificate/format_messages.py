@@ -9,15 +9,16 @@ from typing import Any
 import numpy as np
 
 from lmi.exact.decimal_rounding import float_up
-from ptcc_certify.bounds.late_messages import LateBounds, RowBound
+from ptcc_certify.bounds.late_messages import LateBounds, RowBound, late_rows
 from ptcc_certify.bounds.late_steps import bound_steps
 from ptcc_certify.bounds.missed_deadline import Missed
 from ptcc_certify.bounds.small_delays import SmallDelays
 from ptcc_certify.certificate.format_vectors import Reader, Writer, number, text
 from ptcc_certify.checker.reading import exact
+from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness
+from ptcc_certify.lyapunov.follower_rows import RowWitness
 from ptcc_certify.protocols.base import Protocol
 from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.protocols.late_messages import LateMessages
@@ -58,12 +59,9 @@ def late_obligations(late: LateBounds | None) -> Iterator[Obligation]:
         yield Obligation("late-form", "messages.form", numbers, {"function": form.function, "phi": phi})
 
 
-def messages_section(late: LateBounds, out: Writer) -> dict[str, Any]:
-    """Return what is proved with late messages, as files have it."""
-    messages, graph = late.messages, late.structure.graph
-    latencies = messages.latencies(graph)
-    followers = [graph.labels[v] for v in late.structure.followers]
-    period, missed, staged = messages.period, late.missed, late.staged
+def asked_messages(messages: LateMessages, graph: SignedDigraph) -> dict[str, Any]:
+    """Return how late, how often lost and how inexact messages are, as files have it."""
+    latencies, period = messages.latencies(graph), messages.period
     return {
         "latency": [format_exact(x) for x in latencies] if isinstance(latencies, tuple) else format_exact(latencies),
         "packets": None if period is None else {"period": format_exact(period), "losses": str(messages.losses)},
@@ -71,6 +69,15 @@ def messages_section(late: LateBounds, out: Writer) -> dict[str, Any]:
         "own": "late" if messages.own_delay else "fresh",
         "value_error": format_exact(messages.value_error),
         "gain_cap": text(messages.gain_cap),
+    }
+
+
+def messages_section(late: LateBounds, out: Writer) -> dict[str, Any]:
+    """Return what is proved with late messages, as files have it."""
+    graph, missed, staged = late.structure.graph, late.missed, late.staged
+    followers = [graph.labels[v] for v in late.structure.followers]
+    return {
+        **asked_messages(late.messages, graph),
         "rows": [
             {name: text(getattr(row, name)) for name in ("cap", "clock", "left", "initial", "floor")}
             for row in late.rows
@@ -142,7 +149,7 @@ def read_late(
         start = data.floats(steps["late-steps", "messages.steps"].witness["start"], F)
         times = tuple(map(exact, section["steps"]["instants"]))
         error = float_up(messages.value_error)
-        instants = bound_steps(FollowerRows(structure), gain, messages.age, error, times, start)
+        instants = bound_steps(late_rows(structure, messages), gain, messages.age, error, times, start)
     return LateBounds(
         messages,
         structure,
@@ -158,7 +165,7 @@ def read_late(
 
 
 def read_messages(section: Mapping[str, Any], structure: Structure, data: Reader) -> LateMessages:
-    """Return what an accepted certificate says of how late messages are."""
+    """Return what a certificate says of how late messages are."""
     latency, packets = section["latency"], section["packets"]
     delay: Any = exact(latency) if isinstance(latency, str) else None
     if delay is None:

@@ -6,7 +6,7 @@ import hashlib
 import io
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ import numpy as np
 
 from lmi.exact.definite import SparseFactor
 from ptcc_certify.bounds.final_state import Influence
-from ptcc_certify.checker.reading import exact
+from ptcc_certify.checker.reading import RejectedError, exact
 from ptcc_certify.checker.side_files import SideFiles, beside
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.io.files import read_bytes
@@ -182,6 +182,14 @@ def text(value: Fraction | None) -> str | None:
 def number(digits: str | None) -> Fraction | None:
     """Read what :func:`text` wrote."""
     return None if digits is None else exact(digits)
+
+
+def readable(read: Callable[[], Any]) -> Any:
+    """Return what is read from a part of any content; None where it cannot be."""
+    try:
+        return read()
+    except (RejectedError, ArithmeticError, LookupError, TypeError, ValueError, AttributeError):
+        return None
 
 
 def finite(value: float | None) -> float | None:

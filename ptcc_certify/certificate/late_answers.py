@@ -15,11 +15,14 @@ from ptcc_certify.certificate.certificate_data import Content
 def at_deadline(certificate: Content, answer: Answer) -> Answer:
     """Return what becomes at ``T``, where messages are late, of a behaviour that follows where none are."""
     late = certificate.late
-    if late is None or answer.status != MET or certificate.constant:
-        return answer
-    if late.direct:
+    asked = late is not None or certificate.request.messages is not None
+    if not asked or answer.status != MET or certificate.constant:
         return answer
     what = f"{answer.what} at T with late messages"
+    if late is None:
+        return Answer(OPEN, what, "nothing is proved of them")
+    if late.direct:
+        return answer
     if late.missed is not None:
         return Answer(REFUTED, what, _misses(certificate, late.missed))
     if late.staged is not None:
@@ -33,7 +36,9 @@ def judge_messages(certificate: Content) -> list[Answer]:
     """Tell what becomes of what may be left at ``T`` with late messages, and whether anything is proved of these."""
     late, most = certificate.late, certificate.expectations.max_residual
     if late is None:
-        answers = [] if most is None else [Answer(OPEN, "max_residual", "no messages are late")]
+        unproved = certificate.request.messages is not None
+        answers = [Answer(OPEN, "late messages", "nothing is proved of what is left at T")] * unproved
+        answers += [] if most is None or unproved else [Answer(OPEN, "max_residual", "no messages are late")]
         if certificate.request.leaders is not None and certificate.tracking is None:
             answers.append(Answer(OPEN, "leaders that move", "no vector for their followers was found"))
         return answers

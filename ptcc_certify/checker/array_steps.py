@@ -8,7 +8,8 @@ at most ``2^30``; long factors are split in two. Nothing is rounded in any other
 from __future__ import annotations
 
 from array import array
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -22,8 +23,15 @@ SMALL, HALF_SHARE, HALF = 35, 20, 15
 class ArraySteps(Steps):
     """:class:`Steps` by NumPy."""
 
-    def _heard(self, y: Sequence[int]) -> Any:
-        products = np.asarray(self.weights) * np.asarray(y)[np.asarray(self.sources)]
+    def _heard(self, told: Mapping[int, Sequence[int]]) -> Any:
+        weights, sources = np.asarray(self.weights), np.asarray(self.sources)
+        if len(told) == 1:
+            (y,) = told.values()
+            products = weights * np.asarray(y)[sources]
+        else:
+            products = np.empty(len(weights), np.int64)
+            for part, where in self._edges_of_age.items():
+                products[where] = weights[where] * np.asarray(told[part])[sources[where]]
         # modulo 2^64, which sums of rows never reach
         before = np.concatenate([[np.uint64(0)], np.cumsum(products.view(np.uint64))])[np.asarray(self.offsets)]
         return -(-np.diff(before).view(np.int64) >> FIXED) + self.error
@@ -38,6 +46,12 @@ class ArraySteps(Steps):
         decay = self._decay(x)
         rest = heard + -(-np.maximum(states - heard, 0) * decay >> FIXED)
         return array("q", np.minimum(states, rest).tobytes())
+
+    @cached_property
+    def _edges_of_age(self) -> dict[int, Any]:
+        """The edges of every age."""
+        parts = np.asarray(self.parts)
+        return {part: np.flatnonzero(parts == part) for part in sorted(set(self.parts))}
 
     @staticmethod
     def _decay(x: Any) -> Any:

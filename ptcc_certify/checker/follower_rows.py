@@ -1,4 +1,7 @@
-"""Rows of followers that single leaders lead, in integers: ``D u - q |W_F| u >= b u``, and how far they start."""
+"""Rows of followers that single leaders lead, in integers: ``D u - q |W_F| u >= b u``, and how far they start.
+
+Where ages differ from edge to edge an edge has a power of ``q``, as what is heard over it is younger.
+"""
 
 from __future__ import annotations
 
@@ -9,9 +12,12 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
+from lmi.exact.elementary_enclosures import exp, log, rounded
 from lmi.exact.numbers import longest, shorten, sized
 from lmi.exact.work import spend
 from ptcc_certify.checker.final_state import state_intervals
+from ptcc_certify.checker.input_formulas import BITS
+from ptcc_certify.checker.late_messages import PARTS
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.protocol import Begin
 from ptcc_certify.checker.reading import need
@@ -108,15 +114,34 @@ class Rows:
         bits = longest(n for x in values for n in x.as_integer_ratio())
         spend(6 * len(self.u), self.graph.bits + bits, longest(self.u) + self.scale.bit_length(), "rows of followers")
 
-    def decay(self, q: Fraction, b: Fraction) -> None:
-        """Verify the rows with ``q`` and ``b``."""
+    def decay(self, q: Fraction, b: Fraction, parts: Sequence[int] = (PARTS,)) -> None:
+        """Verify ``D_k u_k - sum_l q^(part_kl/64) |w_kl| u_l >= b u_k``, with parts by edge, or one for all."""
         need(b > 0, "b is not positive")
         self._spent(q, b)
-        own, other = q.denominator * b.denominator, q.numerator * b.denominator
-        third = b.numerator * q.denominator * self.graph.unit
-        rows = zip(self.u, self.followers.degrees, self.heard, strict=True)
+        heard, common = self._heard_later(q, parts)
+        own, other = common * b.denominator, b.denominator
+        third = b.numerator * common * self.graph.unit
+        rows = zip(self.u, self.followers.degrees, heard, strict=True)
         low = next((k for k, (u, D, h) in enumerate(rows) if (own * D - third) * u < other * h), None)
         need(low is None, f"the row of agent {self.followers.label(low or 0)} does not decay so fast")
+
+    def _heard_later(self, q: Fraction, parts: Sequence[int]) -> tuple[Sequence[int], int]:
+        """Bound ``sum_l q^(part_kl/64) |w_kl| u_l`` from above, over a common denominator and the unit of the graph."""
+        if len(parts) == 1:
+            return [q.numerator * x for x in self.heard], q.denominator
+        graph, log_q = self.graph, log(q)[1]
+        power = {part: rounded(exp(log_q * Fraction(part, PARTS))[1], BITS, up=True) for part in set(parts)}
+        power |= {0: Fraction(1), PARTS: q}
+        common = math.lcm(*(x.denominator for x in power.values()))
+        factors = {part: x.numerator * (common // x.denominator) for part, x in power.items()}
+        bits = longest(factors.values())
+        sized(graph.n, bits + graph.bits + longest(self.u), "rows of followers")
+        spend(2 * graph.n_edges, bits + graph.bits, longest(self.u), "rows of followers")
+        value, total, sizes = dict(zip(self.followers.nodes, self.u, strict=True)), [0] * graph.n, graph.values
+        for s, t, k, part in zip(graph.source, graph.target, graph.which, parts, strict=True):
+            if s in value:
+                total[t] += factors[part] * abs(sizes[k]) * value[s]
+        return [total[v] for v in self.followers.nodes], common
 
     def above_initial(self, initial: Fraction) -> None:
         """Verify ``initial u_k >= |x_k(0) - x*_k|``."""

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from math import ceil
 from typing import Any
 
+from lmi.exact.numbers import longest
+from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.input_formulas import PrescribedGain
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import entries, exact, fields, need
+from ptcc_certify.checker.reading import entries, exact, fields, length, need
 from ptcc_certify.checker.side_files import Numbers, beside
+
+#: Ages of what is heard over single edges are rounded up to so many parts of the largest one.
+PARTS = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +31,7 @@ class Messages:
     latency : Numbers
         The least age of what is heard over each edge; one number for all.
     delay : Fraction
-        Nothing that is heard is older.
+        Nothing that is heard is older; over an edge nothing is older than its latency and what values are held.
     late : bool
         The own state is as old as what is heard.
     value_error : Fraction
@@ -43,6 +50,23 @@ class Messages:
     def latency_of(self, edge: int) -> Fraction:
         """Return the latency of an edge, by its place among all."""
         return self.latency[edge if len(self.latency) > 1 else 0]
+
+    def parts(self) -> Sequence[int]:
+        """Return the age of what is heard over each edge, at most, in 64ths of the largest one; one for all edges.
+
+        Raises
+        ------
+        WorkError
+            Latencies are too long to be compared.
+        """
+        if len(self.latency) == 1 or not self.delay:
+            return (PARTS,)
+        distinct, held = set(self.latency.values), self.delay - self.latency.largest()
+        bits = longest((*self.delay.as_integer_ratio(), *held.as_integer_ratio(), self.latency.scale or 1))
+        spend(4 * len(distinct), bits, bits + length(map(Fraction, distinct)), "ages of what is heard")
+        part = {x: ceil(PARTS * (Fraction(x) / (self.latency.scale or 1) + held) / self.delay) for x in distinct}
+        each = [part[x] for x in self.latency.values]
+        return each if min(each) < PARTS else (PARTS,)
 
 
 def read_messages(doc: Document, graph: Digraph, gain: PrescribedGain, section: dict[str, Any]) -> Messages:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from array import array
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from itertools import pairwise
 
@@ -19,6 +19,7 @@ from lmi.exact.numbers import longest, sized
 from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.input_formulas import BITS, PrescribedGain
+from ptcc_certify.checker.late_messages import PARTS
 
 #: Bits of a fixed-point number, of the share of a degree in the largest one, and of the way of the clock.
 FIXED, SHARE, WAY = 30, 40, 42
@@ -78,10 +79,18 @@ class Steps:
         ``y_0`` by follower, times a scale.
     value_error : Fraction
         Times the same scale.
+    parts : ints
+        Ages of what is heard over the edges of the graph, in 64ths of the largest one; or one for all.
     """
 
     def __init__(
-        self, graph: Digraph, nodes: Sequence[int], degrees: Sequence[int], start: Sequence[int], value_error: Fraction
+        self,
+        graph: Digraph,
+        nodes: Sequence[int],
+        degrees: Sequence[int],
+        start: Sequence[int],
+        value_error: Fraction,
+        parts: Sequence[int] = (PARTS,),
     ):
         self.graph, self.nodes, self.largest = graph, nodes, max(max(start), 1)
         spend(graph.n_edges + 2 * graph.n, graph.bits + FIXED, longest(start), "bounds from instant to instant")
@@ -91,13 +100,14 @@ class Steps:
         self.shares = array("q", ((D << SHARE) // self.top for D in degrees))
         place = dict(zip(nodes, range(len(nodes)), strict=True))
         sizes, (offsets, sources, which) = [abs(w) for w in graph.values], graph.into
-        # where the edges of every follower begin that come from followers, these, and what they share in its degree
-        self.offsets, self.sources, self.weights = array("q", [0]), array("q"), array("q")
+        # where the edges of every follower begin that come from followers, these, shares in its degree, and ages
+        self.offsets, self.sources, self.weights, self.parts = array("q", [0]), array("q"), array("q"), array("q")
         for v, D in zip(nodes, degrees, strict=True):
             for e in range(offsets[v], offsets[v + 1]):
                 if (s := place.get(sources[e])) is not None:
                     self.sources.append(s)
                     self.weights.append(-(-(sizes[which[e]] << FIXED) // D))
+                    self.parts.append(parts[e if len(parts) > 1 else 0])
             self.offsets.append(len(self.sources))
 
     def run(self, instants: Sequence[Fraction], delay: Fraction, ways: Sequence[Fraction | None]) -> Sequence[int]:
@@ -111,15 +121,17 @@ class Steps:
         ways : Fractions
             How far the clock goes between two of them, from below; None: infinitely far.
         """
-        said = [max(bisect_right(instants, t - delay) - 1, 0) for t in instants[:-1]]
-        window = max(i - j for i, j in enumerate(said)) + 2
+        ages = {part: delay * part / PARTS for part in sorted(set(self.parts) or {PARTS}, reverse=True)}
+        said = [[max(bisect_right(instants, t - age) - 1, 0) for age in ages.values()] for t in instants[:-1]]
+        window = max(i - oldest for i, (oldest, *_) in enumerate(said)) + 2
         sized(len(self.nodes) * window, 64, "bounds from instant to instant")
         spend(len(ways) * (len(self.sources) + 8 * len(self.nodes)), FIXED, FIXED, "bounds from instant to instant")
         known: dict[int, Sequence[int]] = {0: self.start}
-        for i, (j, way) in enumerate(zip(said, ways, strict=True)):
-            for old in [m for m in known if m < j]:
+        for i, (places, way) in enumerate(zip(said, ways, strict=True)):
+            for old in [m for m in known if m < places[0]]:
                 del known[old]
-            known[i + 1] = self._step(known[i], self._heard(known[j]), None if way is None else self._fixed(way))
+            heard = self._heard({part: known[j] for part, j in zip(ages, places, strict=True)})
+            known[i + 1] = self._step(known[i], heard, None if way is None else self._fixed(way))
         return known[len(ways)]
 
     def _fixed(self, way: Fraction) -> tuple[int, int]:
@@ -129,9 +141,9 @@ class Steps:
         whole = (x.numerator << max(shift, 0)) // (x.denominator << max(-shift, 0))
         return whole, SHARE + shift - FIXED
 
-    def _heard(self, y: Sequence[int]) -> Sequence[int]:
-        """Bound ``sum_l |w_kl| y_l / D_k + value_error`` from above."""
-        products = [a * y[s] for a, s in zip(self.weights, self.sources, strict=True)]
+    def _heard(self, told: Mapping[int, Sequence[int]]) -> Sequence[int]:
+        """Bound ``sum_l |w_kl| y_l / D_k + value_error`` from above, each ``y`` that of the age of its edge."""
+        products = [a * told[part][s] for a, s, part in zip(self.weights, self.sources, self.parts, strict=True)]
         return [-(-sum(products[a:b]) >> FIXED) + self.error for a, b in pairwise(self.offsets)]
 
     def _step(self, y: Sequence[int], heard: Sequence[int], way: tuple[int, int] | None) -> Sequence[int]:

@@ -80,10 +80,11 @@ def _check_followers(
 ) -> None:
     """Verify what is said of the followers of leaders that rest."""
     residual = None if section["residual"] is None else _residual(doc, followers, section["residual"])
+    parts = messages.parts()
     for k, entry in enumerate(section["rows"]):
-        _check_rows(doc, messages, followers, entry, f"messages.rows[{k}]", residual)
+        _check_rows(doc, messages, followers, parts, entry, f"messages.rows[{k}]", residual)
     if section["steps"] is not None:
-        _check_steps(doc, messages, followers, section["steps"], residual)
+        _check_steps(doc, messages, followers, parts, section["steps"], residual)
     if residual is not None:
         doc.open("late-residual", "messages.residual")
         low = residual.met.find(0)
@@ -105,7 +106,13 @@ def _residual(doc: Document, followers: Followers, entry: Any) -> Residual:
 
 
 def _check_rows(
-    doc: Document, messages: Messages, followers: Followers, entry: Any, of: str, residual: Residual | None
+    doc: Document,
+    messages: Messages,
+    followers: Followers,
+    parts: Sequence[int],
+    entry: Any,
+    of: str,
+    residual: Residual | None,
 ) -> None:
     """Verify ``|x_k - x*_k| <= u_k (initial e^(-b s) + floor)`` by one witness of rows."""
     doc.at = of
@@ -121,7 +128,7 @@ def _check_rows(
     bits = length((q, b, left, clock or left, cap or left, messages.delay, messages.gain.T, messages.gain.rho1))
     spend(50, bits, bits, "rows of followers")
     rows = Rows(followers, u)
-    rows.decay(q, b)
+    rows.decay(q, b, parts)
     need(cap is None or b * cap * messages.delay <= log(q)[0], "b cap delay is above ln q")
     limit = min((x for x in (cap, messages.gain_cap) if x is not None), default=None)
     need((limit is None) == (clock is None), "clock is null iff nothing caps the gain")
@@ -138,7 +145,12 @@ def _check_rows(
 
 
 def _check_steps(
-    doc: Document, messages: Messages, followers: Followers, section: Any, residual: Residual | None
+    doc: Document,
+    messages: Messages,
+    followers: Followers,
+    parts: Sequence[int],
+    section: Any,
+    residual: Residual | None,
 ) -> None:
     """Verify the start of a solution that never grows, and form its bounds at the deadline."""
     doc.at = "messages.steps"
@@ -161,7 +173,7 @@ def _check_steps(
     kind, graph = Steps, followers.structure.graph
     if doc.exact.numpy and graph.n_edges >= MANY_EDGES:
         from ptcc_certify.checker.array_steps import ArraySteps as kind  # noqa: N813
-    steps = kind(graph, followers.nodes, followers.degrees, values, error)
+    steps = kind(graph, followers.nodes, followers.degrees, values, error, parts)
     bounds = steps.run(instants, messages.delay, ways)
     if residual is not None:
         residual.meet(bounds, Fraction(steps.largest, scale << FIXED))

@@ -6,7 +6,7 @@
 
 has a solution with ``b > 0`` iff ``q`` is below 1 over the spectral radius of ``D^-1 |W_F|``: ``u = (D - q |W_F| - t
 I)^-1 1``, ``t`` just below the smallest eigenvalue of ``D - q |W_F|``. With ``q = 1`` it is the
-row-wise decay rate of followers.
+row-wise decay rate of followers. Where what is heard over an edge is younger than elsewhere, ``q`` has a smaller power.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ _SLACK, _ROUNDING = 1e-9, 1e-13
 _LOOSE = 0.05
 #: Inverse iterations for many followers.
 _ROUNDS = 3
-#: Products by which the largest ``q`` is found.
-_PRODUCTS = 30
+#: Products by which the largest ``q`` is found, halvings where ages differ, and the largest one that is tried then.
+_PRODUCTS, _HALVINGS, _LARGEST = 30, 8, 1e12
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +59,8 @@ class FollowerRows:
     Parameters
     ----------
     structure : Structure
+    shares : (E,) array, optional
+        By edge, how old is what is heard over it in terms of the oldest: ``q`` has this power there. All 1 by default.
 
     Attributes
     ----------
@@ -82,7 +84,7 @@ class FollowerRows:
     (0.154, True)
     """
 
-    def __init__(self, structure: Structure):
+    def __init__(self, structure: Structure, shares: np.ndarray | None = None):
         refuse_leader_groups(structure, "a bound row by row")
         if not structure.followers.size:
             raise HypothesisError("nobody listens to anybody, so there is nothing that could be late; add edges")
@@ -90,7 +92,40 @@ class FollowerRows:
         self.structure, self.followers = structure, structure.followers
         self.D = graph.in_weight()[self.followers]
         self.W: Any = abs(graph.adjacency()[self.followers][:, self.followers]).tocsr()
+        self.shares: np.ndarray | None = None
+        if shares is not None:
+            # one more, so that no entry is 0, in the order of those of W
+            ages = _entries(graph, 1.0 + shares)[self.followers][:, self.followers].tocsr()
+            self.W.sort_indices()
+            ages.sort_indices()
+            self.shares = ages.data - 1.0
         self._smallest: dict[Fraction, float] = {}
+
+    @property
+    def least_share(self) -> Fraction:
+        """The least positive share of an edge between followers; 1 if there is none."""
+        positive = np.ones(0) if self.shares is None else self.shares[self.shares > 0]
+        return Fraction(float(positive.min(initial=1.0)))
+
+    def heard(self, q: float) -> Any:
+        """Return ``|W_F|`` times ``q``, to the power of the share of every edge."""
+        if self.shares is None:
+            return q * self.W
+        heard = self.W.copy()
+        heard.data = heard.data * q**self.shares
+        return heard
+
+    def by_age(self) -> dict[float, Any]:
+        """Return ``|W_F|`` in parts, edges of one share each."""
+        if self.shares is None:
+            return {1.0: self.W}
+        parts = {}
+        for share in np.unique(self.shares):
+            part = self.W.copy()
+            part.data = np.where(self.shares == share, part.data, 0.0)
+            part.eliminate_zeros()
+            parts[float(share)] = part
+        return parts
 
     def share(self, u: np.ndarray) -> np.ndarray:
         """Return ``(|W_F| u)_k / (D_k u_k)`` for every follower."""
@@ -104,11 +139,28 @@ class FollowerRows:
             u = u + (self.W @ u) / self.D
             u /= u.max()
             least = min(least, float(self.share(np.maximum(u, 1e-200)).max()))
-        return 1 / least if least > 0 else math.inf
+        if not least > 0:
+            return math.inf
+        return 1 / least if self.shares is None or u.size > DIRECT_ROWS else self._largest_power(1 / least, u)
+
+    def _largest_power(self, q: float, u: np.ndarray) -> float:
+        """Return a larger ``q`` than one that serves if all edges have share 1, where some have less."""
+        positive = self.shares[self.shares > 0] if self.shares is not None else np.ones(0)
+        if not positive.size:
+            return math.inf
+        low, high = math.log(max(q, 1.0)), min(math.log(max(q, 1.0)) / float(positive.min()), math.log(_LARGEST))
+        for _ in range(_HALVINGS):
+            middle = (low + high) / 2
+            heard = self.heard(math.exp(middle))
+            for _ in range(_PRODUCTS):
+                u = np.maximum(u + (heard @ u) / self.D, 1e-200)
+                u /= u.max()
+            low, high = (middle, high) if ((heard @ u) / (self.D * u)).max() < 1 else (low, middle)
+        return math.exp(low)
 
     def decay(self, witness: RowWitness, q: float) -> float:
         """Return the ``b`` that the ``u`` of a witness proves with another ``q``, in floats."""
-        return float((self.D * (1 - q * self.share(witness.u))).min())
+        return float((self.D - (self.heard(q) @ witness.u) / witness.u).min())
 
     def witness(self, q: Fraction, loss: float = 0.01) -> RowWitness:
         """Return a witness whose ``b`` is about ``1 - loss`` of the largest for this ``q``.
@@ -118,7 +170,7 @@ class FollowerRows:
         NoCertificate
             No positive ``b`` was found: ``q`` is too large.
         """
-        A = SparseHMatrix(_with_diagonal(self.D, float(q) * self.W))
+        A = SparseHMatrix(_with_diagonal(self.D, self.heard(float(q))))
         if q not in self._smallest:
             self._smallest[q] = A.smallest() if self.D.size <= DIRECT_ROWS else self._roughly_smallest(A)
         t, ones = self._smallest[q] * (1 - loss), np.ones(self.D.size)
@@ -149,7 +201,7 @@ class FollowerRows:
             It is not positive.
         """
         u = round_array(u / u.max())
-        pushed = float(q) * (self.W @ u) / u
+        pushed = (self.heard(float(q)) @ u) / u
         b = float((self.D - pushed - _ROUNDING * (self.D + pushed)).min())
         if not b > 0:
             raise NoCertificate(f"no positive b for q = {float(q):.6g}")
@@ -177,6 +229,13 @@ one group
         raise HypothesisError(
             f"{what} needs leaders that listen to nobody; {first} and {second} are leaders of one group"
         )
+
+
+def _entries(graph: Any, values: np.ndarray) -> Any:
+    from scipy import sparse
+
+    n = graph.n_nodes
+    return sparse.csr_array((values, (graph.target, graph.source)), shape=(n, n))
 
 
 def _with_diagonal(D: np.ndarray, W: Any) -> Any:

@@ -30,8 +30,8 @@ Pattern = Literal["oldest", "fresh", "varying", "square"]
 PATTERNS = ("oldest", "fresh", "varying", "square")
 #: Instants of a run, and at most; the share of ``T`` down to which they come nearer to it.
 STEPS, MOST_STEPS, NEAREST = 1500, 20_000, 1e-9
-#: Steps in one delay, at least.
-IN_DELAY = 6
+#: Steps in the largest delay, at least, and steps of a run that the least one may ask for.
+IN_DELAY, _MOST_FOR_LEAST = 6, 5000
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +72,8 @@ def simulate_late(
         N agents, in whatever form :func:`ptcc_certify.as_graph` takes.
     protocol : Protocol
     messages : LateMessages
-        Values are off by the whole ``value_error``, to either side.
+        Values are off by the whole ``value_error``, to either side. What is heard over an edge is as old as a step
+        where its own delay is less than that, as a delay of 0 is.
     x0 : state-like
         The state up to 0, whatever :func:`ptcc_certify.as_state` takes.
     pattern : {"oldest", "fresh", "varying", "square"}
@@ -118,7 +119,7 @@ def simulate_late(
     if deadlines is not None and len(deadlines) != graph.n_nodes:
         raise ParameterError(f"deadlines are {len(deadlines)} for {graph.n_nodes} agents; give one for each")
     first = [float(x) for x in as_state(x0, graph, "x0")]
-    t = _grid(float(protocol.T), float(messages.age), steps)
+    t = _grid(float(protocol.T), float(messages.age), _least_age(graph, messages), steps)
     clocks = _clocks(graph, protocol, messages, t, deadlines)
     with np.errstate(invalid="ignore"):
         steps_of_clock = np.where(np.isinf(clocks[1:]), np.inf, clocks[1:] - clocks[:-1])
@@ -150,9 +151,16 @@ def can_run(protocol: Protocol, messages: LateMessages) -> bool:
     return not messages.age or MOST_STEPS * messages.age >= protocol.T * IN_DELAY
 
 
-def _grid(T: float, age: float, steps: int) -> np.ndarray:
-    """Return instants that come near to ``T``, at least some in every delay."""
-    longest = min(T / steps, age / IN_DELAY) if age else T / steps
+def _least_age(graph: SignedDigraph, messages: LateMessages) -> float:
+    """Return the least age of what is heard over an edge that is not 0; the largest one if there is none."""
+    latencies = messages.latencies(graph)
+    each = latencies if isinstance(latencies, tuple) else (latencies,)
+    return float(min((x + messages.held for x in each if x + messages.held > 0), default=messages.age))
+
+
+def _grid(T: float, age: float, least: float, steps: int) -> np.ndarray:
+    """Return instants that come near to ``T``: some in the largest delay, one in the least unless that is too short."""
+    longest = min(T / steps, age / IN_DELAY, max(least, T / _MOST_FOR_LEAST)) if age else T / steps
     if T / longest > MOST_STEPS:
         raise ParameterError(
             f"a delay of {age:.3g} in a run of {T:.6g} takes more than {MOST_STEPS:,} steps; the bound needs no run"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
@@ -69,9 +70,19 @@ def _worst(bounds: LateBounds, run: Any, ends: np.ndarray) -> float:
     return max(float((away / allowed).max()), float(last))
 
 
-def _judge_late(seed: int, patterns: tuple[str, ...] = PATTERNS) -> list[float]:
+def _apart(rng: np.random.Generator, structure: Structure, messages: LateMessages) -> LateMessages:
+    """The same with a delay of every edge by itself, none above that of all."""
+    shares = rng.choice([0.05, 0.2, 0.7, 1.0], structure.graph.n_edges)
+    shares[int(rng.integers(0, shares.size))] = 1.0
+    whole = messages.largest_delay
+    each = {(s, t): whole * Fraction(float(x)) for (s, t, _), x in zip(structure.graph.edges, shares, strict=True)}
+    return replace(messages, delay=each)
+
+
+def _judge_late(seed: int, patterns: tuple[str, ...] = PATTERNS, apart: bool = False) -> list[float]:
     rng, structure, protocol, x0, ends = _case(seed)
     messages = _messages(rng, protocol, exact=bool(rng.random() < 0.5))
+    messages = _apart(rng, structure, messages) if apart else messages
     bounds = bound_late(structure, protocol, messages, x0, ends.intervals)
     start = [float(x) for x in x0]
     ratios = []
@@ -90,8 +101,30 @@ def test_no_run_with_late_lost_or_rounded_messages_exceeds_what_is_proved(seed: 
 @pytest.mark.campaign
 @pytest.mark.parametrize("block", range(11))
 def test_220_graphs_of_constant_varying_and_square_delays_keep_their_bounds(block: int) -> None:
-    worst = [max(_judge_late(1000 + 20 * block + k)) for k in range(20)]
+    worst = [max(_judge_late(1000 + 20 * block + k, apart=k % 3 == 0)) for k in range(20)]
     assert max(worst) <= 1 + ROUNDING
+
+
+@pytest.mark.parametrize("seed", range(4, 7))
+def test_delays_of_single_edges_leave_no_more_than_the_largest_for_all_and_no_run_exceeds_that(seed: int) -> None:
+    rng, structure, protocol, x0, ends = _case(seed)
+    alike = LateMessages(delay=protocol.T / 20)
+    apart = _apart(rng, structure, alike)
+    whole, single = (bound_late(structure, protocol, one, x0, ends.intervals) for one in (alike, apart))
+    assert (single.residual <= whole.residual * 1.02).all()  # type: ignore[operator, union-attr]
+    _judge_late(seed, ("oldest", "varying"), apart=True)
+
+
+def test_messages_of_leaders_at_rest_may_be_as_old_as_they_like() -> None:
+    graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 2), ("c", "b", -1), ("a", "c", 1)])
+    structure, protocol = analyse(graph), NominalProtocol(T=1, rho1=1, rho2=4, kappa=1)
+    each = {("a", "b"): "0.3", ("a", "c"): "0.3", ("b", "c"): "0.009375", ("c", "b"): "0.009375"}
+    single = bound_late(structure, protocol, LateMessages(delay=each))
+    among = bound_late(structure, protocol, LateMessages(delay="0.009375"))
+    assert single.largest <= among.largest * 1.05
+    cert = certify(graph, protocol, messages=LateMessages(delay=each), simulation=False, method="paper")
+    assert cert.checked is not None and cert.checked.accepted, cert.checked
+    assert cert.late is not None and cert.late.largest <= among.largest * 1.05
 
 
 def test_a_bound_that_no_longer_falls_leaves_room_for_how_the_check_rounds() -> None:

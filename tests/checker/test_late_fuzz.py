@@ -27,7 +27,15 @@ from ptcc_certify.checker import messages as checked_messages
 
 SEED = int(os.environ.get("PTCC_FUZZ_SEED", "0"))
 #: Certificates each field of which is changed.
-SINGLY = ("everything of 1", "each edge of 2", "capped of 4", "leaders of 1", "sign of 4", "form False of 1")
+SINGLY = (
+    "everything of 1",
+    "each edge of 2",
+    "ages apart of 2",
+    "capped of 4",
+    "leaders of 1",
+    "sign of 4",
+    "form False of 1",
+)
 #: Obligations and parts of section 22.
 OWN = ("messages", "leaders", "late-", "tracking")
 
@@ -42,10 +50,12 @@ def cases() -> list[tuple[str, Json]]:
         x0 = [Fraction(int(v), 10) for v in rng.integers(-50, 50, drawn.n_nodes)]
         known, any_state = plain(drawn, nominal(), x0, method="paper"), plain(drawn, nominal(), None, method="paper")
         ages = [Fraction(1, 20) + Fraction(k, 1000) for k in range(len(known["graph"]["edges"]))]
+        apart = [Fraction(1 + 4 * (3 * k % 4), 100) for k in range(len(known["graph"]["edges"]))]
         packets = {"period": "1/100", "losses": "3"}
         some: dict[str, Json] = {
             "everything": with_messages(known, "1/20", qs=("21/20", "6/5"), steps=12, missed=True, staged=True),
             "each edge": with_messages(known, ages, missed=True, steps=8),
+            "ages apart": with_messages(known, apart, qs=("21/20", "2"), steps=8),
             "capped": with_messages(known, gain_cap=20, value_error="1/100", packets=packets, steps=8),
             "values off": with_messages(known, "0", value_error="1/10", qs=("1", "6/5")),
             "any state": with_messages(any_state, "1/20", steps=8),

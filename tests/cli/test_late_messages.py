@@ -325,3 +325,59 @@ def test_late_messages_ask_for_sliding_variables_at_0() -> None:
         certify(SignedDigraph.from_edges([(1, 2, 1)]), NominalProtocol(1, 1, 2, 1), messages=0.1)
     with pytest.raises(ParameterError, match="is none; give MovingLeaders"):
         certify(SignedDigraph.from_edges([(1, 2, 1)]), NominalProtocol(1, 1, 2, 1), leaders=MovingLeaders)
+
+
+GROUP = ("group.csv", "--x0", "1,2,3", "--gain-cap", "20", "--expect", "bipartite-consensus", *QUICK)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--delay", "1"), "up to 1 old"),
+        (("--delay", "1", "--own-delay"), "the own state as well"),
+        (("--delay", "delay"), "edge by edge"),
+        (("--delay", "1", "--period", "0.1", "--packet-loss", "2"), "2 in a row lost"),
+    ],
+)
+def test_a_file_without_anything_proved_of_late_messages_still_says_that_they_were_asked_for(
+    words: tuple[str, ...], said: str
+) -> None:
+    Path("group.csv").write_text("source,target,weight,delay\na,b,1,1\nb,a,1,2\nb,c,1,0\n")
+    run = ptcc("certify", *GROUP, *words, "-o", "c.json")
+    assert run.code == 4 and "messages" not in json.loads(Path("c.json").read_text())
+    saved = read_certificate("c.json")
+    assert saved.late is not None and not saved.late.says_something
+    assert saved.request.messages == saved.late.messages
+    assert int(saved.assessment.exit_code) == 4 and "at T with late messages" in saved.assessment.text
+    assert "LATE" in run.out and "LATE" in saved.summary()
+    assert said in run.out and said in saved.summary()
+    assert ptcc("report", "c.json", "-o", "c.html").code == ptcc("report", "c.json", "-o", "c.tex").code == 0
+    assert "Late messages" in Path("c.html").read_text() and "nothing is proved" in Path("c.html").read_text()
+
+
+def test_a_file_without_anything_proved_of_moving_leaders_still_says_that_they_were_asked_for() -> None:
+    graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 1)])
+    leaders = MovingLeaders(speed=1, disturbance="1/3", sign_gain=2)
+    made = certify(graph, NominalProtocol(T=1, rho1=1, rho2=4, kappa=1), [1, 2, 3], leaders=leaders, method="paper")
+    made.changed(tracking=None).save("c.json")
+    saved = read_certificate("c.json")
+    assert saved.request.leaders == leaders and saved.tracking is None
+    assert "left open: leaders that move" in saved.assessment.text and int(saved.assessment.exit_code) == 4
+
+
+@pytest.mark.parametrize("asked", [None, 3, {}, {"messages": 1}, {"messages": {"latency": [], "packets": None}}])
+def test_what_a_file_says_of_messages_that_were_asked_for_may_be_of_any_content(asked: object) -> None:
+    assert ptcc("certify", *GROUP, "--delay", "1", "-o", "c.json").code == 4
+    data = json.loads(Path("c.json").read_text())
+    data["unverified"]["asked"] = asked
+    Path("c.json").write_text(json.dumps(data))
+    assert read_certificate("c.json").late is None
+
+
+def test_gains_that_are_changed_leave_late_messages_undecided() -> None:
+    graph, protocol = SignedDigraph.from_edges([("a", "b", 1)]), NominalProtocol(T=1, rho1=1, rho2=4, kappa=1)
+    late, asked = LateMessages(delay="0.1"), Expectations("bipartite containment")
+    made = certify(graph, protocol, [1, 2], messages=late, expectations=asked, method="paper")
+    assert int(made.assessment.exit_code) == 0
+    other = made.changed(protocol=NominalProtocol(T=2, rho1=1, rho2=4, kappa=1))
+    assert int(other.assessment.exit_code) == 4
