@@ -1,4 +1,4 @@
-(* The parts of the check one by one, to name the first that fails; [Checker.check] decides. *)
+(* The parts of the check one by one, to name the first that fails where [Checker.check] says no. *)
 open Checker
 let of_check c d : (string * (unit -> bool)) list =
   [ "graph: an edge", (fun () -> check_edges c d.dls);
