@@ -7,7 +7,7 @@
     [|y|^2 + 2 |r|^2 / min e <= c s^2]. [D], [R], [y] may be any integers: nothing is proved of how they are found. *)
 Require Import ZArith QArith Qreals List Bool Reals Lra Lia Psatz.
 Import ListNotations.
-Require Import Vec.
+Require Import Certificate Vec.
 Open Scope R_scope.
 
 Definition pos_def (A : mat) : Prop :=
