@@ -73,15 +73,11 @@ Proof.
   - intros H e He. apply forallb_forall. intros f Hf. destruct (twin e f) eqn:T; [|reflexivity]. apply twin_ok in T as [T1 T2].
     apply (proj2 (negative_ok (wt e * wt f))). apply H; auto.
 Qed.
-Lemma row_ok P l : check_row P l = true -> match row P, l with
-  | 1%nat, [C] => forall i, In i (members P) -> In i (nodes C)
-  | 2%nat, [C] => exists i, In i (members P) /\ ~ In i (nodes C)
-  | 3%nat, _ :: _ :: _ => True
-  | _, _ => False end.
+Lemma row_ok P l : check_row P l = true -> l <> [] /\ row P = match l with
+  | [C] => if forallb (fun i => mem i (nodes C)) (members P) then 1%nat else 2%nat | _ => 3%nat end.
 Proof.
-  unfold check_row. destruct (row P) as [|[|[|[|r]]]]; try discriminate; destruct l as [|C [|C' l]]; try discriminate; intros H; [| |exact I].
-  - intros i Hi. rewrite forallb_forall in H. apply mem_In. auto.
-  - apply existsb_exists in H as [i [Hi H]]. exists i. split; [exact Hi|]. intros K. apply mem_In in K. rewrite K in H. discriminate.
+  unfold check_row. intros H. apply andb_prop in H as [H1 H2]. split; [intros ->; discriminate|].
+  apply Nat.eqb_eq. exact H2.
 Qed.
 Lemma same_truth a b P : Bool.eqb a b = true -> (b = true <-> P) -> (a = true <-> P).
 Proof. intros H. apply eqb_prop in H. subst a. tauto. Qed.
@@ -107,25 +103,24 @@ Proof.
   apply andb_prop in H as [H H9]. apply andb_prop in H as [H H8]. apply andb_prop in H as [H H7]. apply andb_prop in H as [H H6].
   apply andb_prop in H as [H H5]. apply andb_prop in H as [H H4]. apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2].
   unfold piece_claim. fold C es. split; [|split; [|split; [|split; [|split; [|split; [|split]]]]]].
-  - destruct C as [|i l]; [discriminate|]. exists i. left. reflexivity.
   - assert (K : forall j, In j C -> linked es (hd O C) j).
     { intros j Hj. rewrite forallb_forall in H2. specialize (H2 j Hj). apply mem_In, reach_ok in H2 as [s [[<-|[]] L]]. exact L. }
     intros i j Hi. split.
     + intros Hj. apply (path_trans _ i (hd O C) j); [apply linked_back; apply K; exact Hi|apply K; exact Hj].
     + intros L. exact (linked_in es C H3 i j L Hi).
-  - apply row_ok. exact H4.
+  - apply (row_ok _ _ H4).
+  - apply (row_ok _ _ H4).
   - apply eqb_prop. exact H5.
   - apply (same_truth _ _ _ H6). apply undirected_ok.
   - apply (same_truth _ _ _ H7). apply cooperative_ok.
   - apply check_balance_ok. exact H8.
-  - intros x M HM B i Hi Hn. rewrite forallb_forall in H9. specialize (H9 i Hi). rewrite forallb_forall in H9.
+  - intros x M i HM B Hi Hn. rewrite forallb_forall in H9. specialize (H9 i Hi). rewrite forallb_forall in H9.
     pose proof (bound_gen (dsw d) (dsv d) (balanced_comps (comps c)) i x M Hsw HM Hgood) as G. fold (end_state c x i) in G.
     assert (S : IZR (dsw d) * Rabs (end_state c x i) <= IZR (dsw d) * M).
     { eapply Rle_trans; [apply G|].
       - intros p Hp. specialize (H9 _ (in_kernel p Hp)). cbn [fst snd] in H9. apply orb_prop in H9 as [H9|H9].
-        + right. unfold balanced_comps in Hp. apply in_flat_map in Hp as [D [HD Hp]].
-          destruct (wit D) as [g w v|] eqn:W; [|destruct Hp]. destruct Hp as [<-|[]]. cbn [fst snd] in *.
-          apply (B D g w v); [|exact W]. unfold own. apply filter_In. split; [exact HD|exact H9].
+        + right. unfold balanced_comps in Hp. apply in_map_iff in Hp as [D [<- HD]]. apply filter_In in HD as [HD W].
+          cbn [fst snd] in *. apply (B D); [|exact W]. unfold own. apply filter_In. split; [exact HD|exact H9].
         + left. apply Z.eqb_eq. exact H9.
       - apply Rmult_le_compat_r; [exact HM|]. apply IZR_le. exact (Hsum i Hn). }
     apply IZR_lt in Hsw. apply (Rmult_le_reg_l (IZR (dsw d))); assumption.

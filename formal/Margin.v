@@ -101,14 +101,14 @@ Proof.
 Qed.
 Lemma margin_ok : check_margin c d m = true -> margin_claim c m.
 Proof.
-  intros H x Hx S. destruct (margin_one H x Hx) as [A B]. fold n es in S. split; [exact A|]. split; [exact B|].
-  intros L0 r [R0 R1]. set (x' := fun i => if mem i (upto m) then 0 else x i).
+  intros H x j Hx Hj Nj S. destruct (margin_one H x Hx) as [A B]. fold n es in S.
+  assert (A1 : Q2R (least m) * norm2 n x < margin_form es n m 1 x) by (destruct A as [A|A]; [exact A|exfalso; auto]).
+  split; [exact A1|]. intros L0 r [R0 R1]. set (x' := fun i => if mem i (upto m) then 0 else x i).
   destruct (margin_one H x') as [A' _].
   { intros i Hi Hn. unfold x'. destruct (mem i (upto m)); [reflexivity|apply Hx; assumption]. }
-  rewrite L0, Rmult_0_l in A, A', B. unfold S. rewrite (margin_convex x r H). fold x'.
+  rewrite L0, Rmult_0_l in A', A1. unfold S. rewrite (margin_convex x r H). fold x'.
   assert (P : 0 <= (1 - r) * margin_form es n m 1 x') by (apply Rmult_le_pos; lra).
-  assert (Q : 0 <= r * margin_form es n m 1 x) by (apply Rmult_le_pos; lra). split; [lra|].
-  intros Z. apply B. symmetry. apply (Rmult_eq_reg_l r); lra.
+  assert (Q : 0 < r * margin_form es n m 1 x) by (apply Rmult_lt_0_compat; lra). lra.
 Qed.
 End Margin.
 

@@ -57,7 +57,7 @@ let sign_symmetric g = List.for_all (fun e -> List.for_all (fun f -> not (twin e
 let piece g (comps : comp list) (members, whole) =
   let own = List.filter (fun (one : comp) -> List.mem (List.hd one.nodes) members) comps in
   let row = match own with [ one ] -> if List.length one.nodes = List.length members then 1 else 2 | _ -> 3 in
-  let some_balanced = List.exists (fun (one : comp) -> match one.wit with Bal _ -> true | Unbal _ -> false) own in
+  let some_balanced = List.exists is_balanced own in
   { members; row; some_balanced; undirected = undirected g members; cooperative = cooperative g members; whole }
 
 let connectivity (p : piece) = List.nth [ "strong"; "quasi-strong"; "weak" ] (p.row - 1)

@@ -103,9 +103,9 @@ let components nodes structure influence =
       let eta = entries "left_null_vector" (one "left_null_vector") in
       need (List.length eta = List.length own) "left_null_vector: a number for each node";
       List.iter2 (fun i x -> v.(i) <- number "left_null_vector" x) own eta;
-      { nodes = own; wit = Bal (Array.to_list g, Array.to_list w, Array.to_list v) } end
+      { nodes = own; camps = Gauge (Array.to_list g); share = Array.to_list w; null = Array.to_list v } end
     else
-      { nodes = own; wit = Unbal (List.map (fun e -> match positions nodes "negative_cycle" e with
+      { nodes = own; share = []; null = []; camps = Cycle (List.map (fun e -> match positions nodes "negative_cycle" e with
           | [ s; t ] -> (s, t) | _ -> bad "negative_cycle: an edge has two ends")
           (entries "negative_cycle" (get "negative_cycle"))) }) listed in
   comps, followers, get "degenerate"
@@ -203,8 +203,8 @@ let upper nodes comps proof bound =
     need (List.length own = List.length inside) "a vector: a number for each node";
     List.init (Array.length nodes.labels) (fun i -> Option.value (List.assoc_opt i (List.combine inside own)) ~default:Number.zero) in
   let dot = List.fold_left2 (fun a x y -> Number.add a (Number.mul x y)) Number.zero in
-  let null = List.find_map (fun one -> match (one : comp).wit with
-    | Bal (_, _, v) when List.mem (List.hd one.nodes) inside -> Some v | _ -> None) comps in
+  let null = List.find_map (fun (one : comp) ->
+    if is_balanced one && List.mem (List.hd one.nodes) inside then Some one.null else None) comps in
   let vector_y = match List.map vector (entries "vectors" (get "vectors")), null with
     | [ y ], None -> y
     | [ y; z ], Some v ->
@@ -269,11 +269,11 @@ let certificate (j : Json.t) : t =
   else not_checked "influence.degenerate";
   (match proved proof "final-state" "graph" [] with
    | _, Null -> () | _ -> unsupported "a final state that is enclosed by a witness");
-  let closed = List.mapi (fun k (one : Checker.comp) -> k + 1, one.nodes, (match one.wit with Bal _ -> true | Unbal _ -> false)) comps in
+  let closed = List.mapi (fun k (one : Checker.comp) -> k + 1, one.nodes, is_balanced one) comps in
   let setting = { Paper.n = Array.length nodes.labels; edges; closed; followers; theorem } in
   let paper = optional (fun _ v -> Paper.read setting nodes proof v) "paper" (get "paper") in
   (match paper with Some { Paper.any_rho = true; _ } -> not_checked "paper.rho_interval, that every rho is admissible" | _ -> ());
-  let gauge () = match comps with [ { wit = Bal (g, _, _); _ } ] -> g | _ -> bad "coordinates eps of another graph" in
+  let gauge () = match comps with [ { camps = Gauge g; _ } ] -> g | _ -> bad "coordinates eps of another graph" in
   let listening = List.filter (fun i -> List.exists (fun e -> e.tgt = i) edges) (List.init (Array.length nodes.labels) Fun.id) in
   let listed = entries "functions" ((fields "lyapunov" [ "functions" ] (get "lyapunov")) "functions") in
   let functions = List.mapi (function_ nodes listening proof gauge paper) listed in
@@ -299,11 +299,13 @@ let certificate (j : Json.t) : t =
         skipped proof (if following proof = "rate-mean" then "rate-mean" else "rate-upper-bound") "rates";
         not_checked "rates.upper_bound, input.threshold.upper"; None in
   if is_sliding then begin
-    skipped proof "sliding-bound" "protocol"; not_checked "reaching_time";
+    let times = fields "reaching_time" [ "bound"; "clock"; "z" ] (get "reaching_time") in
+    need (times "bound" = Str Texts.sliding_bound && times "clock" = Str Texts.sliding_clock) "reaching_time: another bound or clock";
+    bare_of proof "sliding-bound" "protocol"; not_checked "reaching_time.z";
     if following proof = "reaching-time" then skipped proof "reaching-time" "reaching_time" end
   else need (get "reaching_time" = Null) "reaching times without sliding variables";
-  let bounded_input, functions = match get "input" with
-    | Null -> false, functions
+  let bounded_input, sliding_input, functions = match get "input" with
+    | Null -> false, [], functions
     | v ->
         let input = fields "input" [ "bounded"; "threshold"; "initial_set"; "constants"; "peak"; "energy"; "path_length";
           "sliding"; "residual"; "disturbed" ] v in
@@ -333,15 +335,23 @@ let certificate (j : Json.t) : t =
               bare_of proof "input-constants" (Printf.sprintf "lyapunov.functions[%d]" k);
               { f with constants = Some (by_agent nodes number "constants" v) }) (List.combine functions constants) in
         let there v = v <> Null in
-        let agents = match input "sliding" with Obj l -> Option.value (List.assoc_opt "agents" l) ~default:Null | _ -> Null in
+        let sliding_input = match input "sliding", kind with
+          | Null, Nominal _ -> []
+          | v, SlidingMode (_, _, _, _, mu3, _) ->
+              let part = fields "input.sliding" [ "bounded"; "agents" ] v in
+              need (truth "input.sliding.bounded" (part "bounded") = (Number.compare (Number.mul mu3 kappa) (Number.of_z Z.one) >= 0))
+                "input.sliding: bounded for every initial state iff mu3 kappa >= 1";
+              if not (there (part "agents")) then []
+              else (bare_of proof "input-sliding" "input"; by_agent nodes number "input.sliding.agents" (part "agents"))
+          | _ -> bad "input.sliding of the nominal protocol" in
         List.iter (fun (listed, kind) -> if listed then skipped proof kind "input")
-          [ there agents, "input-sliding"; there (input "peak"), "input-peak"; there (input "energy"), "input-energy";
+          [ there (input "peak"), "input-peak"; there (input "energy"), "input-energy";
             there (input "path_length"), "input-length" ];
         List.iteri (fun i _ -> skipped proof "limited-gain" (Printf.sprintf "input.residual[%d]" i))
           (entries "residual" (input "residual"));
         if there (input "disturbed") then skipped proof "nominal-disturbed" "input";
-        not_checked "input.initial_set, .peak, .energy, .path_length, .sliding, .residual, .disturbed";
-        bounded, functions in
+        not_checked "input.initial_set, .peak, .energy, .path_length, .sliding.bounded, .residual, .disturbed";
+        bounded, sliding_input, functions in
   let and_besides o = match o with
     | Obj l -> (match List.assoc_opt "kind" l, List.assoc_opt "of" l with
         | Some (Str k), Some (Str o) when more <> [] && of_besides k && named k && named o -> unknown proof k o
@@ -355,7 +365,7 @@ let certificate (j : Json.t) : t =
     sections = List.rev !left_out;
     cert = { order = Array.length nodes.labels; edges; kind; rho1; rho2; kappa; comps; pieces; all_balanced = found.balance;
       sign_symmetric = Pieces.sign_symmetric all; funcs = functions;
-      start = Option.value start ~default:[]; sliding = (if start = None then [] else sliding); final;
+      start = Option.value start ~default:[]; sliding; final; sliding_input;
       margins = (match paper with Some p -> p.inequalities | None -> []);
       leaders = (match paper with Some p -> p.groups | None -> []);
       upper_bound;

@@ -49,3 +49,6 @@ let obligations = [
   "final-state", ("L Q = 0 and Q(x - sigma) is kept, so the agents end at Q(X(0) - sigma(0))",
     "Lemmas 2, 8 and 9");
 ]
+(* and of section 13 *)
+let sliding_bound = "||sigma(t)|| <= phi(t,T_r)^(-mu3) e^(-mu2 t) ||sigma(0)||"
+let sliding_clock = "z = ln(T_r / (T_r - t)); null: certain at T_r only"

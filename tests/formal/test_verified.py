@@ -141,6 +141,40 @@ def test_a_lower_bound_on_all_rates_than_is_proved_is_rejected(kind: str, tmp_pa
     assert code == 1 and "rate-upper-bound of rates" in text
 
 
+def test_what_the_sliding_mode_adds_to_the_input_is_verified(tmp_path: Path) -> None:
+    program()
+    gains = {"T_r": "0.5", "T_s": 1, "rho1": 1, "rho2": 1, "kappa": 2, "mu1": 2, "mu2": 1, "delta": 1}
+    edges, start = [("a", "b", 1), ("b", "a", -1), ("b", "c", -2)], [1, 2, 3]
+    for mu3, sigma, stated in (("0.5", [0, -1, 2], True), ("0.4", [0, -1, 2], False), ("0.4", [0, 0, 0], True)):
+        protocol = SlidingModeProtocol(**gains, mu3=mu3)
+        document = json.loads(certify(edges, protocol, start, sigma0=sigma, simulation=False).to_json())
+        code, text = said(document, tmp_path)
+        assert code == 0 and "verified    sliding-bound of protocol" in text
+        assert ("verified    input-sliding of input" in text) == stated
+        if not stated:
+            continue
+        least = {label: 2 + (1 + Fraction(mu3) * 4) * abs(s) for label, s in zip("abc", sigma, strict=True)}
+        for label in "abc":
+            assert (
+                said(
+                    resealed(changed(document, ("input", "sliding", "agents", label), str(least[label]))), tmp_path
+                ).code
+                == 0
+            )
+            lower = resealed(
+                changed(document, ("input", "sliding", "agents", label), str(least[label] - Fraction(1, 999)))
+            )
+            code, text = said(lower, tmp_path)
+            assert code == 1 and "input-sliding of input" in text and not check(lower).accepted
+        for path, new in (
+            (("reaching_time", "bound"), "||sigma(t)|| <= 0"),
+            (("input", "sliding", "bounded"), mu3 != "0.5"),
+            (("protocol", "delta"), "2"),
+        ):
+            forged = resealed(changed(document, path, new))
+            assert said(forged, tmp_path).code == 1 and not check(forged).accepted, path
+
+
 def test_limits_disturbance_and_noise_are_named_and_none_can_be_added(tmp_path: Path) -> None:
     program()
     limits = [GainLimits(gain_cap=10), GainLimits(stop_before="0.1"), GainLimits(sample_period="0.001")]
