@@ -236,7 +236,7 @@ def prove_agents(
         Gain, clock and deadline.
     agents : Agents
     functions : sequence of LyapunovFunction
-        Proved; the fastest decides the coupling.
+        Proved; one of a large rate and a small overshoot constant decides the coupling.
     influence : Influence
     offsets : N rows of d Fraction
     initial_state : N tuples of d tuples of n Fraction, or None
@@ -249,11 +249,12 @@ def prove_agents(
     gain = base.gain
     proved = [V.proved_rate for V in functions]
     best = max((rate for rate in proved if rate > 0), default=None)
+    wanted = None if best is None else _coupled_rate(functions)
     scaled = ScaledAgent(agents.coefficients, agents.own, gain.rho1, gain.pole, gain.first, agents.cap)
     if agents.of_paper:
         matrix = paper_matrix(scaled, best or Fraction(1))
     else:
-        coupling = Fraction(1) if best is None else Fraction(up(1 / best, 6))
+        coupling = Fraction(1) if wanted is None else Fraction(up(1 / wanted, 6))
         matrix = agent_matrix(scaled, agents.decay_rate / gain.pole, coupling)
     used = [k for k, rate in enumerate(proved) if rate > 0 and matrix.coupling * rate >= 1]
     protocol = AgentsProtocol(
@@ -272,6 +273,15 @@ def prove_agents(
     decided = initial_state is not None and bool(used or not structure.graph.n_edges)
     final = _final_state(part, influence) if influence.exact and decided else None
     return replace(part, final_state=final, residual=_residual(part), input=_input(part))
+
+
+def _coupled_rate(functions: Sequence[LyapunovFunction]) -> Fraction:
+    """Return the rate that is worth its price: gains grow as it falls, bounds with the root of the overshoot constant.
+
+    The fastest function alone may be worthless: a diagonal one reaches its best rate at an overshoot of 1e13.
+    """
+    decaying = [V for V in functions if V.proved_rate > 0]
+    return min(decaying, key=lambda V: V.overshoot / V.proved_rate**2).proved_rate
 
 
 def _final_state(part: AgentsPart, influence: Influence) -> Intervals:
