@@ -128,6 +128,13 @@ _ALSO_CALLED = {
     "load_certificate": "read_certificate",
     "plot_states": "plot_trajectory",
     "load_graph": "as_graph",
+    "load": "read_certificate",
+    "verify": "check",
+    "plot": "plot_trajectory",
+    "compare": "certify_many",
+    "DiGraph": "SignedDigraph",
+    "Graph": "SignedDigraph",
+    "Protocol": "NominalProtocol",
 }
 _ALSO_CALLED |= {name: f"theorems.restricted_signals.{name}" for name in ("DwellTime", "JointWindows", "ClockShares")}
 

@@ -397,7 +397,10 @@ def _assess_agents(part: AgentsPart) -> tuple[bool | None, str, str, str]:
     remark = f"every position within {up(worst, 2)} of its place at {when}"
     if part.initial_state is None or not math.isfinite(worst):
         return fall <= USEFUL, f"deviations at {when} are {up(fall, 2)} of the first ones", caveat, advice
-    return fall <= USEFUL or worst <= USEFUL * part.longest_way, remark, caveat, advice
+    useful = worst <= USEFUL * part.longest_way if part.longest_way else fall <= USEFUL
+    if not useful and not capped and not advice:
+        advice = f"a larger --decay, such as {2 * math.ceil(part.decay)}, leaves less"
+    return useful, remark, caveat, advice
 
 
 def _limited_usefulness(certificate: Content) -> tuple[bool, str, None]:

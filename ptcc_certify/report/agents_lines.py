@@ -81,16 +81,19 @@ def _final_lines(part: AgentsPart, width: int) -> Iterator[tuple[str, str]]:
         ends = [[chain[i] for chain in agent] for agent in part.final_state]
         if i and not any(m or r for row in ends for m, r in row):
             continue
-        words = [f"{shorten_label(label)}={_place(row)}" for label, row in zip(labels, ends, strict=True)]
+        places = [_place(row) for row in ends]
+        words = [f"{shorten_label(label)}={place}" for label, place in zip(labels, places, strict=True)]
         kind = f"({_accuracy(ends)}{', at rest' * (rest and i == 0)})"
         text = shorten_list(words, width - columns(kind) - 1)
+        if len(set(places)) == 1 < len(places):
+            text = f"{places[0]}, of every agent"
         if i == 0 and part.protocol.gain_cap is not None:
             kind = f"{kind[:-1]}; within what the cap leaves)"
         yield _ENDS[i] if i < len(_ENDS) else f"x^({i})(T)", f"{text} {kind}"
 
 
 def _place(row: Sequence[Interval]) -> str:
-    numbers = [short_number(m) for m, _ in row]
+    numbers = [short_number(float(m) if r else m) for m, r in row]
     return numbers[0] if len(numbers) == 1 else f"({', '.join(numbers)})"
 
 

@@ -342,8 +342,16 @@ def _short_verdict(certificate: Certificate) -> str:
     certified, advice = assessment.certified_part, re.sub(r" \(.*?\)", "", assessment.advice)
     certified += ", but says little by T" * (assessment.useful is False)
     checked = "" if certified != CERTIFIED or assessment.answers or assessment.caveat else "checked without a solver"
-    ended = f"the time limit of {certificate.time_limit:g} s ended {', '.join(certificate.cut_off)}"
-    return assessment.line(certified, checked, assessment.caveat, advice, ended * bool(certificate.cut_off))
+    return assessment.line(certified, checked, assessment.caveat, advice, _cut_off(certificate))
+
+
+def _cut_off(certificate: Certificate) -> str:
+    """Tell which searches ended early; each has a share of the time limit, so that all of it is not over then."""
+    if not certificate.cut_off:
+        return ""
+    return (
+        f"ended early: {', '.join(certificate.cut_off)}, at a share of the time limit of {certificate.time_limit:g} s"
+    )
 
 
 def structure_lines(structure: Structure, name: str) -> list[str]:
@@ -391,8 +399,7 @@ def certificate_lines(
                 yield from part(certificate)
         yield from _headed("simulated", _simulated(certificate))
         if certificate.cut_off:
-            named = f"the time limit of {certificate.time_limit:g} s ended {', '.join(certificate.cut_off)}"
-            yield "cut off", f"{named}; what was proved by then stands"
+            yield "cut off", f"{_cut_off(certificate)}; what was proved by then stands"
         yield from (("note", note) for note in certificate.notes[:3])
         yield "verdict", certificate.assessment.text
 

@@ -250,6 +250,40 @@ def test_the_input_at_rest_is_bounded_iff_the_common_velocity_falls_fast_enough(
     assert check(certificate.to_dict()).accepted and certificate.agents_comparison.worst <= 1 + 1e-7
 
 
+def test_a_bound_that_is_larger_than_the_way_of_the_agents_says_little_by_t():
+    little = made(TEAM, NOMINAL, [5, 2, 4, -1], Agents(order=2, decay="2.01")).assessment
+    assert little.useful is False and little.advice == "--decay 4 bounds it"
+    certificate = made(TEAM, NOMINAL, [1, 2, -1, -1], Agents(order=2), v0=[10000, -10000, 0, 0])
+    part, assessment = certificate.agents, certificate.assessment
+    assert part is not None and part.deviation_bound(np.array([0.01]))[:, 0].max() > 0.01 * part.longest_way > 0
+    assert assessment.useful is False and "a larger --decay, such as 8, leaves less" in assessment.text
+
+
+def test_the_coupling_is_not_that_of_a_fast_function_with_a_huge_overshoot_constant():
+    edges = [
+        ("1", "2", "0.8"),
+        ("2", "3", "-1.2"),
+        ("3", "1", "-0.5"),
+        ("3", "4", 1),
+        ("4", "5", -2),
+        ("5", "4", "-0.7"),
+    ]
+    edges += [("5", "6", "1.5"), ("6", "7", 1), ("7", "6", "-0.3")]
+    graph, x0 = SignedDigraph.from_edges(edges), [3, -1, 2, 0, -4, 1, 5]
+    protocol = NominalProtocol(T=3)
+    bounds = {}
+    for method in ("paper", "perron"):
+        part = certify(graph, protocol, x0, agents=Agents(order=2), method=method, simulation=False).agents
+        assert part is not None
+        bounds[method] = part.deviation_bound(np.array([0.01])).max()
+    assert bounds["perron"] < 10 * bounds["paper"]
+
+
+def test_velocities_that_are_the_same_everywhere_are_told_once():
+    certificate = made(TEAM, NOMINAL, [5, 2, 4, -1], Agents(order=2, drag="0.1"))
+    assert "v(T) 0, of every agent (rounded)" in told(certificate)
+
+
 def test_at_twice_the_order_the_input_is_bounded():
     assert "input bounded; |u_k| <=" in told(made(TEAM, NOMINAL, [5, 2, 4, -1], Agents(order=2, decay=4)))
 
