@@ -71,8 +71,8 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
     rho2 = 0 runs the nominal protocol without a deadline (asymptotic baseline). With --dimension d, --x0 takes N*d
     numbers, agent after agent, and columns are headed <label>[1] to <label>[d].
 
-    Agents of order n run with the gains that `certify` proves under the same --method, up to the deadline; beside their positions there are
-    columns v(<label>), a(<label>).
+    Agents of order n run with the gains that `certify` proves under the same --method, up to the deadline; beside
+    their positions there are columns v(<label>), a(<label>).
 
     Of a family - several graphs with --switching, weights in intervals, --uncertainty, --optional - one run under one
     signal, with a column mode: the number of the graph that acts.
