@@ -69,6 +69,11 @@ class Tracking:
         return float(self.witness.b * self.protocol.gain.pole)
 
     @property
+    def bounding_rho2(self) -> str:
+        """A ``rho2`` of few digits with which ``p > 1``, so that the input stays bounded."""
+        return up(1 / (self.witness.b * self.protocol.kappa) * Fraction(1001, 1000), 3)
+
+    @property
     def drift(self) -> float:
         """``(speed + disturbance) / min u``; 0 with the sign term, which takes it up."""
         return 0.0 if self.leaders.sign_gain is not None else float(self.leaders.total) / float(self.witness.u.min())

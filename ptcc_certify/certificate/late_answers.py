@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from fractions import Fraction
 
 from lmi.exact.decimal_rounding import down, near, up
@@ -10,6 +11,7 @@ from ptcc_certify.bounds.missed_deadline import Missed
 from ptcc_certify.bounds.tracking import Tracking
 from ptcc_certify.certificate.answer import MET, OPEN, REFUTED, Answer
 from ptcc_certify.certificate.certificate_data import Content
+from ptcc_certify.lyapunov.search import USEFUL
 
 
 def at_deadline(certificate: Content, answer: Answer) -> Answer:
@@ -55,7 +57,7 @@ def _judge_residual(certificate: Content, late: LateBounds, most: Fraction) -> A
         return Answer(MET, what)
     if missed is not None and missed.bound > most:
         return Answer(REFUTED, what, _misses(certificate, missed))
-    shorter = "" if late.enough is None else f"; certified with a delay of {down(late.enough, 4)}"
+    shorter = "" if late.enough is None else f"; certified where nothing is older than {down(late.enough, 4)}"
     return Answer(OPEN, what, f"this certificate's limit is {up(late.largest, 3)}{shorter}")
 
 
@@ -91,3 +93,46 @@ def _judge_tracking(tracking: Tracking | None, most: Fraction, what: str) -> Ans
     what += " from within 1 of the targets" * tracking.relative
     largest = Fraction(float(tracking.input.max()))
     return Answer(MET, what) if largest <= most else Answer(OPEN, what, f"proved: {up(largest)}")
+
+
+def use_of_late(late: LateBounds, longest_way: float | None) -> tuple[bool | None, str, str]:
+    """Return whether what is left at ``T`` with late messages is a hundredth of the longest way, what, and a caveat.
+
+    Parameters
+    ----------
+    late : LateBounds
+    longest_way : float or None
+        Of an agent to its final state; None without an initial state.
+
+    Returns
+    -------
+    tuple of bool or None, str, str
+        None where nothing is proved of what is left. The rest of the certificate knows of no delay: what it tells of
+        the input does not hold here.
+    """
+    caveat = "" if late.messages.gain_cap is not None else "the input is not proved bounded"
+    if math.isinf(late.largest):
+        return None, "", caveat
+    way = 1.0 if late.relative else longest_way
+    remark = f"every agent within {up(late.largest, 2)} of its final state at T{' from within 1 of it' * late.relative}"
+    return way is not None and late.largest <= USEFUL * way, remark, caveat
+
+
+def use_of_tracking(tracking: Tracking) -> tuple[bool, str, str, str]:
+    """Return whether followers are near their targets at ``0.99 T``, how near, what is not proved, and a mend.
+
+    Parameters
+    ----------
+    tracking : Tracking
+
+    Returns
+    -------
+    tuple of bool, str, str, str
+        Near is a hundredth of what is proved of the distance at first.
+    """
+    first, last = (float(x) for x in tracking.distance_bound([1.0, 0.01]).max(axis=0))
+    remark = f"every follower within {up(last, 2)} of its target at 0.99 T{' from within 1 of it' * tracking.relative}"
+    if tracking.input is not None:
+        return last <= USEFUL * first, remark, "", ""
+    mend = f"--rho2 {tracking.bounding_rho2} bounds the input"
+    return last <= USEFUL * first, remark, "the input is not proved bounded", mend

@@ -27,7 +27,13 @@ from ptcc_certify.bounds.envelope import Envelope
 from ptcc_certify.certificate.agents_part import AgentsPart
 from ptcc_certify.certificate.answer import MET, OPEN, REFUTED, Answer
 from ptcc_certify.certificate.certificate_data import Content
-from ptcc_certify.certificate.late_answers import at_deadline, judge_input_beside, judge_messages
+from ptcc_certify.certificate.late_answers import (
+    at_deadline,
+    judge_input_beside,
+    judge_messages,
+    use_of_late,
+    use_of_tracking,
+)
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.input_formulas import InitialSet, root_above
 from ptcc_certify.errors import ExitCode
@@ -225,6 +231,10 @@ the input is not bounded; --rho2 0.501 (rho2 kappa 0.501) leaves 1 % and bounds 
         useful, remark = True, "nothing to decay"
     elif certificate.agents is not None:
         useful, remark, caveat, advice = _assess_agents(certificate.agents)
+    elif certificate.late is not None:
+        useful, remark, caveat = use_of_late(certificate.late, certificate.longest_way)
+    elif certificate.tracking is not None:
+        useful, remark, caveat, advice = use_of_tracking(certificate.tracking)
     else:
         limited = certificate.effort is not None and certificate.effort.residual
         useful, remark, rho2 = (_limited_usefulness if limited else _usefulness)(certificate)
@@ -252,7 +262,7 @@ def _judge_behaviour(certificate: Content, expected: str) -> Answer:
     answer, part = judge_behaviour(certificate.structure, expected), certificate.agents
     if part is None:
         return answer
-    what = f"{expected} of x - h" if part.formation else expected
+    what = f"{expected} of x - offsets" if part.formation else expected
     if part.settles:
         return replace(answer, what=what)
     return Answer(OPEN, what, "the capped gain leaves something at T" if part.functions else "no decay is proved")

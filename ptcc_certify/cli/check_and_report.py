@@ -56,6 +56,10 @@ def check(
 
     if certificate == "-" and "-" in graph:
         raise ParameterError("CERTIFICATE and GRAPH cannot both be standard input; name a file for one")
+    source = click.get_current_context().get_parameter_source
+    given = [name for name in shared.READING if source(name) is ParameterSource.COMMANDLINE]
+    if given and not graph:
+        raise ParameterError(f"{shared.flag_of(given[0])} tells how a graph is read; name it: ptcc check CERT GRAPH")
     proved = None
     with progress(("independent check",), screen.quiet) as begin:
         begin("independent check")

@@ -239,7 +239,8 @@ def read_scenario(path: str) -> Scenario:
         for key, value in keys.items():
             place = f"{name}: [{section}] {shorten(key)}"
             if key not in known:
-                raise ParameterError(f"{place}: no such key{_where(key) or did_you_mean(key, known)}")
+                hint = _where(key) or did_you_mean(key, known) or f"; there are {', '.join(known)}"
+                raise ParameterError(f"{place}: no such key{hint}")
             option = known[key][0]
             if option == "plant":
                 options[option] = _numbers(value if isinstance(value, list) else [value], place)

@@ -52,6 +52,7 @@ _TABLES = ("", ".csv", ".txt")
     help="Family: random (with --seed), worst-case, constant, or FILE.csv with columns t (or clock), mode, level.",
 )
 @agents_options
+@shared.method_option
 @click.option("--dimension", type=click.IntRange(1, 1000), default=1, help="State components per agent.")
 @click.option("--samples", type=click.IntRange(2, 100_000), default=201, help="Instants up to T, dense towards it.")
 @click.option("--steps", type=click.IntRange(1, 100_000), help="Instead: so many equal steps of t from 0 to T.")
@@ -70,8 +71,8 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
     rho2 = 0 runs the nominal protocol without a deadline (asymptotic baseline). With --dimension d, --x0 takes N*d
     numbers, agent after agent, and columns are headed <label>[1] to <label>[d].
 
-    Agents of order n run with the gains that `certify` proves, up to the deadline; beside their positions there are
-    columns v(<label>), a(<label>).
+    Agents of order n run with the gains that `certify` proves under the same --method, up to the deadline; beside
+    their positions there are columns v(<label>), a(<label>).
 
     Of a family - several graphs with --switching, weights in intervals, --uncertainty, --optional - one run under one
     signal, with a column mode: the number of the graph that acts.
@@ -98,6 +99,8 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
         if protocol.reaching is not None:
             click.echo("note: u is without the sliding terms, which cancel the disturbance", err=True)
         return ExitCode.OK
+    if click.get_current_context().get_parameter_source("method") is ParameterSource.COMMANDLINE:
+        raise ParameterError("--method: chooses the gains of agents of order n; leave it out, or add --agents")
     trajectory = _run(signed, protocol, options)
     _write(trajectory, output, plot_of_run, {"wide": wide, "time_unit": time_unit})
     if protocol.prescribed and trajectory.actuator is None and not trajectory.deadline_resolved:
@@ -153,7 +156,7 @@ def _run_agents(signed: SignedDigraph, protocol: Protocol, options: shared.Optio
     more = agents_keywords(options, signed)
     if protocol.reaching is not None:
         more |= {"sigma0": shared.sliding_keywords(protocol, options, signed)["sigma0"]}
-    return run_of_agents(signed, protocol, more, options["samples"])
+    return run_of_agents(signed, protocol, more | {"method": options["method"]}, options["samples"])
 
 
 def _run(signed: SignedDigraph | Family, protocol: Protocol, options: shared.Options) -> Trajectory:

@@ -9,8 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 
+from lmi.exact.decimal_rounding import near
 from ptcc_certify.errors import ParameterError, gated
-from ptcc_certify.protocols.parameters import Given, NotNegative, Parameters, readable
+from ptcc_certify.protocols.parameters import Given, NotNegative, Parameters
 
 
 @gated
@@ -53,9 +54,9 @@ give 2 or more
 
     def __post_init__(self) -> None:
         if self.sign_gain is not None and self.sign_gain < self.total:
-            total = readable(self.total)
+            total = near(self.total)
             raise ParameterError(
-                f"sign_gain = {readable(self.sign_gain)} is below speed + disturbance = {total}, which pushes "
+                f"sign_gain = {near(self.sign_gain)} is below speed + disturbance = {total}, which pushes "
                 f"followers off; give {total} or more"
             )
 

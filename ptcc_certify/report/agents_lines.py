@@ -88,7 +88,7 @@ def _final_lines(part: AgentsPart, width: int) -> Iterator[tuple[str, str]]:
         if len(set(places)) == 1 < len(places):
             text = f"{places[0]}, of every agent"
         if i == 0 and part.protocol.gain_cap is not None:
-            kind = f"{kind[:-1]}; within what the cap leaves)"
+            kind = f"{kind[:-1]}; without the cap)"
         yield _ENDS[i] if i < len(_ENDS) else f"x^({i})(T)", f"{text} {kind}"
 
 
@@ -166,5 +166,5 @@ def long_lines(part: AgentsPart) -> Iterator[tuple[str, str]]:
 def claimed_of(part: AgentsPart) -> str:
     """Tell of what the claim of the graph holds, where it is not just of the positions."""
     if part.settles:
-        return " of x - h" * part.formation
-    return f"{' of x - h' * part.formation} but for what the cap leaves" if part.functions else " of x' = u"
+        return " of x - offsets" * part.formation
+    return f"{' of x - offsets' * part.formation} but for what the cap leaves" if part.functions else " of x' = u"

@@ -54,7 +54,7 @@ def agents_view(saved: Certificate, part: AgentsPart) -> dict[str, Any]:
 
 def _title(saved: Certificate) -> str:
     claims = saved.claims
-    what = claims[0].behaviour if len(claims) == 1 else f"{len(claims):,} components settle"
+    what = claims[0].sharpest if len(claims) == 1 else f"{len(claims):,} components settle"
     text = f"{what} of {plant_text(saved.agents.protocol.plant)}" if saved.agents is not None else what
     return text[:1].upper() + text[1:] if saved.verdict == "certified" else "Undecided: " + text
 

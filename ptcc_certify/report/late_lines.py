@@ -55,8 +55,7 @@ def tracking_lines(certificate: Certificate) -> Lines:
     if tracking.input is not None:
         yield "input", f"bounded up to T; |u_k| <= {up(float(tracking.input.max()), 4)}{whole}"
     else:
-        least = up(1 / (tracking.witness.b * certificate.protocol.kappa) * Fraction(1001, 1000), 3)
-        yield "INPUT", f"not proved bounded while leaders move; rho2 = {least} bounds it"
+        yield "INPUT", f"not proved bounded while leaders move; rho2 = {tracking.bounding_rho2} bounds it"
 
 
 def messages_text(messages: LateMessages, protocol: Protocol | None = None) -> str:

@@ -198,7 +198,7 @@ def _in_words(saved: Certificate) -> tuple[Markup, str]:
 def _title(saved: Certificate, invariant: str) -> Markup:
     """Say what the certificate is about."""
     claims, deadline = saved.claims, "T" if saved.protocol.reaching is None else "T_r + T_s"
-    behaviour = claims[0].behaviour if len(claims) == 1 else f"{len(claims):,} components settle"
+    behaviour = claims[0].sharpest if len(claims) == 1 else f"{len(claims):,} components settle"
     text = Markup("{} at {} = {}").format(behaviour, deadline, rational(saved.protocol.T)).replace("= \u2248", "\u2248")
     if saved.constant:
         text = Markup("every agent keeps {}").format(invariant)

@@ -220,7 +220,7 @@ def _short_final_state(certificate: Certificate) -> Lines:
     result, labels = certificate.final_state, certificate.graph.labels
     if result is None:
         return
-    degenerate, limits = "; degenerate x(0)" * bool(result.degenerate), "; no limits" * bool(certificate.limits)
+    degenerate, limits = "; degenerate x(0)" * bool(result.degenerate), "; without limits" * bool(certificate.limits)
     kind = f"({_accuracy(result, 'rounded')}{degenerate}{limits})"
     groups: dict[Fraction | float, list[str]] = {}
     for label, state in zip(labels, result.states, strict=True):
@@ -267,8 +267,9 @@ def _bounds(certificate: Certificate, drawn: bool) -> Lines:
         return
     norm, agents, more = _error_texts(certificate)
     if norm:
+        limited = certificate.effort is not None and bool(certificate.effort.residual)  # from the whole set
         texts = (norm + agents.replace("every agent", whom) + more for whom in ("every agent", "agents", "each"))
-        fitting = (text for text in texts if columns(text) <= TEXT and not drawn)
+        fitting = (text for text in texts if columns(text) <= TEXT and (limited or not drawn))
         yield "error", next(fitting, norm + more)
     if certificate.effort is not None:
         loud = certificate.effort.bounded is False and not certificate.effort.residual
@@ -342,16 +343,16 @@ def _short_verdict(certificate: Certificate) -> str:
     certified, advice = assessment.certified_part, re.sub(r" \(.*?\)", "", assessment.advice)
     certified += ", but says little by T" * (assessment.useful is False)
     checked = "" if certified != CERTIFIED or assessment.answers or assessment.caveat else "checked without a solver"
-    return assessment.line(certified, checked, assessment.caveat, advice, _cut_off(certificate))
+    ended = _cut_off_text(certificate)
+    return assessment.line(certified, checked, assessment.caveat, advice, ended)
 
 
-def _cut_off(certificate: Certificate) -> str:
-    """Tell which searches ended early; each has a share of the time limit, so that all of it is not over then."""
+def _cut_off_text(certificate: Certificate) -> str:
+    """Tell which searches took longer than their shares of the time limit; nothing if none did."""
     if not certificate.cut_off:
         return ""
-    return (
-        f"ended early: {', '.join(certificate.cut_off)}, at a share of the time limit of {certificate.time_limit:g} s"
-    )
+    shares = "its share" if len(certificate.cut_off) == 1 else "their shares"
+    return f"{', '.join(certificate.cut_off)} took {shares} of --time-limit {certificate.time_limit:g} s"
 
 
 def structure_lines(structure: Structure, name: str) -> list[str]:
@@ -399,7 +400,7 @@ def certificate_lines(
                 yield from part(certificate)
         yield from _headed("simulated", _simulated(certificate))
         if certificate.cut_off:
-            yield "cut off", f"{_cut_off(certificate)}; what was proved by then stands"
+            yield "cut off", f"{_cut_off_text(certificate)}; what was proved by then stands"
         yield from (("note", note) for note in certificate.notes[:3])
         yield "verdict", certificate.assessment.text
 

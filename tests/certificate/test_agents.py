@@ -314,7 +314,7 @@ DECADES = SignedDigraph.from_edges([("a", "b", "1e-30"), ("b", "a", "1e30"), ("b
     ("graph", "agents", "answer", "claim"),
     [
         (ENEMIES, {}, "stability", "stability at T = 2"),
-        (ENEMIES, {"offsets": [5, 0, 0]}, "stability of x - h", "stability of x - h at T = 2"),
+        (ENEMIES, {"offsets": [5, 0, 0]}, "stability of x - offsets", "stability of x - offsets at T = 2"),
         (
             ENEMIES,
             {"gain_cap": 3},

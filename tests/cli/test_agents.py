@@ -82,6 +82,19 @@ def test_a_simulated_run_of_agents_has_columns_of_velocities_and_ends_where_cert
         assert np.allclose([float(x) for x in rows[-1][2 + 6 * i : 8 + 6 * i]], proved, rtol=0, atol=1e-9)
 
 
+def test_a_simulated_run_has_the_gains_that_certify_proves_under_the_same_method():
+    begin = ("fig1a", "--agents", "2", "--x0", "5,2,-4,3,-2,1")
+    runs = {}
+    for method in ("paper", "best"):
+        cert = json.loads(ptcc("certify", *begin, "--method", method, "--no-simulation", "--json").out)["agents"]
+        rows = list(csv.reader(io.StringIO(ptcc("simulate", *begin, "--method", method, "--samples", "2").out)))
+        runs[method] = ([float(Fraction(K)) for K in cert["gains"]], [float(x) for x in rows[1][-6:]])
+    (paper, u), (best, other) = runs["paper"], runs["best"]
+    assert paper[0] != best[0]
+    # At rest the input is the first gain times what is the same in both.
+    assert np.allclose(np.array(u) * best[0], np.array(other) * paper[0])
+
+
 @pytest.mark.parametrize(
     ("command", "options", "says"),
     [

@@ -256,6 +256,22 @@ def test_an_input_that_is_not_bounded_while_leaders_move_is_told_with_the_gain_t
     assert least is not None, weak
     strong = ptcc("certify", "team.csv", "--leader-speed", "1", *START, *QUICK[4:], "--rho2", least[1], "--kappa", "1")
     assert "input      bounded up to T" in strong.out, strong
+    verdict = " ".join(weak.out.partition("verdict")[2].split())
+    assert f"the input is not proved bounded; --rho2 {least[1]} bounds the input" in verdict
+
+
+def test_the_verdict_with_late_messages_is_about_these_and_proposes_no_gains_for_messages_at_once() -> None:
+    weak = (*QUICK[4:], "--rho2", "0.1", "--kappa", "1")
+    for words, caveat in (((), "the input is not proved bounded"), (("--gain-cap", "1"), "")):
+        run = ptcc("certify", "team.csv", "--delay", "0.02", *START, *weak, *words)
+        verdict = " ".join(run.out.partition("verdict")[2].split())
+        assert caveat in verdict and "--rho2" not in verdict, run
+
+
+def test_a_delay_that_would_do_is_told_as_an_age() -> None:
+    lost = ("--delay", "0.005", "--period", "0.01", "--packet-loss", "3", "--max-residual", "0.001")
+    run = ptcc("certify", "team.csv", *lost, *START, *QUICK)
+    assert "certified where nothing is older than 0.0" in " ".join(run.out.split()), run
 
 
 @pytest.mark.parametrize(

@@ -859,3 +859,5 @@ def test_coordinates_of_agents_stand_below_each_other_and_side_by_side_in_a_wide
         axes = ptcc_certify.plot_motion(cert, wide=wide).axes
         assert axes[0].get_subplotspec().get_gridspec().get_geometry() == shape
         assert {ax.get_ylabel() for ax in axes} == {"position 1", "position 2", "velocity 1", "velocity 2"}
+        assert len({(ax.get_xlim(), tuple(ax.get_xticks())) for ax in axes}) == 1
+        assert sorted(text.get_text() for ax in axes for text in ax.texts) == ["a", "a", "b", "b"]

@@ -13,7 +13,7 @@ from ptcc_certify.certificate.agents_part import AgentsPart
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.report.plots.agents import CAMP_STYLES, HALO, NAME_SIZE, NAMED_AGENTS, camp_groups
+from ptcc_certify.report.plots.agents import CAMP_STYLES, HALO, NAME_SIZE, NAMED_AGENTS, camp_groups, name_agents
 from ptcc_certify.report.plots.style import SINGLE_COLUMN, axes_of, finished, new_axes, shown, styled, time_label
 from ptcc_certify.report.text_layout import printable, shorten_text
 from ptcc_certify.simulation.agents import AgentsTrajectory
@@ -90,6 +90,18 @@ def plot_motion(subject: Any, *, wide: bool = False, time_unit: str = "") -> Fig
                 finished(ax, time_label("time $t$", time_unit) if place // columns == rows - 1 else "", label)
                 if (legend := ax.get_legend()) is not None and (i or q):
                     legend.remove()
+                if i == 0 and run.graph.n_nodes <= NAMED_AGENTS:
+                    colours = {k: CAMP_STYLES[groups[k]][0] for k in range(run.graph.n_nodes)}
+                    name_agents(ax, run, run.states[:, q, 0], colours)
+        if run.graph.n_nodes <= NAMED_AGENTS:  # names take room, in all panels the same
+            begin, last, ticks = (
+                min(ax.get_xlim()[0] for ax in figure.axes),
+                float(run.t[-1]),
+                figure.axes[0].get_xticks(),
+            )
+            for ax in figure.axes:
+                ax.set_xticks(ticks)
+                ax.set_xlim(begin, last + 0.03 * (last - begin))
         return shown(figure)
 
 
@@ -99,7 +111,7 @@ def _lines(ax: Axes, run: AgentsTrajectory, values: np.ndarray, groups: np.ndarr
         color, line = CAMP_STYLES[groups[k]]
         first = k == int(np.flatnonzero(groups == groups[k])[0])
         ax.plot(run.t, row, color=color, linestyle=line, linewidth=1, label=groups[k] if first else None)
-    ax.axvline(float(run.protocol.gain.T), color="#7F7F7F", linewidth=0.8, linestyle=":")
+    ax.axvline(float(run.protocol.gain.T), color="black", linewidth=0.8, linestyle=":", label="deadline $T$")
 
 
 @styled
@@ -127,7 +139,7 @@ def plot_formation(subject: Any, *, ax: Axes | None = None) -> Axes:
     >>> protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
     >>> cert = certify(foes, protocol, [[3, 1], [1, 0]], agents=Agents(order=2), method="paper")
     >>> plot_formation(cert).get_xlabel()
-    'coordinate 1'
+    '$x$'
     """
     run = agents_run(subject)
     if run.states.shape[1] != 2:
@@ -145,7 +157,9 @@ def plot_formation(subject: Any, *, ax: Axes | None = None) -> Axes:
     ax.set_aspect("equal", adjustable="datalim")
     if run.graph.n_nodes <= 2 * NAMED_AGENTS:
         _name_ends(ax, run)
-    return finished(ax, "coordinate 1", "coordinate 2")
+    for face, name in (("white", "at $t = 0$"), ("#7F7F7F", "at $t = T$")):
+        ax.plot([], [], "o", markersize=4, markerfacecolor=face, markeredgecolor="#7F7F7F", label=name)
+    return finished(ax, "$x$", "$y$")
 
 
 def _name_ends(ax: Axes, run: AgentsTrajectory) -> None:
