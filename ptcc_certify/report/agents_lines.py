@@ -23,13 +23,6 @@ _ENDS = ("x(T)", "v(T)", "a(T)")
 _INSTANTS = ((0.5, "0.5 T"), (0.1, "0.9 T"), (0.01, "0.99 T"), (1e-6, "T(1-1e-6)"))
 
 
-def begin_text(part: AgentsPart, origins: Sequence[str]) -> str:
-    """Tell which initial states were given."""
-    if part.initial_state is None:
-        return "no x(0)"
-    return ", ".join(origins)
-
-
 def agents_text(part: AgentsPart) -> str:
     """Tell the agents and their protocol in one line.
 

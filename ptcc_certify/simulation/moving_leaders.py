@@ -12,7 +12,6 @@ steps.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -182,18 +181,3 @@ def _decay(A: np.ndarray) -> np.ndarray:
     from scipy.linalg import expm
 
     return np.asarray(expm(-A))
-
-
-def worst_share(run: TrackingRun, bound: np.ndarray, T: Fraction, followers: np.ndarray) -> float:
-    """Return the largest ratio of a distance to its bound before ``T``.
-
-    Parameters
-    ----------
-    run : TrackingRun
-    bound : (F, M) array
-        At the instants of the run up to the last one before ``T``.
-    T : Fraction
-    followers : (F,) int array
-    """
-    before = run.t < float(T)
-    return float((np.abs(run.states - run.targets)[followers][:, before] / bound[:, before]).max())
