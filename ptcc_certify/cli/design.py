@@ -41,7 +41,7 @@ _EXAMPLE_OF_AGENTS = "ptcc design fig1a --agents double-integrator --max-input 3
 @click.command(cls=OneGraph)
 @graph_argument
 @number_option("--max-input", metavar="U", help="Needed. Every |u_k| is to be at most U, from all initial states.")
-@number_option("--initial-bound", metavar="R", help="Needed, but of agents. All initial states with |x_k(0)| <= R.")
+@number_option("--initial-bound", metavar="R", help="Needed without --agents. All |x_k(0)| <= R.")
 @number_option("--deadline", metavar="T", help="Ask for this deadline ..")
 @click.option("--shortest-deadline", is_flag=True, help=".. or for the shortest one.")
 @number_option("--residual", metavar="r", help="Every agent may be so far from its final state at the deadline.")

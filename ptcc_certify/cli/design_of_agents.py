@@ -57,7 +57,7 @@ def refuse_of_agents() -> None:
         if context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
             raise ParameterError(
                 f"{flag_of('protocol' if name == 'kind' else name)}: is not searched for single integrators; "
-                "leave it out, or give --agents double-integrator, say"
+                "give it to ptcc certify, or --agents double-integrator, say, to this command"
             )
 
 
