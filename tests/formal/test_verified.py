@@ -41,6 +41,19 @@ def test_nothing_is_admitted_and_no_axiom_is_added() -> None:
         assert not words.search(text), file.name
 
 
+def test_the_statement_is_one_file_of_as_many_lines_as_is_said() -> None:
+    text = re.sub(r"\(\*.*?\*\)", "", (SOURCES / "Certificate.v").read_text("utf-8"), flags=re.DOTALL)
+    lines = [line for line in text.splitlines() if line.strip()]
+    assert max(map(len, lines)) <= 120
+    asked = [line for line in lines if "Require" in line]
+    assert asked == [
+        "Require Import ZArith QArith Qreals List Bool Reals.",
+        "From Coquelicot Require Import Coquelicot.",
+    ]
+    for page in (SOURCES / "README.md", SOURCES.parent / "docs" / "theory" / "verified-checker.md"):
+        assert f"{len(lines)} lines" in page.read_text("utf-8")
+
+
 def test_the_fixed_texts_of_the_reader_are_those_of_the_format() -> None:
     text = (SOURCES / "ocaml" / "texts.ml").read_text("utf-8")
     rows = re.findall(r'\("([a-z-]+)", \("([^"]*)",\s*"([^"]*)"\)\)|"([a-z-]+)", \("([^"]*)",\s*"([^"]*)"\)', text)
