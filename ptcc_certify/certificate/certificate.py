@@ -233,10 +233,9 @@ class Certificate(Content, FromFile, Shown):
 
         Parameters
         ----------
-        what : {"decay", "input", "graph", "spectrum", "states", "motion", "formation", None}
+        what : {"decay", "input", "graph", "spectrum", "states", "motion", "formation", "late", "tracking", None}
             Run and bound, inputs and their proved peaks, the graph, the eigenvalues, or the states; of agents of order
-            n positions and velocities, or their ways in the plane. None: the decay, of agents of
-            order n the motion.
+            n positions and velocities, or their ways in the plane. None: :attr:`main_figure`.
         **keywords : Any
             ``ax`` and others of the function ``ptcc_certify.plot_<what>``.
 
@@ -249,7 +248,16 @@ class Certificate(Content, FromFile, Shown):
         ParameterError
             No figure is called so, or there is nothing to draw.
         """
-        return plot(self, what or ("decay" if self.agents is None else "motion"), **keywords)
+        return plot(self, what or self.main_figure, **keywords)
+
+    @property
+    def main_figure(self) -> str:
+        """The figure of what is claimed: of moving leaders, late messages, agents of order n, else the decay."""
+        if self.agents is not None:
+            return "motion"
+        if self.initial_state is None or self.final_state is None:
+            return "decay"
+        return "tracking" if self.tracking is not None else "decay" if self.late is None else "late"
 
     def summary(self) -> str:
         """Return what ``ptcc certify`` prints of it."""

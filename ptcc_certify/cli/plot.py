@@ -62,7 +62,7 @@ class _Figure(click.Choice):  # type: ignore[type-arg]  # no generic class befor
     type=_Figure([*OF_A_RUN, "graph", "spectrum", *OF_AGENTS, *OF_A_CERTIFICATE]),
     help="States, input, or error under its proved bounds over time; the graph; its eigenvalues; of agents of order n "
     "positions and velocities, or their ways in the plane; of a certificate with late messages, or moving leaders, "
-    "what is proved then.  [default: of a certificate decay or motion, else graph]",
+    "what is proved then.  [default: of a certificate what it claims, else graph]",
 )
 @click.option(
     "-o",
@@ -145,7 +145,7 @@ def _of_certificate(
         if begins and certificate.initial_state is not None:
             raise ParameterError(f"--x0 is for what holds no initial state; the certificate {path} has its own")
         of_agents = isinstance(certificate, Certificate) and certificate.agents is not None
-        what = what or ("motion" if of_agents else "decay")
+        what = what or (certificate.main_figure if isinstance(certificate, Certificate) else "decay")
         if what in (*OF_A_RUN, *OF_AGENTS) and of_agents != (what in OF_AGENTS):
             other = " or ".join(OF_AGENTS if of_agents else OF_A_RUN)
             raise ParameterError(f"--what {what} is not drawn of {path}; ask for --what {other}")

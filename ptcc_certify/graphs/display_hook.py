@@ -51,7 +51,7 @@ class Shown:
             """Refuse a name, with that which may have been meant."""
             hint = ""
             if not name.startswith("_"):
-                hint = f"; {_ELSEWHERE[name]}" if name in _ELSEWHERE else did_you_mean(name, dir(type(self)))
+                hint = f"; {_ELSEWHERE[name]}" if name in _ELSEWHERE else did_you_mean(name, dir(self))
             raise UnknownName(f"{type(self).__name__} has no attribute {name!r}{hint}")
 
 

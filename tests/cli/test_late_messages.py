@@ -305,6 +305,15 @@ def test_page_and_statement_tell_of_late_messages_and_moving_leaders() -> None:
     assert "then at $T$ every follower is on its target" in Path("l.tex").read_text()
 
 
+def test_the_figure_that_is_drawn_unasked_is_of_what_the_certificate_claims() -> None:
+    assert ptcc("certify", "chain.csv", "--leader-speed", "1", "--x0", "1,0,2", *QUICK, "-o", "l.json").code == 0
+    assert ptcc("plot", "l.json").code == 0 and Path("l-tracking.png").exists()
+    assert ptcc("certify", "chain.csv", "--delay", "0.01", "--x0", "1,0,2", *QUICK, "-o", "m.json").code == 0
+    assert ptcc("plot", "m.json").code == 0 and Path("m-late.png").exists()
+    assert ptcc("certify", "chain.csv", "--delay", "0.01", *QUICK, "-o", "random.json").code == 0
+    assert ptcc("plot", "random.json").code == 0 and Path("random-late.png").exists()
+
+
 def test_delays_that_are_too_short_to_run_have_a_page_and_a_figure_of_the_bound() -> None:
     assert ptcc("certify", "chain.csv", "--delay", "1e-5", "--x0", "1,0,2", *QUICK, "-o", "c.json").code == 0
     assert ptcc("report", "c.json", "-o", "c.html").code == ptcc("plot", "c.json", "--what", "late").code == 0
