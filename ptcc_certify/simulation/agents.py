@@ -69,6 +69,11 @@ class AgentsTrajectory:
     rtol: float
 
     @property
+    def labels(self) -> tuple[str, ...]:
+        """The N agents, in the order of the rows of ``states``."""
+        return self.graph.labels
+
+    @property
     def positions(self) -> np.ndarray:
         """(N, d, M) array."""
         return self.states[:, :, 0]

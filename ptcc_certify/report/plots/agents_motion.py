@@ -13,7 +13,7 @@ from ptcc_certify.certificate.agents_part import AgentsPart
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.report.plots.agents import CAMP_STYLES, HALO, NAME_SIZE, NAMED_AGENTS, camp_groups
+from ptcc_certify.report.plots.agents import CAMP_STYLES, HALO, NAME_SIZE, NAMED_AGENTS, camp_groups, name_agents
 from ptcc_certify.report.plots.style import SINGLE_COLUMN, axes_of, finished, new_axes, shown, styled, time_label
 from ptcc_certify.report.text_layout import printable, shorten_text
 from ptcc_certify.simulation.agents import AgentsTrajectory
@@ -88,9 +88,22 @@ def plot_motion(subject: Any, *, wide: bool = False, time_unit: str = "") -> Fig
                 name = _NAMES[i] if i < len(_NAMES) else f"derivative {i}"
                 label = f"{name} {q + 1}" if d > 1 else name
                 finished(ax, time_label("time $t$", time_unit) if place // columns == rows - 1 else "", label)
+                if i == 0 and len(groups) <= NAMED_AGENTS:
+                    colours = {k: CAMP_STYLES[group][0] for k, group in enumerate(groups)}
+                    name_agents(ax, run, run.states[:, q, i], colours)
                 if (legend := ax.get_legend()) is not None and (i or q):
                     legend.remove()
+        _align(figure.axes[:d], figure.axes)  # positions are drawn first
         return shown(figure)
+
+
+def _align(named: list[Axes], every: list[Axes]) -> None:
+    """Give all panels the times of the one whose names take most room."""
+    widest = min(named, key=lambda ax: ax.get_xlim()[0])
+    limits, ticks = widest.get_xlim(), widest.get_xticks()
+    for ax in every:
+        ax.set_xticks(ticks)
+        ax.set_xlim(limits)
 
 
 def _lines(ax: Axes, run: AgentsTrajectory, values: np.ndarray, groups: np.ndarray) -> None:
@@ -99,7 +112,7 @@ def _lines(ax: Axes, run: AgentsTrajectory, values: np.ndarray, groups: np.ndarr
         color, line = CAMP_STYLES[groups[k]]
         first = k == int(np.flatnonzero(groups == groups[k])[0])
         ax.plot(run.t, row, color=color, linestyle=line, linewidth=1, label=groups[k] if first else None)
-    ax.axvline(float(run.protocol.gain.T), color="#7F7F7F", linewidth=0.8, linestyle=":")
+    ax.axvline(float(run.protocol.gain.T), color="black", linewidth=0.8, linestyle=":", label="deadline $T$")
 
 
 @styled
