@@ -70,7 +70,7 @@ class AgentsTrajectory:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """Names of the agents."""
+        """The N agents, in the order of the rows of ``states``."""
         return self.graph.labels
 
     @property

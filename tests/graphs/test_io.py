@@ -705,6 +705,7 @@ BAD_FILES = [
         ",ann,bob,eve\nann,0,1,0\n",
         ["line 1:", "looks like a matrix with names", "from_matrix(pandas.read_csv"],
     ),
+    ("el.txt", "0 1 {'weight': 1}\n", ["line 1:", "edge 0 -> 1 is not a number", "write_weighted_edgelist"]),
     ("g.csv", ",b,1\n", ["line 1:", "the source is empty"]),
     ("g.csv", "a,b,\N{MINUS SIGN}2\n", ["line 1:", "is not a number; write -2"]),
     ("g.csv", "listener,speaker,weight\na,b,1\n", ["line 1:", "names no source and target"]),

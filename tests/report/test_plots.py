@@ -861,3 +861,13 @@ def test_coordinates_of_agents_stand_below_each_other_and_side_by_side_in_a_wide
         assert {ax.get_ylabel() for ax in axes} == {"position 1", "position 2", "velocity 1", "velocity 2"}
         assert len({(ax.get_xlim(), tuple(ax.get_xticks())) for ax in axes}) == 1
         assert sorted(text.get_text() for ax in axes for text in ax.texts) == ["a", "a", "b", "b"]
+
+
+def test_a_motion_names_its_agents_and_all_panels_have_the_same_times():
+    pair = SignedDigraph.from_edges([("ann", "bob", 1), ("bob", "ann", 1)])
+    agents, x0 = ptcc_certify.Agents(order=2), {"ann": [0, 1], "bob": [3, 1]}
+    cert = certify(pair, NominalProtocol(T=1), x0, agents=agents, method="paper", simulation=False)
+    panels = ptcc_certify.plot_motion(cert).axes
+    assert [sorted(text.get_text() for text in ax.texts) for ax in panels[:2]] == [["ann", "bob"], ["ann, bob"]]
+    assert len(panels) == 4 and {ax.get_xlim() for ax in panels} == {panels[1].get_xlim()}
+    assert "deadline $T$" in {text.get_text() for text in panels[0].get_legend().get_texts()}

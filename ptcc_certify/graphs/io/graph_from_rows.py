@@ -136,6 +136,8 @@ class _Draft:
                 mend = "write decimals with a point"
             elif text.lower() in WORDS_OF_SIGN:
                 mend = "write 1 or -1"
+            elif text.startswith("{"):
+                mend = "write the file with networkx.write_weighted_edgelist"
             elif MINUS in text:
                 mend = f"write {text.replace(MINUS, '-')[:40]}"
             elif code == 0 and self.rows.headerless and "finite" not in message:

@@ -88,21 +88,22 @@ def plot_motion(subject: Any, *, wide: bool = False, time_unit: str = "") -> Fig
                 name = _NAMES[i] if i < len(_NAMES) else f"derivative {i}"
                 label = f"{name} {q + 1}" if d > 1 else name
                 finished(ax, time_label("time $t$", time_unit) if place // columns == rows - 1 else "", label)
+                if i == 0 and len(groups) <= NAMED_AGENTS:
+                    colours = {k: CAMP_STYLES[group][0] for k, group in enumerate(groups)}
+                    name_agents(ax, run, run.states[:, q, i], colours)
                 if (legend := ax.get_legend()) is not None and (i or q):
                     legend.remove()
-                if i == 0 and run.graph.n_nodes <= NAMED_AGENTS:
-                    colours = {k: CAMP_STYLES[groups[k]][0] for k in range(run.graph.n_nodes)}
-                    name_agents(ax, run, run.states[:, q, 0], colours)
-        if run.graph.n_nodes <= NAMED_AGENTS:  # names take room, in all panels the same
-            begin, last, ticks = (
-                min(ax.get_xlim()[0] for ax in figure.axes),
-                float(run.t[-1]),
-                figure.axes[0].get_xticks(),
-            )
-            for ax in figure.axes:
-                ax.set_xticks(ticks)
-                ax.set_xlim(begin, last + 0.03 * (last - begin))
+        _align(figure.axes[:d], figure.axes)  # positions are drawn first
         return shown(figure)
+
+
+def _align(named: list[Axes], every: list[Axes]) -> None:
+    """Give all panels the times of the one whose names take most room."""
+    widest = min(named, key=lambda ax: ax.get_xlim()[0])
+    limits, ticks = widest.get_xlim(), widest.get_xticks()
+    for ax in every:
+        ax.set_xticks(ticks)
+        ax.set_xlim(limits)
 
 
 def _lines(ax: Axes, run: AgentsTrajectory, values: np.ndarray, groups: np.ndarray) -> None:
