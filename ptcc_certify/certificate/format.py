@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 
 from ptcc_certify.bounds.envelope import FRACTIONS, LAST_INSTANTS
-from ptcc_certify.bounds.final_state import FinalState, rounding_radius
 from ptcc_certify.bounds.input.effort import EnergyIntegral, Peak
 from ptcc_certify.certificate.certificate_data import Content, Observations, Source
 from ptcc_certify.certificate.format_agents import agents_section, read_agents
 from ptcc_certify.certificate.format_effort import LIMITS, effort_section, energy_witness, peak_witness, read_effort
+from ptcc_certify.certificate.format_final_state import final_state_sections, read_final_state
 from ptcc_certify.certificate.format_graph import certificate_graph, claim_sections, graph_section, structure_section
 from ptcc_certify.certificate.format_leaders import leaders_section, read_tracking
 from ptcc_certify.certificate.format_messages import Vectors, messages_section, read_late
@@ -28,20 +28,15 @@ from ptcc_certify.certificate.format_unproved import nothing_proved, read_unprov
 from ptcc_certify.certificate.format_vectors import (
     Reader,
     Writer,
-    agents_ends,
-    exact_or_ball,
     factor_entry,
     finite,
-    influence_balls,
-    interval_text,
     number,
     text,
 )
 from ptcc_certify.certificate.request import Expectations, Request
 from ptcc_certify.checker import SCHEMA, SLIDING_BOUND, SLIDING_CLOCK, CheckReport, digest
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
-from ptcc_certify.checker.reading import RejectedError, exact, interval, triangle
-from ptcc_certify.checker.side_files import beside
+from ptcc_certify.checker.reading import RejectedError, exact, triangle
 from ptcc_certify.errors import one_line
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import Structure, analyse, behaviour_name
@@ -57,7 +52,7 @@ def certificate_document(content: Content, verdict: str, files: bool = False) ->
     """Return a certificate as JSON-ready data, and what holds its side files."""
     graph, structure = content.graph, content.structure
     out = Writer(graph.labels, files)
-    influence, final = _write_final_state(content, out)
+    influence, final = final_state_sections(content, out)
     run = content.trajectory
     document: dict[str, Any] = {
         "schema": SCHEMA,
@@ -127,7 +122,7 @@ def read_document(
         ),
         "searched_functions": tuple(V for V in functions if V.kind != "paper"),
         "limit": _read_limit(steps, data),
-        "final_state": _read_final_state(document, structure, data),
+        "final_state": read_final_state(document, structure, data),
         "matrix": None,
         "late": read_late(document, structure, protocol, data, steps)
         or nothing_proved(request.messages, structure, protocol, initial_state is None),
@@ -273,90 +268,6 @@ def _read_limit(steps: Mapping[tuple[str, str], Obligation], data: Reader) -> Ra
         return RateBound(value, data.nodes([section["node"]]))
     form, vectors = triangle(section["lower_triangle"], len(section["nodes"])), section["vectors"]
     return RateBound(value, data.nodes(section["nodes"]), form, tuple(tuple(map(exact, vector)) for vector in vectors))
-
-
-# ---------------------------------------------------------------------- final state
-
-
-def _write_final_state(content: Content, out: Writer) -> tuple[dict[str, Any] | None, dict[str, Any] | None]:
-    """Write the influence of every leader, and the final state, exact or in balls; None if they are floating point."""
-    if content.influence.exact:
-        return _exact_final_state(content)
-    return (None, None) if content.influence.enclosure is None else _enclose_final_state(content, out)
-
-
-def _exact_final_state(content: Content) -> tuple[dict[str, Any], dict[str, Any] | None]:
-    matrix, structure, labels = content.influence, content.structure, content.graph.labels
-    left_null_vectors, containment_weights = influence_balls(matrix)
-    followers = structure.followers.tolist()
-    ends: dict[str, Any] | None = None
-    if content.final_state is not None and content.initial_state is not None:
-        sigma0 = content.sigma0 or [Fraction(0)] * len(labels)
-        first = [(x - s, Fraction(0)) for x, s in zip(content.initial_state, sigma0, strict=True)]
-        final = agents_ends(matrix, first)
-        ends = {label: interval_text(final[v]) for v, label in enumerate(labels)}
-    section = {
-        "components": [
-            {"nodes": [labels[v] for v in c.nodes], "left_null_vector": [interval_text(w) for w in null_vector]}
-            for c, null_vector in zip(matrix.balanced, left_null_vectors, strict=True)
-        ],
-        "containment_weights": {
-            labels[v]: [interval_text(w) for w in row] for v, row in zip(followers, containment_weights, strict=True)
-        },
-        "degenerate": None if ends is None else list(content.degenerate),
-    }
-    return section, ends
-
-
-def _enclose_final_state(content: Content, out: Writer) -> tuple[dict[str, Any], dict[str, Any] | None]:
-    """Write the final state of a large graph: left null vectors of leader groups, and its intervals."""
-    labels, matrix, final_state = content.graph.labels, content.influence, content.final_state
-    assert matrix.enclosure is not None
-    final: dict[str, Any] | None = None
-    if final_state is not None and final_state.radius is not None:
-        pairs = list(zip(final_state.states, final_state.radius, strict=True))
-        if out.aside(len(labels)) and all(isinstance(x, float) or r == 0 for x, r in pairs):
-            radius = [float(r) if isinstance(x, float) else rounding_radius(x) for x, r in pairs]
-            final = {
-                "mid": out.vector("mid", np.asarray(final_state)),
-                "radius": out.vector("radius", np.array(radius)),
-            }
-        else:
-            final = {label: _interval_text(x, r) for label, (x, r) in zip(labels, pairs, strict=True)}
-    groups = []
-    for k, (component, null_vector) in enumerate(matrix.groups):
-        if k in matrix.enclosure.left_null_vectors:
-            middles, radii = (x.tolist() for x in matrix.enclosure.left_null_vectors[k])
-            left_null_vector: list[Any] = [
-                {"mid": repr(x), "radius": repr(r)} for x, r in zip(middles, radii, strict=True)
-            ]
-        else:
-            left_null_vector = [exact_or_ball(Fraction(w)) for w in null_vector]
-        if len(component.nodes) > 1:
-            groups.append({"nodes": [labels[v] for v in component.nodes], "left_null_vector": left_null_vector})
-    degenerate = None if final_state is None else list(final_state.degenerate)
-    return {"components": groups, "containment_weights": None, "degenerate": degenerate}, final
-
-
-def _interval_text(x: Fraction | float, radius: Fraction) -> str | dict[str, str]:
-    if radius == 0:
-        return exact_or_ball(Fraction(x))
-    if isinstance(x, float):
-        return {"mid": repr(x), "radius": repr(float(radius))}
-    return {"mid": format_exact(x), "radius": format_exact(radius)}
-
-
-def _read_final_state(document: Mapping[str, Any], structure: Structure, data: Reader) -> FinalState | None:
-    final = document["final_state"]
-    if final is None:
-        return None
-    if list(final) == ["mid", "radius"] and beside(final["mid"]):
-        middle, radius = data.agents(final["mid"]), data.agents(final["radius"])
-    else:
-        middle, radius = zip(*map(interval, final.values()), strict=True)
-    values = [middle[c.nodes[0]] * (c.gauge or (1,))[0] for c in structure.closed_components if c.balanced]
-    spread = radius if any(radius) else None
-    return FinalState(structure.graph.labels, middle, tuple(values), tuple(document["influence"]["degenerate"]), spread)
 
 
 # ---------------------------------------------------------------------- proof
