@@ -193,7 +193,7 @@ def bound_late(
     rows = late_rows(structure, messages)
     first = np.ones(rows.D.size)
     if initial_state is not None and ends is not None:
-        first = np.array([float_up(abs(initial_state[v] - ends[v][0]) + ends[v][1]) for v in rows.followers])
+        first = _away(rows, initial_state, ends)
     bounds = LateBounds(messages, structure, gain, initial_state is None or ends is None)
     found = search_rows(rows, gain, messages, first)
     steps = None
@@ -210,6 +210,19 @@ def bound_late(
     staged = stage_deadlines(rows, protocol.T, messages.age)
     unarrived = staged is None and stage_deadlines(rows, protocol.T, Fraction(0)) is not None
     return replace(bounds, staged=staged, unarrived=unarrived)
+
+
+def _away(
+    rows: FollowerRows, initial_state: Sequence[Fraction], ends: Sequence[tuple[Fraction, Fraction]]
+) -> np.ndarray:
+    """Bound ``|x_k(0) - x_k*|`` of every follower from above: of many in floats with room for their rounding."""
+    if rows.D.size > SEARCHED_FOLLOWERS:
+        with suppress(OverflowError):
+            followers = rows.followers.tolist()
+            parts = ((initial_state[v], *ends[v]) for v in followers)
+            x, mid, radius = np.array([[float(value) for value in part] for part in parts]).T
+            return np.asarray(np.abs(x - mid) + radius + (np.abs(x) + np.abs(mid) + radius) * 2.0**-50 + 1e-300)
+    return np.array([float_up(abs(initial_state[v] - ends[v][0]) + ends[v][1]) for v in rows.followers])
 
 
 def late_rows(structure: Structure, messages: LateMessages) -> FollowerRows:
@@ -255,8 +268,8 @@ def search_rows(
         for loss in _LOSSES[: None if small else 1]:
             offer(1.0, loss)
     else:
-        most = min(rows.largest_q(), _LARGEST_Q)
         if small:
+            most = min(rows.largest_q(), _LARGEST_Q)
             tried = np.exp(math.log(most) * np.linspace(0, 1, _TRIED + 2)[1:-1] ** 2)
             for q in tried:
                 offer(float(q), _LOSSES[0])
@@ -265,7 +278,7 @@ def search_rows(
                 for loss in _LOSSES[1:]:
                     offer(float(best.witness.q), loss)
         else:
-            best_q = _best_q(rows, gain, messages, most)
+            best_q = _best_q(rows, gain, messages, _LARGEST_Q)
             for loss in _LOSSES[1:]:
                 offer(best_q, loss)
     return (min(candidates, key=_largest),) if candidates else ()

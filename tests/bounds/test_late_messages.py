@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from late_certificates import led_graph
 
+from ptcc_certify.bounds import late_messages
 from ptcc_certify.bounds.final_state import final_state
 from ptcc_certify.bounds.late_messages import LateBounds, bound_late
 from ptcc_certify.bounds.small_delays import delay_threshold
@@ -125,6 +126,19 @@ def test_messages_of_leaders_at_rest_may_be_as_old_as_they_like() -> None:
     cert = certify(graph, protocol, messages=LateMessages(delay=each), simulation=False, method="paper")
     assert cert.checked is not None and cert.checked.accepted, cert.checked
     assert cert.late is not None and cert.late.largest <= among.largest * 1.05
+
+
+def test_initial_deviations_of_many_followers_are_bounded_from_above_and_nearly_exact(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(late_messages, "SEARCHED_FOLLOWERS", 0)
+    rows = FollowerRows(analyse(SignedDigraph.from_edges([(0, k, 1) for k in range(1, 8)])))
+    state = [Fraction(1), *(Fraction(10) ** k / 3 for k in range(-3, 4))]
+    ends = [(Fraction(1, 3), Fraction(v, 10**12)) for v in range(8)]
+    exact = [abs(x - mid) + radius for x, (mid, radius) in zip(state, ends, strict=True)][1:]
+    above = [Fraction(float(x)) for x in late_messages._away(rows, state, ends)]
+    for x, y, size in zip(exact, above, state[1:], strict=True):
+        assert x <= y <= x + (size + 1) / 10**14
 
 
 def test_a_bound_that_no_longer_falls_leaves_room_for_how_the_check_rounds() -> None:
