@@ -67,6 +67,8 @@ def design(graph: str, curve: str | None, output: str | None, as_json: bool, scr
     """
     agents = agents_of(options)
     special = agents is not None and not agents.plain
+    if not special:
+        refuse_of_agents()
     _refuse_incomplete(options, special)
     for path in (output, curve):
         refuse_output(path)
@@ -80,7 +82,6 @@ def design(graph: str, curve: str | None, output: str | None, as_json: bool, scr
             answer = design_of_agents(signed, options)
         command = command_of_agents(answer, options)
     else:
-        refuse_of_agents()
         answer = _of_single_integrators(signed, curve, screen, options)
         command = answer.certify_options
     LOG.info("%s", one_line(f"{answer.verdict}: {answer.binding}"))

@@ -81,7 +81,7 @@ def report_html(
     >>> with TemporaryDirectory() as folder:
     ...     certify(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5]).save(f"{folder}/c.json")
     ...     page = report_html(read_certificate(f"{folder}/c.json"))
-    >>> "<h1>Bipartite consensus at T = 1</h1>" in page, "<bdi>&lt;b&gt;</bdi>" in page, "<b>" in page
+    >>> "<h1>Signed-average consensus at T = 1</h1>" in page, "<bdi>&lt;b&gt;</bdi>" in page, "<b>" in page
     (True, True, False)
     """
     template = "family_page.html" if isinstance(saved, FamilyCertificate) else "page.html"

@@ -61,7 +61,7 @@ def test_a_certificate_with_late_messages_is_accepted_and_read_back_as_it_was_ma
     assert section["latency"] == ["1/100", "1/100", "1/50", "1/200"]  # in the order of listeners: b from a and c, c, d
     assert float(max(late.residual)) == late.largest  # type: ignore[arg-type]
     saved = read_certificate("c.json")
-    motion = simulate_late(saved.graph, saved.protocol, LateMessages(delay="0.02"), [1, 3, 4, -4], steps=300)
+    motion = simulate_late(saved.graph, saved.protocol, late.messages, [1, 3, 4, -4], steps=300)
     assert np.abs(motion.states[:, -1] - [1, 1, 1, -1]).max() <= late.largest
 
 
