@@ -11,15 +11,18 @@ The names at the top, by topic:
 
 - Graphs: ``SignedDigraph``, ``as_graph``, ``as_state``, ``read_graph``, ``write_graph``, ``analyse``, ``Structure``
 - Families of graphs: ``Family``, ``as_family``, ``read_family``, ``decide``
-- Protocols, disturbances, actuators: ``NominalProtocol``, ``SlidingModeProtocol``, ``ExpressionDisturbance``,
-  ``SampledDisturbance``, ``StateDependent``, ``telegraph_noise``, ``GainLimits``
-- Runs: ``simulate``, ``simulate_family``, ``Trajectory``
+- Protocols, disturbances, actuators: ``Agents``, ``companion_form``, ``NominalProtocol``, ``SlidingModeProtocol``,
+  ``ExpressionDisturbance``, ``SampledDisturbance``, ``StateDependent``, ``telegraph_noise``, ``GainLimits``,
+  ``LateMessages``, ``MovingLeaders``
+- Runs: ``simulate``, ``simulate_family``, ``simulate_late``, ``simulate_tracking``, ``Trajectory``
 - Certificates: ``certify``, ``certify_vectors``, ``Certificate``, ``Expectations``, ``read_certificate``, ``check``
-- Bounds and design: ``final_state``, ``influence``, ``box``, ``ellipsoid``, ``worst_initial_state``, ``design``
+- Bounds and design: ``final_state``, ``influence``, ``formation_of_biases``, ``box``, ``ellipsoid``,
+  ``worst_initial_state``, ``design``, ``design_agents``
 - Many graphs: ``Ensemble``, ``certify_many``
 - Figures: ``plot_trajectory``, ``plot_decay``, ``plot_run``, ``plot_sliding``, ``plot_trade_off``, ``plot_input``,
   ``plot_effort``, ``plot_graph``, ``plot_spectrum``, ``plot_frontier``, ``plot_family``, ``plot_family_decay``,
-  ``save_figure``, ``SINGLE_COLUMN``, ``DOUBLE_COLUMN``
+  ``plot_motion``, ``plot_formation``, ``plot_late``, ``plot_tracking``, ``save_figure``, ``SINGLE_COLUMN``,
+  ``DOUBLE_COLUMN``
 - Reports: ``write_report``, ``explore``, ``cite``
 - Errors: ``PTCCError``
 
@@ -54,6 +57,8 @@ _EXPORTS = {
     "read_family": "graphs.io",
     "decide": "theorems.family_behaviour",
     # Protocols, disturbances, actuators
+    "Agents": "protocols.agents",
+    "companion_form": "protocols.companion",
     "NominalProtocol": "protocols",
     "SlidingModeProtocol": "protocols",
     "ExpressionDisturbance": "protocols.disturbance",
@@ -61,9 +66,13 @@ _EXPORTS = {
     "StateDependent": "protocols.disturbance",
     "telegraph_noise": "protocols.disturbance",
     "GainLimits": "protocols.gain_limits",
+    "LateMessages": "protocols.late_messages",
+    "MovingLeaders": "protocols.moving_leaders",
     # Runs
     "simulate": "simulation.run",
     "simulate_family": "simulation.family_run",
+    "simulate_late": "simulation.late_messages",
+    "simulate_tracking": "simulation.moving_leaders",
     "Trajectory": "simulation.trajectory",
     # Certificates
     "certify": "certificate.procedure",
@@ -75,14 +84,18 @@ _EXPORTS = {
     # Bounds and design
     "final_state": "bounds.final_state",
     "influence": "bounds.final_state",
+    "formation_of_biases": "bounds.formation",
     "box": "bounds.input.initial_set",
     "ellipsoid": "bounds.input.initial_set",
     "worst_initial_state": "bounds.input.worst_initial_state",
     "design": "gain_design",
+    "design_agents": "agents_design",
     # Many graphs
     "Ensemble": "graphs.ensembles",
     "certify_many": "batch",
     # Figures
+    "plot_motion": "report.plots.agents_motion",
+    "plot_formation": "report.plots.agents_motion",
     "plot_trajectory": "report.plots.trajectory",
     "plot_decay": "report.plots.decay",
     "plot_run": "report.plots.trajectory",
@@ -95,6 +108,8 @@ _EXPORTS = {
     "plot_frontier": "report.plots.spectrum",
     "plot_family": "report.plots.family",
     "plot_family_decay": "report.plots.family",
+    "plot_late": "report.plots.late",
+    "plot_tracking": "report.plots.late",
     "save_figure": "report.plots.style",
     "SINGLE_COLUMN": "report.plots.style",
     "DOUBLE_COLUMN": "report.plots.style",
@@ -113,6 +128,13 @@ _ALSO_CALLED = {
     "load_certificate": "read_certificate",
     "plot_states": "plot_trajectory",
     "load_graph": "as_graph",
+    "load": "read_certificate",
+    "verify": "check",
+    "plot": "plot_trajectory",
+    "compare": "certify_many",
+    "DiGraph": "SignedDigraph",
+    "Graph": "SignedDigraph",
+    "Protocol": "NominalProtocol",
 }
 _ALSO_CALLED |= {name: f"theorems.restricted_signals.{name}" for name in ("DwellTime", "JointWindows", "ClockShares")}
 

@@ -125,7 +125,7 @@ class HypothesisError(PTCCError, ValueError):
 
 
 class UnknownName(PTCCError, AttributeError):
-    """A room has no module, and the package no public name, that is called so."""
+    """A room has no module, the package no public name, or an object no attribute, that is called so."""
 
 
 class SimulationError(PTCCError, RuntimeError):

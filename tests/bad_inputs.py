@@ -280,6 +280,12 @@ OPTIONS = [
     _option("x0 for two dimensions a text", "--x0", "--dimension", "2", "--x0", "x," * 11 + "x", command="simulate"),
     _option("simulated x0 of 400 digits", "x0", "--x0", "9" * 400 + ",2,3,4,5,6", command="simulate"),
     BadInput("no certificate", ("check",), "CERTIFICATE"),
+    BadInput(
+        "reading options without a graph",
+        ("check", "c.json", "--edges", "listens"),
+        "name it: ptcc check CERT GRAPH",
+        (("c.json", "{}"),),
+    ),
     BadInput("missing certificate", ("check", "nowhere.json"), "nowhere.json: not a readable certificate"),
     BadInput("certificate that is a folder", ("check", "c.json"), "is a folder", (("c.json", _folder),)),
     BadInput("certificate cut short", ("check", "c.json"), "not a readable", (("c.json", '{"schema": "ptcc-'),)),

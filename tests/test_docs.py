@@ -93,6 +93,9 @@ NO_SOURCE = {
     "families are new here: their page is docs/theory/families.md": {
         *("Family", "decide", "DwellTime", "JointWindows", "ClockShares")
     },
+    "agents of order n are new here: their page is docs/theory/agents.md": {
+        *("Agents", "companion_form", "formation_of_biases")
+    },
     "files and numbers are converted": {
         *(
             "as_family",

@@ -288,7 +288,21 @@ FAMILIES = {
     "ptcc.decide(day)[0].plot()": "ParameterError: the component has no counterexample",
     "ptcc.analyse(day)": "GraphError: Family(2 nodes, 1 of 2 weights uncertain) is several graphs",
 }
-CALLS = CONTROL_RESEARCHER | NETWORK_SCIENTIST | ENGINEER | STUDENT | REVIEWER | MISTAKES | FAMILIES
+#: Not there; the refusal says where it is.
+ELSEWHERE = {
+    "g.plot()": "... UnknownName: SignedDigraph has no attribute 'plot'; draw it with ptcc_certify.plot_graph",
+    "g.nodes": "... UnknownName: SignedDigraph has no attribute 'nodes'; did you mean labels?",
+    "g.add_edge('ann', 'eve', 1)": "... UnknownName: SignedDigraph has no attribute 'add_edge'; it stays as it is",
+    "g.lables": "... did you mean labels",
+    "ptcc.analyse(g).camps": "... UnknownName: Structure has no attribute 'camps'; gauge holds the camp",
+    "cert.T": "... UnknownName: Certificate has no attribute 'T'; see its protocol",
+    "cert.error(1)": "... UnknownName: Certificate has no attribute 'error'; norm_bound(q) bounds ||E(t)||",
+    "cert.check()": "... UnknownName: Certificate has no attribute 'check'; write ptcc_certify.check(certificate)",
+    "cert.trajectory.animate()": "... UnknownName: Trajectory has no attribute 'animate'; there are no animations",
+    "hasattr(g, 'nodes'), hasattr(g, '_ipython_display_'), copy.copy(g) == g": "(False, False, True)",
+    "ptcc.load('c.json')": "... did you mean read_certificate?",
+}
+CALLS = CONTROL_RESEARCHER | NETWORK_SCIENTIST | ENGINEER | STUDENT | REVIEWER | MISTAKES | FAMILIES | ELSEWHERE
 
 
 @pytest.fixture(scope="module")

@@ -65,7 +65,15 @@ def test_commands_and_python_of_a_page_run(page: Path, folder: Path, request, mo
     run_page(text, folder)
 
 
-@pytest.mark.parametrize("page", ["guide/answer.md", "guide/input.md"])
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_no_line_of_a_formula_begins_like_a_point_of_a_list(page: Path):
+    apart = r"^```.*?^```|`[^`\n]*`|^\$\$.*?\$\$"
+    text = re.sub(apart, "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+    formulas = re.findall(r"\$[^$]+\$", text)
+    assert [formula for formula in formulas if re.search(r"\n([-+*]|\d+[.)]) ", formula)] == []
+
+
+@pytest.mark.parametrize("page", ["guide/answer.md", "guide/input.md", "guide/agents.md"])
 def test_transcripts_are_what_ptcc_prints(page: str):
     assert check_transcripts((ROOT / "docs" / page).read_text(encoding="utf-8"))
 

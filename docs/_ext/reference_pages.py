@@ -34,6 +34,7 @@ ROOMS = {
         "theorems.claims theorems.table theorems.theorem theorems.lemmas theorems.symbolic",
     ),
     "gain_design": ("Design of gains and deadlines", "gain_design"),
+    "agents_design": ("Design of deadlines of agents of order n", "agents_design"),
     "batch": ("Many graphs", "batch"),
     "report": ("Pages, statements, figures", "report.explorer"),
     "examples": ("The examples of the paper", "examples"),

@@ -146,6 +146,8 @@ def _factor(F: Integers, D: Integers) -> tuple[np.ndarray, int, float]:
             return np.zeros_like(rows), 0, math.inf
         least = min(halves, default=0)
         image, power = np.ldexp(rows, [least - half for half in halves]) @ Z, power - least
-        apart = float(np.abs(Z.T @ T @ Z - np.eye(len(T))).sum(axis=1).max(initial=0.0))
+        # besides what the rounding of T may hide: of an ill-conditioned T floats see another matrix
+        off = np.abs(Z.T @ T @ Z - np.eye(len(T))) + 2.0**-50 * (np.abs(Z.T) @ np.abs(T) @ np.abs(Z))
+        apart = float(off.sum(axis=1).max(initial=0.0))
         finite = bool(np.isfinite((image**2).sum()))
     return (image, power, apart) if finite else (np.zeros_like(rows), 0, math.inf)

@@ -100,8 +100,14 @@ class Certificate(Content, FromFile, Shown):
         What was asked.
     observed : Observations
         What was seen, and is not claimed.
+    late : LateBounds or None
+        What holds with late messages; None where nothing was asked of them.
+    tracking : Tracking or None
+        What holds while leaders move; None where nothing was asked of that.
     source : Source or None
         The file that it was read from.
+    agents : AgentsPart or None
+        What is proved of agents of order n; then initial and final states are there, and not above.
 
     References
     ----------
@@ -196,7 +202,8 @@ class Certificate(Content, FromFile, Shown):
 
         ``role``, ``group``, ``camp`` and ``component`` are those of :meth:`Structure.to_pandas`; ``x(0)`` and ``x(T)``
         are rounded to floats; ``deviation`` bounds ``|x_k - x_k(T)|`` at 0.99 T, or at T_r + 0.99 T_s. The last three
-        are NaN where the certificate has no initial state, or nothing is proved.
+        are NaN where the certificate has no initial state, or nothing is proved. Of agents of order n there are columns
+        for each derivative and coordinate, such as ``v_2(T)``, and the proved bound of the input.
 
         Raises
         ------
@@ -209,6 +216,8 @@ class Certificate(Content, FromFile, Shown):
         >>> certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5]).to_pandas()["x(T)"].to_dict()
         {'a': -1.0, 'b': 1.0}
         """
+        if self.agents is not None:
+            return self.structure.to_pandas().assign(**self.agents.columns())
         table, unknown = self.structure.to_pandas(), np.full(self.graph.n_nodes, np.nan)
         start, deviation = self.initial_state, unknown
         if start is not None and self.functions:
@@ -219,13 +228,14 @@ class Certificate(Content, FromFile, Shown):
         table["deviation"] = np.where(np.isfinite(deviation), deviation, np.nan)
         return table
 
-    def plot(self, what: str = "decay", **keywords: Any) -> Any:
+    def plot(self, what: str | None = None, **keywords: Any) -> Any:
         """Draw a figure of the certificate.
 
         Parameters
         ----------
-        what : {"decay", "input", "graph", "spectrum", "states"}
-            Run and bound, inputs and their proved peaks, the graph, the eigenvalues, or the states.
+        what : {"decay", "input", "graph", "spectrum", "states", "motion", "formation", "late", "tracking", None}
+            Run and bound, inputs and their proved peaks, the graph, the eigenvalues, or the states; of agents of order
+            n positions and velocities, or their ways in the plane. None: :attr:`main_figure`.
         **keywords : Any
             ``ax`` and others of the function ``ptcc_certify.plot_<what>``.
 
@@ -238,7 +248,16 @@ class Certificate(Content, FromFile, Shown):
         ParameterError
             No figure is called so, or there is nothing to draw.
         """
-        return plot(self, what, **keywords)
+        return plot(self, what or self.main_figure, **keywords)
+
+    @property
+    def main_figure(self) -> str:
+        """The figure of what is claimed: of moving leaders, late messages, agents of order n, else the decay."""
+        if self.agents is not None:
+            return "motion"
+        if self.initial_state is None or self.final_state is None:
+            return "decay"
+        return "tracking" if self.tracking is not None else "decay" if self.late is None else "late"
 
     def summary(self) -> str:
         """Return what ``ptcc certify`` prints of it."""

@@ -15,13 +15,20 @@ from typing import Any, Self
 
 import numpy as np
 
+from ptcc_certify.bounds.agents_comparison import AgentsComparison
 from ptcc_certify.bounds.deviation_from_final_state import DeviationGeometry
 from ptcc_certify.bounds.envelope import Comparison, Envelope, remaining_part
 from ptcc_certify.bounds.final_state import FinalState, Influence, final_state, influence
 from ptcc_certify.bounds.input.effort import Effort
 from ptcc_certify.bounds.input.effort_bounds import InputRequest, bound_effort
 from ptcc_certify.bounds.input.worst_initial_state import WorstInitialState, worst_initial_state
+from ptcc_certify.bounds.late_messages import LateBounds
 from ptcc_certify.bounds.sliding_envelope import SlidingEnvelope
+from ptcc_certify.bounds.small_delays import DecayingForm
+from ptcc_certify.bounds.tracking import Tracking
+from ptcc_certify.certificate.agents_part import AgentsPart
+from ptcc_certify.certificate.format_leaders import tracking_obligations
+from ptcc_certify.certificate.format_messages import late_obligations
 from ptcc_certify.certificate.format_vectors import final_state_witness
 from ptcc_certify.certificate.request import Expectations, Request
 from ptcc_certify.checker import CheckReport
@@ -37,6 +44,7 @@ from ptcc_certify.lyapunov.search import DIAGONAL, Search
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.disturbance import ExpressionDisturbance
 from ptcc_certify.protocols.reaching_time import ReachingTime
+from ptcc_certify.simulation.agents import AgentsTrajectory
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.trajectory import Trajectory
 from ptcc_certify.theorems.claims import Claim, sliding_claim
@@ -65,6 +73,8 @@ class Observations:
         The searches that the time limit ended; what they had proved by then stands.
     notes : tuple of str
         What kept the verdict from ``certified``, and other remarks.
+    agents_run : AgentsTrajectory or None
+        A simulated run of agents of order n.
     """
 
     trajectory: Trajectory | None = None
@@ -73,6 +83,7 @@ class Observations:
     search: Search = field(default_factory=Search)
     cut_off: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    agents_run: AgentsTrajectory | None = None
 
 
 #: What may be put to a certificate that was read: what is asked, and what was seen.
@@ -126,7 +137,10 @@ class Content:
     matrix: Influence | None
     request: Request
     observed: Observations
+    late: LateBounds | None = None
+    tracking: Tracking | None = None
     source: Source | None = None
+    agents: AgentsPart | None = None
 
     def changed(self, **values: Any) -> Self:
         """Return the certificate with other parts, in whichever group they are; what follows is computed anew.
@@ -150,10 +164,13 @@ class Content:
         """
         if self.source is not None and values.keys() - _OF_NO_FILE:
             raise ParameterError("a certificate that was read is what its file says; certify the graph again")
+        if self.agents is not None and values.keys() & {"protocol", "initial_state", "sigma0"}:
+            raise ParameterError("gains and bounds of agents of order n belong to their protocol; certify them again")
         if (search := values.pop("search", None)) is not None:
             values |= {"searched_functions": search.functions, "search": replace(search, functions=())}
         if values.keys() & {"protocol", "initial_state", "sigma0"}:
             values.setdefault("trajectory", None)
+            values |= {"late": values.get("late"), "tracking": values.get("tracking")}
         if values.keys() & {"initial_state", "sigma0"} and "final_state" not in values:
             x0, sigma0 = (values.get(name, getattr(self, name)) for name in ("initial_state", "sigma0"))
             first = x0 and [x - s for x, s in zip(x0, sigma0 or [0] * len(x0), strict=True)]
@@ -425,6 +442,8 @@ class Content:
         return self.envelope.deviation_bound(remaining, self._require_initial_state())
 
     def _require_initial_state(self) -> tuple[Fraction, ...]:
+        if self.agents is not None:
+            raise ParameterError("this certificate is of agents of order n; ask its attribute agents")
         if self.initial_state is None:
             raise ParameterError("the certificate has no initial state; certify the graph with x0")
         return self.initial_state
@@ -446,7 +465,7 @@ class Content:
         """What is proved about the input; None if no decay was proved."""
         if self.source is not None:
             return self.source.effort
-        if self.rate is None and not self.constant:
+        if self.agents is not None or (self.rate is None and not self.constant):
             return None
         request = InputRequest(
             self.structure,
@@ -465,6 +484,23 @@ class Content:
             noise=self.noise,
         )
         return bound_effort(request)
+
+    @property
+    def decaying_forms(self) -> list[DecayingForm]:
+        """The Lyapunov functions in the coordinates ``E`` with all their constants; none without an exact ``Q``."""
+        effort, found = self.effort, []
+        if effort is None or not self.influence.exact or self._geometry is None:
+            return []
+        for k, (V, constants) in enumerate(zip(self.functions, effort.constants, strict=True)):
+            form = V.form
+            if form is None or form.coordinates != "E" or V.deviation is None or not V.proved_rate > 0:
+                continue
+            if form.diagonal is not None:
+                weight = dict(zip(form.nodes, form.diagonal, strict=True))
+                constants = tuple(1 / weight[v] if v in weight else Fraction(0) for v in range(self.graph.n_nodes))
+            if constants is not None:
+                found.append(DecayingForm(k, form, constants, V.deviation.agents))
+        return found
 
     @cached_property
     def worst_initial_state(self) -> WorstInitialState | None:
@@ -505,7 +541,9 @@ class Content:
                 obligations.append(Obligation("reaching-time", "reaching_time"))
         if self.effort is not None:
             obligations += self.effort.obligations
-        return tuple(obligations)
+        if self.agents is not None:
+            obligations += self.agents.obligations
+        return (*obligations, *late_obligations(self.late), *tracking_obligations(self.tracking))
 
     # ------------------------------------------------------------------ simulation
 
@@ -515,6 +553,17 @@ class Content:
         if self.trajectory is None or not (self.envelope.functions or self.protocol.reaching):
             return None
         return self.envelope.compare(self.trajectory)
+
+    @cached_property
+    def agents_comparison(self) -> AgentsComparison | None:
+        """The simulated run of agents of order n against the proved bounds; None without a run."""
+        run = self.observed.agents_run
+        return None if self.agents is None or run is None else self.agents.compare(run)
+
+    @property
+    def violated(self) -> bool:
+        """Whether a simulated run exceeds a proved bound."""
+        return any(seen is not None and seen.violated for seen in (self.comparison, self.agents_comparison))
 
     @property
     def disturbance(self) -> str | None:

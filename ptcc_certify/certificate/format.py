@@ -16,28 +16,27 @@ from typing import Any
 import numpy as np
 
 from ptcc_certify.bounds.envelope import FRACTIONS, LAST_INSTANTS
-from ptcc_certify.bounds.final_state import FinalState, rounding_radius
 from ptcc_certify.bounds.input.effort import EnergyIntegral, Peak
 from ptcc_certify.certificate.certificate_data import Content, Observations, Source
+from ptcc_certify.certificate.format_agents import agents_section, read_agents
 from ptcc_certify.certificate.format_effort import LIMITS, effort_section, energy_witness, peak_witness, read_effort
+from ptcc_certify.certificate.format_final_state import final_state_sections, read_final_state
 from ptcc_certify.certificate.format_graph import certificate_graph, claim_sections, graph_section, structure_section
+from ptcc_certify.certificate.format_leaders import leaders_section, read_tracking
+from ptcc_certify.certificate.format_messages import Vectors, messages_section, read_late
+from ptcc_certify.certificate.format_unproved import nothing_proved, read_unproved, write_unproved
 from ptcc_certify.certificate.format_vectors import (
     Reader,
     Writer,
-    exact_or_ball,
     factor_entry,
     finite,
-    influence_balls,
-    interval_text,
     number,
     text,
-    weighted_sum,
 )
 from ptcc_certify.certificate.request import Expectations, Request
 from ptcc_certify.checker import SCHEMA, SLIDING_BOUND, SLIDING_CLOCK, CheckReport, digest
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
-from ptcc_certify.checker.reading import RejectedError, exact, interval, triangle
-from ptcc_certify.checker.side_files import beside
+from ptcc_certify.checker.reading import RejectedError, exact, triangle
 from ptcc_certify.errors import one_line
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import Structure, analyse, behaviour_name
@@ -53,7 +52,7 @@ def certificate_document(content: Content, verdict: str, files: bool = False) ->
     """Return a certificate as JSON-ready data, and what holds its side files."""
     graph, structure = content.graph, content.structure
     out = Writer(graph.labels, files)
-    influence, final = _write_final_state(content, out)
+    influence, final = final_state_sections(content, out)
     run = content.trajectory
     document: dict[str, Any] = {
         "schema": SCHEMA,
@@ -82,6 +81,12 @@ def certificate_document(content: Content, verdict: str, files: bool = False) ->
         "proof": [_write_obligation(o, out) for o in content.obligations],
         "verdict": verdict,
     }
+    if content.agents is not None:
+        document["agents"] = agents_section(content.agents, out)
+    if content.late is not None and content.late.says_something:
+        document["messages"] = messages_section(content.late, out)
+    if content.tracking is not None:
+        document["leaders"] = leaders_section(content.tracking, out)
     return document | {"digest": digest(document), "unverified": _write_unverified(content)}, out
 
 
@@ -103,6 +108,8 @@ def read_document(
     if paper is not None and paper["rho_interval"] is not None:
         rho = ExactInterval(*(number(paper["rho_interval"][key]) for key in ("printed", "exact")))
     effort = read_effort(document, structure, protocol, data, steps)
+    request = _read_request(document["unverified"], None if effort is None else effort.initial_set)
+    request = replace(request, **read_unproved(document, structure))
     return {
         "structure": structure,
         "protocol": protocol,
@@ -115,11 +122,15 @@ def read_document(
         ),
         "searched_functions": tuple(V for V in functions if V.kind != "paper"),
         "limit": _read_limit(steps, data),
-        "final_state": _read_final_state(document, structure, data),
+        "final_state": read_final_state(document, structure, data),
         "matrix": None,
-        "request": _read_request(document["unverified"], None if effort is None else effort.initial_set),
+        "late": read_late(document, structure, protocol, data, steps)
+        or nothing_proved(request.messages, structure, protocol, initial_state is None),
+        "tracking": read_tracking(document, structure, protocol, data, steps),
+        "request": request,
         "observed": _read_observations(document["unverified"]),
         "source": Source(path, sha256, document, report, effort, proof, files),
+        "agents": read_agents(document.get("agents"), structure, protocol, functions),
     }
 
 
@@ -259,95 +270,6 @@ def _read_limit(steps: Mapping[tuple[str, str], Obligation], data: Reader) -> Ra
     return RateBound(value, data.nodes(section["nodes"]), form, tuple(tuple(map(exact, vector)) for vector in vectors))
 
 
-# ---------------------------------------------------------------------- final state
-
-
-def _write_final_state(content: Content, out: Writer) -> tuple[dict[str, Any] | None, dict[str, Any] | None]:
-    """Write the influence of every leader, and the final state, exact or in balls; None if they are floating point."""
-    if content.influence.exact:
-        return _exact_final_state(content)
-    return (None, None) if content.influence.enclosure is None else _enclose_final_state(content, out)
-
-
-def _exact_final_state(content: Content) -> tuple[dict[str, Any], dict[str, Any] | None]:
-    matrix, structure, labels = content.influence, content.structure, content.graph.labels
-    left_null_vectors, containment_weights = influence_balls(matrix)
-    followers = structure.followers.tolist()
-    ends: dict[str, Any] | None = None
-    if content.final_state is not None and content.initial_state is not None:
-        sigma0 = content.sigma0 or [Fraction(0)] * len(labels)
-        first = [(x - s, Fraction(0)) for x, s in zip(content.initial_state, sigma0, strict=True)]
-        groups = list(zip(matrix.balanced, left_null_vectors, strict=True))
-        values = [weighted_sum(null_vector, [first[v] for v in c.nodes]) for c, null_vector in groups]
-        final = dict.fromkeys(range(len(labels)), (Fraction(0), Fraction(0)))
-        for component, (middle, radius) in zip(matrix.balanced, values, strict=True):
-            final |= {v: (g * middle, radius) for v, g in zip(component.nodes, component.gauge or (), strict=True)}
-        final |= {v: weighted_sum(row, values) for v, row in zip(followers, containment_weights, strict=True)}
-        ends = {label: interval_text(final[v]) for v, label in enumerate(labels)}
-    section = {
-        "components": [
-            {"nodes": [labels[v] for v in c.nodes], "left_null_vector": [interval_text(w) for w in null_vector]}
-            for c, null_vector in zip(matrix.balanced, left_null_vectors, strict=True)
-        ],
-        "containment_weights": {
-            labels[v]: [interval_text(w) for w in row] for v, row in zip(followers, containment_weights, strict=True)
-        },
-        "degenerate": None if ends is None else list(content.degenerate),
-    }
-    return section, ends
-
-
-def _enclose_final_state(content: Content, out: Writer) -> tuple[dict[str, Any], dict[str, Any] | None]:
-    """Write the final state of a large graph: left null vectors of leader groups, and its intervals."""
-    labels, matrix, final_state = content.graph.labels, content.influence, content.final_state
-    assert matrix.enclosure is not None
-    final: dict[str, Any] | None = None
-    if final_state is not None and final_state.radius is not None:
-        pairs = list(zip(final_state.states, final_state.radius, strict=True))
-        if out.aside(len(labels)) and all(isinstance(x, float) or r == 0 for x, r in pairs):
-            radius = [float(r) if isinstance(x, float) else rounding_radius(x) for x, r in pairs]
-            final = {
-                "mid": out.vector("mid", np.asarray(final_state)),
-                "radius": out.vector("radius", np.array(radius)),
-            }
-        else:
-            final = {label: _interval_text(x, r) for label, (x, r) in zip(labels, pairs, strict=True)}
-    groups = []
-    for k, (component, null_vector) in enumerate(matrix.groups):
-        if k in matrix.enclosure.left_null_vectors:
-            middles, radii = (x.tolist() for x in matrix.enclosure.left_null_vectors[k])
-            left_null_vector: list[Any] = [
-                {"mid": repr(x), "radius": repr(r)} for x, r in zip(middles, radii, strict=True)
-            ]
-        else:
-            left_null_vector = [exact_or_ball(Fraction(w)) for w in null_vector]
-        if len(component.nodes) > 1:
-            groups.append({"nodes": [labels[v] for v in component.nodes], "left_null_vector": left_null_vector})
-    degenerate = None if final_state is None else list(final_state.degenerate)
-    return {"components": groups, "containment_weights": None, "degenerate": degenerate}, final
-
-
-def _interval_text(x: Fraction | float, radius: Fraction) -> str | dict[str, str]:
-    if radius == 0:
-        return exact_or_ball(Fraction(x))
-    if isinstance(x, float):
-        return {"mid": repr(x), "radius": repr(float(radius))}
-    return {"mid": format_exact(x), "radius": format_exact(radius)}
-
-
-def _read_final_state(document: Mapping[str, Any], structure: Structure, data: Reader) -> FinalState | None:
-    final = document["final_state"]
-    if final is None:
-        return None
-    if list(final) == ["mid", "radius"] and beside(final["mid"]):
-        middle, radius = data.agents(final["mid"]), data.agents(final["radius"])
-    else:
-        middle, radius = zip(*map(interval, final.values()), strict=True)
-    values = [middle[c.nodes[0]] * (c.gauge or (1,))[0] for c in structure.closed_components if c.balanced]
-    spread = radius if any(radius) else None
-    return FinalState(structure.graph.labels, middle, tuple(values), tuple(document["influence"]["degenerate"]), spread)
-
-
 # ---------------------------------------------------------------------- proof
 
 
@@ -360,6 +282,8 @@ def _write_obligation(obligation: Obligation, out: Writer) -> dict[str, Any]:
         witness = energy_witness(witness)
     elif isinstance(witness, Peak):
         witness = peak_witness(witness, out)
+    elif isinstance(witness, Vectors):
+        witness = witness.written(out)
     elif isinstance(witness, tuple):
         witness = {"u": dict(zip(out.labels, map(format_exact, witness), strict=True))}
     elif isinstance(witness, np.ndarray):
@@ -424,7 +348,7 @@ def _write_unverified(content: Content) -> dict[str, Any]:
         },
         "residual": {name: finite(envelope.residual(q)) for name, q in residual.items()} if content.direct else None,
         "final_state": floats,
-        "asked": _write_request(content.request),
+        "asked": _write_request(content.request) | write_unproved(content),
         "scenario": None if content.request.scenario is None else dict(content.request.scenario),
         "origins": dict(content.request.origins),
         "simulation": _write_run(content),
@@ -471,6 +395,7 @@ def _write_request(request: Request) -> dict[str, Any]:
         "behaviour": expectations.behaviour,
         "min_rate": text(expectations.min_rate),
         "max_input": text(expectations.max_input),
+        "max_residual": text(expectations.max_residual),
         "limits": [{name: text(getattr(entry, name)) for name in LIMITS} for entry in request.limits],
         "delta": text(request.delta),
         "noise": text(request.noise),
@@ -497,7 +422,9 @@ def _read_request(unverified: Mapping[str, Any], initial_set: InitialSet | None)
         delta=_positive(section, "delta"),
         noise=_positive(section, "noise"),
         time_limit=float(seconds) if isinstance(seconds, int | float) and seconds is not True else math.inf,
-        expectations=Expectations(behaviour, _positive(section, "min_rate"), _positive(section, "max_input")),
+        expectations=Expectations(
+            behaviour, *(_positive(section, key) for key in ("min_rate", "max_input", "max_residual"))
+        ),
         scenario=scenario if isinstance(scenario, dict) else None,
         origins={key: one_line(origin)[:200] for key, origin in origins if isinstance(origin, str)},
     )

@@ -6,7 +6,7 @@ import hashlib
 import io
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ import numpy as np
 
 from lmi.exact.definite import SparseFactor
 from ptcc_certify.bounds.final_state import Influence
-from ptcc_certify.checker.reading import exact
+from ptcc_certify.checker.reading import RejectedError, exact
 from ptcc_certify.checker.side_files import SideFiles, beside
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.io.files import read_bytes
@@ -184,6 +184,14 @@ def number(digits: str | None) -> Fraction | None:
     return None if digits is None else exact(digits)
 
 
+def readable(read: Callable[[], Any]) -> Any:
+    """Return what is read from a part of any content; None where it cannot be."""
+    try:
+        return read()
+    except (RejectedError, ArithmeticError, LookupError, TypeError, ValueError, AttributeError):
+        return None
+
+
 def finite(value: float | None) -> float | None:
     """Return a float that JSON holds, or None."""
     return value if value is not None and math.isfinite(value) else None
@@ -240,6 +248,20 @@ def influence_balls(matrix: Influence) -> tuple[list[list[Interval]], list[list[
     columns = [_balls([Fraction(row[k]) for row in rows]) for k in range(len(matrix.left_null_vectors))]
     containment_weights = [list(row) for row in zip(*columns, strict=True)] if columns else [[] for _ in rows]
     return left_null_vectors, containment_weights
+
+
+def agents_ends(matrix: Influence, begin: Sequence[Interval]) -> list[Interval]:
+    """Return ``Q x`` for intervals ``x`` of the agents."""
+    left_null_vectors, containment_weights = influence_balls(matrix)
+    groups = list(zip(matrix.balanced, left_null_vectors, strict=True))
+    values = [weighted_sum(null_vector, [begin[v] for v in c.nodes]) for c, null_vector in groups]
+    ends = [(Fraction(0), Fraction(0))] * len(begin)
+    for component, (middle, radius) in zip(matrix.balanced, values, strict=True):
+        for v, g in zip(component.nodes, component.gauge or (), strict=True):
+            ends[v] = g * middle, radius
+    for v, row in zip(matrix.structure.followers.tolist(), containment_weights, strict=True):
+        ends[v] = weighted_sum(row, values)
+    return ends
 
 
 def _balls(values: Sequence[Fraction]) -> list[Interval]:

@@ -8,17 +8,17 @@ the check; a simulation corroborates and never proves.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import partial
-from typing import Any, overload
+from typing import Any, cast, overload
 
 import numpy as np
 
 from lmi import search_time as deadline
 from lmi.child_process import apart
-from lmi.errors import LMIError, OutOfTime
+from lmi.errors import LMIError, NoCertificate, OutOfTime
 from lmi.search_time import share_of_time
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.bounds.final_state import (
@@ -30,6 +30,12 @@ from ptcc_certify.bounds.final_state import (
     final_state,
     influence,
 )
+from ptcc_certify.bounds.late_messages import LateBounds, bound_late
+from ptcc_certify.bounds.longest_delay import longest_delay
+from ptcc_certify.bounds.small_delays import SmallDelayBounds
+from ptcc_certify.bounds.tracking import Tracking, bound_tracking
+from ptcc_certify.certificate.agents_part import prove_agents
+from ptcc_certify.certificate.agents_request import Chains, read_chains, refuse_agents
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.certificate_data import Observations
 from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
@@ -38,10 +44,12 @@ from ptcc_certify.certificate.request import (
     Request,
     listener,
     origins_of,
+    read_expectations,
     read_initial_state,
     read_request,
     read_sliding_variable,
     refuse,
+    refuse_beside,
 )
 from ptcc_certify.certificate.verdict import MANY_DECADES
 from ptcc_certify.checker.input_formulas import Limits
@@ -57,8 +65,12 @@ from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.lyapunov.rate_upper_bound import RateBound, mean_bound, prove_rate_bound
 from ptcc_certify.lyapunov.search import APART_NODES, Search, search_functions, search_large
 from ptcc_certify.protocols import Protocol
+from ptcc_certify.protocols.agents import Agents
 from ptcc_certify.protocols.base import ReachingProtocol
 from ptcc_certify.protocols.disturbance import as_disturbance
+from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.protocols.moving_leaders import MovingLeaders
+from ptcc_certify.protocols.reaching_time import ReachingTime
 from ptcc_certify.simulation.filippov import rounding_slack
 from ptcc_certify.simulation.instants import PAST
 from ptcc_certify.simulation.run import simulate
@@ -111,12 +123,17 @@ def certify(
     limits: Limits | Sequence[Limits] = (),
     delta: Any = None,
     noise: Any = None,
+    messages: LateMessages | None = None,
+    leaders: MovingLeaders | None = None,
     signal: SignalClass = "any",
     time_limit: float | None = None,
     expectations: Expectations | str | None = None,
     scenario: Mapping[str, Any] | None = None,
     origins: Mapping[str, str] | None = None,
     progress: Callable[[str], None] | None = None,
+    agents: Agents | None = None,
+    v0: Any = None,
+    derivatives: Any = None,
 ) -> Certificate | FamilyCertificate:
     """Certify what a protocol does on a signed digraph, or on a family of these whatever the signal.
 
@@ -156,6 +173,12 @@ def certify(
     noise : number, optional
         Nominal protocol: bound of the measurement noise ``|n_k|``, ``u = -gain L (X + n)``, whose effect is bounded
         under each of ``limits`` but sampling. Noise times an infinite gain is bounded by nothing.
+    messages : LateMessages, optional
+        How late, how often lost and how inexact is what agents hear; what is left at the deadline then is bounded. With
+        single leaders, and ``sigma(0) = 0`` under the sliding-mode protocol.
+    leaders : MovingLeaders, optional
+        Nominal protocol, single leaders: how fast these move; how followers track them is bounded. Not with
+        ``messages``.
     signal : {"any", "constant"}, DwellTime, JointWindows or ClockShares
         Of a family: restricted signals of which more is claimed, beside what holds for every signal; the three classes
         are in :mod:`ptcc_certify.theorems.restricted_signals`.
@@ -173,6 +196,12 @@ def certify(
         kept under ``unverified.origins``, and told by ``summary``.
     progress : callable, optional
         Is told each of :data:`STEPS` as it begins.
+    agents : Agents, optional
+        Agents of order n, or in a formation; without them ``x' = u``. Then ``x0`` may be N rows of coordinates.
+    v0 : state-like, optional
+        Of agents of order n: initial velocities, like ``x0``; without them 0.
+    derivatives : sequence of state-like, optional
+        Instead of ``v0``: velocities, accelerations and so on.
 
     Returns
     -------
@@ -213,15 +242,21 @@ def certify(
     options: dict[str, Any] = {"method": method, "at": at, "initial_set": initial_set, "limits": limits, "delta": delta}
     options |= {
         "noise": noise,
+        "messages": messages,
+        "leaders": leaders,
         "signal": signal,
         "time_limit": time_limit,
         "expectations": expectations,
         "scenario": scenario,
     }
     options["origins"] = origins_of(graph, x0, sigma0) | dict(origins or {})
+    of_agents = _agents_options(
+        agents, protocol, {**options, "sigma0": sigma0, "disturbance": disturbance}, v0, derivatives
+    )
     if isinstance(graph, Protocol):
         raise ParameterError("graph and protocol are exchanged; write certify(graph, protocol)")
     if uncertainty or is_family(graph):
+        options |= {"agents": of_agents}
         options |= {"simulation": simulation, "sigma0": sigma0, "disturbance": disturbance, "progress": progress}
         family = _family(graph, orientation, uncertainty, options)
         return certify_family(family, protocol, x0, **{name: options[name] for name in _OF_FAMILIES})
@@ -233,43 +268,76 @@ def certify(
     refuse(graph, protocol, method, {"sigma0": sigma0, "disturbance": disturbance}, [*limits, delta, noise])
     structure = analyse(graph)
     request = read_request(structure, protocol, options)
-    initial_state = None if x0 is None else read_initial_state(structure, x0, "x0")
+    refuse_beside(structure, protocol, request)
+    chains = None if of_agents is None else read_chains(of_agents, graph, x0, v0, derivatives)
+    initial_state = None if x0 is None or chains else read_initial_state(structure, x0, "x0")
     manifold, reaching = read_sliding_variable(structure, protocol, sigma0)
     case = Case(structure, protocol, request, initial_state, manifold, progress)
-    runs = case.needs_run(simulation) and initial_state is not None
+    wanted = case.needs_run(simulation)
+    runs = wanted and initial_state is not None
     if not runs and disturbance is not None and protocol.reaching is not None:
         _check_disturbance(disturbance, protocol.reaching, graph)
-    with deadline.time_limit(SEARCHING * request.time_limit):
-        trajectory = case.simulation(disturbance) if runs else None
-        lyapunov, proof, numerical = case.paper()
-        search = case.search(proof)
-        limit = case.upper_bound()
-    matrix, result = case.final_state(trajectory)
-    proved = [proof.rate, *(V.rate for V in search.functions)]
-    certificate = Certificate(
-        structure=structure,
-        protocol=protocol,
-        initial_state=initial_state,
-        sigma0=manifold,
-        reaching=reaching,
-        lyapunov=lyapunov,
-        proof=proof,
-        searched_functions=search.functions,
-        limit=limit,
-        final_state=result,
-        matrix=matrix,
-        request=request,
-        observed=Observations(
-            trajectory=trajectory,
-            numerical_rate=numerical,
-            spectral_rate=_spectral_rate(structure, proved, case.notes),
-            search=replace(search, functions=()),
-            cut_off=tuple(case.cut_off),
-            notes=tuple(case.notes),
-        ),
-    )
+    certificate = case.certificate(disturbance, runs, reaching)
+    if of_agents is not None and chains is not None:
+        certificate = _with_agents(certificate, of_agents, chains, wanted)
+    certificate = _with_small_delays(certificate)
     progress(STEPS[5])
     return _with_word_of_check(certificate)
+
+
+def _agents_options(agents: Any, protocol: Protocol, asked: dict[str, Any], v0: Any, derivatives: Any) -> Agents | None:
+    """Return agents of order n, None for single integrators, or refuse what is asked of them."""
+    if agents is None or (isinstance(agents, Agents) and agents.plain):
+        if v0 is not None or derivatives is not None:
+            raise ParameterError("v0: single integrators have no velocity to begin with; give agents=Agents(order=2)")
+        return None
+    if isinstance(protocol, Protocol):
+        refuse_agents(agents, protocol, asked)
+    return cast(Agents, agents)
+
+
+def _with_agents(certificate: Certificate, agents: Agents, chains: Chains, run: bool) -> Certificate:
+    """Return the certificate of a graph as one of agents of order n on it."""
+    functions = certificate.functions
+    try:
+        part = prove_agents(
+            certificate.structure,
+            certificate.protocol,
+            agents,
+            functions,
+            certificate.influence,
+            chains.offsets,
+            chains.states,
+        )
+    except NoCertificate as error:
+        raise ParameterError(f"agents: {error}; ask for a smaller decay or a lower order") from None
+    notes, motion = [*certificate.notes, *chains.notes], None
+    if run and part.initial_state is not None:
+        try:
+            motion = part.simulate()
+        except SimulationError as error:
+            notes.append(f"simulation: {error}")
+    return certificate.changed(agents=part, notes=tuple(notes), agents_run=motion)
+
+
+def _with_small_delays(certificate: Certificate) -> Certificate:
+    """Add what Lyapunov functions of the whole graph prove with late messages under a capped gain."""
+    late, x0 = certificate.late, certificate.initial_state
+    if late is None:
+        return certificate
+    forms = certificate.decaying_forms
+    if late.messages.gain_cap is not None and not late.messages.value_error and x0 is not None and forms:
+        bounds = SmallDelayBounds(
+            certificate.structure, certificate.protocol.gain, late.messages, certificate.influence, x0
+        )
+        late = replace(late, form=bounds.best(forms), longest_delay=bounds.longest_delay(forms))
+    asked, final = certificate.expectations.max_residual, certificate.final_state
+    if asked is not None and late.rows and late.largest > asked and late.messages.age:
+        ends = None if final is None else final.intervals
+        case = certificate.structure, certificate.protocol, asked, late.messages, x0, ends
+        if certificate.graph.n_nodes <= EXACT_NODES:
+            late = replace(late, enough=longest_delay(*case))
+    return certificate.changed(late=late)
 
 
 def _check_disturbance(disturbance: Any, protocol: ReachingProtocol, graph: SignedDigraph) -> None:
@@ -283,9 +351,19 @@ def _family(graph: Any, orientation: str | None, uncertainty: Any, options: Mapp
     """Return a family, or refuse what it does not take: what is set, but for ``simulation=False``."""
     unset = {None, False, "best", ()}
     for name, value in options.items():
-        if name not in _OF_FAMILIES and (not isinstance(value, Hashable) or value not in unset):
+        if name not in _OF_FAMILIES and not _among(unset, value):
             raise ParameterError(f"{name} is not for families of graphs yet; leave it out, or certify one graph")
+    if read_expectations(options["expectations"]).max_residual is not None:
+        raise ParameterError("max_residual: is asked of late messages, which families do not take yet; leave it out")
     return as_family(graph, orientation, uncertainty=uncertainty)
+
+
+def _among(values: set[Any], value: Any) -> bool:
+    """Tell whether a value, hashable or not, is among some."""
+    try:
+        return value in values
+    except TypeError:
+        return False
 
 
 def _with_word_of_check(certificate: Certificate) -> Certificate:
@@ -329,6 +407,41 @@ class Case:
     progress: Callable[[str], None]
     notes: list[str] = field(default_factory=list)
     cut_off: list[str] = field(default_factory=list)
+
+    def certificate(self, disturbance: Any, runs: bool, reaching: tuple[ReachingTime, ...] | None) -> Certificate:
+        """Return what the steps find and prove, before the independent check."""
+        with deadline.time_limit(SEARCHING * self.request.time_limit):
+            trajectory = self.simulation(disturbance) if runs else None
+            lyapunov, proof, numerical = self.paper()
+            search = self.search(proof)
+            limit = self.upper_bound()
+        matrix, result = self.final_state(trajectory)
+        late, tracking = self.late_messages(result), self.tracking(result)
+        proved = [proof.rate, *(V.rate for V in search.functions)]
+        return Certificate(
+            structure=self.structure,
+            protocol=self.protocol,
+            initial_state=self.initial_state,
+            sigma0=self.sigma0,
+            reaching=reaching,
+            lyapunov=lyapunov,
+            proof=proof,
+            searched_functions=search.functions,
+            limit=limit,
+            final_state=result,
+            matrix=matrix,
+            request=self.request,
+            late=late,
+            tracking=tracking,
+            observed=Observations(
+                trajectory=trajectory,
+                numerical_rate=numerical,
+                spectral_rate=_spectral_rate(self.structure, proved, self.notes),
+                search=replace(search, functions=()),
+                cut_off=tuple(self.cut_off),
+                notes=tuple(self.notes),
+            ),
+        )
 
     def needs_run(self, simulation: bool | None) -> bool:
         """Tell whether there is to be a run."""
@@ -404,6 +517,29 @@ class Case:
                     f"the simulated run is still {gap:.1e} from the final state: its slowest modes had not settled"
                 )
         return matrix, result
+
+    def late_messages(self, result: FinalState | None) -> LateBounds | None:
+        """Bound what late messages leave at the deadline; None if nothing is asked of them."""
+        messages = self.request.messages
+        if messages is None:
+            return None
+        if any(self.sigma0 or ()):
+            raise ParameterError(
+                "late messages ask for sigma(0) = 0, so that no sliding variable moves; leave sigma0 out"
+            )
+        ends = None if result is None else result.intervals
+        return bound_late(self.structure, self.protocol, messages, self.initial_state, ends)
+
+    def tracking(self, result: FinalState | None) -> Tracking | None:
+        """Bound how followers track leaders that move; None if nothing is asked of that."""
+        leaders, ends = self.request.leaders, None if result is None else result.intervals
+        if leaders is None:
+            return None
+        try:
+            return bound_tracking(self.structure, self.protocol, leaders, self.initial_state, ends)
+        except LMIError as error:
+            self.notes.append(f"moving leaders: {error}")
+            return None
 
 
 def _search_and_prove(

@@ -21,10 +21,13 @@ from ptcc_certify.graphs.io import as_state
 from ptcc_certify.graphs.rationals import as_fraction, shorten, writable
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure, behaviour_name
+from ptcc_certify.lyapunov.follower_rows import refuse_leader_groups
 from ptcc_certify.lyapunov.search import METHODS
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.base import refuse_no_protocol
 from ptcc_certify.protocols.gain_limits import GainLimits
+from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.protocols.moving_leaders import MovingLeaders
 from ptcc_certify.protocols.parameters import parameter
 from ptcc_certify.protocols.reaching_time import ReachingTime, certified_reaching_times
 
@@ -45,6 +48,8 @@ class Expectations:
         A proved rate of at least so much, per unit of the stretched clock.
     max_input : Fraction or None
         A proved peak of every ``|u_k|`` of at most so much, in units of the input.
+    max_residual : Fraction or None
+        With late messages: every agent proved within so much of its final state at ``T``.
 
     Raises
     ------
@@ -67,6 +72,7 @@ class Expectations:
     behaviour: str | None = None
     min_rate: Fraction | None = None
     max_input: Fraction | None = None
+    max_residual: Fraction | None = None
 
     def __post_init__(self) -> None:
         try:
@@ -74,7 +80,7 @@ class Expectations:
         except ValueError as error:
             raise ParameterError(f"expected behaviour: {error}") from None
         object.__setattr__(self, "behaviour", behaviour)
-        for name in ("min_rate", "max_input"):
+        for name in ("min_rate", "max_input", "max_residual"):
             if (value := getattr(self, name)) is not None:
                 object.__setattr__(self, name, parameter(name, value, zero_allowed=True))
 
@@ -97,6 +103,10 @@ class Request:
         Nominal protocol: bound of the disturbances that are judged besides, in units of the input.
     noise : Fraction or None
         Nominal protocol: bound of the measurement noise that is judged under each of the limits.
+    messages : LateMessages or None
+        How late is what agents hear.
+    leaders : MovingLeaders or None
+        How leaders move.
     time_limit : float
         Seconds that the searches were given, infinity for no limit.
     expectations : Expectations
@@ -114,6 +124,8 @@ class Request:
     limits: tuple[Limits, ...] = ()
     delta: Fraction | None = None
     noise: Fraction | None = None
+    messages: LateMessages | None = None
+    leaders: MovingLeaders | None = None
     time_limit: float = math.inf
     expectations: Expectations = field(default_factory=Expectations)
     scenario: Mapping[str, Any] | None = None
@@ -152,6 +164,71 @@ def refuse(
     _refuse_long(_distinct_weights(graph), graph.n_nodes, "the weights", lambda: f"edge {_longest_edge(graph)}")
 
 
+_NO_SET = "(--initial-bound) is not taken up here, bounds are from one initial state; give x0 alone"
+#: What is not certified beside late messages, and what to do instead.
+_NOT_LATE = {
+    "initial_set": _NO_SET,
+    "stop_before": "late messages are certified under a gain cap alone; leave it out",
+    "sample_period": "of late messages a period tells how often they are sent; give that instead",
+    "noise": "of late messages an error of values tells it: noise within NU is one of 2 NU, a quantisation of 4 NU; "
+    "give that instead",
+    "delta": "is not proved of late messages under the nominal protocol; take the sliding-mode protocol, under which "
+    "disturbances within delta move nothing",
+}
+#: What is not certified beside leaders that move.
+_NOT_TRACKING = {
+    "initial_set": _NO_SET,
+    "gain_cap": "leaders that move are tracked at T by a gain without limits; leave it out",
+    "stop_before": "leaders that move are tracked at T by a gain without limits; leave it out",
+    "sample_period": "leaders that move are tracked at T by a gain without limits; leave it out",
+    "noise": "is not proved while leaders move; leave it out",
+    "delta": "of leaders that move MovingLeaders(disturbance=..) tells what disturbs the followers; give that instead",
+}
+
+
+def refuse_beside(structure: Structure, protocol: Protocol, request: Request) -> None:
+    """Refuse late messages and moving leaders where nothing could be certified, before anything is searched."""
+    messages, leaders = request.messages, request.leaders
+    if messages is None and request.expectations.max_residual is not None:
+        raise ParameterError("max_residual: is asked of late messages; tell how late they are, or leave it out")
+    if messages is None and leaders is None:
+        return
+    if messages is not None and leaders is not None:
+        raise ParameterError("messages and leaders together are not certified yet; ask for one of them")
+    _refuse_more(_NOT_TRACKING if messages is None else _NOT_LATE, request)
+    if leaders is not None:
+        if protocol.reaching:
+            raise ParameterError(
+                "leaders that move are certified under the nominal protocol; change it, or leave them out"
+            )
+        refuse_leader_groups(structure, "leaders that move as they like: a bound")
+    if messages is not None:
+        _refuse_messages(structure, messages, [limit.gain_cap for limit in request.limits])
+    alone = structure.followers.size == 0 if leaders is not None else structure.graph.n_edges == 0
+    if alone:
+        raise ParameterError("nobody listens to a leader, so nothing is late and nobody tracks; leave it out")
+
+
+def _refuse_more(refused: Mapping[str, str], request: Request) -> None:
+    """Refuse limits of the gain, noise and disturbances of which nothing is certified beside."""
+    for name, mend in refused.items():
+        if any(getattr(one, name, None) is not None for one in (request, *request.limits)):
+            raise ParameterError(f"{name}{' ' if mend is _NO_SET else ': '}{mend}")
+
+
+def _refuse_messages(structure: Structure, messages: LateMessages, caps: Sequence[Fraction | None]) -> None:
+    """Refuse late messages that do not fit the graph, or a cap of the gain that is another than theirs."""
+    messages.latencies(structure.graph)
+    if any(cap != messages.gain_cap for cap in caps):
+        raise ParameterError("gain_cap: limits and late messages have two; give both the same, or messages alone")
+    if messages.gain_cap is None:
+        refuse_leader_groups(structure, "late messages: add a gain cap; without one a bound")
+    if messages.value_error and messages.own_delay:
+        raise ParameterError("values that are off are not certified where the own state is late; leave one of them out")
+    if messages.value_error:
+        refuse_leader_groups(structure, "what values that are off add: a bound")
+
+
 def read_request(structure: Structure, protocol: Protocol, arguments: Mapping[str, Any]) -> Request:
     """Return a request from the arguments of :func:`ptcc_certify.certify`, or refuse it."""
     if not isinstance(scenario := arguments["scenario"], Mapping | None):
@@ -163,6 +240,8 @@ def read_request(structure: Structure, protocol: Protocol, arguments: Mapping[st
         at=None if arguments["at"] is None else _instant(arguments["at"], protocol),
         initial_set=None if (region := arguments["initial_set"]) is None else read_initial_set(structure, region),
         limits=tuple(_limits(entry, protocol) for entry in arguments["limits"]),
+        messages=_one_of(LateMessages, "messages", arguments["messages"], "delay='0.01'"),
+        leaders=_one_of(MovingLeaders, "leaders", arguments["leaders"], "speed=1"),
         time_limit=read_seconds(arguments["time_limit"], structure.graph),
         expectations=read_expectations(arguments["expectations"]),
         scenario=scenario,
@@ -208,6 +287,13 @@ def read_expectations(asked: Any) -> Expectations:
     if not isinstance(asked, Expectations):
         raise ParameterError(f"expectations = {shorten(repr(asked))} is none; give Expectations('stability'), say")
     return asked
+
+
+def _one_of(kind: type, name: str, value: Any, example: str) -> Any:
+    """Return what is of a kind, or None; refuse anything else."""
+    if value is not None and not isinstance(value, kind):
+        raise ParameterError(f"{name} = {shorten(repr(value))} is none; give {kind.__name__}({example}), say")
+    return value
 
 
 def _limits(entry: Any, protocol: Protocol) -> GainLimits:

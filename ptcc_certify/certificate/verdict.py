@@ -17,12 +17,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
+
+import numpy as np
 
 from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.bounds.envelope import Envelope
+from ptcc_certify.certificate.agents_part import AgentsPart
+from ptcc_certify.certificate.answer import MET, OPEN, REFUTED, Answer
 from ptcc_certify.certificate.certificate_data import Content
+from ptcc_certify.certificate.late_answers import (
+    at_deadline,
+    judge_input_beside,
+    judge_messages,
+    use_of_late,
+    use_of_tracking,
+)
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.input_formulas import InitialSet, root_above
 from ptcc_certify.errors import ExitCode
@@ -30,8 +41,6 @@ from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.search import USEFUL
 
-#: What became of an expectation.
-MET, REFUTED, OPEN = "met", "refuted", "left open"
 #: The share of the time that is left where the bound is judged.
 LAST = Fraction(1, 100)
 #: Digits of the gain that is proposed.
@@ -44,18 +53,6 @@ MANY_DECADES = 8
 
 CERTIFIED, UNDECIDED = "certified", "undecided"
 VIOLATED = "VIOLATED: the simulated run exceeds the proved bound; please report this graph"
-
-
-@dataclass(frozen=True)
-class Answer:
-    """What became of one expectation: ``met``, ``refuted`` or ``left open``, of what, and why."""
-
-    status: str
-    what: str
-    why: str = ""
-
-    def __str__(self) -> str:
-        return f"{self.what} ({self.why})" if self.why else self.what
 
 
 @dataclass(frozen=True)
@@ -218,22 +215,31 @@ the input is not bounded; --rho2 0.501 (rho2 kappa 0.501) leaves 1 % and bounds 
     >>> assessment.useful, int(assessment.exit_code)
     (True, 0)
     """
-    expectations, comparison = certificate.expectations, certificate.comparison
-    answers = [] if expectations.behaviour is None else [judge_behaviour(certificate.structure, expectations.behaviour)]
+    expectations = certificate.expectations
+    answers = []
+    if expectations.behaviour is not None:
+        answers.append(at_deadline(certificate, _judge_behaviour(certificate, expectations.behaviour)))
     answers += [] if expectations.min_rate is None else [judge_rate(certificate, expectations.min_rate)]
     answers += [] if expectations.max_input is None else [judge_input(certificate, expectations.max_input)]
     answers += judge_limits(certificate)
+    answers += judge_messages(certificate)
     useful, remark, caveat, advice = None, "", "", ""
     verdict = verdict_of(report)
     if verdict != CERTIFIED:
         remark = _next_step(certificate, report)
     elif certificate.constant:
         useful, remark = True, "nothing to decay"
+    elif certificate.agents is not None:
+        useful, remark, caveat, advice = _assess_agents(certificate.agents)
+    elif certificate.late is not None:
+        useful, remark, caveat = use_of_late(certificate.late, certificate.longest_way)
+    elif certificate.tracking is not None:
+        useful, remark, caveat, advice = use_of_tracking(certificate.tracking)
     else:
         limited = certificate.effort is not None and certificate.effort.residual
         useful, remark, rho2 = (_limited_usefulness if limited else _usefulness)(certificate)
         caveat, advice = ("", "") if limited else _advise(certificate, rho2)
-    violated = comparison is not None and comparison.violated
+    violated = certificate.violated
     ignored = sorted({answer.what for answer in answers if answer.status == OPEN} & {"limits", "noise"})
     ignored += ["disturbances"] * (certificate.delta is not None)
     without = f" without {' and '.join(ignored)}" if ignored else ""
@@ -251,9 +257,22 @@ def judge_behaviour(structure: Structure, expected: str) -> Answer:
     return Answer(REFUTED, expected, f"it is {claims[0].sharpest}" if len(claims) == 1 else "not in every component")
 
 
+def _judge_behaviour(certificate: Content, expected: str) -> Answer:
+    """Tell the same of what the agents are, which may be of order n, and have places or a capped gain."""
+    answer, part = judge_behaviour(certificate.structure, expected), certificate.agents
+    if part is None:
+        return answer
+    what = f"{expected} of x - offsets" if part.formation else expected
+    if part.settles:
+        return replace(answer, what=what)
+    return Answer(OPEN, what, "the capped gain leaves something at T" if part.functions else "no decay is proved")
+
+
 def judge_rate(certificate: Content, least: Fraction) -> Answer:
     """Tell whether a rate of at least so much is proved, or excluded by the proved upper bound."""
     what, rate, bound = f"rate >= {near(least, 12)}", certificate.rate, certificate.upper_bound
+    if certificate.agents is not None:
+        rate, bound = certificate.agents.matrix.rate if certificate.agents.functions else None, None
     if certificate.constant or (rate is not None and rate >= least):
         return Answer(MET, what)
     if bound is not None and least > bound:
@@ -265,8 +284,15 @@ def judge_rate(certificate: Content, least: Fraction) -> Answer:
 def judge_input(certificate: Content, most: Fraction) -> Answer:
     """Tell whether every input is proved to stay within so much, under all that was asked for besides."""
     effort, what = certificate.effort, f"|u_k| <= {near(most, 12)}"
+    if certificate.agents is not None:
+        proved = certificate.agents.input
+        least_bound = "no bound is proved" if proved is None else f"proved: {up(max(proved))}"
+        return Answer(MET, what) if proved is not None and max(proved) <= most else Answer(OPEN, what, least_bound)
     if certificate.constant:
         return Answer(MET, what)
+    beside = (certificate.late, certificate.tracking, certificate.request.leaders)
+    if any(part is not None for part in beside):
+        return judge_input_beside(certificate, most, what, _first_input(certificate))
     least, bound = input_range(certificate)
     if bound is not None and bound <= most:
         return Answer(MET, what)
@@ -308,6 +334,16 @@ def input_range(certificate: Content) -> tuple[Fraction | float, Fraction | None
     if most is not None and certificate.delta is not None:
         most = None if effort.disturbed is None else most + max(effort.disturbed.inputs)
     return least, most
+
+
+def _first_input(certificate: Content) -> Fraction:
+    """Return what the largest ``|u_k(0)|`` is at least under the limits of the gain; 0 where nothing is known."""
+    effort, gain, late = certificate.effort, certificate.protocol.gain.exact, certificate.late
+    if effort is None or effort.first is None:
+        return Fraction(0)
+    caps = [] if late is None or late.messages.gain_cap is None else [late.messages.gain_cap]
+    tops = [*caps, *(entry.largest_gain(gain) for entry in certificate.limits)]
+    return effort.first * min([Fraction(1), *(top / certificate.protocol.gain.first for top in tops)])
 
 
 def judge_limits(certificate: Content) -> list[Answer]:
@@ -355,6 +391,26 @@ def _usefulness(certificate: Content) -> tuple[bool, str, Fraction | None]:
         if worst <= USEFUL * way:
             return True, f"every agent within {up(worst, 2)} of its final state at {instant}", None
     return False, remark, _useful_rho2(envelope, constant, p.kappa)
+
+
+def _assess_agents(part: AgentsPart) -> tuple[bool | None, str, str, str]:
+    """Return whether bounds of agents of order n say something by ``T``, what, what is not proved, and a mend."""
+    capped, caveat, advice = part.protocol.gain_cap is not None, "", ""
+    if part.unbounded:
+        mends = [mend for _, mend in part.unbounded]
+        caveat = "the input is not certified bounded"
+        advice = f"{' and '.join(mends)} bound{'s' * (len(mends) == 1)} it"
+    last = np.array([0.0 if capped else float(LAST)])
+    fall = math.exp(-float(part.matrix.rate) * float(part.protocol.clock(last)[0]) / 2)
+    worst = float(part.deviation_bound(last)[:, 0].max(initial=0.0))
+    when = "T" if capped else "0.99 T"
+    remark = f"every position within {up(worst, 2)} of its place at {when}"
+    if part.initial_state is None or not math.isfinite(worst):
+        return fall <= USEFUL, f"deviations at {when} are {up(fall, 2)} of the first ones", caveat, advice
+    useful = worst <= USEFUL * part.longest_way if part.longest_way else fall <= USEFUL
+    if not useful and not capped and not advice:
+        advice = f"a larger --decay, such as {2 * math.ceil(part.decay)}, leaves less"
+    return useful, remark, caveat, advice
 
 
 def _limited_usefulness(certificate: Content) -> tuple[bool, str, None]:

@@ -22,6 +22,7 @@ from typing import Any
 
 from lmi.exact import arithmetic
 from lmi.exact.work import WorkError, limited
+from ptcc_certify.checker.agents import check_agents
 from ptcc_certify.checker.attracting_boxes import check_boxes
 from ptcc_certify.checker.family import check_family
 from ptcc_certify.checker.family_bounds import check_family_bounds
@@ -30,7 +31,9 @@ from ptcc_certify.checker.family_sliding import check_drive
 from ptcc_certify.checker.final_state import check_final_state
 from ptcc_certify.checker.graph import check_graph
 from ptcc_certify.checker.input import INPUT_NODES, Verified, check_input
+from ptcc_certify.checker.leaders import check_leaders
 from ptcc_certify.checker.lyapunov import check_functions
+from ptcc_certify.checker.messages import check_messages
 from ptcc_certify.checker.obligations import OBLIGATIONS, CheckReport, ProofObligation, VerifiedObligation
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.protocol import (
@@ -55,10 +58,10 @@ GRAPH = "a graph file is not read: compare the SHA-256 that is printed, or use p
 KEYS = (
     *("schema", "producer", "graph", "structure", "claim", "components", "protocol", "paper", "lyapunov", "rates"),
     *("overshoot", "initial_state", "sliding_variable", "influence", "final_state", "reaching_time", "input", "proof"),
-    *("verdict", "digest", "unverified", "boxes", "restricted"),
+    *("verdict", "digest", "unverified", "boxes", "restricted", "agents", "messages", "leaders"),
 )
 #: Parts that need not be there.
-OPTIONAL = ("components", "boxes", "restricted")
+OPTIONAL = ("components", "boxes", "restricted", "agents", "messages", "leaders")
 
 #: Parts that are null in a certificate of a family.
 NOT_OF_FAMILIES = ("paper", "rates", "overshoot", "influence")
@@ -174,7 +177,13 @@ def _verdict(doc: Document) -> str:
     rate = check_rates(doc, paper, functions)
     bound = check_rate_bound(doc, structure)
     check_sliding(doc, graph, protocol, begin)
-    check_input(doc, Verified(structure, protocol, begin, final, functions, rate, bound))
+    verified = Verified(structure, protocol, begin, final, functions, rate, bound)
+    if "agents" in data:
+        need("messages" not in data and "leaders" not in data, "agents of order n with late messages or moving leaders")
+        return _close(doc, check_agents(doc, verified))
+    check_input(doc, verified)
+    check_messages(doc, verified)
+    check_leaders(doc, verified)
     return _close(doc, data["influence"] is not None and (rate is not None or not graph.listening))
 
 
@@ -190,6 +199,9 @@ def _close(doc: Document, proved: bool) -> str:
 
 def _family_verdict(doc: Document, protocol: Protocol) -> str:
     """Verify a certificate of a family, part after part; return its verdict."""
+    need("agents" not in doc.data, "agents of order n on a family")
+    need("messages" not in doc.data, "late messages of a family")
+    need("leaders" not in doc.data, "leaders of a family that move")
     family = check_family(doc)
     begin = check_begin(doc, family.modes[0].structure.graph, protocol)
     functions = check_family_functions(doc, family)

@@ -13,10 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from lmi.exact.numbers import longest
 from ptcc_certify.checker.digraph import Adjacency, Digraph
 
-#: Edges taken at a time.
-CHUNK = 8192
+#: Edges taken at a time; and where sums have so few bits that int64 holds them.
+CHUNK, LONG_CHUNK, INT64_BITS = 8192, 1 << 18, 62
 
 
 class ArrayDigraph(Digraph):
@@ -30,10 +31,18 @@ class ArrayDigraph(Digraph):
         offsets = np.bincount(np.asarray(self.source), minlength=self.n).cumsum().tolist()
         return [0, *offsets], ends, which
 
+    @cached_property
+    def degree_bits(self) -> int:
+        """Bits of the largest number of edges that enter a node, or leave one."""
+        degrees = [int(np.bincount(np.asarray(ends)).max(initial=0)) for ends in (self.source, self.target)]
+        return max(degrees).bit_length()
+
     def _add_over_edges(self, of: Any, to: Any, values: Sequence[int], x: Sequence[int]) -> list[int]:
-        total: Any = np.zeros(self.n, dtype=object)
-        weights, numbers = np.array(values, dtype=object), np.array(x, dtype=object)
-        step = min(CHUNK, self.n)  # so many products take no more memory than the sums
+        short = longest(values) + longest(x) + self.degree_bits <= INT64_BITS
+        kind: Any = np.int64 if short else object
+        total = np.zeros(self.n, dtype=kind)
+        weights, numbers = np.array(values, dtype=kind), np.array(x, dtype=kind)
+        step = LONG_CHUNK if short else min(CHUNK, self.n)  # so many products take no more memory than the sums
         for first in range(0, self.n_edges, step):
             i, j, k = (np.asarray(part)[first : first + step] for part in (of, to, self.which))
             np.add.at(total, j, weights[k] * numbers[i])

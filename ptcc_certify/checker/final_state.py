@@ -80,6 +80,25 @@ class FinalState:
         need(self.u is not None, f"agent {shorten(labels[astray])} is not where its neighbours pull it")
         return _worst(F, residuals, self.pushed)
 
+    def values(self, x: Numbers) -> dict[int, Interval]:
+        """Enclose ``eta_k' G_k x`` of every balanced closed component, by its number."""
+        vectors, values = self.left_null_vectors, {}
+        for k, group, _ in self.structure.balanced:
+            states = [(x[v], Fraction(0)) for v in group]
+            values[k] = combined(vectors[k], states) if k in vectors else states[0]
+        return values
+
+    def enclosures(self, values: Mapping[int, Interval]) -> dict[int, Interval]:
+        """Enclose ``Q x`` by node from its values of the components; in the large form on the leaders alone."""
+        structure, result = self.structure, dict[int, Interval]()
+        for k, (group, gauge) in enumerate(zip(structure.closed, structure.gauges, strict=True), start=1):
+            x, r = values.get(k, ZERO)
+            result |= {v: (g * x, r) for v, g in zip(group, gauge or [0] * len(group), strict=True)}
+        if self.weights is not None:
+            rows = zip(structure.followers, self.weights, strict=True)
+            result |= {v: combined(row, list(values.values())) for v, row in rows}
+        return result
+
     @cached_property
     def projection(self) -> list[dict[int, Fraction]]:
         """The rows of ``Q``, which are exact."""
@@ -224,21 +243,14 @@ def _weights(final: FinalState, section: Any) -> list[list[Interval]]:
 
 def _final(doc: Document, final: FinalState, section: Any, degenerate: Any, begin: Begin) -> Fraction:
     """Verify where the agents end; return the largest radius that is proved."""
-    structure, shifted, vectors = final.structure, begin.state or Numbers([]), final.left_null_vectors
+    structure, shifted = final.structure, begin.state or Numbers([])
     if begin.sigma is not None:
         shifted = Numbers([x - s for x, s in zip(shifted, begin.sigma, strict=True)])
-    initial_states = {k: [(shifted[v], Fraction(0)) for v in group] for k, group, _ in structure.balanced}
-    values = {k: combined(vectors[k], x0) if k in vectors else x0[0] for k, x0 in initial_states.items()}
+    values = final.values(shifted)
     need(all(abs(x) > r or r == 0 for x, r in values.values()), "a value that may or may not be 0")
     need(same(degenerate, [k for k, (x, _) in values.items() if x == 0]), "which components meet at 0")
-    intervals, spare = _intervals(doc, structure.graph, section), WIDEST * shifted.largest()
-    enclosures: dict[int, Interval] = {}
-    for k, (group, gauge) in enumerate(zip(structure.closed, structure.gauges, strict=True), start=1):
-        x, r = values.get(k, ZERO)
-        enclosures |= {v: (g * x, r) for v, g in zip(group, gauge or [0] * len(group), strict=True)}
-    if final.weights is not None:
-        rows = zip(structure.followers, final.weights, strict=True)
-        enclosures |= {v: combined(row, list(values.values())) for v, row in rows}
+    intervals, spare = state_intervals(doc, structure.graph, section), WIDEST * shifted.largest()
+    enclosures = final.enclosures(values)
     for v, (x, r) in enclosures.items():
         mid, radius = intervals[0][v], intervals[1][v]
         if x != mid or r != radius:
@@ -255,7 +267,7 @@ def _narrow(label: str, off: Any, error: Any, radius: Any, spare: Any) -> None:
         raise RejectedError(f"the interval of agent {shorten(label)} is wider than what is proved")
 
 
-def _intervals(doc: Document, graph: Digraph, section: Any) -> tuple[Numbers, Numbers]:
+def state_intervals(doc: Document, graph: Digraph, section: Any) -> tuple[Numbers, Numbers]:
     """Read middles and radii of the final state: two side vectors, or intervals by agent."""
     if isinstance(section, dict) and beside(section.get("mid")):
         fields(section, ("mid", "radius"), "final_state")

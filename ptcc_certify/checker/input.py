@@ -14,6 +14,7 @@ from lmi.exact.numbers import integers, longest, shorten, sized
 from lmi.exact.routh_test import nonzero_spectrum_beyond, tractable
 from lmi.exact.work import spend
 from ptcc_certify.checker import input_formulas as formulas
+from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.final_state import FinalState
 from ptcc_certify.checker.graph import by_agent, ordered
 from ptcc_certify.checker.lyapunov import Function
@@ -154,23 +155,26 @@ def _constants(doc: Document, verified: Verified, section: Sequence[Any]) -> lis
     results: list[list[Fraction] | None] = [None] * len(section)
     for k, (entry, function) in enumerate(zip(section, verified.functions, strict=True)):
         doc.at = f"input.constants[{k}]"
-        if entry is None:
-            continue
-        form = function.form
-        if form is None or form.matrix is None:
-            raise RejectedError("constants that follow from a diagonal")
-        doc.open("input-constants", f"lyapunov.functions[{k}]")
-        constants, (P, scale), forms = list(_each(doc, verified, entry, "constants")), form.entries, []
-        for v, c in enumerate(constants):
-            p, q = (c / scale).as_integer_ratio()
-            sized(v + 1, longest((q, q * p)), "constants")
-            forms.append(([q * (own == v) for own in form.nodes], q * p))
-        failed = doc.exact.bounded(P, forms)
-        label = verified.structure.graph.labels[failed or 0]
-        need(failed is None, f"the constant of agent {shorten(label)} is not proved")
-        doc.done(f"at most {up(max(constants))}")
-        results[k] = constants
+        if entry is not None:
+            results[k] = check_constants(doc, verified.structure.graph, function, k, entry)
     return results
+
+
+def check_constants(doc: Document, graph: Digraph, function: Function, k: int, entry: Any) -> list[Fraction]:
+    """Verify ``e_v^2 <= c_v V`` for the full matrix of the Lyapunov function ``k``; return ``c``."""
+    form = function.form
+    if form is None or form.matrix is None:
+        raise RejectedError("constants that follow from a diagonal")
+    doc.open("input-constants", f"lyapunov.functions[{k}]")
+    constants, (P, scale), forms = list(by_agent(doc, graph, entry, "constants", files=False)), form.entries, []
+    for v, c in enumerate(constants):
+        p, q = (c / scale).as_integer_ratio()
+        sized(v + 1, longest((q, q * p)), "constants")
+        forms.append(([q * (own == v) for own in form.nodes], q * p))
+    failed = doc.exact.bounded(P, forms)
+    need(failed is None, f"the constant of agent {shorten(graph.labels[failed or 0])} is not proved")
+    doc.done(f"at most {up(max(constants))}")
+    return constants
 
 
 def _initial_set(doc: Document, verified: Verified, section: Any) -> formulas.InitialSet | None:

@@ -594,10 +594,11 @@ class InputBounds:
         entries = root_above(form.value([initial_set.largest(row) for row in rows], sizes=True))
         return min(entries, middle + root_above(excess))
 
-    def _pieces(self, k: int, z: Fraction) -> tuple[list[Piece], Fraction]:
+    def _pieces(self, k: int, z: Fraction) -> tuple[list[Piece], Fraction, Fraction]:
         """Bound ``sqrt(V)`` in pieces of the time up to ``z``, while sliding variables move.
 
-        From ``z`` on ``sqrt(V)`` is at most the number that is returned besides, times ``e^(-rate s / 2)``.
+        Returned besides are what ``gain sqrt(V)`` is at most up to ``z``, if ``gain e^(-rate s / 2)`` never grows; and
+        what, times ``e^(-rate s / 2)``, is at least ``sqrt(V)`` from ``z`` on.
 
         In a piece from ``a`` to ``b`` of the time ``sqrt(V)`` gains at most ``w (psi(a) - psi(b)) + f (b - a)``, ``w``
         and ``f`` being the norms of what bounds ``L sigma``, ``|sigma_k| <= |sigma_k(0)|``, and ``L f``.
@@ -617,7 +618,7 @@ class InputBounds:
             v = rounded(v * decay_above(form.rate / 2 * part.clock[0]) + added, BITS, up=True)
         nearest = exp(-z, BITS)[0]
         begin = rounded(v * exp(form.rate / 2 * gain.clock(z, nearest), BITS)[1], BITS, up=True)
-        self._cache[k, z] = pieces, begin
+        self._cache[k, z] = pieces, max(p.first * p.root + p.last * p.added for p in pieces), begin
         return self._cache[k, z]
 
     def share(self, k: int, limits: Limits, clock: Fraction, growth: Fraction) -> Fraction:
@@ -671,10 +672,9 @@ class InputBounds:
         c, rate = self.root_constant(k, v), self.form(k).rate
         if self.reaching is None:
             return of(self.gain, error_bound, c * self.initial_root(k), rate, z)
-        pieces, begin = self._pieces(k, z)
+        pieces, most, begin = self._pieces(k, z)
         late = of(self.gain, Fraction(0), c * begin, rate, z)
-        if of is peak_above:  # gain e^(-rate s / 2) does not grow
-            most = max(p.first * p.root + p.last * p.added for p in pieces)
+        if of is peak_above:
             return rounded(max(late, min(c * most, error_bound * pieces[-1].last)), BITS, up=True)
         for p in pieces:
             size = min(c * (p.root + p.added), error_bound)

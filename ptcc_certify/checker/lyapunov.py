@@ -17,7 +17,7 @@ from ptcc_certify.checker.matrix_products import Matrix, block, combined, decays
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.quadratic_form import Form
 from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, need, same, triangle
-from ptcc_certify.checker.side_files import beside
+from ptcc_certify.checker.side_files import Numbers, beside
 from ptcc_certify.checker.structure import Structure
 from ptcc_certify.checker.theorem_function import Paper
 
@@ -38,12 +38,18 @@ class Function:
         ``||z(t)||^2 <= overshoot e^(-rate s) ||z(0)||^2``.
     form : Form or None
         None: proved by rows, in a large graph; the coordinates are ``E``.
+    by_rows : (list of int, Numbers) or None
+        Then its nodes and its diagonal.
+    deviation : list of Fraction or None
+        ``c_k`` with ``(x_k - (Q x)_k)^2 <= c_k V``.
     """
 
     kind: str
     rate: Fraction
     overshoot: Fraction
     form: Form | None
+    by_rows: tuple[Sequence[int], Numbers] | None = None
+    deviation: Sequence[Fraction] | None = None
 
 
 def check_functions(doc: Document, structure: Structure, final: FinalState, paper: Paper | None) -> list[Function]:
@@ -65,11 +71,11 @@ def check_functions(doc: Document, structure: Structure, final: FinalState, pape
             function, form = _by_rows(doc, structure, entry, of, proofs), None
         else:
             function, form = _searched(doc, structure, entry, of)
-        functions.append(function)
         if entry["deviation"] is not None:
             if form is None:
                 raise RejectedError("a deviation without a form")
-            _deviation(doc, final, entry["deviation"], form, of)
+            function = replace(function, deviation=_deviation(doc, final, entry["deviation"], form, of))
+        functions.append(function)
     return functions
 
 
@@ -103,7 +109,7 @@ def _by_rows(doc: Document, structure: Structure, function: Any, of: str, proofs
     check_dominance(doc, structure, nodes, weights, rate, of, proofs)
     overshoot = Fraction(max(weights.values)) / Fraction(min(weights.values))
     need(exact(function["overshoot"]) == overshoot, "the overshoot constant is another")
-    return Function(function["class"], rate, overshoot, None)
+    return Function(function["class"], rate, overshoot, None, (nodes, weights))
 
 
 def _searched(doc: Document, structure: Structure, function: Any, of: str) -> tuple[Function, tuple[Matrix, Fraction]]:
@@ -142,16 +148,22 @@ def _ends(doc: Document, rows: Sequence[Sequence[Fraction]], of: str) -> tuple[F
     return low, high
 
 
-def _deviation(doc: Document, final: FinalState, section: Any, scaled_form: tuple[Matrix, Fraction], of: str) -> None:
-    """Verify ``(x_k - (Q x)_k)^2 <= c_k V`` and ``||x - Q x||^2 <= c V``, in the coordinates ``free_nodes``."""
+def _deviation(
+    doc: Document, final: FinalState, section: Any, scaled_form: tuple[Matrix, Fraction], of: str
+) -> list[Fraction]:
+    """Verify ``(x_k - (Q x)_k)^2 <= c_k V``, ``||x - Q x||^2 <= c V``, in the coordinates ``free_nodes``.
+
+    Returns the ``c_k``.
+    """
     doc.open("deviation", of)
     structure, (form, scale) = final.structure, scaled_form
     labels = structure.graph.labels
     agents = ordered(labels, fields(section, ("agents", "norm"), "deviation")["agents"], "agents")
     (D, common, gram), S = final.deviations, only(form, structure.free_nodes)
     forms: list[tuple[list[int], int]] = []
-    for row, text in zip(D, agents.values(), strict=True):
-        p, q = (exact(text) * common**2 / scale).as_integer_ratio()
+    constants = [exact(text) for text in agents.values()]
+    for row, c in zip(D, constants, strict=True):
+        p, q = (c * common**2 / scale).as_integer_ratio()
         sized((len(forms) + 1) * len(row), longest((q,)) + longest(row), "deviations")
         spend(len(row), longest((q,)), longest(row), "deviations")
         forms.append(([q * x for x in row], q * p))
@@ -161,3 +173,4 @@ def _deviation(doc: Document, final: FinalState, section: Any, scaled_form: tupl
     N = combined("the deviation of the norm", (p, S), (-q, gram))
     need(p >= 0 and doc.exact.definite(N), "the constant of the norm is not proved")
     doc.done(f"norm at most {up(exact(section['norm']))}")
+    return constants

@@ -50,7 +50,10 @@ def check_protocol(doc: Document) -> Protocol:
     section = fields(section, ("kind", *names, *(["disturbance"] if sliding else [])), "protocol")
     need(sliding or section["kind"] == "nominal", "an unknown kind of protocol")
     gains = {name: exact(section[name]) for name in names}
-    need(all(value > 0 for name, value in gains.items() if name != "delta"), "a parameter is not positive")
+    of_agents = "agents" in doc.data  # whose rho1 may be 0
+    may_be_zero = ("delta", "rho1") if of_agents else ("delta",)
+    need(all(value > 0 for name, value in gains.items() if name not in may_be_zero), "a parameter is not positive")
+    need(gains["rho1"] >= 0, "rho1 is negative")
     if sliding:
         need(0 <= gains["delta"] < gains["mu1"], "mu1 is not above delta")
         need(section["disturbance"] is None or isinstance(section["disturbance"], str), "disturbance is not a text")

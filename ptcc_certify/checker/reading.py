@@ -71,11 +71,22 @@ def read(path: str | Path) -> dict[str, Any]:
         integer = lambda text: int(text) if len(text) <= 18 else number(text)  # noqa: E731
         data = json.loads(text, object_pairs_hook=unique, parse_constant=number, parse_float=number, parse_int=integer)
     except (OSError, ValueError, RecursionError) as error:
-        detail = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        detail = _why(error)
         raise UnreadableError(f"{name}: not a readable certificate ({shorten(detail, 160)})") from None
     if not isinstance(data, dict) or data.get("schema") != SCHEMA:
         raise UnreadableError(f'{name}: not a certificate of schema "{SCHEMA}"')
     return data
+
+
+def _why(error: Exception) -> str:
+    """Tell in plain words why a file cannot be read."""
+    if isinstance(error, UnicodeDecodeError):
+        return f"no UTF-8 at byte {error.start}"
+    if isinstance(error, json.JSONDecodeError):
+        return f"no JSON: line {error.lineno}, column {error.colno}: {error.msg.removesuffix(' starting at')}"
+    if isinstance(error, RecursionError):
+        return "brackets are nested too deep"
+    return (error.strerror if isinstance(error, OSError) else None) or str(error)
 
 
 def loaded_bytes(content: bytes, text: str) -> int:

@@ -9,6 +9,7 @@ import click
 
 from lmi.exact.decimal_rounding import down
 from ptcc_certify.cli import options as shared
+from ptcc_certify.cli.agents import agents_keywords, agents_of, agents_options, dimension_option, refuse_dimension
 from ptcc_certify.cli.families import (
     certify_family,
     family_options,
@@ -16,6 +17,7 @@ from ptcc_certify.cli.families import (
     refuse_restricted,
     restricted_options,
 )
+from ptcc_certify.cli.messages import leader_options, leaders_of, message_options, messages_of
 from ptcc_certify.cli.scenario import scenario_record
 from ptcc_certify.cli.terminal import LOG, Screen, print_json, progress, refuse_output, screen_options
 from ptcc_certify.errors import ParameterError, one_line
@@ -45,6 +47,13 @@ if TYPE_CHECKING:
 )
 @shared.method_option
 @shared.limit_options
+@agents_options
+@message_options
+@leader_options
+@shared.number_option(
+    "--max-residual", metavar="R", help="With late messages: ask for every agent within R of its final state at T."
+)
+@dimension_option
 @shared.initial_bound_option
 @shared.number_option(
     "--noise", metavar="NU", help="Nominal: bound the effect of measurement noise |n_k| <= NU under a limit."
@@ -65,8 +74,11 @@ def certify(graph: tuple[str, ...], output: str | None, as_json: bool, screen: S
     from ptcc_certify.graphs.family import Family
 
     refuse_output(output)
+    refuse_dimension(options, "certify")
     protocol, given = shared.protocol_of(options), read_graph_or_family(graph, options)
     if isinstance(given, Family):
+        if agents_of(options) is not None:
+            raise ParameterError("--agents: is not for families of graphs yet; certify one graph")
         return certify_family(graph, given, output, as_json, screen, options)
     refuse_restricted(options)
     return _certify_graph(graph[0], given, protocol, output, as_json, screen, options)
@@ -87,8 +99,12 @@ def _certify_graph(
     from ptcc_certify.report.screen import certificate_lines, summary_lines
 
     LOG.info("%s", one_line(f"read {graph}: {signed.n_nodes} nodes, {signed.n_edges} edges"))
-    x0 = shared.read_initial_state(options["x0"], options["seed"], signed)
     more = shared.sliding_keywords(protocol, options, signed) | _requests(options)
+    of_agents = agents_keywords(options, signed)
+    x0 = of_agents.pop("x0", None) or shared.read_initial_state(options["x0"], options["seed"], signed)
+    if of_agents:
+        more = {name: value for name, value in more.items() if name not in ("limits", "disturbance")} | of_agents
+    more |= {"messages": messages_of(graph, signed, options), "leaders": leaders_of(options)}
     origins = _origins(options)
     with progress(STEPS, screen.quiet) as begin:
         named = {"graph": Path(graph).name, **origins}
@@ -119,17 +135,23 @@ def _requests(options: shared.Options) -> dict[str, Any]:
         raise ParameterError("--max-input is outside its domain; it must be > 0")
     more: dict[str, Any] = {name: options[name] for name in ("method", "simulation", "time_limit", "at")}
     more |= {"initial_set": options["initial_bound"]}
-    more |= {"expectations": Expectations(options["expect"], options["min_rate"], most), "scenario": scenario_record()}
+    more |= {
+        "expectations": Expectations(options["expect"], options["min_rate"], most, options["max_residual"]),
+        "scenario": scenario_record(),
+    }
     if options["kind"] == "nominal":
-        own = {name: options[name] for name in ("delta", "noise")}
+        own = {"noise": options["noise"]}
+        own |= {"delta": options["delta"]} if options["leader_speed"] is None else {}  # else it disturbs the followers
         return more | own | {"limits": [*filter(None, [shared.actuator_of(options)])]}
     return more
 
 
 def _origins(options: shared.Options) -> dict[str, str]:
     """Return which of ``x(0)`` and ``sigma(0)`` were drawn, and with which seed."""
-    states = {"x(0)": options["x0"], "sigma(0)": options["sigma0"]}
-    return {name: f"random, seed {options['seed']}" for name, text in states.items() if text == "random"}
+    states = {"x(0)": options["x0"], "sigma(0)": options["sigma0"], "v(0)": options["v0"], "a(0)": options["a0"]}
+    drawn = {name: f"random, seed {options['seed']}" for name, text in states.items() if text == "random"}
+    zero = {name: "0" for name in ("v(0)", "a(0)") if states[name] in (None, "0")}
+    return drawn | (zero if options["agents"] is not None else {})
 
 
 def _log_result(certificate: Certificate) -> None:

@@ -26,29 +26,48 @@ if TYPE_CHECKING:
 @shared.reading_options
 @mode_options
 @click.option("--stdlib", is_flag=True, help="Use the standard library alone, even where python-flint is installed.")
+@click.option("--verified", is_flag=True, help="Use the checker that is itself proved in Coq, if formal/ is built.")
 @shared.memory_option
 @shared.json_option
 @screen_options
 def check(
-    certificate: str, graph: tuple[str, ...], stdlib: bool, memory: float, as_json: bool, screen: Screen, **options: Any
+    certificate: str,
+    graph: tuple[str, ...],
+    stdlib: bool,
+    verified: bool,
+    memory: float,
+    as_json: bool,
+    screen: Screen,
+    **options: Any,
 ) -> int:
     """Check CERTIFICATE exactly, without a solver; with GRAPH, that it speaks of this graph.
 
     CERTIFICATE is a file, or - for standard input (side files are then those in this folder). GRAPH is read as the
     certificate says that it was read, which is printed; the options about reading override that. Of a family name all
     its graphs, in any order. Prints claim and verdict; -v tells every obligation with what was verified. Exit code 0
-    if the claim is proved, 1 if it is rejected, 4 if the certificate itself says undecided.
+    if the claim is proved, 1 if it is rejected, 4 if the certificate itself says undecided. With --verified all that
+    was not checked is named.
     `python -m ptcc_certify.checker` does the same, without other packages.
     """
     from ptcc_certify.certificate.checking import read_and_check
+    from ptcc_certify.cli.verified import verified_check
     from ptcc_certify.report.screen import check_summary
     from ptcc_certify.report.text_layout import wrap_lines
 
     if certificate == "-" and "-" in graph:
         raise ParameterError("CERTIFICATE and GRAPH cannot both be standard input; name a file for one")
+    source = click.get_current_context().get_parameter_source
+    given = [name for name in shared.READING if source(name) is ParameterSource.COMMANDLINE]
+    if given and not graph:
+        raise ParameterError(f"{shared.flag_of(given[0])} tells how a graph is read; name it: ptcc check CERT GRAPH")
+    proved = None
     with progress(("independent check",), screen.quiet) as begin:
         begin("independent check")
-        document, report = read_and_check(certificate, stdlib=stdlib, memory=memory)
+        if verified:
+            proved = verified_check(certificate)
+            document, report = proved.document, proved.report
+        else:
+            document, report = read_and_check(certificate, stdlib=stdlib, memory=memory)
     how: dict[str, str] = {}
     if graph and report.accepted:
         if "modes" in document["graph"]:
@@ -57,8 +76,12 @@ def check(
             raise ParameterError("this certificate is of one graph; name one")
         else:
             report, how = _same_graph(certificate, document, report, graph[0], options)
+    if proved is not None:
+        proved = replace(proved, report=report)
     if as_json:
-        print_json(report.to_dict() | how)
+        print_json(report.to_dict() | how | ({"not_checked": list(proved.not_checked)} if proved else {}))
+    elif proved is not None:
+        print_lines(*(f"graph      {text}" for text in how.values() or _own_graph(document, report)), *proved.lines())
     else:
         lines = [f"graph      {text}" for text in how.values() or _own_graph(document, report)]
         screen.show(

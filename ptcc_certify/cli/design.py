@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
+from ptcc_certify.cli.agents import agents_of, agents_options, dimension_option
+from ptcc_certify.cli.design_of_agents import command_of_agents, design_of_agents, refuse_of_agents, template_options
 from ptcc_certify.cli.options import (
     OneGraph,
     Options,
@@ -26,17 +28,20 @@ from ptcc_certify.errors import ExitCode, ParameterError, one_line
 from ptcc_certify.report.text_layout import wrap_command
 
 if TYPE_CHECKING:
+    from ptcc_certify.agents_design import AgentsDesign
     from ptcc_certify.gain_design import Design
+    from ptcc_certify.graphs.digraph import SignedDigraph
 
-#: What a scenario may ask that no gains are searched under.
-_NOT_SEARCHED = ("gain_cap", "stop_before", "sample_period", "delta", "noise")
+#: What a scenario may ask that no gains are searched under, and what of these agents of order n take.
+_NOT_SEARCHED, _OF_AGENTS = ("gain_cap", "stop_before", "sample_period", "delta", "noise"), ("gain_cap", "delta")
 _EXAMPLE = "ptcc design fig5b --max-input 10 --initial-bound 1 --shortest-deadline"
+_EXAMPLE_OF_AGENTS = "ptcc design fig1a --agents double-integrator --max-input 30 --shortest-deadline"
 
 
 @click.command(cls=OneGraph)
 @graph_argument
 @number_option("--max-input", metavar="U", help="Needed. Every |u_k| is to be at most U, from all initial states.")
-@number_option("--initial-bound", metavar="R", help="Needed. All initial states with |x_k(0)| <= R.")
+@number_option("--initial-bound", metavar="R", help="Needed without --agents. All |x_k(0)| <= R.")
 @number_option("--deadline", metavar="T", help="Ask for this deadline ..")
 @click.option("--shortest-deadline", is_flag=True, help=".. or for the shortest one.")
 @number_option("--residual", metavar="r", help="Every agent may be so far from its final state at the deadline.")
@@ -44,6 +49,9 @@ _EXAMPLE = "ptcc design fig5b --max-input 10 --initial-bound 1 --shortest-deadli
 @output_option
 @json_option
 @click.option("--curve", type=click.Path(dir_okay=False), help="Deadline against peak input: FILE.csv, or a figure.")
+@agents_options
+@template_options
+@dimension_option
 @screen_options
 @reading_options
 def design(graph: str, curve: str | None, output: str | None, as_json: bool, screen: Screen, **options: Any) -> int:
@@ -52,37 +60,81 @@ def design(graph: str, curve: str | None, output: str | None, as_json: bool, scr
     The numbers printed are exact, and the last lines are the command that proves them again with exit code 0.
     A saturation, a sample period, disturbances and noise are not searched under: give them to that command.
 
+    Of agents of order n, from one initial state, the shortest deadline is searched, also under the sliding-mode
+    protocol, and under a gain cap that is given.
+
     Exit code 0: met, with a certificate. 3: no gains of this protocol can, proved. 4: not with this certificate.
     """
-    from ptcc_certify.gain_design import INFEASIBLE, MET
-    from ptcc_certify.gain_design import design as run
-    from ptcc_certify.report.design_screen import design_lines, design_summary
-
-    _refuse_incomplete(options)
+    agents = agents_of(options)
+    special = agents is not None and not agents.plain
+    if not special:
+        refuse_of_agents()
+    _refuse_incomplete(options, special)
     for path in (output, curve):
         refuse_output(path)
+    signed = read(graph, options)
+    answer: Design | AgentsDesign
+    if special:
+        if curve is not None:
+            raise ParameterError("--curve: is drawn of single integrators; leave it out")
+        with progress(("search of a deadline",), screen.quiet) as begin:
+            begin("search of a deadline")
+            answer = design_of_agents(signed, options)
+        command = command_of_agents(answer, options)
+    else:
+        answer = _of_single_integrators(signed, curve, screen, options)
+        command = answer.certify_options
+    LOG.info("%s", one_line(f"{answer.verdict}: {answer.binding}"))
+    _save(answer, output)
+    words = None if command is None else _certify_command(command, graph, options)
+    ignored = places_of(name for name in _NOT_SEARCHED if not (special and name in _OF_AGENTS))
+    return _show(answer, signed, graph, output, as_json, screen, words, ignored)
+
+
+def _of_single_integrators(signed: SignedDigraph, curve: str | None, screen: Screen, options: Options) -> Design:
+    """Return gains of single integrators, and save how their peak input depends on the deadline."""
+    from ptcc_certify.gain_design import design as run
+
     if curve is not None and Path(curve).suffix.lower() not in (*FIGURES, ".csv"):
         raise ParameterError(f"{curve}: the curve is written to .csv, {', '.join(FIGURES)}; choose one of these")
     request: Any = {name: options[name] for name in ("max_input", "initial_bound", "deadline", "residual")}
-    signed = read(graph, options)
     with progress(("search of gains",), screen.quiet) as begin:
         begin("search of gains")
         answer = run(signed, input_norm=2 if options["input_norm"] else None, **request)
-    LOG.info("%s", one_line(f"{answer.verdict}: {answer.binding}"))
+    if curve:
+        _save_curve(answer, curve)
+    return answer
+
+
+def _save(answer: Design | AgentsDesign, output: str | None) -> None:
+    """Write the certificate, if there is one and a file for it."""
     if output and answer.certificate is not None:
         scenario = scenario_record()
         recorded = answer.certificate.changed(scenario=scenario) if scenario else answer.certificate
         recorded.save(output)
-    if curve:
-        _save_curve(answer, curve)
-    command = _certify_command(answer, graph, options)
+
+
+def _show(
+    answer: Design | AgentsDesign,
+    signed: SignedDigraph,
+    graph: str,
+    output: str | None,
+    as_json: bool,
+    screen: Screen,
+    command: list[str] | None,
+    ignored: list[str],
+) -> int:
+    """Print the answer, and the command that proves it again; return the exit code."""
+    from ptcc_certify.gain_design import INFEASIBLE, MET
+    from ptcc_certify.report.design_screen import design_lines, design_summary
+
     if as_json:
         print_json(answer.to_dict() | {"command": None if command is None else " ".join(command)})
     else:
         screen.show(lambda: design_summary(answer, signed, graph), lambda: design_lines(answer, signed, graph))
         if output and answer.certificate is not None:
             screen.note(f"written    {output}")
-        if ignored := places_of(_NOT_SEARCHED):
+        if ignored:
             screen.note(f"note       not designed for: {', '.join(ignored)}; ask ptcc certify about them")
         if command is not None:
             again = " (give it the graph again, on standard input)" if graph == "-" else ""
@@ -94,14 +146,16 @@ def design(graph: str, curve: str | None, output: str | None, as_json: bool, scr
     return {MET: ExitCode.OK, INFEASIBLE: ExitCode.REFUTED}.get(answer.verdict, ExitCode.UNDECIDED)
 
 
-def _refuse_incomplete(options: dict[str, Any]) -> None:
+def _refuse_incomplete(options: dict[str, Any], special: bool) -> None:
     """Name everything that is missing, at once; of the two questions about the deadline the flag's counts."""
-    names = {"max_input": "--max-input U", "initial_bound": "--initial-bound R"}
+    names = {"max_input": "--max-input U"} | ({} if special else {"initial_bound": "--initial-bound R"})
     missing = [flag for name, flag in names.items() if options[name] is None]
     if options["deadline"] is None and not options["shortest_deadline"]:
         missing = [*filter(None, [", ".join(missing)]), "one of --deadline T, --shortest-deadline"]
     if missing:
-        raise ParameterError(f"design needs {' and '.join(missing)}; e.g. {_EXAMPLE}")
+        raise ParameterError(
+            f"design needs {' and '.join(missing)}; e.g. {_EXAMPLE if not special else _EXAMPLE_OF_AGENTS}"
+        )
     if options["deadline"] is None or not options["shortest_deadline"]:
         return
     source = click.get_current_context().get_parameter_source
@@ -111,14 +165,12 @@ def _refuse_incomplete(options: dict[str, Any]) -> None:
         options["deadline"] = None
 
 
-def _certify_command(answer: Design, graph: str, options: Options) -> list[str] | None:
-    """Return the words of the command that certifies the gains of a design again, quoted for a shell; None if none."""
-    if answer.certify_options is None:
-        return None
+def _certify_command(certify_options: list[str], graph: str, options: Options) -> list[str]:
+    """Return the words of the command that certifies the gains of a design again, quoted for a shell."""
     flags = [] if options["edges"] is None else ["--edges", options["edges"]]
     flags += [] if options["duplicates"] == "refuse" else ["--duplicates", options["duplicates"]]
     flags += [flag_of(name) for name in ("drop_self_loops", "undirected") if options[name]]
-    flags += answer.certify_options
+    flags += certify_options
     words = [*flags, "--", graph] if graph.startswith("-") and graph != "-" else [graph, *flags]
     return [shlex.quote(word) for word in ("ptcc", "certify", *words)]
 

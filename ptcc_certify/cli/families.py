@@ -25,7 +25,10 @@ if TYPE_CHECKING:
     from ptcc_certify.theorems.restricted_signals import DwellTime, SignalClass
 
 #: Options of certify that families do not take.
-_NOT_OF_FAMILIES = ("noise", *shared.LIMITS, "method", "at", "initial_bound", "simulation")
+_NOT_OF_FAMILIES = (
+    *("noise", *shared.LIMITS, "method", "at", "initial_bound", "simulation", "max_residual"),
+    *("delay", "period", "packet_loss", "quantisation", "own_delay", "leader_speed", "sign_gain"),
+)
 #: Options that tell how files of families are read, and the keywords of read_family.
 _READING = {"edges": "orientation"} | {n: n for n in (*shared.READING[1:], "uncertainty", "optional")}
 

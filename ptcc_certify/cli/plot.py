@@ -10,10 +10,11 @@ import click
 from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
+from ptcc_certify.cli.agents import agents_keywords, agents_of, agents_options, dimension_option, refuse_dimension
 from ptcc_certify.cli.completion import CERTIFICATES, GRAPHS, PACKAGED, complete
 from ptcc_certify.cli.families import mode_options, read_graph_or_family, refuse_options
 from ptcc_certify.cli.kinds_of_file import kind_of
-from ptcc_certify.cli.scenario import graph_of
+from ptcc_certify.cli.scenario import MEMORY, graph_of, refuse_beside
 from ptcc_certify.cli.terminal import FIGURES, print_lines, progress, refuse_output
 from ptcc_certify.errors import ExitCode, ParameterError
 
@@ -22,12 +23,19 @@ if TYPE_CHECKING:
     from ptcc_certify.certificate.family_certificate import FamilyCertificate
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.family import Family
+    from ptcc_certify.protocols import Protocol
     from ptcc_certify.simulation.trajectory import Trajectory
 
 #: Options that a certificate takes; the others are for graphs.
 _OF_CERTIFICATES = ("graph", "what", "output", "wide", "time_unit", "memory", "x0", "seed")
 #: Figures of a simulated run.
 OF_A_RUN = ("states", "input", "decay")
+#: Figures of agents of order n.
+OF_AGENTS = ("motion", "formation")
+
+
+#: Figures of a certificate with late messages, or with moving leaders.
+OF_A_CERTIFICATE = ("late", "tracking")
 
 
 class _Figure(click.Choice):  # type: ignore[type-arg]  # no generic class before click 8.2
@@ -51,9 +59,10 @@ class _Figure(click.Choice):  # type: ignore[type-arg]  # no generic class befor
 )
 @click.option(
     "--what",
-    type=_Figure([*OF_A_RUN, "graph", "spectrum"]),
-    help="States, input, or error under its proved bounds over time; the graph; its eigenvalues."
-    "  [default: of a certificate decay, else graph]",
+    type=_Figure([*OF_A_RUN, "graph", "spectrum", *OF_AGENTS, *OF_A_CERTIFICATE]),
+    help="States, input, or error under its proved bounds over time; the graph; its eigenvalues; of agents of order n "
+    "positions and velocities, or their ways in the plane; of a certificate with late messages, or moving leaders, "
+    "what is proved then.  [default: of a certificate what it claims, else graph]",
 )
 @click.option(
     "-o",
@@ -68,6 +77,8 @@ class _Figure(click.Choice):  # type: ignore[type-arg]  # no generic class befor
 @shared.protocol_options
 @shared.limit_options
 @shared.random_within_option
+@agents_options
+@dimension_option
 @shared.method_option
 @shared.time_limit_option
 @shared.memory_option
@@ -89,23 +100,37 @@ def plot(
     certified = kind_of(graph[0]) in ("a certificate", "JSON")
     if certified and len(graph) > 1:
         raise ParameterError(f"{graph[0]}: is a certificate, which is drawn by itself; leave out {graph[1]}")
-    what = what or ("decay" if certified else "graph")
-    output = output or f"{PurePath(graph[0]).stem.lstrip('-') or 'graph'}-{what}.png"
-    if PurePath(output).suffix.lower() not in FIGURES:
+    if output is not None and PurePath(output).suffix.lower() not in FIGURES:
         raise ParameterError(f"{output}: figures are written to {', '.join(FIGURES)}; choose one of these")
     refuse_output(output)
+    if what in OF_A_CERTIFICATE and not certified:
+        flag = "--delay" if what == "late" else "--leader-speed"
+        raise ParameterError(f"--what {what} is of a certificate; make one with ptcc certify GRAPH {flag} .. -o c.json")
+    refuse_dimension(options, "plot")
     try:
-        subject = _of_certificate(graph[0], what, options) if certified else _of_graphs(graph, what, options)
+        if certified:
+            what, subject = _of_certificate(graph[0], what, options)
+        else:
+            what = what or "graph"
+            subject = _of_graphs(graph, what, options)
     except RejectedCertificate as error:
         print_lines(f"rejected: {error}", err=True)
         return ExitCode.VIOLATED
+    if output is None:
+        output = f"{PurePath(graph[0]).stem.lstrip('-') or 'graph'}-{what}.png"
+        refuse_output(output)
     save_figure(_draw(what, subject, wide, time_unit), output)
     print_lines(f"written    {output}")
     return ExitCode.OK
 
 
-def _of_certificate(path: str, what: str, options: shared.Options) -> Certificate | FamilyCertificate:
-    """Read a certificate's file, and repeat its run if that is drawn; refuse options that are about a graph."""
+def _of_certificate(
+    path: str, what: str | None, options: shared.Options
+) -> tuple[str, Certificate | FamilyCertificate]:
+    """Read a certificate's file, and repeat its run if that is drawn; refuse options that are about a graph.
+
+    Which figure comes first: ``what``, or the one that is drawn where none is named.
+    """
     from ptcc_certify.certificate.certificate import Certificate, read_certificate
 
     context = click.get_current_context()
@@ -119,8 +144,13 @@ def _of_certificate(path: str, what: str, options: shared.Options) -> Certificat
         certificate = read_certificate(path, memory=options["memory"])
         if begins and certificate.initial_state is not None:
             raise ParameterError(f"--x0 is for what holds no initial state; the certificate {path} has its own")
+        of_agents = isinstance(certificate, Certificate) and certificate.agents is not None
+        what = what or (certificate.main_figure if isinstance(certificate, Certificate) else "decay")
+        if what in (*OF_A_RUN, *OF_AGENTS) and of_agents != (what in OF_AGENTS):
+            other = " or ".join(OF_AGENTS if of_agents else OF_A_RUN)
+            raise ParameterError(f"--what {what} is not drawn of {path}; ask for --what {other}")
         if what not in OF_A_RUN:
-            return certificate
+            return what, certificate
         if begins:
             one = certificate.graph if isinstance(certificate, Certificate) else certificate.family.modes[0].mandatory
             x0 = shared.read_initial_state(options["x0"], options["seed"], one)
@@ -128,7 +158,7 @@ def _of_certificate(path: str, what: str, options: shared.Options) -> Certificat
         elif certificate.initial_state is None:
             raise ParameterError(f"{path}: the certificate holds no initial state; give one with --x0")
         begin("simulation")
-        return certificate.with_simulation() if isinstance(certificate, Certificate) else certificate
+        return what, certificate.with_simulation() if isinstance(certificate, Certificate) else certificate
 
 
 def _of_graphs(graphs: tuple[str, ...], what: str, options: shared.Options) -> Any:
@@ -144,6 +174,8 @@ def _of_family(family: Family, what: str, options: shared.Options) -> Family | F
     from ptcc_certify.certificate.family_certificate import STEPS, certify_family
 
     refuse_options(options)
+    if what in OF_AGENTS or agents_of(options) is not None:
+        raise ParameterError("--agents: is not for families of graphs yet; draw one graph")
     given = click.get_current_context().get_parameter_source("disturbance") is ParameterSource.COMMANDLINE
     if given and options["disturbance"] is not None:
         raise ParameterError("--disturbance: runs of a family are drawn under the worst one; leave it out")
@@ -168,6 +200,9 @@ def _of_graph(
     protocol = shared.protocol_of(options, () if what == "decay" else ("delta", "disturbance"))
     if what in ("graph", "spectrum"):
         return signed, protocol
+    refuse_beside(click.get_current_context().meta.get(MEMORY), f"plot --what {what}")
+    if what in OF_AGENTS or agents_of(options) is not None:
+        return _of_agents(signed, protocol, what, options)
     x0 = shared.read_initial_state(options["x0"], options["seed"], signed, within=options["initial_bound"])
     if what == "decay":
         if shared.actuator_of(options) is not None:
@@ -179,28 +214,55 @@ def _of_graph(
     return simulate(signed, protocol, x0, **shared.run_keywords(protocol, options, signed))
 
 
+def _of_agents(signed: SignedDigraph, protocol: Protocol, what: str, options: shared.Options) -> Certificate:
+    """Return what the figure of agents of order n is drawn from: a certificate of theirs."""
+    from ptcc_certify.certificate.procedure import STEPS, certify
+
+    of_agents = agents_keywords(options, signed)
+    if not of_agents:
+        raise ParameterError(f"--what {what}: is of agents of order n; add --agents double-integrator, say")
+    if what not in OF_AGENTS:
+        raise ParameterError(
+            f"--what {what}: is not drawn of agents of order n; ask for --what {' or '.join(OF_AGENTS)}"
+        )
+    if what == "formation" and options["dimension"] != 2:
+        raise ParameterError("--what formation: is drawn in the plane; add --dimension 2")
+    search = {name: options[name] for name in ("method", "time_limit")}
+    if protocol.reaching is not None:
+        search |= {"sigma0": shared.sliding_keywords(protocol, options, signed)["sigma0"]}
+    with progress(STEPS) as begin:
+        return certify(signed, protocol, simulation=False, progress=begin, **of_agents, **search)
+
+
 def _draw(what: str, subject: Any, wide: bool, time_unit: str) -> Any:
     """Draw a figure of a certificate, a run, a family, or a graph with its protocol."""
     from ptcc_certify.certificate.family_certificate import FamilyCertificate
     from ptcc_certify.graphs.display_hook import plot_of_family
     from ptcc_certify.graphs.family import Family
+    from ptcc_certify.report.plots.agents_motion import plot_formation, plot_motion
     from ptcc_certify.report.plots.decay import plot_decay
     from ptcc_certify.report.plots.graph import plot_graph
     from ptcc_certify.report.plots.input import plot_input
+    from ptcc_certify.report.plots.late import plot_late, plot_tracking
     from ptcc_certify.report.plots.spectrum import plot_spectrum
     from ptcc_certify.report.plots.trajectory import plot_run
 
     if isinstance(subject, Family | FamilyCertificate):
+        if what in OF_A_CERTIFICATE:
+            raise ParameterError(f"--what {what} is of the certificate of one graph; this one is of a family")
         if wide:
             raise ParameterError(
                 "--wide is for the states of one graph; figures of families are one column wide: leave it out"
             )
         return plot_of_family(subject, what, **({"time_unit": time_unit} if what in OF_A_RUN else {}))
     subject, protocol = subject if isinstance(subject, tuple) else (subject, None)
+    if what in OF_AGENTS:
+        return plot_motion(subject, wide=wide, time_unit=time_unit) if what == "motion" else plot_formation(subject)
     if what == "graph":
         return plot_graph(subject)
     if what == "spectrum":
         return plot_spectrum(subject, protocol=protocol)
     if what == "states":
         return plot_run(subject, wide=wide, time_unit=time_unit)
-    return {"input": plot_input, "decay": plot_decay}[what](subject, time_unit=time_unit)
+    figures = {"input": plot_input, "decay": plot_decay, "late": plot_late, "tracking": plot_tracking}
+    return figures[what](subject, time_unit=time_unit)

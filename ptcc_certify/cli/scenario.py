@@ -27,6 +27,10 @@ from ptcc_certify.graphs.rationals import shorten
 MAX_BYTES = 1_000_000
 #: Where the scenario of a call is kept: ``context.meta[MEMORY]``.
 MEMORY = "ptcc_certify.scenario"
+#: Commands for which it does not matter what the agents are.
+_OF_THE_GRAPH_ALONE = ("classify", "check")
+#: Options of late messages and moving leaders, under which ``ptcc certify`` alone works.
+BESIDE = ("delay", "period", "packet_loss", "quantisation", "own_delay", "leader_speed", "sign_gain")
 #: Where the context of its command is kept.
 COMMAND = "ptcc_certify.command"
 
@@ -75,6 +79,20 @@ SECTIONS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
             "dimension": ("dimension", "1"),
         },
     ),
+    "agents": (
+        "Agents of order n, their first velocities, and a formation.",
+        {
+            "kind": ("agents", '"double-integrator"'),
+            "v0": ("v0", '"0"'),
+            "a0": ("a0", '"0"'),
+            "drag": ("drag", "0.1"),
+            "plant": ("plant", '"0,0.1"'),
+            "offsets": ("offsets", '"offsets.csv"'),
+            "biases": ("biases", '"biases.csv"'),
+            "rest": ("rest", "1"),
+            "decay": ("decay", "4"),
+        },
+    ),
     "disturbance": (
         "What disturbs the agents.",
         {"delta": ("delta", "1"), "signal": ("disturbance", '"worst-case"'), "noise": ("noise", "0.01")},
@@ -87,12 +105,27 @@ SECTIONS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
             "sample_period": ("sample_period", "0.001"),
         },
     ),
+    "messages": (
+        "Messages that arrive late, get lost or are rounded.",
+        {
+            "delay": ("delay", "0.02"),
+            "period": ("period", "0.01"),
+            "packet_loss": ("packet_loss", "3"),
+            "quantisation": ("quantisation", "0.1"),
+            "own_delay": ("own_delay", "false"),
+        },
+    ),
+    "leaders": (
+        "Leaders that move (nominal protocol).",
+        {"speed": ("leader_speed", "0.5"), "sign_gain": ("sign_gain", "1")},
+    ),
     "expectations": (
         "What is asked: exit code 3 if it is refuted, 4 if it is left open.",
         {
             "behaviour": ("expect", '"bipartite-consensus"'),
             "min_rate": ("min_rate", "1"),
             "max_input": ("max_input", "100"),
+            "max_residual": ("max_residual", "0.05"),
         },
     ),
     "certificate": (
@@ -118,7 +151,7 @@ SECTIONS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
         },
     ),
 }
-_STATES = ("x0", "sigma0")
+_STATES = ("x0", "sigma0", "v0", "a0", "offsets", "biases")
 #: Keys that make a family of a graph.
 OF_FAMILIES = ("uncertainty", "optional")
 #: Options of the other protocol: a flag that chooses the protocol leaves such keys out.
@@ -206,9 +239,12 @@ def read_scenario(path: str) -> Scenario:
         for key, value in keys.items():
             place = f"{name}: [{section}] {shorten(key)}"
             if key not in known:
-                raise ParameterError(f"{place}: no such key{_where(key) or did_you_mean(key, known)}")
+                hint = _where(key) or did_you_mean(key, known) or f"; there are {', '.join(known)}"
+                raise ParameterError(f"{place}: no such key{hint}")
             option = known[key][0]
-            if option in _STATES:
+            if option == "plant":
+                options[option] = _numbers(value if isinstance(value, list) else [value], place)
+            elif option in _STATES:
                 options[option] = _state(value, folder, place)
             elif option == "graph" and isinstance(value, list):
                 options[option] = _texts_of(value, place, '["day.csv", "night.csv"]') or None
@@ -272,6 +308,13 @@ def _texts_of(value: list[Any], place: str, example: str) -> list[str]:
     return value
 
 
+def _numbers(value: list[Any], place: str) -> str:
+    """Return a list of numbers as an option takes it."""
+    if not all(isinstance(x, int | str) and not isinstance(x, bool) for x in value):
+        raise ParameterError(f"{place}: write a list of numbers, such as [0, 0.1]")
+    return ",".join(map(str, value))
+
+
 def _value(value: Any, example: str, place: str) -> Any:
     """Return a value as an option takes it: true or false, or a text."""
     if example.startswith("["):
@@ -333,6 +376,15 @@ def graph_of(context: click.Context, parameter: click.Parameter, graph: Any) -> 
     scenario = _scenario_of(named[0])
     context.meta.update({MEMORY: scenario, COMMAND: context, SCENARIO: named[0]})
     own = {parameter.name for parameter in context.command.params}
+    if "agents" not in own and context.command.name not in _OF_THE_GRAPH_ALONE:
+        for key in ("agents", "offsets", "biases"):
+            if scenario.options.get(key) not in (None, "integrator", "1"):
+                why = (
+                    f"ptcc {context.command.name} takes single integrators; ptcc certify, simulate and plot take others"
+                )
+                raise ParameterError(f"{scenario.place(key)}: {why}")
+    if context.command.name in ("simulate", "design"):
+        refuse_beside(scenario, context.command.name)
     if "x0" in own and "dimension" not in own and scenario.options.get("dimension", "1") != "1":
         why = f"ptcc {context.command.name} takes scalar agents; what is proved of one component holds for each"
         raise ParameterError(f"{scenario.place('dimension')}: {why}: leave it out, and let x0 be one component")
@@ -359,6 +411,18 @@ def _scenario_of(path: str) -> Scenario:
             except FormatError as error:
                 raise FormatError(f"{scenario.place('graph')}: {error}") from None
     return scenario
+
+
+def refuse_beside(scenario: Scenario | None, command: str) -> None:
+    """Refuse late messages and moving leaders of a scenario where they would be left out without a word."""
+    if scenario is None:
+        return
+    for option in BESIDE:
+        if scenario.options.get(option) not in (None, False):
+            what = "leaders that move" if option in ("leader_speed", "sign_gain") else "late messages"
+            figure = "tracking" if option in ("leader_speed", "sign_gain") else "late"
+            mend = f"ptcc certify -o c.json proves it, ptcc plot c.json --what {figure} runs it"
+            raise ParameterError(f"{scenario.place(option)}: ptcc {command} does not take {what}; {mend}")
 
 
 def takes_one_graph(name: str | None) -> str:
@@ -411,7 +475,9 @@ def placed(context: click.Context, error: PTCCError | click.BadParameter) -> Exc
         text = str(error)
         match = re.match(r"(?:--)?([A-Za-z][\w-]*)(: | = | )", text)
         option = match[1].replace("-", "_") if match else ""
-        option = {"initial_state": "x0", "initial": "x0", "behaviour": "expect"}.get(option, option)
+        option = {"initial_state": "x0", "initial": "x0", "behaviour": "expect", "speed": "leader_speed"}.get(
+            option, option
+        )
         if match and match[0].startswith("--"):
             text = text[match.end() :]
     if context.meta[COMMAND].get_parameter_source(option) is ParameterSource.DEFAULT_MAP:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +11,7 @@ import click
 from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
+from ptcc_certify.cli.agents import agents_keywords, agents_of, agents_options, run_of_agents
 from ptcc_certify.cli.families import (
     dwell_of,
     dwell_options,
@@ -25,8 +27,10 @@ from ptcc_certify.graphs.rationals import shorten
 if TYPE_CHECKING:
     from fractions import Fraction
 
+    from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.family import Family
     from ptcc_certify.protocols import Protocol
+    from ptcc_certify.simulation.agents import AgentsTrajectory
     from ptcc_certify.simulation.family_run import FamilyTrajectory
     from ptcc_certify.simulation.trajectory import Trajectory
 
@@ -47,6 +51,8 @@ _TABLES = ("", ".csv", ".txt")
     default="random",
     help="Family: random (with --seed), worst-case, constant, or FILE.csv with columns t (or clock), mode, level.",
 )
+@agents_options
+@shared.method_option
 @click.option("--dimension", type=click.IntRange(1, 1000), default=1, help="State components per agent.")
 @click.option("--samples", type=click.IntRange(2, 100_000), default=201, help="Instants up to T, dense towards it.")
 @click.option("--steps", type=click.IntRange(1, 100_000), help="Instead: so many equal steps of t from 0 to T.")
@@ -65,47 +71,101 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
     rho2 = 0 runs the nominal protocol without a deadline (asymptotic baseline). With --dimension d, --x0 takes N*d
     numbers, agent after agent, and columns are headed <label>[1] to <label>[d].
 
+    Agents of order n run with the gains that `certify` proves under the same --method, up to the deadline; beside
+    their positions there are columns v(<label>), a(<label>).
+
     Of a family - several graphs with --switching, weights in intervals, --uncertainty, --optional - one run under one
     signal, with a column mode: the number of the graph that acts.
     """
-    from ptcc_certify.graphs.io import write_atomically
+    from ptcc_certify.graphs.family import Family
 
     suffix, vectors = Path(output or "").suffix.lower(), options["dimension"] > 1
     if suffix not in (*FIGURES, *_TABLES):
         raise ParameterError(f"{output}: CSV is written to .csv, figures to {', '.join(FIGURES)}; choose one of these")
-    if suffix in FIGURES and vectors:
+    several = agents_of(options)
+    special = several is not None and not several.plain
+    if suffix in FIGURES and vectors and not special:
         raise ParameterError("a figure shows one component per agent; leave out --dimension or write CSV")
     refuse_output(output)
     protocol = shared.protocol_of(options, ("delta", "disturbance"))
-    if vectors and options["kind"] != "nominal":
+    if vectors and options["kind"] != "nominal" and not special:
         raise ParameterError("the sliding-mode protocol is simulated for scalar agents; leave out --dimension")
-    trajectory = _run(graph, protocol, options)
-    if output and suffix in FIGURES:
-        from ptcc_certify.report.plots.style import save_figure
-        from ptcc_certify.report.plots.trajectory import plot_run
-
-        save_figure(plot_run(trajectory, wide=wide, time_unit=time_unit), output)
-    elif output:
-        write_atomically(output, trajectory.to_csv())
-    else:
-        click.echo(trajectory.to_csv(), nl=False, color=True)  # labels stay as they are, escape codes included
-        if sys.stdout.isatty():
-            click.echo("note: -o FILE.csv keeps the table, -o FILE.png draws the states", err=True)
-    if output:
-        print_lines(f"written    {output}")
+    signed = read_graph_or_family(graph, options)
+    if special:
+        if isinstance(signed, Family):
+            raise ParameterError("--agents: is not for families of graphs yet; simulate one graph")
+        motion = _run_agents(signed, protocol, options)
+        _write(motion, output, plot_of_agents, {"wide": wide, "time_unit": time_unit})
+        if protocol.reaching is not None:
+            click.echo("note: u is without the sliding terms, which cancel the disturbance", err=True)
+        return ExitCode.OK
+    if click.get_current_context().get_parameter_source("method") is ParameterSource.COMMANDLINE:
+        raise ParameterError("--method: chooses the gains of agents of order n; leave it out, or add --agents")
+    trajectory = _run(signed, protocol, options)
+    _write(trajectory, output, plot_of_run, {"wide": wide, "time_unit": time_unit})
     if protocol.prescribed and trajectory.actuator is None and not trajectory.deadline_resolved:
         click.echo("note: the run had not settled at the deadline; raise rho2 * kappa", err=True)
     return ExitCode.OK
 
 
-def _run(graphs: tuple[str, ...], protocol: Protocol, options: shared.Options) -> Trajectory:
+def _write(run: Any, output: str | None, draw: Callable[..., Any], look: dict[str, Any]) -> None:
+    """Write a run as a figure or CSV, to a file or to standard output."""
+    from ptcc_certify.graphs.io import write_atomically
+
+    if output and Path(output).suffix.lower() in FIGURES:
+        from ptcc_certify.report.plots.style import save_figure
+
+        save_figure(draw(run, **look), output)
+    elif output:
+        write_atomically(output, run.to_csv())
+    else:
+        click.echo(run.to_csv(), nl=False, color=True)  # labels stay as they are, escape codes included
+        if sys.stdout.isatty():
+            click.echo("note: -o FILE.csv keeps the table, -o FILE.png draws the states", err=True)
+    if output:
+        print_lines(f"written    {output}")
+
+
+def plot_of_run(run: Any, **look: Any) -> Any:
+    """Draw the states of a run."""
+    from ptcc_certify.report.plots.trajectory import plot_run
+
+    return plot_run(run, **look)
+
+
+def plot_of_agents(run: Any, **look: Any) -> Any:
+    """Draw positions, velocities and so on of a run of agents of order n."""
+    from ptcc_certify.report.plots.agents_motion import plot_motion
+
+    return plot_motion(run, **look)
+
+
+def _run_agents(signed: SignedDigraph, protocol: Protocol, options: shared.Options) -> AgentsTrajectory:
+    """Return the run of agents of order n."""
+    for name in ("steps", "boundary_layer"):
+        if options[name] is not None:
+            raise ParameterError(
+                f"{shared.flag_of(name)}: is for single integrators; leave it out, or leave out --agents"
+            )
+    source = click.get_current_context().get_parameter_source
+    if options["kind"] == "nominal" and options["disturbance"] is not None:
+        raise ParameterError("--disturbance: agents of order n run without, or under --protocol sliding-mode")
+    if source("signal") == ParameterSource.COMMANDLINE:
+        raise ParameterError("--signal: is for families (--switching, --uncertainty, intervals); this is one graph")
+    refuse_restricted(options)
+    more = agents_keywords(options, signed)
+    if protocol.reaching is not None:
+        more |= {"sigma0": shared.sliding_keywords(protocol, options, signed)["sigma0"]}
+    return run_of_agents(signed, protocol, more | {"method": options["method"]}, options["samples"])
+
+
+def _run(signed: SignedDigraph | Family, protocol: Protocol, options: shared.Options) -> Trajectory:
     """Return the run of a graph, or of a family under a signal."""
     from ptcc_certify.graphs.family import Family
     from ptcc_certify.simulation.run import simulate as run
 
     steps = options["steps"]
     times = None if steps is None else [protocol.T * k / steps for k in range(steps + 1)]
-    signed = read_graph_or_family(graphs, options)
     if isinstance(signed, Family):
         return _run_family(signed, protocol, times, options)
     if click.get_current_context().get_parameter_source("signal") == ParameterSource.COMMANDLINE:

@@ -17,6 +17,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -170,12 +171,6 @@ class ReachingProblem:
     sigma0 : (N,) array
     disturbance : Disturbance
 
-    Attributes
-    ----------
-    z : (N,) array
-        ``ln(T_r/(T_r - t))`` where each sliding variable reaches 0, to near machine precision; 0 for one that starts
-        there or below 1e-290, infinite for one that is 0 at ``T_r`` only.
-
     Raises
     ------
     SimulationError
@@ -191,12 +186,20 @@ class ReachingProblem:
         # A worst-case disturbance of the full size leaves mu1 - delta, which floats would cancel.
         self._gap = float(protocol.mu1 - protocol.delta)
         self._worst = isinstance(disturbance, WorstCaseDisturbance) and disturbance.delta == protocol.delta
-        self.z = np.zeros(len(sigma0))
         if self._agents.size:
             self._end = self._latest()
             self._edges, self._steps = self._panels()
             self._sums = np.concatenate([np.zeros((self._agents.size, 1)), np.cumsum(self._steps, axis=1)], axis=1)
-            self.z[self._agents] = [self._root(row) for row in range(self._agents.size)]
+
+    @cached_property
+    def z(self) -> np.ndarray:
+        """``ln(T_r/(T_r - t))`` where each of the N sliding variables reaches 0, to near machine precision.
+
+        0 for one that starts there or below 1e-290, infinite for one that is 0 at ``T_r`` only.
+        """
+        z = np.zeros(self._unit.size)
+        z[self._agents] = [self._root(row) for row in range(self._agents.size)]
+        return z
 
     def sigma(self, z: np.ndarray) -> np.ndarray:
         """Return the (N, M) sliding variables at increasing instants ``z >= 0``, infinite from ``T_r`` on."""
@@ -212,7 +215,7 @@ class ReachingProblem:
         What remains of the bracket is raised by what the sum may be off by; it is at most the integral from ``z`` to
         the certain instant, too, which nothing cancels.
         """
-        bounds = np.zeros((self.z.size, z.size))
+        bounds = np.zeros((self._unit.size, z.size))
         for row, agent in enumerate(self._agents.tolist()):
             before = z < certain[agent]
             size = self._size(row, z[before], SUM_ERROR)

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from lmi.exact.decimal_rounding import near
 from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.graphs.io import as_graph
 from ptcc_certify.protocols.base import ReachingProtocol, aligned, symbols
 from ptcc_certify.protocols.casadi_latex import to_latex
 from ptcc_certify.protocols.nominal import NominalProtocol, nominal_rows
-from ptcc_certify.protocols.parameters import NotNegative, Positive, readable
+from ptcc_certify.protocols.parameters import NotNegative, Positive
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -70,8 +71,8 @@ class SlidingModeProtocol(ReachingProtocol):
     def __post_init__(self) -> None:
         if self.mu1 <= self.delta:
             raise ParameterError(
-                f"mu1 = {readable(self.mu1)} does not exceed delta = {readable(self.delta)}; a disturbance could "
-                f"outweigh it: give mu1 > {readable(self.delta)}"
+                f"mu1 = {near(self.mu1)} does not exceed delta = {near(self.delta)}; a disturbance could "
+                f"outweigh it: give mu1 > {near(self.delta)}"
             )
         _ = self.gain, self.reaching_gain  # refuses what is beyond float64
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ptcc_certify.agents_design import AgentsDesign
 from ptcc_certify.gain_design import Design
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import analyse
@@ -9,7 +10,7 @@ from ptcc_certify.report.structure_text import graph_entries
 from ptcc_certify.report.text_layout import format_lines, wrap_lines
 
 
-def design_summary(answer: Design, graph: SignedDigraph, name: str) -> list[str]:
+def design_summary(answer: Design | AgentsDesign, graph: SignedDigraph, name: str) -> list[str]:
     """Return the short screen: graph, how it was read, what was asked, verdict, deadlines; 8 lines of 80 columns.
 
     Gains that meet it stand between verdict and deadlines.
@@ -25,6 +26,6 @@ def design_summary(answer: Design, graph: SignedDigraph, name: str) -> list[str]
     return wrap_lines(format_lines((head, text) for head, text in entries if text))
 
 
-def design_lines(answer: Design, graph: SignedDigraph, name: str) -> list[str]:
+def design_lines(answer: Design | AgentsDesign, graph: SignedDigraph, name: str) -> list[str]:
     """Return the long screen: gains, what binds, and the largest input besides."""
     return [*format_lines(graph_entries(analyse(graph), name)), *answer.lines()]

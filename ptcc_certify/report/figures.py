@@ -10,13 +10,17 @@ from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ptcc_certify.bounds.late_messages import LateBounds
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.graphs.size_limits import DRAWN_NODES, INPUT_NODES
+from ptcc_certify.graphs.size_limits import DRAWN_NODES, EXACT_NODES, INPUT_NODES
+from ptcc_certify.protocols.base import Protocol
 from ptcc_certify.report.plots.decay import plot_decay
 from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.plots.input import plot_input
+from ptcc_certify.report.plots.late import plot_late, plot_tracking
 from ptcc_certify.report.plots.style import figure_bytes
 from ptcc_certify.report.plots.trajectory import plot_sliding, plot_trajectory
+from ptcc_certify.simulation.late_messages import can_run
 
 #: What draws each figure of a certificate, on given axes or its own; all but the graph show its simulated run.
 PLOTS: dict[str, Callable[..., Axes]] = {
@@ -25,6 +29,8 @@ PLOTS: dict[str, Callable[..., Axes]] = {
     "sliding": plot_sliding,
     "decay": plot_decay,
     "input": plot_input,
+    "late": plot_late,
+    "tracking": plot_tracking,
 }
 
 
@@ -32,6 +38,9 @@ def draw(saved: Certificate, wanted: Sequence[str]) -> dict[str, Any]:
     """Draw those of the wanted figures for which there is something to draw."""
     run, n = saved.trajectory, saved.graph.n_nodes
     there = {"graph": n <= DRAWN_NODES}
+    if saved.initial_state is not None and n <= EXACT_NODES:
+        there["late"] = saved.late is not None and _late_is_drawn(saved.late, saved.protocol)
+        there["tracking"] = saved.tracking is not None
     if run is not None:
         slid = run.sliding is not None
         there["states"] = n <= INPUT_NODES and not saved.constant
@@ -42,6 +51,11 @@ def draw(saved: Certificate, wanted: Sequence[str]) -> dict[str, Any]:
     # the input of the run that the other figures show, without limits of the gain
     axes = (plot_input(run, certificate=saved) if name == "input" else PLOTS[name](saved) for name in drawn)
     return {name: ax.figure for name, ax in zip(drawn, axes, strict=True)}
+
+
+def _late_is_drawn(late: LateBounds, protocol: Protocol) -> bool:
+    """Tell whether there are runs with late messages under something that was proved."""
+    return late.says_something and can_run(protocol, late.messages)
 
 
 def inline_figure(figure: Figure, name: str, caption: Markup) -> Markup:

@@ -13,6 +13,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 from typing import Any
 
+from ptcc_certify.agents_design import AgentsDesign
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.errors import PTCCError
@@ -24,6 +25,7 @@ from ptcc_certify.graphs.size_limits import SHOWN_NODES
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.report.family_screen import decision_lines, family_lines, family_text
 from ptcc_certify.report.figures import draw
+from ptcc_certify.report.plots.agents_motion import plot_motion
 from ptcc_certify.report.plots.family_graph import plot_family_graph
 from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.plots.style import figure_bytes
@@ -57,10 +59,17 @@ def certificate_html(certificate: Certificate) -> str:
 
     Of one that was read, up to 120 nodes, the run is made for the figure.
     """
+    part = certificate.agents
+    if part is not None:
+        drawn = part.initial_state is not None and certificate.graph.n_nodes <= SHOWN_NODES
+        alt = "positions, velocities and so on over time"
+        return _page(certificate_lines(certificate, "signed digraph"), plot_motion(certificate) if drawn else None, alt)
+    lines = certificate_lines(certificate, "signed digraph")
+    if figures := draw(certificate, ["late", "tracking"]):
+        (figure,) = figures.values()
+        return _page(lines, figure, "distance of the farthest agent under its proved bound, over time")
     alt = "simulated decay of the error under its proved bound, over the time left to the deadline"
-    return _page(
-        certificate_lines(certificate, "signed digraph"), draw(_with_run(certificate), ["decay"]).get("decay"), alt
-    )
+    return _page(lines, draw(_with_run(certificate), ["decay"]).get("decay"), alt)
 
 
 def _with_run(certificate: Certificate) -> Certificate:
@@ -115,6 +124,12 @@ def design_html(answer: Design) -> str:
     """Show a design: the screen of ``ptcc design``, and its peak input against the deadline."""
     alt = "certified peak input against the deadline, and what no gains can stay below"
     return _page(answer.lines(), plot_trade_off(answer).figure, alt)
+
+
+@shows(AgentsDesign)
+def agents_design_html(answer: AgentsDesign) -> str:
+    """Show a design of agents of order n: the screen of ``ptcc design``."""
+    return _page(answer.lines(), None, "")
 
 
 def _structure_page(lines: Iterable[str], structure: Structure) -> str:

@@ -28,8 +28,10 @@ from ptcc_certify.graphs.io.graph_files import reading_flags
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.size_limits import DRAWN_NODES, LABELLED_NODES
 from ptcc_certify.report import notation as texts
+from ptcc_certify.report.agents_page import agents_view
 from ptcc_certify.report.family_page import family_view
 from ptcc_certify.report.figures import draw, inline_figure
+from ptcc_certify.report.late_lines import late_lines, tracking_lines
 from ptcc_certify.report.notation import above, agent_parts, enclosed, printable, rational
 from ptcc_certify.report.plots.agents import camp_groups
 from ptcc_certify.report.plots.distributions import plot_degrees, plot_final_states
@@ -79,13 +81,17 @@ def report_html(
     >>> with TemporaryDirectory() as folder:
     ...     certify(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5]).save(f"{folder}/c.json")
     ...     page = report_html(read_certificate(f"{folder}/c.json"))
-    >>> "<h1>Bipartite consensus at T = 1</h1>" in page, "<bdi>&lt;b&gt;</bdi>" in page, "<b>" in page
+    >>> "<h1>Signed-average consensus at T = 1</h1>" in page, "<bdi>&lt;b&gt;</bdi>" in page, "<b>" in page
     (True, True, False)
     """
     template = "family_page.html" if isinstance(saved, FamilyCertificate) else "page.html"
+    part = None if isinstance(saved, FamilyCertificate) else saved.agents
     report = saved.checked
     more = {"no_run": no_run, "obligations": [] if report is None else _obligations(report)}
-    shown = family_view(saved, runs) if isinstance(saved, FamilyCertificate) else _view(saved)
+    if part is not None:
+        template, shown = "agents_page.html", agents_view(saved, part)  # type: ignore[arg-type]
+    else:
+        shown = family_view(saved, runs) if isinstance(saved, FamilyCertificate) else _view(saved)
     return _environment().get_template(template).render(shown | _written(day) | more)
 
 
@@ -171,9 +177,11 @@ def _view(saved: Certificate) -> dict[str, Any]:
         "kinds": Counter(m.kind for m in saved.envelope.functions).items(),
         "remaining": _remaining(saved),
         "reaching": list(islice(zip(labels, saved.sigma0 or (), saved.reaching or (), strict=False), ROWS)),
-        "figures": draw(saved, ("graph", "states", "sliding", "decay", "input")) | _distributions(saved),
+        "figures": draw(saved, ("graph", "states", "sliding", "decay", "input", "late", "tracking"))
+        | _distributions(saved),
         "camp_counts": Counter(camp_groups(saved.structure)[saved.structure.leaders]).items(),
         "gap": _gap(saved),
+        "late_lines": [*late_lines(saved), *tracking_lines(saved)],
         "peak_agent": labels[max(range(len(peaks)), key=peaks.__getitem__)] if peaks else None,
         "commands": commands,
         "notes": [note for note in notes[:5] if isinstance(note, str)] if isinstance(notes, list) else [],
@@ -190,10 +198,11 @@ def _in_words(saved: Certificate) -> tuple[Markup, str]:
 def _title(saved: Certificate, invariant: str) -> Markup:
     """Say what the certificate is about."""
     claims, deadline = saved.claims, "T" if saved.protocol.reaching is None else "T_r + T_s"
-    behaviour = claims[0].behaviour if len(claims) == 1 else f"{len(claims):,} components settle"
+    behaviour = claims[0].sharpest if len(claims) == 1 else f"{len(claims):,} components settle"
     text = Markup("{} at {} = {}").format(behaviour, deadline, rational(saved.protocol.T)).replace("= \u2248", "\u2248")
     if saved.constant:
         text = Markup("every agent keeps {}").format(invariant)
+    text += ", nothing late" * (saved.late is not None) + ", leaders at rest" * (saved.tracking is not None)
     return text[:1].upper() + text[1:] if saved.verdict == "certified" else "Undecided: " + text
 
 

@@ -107,6 +107,8 @@ def write_report(
     if isinstance(saved, FamilyCertificate):
         _write_family(saved, path, suffix, simulation, progress, day)
         return saved.verdict
+    if saved.agents is not None and suffix == ".tex":
+        raise ParameterError("there is no statement in LaTeX of agents of order n yet; write the page, FILE.html")
     saved, why = _with_run(saved, simulation)
     progress("report")
     if suffix == ".tex":

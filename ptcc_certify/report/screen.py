@@ -16,8 +16,10 @@ from typing import TYPE_CHECKING, Any
 from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.errors import PTCCError
 from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.report.agents_lines import answers, claimed_of, long_lines
 from ptcc_certify.report.family_screen import WHATEVER, family_summary
 from ptcc_certify.report.input_lines import disturbed_lines, initial_states_text, input_lines, limits_text
+from ptcc_certify.report.late_lines import late_lines, residual_text, tracking_lines
 from ptcc_certify.report.sliding_lines import sliding_lines
 from ptcc_certify.report.structure_text import (
     ORIENTATION,
@@ -74,7 +76,8 @@ def summary_lines(certificate: Certificate, name: str, origins: Mapping[str, str
     -------
     list of str
         Graph, how it was read, protocol, claim, final state, error bound, input, disturbances, verdict. Error
-        bound and input tell of single agents where their line has room.
+        bound and input tell of single agents where their line has room. Where messages are late, or leaders move, what
+        holds then stands before the claim, in place of error bound and input.
 
     Examples
     --------
@@ -94,15 +97,23 @@ def summary_lines(certificate: Certificate, name: str, origins: Mapping[str, str
     whatever = "" if p.reaching is None else f", any |d_k| <= {down(p.reaching.delta, 12)}"
     if p.reaching is not None and p.reaching.delta == 0:
         whatever = ", without disturbances"
-    claims = _claim_texts(certificate.structure, certificate.claims, f" at T = {near(p.T)}", whatever)
+    if certificate.late is not None:
+        whatever = ", nothing late"
+    if certificate.tracking is not None:
+        whatever = ", leaders at rest"
+    claims = _claim_texts(
+        certificate.structure, certificate.claims, _when(certificate, f"at T = {near(p.T)}"), whatever
+    )
+    if len(certificate.claims) > 1 and (certificate.late or certificate.tracking):
+        claims.append(whatever.removeprefix(", "))
     drawn = _is_set_asked(certificate)
     entries = [
         *graph_entries(certificate.structure, name),
         ("protocol", _protocol_text(certificate, origins)),
+        *late_lines(certificate),
+        *tracking_lines(certificate),
         *_headed("claim", claims),
-        *([] if drawn else _short_final_state(certificate)),
-        *_bounds(certificate, drawn),
-        *disturbed_lines(certificate),
+        *_answers(certificate, drawn),
         ("verdict", _short_verdict(certificate)),
     ]
     return wrap_lines(format_lines(entries))
@@ -150,7 +161,7 @@ def _file_summary(path: str, document: Mapping[str, Any], report: CheckReport) -
     from ptcc_certify.certificate.certificate import Certificate, accepted_certificate
     from ptcc_certify.certificate.format_vectors import read_side_files
 
-    origins = dict.fromkeys(("x(0)", "sigma(0)"), "as in the file")
+    origins = dict.fromkeys(("x(0)", "v(0)", "a(0)", "sigma(0)"), "as in the file")
     files = read_side_files(document, Path(path).parent)
     certificate = accepted_certificate(Path(path), document, "", report, files)
     if isinstance(certificate, Certificate):
@@ -158,9 +169,17 @@ def _file_summary(path: str, document: Mapping[str, Any], report: CheckReport) -
     return family_summary(certificate, path, origins)
 
 
+def _when(certificate: Certificate, when: str) -> str:
+    """Tell of what a claim is, and when."""
+    return f" {when}" if certificate.agents is None else f"{claimed_of(certificate.agents)} {when}"
+
+
 def _protocol_text(certificate: Certificate, origins: Mapping[str, str]) -> str:
     """Tell the protocol with its parameters, and where the initial state comes from."""
     begin = [] if certificate.initial_state is None else [f"x(0) {origins.get('x(0)', 'given')}"]
+    if certificate.agents is not None and certificate.agents.initial_state is not None:
+        names = ("x(0)", "v(0)", "a(0)")[: certificate.agents.order]
+        begin = [f"{name} {origins.get(name, 'given')}" for name in names]
     if certificate.initial_set is not None and (not begin or _is_set_asked(certificate)):
         begin = [initial_states_text(certificate.initial_set)]
     if certificate.sigma0 is not None:
@@ -201,7 +220,7 @@ def _short_final_state(certificate: Certificate) -> Lines:
     result, labels = certificate.final_state, certificate.graph.labels
     if result is None:
         return
-    degenerate, limits = "; degenerate x(0)" * bool(result.degenerate), "; no limits" * bool(certificate.limits)
+    degenerate, limits = "; degenerate x(0)" * bool(result.degenerate), "; without limits" * bool(certificate.limits)
     kind = f"({_accuracy(result, 'rounded')}{degenerate}{limits})"
     groups: dict[Fraction | float, list[str]] = {}
     for label, state in zip(labels, result.states, strict=True):
@@ -228,6 +247,18 @@ def _is_set_asked(certificate: Certificate) -> bool:
     return certificate.initial_set is not None and "x(0)" in certificate.request.origins
 
 
+def _answers(certificate: Certificate, drawn: bool) -> Lines:
+    """Tell where the agents end, how near by when, and the input."""
+    if certificate.agents is not None:
+        yield from answers(certificate.agents)
+        return
+    if certificate.tracking is None and not drawn:
+        yield from _short_final_state(certificate)
+    if certificate.late is None and certificate.tracking is None:
+        yield from _bounds(certificate, drawn)
+        yield from disturbed_lines(certificate)
+
+
 def _bounds(certificate: Certificate, drawn: bool) -> Lines:
     """Tell how near the agents are by when, and how large the input gets; of single agents where the line has room."""
     if certificate.constant:
@@ -236,8 +267,9 @@ def _bounds(certificate: Certificate, drawn: bool) -> Lines:
         return
     norm, agents, more = _error_texts(certificate)
     if norm:
+        limited = certificate.effort is not None and bool(certificate.effort.residual)  # from the whole set
         texts = (norm + agents.replace("every agent", whom) + more for whom in ("every agent", "agents", "each"))
-        fitting = (text for text in texts if columns(text) <= TEXT and not drawn)
+        fitting = (text for text in texts if columns(text) <= TEXT and (limited or not drawn))
         yield "error", next(fitting, norm + more)
     if certificate.effort is not None:
         loud = certificate.effort.bounded is False and not certificate.effort.residual
@@ -311,8 +343,16 @@ def _short_verdict(certificate: Certificate) -> str:
     certified, advice = assessment.certified_part, re.sub(r" \(.*?\)", "", assessment.advice)
     certified += ", but says little by T" * (assessment.useful is False)
     checked = "" if certified != CERTIFIED or assessment.answers or assessment.caveat else "checked without a solver"
-    ended = f"the time limit of {certificate.time_limit:g} s ended {', '.join(certificate.cut_off)}"
-    return assessment.line(certified, checked, assessment.caveat, advice, ended * bool(certificate.cut_off))
+    ended = _cut_off_text(certificate)
+    return assessment.line(certified, checked, assessment.caveat, advice, ended)
+
+
+def _cut_off_text(certificate: Certificate) -> str:
+    """Tell which searches took longer than their shares of the time limit; nothing if none did."""
+    if not certificate.cut_off:
+        return ""
+    shares = "its share" if len(certificate.cut_off) == 1 else "their shares"
+    return f"{', '.join(certificate.cut_off)} took {shares} of --time-limit {certificate.time_limit:g} s"
 
 
 def structure_lines(structure: Structure, name: str) -> list[str]:
@@ -337,7 +377,13 @@ def certificate_lines(
     def lines() -> Lines:
         yield from _graph_lines(structure, name)
         yield "structure", structure_text(structure)
-        yield from _claim_lines(structure, certificate.claims, f" {when}")
+        yield from late_lines(certificate)
+        if by_agent := residual_text(certificate):
+            yield "", f"by agent: {by_agent}"
+        yield from tracking_lines(certificate)
+        if certificate.late is not None or certificate.tracking is not None:
+            yield "", f"the lines below are of {'messages at once' if certificate.late else 'leaders at rest'}"
+        yield from _claim_lines(structure, certificate.claims, _when(certificate, when))
         yield "protocol", _gains_text(p)
         if certificate.limits or certificate.noise is not None or certificate.delta is not None:
             yield "", "a line that names no limits, noise or disturbances is without them"
@@ -345,13 +391,16 @@ def certificate_lines(
             drawn = f" ({origins['x(0)']})" if "x(0)" in origins else ""
             alone = ", of the simulated run alone" * _is_set_asked(certificate)
             yield "x(0)", value_list(structure.graph.labels, certificate.initial_state) + drawn + alone
-        states = () if _is_set_asked(certificate) else (_final_state_lines, _deviation_lines)
-        for part in (_sliding_lines, *states, _rate_lines, input_lines):
-            yield from part(certificate)
+        if certificate.agents is not None:
+            yield from chain(long_lines(certificate.agents), _rate_lines(certificate))
+            yield from _headed("simulated", _simulated_agents(certificate))
+        else:
+            states = () if _is_set_asked(certificate) else (_final_state_lines, _deviation_lines)
+            for part in (_sliding_lines, *states, _rate_lines, input_lines):
+                yield from part(certificate)
         yield from _headed("simulated", _simulated(certificate))
         if certificate.cut_off:
-            named = f"the time limit of {certificate.time_limit:g} s ended {', '.join(certificate.cut_off)}"
-            yield "cut off", f"{named}; what was proved by then stands"
+            yield "cut off", f"{_cut_off_text(certificate)}; what was proved by then stands"
         yield from (("note", note) for note in certificate.notes[:3])
         yield "verdict", certificate.assessment.text
 
@@ -401,7 +450,8 @@ def _rate_lines(certificate: Certificate) -> Lines:
     ratio = "" if bound is None else f", optimality ratio at least {down(rate / bound, 4)}"
     yield "rate", f"{down(rate)} per unit of the stretched clock s, proved: V <= e^(-rate s) V(0){best}{ratio}"
     yield from _class_lines(certificate)
-    yield from _residual_lines(certificate) if certificate.direct else _reaching_lines(certificate)
+    if certificate.agents is None:
+        yield from _residual_lines(certificate) if certificate.direct else _reaching_lines(certificate)
     proved = f"{len(certificate.obligations)} proof obligations proved in {arithmetic(certificate.direct)}"
     text, report = proved, certificate.checked
     if report is not None:
@@ -493,6 +543,14 @@ def _simulated(certificate: Certificate) -> Iterator[str]:
         gap = float(abs(run.final_state - certificate.final_state).max())
         remark = "" if run.deadline_resolved else " (the run had not settled)"
         yield f"end state within {gap:.1e} of the final state{remark}"
+
+
+def _simulated_agents(certificate: Certificate) -> Iterator[str]:
+    """Tell what the run of agents of order n showed."""
+    seen = certificate.agents_comparison
+    if seen is not None:
+        word = "VIOLATED" if seen.violated else "kept"
+        yield f"CVODES: bounds {word}, worst ratio of V {seen.decay:.4g}, of all bounds {seen.worst:.4g}"
 
 
 def _claim_lines(structure: Structure, claims: Sequence[Claim], when: str = "") -> Lines:

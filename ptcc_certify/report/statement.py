@@ -109,6 +109,7 @@ def report_latex(saved: Certificate, figures: dict[str, str] | None = None) -> s
         **dict(zip(("columns", "rows"), _states(saved), strict=True)),
         **{"figures": figures or {}, "stem": _stem(saved.path.stem), "captions": _captions(saved)},
         "sha256": _broken(saved.sha256),
+        **_late(saved),
     }
     return _environment().get_template("statement.tex").render(view)
 
@@ -295,6 +296,17 @@ def _shares(saved: Certificate) -> list[tuple[float, float]]:
     sliding = Envelope(envelope.structure, envelope.gain, envelope.functions)
     clocks = [float(p.rho1 * p.span) * f - float(p.rho2 * p.kappa) * math.log(1 - f) for f in FRACTIONS]
     return [(f, float(sliding.norm_factor(s * (1 - 1e-12)))) for f, s in zip(FRACTIONS, clocks, strict=True)]
+
+
+def _late(saved: Certificate) -> dict[str, float | str | None]:
+    """Return what is left at ``T`` with late messages, who misses it, and how far followers drift off after ``T``."""
+    late, tracking = saved.late, saved.tracking
+    missed = None if late is None else late.missed
+    return {
+        "late_largest": None if late is None or math.isinf(late.largest) else late.largest,
+        "late_missed": None if missed is None else _cut(saved.graph.labels[missed.agent]),
+        "tracking_after": None if tracking is None else tracking.distance_after,
+    }
 
 
 def _states(saved: Certificate) -> tuple[list[str], list[tuple[str, str, tuple[str, ...]]]]:

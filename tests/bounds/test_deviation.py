@@ -270,3 +270,15 @@ def test_a_held_input_may_leave_more_than_the_start():
         if Fraction(x) > most:
             agents[label] = str(most)
             assert not check(signed(told)).accepted
+
+
+def test_constants_are_accepted_where_weights_of_eighteen_orders_make_floats_see_another_form():
+    edges = [
+        *[("0", "2", "0.00296"), ("1", "2", -960000), ("4", "2", "0.000016"), ("0", "3", -143000000)],
+        *[("4", "3", "-0.0000098"), ("1", "4", "-0.0000111"), ("2", "4", "-0.0000012"), ("3", "4", "0.000002")],
+        *[("3", "5", "0.98"), ("6", "5", "0.000239"), ("2", "6", -1300000), ("4", "6", -2170000)],
+        ("5", "6", "-0.0000000086"),
+    ]
+    graph = SignedDigraph.from_edges(edges, [str(v) for v in range(7)])
+    cert = certify(graph, NominalProtocol(T=1, rho1=180, rho2="3.4", kappa=1), [1] * 7, simulation=False)
+    assert cert.checked is not None and cert.checked.accepted, cert.checked

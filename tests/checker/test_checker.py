@@ -937,14 +937,16 @@ def test_huge_and_hostile_files_are_refused(tmp_path: Path):
     assert "not a number" in one_line(path)
     for nested in ("[" * 10**6, "[" * 10**6 + "]" * 10**6, '{"a":' * 10**6):
         path.write_text('{"schema": "ptcc-certificate/2", "x": ' + nested)
-        assert "not a readable certificate" in one_line(path)
+        assert "not a readable certificate (brackets are nested too deep)" in one_line(path)
+    path.write_text('{"schema": \n"ptcc-')
+    assert "not a readable certificate (no JSON: line 2, column 1: Unterminated string)" in one_line(path)
     path.write_text('{"schema": "ptcc-certificate/2", "schema": "ptcc-certificate/2"}')
     assert "a key occurs twice" in one_line(path)
     for text in ("NaN", "Infinity", "-Infinity"):
         path.write_text('{"schema": "ptcc-certificate/2", "x": ' + text + "}")
         assert "not a number" in one_line(path)
     path.write_bytes(b"\xff\xfe\x00")
-    assert "not a readable certificate" in one_line(path)
+    assert "not a readable certificate (no UTF-8 at byte 0)" in one_line(path)
     path.write_text('{"schema": "ptcc-certificate/1"}')
     assert 'not a certificate of schema "ptcc-certificate/2"' in one_line(path)
     assert "no such file" in one_line(tmp_path / "missing.json").lower()

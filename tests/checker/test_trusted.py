@@ -8,22 +8,27 @@ import os
 import shutil
 import subprocess
 import sys
+from fractions import Fraction
 from functools import cache
 from pathlib import Path
 
 import pytest
+from agent_documents import Setting, document
 from paper_examples import paper_examples
 
 import ptcc_certify
 from ptcc_certify.certificate.family_certificate import certify_family
+from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.protocols.moving_leaders import MovingLeaders
 
 ROOT = Path(ptcc_certify.__file__).parents[1]
 LISTED = (ROOT / "ptcc_certify/checker/TRUSTED").read_text(encoding="utf-8").splitlines()
 ALL = [line for line in LISTED if not line.startswith("#")]
-TWINS = [line for line in ALL if line.endswith(("/fast.py", "/array_digraph.py"))]
+TWINS = [line for line in ALL if line.endswith(("/fast.py", "/array_digraph.py", "/array_steps.py"))]
 PLAIN = [line for line in ALL if line not in TWINS]
 MODULES = [line for line in PLAIN if line.endswith(".py")]
 
@@ -45,7 +50,7 @@ STANDARD = {
     *("re", "sys", "typing"),
 }
 #: Functions of ``math`` that give integers.
-EXACT_MATH = {"ceil", "floor", "gcd", "isqrt", "lcm", "prod"}
+EXACT_MATH = {"ceil", "comb", "factorial", "floor", "gcd", "isqrt", "lcm", "prod"}
 #: Where floats may stand, and what for. Nothing that is decided depends on one, but for limits of time and memory.
 FLOATS = {
     ("lmi/exact/decimal_rounding.py", "float_up"): "the float next to a number",
@@ -102,7 +107,8 @@ def test_the_list_is_what_the_checker_imports():
 
 
 def test_each_file_of_the_list_is_there_once():
-    assert TWINS == ["lmi/exact/fast.py", "ptcc_certify/checker/array_digraph.py"] and ALL[-2:] == TWINS
+    arrays = [f"ptcc_certify/checker/array_{name}.py" for name in ("digraph", "steps")]
+    assert ["lmi/exact/fast.py", *arrays] == TWINS and ALL[-3:] == TWINS
     assert len(set(ALL)) == len(ALL) and all((ROOT / name).is_file() for name in ALL)
 
 
@@ -190,6 +196,32 @@ def families() -> list[str]:
     return found
 
 
+@cache
+def agents() -> list[str]:
+    """The JSON of certificates of agents of order n: drag, at rest, capped, and what is used of full matrices."""
+    pair = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", -2), ("a", "f", 3)])
+    half = Fraction(1, 2)
+    settings = (
+        Setting(plant=(Fraction(0), half)),
+        Setting(damping=half, plant=(Fraction(0), half)),
+        Setting(cap=Fraction(5), method="full"),
+    )
+    return [json.dumps(document(pair, setting)) for setting in settings]
+
+
+@cache
+def of_messages() -> list[str]:
+    """The JSON of certificates of late messages by rows and steps, by a Lyapunov function, and of moving leaders."""
+    chain = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1), ("a", "c", 2)])
+    protocol, x0 = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 3, 4]
+    late = LateMessages(delay="0.02"), LateMessages(delay="0.001", gain_cap=4, own_delay=True)
+    made = [certify(chain, protocol, x0, simulation=False, method="paper", messages=messages) for messages in late]
+    made.append(certify(chain, protocol, x0, simulation=False, method="paper", leaders=MovingLeaders(speed=1)))
+    kinds = {step["kind"] for one in made for step in json.loads(one.to_json())["proof"]}
+    assert {"late-rows", "late-steps", "late-residual", "late-staged", "late-form", "tracking"} <= kinds
+    return [one.to_json() for one in made]
+
+
 @pytest.mark.parametrize("watched", [False, True])
 def test_the_examples_are_accepted_by_these_files_alone(watched: bool, tmp_path: Path):
     """Copied into an empty folder, isolated from all that is installed: no NumPy, no flint, no solver.
@@ -223,7 +255,7 @@ def test_the_examples_are_accepted_by_these_files_alone(watched: bool, tmp_path:
     ):
         assert "ModuleNotFoundError" in run(f"import {name}").stderr
     check = "import runpy; sys.argv[0] = 'checker'; runpy.run_module('ptcc_certify.checker', run_name='__main__')"
-    for text in (*families(), *paper_examples()):
+    for text in (*families(), *agents(), *of_messages(), *paper_examples()):
         (tmp_path / "c.json").write_text(text, encoding="utf-8")
         done = run(check, "c.json")
         assert done.returncode == 0, done.stdout + done.stderr

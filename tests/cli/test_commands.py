@@ -114,8 +114,10 @@ def test_only_near_names_of_files_are_told():
 
 
 def test_an_option_of_another_command_is_told_with_it():
-    words = ("design", "team.csv", "--max-input", "9", "--initial-bound", "1", "--deadline", "1", "--gain-cap", "5")
-    assert "--gain-cap'. It is an option of ptcc certify, ptcc simulate, ptcc plot" in ptcc(*words).err
+    words = ("design", "team.csv", "--max-input", "9", "--initial-bound", "1", "--deadline", "1", "--stop-before", "5")
+    assert "--stop-before'. It is an option of ptcc certify, ptcc simulate, ptcc plot" in ptcc(*words).err
+    capped = ptcc(*words[:-2], "--gain-cap", "5").err
+    assert "--gain-cap: is not searched for single integrators; give it to ptcc certify, or" in capped
 
 
 def test_only_near_options_are_told():

@@ -112,9 +112,10 @@ def test_a_flag_that_changes_the_protocol_leaves_out_the_parameters_of_the_other
     ("old", "new", "says"),
     [
         ("rho1", "rh1", "s.toml: [protocol] rh1: no such key; did you mean rho1?"),
+        ("rho1", "velocity", "s.toml: [protocol] velocity: no such key; there are kind, T, rho1, rho2, kappa"),
         ("deadline", "seed", "s.toml: [design] seed: no such key; it belongs to [initial_state]"),
         ("[protocol]", "[protocl]", "s.toml: [protocl]: no such section; did you mean protocol?"),
-        ("[design]", "[agents]", "s.toml: [agents]: no such section"),
+        ("[design]", "[vehicles]", "s.toml: [vehicles]: no such section"),
         ("\n[graph]", "T = 1\n[graph]", "s.toml: [T]: no such key outside of a section; it belongs to [protocol]"),
         ("T = 2", "T = -2", "s.toml: [protocol] T: T = -2 is outside its domain"),
         ("T = 2", "T = nan", "s.toml: [protocol] T: T = nan"),

@@ -159,6 +159,21 @@ def test_what_binds_cannot_be_tightened(name, U, R, asked):
     assert designed(name, Fraction(U) * less, R, **asked, deadline=found.deadline).verdict != MET
 
 
+def test_a_shorter_deadline_is_worth_more_than_gains_that_certify_proves_again(monkeypatch):
+    graph = graph_of("fig1a")
+    first, shortest = gain_design._first_protocol(analyse(graph)), designed("fig1a", 10, 1)
+    usual = gain_design.certify
+
+    def weaker(graph, protocol, **more):  # proves twice the deadline
+        made = usual(graph, protocol, **more)
+        return made if protocol == first else made.changed(protocol=protocol.replace(T=2 * protocol.T))
+
+    monkeypatch.setattr(gain_design, "certify", weaker)
+    found = design(graph, max_input=10, initial_bound=1)
+    assert found.verdict == MET and found.deadline == shortest.deadline
+    assert found.certificate.checked.accepted and not found.repeatable and found.certify_options is None
+
+
 @pytest.mark.parametrize("name", ["pair", "fig1b"])
 def test_a_smaller_residual_takes_longer(name):
     times = [designed(name, 20, 3, residual=r).deadline for r in ("2.9", "2.755", "2.5", "0.1", "0.001")]

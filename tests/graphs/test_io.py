@@ -113,6 +113,14 @@ def test_a_decimal_comma_is_not_taken_for_another_column(rows):
         text(rows)
 
 
+@pytest.mark.parametrize(
+    "titles", ["From Node;To Node;Sign", "FromNodeId;ToNodeId;Weight", "source_id;target-id;w", "rater;ratee;Rating"]
+)
+def test_titles_of_a_header_may_have_blanks_capitals_and_hyphens(titles):
+    table = f'{titles};Year\n"Anna Berg";"Bo, Jr.";-1;2001\n'
+    assert read_graph(io.StringIO(table)).edges == (("Anna Berg", "Bo, Jr.", Fraction(-1)),)
+
+
 def test_names_of_a_header_in_a_row_with_a_number_are_nodes():
     assert edges(text("source,target,1\n")) == {("source", "target", Fraction(1))}
 
@@ -691,6 +699,14 @@ BAD_FILES = [
     ("g.csv", "a,b,1\n\n# x\nb,c,-inf\n", ["line 4:", '"-inf"', "edge b -> c", "not a finite number"]),
     ("g.csv", "a,b,1\nx\nb,c,Infinity\n", ["line 3:", "not a finite number"]),
     ("g.csv", "a,b,+\n", ["line 1:", 'weight "+" of edge a -> b is not a number; write 1 or -1']),
+    ("g.csv", "source,target,sign\na,b,positive\n", ["line 2:", 'weight "positive" of edge a -> b', "write 1 or -1"]),
+    (
+        "W.csv",
+        ",ann,bob,eve\nann,0,1,0\n",
+        ["line 1:", "looks like a matrix with names", "from_matrix(pandas.read_csv"],
+    ),
+    ("el.txt", "0 1 {'weight': 1}\n", ["line 1:", "edge 0 -> 1 is not a number", "write_weighted_edgelist"]),
+    ("g.csv", ",b,1\n", ["line 1:", "the source is empty"]),
     ("g.csv", "a,b,\N{MINUS SIGN}2\n", ["line 1:", "is not a number; write -2"]),
     ("g.csv", "listener,speaker,weight\na,b,1\n", ["line 1:", "names no source and target"]),
     ("W.txt", "0 -1 0.5\n1/3 0 0\n0 2 0\n", ["looks like a 3 x 3 matrix", ".npy or .mtx"]),

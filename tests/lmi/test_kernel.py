@@ -17,7 +17,7 @@ KERNEL = Path(lmi.exact.__file__).parent
 FAST, SHOWS = "fast.py", {"decimal_rounding.py"}
 PLAIN = sorted(path for path in KERNEL.glob("*.py") if path.name != FAST)
 #: What of `math` is exact on integers.
-EXACT = {"gcd", "isqrt", "lcm"}
+EXACT = {"comb", "factorial", "gcd", "isqrt", "lcm"}
 
 
 def imports(tree: ast.AST) -> set[str]:

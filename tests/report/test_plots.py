@@ -35,12 +35,15 @@ from ptcc_certify.graphs.digraph import SignedDigraph, Weights
 from ptcc_certify.graphs.size_limits import LABELLED_NODES
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.protocols.gain_limits import GainLimits
+from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.protocols.moving_leaders import MovingLeaders
 from ptcc_certify.protocols.nominal import NominalProtocol
-from ptcc_certify.report.plots.agents import CAMP_STYLES, NAMED_AGENTS, NAMED_OF_PART
+from ptcc_certify.report.plots.agents import CAMP_STYLES, NAME_SIZE, NAMED_AGENTS, NAMED_OF_PART
 from ptcc_certify.report.plots.decay import plot_decay
 from ptcc_certify.report.plots.graph import GROUND, plot_graph
 from ptcc_certify.report.plots.graph_layout import FREE_NODES, arc, arrows_of
 from ptcc_certify.report.plots.input import plot_effort, plot_input
+from ptcc_certify.report.plots.late import plot_late, plot_tracking
 from ptcc_certify.report.plots.spectrum import CLASS_MARKERS, plot_frontier, plot_spectrum
 from ptcc_certify.report.plots.style import DOUBLE_COLUMN, EDGE_STYLES, SINGLE_COLUMN, STYLE, save_figure
 from ptcc_certify.report.plots.trade_off import plot_trade_off
@@ -577,6 +580,15 @@ def test_of_a_certificate_without_a_run_the_bounds_are_drawn_and_states_simulate
 # ---------------------------------------------------------------------- what an editor of figures asks
 
 
+CHAIN = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 1), ("c", "d", -1)])
+MOVING: dict[str, dict[str, Any]] = {
+    "late": {"messages": LateMessages(delay="0.05")},
+    "capped": {"messages": LateMessages(delay="0.0005", own_delay=True, gain_cap=20)},
+    "leaders": {"leaders": MovingLeaders(speed=1)},
+    "sign": {"leaders": MovingLeaders(speed=1, sign_gain=1)},
+}
+
+
 @cache
 def gallery() -> dict[str, Figure]:
     """Every figure at the width of a column, of few agents, of many, and of one, drawn."""
@@ -592,6 +604,10 @@ def gallery() -> dict[str, Figure]:
     figures = {f"{name} {plot.__name__}": plot(certified(name)).figure for plot, names in plots for name in names}
     pair = design(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)]), max_input=10, initial_bound=1)
     figures["pair plot_trade_off"] = plot_trade_off(pair).figure
+    for name, asked in MOVING.items():
+        cert = certify(CHAIN, NominalProtocol(1, 1, 2, 1), [1, 3, -2, 4], method="perron", simulation=False, **asked)
+        plot = plot_late if "messages" in asked else plot_tracking
+        figures[f"{name} {plot.__name__}"] = plot(cert, time_unit="s").figure
     for figure in figures.values():
         FigureCanvasAgg(figure).draw()
     return figures
@@ -659,12 +675,12 @@ def test_every_figure_names_the_unit_of_time() -> None:
 
 def test_every_figure_has_one_signature() -> None:
     names = [name for name in ptcc_certify.__all__ if name.startswith("plot_")]
-    assert len(names) == 12
+    assert len(names) == 16
     for name in names:
         subject, *keywords = inspect.signature(getattr(ptcc_certify, name)).parameters.values()
         assert subject.name == "subject" and subject.default is inspect.Parameter.empty
         assert all(one.kind is inspect.Parameter.KEYWORD_ONLY for one in keywords)
-        assert name == "plot_run" or (keywords[0].name, keywords[0].default) == ("ax", None)
+        assert name in ("plot_run", "plot_motion") or (keywords[0].name, keywords[0].default) == ("ax", None)
 
 
 def test_a_subject_that_leads_to_no_figure_is_refused_with_the_mend() -> None:
@@ -674,6 +690,10 @@ def test_a_subject_that_leads_to_no_figure_is_refused_with_the_mend() -> None:
         ParameterError, match="drawn from a certificate, not from SignedDigraph; certify the graph first"
     ):
         plot_frontier(graph_of("fig1a"))
+    with pytest.raises(ParameterError, match="drawn from a certificate, not from str; certify the graph first"):
+        plot_late("fig1a")
+    with pytest.raises(ParameterError, match="says nothing of moving leaders; certify with leaders"):
+        plot_tracking(certified("fig1a"))
     with pytest.raises(ParameterError, match="no sliding variables; simulate under the sliding-mode protocol"):
         plot_sliding(certified("fig1a"))
     run = certified("fig1a").trajectory
@@ -817,3 +837,37 @@ def test_ticks_of_time_do_not_overlap_beside_long_names():
     FigureCanvasAgg(ax.figure).draw()
     boxes = [label.get_window_extent() for label in ax.get_xticklabels()]
     assert len(boxes) > 1 and all(a.x1 < b.x0 for a, b in pairwise(boxes))
+
+
+def test_names_of_agents_that_end_at_one_place_do_not_cover_each_other():
+    pair = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)])
+    protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
+    cert = ptcc_certify.certify(
+        pair, protocol, [[3, 1], [1, 0]], agents=ptcc_certify.Agents(order=2), method="paper", simulation=False
+    )
+    first, second = (np.array(text.xyann) for text in ptcc_certify.plot_formation(cert).texts)
+    assert np.hypot(*(first - second)) > NAME_SIZE
+
+
+def test_coordinates_of_agents_stand_below_each_other_and_side_by_side_in_a_wide_figure():
+    pair = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)])
+    protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
+    cert = ptcc_certify.certify(
+        pair, protocol, [[3, 1], [1, 0]], agents=ptcc_certify.Agents(order=2), method="paper", simulation=False
+    )
+    for wide, shape in ((False, (4, 1)), (True, (2, 2))):
+        axes = ptcc_certify.plot_motion(cert, wide=wide).axes
+        assert axes[0].get_subplotspec().get_gridspec().get_geometry() == shape
+        assert {ax.get_ylabel() for ax in axes} == {"position 1", "position 2", "velocity 1", "velocity 2"}
+        assert len({(ax.get_xlim(), tuple(ax.get_xticks())) for ax in axes}) == 1
+        assert sorted(text.get_text() for ax in axes for text in ax.texts) == ["a", "a", "b", "b"]
+
+
+def test_a_motion_names_its_agents_and_all_panels_have_the_same_times():
+    pair = SignedDigraph.from_edges([("ann", "bob", 1), ("bob", "ann", 1)])
+    agents, x0 = ptcc_certify.Agents(order=2), {"ann": [0, 1], "bob": [3, 1]}
+    cert = certify(pair, NominalProtocol(T=1), x0, agents=agents, method="paper", simulation=False)
+    panels = ptcc_certify.plot_motion(cert).axes
+    assert [sorted(text.get_text() for text in ax.texts) for ax in panels[:2]] == [["ann", "bob"], ["ann, bob"]]
+    assert len(panels) == 4 and {ax.get_xlim() for ax in panels} == {panels[1].get_xlim()}
+    assert "deadline $T$" in {text.get_text() for text in panels[0].get_legend().get_texts()}

@@ -31,7 +31,7 @@ from jinja2 import UndefinedError
 from report_examples import HOSTILE, MADE, NOMINAL, SLIDING, example, forged, undecided
 
 import ptcc_certify
-from ptcc_certify import Certificate, GainLimits, NominalProtocol, SignedDigraph, certify, design
+from ptcc_certify import Agents, Certificate, GainLimits, NominalProtocol, SignedDigraph, certify, design
 from ptcc_certify.certificate.certificate import RejectedCertificate, read_certificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import load_graph
@@ -422,6 +422,14 @@ def test_isolated_agents_under_the_sliding_mode_keep_the_difference(tmp_path: Pa
     page = sound(reported(certify(graph, SLIDING, [1, 2], sigma0=[3, 0], simulation=False), tmp_path))
     assert "Every agent keeps x \u2212 \u03c3" in page.text and "keeps its state" not in page.text
     assert [row[4] for row in rows((tmp_path / "c.html").read_text(), "Where the agents end")] == ["-2", "2"]
+
+
+def test_the_heading_names_the_sharpest_claim(tmp_path: Path):
+    allies = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("b", "c", 1)])
+    protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
+    for agents, told in ((None, "Consensus at T"), (Agents(order=2), "Consensus of double integrators")):
+        made = certify(allies, protocol, [1, 2, 3], agents=agents, method="paper", simulation=False)
+        assert f"<h1>{told}" in reported(made, tmp_path)
 
 
 def test_a_long_deadline_is_plain_in_the_title(tmp_path: Path):

@@ -112,6 +112,7 @@ REQUESTS: list[tuple[Any, dict[str, Any], int, str]] = [
         "left open: limits",
     ),
     (NOMINAL, {"initial_set": 3}, 0, "for all |x_k(0)| <= 3"),
+    (NOMINAL, {"initial_set": 3, "limits": [GainLimits(gain_cap=50)]}, 0, "every agent within"),
     (NOMINAL, {"at": "0.3"}, 0, "at t = 0.3: ||E|| <="),
     (NOMINAL, {"time_limit": 1e-9}, 4, "took its share of 1e-09 s"),
     (ptcc.NominalProtocol(T=1, rho1=1, rho2="0.1", kappa=1), {}, 0, "NOT BOUNDED"),

@@ -102,7 +102,7 @@ def bound_effort(request: InputRequest) -> Effort:
     effort = Effort(bounded, by, (lower, upper), None, (None,) * len(request.forms), sliding=sliding)
     if (request.initial_state is None and request.initial_set is None) or still or n > INPUT_NODES:
         return effort
-    constants = tuple(None if f is None or f.matrix is None else _constants(f, n) for f in request.forms)
+    constants = tuple(None if f is None or f.matrix is None else full_constants(f, n) for f in request.forms)
     region = request.initial_set or InitialSet(tuple(request.initial_state or ()))
     rows = structure.graph.exact_rows(range(n))
     bounds = InputBounds(rows, gain.exact, request.forms, constants, region, _reaching_phase(request))
@@ -180,7 +180,7 @@ def _reaching_phase(request: InputRequest) -> Reaching | None:
     return Reaching(sigma0, protocol.T_r, protocol.T_s, drive.rho1, drive.pole, push, quiet)
 
 
-def _constants(form: Form, n: int) -> tuple[Fraction, ...] | None:
+def full_constants(form: Form, n: int) -> tuple[Fraction, ...] | None:
     """Return ``c_k`` with ``e_k^2 <= c_k E'P E`` for a full ``P``, a little above the diagonal of its inverse."""
     P, scale = form.entries
     above = arithmetic().above(P, [[int(i == j) for j in range(len(P))] for i in range(len(P))])

@@ -18,8 +18,8 @@ from ptcc_certify.graphs.rationals import parse_exact, shorten
 from ptcc_certify.graphs.size_limits import MAX_LINE
 
 _SEPARATORS = ("\t", ",", ";", None)  # None: blanks
-_SOURCE = ("source", "from", "fromnodeid", "src", "rater")
-_TARGET = ("target", "to", "tonodeid", "dst", "rated")
+_SOURCE = ("source", "from", "fromnodeid", "fromnode", "fromid", "sourcenode", "sourceid", "src", "rater")
+_TARGET = ("target", "to", "tonodeid", "tonode", "toid", "targetnode", "targetid", "dst", "rated", "ratee")
 _WEIGHT = ("weight", "sign", "rating", "value", "w")
 #: The note of a file whose header puts source and target elsewhere than source first.
 BY_HEADER = "columns by header"
@@ -73,14 +73,19 @@ def _separator(line: str) -> tuple[str | None, bool]:
 
 
 def column(row: Sequence[str], names: Sequence[str], place: str) -> int | None:
-    """Return the column that bears the first of ``names`` that occurs."""
-    lower = [field.lower() for field in row]
+    """Return the column that bears the first of ``names`` that occurs, whatever its case, blanks and hyphens."""
+    titles = [_plain(field) for field in row]
     for name in names:
-        if lower.count(name) > 1:
+        if titles.count(_plain(name)) > 1:
             raise FormatError(f'{place}: two columns are named "{name}"; rename one')
-        if name in lower:
-            return lower.index(name)
+        if _plain(name) in titles:
+            return titles.index(_plain(name))
     return None
+
+
+def _plain(title: str) -> str:
+    """Return a title in small letters, without what may stand between its words."""
+    return re.sub(r"[\s_-]", "", title.lower())
 
 
 def edge_columns(row: Sequence[str], place: str) -> tuple[int, int, int | None] | None:
@@ -185,6 +190,9 @@ def _declared(row: list[str], columns: tuple[int, int, int], place: str, mend: s
     if source and target:
         edge = f"{shorten(source)} -> {shorten(target)}"
         raise FormatError(f"{place}: edge {edge} has no weight; add one in a third column{mend}")
+    if mend and not row[0] and all(row[1:]) and not re.fullmatch(r"[+-]?[\d./eE+-]+", row[-1]):
+        read = 'SignedDigraph.from_matrix(pandas.read_csv(FILE, index_col=0), orientation="listens")'
+        raise FormatError(f"{place}: looks like a matrix with names; write rows of edges, or in Python {read}")
     if target or weight or not source:
         raise FormatError(f"{place}: the {'target' if source else 'source'} is empty; name a node or remove the row")
     return source

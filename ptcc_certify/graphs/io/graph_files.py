@@ -18,6 +18,8 @@ from ptcc_certify.graphs.rationals import shorten
 
 MATRICES = {"mtx": read_mtx, "npz": read_npz, "npy": read_npy, "mat": read_mat}
 _GRAPHS = {"graphml": read_graphml, "gml": read_gml, "net": read_pajek, "pajek": read_pajek}
+#: Endings of files that are no edge lists.
+OTHER_FORMATS = (*_GRAPHS, *MATRICES)
 _READERS = dict.fromkeys(("csv", "tsv", "txt", "edges", "edgelist"), read_edge_list) | _GRAPHS | MATRICES
 
 

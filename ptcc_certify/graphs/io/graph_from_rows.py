@@ -26,6 +26,9 @@ HEADER_MEND = "; if this row is a header, name its columns source, target, weigh
 #: What is said at once of a table with such a row and decimal commas.
 DECIMALS = "; write decimals with a point, too"
 
+#: What stands for a sign in some tables.
+WORDS_OF_SIGN = ("+", "-", MINUS, "positive", "negative", "pos", "neg", "plus", "minus")
+
 
 @dataclass
 class Rows:
@@ -131,8 +134,10 @@ class _Draft:
             mend = "remove the row or give a weight"
             if "," in text:
                 mend = "write decimals with a point"
-            elif text in ("+", "-", MINUS):
+            elif text.lower() in WORDS_OF_SIGN:
                 mend = "write 1 or -1"
+            elif text.startswith("{"):
+                mend = "write the file with networkx.write_weighted_edgelist"
             elif MINUS in text:
                 mend = f"write {text.replace(MINUS, '-')[:40]}"
             elif code == 0 and self.rows.headerless and "finite" not in message:

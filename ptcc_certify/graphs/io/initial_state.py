@@ -305,6 +305,28 @@ def _state_of_file(path: str | os.PathLike[str], graph: SignedDigraph) -> list[F
     return _in_node_order(pairs, graph, name, FormatError)
 
 
+def read_vectors_of_file(path: str | os.PathLike[str], graph: SignedDigraph, dimension: int) -> list[list[Fraction]]:
+    """Read rows ``node,x,y,..`` of so many numbers for each node; the header is optional.
+
+    Raises
+    ------
+    FormatError
+        A row has another number of entries, an entry is no number, or a node has no row, or two.
+    """
+    name, _ = name_and_ending(path)
+    columns: list[list[tuple[str, str, str]]] = [[] for _ in range(dimension)]
+    for number, texts in records(read_bytes(path, name), name):
+        place, row = f"{name}, line {number}", [text.strip() for text in texts]
+        if not any(row) or (not columns[0] and row[0] not in graph.index):
+            continue  # a header
+        if len(row) != dimension + 1:
+            raise FormatError(f"{place}: a row needs a node and {dimension} numbers; write node,x,y")
+        for entries, text in zip(columns, row[1:], strict=True):
+            entries.append((row[0], text, place))
+    states = [_in_node_order(entries, graph, name, FormatError) for entries in columns]
+    return [list(row) for row in zip(*states, strict=True)]
+
+
 def _node_and_value(row: Sequence[str], place: str) -> tuple[int | None, int | None]:
     """Return the columns of a header; beside that of the nodes a single other one holds the values, however called."""
     node, value = column(row, _NODE, place), column(row, _VALUE, place)

@@ -15,6 +15,7 @@ from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import Structure, analyse, find_camps
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, STEPS, tick_count
 from ptcc_certify.report.text_layout import columns, printable, shorten_text
+from ptcc_certify.simulation.agents import AgentsTrajectory
 from ptcc_certify.simulation.family_run import FamilyTrajectory
 from ptcc_certify.simulation.trajectory import Trajectory
 
@@ -111,7 +112,7 @@ def draw_deadlines(ax: Axes, run: Trajectory) -> None:
 
 def name_agents(
     ax: Axes,
-    run: Trajectory,
+    run: Trajectory | AgentsTrajectory,
     values: np.ndarray,
     lines: dict[int, str],
     *,

@@ -11,7 +11,7 @@ from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled
-from ptcc_certify.report.plots.subject import structure_of
+from ptcc_certify.report.plots.subject import certificate_of, structure_of
 from ptcc_certify.simulation.trajectory import Trajectory
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
 
@@ -97,9 +97,7 @@ def plot_frontier(subject: Any, *, ax: Axes | None = None) -> Axes:
     >>> [line.get_label() for line in ax.lines]
     ['paper', 'perron', 'upper bound (proved)', 'spectral rate (numerical)']
     """
-    if not isinstance(subject, Certificate):
-        kind = type(subject).__name__
-        raise ParameterError(f"this figure is drawn from a certificate, not from {kind}; certify the graph first")
+    subject = certificate_of(subject)
     functions = subject.envelope.functions
     if not functions:
         raise ParameterError("the certificate holds no proved Lyapunov function")

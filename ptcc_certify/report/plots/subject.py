@@ -68,6 +68,28 @@ def trajectory_of(subject: Any) -> Trajectory:
     return run
 
 
+def certificate_of(subject: Any) -> Certificate:
+    """Return the certificate of one graph that a figure is drawn from, or refuse anything else.
+
+    Raises
+    ------
+    ParameterError
+        The subject is no certificate, or one of a family.
+
+    Examples
+    --------
+    >>> from ptcc_certify.report.plots.subject import certificate_of
+    >>> certificate_of("fig1a")
+    Traceback (most recent call last):
+    ptcc_certify.errors.ParameterError: this figure is drawn from a certificate, not from str; certify the graph first
+    """
+    refuse_family(subject)
+    if not isinstance(subject, Certificate):
+        kind = type(subject).__name__
+        raise ParameterError(f"this figure is drawn from a certificate, not from {kind}; certify the graph first")
+    return subject
+
+
 def structure_of(subject: Any) -> Structure:
     """Return the structure of a certificate, a trajectory, or anything that :func:`~ptcc_certify.as_graph` takes.
 

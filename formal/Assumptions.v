@@ -1,0 +1,2 @@
+Require Import Main.
+Print Assumptions check_sound.

@@ -1,0 +1,123 @@
+(* A certificate while it is read: fields, texts, labels, and how far its proof was followed. *)
+open Json
+exception Unsupported of string
+let bad m = raise (Bad m)
+let unsupported m = raise (Unsupported m)
+
+let entries what = function Arr l -> l | _ -> bad (what ^ ": an array is due")
+let text what = function Str s -> s | _ -> bad (what ^ ": a text is due")
+let truth what = function Bool b -> b | _ -> bad (what ^ ": true or false is due")
+(* an object with exactly these keys, as a function from keys to values *)
+let fields what keys = function
+  | Obj l ->
+      List.iter (fun k -> if not (List.mem_assoc k l) then bad (Printf.sprintf "%s: the key %S is missing" what k)) keys;
+      List.iter (fun (k, _) -> if not (List.mem k keys) then bad (Printf.sprintf "%s: the key %S is unknown" what k)) l;
+      fun k -> List.assoc k l
+  | _ -> bad (what ^ ": an object is due")
+let beside = function Obj l -> (match List.assoc_opt "count" l with Some (Num _) -> true | _ -> false) | _ -> false
+let need ok what = if not ok then bad what
+
+let number what = function
+  | Str s -> Number.rational s
+  | Obj l when List.mem_assoc "mid" l -> unsupported (what ^ " with a radius")
+  | _ -> bad (what ^ ": a number is due")
+let optional read what = function Null -> None | x -> Some (read what x)
+let integer what = function
+  | Num s when Number.digits (Number.unsigned s) -> Number.Z.of_string s
+  | _ -> bad (what ^ ": an integer is due")
+
+(* the nodes, and where they stand *)
+type nodes = { labels : string array; index : (string, int) Hashtbl.t }
+let nodes_of v =
+  let labels = Array.of_list (List.map (text "nodes") (entries "nodes" v)) in
+  need (Array.length labels > 0) "nodes: there is none";
+  let index = Hashtbl.create (Array.length labels) in
+  Array.iteri (fun i s -> need (not (Hashtbl.mem index s)) "a node occurs twice"; Hashtbl.add index s i) labels;
+  { labels; index }
+let node nodes what v = match Hashtbl.find_opt nodes.index (text what v) with
+  | Some i -> i | None -> bad (what ^ ": an unknown node")
+let positions nodes what v = if beside v then unsupported "side files" else List.map (node nodes what) (entries what v)
+(* an object that has these labels as keys, in this order *)
+let ordered labels what = function
+  | Obj l -> need (List.map fst l = labels) (what ^ ": agents are others, or in another order"); List.map snd l
+  | _ -> bad (what ^ ": an object by agent is due")
+let by_agent nodes read what v =
+  if beside v then unsupported "side files" else List.map (read what) (ordered (Array.to_list nodes.labels) what v)
+
+(* JSON as section 16 hashes it *)
+let hashed (v : Json.t) : string =
+  let b = Buffer.create 4096 in
+  let quoted s =
+    Buffer.add_char b '"';
+    let n = String.length s in
+    let rec go i = if i < n then begin
+      let c = Char.code s.[i] in
+      if c < 128 then begin
+        (match s.[i] with
+         | '"' -> Buffer.add_string b "\\\"" | '\\' -> Buffer.add_string b "\\\\" | '\b' -> Buffer.add_string b "\\b"
+         | '\t' -> Buffer.add_string b "\\t" | '\n' -> Buffer.add_string b "\\n" | '\012' -> Buffer.add_string b "\\f"
+         | '\r' -> Buffer.add_string b "\\r"
+         | _ when c < 32 || c = 127 -> Buffer.add_string b (Printf.sprintf "\\u%04x" c)
+         | x -> Buffer.add_char b x); go (i + 1) end
+      else begin
+        let more, first = if c >= 0xF0 then 3, c land 7 else if c >= 0xE0 then 2, c land 15 else 1, c land 31 in
+        let u = ref first in
+        for j = 1 to more do u := (!u lsl 6) lor (Char.code s.[i + j] land 63) done;
+        let unit x = Buffer.add_string b (Printf.sprintf "\\u%04x" x) in
+        if !u < 0x10000 then unit !u
+        else (let x = !u - 0x10000 in unit (0xD800 lor (x lsr 10)); unit (0xDC00 lor (x land 0x3FF)));
+        go (i + more + 1) end end in
+    go 0; Buffer.add_char b '"' in
+  let rec put depth v =
+    need (depth <= 8) "nested too deep";
+    match v with
+    | Null -> Buffer.add_string b "null" | Bool x -> Buffer.add_string b (string_of_bool x)
+    | Num s -> Buffer.add_string b (Number.Z.to_string (integer "a number outside unverified" (Num s)))
+    | Str s -> quoted s
+    | Arr l -> Buffer.add_char b '['; List.iteri (fun i x -> if i > 0 then Buffer.add_char b ','; put (depth + 1) x) l; Buffer.add_char b ']'
+    | Obj l ->
+        Buffer.add_char b '{';
+        List.iteri (fun i (k, x) -> if i > 0 then Buffer.add_char b ','; quoted k; Buffer.add_char b ':'; put (depth + 1) x)
+          (List.sort (fun (a, _) (b, _) -> compare a b) l);
+        Buffer.add_char b '}' in
+  put 0 v; Buffer.contents b
+
+(* a text as the lines of the graph's SHA-256 have it *)
+let line_text s =
+  let b = Buffer.create 16 in
+  Buffer.add_char b '"';
+  String.iter (function
+    | '"' -> Buffer.add_string b "\\\"" | '\\' -> Buffer.add_string b "\\\\" | '\b' -> Buffer.add_string b "\\b"
+    | '\t' -> Buffer.add_string b "\\t" | '\n' -> Buffer.add_string b "\\n" | '\012' -> Buffer.add_string b "\\f"
+    | '\r' -> Buffer.add_string b "\\r"
+    | c when Char.code c < 32 -> Buffer.add_string b (Printf.sprintf "\\u%04x" (Char.code c))
+    | c -> Buffer.add_char b c) s;
+  Buffer.add_char b '"'; Buffer.contents b
+
+(* the obligations of the proof, taken one after the other *)
+type proof = { mutable rest : Json.t list; mutable checked : (string * string) list; mutable unchecked : (string * string) list }
+let proof_of v = { rest = entries "proof" v; checked = []; unchecked = [] }
+let following p = match p.rest with Obj l :: _ -> (match List.assoc_opt "kind" l with Some (Str s) -> s | _ -> "") | _ -> ""
+(* the next obligation, which must be this one: its numbers, and its witness *)
+let take p kind of_ keys =
+  match p.rest with
+  | [] -> bad (Printf.sprintf "the proof does not list %s of %s" kind of_)
+  | o :: rest ->
+      let what = kind ^ " of " ^ of_ in
+      let get = fields ("an obligation, " ^ what) [ "kind"; "of"; "proves"; "lemma"; "numbers"; "witness" ] o in
+      let proves, lemma = try List.assoc kind Texts.obligations with Not_found -> bad ("an unknown obligation " ^ kind) in
+      need (get "kind" = Str kind && get "of" = Str of_ && get "proves" = Str proves && get "lemma" = Str lemma)
+        ("the proof lists another obligation than " ^ what);
+      p.rest <- rest;
+      (match keys with
+       | None -> (fun _ -> Number.zero), get "witness"
+       | Some keys -> let n = fields ("numbers of " ^ what) keys (get "numbers") in (fun k -> number k (n k)), get "witness")
+let proved p kind of_ keys =
+  let n, w = take p kind of_ (Some keys) in p.checked <- (kind, of_) :: p.checked; n, w
+let bare p kind of_ keys =
+  let n, w = proved p kind of_ keys in need (w = Null) (kind ^ ": a witness that nothing asks for"); n
+(* without numbers and witness *)
+let bare_of p kind of_ = let _ : string -> Checker.q = bare p kind of_ [] in ()
+let skipped p kind of_ = ignore (take p kind of_ None); p.unchecked <- (kind, of_) :: p.unchecked
+(* of a part that is not read *)
+let unknown p kind of_ = p.rest <- List.tl p.rest; p.unchecked <- (kind, of_) :: p.unchecked

@@ -1,0 +1,19 @@
+(* The parts of the check one by one, to name the first that fails where [Checker.check] says no. *)
+open Checker
+let of_check c d : (string * (unit -> bool)) list =
+  [ "graph: an edge", (fun () -> check_edges c d.dls);
+    "protocol: a parameter", (fun () -> check_protocol c);
+    "structure of graph", (fun () -> check_structure c);
+    "final-state of graph", (fun () -> check_end c d);
+    "final-state of graph: where the components end", (fun () -> check_behaviour c d);
+    "claim of graph", (fun () -> check_claims c d) ]
+  @ List.mapi (fun k f -> Printf.sprintf "lyapunov.functions[%d]" k, (fun () -> check_function c d f)) c.funcs
+  @ [ "final-state of graph: no Lyapunov function proves that it is reached", (fun () -> check_reached c d);
+      "final_state: not what was proved", (fun () -> check_final c d);
+      "input-threshold of input", (fun () -> check_input c d);
+      "rates, or overshoot, are not what was proved", (fun () -> check_rates c);
+      "input-sliding of input", (fun () -> check_sliding c) ]
+  @ List.mapi (fun k m -> Printf.sprintf "paper: inequality %d of its own function" (k + 1), (fun () -> check_margin c d m)) c.margins
+  @ List.mapi (fun k l -> Printf.sprintf "leader-decrease of paper, group %d" (k + 1), (fun () -> check_leader c d l)) c.leaders
+  @ (match c.upper_bound with
+     | Some u -> [ "rate-upper-bound of rates", (fun () -> check_upper c d u) ] | None -> [])

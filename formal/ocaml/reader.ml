@@ -1,0 +1,372 @@
+(* From the document to the record that the theorem speaks of. What is read here is compared key by key with
+   FORMAT.md; what the theorem does not speak of is named, and not believed. *)
+open Checker
+open Json
+open Document
+module Z = Number.Z
+
+type t = {
+  nodes : nodes; cert : cert; sha256 : string; theorem : string;
+  verdict : string; checked : (string * string) list; unchecked : (string * string) list; sections : string list }
+
+let keys = [ "schema"; "producer"; "graph"; "structure"; "claim"; "protocol"; "paper"; "lyapunov"; "rates"; "overshoot";
+  "initial_state"; "sliding_variable"; "influence"; "final_state"; "reaching_time"; "input"; "proof"; "verdict"; "digest";
+  "unverified" ]
+(* keys of some certificates alone: their claims are of other motions, and are not read; or they are claims besides the
+   others, which keep their meaning: named, and not believed, with their obligations *)
+let not_read = [ "boxes", "a certificate of a family";
+  "restricted", "a certificate of a family"; "agents", "a certificate of agents of order n, section agents" ]
+let besides = [ "messages", "messages that are late, lost or rounded"; "leaders", "leaders that move" ]
+(* kinds of obligations and what they are of have these letters alone: what is printed of them can be no other line *)
+let named = String.for_all (function 'a' .. 'z' | '0' .. '9' | '-' | '.' | '[' | ']' -> true | _ -> false)
+let of_besides kind = kind = "tracking" || (String.length kind > 5 && String.sub kind 0 5 = "late-")
+
+let graph v =
+  let get = fields "graph" [ "nodes"; "edges"; "read"; "sha256" ] v in
+  let nodes = nodes_of (get "nodes") in
+  let read = fields "graph.read" [ "orientation"; "duplicates"; "self_loops"; "undirected" ] (get "read") in
+  need (List.mem (text "orientation" (read "orientation")) [ "information"; "listens"; "matrix" ]) "graph.read: orientation";
+  need (List.mem (text "duplicates" (read "duplicates")) [ "refused"; "sum"; "last" ]) "graph.read: duplicates";
+  let loops = text "self_loops" (read "self_loops") in
+  let dropped = String.length loops >= 9 && String.length loops <= 20 && String.sub loops 0 8 = "dropped "
+    && Number.digits (String.sub loops 8 (String.length loops - 8)) in
+  need (loops = "refused" || dropped) "graph.read: self_loops";
+  ignore (truth "graph.read: undirected" (read "undirected"));
+  let edges = match get "edges" with
+    | Obj _ -> unsupported "edges in side files"
+    | e -> List.map (fun e -> match entries "an edge" e with
+        | [ s; t; w ] -> { tgt = node nodes "an edge" t; src = node nodes "an edge" s; wt = number "a weight" w }
+        | _ -> bad "an edge has three entries") (entries "edges" e) in
+  ignore (List.fold_left (fun last e ->
+    let at = (e.tgt, e.src) in need (compare last at < 0) "edges are in another order"; at) (-1, -1) edges);
+  let name i = nodes.labels.(i) in
+  let lines = List.map (fun s -> "[" ^ line_text s ^ "]\n") (List.sort compare (Array.to_list nodes.labels))
+    @ List.map (fun e -> Printf.sprintf "[%s, %s, \"%s\"]\n" (line_text (name e.src)) (line_text (name e.tgt)) (Number.text e.wt))
+        (List.sort (fun a b -> compare (name a.src, name a.tgt) (name b.src, name b.tgt)) edges) in
+  let sha256 = Sha256.hex (String.concat "" lines) in
+  need (get "sha256" = Str sha256) "graph: another SHA-256 than that of the edges";
+  nodes, edges, sha256
+
+let protocol v =
+  let number_of get k = number ("protocol." ^ k) (get k) in
+  match v with
+  | Obj l when List.assoc_opt "kind" l = Some (Str "sliding-mode") ->
+      let get = fields "protocol" [ "kind"; "T_r"; "T_s"; "rho1"; "rho2"; "kappa"; "mu1"; "mu2"; "mu3"; "delta"; "disturbance" ] v in
+      let q = number_of get in
+      (match get "disturbance" with Null | Str _ -> () | _ -> bad "protocol.disturbance is not a text");
+      SlidingMode (q "T_r", q "T_s", q "mu1", q "mu2", q "mu3", q "delta"), q "rho1", q "rho2", q "kappa"
+  | _ ->
+      let get = fields "protocol" [ "kind"; "T"; "rho1"; "rho2"; "kappa" ] v in
+      need (get "kind" = Str "nominal") "an unknown kind of protocol";
+      let q = number_of get in
+      Nominal (q "T"), q "rho1", q "rho2", q "kappa"
+
+(* closed components with their witnesses, and what influence says of the balanced ones *)
+let components nodes structure influence =
+  let n = Array.length nodes.labels in
+  let get = fields "influence" [ "components"; "containment_weights"; "degenerate" ] influence in
+  let listed = List.map (fun item ->
+    let get = match item with
+      | Obj l when List.assoc_opt "balanced" l = Some (Bool true) -> fields "a closed component" [ "nodes"; "balanced"; "gauge" ] item
+      | _ -> fields "a closed component" [ "nodes"; "balanced"; "negative_cycle" ] item in
+    let own = positions nodes "a closed component" (get "nodes") in
+    need (own <> [] && List.sort_uniq compare own = own) "nodes of a closed component are not in order";
+    own, truth "balanced" (get "balanced"), get) (entries "closed_components" (structure "closed_components")) in
+  let firsts = List.map (fun (own, _, _) -> List.hd own) listed in
+  need (List.sort_uniq compare firsts = firsts) "closed components are in another order";
+  let leading = List.concat_map (fun (own, _, _) -> own) listed in
+  let is_leader = Array.make n false in
+  List.iter (fun i -> need (not is_leader.(i)) "a node in two closed components"; is_leader.(i) <- true) leading;
+  let followers = List.filter (fun i -> not is_leader.(i)) (List.init n Fun.id) in
+  need (positions nodes "leaders" (structure "leaders") = leading) "other leaders";
+  need (positions nodes "followers" (structure "followers") = followers) "other followers";
+  if get "containment_weights" = Null then unsupported "a final state of the large form";
+  let balanced = List.length (List.filter (fun (_, b, _) -> b) listed) in
+  let rows = ordered (List.map (fun i -> nodes.labels.(i)) followers) "containment_weights" (get "containment_weights") in
+  let rows = List.map2 (fun i row ->
+    let ws = List.map (number "containment_weights") (entries "containment_weights" row) in
+    need (List.length ws = balanced) "containment_weights: a number for each balanced component"; i, ws) followers rows in
+  let vectors = entries "influence.components" (get "components") in
+  need (List.length vectors = balanced) "influence.components: one for each balanced component";
+  let k = ref (-1) in
+  let comps = List.map (fun (own, is_balanced, get) ->
+    if is_balanced then begin
+      incr k;
+      let camps = List.map (integer "gauge") (entries "gauge" (get "gauge")) in
+      need (List.length camps = List.length own && Z.equal (List.hd camps) Z.one) "camps of a component";
+      List.iter (fun g -> need (Z.equal (Z.abs g) Z.one) "camps of a component") camps;
+      let g = Array.make n Z.zero and w = Array.make n Number.zero and v = Array.make n Number.zero in
+      List.iter2 (fun i s -> g.(i) <- s; w.(i) <- Number.of_z s) own camps;
+      List.iter (fun (i, ws) -> w.(i) <- List.nth ws !k) rows;
+      let one = fields "a component of influence" [ "nodes"; "left_null_vector" ] (List.nth vectors !k) in
+      need (positions nodes "influence" (one "nodes") = own) "influence: another component";
+      let eta = entries "left_null_vector" (one "left_null_vector") in
+      need (List.length eta = List.length own) "left_null_vector: a number for each node";
+      List.iter2 (fun i x -> v.(i) <- number "left_null_vector" x) own eta;
+      { nodes = own; camps = Gauge (Array.to_list g); share = Array.to_list w; null = Array.to_list v } end
+    else
+      { nodes = own; share = []; null = []; camps = Cycle (List.map (fun e -> match positions nodes "negative_cycle" e with
+          | [ s; t ] -> (s, t) | _ -> bad "negative_cycle: an edge has two ends")
+          (entries "negative_cycle" (get "negative_cycle"))) }) listed in
+  comps, followers, get "degenerate"
+
+let interval what = function
+  | Obj l when List.mem_assoc "mid" l ->
+      let get = fields what [ "mid"; "radius" ] (Obj l) in
+      let mid, radius = number what (get "mid"), number what (get "radius") in
+      need (Z.sign radius.qnum > 0) (what ^ ": a radius is not positive"); mid, radius
+  | v -> number what v, Number.zero
+
+(* a Lyapunov matrix on all nodes, 0 elsewhere; the weights of a diagonal one *)
+let matrix nodes what own rows =
+  let n = Array.length nodes.labels in
+  let m = Array.make_matrix n n Number.zero in
+  List.iteri (fun a row ->
+    let row = List.map (number what) (entries what row) in
+    need (List.length row = a + 1) (what ^ ": the rows of a lower triangle");
+    List.iteri (fun b x -> let i = own.(a) and j = own.(b) in m.(i).(j) <- x; m.(j).(i) <- x) row) rows;
+  need (List.length rows = Array.length own) (what ^ ": the rows of a lower triangle");
+  Array.to_list (Array.map Array.to_list m)
+let diagonal_matrix nodes weights =
+  let n = Array.length nodes.labels in
+  let m = Array.make_matrix n n Number.zero in
+  List.iter (fun (i, w) -> m.(i).(i) <- w) weights;
+  Array.to_list (Array.map Array.to_list m)
+let ends weights = match weights with
+  | [] -> bad "a Lyapunov function of no nodes"
+  | (_, w) :: l -> List.fold_left (fun (a, b) (_, x) ->
+      (if Number.compare x a < 0 then x else a), (if Number.compare x b > 0 then x else b)) (w, w) l
+
+let block nodes listening shape v =
+  let get = fields "a block" [ "name"; "nodes"; shape; "times_rho" ] v in
+  let own = positions nodes "nodes of a block" (get "nodes") in
+  need (List.sort_uniq compare own |> List.length = List.length own) "nodes of a block: one occurs twice";
+  need (List.sort compare own = listening) "nodes of a block: not those that listen to somebody";
+  text "name" (get "name"), own, get shape, truth "times_rho" (get "times_rho")
+let function_ nodes listening proof gauge paper number_of v =
+  let of_ = Printf.sprintf "lyapunov.functions[%d]" number_of in
+  let get = fields "a Lyapunov function" [ "class"; "coordinates"; "blocks"; "rho"; "rate"; "overshoot"; "deviation" ] v in
+  let rate = number "rate" (get "rate") and overshoot = number "overshoot" (get "overshoot") in
+  let ly, diagonal, lowest, highest = match paper with
+    | Some (p : Paper.t) when p.own_rate <> None && number_of = 0 ->
+        need (get "class" = Str "paper") "the first Lyapunov function is not the paper's";
+        List.iter (fun k -> need (get k = p.section k) "the first Lyapunov function is not the paper's")
+          [ "coordinates"; "blocks"; "rho"; "rate"; "overshoot" ];
+        let lo, hi = ends p.weights in
+        (if p.coordinates = "E" then InE (diagonal_matrix nodes p.weights)
+         else
+           let n = Array.length nodes.labels in
+           let d = Array.make n Number.zero in
+           List.iter (fun (i, w) -> d.(i) <- w) p.weights;
+           InEps (Array.to_list d, gauge ())), false, lo, hi
+    | _ ->
+        need (get "coordinates" = Str "E" && get "rho" = Null) "other coordinates, or a rho";
+        let one = match entries "blocks" (get "blocks") with [ b ] -> b | _ -> bad "blocks: one is due" in
+        (match text "class" (get "class") with
+         | "full" ->
+             let name, own, rows, times_rho = block nodes listening "lower_triangle" one in
+             need (name = "P" && not times_rho) "another block";
+             if following proof <> "rate" then bad (of_ ^ ": its rate is not proved");
+             need (Number.equal (bare proof "rate" of_ [ "b" ] "b") rate) (of_ ^ ": b is not the rate");
+             let e = bare proof "overshoot" of_ [ "lowest"; "highest" ] in
+             InE (matrix nodes "lower_triangle" (Array.of_list own) (entries "lower_triangle" rows)), false, e "lowest", e "highest"
+         | "perron" | "lmi" ->
+             if following proof = "dominance" then unsupported "dominance";
+             let name, own, d, times_rho = block nodes listening "diagonal" one in
+             need (name = "P" && not times_rho) "another block";
+             let d = List.map (number "diagonal") (entries "diagonal" d) in
+             need (List.length d = List.length own) "diagonal: a number for each node";
+             let weights = List.combine own d in
+             need (Number.equal (bare proof "rate" of_ [ "b" ] "b") rate) (of_ ^ ": b is not the rate");
+             let lo, hi = ends weights in
+             InE (diagonal_matrix nodes weights), true, lo, hi
+         | _ -> bad "an unknown class") in
+  let deviation = match get "deviation" with
+    | Null -> None
+    | d ->
+        let d = fields "deviation" [ "agents"; "norm" ] d in
+        bare_of proof "deviation" of_;
+        Some (number "deviation.norm" (d "norm"), by_agent nodes number "deviation.agents" (d "agents")) in
+  { ly; diagonal; rate; lowest; highest; overshoot; deviation; constants = None }
+
+(* some function tells that a state at which nothing moves is one at which agents end *)
+let has_kernel = List.exists (fun f -> f.deviation <> None && (match f.ly with InE _ -> true | InEps _ -> false))
+(* the upper bound on the rate: of two vectors, the combination that the left null vector annihilates *)
+let upper nodes comps proof bound =
+  let numbers, witness = proved proof "rate-upper-bound" "rates" [ "upper_bound" ] in
+  need (Number.equal (numbers "upper_bound") bound) "rate-upper-bound: another upper bound";
+  let get = fields "the witness" [ "nodes"; "lower_triangle"; "vectors" ] witness in
+  let inside = positions nodes "nodes" (get "nodes") in
+  need (inside <> [] && List.sort_uniq compare inside = inside) "rate-upper-bound: nodes are in another order";
+  let vector v =
+    let own = List.map (number "a vector") (entries "a vector" v) in
+    need (List.length own = List.length inside) "a vector: a number for each node";
+    List.init (Array.length nodes.labels) (fun i -> Option.value (List.assoc_opt i (List.combine inside own)) ~default:Number.zero) in
+  let dot = List.fold_left2 (fun a x y -> Number.add a (Number.mul x y)) Number.zero in
+  let null = List.find_map (fun (one : comp) ->
+    if is_balanced one && List.mem (List.hd one.nodes) inside then Some one.null else None) comps in
+  let vector_y = match List.map vector (entries "vectors" (get "vectors")), null with
+    | [ y ], None -> y
+    | [ y; z ], Some v ->
+        let a = dot v y and b = dot v z in
+        if Z.sign a.qnum = 0 then y else List.map2 (fun y z -> Number.sub (Number.mul b y) (Number.mul a z)) y z
+    | _ -> bad "rate-upper-bound: two vectors iff the component is closed and balanced" in
+  let form = matrix nodes "lower_triangle" (Array.of_list inside) (entries "lower_triangle" (get "lower_triangle")) in
+  { bound; inside; because = ByForm (form, vector_y) }
+(* the same by the trace of a strong component, named by its first node *)
+let mean nodes all proof bound =
+  let numbers, witness = proved proof "rate-mean" "rates" [ "upper_bound" ] in
+  need (Number.equal (numbers "upper_bound") bound) "rate-mean: another upper bound";
+  let first = node nodes "rate-mean" ((fields "the witness" [ "node" ] witness) "node") in
+  let inside = Pieces.strong_component all first in
+  need (List.hd inside = first) "rate-mean: not the first node of its component";
+  { bound; inside; because = ByTrace }
+
+let certificate (j : Json.t) : t =
+  (match j with
+   | Obj l when List.assoc_opt "schema" l = Some (Str "ptcc-certificate/2") ->
+       List.iter (fun (key, what) -> if List.mem_assoc key l then unsupported what) not_read;
+       (match List.assoc_opt "graph" l with
+        | Some (Obj g) when List.mem_assoc "modes" g -> unsupported "a certificate of a family" | _ -> ())
+   | _ -> bad "not a certificate of schema \"ptcc-certificate/2\"");
+  let more = List.filter (fun (key, _) -> match j with Obj l -> List.mem_assoc key l | _ -> false) besides in
+  let apart = match j with Obj l -> List.mem_assoc "components" l | _ -> false in
+  let get = fields "the certificate" (keys @ List.map fst more @ (if apart then [ "components" ] else [])) j in
+  let left_out = ref [] in
+  let not_checked s = left_out := s :: !left_out in
+  List.iter (fun (key, what) -> not_checked (Printf.sprintf "%s, all that is said of %s" key what)) more;
+  ignore (text "producer" (get "producer"));
+  ignore (match get "unverified" with Obj _ -> () | _ -> bad "unverified is not an object");
+  let outside = match j with Obj l -> List.filter (fun (k, _) -> k <> "digest" && k <> "unverified") l | _ -> [] in
+  need (get "digest" = Str (Sha256.hex (hashed (Obj outside)))) "digest: the certificate was changed after it was made";
+  let nodes, edges, sha256 = graph (get "graph") in
+  let structure = fields "structure"
+    [ "connectivity"; "closed_components"; "leaders"; "followers"; "balanced"; "sign_symmetric" ] (get "structure") in
+  let kind, rho1, rho2, kappa = protocol (get "protocol") in
+  let is_sliding = match kind with SlidingMode _ -> true | Nominal _ -> false in
+  let proof = proof_of (get "proof") in
+  bare_of proof "structure" "graph";
+  bare_of proof "claim" "graph";
+  if get "influence" = Null then unsupported "an undecided certificate, without influence";
+  let comps, followers, degenerate = components nodes structure (get "influence") in
+  let all = Pieces.graph (Array.length nodes.labels) edges in
+  let found = Pieces.find all in
+  let pieces = List.map (Pieces.piece all comps) found.pieces in
+  let final_text = match get "final_state" with Obj l when List.length l = Array.length nodes.labels -> Obj l | _ -> Null in
+  let theorem = Pieces.compare_claims nodes is_sliding pieces (structure "connectivity") (get "claim")
+    (match j with Obj l -> List.assoc_opt "components" l | _ -> None) final_text in
+  need (structure "balanced" = Bool (match found.balance with Gauge _ -> true | Cycle _ -> false)) "structure: balance of the graph";
+  need (structure "sign_symmetric" = Bool (Pieces.sign_symmetric all)) "structure: sign symmetry";
+  let start = match get "initial_state" with Null -> None | v -> Some (by_agent nodes number "initial_state" v) in
+  let sliding = match get "sliding_variable" with Null -> [] | v -> by_agent nodes number "sliding_variable" v in
+  need (is_sliding = (get "sliding_variable" <> Null)) "sigma(0) belongs to the sliding-mode protocol, and is part of it";
+  let final = match start, get "final_state" with
+    | None, Null -> []
+    | Some _, Obj l when (match List.assoc_opt "mid" l with Some m -> beside m | None -> false) -> unsupported "side files"
+    | Some _, v -> by_agent nodes interval "final_state" v
+    | None, _ -> bad "a final state without an initial state" in
+  if start = None then need (degenerate = Null) "influence.degenerate without an initial state"
+  else not_checked "influence.degenerate";
+  (match proved proof "final-state" "graph" [] with
+   | _, Null -> () | _ -> unsupported "a final state that is enclosed by a witness");
+  let closed = List.mapi (fun k (one : Checker.comp) -> k + 1, one.nodes, is_balanced one) comps in
+  let setting = { Paper.n = Array.length nodes.labels; edges; closed; followers; theorem } in
+  let paper = optional (fun _ v -> Paper.read setting nodes proof v) "paper" (get "paper") in
+  (match paper with Some { Paper.any_rho = true; _ } -> not_checked "paper.rho_interval, that every rho is admissible" | _ -> ());
+  let gauge () = match comps with [ { camps = Gauge g; _ } ] -> g | _ -> bad "coordinates eps of another graph" in
+  let listening = List.filter (fun i -> List.exists (fun e -> e.tgt = i) edges) (List.init (Array.length nodes.labels) Fun.id) in
+  let listed = entries "functions" ((fields "lyapunov" [ "functions" ] (get "lyapunov")) "functions") in
+  let functions = List.mapi (function_ nodes listening proof gauge paper) listed in
+  let rates = fields "rates" [ "paper"; "diagonal"; "proved"; "upper_bound" ] (get "rates") in
+  let rate k = optional number ("rates." ^ k) (rates k) in
+  (match rate "paper", Option.bind paper (fun (p : Paper.t) -> p.own_rate) with
+   | None, None -> () | Some a, Some b when Number.equal a b -> () | _ -> bad "rates.paper is not that of the paper's function");
+  let best_overshoot = match get "overshoot" with
+    | Null -> None
+    | v -> let o = fields "overshoot" [ "value"; "of" ] v in
+        let of_ = text "overshoot.of" (o "of") in
+        let value = number "overshoot.value" (o "value") in
+        need (List.exists (fun f -> (match rate "proved" with Some r -> Number.equal f.rate r | None -> false)
+          && Number.equal f.overshoot value && of_ = (match f.ly with InE _ -> "||E||^2" | InEps _ -> "||eps||^2")) functions)
+          "overshoot.of: other coordinates than those of a Lyapunov function with the largest rate";
+        Some value in
+  let upper_bound = match rate "upper_bound" with
+    | None -> None
+    | Some bound when following proof = "rate-upper-bound" && has_kernel functions ->
+        Some (upper nodes comps proof bound)
+    | Some bound when following proof = "rate-mean" && has_kernel functions -> Some (mean nodes all proof bound)
+    | Some _ ->
+        skipped proof (if following proof = "rate-mean" then "rate-mean" else "rate-upper-bound") "rates";
+        not_checked "rates.upper_bound, input.threshold.upper"; None in
+  if is_sliding then begin
+    let times = fields "reaching_time" [ "bound"; "clock"; "z" ] (get "reaching_time") in
+    need (times "bound" = Str Texts.sliding_bound && times "clock" = Str Texts.sliding_clock) "reaching_time: another bound or clock";
+    bare_of proof "sliding-bound" "protocol"; not_checked "reaching_time.z";
+    if following proof = "reaching-time" then skipped proof "reaching-time" "reaching_time" end
+  else need (get "reaching_time" = Null) "reaching times without sliding variables";
+  let bounded_input, sliding_input, functions = match get "input" with
+    | Null -> false, [], functions
+    | v ->
+        let input = fields "input" [ "bounded"; "threshold"; "initial_set"; "constants"; "peak"; "energy"; "path_length";
+          "sliding"; "residual"; "disturbed" ] v in
+        let threshold = fields "threshold" [ "lower"; "upper" ] (input "threshold") in
+        List.iter (fun (key, of_) ->
+          let half = Number.div (Number.mul rho2 kappa) (Number.of_z (Z.of_int 2)) in
+          match optional number "threshold" (threshold key), rate of_ with
+          | None, None -> ()
+          | Some a, Some r when Number.equal a (Number.mul half r) -> ()
+          | _ -> bad "input.threshold: not what the rates say") [ ("lower", "proved"); ("upper", "upper_bound") ];
+        let bounded = match input "bounded" with
+          | Null -> false
+          | b when following proof = "input-threshold" ->
+              let stays = truth "input.bounded" b in
+              (match proof.rest with
+               | Obj l :: _ when stays && List.assoc_opt "witness" l = Some (Str "rate") ->
+                   ignore (proved proof "input-threshold" "input" []); true
+               | _ -> skipped proof "input-threshold" "input"; not_checked "input.bounded"; false)
+          | _ -> bad "input.bounded without a proof" in
+        let constants = entries "constants" (input "constants") in
+        need (List.length constants = List.length functions) "constants: one for each Lyapunov function";
+        let is_full = function Obj l -> List.assoc_opt "class" l = Some (Str "full") | _ -> false in
+        let functions = List.mapi (fun k (f, v) -> match v with
+          | Null -> f
+          | v ->
+              need (is_full (List.nth listed k)) "constants: of a Lyapunov function that is not full";
+              bare_of proof "input-constants" (Printf.sprintf "lyapunov.functions[%d]" k);
+              { f with constants = Some (by_agent nodes number "constants" v) }) (List.combine functions constants) in
+        let there v = v <> Null in
+        let sliding_input = match input "sliding", kind with
+          | Null, Nominal _ -> []
+          | v, SlidingMode (_, _, _, _, mu3, _) ->
+              let part = fields "input.sliding" [ "bounded"; "agents" ] v in
+              need (truth "input.sliding.bounded" (part "bounded") = (Number.compare (Number.mul mu3 kappa) (Number.of_z Z.one) >= 0))
+                "input.sliding: bounded for every initial state iff mu3 kappa >= 1";
+              if not (there (part "agents")) then []
+              else (bare_of proof "input-sliding" "input"; by_agent nodes number "input.sliding.agents" (part "agents"))
+          | _ -> bad "input.sliding of the nominal protocol" in
+        List.iter (fun (listed, kind) -> if listed then skipped proof kind "input")
+          [ there (input "peak"), "input-peak"; there (input "energy"), "input-energy";
+            there (input "path_length"), "input-length" ];
+        List.iteri (fun i _ -> skipped proof "limited-gain" (Printf.sprintf "input.residual[%d]" i))
+          (entries "residual" (input "residual"));
+        if there (input "disturbed") then skipped proof "nominal-disturbed" "input";
+        not_checked "input.initial_set, .peak, .energy, .path_length, .sliding.bounded, .residual, .disturbed";
+        bounded, sliding_input, functions in
+  let and_besides o = match o with
+    | Obj l -> (match List.assoc_opt "kind" l, List.assoc_opt "of" l with
+        | Some (Str k), Some (Str o) when more <> [] && of_besides k && named k && named o -> unknown proof k o
+        | _ -> bad "an obligation that nothing asks for")
+    | _ -> bad "an obligation is not an object" in
+  while proof.rest <> [] do and_besides (List.hd proof.rest) done;
+  let verdict = text "verdict" (get "verdict") in
+  let certified = rate "proved" <> None || edges = [] in
+  need (verdict = (if certified then "certified" else "undecided")) "what was proved makes another verdict";
+  { nodes; sha256; verdict; theorem; checked = List.rev proof.checked; unchecked = List.rev proof.unchecked;
+    sections = List.rev !left_out;
+    cert = { order = Array.length nodes.labels; edges; kind; rho1; rho2; kappa; comps; pieces; all_balanced = found.balance;
+      sign_symmetric = Pieces.sign_symmetric all; funcs = functions;
+      start = Option.value start ~default:[]; sliding; final; sliding_input;
+      margins = (match paper with Some p -> p.inequalities | None -> []);
+      leaders = (match paper with Some p -> p.groups | None -> []);
+      upper_bound;
+      proved = rate "proved"; best_diagonal = rate "diagonal"; best_overshoot; bounded_input } }

@@ -1,0 +1,54 @@
+(* The fixed texts of section 14 of FORMAT.md: kind, what it proves, lemma. *)
+let obligations = [
+  "structure", ("components, closedness, camps and negative cycles are those of the edges",
+    "Lemma 1");
+  "claim", ("the hypotheses of the theorem and of the corollaries hold",
+    "Theorems 1 to 6, Corollaries 1 to 10");
+  "deviation-decrease", ("Z L + L'Z - b Z > 0 modulo G1, Z = G (P - p p'/p'1) G, p near the left null vector of M(L)",
+    "Lemma 3.1");
+  "leader-decrease", ("L_k'(W L_k + L_k'W - b W)L_k > 0 modulo G_k 1, W the block, near the left null vector of M(L_k)",
+    "Lemma 3.1");
+  "leader-margin", ("W L_k + L_k'W - m I > 0, W the block of this component",
+    "Lemma 3.2");
+  "margin", ("S - m I > 0 for the matrix S whose least eigenvalue the objective takes",
+    "Lyapunov decrease");
+  "rho-interval", ("S(end) > 0 at both ends, so S(rho) > 0 in between",
+    "Lemma 5");
+  "rate", ("P L + L'P - b P > 0 on the range of L",
+    "Lyapunov decrease");
+  "dominance", ("S = P L + L'P - b P, (g_k - b) P_k for leader groups: S_ii d_i > sum_j |S_ij| d_j for a vector d > 0",
+    "Lyapunov decrease");
+  "overshoot", ("lowest I < P < highest I",
+    "Rayleigh quotient");
+  "deviation", ("(x_k - (Q x)_k)^2 <= c_k V for every agent, ||x - Q x||^2 <= c V",
+    "Schur complement");
+  "rate-upper-bound", ("H B + B'H > 0, B = A - (upper_bound/2) I, H negative on the vectors",
+    "inertia of Lyapunov equations");
+  "rate-mean", ("upper_bound = 2 trace(A)/r, A the block of L of a strong component, r of whose eigenvalues are not 0",
+    "the least real part is not above the mean");
+  "sliding-bound", ("mu1 > delta, mu2, mu3 > 0, so the bound holds and sigma = 0 from T_r on",
+    "Proposition 1");
+  "reaching-time", ("|sigma_k(0)| <= (mu1 - delta) int_0^t dr/psi(r) at z_k",
+    "comparison with the worst-case disturbance");
+  "input-threshold", ("nonzero eigenvalues of L have rho2 kappa Re lambda >= 1, semisimple where that is 1; or some has not",
+    "gain e^(-lambda s) stays bounded, or not");
+  "input-constants", ("e_k^2 <= c_k E'P E for every agent",
+    "Schur complement");
+  "input-sliding", ("|u_k - gain e_k| <= mu1 + (mu2 + mu3 kappa/T_r) |sigma_k(0)|",
+    "Proposition 1");
+  "input-peak", ("gain |e_k| <= peak_k up to the deadline",
+    "|e_k| <= min(A_k, sqrt(c_k V(0)) e^(-rate s / 2))");
+  "input-energy", ("int ||gain E||^2 dt <= energy",
+    "the same in norm, or two Lyapunov equations");
+  "input-length", ("int ||gain E|| dt <= path length",
+    "the same in norm");
+  "limited-gain", ("what remains at the deadline under gain saturation, switch-off or zero-order hold",
+    "Lyapunov decrease");
+  "nominal-disturbed", ("|d_k| <= delta adds at most these to the inputs of the nominal protocol and to where the agents end",
+    "variation of constants");
+  "final-state", ("L Q = 0 and Q(x - sigma) is kept, so the agents end at Q(X(0) - sigma(0))",
+    "Lemmas 2, 8 and 9");
+]
+(* and of section 13 *)
+let sliding_bound = "||sigma(t)|| <= phi(t,T_r)^(-mu3) e^(-mu2 t) ||sigma(0)||"
+let sliding_clock = "z = ln(T_r / (T_r - t)); null: certain at T_r only"

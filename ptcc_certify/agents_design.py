@@ -1,0 +1,548 @@
+"""The shortest deadline of agents of order n within a limit of their input.
+
+Of chains of integrators gain and bound scale with the deadline alone: the Lyapunov function of the graph fixes the
+gains ``K`` up to the decay ``R``, which is least at ``R = 2 n``, where the input is bounded; multiplying ``rho1`` and
+``rho2`` by one number changes ``K`` and nothing else; and a larger share ``rho1 T/(rho2 kappa)`` of the constant
+part of the gain raised the bound wherever it was tried. So the deadline is sought, with ``rho1 T``, ``rho2 kappa`` and
+``R`` as they are.
+
+The search is bisection with secants in the logarithms of deadline and bound. Every candidate is proved, by
+:func:`~ptcc_certify.certificate.agents_part.prove_agents`, and compared with the limit exactly; it ends where a
+deadline keeps the limit and one that is shorter by a thousandth does not. The bound need not be monotone in the
+deadline (agents may fly towards each other), so that much shorter ones, which were not tried, are excluded by nothing
+but what holds for all gains of the protocol: :mod:`ptcc_certify.bounds.shortest_time`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from lmi.errors import NoCertificate
+from lmi.exact.decimal_rounding import down, float_up, up
+from ptcc_certify.bounds.input.tightest_bound import log
+from ptcc_certify.bounds.shortest_time import shortest_time
+from ptcc_certify.certificate.agents_part import AgentsPart, prove_agents
+from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.format_vectors import agents_ends
+from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.request import Expectations
+from ptcc_certify.errors import ParameterError, gated
+from ptcc_certify.gain_design import INFEASIBLE, MET, UNPROVED
+from ptcc_certify.graphs.display_hook import Shown
+from ptcc_certify.graphs.rationals import format_exact, short_exact, shorten
+from ptcc_certify.protocols import NominalProtocol, Protocol
+from ptcc_certify.protocols.agents import MOST_MOTION, Agents
+from ptcc_certify.protocols.parameters import parameter
+
+if TYPE_CHECKING:
+    from ptcc_certify.graphs.digraph import Exact
+
+#: A deadline that is shorter by this share than the one that is found does not keep the limit.
+TOLERANCE = Fraction(1, 1000)
+#: Significant digits of deadlines and of ``rho1``.
+DIGITS = 7
+#: How often the deadline is doubled or halved until it is bracketed.
+_DOUBLINGS = 60
+#: The logarithm of the excess of what is not proved at all.
+_HOPELESS = 700.0
+
+
+@dataclass(frozen=True)
+class AgentsRequest:
+    """What is asked.
+
+    Attributes
+    ----------
+    max_input : Fraction
+        ``U`` of the Euclidean norm of every agent's input.
+    deadline, residual : Fraction or None
+        In units of time; how far a position may be from its place at the deadline, under a gain cap.
+    """
+
+    max_input: Fraction
+    deadline: Fraction | None
+    residual: Fraction | None
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A deadline, and what is proved of it."""
+
+    deadline: Fraction
+    protocol: Protocol
+    part: AgentsPart
+
+    @cached_property
+    def peak(self) -> Fraction | None:
+        """The largest bound of an input; None if none is proved."""
+        return None if self.part.input is None else max(self.part.input)
+
+    @cached_property
+    def residual(self) -> Fraction | None:
+        """The largest deviation of a position at the deadline; None if none is proved."""
+        if self.part.protocol.gain_cap is None:
+            return Fraction(0)
+        return None if self.part.residual is None else max(row[0] for row in self.part.residual.agents)
+
+    def excess(self, request: AgentsRequest) -> Fraction | None:
+        """Return what is proved over what is asked, the larger of two; at most 1 if it is met, None if it is open."""
+        if self.peak is None or self.residual is None:
+            return None
+        beyond = self.residual / request.residual if request.residual else Fraction(0)
+        return max(self.peak / request.max_input, beyond)
+
+    def meets(self, request: AgentsRequest) -> bool:
+        """Tell whether what is proved suffices."""
+        excess = self.excess(request)
+        return excess is not None and excess <= 1
+
+
+@dataclass(frozen=True, repr=False)
+class AgentsDesign(Shown):
+    """What was asked of agents of order n, and a deadline that is proved to meet it; made by :func:`design_agents`.
+
+    Attributes
+    ----------
+    verdict : {"met", "infeasible", "not with this certificate"}
+        ``infeasible``: no gains of the protocol can, proved. The third says that these bounds do not suffice.
+    binding : str
+        What binds, or what is missing.
+    asked : AgentsRequest
+    agents : Agents
+    deadline : Fraction or None
+        ``T``, in units of time: the one that is asked for, else the one that is found.
+    certificate : Certificate or None
+        What proves it; None unless the verdict is ``met``.
+    peak, residual : Fraction or None
+        Proved at ``deadline``: the largest input of an agent, and what is left of a position under a gain cap.
+    too_short : Fraction or None
+        The longest deadline below ``deadline`` that was tried, and whose bounds do not keep the limit.
+    shortest_possible : Fraction or None
+        No input within the limit brings the agents where the protocol does by a shorter deadline, proved; None if
+        nothing is known: under a gain cap, and of agents that move by themselves.
+    repeatable : bool
+        Whether :func:`ptcc_certify.certify` proves the same by the functions that it finds itself.
+
+    Examples
+    --------
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -3)])
+    >>> answer = design_agents(pair, Agents(order=2), [1, 1], v0=[0, 1], max_input=10)
+    >>> answer.verdict, answer.certificate.verdict, bool(answer.peak <= 10)
+    ('met', 'certified', True)
+    >>> bool(answer.shortest_possible <= answer.too_short < answer.deadline)
+    True
+    """
+
+    verdict: str
+    binding: str
+    asked: AgentsRequest
+    agents: Agents
+    deadline: Fraction | None = None
+    certificate: Certificate | None = None
+    peak: Fraction | None = None
+    residual: Fraction | None = None
+    too_short: Fraction | None = None
+    shortest_possible: Fraction | None = None
+    repeatable: bool = False
+
+    @property
+    def protocol(self) -> Protocol | None:
+        """The protocol with this deadline; None unless the verdict is ``met``."""
+        return None if self.certificate is None else self.certificate.protocol
+
+    @property
+    def gain_cap(self) -> Fraction | None:
+        """Where the gain is capped; None if it is not."""
+        return self.agents.cap
+
+    @property
+    def ratio(self) -> float | None:
+        """The deadline over the shortest possible one, rounded up; None where one is not known."""
+        if not self.deadline or not self.shortest_possible:
+            return None
+        return float_up(self.deadline / self.shortest_possible)
+
+    @property
+    def request_text(self) -> str:
+        """What was asked, in one line."""
+        asked = self.asked
+        text = f"||u_k|| <= {short_exact(asked.max_input)} from the given initial state, "
+        text += "shortest deadline" if asked.deadline is None else f"deadline {short_exact(asked.deadline)}"
+        return text + ("" if asked.residual is None else f", positions within {short_exact(asked.residual)}")
+
+    @property
+    def bounds_text(self) -> str:
+        """What is proved of input and positions at the deadline, in one line; empty without a certificate."""
+        if self.peak is None or self.residual is None:
+            return ""
+        where = f"every position within {up(self.residual)} of its place" if self.residual else "every agent in place"
+        return f"||u_k|| <= {up(self.peak)}, {where} at T"
+
+    @property
+    def gains_text(self) -> str:
+        """The parameters of the protocol, exact, and the gains of the agents; empty where there are none."""
+        if self.protocol is None or self.certificate is None or self.certificate.agents is None:
+            return ""
+        text = ", ".join(f"{name}={short_exact(value)}" for name, value in self.protocol.parameters.items())
+        gains = ", ".join(str(float(K)) for K in self.certificate.agents.protocol.gains)
+        return f"{text}; K = ({gains})"
+
+    @property
+    def deadline_text(self) -> str:
+        """What is proved of shorter deadlines, in one line; empty where nothing is."""
+        parts = []
+        if self.certificate is not None and self.deadline is not None and self.too_short is not None:
+            parts = [f"{short_exact(self.deadline)} is met, {short_exact(self.too_short)} not by these bounds"]
+        if self.shortest_possible is not None:
+            parts.append(f"no gains meet one below {down(self.shortest_possible)}")
+        return "; ".join(parts)
+
+    def lines(self) -> list[str]:
+        """Return everything as text: request, verdict, what binds, gains, bounds, deadlines."""
+        rows = [("asked", self.request_text), ("verdict", self.verdict), ("", self.binding)]
+        rows += [("gains", self.gains_text), ("proved", self.bounds_text), ("deadline", self.deadline_text)]
+        if self.ratio is not None and self.certificate is not None:
+            rows.append(("", f"the deadline is at most {up(self.ratio, 3)} times the shortest possible one"))
+        return [f"{name:<10} {text}" for name, text in rows if text]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the design as JSON-ready data, exact numbers as texts, without the certificate."""
+
+        def text(x: Fraction | None) -> str | None:
+            return None if x is None else format_exact(x)
+
+        asked = self.asked
+        numbers = ("gain_cap", "deadline", "peak", "residual", "too_short", "shortest_possible")
+        return {
+            "verdict": self.verdict,
+            "binding": self.binding,
+            "agents": self.agents.text(),
+            "max_input": text(asked.max_input),
+            "asked": {"deadline": text(asked.deadline), "residual": text(asked.residual)},
+            "protocol": None if self.protocol is None else self.protocol.to_dict(),
+            **{name: text(getattr(self, name)) for name in numbers},
+            "ratio": self.ratio,
+        }
+
+    def __repr__(self) -> str:
+        if self.deadline is None or self.certificate is None or self.peak is None:
+            return f"AgentsDesign({self.verdict}: {self.binding})"
+        return f"AgentsDesign({self.verdict}, T={short_exact(self.deadline)}, peak {up(self.peak)})"
+
+
+@gated
+def design_agents(
+    graph: Any,
+    agents: Agents,
+    x0: Any,
+    *,
+    max_input: Exact,
+    v0: Any = None,
+    derivatives: Any = None,
+    deadline: Exact | None = None,
+    residual: Exact | None = None,
+    protocol: Protocol | None = None,
+    orientation: str | None = None,
+) -> AgentsDesign:
+    """Find the shortest deadline of agents of order n for which their input is proved to stay within a limit.
+
+    Parameters
+    ----------
+    graph : graph-like
+        In whatever form :func:`ptcc_certify.as_graph` takes.
+    agents : Agents
+        Of order n, or in a formation; their ``decay`` is ``2 n`` unless it is given.
+    x0 : state-like, or N rows of coordinates
+        Initial positions, in node order or by label, in units of length.
+    v0 : state-like, optional
+        Initial velocities, like ``x0``; without them 0.
+    derivatives : sequence of state-like, optional
+        Instead of ``v0``: velocities, accelerations and so on.
+    max_input : int, float, str or Fraction
+        Positive: bound of the Euclidean norm of every agent's input at all times, sliding terms included.
+    deadline : int, float, str or Fraction, optional
+        ``T``, in units of time: is it met? Without it the shortest deadline is sought.
+    residual : int, float, str or Fraction, optional
+        Positive, with ``agents.gain_cap``: how far every position may be from its place at the deadline.
+    protocol : NominalProtocol or SlidingModeProtocol, optional
+        Its ``rho1 T``, ``rho2 kappa`` and sliding terms are kept, its deadline is sought; by default nominal with
+        ``rho2 kappa = 1`` and ``rho1 T = 1/1000``.
+    orientation : {"information", "listens"}, optional
+        See :func:`ptcc_certify.as_graph`.
+
+    Returns
+    -------
+    AgentsDesign
+
+    Raises
+    ------
+    ParameterError
+        A number that is not positive, states that do not fit, single integrators without a formation, or something
+        that is not searched: agents at rest, a decay below ``2 n``, a gain cap without a residual.
+
+    References
+    ----------
+    The protocol (4) of [Zhu]_ for agents of order n; see "Agents of order n" in the theory.
+
+    Examples
+    --------
+    >>> trio = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("a", "c", -1), ("c", "a", -1)])
+    >>> square = Agents(order=2, offsets={"a": [0, 0], "b": [1, 0], "c": [0, 1]})
+    >>> start = {"a": [0, 3], "b": [5, 1], "c": [-2, -4]}
+    >>> answer = design_agents(trio, square, start, max_input=5)
+    >>> answer.verdict, answer.certificate.assessment.text.split(";")[0]
+    ('met', 'met: |u_k| <= 5')
+    >>> design_agents(trio, square, start, max_input=5, deadline=1).verdict
+    'infeasible'
+    """
+    request = AgentsRequest(
+        parameter("max_input", max_input),
+        None if deadline is None else parameter("deadline", deadline),
+        None if residual is None else parameter("residual", residual),
+    )
+    _refuse(agents, request)
+    agents = replace(agents, decay=agents.decay_rate)
+    template = NominalProtocol(T=1, rho1="0.001", rho2=1, kappa=1) if protocol is None else protocol
+    given = {"agents": agents, "v0": v0, "derivatives": derivatives, "orientation": orientation, "simulation": False}
+    first = request.deadline or min(Fraction(1), _longest(agents) / 2)
+    base = certify(graph, at_deadline(template, first), x0, **given)
+    part = base.agents
+    if part is None or part.initial_state is None:
+        raise ParameterError("design of agents of order n starts from an initial state; give x0")
+    blank = AgentsDesign(UNPROVED, "", request, agents, request.deadline, shortest_possible=_least_time(base, request))
+    if (reason := _unusable(base, part, request)) is not None:
+        return replace(blank, binding=reason)
+    search = Search(base, agents, template, request)
+    if request.deadline is not None or not any(part.initial_values):  # agents in place need no input, nor more time
+        candidate = search.at(first)
+        if candidate is None or not candidate.meets(request):
+            return _without(blank, search, candidate)
+    else:
+        search.run(blank.shortest_possible or first)
+        candidate = search.best
+        if candidate is None:
+            return _without(blank, search, search.nearest)
+    asked = Expectations(max_input=request.max_input)
+    again = certify(graph, candidate.protocol, x0, **given, expectations=asked)
+    return _with(replace(blank, too_short=search.too_short), candidate, base, again)
+
+
+def at_deadline(protocol: Protocol, T: Fraction) -> Protocol:
+    """Return a protocol with another deadline: ``rho1 T`` is kept, but for rounding, and so are shares of ``T``.
+
+    Examples
+    --------
+    >>> at_deadline(NominalProtocol(T=1, rho1=1, rho2=3, kappa=2), Fraction(4))
+    NominalProtocol(T=4, rho1=0.25, rho2=3, kappa=2)
+    """
+    share = T / protocol.T
+    rho1, reaching = Fraction(up(protocol.rho1 / share, DIGITS)), protocol.reaching
+    if reaching is None:
+        return protocol.replace(T=T, rho1=rho1)
+    T_r = min(Fraction(up(reaching.T_r * share, DIGITS)), T * (1 - Fraction(1, 10**DIGITS)))
+    return protocol.replace(T_r=T_r, T_s=T - T_r, rho1=rho1)
+
+
+def _refuse(agents: Any, request: AgentsRequest) -> None:
+    """Refuse what is not searched."""
+    if not isinstance(agents, Agents):
+        raise ParameterError(f"agents = {shorten(repr(agents))} is none; give Agents(order=2), say")
+    if agents.plain:
+        raise ParameterError("agents: these are single integrators; design(graph, ..) finds their gains")
+    if agents.rest is not None:
+        raise ParameterError("rest: no number is proved of the input of agents that meet at rest; leave it out")
+    if agents.decay_rate < 2 * agents.degree and agents.cap is None:
+        raise ParameterError(
+            f"decay: below 2 n = {2 * agents.degree} no input is proved to be bounded; leave it out, or cap the gain"
+        )
+    if request.residual is not None and agents.cap is None:
+        raise ParameterError(
+            "residual: nothing is left at T without a gain cap, and no cap is searched for agents of order n; "
+            "leave it out, or give gain_cap"
+        )
+    if agents.cap is not None and request.residual is None:
+        raise ParameterError("gain_cap: leaves something at every deadline; give residual, how far a position may be")
+
+
+def _longest(agents: Agents) -> Fraction:
+    """Return the longest deadline of agents that move by themselves; that of others is as good as without a limit."""
+    if not any(agents.coefficients):
+        return Fraction(2) ** _DOUBLINGS
+    return MOST_MOTION / (1 + max(map(abs, agents.coefficients)))
+
+
+def _least_time(base: Certificate, request: AgentsRequest) -> Fraction | None:
+    """Return a deadline below which no input within the limit suffices; None if nothing is known."""
+    part = base.agents
+    if part is None or part.initial_state is None or any(part.protocol.plant) or part.protocol.gain_cap is not None:
+        return None
+    if not base.influence.exact:
+        return None
+    zero, offsets = Fraction(0), part.protocol.offsets
+    deviations: list[list[list[Fraction]]] = [[[] for _ in row] for row in offsets]
+    for q in range(part.dimension):
+        for i in range(part.order):
+            begin = [
+                agent[q][i] - (h[q] if i == 0 else 0) for agent, h in zip(part.initial_state, offsets, strict=True)
+            ]
+            ends = agents_ends(base.influence, [(x, zero) for x in begin])
+            if any(radius for _, radius in ends):
+                return None
+            for k, (x, (end, _)) in enumerate(zip(begin, ends, strict=True)):
+                deviations[k][q].append(x - end)
+    return max(shortest_time(rows, request.max_input) for rows in deviations) or None
+
+
+def _unusable(base: Certificate, part: AgentsPart, request: AgentsRequest) -> str | None:
+    """Tell what is missing, whatever the deadline; None if nothing is."""
+    if not base.graph.n_edges:
+        return "no agent listens to another, so that no gains act"
+    if not part.functions:
+        return base.notes[0] if base.notes else "no decay was proved"
+    if part.input is None:
+        return "no input of single agents is proved for a graph of this size"
+    if part.protocol.gain_cap is not None and part.residual is None:
+        return "no deviation of single agents is proved for a graph of this size"
+    reaching, forces = part.protocol.base.reaching, abs(part.protocol.plant[0])
+    terms = Fraction(0) if reaching is None else reaching.mu1 * part.dimension
+    places = forces * max(sum(map(abs, h), Fraction(0)) for h in part.protocol.offsets)
+    if terms + places < request.max_input:
+        return None
+    named = [f"the sliding terms {short_exact(terms)}"] * bool(terms)
+    named += [f"the force that holds agents in their places {up(places)}"] * bool(places)
+    return f"whatever the deadline, the limit is taken by {' and '.join(named)}: give a larger limit or a smaller mu1"
+
+
+@dataclass
+class Search:
+    """The search of a deadline: candidates by their deadlines, each proved once."""
+
+    base: Certificate
+    agents: Agents
+    template: Protocol
+    request: AgentsRequest
+    tried: dict[Fraction, Candidate | None] = field(default_factory=dict)
+
+    def at(self, T: Fraction) -> Candidate | None:
+        """Return what is proved of a deadline; None if no matrix is found."""
+        if T not in self.tried:
+            self.tried[T] = self._prove(T)
+        return self.tried[T]
+
+    def _prove(self, T: Fraction) -> Candidate | None:
+        first, protocol = self.base.agents, at_deadline(self.template, T)
+        assert first is not None
+        try:
+            part = prove_agents(
+                self.base.structure,
+                protocol,
+                self.agents,
+                self.base.functions,
+                self.base.influence,
+                first.protocol.offsets,
+                first.initial_state,
+            )
+        except NoCertificate:
+            return None
+        return Candidate(T, protocol, part)
+
+    def run(self, start: Fraction) -> None:
+        """Bracket the limit from a first deadline on, and narrow it down to the tolerance."""
+        from scipy.optimize import brentq
+
+        longest = log(_longest(self.agents))
+        ends = [min(log(start), longest)]
+        outside = self.margin(ends[0]) > 0
+        for _ in range(_DOUBLINGS):
+            following = ends[-1] + (math.log(2) if outside else -math.log(2))
+            if ends[-1] == longest and outside:
+                return
+            ends.append(min(following, longest))
+            if (self.margin(ends[-1]) > 0) != outside:
+                break
+        else:
+            return
+        brentq(self.margin, *sorted(ends[-2:]), xtol=float(TOLERANCE) / 2)
+
+    def margin(self, z: float) -> float:
+        """Return the logarithm of what is proved over what is asked, at the deadline ``e^z``."""
+        candidate = self.at(Fraction(up(math.exp(z), DIGITS)))
+        excess = None if candidate is None else candidate.excess(self.request)
+        return _HOPELESS if excess is None else min(max(log(excess), -_HOPELESS), _HOPELESS)
+
+    @property
+    def best(self) -> Candidate | None:
+        """The shortest deadline that is proved to meet what is asked."""
+        met = [c for c in self.tried.values() if c is not None and c.meets(self.request)]
+        return min(met, key=lambda c: c.deadline, default=None)
+
+    @property
+    def nearest(self) -> Candidate | None:
+        """The candidate that exceeds what is asked least."""
+        found = [(c.excess(self.request), c) for c in self.tried.values() if c is not None]
+        return min(((x, c) for x, c in found if x is not None), key=lambda pair: pair[0], default=(0, None))[1]
+
+    @property
+    def too_short(self) -> Fraction | None:
+        """The longest deadline tried that is shorter than the best one."""
+        best = self.best
+        return None if best is None else max((T for T in self.tried if best.deadline > T), default=None)
+
+
+def _with(blank: AgentsDesign, candidate: Candidate, base: Certificate, again: Certificate) -> AgentsDesign:
+    """Return the answer with a certificate: the one that certify makes by itself, if it meets what is asked."""
+    asked = blank.asked
+    own = None if again.agents is None else Candidate(candidate.deadline, candidate.protocol, again.agents)
+    repeatable = own is not None and own.meets(asked) and again.verdict == "certified"
+    if own is None or not repeatable:
+        own, changes = candidate, {"protocol": candidate.protocol, "agents": candidate.part}
+        again = base.changed(**changes, expectations=Expectations(max_input=asked.max_input))
+        report = again.checked
+        if report is None or not report.accepted:
+            why = "" if report is None else f" {report.rejected}: {report.reason}"
+            return replace(blank, binding=f"the independent check does not accept{why}")
+    peak, residual, inputs = own.peak, own.residual, own.part.input
+    assert peak is not None and residual is not None and inputs is not None
+    label = again.graph.labels[inputs.index(peak)]
+    binding = f"the input of agent {shorten(label)} at t = 0, {up(100 * peak / asked.max_input, 4)} % of the limit"
+    if asked.residual is not None and residual / asked.residual > peak / asked.max_input:
+        binding = f"what the gain cap leaves, {up(100 * residual / asked.residual, 4)} % of what is allowed"
+    if not peak:
+        binding = "nothing binds: agents are in place and need no input"
+    return replace(
+        blank,
+        verdict=MET,
+        binding=binding,
+        deadline=own.deadline,
+        certificate=again,
+        peak=peak,
+        residual=residual,
+        repeatable=repeatable,
+    )
+
+
+def _without(answer: AgentsDesign, search: Search, nearest: Candidate | None) -> AgentsDesign:
+    """Return the answer without a certificate: what is not met, by how much, and which deadline would be."""
+    asked, least = answer.asked, answer.shortest_possible
+    if asked.deadline is not None and least is not None and least > asked.deadline:
+        times = down(least / asked.deadline)
+        text = f"no gains meet a deadline below {down(least)}, {times} times the one asked for"
+        return replace(answer, verdict=INFEASIBLE, binding=text)
+    if nearest is None or nearest.peak is None:
+        return replace(answer, binding="no matrix for these agents was proved")
+    text = f"at T = {short_exact(nearest.deadline)} the certified peak is {up(nearest.peak)}"
+    text += f", {up(nearest.peak / asked.max_input)} times the limit"
+    if nearest.residual:
+        text += f", and {up(nearest.residual)} is left of a position"
+    if asked.deadline is None:
+        return replace(answer, binding=f"{text}; no deadline that was tried keeps the limit")
+    search.run(asked.deadline)
+    best = search.best
+    mend = (
+        "no longer deadline that was tried keeps it" if best is None else f"T = {short_exact(best.deadline)} keeps it"
+    )
+    return replace(answer, binding=f"{text}; {mend}", peak=nearest.peak, residual=nearest.residual)

@@ -1,0 +1,129 @@
+"""What one matrix for agents of order n says of each agent: deviations of every derivative, and the input.
+
+With ``V = sum_kl Om_kl z_k'P z_l``, ``z`` the coordinates of a Lyapunov function of the graph, each column of ``Y``
+taken for a state, ``V(t) <= e^(-r s) V(0)``, and
+
+    |x_k^(i-1) - common motion| <= eta^(i-1) sqrt(c_k W_ii V),      |K eps_k| <= c sqrt(b'P b c_k^E V)
+
+with the constants ``(x_k - (Q x)_k)^2 <= c_k V`` and ``e_k^2 <= c_k^E V`` that the function has for single integrators.
+All norms are Euclidean over the coordinates of space.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from contextlib import suppress
+from fractions import Fraction
+
+import numpy as np
+
+from ptcc_certify.bounds.input.effort_bounds import full_constants
+from ptcc_certify.checker.input_formulas import root_above
+from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.lyapunov.function import LyapunovFunction
+from ptcc_certify.theorems.agent_decrease import Matrix
+
+#: Of every agent, in every coordinate of space, its position, velocity and so on.
+States = tuple[tuple[tuple[Fraction, ...], ...], ...]
+
+
+def scaled_states(states: States, offsets: Sequence[Sequence[Fraction]], zeta: Fraction) -> States:
+    """Return ``y_k = diag(1, zeta, ..) (xi_k - (h_k, 0, ..))``.
+
+    Examples
+    --------
+    >>> one = Fraction(1)
+    >>> scaled_states((((3 * one, one),),), [[one]], Fraction(1, 2))
+    (((Fraction(2, 1), Fraction(1, 2)),),)
+    """
+    return tuple(
+        tuple(
+            tuple((x - (h if i == 0 else 0)) * zeta**i for i, x in enumerate(chain))
+            for chain, h in zip(agent, offset, strict=True)
+        )
+        for agent, offset in zip(states, offsets, strict=True)
+    )
+
+
+def initial_value(structure: Structure, V: LyapunovFunction, P: Matrix, scaled: States) -> Fraction:
+    """Return ``V = sum_kl Om_kl z_k'P z_l`` of scaled states, summed over the coordinates of space."""
+    rows, n = structure.graph.exact_rows(range(structure.graph.n_nodes)), len(P)
+    total = Fraction(0)
+    for q in range(len(scaled[0])):
+        columns = []
+        for i in range(n):
+            x = [agent[q][i] for agent in scaled]
+            error = [-sum((a * x[j] for j, a in row.items()), Fraction(0)) for row in rows]
+            columns.append(V.exact_coordinates_of(x, error))
+        for i in range(n):
+            for j in range(i + 1):
+                total += (1 + (i != j)) * P[i][j] * _product(V, columns[i], columns[j])
+    return total
+
+
+def _product(V: LyapunovFunction, x: Sequence[Fraction], y: Sequence[Fraction]) -> Fraction:
+    """Return ``x' Om y``."""
+    if V.matrix is None:
+        return sum((w * a * b for w, a, b in zip(V.weights, x, y, strict=True)), Fraction(0))
+    parts = (
+        a * sum((p * b for p, b in zip(row, y, strict=True)), Fraction(0)) for a, row in zip(x, V.matrix, strict=True)
+    )
+    return sum(parts, Fraction(0))
+
+
+def error_constants(structure: Structure, V: LyapunovFunction) -> tuple[Fraction, ...] | None:
+    """Return ``c_k^E`` with ``e_k^2 <= c_k^E V`` of every agent; None where they are not seen for a full matrix."""
+    n = structure.graph.n_nodes
+    if V.matrix is not None:
+        return None if V.form is None else full_constants(V.form, n)
+    weight = dict(zip(V.nodes, V.weights, strict=True))
+    if V.coordinates == "E":
+        return tuple(1 / weight[v] if v in weight else Fraction(0) for v in range(n))
+    rows = structure.graph.exact_rows(range(n))
+    return tuple(sum((x * x / weight[j] for j, x in row.items()), Fraction(0)) for row in rows)
+
+
+def least_input(
+    structure: Structure, functions: Sequence[LyapunovFunction], P: Matrix, scaled: States | None
+) -> Fraction | None:
+    """Return the proved rate of the function by which the bound of the input is least, in floats; None without one.
+
+    That bound is ``sqrt(max_k c_k^E V(0))/rate``, up to what all functions share. Without an initial state ``V(0)``
+    stands for the largest of errors of size 1. The fastest functions of followers may have huge constants.
+    """
+    decaying = [V for V in functions if V.proved_rate > 0]
+    if len(decaying) < 2:
+        return decaying[0].proved_rate if decaying else None
+    L, inner = structure.graph.laplacian(), np.array([[float(x) for x in row] for row in P])
+    states = None if scaled is None else np.array([[[float(x) for x in row] for row in agent] for agent in scaled])
+
+    def size(V: LyapunovFunction) -> float:
+        with np.errstate(all="ignore"), suppress(np.linalg.LinAlgError):
+            if V.matrix is None:
+                constant = max(map(float, error_constants(structure, V) or ()))
+            else:
+                constant = float(np.linalg.inv(V.array).diagonal().max())
+            value = float(V.highest)
+            if states is not None:
+                z = V.scaled(V.coordinates_of(states, L))
+                value = float(np.einsum("kqi,ij,kqj", z, inner, z))
+            bound = math.sqrt(max(constant * value, 0.0)) / float(V.proved_rate)
+            return bound if math.isfinite(bound) else math.inf
+        return math.inf
+
+    return min(decaying, key=lambda V: (size(V), -V.proved_rate)).proved_rate
+
+
+def root_product(*factors: Fraction) -> Fraction:
+    """Return the root of a product, rounded up.
+
+    Examples
+    --------
+    >>> float(root_product(Fraction(2), Fraction(8)))
+    4.0
+    """
+    product = Fraction(1)
+    for factor in factors:
+        product *= factor
+    return root_above(product) if product else Fraction(0)

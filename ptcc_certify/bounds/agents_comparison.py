@@ -1,0 +1,105 @@
+"""A simulated run of agents of order n against the proved bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from lmi.exact.decimal_rounding import float_up
+from ptcc_certify.bounds.agents import error_constants, root_product
+from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.lyapunov.function import LyapunovFunction
+from ptcc_certify.simulation.agents import AgentsTrajectory
+from ptcc_certify.theorems.agent_decrease import AgentMatrix
+
+
+@dataclass(frozen=True)
+class AgentsComparison:
+    """How near a run comes to its bounds: ratios, at most 1 up to rounding where none is violated.
+
+    All are taken of ``e^(r s/2)`` times what is bounded, which is what was integrated: there is no floor.
+
+    Attributes
+    ----------
+    decay : float
+        ``max sqrt(V(t) e^(r s) / V(0))`` over the functions and the instants after 0.
+    deviations : tuple of n float
+        The same of positions, velocities and so on, over the agents; empty without constants.
+    relative_input : float or None
+        The same of ``|K eps_k|``.
+    input : float or None
+        ``max |u_k|`` over its proved bound; None without one.
+    """
+
+    decay: float
+    deviations: tuple[float, ...]
+    relative_input: float | None
+    input: float | None
+
+    @property
+    def worst(self) -> float:
+        """The largest of all."""
+        ratios = (self.decay, *self.deviations, self.relative_input or 0.0, self.input or 0.0)
+        return max(ratios)
+
+    @property
+    def violated(self) -> bool:
+        """Whether a bound was exceeded by more than rounding."""
+        return not self.worst <= 1 + 1e-6
+
+
+def compare_agents(
+    structure: Structure,
+    matrix: AgentMatrix,
+    functions: Sequence[LyapunovFunction],
+    initial_values: Sequence[Fraction],
+    inputs: Sequence[Sequence[Fraction] | None],
+    bounds: Sequence[Fraction] | None,
+    run: AgentsTrajectory,
+) -> AgentsComparison | None:
+    """Compare a run with what the functions and the matrix prove of it; None where nothing disagrees."""
+    later = np.isfinite(run.scaled).all(axis=(0, 1, 2)) & (run.t > 0)
+    z, L = run.scaled[..., later], structure.graph.laplacian()
+    N, n = len(z), z.shape[2]
+    P = np.linalg.cholesky(np.array([[float(x) for x in row] for row in matrix.inverse])).T
+    decay, deviation, relative = 0.0, np.full((N, n), np.inf), np.full(N, np.inf)
+    for V, value, own in zip(functions, initial_values, inputs, strict=True):
+        if not value:
+            continue
+        roots = V.scaled(V.coordinates_of(z, L))
+        values = (np.einsum("ij,kdjm->kdim", P, roots) ** 2).sum(axis=(0, 1, 2))
+        decay = max(decay, float(np.sqrt(values.max() / float(value))))
+        if V.deviation is not None:
+            rows = [[float_up(root_product(c, matrix.W[i][i], value)) for i in range(n)] for c in V.deviation.agents]
+            deviation = np.minimum(deviation, rows)
+        constants = own if V.matrix is not None else error_constants(structure, V)
+        if constants is not None:
+            gain = matrix.gains[-1] * matrix.coupling
+            relative = np.minimum(relative, [float_up(root_product(gain, c, value)) for c in constants])
+    if not any(initial_values):
+        return None
+    eps = -(L @ z.reshape(N, -1)).reshape(z.shape)
+    pull = np.einsum("i,kdim->kdm", np.array(list(map(float, matrix.gains))), eps)
+    pulls = np.sqrt((pull**2).sum(axis=1)).max(axis=-1)
+    sizes = np.sqrt((z**2).sum(axis=1)).max(axis=-1)
+    known = np.isfinite(deviation).all()
+    total = None
+    if bounds is not None:
+        actual = np.sqrt((run.input[..., later] ** 2).sum(axis=1)).max(axis=-1)
+        total = float(_ratio(actual, np.array([float_up(x) for x in bounds])).max())
+    return AgentsComparison(
+        decay,
+        tuple(_ratio(sizes, deviation).max(axis=0).tolist()) if known else (),
+        float(_ratio(pulls, relative).max()) if np.isfinite(relative).all() else None,
+        total,
+    )
+
+
+def _ratio(size: np.ndarray, bound: np.ndarray) -> np.ndarray:
+    """Return sizes over bounds; 0 over 0, up to rounding, is 0."""
+    zero = bound == 0
+    least = 1e-9 * max(float(bound.max(initial=0.0)), 1e-300)
+    return np.where(zero, np.where(size > least, np.inf, 0.0), size / np.where(zero, 1, bound))

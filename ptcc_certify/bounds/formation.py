@@ -1,0 +1,136 @@
+"""Formations from biases of what agents measure: those that fit have places, exactly; others drift, and who is named.
+
+With biases ``b_k`` of the relative positions, ``e = -L x + b``. If ``Q b = 0`` there is one ``h`` with ``L h = b`` and
+``Q h = 0``: then ``e = -L (x - h)``, and the agents take the formation ``h``. If not, the means of leader groups drift:
+single integrators run away like ``s(t) Q b``, which has no bound before ``T``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import flint
+
+from ptcc_certify.bounds.final_state import Influence, influence
+from ptcc_certify.errors import ParameterError, gated
+from ptcc_certify.graphs.io import as_graph, as_states
+from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.structure import analyse
+
+#: Agents at most: the places of more are not solved for exactly.
+MOST_NODES = 400
+
+Rows = tuple[tuple[Fraction, ...], ...]
+
+
+@dataclass(frozen=True)
+class GroupDrift:
+    """A balanced leader group whose biases do not cancel.
+
+    Attributes
+    ----------
+    nodes : tuple of str
+    rate : tuple of d Fraction
+        ``eta_k'G_k b``, coordinate by coordinate: its agents drift by plus or minus this per unit of the clock.
+    """
+
+    nodes: tuple[str, ...]
+    rate: tuple[Fraction, ...]
+
+    def __str__(self) -> str:
+        rates = ", ".join(str(x) for x in self.rate)
+        return f"{', '.join(map(shorten, self.nodes[:5]))}{', ...' * (len(self.nodes) > 5)} by {shorten(rates)}"
+
+
+@dataclass(frozen=True)
+class Biases:
+    """What biases do.
+
+    Attributes
+    ----------
+    labels : tuple of str
+    offsets : N rows of d Fraction, or None
+        The formation that they make; None if they drift.
+    drift : N rows of d Fraction
+        ``Q b``: how far each agent drifts per unit of the clock.
+    groups : tuple of GroupDrift
+        The leader groups that drift, and how fast; empty if the biases fit a formation.
+    """
+
+    labels: tuple[str, ...]
+    offsets: Rows | None
+    drift: Rows
+    groups: tuple[GroupDrift, ...]
+
+
+@gated
+def formation_of_biases(graph: Any, biases: Any) -> Biases:
+    """Return the formation that biases of relative positions make, or who drifts and how fast, exactly.
+
+    Parameters
+    ----------
+    graph : graph-like
+        N agents.
+    biases : state-like, or N rows of d numbers
+        ``b_k``, what is added to ``e_k = sum_l w_kl (x_l - sign(w_kl) x_k)``.
+
+    Returns
+    -------
+    Biases
+
+    Raises
+    ------
+    ParameterError
+        The biases do not fit the graph, or it has more than 400 agents.
+
+    Examples
+    --------
+    >>> pair = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)])
+    >>> fit = formation_of_biases(pair, [1, -1])
+    >>> [str(h) for (h,) in fit.offsets]
+    ['1/2', '-1/2']
+    >>> odd = formation_of_biases(pair, [1, 0])
+    >>> odd.offsets, str(odd.groups[0])
+    (None, 'a, b by 1/2')
+    """
+    graph = as_graph(graph)
+    if graph.n_nodes > MOST_NODES:
+        raise ParameterError(f"biases: exact places are found for up to {MOST_NODES} agents; give offsets instead")
+    rows = [list(map(Fraction, row)) for row in as_states(biases, graph, "biases")]
+    who, d = influence(analyse(graph), exact=True), len(rows[0])
+    columns = [[row[q] for row in rows] for q in range(d)]
+    ends = [who.apply(column) for column in columns]
+    drift = tuple(tuple(Fraction(x) for x in row) for row in zip(*(end for end, _ in ends), strict=True))
+    rates = [tuple(Fraction(values[k]) for _, values in ends) for k in range(len(who.balanced))]
+    groups = tuple(
+        GroupDrift(tuple(graph.labels[v] for v in c.nodes), rate)
+        for c, rate in zip(who.balanced, rates, strict=True)
+        if any(rate)
+    )
+    offsets = None if groups else tuple(map(tuple, zip(*(_places(who, column) for column in columns), strict=True)))
+    return Biases(graph.labels, offsets, drift, groups)
+
+
+def _places(who: Influence, biases: Sequence[Fraction]) -> list[Fraction]:
+    """Return ``h`` with ``L h = b``, ``Q h = 0``, for ``Q b = 0``.
+
+    All nodes but the first one of each balanced closed component are solved for, which leaves a nonsingular matrix.
+    """
+    graph, first = who.structure.graph, {c.nodes[0] for c in who.balanced}
+    nodes = [v for v in range(graph.n_nodes) if v not in first]
+    places = [Fraction(0)] * graph.n_nodes
+    if nodes:
+        rows = graph.exact_rows(nodes)
+        L = flint.fmpq_mat(len(nodes), len(nodes), [_fmpq(row.get(v, Fraction(0))) for row in rows for v in nodes])
+        solution = L.solve(flint.fmpq_mat(len(nodes), 1, [_fmpq(biases[v]) for v in nodes]))
+        for i, v in enumerate(nodes):
+            places[v] = Fraction(int(solution[i, 0].p), int(solution[i, 0].q))
+    kept, _ = who.apply(places)
+    return [h - Fraction(x) for h, x in zip(places, kept, strict=True)]
+
+
+def _fmpq(x: Fraction) -> flint.fmpq:
+    return flint.fmpq(x.numerator, x.denominator)

@@ -1,0 +1,333 @@
+"""What holds with late messages: what is left at the deadline, row by row; who misses it; deadlines of stages.
+
+Agents obey :mod:`ptcc_certify.protocols.late_messages`, leaders listen to nobody. With ``D_k u_k - q sum_l |w_kl| u_l
+>= b u_k``, ``cap <= ln q / (b age)`` and ``s_c`` the integral of ``min(gain, cap)``
+
+    |x_k(t) - x_k*| <= u_k (initial e^(-b s_c(t)) + floor)
+
+for every gain that acts and all delays up to ``age``; ``initial`` is the largest ``|x_k(0) - x_k*| / u_k``, and
+``floor`` what errors of values add.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import numpy as np
+
+from lmi.dyadic import round_to_bits
+from lmi.errors import LMIError, NoCertificate
+from lmi.exact.decimal_rounding import float_up, up
+from lmi.exact.elementary_enclosures import log, rounded
+from ptcc_certify.bounds.late_steps import Steps, search_steps
+from ptcc_certify.bounds.missed_deadline import Missed, find_missed
+from ptcc_certify.bounds.small_delays import SmallDelays
+from ptcc_certify.bounds.staged_deadlines import stage_deadlines
+from ptcc_certify.checker.input_formulas import BITS, Limits, decay_above
+from ptcc_certify.checker.late_messages import PARTS
+from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness
+from ptcc_certify.protocols.base import Protocol
+from ptcc_certify.protocols.gain_limits import GainLimits, LimitedGain
+from ptcc_certify.protocols.late_messages import LateMessages
+
+#: Up to so many followers many ``q`` are tried; beyond, the best of those that one vector proves.
+SEARCHED_FOLLOWERS = 3000
+#: Values of ``q`` that are tried, and the largest one; losses of ``b`` for a more even vector.
+_TRIED, _LARGEST_Q, _LOSSES = 10, 1e9, (0.01, 0.2, 0.6)
+#: What is added to a bound in floats, relatively, so that it holds.
+_MORE = 1 + 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class RowBound:
+    """A bound by rows: ``|x_k(t) - x_k*| <= u_k (initial e^(-b s_c(t)) + floor)``, at ``T`` with ``left`` in its place.
+
+    Attributes
+    ----------
+    witness : RowWitness
+        ``q``, ``b`` and ``u``.
+    cap : Fraction or None
+        Of the clock ``s_c``; None where nothing is late.
+    clock : Fraction or None
+        ``s_c(T)`` from below; None where it is infinite.
+    left, initial, floor : Fraction
+        From above.
+    """
+
+    witness: RowWitness
+    cap: Fraction | None
+    clock: Fraction | None
+    left: Fraction
+    initial: Fraction
+    floor: Fraction
+
+    def residual(self) -> np.ndarray:
+        """Return what bounds ``|x_k(T) - x_k*|`` for every follower, in floats from above."""
+        return self.witness.u * float(self.initial * self.left + self.floor) * _MORE + 1e-300
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LateBounds:
+    """What is proved of a graph whose messages are late.
+
+    Attributes
+    ----------
+    messages : LateMessages
+    structure : Structure
+    gain : LimitedGain
+        The gain that acts.
+    relative : bool
+        Whether bounds are for every initial state within 1 of its final one, in place of the given state.
+    rows : tuple of RowBound
+    steps : Steps or None
+    missed : Missed or None
+    staged : tuple of Fraction, or None
+        Of every follower the deadline at which it is at its final state exactly.
+    residual : (N,) array or None
+        What bounds ``|x_k(T) - x_k*|`` row by row, in floats from above; None where nothing does.
+    form : SmallDelays or None
+        What a Lyapunov function of the whole graph proves under a capped gain.
+    longest_delay : float or None
+        About the longest delay that such functions forgive: this certificate's limit. None if it was not asked.
+    unarrived : bool
+        Whether deadlines of stages fail since information takes longer than ``T`` to come from leaders to all.
+    enough : Fraction or None
+        A delay with which no more is left than was asked, near to the longest one that is proved.
+    """
+
+    messages: LateMessages
+    structure: Structure
+    gain: LimitedGain
+    relative: bool
+    rows: tuple[RowBound, ...] = ()
+    steps: Steps | None = None
+    missed: Missed | None = None
+    staged: tuple[Fraction, ...] | None = None
+    residual: np.ndarray | None = None
+    form: SmallDelays | None = None
+    longest_delay: float | None = None
+    unarrived: bool = False
+    enough: Fraction | None = None
+
+    @property
+    def says_something(self) -> bool:
+        """Whether anything is proved."""
+        return bool(self.rows or self.steps or self.missed or self.staged or self.form)
+
+    @property
+    def largest(self) -> float:
+        """The largest of the bounds of ``|x_k(T) - x_k*|``; infinite where nothing is bounded."""
+        largest = math.inf if self.residual is None else float(self.residual.max())
+        return largest if self.form is None else min(largest, float_up(max(self.form.residual)))
+
+    def __repr__(self) -> str:
+        within = "nothing" if math.isinf(self.largest) else f"every agent within {up(self.largest, 2)}"
+        return f"LateBounds({self.messages!r}: {within} at T)"
+
+    @property
+    def direct(self) -> bool:
+        """Whether all followers hear of leaders alone, so that they settle at ``T`` exactly."""
+        return self.staged is not None and len(set(self.staged)) == 1
+
+    def deviation_bound(self, t: Sequence[float] | np.ndarray) -> np.ndarray:
+        """Return what bounds ``|x_k - x_k*|`` at instants, ``(F, M)`` floats; infinite where nothing does."""
+        t = np.asarray(t, dtype=float)
+        whole = np.full((self.structure.followers.size, len(t)), np.inf)
+        for row in self.rows:
+            cap = [x for x in (row.cap, self.gain.limits.gain_cap) if x is not None]
+            clock = GainLimits(gain_cap=min(cap, default=None)).limit(self.gain.gain).clock(t)
+            b, M, c = map(float, (row.witness.b, row.initial, row.floor))
+            whole = np.minimum(whole, row.witness.u[:, None] * (M * np.exp(-b * clock) + c) * _MORE)
+        if self.steps is not None:
+            at = np.searchsorted([float(x) for x in self.steps.instants], t * (1 - 1e-15), side="right") - 1
+            whole = np.minimum(whole, self.steps.bounds[np.maximum(at, 0)].T)
+        return whole
+
+
+def bound_late(
+    structure: Structure,
+    protocol: Protocol,
+    messages: LateMessages,
+    initial_state: Sequence[Fraction] | None = None,
+    ends: Sequence[tuple[Fraction, Fraction]] | None = None,
+) -> LateBounds:
+    """Bound what late messages leave at the deadline.
+
+    Parameters
+    ----------
+    structure : Structure
+        All leaders are single nodes.
+    protocol : Protocol
+        Its ``gain``; under the sliding-mode protocol with ``sigma(0) = 0``.
+    messages : LateMessages
+    initial_state : sequence of N Fraction, optional
+    ends : sequence of N (middle, radius), optional
+        Of ``Q X(0)``; without it bounds are for every initial state within 1 of its final one.
+
+    Returns
+    -------
+    LateBounds
+        Without bounds by rows where a leader belongs to a group, or the own state is late, too.
+
+    Raises
+    ------
+    ParameterError
+        A delay is of an edge that is not there.
+
+    Examples
+    --------
+    >>> structure = analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 3, 1), (3, 2, 1)]))
+    >>> bounds = bound_late(structure, NominalProtocol(T=1, rho1=1, rho2=4, kappa=1), LateMessages(delay="0.01"))
+    >>> bounds.residual.max() < 0.5
+    np.True_
+    """
+    latencies = messages.latencies(structure.graph)
+    gain = GainLimits(gain_cap=messages.gain_cap).limit(protocol.gain)
+    if messages.own_delay or any(len(c.nodes) > 1 for c in structure.closed_components):
+        return LateBounds(messages, structure, gain, initial_state is None or ends is None)
+    rows = late_rows(structure, messages)
+    first = np.ones(rows.D.size)
+    if initial_state is not None and ends is not None:
+        first = _away(rows, initial_state, ends)
+    bounds = LateBounds(messages, structure, gain, initial_state is None or ends is None)
+    found = search_rows(rows, gain, messages, first)
+    steps = None
+    if messages.age:
+        with suppress(LMIError):
+            steps = search_steps(rows, gain, messages.age, float(messages.value_error) * _MORE, first)
+    each = [row.residual() for row in found]
+    each += [] if steps is None else [steps.bounds[-1] * _MORE + 1e-300]
+    bounds = replace(bounds, rows=found, steps=steps, residual=_least(structure, each))
+    if messages.value_error or messages.gain_cap is not None:
+        return bounds
+    if initial_state is not None and ends is not None:
+        bounds = replace(bounds, missed=find_missed(rows, protocol, latencies, initial_state, ends))
+    staged = stage_deadlines(rows, protocol.T, messages.age)
+    unarrived = staged is None and stage_deadlines(rows, protocol.T, Fraction(0)) is not None
+    return replace(bounds, staged=staged, unarrived=unarrived)
+
+
+def _away(
+    rows: FollowerRows, initial_state: Sequence[Fraction], ends: Sequence[tuple[Fraction, Fraction]]
+) -> np.ndarray:
+    """Bound ``|x_k(0) - x_k*|`` of every follower from above: of many in floats with room for their rounding."""
+    if rows.D.size > SEARCHED_FOLLOWERS:
+        with suppress(OverflowError):
+            followers = rows.followers.tolist()
+            parts = ((initial_state[v], *ends[v]) for v in followers)
+            x, mid, radius = np.array([[float(value) for value in part] for part in parts]).T
+            return np.asarray(np.abs(x - mid) + radius + (np.abs(x) + np.abs(mid) + radius) * 2.0**-50 + 1e-300)
+    return np.array([float_up(abs(initial_state[v] - ends[v][0]) + ends[v][1]) for v in rows.followers])
+
+
+def late_rows(structure: Structure, messages: LateMessages) -> FollowerRows:
+    """Return the rows of the followers, with ages of what is heard by edge, in 64ths of the oldest, rounded up.
+
+    Parameters
+    ----------
+    structure : Structure
+        All leaders are single nodes.
+    messages : LateMessages
+    """
+    latencies = messages.latencies(structure.graph)
+    if not isinstance(latencies, tuple) or not messages.age:
+        return FollowerRows(structure)
+    part = {x: math.ceil(PARTS * (x + messages.held) / messages.age) for x in set(latencies)}
+    if min(part.values()) == PARTS:
+        return FollowerRows(structure)
+    return FollowerRows(structure, np.array([part[x] / PARTS for x in latencies]))
+
+
+def _least(structure: Structure, bounds: Sequence[np.ndarray]) -> np.ndarray | None:
+    """Return the least of bounds of followers, for all agents."""
+    if not bounds:
+        return None
+    whole = np.zeros(structure.graph.n_nodes)
+    whole[structure.followers] = np.minimum.reduce(bounds)
+    return whole
+
+
+def search_rows(
+    rows: FollowerRows, gain: LimitedGain, messages: LateMessages, first: np.ndarray
+) -> tuple[RowBound, ...]:
+    """Return the row bound that leaves least at ``T`` of those found; none if no vector was found."""
+    candidates: list[RowBound] = []
+
+    def offer(q: float, loss: float) -> None:
+        with suppress(LMIError):
+            witness = rows.witness(Fraction(round_to_bits(q, 24)), loss)
+            candidates.append(row_bound(rows, gain, messages, first, witness))
+
+    small = rows.D.size <= SEARCHED_FOLLOWERS
+    if not messages.age:
+        for loss in _LOSSES[: None if small else 1]:
+            offer(1.0, loss)
+    else:
+        if small:
+            most = min(rows.largest_q(), _LARGEST_Q)
+            tried = np.exp(math.log(most) * np.linspace(0, 1, _TRIED + 2)[1:-1] ** 2)
+            for q in tried:
+                offer(float(q), _LOSSES[0])
+            best = min(candidates, key=_largest, default=None)
+            if best is not None:
+                for loss in _LOSSES[1:]:
+                    offer(float(best.witness.q), loss)
+        else:
+            best_q = _best_q(rows, gain, messages, _LARGEST_Q)
+            for loss in _LOSSES[1:]:
+                offer(best_q, loss)
+    return (min(candidates, key=_largest),) if candidates else ()
+
+
+def _largest(bound: RowBound) -> float:
+    return float(bound.residual().max())
+
+
+def _best_q(rows: FollowerRows, gain: LimitedGain, messages: LateMessages, most: float) -> float:
+    """Return the ``q`` that leaves least by the vector for ``q = 1``."""
+    witness, age = rows.witness(Fraction(1), _LOSSES[1]), float(messages.age)
+    share = float(rows.share(witness.u).max())
+    top = min(most, 1 / share if share else most)
+    best, least = 1 + (top - 1) / 2, 0.0
+    for q in np.exp(math.log(top) * np.linspace(0, 1, 60)[1:-1] ** 2):
+        b = rows.decay(witness, float(q))
+        if b > 0:
+            cap = Fraction(math.log(q) / (b * age))
+            caps = [cap, *([] if messages.gain_cap is None else [messages.gain_cap])]
+            value = -b * float(GainLimits(gain_cap=min(caps)).limit(gain.gain).clock([float(gain.gain.T)])[0])
+            best, least = (float(q), value) if value < least else (best, least)
+    return best
+
+
+def row_bound(
+    rows: FollowerRows, gain: LimitedGain, messages: LateMessages, first: np.ndarray, witness: RowWitness
+) -> RowBound:
+    """Return what a witness proves under a delay.
+
+    Raises
+    ------
+    NoCertificate
+        ``q`` is 1, which serves no delay.
+    """
+    caps = [] if messages.gain_cap is None else [messages.gain_cap]
+    cap = None
+    if messages.age:
+        if witness.q <= 1:
+            raise NoCertificate("q = 1 serves no delay")
+        cap = rounded(log(witness.q)[0] / (witness.b * messages.age), BITS)
+        caps.append(cap)
+    clock, left = None, Fraction(0)
+    if caps:
+        clock = Limits(min(caps)).clock_below(gain.gain.exact)
+        left = rounded(decay_above(witness.b * clock), BITS, up=True)
+    floor = 0.0
+    if messages.value_error:
+        slack = rows.D * witness.u - rows.W @ witness.u
+        floor = float((rows.D / slack).max()) * float(messages.value_error)
+    initial = float((first / witness.u).max())
+    return RowBound(witness, cap, clock, left, Fraction(initial * _MORE), Fraction(floor * _MORE))

@@ -1,0 +1,171 @@
+"""Followers whose messages are late, bounded from instant to instant by a solution that never grows.
+
+With ``y_0 >= |eps(0)|`` and ``D y_0 >= |W_F| y_0 + nu D`` the solution of
+
+    y' = -gain (D y - |W_F| y(t - delay) - nu D),    y = y_0 up to 0,
+
+never grows, so that ``|eps(t)| <= y(t)`` whatever the delays up to ``delay`` and the value errors up to ``nu``. Between
+instants ``t_(i-1)`` and ``t_i`` what it hears over an edge is at most ``y`` at an instant ``t_j <= t_(i-1) - age`` with
+the age of the edge, hence
+
+    y_i = h + (y_(i-1) - h)_+ e^(-D (s(t_i) - s(t_(i-1)))),    h = D^-1 |W_F| y_j + nu.
+
+Where delays are constant and weights positive the solution is attained: what is lost is the distance of instants.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from ptcc_certify.lyapunov.follower_rows import FollowerRows
+from ptcc_certify.protocols.gain_limits import LimitedGain
+
+#: Instants at most, and products of weights that all instants together may take.
+MOST_INSTANTS, MOST_PRODUCTS = 2000, 20_000_000
+#: Instants in one delay, at most, and in each e-fold of the time that is left.
+_IN_DELAY, _IN_E_FOLD = 32, 120
+#: Fewer instants than this say nothing.
+_FEWEST = 20
+#: Integers over ``2^30`` by which the check may form what is formed here in floats.
+_UNIT = 2.0**-30
+#: What is added so that the start obeys its inequality for certain, relatively.
+_MORE = 1e-9
+#: Iterations for the start.
+_ITERATIONS = 200
+
+
+@dataclass(frozen=True, eq=False)
+class Steps:
+    """The instants, and what bounds ``|eps|`` there.
+
+    Attributes
+    ----------
+    instants : tuple of Fraction
+        ``t_0 = 0 .. t_m = T``.
+    start : (F,) array
+        ``y_0``, floats that are taken as they are.
+    bounds : (m + 1, F) array
+        ``y_i`` in floats, not below what integers over ``2^30`` give.
+    """
+
+    instants: tuple[Fraction, ...]
+    start: np.ndarray
+    bounds: np.ndarray
+
+
+def instants_of(T: Fraction, delay: Fraction, most: int) -> tuple[Fraction, ...]:
+    """Return instants from 0 to ``T``: near to ``T`` parts of the delay, farther away parts of the time left.
+
+    Examples
+    --------
+    >>> instants = instants_of(Fraction(1), Fraction(1, 10), 100)
+    >>> instants[0], instants[-1], len(instants) <= 101
+    (Fraction(0, 1), Fraction(1, 1), True)
+    """
+    for parts in range(_IN_DELAY, 1, -1):
+        step, share = delay / parts, _IN_E_FOLD * parts / _IN_DELAY
+        left, backwards = Fraction(0), [Fraction(0)]
+        while left < T and len(backwards) <= most:
+            # Whole steps, so that an instant lies a delay before another where steps are short.
+            left += step * max(1, int(float(left / step) / share))
+            backwards.append(min(left, T))
+        if backwards[-1] == T and len(backwards) <= most + 1:
+            return tuple(T - left for left in reversed(backwards))
+    count = max(2, most)
+    return tuple(T * i / count for i in range(count + 1))
+
+
+def search_steps(
+    rows: FollowerRows, gain: LimitedGain, delay: Fraction, error: float, first: np.ndarray
+) -> Steps | None:
+    """Choose instants and start, and bound followers from instant to instant; None where the graph is too large.
+
+    Parameters
+    ----------
+    rows : FollowerRows
+    gain : LimitedGain
+        The gain that acts.
+    delay : Fraction
+        Positive, in units of time.
+    error : float
+        Of a value that is heard, from above.
+    first : (F,) array
+        ``|eps(0)|`` from above.
+
+    Raises
+    ------
+    NoCertificate
+        No vector for the followers was found.
+    """
+    most = min(MOST_INSTANTS, MOST_PRODUCTS // (rows.W.nnz + 4 * rows.D.size))
+    if most < _FEWEST:
+        return None
+    start = _start(rows, error, first)
+    if not 0 < float(start.max()) < np.inf:
+        return None
+    return bound_steps(rows, gain, delay, error, instants_of(gain.gain.T, delay * rows.least_share, most), start)
+
+
+def bound_steps(
+    rows: FollowerRows,
+    gain: LimitedGain,
+    delay: Fraction,
+    error: float,
+    instants: tuple[Fraction, ...],
+    start: np.ndarray,
+) -> Steps:
+    """Bound followers from instant to instant, in floats that leave room for the integers of the check."""
+    parts = [(W, _hearing(instants, delay * Fraction(share))) for share, W in rows.by_age().items()]
+    clock, size = _clock(gain, instants), float(start.max())
+    room, bounds = _UNIT * size * (np.diff(rows.W.indptr) + 4.0), [start + _UNIT * size]
+    for i in range(1, len(instants)):
+        before, heard = bounds[-1], sum(W @ bounds[at[i - 1]] for W, at in parts) / rows.D + error + room
+        step = clock[i] - clock[i - 1] if np.isfinite(clock[i]) else np.inf
+        left = _decay_above(rows.D * max(step, 0.0) * (1 - 1e-9))
+        bounds.append(np.minimum(before, heard + np.maximum(before - heard, 0) * left + 4 * _UNIT * size))
+    return Steps(instants, start, np.array(bounds))
+
+
+def _hearing(instants: Sequence[Fraction], delay: Fraction) -> list[int]:
+    """Return for every instant the number of the last one that is a delay before it, 0 if there is none."""
+    heard, j = [], 0
+    for t in instants:
+        while j + 1 < len(instants) and instants[j + 1] <= t - delay:
+            j += 1
+        heard.append(j)
+    return heard
+
+
+def _decay_above(x: np.ndarray) -> np.ndarray:
+    """Bound ``e^-x`` by the reciprocal of the first terms of ``e^x``."""
+    with np.errstate(over="ignore"):
+        return 1 / (1 + x * (1 + x / 2 * (1 + x / 3 * (1 + x / 4))))
+
+
+def _start(rows: FollowerRows, error: float, first: np.ndarray) -> np.ndarray:
+    """Return a small ``y_0 >= first`` with ``D y_0 >= |W_F| y_0 + error D``, by iteration from below."""
+    y = first * (1 + _MORE)
+    for _ in range(_ITERATIONS):
+        new = np.maximum(y, (rows.W @ y) / rows.D + error)
+        if (new <= y * (1 + _MORE)).all():
+            break
+        y = new
+    witness = rows.witness(Fraction(1), 0.5)
+    slack = rows.D * witness.u - rows.W @ witness.u
+    lacking = rows.W @ y + error * rows.D - rows.D * y + 1e-13 * rows.D * (y + error)
+    return y + float(np.maximum(lacking / slack, 0).max() * (1 + 1e-6)) * witness.u
+
+
+def _clock(gain: LimitedGain, instants: Sequence[Fraction]) -> np.ndarray:
+    """Return the clock at instants, from the time that is left."""
+    T = gain.gain.T
+    left = np.array([float((T - t) / T) for t in instants])
+    return gain.clock(_floats(instants), remaining=left)
+
+
+def _floats(values: Sequence[Fraction]) -> np.ndarray:
+    return np.array([float(x) for x in values])

@@ -1,0 +1,158 @@
+"""How followers track leaders that move: exactly at the deadline, and with a sign term ever after.
+
+The target of the followers is ``X_F*(t) = -L_F^-1 L_FL X_L(t)``. With ``D_k u_k - sum_l |w_kl| u_l >= a u_k``, ``u >
+0``, ``m = max_k |x_k - x_k*| / u_k``, ``p = a rho2 kappa`` and ``c = (speed + disturbance) / min u``
+
+    m(t) <= e^(-a s(t)) m(0) + c (T - t) (1 - ((T - t)/T)^(p - 1)) / (p - 1)    before T,    m(T) = 0;
+
+from ``T`` on ``m <= c / (a rho1)``. With the sign term the second part is left out, and ``m = 0`` from ``T`` on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from lmi.errors import LMIError, NoCertificate
+from lmi.exact.decimal_rounding import float_up, up
+from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness, refuse_leader_groups
+from ptcc_certify.protocols.base import Protocol
+from ptcc_certify.protocols.moving_leaders import MovingLeaders
+
+#: Losses of ``a`` that are tried for a more even ``u``; the share of the time that is left where they are compared.
+_LOSSES, _JUDGED = (0.01, 0.2, 0.6), 0.05
+#: What is added to a bound in floats, relatively, so that it holds.
+_MORE = 1 + 1e-9
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Tracking:
+    """What is proved of followers of moving leaders.
+
+    Attributes
+    ----------
+    leaders : MovingLeaders
+    structure : Structure
+    protocol : Protocol
+    witness : RowWitness
+        ``u`` and, as its ``b``, ``a``.
+    initial : Fraction
+        ``m(0)`` from above.
+    relative : bool
+        Whether ``initial`` is that of all initial states within 1 of their targets.
+    after : Fraction
+        ``m`` from ``T`` on, from above.
+    input : (N,) array or None
+        What bounds ``|gain e_k|`` up to ``T``, with the sign term if there is one; None where nothing does.
+    """
+
+    leaders: MovingLeaders
+    structure: Structure
+    protocol: Protocol
+    witness: RowWitness
+    initial: Fraction
+    relative: bool
+    after: Fraction
+    input: np.ndarray | None
+
+    def __repr__(self) -> str:
+        return f"Tracking({self.leaders!r}: exact at T, within {up(self.distance_after, 2)} after it)"
+
+    @property
+    def pole(self) -> float:
+        """``p = a rho2 kappa``: above 1 the input stays bounded."""
+        return float(self.witness.b * self.protocol.gain.pole)
+
+    @property
+    def bounding_rho2(self) -> str:
+        """A ``rho2`` of few digits with which ``p > 1``, so that the input stays bounded."""
+        return up(1 / (self.witness.b * self.protocol.kappa) * Fraction(1001, 1000), 3)
+
+    @property
+    def drift(self) -> float:
+        """``(speed + disturbance) / min u``; 0 with the sign term, which takes it up."""
+        return 0.0 if self.leaders.sign_gain is not None else float(self.leaders.total) / float(self.witness.u.min())
+
+    @property
+    def distance_after(self) -> float:
+        """What bounds ``|x_k - x_k*|`` of every follower from ``T`` on."""
+        return float(self.after) * float(self.witness.u.max()) * _MORE
+
+    def distance_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
+        """Return what bounds ``|x_k - x_k*|`` of followers where ``1 - t/T`` is ``remaining``, ``(F, M)`` floats."""
+        q, T, p = np.asarray(remaining, dtype=float), float(self.protocol.T), self.pole
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = np.where(q > 0, (1 - q ** (p - 1)) / (p - 1) if p != 1 else -np.log(q), 0.0)
+            clock = self.protocol.gain.clock_at_remaining(q)
+        m = np.exp(-float(self.witness.b) * clock) * float(self.initial) + self.drift * T * q * np.maximum(share, 0)
+        return self.witness.u[:, None] * np.where(q > 0, m, 0.0) * _MORE
+
+
+def bound_tracking(
+    structure: Structure,
+    protocol: Protocol,
+    leaders: MovingLeaders,
+    initial_state: Sequence[Fraction] | None = None,
+    ends: Sequence[tuple[Fraction, Fraction]] | None = None,
+) -> Tracking:
+    """Bound how followers track leaders that move.
+
+    Parameters
+    ----------
+    structure : Structure
+        All leaders are single nodes.
+    protocol : Protocol
+        The nominal one.
+    leaders : MovingLeaders
+    initial_state : sequence of N Fraction, optional
+    ends : sequence of N (middle, radius), optional
+        Of ``Q X(0)``, the targets at first; without it ``initial`` is for all initial states within 1 of these.
+
+    Raises
+    ------
+    HypothesisError
+        A leader belongs to a group, so that it is not free to move.
+    NoCertificate
+        No vector for the followers was found.
+
+    Examples
+    --------
+    >>> structure = analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 3, -1)]))
+    >>> tracking = bound_tracking(structure, NominalProtocol(T=1, rho1=1, rho2=4, kappa=1), MovingLeaders(speed=1))
+    >>> tracking.distance_bound([1e-3, 0]).max(axis=0) < 2e-3
+    array([ True,  True])
+    """
+    refuse_leader_groups(structure, "leaders that move as they like: a bound")
+    rows = FollowerRows(structure)
+    given = None if initial_state is None or ends is None else zip(initial_state, ends, strict=True)
+    every = None if given is None else np.array([float_up(abs(x - mid) + radius) for x, (mid, radius) in given])
+    first = np.ones(rows.D.size) if every is None else every[rows.followers]
+    found: list[Tracking] = []
+    for loss in _LOSSES:
+        with suppress(LMIError):
+            found.append(_tracking(rows, protocol, leaders, first, every is None, loss))
+    if not found:
+        raise NoCertificate("no vector for the followers was found")
+    return min(found, key=lambda one: (one.input is None, float(one.distance_bound(np.array([_JUDGED])).max())))
+
+
+def _tracking(
+    rows: FollowerRows, protocol: Protocol, leaders: MovingLeaders, first: np.ndarray, relative: bool, loss: float
+) -> Tracking:
+    """Return what one vector proves."""
+    witness, gain, sign = rows.witness(Fraction(1), loss), protocol.gain, leaders.sign_gain
+    initial = Fraction(float((first / witness.u).max()) * _MORE)
+    c, p = leaders.total / Fraction(float(witness.u.min())), witness.b * gain.pole
+    after = Fraction(0) if sign is not None else c / (witness.b * gain.rho1)
+    whole = None
+    if p > 1 or (sign is not None and p >= 1):
+        most = gain.first * initial + (0 if sign is not None else c * (gain.rho1 * gain.T + gain.pole) / (p - 1))
+        whole = np.zeros(rows.structure.graph.n_nodes)
+        whole[rows.followers] = (rows.D * witness.u + rows.W @ witness.u) * float_up(most) * _MORE + float(sign or 0)
+        whole[rows.followers] *= _MORE
+    return Tracking(leaders, rows.structure, protocol, witness, initial, relative, after, whole)

@@ -1,0 +1,392 @@
+"""What a certificate says of agents of order n: their protocol, its proof, final states, and bounds over time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from lmi.exact.decimal_rounding import down, float_down, float_up, up
+from ptcc_certify.bounds.agent_motion import Interval, common_motion
+from ptcc_certify.bounds.agents import (
+    States,
+    error_constants,
+    initial_value,
+    least_input,
+    root_product,
+    scaled_states,
+)
+from ptcc_certify.bounds.agents_comparison import AgentsComparison, compare_agents
+from ptcc_certify.bounds.final_state import Influence
+from ptcc_certify.bounds.input.tightest_bound import round_up
+from ptcc_certify.certificate.format_vectors import agents_ends, weighted_sum
+from ptcc_certify.checker.input_formulas import Limits, decay_above
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.lyapunov.function import LyapunovFunction
+from ptcc_certify.protocols import Protocol
+from ptcc_certify.protocols.agents import Agents, AgentsProtocol
+from ptcc_certify.simulation.agents import AgentsTrajectory, simulate_agents
+from ptcc_certify.theorems.agent_decrease import AgentMatrix, ScaledAgent, agent_matrix, paper_matrix, round_and_prove
+from ptcc_certify.theorems.theorem import Obligation
+
+Intervals = tuple[tuple[tuple[Interval, ...], ...], ...]
+
+
+@dataclass(frozen=True)
+class UsedFunction:
+    """A Lyapunov function of the graph that is used: its number, and the input constants of a full matrix."""
+
+    number: int
+    inputs: tuple[Fraction, ...] | None
+
+
+@dataclass(frozen=True)
+class Residual:
+    """What is left at ``T`` under a bounded gain: of each agent, of its position, velocity and so on."""
+
+    clock: Fraction
+    agents: tuple[tuple[Fraction, ...], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class AgentsPart:
+    """What is proved of agents of order n.
+
+    Attributes
+    ----------
+    structure : Structure
+    protocol : AgentsProtocol
+        As the agents run it.
+    matrix : AgentMatrix
+        ``W``, the rate ``r`` and the gains, proved.
+    used : tuple of UsedFunction
+    functions : tuple of LyapunovFunction
+        Those that are used.
+    initial_state : N tuples of d tuples of n Fraction, or None
+        Position, velocity and so on of every agent in every coordinate.
+    motion : n by n intervals
+        ``M``: the common motion from 0 to ``T``.
+    final_state : like initial_state, with intervals, or None
+    residual : Residual or None
+    input : tuple of N Fraction, or None
+        Bounds of the Euclidean norm of every agent's input.
+    """
+
+    structure: Structure
+    protocol: AgentsProtocol
+    matrix: AgentMatrix
+    used: tuple[UsedFunction, ...]
+    functions: tuple[LyapunovFunction, ...]
+    initial_state: States | None
+    motion: tuple[tuple[Interval, ...], ...]
+    final_state: Intervals | None = None
+    residual: Residual | None = None
+    input: tuple[Fraction, ...] | None = None
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def order(self) -> int:
+        """``n``."""
+        return self.protocol.order
+
+    @property
+    def dimension(self) -> int:
+        """``d``, the coordinates of space."""
+        return len(self.protocol.offsets[0])
+
+    @property
+    def decay(self) -> Fraction:
+        """``R = r rho2 kappa``."""
+        return self.matrix.rate * self.protocol.gain.pole
+
+    @property
+    def first_gain(self) -> Fraction:
+        """``eta(0)``."""
+        gain, cap = self.protocol.gain.first, self.protocol.gain_cap
+        return gain if cap is None else min(gain, cap)
+
+    @property
+    def formation(self) -> bool:
+        """Whether an agent has a place other than 0."""
+        return any(any(row) for row in self.protocol.offsets)
+
+    @property
+    def settles(self) -> bool:
+        """Whether the behaviour of the claim is proved at ``T`` itself, of positions less their places in a formation.
+
+        A capped gain leaves something there, and gains without a Lyapunov function prove nothing.
+        """
+        return self.structure.graph.n_edges == 0 or (bool(self.functions) and self.protocol.gain_cap is None)
+
+    @property
+    def moving(self) -> bool:
+        """Whether some derivative of a final state is not 0."""
+        return any(m or r for agent in self.final_state or () for chain in agent for m, r in chain[1:])
+
+    @property
+    def unbounded(self) -> tuple[tuple[str, str], ...]:
+        """What leaves the input without a bound, and what mends it; empty where nothing does.
+
+        The deviations' part is ``eta^n e^(-r s/2)`` of what it is at 0; that of the common velocity at rest
+        ``eta e^(-alpha s - a_2 t)``, whose logarithm grows by at most ``eta (1/k - alpha) - a_2``.
+        """
+        n, gain = self.order, self.protocol.gain
+        if self.protocol.gain_cap is not None:
+            return ()
+        found = []
+        if self.decay < 2 * n:
+            found.append((f"decay {down(self.decay)} is below 2 n = {2 * n}", f"--decay {2 * n}"))
+        if any(self.protocol.own):
+            alpha = self.protocol.own[1]
+            least = 1 / gain.pole + max(Fraction(0), -self.protocol.plant[1]) / gain.first
+            if alpha < least:
+                found.append((f"rest {down(alpha)} is below {up(least, 4)}", f"--rest {up(least, 4)}"))
+        return tuple(found)
+
+    @property
+    def longest_way(self) -> float:
+        """The longest way of an agent from its initial to its final position (numerical); 0 without a final state."""
+        begin, end = self.initial_state or (), self.final_state or ()
+        squares = [
+            sum(float(x[0] - m[0][0]) ** 2 for x, m in zip(agent, place, strict=True))
+            for agent, place in zip(begin, end, strict=False)
+        ]
+        return math.sqrt(max(squares, default=0.0))
+
+    @cached_property
+    def initial_values(self) -> tuple[Fraction, ...]:
+        """``V(0)`` of every function used."""
+        if self.initial_state is None:
+            return ()
+        scaled = scaled_states(self.initial_state, self.protocol.offsets, 1 / self.first_gain)
+        return tuple(initial_value(self.structure, V, self.matrix.inverse, scaled) for V in self.functions)
+
+    @property
+    def obligations(self) -> list[Obligation]:
+        """What the independent check verifies, in its order."""
+        result = [
+            Obligation("input-constants", f"lyapunov.functions[{one.number}]")
+            for one in self.used
+            if one.inputs is not None
+        ]
+        result += [
+            Obligation("agent-positive", "agents"),
+            Obligation("agent-decrease", "agents", {"rate": self.matrix.rate}),
+            Obligation("agent-coupling", "agents", {"coupling": self.matrix.coupling}),
+            Obligation("agent-motion", "agents"),
+        ]
+        parts = {"final-state": self.final_state, "residual": self.residual, "input": self.input}
+        return result + [Obligation(f"agent-{name}", "agents") for name, part in parts.items() if part is not None]
+
+    # ------------------------------------------------------------------ bounds over time
+
+    def deviation_bound(self, remaining: np.ndarray) -> np.ndarray:
+        """Return (N, n, M) bounds of the deviation of each derivative from the common motion.
+
+        Infinite where nothing is proved, or without an initial state.
+        """
+        q = np.atleast_1d(np.asarray(remaining, dtype=float))
+        roots = np.full((self.structure.graph.n_nodes, self.order), np.inf)
+        for V, value in zip(self.functions, self.initial_values, strict=False):
+            if V.deviation is not None:
+                rows = [
+                    [float_up(root_product(c, self.matrix.W[i][i], value)) for i in range(self.order)]
+                    for c in V.deviation.agents
+                ]
+                roots = np.minimum(roots, np.array(rows))
+        eta = np.array([self.protocol.value(x) for x in q])
+        with np.errstate(over="ignore", invalid="ignore"):
+            fall = -float_down(self.matrix.rate) / 2 * self.protocol.clock(q) + np.outer(
+                np.arange(self.order), np.log(eta)
+            )
+            return roots[:, :, None] * np.exp(fall + 1e-9)
+
+    def columns(self) -> dict[str, list[float]]:
+        """Return initial and final states in floats, and bounds of the input, one number for each agent."""
+        names = ["x", "v", "a", *(f"x^({i})_" for i in range(3, self.order))][: self.order]
+        marks = [""] if self.dimension == 1 else [f"_{q + 1}" for q in range(self.dimension)]
+        table: dict[str, list[float]] = {}
+        for i, name in enumerate(names):
+            for q, mark in enumerate(marks):
+                if self.initial_state is not None:
+                    table[f"{name}{mark}(0)"] = [float(agent[q][i]) for agent in self.initial_state]
+                if self.final_state is not None:
+                    table[f"{name}{mark}(T)"] = [float(agent[q][i][0]) for agent in self.final_state]
+        return table | ({} if self.input is None else {"input": [float_up(x) for x in self.input]})
+
+    def simulate(self, **options: Any) -> AgentsTrajectory:
+        """Run the agents from their initial states; options are those of :func:`simulate_agents`.
+
+        Raises
+        ------
+        ParameterError
+            There are no initial states.
+        SimulationError
+            The integrator failed.
+        """
+        if self.initial_state is None:
+            raise ParameterError("the certificate has no initial state; certify the graph with x0")
+        states = [[[float(x) for x in chain] for chain in agent] for agent in self.initial_state]
+        return simulate_agents(self.structure.graph, self.protocol, states, float(self.matrix.rate), **options)
+
+    def compare(self, run: AgentsTrajectory) -> AgentsComparison | None:
+        """Compare a run with what is proved of it; None where nothing disagrees."""
+        inputs = [one.inputs for one in self.used]
+        return compare_agents(self.structure, self.matrix, self.functions, self.initial_values, inputs, self.input, run)
+
+    def __repr__(self) -> str:
+        size = "" if self.input is None else f", |u_k| <= {up(max(self.input), 4)}"
+        return f"AgentsPart(order {self.order}, R = {float(self.decay):.6g}{size})"
+
+
+def prove_agents(
+    structure: Structure,
+    base: Protocol,
+    agents: Agents,
+    functions: Sequence[LyapunovFunction],
+    influence: Influence,
+    offsets: Sequence[Sequence[Fraction]],
+    initial_state: States | None,
+) -> AgentsPart:
+    """Design the gains of agents of order n for proved Lyapunov functions of their graph, and prove what they do.
+
+    Parameters
+    ----------
+    structure : Structure
+    base : Protocol
+        Gain, clock and deadline.
+    agents : Agents
+    functions : sequence of LyapunovFunction
+        Proved; the one that makes inputs smallest decides the coupling, and faster ones are used besides.
+    influence : Influence
+    offsets : N rows of d Fraction
+    initial_state : N tuples of d tuples of n Fraction, or None
+
+    Raises
+    ------
+    NoCertificate
+        No matrix for one agent was found.
+    """
+    gain = base.gain
+    proved = [V.proved_rate for V in functions]
+    best = max((rate for rate in proved if rate > 0), default=None)
+    scaled = ScaledAgent(agents.coefficients, agents.own, gain.rho1, gain.pole, gain.first, agents.cap)
+    if agents.of_paper:
+        matrix = paper_matrix(scaled, best or Fraction(1))
+    else:
+        rate = agents.decay_rate / gain.pole
+        matrix = agent_matrix(scaled, rate, Fraction(1) if best is None else _coupling(best))
+        first = gain.first if agents.cap is None else min(gain.first, agents.cap)
+        states = None if initial_state is None else scaled_states(initial_state, offsets, 1 / first)
+        chosen = least_input(structure, functions, matrix.inverse, states)
+        if chosen is not None and best is not None and chosen < best:
+            found = np.array([[float(x) for x in row] for row in matrix.W])
+            slower = round_and_prove(scaled, found, rate, _coupling(chosen))
+            matrix = matrix if slower is None else slower
+    used = [k for k, rate in enumerate(proved) if rate > 0 and matrix.coupling * rate >= 1]
+    protocol = AgentsProtocol(
+        base, agents.coefficients, agents.own, matrix.gains, tuple(map(tuple, offsets)), agents.cap
+    )
+    constants = [error_constants(structure, functions[k]) if functions[k].matrix is not None else None for k in used]
+    part = AgentsPart(
+        structure,
+        protocol,
+        matrix,
+        tuple(map(UsedFunction, used, constants)),
+        tuple(functions[k] for k in used),
+        initial_state,
+        common_motion(agents.coefficients, agents.own, gain),
+    )
+    decided = initial_state is not None and bool(used or not structure.graph.n_edges)
+    final = _final_state(part, influence) if influence.exact and decided else None
+    return replace(part, final_state=final, residual=_residual(part), input=_input(part, influence))
+
+
+def _coupling(rate: Fraction) -> Fraction:
+    """Return a short number not below the reciprocal of a rate."""
+    return Fraction(up(1 / rate, 6))
+
+
+def _final_state(part: AgentsPart, influence: Influence) -> Intervals:
+    """Return where the agents end, with their velocities and so on."""
+    offsets, zero = part.protocol.offsets, Fraction(0)
+    coordinates = []
+    for q in range(part.dimension):
+        begin = [
+            [(x - (h[q] if i == 0 else 0), zero) for i, x in enumerate(agent[q])]
+            for agent, h in zip(part.initial_state or (), offsets, strict=True)
+        ]
+        columns = [agents_ends(influence, [weighted_sum(row, chain) for chain in begin]) for row in part.motion]
+        coordinates.append(list(zip(*columns, strict=True)))
+    return tuple(
+        tuple(
+            tuple((m + (offsets[k][q] if i == 0 else 0), r) for i, (m, r) in enumerate(coordinates[q][k]))
+            for q in range(part.dimension)
+        )
+        for k in range(len(offsets))
+    )
+
+
+def _residual(part: AgentsPart) -> Residual | None:
+    """Return what is left at ``T`` under the cap."""
+    cap, gain = part.protocol.gain_cap, part.protocol.gain
+    known = [(V.deviation, value) for V, value in zip(part.functions, part.initial_values, strict=False)]
+    if cap is None or not any(deviation for deviation, _ in known):
+        return None
+    clock = Limits(gain_cap=cap).clock_below(gain.exact)
+    decay = decay_above(part.matrix.rate * clock)
+    rows = []
+    for k in range(part.structure.graph.n_nodes):
+        squares = [
+            min(d.agents[k] * part.matrix.W[i][i] * value for d, value in known if d is not None)
+            for i in range(part.order)
+        ]
+        rows.append(tuple(round_up(cap**i * root_product(x, decay)) for i, x in enumerate(squares)))
+    return Residual(clock, tuple(rows))
+
+
+def _input(part: AgentsPart, influence: Influence) -> tuple[Fraction, ...] | None:
+    """Return bounds of the whole input; None where none is proved."""
+    n, cap, base = part.order, part.protocol.gain_cap, part.protocol.base
+    if part.initial_state is None or part.unbounded or not part.functions:
+        return None
+    eta = part.first_gain if part.decay >= 2 * n or cap is None else cap
+    pairs = [
+        (one.inputs if V.matrix is not None else error_constants(part.structure, V), value)
+        for one, V, value in zip(part.used, part.functions, part.initial_values, strict=True)
+    ]
+    damped = _damping(part, influence)
+    if damped is None or all(constants is None for constants, _ in pairs):
+        return None
+    gain = part.matrix.gains[-1] * part.matrix.coupling  # c^2 b'P b
+    extra = base.reaching.mu1 * part.dimension if base.reaching is not None else Fraction(0)
+    bounds = []
+    for k, h in enumerate(part.protocol.offsets):
+        square = min(constants[k] * value for constants, value in pairs if constants is not None)
+        own = abs(part.protocol.plant[0]) * sum(map(abs, h)) + damped[k]
+        bounds.append(round_up(eta**n * root_product(gain, square) + own + extra))
+    return tuple(bounds)
+
+
+def _damping(part: AgentsPart, influence: Influence) -> list[Fraction] | None:
+    """Return bounds of ``eta f_2 |x_k'|`` of agents that meet at rest, else 0; None where none is proved."""
+    N, eta = part.structure.graph.n_nodes, part.first_gain
+    if not any(part.protocol.own):
+        return [Fraction(0)] * N
+    known = [(V.deviation.agents, x) for V, x in zip(part.functions, part.initial_values, strict=True) if V.deviation]
+    if not known or not influence.exact:
+        return None
+    begin = [[(agent[q][1], Fraction(0)) for agent in part.initial_state or ()] for q in range(part.dimension)]
+    common = list(zip(*(agents_ends(influence, column) for column in begin), strict=True))
+    bounds = []
+    for k in range(N):
+        away = root_product(part.matrix.W[1][1], min(c[k] * value for c, value in known))
+        along = root_product(sum(((abs(m) + r) ** 2 for m, r in common[k]), Fraction(0)))
+        bounds.append(part.protocol.own[1] * eta * (eta * away + along))
+    return bounds

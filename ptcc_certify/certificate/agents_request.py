@@ -1,0 +1,157 @@
+"""What is asked of agents of order n, read and refused where it does not fit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+from ptcc_certify.bounds.agents import States
+from ptcc_certify.bounds.formation import formation_of_biases
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.io.initial_state import as_states, random_states
+from ptcc_certify.graphs.rationals import shorten, writable
+from ptcc_certify.protocols import Protocol
+from ptcc_certify.protocols.agents import DERIVATIVES, MOST_DIMENSION, PLURALS, Agents
+
+#: What is asked of single integrators alone.
+_NOT_OF_AGENTS = {
+    "at": "leave it out",
+    "initial_set": "give x0 instead",
+    "limits": "give Agents(gain_cap=..) instead of a gain cap; a stop and sampling are not proved for them",
+    "delta": "take the sliding-mode protocol, which disturbances within delta do not move",
+    "noise": "leave it out",
+    "messages": "leave it out; late messages are proved of single integrators",
+    "leaders": "leave it out; their leaders move as their plant does",
+    "disturbance": "leave it out: what holds holds for every disturbance within delta",
+}
+
+
+class Chains(NamedTuple):
+    """Position, velocity and so on of every agent in every coordinate, the dimension of space, places, and remarks."""
+
+    states: States | None
+    dimension: int
+    offsets: tuple[tuple[Fraction, ...], ...]
+    notes: tuple[str, ...] = ()
+
+
+def refuse_agents(agents: Any, protocol: Protocol, asked: dict[str, Any]) -> None:
+    """Refuse what is not asked of agents of order n, or not proved of them.
+
+    Raises
+    ------
+    ParameterError
+        Says what, and what to do instead.
+    """
+    if not isinstance(agents, Agents):
+        raise ParameterError(f"agents = {shorten(repr(agents))} is none; give Agents(order=2), say")
+    for name, value in asked.items():
+        empty = value is None or (isinstance(value, list | tuple) and not any(one is not None for one in value))
+        if name in _NOT_OF_AGENTS and not empty:
+            raise ParameterError(f"{name} is for single integrators; of agents of order n: {_NOT_OF_AGENTS[name]}")
+    sigma0 = asked.get("sigma0")
+    if sigma0 is not None and any(_entries(sigma0)):
+        raise ParameterError(
+            "sigma0: agents of order n start with sigma(0) = 0 (their auxiliary variables at minus the highest "
+            "derivative); otherwise their final positions depend on the disturbance: leave it out"
+        )
+    agents.refuse_motion(protocol.T)
+
+
+def _entries(values: Any) -> list[Any]:
+    """Return the numbers of a state as far as they are seen without its graph."""
+    if isinstance(values, str):
+        return [values] if values.strip() not in ("0", "") else []
+    values = values.values() if hasattr(values, "values") and callable(values.values) else values
+    try:
+        return [float(x) for x in values]
+    except (TypeError, ValueError):
+        return [values]
+
+
+def read_offsets(agents: Agents, graph: SignedDigraph, dimension: int) -> tuple[tuple[Fraction, ...], ...]:
+    """Return ``h_k`` of every agent: those that are given, and the places that biases make.
+
+    Raises
+    ------
+    ParameterError
+        They do not fit the graph, or biases fit no formation: who drifts, and how fast.
+    """
+    rows = [[Fraction(0)] * dimension for _ in graph.labels]
+    if agents.offsets is not None:
+        rows = _states(agents.offsets, graph, "offsets", dimension)
+    if agents.biases is not None:
+        made = formation_of_biases(graph, _states(agents.biases, graph, "biases", dimension))
+        if made.offsets is None:
+            named = "; ".join(map(str, made.groups[:3])) + "; ..." * (len(made.groups) > 3)
+            raise ParameterError(
+                f"biases fit no formation: leader group {named} per unit of the clock, without bound before T; "
+                "change them so that their weighted signed sum over each leader group is 0"
+            )
+        rows = [[x + y for x, y in zip(*pair, strict=True)] for pair in zip(rows, made.offsets, strict=True)]
+    return tuple(map(tuple, rows))
+
+
+def read_chains(agents: Agents, graph: SignedDigraph, x0: Any, v0: Any, derivatives: Any) -> Chains:
+    """Return position, velocity and so on of every agent, the dimension of space, places, and remarks.
+
+    Velocities that are not given are 0.
+    """
+    n = agents.degree
+    if v0 is not None and derivatives is not None:
+        raise ParameterError("v0 is the first of derivatives; give one of them")
+    if isinstance(derivatives, str) or not isinstance(derivatives, Iterable | None):
+        raise ParameterError(f"derivatives = {shorten(repr(derivatives))} is no list; give [v0], or [v0, a0] and so on")
+    given = [v0] if derivatives is None else list(derivatives)
+    given = [None if isinstance(one, str) and one.strip() == "0" else one for one in given]
+    if any(one is not None for one in given[n - 1 :]):
+        surplus = DERIVATIVES[n] if n < len(DERIVATIVES) else f"derivative {n}"
+        raise ParameterError(
+            f"{'v0' if n == 1 else 'derivatives'}: agents of order {n} have no {surplus} to begin with"
+        )
+    if x0 is None:
+        if any(one is not None for one in given):
+            raise ParameterError("v0 without x0: give the positions, too")
+        d = _dimension_of(agents, graph)
+        return Chains(None, d, read_offsets(agents, graph, d))
+    positions = _states(x0, graph, "x0")
+    d = len(positions[0])
+    if d > MOST_DIMENSION:
+        raise ParameterError(f"x0 has {d} numbers for each agent; space has at most {MOST_DIMENSION} coordinates")
+    columns, notes = [positions], []
+    for i in range(1, n):
+        value = given[i - 1] if i <= len(given) else None
+        name = DERIVATIVES[i] if i < len(DERIVATIVES) else f"derivative {i}"
+        if value is None:
+            columns.append([[Fraction(0)] * d for _ in positions])
+        else:
+            columns.append(_states(value, graph, "v0" if i == 1 else f"derivatives[{i - 1}] ({name})", d))
+    missing = [PLURALS[i] for i in range(1, min(n, len(PLURALS))) if i > len(given) or given[i - 1] is None]
+    if missing and v0 is None and derivatives is None:
+        notes.append(f"no {' and '.join(missing)} given: taken for 0")
+    chains = tuple(tuple(tuple(columns[i][k][q] for i in range(n)) for q in range(d)) for k in range(graph.n_nodes))
+    return Chains(chains, d, read_offsets(agents, graph, d), tuple(notes))
+
+
+def _dimension_of(agents: Agents, graph: SignedDigraph) -> int:
+    given = {"offsets": agents.offsets, "biases": agents.biases}
+    return next((len(_states(rows, graph, name)[0]) for name, rows in given.items() if rows is not None), 1)
+
+
+def _states(values: Any, graph: SignedDigraph, name: str, dimension: int | None = None) -> list[list[Fraction]]:
+    """Return N rows of d numbers, or refuse them."""
+    rows: Sequence[Sequence[Fraction]]
+    if isinstance(values, str) and values.strip() == "random" and name != "x0":
+        rows = random_states([0, 2], graph.n_nodes, dimension or 1)
+    else:
+        rows = as_states(values, graph, name)
+    if dimension is not None and len(rows[0]) != dimension:
+        raise ParameterError(
+            f"{name} has {len(rows[0])} numbers for each agent, x0 has {dimension}: give {graph.n_nodes} x {dimension}"
+        )
+    for label, row in zip(graph.labels, rows, strict=True):
+        if not all(map(writable, row)):
+            raise ParameterError(f"{name} of agent {shorten(label)} has too many digits to keep; round it")
+    return [list(row) for row in rows]

@@ -1,0 +1,106 @@
+"""Where the agents end, in the JSON of a certificate: influence of the leaders and final states, exact or in balls."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from ptcc_certify.bounds.final_state import FinalState, rounding_radius
+from ptcc_certify.certificate.certificate_data import Content
+from ptcc_certify.certificate.format_vectors import (
+    Reader,
+    Writer,
+    agents_ends,
+    exact_or_ball,
+    influence_balls,
+    interval_text,
+)
+from ptcc_certify.checker.reading import interval
+from ptcc_certify.checker.side_files import beside
+from ptcc_certify.graphs.rationals import format_exact
+from ptcc_certify.graphs.structure import Structure
+
+
+def final_state_sections(content: Content, out: Writer) -> tuple[dict[str, Any] | None, dict[str, Any] | None]:
+    """Write the influence of every leader, and the final state, exact or in balls; None if they are floating point."""
+    if content.influence.exact:
+        return _exact_final_state(content)
+    return (None, None) if content.influence.enclosure is None else _enclose_final_state(content, out)
+
+
+def _exact_final_state(content: Content) -> tuple[dict[str, Any], dict[str, Any] | None]:
+    matrix, structure, labels = content.influence, content.structure, content.graph.labels
+    left_null_vectors, containment_weights = influence_balls(matrix)
+    followers = structure.followers.tolist()
+    ends: dict[str, Any] | None = None
+    if content.final_state is not None and content.initial_state is not None:
+        sigma0 = content.sigma0 or [Fraction(0)] * len(labels)
+        first = [(x - s, Fraction(0)) for x, s in zip(content.initial_state, sigma0, strict=True)]
+        final = agents_ends(matrix, first)
+        ends = {label: interval_text(final[v]) for v, label in enumerate(labels)}
+    section = {
+        "components": [
+            {"nodes": [labels[v] for v in c.nodes], "left_null_vector": [interval_text(w) for w in null_vector]}
+            for c, null_vector in zip(matrix.balanced, left_null_vectors, strict=True)
+        ],
+        "containment_weights": {
+            labels[v]: [interval_text(w) for w in row] for v, row in zip(followers, containment_weights, strict=True)
+        },
+        "degenerate": None if ends is None else list(content.degenerate),
+    }
+    return section, ends
+
+
+def _enclose_final_state(content: Content, out: Writer) -> tuple[dict[str, Any], dict[str, Any] | None]:
+    """Write the final state of a large graph: left null vectors of leader groups, and its intervals."""
+    labels, matrix, final_state = content.graph.labels, content.influence, content.final_state
+    assert matrix.enclosure is not None
+    final: dict[str, Any] | None = None
+    if final_state is not None and final_state.radius is not None:
+        pairs = list(zip(final_state.states, final_state.radius, strict=True))
+        if out.aside(len(labels)) and all(isinstance(x, float) or r == 0 for x, r in pairs):
+            radius = [float(r) if isinstance(x, float) else rounding_radius(x) for x, r in pairs]
+            final = {
+                "mid": out.vector("mid", np.asarray(final_state)),
+                "radius": out.vector("radius", np.array(radius)),
+            }
+        else:
+            final = {label: _interval_text(x, r) for label, (x, r) in zip(labels, pairs, strict=True)}
+    groups = []
+    for k, (component, null_vector) in enumerate(matrix.groups):
+        if k in matrix.enclosure.left_null_vectors:
+            middles, radii = (x.tolist() for x in matrix.enclosure.left_null_vectors[k])
+            left_null_vector: list[Any] = [
+                {"mid": repr(x), "radius": repr(r)} for x, r in zip(middles, radii, strict=True)
+            ]
+        else:
+            left_null_vector = [exact_or_ball(Fraction(w)) for w in null_vector]
+        if len(component.nodes) > 1:
+            groups.append({"nodes": [labels[v] for v in component.nodes], "left_null_vector": left_null_vector})
+    degenerate = None if final_state is None else list(final_state.degenerate)
+    return {"components": groups, "containment_weights": None, "degenerate": degenerate}, final
+
+
+def _interval_text(x: Fraction | float, radius: Fraction) -> str | dict[str, str]:
+    if radius == 0:
+        return exact_or_ball(Fraction(x))
+    if isinstance(x, float):
+        return {"mid": repr(x), "radius": repr(float(radius))}
+    return {"mid": format_exact(x), "radius": format_exact(radius)}
+
+
+def read_final_state(document: Mapping[str, Any], structure: Structure, data: Reader) -> FinalState | None:
+    """Read where the agents end; None if the certificate does not say."""
+    final = document["final_state"]
+    if final is None:
+        return None
+    if list(final) == ["mid", "radius"] and beside(final["mid"]):
+        middle, radius = data.agents(final["mid"]), data.agents(final["radius"])
+    else:
+        middle, radius = zip(*map(interval, final.values()), strict=True)
+    values = [middle[c.nodes[0]] * (c.gauge or (1,))[0] for c in structure.closed_components if c.balanced]
+    spread = radius if any(radius) else None
+    return FinalState(structure.graph.labels, middle, tuple(values), tuple(document["influence"]["degenerate"]), spread)

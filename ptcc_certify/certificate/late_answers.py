@@ -1,0 +1,138 @@
+"""What becomes of expectations where messages are late, or leaders move: the rest of a certificate knows of neither."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+from lmi.exact.decimal_rounding import down, near, up
+from ptcc_certify.bounds.late_messages import LateBounds
+from ptcc_certify.bounds.missed_deadline import Missed
+from ptcc_certify.bounds.tracking import Tracking
+from ptcc_certify.certificate.answer import MET, OPEN, REFUTED, Answer
+from ptcc_certify.certificate.certificate_data import Content
+from ptcc_certify.lyapunov.search import USEFUL
+
+
+def at_deadline(certificate: Content, answer: Answer) -> Answer:
+    """Return what becomes at ``T``, where messages are late, of a behaviour that follows where none are."""
+    late = certificate.late
+    asked = late is not None or certificate.request.messages is not None
+    if not asked or answer.status != MET or certificate.constant:
+        return answer
+    what = f"{answer.what} at T with late messages"
+    if late is None:
+        return Answer(OPEN, what, "nothing is proved of them")
+    if late.direct:
+        return answer
+    if late.missed is not None:
+        return Answer(REFUTED, what, _misses(certificate, late.missed))
+    if late.staged is not None:
+        return Answer(OPEN, what, "with deadlines of stages it holds, with one for all none is proved to hold it")
+    if late.messages.gain_cap is not None:
+        return Answer(OPEN, what, "nothing settles under a cap")
+    return Answer(OPEN, what, "nobody is proved to settle at T")
+
+
+def judge_messages(certificate: Content) -> list[Answer]:
+    """Tell what becomes of what may be left at ``T`` with late messages, and whether anything is proved of these."""
+    late, most = certificate.late, certificate.expectations.max_residual
+    if late is None:
+        unproved = certificate.request.messages is not None
+        answers = [Answer(OPEN, "late messages", "nothing is proved of what is left at T")] * unproved
+        answers += [] if most is None or unproved else [Answer(OPEN, "max_residual", "no messages are late")]
+        if certificate.request.leaders is not None and certificate.tracking is None:
+            answers.append(Answer(OPEN, "leaders that move", "no vector for their followers was found"))
+        return answers
+    if not late.says_something:
+        limit = f"; this certificate's limit is a delay of {late.longest_delay:.3g}" if late.longest_delay else ""
+        return [Answer(OPEN, "late messages", f"nothing is proved of what is left at T{limit}")]
+    return [] if most is None else [_judge_residual(certificate, late, most)]
+
+
+def _judge_residual(certificate: Content, late: LateBounds, most: Fraction) -> Answer:
+    """Tell whether no more than ``most`` is left at ``T``."""
+    what, missed = f"within {near(most, 12)} at T" + " from within 1 of it" * late.relative, late.missed
+    if late.largest <= most:
+        return Answer(MET, what)
+    if missed is not None and missed.bound > most:
+        return Answer(REFUTED, what, _misses(certificate, missed))
+    shorter = "" if late.enough is None else f"; certified where nothing is older than {down(late.enough, 4)}"
+    return Answer(OPEN, what, f"this certificate's limit is {up(late.largest, 3)}{shorter}")
+
+
+def _misses(certificate: Content, missed: Missed) -> str:
+    """Tell who misses the deadline by how much."""
+    return f"agent {certificate.graph.labels[missed.agent]} is away by {down(missed.bound, 2)} at least, proved"
+
+
+def judge_input_beside(certificate: Content, most: Fraction, what: str, first: Fraction | float) -> Answer:
+    """Tell whether every input stays within so much where messages are late, or leaders move.
+
+    Parameters
+    ----------
+    certificate : Certificate
+    most : Fraction
+    what : str
+        What is asked, in words.
+    first : Fraction or float
+        What the largest ``|u_k(0)|`` is at least where nobody hears of anything wrong.
+    """
+    late, tracking = certificate.late, certificate.tracking
+    if first > most and not (late is not None and late.messages.value_error):
+        return Answer(REFUTED, what, f"it is up to {down(first)} at the start, proved")
+    if late is not None:
+        return Answer(OPEN, what, "no bound is proved with late messages")
+    return _judge_tracking(tracking, most, what)
+
+
+def _judge_tracking(tracking: Tracking | None, most: Fraction, what: str) -> Answer:
+    """Tell whether every input stays within so much while leaders move."""
+    if tracking is None or tracking.input is None:
+        return Answer(OPEN, what, "no bound is proved while leaders move")
+    what += " from within 1 of the targets" * tracking.relative
+    largest = Fraction(float(tracking.input.max()))
+    return Answer(MET, what) if largest <= most else Answer(OPEN, what, f"proved: {up(largest)}")
+
+
+def use_of_late(late: LateBounds, longest_way: float | None) -> tuple[bool | None, str, str]:
+    """Return whether what is left at ``T`` with late messages is a hundredth of the longest way, what, and a caveat.
+
+    Parameters
+    ----------
+    late : LateBounds
+    longest_way : float or None
+        Of an agent to its final state; None without an initial state.
+
+    Returns
+    -------
+    tuple of bool or None, str, str
+        None where nothing is proved of what is left. The rest of the certificate knows of no delay: what it tells of
+        the input does not hold here.
+    """
+    caveat = "" if late.messages.gain_cap is not None else "the input is not proved bounded"
+    if math.isinf(late.largest):
+        return None, "", caveat
+    way = 1.0 if late.relative else longest_way
+    remark = f"every agent within {up(late.largest, 2)} of its final state at T{' from within 1 of it' * late.relative}"
+    return way is not None and late.largest <= USEFUL * way, remark, caveat
+
+
+def use_of_tracking(tracking: Tracking) -> tuple[bool, str, str, str]:
+    """Return whether followers are near their targets at ``0.99 T``, how near, what is not proved, and a mend.
+
+    Parameters
+    ----------
+    tracking : Tracking
+
+    Returns
+    -------
+    tuple of bool, str, str, str
+        Near is a hundredth of what is proved of the distance at first.
+    """
+    first, last = (float(x) for x in tracking.distance_bound([1.0, 0.01]).max(axis=0))
+    remark = f"every follower within {up(last, 2)} of its target at 0.99 T{' from within 1 of it' * tracking.relative}"
+    if tracking.input is not None:
+        return last <= USEFUL * first, remark, "", ""
+    mend = f"--rho2 {tracking.bounding_rho2} bounds the input"
+    return last <= USEFUL * first, remark, "the input is not proved bounded", mend

@@ -1,0 +1,257 @@
+"""Verifies bounds of agents of order n: what is left at the deadline with a capped gain, and their input."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from itertools import chain
+from operator import mul
+from typing import Any
+
+from lmi.exact.decimal_rounding import up
+from lmi.exact.elementary_enclosures import exp, rounded
+from lmi.exact.numbers import integers, longest, shorten, sized
+from lmi.exact.work import spend
+from ptcc_certify.checker.agent_model import Agents
+from ptcc_certify.checker.agent_motion import States
+from ptcc_certify.checker.digraph import Digraph
+from ptcc_certify.checker.final_state import FinalState
+from ptcc_certify.checker.graph import by_agent, ordered
+from ptcc_certify.checker.input_formulas import Limits, root_above
+from ptcc_certify.checker.lyapunov import Function
+from ptcc_certify.checker.matrix_products import Matrix
+from ptcc_certify.checker.proof_cursor import Document
+from ptcc_certify.checker.reading import entries, exact, fields, need
+from ptcc_certify.checker.side_files import Numbers
+
+#: Bits to which long numbers are rounded, upwards, before they bound every agent.
+BITS = 256
+#: Up to ``r clock`` of this size exponentials are formed; beyond it they are not made smaller.
+LARGEST_DECAY = 100_000
+
+
+@dataclass(frozen=True)
+class Used:
+    """A Lyapunov function that is used.
+
+    Attributes
+    ----------
+    function : Function
+    inputs : list of Fraction or None
+        ``c_k`` with ``e_k^2 <= c_k E'P E`` of a full matrix; None: not known, or those of a diagonal one.
+    """
+
+    function: Function
+    inputs: Sequence[Fraction] | None
+
+    def error_constants(self, graph: Digraph) -> Sequence[Fraction] | None:
+        """Return ``c_k`` with ``e_k^2 <= c_k V``; None if they are not known."""
+        function, form = self.function, self.function.form
+        if self.inputs is not None or (form is not None and form.diagonal is None):
+            return self.inputs
+        if form is not None and form.coordinates == "eps":
+            each = {v: rounded(1 / w, BITS, up=True) for v, w in zip(form.nodes, form.diagonal or (), strict=True)}
+            rows = (graph.row(v) for v in range(graph.n))
+            spend(graph.n + graph.n_edges, 2 * graph.bits, BITS, "constants of the input")
+            return [sum((x * x * each[j] for j, x in row.items()), Fraction(0)) / graph.unit**2 for row in rows]
+        nodes, weights = (form.nodes, form.diagonal or ()) if form is not None else function.by_rows or ((), ())
+        own = dict(zip(nodes, weights, strict=True))
+        return [1 / own[v] if v in own else Fraction(0) for v in range(graph.n)]
+
+
+@dataclass(frozen=True)
+class Begin:
+    """Where agents begin, and what their Lyapunov functions are worth there.
+
+    Attributes
+    ----------
+    agents : Agents
+    graph : Digraph
+    states, offsets : by agent
+        ``xi_k(0)`` by coordinate, and ``h_k``.
+    """
+
+    agents: Agents
+    graph: Digraph
+    states: States
+    offsets: Sequence[Sequence[Fraction]]
+
+    @cached_property
+    def columns(self) -> tuple[list[list[list[int]]], int]:
+        """``y(0)`` by coordinate and derivative, a number for each agent; over a scale, and the scale."""
+        n, d = self.agents.n, self.agents.d
+        pairs = zip(self.states, self.offsets, strict=True)
+        axes = ((row, h) for own, at in pairs for row, h in zip(own, at, strict=True))
+        rows = [[x - (h if j == 0 else 0) for j, x in enumerate(row)] for row, h in axes]
+        whole, scale = integers(rows)
+        p, q = (1 / self.agents.eta_0).as_integer_ratio()
+        factors = [p**i * q ** (n - 1 - i) for i in range(n)]
+        bits = longest(chain.from_iterable(whole)), longest(factors)
+        sized(len(whole) * n, sum(bits), "the initial states")
+        spend(len(whole) * n, *bits, "the initial states")
+        return [[[row[i] * x for row in whole[axis::d]] for i, x in enumerate(factors)] for axis in range(d)], (
+            scale * q ** (n - 1)
+        )
+
+    @cached_property
+    def inverse(self) -> tuple[Matrix, Fraction]:
+        """``P = W^-1`` in integers, times a positive number, and that."""
+        W, scale = self.agents.scaled_W
+        adjugate, determinant = _adjugate(W)
+        return adjugate, Fraction(determinant, scale)
+
+    def value(self, function: Function) -> Fraction:
+        """Bound ``V(0) = sum_kl Om_kl z_k'P z_l``, summed over the coordinates of space, from above, to many bits."""
+        n, (P, times), (columns, scale) = self.agents.n, self.inverse, self.columns
+        form, total, unit = Weights.of(function), 0, 1
+        for each in columns:
+            Z: list[list[int]] = []
+            for x in each:
+                z, unit = form.coordinates(self.graph, x)
+                Z.append(z)
+            U = [form.times(z) for z in Z]
+            bits = longest(chain.from_iterable(Z)), longest(chain.from_iterable(U))
+            spend(n**2 * len(Z[0]), *bits, "initial values")
+            spend(n**2, sum(bits), longest(chain.from_iterable(P)), "initial values")
+            total += sum(P[i][j] * sum(map(mul, Z[i], U[j])) for i in range(n) for j in range(n))
+        return rounded(Fraction(total, form.scale * (scale * unit) ** 2) / times, BITS, up=True)
+
+
+@dataclass(frozen=True)
+class Weights:
+    """The matrix of a Lyapunov function in integers over ``scale``; its diagonal if it is diagonal.
+
+    Attributes
+    ----------
+    nodes : list of int
+    gauge : list of int
+        Camps of the nodes, in the coordinates ``eps``; empty in ``E``.
+    diagonal : list of int or None
+    matrix : rows of int or None
+    scale : int
+    """
+
+    nodes: Sequence[int]
+    gauge: Sequence[int]
+    diagonal: Sequence[int] | None
+    matrix: Matrix | None
+    scale: int
+
+    @classmethod
+    def of(cls, function: Function) -> Weights:
+        """Return the matrix of a function."""
+        form, rows = function.form, function.by_rows
+        if form is not None and form.diagonal is None:
+            return cls(form.nodes, (), None, *form.entries)
+        if form is not None:
+            (own,), scale = integers([form.diagonal or ()])
+            return cls(form.nodes, form.gauge if form.coordinates == "eps" else (), own, None, scale)
+        nodes, weights = rows or ((), Numbers([]))
+        own, scale = weights.over(range(len(nodes)))
+        return cls(nodes, (), own, None, scale)
+
+    def coordinates(self, graph: Digraph, x: Sequence[int]) -> tuple[list[int], int]:
+        """Return ``L x`` on the nodes, or ``x - (p'G x / p'1) G 1``, in integers over a number; and that."""
+        if not self.gauge:
+            pushed = graph.laplacian_product(x)
+            return [pushed[v] for v in self.nodes], graph.unit
+        p = self.diagonal or ()
+        total, bits = sum(p), longest(x)
+        spend(2 * len(p), total.bit_length(), bits, "initial values")
+        mean = sum(w * g * x[v] for w, g, v in zip(p, self.gauge, self.nodes, strict=True))
+        return [total * x[v] - g * mean for g, v in zip(self.gauge, self.nodes, strict=True)], total
+
+    def times(self, z: Sequence[int]) -> list[int]:
+        """Return the matrix times a vector."""
+        bits = longest(z)
+        if self.matrix is None:
+            own = self.diagonal or ()
+            spend(len(own), longest(own), bits, "initial values")
+            return list(map(mul, own, z))
+        spend(len(z) ** 2, longest(chain.from_iterable(self.matrix)), bits, "initial values")
+        return [sum(map(mul, row, z)) for row in self.matrix]
+
+
+def _adjugate(W: Matrix) -> tuple[Matrix, int]:
+    """Return ``det(W) W^-1`` and ``det(W)`` of a positive definite integer matrix, by elimination without fractions."""
+    n, before = len(W), 1
+    bits = n * longest(chain.from_iterable(W))
+    spend(2 * n**3, bits, bits, "the inverse of W")
+    rows = [[*row, *(int(i == j) for j in range(n))] for i, row in enumerate(W)]
+    for k in range(n):
+        own, pivot = rows[k], rows[k][k]
+        rows = [
+            row if i == k else [(pivot * x - row[k] * y) // before for x, y in zip(row, own, strict=True)]
+            for i, row in enumerate(rows)
+        ]
+        before = pivot
+    return [row[n:] for row in rows], before
+
+
+def check_residual(doc: Document, begin: Begin, used: Sequence[Used], section: Any) -> None:
+    """Verify what is left at the deadline with a capped gain, of positions, velocities and so on."""
+    doc.open("agent-residual", "agents")
+    agents, labels = begin.agents, begin.graph.labels
+    fields(section, ("clock", "agents"), "residual")
+    clock, cap = exact(section["clock"]), agents.cap or Fraction(0)
+    need(clock >= 0, "the clock is negative")
+    need(clock <= _clock_below(agents), "the clock is not proved")
+    values = ordered(labels, section["agents"], "residual")
+    numbers = [[exact(x) for x in entries(row, "derivatives", agents.n)] for row in values.values()]
+    decay = exp(-min(agents.rate * clock, Fraction(LARGEST_DECAY)))[1]
+    powers = [rounded(cap ** (2 * i) * agents.W[i][i] * decay, BITS, up=True) for i in range(agents.n)]
+    known = [(use.function.deviation, begin.value(use.function)) for use in used if use.function.deviation is not None]
+    for v, row in enumerate(numbers):
+        least = min(c[v] * value for c, value in known if c is not None)
+        for i, x in enumerate(row):
+            holds = x >= 0 and x**2 >= powers[i] * least
+            need(holds, f"what is left of agent {shorten(labels[v])} is not proved")
+    doc.done(f"positions within {up(max(row[0] for row in numbers))}")
+
+
+def _clock_below(agents: Agents) -> Fraction:
+    """Return a lower bound of the integral of the capped gain up to the deadline; the integral if it never grows."""
+    cap, gain = agents.cap or Fraction(0), agents.gain
+    if cap <= agents.first_gain:
+        return cap * gain.T
+    return Limits(gain_cap=cap).integrals(gain)[0]
+
+
+def check_input(
+    doc: Document, begin: Begin, used: Sequence[Used], section: Any, final: FinalState, mu1: Fraction
+) -> None:
+    """Verify the bound of every agent's input, in Euclidean norm over space; ``mu1`` is 0 without sliding variables."""
+    doc.open("agent-input", "agents")
+    agents, graph = begin.agents, begin.graph
+    fields(section, ("agents", "largest"), "input")
+    values = by_agent(doc, graph, section["agents"], "the input", files=False)
+    (P, times), gain = begin.inverse, agents.eta_0 if agents.bounded else agents.cap or Fraction(0)
+    common = rounded(gain ** (2 * agents.n) * agents.coupling**2 * P[-1][-1] / times, BITS, up=True)
+    known = [(c, begin.value(use.function)) for use in used if (c := use.error_constants(graph)) is not None]
+    damped = _damping(begin, used, final)
+    for v, x in enumerate(values):
+        own = abs(agents.plant[0]) * sum(map(abs, begin.offsets[v]), Fraction(0)) + damped[v]
+        rest = x - own - mu1 * agents.d
+        holds = rest >= 0 and rest**2 >= common * min(c[v] * value for c, value in known)
+        need(holds, f"the input of agent {shorten(graph.labels[v])} is not proved")
+    need(exact(section["largest"]) == max(values), "the largest input is another")
+    doc.done(f"at most {up(max(values))}")
+
+
+def _damping(begin: Begin, used: Sequence[Used], final: FinalState) -> list[Fraction]:
+    """Bound ``eta f_2 |x_k'|`` of every agent that meets others at rest, by the common velocity and its deviation."""
+    agents, n, eta = begin.agents, begin.graph.n, begin.agents.eta_0
+    if not any(agents.own):
+        return [Fraction(0)] * n
+    known = [(use.function.deviation, begin.value(use.function)) for use in used if use.function.deviation is not None]
+    spend(40 * n * (agents.d + len(known)), BITS, BITS, "the common velocity")
+    columns = [[row[axis][1] for row in begin.states] for axis in range(agents.d)]
+    speeds = [final.enclosures(final.values(Numbers(column))) for column in columns]
+    bounds = []
+    for v in range(n):
+        away = root_above(agents.W[1][1] * min(c[v] * value for c, value in known))
+        along = root_above(sum(((abs(x) + r) ** 2 for x, r in (speed[v] for speed in speeds)), Fraction(0)))
+        bounds.append(agents.own[1] * eta * (eta * away + along))
+    return bounds

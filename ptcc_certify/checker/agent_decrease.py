@@ -1,0 +1,108 @@
+"""Verifies the Lyapunov matrix of one agent: that it decays at all gains, and that the coupling is strong enough."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from itertools import chain, pairwise
+
+from lmi.exact.decimal_rounding import down
+from lmi.exact.matrix_polynomials import nonnegative_between, semidefinite
+from lmi.exact.numbers import integers, longest
+from lmi.exact.work import spend
+from ptcc_certify.checker.agent_model import Agents
+from ptcc_certify.checker.lyapunov import Function
+from ptcc_certify.checker.matrix_products import Matrix
+from ptcc_certify.checker.proof_cursor import Document
+from ptcc_certify.checker.reading import need
+
+Rows = list[list[Fraction]]
+
+
+def check_decrease(doc: Document, agents: Agents, used: Sequence[Function]) -> None:
+    """Verify ``W > 0``, ``A_z W + W A_z' - b b' + r W <= 0`` at all ``zeta``, ``W K = c b`` and ``c rate >= 1``."""
+    doc.open("agent-positive", "agents")
+    need(doc.exact.definite(agents.scaled_W[0]), "W is not proved positive definite")
+    doc.done(f"{agents.n} rows")
+    numbers = doc.open("agent-decrease", "agents", ["rate"])
+    need(numbers["rate"] == agents.rate, "the rate is another than that of the agents")
+    _check_points(agents)
+    F = _form(agents, _uncapped(agents))
+    for low, high in pairwise(agents.points):
+        need(nonnegative_between(F, low, high), "the decrease is not proved between two points")
+    if agents.cap is not None:
+        (at_cap,) = _form(agents, [_constant(agents, 1 / agents.cap)])
+        need(semidefinite(at_cap), "the decrease is not proved at the cap of the gain")
+    doc.done(f"r = {down(agents.rate)}, {max(len(agents.points) - 1, 0)} intervals")
+    numbers = doc.open("agent-coupling", "agents", ["coupling"])
+    need(numbers["coupling"] == agents.coupling, "the coupling is another than that of the agents")
+    _check_gains(agents)
+    need(all(agents.coupling * f.rate >= 1 for f in used), "the coupling is too weak for a Lyapunov function")
+    doc.done(f"c = {down(agents.coupling)}, {len(used)} Lyapunov functions")
+
+
+def _check_points(agents: Agents) -> None:
+    """Verify that the points are ends of intervals that cover all values of ``zeta`` while the gain is not capped."""
+    points, cap = agents.points, agents.cap
+    if cap is not None and cap <= agents.first_gain:
+        need(not points, "points where the gain is capped from the beginning")
+        return
+    need(len(points) >= 2, "fewer than two points")
+    need(all(low < high for low, high in pairwise(points)), "points are not in ascending order")
+    need(points[0] == (0 if cap is None else 1 / cap), "the points begin elsewhere")
+    need(points[-1] == 1 / agents.first_gain, "the points end elsewhere")
+
+
+def _check_gains(agents: Agents) -> None:
+    """Verify ``W K = c b``."""
+    (W, scale), ((K, own), _) = agents.scaled_W, integers([agents.gains, [agents.coupling]])
+    spend(agents.n**2, longest(chain.from_iterable(W)), longest(K), "the gains")
+    products = [sum(x * y for x, y in zip(row, K, strict=True)) for row in W]
+    need(products == [0] * (agents.n - 1) + [own[0] * scale], "K is not c b'W^-1")
+
+
+def _zeros(n: int) -> Rows:
+    return [[Fraction(0)] * n for _ in range(n)]
+
+
+def _uncapped(agents: Agents) -> list[Rows]:
+    """Return ``A_z`` as a polynomial in ``zeta``: ``N - theta J - b (f + a_z)'``, ``theta = (1 - rho1 zeta)^2 / k``."""
+    n, rho1, k = agents.n, agents.gain.rho1, agents.gain.k
+    result = [_zeros(n) for _ in range(max(n, 2) + 1)]
+    for power, theta in enumerate((1 / k, -2 * rho1 / k, rho1**2 / k)):
+        for i in range(n):
+            result[power][i][i] -= i * theta
+    for i in range(n - 1):
+        result[0][i][i + 1] += 1
+    for i in range(n):
+        result[0][n - 1][i] -= agents.own[i]
+        result[n - i][n - 1][i] -= agents.plant[i]
+    return result
+
+
+def _constant(agents: Agents, zeta: Fraction) -> Rows:
+    """Return ``A_z`` at the cap: ``theta = 0``."""
+    n = agents.n
+    result = [[Fraction(int(j == i + 1)) for j in range(n)] for i in range(n)]
+    for i in range(n):
+        result[n - 1][i] -= agents.own[i] + agents.plant[i] * zeta ** (n - i)
+    return result
+
+
+def _form(agents: Agents, A: Sequence[Rows]) -> list[Matrix]:
+    """Return ``b b' - r W - A_z W - W A_z'`` by powers of ``zeta``, times one positive integer."""
+    n, (W, own) = agents.n, agents.scaled_W
+    rows, unit = integers([row for part in A for row in part])
+    p, q = agents.rate.as_integer_ratio()
+    bits, width = longest(chain.from_iterable(W)) + q.bit_length(), longest(chain.from_iterable(rows))
+    spend(2 * len(A) * n**3, bits, width, "the decrease of one agent")
+    scale, result = own * unit, []
+    for power in range(len(A)):
+        part = rows[power * n : (power + 1) * n]
+        AW = [[sum(part[i][h] * W[h][j] for h in range(n) if part[i][h]) for j in range(n)] for i in range(n)]
+        F = [[-q * (AW[i][j] + AW[j][i]) for j in range(n)] for i in range(n)]
+        if power == 0:
+            F = [[x - p * unit * y for x, y in zip(*both, strict=True)] for both in zip(F, W, strict=True)]
+            F[n - 1][n - 1] += q * scale
+        result.append(F)
+    return result

@@ -1,0 +1,141 @@
+"""Verifies the common motion of agents of order n, which is that of one agent without neighbours, and where it ends."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any
+
+from lmi.exact.matrix_exponential import expm
+from lmi.exact.numbers import integers, longest, shorten
+from lmi.exact.work import spend
+from ptcc_certify.checker.agent_model import Agents
+from ptcc_certify.checker.final_state import FinalState
+from ptcc_certify.checker.graph import ordered
+from ptcc_certify.checker.proof_cursor import Document
+from ptcc_certify.checker.reading import Interval, entries, exact, interval, need
+from ptcc_certify.checker.side_files import Numbers
+
+#: Bits to which an integral is enclosed.
+BITS = 96
+#: Largest exponent ``w`` of :func:`rest_integral`.
+LARGEST_EXPONENT = 1000
+#: By agent, coordinate by coordinate, numbers for position, velocity and so on.
+States = Sequence[Sequence[Sequence[Fraction]]]
+
+
+def check_motion(doc: Document, agents: Agents, section: Any) -> list[list[Interval]]:
+    """Verify ``M``, which takes the common motion from time 0 to the deadline; return it."""
+    doc.open("agent-motion", "agents")
+    n = agents.n
+    M = [[interval(x) for x in entries(row, "a row", n)] for row in entries(section, "motion", n)]
+    true, radius = _motion(agents)
+    for row, exact_row in zip(M, true, strict=True):
+        for (mid, wide), (low, high) in zip(row, exact_row, strict=True):
+            need(mid - wide <= low - radius and high + radius <= mid + wide, "the common motion is another")
+            need(wide == 0 or low < high or radius > 0, "a radius where the common motion is known exactly")
+    doc.done("exact" if not any(wide for row in M for _, wide in row) else "enclosed")
+    return M
+
+
+def _motion(agents: Agents) -> tuple[list[list[Interval]], Fraction]:
+    """Return ends of the entries of ``M``, and how far it may be beyond them."""
+    n, T, zero = agents.n, agents.gain.T, Fraction(0)
+    if any(agents.own):  # at rest
+        damping = agents.own[1]
+        exponent = (agents.plant[1] + damping * agents.gain.rho1) * T
+        need(abs(exponent) <= LARGEST_EXPONENT, f"(a_2 + f_2 rho1) T is above {LARGEST_EXPONENT} in size")
+        low, high = rest_integral(damping * agents.gain.k, exponent)
+        return [[(Fraction(1), Fraction(1)), (T * low, T * high)], [(zero, zero), (zero, zero)]], zero
+    companion = [[T if j == i + 1 else zero for j in range(n)] for i in range(n - 1)]
+    companion.append([-a * T for a in agents.plant])
+    middle, radius = expm(companion, BITS)
+    return [[(x, x) for x in row] for row in middle], radius
+
+
+def rest_integral(p: Fraction, w: Fraction, bits: int = BITS) -> Interval:
+    """Enclose ``int_0^1 e^(-w (1 - q)) q^p dq = sum_(j >= 0) (-w)^j / ((p + 1)(p + 2) .. (p + j + 1))``.
+
+    Parameters
+    ----------
+    p : Fraction
+        Not negative.
+    w : Fraction
+        At most ``LARGEST_EXPONENT`` in size.
+
+    Returns
+    -------
+    (below, above)
+        Equal for ``w = 0``.
+
+    Examples
+    --------
+    >>> rest_integral(Fraction(1), Fraction(0))
+    (Fraction(1, 2), Fraction(1, 2))
+    >>> below, above = rest_integral(Fraction(0), Fraction(1))  # 1 - 1/e
+    >>> float(below), float(above - below) < 1e-28
+    (0.6321205588285577, True)
+    """
+    if w == 0:
+        return 1 / (p + 1), 1 / (p + 1)
+    places = bits + 2 * int(abs(w)) + 32
+    (a, c), (b, d) = p.as_integer_ratio(), w.as_integer_ratio()
+    own = longest((a, b, c, d))
+    spend(8 * (places + 2 * LARGEST_EXPONENT), places + 2 * own, 2 * own, "the common motion")
+    # term: the summand in units of 2^-places, rounded; each: what it is off by; off: what the sum is
+    term = (c << places) // (a + c)
+    total, off, each, j = term, Fraction(1), Fraction(1), 0
+    while p + j + 2 < 2 * abs(w) or abs(term) > each:
+        j += 1
+        bottom = a + (j + 1) * c  # p + j + 1 = bottom / c
+        term = -term * b * c // (d * bottom)
+        each = Fraction(-int(-(each * abs(b) * c) // (d * bottom)) + 2)
+        total, off = total + term, off + each
+    off += 2 * (abs(term) + each)  # the rest is at most twice its first term, which is less than half of this one
+    return (total - off) / (1 << places), (total + off) / (1 << places)
+
+
+def check_final_states(
+    doc: Document, agents: Agents, final: FinalState, M: Sequence[Sequence[Interval]], states: States, offsets: Any
+) -> None:
+    """Verify the interval of every agent, coordinate and derivative: ``h_k + sum_l Q_kl sum_j M_ij g_lj``."""
+    doc.open("agent-final-state", "agents")
+    labels, n = final.structure.graph.labels, agents.n
+    section = ordered(labels, doc.data["agents"]["final_state"], "final_state")
+    claimed = [
+        [[interval(x) for x in entries(row, "derivatives", n)] for row in entries(rows, "coordinates", agents.d)]
+        for rows in section.values()
+    ]
+    rounded = any(wide for row in M for _, wide in row)
+    for axis in range(agents.d):
+        G = [[row[axis][j] - (offsets[v][axis] if j == 0 else 0) for v, row in enumerate(states)] for j in range(n)]
+        each = [final.enclosures(final.values(Numbers(g))) for g in G] if rounded else []
+        for i, row in enumerate(M):
+            ends = final.enclosures(final.values(Numbers(_combined([mid for mid, _ in row], G))))
+            for v, label in enumerate(labels):
+                x, r = ends[v]
+                r += sum(
+                    (wide * (abs(Q[v][0]) + Q[v][1]) for (_, wide), Q in zip(row, each, strict=False)), Fraction(0)
+                )
+                mid, radius = claimed[v][axis][i]
+                x += offsets[v][axis] if i == 0 else 0
+                need(abs(x - mid) + r <= radius, f"agent {shorten(label)} ends elsewhere")
+    doc.done("exact" if final.exact and not rounded else "enclosed")
+
+
+def _combined(row: Sequence[Fraction], G: Sequence[Sequence[Fraction]]) -> list[Fraction]:
+    """Return ``sum_j M_j g_lj`` of every agent."""
+    (own,), unit = integers([row])
+    X, scale = integers(G)
+    spend(len(row) * len(G[0]), longest(own), longest(x for part in X for x in part), "the common motion")
+    sums = (sum(m * x for m, x in zip(own, column, strict=True)) for column in zip(*X, strict=True))
+    return [Fraction(x, unit * scale) for x in sums]
+
+
+def read_states(labels: Sequence[str], entry: Any, what: str, agents: Agents) -> States:
+    """Read by agent numbers for every coordinate and derivative."""
+    section = ordered(labels, entry, what)
+    return [
+        [[exact(x) for x in entries(row, "derivatives", agents.n)] for row in entries(rows, "coordinates", agents.d)]
+        for rows in section.values()
+    ]

@@ -1,0 +1,134 @@
+"""Verifies a Lyapunov function under small delays and a capped gain."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import chain
+from operator import mul
+from typing import Any
+
+from lmi.exact.decimal_rounding import down
+from lmi.exact.elementary_enclosures import exp
+from lmi.exact.numbers import integers, longest, shorten
+from lmi.exact.work import spend
+from ptcc_certify.checker import input_formulas as formulas
+from ptcc_certify.checker.digraph import Digraph
+from ptcc_certify.checker.graph import by_agent
+from ptcc_certify.checker.input import Verified
+from ptcc_certify.checker.late_messages import Messages
+from ptcc_certify.checker.proof_cursor import Document
+from ptcc_certify.checker.quadratic_form import Form
+from ptcc_certify.checker.reading import RejectedError, exact, fields, length, need
+from ptcc_certify.checker.side_files import Numbers
+
+#: Largest ``b gain_cap delay``; what is larger asks for a ``q`` that nothing allows.
+LARGEST_GROWTH = 1000
+
+
+@dataclass(frozen=True)
+class Constants:
+    """A Lyapunov function with ``e_k^2 <= errors_k V`` and ``(x_k - (Q x)_k)^2 <= deviations_k V``."""
+
+    form: Form
+    errors: Sequence[Fraction]
+    deviations: Sequence[Fraction]
+
+
+def check_form(doc: Document, messages: Messages, verified: Verified, section: Any) -> None:
+    """Verify ``sqrt(V) <= e^(-b s) sqrt(V(0))`` under late messages, and how far the final state may move."""
+    doc.at = "messages.form"
+    fields(section, ("left", "moved", "residual"), "form")
+    graph, cap = verified.structure.graph, messages.gain_cap
+    if cap is None:
+        raise RejectedError("form without a cap of the gain")
+    need(messages.value_error == 0, "form of values that are off")
+    obligation = doc.open("late-form", "messages.form", ["q", "b", "kap"], witness=True)
+    witness = fields(obligation["witness"], ("function", "phi"), "the witness")
+    q, b, kap = (obligation[key] for key in ("q", "b", "kap"))
+    known = _function(doc, verified, witness["function"])
+    phi, left = by_agent(doc, graph, witness["phi"], "phi", files=False), exact(section["left"])
+    need(all(x >= 0 for x in phi), "phi is negative")
+    lag = cap * messages.delay * q
+    bits = length((b, kap, lag, left, known.form.rate, *phi, *known.errors, *known.deviations))
+    spend(20 * graph.n, bits, bits, "small delays")
+    need(b > 0, "b is not positive")
+    growth = b * cap * messages.delay
+    need(growth <= LARGEST_GROWTH and q >= exp(growth)[1], "q is below e^(b h)")
+    pushed = _heard(graph, phi, messages.late)
+    for label, x, c, y in zip(graph.labels, phi, known.errors, pushed, strict=True):
+        need(x >= formulas.root_above(c) + lag * y, f"phi of agent {shorten(label)} is too small")
+    need(kap >= 0 and kap**2 >= _value_of_sizes(doc, graph, known.form, pushed), "kap is too small")
+    need(b + lag * kap <= known.form.rate / 2, "the delay takes more than the rate")
+    need(left >= formulas.decay_above(b * formulas.Limits(cap).clock_below(messages.gain)), "left is not proved")
+    root = formulas.root_above(_initial_value(verified, known.form))
+    moved = [lag / b * root * x for x in _moved(verified, pushed)]
+    claimed = _above(doc, graph, section["moved"], "moved", moved)
+    rest = [x + formulas.root_above(c) * root * left for x, c in zip(claimed, known.deviations, strict=True)]
+    _above(doc, graph, section["residual"], "residual", rest)
+    doc.done(f"b = {down(b)}, gain at most {down(cap)}")
+
+
+def _function(doc: Document, verified: Verified, k: Any) -> Constants:
+    """Return the Lyapunov function of this number, with its constants."""
+    need(type(k) is int and 0 <= k < len(verified.functions), "no such Lyapunov function")
+    function, graph = verified.functions[k], verified.structure.graph
+    form = function.form
+    if form is None or form.coordinates != "E" or function.rate <= 0:
+        raise RejectedError("a Lyapunov function of large graphs, of deviations, or without a rate")
+    deviation, constants = doc.data["lyapunov"]["functions"][k]["deviation"], doc.data["input"]["constants"][k]
+    need(deviation is not None, "a Lyapunov function without deviations")
+    deviations = by_agent(doc, graph, deviation["agents"], "deviations", files=False)
+    if form.diagonal is not None:
+        weight = dict(zip(form.nodes, form.diagonal, strict=True))
+        errors = [1 / weight[v] if v in weight else Fraction(0) for v in range(graph.n)]
+    else:
+        need(constants is not None, "a full matrix without constants")
+        errors = list(by_agent(doc, graph, constants, "constants", files=False))
+    return Constants(form, errors, list(deviations))
+
+
+def _above(doc: Document, graph: Digraph, entry: Any, what: str, least: Sequence[Fraction]) -> Numbers:
+    """Read bounds by agent, none of which is below what is proved."""
+    values = by_agent(doc, graph, entry, what, files=False)
+    low = next((label for label, x, y in zip(graph.labels, values, least, strict=True) if x < y), None)
+    need(low is None, f"{what} of agent {shorten(low or '')} is not proved")
+    return values
+
+
+def _heard(graph: Digraph, phi: Numbers, late: bool) -> list[Fraction]:
+    """Return ``|W| phi``, or ``|L| phi`` where the own state is late too."""
+    values, scale = phi.over(range(graph.n))
+    sums = graph.sums_in(values)
+    if late:
+        sums = [x + D * y for x, D, y in zip(sums, graph.diagonal, values, strict=True)]
+    return [Fraction(x, scale * graph.unit) for x in sums]
+
+
+def _value_of_sizes(doc: Document, graph: Digraph, form: Form, sizes: Sequence[Fraction]) -> Fraction:
+    """Return ``y'|L'P L| y``, with the sizes of the entries."""
+    (M, scale), ((Y,), common) = form.of_state(doc.exact, graph), integers([sizes])
+    spend(graph.n**2, longest(chain.from_iterable(M)), longest(Y), "small delays")
+    total = sum(y * sum(map(mul, map(abs, row), Y)) for y, row in zip(Y, M, strict=True) if y)
+    return total / (scale * common**2)
+
+
+def _initial_value(verified: Verified, form: Form) -> Fraction:
+    """Return ``V(0)``."""
+    graph, state = verified.structure.graph, verified.begin.state
+    if state is None:
+        raise RejectedError("form without an initial state")
+    values, scale = state.over(range(graph.n))
+    errors = graph.laplacian_product(values)
+    spend(len(form.nodes) ** 2, longest(errors), longest(chain.from_iterable(form.entries[0])), "V(0)")
+    return form.value([Fraction(errors[v], scale * graph.unit) for v in form.nodes])
+
+
+def _moved(verified: Verified, pushed: Sequence[Fraction]) -> list[Fraction]:
+    """Return ``|Q| B phi``."""
+    need(verified.final.exact, "form without an exact influence of the leaders")
+    rows = verified.final.projection
+    bits = length(chain(pushed, *(row.values() for row in rows)))
+    spend(2 * sum(map(len, rows)), bits, bits, "how far the final state moves")
+    return [sum((abs(x) * pushed[j] for j, x in row.items()), Fraction(0)) for row in rows]

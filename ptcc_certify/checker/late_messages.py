@@ -1,0 +1,107 @@
+"""Reads how late messages are: ages of what is heard, packets that get lost, values that are rounded."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from math import ceil
+from typing import Any
+
+from lmi.exact.numbers import longest
+from lmi.exact.work import spend
+from ptcc_certify.checker.digraph import Digraph
+from ptcc_certify.checker.input_formulas import PrescribedGain
+from ptcc_certify.checker.proof_cursor import Document
+from ptcc_certify.checker.reading import entries, exact, fields, length, need
+from ptcc_certify.checker.side_files import Numbers, beside
+
+#: Ages of what is heard over single edges are rounded up to so many parts of the largest one.
+PARTS = 64
+
+
+@dataclass(frozen=True, eq=False)
+class Messages:
+    """What is heard, and when.
+
+    Attributes
+    ----------
+    gain : PrescribedGain
+        That of the protocol.
+    latency : Numbers
+        The least age of what is heard over each edge; one number for all.
+    delay : Fraction
+        Nothing that is heard is older; over an edge nothing is older than its latency and what values are held.
+    late : bool
+        The own state is as old as what is heard.
+    value_error : Fraction
+        No value is off by more.
+    gain_cap : Fraction or None
+        What the gain is capped at.
+    """
+
+    gain: PrescribedGain
+    latency: Numbers
+    delay: Fraction
+    late: bool
+    value_error: Fraction
+    gain_cap: Fraction | None
+
+    def latency_of(self, edge: int) -> Fraction:
+        """Return the latency of an edge, by its place among all."""
+        return self.latency[edge if len(self.latency) > 1 else 0]
+
+    def parts(self) -> Sequence[int]:
+        """Return the age of what is heard over each edge, at most, in 64ths of the largest one; one for all edges.
+
+        Raises
+        ------
+        WorkError
+            Latencies are too long to be compared.
+        """
+        if len(self.latency) == 1 or not self.delay:
+            return (PARTS,)
+        distinct, held = set(self.latency.values), self.delay - self.latency.largest()
+        bits = longest((*self.delay.as_integer_ratio(), *held.as_integer_ratio(), self.latency.scale or 1))
+        spend(4 * len(distinct), bits, bits + length(map(Fraction, distinct)), "ages of what is heard")
+        part = {x: ceil(PARTS * (Fraction(x) / (self.latency.scale or 1) + held) / self.delay) for x in distinct}
+        each = [part[x] for x in self.latency.values]
+        return each if min(each) < PARTS else (PARTS,)
+
+
+def read_messages(doc: Document, graph: Digraph, gain: PrescribedGain, section: dict[str, Any]) -> Messages:
+    """Read the ages of what is heard, how far it is off, and what caps the gain.
+
+    Raises
+    ------
+    RejectedError
+        Some of it does not fit the rest.
+    """
+    latency, packets = _latency(doc, graph, section["latency"]), section["packets"]
+    need(all(x >= 0 for x in latency.values), "a latency is negative")
+    age = latency.largest()
+    if packets is not None:
+        fields(packets, ("period", "losses"), "packets")
+        period, losses = exact(packets["period"]), exact(packets["losses"])
+        need(period > 0, "period is not positive")
+        need(losses >= 0 and losses.denominator == 1, "losses is no number of packets")
+        age += (losses + 1) * period
+    delay, error = exact(section["delay"]), exact(section["value_error"])
+    need(delay == age, "delay is not the largest age of what is heard")
+    need(error >= 0, "value_error is negative")
+    need(delay > 0 or error > 0, "nothing is late, and nothing is off")
+    need(section["own"] in ("fresh", "late"), "own is neither fresh nor late")
+    late, cap = section["own"] == "late", None if section["gain_cap"] is None else exact(section["gain_cap"])
+    need(cap is None or cap > 0, "gain_cap is not positive")
+    need(cap is not None or not late, "the own state is late, and the gain has no cap: the protocol diverges")
+    return Messages(gain, latency, delay, late, error, cap)
+
+
+def _latency(doc: Document, graph: Digraph, entry: Any) -> Numbers:
+    """Read a number for all edges, or one for each, in their order."""
+    if isinstance(entry, str):
+        return Numbers([exact(entry)])
+    need(graph.n_edges > 0, "latencies without edges")
+    if not beside(entry):
+        entries(entry, "latency", graph.n_edges)
+    return doc.files.numbers(entry, "latency", graph.n_edges)

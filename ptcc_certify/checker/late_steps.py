@@ -1,0 +1,159 @@
+"""A solution that never grows, from instant to instant in integers: what followers are off by under late messages.
+
+``y' = -g (D y - |W_F| y(t - delay) - value_error D)`` from a constant history ``y_0`` with ``D y_0 >= |W_F| y_0 +
+value_error D`` never grows, and bounds ``|x - x*|`` for all delays up to ``delay``. Between two instants of the grid
+what is heard is at most what was said at an instant before, so that each row has a solution in closed form. Entries are
+multiples of ``2^-30`` of the largest one at first; everything is rounded up.
+"""
+
+from __future__ import annotations
+
+from array import array
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from itertools import pairwise
+
+from lmi.exact.elementary_enclosures import log, rounded
+from lmi.exact.numbers import longest, sized
+from lmi.exact.work import spend
+from ptcc_certify.checker.digraph import Digraph
+from ptcc_certify.checker.input_formulas import BITS, PrescribedGain
+from ptcc_certify.checker.late_messages import PARTS
+
+#: Bits of a fixed-point number, of the share of a degree in the largest one, and of the way of the clock.
+FIXED, SHARE, WAY = 30, 40, 42
+ONE = 1 << FIXED
+#: The most that the way of the clock times the largest degree is taken for: ``2^LONGEST_WAY``.
+LONGEST_WAY = 31
+
+
+def clock_below(gain: PrescribedGain, cap: Fraction | None, a: Fraction, b: Fraction) -> Fraction | None:
+    """Bound ``int_a^b min(gain, cap) dt`` from below for ``0 <= a < b <= T``; None where it is infinite.
+
+    Examples
+    --------
+    >>> gain = PrescribedGain(Fraction(1), Fraction(1), Fraction(2))
+    >>> float(clock_below(gain, None, Fraction(0), Fraction(1, 2)))  # 1/2 + 2 ln 2
+    1.8862943611198906
+    >>> clock_below(gain, Fraction(5), Fraction(1, 2), Fraction(1)), clock_below(gain, None, Fraction(0), Fraction(1))
+    (Fraction(5, 2), None)
+    """
+    turn = gain.T
+    if cap is not None:
+        turn = max(gain.T - gain.k / (cap - gain.rho1), Fraction(0)) if cap > gain.rho1 else Fraction(0)
+    elif b == gain.T:
+        return None
+    early, late = min(b, turn), max(a, turn)
+    way = Fraction(0) if cap is None or late >= b else cap * (b - late)
+    if a < early:
+        way += gain.rho1 * (early - a) + gain.k * log((gain.T - a) / (gain.T - early), BITS)[0]
+    return rounded(max(way, Fraction(0)), BITS)
+
+
+def decay_above(x: int) -> int:
+    """Bound ``e^-x`` from above by ``1/(1 + x + x^2/2 + x^3/6 + x^4/24)``; both are multiples of ``2^-30``.
+
+    Examples
+    --------
+    >>> decay_above(ONE) / ONE  # 24/65
+    0.3692307695746422
+    """
+    total = ONE
+    for n in (4, 3, 2, 1):
+        total = ONE + (x * total >> FIXED) // n
+    return -(-(ONE * ONE) // total)
+
+
+class Steps:
+    """The bounds of followers from instant to instant.
+
+    Parameters
+    ----------
+    graph : Digraph
+    nodes : ints
+        The followers.
+    degrees : ints
+        ``D_k`` of the followers, times the unit of the graph.
+    start : ints
+        ``y_0`` by follower, times a scale.
+    value_error : Fraction
+        Times the same scale.
+    parts : ints
+        Ages of what is heard over the edges of the graph, in 64ths of the largest one; or one for all.
+    """
+
+    def __init__(
+        self,
+        graph: Digraph,
+        nodes: Sequence[int],
+        degrees: Sequence[int],
+        start: Sequence[int],
+        value_error: Fraction,
+        parts: Sequence[int] = (PARTS,),
+    ):
+        self.graph, self.nodes, self.largest = graph, nodes, max(max(start), 1)
+        spend(graph.n_edges + 2 * graph.n, graph.bits + FIXED, longest(start), "bounds from instant to instant")
+        self.start = array("q", (-(-(x << FIXED) // self.largest) for x in start))
+        self.error = -(-(value_error.numerator << FIXED) // (value_error.denominator * self.largest))
+        self.top = max(degrees)
+        self.shares = array("q", ((D << SHARE) // self.top for D in degrees))
+        place = dict(zip(nodes, range(len(nodes)), strict=True))
+        sizes, (offsets, sources, which) = [abs(w) for w in graph.values], graph.into
+        # where the edges of every follower begin that come from followers, these, shares in its degree, and ages
+        self.offsets, self.sources, self.weights, self.parts = array("q", [0]), array("q"), array("q"), array("q")
+        for v, D in zip(nodes, degrees, strict=True):
+            for e in range(offsets[v], offsets[v + 1]):
+                if (s := place.get(sources[e])) is not None:
+                    self.sources.append(s)
+                    self.weights.append(-(-(sizes[which[e]] << FIXED) // D))
+                    self.parts.append(parts[e if len(parts) > 1 else 0])
+            self.offsets.append(len(self.sources))
+
+    def run(self, instants: Sequence[Fraction], delay: Fraction, ways: Sequence[Fraction | None]) -> Sequence[int]:
+        """Return the bounds at the last instant, multiples of ``largest 2^-30``.
+
+        Parameters
+        ----------
+        instants : Fractions
+            Ascending from 0 on.
+        delay : Fraction
+        ways : Fractions
+            How far the clock goes between two of them, from below; None: infinitely far.
+        """
+        ages = {part: delay * part / PARTS for part in sorted(set(self.parts) or {PARTS}, reverse=True)}
+        said = [[max(bisect_right(instants, t - age) - 1, 0) for age in ages.values()] for t in instants[:-1]]
+        window = max(i - oldest for i, (oldest, *_) in enumerate(said)) + 2
+        sized(len(self.nodes) * window, 64, "bounds from instant to instant")
+        spend(len(ways) * (len(self.sources) + 8 * len(self.nodes)), FIXED, FIXED, "bounds from instant to instant")
+        known: dict[int, Sequence[int]] = {0: self.start}
+        for i, (places, way) in enumerate(zip(said, ways, strict=True)):
+            for old in [m for m in known if m < places[0]]:
+                del known[old]
+            heard = self._heard({part: known[j] for part, j in zip(ages, places, strict=True)})
+            known[i + 1] = self._step(known[i], heard, None if way is None else self._fixed(way))
+        return known[len(ways)]
+
+    def _fixed(self, way: Fraction) -> tuple[int, int]:
+        """Return what the way times the largest degree is, as an integer of ``WAY`` bits, and how far it is shifted."""
+        x = min(way * Fraction(self.top, self.graph.unit), Fraction(1 << LONGEST_WAY))
+        shift = WAY - (x.numerator.bit_length() - x.denominator.bit_length()) - 1
+        whole = (x.numerator << max(shift, 0)) // (x.denominator << max(-shift, 0))
+        return whole, SHARE + shift - FIXED
+
+    def _heard(self, told: Mapping[int, Sequence[int]]) -> Sequence[int]:
+        """Bound ``sum_l |w_kl| y_l / D_k + value_error`` from above, each ``y`` that of the age of its edge."""
+        products = [a * told[part][s] for a, s, part in zip(self.weights, self.sources, self.parts, strict=True)]
+        return [-(-sum(products[a:b]) >> FIXED) + self.error for a, b in pairwise(self.offsets)]
+
+    def _step(self, y: Sequence[int], heard: Sequence[int], way: tuple[int, int] | None) -> Sequence[int]:
+        """Bound the next state."""
+        if way is None:
+            return array("q", map(min, y, heard))
+        known: dict[int, int] = {}
+        for share in set(self.shares):
+            known[share] = decay_above(share * way[0] >> way[1])
+        rest = (
+            h + -(-max(x - h, 0) * known[share] >> FIXED) for x, h, share in zip(y, heard, self.shares, strict=True)
+        )
+        return array("q", map(min, y, rest))

@@ -1,0 +1,180 @@
+"""Verifies what holds where messages are late, get lost or are rounded: section 22 of the format."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from itertools import pairwise
+from typing import Any
+
+from lmi.exact.decimal_rounding import down, up
+from lmi.exact.elementary_enclosures import log
+from lmi.exact.numbers import longest, shorten
+from lmi.exact.work import spend
+from ptcc_certify.checker import input_formulas as formulas
+from ptcc_certify.checker.follower_rows import Followers, Rows, followers_of
+from ptcc_certify.checker.graph import MANY_EDGES, by_agent
+from ptcc_certify.checker.input import Verified
+from ptcc_certify.checker.late_form import check_form
+from ptcc_certify.checker.late_messages import Messages, read_messages
+from ptcc_certify.checker.late_steps import FIXED, Steps, clock_below
+from ptcc_certify.checker.missed_deadline import check_missed, check_staged
+from ptcc_certify.checker.proof_cursor import Document
+from ptcc_certify.checker.reading import entries, exact, fields, length, need
+from ptcc_certify.checker.side_files import Numbers
+
+KEYS = (
+    *("latency", "packets", "delay", "own", "value_error", "gain_cap"),
+    *("rows", "steps", "residual", "missed", "staged", "form"),
+)
+#: Witnesses of rows, and instants of steps, that are read.
+MANY_ROWS, MANY_INSTANTS = 100, 2001
+
+
+class Residual:
+    """What is stated of ``|x_k(T) - x*_k|`` by follower, and which of it was met by a bound.
+
+    Parameters
+    ----------
+    values : Numbers
+        By follower.
+    """
+
+    def __init__(self, values: Numbers):
+        self.values, self.scale = values.over(range(len(values)))
+        self.met = bytearray(len(values))
+
+    def meet(self, bounds: Sequence[int], factor: Fraction) -> None:
+        """Mark those that are at least ``factor`` times a bound."""
+        p, q = (factor * self.scale).as_integer_ratio()
+        bits = longest((p, q))
+        spend(2 * len(bounds), bits, longest(bounds) + longest(self.values), "bounds of followers")
+        for k, (x, y) in enumerate(zip(self.values, bounds, strict=True)):
+            if q * x >= p * y:
+                self.met[k] = 1
+
+
+def check_messages(doc: Document, verified: Verified) -> None:
+    """Verify everything that is said of late messages, if there is something."""
+    if "messages" not in doc.data:
+        return
+    section, graph = fields(doc.section("messages"), KEYS, "messages"), verified.structure.graph
+    need("leaders" not in doc.data, "late messages and leaders that move")
+    sigma = verified.begin.sigma
+    need(sigma is None or not any(sigma.values), "late messages while sliding variables move")
+    messages = read_messages(doc, graph, verified.gain, section)
+    need(len(entries(section["rows"], "rows")) <= MANY_ROWS, f"more than {MANY_ROWS} witnesses of rows")
+    by_rows = bool(section["rows"]) or any(section[key] is not None for key in ("steps", "missed", "staged"))
+    need(by_rows or section["form"] is not None, "nothing is stated of late messages")
+    bounded = bool(section["rows"]) or section["steps"] is not None
+    need(bounded == (section["residual"] is not None), "a residual is stated iff rows or steps bound it")
+    if by_rows:
+        need(not messages.late, "rows, steps, missed or staged of a late own state")
+        _check_followers(doc, messages, verified, followers_of(doc, verified.structure, verified.begin), section)
+    if section["form"] is not None:
+        check_form(doc, messages, verified, section["form"])
+
+
+def _check_followers(
+    doc: Document, messages: Messages, verified: Verified, followers: Followers, section: dict[str, Any]
+) -> None:
+    """Verify what is said of the followers of leaders that rest."""
+    residual = None if section["residual"] is None else _residual(doc, followers, section["residual"])
+    parts = messages.parts()
+    for k, entry in enumerate(section["rows"]):
+        _check_rows(doc, messages, followers, parts, entry, f"messages.rows[{k}]", residual)
+    if section["steps"] is not None:
+        _check_steps(doc, messages, followers, parts, section["steps"], residual)
+    if residual is not None:
+        doc.open("late-residual", "messages.residual")
+        low = residual.met.find(0)
+        label = followers.structure.graph.labels[followers.nodes[max(low, 0)]]
+        need(low < 0, f"the residual of agent {shorten(label)} is not proved")
+        doc.done(f"at most {up(Fraction(max(residual.values), residual.scale))}")
+    if section["missed"] is not None:
+        check_missed(doc, messages, followers, verified.begin, section["missed"])
+    if section["staged"] is not None:
+        check_staged(doc, messages, followers, section["staged"])
+
+
+def _residual(doc: Document, followers: Followers, entry: Any) -> Residual:
+    """Read bounds by agent; leaders rest."""
+    doc.at, structure = "messages.residual", followers.structure
+    values = by_agent(doc, structure.graph, entry, "residual")
+    need(all(values.values[v] == 0 for group in structure.closed for v in group), "a residual of a leader that rests")
+    return Residual(Numbers([values.values[v] for v in followers.nodes], values.scale))
+
+
+def _check_rows(
+    doc: Document,
+    messages: Messages,
+    followers: Followers,
+    parts: Sequence[int],
+    entry: Any,
+    of: str,
+    residual: Residual | None,
+) -> None:
+    """Verify ``|x_k - x*_k| <= u_k (initial e^(-b s) + floor)`` by one witness of rows."""
+    doc.at = of
+    fields(entry, ("cap", "clock", "left", "initial", "floor"), of)
+    cap, clock = (None if entry[key] is None else exact(entry[key]) for key in ("cap", "clock"))
+    left, initial, floor = (exact(entry[key]) for key in ("left", "initial", "floor"))
+    obligation = doc.open("late-rows", of, ["q", "b"], witness=True)
+    q, b = obligation["q"], obligation["b"]
+    u = followers.vector(doc, fields(obligation["witness"], ("u",), "the witness")["u"], "u")
+    need(q > 1 or (q == 1 and messages.delay == 0), "q is not above 1")
+    need((cap is None) == (messages.delay == 0), "cap is null iff nothing is late")
+    need(cap is None or cap > 0, "cap is not positive")
+    bits = length((q, b, left, clock or left, cap or left, messages.delay, messages.gain.T, messages.gain.rho1))
+    spend(50, bits, bits, "rows of followers")
+    rows = Rows(followers, u)
+    rows.decay(q, b, parts)
+    need(cap is None or b * cap * messages.delay <= log(q)[0], "b cap delay is above ln q")
+    limit = min((x for x in (cap, messages.gain_cap) if x is not None), default=None)
+    need((limit is None) == (clock is None), "clock is null iff nothing caps the gain")
+    if limit is None or clock is None:
+        need(left == 0, "left is not 0 though the clock goes on for ever")
+    else:
+        need(0 <= clock <= formulas.Limits(limit).clock_below(messages.gain), "the clock does not come so far")
+        need(left >= formulas.decay_above(b * clock), "left is not proved")
+    rows.above_initial(initial)
+    rows.above_floor(floor, messages.value_error)
+    if residual is not None:
+        residual.meet(rows.u, (initial * left + floor) / rows.scale)
+    doc.done(f"b = {down(b)}, q = {down(q)}")
+
+
+def _check_steps(
+    doc: Document,
+    messages: Messages,
+    followers: Followers,
+    parts: Sequence[int],
+    section: Any,
+    residual: Residual | None,
+) -> None:
+    """Verify the start of a solution that never grows, and form its bounds at the deadline."""
+    doc.at = "messages.steps"
+    texts = entries(fields(section, ("instants",), "steps")["instants"], "instants")
+    need(2 <= len(texts) <= MANY_INSTANTS, f"instants are fewer than 2 or more than {MANY_INSTANTS}")
+    gain, instants = messages.gain, [exact(x) for x in texts]
+    need(all(a < b for a, b in pairwise(instants)), "instants do not ascend")
+    need(instants[0] == 0 and instants[-1] == gain.T, "instants do not reach from 0 to the deadline")
+    need(messages.delay > 0, "steps though nothing is late")
+    witness = fields(doc.open("late-steps", "messages.steps", witness=True)["witness"], ("start",), "the witness")
+    start = followers.vector(doc, witness["start"], "start")
+    need(all(x >= 0 for x in start.values), "start is negative")
+    values, scale = start.over(range(len(start)))
+    error = messages.value_error * scale
+    followers.starts_within(values, scale)
+    followers.never_grows(values, error)
+    bits = length((gain.T, gain.rho1, gain.k, messages.delay, messages.gain_cap or gain.T, *instants))
+    spend(60 * len(instants), bits, bits, "instants of steps")
+    ways = [clock_below(gain, messages.gain_cap, a, b) for a, b in pairwise(instants)]
+    kind, graph = Steps, followers.structure.graph
+    if doc.exact.numpy and graph.n_edges >= MANY_EDGES:
+        from ptcc_certify.checker.array_steps import ArraySteps as kind  # noqa: N813
+    steps = kind(graph, followers.nodes, followers.degrees, values, error, parts)
+    bounds = steps.run(instants, messages.delay, ways)
+    if residual is not None:
+        residual.meet(bounds, Fraction(steps.largest, scale << FIXED))
+    doc.done(f"{len(ways)} steps")

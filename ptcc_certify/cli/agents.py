@@ -1,0 +1,159 @@
+"""Options of agents of order n, and what they make of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ptcc_certify.cli.options import Options, exact_number, flag_of, options_of, read_initial_state
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.rationals import shorten
+
+if TYPE_CHECKING:
+    from ptcc_certify.graphs.digraph import SignedDigraph
+    from ptcc_certify.protocols import Protocol
+    from ptcc_certify.protocols.agents import Agents
+    from ptcc_certify.simulation.agents import AgentsTrajectory
+
+#: Agents by their names, and their orders.
+NAMES = {"integrator": 1, "double-integrator": 2, "triple-integrator": 3}
+#: The largest order, which the library refuses to exceed.
+_MOST_ORDER = 8
+#: Options that need ``--agents``.
+_OWN = ("drag", "plant", "v0", "a0", "offsets", "biases", "rest", "decay")
+
+#: Options that are of single integrators alone, and what to do instead.
+_OF_SINGLE_INTEGRATORS = {
+    "stop_before": "leave it out, or cap the gain with --gain-cap",
+    "sample_period": "leave it out, or cap the gain with --gain-cap",
+    "noise": "leave it out",
+    "at": "leave it out; -v tells bounds at several instants",
+    "initial_bound": "give the initial state with --x0 and --v0 instead",
+}
+
+agents_options = options_of(
+    click.option(
+        "--agents",
+        "agents",
+        metavar="KIND",
+        help="Agents of order n: double-integrator, triple-integrator, or n.  [default: integrator]",
+    ),
+    click.option("--v0", "v0", metavar="STATE", help="Agents: initial velocities, like --x0.  [default: 0]"),
+    click.option("--a0", "a0", metavar="STATE", help="Agents of order 3: initial accelerations.  [default: 0]"),
+    click.option("--drag", metavar="NUMBER", help="Agents: the force -drag times the highest velocity.  [default: 0]"),
+    click.option("--plant", metavar="LIST", help="Agents: a_1,..,a_n of x^(n) + a_n x^(n-1) + .. + a_1 x = u."),
+    click.option("--offsets", metavar="STATE", help="Agents: their places in a formation, like --x0."),
+    click.option("--biases", metavar="STATE", help="Agents: what is added to their relative positions, like --x0."),
+    click.option("--rest", metavar="ALPHA", help="Double integrators meet at rest: damping of their own velocity."),
+    click.option("--decay", metavar="R", help="Agents: deviations fall like (1 - t/T)^(R/2).  [default: 2 n]"),
+)
+#: Of commands that take vectors of agents of order n alone.
+dimension_option = click.option(
+    "--dimension", type=click.IntRange(1, 1000), help="Agents: coordinates of space; --x0 agent after agent."
+)
+
+
+def agents_of(options: Options) -> Agents | None:
+    """Return the agents that the options tell; None if they tell none."""
+    from ptcc_certify.protocols.agents import Agents
+
+    kind = options["agents"]
+    if kind is None:
+        given = [name for name in _OWN if options[name] is not None]
+        if given and given[0] not in ("offsets", "biases"):
+            raise ParameterError(f"{flag_of(given[0])}: is for agents of order n; give --agents double-integrator, say")
+        if not given:
+            return None
+        kind = "integrator"
+    order = str(NAMES.get(kind, kind))
+    if not (order.isascii() and order.isdecimal() and 1 <= int(order[:9]) <= _MOST_ORDER):
+        named = f"{', '.join(NAMES)}, or an order from 1 to {_MOST_ORDER}"
+        raise ParameterError(f'--agents: "{shorten(kind)}" is unknown; one of {named}')
+    plant = None
+    if options["plant"] is not None:
+        plant = [exact_number(text, "--plant") for text in options["plant"].split(",")]
+    numbers = {
+        name: None if options[name] is None else exact_number(options[name], flag_of(name))
+        for name in ("drag", "rest", "decay")
+    }
+    return Agents(
+        int(order), plant, offsets=options["offsets"], biases=options["biases"], gain_cap=options["gain_cap"], **numbers
+    )
+
+
+def agents_keywords(options: Options, graph: SignedDigraph) -> dict[str, Any]:
+    """Return agents and their initial states as the library takes them; nothing for single integrators."""
+    from dataclasses import replace
+
+    agents = agents_of(options)
+    if agents is None:
+        return {}
+    _refuse_unproved(options)
+    d = options["dimension"] or 1
+    for i, name in enumerate(("offsets", "biases")):
+        if options[name] is not None:
+            rows = read_vectors(options[name], [options["seed"], 4 + i], graph, d, f"--{name}")
+            agents = replace(agents, **{name: rows})
+    given = [options["v0"], options["a0"]]
+    later = [
+        None if text is None or text.strip() == "0" else read_vectors(text, [options["seed"], i + 2], graph, d, flag)
+        for i, (text, flag) in enumerate(zip(given, ("--v0", "--a0"), strict=True))
+    ]
+    for i, (flag, name) in enumerate((("--v0", "velocity"), ("--a0", "acceleration"))):
+        if later[i] is not None and agents.degree < i + 2:
+            why = f"agents of order {agents.degree} have no {name} to begin with"
+            raise ParameterError(f"{flag}: {why}; leave it out, or give --agents {i + 2}")
+    while later and later[-1] is None:
+        later.pop()
+    x0 = read_vectors(options["x0"], options["seed"], graph, d, "--x0")
+    more: dict[str, Any] = {"agents": agents, "x0": x0}
+    return more | ({"derivatives": later} if later or any(text is not None for text in given) else {})
+
+
+def _refuse_unproved(options: Options) -> None:
+    """Refuse what is asked of single integrators alone, by the names of the options."""
+    for name, mend in _OF_SINGLE_INTEGRATORS.items():
+        if options.get(name) is not None:
+            raise ParameterError(f"{flag_of(name)}: is not proved of agents of order n; {mend}")
+    if options["kind"] == "nominal" and options.get("delta") is not None:
+        mend = "take --protocol sliding-mode, under which disturbances within delta move nothing"
+        raise ParameterError(f"--delta: is not proved of agents of order n under the nominal protocol; {mend}")
+
+
+def refuse_dimension(options: Options, command: str) -> None:
+    """Refuse vectors where there are no agents of order n."""
+    if options["agents"] is None and options["dimension"] not in (None, 1):
+        why = f"ptcc {command} takes scalar agents, unless --agents tells others"
+        raise ParameterError(f"--dimension: {why}; what is proved of one component holds for each: leave it out")
+
+
+def run_of_agents(graph: SignedDigraph, protocol: Protocol, keywords: dict[str, Any], samples: int) -> AgentsTrajectory:
+    """Run agents of order n with the gains that ``ptcc certify`` proves, from their initial states to the deadline."""
+    from ptcc_certify.certificate.procedure import certify
+
+    part = certify(graph, protocol, simulation=False, **keywords).agents
+    if part is None or (graph.n_edges and not part.functions):
+        raise ParameterError("no gains of these agents are proved; ptcc certify tells why")
+    return part.simulate(samples=samples)
+
+
+def read_vectors(text: str, seed: Any, graph: SignedDigraph, dimension: int, name: str) -> Any:
+    """Return N rows of ``dimension`` exact numbers: agent after agent, of a file ``node,x,y``, or random."""
+    from ptcc_certify.graphs.io.initial_state import random_states, read_vectors_of_file
+
+    if text == "random":
+        return random_states(seed, graph.n_nodes, dimension)
+    if dimension == 1:
+        return [[x] for x in read_initial_state(text, seed, graph, name)]
+    if Path(text).is_file():
+        return read_vectors_of_file(text, graph, dimension)
+    texts = text.split(",")
+    if len(texts) != graph.n_nodes * dimension:
+        raise ParameterError(
+            f"{name} has {len(texts)} value{'s' * (len(texts) > 1)} for {graph.n_nodes} agents of dimension "
+            f"{dimension}; give {graph.n_nodes * dimension} numbers, agent after agent, or a file node,x,y"
+        )
+    numbers = [exact_number(one, name) for one in texts]
+    return [numbers[k : k + dimension] for k in range(0, len(numbers), dimension)]

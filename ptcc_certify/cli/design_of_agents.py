@@ -1,0 +1,94 @@
+"""``ptcc design --agents``: the shortest deadline of agents of order n within a limit of their input."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+from click.core import ParameterSource
+
+from ptcc_certify.cli.agents import agents_keywords
+from ptcc_certify.cli.options import Options, flag_of, number_option, options_of, protocol_of
+from ptcc_certify.cli.scenario import kind_of_protocol
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.rationals import short_exact
+
+if TYPE_CHECKING:
+    from ptcc_certify.agents_design import AgentsDesign
+    from ptcc_certify.graphs.digraph import SignedDigraph
+
+#: Sliding terms, which are kept.
+_SLIDING = ("mu1", "mu2", "mu3", "delta")
+#: Options of this command that need ``--agents``, and those that say what the agents are and where they begin.
+_OWN = ("kind", *_SLIDING, "x0", "seed", "gain_cap", "dimension")
+_OF_STATES = ("plant", "drag", "x0", "v0", "a0", "offsets", "biases", "dimension")
+#: What is searched: the gains that a deadline ``T = 1`` would have, whose deadline is then sought.
+_TEMPLATE = {"T": None, "T_r": None, "T_s": None, "rho1": "0.001", "rho2": "1", "kappa": "1"}
+
+template_options = options_of(
+    click.option(
+        "--protocol",
+        "kind",
+        type=click.Choice(["nominal", "sliding-mode"]),
+        default="nominal",
+        is_eager=True,
+        callback=kind_of_protocol,
+        help="Agents: nominal, or sliding mode, which disturbances within --delta do not move.",
+    ),
+    click.option("--x0", metavar="STATE", default="random", help="Agents: initial positions, as of ptcc certify."),
+    click.option("--seed", type=click.IntRange(min=0), default=0, help="Agents: seed of random initial states."),
+    *(
+        click.option(flag_of(name), name, metavar="NUMBER", help=f"Agents, sliding mode: {text}")
+        for name, text in {
+            "delta": "bound of every disturbance.  [default: 1]",
+            "mu1": "switching gain, above delta.  [default: 2]",
+            "mu2": "constant part of the reaching gain.  [default: 1]",
+            "mu3": "factor of its growing part.  [default: 1]",
+        }.items()
+    ),
+    number_option("--gain-cap", metavar="G", help="Agents: the gain is at most G; with --residual."),
+)
+
+
+def refuse_of_agents() -> None:
+    """Refuse flags of agents of order n where there are none; a scenario may have such keys for other commands."""
+    context = click.get_current_context()
+    for name in _OWN:
+        if context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
+            mend = "give it to ptcc certify, or --agents double-integrator, say, to this command"
+            if name == "x0":
+                mend = "every initial state within a bound is; here it is --initial-bound R"
+            raise ParameterError(
+                f"{flag_of('protocol' if name == 'kind' else name)}: is not searched for single integrators; {mend}"
+            )
+
+
+def design_of_agents(signed: SignedDigraph, options: Options) -> AgentsDesign:
+    """Return the deadline of the agents that the options tell."""
+    from ptcc_certify.agents_design import design_agents
+
+    if options["input_norm"]:
+        raise ParameterError("--input-norm: is of single integrators; of agents in space U bounds ||u_k|| as it is")
+    request: Any = {name: options[name] for name in ("max_input", "deadline", "residual")}
+    protocol = protocol_of({**options, **_TEMPLATE})
+    return design_agents(signed, protocol=protocol, **agents_keywords(options, signed), **request)
+
+
+def command_of_agents(answer: AgentsDesign, options: Options) -> list[str] | None:
+    """Return options of ``ptcc certify`` that prove a design again; None if none do."""
+    protocol = answer.protocol
+    if protocol is None or not answer.repeatable:
+        return None
+    given: dict[str, Any] = {"agents": options["agents"] or "integrator"}
+    given |= {name: options[name] for name in _OF_STATES if options[name] is not None}
+    if "random" in given.values():
+        given["seed"] = options["seed"]
+    if options["decay"] is not None or answer.agents.degree == 1:
+        given["decay"] = short_exact(answer.agents.decay_rate)
+    if answer.gain_cap is not None:
+        given["gain_cap"] = short_exact(answer.gain_cap)
+    if protocol.reaching is not None:
+        given["protocol"] = protocol.kind
+    given |= {name: short_exact(value) for name, value in protocol.parameters.items()}
+    given["max_input"] = short_exact(answer.asked.max_input)
+    return [text for name, value in given.items() for text in (flag_of(name), str(value))]

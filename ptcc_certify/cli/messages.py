@@ -1,0 +1,116 @@
+"""Options of late, lost and rounded messages, and what becomes of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+import click
+
+from ptcc_certify.cli.options import Options, graph_file, number_option, options_of
+from ptcc_certify.errors import NumberError, ParameterError
+
+if TYPE_CHECKING:
+    from ptcc_certify.graphs.digraph import SignedDigraph
+    from ptcc_certify.protocols.late_messages import LateMessages
+    from ptcc_certify.protocols.moving_leaders import MovingLeaders
+
+message_options = options_of(
+    click.option(
+        "--delay",
+        metavar="D|COLUMN",
+        help="What agents hear is up to D late; or the column of the edge list that tells the delay of every edge.",
+    ),
+    number_option("--period", metavar="H", help="Messages are sent every H; the last one that came is held."),
+    click.option(
+        "--packet-loss",
+        type=click.IntRange(min=0, max=10**6),
+        metavar="COUNT",
+        help="Up to so many messages in a row get lost; asks for --period.",
+    ),
+    number_option("--quantisation", metavar="STEP", help="What is heard is rounded to multiples of STEP."),
+    click.option(
+        "--own-delay/--no-own-delay",
+        default=False,
+        show_default=False,
+        help="The own state is as late as what is heard; asks for --gain-cap.",
+    ),
+)
+leader_options = options_of(
+    number_option("--leader-speed", metavar="V", help="Leaders move, as fast as V: how followers track them."),
+    number_option(
+        "--sign-gain", metavar="MU", help="With --leader-speed: followers add MU sign(e_k), and stay on their targets."
+    ),
+)
+#: What asks for bounds with late messages; --own-delay belongs to these.
+_ASKING = ("delay", "period", "quantisation")
+
+
+def messages_of(graph: str, signed: SignedDigraph, options: Options) -> LateMessages | None:
+    """Return how late messages are; None if nothing is asked of them."""
+    from ptcc_certify.protocols.late_messages import LateMessages
+
+    if options["packet_loss"] and options["period"] is None:
+        raise ParameterError("--packet-loss says nothing by itself; give --period, the time between two messages")
+    if all(options[name] is None for name in _ASKING):
+        if options["own_delay"]:
+            raise ParameterError("--own-delay says nothing by itself; give --delay")
+        return None
+    step = options["quantisation"]
+    if step is not None and step < 0:
+        raise ParameterError("--quantisation is outside its domain; a step must be >= 0")
+    return LateMessages(
+        delay=0 if options["delay"] is None else _delay(graph, signed, options["delay"]),
+        period=options["period"],
+        losses=options["packet_loss"] or 0,
+        value_error=0 if step is None else step / 2,
+        own_delay=options["own_delay"],
+        gain_cap=options["gain_cap"],
+    )
+
+
+def _delay(graph: str, signed: SignedDigraph, text: str) -> Fraction | dict[tuple[str, str], Fraction]:
+    """Return a delay, or those of a column."""
+    from ptcc_certify.graphs.io.edge_delays import read_delays
+    from ptcc_certify.graphs.io.files import name_and_ending
+    from ptcc_certify.graphs.io.graph_files import OTHER_FORMATS
+    from ptcc_certify.graphs.rationals import parse_exact
+
+    text = text.strip()
+    try:
+        return parse_exact(text)
+    except NumberError as error:
+        if not text.isidentifier() or "finite" in str(error):
+            raise ParameterError(
+                f"--delay: {error}; give a number in your unit of time, or the name of a column"
+            ) from None
+    if graph == "-":
+        raise ParameterError("--delay names a column, but standard input is read once; save the edge list to a file")
+    if (ending := name_and_ending(graph)[1]) in OTHER_FORMATS:
+        mend = "save it as one, or give one delay for all"
+        raise ParameterError(f"--delay {text}: names a column of an edge list, and .{ending} is none; {mend}")
+    delays = read_delays(graph_file(graph), signed, text)
+    signed.read["notes"] = (f'delays of column "{text}"', *_without(signed.read["notes"], text))
+    return delays
+
+
+def _without(notes: Iterable[str], title: str) -> Iterator[str]:
+    """Leave a column that is read out of the note on columns that are ignored."""
+    for note in notes:
+        head, _, names = note.partition("columns ignored: ")
+        left = [name for name in names.split(", ") if name.strip('"').lower() != title.lower()]
+        if head or left:
+            yield note if head else f"columns ignored: {', '.join(left)}"
+
+
+def leaders_of(options: Options) -> MovingLeaders | None:
+    """Return how leaders move; None if nothing is asked of that. ``--delta`` is what disturbs the followers."""
+    from ptcc_certify.protocols.moving_leaders import MovingLeaders
+
+    speed, sign = options["leader_speed"], options["sign_gain"]
+    if speed is None:
+        if sign is not None:
+            raise ParameterError("--sign-gain belongs to leaders that move; give --leader-speed")
+        return None
+    return MovingLeaders(speed=speed, disturbance=options["delta"] or 0, sign_gain=sign)

@@ -1,0 +1,72 @@
+"""Delays of edges: a column of the edge list that a graph was read from."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from ptcc_certify.errors import FormatError, NumberError
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.io.edge_list import column, edge_columns, records
+from ptcc_certify.graphs.io.files import Source, name_and_ending, read_bytes
+from ptcc_certify.graphs.rationals import parse_exact, shorten
+
+
+def read_delays(path: Source, graph: SignedDigraph, title: str = "delay") -> dict[tuple[str, str], Fraction]:
+    r"""Read what messages take over every edge from a column of an edge list with a header.
+
+    Parameters
+    ----------
+    path : str, Path or file object
+        The file that the graph was read from; ``graph.read`` tells which end of a row listens.
+    graph : SignedDigraph
+    title : str
+        Of the column.
+
+    Returns
+    -------
+    dict
+        The delay of every edge, by the labels of source and target.
+
+    Raises
+    ------
+    FormatError
+        There is no header, no such column, or a delay that is no number; an edge without delay, by line.
+
+    Examples
+    --------
+    >>> text = b"source,target,weight,delay\na,b,1,0.02\n"
+    >>> graph = read_graph(BytesIO(text), format="csv")
+    >>> read_delays(BytesIO(text), graph)
+    {('a', 'b'): Fraction(1, 50)}
+    """
+    name, _ = name_and_ending(path)
+    rows = records(read_bytes(path, name), name)
+    number, fields = next(((number, row) for number, row in rows if len(row) > 1), (1, []))
+    place, titles = f"{name}, line {number}", [field.strip() for field in fields]
+    ends = edge_columns(titles, place)
+    at = None if ends is None else column(titles, [title.lower()], place)
+    if ends is None or at is None:
+        raise FormatError(f'{place}: no column "{shorten(title)}"; begin with a header source,target,weight,{title}')
+    first, second = ends[:2] if graph.read["orientation"] != "listens" else (ends[1], ends[0])
+    delays: dict[tuple[str, str], Fraction] = {}
+    for number, row in rows:
+        if len([field for field in row if field.strip()]) < 2:
+            continue
+        place, text = f"{name}, line {number}", row[at].strip() if at < len(row) else ""
+        source, target = row[first].strip(), row[second].strip()
+        if source == target:
+            continue  # a self-loop that was dropped
+        try:
+            value = parse_exact(text)
+        except NumberError:
+            edge = f"{shorten(source)} -> {shorten(target)}"
+            raise FormatError(
+                f'{place}: delay "{shorten(text)}" of edge {edge} is not a number; give one >= 0'
+            ) from None
+        if value < 0:
+            edge = f"{shorten(source)} -> {shorten(target)}"
+            raise FormatError(f"{place}: delay {shorten(text)} of edge {edge} is negative; give a number >= 0")
+        delays[source, target] = max(value, delays.get((source, target), value))
+        if graph.read["undirected"]:
+            delays[target, source] = max(value, delays.get((target, source), value))
+    return delays

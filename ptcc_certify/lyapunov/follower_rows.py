@@ -1,0 +1,250 @@
+"""Rows of followers of single leaders: the vectors ``u > 0`` by which late messages and moving leaders are certified.
+
+``D`` holds the in-weights of the followers, ``|W_F|`` the sizes of the weights among them. For ``q >= 1``
+
+    D_k u_k - q sum_l |w_kl| u_l >= b u_k    for every follower k
+
+has a solution with ``b > 0`` iff ``q`` is below 1 over the spectral radius of ``D^-1 |W_F|``: ``u = (D - q |W_F| - t
+I)^-1 1``, ``t`` just below the smallest eigenvalue of ``D - q |W_F|``. With ``q = 1`` it is the
+row-wise decay rate of followers. Where what is heard over an edge is younger than elsewhere, ``q`` has a smaller power.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from lmi.dyadic import round_to_bits
+from lmi.errors import NoCertificate
+from lmi.sparse_h_matrix import DIRECT_ROWS, SparseHMatrix, solve
+from ptcc_certify.errors import HypothesisError
+from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.lyapunov.dominance import round_array
+
+#: What floats may have lost in a row: a share of ``b``, and of the terms that cancel. The check forms rows exactly.
+_SLACK, _ROUNDING = 1e-9, 1e-13
+#: Residual of a solve for ``u``, in every row.
+_LOOSE = 0.05
+#: Inverse iterations for many followers.
+_ROUNDS = 3
+#: Products by which the largest ``q`` is found, halvings where ages differ, and the largest one that is tried then.
+_PRODUCTS, _HALVINGS, _LARGEST = 30, 8, 1e12
+
+
+@dataclass(frozen=True, eq=False)
+class RowWitness:
+    """``q``, ``b`` and ``u``, rounded, with ``D_k u_k - q sum_l |w_kl| u_l >= b u_k`` for every follower.
+
+    Attributes
+    ----------
+    q, b : Fraction
+        ``q >= 1``; ``b > 0`` in units of weight.
+    u : (F,) array
+        Positive floats of 40 bits, the largest 1.
+    """
+
+    q: Fraction
+    b: Fraction
+    u: np.ndarray
+
+
+class FollowerRows:
+    """The followers of a graph all of whose leaders are single nodes.
+
+    Parameters
+    ----------
+    structure : Structure
+    shares : (E,) array, optional
+        By edge, how old is what is heard over it in terms of the oldest: ``q`` has this power there. All 1 by default.
+
+    Attributes
+    ----------
+    followers : (F,) int array
+        Their nodes.
+    D : (F,) array
+        Their in-weights.
+    W : (F, F) sparse array
+        ``|W_F|``: listeners are rows.
+
+    Raises
+    ------
+    HypothesisError
+        A leader belongs to a group, or nobody listens to anybody.
+
+    Examples
+    --------
+    >>> chain = FollowerRows(analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 3, -1), (3, 2, 1)])))
+    >>> witness = chain.witness(Fraction(5, 4))
+    >>> round(float(witness.b), 3), chain.largest_q() > 1.4
+    (0.154, True)
+    """
+
+    def __init__(self, structure: Structure, shares: np.ndarray | None = None):
+        refuse_leader_groups(structure, "a bound row by row")
+        if not structure.followers.size:
+            raise HypothesisError("nobody listens to anybody, so there is nothing that could be late; add edges")
+        graph = structure.graph
+        self.structure, self.followers = structure, structure.followers
+        self.D = graph.in_weight()[self.followers]
+        self.W: Any = abs(graph.adjacency()[self.followers][:, self.followers]).tocsr()
+        self.shares: np.ndarray | None = None
+        if shares is not None:
+            # one more, so that no entry is 0, in the order of those of W
+            ages = _entries(graph, 1.0 + shares)[self.followers][:, self.followers].tocsr()
+            self.W.sort_indices()
+            ages.sort_indices()
+            self.shares = ages.data - 1.0
+        self._smallest: dict[Fraction, float] = {}
+
+    @property
+    def least_share(self) -> Fraction:
+        """The least positive share of an edge between followers; 1 if there is none."""
+        positive = np.ones(0) if self.shares is None else self.shares[self.shares > 0]
+        return Fraction(float(positive.min(initial=1.0)))
+
+    def heard(self, q: float) -> Any:
+        """Return ``|W_F|`` times ``q``, to the power of the share of every edge."""
+        if self.shares is None:
+            return q * self.W
+        heard = self.W.copy()
+        heard.data = heard.data * q**self.shares
+        return heard
+
+    def by_age(self) -> dict[float, Any]:
+        """Return ``|W_F|`` in parts, edges of one share each."""
+        if self.shares is None:
+            return {1.0: self.W}
+        parts = {}
+        for share in np.unique(self.shares):
+            part = self.W.copy()
+            part.data = np.where(self.shares == share, part.data, 0.0)
+            part.eliminate_zeros()
+            parts[float(share)] = part
+        return parts
+
+    def share(self, u: np.ndarray) -> np.ndarray:
+        """Return ``(|W_F| u)_k / (D_k u_k)`` for every follower."""
+        return (self.W @ u) / (self.D * u)
+
+    def largest_q(self) -> float:
+        """Bound from below the largest ``q`` that leaves a positive ``b``: infinite without a cycle of followers."""
+        u = self.witness(Fraction(1), 0.01).u
+        least = float(self.share(u).max())
+        for _ in range(_PRODUCTS):
+            u = u + (self.W @ u) / self.D
+            u /= u.max()
+            least = min(least, float(self.share(np.maximum(u, 1e-200)).max()))
+        if not least > 0:
+            return math.inf
+        return 1 / least if self.shares is None or u.size > DIRECT_ROWS else self._largest_power(1 / least, u)
+
+    def _largest_power(self, q: float, u: np.ndarray) -> float:
+        """Return a larger ``q`` than one that serves if all edges have share 1, where some have less."""
+        positive = self.shares[self.shares > 0] if self.shares is not None else np.ones(0)
+        if not positive.size:
+            return math.inf
+        low, high = math.log(max(q, 1.0)), min(math.log(max(q, 1.0)) / float(positive.min()), math.log(_LARGEST))
+        for _ in range(_HALVINGS):
+            middle = (low + high) / 2
+            heard = self.heard(math.exp(middle))
+            for _ in range(_PRODUCTS):
+                u = np.maximum(u + (heard @ u) / self.D, 1e-200)
+                u /= u.max()
+            low, high = (middle, high) if ((heard @ u) / (self.D * u)).max() < 1 else (low, middle)
+        return math.exp(low)
+
+    def decay(self, witness: RowWitness, q: float) -> float:
+        """Return the ``b`` that the ``u`` of a witness proves with another ``q``, in floats."""
+        return float((self.D - (self.heard(q) @ witness.u) / witness.u).min())
+
+    def witness(self, q: Fraction, loss: float = 0.01) -> RowWitness:
+        """Return a witness whose ``b`` is about ``1 - loss`` of the largest for this ``q``.
+
+        Raises
+        ------
+        NoCertificate
+            No positive ``b`` was found: ``q`` is too large.
+        """
+        A = SparseHMatrix(_with_diagonal(self.D, self.heard(float(q))))
+        if q not in self._smallest:
+            self._smallest[q] = A.smallest() if self.D.size <= DIRECT_ROWS else self._roughly_smallest(A)
+        t, ones = self._smallest[q] * (1 - loss), np.ones(self.D.size)
+        shifted = A.M - t * _identity(ones.size)
+        u = solve(shifted, ones, np.maximum(self.D - t, self.D * 1e-3), _LOOSE / math.sqrt(ones.size))
+        if not (np.isfinite(u).all() and u.min() > 1e-280 * u.max()):
+            raise NoCertificate(f"no positive vector for q = {float(q):.6g}")
+        return self.rounded(q, u)
+
+    def _roughly_smallest(self, A: SparseHMatrix) -> float:
+        """Bound the smallest eigenvalue from below by a few loose solves, for many followers."""
+        y, low = np.ones(self.D.size), 0.0
+        for _ in range(_ROUNDS):
+            y = np.abs(solve(A.M, y / y.max(), self.D, _LOOSE / math.sqrt(y.size)))
+            if not (np.isfinite(y).all() and y.min() > 0):
+                break
+            low = max(low, float(((A.M @ y) / y).min()))
+        if not low > 0:
+            raise NoCertificate("followers decay too slowly for Krylov solves to tell")
+        return low
+
+    def rounded(self, q: Fraction, u: np.ndarray) -> RowWitness:
+        """Return the witness of a vector, rounded, with the largest ``b`` that leaves room for rounding.
+
+        Raises
+        ------
+        NoCertificate
+            It is not positive.
+        """
+        u = round_array(u / u.max())
+        pushed = (self.heard(float(q)) @ u) / u
+        b = float((self.D - pushed - _ROUNDING * (self.D + pushed)).min())
+        if not b > 0:
+            raise NoCertificate(f"no positive b for q = {float(q):.6g}")
+        return RowWitness(q, Fraction(round_to_bits(b * (1 - _SLACK), 53)), u)
+
+
+def refuse_leader_groups(structure: Structure, what: str) -> None:
+    """Refuse a graph some of whose leaders form a group, by the labels of one.
+
+    Raises
+    ------
+    HypothesisError
+        Names two leaders of the group.
+
+    Examples
+    --------
+    >>> refuse_leader_groups(analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1), (2, 3, 1)])), "this")
+    Traceback (most recent call last):
+    ptcc_certify.errors.HypothesisError: this needs leaders that listen to nobody; 1 and 2 are leaders of \
+one group
+    """
+    group = next((c for c in structure.closed_components if len(c.nodes) > 1), None)
+    if group is not None:
+        first, second = (shorten(structure.graph.labels[v]) for v in group.nodes[:2])
+        raise HypothesisError(
+            f"{what} needs leaders that listen to nobody; {first} and {second} are leaders of one group"
+        )
+
+
+def _entries(graph: Any, values: np.ndarray) -> Any:
+    from scipy import sparse
+
+    n = graph.n_nodes
+    return sparse.csr_array((values, (graph.target, graph.source)), shape=(n, n))
+
+
+def _with_diagonal(D: np.ndarray, W: Any) -> Any:
+    from scipy import sparse
+
+    return sparse.csr_array(sparse.diags_array(D) - W)
+
+
+def _identity(n: int) -> Any:
+    from scipy import sparse
+
+    return sparse.eye_array(n, format="csr")

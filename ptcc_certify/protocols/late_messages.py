@@ -1,0 +1,157 @@
+"""Messages that arrive late, get lost, or are rounded: what agents hear of each other, and how old it is.
+
+    x_k'(t) = -gain(t) sum_l w_kl (sign(w_kl) x_k(t) - y_kl(t)),    |y_kl(t) - x_l(t - tau_kl(t))| <= value_error,
+
+``0 <= tau_kl(t) <= age``. A value is sent every ``period``, of which at most ``losses`` in a row get lost; the last one
+that came is held, so that what is heard is at most ``delay + (losses + 1) period`` old.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from numbers import Integral
+from typing import Any
+
+from ptcc_certify.errors import ParameterError, gated
+from ptcc_certify.graphs.digraph import Exact, SignedDigraph
+from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.protocols.parameters import Given, NotNegative, parameter, readable
+
+#: Most losses in a row.
+MOST_LOSSES = 10**6
+
+
+@gated
+@dataclass(frozen=True)
+class LateMessages:
+    """How late and how exact is what agents hear.
+
+    Parameters
+    ----------
+    delay : number or str, or mapping of (source, target) to number
+        What every message takes, or that over each edge by itself, in units of time, not negative. Over an edge that
+        a mapping does not name messages take no time.
+    period : number or str, optional
+        Between two messages, positive, in units of time; without it messages are sent all the time.
+    losses : int
+        Messages in a row that may get lost; asks for a ``period``.
+    value_error : number or str
+        What a value that is heard is off by at most, in units of the state: half the step of a quantiser, the
+        threshold of an event trigger, noise.
+    own_delay : bool
+        Whether the own state is as old as what is heard: a relative position that is measured late.
+    gain_cap : number or str, optional
+        The gain is at most this, 1/time/weight; ``own_delay`` asks for it.
+
+    Raises
+    ------
+    ParameterError
+        A number is outside its domain, losses without a period, an own state that is late without a cap of the gain,
+        or nothing is late, lost or rounded.
+
+    References
+    ----------
+    Feyzmahdavian, Charalambous, Johansson, Exponential stability of homogeneous positive systems of degree one with
+    time-varying delays, IEEE Trans. Automat. Control 59 (2014).
+
+    Examples
+    --------
+    >>> messages = LateMessages(delay="0.01", period="0.005", losses=3)
+    >>> messages.age
+    Fraction(3, 100)
+    >>> LateMessages(delay=1, own_delay=True)
+    Traceback (most recent call last):
+    ptcc_certify.errors.ParameterError: own_delay without gain_cap: an own state that is late makes the protocol \
+diverge, for its gain grows without limit before T; give gain_cap, or measure the own state without delay
+    """
+
+    delay: Exact | Mapping[tuple[str, str], Exact] = 0
+    period: Given = Given()
+    losses: int = 0
+    value_error: NotNegative = NotNegative(0)
+    own_delay: bool = False
+    gain_cap: Given = Given()
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        if isinstance(self.delay, Mapping):
+            put(self, "delay", {edge: parameter(_of(edge), x, True) for edge, x in self.delay.items()})
+        else:
+            put(self, "delay", parameter("delay", self.delay, True))
+        if (
+            isinstance(self.losses, bool)
+            or not isinstance(self.losses, Integral)
+            or not 0 <= self.losses <= MOST_LOSSES
+        ):
+            raise ParameterError(
+                f"losses = {shorten(repr(self.losses))} is not a number of messages, 0 to {MOST_LOSSES:,}"
+            )
+        put(self, "losses", int(self.losses))
+        if self.losses and self.period is None:
+            raise ParameterError("losses without a period: tell how long it is from one message to the next")
+        if not isinstance(self.own_delay, bool):
+            raise ParameterError(f"own_delay = {shorten(repr(self.own_delay))} is neither True nor False")
+        if self.own_delay and self.gain_cap is None:
+            raise ParameterError(
+                "own_delay without gain_cap: an own state that is late makes the protocol diverge, for its gain grows "
+                "without limit before T; give gain_cap, or measure the own state without delay"
+            )
+        if not self.age and not self.value_error:
+            raise ParameterError(
+                "messages that are neither late, nor lost, nor rounded; give a delay, a period or a value error above 0"
+            )
+
+    @property
+    def largest_delay(self) -> Fraction:
+        """What a message takes at most, in units of time."""
+        each = self.delay.values() if isinstance(self.delay, Mapping) else [self.delay]
+        return max((Fraction(x) for x in each), default=Fraction(0))
+
+    @property
+    def held(self) -> Fraction:
+        """How long a value is held at most, until the next one comes: ``(losses + 1) period``."""
+        return Fraction(0) if self.period is None else (self.losses + 1) * self.period
+
+    @property
+    def age(self) -> Fraction:
+        """How old is what is heard, at most, in units of time: ``largest_delay + held``."""
+        return self.largest_delay + self.held
+
+    def latencies(self, graph: SignedDigraph) -> Fraction | tuple[Fraction, ...]:
+        """Return what messages take: one number, or one for every edge of a graph, in the order of its edges.
+
+        Parameters
+        ----------
+        graph : SignedDigraph
+
+        Raises
+        ------
+        ParameterError
+            A delay is of an edge that the graph does not have.
+        """
+        if not isinstance(self.delay, Mapping):
+            return Fraction(self.delay)
+        given = {(str(source), str(target)): Fraction(x) for (source, target), x in self.delay.items()}
+        edges = [(source, target) for source, target, _ in graph.edges]
+        for source, target in given.keys() - set(edges):
+            raise ParameterError(
+                f"a delay of {shorten(source)} -> {shorten(target)}, but the graph has no such edge; "
+                "(source, target) is the way that information flows"
+            )
+        return tuple(given.get(edge, Fraction(0)) for edge in edges)
+
+    def __repr__(self) -> str:
+        parts = [f"delay={readable(self.largest_delay)}"]
+        parts += [] if self.period is None else [f"period={readable(self.period)}, losses={self.losses}"]
+        parts += [f"value_error={readable(self.value_error)}"] * (self.value_error != 0)
+        parts += ["own_delay=True"] * self.own_delay
+        parts += [] if self.gain_cap is None else [f"gain_cap={readable(self.gain_cap)}"]
+        return f"LateMessages({', '.join(parts)})"
+
+
+def _of(edge: Any) -> str:
+    if not isinstance(edge, tuple) or len(edge) != 2:
+        raise ParameterError(f"a delay of {shorten(repr(edge))}, which is no edge; name it as (source, target)")
+    return f"delay of {shorten(str(edge[0]))} -> {shorten(str(edge[1]))}"

@@ -1,0 +1,66 @@
+"""Leaders that move: how fast, what disturbs the followers, and the sign term that keeps them on their targets.
+
+x_j' = v_j,  |v_j| <= speed                                              a leader, which listens to nobody
+x_k' = -gain(t) (L x)_k + d_k [ + sign_gain sign(e_k) ],  |d_k| <= disturbance,  e = -L x      a follower
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+from lmi.exact.decimal_rounding import near
+from ptcc_certify.errors import ParameterError, gated
+from ptcc_certify.protocols.parameters import Given, NotNegative, Parameters
+
+
+@gated
+@dataclass(frozen=True, repr=False)
+class MovingLeaders(Parameters):
+    """How fast leaders move, and what is done about it.
+
+    Parameters
+    ----------
+    speed : number or str
+        Of every leader, at most; in units of the state over time, not negative.
+    disturbance : number or str
+        Of every follower, at most; in units of the input, not negative.
+    sign_gain : number or str, optional
+        What followers add times ``sign(e_k)``, at least ``speed + disturbance``: they stay on their targets after
+        ``T``. Without it they are there at ``T``.
+
+    Raises
+    ------
+    ParameterError
+        A number is outside its domain, or ``sign_gain`` is below ``speed + disturbance``.
+
+    References
+    ----------
+    The sliding-mode term is that of protocol (8) of [Zhu]_, with ``e_k`` in place of ``sigma_k``.
+
+    Examples
+    --------
+    >>> MovingLeaders(speed="0.5", sign_gain=1).total
+    Fraction(1, 2)
+    >>> MovingLeaders(speed=1, disturbance=1, sign_gain=1)
+    Traceback (most recent call last):
+    ptcc_certify.errors.ParameterError: sign_gain = 1 is below speed + disturbance = 2, which pushes followers off; \
+give 2 or more
+    """
+
+    speed: NotNegative = NotNegative()
+    disturbance: NotNegative = NotNegative(0)
+    sign_gain: Given = Given()
+
+    def __post_init__(self) -> None:
+        if self.sign_gain is not None and self.sign_gain < self.total:
+            total = near(self.total)
+            raise ParameterError(
+                f"sign_gain = {near(self.sign_gain)} is below speed + disturbance = {total}, which pushes "
+                f"followers off; give {total} or more"
+            )
+
+    @property
+    def total(self) -> Fraction:
+        """``speed + disturbance``: how fast a follower and its target may part."""
+        return self.speed + self.disturbance

@@ -1,0 +1,163 @@
+"""What the screen tells of agents of order n: their equation and protocol, where they end, how near by when, input."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from lmi.exact.decimal_rounding import down, near, up
+from ptcc_certify.protocols.agents import DERIVATIVES, PLURALS, plant_text
+from ptcc_certify.report.text_layout import TEXT, columns, short_number, shorten_label, shorten_list
+
+if TYPE_CHECKING:
+    from ptcc_certify.bounds.agent_motion import Interval
+    from ptcc_certify.certificate.agents_part import AgentsPart
+
+#: Names of final derivatives on the screen.
+_ENDS = ("x(T)", "v(T)", "a(T)")
+#: ``1 - t/T`` and its name, where the long screen tells what may be left.
+_INSTANTS = ((0.5, "0.5 T"), (0.1, "0.9 T"), (0.01, "0.99 T"), (1e-6, "T(1-1e-6)"))
+
+
+def agents_text(part: AgentsPart) -> str:
+    """Tell the agents and their protocol in one line.
+
+    The gains are those of relative positions, velocities and so on, each times a power of the gain.
+    """
+    protocol, n = part.protocol, part.order
+    terms = [f"{near(K)} {_power(n - i)}{_primed('e', i)}" for i, K in enumerate(protocol.gains)]
+    terms += [f"{near(f)} {_power(n - i)}{_primed('x', i)}" for i, f in enumerate(protocol.own) if f]
+    signs = [" + "] * (n - 1) + [" - "] * (len(terms) - n)
+    law = terms[0] + "".join(sign + term for sign, term in zip(signs, terms[1:], strict=True))
+    more = ["in formation"] * part.formation
+    more += [f"in {part.dimension} dimensions"] * (part.dimension > 1)
+    more += ["meeting at rest"] * any(protocol.own)
+    texts = [
+        f"{plant_text(protocol.plant)} {', '.join(more)}".strip(),
+        *([] if protocol.gain_cap is None else [f"gain at most {near(protocol.gain_cap)}"]),
+    ]
+    driven = part.functions or not part.structure.graph.n_edges  # else no gains are proved
+    return "; ".join([*texts, *[f"u = {law}"] * bool(driven)])
+
+
+def _power(m: int) -> str:
+    return "g " if m == 1 else f"g^{m} "
+
+
+def _primed(letter: str, i: int) -> str:
+    return letter + ("'" * i if i < 4 else f"^({i})")
+
+
+def answers(part: AgentsPart) -> Iterator[tuple[str, str]]:
+    """Return the lines of the short screen: where agents end, bounds of deviations, and of the input."""
+    yield "agents", agents_text(part)
+    yield from _final_lines(part, 2 * TEXT)
+    if not part.functions:
+        if part.structure.graph.n_edges == 0:
+            yield "error", "none: no agent listens to another, each moves by itself"
+        return
+    yield "error", _error_text(part)
+    yield _input_line(part)
+
+
+def _final_lines(part: AgentsPart, width: int) -> Iterator[tuple[str, str]]:
+    """Tell positions at ``T``, and velocities and so on unless all are 0."""
+    if part.final_state is None:
+        return
+    labels = part.structure.graph.labels
+    rest = not part.moving and part.order > 1
+    for i in range(part.order):
+        ends = [[chain[i] for chain in agent] for agent in part.final_state]
+        if i and not any(m or r for row in ends for m, r in row):
+            continue
+        places = [_place(row) for row in ends]
+        words = [f"{shorten_label(label)}={place}" for label, place in zip(labels, places, strict=True)]
+        kind = f"({_accuracy(ends)}{', at rest' * (rest and i == 0)})"
+        text = shorten_list(words, width - columns(kind) - 1)
+        if len(set(places)) == 1 < len(places):
+            text = f"{places[0]}, of every agent"
+        if i == 0 and part.protocol.gain_cap is not None:
+            kind = f"{kind[:-1]}; without the cap)"
+        yield _ENDS[i] if i < len(_ENDS) else f"x^({i})(T)", f"{text} {kind}"
+
+
+def _place(row: Sequence[Interval]) -> str:
+    numbers = [short_number(float(m) if r else m) for m, r in row]
+    return numbers[0] if len(numbers) == 1 else f"({', '.join(numbers)})"
+
+
+def _accuracy(ends: Sequence[Sequence[Interval]]) -> str:
+    widest = max(r for row in ends for _, r in row)
+    if widest > Fraction(1, 10**12):
+        return f"to within {up(widest, 2)}, proved"
+    cut = widest > 0 or any(Fraction(short_number(m)) != m for row in ends for m, _ in row)
+    return "rounded" if cut else "exact"
+
+
+def _named(bounds: Sequence[float]) -> str:
+    """Tell bounds of positions, velocities and so on."""
+    words = []
+    for i, bound in enumerate(bounds):
+        name = PLURALS[i] if i < len(PLURALS) else f"derivatives {i}"
+        words.append(f"{name} within {up(bound, 2)}")
+    return ", ".join(words) + " of the common motion"
+
+
+def _error_text(part: AgentsPart) -> str:
+    """Tell how near agents are to the common motion at ``0.99 T``, or at ``T`` under a cap."""
+    if part.residual is not None:
+        return "at T " + _named([float(max(row[i] for row in part.residual.agents)) for i in range(part.order)])
+    bounds = part.deviation_bound(np.array([0.01]))[:, :, 0].max(axis=0)
+    if not np.isfinite(bounds).all():
+        fall = math.exp(-float(part.matrix.rate) * float(part.protocol.clock(np.array([0.01]))[0]) / 2)
+        return f"at 0.99 T deviations are {up(fall * (1 + 1e-9), 2)} of the first ones, in the norm of V"
+    return "at 0.99 T " + _named(bounds.tolist())
+
+
+def _input_line(part: AgentsPart) -> tuple[str, str]:
+    """Tell whether the input is bounded, its proved size, and whose it is."""
+    if part.input is None:
+        if part.unbounded:
+            return "INPUT", f"NOT CERTIFIED BOUNDED: {', '.join(why for why, _ in part.unbounded)}"
+        return "input", "bounded; no number is proved" + " without x(0)" * (part.initial_state is None)
+    largest = max(part.input)
+    label = part.structure.graph.labels[part.input.index(largest)]
+    norm = "|u_k|" if part.dimension == 1 else "||u_k||"
+    text = f"bounded; {norm} <= {up(largest, 4)}"
+    agent = f", the largest of agent {shorten_label(label, 22)}"
+    return "input", text + agent * (columns(text + agent) <= TEXT)
+
+
+def long_lines(part: AgentsPart) -> Iterator[tuple[str, str]]:
+    """Return what the long screen tells besides."""
+    matrix, rest = part.matrix, f"R = r rho2 kappa = {near(part.decay)}"
+    gains = ", ".join(str(float(K)) for K in part.protocol.gains)
+    yield "agents", f"{agents_text(part)}; K = ({gains}), coupling {near(matrix.coupling)}"
+    pieces = max(len(matrix.points) - 1, 0)
+    used = f"{len(part.used)} Lyapunov function{'s' * (len(part.used) != 1)}"
+    yield "", f"V <= e^(-r s) V(0), r = {down(matrix.rate)}, {rest}; one matrix for {used}, {pieces} pieces"
+    yield from _final_lines(part, 12 * TEXT)
+    if part.functions and part.initial_state is not None:
+        for i in range(part.order):
+            worst = part.deviation_bound(np.array([q for q, _ in _INSTANTS]))[:, i].max(axis=0)
+            if np.isfinite(worst).all():
+                bounds = ", ".join(
+                    f"{up(float(x), 2)} at {name}" for x, (_, name) in zip(worst, _INSTANTS, strict=True)
+                )
+                name = DERIVATIVES[i] if i < len(DERIVATIVES) else f"derivative {i}"
+                yield "deviation" if i == 0 else "", f"{name}: from the common motion at most {bounds}"
+    if part.residual is not None:
+        yield "left", _error_text(part)
+    if part.functions:
+        yield _input_line(part)
+
+
+def claimed_of(part: AgentsPart) -> str:
+    """Tell of what the claim of the graph holds, where it is not just of the positions."""
+    if part.settles:
+        return " of x - offsets" * part.formation
+    return f"{' of x - offsets' * part.formation} but for what the cap leaves" if part.functions else " of x' = u"

@@ -1,0 +1,147 @@
+"""What screens tell of late messages: how late, what is left at the deadline, who misses it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from lmi.exact.decimal_rounding import down, float_up, near, up
+from ptcc_certify.bounds.small_delays import delay_threshold
+from ptcc_certify.graphs.size_limits import EXACT_NODES
+from ptcc_certify.report.structure_text import Lines
+from ptcc_certify.report.text_layout import shorten_label, shorten_list
+
+if TYPE_CHECKING:
+    from ptcc_certify.bounds.late_messages import LateBounds
+    from ptcc_certify.certificate.certificate import Certificate
+    from ptcc_certify.protocols.base import Protocol
+    from ptcc_certify.protocols.late_messages import LateMessages
+
+
+def late_lines(certificate: Certificate) -> Lines:
+    """Tell how late messages are; what cannot be then, and what is left at the deadline."""
+    late = certificate.late
+    if late is None:
+        return
+    yield "messages", messages_text(late.messages, certificate.protocol)
+    texts = [*_impossible(late), *([] if late.direct else _left(late)), *_stages(late)]
+    if (at := certificate.at) is not None and (late.rows or late.steps is not None):
+        texts.append(f"at t = {near(at)} every agent within {up(float(late.deviation_bound([float(at)]).max()), 2)}")
+    yield "late" if late.says_something else "LATE", texts[0]
+    yield from (("", text) for text in texts[1:])
+
+
+def tracking_lines(certificate: Certificate) -> Lines:
+    """Tell how followers track leaders that move."""
+    tracking = certificate.tracking
+    if tracking is None:
+        return
+    leaders, T = tracking.leaders, near(certificate.protocol.T)
+    sign = "" if leaders.sign_gain is None else f"; followers add {near(leaders.sign_gain)} sign(e_k)"
+    pushed = f"; any |d_k| <= {near(leaders.disturbance)}" * (leaders.disturbance > 0)
+    yield "leaders", f"speed |x_j'| <= {near(leaders.speed)}{pushed}{sign}"
+    instants = {"0.9 T": Fraction(1, 10), "0.99 T": Fraction(1, 100)}
+    if (at := certificate.at) is not None:
+        instants = {f"t = {near(at)}": 1 - at / certificate.protocol.T}
+    bounds = {when: up(float(tracking.distance_bound([float(q)]).max()), 2) for when, q in instants.items()}
+    after = "and ever after" if not tracking.after else f"within {up(tracking.distance_after, 2)} of it from then on"
+    yield "tracking", f"every follower on its target at T = {T}, {after}"
+    whole = " from within 1 of it at first" * tracking.relative
+    yield "", f"before T within {', '.join(f'{x} of it at {when}' for when, x in bounds.items())}{whole}"
+    if tracking.input is not None:
+        yield "input", f"bounded up to T; |u_k| <= {up(float(tracking.input.max()), 4)}{whole}"
+    else:
+        yield "INPUT", f"not proved bounded while leaders move; rho2 = {tracking.bounding_rho2} bounds it"
+
+
+def messages_text(messages: LateMessages, protocol: Protocol | None = None) -> str:
+    """Tell how late, how often lost and how inexact messages are.
+
+    Examples
+    --------
+    >>> from ptcc_certify.protocols.late_messages import LateMessages
+    >>> messages_text(LateMessages(delay="0.01", period="0.005", losses=3))
+    'up to 0.03 old: 0.01 late, every 0.005, 3 in a row lost'
+    >>> messages_text(LateMessages(delay={("a", "b"): "0.01", ("b", "c"): "0.02"}))
+    'up to 0.02 old, edge by edge'
+    """
+    each = ", edge by edge" * isinstance(messages.delay, Mapping)
+    parts = [f"{near(messages.largest_delay)} late{each}"] * (messages.largest_delay > 0)
+    if messages.period is not None:
+        parts.append(f"every {near(messages.period)}")
+        parts += [f"{messages.losses} in a row lost"] * (messages.losses > 0)
+        each = f": {', '.join(parts)}"
+    told = [f"up to {near(messages.age)} old{each}"] * (messages.age > 0)
+    if protocol is not None and messages.age >= protocol.T:
+        told.append(f"T = {near(protocol.T)}, so that by T nothing new need arrive")
+    told += [f"off by up to {near(messages.value_error)}"] * (messages.value_error != 0)
+    told += [f"gain <= {near(messages.gain_cap)}"] if messages.gain_cap is not None else []
+    return "; ".join(told + ["the own state as well"] * messages.own_delay)
+
+
+def residual_text(certificate: Certificate) -> str:
+    """List what is left at ``T`` at most, agent by agent; empty where nothing is proved."""
+    late = certificate.late
+    if late is None or math.isinf(late.largest):
+        return ""
+    bounds = late.residual if late.residual is not None else np.full(certificate.graph.n_nodes, np.inf)
+    if late.form is not None:
+        bounds = np.minimum(bounds, [float_up(x) for x in late.form.residual])
+    names = certificate.graph.labels
+    return shorten_list([f"{names[v]} {up(float(bounds[v]), 2)}" for v in range(len(names)) if bounds[v]])
+
+
+def _impossible(late: LateBounds) -> list[str]:
+    """Tell what cannot be: who misses the deadline, and delays from which on a constant gain diverges."""
+    texts = []
+    if late.missed is not None:
+        label = shorten_label(late.structure.graph.labels[late.missed.agent], 22)
+        size = down(late.missed.bound, 2)
+        texts.append(f"agent {label} is off its final state at T by {size} at least, if none comes sooner")
+    threshold = _threshold(late)
+    if late.messages.age >= threshold:
+        gain = near(late.messages.gain_cap or Fraction(1))
+        texts.append(f"at a constant gain of {gain} agents diverge with delays above {threshold:.3g} (numerical)")
+    return texts
+
+
+def _threshold(late: LateBounds) -> float:
+    """Return the delay that constant gain bears with a late own state; infinite if the own state is fresh."""
+    if not late.messages.own_delay or late.structure.graph.n_nodes > EXACT_NODES:
+        return math.inf
+    return delay_threshold(late.structure, float(late.messages.gain_cap or 1))
+
+
+def _left(late: LateBounds) -> list[str]:
+    """Tell what is left at T at most, and which delays are certified."""
+    cap = "under a cap nothing settles: " * (late.messages.gain_cap is not None)
+    if math.isinf(late.largest):
+        return [f"{cap}nothing is proved of what is left at T{_limits(late)}"]
+    whole = ", from within 1 of it at first" * late.relative
+    formed = late.form is not None and float(max(late.form.residual)) <= late.largest
+    return [f"{cap}every agent within {up(late.largest, 2)} of its final state at T{whole}{_limits(late) * formed}"]
+
+
+def _limits(late: LateBounds) -> str:
+    """Tell the longest delay that the certificate forgives, and the one that constant gain does."""
+    if late.longest_delay is None:
+        return ""
+    threshold = _threshold(late)
+    more = "" if math.isinf(threshold) else f", the loop's {threshold:.3g} at constant gain"
+    return f"; this certificate's limit is a delay of {late.longest_delay:.2g}{more}"
+
+
+def _stages(late: LateBounds) -> list[str]:
+    """Tell the deadlines of stages, at which agents are at their final states exactly."""
+    if late.unarrived:
+        return ["no deadlines of stages: information takes longer than T from the leaders to the last agent"]
+    if late.direct:
+        return ["every agent exactly at its final state at T: all hear of leaders alone"]
+    if late.staged is None:
+        return []
+    when = f"from {near(min(late.staged))} to {near(max(late.staged))}, {near(late.messages.age)} apart"
+    return [f"exactly at x(T) by T if agents have deadlines of their own, {when}"]

@@ -1,0 +1,180 @@
+"""Agents of order n over time: positions, velocities and so on; and a formation in the plane."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ptcc_certify.certificate.agents_part import AgentsPart
+from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.structure import analyse
+from ptcc_certify.report.plots.agents import CAMP_STYLES, HALO, NAME_SIZE, NAMED_AGENTS, camp_groups, name_agents
+from ptcc_certify.report.plots.style import SINGLE_COLUMN, axes_of, finished, new_axes, shown, styled, time_label
+from ptcc_certify.report.text_layout import printable, shorten_text
+from ptcc_certify.simulation.agents import AgentsTrajectory
+
+#: Labels of axes.
+_NAMES = ("position", "velocity", "acceleration")
+#: How far a name stands from the mark that it names, in points.
+_AWAY = 8
+
+
+def agents_run(subject: Any) -> AgentsTrajectory:
+    """Return the run of agents of order n, simulated where there is none.
+
+    Raises
+    ------
+    ParameterError
+        The subject is none, or of single integrators.
+    """
+    if isinstance(subject, Certificate) and subject.agents is not None:
+        return subject.observed.agents_run or subject.agents.simulate()
+    if isinstance(subject, AgentsPart):
+        return subject.simulate()
+    if isinstance(subject, AgentsTrajectory):
+        return subject
+    raise ParameterError("this figure is of agents of order n; certify with agents=Agents(order=2), say")
+
+
+def plot_motion(subject: Any, *, wide: bool = False, time_unit: str = "") -> Figure:
+    """Draw positions, velocities and so on over time, of each coordinate below each other.
+
+    Parameters
+    ----------
+    subject : AgentsTrajectory, or Certificate of agents of order n
+    wide : bool
+        As wide as two columns of a journal, the coordinates side by side.
+    time_unit : str
+        Of the deadline, for the labels of the axes.
+
+    Returns
+    -------
+    Figure
+
+    Raises
+    ------
+    ParameterError
+        The subject leads to no such run.
+
+    Examples
+    --------
+    >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
+    >>> protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
+    >>> cert = certify(foes, protocol, [3, 1], agents=Agents(order=2), method="paper")
+    >>> [ax.get_ylabel() for ax in plot_motion(cert).axes]
+    ['position', 'velocity']
+    """
+    from matplotlib import style
+
+    from ptcc_certify.report.plots.style import STYLE
+
+    run = agents_run(subject)
+    _, d, n, _ = run.states.shape
+    width, height = SINGLE_COLUMN
+    with style.context(STYLE):
+        rows, columns = (n, d) if wide else (n * d, 1)
+        figure = Figure((2 * width if wide else width, 0.75 * height * rows), layout="constrained")
+        groups = camp_groups(analyse(run.graph))
+        for i in range(n):
+            for q in range(d):
+                place = i * d + q if wide else q * n + i
+                ax = new_axes(figure, (rows, columns, 1 + place))
+                _lines(ax, run, run.states[:, q, i], groups)
+                name = _NAMES[i] if i < len(_NAMES) else f"derivative {i}"
+                label = f"{name} {q + 1}" if d > 1 else name
+                finished(ax, time_label("time $t$", time_unit) if place // columns == rows - 1 else "", label)
+                if i == 0 and len(groups) <= NAMED_AGENTS:
+                    colours = {k: CAMP_STYLES[group][0] for k, group in enumerate(groups)}
+                    name_agents(ax, run, run.states[:, q, i], colours)
+                if (legend := ax.get_legend()) is not None and (i or q):
+                    legend.remove()
+        _align(figure.axes[:d], figure.axes)  # positions are drawn first
+        return shown(figure)
+
+
+def _align(named: list[Axes], every: list[Axes]) -> None:
+    """Give all panels the times of the one whose names take most room."""
+    widest = min(named, key=lambda ax: ax.get_xlim()[0])
+    limits, ticks = widest.get_xlim(), widest.get_xticks()
+    for ax in every:
+        ax.set_xticks(ticks)
+        ax.set_xlim(limits)
+
+
+def _lines(ax: Axes, run: AgentsTrajectory, values: np.ndarray, groups: np.ndarray) -> None:
+    """Draw a line for each agent in the colour of its camp."""
+    for k, row in enumerate(values):
+        color, line = CAMP_STYLES[groups[k]]
+        first = k == int(np.flatnonzero(groups == groups[k])[0])
+        ax.plot(run.t, row, color=color, linestyle=line, linewidth=1, label=groups[k] if first else None)
+    ax.axvline(float(run.protocol.gain.T), color="black", linewidth=0.8, linestyle=":", label="deadline $T$")
+
+
+@styled
+def plot_formation(subject: Any, *, ax: Axes | None = None) -> Axes:
+    """Draw the ways of agents in the plane: open circles where they begin, full ones where they are at ``T``.
+
+    Parameters
+    ----------
+    subject : AgentsTrajectory, or Certificate of agents of order n
+        In two dimensions.
+    ax : Axes, optional
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ParameterError
+        The subject leads to no such run, or to one that is not in the plane.
+
+    Examples
+    --------
+    >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
+    >>> protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
+    >>> cert = certify(foes, protocol, [[3, 1], [1, 0]], agents=Agents(order=2), method="paper")
+    >>> plot_formation(cert).get_xlabel()
+    '$x$'
+    """
+    run = agents_run(subject)
+    if run.states.shape[1] != 2:
+        d = run.states.shape[1]
+        raise ParameterError(
+            f"a formation is drawn in the plane; these agents have {d} coordinate{'s' * (d > 1)}: certify them with 2"
+        )
+    ax, groups, width = axes_of(ax, (SINGLE_COLUMN[0], SINGLE_COLUMN[0])), camp_groups(analyse(run.graph)), 1.0
+    for k, (x, y) in enumerate(run.positions):
+        color, line = CAMP_STYLES[groups[k]]
+        first = k == int(np.flatnonzero(groups == groups[k])[0])
+        ax.plot(x, y, color=color, linestyle=line, linewidth=width, label=groups[k] if first else None)
+        ax.plot(x[0], y[0], "o", markersize=3.5, markerfacecolor="white", markeredgecolor=color, zorder=4)
+        ax.plot(x[-1], y[-1], "o", markersize=4.5, color=color, zorder=5)
+    ax.set_aspect("equal", adjustable="datalim")
+    if run.graph.n_nodes <= 2 * NAMED_AGENTS:
+        _name_ends(ax, run)
+    for face, name in (("white", "at $t = 0$"), ("#7F7F7F", "at $t = T$")):
+        ax.plot([], [], "o", markersize=4, markerfacecolor=face, markeredgecolor="#7F7F7F", label=name)
+    return finished(ax, "$x$", "$y$")
+
+
+def _name_ends(ax: Axes, run: AgentsTrajectory) -> None:
+    """Write every agent's name beside the end of its way, on the side where other marks and names are farthest."""
+    ends, begins = run.positions[:, :, -1], run.positions[:, :, 0]
+    points = 72 * min(SINGLE_COLUMN) * 0.8
+    unit = float(np.ptp(np.vstack([ends, begins]), axis=0).max() or 1) * 1.1 / points  # of data, for one point of print
+    sides = [np.array([math.cos(a), math.sin(a)]) * _AWAY for a in np.arange(16) * math.pi / 8]
+    taken: list[np.ndarray] = [*ends, *begins]
+    for k, end in enumerate(ends):
+        others = np.array([*taken[:k], *taken[k + 1 :]])
+        free = [float(np.hypot(*(others - end - unit * side).T).min()) for side in sides]
+        side = sides[int(np.argmax(np.round(free, 9)))]
+        taken.append(end + unit * side)
+        name = shorten_text(printable(run.graph.labels[k]), 12)
+        how: dict[str, Any] = {"textcoords": "offset points", "fontsize": NAME_SIZE, "ha": "center", "va": "center"}
+        ax.annotate(name, (end[0], end[1]), (side[0], side[1]), zorder=6, **how).set_path_effects([*HALO])

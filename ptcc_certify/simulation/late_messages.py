@@ -1,0 +1,239 @@
+"""Runs with late messages, without an ODE solver: every run is a solution, up to rounding.
+
+Over a step from ``t_i`` to ``t_(i+1)`` what an agent hears is held, as it was at an instant ``t_j`` between ``t_(i+1) -
+age`` and ``t_i``: the delay ``t - t_j`` is one of those that are allowed, and the step has a closed form,
+
+    x_k(t_(i+1)) = h_k + (x_k(t_i) - h_k) e^(-D_k (s(t_(i+1)) - s(t_i))),    h_k = sum_l w_kl y_kl / D_k,
+
+exact where the gain has its pole. With an own state that is late the whole right side is held.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, Literal
+
+import numpy as np
+
+from ptcc_certify.errors import ParameterError, gated
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.io import as_graph, as_state
+from ptcc_certify.graphs.rationals import shorten, whole_number
+from ptcc_certify.protocols.base import Protocol, refuse_no_protocol
+from ptcc_certify.protocols.gain import Gain
+from ptcc_certify.protocols.gain_limits import GainLimits, LimitedGain
+from ptcc_certify.protocols.late_messages import LateMessages
+
+Pattern = Literal["oldest", "fresh", "varying", "square"]
+PATTERNS = ("oldest", "fresh", "varying", "square")
+#: Instants of a run, and at most; the share of ``T`` down to which they come nearer to it.
+STEPS, MOST_STEPS, NEAREST = 1500, 20_000, 1e-9
+#: Steps in the largest delay, at least, and steps of a run that the least one may ask for.
+IN_DELAY, _MOST_FOR_LEAST = 6, 5000
+
+
+@dataclass(frozen=True, eq=False)
+class LateRun:
+    """A run with late messages.
+
+    Attributes
+    ----------
+    t : (M,) array
+        Instants from 0 to ``T``, in units of time.
+    states : (N, M) array
+    pattern : str
+        How old is what agents hear.
+    """
+
+    t: np.ndarray
+    states: np.ndarray
+    pattern: str
+
+
+@gated
+def simulate_late(
+    graph: Any,
+    protocol: Protocol,
+    messages: LateMessages,
+    x0: Any,
+    *,
+    pattern: Pattern = "oldest",
+    seed: int = 0,
+    steps: int = STEPS,
+    deadlines: Sequence[Fraction] | None = None,
+) -> LateRun:
+    """Run a protocol with late messages up to its deadline.
+
+    Parameters
+    ----------
+    graph : graph-like
+        N agents, in whatever form :func:`ptcc_certify.as_graph` takes.
+    protocol : Protocol
+    messages : LateMessages
+        Values are off by the whole ``value_error``, to either side. What is heard over an edge is as old as a step
+        where its own delay is less than that, as a delay of 0 is.
+    x0 : state-like
+        The state up to 0, whatever :func:`ptcc_certify.as_state` takes.
+    pattern : {"oldest", "fresh", "varying", "square"}
+        As old as allowed; as fresh as allowed, but for the step; between the two like a sine of its own for every edge;
+        from the one to the other and back at random instants.
+    seed : int
+        Of what is random.
+    steps : int
+        Instants, about.
+    deadlines : sequence of N Fraction, optional
+        Of every agent by itself, in place of ``T``; in units of time.
+
+    Returns
+    -------
+    LateRun
+
+    Raises
+    ------
+    ParameterError
+        The pattern is unknown, a number is outside its domain, the state does not fit the graph, or the delay is so
+        short that the run would take more than 20,000 steps.
+
+    References
+    ----------
+    Feyzmahdavian, Charalambous, Johansson, Exponential stability of homogeneous positive systems of degree one with
+    time-varying delays, IEEE Trans. Automat. Control 59 (2014).
+
+    Examples
+    --------
+    >>> pair = SignedDigraph.from_edges([(1, 2, 1), (2, 3, 1)])
+    >>> protocol = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
+    >>> run = simulate_late(pair, protocol, LateMessages(delay="0.1"), [1, 0, 0])
+    >>> run.states[:, -1].round(3)
+    array([1.   , 1.   , 0.996])
+    """
+    if pattern not in PATTERNS:
+        raise ParameterError(f'pattern "{shorten(str(pattern))}" is unknown; one of {", ".join(PATTERNS)}')
+    refuse_no_protocol(protocol)
+    if not isinstance(messages, LateMessages):
+        raise ParameterError(f"messages = {shorten(repr(messages))} is none; give LateMessages(delay='0.01'), say")
+    graph = as_graph(graph)
+    steps, seed = whole_number(steps, "steps", 2, MOST_STEPS), whole_number(seed, "seed", 0, 2**63)
+    if deadlines is not None and len(deadlines) != graph.n_nodes:
+        raise ParameterError(f"deadlines are {len(deadlines)} for {graph.n_nodes} agents; give one for each")
+    first = [float(x) for x in as_state(x0, graph, "x0")]
+    t = _grid(float(protocol.T), float(messages.age), _least_age(graph, messages), steps)
+    clocks = _clocks(graph, protocol, messages, t, deadlines)
+    with np.errstate(invalid="ignore"):
+        steps_of_clock = np.where(np.isinf(clocks[1:]), np.inf, clocks[1:] - clocks[:-1])
+    hearing = _Hearing(graph, messages, t, pattern, np.random.default_rng(seed))
+    states = np.empty((t.size, graph.n_nodes))
+    states[0] = first
+    D = graph.in_weight()
+    for i in range(t.size - 1):
+        pushes, pulls = hearing.sums(i, states)
+        step = steps_of_clock[i]
+        if messages.own_delay:
+            states[i + 1] = states[i] + step * (pushes - pulls)
+            continue
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            goal = np.where(D > 0, pushes / D, states[i])
+            left = np.where(np.isfinite(step), np.exp(-D * step), D <= 0)
+        states[i + 1] = goal + (states[i] - goal) * left
+    return LateRun(t, states.T, pattern)
+
+
+def can_run(protocol: Protocol, messages: LateMessages) -> bool:
+    """Tell whether delays are long enough for a run of at most 20,000 steps.
+
+    Parameters
+    ----------
+    protocol : Protocol
+    messages : LateMessages
+    """
+    return not messages.age or MOST_STEPS * messages.age >= protocol.T * IN_DELAY
+
+
+def _least_age(graph: SignedDigraph, messages: LateMessages) -> float:
+    """Return the least age of what is heard over an edge that is not 0; the largest one if there is none."""
+    latencies = messages.latencies(graph)
+    each = latencies if isinstance(latencies, tuple) else (latencies,)
+    return float(min((x + messages.held for x in each if x + messages.held > 0), default=messages.age))
+
+
+def _grid(T: float, age: float, least: float, steps: int) -> np.ndarray:
+    """Return instants that come near to ``T``: some in the largest delay, one in the least unless that is too short."""
+    longest = min(T / steps, age / IN_DELAY, max(least, T / _MOST_FOR_LEAST)) if age else T / steps
+    if T / longest > MOST_STEPS:
+        raise ParameterError(
+            f"a delay of {age:.3g} in a run of {T:.6g} takes more than {MOST_STEPS:,} steps; the bound needs no run"
+        )
+    share = 0.02
+    left, each = [0.0, NEAREST * T], NEAREST * T
+    while left[-1] < T:
+        each = min(longest, left[-1] * share)
+        left.append(left[-1] + each)
+    left[-1] = T
+    return T - np.array(left[::-1])
+
+
+def _clocks(
+    graph: SignedDigraph,
+    protocol: Protocol,
+    messages: LateMessages,
+    t: np.ndarray,
+    deadlines: Sequence[Fraction] | None,
+) -> np.ndarray:
+    """Return the clock at every instant, one for all agents or ``(M, N)``; infinite from a deadline on."""
+    limits = GainLimits(gain_cap=messages.gain_cap)
+    if deadlines is None:
+        return limits.limit(protocol.gain).clock(t, remaining=np.maximum(1 - t / t[-1], 0))[:, None]
+    g = protocol.gain
+    whole = np.empty((t.size, graph.n_nodes))
+    for end in set(deadlines):
+        gain = LimitedGain(Gain(end, g.rho1, g.rho2, g.kappa), limits)
+        column = gain.clock(t)
+        column[t >= float(end) * (1 - 1e-14)] = np.inf
+        whole[:, [k for k, x in enumerate(deadlines) if x == end]] = column[:, None]
+    return whole
+
+
+class _Hearing:
+    """What agents hear over a step: sums over edges of values that are held."""
+
+    def __init__(
+        self, graph: SignedDigraph, messages: LateMessages, t: np.ndarray, pattern: str, random: np.random.Generator
+    ):
+        self.source, self.target, self.weights, self.n = graph.source, graph.target, graph.weights, graph.n_nodes
+        latencies = messages.latencies(graph)
+        each = latencies if isinstance(latencies, tuple) else (latencies,) * graph.n_edges
+        self.ages = np.array([float(x + messages.held) for x in each])
+        self.t, self.pattern, self.random = t, pattern, random
+        self.error, self.own = float(messages.value_error), messages.own_delay
+        self.speed = random.uniform(2, 40, graph.n_edges) / t[-1]
+        self.phase = random.uniform(0, 2 * np.pi, graph.n_edges)
+        self.old = random.random(graph.n_edges) < 0.5
+        self.signs = np.where(random.random(graph.n_edges) < 0.5, 1.0, -1.0)
+
+    def sums(self, i: int, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the sums of ``w y`` and, for an own state that is late, of ``|w| x_k`` as it was."""
+        j = self._instants(i)
+        values = states[j, self.source]
+        if self.error:
+            self.signs = np.where(self.random.random(self.signs.size) < 0.05, -self.signs, self.signs)
+            values = values + self.error * self.signs
+        pushes = np.bincount(self.target, self.weights * values, minlength=self.n)
+        if not self.own:
+            return pushes, np.zeros(self.n)
+        own = states[j, self.target] + (self.error * self.signs if self.error else 0.0)
+        return pushes, np.bincount(self.target, np.abs(self.weights) * own, minlength=self.n)
+
+    def _instants(self, i: int) -> np.ndarray:
+        """Return for every edge the number of the instant that is heard over the next step."""
+        oldest = np.minimum(np.searchsorted(self.t, (self.t[i + 1] - self.ages) * (1 + 1e-13)), i)
+        if self.pattern == "oldest":
+            return oldest
+        if self.pattern == "fresh":
+            return np.full(oldest.size, i)
+        if self.pattern == "varying":
+            share = (1 + np.sin(self.speed * self.t[i] + self.phase)) / 2
+            return oldest + np.floor((i - oldest) * share).astype(np.int64)
+        self.old ^= self.random.random(self.old.size) < 0.03
+        return np.where(self.old, oldest, i)

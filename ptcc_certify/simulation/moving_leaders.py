@@ -1,0 +1,183 @@
+"""Runs with leaders that move as badly as they may, without an ODE solver.
+
+Over a step from ``s_i`` to ``s_(i+1)`` of the clock, in which the gain grows to ``g``, leaders move at ``v gain(t)/g``,
+and followers are pushed by ``d gain(t)/g``: within the limits of ``v`` and ``d``, and with a step in closed form,
+
+    eps_(i+1) = E eps_i + (I - E) L_F^-1 (d - X*') / g,    E = e^(-L_F (s_(i+1) - s_i)).
+
+So without the sign term every run is a solution, up to rounding. The sign term acts with a boundary layer, held over
+steps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ptcc_certify.errors import ParameterError, gated
+from ptcc_certify.graphs.io import as_graph, as_state
+from ptcc_certify.graphs.rationals import whole_number
+from ptcc_certify.graphs.size_limits import EXACT_NODES
+from ptcc_certify.graphs.structure import analyse
+from ptcc_certify.lyapunov.follower_rows import refuse_leader_groups
+from ptcc_certify.protocols.base import Protocol, refuse_no_protocol
+from ptcc_certify.protocols.moving_leaders import MovingLeaders
+
+#: Steps up to T; the share of what is left of T that a step takes; how near they come; where a run with sign term ends.
+STEPS, SHARE, NEAREST, PAST = 800, 0.02, 1e-7, 0.5
+#: Most steps of a run.
+MOST_STEPS = 20_000
+
+
+@dataclass(frozen=True, eq=False)
+class TrackingRun:
+    """A run with moving leaders.
+
+    Attributes
+    ----------
+    t : (M,) array
+        Instants from 0 beyond ``T``, in units of time.
+    states, targets : (N, M) array
+        Of leaders both are the same.
+    """
+
+    t: np.ndarray
+    states: np.ndarray
+    targets: np.ndarray
+
+
+@gated
+def simulate_tracking(
+    graph: Any,
+    protocol: Protocol,
+    leaders: MovingLeaders,
+    x0: Any,
+    *,
+    u: np.ndarray | None = None,
+    steps: int = STEPS,
+) -> TrackingRun:
+    """Run followers of leaders that move away from the follower that is farthest off, as fast as they may.
+
+    Parameters
+    ----------
+    graph : graph-like
+        N agents, in whatever form :func:`ptcc_certify.as_graph` takes; all leaders are single nodes.
+    protocol : Protocol
+        The nominal one.
+    leaders : MovingLeaders
+    x0 : state-like
+        The initial state, whatever :func:`ptcc_certify.as_state` takes.
+    u : (F,) array, optional
+        By which distances are compared, positive; dimensionless.
+    steps : int
+        Up to ``T``, about.
+
+    Returns
+    -------
+    TrackingRun
+
+    Raises
+    ------
+    HypothesisError
+        A leader belongs to a group.
+    ParameterError
+        There are more than 120 agents, the protocol is not the nominal one, a number is outside its domain, or the
+        state does not fit the graph.
+
+    References
+    ----------
+    The sliding-mode term is that of protocol (8) of [Zhu]_, with ``e_k`` in place of ``sigma_k``.
+
+    Examples
+    --------
+    >>> graph = SignedDigraph.from_edges([(1, 2, 1), (2, 3, -1)])
+    >>> p = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
+    >>> run = simulate_tracking(graph, p, MovingLeaders(speed=1), [1, 0, 0])
+    >>> at = int(np.argmin(abs(run.t - 1)))
+    >>> abs(run.states - run.targets)[:, at].max() < 1e-6
+    np.True_
+    """
+    refuse_no_protocol(protocol)
+    if not isinstance(leaders, MovingLeaders) or protocol.reaching:
+        raise ParameterError(
+            "leaders that move run under the nominal protocol; give it, and MovingLeaders(speed=1), say"
+        )
+    structure, steps = analyse(as_graph(graph)), whole_number(steps, "steps", 2, MOST_STEPS)
+    refuse_leader_groups(structure, "leaders that move as they like: a run")
+    n, F = structure.graph.n_nodes, structure.followers
+    if n > EXACT_NODES:
+        raise ParameterError(f"runs with moving leaders are of up to {EXACT_NODES} agents; the graph has {n}")
+    if not F.size:
+        raise ParameterError("nobody listens to a leader, so nobody tracks; add edges")
+    x = np.array([float(value) for value in as_state(x0, structure.graph, "x0")])
+    heads = np.setdiff1d(np.arange(n), F)
+    L = structure.graph.dense_laplacian()
+    L_F, Q = L[np.ix_(F, F)], -np.linalg.solve(L[np.ix_(F, F)], L[np.ix_(F, heads)])
+    weights = np.ones(F.size) if u is None else np.asarray(u, dtype=float)
+    if weights.shape != (F.size,) or not (weights > 0).all():
+        raise ParameterError(f"u is not {F.size} positive numbers, one for each follower; leave it out")
+    t, clock, last = _grid(protocol, steps)
+    step_of = _Step(L_F, leaders, Q)
+    states, targets = np.empty((t.size, n)), np.empty((t.size, n))
+    lead, eps = x[heads], x[F] - Q @ x[heads]
+    for i in range(t.size):
+        states[i, heads] = targets[i, heads] = lead
+        targets[i, F] = Q @ lead
+        states[i, F] = targets[i, F] + eps
+        if i + 1 < t.size:
+            moved, eps = step_of(eps, weights, clock[i], last[i], t[i + 1] - t[i])
+            lead = lead + moved
+    return TrackingRun(t, states.T, targets.T)
+
+
+def _grid(protocol: Protocol, steps: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return instants, and of every step the clock that passes and the largest gain."""
+    T, gain = float(protocol.T), protocol.gain
+    left, each = [0.0, NEAREST * T], NEAREST * T
+    while left[-1] < T:
+        each = min(T / steps, left[-1] * SHARE)
+        left.append(left[-1] + each)
+    left[-1] = T
+    remaining = np.array(left[::-1]) / T
+    later = np.linspace(0, PAST * T, max(steps // 4, 2))[1:]
+    clock = gain.clock_at_remaining(np.maximum(remaining, NEAREST * 1e-3))
+    values = np.append(gain.value_at_remaining(remaining[1:-1]), np.inf)
+    rho1 = float(gain.rho1)
+    whole = np.concatenate([T * (1 - remaining), T + later])
+    passed = np.concatenate([np.diff(clock), rho1 * np.diff(later, prepend=0)])
+    return whole, passed, np.concatenate([values, np.full(later.size, rho1)])
+
+
+class _Step:
+    """One step of the deviations, at the worst velocities and disturbances."""
+
+    def __init__(self, L_F: np.ndarray, leaders: MovingLeaders, Q: np.ndarray):
+        self.L_F, self.Q, self.inverse = L_F, Q, np.linalg.inv(L_F)
+        self.speed, self.delta = float(leaders.speed), float(leaders.disturbance)
+        self.sign = None if leaders.sign_gain is None else float(leaders.sign_gain)
+
+    def __call__(
+        self, eps: np.ndarray, weights: np.ndarray, ds: float, gain: float, dt: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return by how much leaders move, and the deviations after the step."""
+        if np.isinf(gain):
+            return np.zeros(self.Q.shape[1]), np.zeros_like(eps)
+        k = int(np.argmax(np.abs(eps) / weights))
+        side = 1.0 if eps[k] >= 0 else -1.0
+        v = -side * np.sign(self.Q[k]) * self.speed
+        push = self.delta * np.where(eps >= 0, 1.0, -1.0) - self.Q @ v
+        if self.sign is not None:
+            e = -self.L_F @ eps
+            layer = 2 * self.sign * max(dt, 1e-300) * np.abs(self.L_F).sum(axis=1)
+            push = push + self.sign * np.clip(e / layer, -1, 1)
+        E = _decay(self.L_F * ds)
+        new = E @ eps + (np.eye(eps.size) - E) @ (self.inverse @ push) / gain
+        return v * ds / gain, new
+
+
+def _decay(A: np.ndarray) -> np.ndarray:
+    from scipy.linalg import expm
+
+    return np.asarray(expm(-A))

@@ -1,0 +1,292 @@
+r"""One matrix for agents of order n: what a Lyapunov function of the graph needs to be one of the agents.
+
+In ``y_k = S (xi_k - h_k)``, ``S = diag(1, zeta, .., zeta^(n-1))``, ``zeta = 1/eta``, the closed loop is
+
+    dY/ds = (I (x) A_z - L (x) b K) Y,   A_z = N - theta J - b (f + a_z)',   (a_z)_i = a_i zeta^(n-i+1)
+
+with ``theta = (1 - rho1 zeta)^2/k`` while the gain grows, 0 while it is capped. Let ``Z L + L'Z >= beta Z`` for a form
+``Z`` of the graph, ``W > 0``, ``P = W^-1``, ``K = c b'P`` with ``c beta >= 1``, and
+
+    F(zeta) = b b' - r W - A_z W - W A_z' >= 0.
+
+Then ``V = sum_kl Z_kl y_k'P y_l`` has ``dV/ds = Y'[Z (x) (A_z'P + P A_z) - c (Z L + L'Z) (x) P b b'P] Y <= -r V``.
+``F`` is a polynomial in ``zeta``; on an interval it is a convex combination of its Bernstein matrices.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from itertools import pairwise
+from math import comb
+
+import numpy as np
+
+from lmi.dyadic import round_to_bits
+from lmi.errors import NoCertificate
+from lmi.exact import arithmetic
+from lmi.exact.matrix_polynomials import nonnegative_between, semidefinite
+from lmi.exact.numbers import integers
+from lmi.feedback import feedback_matrix
+
+Matrix = tuple[tuple[Fraction, ...], ...]
+#: Significant bits of the entries of ``W``, and digits of the gains: the first that prove.
+BITS, DIGITS = 40, (4, 6, 9, 12, 15)
+#: Ends of intervals of ``zeta`` at most.
+MOST_POINTS = 257
+
+
+@dataclass(frozen=True)
+class ScaledAgent:
+    """One agent of order n in scaled coordinates, at every value of ``zeta``.
+
+    Attributes
+    ----------
+    plant, own : tuple of n Fraction
+        ``a`` and ``f``.
+    rho1, k : Fraction
+        Of the gain ``rho1 + k/(T - t)``.
+    first : Fraction
+        The gain at 0.
+    cap : Fraction or None
+        What the gain is at most.
+
+    Examples
+    --------
+    >>> zero, one = Fraction(0), Fraction(1)
+    >>> agent = ScaledAgent((zero, zero), (zero, zero), zero, one, 2 * one, None)
+    >>> agent.matrix(one, zero)
+    ((Fraction(0, 1), Fraction(1, 1)), (Fraction(0, 1), Fraction(-1, 1)))
+    """
+
+    plant: tuple[Fraction, ...]
+    own: tuple[Fraction, ...]
+    rho1: Fraction
+    k: Fraction
+    first: Fraction
+    cap: Fraction | None
+
+    @property
+    def order(self) -> int:
+        """``n``."""
+        return len(self.plant)
+
+    @property
+    def span(self) -> tuple[Fraction, Fraction] | None:
+        """The least and the largest ``zeta`` while the gain grows; None if it is capped from the start."""
+        if self.cap is not None and self.cap <= self.first:
+            return None
+        return (Fraction(0) if self.cap is None else 1 / self.cap), 1 / self.first
+
+    def matrix(self, theta: Fraction, zeta: Fraction) -> Matrix:
+        """Return ``A_z``."""
+        n = self.order
+        last = [-f - a * zeta ** (n - i) for i, (f, a) in enumerate(zip(self.own, self.plant, strict=True))]
+        rows = [[Fraction(j == i + 1) - theta * i * (i == j) for j in range(n)] for i in range(n)]
+        rows[-1] = [x + y for x, y in zip(rows[-1], last, strict=True)]
+        return tuple(map(tuple, rows))
+
+    @cached_property
+    def coefficients(self) -> list[Matrix]:
+        """``A_z`` while the gain grows, as a polynomial in ``zeta``, the constant one first."""
+        n, zero = self.order, Fraction(0)
+        theta = [1 / self.k, -2 * self.rho1 / self.k, self.rho1**2 / self.k]
+        powers = []
+        for m in range(max(n, 2) + 1):
+            rows = [[Fraction(m == 0 and j == i + 1) for j in range(n)] for i in range(n)]
+            for i in range(n):
+                rows[i][i] -= i * theta[m] if m < 3 else zero
+            if m == 0:
+                rows[-1] = [x - f for x, f in zip(rows[-1], self.own, strict=True)]
+            elif m <= n:
+                rows[-1][n - m] -= self.plant[n - m]
+            powers.append(tuple(map(tuple, rows)))
+        return powers
+
+    def vertices(self, points: Sequence[Fraction]) -> list[np.ndarray]:
+        """Return matrices in floats whose convex hull holds every ``A_z``: those of Bernstein, and that of the cap."""
+        matrices = [A for low, high in pairwise(map(float, points)) for A in self._bernstein(low, high)]
+        return matrices + ([] if self.cap is None else [_floats(self.matrix(Fraction(0), 1 / self.cap))])
+
+    def _bernstein(self, low: float, high: float) -> list[np.ndarray]:
+        """Return the Bernstein matrices of ``A_z`` while the gain grows, between two values of ``zeta``."""
+        C, m = list(map(_floats, self.coefficients)), len(self.coefficients) - 1
+        shifted = [
+            (high - low) ** j * sum(comb(p, j) * low ** (p - j) * C[p] for p in range(j, m + 1)) for j in range(m + 1)
+        ]
+        shares = np.array([[comb(i, j) / comb(m, j) for j in range(m + 1)] for i in range(m + 1)])
+        return list(np.einsum("ij,jab->iab", shares, np.array(shifted)))
+
+
+def _floats(A: Matrix) -> np.ndarray:
+    return np.array([[float(x) for x in row] for row in A])
+
+
+@dataclass(frozen=True)
+class AgentMatrix:
+    """A proved ``W``, for a rate and the gains of one agent.
+
+    Attributes
+    ----------
+    W : n rows of n Fraction
+    rate : Fraction
+        ``r``, per unit of the stretched clock.
+    points : tuple of Fraction
+        Ends of the intervals of ``zeta`` on which the Bernstein matrices prove it.
+    coupling : Fraction
+        ``c``.
+    gains : tuple of n Fraction
+        ``K = c b'W^-1``.
+    """
+
+    W: Matrix
+    rate: Fraction
+    points: tuple[Fraction, ...]
+    coupling: Fraction
+    gains: tuple[Fraction, ...]
+
+    @cached_property
+    def inverse(self) -> Matrix:
+        """``P = W^-1``."""
+        return inverse(self.W)
+
+
+def inverse(W: Matrix) -> Matrix:
+    """Return the inverse of a positive definite matrix.
+
+    Examples
+    --------
+    >>> inverse(((Fraction(2), Fraction(1)), (Fraction(1), Fraction(1))))[0]
+    (Fraction(1, 1), Fraction(-1, 1))
+    """
+    n = len(W)
+    rows = [[*row, *(Fraction(i == j) for j in range(n))] for i, row in enumerate(W)]
+    for k in range(n):
+        rows[k] = [x / rows[k][k] for x in rows[k]]
+        for i in range(n):
+            if i != k and rows[i][k]:
+                rows[i] = [x - rows[i][k] * y for x, y in zip(rows[i], rows[k], strict=True)]
+    return tuple(tuple(row[n:]) for row in rows)
+
+
+def margin(A: Matrix, W: Matrix, rate: Fraction, driven: bool = True) -> Matrix:
+    """Return ``b b' - rate W - A W - W A'``, or this without ``b b'``."""
+    n = len(W)
+    AW = [[sum((A[i][k] * W[k][j] for k in range(n)), Fraction(0)) for j in range(n)] for i in range(n)]
+    return tuple(
+        tuple(Fraction(driven and i == j == n - 1) - rate * W[i][j] - AW[i][j] - AW[j][i] for j in range(n))
+        for i in range(n)
+    )
+
+
+def nonnegative(S: Matrix) -> bool:
+    """Tell whether a symmetric matrix is positive semidefinite, exactly.
+
+    Examples
+    --------
+    >>> nonnegative(((Fraction(1, 2), Fraction(1, 2)), (Fraction(1, 2), Fraction(1, 2))))
+    True
+    """
+    return semidefinite(integers(S)[0])
+
+
+def prove_decrease(agent: ScaledAgent, W: Matrix, rate: Fraction) -> tuple[Fraction, ...] | None:
+    """Return ends of intervals of ``zeta`` on which Bernstein matrices prove ``F >= 0``; None if they do not.
+
+    Intervals are halved where they do not prove it, which ends where ``F > 0``.
+    """
+    cap = [] if agent.cap is None else [agent.matrix(Fraction(0), 1 / agent.cap)]
+    if not arithmetic().definite(integers(W)[0]) or not all(nonnegative(margin(A, W, rate)) for A in cap):
+        return None
+    if agent.span is None:
+        return ()
+    zero = Fraction(0)
+    parts = [margin(A, W, rate if j == 0 else zero, j == 0) for j, A in enumerate(agent.coefficients)]
+    whole, n = integers([row for part in parts for row in part])[0], len(W)
+    F = [whole[n * j : n * j + n] for j in range(len(parts))]
+    points, todo = [agent.span[0]], [agent.span]
+    while todo:
+        low, high = todo.pop()
+        if nonnegative_between(F, low, high):
+            points.append(high)
+        elif len(points) + len(todo) + 2 > MOST_POINTS or not nonnegative_between(F, high, high):
+            return None  # at a point it does not hold, or it holds too narrowly
+        else:
+            middle = (low + high) / 2
+            todo += [(middle, high), (low, middle)]
+    return tuple(points)
+
+
+def agent_matrix(agent: ScaledAgent, rate: Fraction, coupling: Fraction) -> AgentMatrix:
+    """Search ``W`` for a rate, round it so that the gains ``K = c b'W^-1`` are short, and prove it.
+
+    Raises
+    ------
+    NoCertificate
+        Nothing that the search found was proved.
+
+    Examples
+    --------
+    >>> zero, one = Fraction(0), Fraction(1)
+    >>> agent = ScaledAgent((zero, zero), (zero, zero), zero, one, 2 * one, None)
+    >>> [float(x) for x in agent_matrix(agent, Fraction(4), one).gains]  # 12 and 6, and a little to spare
+    [12.03, 6.008]
+    """
+    points = [] if agent.span is None else list(agent.span)
+    for _ in range(4):
+        found = feedback_matrix(agent.vertices(points), float(rate))
+        if (proved := round_and_prove(agent, found, rate, coupling)) is not None:
+            return proved
+        points = sorted({*points, *((a + b) / 2 for a, b in pairwise(points))})
+    raise NoCertificate(f"no matrix for agents of order {agent.order} was proved at the rate {float(rate):.6g}")
+
+
+def paper_matrix(agent: ScaledAgent, beta: Fraction) -> AgentMatrix:
+    """Return the matrix of single integrators under the paper's protocol: ``K = 1``, ``W = c = 1/beta``, ``r = beta``.
+
+    Then ``F = 1 - r W = 0``, ``V`` is ``beta`` times the Lyapunov function of the graph, and every bound is the same.
+
+    Examples
+    --------
+    >>> zero, one = Fraction(0), Fraction(1)
+    >>> paper_matrix(ScaledAgent((zero,), (zero,), one, one, 2 * one, None), Fraction(3)).gains
+    (Fraction(1, 1),)
+    """
+    W = ((1 / beta,),)
+    points = prove_decrease(agent, W, beta)
+    if points is None:
+        raise NoCertificate("the paper's protocol is that of single integrators")
+    return AgentMatrix(W, beta, points, 1 / beta, (Fraction(1),))
+
+
+def round_and_prove(agent: ScaledAgent, found: np.ndarray, rate: Fraction, coupling: Fraction) -> AgentMatrix | None:
+    """Round a matrix so that ``K = c b'W^-1`` has few digits, and prove it; None if no rounding proves."""
+    W = [[round_to_bits(float(x), BITS) for x in row] for row in found]
+    gains = float(coupling) * np.linalg.solve(found, np.eye(len(found))[-1])
+    for digits in DIGITS:
+        K = tuple(Fraction(f"{x:.{digits - 1}e}") for x in gains)
+        exact = with_gains(W, [x / coupling for x in K])
+        if (points := prove_decrease(agent, exact, rate)) is not None:
+            return AgentMatrix(exact, rate, points, coupling, K)
+    return None
+
+
+def with_gains(W: Sequence[Sequence[Fraction]], g: Sequence[Fraction]) -> Matrix:
+    """Return the symmetric matrix next to ``W`` with ``W g = b``, ``b`` the last unit vector: so ``g = b'W^-1``.
+
+    Of all such it is the nearest one in the Frobenius norm (the symmetric update of Powell).
+
+    Examples
+    --------
+    >>> with_gains([[Fraction(2), Fraction(1)], [Fraction(1), Fraction(1)]], [Fraction(-1), Fraction(2)])[0]
+    (Fraction(2, 1), Fraction(1, 1))
+    """
+    n = len(g)
+    rest = [Fraction(i == n - 1) - sum((W[i][j] * g[j] for j in range(n)), Fraction(0)) for i in range(n)]
+    size, along = sum(x * x for x in g), sum((x * y for x, y in zip(g, rest, strict=True)), Fraction(0))
+    return tuple(
+        tuple(W[i][j] + (rest[i] * g[j] + g[i] * rest[j] - along * g[i] * g[j] / size) / size for j in range(n))
+        for i in range(n)
+    )

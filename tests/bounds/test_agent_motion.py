@@ -1,0 +1,48 @@
+"""The common motion of agents of order n, against ball arithmetic."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import flint
+import numpy as np
+import pytest
+
+from ptcc_certify.bounds.agent_motion import common_motion, companion, decay_integral
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.protocols.gain import Gain
+
+
+def ball(x: Fraction) -> flint.arb:
+    return flint.arb(flint.fmpq(x.numerator, x.denominator))
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_the_free_motion_encloses_the_exponential(seed: int):
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(1, 6))
+    plant = [Fraction(int(x), 10) for x in rng.integers(-40, 41, n)]
+    gain = Gain(T=Fraction(int(rng.integers(1, 30)), 10), rho1=1, rho2=1, kappa=1)
+    flint.ctx.prec = 300
+    A = flint.arb_mat([[ball(gain.T * x) for x in row] for row in companion(plant)])
+    true = A.exp()
+    for i, row in enumerate(common_motion(plant, [Fraction(0)] * n, gain)):
+        for j, (middle, radius) in enumerate(row):
+            assert abs(true[i, j] - ball(middle)) <= ball(radius)
+            assert float(radius) <= 1e-20 * (1 + abs(float(middle)))
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_the_way_of_agents_that_come_to_rest(seed: int):
+    rng = np.random.default_rng(seed)
+    w, p = Fraction(int(rng.integers(-400, 401)), 10), Fraction(int(rng.integers(1, 60)), 10)
+    middle, radius = decay_integral(w, p)
+    flint.ctx.prec = 400
+    # e^(-w) 1F1(p + 1, p + 2, w)/(p + 1)
+    true = (-ball(w)).exp() * ball(w).hypgeom_1f1(ball(p + 1), ball(p + 2)) / ball(p + 1)
+    assert abs(true - ball(middle)) <= ball(radius) and float(radius) < 1e-30
+
+
+def test_a_way_that_is_too_steep_is_refused():
+    with pytest.raises(ParameterError, match="smaller rest"):
+        decay_integral(Fraction(101), Fraction(1))

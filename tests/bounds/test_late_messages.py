@@ -1,0 +1,397 @@
+"""What is proved with late messages, and of leaders that move, against runs that are solutions up to rounding."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any
+
+import networkx as nx
+import numpy as np
+import pytest
+from late_certificates import led_graph
+
+from ptcc_certify.bounds import late_messages
+from ptcc_certify.bounds.final_state import final_state
+from ptcc_certify.bounds.late_messages import LateBounds, bound_late
+from ptcc_certify.bounds.small_delays import delay_threshold
+from ptcc_certify.bounds.staged_deadlines import levels
+from ptcc_certify.bounds.tracking import bound_tracking
+from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.errors import HypothesisError, ParameterError
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.structure import Structure, analyse
+from ptcc_certify.lyapunov.follower_rows import FollowerRows
+from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.protocols.moving_leaders import MovingLeaders
+from ptcc_certify.simulation.late_messages import PATTERNS, simulate_late
+from ptcc_certify.simulation.moving_leaders import simulate_tracking
+
+#: What rounding in floats may do to a run, relatively.
+ROUNDING = 1e-9
+#: What it leaves of a deviation, over the largest state at first.
+FLOOR = 1e-12
+
+
+def _case(seed: int, **kinds: Any) -> tuple[np.random.Generator, Structure, NominalProtocol, list[Fraction], Any]:
+    rng = np.random.default_rng(seed)
+    signs = str(rng.choice(["mixed", "positive", "gauge"]))
+    structure = analyse(led_graph(rng, int(rng.integers(1, 4)), int(rng.integers(1, 7)), signs=signs, **kinds))
+    protocol = NominalProtocol(
+        T=Fraction(int(rng.integers(2, 30)), 10),
+        rho1=Fraction(int(rng.integers(1, 20)), 10),
+        rho2=Fraction(int(rng.integers(2, 60)), 10),
+        kappa=1,
+    )
+    x0 = [Fraction(int(x), 10) for x in rng.integers(-100, 100, structure.graph.n_nodes)]
+    return rng, structure, protocol, x0, final_state(structure, x0)
+
+
+def _messages(rng: np.random.Generator, protocol: NominalProtocol, exact: bool) -> LateMessages:
+    delay = protocol.T * Fraction(int(10 ** rng.uniform(0.5, 2.5)), 1000)
+    capped = Fraction(int(rng.integers(5, 80))) if rng.random() < 0.3 else None
+    if rng.random() < 0.4:
+        losses = int(rng.integers(0, 4))
+        error = Fraction(0) if exact else Fraction(int(rng.integers(1, 9)), 10)
+        return LateMessages(
+            delay / 2, period=delay / (2 * losses + 2), losses=losses, value_error=error, gain_cap=capped
+        )
+    return LateMessages(delay=delay, gain_cap=capped)
+
+
+def _worst(bounds: LateBounds, run: Any, ends: np.ndarray) -> float:
+    F = bounds.structure.followers
+    away = np.maximum(np.abs(run.states - ends[:, None])[F] - FLOOR * np.abs(run.states[:, 0]).max(), 0)
+    allowed = bounds.deviation_bound(run.t)
+    assert bounds.residual is not None
+    last = (away[:, -1] / bounds.residual[F]).max()
+    return max(float((away / allowed).max()), float(last))
+
+
+def _apart(rng: np.random.Generator, structure: Structure, messages: LateMessages) -> LateMessages:
+    """The same with a delay of every edge by itself, none above that of all."""
+    shares = rng.choice([0.05, 0.2, 0.7, 1.0], structure.graph.n_edges)
+    shares[int(rng.integers(0, shares.size))] = 1.0
+    whole = messages.largest_delay
+    each = {(s, t): whole * Fraction(float(x)) for (s, t, _), x in zip(structure.graph.edges, shares, strict=True)}
+    return replace(messages, delay=each)
+
+
+def _judge_late(seed: int, patterns: tuple[str, ...] = PATTERNS, apart: bool = False) -> list[float]:
+    rng, structure, protocol, x0, ends = _case(seed)
+    messages = _messages(rng, protocol, exact=bool(rng.random() < 0.5))
+    messages = _apart(rng, structure, messages) if apart else messages
+    bounds = bound_late(structure, protocol, messages, x0, ends.intervals)
+    start = [float(x) for x in x0]
+    ratios = []
+    for pattern in patterns:
+        run = simulate_late(structure.graph, protocol, messages, start, pattern=pattern, seed=seed, steps=300)  # type: ignore[arg-type]
+        ratios.append(_worst(bounds, run, np.asarray(ends, dtype=float)))
+        assert ratios[-1] <= 1 + ROUNDING, (seed, pattern)
+    return ratios
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_run_with_late_lost_or_rounded_messages_exceeds_what_is_proved(seed: int) -> None:
+    _judge_late(seed, (PATTERNS[seed],))
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("block", range(11))
+def test_220_graphs_of_constant_varying_and_square_delays_keep_their_bounds(block: int) -> None:
+    worst = [max(_judge_late(1000 + 20 * block + k, apart=k % 3 == 0)) for k in range(20)]
+    assert max(worst) <= 1 + ROUNDING
+
+
+@pytest.mark.parametrize("seed", range(4, 7))
+def test_delays_of_single_edges_leave_no_more_than_the_largest_for_all_and_no_run_exceeds_that(seed: int) -> None:
+    rng, structure, protocol, x0, ends = _case(seed)
+    alike = LateMessages(delay=protocol.T / 20)
+    apart = _apart(rng, structure, alike)
+    whole, single = (bound_late(structure, protocol, one, x0, ends.intervals) for one in (alike, apart))
+    assert (single.residual <= whole.residual * 1.02).all()  # type: ignore[operator, union-attr]
+    _judge_late(seed, ("oldest", "varying"), apart=True)
+
+
+def test_messages_of_leaders_at_rest_may_be_as_old_as_they_like() -> None:
+    graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 2), ("c", "b", -1), ("a", "c", 1)])
+    structure, protocol = analyse(graph), NominalProtocol(T=1, rho1=1, rho2=4, kappa=1)
+    each = {("a", "b"): "0.3", ("a", "c"): "0.3", ("b", "c"): "0.009375", ("c", "b"): "0.009375"}
+    single = bound_late(structure, protocol, LateMessages(delay=each))
+    among = bound_late(structure, protocol, LateMessages(delay="0.009375"))
+    assert single.largest <= among.largest * 1.05
+    cert = certify(graph, protocol, messages=LateMessages(delay=each), simulation=False, method="paper")
+    assert cert.checked is not None and cert.checked.accepted, cert.checked
+    assert cert.late is not None and cert.late.largest <= among.largest * 1.05
+
+
+def test_initial_deviations_of_many_followers_are_bounded_from_above_and_nearly_exact(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(late_messages, "SEARCHED_FOLLOWERS", 0)
+    rows = FollowerRows(analyse(SignedDigraph.from_edges([(0, k, 1) for k in range(1, 8)])))
+    state = [Fraction(1), *(Fraction(10) ** k / 3 for k in range(-3, 4))]
+    ends = [(Fraction(1, 3), Fraction(v, 10**12)) for v in range(8)]
+    exact = [abs(x - mid) + radius for x, (mid, radius) in zip(state, ends, strict=True)][1:]
+    above = [Fraction(float(x)) for x in late_messages._away(rows, state, ends)]
+    for x, y, size in zip(exact, above, state[1:], strict=True):
+        assert x <= y <= x + (size + 1) / 10**14
+
+
+def test_a_bound_that_no_longer_falls_leaves_room_for_how_the_check_rounds() -> None:
+    rng = np.random.default_rng(7)
+    graph, x0 = led_graph(rng, 2, 4), [Fraction(int(v), 10) for v in rng.integers(-100, 100, 6)]
+    protocol, messages = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1), LateMessages(delay=1)
+    cert = certify(graph, protocol, x0, messages=messages, simulation=False, method="paper")
+    assert cert.checked is not None
+    assert cert.checked.accepted, cert.checked.reason
+
+
+def _missing(seeds: range) -> Iterator[tuple[Structure, NominalProtocol, list[Fraction], LateBounds]]:
+    for seed in seeds:
+        _, structure, protocol, x0, ends = _case(seed)
+        messages = LateMessages(delay=protocol.T / 8)
+        bounds = bound_late(structure, protocol, messages, x0, ends.intervals)
+        if bounds.missed is not None:
+            yield structure, protocol, x0, bounds
+
+
+def _judge_missed(seeds: range) -> int:
+    count = 0
+    for structure, protocol, x0, bounds in _missing(seeds):
+        older = LateMessages(delay=protocol.T / 6)  # of which a step takes a sixth at most: never below T/8
+        run = simulate_late(structure.graph, protocol, older, [float(x) for x in x0], steps=200)
+        end = np.asarray(final_state(structure, x0), dtype=float)
+        k = bounds.missed.agent  # type: ignore[union-attr]
+        away = abs(run.states[k, -1] - end[k]) + FLOOR * float(max(map(abs, x0)))
+        assert away >= float(bounds.missed.bound) * (1 - ROUNDING)  # type: ignore[union-attr]
+        count += 1
+    return count
+
+
+def test_who_is_said_to_miss_the_deadline_misses_it_by_so_much() -> None:
+    assert _judge_missed(range(3, 5)) > 0
+
+
+@pytest.mark.campaign
+def test_the_lower_bound_of_what_is_missed_is_kept_on_200_graphs() -> None:
+    assert _judge_missed(range(2000, 2200)) >= 50
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_agents_with_deadlines_one_delay_apart_are_at_their_final_states_exactly(seed: int) -> None:
+    _, structure, protocol, x0, ends = _case(seed, acyclic=True)
+    messages = LateMessages(delay=protocol.T / 20)
+    bounds = bound_late(structure, protocol, messages, x0, ends.intervals)
+    assert bounds.staged is not None
+    assert max(bounds.staged) == protocol.T
+    deadlines = [protocol.T] * structure.graph.n_nodes
+    for v, end in zip(structure.followers, bounds.staged, strict=True):
+        deadlines[v] = end
+    start = [float(x) for x in x0]
+    for pattern in ("oldest", "square"):
+        run = simulate_late(structure.graph, protocol, messages, start, pattern=pattern, deadlines=deadlines, steps=200)
+        away = np.abs(run.states[:, -1] - np.asarray(ends, dtype=float))
+        assert away.max() <= 1e-9 * max(1, max(map(abs, x0)))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_levels_are_longest_paths_from_leaders_and_a_cycle_has_none(seed: int) -> None:
+    rows = FollowerRows(analyse(led_graph(np.random.default_rng(seed), 2, 6, acyclic=seed % 2 == 0)))
+    heard = (rows.W.toarray() > 0).astype(float)
+    found, count = levels(rows), len(heard)
+    if np.linalg.matrix_power(heard, count).any():  # a path of so many edges goes round
+        assert found is None
+        return
+    paths = [length for length in range(count) if np.linalg.matrix_power(heard, length).any()]
+    longest = [
+        1 + max(length for length in paths if np.linalg.matrix_power(heard, length)[k].any()) for k in range(count)
+    ]
+    assert found is not None
+    assert found.tolist() == longest
+
+
+def test_levels_of_many_followers_are_found_along_every_edge_once() -> None:
+    chain = FollowerRows(analyse(SignedDigraph.from_edges([(k, k + 1, 1) for k in range(20_000)])))
+    found = levels(chain)
+    assert found is not None
+    assert found.max() == 20_000
+
+
+def test_one_common_deadline_is_missed_where_deadlines_of_stages_are_met() -> None:
+    chain = analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 3, 1), (3, 4, -1)]))
+    protocol, messages = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1), LateMessages(delay="0.1")
+    run = simulate_late(chain.graph, protocol, messages, [1, 0, 0, 0], steps=200)
+    assert abs(run.states[2, -1] - 1) > 1e-3
+    late = bound_late(chain, protocol, messages, [Fraction(1), Fraction(0), Fraction(0), Fraction(0)], None)
+    assert late.staged == (Fraction(4, 5), Fraction(9, 10), Fraction(1))
+    assert bound_late(chain, protocol, LateMessages(delay="0.5")).staged is None  # information has not arrived
+
+
+@pytest.mark.parametrize("share, grows", [(0.99, False), (1.01, True)])
+def test_a_late_own_state_settles_up_to_the_threshold_of_the_delay_and_no_further(share: float, grows: bool) -> None:
+    structure = analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1), (2, 3, -2), (3, 1, 1)]))
+    gain = 40.0
+    delay = share * delay_threshold(structure, gain)
+    # The equation itself, at constant gain, in steps of a 60th of the delay by the trapezoidal rule.
+    each, steps = delay / 60, 60 * 400
+    L, x = structure.graph.dense_laplacian(), np.zeros((steps + 61, 3))
+    x[:61] = np.random.default_rng(1).normal(size=3)
+    for i in range(60, steps + 60):
+        x[i + 1] = x[i] - each * gain * (L @ (x[i - 60] + x[i - 59])) / 2
+    E = x @ L.T
+    early, late = (np.abs(E[part]).max() for part in (slice(6_000, 9_000), slice(-3_000, None)))
+    assert (late > early) == grows
+
+
+def test_an_own_state_that_is_late_diverges_without_a_cap_as_is_said_where_it_is_refused() -> None:
+    with pytest.raises(ParameterError, match="makes the protocol diverge, for its gain grows without limit before T"):
+        LateMessages(delay="0.01", own_delay=True)
+    pair, p = SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1)]), NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
+    sizes = [
+        np.abs(
+            simulate_late(pair, p, LateMessages(delay="0.2", own_delay=True, gain_cap=cap), [1, 0], steps=200).states
+        ).max()
+        for cap in (10, 1000, 100_000)
+    ]
+    assert sizes[0] < sizes[1] < sizes[2]
+
+
+BAD = [
+    ({"delay": -1}, "delay = -1 is outside its domain"),
+    ({"delay": float("nan")}, "delay = nan is not a finite number"),
+    ({"delay": 1, "losses": 3}, "losses without a period: tell how long it is from one message to the next"),
+    ({"delay": 1, "period": 0}, "period = 0 is outside its domain"),
+    ({"delay": 1, "period": 1, "losses": -1}, "losses = -1 is not a number of messages, 0 to 1,000,000"),
+    ({"delay": 0}, "messages that are neither late, nor lost, nor rounded; give a delay, a period or a value error"),
+    ({"delay": {"a": 1}}, "a delay of 'a', which is no edge; name it as (source, target)"),
+]
+
+
+@pytest.mark.parametrize("options, said", BAD)
+def test_messages_outside_their_domain_are_refused_by_name(options: dict[str, Any], said: str) -> None:
+    with pytest.raises(ParameterError) as error:
+        LateMessages(**options)
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_a_delay_of_an_edge_that_is_not_there_is_named() -> None:
+    pair = analyse(SignedDigraph.from_edges([("a", "b", 1)]))
+    protocol = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
+    with pytest.raises(ParameterError, match="a delay of b -> a, but the graph has no such edge"):
+        bound_late(pair, protocol, LateMessages(delay={("b", "a"): 1}))
+
+
+# ---------------------------------------------------------------------- leaders that move
+
+
+def _judge_tracking(seed: int) -> tuple[float, float]:
+    """Return the worst ratio before T without the sign term, and after T to its bound."""
+    rng, structure, protocol, x0, ends = _case(seed)
+    speed, delta = Fraction(int(rng.integers(0, 30)), 10), Fraction(int(rng.integers(1, 20)), 10)
+    leaders = MovingLeaders(speed=speed, disturbance=delta)
+    tracking = bound_tracking(structure, protocol, leaders, x0, ends.intervals)
+    run = simulate_tracking(structure.graph, protocol, leaders, [float(x) for x in x0], u=tracking.witness.u, steps=300)
+    F, T = structure.followers, float(protocol.T)
+    away = np.abs(run.states - run.targets)[F]
+    before, after = run.t < T * (1 - 1e-8), run.t > T * (1 + 1e-8)
+    bound = tracking.distance_bound(1 - run.t[before] / T)
+    scale = max(1.0, float(max(map(abs, x0))))
+    ratio = float(((away[:, before] - 1e-12 * scale) / bound).max())
+    later = float((away[:, after] / tracking.witness.u[:, None]).max() / float(tracking.after))
+    if tracking.input is not None:
+        e = np.abs(structure.graph.dense_laplacian() @ run.states)[F][:, before]
+        assert (protocol.gain.value(run.t[before]) * e <= tracking.input[F][:, None] * (1 + 1e-6)).all()
+    return ratio, later
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_followers_of_the_worst_leaders_track_them_as_is_proved_and_stay_as_near_after_T(seed: int) -> None:
+    ratio, later = _judge_tracking(seed)
+    assert ratio <= 1 + ROUNDING
+    assert later <= 1 + ROUNDING
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("block", range(10))
+def test_100_graphs_of_moving_leaders_keep_their_bounds(block: int) -> None:
+    worst = [_judge_tracking(3000 + 10 * block + k) for k in range(10)]
+    assert max(max(pair) for pair in worst) <= 1 + ROUNDING
+
+
+def _judge_sign(seed: int) -> float:
+    """Return the worst ratio with the sign term, allowing for its boundary layer."""
+    _, structure, protocol, x0, ends = _case(seed)
+    leaders = MovingLeaders(speed=1, disturbance="1/2", sign_gain="3/2")
+    tracking = bound_tracking(structure, protocol, leaders, x0, ends.intervals)
+    run = simulate_tracking(structure.graph, protocol, leaders, [float(x) for x in x0], u=tracking.witness.u, steps=400)
+    F, T = structure.followers, float(protocol.T)
+    away = np.abs(run.states - run.targets)[F] / tracking.witness.u[:, None]
+    at = 1 - run.t / T
+    bound = tracking.distance_bound(np.maximum(at, 0)) / tracking.witness.u[:, None]
+    # Within the layer |e_k| <= 2 mu dt sum_l |L_kl|; at the row of the maximum |e_k| >= a u_k m; dt <= T/200.
+    rows = np.abs(structure.graph.dense_laplacian()[np.ix_(F, F)]).sum(axis=1)
+    width, dt = 2 * 1.5 * rows / (float(tracking.witness.b) * tracking.witness.u), T / 200
+    layer = dt * float(width.max() + 4 * 1.5 / tracking.witness.u.min())
+    return float(((away - layer) / np.maximum(bound, 1e-9)).max())
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_with_the_sign_term_followers_stay_on_their_targets_but_for_the_boundary_layer(seed: int) -> None:
+    assert _judge_sign(seed) <= 1
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("block", range(5))
+def test_with_the_sign_term_100_graphs_keep_their_bounds(block: int) -> None:
+    assert max(_judge_sign(4000 + 20 * block + k) for k in range(20)) <= 1
+
+
+def test_a_sign_gain_below_what_pushes_is_refused_and_leaders_in_a_group_too() -> None:
+    with pytest.raises(ParameterError, match=r"sign_gain = 1 is below speed \+ disturbance = 2"):
+        MovingLeaders(speed=1, disturbance=1, sign_gain=1)
+    group = analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1), (2, 3, 1)]))
+    protocol = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
+    with pytest.raises(HypothesisError, match="1 and 2 are leaders of one group"):
+        bound_tracking(group, protocol, MovingLeaders(speed=1))
+
+
+def test_runs_refuse_what_they_cannot_run_by_name() -> None:
+    pair, p = SignedDigraph.from_edges([(1, 2, 1)]), NominalProtocol(1, 1, 2, 1)
+    late, moving = LateMessages(delay="0.1"), MovingLeaders(speed=1)
+    for messages, x0, more, said in (
+        (0.1, [1, 0], {}, "messages = 0.1 is none"),
+        (late, [1, 0, 0], {}, "x0"),
+        (late, [1, math.nan], {}, "x0"),
+        (late, [1, 0], {"steps": 0}, "steps"),
+        (late, [1, 0], {"seed": -1}, "seed"),
+        (late, [1, 0], {"pattern": "never"}, "pattern"),
+        (late, [1, 0], {"deadlines": [1]}, "deadlines are 1 for 2 agents"),
+        (LateMessages(delay="1e-9"), [1, 0], {}, "more than 20,000 steps"),
+    ):
+        with pytest.raises(ParameterError, match=said):
+            simulate_late(pair, p, messages, x0, **more)
+    for graph, leaders, x0, more, said in (
+        (pair, 1, [1, 0], {}, "leaders that move run under the nominal protocol"),
+        (pair, moving, [1], {}, "x0"),
+        (pair, moving, [1, 0], {"steps": 0}, "steps"),
+        (pair, moving, [1, 0], {"u": [0]}, "u is not 1 positive numbers"),
+        (SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1)]), moving, [1, 1], {}, "one group"),
+    ):
+        with pytest.raises((ParameterError, HypothesisError), match=said):
+            simulate_tracking(graph, p, leaders, x0, **more)
+    assert simulate_late(nx.DiGraph([(1, 2, {"weight": 1})]), p, late, [1, 0]).states.shape[0] == 2
+
+
+def test_certificates_show_and_draw_late_messages_and_moving_leaders() -> None:
+    chain, p = SignedDigraph.from_edges([(1, 2, 1), (2, 3, -1)]), NominalProtocol(1, 1, 2, 1)
+    for name, asked in (("late", {"messages": LateMessages(delay="0.1")}), ("tracking", {"leaders": MovingLeaders(1)})):
+        cert = certify(chain, p, [1, 0, 2], method="perron", simulation=False, **asked)
+        assert cert.plot(name).lines
+        assert len(repr(getattr(cert, name))) < 120
+        assert "<svg" in cert._repr_html_() or "<img" in cert._repr_html_()
+    assert certify(chain, p, method="perron", messages=LateMessages(delay="0.1")).late.relative

@@ -1,0 +1,379 @@
+"""Certificates of agents of order n: what is proved, against exact and integrated motions; what is refused, and how."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from math import comb
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from agent_cases import agent_case
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm
+
+from ptcc_certify.certificate.certificate import Certificate, read_certificate
+from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.request import Expectations
+from ptcc_certify.certificate.verdict import MET
+from ptcc_certify.checker import check
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.protocols.agents import Agents
+from ptcc_certify.report.screen import summary_lines
+
+TEAM = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("c", "a", -1), ("c", "d", 1), ("d", "c", 1)])
+PAIR = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
+ENEMIES = SignedDigraph.from_edges([("a", "b", -1), ("b", "c", -2), ("c", "a", -1), ("b", "a", -1)])
+CAMPS = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -2), ("c", "a", "-1/2"), ("c", "f", -1), ("a", "f", 2)])
+NOMINAL = NominalProtocol(T=2, rho1=1, rho2=1, kappa=2)
+SLIDING = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
+
+
+def made(graph: Any, protocol: Any, x0: Any, agents: Agents, **options: Any) -> Certificate:
+    return certify(graph, protocol, x0, agents=agents, method="perron", **options)
+
+
+def seen(seed: int, order: int | None = None) -> tuple[Certificate, Any]:
+    """The certificate of a random case, and its run against the bounds."""
+    case = agent_case(seed, order)
+    certificate = made(case.graph, case.protocol, case.x0, case.agents, derivatives=case.derivatives)
+    return certificate, certificate.agents_comparison
+
+
+def kernel_projection(graph: SignedDigraph) -> np.ndarray:
+    """``Q`` in floats, from the singular vectors of ``L``: onto its kernel along its range."""
+    L = graph.laplacian().toarray()
+    left, sizes, right = np.linalg.svd(L)
+    rank = int((sizes > 1e-9 * max(sizes.max(initial=0), 1e-300)).sum())
+    N, M = right[rank:].T, left[:, rank:]
+    return N @ np.linalg.solve(M.T @ N, M.T)
+
+
+def holds(certificate: Certificate, comparison: Any) -> None:
+    """Accepted, no bound exceeded, and the final state is the projection of one agent's free motion."""
+    part = certificate.agents
+    assert part is not None and certificate.verdict == "certified", certificate.checked
+    assert comparison is None or comparison.worst <= 1 + 1e-7, comparison
+    if any(part.protocol.own):
+        return
+    n, T = part.order, float(part.protocol.gain.T)
+    A = np.eye(n, k=1)
+    A[-1] = [-float(a) for a in part.protocol.plant]
+    xi = np.array([[[float(x) for x in chain] for chain in agent] for agent in part.initial_state or ()])
+    h = np.array([[float(x) for x in row] for row in part.protocol.offsets])
+    xi[:, :, 0] -= h
+    end = np.einsum("kl,ldj,ij->kdi", kernel_projection(certificate.graph), xi, expm(A * T))
+    end[:, :, 0] += h
+    claimed = np.array([[[float(m) for m, _ in chain] for chain in agent] for agent in part.final_state or ()])
+    assert np.abs(end - claimed).max() <= 1e-7 * max(1.0, np.abs(end).max())
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_bounds_hold_on_random_graphs_and_agents(seed: int):
+    holds(*seen(seed))
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("seed", range(4, 330))
+def test_bounds_hold_on_many_random_graphs_and_agents(seed: int):
+    holds(*seen(seed))
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("seed", range(20))
+def test_bounds_hold_for_agents_of_orders_four_to_eight(seed: int):
+    holds(*seen(seed, 4 + seed % 5))
+
+
+def test_a_run_obeys_the_equation_of_the_agents_in_time():
+    agents = Agents(plant=[Fraction(1, 2), Fraction(-1, 5)], offsets=[[1], [0], [2], [-1]])
+    part = made(TEAM, NOMINAL, [5, 2, 4, -1], agents, v0=[1, 0, 0, -2]).agents
+    assert part is not None
+    run = part.simulate(remaining=0.02)
+    loop = part.protocol.closed_loop(TEAM)
+    import casadi as ca
+
+    slope = ca.Function("f", [loop["t"], loop["x"]], [loop["ode"]])
+    begin = run.states[:, 0, :, 0].T.ravel()
+    t = run.t[run.t <= 0.98 * 2]
+    told = solve_ivp(lambda s, x: np.array(slope(s, x)).ravel(), (0, t[-1]), begin, "DOP853", t, rtol=1e-11, atol=1e-12)
+    ours = run.states[:, 0, :, : t.size].transpose(1, 0, 2).reshape(8, -1)
+    assert np.abs(told.y - ours).max() <= 1e-7
+
+
+def test_agents_meet_in_flight_and_fly_on_as_mirror_images():
+    part = made(TEAM, NOMINAL, [5, 2, 4, -1], Agents(order=2), v0=[1, 0, 0, -2]).agents
+    assert part is not None and part.final_state is not None
+    ends = [[m for m, _ in chain] for (chain,) in part.final_state]
+    assert ends[0] == ends[1] == [-x for x in ends[2]] == [-x for x in ends[3]]
+    mean = (Fraction(4) - 1 + 2 * (0 - 2)) / 2  # c and d lead; their mean at 2 + 2 v
+    assert ends[2] == [mean, Fraction(-1)]
+
+
+def test_agents_meet_at_rest_where_their_own_velocity_is_damped():
+    part = made(TEAM, NOMINAL, [5, 2, 4, -1], Agents(order=2, rest=1), v0=[1, 0, 0, -2]).agents
+    assert part is not None and part.final_state is not None and part.input is not None
+    run = part.simulate(remaining=1e-9)
+    assert (np.nanmax(np.abs(run.input[:, 0]), axis=1) <= np.array([float(x) for x in part.input])).all()
+    assert [chain[1] for (chain,) in part.final_state] == [(0, 0)] * 4
+    claimed = [float(chain[0][0]) for (chain,) in part.final_state]
+    assert np.abs(run.positions[:, 0, -2] - claimed).max() < 1e-8
+
+
+def test_one_integrator_is_the_plain_certificate():
+    plain, same = (certify(PAIR, NOMINAL, [3, 1], simulation=False, **more) for more in ({}, {"agents": Agents(1)}))
+    assert same == plain and same.agents is None and "agents" not in same.document
+
+
+@pytest.mark.parametrize("graph", [TEAM, ENEMIES, CAMPS], ids=["team", "enemies", "camps"])
+def test_single_integrators_in_a_formation_have_the_plain_bounds_about_their_places(graph: SignedDigraph):
+    """Order 1 of the agents is the paper's protocol: gains, final states and bounds are those of ``x - h``."""
+    N, strong = graph.n_nodes, NominalProtocol(T=2, rho1=1, rho2=5, kappa=2)
+    x0, h = [5, 2, 4, -1][:N], [1, -3, 2, 2][:N]
+    ours = certify(graph, strong, x0, agents=Agents(order=1, offsets=h), method="paper")
+    plain = certify(graph, strong, [x - y for x, y in zip(x0, h, strict=True)], method="paper", simulation=False)
+    part = ours.agents
+    assert isinstance(plain, Certificate) and plain.final_state is not None and part is not None
+    assert check(ours.to_dict()).accepted and ours.verdict == "certified"
+    assert part.protocol.gains == (1,) and part.matrix.rate == plain.rate
+    ends = [chain[0][0] - y for (chain,), y in zip(part.final_state or (), h, strict=True)]
+    assert ends == list(plain.final_state.states)
+    late = np.array([0.01, 1e-6])  # before, theirs is no larger than the largest state, either
+    assert np.allclose(part.deviation_bound(late)[:, 0], plain.deviation_bound(late), rtol=1e-7, atol=0)
+    assert part.input is not None and plain.effort is not None and plain.effort.peak is not None
+    for bound, peak in zip(part.input, plain.effort.peak.agents, strict=True):
+        assert peak <= bound * (1 + Fraction(1, 10**9))  # theirs is the least over several instants, ours at 0
+    assert ours.agents_comparison.worst <= 1 + 1e-7
+
+
+def test_single_integrators_run_the_equation_of_the_plain_protocol():
+    import casadi as ca
+
+    part = made(TEAM, NOMINAL, [5, 2, 4, -1], Agents(order=1, offsets=[0] * 4)).agents
+    loops = [protocol.closed_loop(TEAM) for protocol in (part.protocol, NOMINAL)]
+    slopes = [ca.Function("f", [loop["t"], loop["x"]], [loop["ode"]]) for loop in loops]
+    for t in (0.0, 1.3, 1.999):
+        one, other = (np.array(slope(t, [5, 2, 4, -1])).ravel() for slope in slopes)
+        assert np.allclose(one, other, rtol=1e-12)
+
+
+def test_a_decay_of_single_integrators_is_not_dropped():
+    part = made(PAIR, NOMINAL, [3, 1], Agents(order=1, decay=6)).agents
+    assert part is not None and part.decay == 6
+
+
+def test_gains_come_near_those_in_closed_form_for_a_small_constant_gain():
+    for n in (2, 3, 4):
+        base = NominalProtocol(T=1, rho1="1e-9", rho2=1, kappa=1)
+        part = made(PAIR, base, None, Agents(order=n)).agents
+        assert part is not None
+        K = [float(x / part.matrix.coupling) for x in part.protocol.gains]
+        exact = [comb(n, i) * np.prod([2 * n - j for j in range(i, n)]) for i in range(n)]
+        assert np.allclose(K, exact, rtol=0.02)
+
+
+def test_agents_of_the_largest_order_are_certified():
+    certificate = made(PAIR, NOMINAL, [3, 1], Agents(order=8))
+    holds(certificate, certificate.agents_comparison)
+
+
+def test_a_file_says_what_the_certificate_says(tmp_path: Path):
+    agents = Agents(order=2, drag="0.3", offsets=[[0, 1]] * 4, gain_cap=30)
+    first = made(TEAM, SLIDING, [[5, 1], [2, 2], [4, 3], [-1, 4]], agents)
+    first.save(tmp_path / "c.json")
+    again = read_certificate(tmp_path / "c.json")
+    assert isinstance(again, Certificate) and again == first
+    one, other = first.agents, again.agents
+    assert one is not None and other is not None and one.protocol == other.protocol
+    assert np.array_equal(one.deviation_bound(np.array([0.5, 0.1])), other.deviation_bound(np.array([0.5, 0.1])))
+    assert one.residual == other.residual and one.input == other.input
+    assert summary_lines(first, "team")[4:] == summary_lines(again, "team")[4:]
+
+
+def test_every_number_that_bounds_something_cannot_be_smaller_for_nothing():
+    document = made(TEAM, NOMINAL, [5, 2, 4, -1], Agents(order=2, gain_cap=30)).to_dict()
+    for change in (
+        lambda part: part["input"]["agents"].update(a="1"),
+        lambda part: part["residual"]["agents"].update(b=["1e-9", "1e-9"]),
+        lambda part: part["residual"].update(clock="1000"),
+        lambda part: part.update(rate="3"),
+        lambda part: part.update(coupling="1/10"),
+        lambda part: part.update(gains=["1", "1"]),
+        lambda part: part["final_state"].update(a=[["0", "0"]]),
+    ):
+        data = {**document, "agents": {**document["agents"]}}
+        for key in ("input", "residual", "final_state"):
+            data["agents"][key] = {**data["agents"][key]}
+        data["agents"]["residual"]["agents"] = {**data["agents"]["residual"]["agents"]}
+        data["agents"]["input"]["agents"] = {**data["agents"]["input"]["agents"]}
+        change(data["agents"])
+        assert not check(data).accepted
+
+
+# ---------------------------------------------------------------------- what is told at the boundary
+
+
+def told(certificate: Certificate) -> str:
+    return " ".join(" ".join(summary_lines(certificate, "team")).split())
+
+
+def test_just_above_the_least_decay_the_input_is_told_not_to_be_certified_bounded():
+    certificate = made(TEAM, NOMINAL, [5, 2, 4, -1], Agents(order=2, decay="2.01"))
+    assert certificate.verdict == "certified" and certificate.agents is not None and certificate.agents.input is None
+    assert "INPUT NOT CERTIFIED BOUNDED: decay 2.01 is below 2 n = 4" in told(certificate)
+    assert "--decay 4 bounds it" in certificate.assessment.text
+
+
+@pytest.mark.parametrize(
+    ("agents", "why", "mend"),
+    [
+        ({"rest": "2/5"}, "rest 0.4 is below 0.5", "--rest 0.5 bounds it"),  # 1/k, k = 2
+        ({"rest": 1, "drag": -2}, "rest 1 is below 1.5", "--rest 1.5 bounds it"),  # 1/k + 2/eta(0), eta(0) = 2
+        (
+            {"rest": "2/5", "decay": 3},
+            "decay 3 is below 2 n = 4, rest 0.4 is below 0.5",
+            "--decay 4 and --rest 0.5 bound it",
+        ),
+    ],
+)
+def test_the_input_at_rest_is_bounded_iff_the_common_velocity_falls_fast_enough(agents: Any, why: str, mend: str):
+    certificate = made(TEAM, NOMINAL, [5, 2, 4, -1], Agents(order=2, **agents), v0=[1, 0, 0, -2])
+    assert certificate.agents is not None and certificate.agents.input is None
+    assert f"INPUT NOT CERTIFIED BOUNDED: {why}" in told(certificate) and mend in certificate.assessment.text
+    words = mend.replace("--", "").split()
+    mended = Agents(order=2, **{**agents, **{name: words[words.index(name) + 1] for name in agents if name in words}})
+    certificate = made(TEAM, NOMINAL, [5, 2, 4, -1], mended, v0=[1, 0, 0, -2])
+    assert certificate.agents is not None and certificate.agents.input is not None
+    assert check(certificate.to_dict()).accepted and certificate.agents_comparison.worst <= 1 + 1e-7
+
+
+def test_a_bound_that_is_larger_than_the_way_of_the_agents_says_little_by_t():
+    little = made(TEAM, NOMINAL, [5, 2, 4, -1], Agents(order=2, decay="2.01")).assessment
+    assert little.useful is False and little.advice == "--decay 4 bounds it"
+    certificate = made(TEAM, NOMINAL, [1, 2, -1, -1], Agents(order=2), v0=[10000, -10000, 0, 0])
+    part, assessment = certificate.agents, certificate.assessment
+    assert part is not None and part.deviation_bound(np.array([0.01]))[:, 0].max() > 0.01 * part.longest_way > 0
+    assert assessment.useful is False and "a larger --decay, such as 8, leaves less" in assessment.text
+
+
+def test_the_coupling_is_not_that_of_a_fast_function_with_a_huge_overshoot_constant():
+    edges = [
+        ("1", "2", "0.8"),
+        ("2", "3", "-1.2"),
+        ("3", "1", "-0.5"),
+        ("3", "4", 1),
+        ("4", "5", -2),
+        ("5", "4", "-0.7"),
+    ]
+    edges += [("5", "6", "1.5"), ("6", "7", 1), ("7", "6", "-0.3")]
+    graph, x0 = SignedDigraph.from_edges(edges), [3, -1, 2, 0, -4, 1, 5]
+    protocol = NominalProtocol(T=3)
+    bounds = {}
+    for method in ("paper", "perron"):
+        part = certify(graph, protocol, x0, agents=Agents(order=2), method=method, simulation=False).agents
+        assert part is not None
+        bounds[method] = part.deviation_bound(np.array([0.01])).max()
+    assert bounds["perron"] < 10 * bounds["paper"]
+
+
+def test_velocities_that_are_the_same_everywhere_are_told_once():
+    certificate = made(TEAM, NOMINAL, [5, 2, 4, -1], Agents(order=2, drag="0.1"))
+    assert "v(T) 0, of every agent (rounded)" in told(certificate)
+
+
+def test_at_twice_the_order_the_input_is_bounded():
+    assert "input bounded; |u_k| <=" in told(made(TEAM, NOMINAL, [5, 2, 4, -1], Agents(order=2, decay=4)))
+
+
+def test_velocities_that_are_not_given_are_told_to_be_zero():
+    assert "no velocities given: taken for 0" in made(TEAM, NOMINAL, [5, 2, 4, -1], Agents(order=2)).notes
+
+
+def test_one_agent_and_single_leaders_and_disconnected_graphs():
+    alone = SignedDigraph.from_edges([], ["a"])
+    certificate = made(alone, NOMINAL, [3], Agents(order=2), v0=[-1])
+    assert certificate.agents is not None and certificate.agents.final_state == ((((1, 0), (-1, 0)),),)
+    assert "no agent listens to another, each moves by itself" in told(certificate)
+    led = SignedDigraph.from_edges([("a", "b", -2)])
+    certificate = made(led, NOMINAL, [3, 5], Agents(order=2), v0=[-1, 4])
+    assert certificate.agents is not None and certificate.agents.final_state is not None
+    assert [chain[0][0] for (chain,) in certificate.agents.final_state] == [1, -1]
+    apart = SignedDigraph.from_edges([("a", "b", 1), ("c", "d", -1)])
+    certificate = made(apart, NOMINAL, [1, 2, 3, 4], Agents(order=3))
+    assert certificate.verdict == "certified" and certificate.agents is not None
+    assert [chain[0][0] for (chain,) in certificate.agents.final_state or ()] == [1, 1, 3, -3]
+
+
+DECADES = SignedDigraph.from_edges([("a", "b", "1e-30"), ("b", "a", "1e30"), ("b", "c", "-1e40"), ("c", "a", 1)])
+
+
+@pytest.mark.parametrize(
+    ("graph", "agents", "answer", "claim"),
+    [
+        (ENEMIES, {}, "stability", "stability at T = 2"),
+        (ENEMIES, {"offsets": [5, 0, 0]}, "stability of x - offsets", "stability of x - offsets at T = 2"),
+        (
+            ENEMIES,
+            {"gain_cap": 3},
+            "stability (the capped gain leaves something at T)",
+            "stability but for what the cap leaves at T = 2",
+        ),
+        (DECADES, {}, "stability (no decay is proved)", "stability of x' = u at T = 2"),
+    ],
+    ids=["plain", "formation", "capped", "undecided"],
+)
+def test_a_behaviour_is_met_only_where_it_is_proved_of_these_agents(graph: Any, agents: Any, answer: str, claim: str):
+    """In a formation, under a cap, or undecided, agents do not end at 0 at T, whatever single integrators would do."""
+    wish = Expectations(behaviour="stability")
+    certificate = made(graph, NOMINAL, [1, 2, 3], Agents(order=2, **agents), expectations=wish)
+    (judged,) = certificate.assessment.answers
+    assert str(judged) == answer and (judged.status == MET) == ("(" not in answer)
+    assert claim in told(certificate) and check(certificate.to_dict()).accepted
+
+
+REFUSED: list[tuple[dict[str, Any], dict[str, Any], str]] = [
+    ({"order": 2, "decay": 2}, {}, "not above 2 (n - 1) = 2: velocities would not agree at T; give 4"),
+    ({"order": 3, "rest": 1}, {}, "meeting at rest is proved for agents of order 2"),
+    ({"plant": [1, 0], "rest": 1}, {}, "agents without a force towards 0"),
+    ({"order": 2, "rest": 1, "gain_cap": 30}, {}, "an unlimited gain"),
+    ({"order": 9}, {}, "order = 9 is outside its domain"),
+    ({"order": 2, "plant": [1]}, {}, "plant has 1 number for agents of order 2"),
+    ({"plant": [0, 1e6]}, {}, "take a shorter deadline or another unit of time"),
+    ({"order": 2}, {"v0": [[1, 2]] * 4}, "v0 has 2 numbers for each agent, x0 has 1: give 4 x 1"),
+    ({"order": 2}, {"v0": [1, 2]}, "2 values for 4 agents"),
+    ({"order": 2}, {"derivatives": [[0] * 4, [1] * 4]}, "agents of order 2 have no acceleration to begin with"),
+    ({"order": 2, "offsets": {"z": 1}}, {}, "not in the graph"),
+    ({"order": 2}, {"at": 1}, "at is for single integrators"),
+    ({"order": 2}, {"noise": 1}, "noise is for single integrators"),
+]
+
+
+@pytest.mark.parametrize(("agents", "options", "says"), REFUSED)
+def test_what_is_not_proved_is_refused_with_the_reason(agents: Any, options: Any, says: str):
+    with pytest.raises(ParameterError) as caught:
+        made(TEAM, NOMINAL, [5, 2, 4, -1], Agents(**agents), **options)
+    assert says in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_sliding_variables_that_begin_elsewhere_are_refused():
+    with pytest.raises(ParameterError, match=r"sigma\(0\) = 0"):
+        made(TEAM, SLIDING, [5, 2, 4, -1], Agents(order=2), sigma0=[1, 0, 0, 0])
+    with pytest.raises(ParameterError, match="velocity to begin with"):
+        certify(TEAM, NOMINAL, [5, 2, 4, -1], v0=[1, 1, 1, 1])
+
+
+def test_a_faster_function_with_a_huge_constant_does_not_decide_the_coupling():
+    follower = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("a", "c", -1), ("c", "a", -1), ("c", "d", 1)])
+    agents, begin = Agents(order=2), {"x0": [5, 2, 4, -1], "v0": [1, 0, 0, -2]}
+    sizes = {}
+    for method in ("paper", "lmi"):  # the latter finds a rate near its supremum, where the follower counts for little
+        part = certify(follower, NOMINAL, agents=agents, method=method, simulation=False, **begin).agents
+        assert part is not None and part.input is not None
+        assert len(part.used) == sum(V.proved_rate * part.matrix.coupling >= 1 for V in part.functions)
+        sizes[method] = max(part.input)
+    assert sizes["lmi"] <= sizes["paper"] * Fraction(1001, 1000)
+    without = certify(follower, NOMINAL, agents=agents, method="lmi", simulation=False).agents
+    assert without is not None and without.matrix.coupling <= Fraction(1001, 1000)

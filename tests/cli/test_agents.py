@@ -1,0 +1,186 @@
+"""Agents of order n at the command line: the screen, files, figures, the page, scenarios, and what is refused."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bad_inputs import ptcc
+
+CERTIFY = ("certify", "fig1a", "--method", "paper", "--T", "2", "--no-simulation")
+
+
+def test_a_certificate_of_double_integrators_is_written_checked_drawn_and_shown(tmp_path: Path):
+    file = str(tmp_path / "c.json")
+    made = ptcc(*CERTIFY, "--agents", "double-integrator", "--dimension", "2", "--v0", "random", "-o", file)
+    assert made.code == 0 and "agents     double integrators in 2 dimensions" in made.out
+    assert "input      bounded; ||u_k|| <=" in made.out
+    checked = ptcc("check", file)
+    assert checked.code == 0 and "v(0) as in the file" in " ".join(checked.out.split())
+    for what in ("motion", "formation"):
+        assert ptcc("plot", file, "--what", what, "-o", str(tmp_path / f"{what}.svg")).code == 0
+    refused = ptcc("plot", file, "--what", "decay", "-o", str(tmp_path / "d.png"))
+    assert refused.code == 2 and "ask for --what motion or formation" in refused.err
+    assert ptcc("report", file, "-o", str(tmp_path / "c.html")).code == 0
+    page = (tmp_path / "c.html").read_text(encoding="utf-8")
+    assert "of double integrators</h1>" in page and "single integrators" not in page
+    refused = ptcc("report", file, "-o", str(tmp_path / "c.tex"))
+    assert refused.code == 2 and "no statement in LaTeX" in refused.err
+
+
+def test_a_scenario_tells_the_agents(tmp_path: Path):
+    (tmp_path / "v.csv").write_text("node,x\n" + "".join(f"{k},{k}\n" for k in range(1, 7)))
+    text = '[graph]\nfile = "fig1a"\n[agents]\nkind = "double-integrator"\ndrag = 0.2\nv0 = "v.csv"\n'
+    (tmp_path / "s.toml").write_text(text + '[certificate]\nmethod = "paper"\nsimulation = false\n')
+    done = ptcc("certify", str(tmp_path / "s.toml"), "--json")
+    part = json.loads(done.out)["agents"]
+    assert done.code == 0 and part["plant"] == ["0", "1/5"]
+    assert [agent[0][1] for agent in part["initial_state"].values()] == ["1", "2", "3", "4", "5", "6"]
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (("--agents", "tricycle"), '--agents: "tricycle" is unknown; one of integrator, double-integrator'),
+        (("--v0", "1,2,3,4,5,6"), "--v0: is for agents of order n; give --agents double-integrator"),
+        (("--dimension", "2"), "ptcc certify takes scalar agents, unless --agents tells others"),
+        (("--agents", "2", "--decay", "2"), "not above 2 (n - 1) = 2"),
+        (("--agents", "2", "--stop-before", "0.1"), "--stop-before: is not proved of agents of order n"),
+        (("--agents", "2", "--dimension", "2", "--x0", "1,2"), "--x0 has 2 values for 6 agents of dimension 2"),
+        (("--agents", "2", "--noise", "1"), "--noise: is not proved of agents of order n"),
+        (("--agents", "2", "--dimension", "-1"), "-1 is not in the range"),
+        (("--agents", "2", "--dimension", "1e30"), "not a valid integer"),
+        (("--agents", "2", "--a0", "1,2,3,4,5,6"), "--a0: agents of order 2 have no acceleration"),
+        (("--agents", "2", "--initial-bound", "3"), "--initial-bound: is not proved of agents of order n"),
+        (("--agents", "9"), "or an order from 1 to 8"),
+    ],
+)
+def test_what_does_not_fit_agents_is_refused_in_one_line(options: tuple[str, ...], says: str):
+    done = ptcc(*CERTIFY, *options)
+    assert done.code == 2 and says in done.err and len(done.err.strip().splitlines()) == 1
+
+
+def _scenario(folder: Path, text: str) -> str:
+    path = folder / "team.toml"
+    path.write_text(f'[graph]\nfile = "fig1a"\n{text}')
+    return str(path)
+
+
+def test_a_simulated_run_of_agents_has_columns_of_velocities_and_ends_where_certify_says():
+    begin = ("fig1a", "--agents", "2", "--x0", "5,2,-4,3,-2,1", "--v0", "1,2,3,4,5,6")
+    rows = list(csv.reader(io.StringIO(ptcc("simulate", *begin, "--samples", "2").out)))
+    part = json.loads(ptcc("certify", *begin, "--no-simulation", "--json").out)["agents"]
+    ends = [agent[0] for agent in part["final_state"].values()]
+    assert rows[0][8:14] == [f"v({k})" for k in range(1, 7)]
+    for i in range(2):
+        proved = [float(Fraction(chain[i])) for chain in ends]
+        assert np.allclose([float(x) for x in rows[-1][2 + 6 * i : 8 + 6 * i]], proved, rtol=0, atol=1e-9)
+
+
+def test_a_simulated_run_has_the_gains_that_certify_proves_under_the_same_method():
+    begin = ("fig1a", "--agents", "2", "--x0", "5,2,-4,3,-2,1")
+    runs = {}
+    for method in ("paper", "best"):
+        cert = json.loads(ptcc("certify", *begin, "--method", method, "--no-simulation", "--json").out)["agents"]
+        rows = list(csv.reader(io.StringIO(ptcc("simulate", *begin, "--method", method, "--samples", "2").out)))
+        runs[method] = ([float(Fraction(K)) for K in cert["gains"]], [float(x) for x in rows[1][-6:]])
+    (paper, u), (best, other) = runs["paper"], runs["best"]
+    assert paper[0] != best[0]
+    # At rest the input is the first gain times what is the same in both.
+    assert np.allclose(np.array(u) * best[0], np.array(other) * paper[0])
+
+
+@pytest.mark.parametrize(
+    ("command", "options", "says"),
+    [
+        ("simulate", ("--steps", "5"), "--steps: is for single integrators"),
+        (
+            "simulate",
+            ("--boundary-layer", "1", "--protocol", "sliding-mode"),
+            "--boundary-layer: is for single integrators",
+        ),
+        ("simulate", ("--disturbance", "none"), "--disturbance: agents of order n run without"),
+        ("plot", ("--what", "decay"), "--what decay: is not drawn of agents of order n"),
+        ("plot", ("--what", "formation"), "--what formation: is drawn in the plane; add --dimension 2"),
+    ],
+)
+def test_what_is_not_run_or_drawn_of_agents_is_refused(command: str, options: tuple[str, ...], says: str):
+    done = ptcc(command, "fig1a", "--agents", "2", *options)
+    assert done.code == 2 and says in done.err and len(done.err.strip().splitlines()) == 1
+
+
+def test_a_figure_of_agents_is_drawn_of_a_certificate_and_of_a_graph(tmp_path: Path):
+    saved = tmp_path / "team.json"
+    ptcc(*CERTIFY, "--agents", "2", "--no-simulation", "-o", str(saved))
+    for index, subject in enumerate(
+        ((str(saved),), ("fig1a", "--agents", "2", "--what", "motion", "--method", "paper"))
+    ):
+        figure = tmp_path / f"{index}.svg"
+        assert ptcc("plot", *subject, "-o", str(figure)).code == 0 and figure.stat().st_size
+
+
+def test_design_takes_a_scenario_of_agents_and_prints_the_command_that_proves_it_again(tmp_path: Path):
+    text = (
+        '[agents]\nkind = "double-integrator"\nv0 = [1, 0, 0, 0, 0, -1]\n[initial_state]\nx0 = [5, 2, -4, 3, -2, 1]\n'
+    )
+    text += "[expectations]\nmax_input = 30\n[design]\nshortest_deadline = true\n[limits]\nstop_before = 0.1\n"
+    scenario, saved = _scenario(tmp_path, text), tmp_path / "d.json"
+    done = ptcc("design", scenario, "-o", str(saved))
+    assert done.code == 0 and "verdict    met: ||u_k|| <= " in done.out and "not by these bounds" in done.out
+    assert "not designed for" in done.out and "[limits] stop_before" in " ".join(done.out.split())
+    command = done.out.split("to prove it again:")[1].replace("\\\n", " ").split()
+    again = ptcc(*command[1:], "--no-simulation")
+    assert again.code == 0 and "verdict    met: |u_k| <= 30" in again.out
+    assert ptcc("check", str(saved)).code == 0
+    assert json.loads(saved.read_text())["unverified"]["scenario"]["design"] == {"shortest_deadline": True}
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (("--agents", "2"), "design needs --max-input U and one of --deadline T, --shortest-deadline"),
+        (("--agents", "2", "--initial-bound", "1"), "--initial-bound: is not proved of agents of order n; give"),
+        (("--agents", "2", "--curve", "c.csv"), "--curve: is drawn of single integrators; leave it out"),
+        (("--agents", "2", "--input-norm", "2"), "--input-norm: is of single integrators"),
+        (("--agents", "2", "--rest", "1"), "rest: no number is proved of the input of agents that meet at rest"),
+        (("--agents", "2", "--decay", "3"), "decay: below 2 n = 4 no input is proved to be bounded"),
+        (("--agents", "2", "--residual", "1"), "residual: nothing is left at T without a gain cap"),
+        (("--agents", "2", "--gain-cap", "9"), "gain_cap: leaves something at every deadline; give residual"),
+        (("--agents", "2", "--delta", "1"), "--delta: is not proved of agents of order n under the nominal"),
+        (("--initial-bound", "1", "--protocol", "sliding-mode"), "--protocol: is not searched for single integrators"),
+        (("--initial-bound", "1", "--x0", "1,2"), "--x0: is not searched for single integrators"),
+        (("--initial-bound", "1", "--v0", "1,2"), "--v0: is for agents of order n"),
+    ],
+)
+def test_what_design_does_not_search_of_agents_is_refused_in_one_line(options: tuple[str, ...], says: str):
+    asked = () if "needs" in says else ("--max-input", "30", "--shortest-deadline")
+    done = ptcc("design", "fig1a", *options, *asked)
+    assert done.code == 2 and says in done.err and len(done.err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("plant", ["[0, 0.1]", '"0,0.1"'])
+def test_a_scenario_lists_the_plant(tmp_path: Path, plant: str):
+    text = f'[agents]\nkind = "double-integrator"\nplant = {plant}\n[certificate]\nmethod = "paper"\nsimulation = false'
+    document = json.loads(ptcc("certify", _scenario(tmp_path, text), "--json").out)
+    assert document["agents"]["plant"] == ["0", "1/10"]
+
+
+def test_nothing_that_is_rounded_is_called_exact():
+    done = ptcc("certify", "fig1b", "--method", "paper", "--agents", "2", "--drag", "0.2", "--no-simulation")
+    (line,) = [line for line in done.out.splitlines() if line.startswith("v(T)")]
+    assert "(rounded)" in line
+
+
+def test_the_page_writes_a_vector_in_one_cell(tmp_path: Path):
+    saved, page = tmp_path / "team.json", tmp_path / "team.html"
+    state = ",".join(map(str, range(12)))
+    ptcc(*CERTIFY, "--agents", "2", "--dimension", "2", "--x0", state, "--gain-cap", "20", "-o", str(saved))
+    assert ptcc("report", str(saved), "-o", str(page)).code == 0
+    text = page.read_text(encoding="utf-8")
+    assert "(10, 11)" in text and "\N{DOUBLE VERTICAL LINE}u\N{DOUBLE VERTICAL LINE} at most" in text
+    assert "fall like" not in text  # which they do under an unlimited gain alone

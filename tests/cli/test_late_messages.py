@@ -1,0 +1,408 @@
+"""Late messages and moving leaders on the command line, from certify to check, plot and the page."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bad_inputs import ptcc
+
+from ptcc_certify import (
+    Expectations,
+    GainLimits,
+    LateMessages,
+    MovingLeaders,
+    NominalProtocol,
+    SignedDigraph,
+    certify,
+    read_certificate,
+)
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.simulation.late_messages import simulate_late
+
+TEAM = "source,target,weight,delay\na,b,1,0.01\nb,c,1,0.02\nc,b,1,0.01\nc,d,-2,0.005\n"
+CHAIN = "source,target,weight\na,b,1\nb,c,-1\n"
+SCENARIO = """[graph]
+file = "team.csv"
+[protocol]
+rho2 = 4
+kappa = 1
+[initial_state]
+x0 = [1, 3, 4, -4]
+[certificate]
+method = "paper"
+simulation = false
+"""
+QUICK = ("--rho2", "4", "--kappa", "1", "--method", "paper", "--no-simulation")
+START = ("--x0", "1,3,4,-4")
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    Path("team.csv").write_text(TEAM)
+    Path("chain.csv").write_text(CHAIN)
+    Path("group.csv").write_text("a,b,1\nb,a,1\nb,c,1\n")
+    return tmp_path
+
+
+def test_a_certificate_with_late_messages_is_accepted_and_read_back_as_it_was_made() -> None:
+    run = ptcc("certify", "team.csv", "--delay", "delay", *START, *QUICK, "-o", "c.json")
+    assert run.code == 0, run
+    assert "messages   up to 0.02 old" in run.out
+    assert "certified" in run.out
+    assert ptcc("check", "c.json").code == 0
+    late, section = read_certificate("c.json").late, json.loads(Path("c.json").read_text())["messages"]
+    assert late is not None
+    assert late.steps is not None
+    assert section["latency"] == ["1/100", "1/100", "1/50", "1/200"]  # in the order of listeners: b from a and c, c, d
+    assert float(max(late.residual)) == late.largest  # type: ignore[arg-type]
+    saved = read_certificate("c.json")
+    motion = simulate_late(saved.graph, saved.protocol, late.messages, [1, 3, 4, -4], steps=300)
+    assert np.abs(motion.states[:, -1] - [1, 1, 1, -1]).max() <= late.largest
+
+
+def test_a_behaviour_asked_for_at_T_is_refuted_where_an_agent_is_proved_to_miss_it() -> None:
+    run = ptcc("certify", "team.csv", "--delay", "0.02", *START, *QUICK, "--expect", "bipartite-consensus")
+    assert run.code == 3, run
+    words = " ".join(run.out.split())
+    assert "refuted: bipartite consensus at T with late messages (agent" in words
+    assert "at least, proved)" in words
+    met = ptcc("certify", "team.csv", "--delay", "0.02", *START, *QUICK, "--max-residual", "0.1")
+    assert met.code == 0, met
+    left = ptcc("certify", "team.csv", "--delay", "0.02", *START, *QUICK, "--max-residual", "0.001")
+    assert left.code == 4, left
+    assert "this certificate's limit is" in " ".join(left.out.split())
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (
+            ("--delay", "0.005", "--gain-cap", "50"),
+            "left open: bipartite consensus at T with late messages (nothing settles under",
+        ),
+        (
+            ("--quantisation", "0.1"),
+            "left open: bipartite consensus at T with late messages (nobody is proved to settle at T)",
+        ),
+        (("--delay", "0.005", "--gain-cap", "50", "--max-input", "1e6"), "(no bound is proved with late messages)"),
+        (("--leader-speed", "1", "--max-input", "100"), "left open: |u_k| <= 100 (proved: "),
+        (("--leader-speed", "1", "--max-input", "1"), "refuted: |u_k| <= 1 (it is up to"),
+    ],
+)
+def test_what_holds_without_late_messages_and_with_leaders_at_rest_is_not_said_to_be_met(
+    words: tuple[str, ...], said: str
+) -> None:
+    run = ptcc("certify", "team.csv", *words, *START, *QUICK, *("--expect", "bipartite-consensus") * ("left" in said))
+    assert said in " ".join(run.out.split()), run
+    assert run.code == (3 if said.startswith("refuted") else 4), run
+
+
+def test_a_behaviour_and_an_input_are_met_where_they_are_proved_of_late_messages_and_moving_leaders() -> None:
+    star = ("--delay", "0.1", "--expect", "bipartite-consensus")  # all listen to a leader at rest alone
+    Path("star.csv").write_text("a,b,1\na,c,-1\n")
+    assert ptcc("certify", "star.csv", *star, "--x0", "1,0,2", *QUICK).code == 0
+    moving = ("--leader-speed", "1", "--expect", "bipartite-consensus", "--max-input", "1e6")
+    assert ptcc("certify", "team.csv", *moving, *START, *QUICK).code == 0
+
+
+def test_followers_without_a_cycle_are_told_deadlines_of_stages() -> None:
+    run = ptcc("certify", "chain.csv", "--delay", "0.1", "--x0", "1,0,2", *QUICK)
+    assert run.code == 0, run
+    assert "deadlines of their own, from 0.9 to 1, 0.1 apart" in " ".join(run.out.split())
+    late = ptcc("certify", "chain.csv", "--delay", "2", "--x0", "1,0,2", *QUICK)
+    assert "information takes longer than T" in " ".join(late.out.split())
+
+
+def test_a_scenario_holds_what_the_flags_say() -> None:
+    flags = ("--delay", "0.005", "--period", "0.01", "--packet-loss", "3", "--quantisation", "0.1")
+    Path("s.toml").write_text(
+        SCENARIO + "[messages]\ndelay = 0.005\nperiod = 0.01\npacket_loss = 3\nquantisation = 0.1\n"
+    )
+    one, other = ptcc("certify", "s.toml", "--json"), ptcc("certify", "team.csv", *flags, *START, *QUICK, "--json")
+    assert one.code == other.code == 0, (one, other)
+    sections = [json.loads(run.out)["messages"] for run in (one, other)]
+    assert sections[0] == sections[1]
+    assert sections[0]["delay"] == "9/200"
+    assert sections[0]["value_error"] == "1/20"
+
+
+def test_followers_track_leaders_that_move_and_the_file_says_so() -> None:
+    run = ptcc("certify", "team.csv", "--leader-speed", "1", *START, *QUICK, "-o", "l.json")
+    assert run.code == 0, run
+    assert re.search(r"on its target at T = 1, within \S+ of it from then on", " ".join(run.out.split()))
+    assert ptcc("check", "l.json").code == 0
+    tracking = read_certificate("l.json").tracking
+    assert tracking is not None
+    assert tracking.distance_bound(np.array([0.0])).max() == 0
+    sign = ptcc("certify", "team.csv", "--leader-speed", "1", "--sign-gain", "1", *START, *QUICK)
+    assert "ever after" in sign.out
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("team.csv", "--delay=-1"), "delay = -1 is outside its domain; delay must be >= 0"),
+        (("team.csv", "--delay", "nan"), '--delay: "nan" is not a finite number'),
+        (("team.csv", "--delay", "0"), "neither late, nor lost, nor rounded"),
+        (("team.csv", "--delay", "0.1", "--packet-loss", "3"), "--packet-loss says nothing by itself; give --period"),
+        (("team.csv", "--max-residual", "1"), "max_residual: is asked of late messages"),
+        (("team.csv", "--delay", "0.1", "--initial-bound", "1"), "--initial-bound) is not taken up"),
+        (("team.csv", "--leader-speed", "1", "--initial-bound", "1"), "--initial-bound) is not taken up"),
+        (("team.csv", "--delay", "0.1", "--stop-before", "0.1"), "stop_before: late messages are certified under a"),
+        (("team.csv", "--delay", "0.1", "--sample-period", "0.1"), "sample_period: of late messages a period tells"),
+        (("team.csv", "--delay", "0.1", "--gain-cap", "9", "--noise", "1"), "a quantisation of 4 NU"),
+        (("team.csv", "--delay", "0.1", "--delta", "1"), "delta: is not proved of late messages under the nominal"),
+        (("team.csv", "--leader-speed", "1", "--gain-cap", "9"), "gain_cap: leaders that move are tracked at T by a"),
+        (("team.csv", "--leader-speed", "1", "--stop-before", "0.1"), "stop_before: leaders that move are tracked"),
+        (("team.csv", "--leader-speed", "1", "--noise", "1"), "noise: is not proved while leaders move"),
+        (("team.csv", "--uncertainty", "1%", "--delay", "0.1"), "--delay is for one graph, not for families yet"),
+        (("team.csv", "--uncertainty", "1%", "--leader-speed", "1"), "--leader-speed is for one graph, not for"),
+        (("team.csv", "--uncertainty", "1%", "--max-residual", "1"), "--max-residual is for one graph, not for"),
+        (("team.csv", "--delay", "1e"), "give a number in your unit of time, or the name of a column"),
+        (("team.csv", "--delay", "latency"), 'team.csv, line 1: no column "latency"; begin with a header'),
+        (("team.csv", "--packet-loss", "3"), "--packet-loss says nothing by itself; give --period"),
+        (("team.csv", "--own-delay"), "--own-delay says nothing by itself; give --delay"),
+        (("team.csv", "--delay", "0.1", "--own-delay"), "makes the protocol diverge"),
+        (("group.csv", "--delay", "0.1"), "needs leaders that listen to nobody; a and b are leaders of one group"),
+        (("group.csv", "--leader-speed", "1"), "needs leaders that listen to nobody; a and b are leaders of one group"),
+        (("team.csv", "--sign-gain", "1"), "--sign-gain belongs to leaders that move; give --leader-speed"),
+        (("team.csv", "--leader-speed", "1", "--sign-gain", "0.5"), "is below speed + disturbance = 1"),
+        (("team.csv", "--leader-speed=-1"), "speed = -1 is outside its domain"),
+        (("team.csv", "--leader-speed", "1", "--delay", "1"), "messages and leaders together are not certified yet"),
+        (("team.csv", "--delay", "1", "--agents", "double-integrator"), "messages is for single integrators"),
+        (("team.csv", "--leader-speed", "1", "--agents", "double-integrator"), "leaders is for single integrators"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_line_that_tells_what_to_do(words: tuple[str, ...], said: str) -> None:
+    run = ptcc("certify", *words)
+    assert run.code == 2, run
+    assert said in run.err
+    assert len(run.err.strip().splitlines()) == 1
+
+
+def test_a_delay_of_a_row_that_is_no_number_is_named_by_its_line() -> None:
+    Path("odd.csv").write_text("source,target,weight,delay\na,b,1,soon\n")
+    run = ptcc("certify", "odd.csv", "--delay", "delay")
+    assert run.code == 2
+    assert 'odd.csv, line 2: delay "soon" of edge a -> b is not a number; give one >= 0' in run.err
+
+
+def test_small_delays_of_a_leader_group_are_certified_under_a_cap_up_to_a_limit_that_is_told() -> None:
+    group, protocol = SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1), (2, 3, -1)]), NominalProtocol(1, 1, 2, 1)
+    cert = certify(
+        group, protocol, [3, 1, 2], messages=LateMessages(delay="0.0002", own_delay=True, gain_cap=20), simulation=False
+    )
+    assert cert.verdict == "certified"
+    assert cert.late is not None
+    assert cert.late.form is not None
+    assert 0.0002 < (cert.late.longest_delay or 0) < 0.1
+    long = certify(group, protocol, [3, 1, 2], messages=LateMessages(delay="0.5", gain_cap=20), simulation=False)
+    assert int(long.assessment.exit_code) == 4
+    assert "this certificate's limit is a delay of" in long.assessment.text
+
+
+def test_messages_that_take_longer_than_the_deadline_are_certified_to_leave_what_was_there_at_first() -> None:
+    run = ptcc("certify", "chain.csv", "--delay", "5", "--x0", "1,0,2", *QUICK)
+    assert run.code == 0, run
+
+
+def test_screens_say_first_what_cannot_be_and_then_what_is_left() -> None:
+    run = ptcc("certify", "chain.csv", "--delay", "0.02", "--x0", "1,0,2", *QUICK)
+    heads = [line.split()[0] for line in run.out.splitlines() if not line.startswith(" ")]
+    assert heads == ["graph", "read", "protocol", "messages", "late", "claim", "x(T)", "verdict"]
+    words = " ".join(run.out.split())
+    assert "late agent c is off its final state at T by" in words
+    assert words.index("at least, if none comes sooner") < words.index("every agent within") < words.index("claim")
+    assert "by agent: b " in ptcc("certify", "chain.csv", "--delay", "0.02", "--x0", "1,0,2", *QUICK, "-v").out
+    Path("star.csv").write_text("a,b,1\na,c,-1\n")
+    star = ptcc("certify", "star.csv", "--delay", "0.02", *QUICK, "--expect", "bipartite-consensus")
+    assert star.code == 0, star
+    assert "every agent exactly at its final state at T" in star.out
+
+
+def test_a_column_of_delays_is_named_and_not_called_ignored() -> None:
+    run = ptcc("certify", "team.csv", "--delay", "delay", *START, *QUICK)
+    assert 'delays of column "delay"' in run.out
+    assert "ignored" not in run.out
+    assert "up to 0.02 old, edge by edge" in run.out
+
+
+def test_a_late_own_state_beyond_the_threshold_of_constant_gain_is_said_to_diverge() -> None:
+    run = ptcc("certify", "group.csv", "--delay", "0.5", "--own-delay", "--gain-cap", "20", *QUICK)
+    assert run.code == 4, run
+    assert "at a constant gain of 20 agents diverge with delays above 0.0393" in run.out  # pi/2 / (20 * 2)
+
+
+def test_a_gain_at_which_the_bound_of_small_delays_is_singular_is_no_defect() -> None:
+    run = ptcc("certify", "team.csv", "--delay", "0.05", "--gain-cap", "20", "--no-simulation")
+    assert run.code == 0, run
+
+
+def test_bounds_are_told_at_an_instant_that_is_asked_for() -> None:
+    late = ptcc("certify", "team.csv", "--delay", "0.02", *START, *QUICK, "--at", "0.5")
+    assert "at t = 0.5 every agent within" in late.out
+    tracking = ptcc("certify", "team.csv", "--leader-speed", "1", *START, *QUICK, "--at", "0.5")
+    assert "of it at t = 0.5" in tracking.out
+
+
+def test_an_input_that_is_not_bounded_while_leaders_move_is_told_with_the_gain_that_bounds_it() -> None:
+    weak = ptcc("certify", "team.csv", "--leader-speed", "1", *START, *QUICK[4:], "--rho2", "0.1", "--kappa", "1")
+    least = re.search(r"INPUT      not proved bounded while leaders move; rho2 = (\S+) bounds it", weak.out)
+    assert least is not None, weak
+    strong = ptcc("certify", "team.csv", "--leader-speed", "1", *START, *QUICK[4:], "--rho2", least[1], "--kappa", "1")
+    assert "input      bounded up to T" in strong.out, strong
+    verdict = " ".join(weak.out.partition("verdict")[2].split())
+    assert f"the input is not proved bounded; --rho2 {least[1]} bounds the input" in verdict
+
+
+def test_the_verdict_with_late_messages_is_about_these_and_proposes_no_gains_for_messages_at_once() -> None:
+    weak = (*QUICK[4:], "--rho2", "0.1", "--kappa", "1")
+    for words, caveat in (((), "the input is not proved bounded"), (("--gain-cap", "1"), "")):
+        run = ptcc("certify", "team.csv", "--delay", "0.02", *START, *weak, *words)
+        verdict = " ".join(run.out.partition("verdict")[2].split())
+        assert caveat in verdict and "--rho2" not in verdict, run
+
+
+def test_a_delay_that_would_do_is_told_as_an_age() -> None:
+    lost = ("--delay", "0.005", "--period", "0.01", "--packet-loss", "3", "--max-residual", "0.001")
+    run = ptcc("certify", "team.csv", *lost, *START, *QUICK)
+    assert "certified where nothing is older than 0.0" in " ".join(run.out.split()), run
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("simulate",), "s.toml: [messages] delay: ptcc simulate does not take late messages; ptcc certify -o c.json"),
+        (("design", "--max-input", "9", "--initial-bound", "1", "--deadline", "1"), "ptcc design does not take late"),
+        (("plot", "--what", "states"), "ptcc plot --what states does not take late messages"),
+    ],
+)
+def test_commands_that_would_leave_late_messages_out_refuse_their_scenario(words: tuple[str, ...], said: str) -> None:
+    Path("s.toml").write_text(SCENARIO + "[messages]\ndelay = 0.005\n")
+    run = ptcc(words[0], "s.toml", *words[1:])
+    assert run.code == 2, run
+    assert said in run.err
+    assert ptcc("classify", "s.toml").code == ptcc("plot", "s.toml", "--what", "graph").code == 0
+
+
+def test_page_and_statement_tell_of_late_messages_and_moving_leaders() -> None:
+    assert ptcc("certify", "chain.csv", "--delay", "0.1", "--x0", "1,0,2", *QUICK, "-o", "c.json").code == 0
+    assert ptcc("certify", "team.csv", "--leader-speed", "1", *START, *QUICK, "-o", "l.json").code == 0
+    for name in ("c", "l"):
+        for ending in ("html", "tex"):
+            assert ptcc("report", f"{name}.json", "-o", f"{name}.{ending}").code == 0
+    page, statement = Path("c.html").read_text(), Path("c.tex").read_text()
+    assert "consensus at T = 1, nothing late</h1>" in page
+    assert "With messages at once: By the deadline" in page
+    assert "If what agents hear is up to $0.1$ old, then every agent is within" in statement
+    assert "If no message comes sooner than after its delay, agent c is off its final state" in statement
+    assert "With leaders at rest: By the deadline" in Path("l.html").read_text()
+    assert "then at $T$ every follower is on its target" in Path("l.tex").read_text()
+
+
+def test_the_figure_that_is_drawn_unasked_is_of_what_the_certificate_claims() -> None:
+    assert ptcc("certify", "chain.csv", "--leader-speed", "1", "--x0", "1,0,2", *QUICK, "-o", "l.json").code == 0
+    assert ptcc("plot", "l.json").code == 0 and Path("l-tracking.png").exists()
+    assert ptcc("certify", "chain.csv", "--delay", "0.01", "--x0", "1,0,2", *QUICK, "-o", "m.json").code == 0
+    assert ptcc("plot", "m.json").code == 0 and Path("m-late.png").exists()
+    assert ptcc("certify", "chain.csv", "--delay", "0.01", *QUICK, "-o", "random.json").code == 0
+    assert ptcc("plot", "random.json").code == 0 and Path("random-late.png").exists()
+
+
+def test_delays_that_are_too_short_to_run_have_a_page_and_a_figure_of_the_bound() -> None:
+    assert ptcc("certify", "chain.csv", "--delay", "1e-5", "--x0", "1,0,2", *QUICK, "-o", "c.json").code == 0
+    assert ptcc("report", "c.json", "-o", "c.html").code == ptcc("plot", "c.json", "--what", "late").code == 0
+
+
+def test_components_are_claimed_of_messages_at_once_too() -> None:
+    Path("two.csv").write_text("source,target,weight\na,b,1\nc,d,-1\nd,e,1\n")
+    assert "\n           nothing late\n" in ptcc("certify", "two.csv", "--delay", "0.1", *QUICK).out
+    assert "\n           leaders at rest\n" in ptcc("certify", "two.csv", "--leader-speed", "1", *QUICK).out
+
+
+def test_a_column_of_a_file_without_columns_is_refused() -> None:
+    Path("g.gml").write_text("graph [ directed 1 node [ id 0 ] node [ id 1 ] edge [ source 0 target 1 weight 1 ] ]")
+    run = ptcc("certify", "g.gml", "--delay", "delay")
+    assert run.code == 2
+    assert "--delay delay: names a column of an edge list, and .gml is none" in run.err
+
+
+def test_families_and_other_limits_are_refused_in_python_too() -> None:
+    pair, protocol = SignedDigraph.from_edges([(1, 2, 1)]), NominalProtocol(1, 1, 2, 1)
+    each, same = LateMessages(delay={(1, 2): "0.1"}), GainLimits(gain_cap=20)
+    with pytest.raises(ParameterError, match="messages is not for families of graphs yet"):
+        certify(pair, protocol, uncertainty="10%", messages=each)
+    with pytest.raises(ParameterError, match="max_residual: is asked of late messages, which families"):
+        certify(pair, protocol, uncertainty="10%", expectations=Expectations(max_residual=1))
+    with pytest.raises(ParameterError, match="gain_cap: limits and late messages have two"):
+        certify(pair, protocol, messages=each, limits=same)
+    with pytest.raises(ParameterError, match=r"MovingLeaders\(disturbance=..\)"):
+        certify(pair, protocol, leaders=MovingLeaders(speed=1), delta=1)
+
+
+def test_late_messages_ask_for_sliding_variables_at_0() -> None:
+    with pytest.raises(ParameterError, match="is none; give LateMessages"):
+        certify(SignedDigraph.from_edges([(1, 2, 1)]), NominalProtocol(1, 1, 2, 1), messages=0.1)
+    with pytest.raises(ParameterError, match="is none; give MovingLeaders"):
+        certify(SignedDigraph.from_edges([(1, 2, 1)]), NominalProtocol(1, 1, 2, 1), leaders=MovingLeaders)
+
+
+GROUP = ("group.csv", "--x0", "1,2,3", "--gain-cap", "20", "--expect", "bipartite-consensus", *QUICK)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--delay", "1"), "up to 1 old"),
+        (("--delay", "1", "--own-delay"), "the own state as well"),
+        (("--delay", "delay"), "edge by edge"),
+        (("--delay", "1", "--period", "0.1", "--packet-loss", "2"), "2 in a row lost"),
+    ],
+)
+def test_a_file_without_anything_proved_of_late_messages_still_says_that_they_were_asked_for(
+    words: tuple[str, ...], said: str
+) -> None:
+    Path("group.csv").write_text("source,target,weight,delay\na,b,1,1\nb,a,1,2\nb,c,1,0\n")
+    run = ptcc("certify", *GROUP, *words, "-o", "c.json")
+    assert run.code == 4 and "messages" not in json.loads(Path("c.json").read_text())
+    saved = read_certificate("c.json")
+    assert saved.late is not None and not saved.late.says_something
+    assert saved.request.messages == saved.late.messages
+    assert int(saved.assessment.exit_code) == 4 and "at T with late messages" in saved.assessment.text
+    assert "LATE" in run.out and "LATE" in saved.summary()
+    assert said in run.out and said in saved.summary()
+    assert ptcc("report", "c.json", "-o", "c.html").code == ptcc("report", "c.json", "-o", "c.tex").code == 0
+    assert "Late messages" in Path("c.html").read_text() and "nothing is proved" in Path("c.html").read_text()
+
+
+def test_a_file_without_anything_proved_of_moving_leaders_still_says_that_they_were_asked_for() -> None:
+    graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 1)])
+    leaders = MovingLeaders(speed=1, disturbance="1/3", sign_gain=2)
+    made = certify(graph, NominalProtocol(T=1, rho1=1, rho2=4, kappa=1), [1, 2, 3], leaders=leaders, method="paper")
+    made.changed(tracking=None).save("c.json")
+    saved = read_certificate("c.json")
+    assert saved.request.leaders == leaders and saved.tracking is None
+    assert "left open: leaders that move" in saved.assessment.text and int(saved.assessment.exit_code) == 4
+
+
+@pytest.mark.parametrize("asked", [None, 3, {}, {"messages": 1}, {"messages": {"latency": [], "packets": None}}])
+def test_what_a_file_says_of_messages_that_were_asked_for_may_be_of_any_content(asked: object) -> None:
+    assert ptcc("certify", *GROUP, "--delay", "1", "-o", "c.json").code == 4
+    data = json.loads(Path("c.json").read_text())
+    data["unverified"]["asked"] = asked
+    Path("c.json").write_text(json.dumps(data))
+    assert read_certificate("c.json").late is None
+
+
+def test_gains_that_are_changed_leave_late_messages_undecided() -> None:
+    graph, protocol = SignedDigraph.from_edges([("a", "b", 1)]), NominalProtocol(T=1, rho1=1, rho2=4, kappa=1)
+    late, asked = LateMessages(delay="0.1"), Expectations("bipartite containment")
+    made = certify(graph, protocol, [1, 2], messages=late, expectations=asked, method="paper")
+    assert int(made.assessment.exit_code) == 0
+    other = made.changed(protocol=NominalProtocol(T=2, rho1=1, rho2=4, kappa=1))
+    assert int(other.assessment.exit_code) == 4

@@ -1,0 +1,291 @@
+"""The checker that is itself proved: what it accepts is what ``ptcc check`` accepts, but for causes that it names."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from agent_documents import Setting
+from agent_documents import document as agents_document
+from generators import all_classes, random_graph, smallest
+from mutations import changed, mutants, resealed
+from paper_examples import paper_examples
+from verified import SKIPPED, UNREAD, program, said, unchecked
+
+from ptcc_certify.certificate.family_certificate import certify_family
+from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.checker import check
+from ptcc_certify.checker.obligations import OBLIGATIONS
+from ptcc_certify.cli.verified import VARIABLE, executable, verified_check
+from ptcc_certify.errors import FormatError, ParameterError
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.family import Family
+from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.protocols.gain_limits import GainLimits
+
+SOURCES = Path(__file__).resolve().parents[2] / "formal"
+
+
+def test_nothing_is_admitted_and_no_axiom_is_added() -> None:
+    words = re.compile(r"\b(Admitted|admit|Axioms?|Parameters?|Conjecture|give_up|bypass_check|Unset Guard)\b")
+    files = sorted(SOURCES.glob("*.v"))
+    assert files
+    for file in files:
+        text = re.sub(r"\(\*.*?\*\)", "", file.read_text("utf-8"), flags=re.DOTALL)
+        assert not words.search(text), file.name
+
+
+def test_the_statement_is_one_file_of_as_many_lines_as_is_said() -> None:
+    text = re.sub(r"\(\*.*?\*\)", "", (SOURCES / "Certificate.v").read_text("utf-8"), flags=re.DOTALL)
+    lines = [line for line in text.splitlines() if line.strip()]
+    assert max(map(len, lines)) <= 120
+    asked = [line for line in lines if "Require" in line]
+    assert asked == [
+        "Require Import ZArith QArith Qreals List Bool Reals.",
+        "From Coquelicot Require Import Coquelicot.",
+    ]
+    for page in (SOURCES / "README.md", SOURCES.parent / "docs" / "theory" / "verified-checker.md"):
+        assert f"{len(lines)} lines" in page.read_text("utf-8")
+
+
+def test_the_fixed_texts_of_the_reader_are_those_of_the_format() -> None:
+    text = (SOURCES / "ocaml" / "texts.ml").read_text("utf-8")
+    rows = re.findall(r'\("([a-z-]+)", \("([^"]*)",\s*"([^"]*)"\)\)|"([a-z-]+)", \("([^"]*)",\s*"([^"]*)"\)', text)
+    read = {(a or d): (b or e, c or f) for a, b, c, d, e, f in rows}
+    assert len(read) > 20 and all(OBLIGATIONS[kind] == texts for kind, texts in read.items())
+
+
+def test_where_the_executable_is_absent_one_line_says_how_to_build_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(VARIABLE, "no-such-file")
+    with pytest.raises(ParameterError, match="make") as caught:
+        executable()
+    assert "\n" not in str(caught.value)
+
+
+def test_the_paper_s_examples_are_accepted_and_every_obligation_is_verified_or_named(tmp_path: Path) -> None:
+    program()
+    for text in paper_examples():
+        document = json.loads(text)
+        (tmp_path / "c.json").write_text(text)
+        proved = verified_check(str(tmp_path / "c.json"))
+        assert proved.report.accepted and proved.report.verdict == "certified", proved.report.reason
+        assert proved.report.sha256 == document["graph"]["sha256"]
+        listed = [f"{o['kind']} of {o['of']}" for o in document["proof"]]
+        verified = [f"{o.kind} of {o.of}" for o in proved.report.obligations]
+        left = [line for line in proved.not_checked if line in listed]
+        assert sorted(verified + left) == sorted(listed)
+        assert {o["kind"] for o in document["proof"]} - {o.kind for o in proved.report.obligations} <= SKIPPED
+
+
+def test_a_file_that_is_no_certificate_is_unreadable(tmp_path: Path) -> None:
+    program()
+    for text in ("", "[]", '{"schema": "ptcc-certificate/1"}', "{" * 1000, '{"a": 1, "a": 2}', '"\xff"', '"\xc0\x80"'):
+        file = tmp_path / "c.json"
+        file.write_bytes(text.encode("latin-1"))
+        with pytest.raises(FormatError):
+            verified_check(str(file))
+        assert subprocess.run([program(), file], capture_output=True, check=False).returncode == 2
+
+
+def test_claims_besides_those_of_the_graph_are_named_and_not_believed(tmp_path: Path) -> None:
+    program()
+    document = json.loads(paper_examples()[0])
+    for key, kind in (("messages", "late-rows"), ("leaders", "tracking")):
+        false = {"kind": kind, "of": key, "proves": "", "lemma": "", "numbers": {}, "witness": None}
+        more = {**document, key: {"delay": "0"}, "proof": [*document["proof"], false]}
+        code, text = said(resealed(more), tmp_path)
+        assert (
+            code == 0 and f"not checked {key}, all that is said of" in text and f"not checked {kind} of {key}" in text
+        )
+        code, text = said(resealed({**more, key: None, "more": None}), tmp_path)
+        assert code == 1 and "unknown" in text
+        code, text = said(resealed({**document, "proof": more["proof"]}), tmp_path)
+        assert code == 1 and "nothing asks for" in text
+
+
+def test_the_claim_of_every_weak_component_is_verified(tmp_path: Path) -> None:
+    program()
+    edges = [("a", "b", 1), ("b", "a", 1), ("b", "f", -1), ("c", "d", -1), ("d", "c", 2), ("c", "d2", 1)]
+    cert = certify(edges, NominalProtocol(1, 1, 1, 1), [1, 2, 3, 4, 5, 6], simulation=False)
+    document = json.loads(cert.to_json())
+    code, text = said(document, tmp_path)
+    assert code == 0 and "verified    claim of graph" in text and len(document["components"]) == 2
+    for path, new in (
+        (("components", 0, "claim", "theorem"), "3.1"),
+        (("components", 0, "claim", "behaviour"), "bipartite consensus"),
+        (("components", 0, "claim", "corollaries"), ["3", "4"]),
+        (("components", 1, "claim", "behaviour"), "interval bipartite consensus"),
+        (("components", 1, "nodes"), document["components"][1]["nodes"][:-1]),
+        (("components", 0, "final_state", "f"), "9"),
+        (("components", 0, "connectivity"), "strong"),
+        (("components",), document["components"][:1]),
+        (("structure", "balanced"), True),
+        (("structure", "sign_symmetric"), True),
+    ):
+        forged = resealed(changed(document, path, new))
+        assert not check(forged).accepted
+        code, text = said(forged, tmp_path)
+        assert code == 1, (path, text)
+
+
+@pytest.mark.parametrize("kind", ["rate-mean", "rate-upper-bound"])
+def test_a_lower_bound_on_all_rates_than_is_proved_is_rejected(kind: str, tmp_path: Path) -> None:
+    program()
+    documents = [json.loads(text) for text in paper_examples()]
+    document = next(d for d in documents if any(o["kind"] == kind for o in d["proof"]))
+    place = next(i for i, o in enumerate(document["proof"]) if o["kind"] == kind)
+    code, text = said(document, tmp_path)
+    assert code == 0 and f"verified    {kind} of rates" in text
+    protocol = {key: Fraction(value) for key, value in document["protocol"].items() if key in ("rho2", "kappa")}
+    bound = (Fraction(document["rates"]["upper_bound"]) + Fraction(document["rates"]["proved"])) / 2
+    bound = Fraction(document["rates"]["proved"]) if kind == "rate-upper-bound" else bound
+    forged = changed(document, ("rates", "upper_bound"), str(bound))
+    forged = changed(forged, ("proof", place, "numbers", "upper_bound"), str(bound))
+    upper = str(protocol["rho2"] * protocol["kappa"] * bound / 2)
+    forged = resealed(changed(forged, ("input", "threshold", "upper"), upper))
+    assert check(forged).rejected == f"{kind} of rates"
+    code, text = said(forged, tmp_path)
+    assert code == 1 and "rate-upper-bound of rates" in text
+
+
+def test_what_the_sliding_mode_adds_to_the_input_is_verified(tmp_path: Path) -> None:
+    program()
+    gains = {"T_r": "0.5", "T_s": 1, "rho1": 1, "rho2": 1, "kappa": 2, "mu1": 2, "mu2": 1, "delta": 1}
+    edges, start = [("a", "b", 1), ("b", "a", -1), ("b", "c", -2)], [1, 2, 3]
+    for mu3, sigma, stated in (("0.5", [0, -1, 2], True), ("0.4", [0, -1, 2], False), ("0.4", [0, 0, 0], True)):
+        protocol = SlidingModeProtocol(**gains, mu3=mu3)
+        document = json.loads(certify(edges, protocol, start, sigma0=sigma, simulation=False).to_json())
+        code, text = said(document, tmp_path)
+        assert code == 0 and "verified    sliding-bound of protocol" in text
+        assert ("verified    input-sliding of input" in text) == stated
+        if not stated:
+            continue
+        least = {label: 2 + (1 + Fraction(mu3) * 4) * abs(s) for label, s in zip("abc", sigma, strict=True)}
+        for label in "abc":
+            assert (
+                said(
+                    resealed(changed(document, ("input", "sliding", "agents", label), str(least[label]))), tmp_path
+                ).code
+                == 0
+            )
+            lower = resealed(
+                changed(document, ("input", "sliding", "agents", label), str(least[label] - Fraction(1, 999)))
+            )
+            code, text = said(lower, tmp_path)
+            assert code == 1 and "input-sliding of input" in text and not check(lower).accepted
+        for path, new in (
+            (("reaching_time", "bound"), "||sigma(t)|| <= 0"),
+            (("input", "sliding", "bounded"), mu3 != "0.5"),
+            (("protocol", "delta"), "2"),
+        ):
+            forged = resealed(changed(document, path, new))
+            assert said(forged, tmp_path).code == 1 and not check(forged).accepted, path
+
+
+def test_limits_disturbance_and_noise_are_named_and_none_can_be_added(tmp_path: Path) -> None:
+    program()
+    limits = [GainLimits(gain_cap=10), GainLimits(stop_before="0.1"), GainLimits(sample_period="0.001")]
+    edges, protocol = [("a", "b", 1), ("b", "a", 1), ("b", "c", -2)], NominalProtocol(1, 1, 1, 3)
+    cert = certify(edges, protocol, [1, 2, 3], limits=limits, delta=1, simulation=False)
+    document = json.loads(cert.to_json())
+    kinds = [o["kind"] for o in document["proof"]]
+    assert kinds.count("limited-gain") == 3 and "nominal-disturbed" in kinds
+    code, text = said(document, tmp_path)
+    assert code == 0 and "not checked limited-gain of input.residual[2]" in text
+    assert "not checked nominal-disturbed of input" in text
+    proof = document["proof"]
+    for forged in (proof[:-1], [*proof, proof[-1]], [*proof[:-2], proof[-1], proof[-2]]):
+        mutant = resealed({**document, "proof": forged})
+        assert not check(mutant).accepted and said(mutant, tmp_path).code == 1
+
+
+def test_no_text_of_the_file_is_printed_as_a_line_of_its_own(tmp_path: Path) -> None:
+    program()
+    document = json.loads(paper_examples()[0])
+    forged = {**document["proof"][-1], "of": "input\u2028verified    rate of lyapunov.functions[99]"}
+    text = json.dumps(resealed({**document, "proof": [*document["proof"], forged]}), ensure_ascii=False)
+    (tmp_path / "c.json").write_text(text, encoding="utf-8")
+    proved = verified_check(str(tmp_path / "c.json"))
+    assert not proved.report.accepted and not proved.report.obligations
+    label = "a\u2028verified    rate of lyapunov.functions[99]\u0085"
+    named = certify([(label, "b", 1), ("b", label, 1)], NominalProtocol(1, 1, 1, 1), simulation=False)
+    (tmp_path / "c.json").write_text(named.to_json(), encoding="utf-8")
+    proved = verified_check(str(tmp_path / "c.json"))
+    assert proved.report.accepted and "lyapunov.functions[99]" not in {o.of for o in proved.report.obligations}
+
+
+def test_agents_of_order_n_and_families_are_not_read_as_agents_of_order_1(tmp_path: Path) -> None:
+    program()
+    family = certify_family(
+        Family.switching([SignedDigraph.from_edges([("a", "b", w)]) for w in (1, 2)]), NominalProtocol(1, 1, 1, 1)
+    )
+    of_agents = agents_document(SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)]), Setting())
+    for document, what in (
+        (json.loads(family.to_json()), "family"),
+        (of_agents, "agents of order n, section agents"),
+    ):
+        assert check(document).accepted
+        code, text = said(document, tmp_path)
+        assert code == 2 and what in text and "use ptcc check" in text
+
+
+def compare(document: dict, path: tuple, folder: Path) -> str:
+    """The cause of a difference between the two checkers on a mutant; empty if they agree."""
+    python, (code, text) = check(resealed(document)), said(resealed(document), folder)
+    accepted = code in (0, 4)
+    if python.accepted == accepted:
+        return ""
+    if accepted:
+        at = str(python.rejected).partition(" of ")[0]  # what Python found false, if it is of a part that is named
+        assert at in SKIPPED or at.startswith("input") or unchecked(document, path), (path, at, python.reason)
+        return "a part that is not checked"
+    assert code == 2 and any(word in text for word in UNREAD), (path, text)
+    return "a form that is not read"
+
+
+@pytest.mark.parametrize("number", range(12))
+def test_of_some_mutants_none_is_accepted_unless_true_or_not_checked(number: int, tmp_path: Path) -> None:
+    program()
+    document = {**json.loads(paper_examples()[number]), "unverified": {}}
+    for path, mutant in mutants(document, every=997, start=number):
+        compare(mutant, path, tmp_path)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("number", range(12))
+def test_of_thousands_of_mutants_none_is_accepted_unless_true_or_not_checked(number: int, tmp_path: Path) -> None:
+    program()
+    document = {**json.loads(paper_examples()[number]), "unverified": {}}
+    every = int(os.environ.get("PTCC_MUTANTS_EVERY", 12))
+    count = sum(1 for path, mutant in mutants(document, every=every) if compare(mutant, path, tmp_path) is not None)
+    assert count > 3000 // every
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize(("name", "kwargs"), all_classes())
+def test_what_the_checker_accepts_of_random_graphs_the_verified_one_accepts(
+    name: str, kwargs: dict, tmp_path: Path
+) -> None:
+    program()
+    for seed in range(int(os.environ.get("PTCC_VERIFIED_GRAPHS", 14))):
+        rng = np.random.default_rng(seed)
+        fixed = "isolated" in kwargs and not kwargs["parts"]
+        settings = {"n": smallest(**kwargs) + (0 if fixed else seed % 5), **kwargs}
+        graph = random_graph(rng, **settings).graph
+        protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
+        more = {}
+        if seed % 2:
+            protocol = SlidingModeProtocol(T_r="0.5", T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
+            more = {"sigma0": [int(v) for v in rng.integers(-2, 3, graph.n_nodes)]}
+        start = [int(v) for v in rng.integers(-9, 10, graph.n_nodes)]
+        # a search that a slow machine cuts short can leave a certificate without a rate, which this checker rejects
+        document = json.loads(certify(graph, protocol, start, simulation=False, time_limit=3600, **more).to_json())
+        code, text = said(document, tmp_path)
+        assert check(document).accepted
+        assert code in (0, 4) or (code == 2 and any(word in text for word in UNREAD)), (name, seed, text)

@@ -1,0 +1,490 @@
+"""Whether what a certificate says of late messages, and of leaders that move, is true: judged without the checker.
+
+Two ways, which share nothing with it: the inequalities of section 22 in rationals and balls, row by row from the edges;
+and motions of the closed loop as the file states it (:mod:`late_motion`), under the largest delays, random ones, square
+waves, and delays and errors chosen against the agents. Bounds over time are tested from below: one that a motion
+exceeds is false.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from fractions import Fraction
+from functools import cached_property, lru_cache
+from typing import Any
+
+import flint
+import late_motion
+import numpy as np
+from late_motion import Gain, LateMotion, Moving
+from oracle import Oracle, ball, number
+
+Json = dict[str, Any]
+#: A bound may lie below what floats find by this share, and by this much for states of size 1.
+SLACK, FLOOR = 1e-8, 1e-9
+#: By this share of the latency what is heard may be younger where a least age is tried.
+YOUNGER = 0.05
+
+
+class Runs:
+    """Motions of one closed loop: states at all instants, for each pattern of delays."""
+
+    def __init__(self, times: np.ndarray, states: list[np.ndarray], gain: Gain):
+        self.times, self.states, self.gain = times, states, gain
+
+    @cached_property
+    def largest(self) -> np.ndarray:
+        """The largest and least states over all patterns, (2, N, times)."""
+        return np.array([np.max(self.states, axis=0), np.min(self.states, axis=0)])
+
+    def away(self, target: np.ndarray) -> np.ndarray:
+        """The largest distance from a target over all patterns, (N, times)."""
+        return np.abs(self.largest - target[None, :, None]).max(axis=0)
+
+
+@lru_cache(maxsize=400)
+def late_runs(
+    W: bytes, x0: bytes, target: bytes, gains: tuple[Gain, ...], oldest: bytes, error: float, late: bool, end: float
+) -> Runs:
+    """Motions for delays up to the ages of ``oldest``, by listener and source, and errors up to ``error``."""
+    start, aim = np.frombuffer(x0), np.frombuffer(target)
+    N = len(start)
+    weights, taubar = np.frombuffer(W).reshape(N, N), np.frombuffer(oldest).reshape(N, N)
+    delay = float(taubar.min())
+    T = max(g.T for g in gains)
+    capped = max(g.cap for g in gains) < math.inf
+    times = np.arange(0, T, min(delay, T) / 3) if capped else late_motion.instants(T, delay)
+    times = np.unique(np.concatenate([times, [g.T for g in gains], np.arange(T, end, min(delay, T) / 3)]))
+    rng = np.random.default_rng(0)
+    motion = LateMotion(weights, list(gains), taubar, times, late)
+    patterns = [
+        late_motion.oldest_of_all,
+        late_motion.by_chance(rng),
+        late_motion.square_wave(5, rng.integers(0, 9, (N, N))),
+        late_motion.worst(weights, aim),
+    ]
+    off = late_motion.worst_errors(error, aim) if error else None
+    return Runs(times, [motion.run(start, ages, off) for ages in patterns], gains[0])
+
+
+class LateOracle(Oracle):
+    """One certificate with late messages, or with leaders that move."""
+
+    def judged(self) -> None:
+        super().judged()
+        if "messages" in self.data:
+            self.messages()
+        if "leaders" in self.data:
+            self.moving()
+
+    # ------------------------------------------------------------------ reading
+
+    @cached_property
+    def single(self) -> bool:
+        return all(len(part) == 1 for part in self.closed)
+
+    @cached_property
+    def follow(self) -> list[int]:
+        return [v for v in range(self.n) if self.L[v][v]]
+
+    @cached_property
+    def among(self) -> dict[int, list[tuple[int, Fraction]]]:
+        """What followers hear of followers: sources and sizes of weights."""
+        return {v: [(s, abs(self.L[v][s])) for s in self.follow if s != v and self.L[v][s]] for v in self.follow}
+
+    def by_follower(self, said: Any) -> dict[int, Fraction]:
+        return dict(zip(self.follow, self.listed(said), strict=True))
+
+    def witness(self, of: str) -> Json:
+        steps = [step for step in self.data["proof"] if step["of"] == of]
+        self.require(len(steps) == 1, f"one obligation of {of}")
+        return steps[0]
+
+    @cached_property
+    def target(self) -> list[Fraction] | None:
+        """``Q X(0)``; None without a state."""
+        if self.data["final_state"] is None:
+            return None
+        return [sum((q * x for q, x in zip(row, self.start or [], strict=True)), Fraction(0)) for row in self.Q]
+
+    def far(self, v: int) -> Fraction:
+        """``|x_v(0) - x*_v|``."""
+        return Fraction(1) if self.target is None or self.start is None else abs(self.start[v] - self.target[v])
+
+    def starts(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Initial states and where they end: that of the file, or some with ``|x - x*| <= 1``."""
+        if self.target is not None and self.start is not None:
+            yield np.array(list(map(float, self.start))), np.array(list(map(float, self.target)))
+            return
+        Q = np.array([[float(x) for x in row] for row in self.Q])
+        rng = np.random.default_rng(1)
+        for _ in range(2):
+            target = Q @ rng.normal(size=self.n)
+            off = np.zeros(self.n)
+            off[self.follow] = rng.choice([-1.0, 1.0], len(self.follow))
+            yield target + off, target
+
+    @cached_property
+    def weight_array(self) -> np.ndarray:
+        W = np.zeros((self.n, self.n))
+        for (s, t), w in self.weights.items():
+            W[t, s] = float(w)
+        return W
+
+    # ------------------------------------------------------------------ late messages
+
+    @property
+    def said(self) -> Json:
+        return self.data["messages"]
+
+    @cached_property
+    def latencies(self) -> dict[tuple[int, int], Fraction]:
+        said, pairs = self.said["latency"], self.pairs
+        each = [number(said)] * len(pairs) if isinstance(said, str) else self.listed(said)
+        return dict(zip(pairs, each, strict=True))
+
+    @cached_property
+    def pairs(self) -> list[tuple[int, int]]:
+        """Edges in the order of the file."""
+        return [(s, t) for s, t, _ in self.edges(self.data["graph"]["edges"])]
+
+    @cached_property
+    def delay(self) -> Fraction:
+        oldest, packets = max(self.latencies.values()), self.said["packets"]
+        return oldest + ((number(packets["losses"]) + 1) * number(packets["period"]) if packets else 0)
+
+    @cached_property
+    def ages(self) -> dict[tuple[int, int], Fraction]:
+        """How old is what is heard over every edge, at most."""
+        held = self.delay - max(self.latencies.values())
+        return {pair: latency + held for pair, latency in self.latencies.items()}
+
+    @cached_property
+    def error(self) -> Fraction:
+        return number(self.said["value_error"])
+
+    @cached_property
+    def cap(self) -> Fraction | None:
+        return None if self.said["gain_cap"] is None else number(self.said["gain_cap"])
+
+    def messages(self) -> None:
+        packets = self.said["packets"]
+        if packets is not None:
+            losses = number(packets["losses"])
+            self.require(number(packets["period"]) > 0 and losses >= 0 and losses.denominator == 1, "packets")
+        self.require(min(self.latencies.values()) >= 0 and number(self.said["delay"]) == self.delay, "delay")
+        self.require(self.error >= 0 and (self.delay or self.error), "value_error")
+        self.require(self.cap is None or self.cap > 0, "gain_cap")
+        late = self.said["own"] == "late"
+        self.require(not late or self.cap is not None, "a late own state without a cap")
+        self.require(not any(self.sigma0), "sliding variables that move")
+        for key in ("rows", "steps", "missed", "staged"):
+            self.require(not self.said[key] or (self.single and not late and self.follow), key)
+        self.above_rows()
+        if self.said["residual"] is not None:
+            self.above_residual()
+        if self.said["missed"] is not None:
+            self.away_at_the_deadline()
+        if self.said["staged"] is not None:
+            self.deadlines()
+        if self.said["form"] is not None:
+            self.small_delays()
+
+    def clock(self, cap: Fraction | None, t: Fraction | None = None) -> Any:
+        """The integral of ``min(gain, cap)`` up to ``t``, or ``T``, a ball."""
+        T, rho1, k = self.gain
+        t, turn = T if t is None else t, T if cap is None else Fraction(0)
+        if cap is not None and cap > rho1 + k / T:
+            turn = T - k / (cap - rho1)
+        early = min(t, turn)
+        whole = ball(rho1 * early) - ball(k) * ball(1 - early / T).log()
+        return whole + (ball(cap * (t - early)) if cap is not None and t > early else 0)
+
+    def loop(
+        self, runs_to: float | None = None, gains: tuple[Gain, ...] | None = None, error: bool = True
+    ) -> Iterator[tuple[Runs, np.ndarray]]:
+        """Motions under the delays of the file, and where they are to end."""
+        T, rho1, k = map(float, self.gain)
+        gain = Gain(T, rho1, k, math.inf if self.cap is None else float(self.cap))
+        # what leaders at rest said is never old
+        ages = np.full((self.n, self.n), float(self.delay))
+        for (s, t), age in self.ages.items():
+            ages[t, s] = float(age) if self.L[s][s] or not self.single else float(self.delay)
+        if ages.min() < T / 400:
+            return  # what is held for so short a time takes too many steps
+        for x0, target in self.starts():
+            yield (
+                late_runs(
+                    self.weight_array.tobytes(),
+                    x0.tobytes(),
+                    target.tobytes(),
+                    gains or (gain,) * self.n,
+                    ages.tobytes(),
+                    float(self.error) if error else 0.0,
+                    self.said["own"] == "late",
+                    runs_to or T,
+                ),
+                target,
+            )
+
+    def power(self, q: Fraction, s: int, v: int) -> Any:
+        """``q`` to the power of the age of what ``v`` hears of ``s`` over the largest age."""
+        share = self.ages[s, v] / self.delay if self.delay else Fraction(1)
+        return ball(q) if share == 1 else (ball(q).log() * ball(share)).exp()
+
+    def above_rows(self) -> None:
+        for i, entry in enumerate(self.said["rows"]):
+            at = f"messages.rows[{i}]"
+            step = self.witness(at)
+            q, b = (number(step["numbers"][key]) for key in ("q", "b"))
+            u = self.by_follower(step["witness"]["u"])
+            initial, left, floor = (number(entry[key]) for key in ("initial", "left", "floor"))
+            cap = None if entry["cap"] is None else number(entry["cap"])
+            self.require(min(u.values()) > 0 and b > 0 and q >= 1, f"{at}: signs")
+            for v, x in u.items():
+                heard = sum((w * u[s] for s, w in self.among[v]), Fraction(0))
+                D = self.L[v][v]
+                later = sum((self.power(q, s, v) * ball(w * u[s]) for s, w in self.among[v]), ball(Fraction(0)))
+                self.require(not ball(D * x - b * x) < later, f"{at}: row {v}")
+                self.require(initial * x >= self.far(v), f"{at}: initial of {v}")
+                self.require(floor * (D * x - heard) >= self.error * D, f"{at}: floor of {v}")
+            self.require(initial >= 0 and floor >= 0, f"{at}: negative")
+            if self.delay:
+                self.require(cap is not None and cap > 0, f"{at}: cap")
+                self.require(not ball(b * (cap or 0) * self.delay) > ball(q).log(), f"{at}: b cap delay")
+            limit = min((x for x in (cap, self.cap) if x is not None), default=None)
+            if limit is None:
+                self.require(left == 0 and entry["clock"] is None, f"{at}: left")
+            else:
+                clock = number(entry["clock"])
+                self.require(clock >= 0 and not ball(clock) > self.clock(limit), f"{at}: clock")
+                self.require(not ball(left) < (-ball(b * clock)).exp(), f"{at}: left")
+            for runs, target in self.loop():
+                T, rho1, k = map(float, self.gain)
+                slow = Gain(T, rho1, k, math.inf if limit is None else float(limit))
+                z = np.array([math.exp(-float(b) * min(slow.clock(t), 1e4)) for t in runs.times])
+                if limit is not None:
+                    z[-1] = float(left) if runs.times[-1] == T else z[-1]
+                bound = float(initial) * z + float(floor)
+                for v, x in u.items():
+                    seen = runs.away(target)[v]
+                    self.require(not np.any(seen > float(x) * bound * (1 + SLACK) + FLOOR), f"{at}: motion of {v}")
+
+    def above_residual(self) -> None:
+        bound = np.array(list(map(float, self.vector(self.said["residual"]))))
+        self.require(not any(bound[v] for v in range(self.n) if v not in self.follow), "a residual of a leader")
+        for runs, target in self.loop():
+            self.require(not np.any(runs.away(target)[:, -1] > bound * (1 + SLACK) + FLOOR), "residual")
+        if self.delay and self.error == 0 and self.cap is None and self.camps(self.follow) is not None:
+            self.require(not np.any(self.attained() > bound * (1 + 1e-6) + FLOOR), "residual that is attained")
+
+    def attained(self) -> np.ndarray:
+        """What the largest delays leave at ``T`` where some camps fit the followers and start on one side each."""
+        camps = self.camps(self.follow) or {}
+        if self.target is None or self.start is None:
+            return np.zeros(self.n)
+        off = {v: camps[v] * (self.start[v] - self.target[v]) for v in self.follow}
+        if min(off.values()) < 0 < max(off.values()):
+            return np.zeros(self.n)
+        return self.left_below(lambda v: abs(off[v]), float(self.delay))
+
+    def left_below(self, size: Any, late: float) -> np.ndarray:
+        """``sum_l (|w_kl|/D_k) e^(-D_l s(T - late)) size_l`` in floats."""
+        T, rho1, k = map(float, self.gain)
+        s, found = Gain(T, rho1, k).clock(max(T - late, 0.0)), np.zeros(self.n)
+        for v in self.follow:
+            parts = (float(w / self.L[v][v] * size(x)) * math.exp(-float(self.L[x][x]) * s) for x, w in self.among[v])
+            found[v] = sum(parts)
+        return found
+
+    def away_at_the_deadline(self) -> None:
+        said = self.said["missed"]
+        agent, bound = self.index[said["agent"]], number(said["bound"])
+        ideal = self.cap is None and self.error == 0 and self.said["own"] == "fresh" and self.target is not None
+        self.require(ideal and bound > 0 and agent in self.follow, "missed: what it needs")
+        if not ideal or self.start is None or self.target is None:
+            return
+        camps, fits, todo = {agent: 1}, True, [agent]
+        for v in todo:
+            for s, _ in self.among[v]:
+                if s not in camps:
+                    camps[s] = camps[v] * (1 if self.weights[s, v] > 0 else -1)
+                    todo.append(s)
+        for v in todo:
+            fits &= all(camps[s] * camps[v] * self.weights[s, v] > 0 for s, _ in self.among[v])
+        heard = {s for v in todo for s, _ in self.among[v]}
+        off = {v: self.start[v] - self.target[v] for v in self.follow}
+        sides = {camps[v] * (off[v] > 0) - camps[v] * (off[v] < 0) for v in heard} - {0}
+        self.require(fits and len(sides) <= 1, "missed: signs")
+        T: Fraction = self.gain[0]
+        total: Any = flint.arb(0)
+        for v, w in self.among[agent]:
+            late = self.latencies[v, agent]
+            self.require(late > 0, "missed: a message that is not late")
+            t = max(T - late, Fraction(0))
+            total += (
+                ball(w / self.L[agent][agent]) * (-ball(self.L[v][v]) * self.clock(None, t)).exp() * ball(abs(off[v]))
+            )
+        self.require(not ball(bound) > total, "missed: bound")
+        self.youngest(agent, float(bound))
+
+    def youngest(self, agent: int, bound: float) -> None:
+        """Motions whose messages are no younger than nearly the latency: none comes near."""
+        T, rho1, k = map(float, self.gain)
+        least = min(map(float, self.latencies.values()))
+        if least < T / 60 or least > T / 2:
+            return
+        young = least * (1 - YOUNGER)
+        times = np.unique(
+            np.concatenate(
+                [np.arange(0, T, least * YOUNGER / 2), late_motion.grid(T, least * YOUNGER / 2, 1e-7, 60), [T]]
+            )
+        )
+        x0, target = (np.array(list(map(float, x or []))) for x in (self.start, self.target))
+
+        def ages(X: np.ndarray, oldest: np.ndarray, j: int) -> np.ndarray:
+            newest = max(int(np.searchsorted(times, times[j] - young * (1 - 1e-12), side="right")) - 1, 0)
+            return np.minimum(np.maximum(newest, oldest), j)
+
+        X = LateMotion(self.weight_array, [Gain(T, rho1, k)] * self.n, float(self.delay), times).run(x0, ages)
+        gain, D = Gain(T, rho1, k), max(float(self.L[v][v]) for v in self.follow)
+        share = math.exp(-D * (gain.clock(T - young) - gain.clock(T - least)))
+        self.require(abs(X[agent, -1] - target[agent]) >= bound * share * (1 - SLACK) - FLOOR, "missed: a motion")
+
+    def deadlines(self) -> None:
+        T, rho1, k = self.gain
+        own = {self.index[label]: number(x) for label, x in self.said["staged"].items()}
+        self.require(sorted(own) == self.follow and min(own.values()) > 0, "staged: who, and when")
+        self.require(self.error == 0 and self.cap is None and self.said["own"] == "fresh", "staged: what it needs")
+        self.require(max(own.values()) == T, "staged: the last deadline")
+        for v, heard in self.among.items():
+            self.require(all(own[v] >= own[s] + self.delay for s, _ in heard), "staged: a deadline too early")
+        if self.false:
+            return
+        gains = tuple(Gain(float(own.get(v, T)), float(rho1), float(k)) for v in range(self.n))
+        for runs, target in self.loop(float(T) * 1.2, gains):
+            for v, t in own.items():
+                after = runs.away(target)[v][runs.times >= float(t)]
+                self.require(after.max() <= 1e-7, f"staged: motion of {v}")
+
+    def small_delays(self) -> None:
+        said = self.said["form"]
+        self.require(self.cap is not None and self.error == 0 and self.target is not None, "form: what it needs")
+        if self.false or self.cap is None:
+            return
+        step = self.witness("messages.form")
+        q, b, kap = (number(step["numbers"][key]) for key in ("q", "b", "kap"))
+        k, phi = step["witness"]["function"], self.vector(step["witness"]["phi"])
+        function, (F, P, _, nodes) = self.data["lyapunov"]["functions"][k], self.forms[k]
+        r, h = number(function["rate"]), self.cap * self.delay
+        self.require(function["coordinates"] == "E" and b > 0 and not ball(q) < ball(b * h).exp(), "form: q")
+        inverse = np.array([[float(x) for x in row] for row in P])
+        constants = dict(zip(nodes, np.diag(np.linalg.inv(inverse)).tolist(), strict=True))
+        late = self.said["own"] == "late"
+        B = [[abs(x) if late or i != j else Fraction(0) for j, x in enumerate(row)] for i, row in enumerate(self.L)]
+        pushed = [sum((x * y for x, y in zip(row, phi, strict=True)), Fraction(0)) for row in B]
+        for v in range(self.n):
+            least = math.sqrt(constants.get(v, 0.0)) * (1 - 1e-9) + float(h * q * pushed[v])
+            self.require(float(phi[v]) >= least * (1 - 1e-12) and phi[v] >= 0, f"form: phi of {v}")
+        # |L'P L| = |F|
+        value = sum((abs(F[i][j]) * pushed[i] * pushed[j] for i in range(self.n) for j in range(self.n)), Fraction(0))
+        self.require(kap >= 0 and kap**2 >= value and b + h * q * kap <= r / 2, "form: kap")
+        self.require(not ball(number(said["left"])) < (-ball(b) * self.clock(self.cap)).exp(), "form: left")
+        moved, residual = (np.array(list(map(float, self.vector(said[key])))) for key in ("moved", "residual"))
+        T = float(self.gain[0])
+        A = np.array([[float(x) for x in row] for row in F])
+        Q = np.array([[float(x) for x in row] for row in self.Q])
+        for runs, target in self.loop(1.2 * T):
+            for X in runs.states:
+                V = np.sqrt(np.maximum(np.einsum("it,ij,jt->t", X, A, X), 0))
+                z = np.array([math.exp(-float(b) * runs.gain.clock(min(t, T))) for t in runs.times])
+                ok = runs.times <= T
+                self.require(not np.any((V[0] * z * (1 + 1e-6) + FLOOR < V)[ok]), "form: a motion")
+                off = np.abs(Q @ (X - X[:, :1]))
+                self.require(not np.any(off > moved[:, None] * (1 + 1e-6) + FLOOR), "form: moved")
+                end = np.abs(X[:, runs.times == T] - target[:, None])
+                self.require(not np.any(end > residual[:, None] * (1 + 1e-6) + FLOOR), "form: residual")
+
+    # ------------------------------------------------------------------ leaders that move
+
+    def moving(self) -> None:
+        said, step = self.data["leaders"], self.witness("leaders")
+        self.require("messages" not in self.data and "mu1" not in self.gains, "leaders: what it needs")
+        self.require(self.single and self.follow, "leaders: groups")
+        if self.false:
+            return
+        a, u = number(step["numbers"]["a"]), self.by_follower(step["witness"]["u"])
+        speed, delta, initial, after = (number(said[key]) for key in ("speed", "disturbance", "initial", "after"))
+        sign = None if said["sign_gain"] is None else number(said["sign_gain"])
+        T, rho1, k = self.gain
+        self.require(speed >= 0 and delta >= 0 and a > 0 and min(u.values()) > 0, "leaders: signs")
+        self.require(sign is None or sign >= speed + delta, "sign_gain")
+        if self.false:
+            return
+        push, p, least = speed + delta, a * k, min(u.values())
+        inputs = None if said["input"] is None else self.vector(said["input"])
+        for v, x in u.items():
+            heard = sum((w * u[s] for s, w in self.among[v]), Fraction(0))
+            self.require(self.L[v][v] * x - heard >= a * x, f"leaders: row {v}")
+            self.require(initial * x >= self.far(v), f"leaders: initial of {v}")
+            if inputs is not None:
+                y = (rho1 + k / T) * initial
+                self.require(p > 1 or (p == 1 and sign is not None), "leaders: input")
+                if sign is None and p > 1:
+                    y += push / least * (rho1 * T + k) / (p - 1)
+                bound = (self.L[v][v] * x + heard) * y + (sign or 0)
+                self.require(inputs[v] >= bound, f"leaders: input of {v}")
+        self.require(after == 0 if sign is not None else after >= push / (a * rho1 * least), "leaders: after")
+        for x0, _ in self.starts():
+            self.tracked(x0, np.array([float(u[v]) for v in self.follow]), float(a), inputs)
+
+    def tracked(self, x0: np.ndarray, u: np.ndarray, a: float, inputs: Any) -> None:
+        said, (T, rho1, k) = self.data["leaders"], map(float, self.gain)
+        speed, delta, initial, after = (
+            float(number(said[key])) for key in ("speed", "disturbance", "initial", "after")
+        )
+        sign = None if said["sign_gain"] is None else float(number(said["sign_gain"]))
+        L = np.array([[float(x) for x in row] for row in self.L])
+        leaders = [v for v in range(self.n) if v not in self.follow]
+        gain = Gain(T, rho1, k)
+        motion, p, layer = Moving(L, leaders, self.follow, gain, speed, delta), a * k, 0.0
+        if sign is None:
+            times = late_motion.grid(T, T / 60, 1e-5, 200)
+            X, aims = motion.run(x0, times, u)
+            later = np.linspace(T, 2 * T, 60)
+            begin = x0.copy()
+            begin[self.follow] = motion.targets @ x0[leaders]
+            more = motion.run(begin, later, u)
+            times, X, aims = np.append(times, later), np.hstack([X, more[0]]), np.hstack([aims, more[1]])
+        else:
+            layer = 1e-2 * max(float(np.abs(x0).max()), 1.0)
+            times, X, aims = motion.run_sign(x0, u, sign, layer)
+        m = (np.abs(X[self.follow] - aims) / u[:, None]).max(axis=0)
+        # with a sign gain the last thousandth before T is left out, and what it would take away stays
+        skipped = 0.0 if sign is None else initial * math.exp(-a * gain.clock(T * (1 - 2.5e-3)))
+        for t, seen, x in zip(times, m, X.T, strict=True):
+            if t >= T:
+                kept = max(layer / (a * u.min()), skipped)
+                self.require(seen <= (after + kept) * 1.01 + FLOOR, f"leaders: after, at {t}")
+                continue
+            bound = initial * math.exp(-a * gain.clock(t))
+            left = (T - t) / T
+            if sign is None:
+                way = (T - t) * (1 - left ** (p - 1)) / (p - 1) if p != 1 else (T - t) * math.log(1 / left)
+                bound += (speed + delta) / u.min() * way
+            allowed = max(bound, layer / (a * u.min())) * (1 + 1e-6) + FLOOR + (0.01 * bound if sign is not None else 0)
+            self.require(seen <= allowed, f"leaders: a motion at {t}: {seen} above {bound}")
+            if inputs is not None:
+                e = gain.value(t) * np.abs(L @ x)[self.follow] + (sign or 0)
+                most = np.array([float(inputs[v]) for v in self.follow])
+                self.require(
+                    not np.any(e > most * (1 + 1e-6) + FLOOR + gain.value(t) * layer), f"leaders: input at {t}"
+                )
+
+
+def late_claims(data: Json, files: Mapping[str, bytes] | None = None) -> list[str]:
+    """Say what is false in an accepted certificate; an empty list if nothing is."""
+    oracle = LateOracle(data, files or {})
+    oracle.judged()
+    return oracle.false
