@@ -8,8 +8,7 @@ import click
 from click.core import ParameterSource
 
 from ptcc_certify.cli.agents import agents_keywords
-from ptcc_certify.cli.options import Options, flag_of, number_option, options_of, protocol_of
-from ptcc_certify.cli.scenario import kind_of_protocol
+from ptcc_certify.cli.options import Options, flag_of, kind_option, number_option, options_of, protocol_of
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import short_exact
 
@@ -26,15 +25,7 @@ _OF_STATES = ("plant", "drag", "x0", "v0", "a0", "offsets", "biases", "dimension
 _TEMPLATE = {"T": None, "T_r": None, "T_s": None, "rho1": "0.001", "rho2": "1", "kappa": "1"}
 
 template_options = options_of(
-    click.option(
-        "--protocol",
-        "kind",
-        type=click.Choice(["nominal", "sliding-mode"]),
-        default="nominal",
-        is_eager=True,
-        callback=kind_of_protocol,
-        help="Agents: nominal, or sliding mode, which disturbances within --delta do not move.",
-    ),
+    kind_option("Agents: nominal, or sliding mode, which disturbances within --delta do not move."),
     click.option("--x0", metavar="STATE", default="random", help="Agents: initial positions, as of ptcc certify."),
     click.option("--seed", type=click.IntRange(min=0), default=0, help="Agents: seed of random initial states."),
     *(

@@ -162,16 +162,23 @@ graphs_argument = click.argument(
     shell_complete=complete(GRAPHS, PACKAGED),
 )
 certificate_argument = click.argument("certificate", callback=_certificate, shell_complete=complete(CERTIFICATES))
-protocol_options = options_of(
-    click.option(
+
+
+def kind_option(text: str) -> Callable[[Any], Any]:
+    """Return the option that tells the protocol; it comes before the others, which may be of one protocol alone."""
+    return click.option(
         "--protocol",
         "kind",
         type=click.Choice(["nominal", "sliding-mode"]),
         default="nominal",
         is_eager=True,
         callback=kind_of_protocol,
-        help="Nominal, or sliding mode, which disturbances within delta do not move.",
-    ),
+        help=text,
+    )
+
+
+protocol_options = options_of(
+    kind_option("Nominal, or sliding mode, which disturbances within delta do not move."),
     click.option("--T", "T", metavar="NUMBER", help="Nominal: the deadline.  [default: 1]"),
     click.option("--rho1", metavar="NUMBER", default="1", help="Constant part of the gain."),
     click.option("--rho2", metavar="NUMBER", default="1", help="Factor of the growing part of the gain."),
