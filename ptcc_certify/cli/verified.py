@@ -17,7 +17,7 @@ from ptcc_certify.errors import FormatError, ParameterError
 VARIABLE, PROGRAM = "PTCC_VERIFIED", "ptcc-verified"
 BUILD = (
     "build it with make in the folder formal of the sources (Debian: apt-get install --no-install-recommends coq "
-    f"libcoq-coquelicot ocaml-nox ocaml-findlib libzarith-ocaml-dev), or name it in {VARIABLE}"
+    f"libcoq-coquelicot ocaml-nox ocaml-findlib libzarith-ocaml-dev), and name formal/ocaml/{PROGRAM} in {VARIABLE}"
 )
 
 
