@@ -20,7 +20,7 @@ from ptcc_certify.bounds.deviation_from_final_state import DeviationGeometry
 from ptcc_certify.bounds.envelope import Comparison, Envelope, remaining_part
 from ptcc_certify.bounds.final_state import FinalState, Influence, final_state, influence
 from ptcc_certify.bounds.input.effort import Effort
-from ptcc_certify.bounds.input.effort_bounds import InputRequest, bound_effort
+from ptcc_certify.bounds.input.effort_bounds import InputRequest, bound_effort, full_constants
 from ptcc_certify.bounds.input.worst_initial_state import WorstInitialState, worst_initial_state
 from ptcc_certify.bounds.late_messages import LateBounds
 from ptcc_certify.bounds.sliding_envelope import SlidingEnvelope
@@ -31,7 +31,7 @@ from ptcc_certify.certificate.format_leaders import tracking_obligations
 from ptcc_certify.certificate.format_messages import late_obligations
 from ptcc_certify.certificate.format_vectors import final_state_witness
 from ptcc_certify.certificate.request import Expectations, Request
-from ptcc_certify.checker import CheckReport
+from ptcc_certify.checker import INPUT_NODES, CheckReport
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
 from ptcc_certify.checker.quadratic_form import Form
 from ptcc_certify.errors import ParameterError, PTCCError, gated
@@ -88,6 +88,9 @@ class Observations:
 
 #: What may be put to a certificate that was read: what is asked, and what was seen.
 _OF_NO_FILE = {"observed", "expectations", *(part.name for part in fields(Observations))} - {"search"}
+#: What Lyapunov functions and their constants depend on, and where they are kept.
+_OF_FUNCTIONS = {"structure", "influence", "lyapunov", "searched_functions", "source"}
+_ONCE = ("functions", "full_constants")
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,11 +178,15 @@ class Content:
             x0, sigma0 = (values.get(name, getattr(self, name)) for name in ("initial_state", "sigma0"))
             first = x0 and [x - s for x, s in zip(x0, sigma0 or [0] * len(x0), strict=True)]
             values["final_state"] = first and final_state(self.structure, first, matrix=self.influence)
+        same_functions = not values.keys() & _OF_FUNCTIONS
         for name in ("request", "observed"):
             group = values.pop(name, getattr(self, name))
             own = {f.name: values.pop(f.name) for f in fields(group) if f.name in values}
             values[name] = replace(group, **own)
-        return replace(self, **values)
+        changed = replace(self, **values)
+        if same_functions:  # what depends on them alone is computed once for all gains and initial states
+            vars(changed).update({part: vars(self)[part] for part in _ONCE if part in vars(self)})
+        return changed
 
     # ------------------------------------------------------------------ parts by their short names
 
@@ -310,6 +317,13 @@ class Content:
     def forms(self) -> list[Form | None]:
         """The Lyapunov functions as bounds of the input take them; None for those of large graphs."""
         return [V.form for V in self.functions]
+
+    @cached_property
+    def full_constants(self) -> tuple[tuple[Fraction, ...] | None, ...]:
+        """Of every Lyapunov function ``c_k``, ``e_k^2 <= c_k V``, where its matrix is full and the graph not large."""
+        n = self.graph.n_nodes
+        forms = [None if f is None or f.matrix is None or n > INPUT_NODES else f for f in self.forms]
+        return tuple(None if f is None else full_constants(f, n) for f in forms)
 
     @property
     def _functions_with_rate(self) -> list[LyapunovFunction]:
@@ -471,6 +485,7 @@ class Content:
             self.structure,
             self.protocol,
             self.forms,
+            () if self.initial_state is None and self.initial_set is None else self.full_constants,
             rate=self.rate,
             limit=self.upper_bound,
             initial_state=self.initial_state,

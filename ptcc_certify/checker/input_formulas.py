@@ -544,10 +544,15 @@ class InputBounds:
         largest = max(map(self.initial_set.largest, self.rows))
         states = max(self.initial_set.largest({v: Fraction(1)}) for v in range(len(self.rows)))
         if self.reaching is not None:
-            pushes, T_r = [self.reaching.pushes(row) for row in self.rows], self.reaching.T_r
+            pushes, T_r = self._pushes, self.reaching.T_r
             largest += max(a for a, _ in pushes) + T_r * max(b for _, b in pushes)
             states += max(map(abs, self.reaching.sigma0)) + T_r * self.reaching.push
         return [min(largest, 2 * row.get(v, Fraction(0)) * states) for v, row in enumerate(self.rows)]
+
+    @cached_property
+    def _pushes(self) -> list[tuple[Fraction, Fraction]]:
+        """What sliding variables and their drift do to every ``e_k``."""
+        return [] if self.reaching is None else [self.reaching.pushes(row) for row in self.rows]
 
     @cached_property
     def error_norm(self) -> Fraction:
@@ -607,8 +612,11 @@ class InputBounds:
             return self._cache[k, z]
         assert self.reaching is not None
         gain, form, v, pieces = self.gain, self.form(k), self.initial_root(k), list[Piece]()
-        pushes = zip(*map(self.reaching.pushes, self._coordinates(form)), strict=True)
-        w, f = (root_above(form.value(own, sizes=True)) for own in pushes)
+        of_errors = form.coordinates == "E"
+        pushes = (
+            [self._pushes[v] for v in form.nodes] if of_errors else map(self.reaching.pushes, self._coordinates(form))
+        )
+        w, f = (root_above(form.value(own, sizes=True)) for own in zip(*pushes, strict=True))
         if ("stretches", z) not in self._cache:
             self._cache["stretches", z] = stretches(gain, self.reaching, z, PIECES)
         for part in self._cache["stretches", z]:
@@ -651,10 +659,12 @@ class InputBounds:
 
     def root_constant(self, k: int, v: int | None) -> Fraction:
         """Return ``c`` with ``|e_v| <= c sqrt(V)``, or ``||E|| <= c sqrt(V)`` without an agent."""
-        if v is not None:
-            return root_above(self.constant(k)[v])
-        form = self.form(k)
-        return root_above(1 / form.lowest if form.coordinates == "E" else sum(self.constant(k), Fraction(0)))
+        if (k, v, "root") not in self._cache:
+            form = self.form(k)
+            whole = 1 / form.lowest if v is None and form.coordinates == "E" else None
+            square = self.constant(k)[v] if v is not None else whole or sum(self.constant(k), Fraction(0))
+            self._cache[k, v, "root"] = root_above(square)
+        return self._cache[k, v, "root"]
 
     def bound(self, of: Of, v: int | None, k: int, z: Fraction) -> Fraction:
         """Bound the peak, the energy or the length ``of`` an agent's ``gain e_v``, or of ``gain ||E||``.

@@ -14,7 +14,7 @@ lie nearer to ``T_r`` than a float tells: everything is computed in ``z = ln(T_r
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -204,9 +204,12 @@ class ReachingProblem:
     def sigma(self, z: np.ndarray) -> np.ndarray:
         """Return the (N, M) sliding variables at increasing instants ``z >= 0``, infinite from ``T_r`` on."""
         values = np.zeros((self.z.size, z.size))
-        for row, agent in enumerate(self._agents.tolist()):
-            before = z < self.z[agent]
-            values[agent, before] = self._sign[agent] * self._unit[agent] * self._size(row, z[before])
+        for rows in self._blocks(z):
+            agents = self._agents[rows]
+            before = z < self.z[agents, None]
+            used = before.any(axis=0)
+            start = (self._sign[agents] * self._unit[agents])[:, None]
+            values[np.ix_(agents, used)] = np.where(before[:, used], start * self._sizes(rows, z[used]), 0.0)
         return values
 
     def above(self, z: np.ndarray, certain: np.ndarray) -> np.ndarray:
@@ -216,31 +219,46 @@ class ReachingProblem:
         the certain instant, too, which nothing cancels.
         """
         bounds = np.zeros((self._unit.size, z.size))
-        for row, agent in enumerate(self._agents.tolist()):
-            before = z < certain[agent]
-            size = self._size(row, z[before], SUM_ERROR)
-            if certain[agent] <= self._end:
-                size = np.minimum(size, self._rest(row, z[before], float(certain[agent])) * self._decay(z[before]))
-            bounds[agent, before] = size * self._unit[agent] * (1 + SUM_ERROR / 2)
+        for rows in self._blocks(z):
+            agents = self._agents[rows]
+            used = z < certain[agents].max()
+            size, decay = self._sizes(rows, z[used], SUM_ERROR), self._decay(z[used])
+            in_panel = self._integrals(z[used], self._edges[self._panel(z[used]) + 1], rows)
+            for place, (row, agent) in enumerate(zip(rows, agents.tolist(), strict=True)):
+                end, before = float(certain[agent]), z[used] < certain[agent]
+                if end <= self._end:
+                    rest = self._rest(row, z[used][before], end, in_panel[place, before]) * decay[before]
+                    size[place, before] = np.minimum(size[place, before], rest)
+                bounds[agent, : before.sum()] = size[place, before] * self._unit[agent] * (1 + SUM_ERROR / 2)
         return bounds
 
-    def _size(self, row: int, z: np.ndarray, more: float = 0.0) -> np.ndarray:
-        """Return the size of one sliding variable in its unit, with so much added to the bracket."""
-        near, size = z <= self._end, np.empty(z.size)
+    def _blocks(self, z: np.ndarray) -> Iterator[range]:
+        """Yield the rows of the agents that do not start at 0, so many at once as fit into memory at instants ``z``."""
+        step = max(1, 10 * _BATCH // (z.size * _NODES.size + 1))
+        for first in range(0, self._agents.size, step):
+            yield range(first, min(first + step, self._agents.size))
+
+    def _sizes(self, rows: range, z: np.ndarray, more: float = 0.0) -> np.ndarray:
+        """Return the (A, M) sizes of some sliding variables in their units, with so much added to the bracket."""
+        near, size = z <= self._end, np.empty((len(rows), z.size))
         panel = self._panel(z[near])
-        integral = self._sums[row, panel] + self._integrals(self._edges[panel], z[near], [row])[0]
-        size[near] = np.minimum(np.maximum(1 - integral, 0) + more, 1) * self._decay(z[near])
-        size[~near] = self._tail(row, z[~near], more)
+        integral = self._sums[rows[0] : rows[-1] + 1, panel] + self._integrals(self._edges[panel], z[near], rows)
+        size[:, near] = np.minimum(np.maximum(1 - integral, 0) + more, 1) * self._decay(z[near])
+        size[:, ~near] = [self._tail(row, z[~near], more) for row in rows]
         return size
 
-    def _rest(self, row: int, z: np.ndarray, end: float) -> np.ndarray:
-        """Return the integrals of one agent from instants ``z < end`` to ``end``, each to near machine precision."""
+    def _rest(self, row: int, z: np.ndarray, end: float, in_panel: np.ndarray) -> np.ndarray:
+        """Return the integrals of one agent from instants ``z < end`` to ``end``, each to near machine precision.
+
+        ``in_panel`` has those from each instant to the end of its panel.
+        """
         panel, last = self._panel(z), int(self._panel(np.array([end]))[0])
         later = np.append(np.cumsum(self._steps[row, :last][::-1])[::-1], 0.0)  # from an edge on to the last panel
         whole = panel < last
-        own = self._integrals(z, np.where(whole, self._edges[panel + 1], end), [row])[0]
         final = float(self._integrals(self._edges[[last]], np.array([end]), [row])[0, 0])
-        return own + np.where(whole, later[np.minimum(panel + 1, last)] + final, 0.0)
+        rest = in_panel + later[np.minimum(panel + 1, last)] + final
+        rest[~whole] = self._integrals(z[~whole], np.full((~whole).sum(), end), [row])[0]
+        return rest
 
     def _panel(self, z: np.ndarray) -> np.ndarray:
         return np.clip(np.searchsorted(self._edges, z, side="right") - 1, 0, self._steps.shape[1] - 1)
@@ -263,8 +281,10 @@ class ReachingProblem:
         """Return the (A, P) integrals of ``(mu1 - s d)/psi dt`` over panels of ``z``."""
         half = (b - a) / 2
         z = (a + half)[:, None] + half[:, None] * _NODES
-        push = self._push(z.ravel(), rows).reshape(len(rows), *z.shape)
         with np.errstate(over="ignore", invalid="ignore"):  # infinite beyond the root of a small initial value
+            if self._worst:
+                return np.multiply.outer(self._gap / self._unit[self._agents[rows]], self._weight(z) @ _WEIGHTS * half)
+            push = self._push(z.ravel(), rows).reshape(len(rows), *z.shape)
             return (push * self._weight(z)) @ _WEIGHTS * half
 
     def _latest(self) -> float:

@@ -57,6 +57,8 @@ class InputRequest:
     protocol : Protocol
     forms : sequence of Form or None
         The Lyapunov functions of the envelope; None for those of large graphs.
+    constants : sequence of (sequence of Fraction or None)
+        Of every one with a full matrix ``c_k``, ``e_k^2 <= c_k V``; asked for where there are initial states.
     rate, limit : Fraction or None
         The largest proved rate, and the proved upper bound on the decay rate.
     initial_state, initial_set
@@ -79,6 +81,7 @@ class InputRequest:
     structure: Structure
     protocol: Protocol
     forms: Sequence[Form | None]
+    constants: Sequence[Sequence[Fraction] | None]
     rate: Fraction | None
     limit: Fraction | None
     initial_state: Sequence[Fraction] | None = None
@@ -102,7 +105,7 @@ def bound_effort(request: InputRequest) -> Effort:
     effort = Effort(bounded, by, (lower, upper), None, (None,) * len(request.forms), sliding=sliding)
     if (request.initial_state is None and request.initial_set is None) or still or n > INPUT_NODES:
         return effort
-    constants = tuple(None if f is None or f.matrix is None else full_constants(f, n) for f in request.forms)
+    constants = tuple(None if c is None else tuple(c) for c in request.constants)
     region = request.initial_set or InitialSet(tuple(request.initial_state or ()))
     rows = structure.graph.exact_rows(range(n))
     bounds = InputBounds(rows, gain.exact, request.forms, constants, region, _reaching_phase(request))
