@@ -93,19 +93,32 @@ Proof.
   rewrite F.empty_o in B. discriminate.
 Qed.
 
-(** * Edges by source *)
+(** * Edges by a number, such as their source *)
 Definition ways := M.t (list edge).
 Definition from_ (m : ways) (i : nat) : list edge := match M.find i m with Some l => l | None => [] end.
-Definition by_source (es : list edge) : ways := fold_right (fun e m => M.add (src e) (e :: from_ m (src e)) m) (M.empty _) es.
-Lemma from_In es i e : In e (from_ (by_source es) i) <-> In e es /\ src e = i.
+Definition by_key (key : edge -> nat) (es : list edge) : ways :=
+  fold_right (fun e m => let k := key e in M.add k (e :: from_ m k) m) (M.empty _) es.
+Definition by_source : list edge -> ways := by_key src.
+Lemma key_In key es i e : In e (from_ (by_key key es) i) <-> In e es /\ key e = i.
 Proof.
   induction es as [|f es IH].
-  - unfold from_, by_source. cbn [fold_right]. rewrite F.empty_o. simpl. tauto.
-  - change (by_source (f :: es)) with (M.add (src f) (f :: from_ (by_source es) (src f)) (by_source es)).
-    unfold from_ at 1. rewrite F.add_o. destruct (Nat_as_OT.eq_dec (src f) i) as [E|N]; cbn [In].
+  - unfold from_, by_key. cbn [fold_right]. rewrite F.empty_o. simpl. tauto.
+  - change (by_key key (f :: es)) with (M.add (key f) (f :: from_ (by_key key es) (key f)) (by_key key es)).
+    unfold from_ at 1. rewrite F.add_o. destruct (Nat_as_OT.eq_dec (key f) i) as [E|N]; cbn [In].
     + rewrite E, IH. split; [intros [<-|[A B]]; auto|intros [[A|A] B]; auto].
-    + change (In e (from_ (by_source es) i) <-> (f = e \/ In e es) /\ src e = i). rewrite IH.
+    + change (In e (from_ (by_key key es) i) <-> (f = e \/ In e es) /\ key e = i). rewrite IH.
       split; [tauto|]. intros [[<-|A] B]; [contradiction|tauto].
+Qed.
+Lemma from_In es i e : In e (from_ (by_source es) i) <-> In e es /\ src e = i.
+Proof. apply key_In. Qed.
+(** edges into each of some lists *)
+Definition number (m : place) (e : edge) : nat := match M.find (tgt e) m with Some k => S k | None => 0 end.
+Lemma number_In l es k e : apart 0 l (places l) = true -> k < length l ->
+  (In e (from_ (by_key (number (places l)) es) (S k)) <-> In e es /\ In (tgt e) (nth k l [])).
+Proof.
+  intros A Hk. rewrite key_In, <- (within_In l k (tgt e) A Hk). unfold number, within.
+  destruct (M.find (tgt e) (places l)) as [j|]; [|split; intros [_ B]; discriminate].
+  rewrite Nat.eqb_eq. split; intros [B C]; (split; [exact B|congruence]).
 Qed.
 
 (** * Who is reached *)
