@@ -163,7 +163,7 @@ Definition leader_claim (c : cert) (l : list Q * Q) : Prop := forall X S t0 t, m
   let W x := qdot (fst l) (fun i => sq (lap (edges c) x i)) in
   t0 <= t < deadline c -> W (X t) <= exp (- (Q2R (snd l) * (s c t - s c t0))) * W (X t0).
 (** where nothing moves: components by camps, and nobody beyond the largest value of a balanced one of its own *)
-Definition rests (c : cert) (y : nat -> R) : Prop := (forall i, (i < order c)%nat -> lap (edges c) y i = 0) /\
+Definition at_rest (c : cert) (y : nat -> R) : Prop := (forall i, (i < order c)%nat -> lap (edges c) y i = 0) /\
   (forall C i, In C (comps c) -> In i (nodes C) -> let h := hd O (nodes C) in
     match camps C with Gauge g => y i = sgn g i * (sgn g h * y h) | Cycle _ => y i = 0 end) /\
   forall P M i, In P (pieces c) -> In i (members P) -> (i < order c)%nat -> 0 <= M ->
@@ -171,7 +171,7 @@ Definition rests (c : cert) (y : nat -> R) : Prop := (forall i, (i < order c)%na
 (** the end is reached at the deadline *)
 Definition limit_claim (c : cert) : Prop := forall X S, moves c X S -> exists y, (forall i, (i < order c)%nat ->
   filterlim (fun t => X t i) (at_left (deadline c)) (locally (y i))) /\ let x0 j := X 0 j - S 0 j in
-  if enclosed c then rests c y /\ ((forall j, (j < order c)%nat -> x0 j = begin c j) -> within c y)
+  if enclosed c then at_rest c y /\ ((forall j, (j < order c)%nat -> x0 j = begin c j) -> within c y)
   else y = end_state c x0.
 (** the input stays bounded *)
 Definition input_claim (c : cert) : Prop := bounded_input c = true -> forall X S t0, moves_from c X S t0 ->

@@ -261,7 +261,7 @@ Proof.
       * assert (La' : a < 0) by (destruct (Req_dec a 0) as [Q|Q]; [rewrite Q, Rabs_R0 in M1; lra|lra]).
         assert (Lb' : b < 0) by (destruct (Req_dec b 0) as [Q|Q]; [rewrite Q, Rabs_R0 in M2; lra|lra]). nra.
 Qed.
-Theorem rests_ok : rests c y.
+Theorem rests_ok : at_rest c y.
 Proof.
   split; [exact Hy|]. split.
   - intros C i HC Hi h. destruct (camps C) as [g|cy] eqn:E.
