@@ -333,11 +333,12 @@ let certificate (j : Json.t) : t =
   let vectors = ref [] in
   let functions = List.mapi (function_ nodes listening groups vectors proof gauge paper) listed in
   let is_weighted f = match f.ly with Weighted _ -> true | _ -> false in
-  if enclosed && not (paper = None && List.for_all is_weighted functions) then unsupported "a large form with dense matrices";
+  let own_rate = Option.bind paper (fun (p : Paper.t) -> p.own_rate) in
+  if enclosed && not (own_rate = None && List.for_all is_weighted functions) then unsupported "a large form with dense matrices";
   if not enclosed && List.exists is_weighted functions then unsupported "dominance with weights of followers";
   let rates = fields "rates" [ "paper"; "diagonal"; "proved"; "upper_bound" ] (get "rates") in
   let rate k = optional number ("rates." ^ k) (rates k) in
-  (match rate "paper", Option.bind paper (fun (p : Paper.t) -> p.own_rate) with
+  (match rate "paper", own_rate with
    | None, None -> () | Some a, Some b when Number.equal a b -> () | _ -> bad "rates.paper is not that of the paper's function");
   let best_overshoot = match get "overshoot" with
     | Null -> None
