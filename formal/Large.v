@@ -2,11 +2,12 @@
 Require Import ZArith QArith Qabs Qreals List Bool Reals Lra Lia Psatz.
 From Coquelicot Require Import Coquelicot.
 Import ListNotations.
-Require Import Vec Definite Graph Flow Certificate Checker Sound Claims Input Mean Slide Main Table Dominance Weighted Rest Enclose Wide.
+Require Import Vec Definite Graph Flow Certificate Checker Sound Claims Input Mean Slide Main Table Dominance Weighted Rest Enclose Wide Group.
 Open Scope R_scope.
 
-(** what is found by search: of each Lyapunov function its vector, of followers what encloses them *)
-Record hints := Hints { vectors : list (list Q); around : list Q }.
+(** what is found by search: of each Lyapunov function the vector of its rows, and the rates of closed components by
+    themselves, 0 of single nodes; of followers what encloses them *)
+Record hints := Hints { vectors : list (list Q * list Q); around : list Q }.
 
 Definition leads (c : cert) (i : nat) : bool := match M.find i (places (map nodes (comps c))) with Some _ => true | None => false end.
 (** leaders: unbalanced ones end at 0, single ones where they are *)
@@ -23,10 +24,17 @@ Definition check_leaders (c : cert) : bool :=
 Definition check_final_large (c : cert) (u : list Q) : bool :=
   match final c with [] => true | _ => let pl := places (map nodes (comps c)) in
     check_leaders c && check_followers c (fun i => match M.find i pl with Some _ => true | None => false end) u end.
-Definition check_functions (c : cert) (vs : list (list Q)) : bool :=
-  (length (funcs c) =? length vs)%nat &&
-  forallb (fun p : func * list Q => check_weighted c (edges c) (snd p) (fun _ => 0%Z) (Zpos (Qden (rate (fst p)))) (fst p))
-    (combine (funcs c) vs).
+Definition weights_of (f : func) : list Q := match ly f with Weighted p => p | _ => [] end.
+Definition check_function_large (c : cert) (pl : place) (into : ways) (f : func) (v : list Q * list Q) : bool :=
+  let K := common (rate f :: snd v) in
+  let gz := table (map (scaled K) (snd v)) in
+  good K (rate f :: snd v) &&
+  numbered 0 (fun k C => check_group (from_ into (S k)) (nodes C) (camps C) (weights_of f) (nth k (snd v) 0%Q)) (comps c) &&
+  check_weighted c (from_ into 0) (fst v) (fun i => match M.find i pl with Some k => get gz k | None => 0%Z end) K f.
+Definition check_functions (c : cert) (vs : list (list Q * list Q)) : bool :=
+  let Cs := map nodes (comps c) in let pl := places Cs in let into := by_key (number pl) (edges c) in
+  (length (funcs c) =? length vs)%nat && forallb ascending Cs &&
+  forallb (fun p : func * (list Q * list Q) => check_function_large c pl into (fst p) (snd p)) (combine (funcs c) vs).
 Definition check_moves (c : cert) : bool :=
   match edges c with [] => true | _ => existsb (fun f => pos (rate f)) (funcs c) end.
 Definition check_input_large (c : cert) : bool :=
@@ -63,16 +71,43 @@ Proof.
 Qed.
 Lemma function_large f : In f (funcs c) -> function_claim c f /\ exists p, ly f = Weighted p.
 Proof.
-  intros Hf. unfold check_functions in Hfunctions. apply andb_prop in Hfunctions as [L H]. apply Nat.eqb_eq in L.
-  rewrite forallb_forall in H. destruct (in_nth (funcs c) f f Hf) as [k [Hk E]].
-  assert (K : In (f, nth k (vectors h) []) (combine (funcs c) (vectors h))).
-  { replace (f, nth k (vectors h) []) with (nth k (combine (funcs c) (vectors h)) (f, [])).
+  intros Hf. unfold check_functions in Hfunctions. cbv zeta in Hfunctions. set (Cs := map nodes (comps c)) in *.
+  apply andb_prop in Hfunctions as [L H]. apply andb_prop in L as [L Asc]. apply Nat.eqb_eq in L.
+  rewrite forallb_forall in H, Asc. destruct (in_nth (funcs c) f f Hf) as [k [Hk E]]. set (v := nth k (vectors h) ([], [])).
+  assert (Kin : In (f, v) (combine (funcs c) (vectors h))).
+  { replace (f, v) with (nth k (combine (funcs c) (vectors h)) (f, ([], []))).
     - apply nth_In. rewrite combine_length. lia.
     - rewrite combine_nth by exact L. rewrite E. reflexivity. }
-  specialize (H _ K). cbn [fst snd] in H. pose proof H as H'. unfold check_weighted in H'. destruct (ly f) as [P|p g|p] eqn:El; try discriminate.
+  specialize (H _ Kin). unfold check_function_large in H. cbv zeta in H. cbn [fst snd] in H.
+  set (K := common (rate f :: snd v)) in *. set (gz := table (map (scaled K) (snd v))) in *.
+  apply andb_prop in H as [H HW]. apply andb_prop in H as [HK HG].
+  assert (HK' : good K (snd v) = true).
+  { unfold good in *. apply andb_prop in HK as [A B]. simpl in B. apply andb_prop in B as [_ B]. rewrite A, B. reflexivity. }
+  destruct (good_ok _ _ HK) as [K0 _]. destruct (wide_parts c Hstructure) as [W0 [W1 [W2 _]]]. fold Cs in W0.
+  pose proof HW as H'. unfold check_weighted in H'. destruct (ly f) as [P|p g|p] eqn:El; try discriminate.
   split; [|exists p; reflexivity].
-  apply (weighted_ok c es (nth k (vectors h) []) (fun _ => 0%Z) (Zpos (Qden (rate f))) f p edges_in Hprot (fun e He => He) El H).
-  intros x z. rewrite (fsum_ext _ _ (fun _ => 0 * 1)) by (intros; unfold Rdiv; ring). rewrite fsum_scal. unfold es. lra.
+  assert (Eout : from_ (by_key (number (places Cs)) es) 0 = filter (fun e => (number (places Cs) e =? 0)%nat) es) by apply key_filter.
+  apply (weighted_ok c (from_ (by_key (number (places Cs)) es) 0) (fst v) _ K f p edges_in Hprot) in HW; [exact HW| |exact El|].
+  - intros e He. rewrite Eout in He. apply filter_In in He. apply He.
+  - intros x z. fold es n. rewrite Eout.
+    rewrite (fsum_ext _ _ (fun i => gamma_of Cs (snd v) i * (Q2R (nth i p 0%Q) * sq (z i)))).
+    + apply (groups_ok n es Cs (snd v) p W0 (fun C HC => Asc C HC)).
+      * intros C i HC Hi. apply in_map_iff in HC as [D [<- HD]]. apply (W1 D i HD Hi).
+      * intros j Hj. rewrite <- key_filter. unfold Cs in Hj. rewrite map_length in Hj. set (C0 := Comp [] (Cycle []) [] []).
+        pose proof (numbered_ok _ _ C0 0%nat HG j Hj) as G. rewrite Nat.add_0_l in G. cbv beta in G.
+        assert (EC : nth j Cs [] = nodes (nth j (comps c) C0)) by (unfold Cs; change (@nil nat) with (nodes C0); apply map_nth).
+        unfold weights_of in G. rewrite El in G. rewrite <- EC in G.
+        assert (Hj' : (j < length Cs)%nat) by (unfold Cs; rewrite map_length; exact Hj).
+        apply (group_ok es _ (nth j Cs []) (camps (nth j (comps c) C0)) p (nth j (snd v) 0%Q) x).
+        -- intros i Hi y. rewrite key_filter. apply lap_filter. intros e He Hkey Et. apply Nat.eqb_neq in Hkey. apply Hkey.
+           assert (In e (from_ (by_key (number (places Cs)) es) (S j))).
+           { apply (number_In Cs es j e W0 Hj'). split; [exact He|]. rewrite Et. exact Hi. }
+           apply key_In in H. apply H.
+        -- intros e He. apply (number_In Cs es j e W0 Hj') in He. apply He.
+        -- exact G.
+    + intros i _. f_equal. unfold gamma_of. destruct (M.find i (places Cs)) as [j|].
+      * unfold gz. rewrite get_table, nth_scaled by exact HK'. apply IZR_lt in K0. field. lra.
+      * unfold Rdiv. ring.
 Qed.
 Lemma lap_bounded : exists B, 0 <= B /\ forall x i, (i < n)%nat -> sq (lap es x i) <= B * norm2 n x.
 Proof. apply (lap_bound c). intros e He. apply (edges_in e He). Qed.
@@ -186,8 +221,8 @@ Proof.
   destruct (margins c) eqn:Em; [|discriminate]. destruct (leaders c) eqn:El; [|discriminate]. destruct (upper_bound c) eqn:Eu; [discriminate|].
   split; [apply wide_structure_ok; exact H4|]. split; [exact K2|]. split; [exact K1|].
   split; [intros E; rewrite H1 in E; discriminate|].
-  split; [intros f Hf; apply (function_large h c H2 H3 H6 f Hf)|].
-  split; [apply (limit_large h c H2 H3 H4 H5 H6 H1 H7 H8)|]. split; [apply (input_large h c H2 H3 H6 H9)|].
+  split; [intros f Hf; apply (function_large h c H2 H3 H4 H6 f Hf)|].
+  split; [apply (limit_large h c H2 H3 H4 H5 H6 H1 H7 H8)|]. split; [apply (input_large h c H2 H3 H4 H6 H9)|].
   split; [apply rates_ok; exact H10|]. split; [apply sliding_ok; assumption|].
   split; [intros m Hm; rewrite Em in Hm; destruct Hm|]. split; [intros l Hl; rewrite El in Hl; destruct Hl|].
   intros u Hu. rewrite Eu in Hu. discriminate.

@@ -163,8 +163,8 @@ let block nodes listening shape v =
   need (List.sort_uniq compare own |> List.length = List.length own) "nodes of a block: one occurs twice";
   need (List.sort compare own = listening) "nodes of a block: not those that listen to somebody";
   text "name" (get "name"), own, get shape, truth "times_rho" (get "times_rho")
-(* weights of a large form, 0 of nodes that listen to nobody; and the vector of its rows *)
-let dominance nodes groups proof of_ rate v =
+(* weights of a large form, 0 of nodes that listen to nobody; the vector of its rows, and the rates of leader groups *)
+let dominance nodes comps proof of_ rate v =
   let name, own, d, times_rho = v in
   need (name = "P" && not times_rho) "another block";
   let numbers, witness = proved proof "dominance" of_ [ "b" ] in
@@ -177,10 +177,15 @@ let dominance nodes groups proof of_ rate v =
     need (List.length listed = List.length own) (what ^ ": a number for each node");
     List.iter2 (fun i x -> need (Z.sign x.qnum > 0) (what ^ " is not positive"); a.(i) <- x) own listed; a in
   let weights = by_node "diagonal" d and vector = by_node "vector" (get "vector") in
-  need (List.length (entries "groups" (get "groups")) = groups) "groups: one for each leader group";
-  if groups > 0 then unsupported "a leader group of a large form";
-  List.map (fun i -> i, weights.(i)) own, Array.to_list weights, Array.to_list vector
-let function_ nodes listening groups vectors proof gauge paper number_of v =
+  let rest = ref (entries "groups" (get "groups")) in
+  let alone = List.map (fun (one : comp) -> match one.nodes, !rest with
+    | [ _ ], _ -> Number.zero
+    | _, [] -> bad "groups: one for each leader group"
+    | _, Obj _ :: _ -> unsupported "a leader group of a large form that is proved by a factor"
+    | _, g :: l -> rest := l; number "groups" g) comps in
+  need (!rest = []) "groups: one for each leader group";
+  List.map (fun i -> i, weights.(i)) own, Array.to_list weights, (Array.to_list vector, alone)
+let function_ nodes listening comps vectors proof gauge paper number_of v =
   let of_ = Printf.sprintf "lyapunov.functions[%d]" number_of in
   let get = fields "a Lyapunov function" [ "class"; "coordinates"; "blocks"; "rho"; "rate"; "overshoot"; "deviation" ] v in
   let rate = number "rate" (get "rate") and overshoot = number "overshoot" (get "overshoot") in
@@ -209,7 +214,7 @@ let function_ nodes listening groups vectors proof gauge paper number_of v =
              InE (matrix nodes "lower_triangle" (Array.of_list own) (entries "lower_triangle" rows)), false, e "lowest", e "highest"
          | "perron" | "lmi" ->
              if following proof = "dominance" then begin
-               let weights, ly, vector = dominance nodes groups proof of_ rate (block nodes listening "diagonal" one) in
+               let weights, ly, vector = dominance nodes comps proof of_ rate (block nodes listening "diagonal" one) in
                vectors := vector :: !vectors;
                let lo, hi = ends weights in
                Weighted ly, true, lo, hi end
@@ -309,7 +314,6 @@ let certificate (j : Json.t) : t =
     | None, _ -> bad "a final state without an initial state" in
   if start = None then need (degenerate = Null) "influence.degenerate without an initial state"
   else not_checked "influence.degenerate";
-  let groups = List.length (List.filter (fun (one : comp) -> List.length one.nodes > 1) comps) in
   let balanced_groups = List.exists (fun (one : comp) -> is_balanced one && List.length one.nodes > 1) comps in
   let around, final = match proved proof "final-state" "graph" [] with
     | _, Null when not enclosed -> [], final
@@ -331,7 +335,7 @@ let certificate (j : Json.t) : t =
   let listening = List.filter (fun i -> is_target.(i)) (List.init (Array.length nodes.labels) Fun.id) in
   let listed = entries "functions" ((fields "lyapunov" [ "functions" ] (get "lyapunov")) "functions") in
   let vectors = ref [] in
-  let functions = List.mapi (function_ nodes listening groups vectors proof gauge paper) listed in
+  let functions = List.mapi (function_ nodes listening comps vectors proof gauge paper) listed in
   let is_weighted f = match f.ly with Weighted _ -> true | _ -> false in
   let own_rate = Option.bind paper (fun (p : Paper.t) -> p.own_rate) in
   if enclosed && not (own_rate = None && List.for_all is_weighted functions) then unsupported "a large form with dense matrices";
