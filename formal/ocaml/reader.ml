@@ -315,14 +315,15 @@ let certificate (j : Json.t) : t =
   if start = None then need (degenerate = Null) "influence.degenerate without an initial state"
   else not_checked "influence.degenerate";
   let balanced_groups = List.exists (fun (one : comp) -> is_balanced one && List.length one.nodes > 1) comps in
-  let around, final = match proved proof "final-state" "graph" [] with
-    | _, Null when not enclosed -> [], final
-    | _ when not enclosed -> unsupported "a final state that is enclosed by a witness"
-    | _, Null when followers = [] && not balanced_groups -> [], final
-    | _, Null -> if start <> None then not_checked "final_state"; [], []
-    | _, w ->
-        let u = by_agent nodes number "the witness u" ((fields "the witness" [ "u" ] w) "u") in
-        if balanced_groups then (if start <> None then not_checked "final_state"; [], []) else u, final in
+  (* of a balanced group nothing tells where it ends but a left null vector, which is not believed *)
+  let unproved = enclosed && (balanced_groups || (following_witness proof = Null && followers <> [])) in
+  if unproved && start <> None then not_checked "final_state";
+  let around, final =
+    if unproved then (skipped proof "final-state" "graph"; [], [])
+    else match proved proof "final-state" "graph" [] with
+      | _, Null -> [], final
+      | _ when not enclosed -> unsupported "a final state that is enclosed by a witness"
+      | _, w -> by_agent nodes number "the witness u" ((fields "the witness" [ "u" ] w) "u"), final in
   if enclosed && entries "influence.components" ((fields "influence" [ "components"; "containment_weights"; "degenerate" ]
     (get "influence")) "components") <> [] then not_checked "influence.components";
   let closed = List.mapi (fun k (one : Checker.comp) -> k + 1, one.nodes, is_balanced one) comps in

@@ -1,4 +1,4 @@
-"""The verified checker on certificates of the large form: what it reads of them is accepted, and no mutant but true ones."""
+"""The verified checker on certificates of the large form: random graphs are accepted, and mutants only if true."""
 
 from __future__ import annotations
 
@@ -44,26 +44,34 @@ def made(name: str, seed: int = 3, sliding: bool = False) -> Json:
 
 
 def rate_too_high(document: Json) -> Json:
-    """The same with the largest rate higher by a millionth, wherever it is told (the gain makes the threshold equal)."""
+    """The same with the largest rate higher by a millionth, wherever it is told; the threshold is the same number."""
     rate = document["rates"]["proved"]
-    return resealed(json.loads(json.dumps(document).replace(rate, str(Fraction(rate) * (1 + Fraction(1, 10**6))))))
+    higher = str(Fraction(rate) * (1 + Fraction(1, 10**6)))
+    return resealed(json.loads(json.dumps(document).replace(rate, higher)))
+
+
+#: Of a large form not checked besides: left null vectors, the upper bound on the rate, and of groups the final states.
+NOT_CHECKED = (("influence", "components"), ("rates", "upper_bound"), ("input", "threshold", "upper"))
 
 
 def compare(document: Json, path: tuple, folder: Path) -> bool:
     """Whether both checkers agree on a mutant; else the cause is one that is listed."""
     python, (code, text) = check(resealed(document)), said(resealed(document), folder)
-    if python.accepted == (code in (0, 4)):
+    accepted = code in (0, 4)
+    if python.accepted == accepted:
         return True
-    if code in (0, 4):
-        at = str(python.rejected).partition(" of ")[0]
-        wide = path[0] == "final_state" and "radius" in str(python.reason)  # true, but no longer as narrow as is proved
-        assert wide or at in ("rate-mean",) or at.startswith("input") or unchecked(document, path), (path, python)
+    if accepted:
+        named = unchecked(document, path) or any(path[: len(part)] == part for part in NOT_CHECKED)
+        kind = str(python.rejected).partition(" of ")[0]
+        narrow = path[0] == "final_state" and "radius" in str(python.reason)  # true, but not as narrow as is proved
+        ends = f"not checked {python.rejected}" in text  # the upper bound on the rate, final states of balanced groups
+        assert named or narrow or ends or kind.startswith("input"), (path, python.rejected, python.reason)
     else:
         assert code == 2 and any(word in text for word in UNREAD), (path, python, text)
     return False
 
 
-@pytest.mark.parametrize("name", ["3.1 all single", "2.1 K=1"])
+@pytest.mark.parametrize("name", ["3.1 all single", "2.1 K=1", "3.1 mixed", "1.1"])
 def test_a_large_form_is_accepted_and_what_is_proved_of_it_is_named(name: str, tmp_path: Path) -> None:
     for sliding in (False, True):
         document = made(name, sliding=sliding)
@@ -72,10 +80,13 @@ def test_a_large_form_is_accepted_and_what_is_proved_of_it_is_named(name: str, t
         for kind in (
             "structure of graph",
             "claim of graph",
-            "final-state of graph",
             "dominance of lyapunov.functions[0]",
         ):
             assert f"verified    {kind}" in text
+        closed = document["structure"]["closed_components"]
+        groups = any(one["balanced"] and len(one["nodes"]) > 1 for one in closed)
+        assert ("not checked final-state of graph" if groups else "verified    final-state of graph") in text
+        assert ("not checked final_state" in text) == groups
         assert "not checked rates.upper_bound" in text
 
 
@@ -95,7 +106,7 @@ def test_false_rates_intervals_and_structure_of_a_large_form_are_rejected(tmp_pa
         assert said(resealed(changed(document, ("proof", step, "witness", "vector", 0), new)), tmp_path).code == 1
 
 
-@pytest.mark.parametrize("name", ["3.1 all single", "2.1 K=1 chain"])
+@pytest.mark.parametrize("name", ["3.1 all single", "2.2"])
 def test_of_some_mutants_of_a_large_form_none_is_accepted_unless_true(name: str, tmp_path: Path) -> None:
     document = made(name)
     for path, mutant in mutants(document, every=97):
@@ -103,9 +114,11 @@ def test_of_some_mutants_of_a_large_form_none_is_accepted_unless_true(name: str,
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize("name", ["2.1 K=1", "2.1 K=1 chain", "3.1 all single", "3.1 single reducible followers"])
+@pytest.mark.parametrize(
+    "name", ["1.1", "2.1 K=1", "2.1 K=1 chain", "2.1 K>=2", "3.1 all single", "3.1 mixed several", "3.2"]
+)
 def test_of_many_mutants_of_large_forms_none_is_accepted_unless_true(name: str, tmp_path: Path) -> None:
-    document = made(name if name in CLASSES else "3.1 all single", 4, sliding=name == "2.1 K=1 chain")
+    document = made(name, 4, sliding=name == "2.1 K=1 chain")
     every = int(os.environ.get("PTCC_MUTANTS_EVERY", 3))
     agreed = Counter(compare(mutant, path, tmp_path) for path, mutant in mutants(document, every=every))
     assert agreed[True] > 50
