@@ -67,9 +67,9 @@ def compare(document: Json, path: tuple, folder: Path) -> bool:
         ends = f"not checked {python.rejected}" in text  # the upper bound on the rate, final states of balanced groups
         assert named or narrow or ends or kind.startswith("input"), (path, python.rejected, python.reason)
     else:
-        # radii of followers are proved from the intervals of leaders as they are stated, be they wider than they need be
+        # radii of followers are proved from the intervals of leaders as stated, be they wider than they need be
         wide = code == 1 and path[0] == "final_state" and "final-state of graph" in text
-        assert wide or code == 2 and any(word in text for word in UNREAD), (path, python, text)
+        assert wide or (code == 2 and any(word in text for word in UNREAD)), (path, python, text)
     return False
 
 
