@@ -1,2 +1,2 @@
-Require Import Main.
-Print Assumptions check_sound.
+Require Import Large.
+Print Assumptions accepts_sound.

@@ -1,20 +1,17 @@
 (** The certificate as a record, and what it claims: all that must be read to believe the theorem of [Main.v]. *)
 Require Import ZArith QArith Qreals List Bool Reals.
 From Coquelicot Require Import Coquelicot.
-Import ListNotations.
-Open Scope R_scope.
+Import ListNotations. Open Scope R_scope.
 
 (** * Signed digraphs *)
 (** Information flows from [src] to [tgt]: the target listens. *)
 Record edge := Edge { tgt : nat; src : nat; wt : Q }.
 Definition mem (i : nat) (l : list nat) : bool := existsb (Nat.eqb i) l.
 (** (L x)_i = sum over edges into i of |w| x_i - w x_src *)
-Definition lap_edge (i : nat) (x : nat -> R) (e : edge) : R :=
-  if (tgt e =? i)%nat then Rabs (Q2R (wt e)) * x i - Q2R (wt e) * x (src e) else 0.
+Definition lap_edge i x e := if (tgt e =? i)%nat then Rabs (Q2R (wt e)) * x i - Q2R (wt e) * x (src e) else 0.
 Definition lap (es : list edge) (x : nat -> R) (i : nat) : R := fold_right (fun e a => lap_edge i x e + a) 0 es.
 Inductive path (es : list edge) : nat -> nat -> Prop :=
-| path_refl i : path es i i
-| path_step i e : In e es -> path es i (src e) -> path es i (tgt e).
+| path_refl i : path es i i | path_step i e : In e es -> path es i (src e) -> path es i (tgt e).
 (** connected if directions are ignored *)
 Definition swap (e : edge) := Edge (src e) (tgt e) (wt e).
 Definition linked (es : list edge) : nat -> nat -> Prop := path (es ++ map swap es).
@@ -42,8 +39,8 @@ Definition quiet (n : nat) (T : R) (S : R -> nat -> R) (t0 : R) : Prop :=
 Inductive balance := Gauge (g : list Z) | Cycle (c : list (nat * nat)).
 (** a closed component; of a balanced one its weights in the final states, and its left null vector *)
 Record comp := Comp { nodes : list nat; camps : balance; share : list Q; null : list Q }.
-(** [V = E' P E], [E = L x]; or [V = eps' diag(p) eps], [eps = x - (p'Gx / p'1) G1] *)
-Inductive lyap := InE (P : list (list Q)) | InEps (p : list Q) (g : list Z).
+(** [V = E' P E], [E = L x]; or [V = eps' diag(p) eps], [eps = x - (p'Gx / p'1) G1]; or [V = E' diag(p) E] *)
+Inductive lyap := InE (P : list (list Q)) | InEps (p : list Q) (g : list Z) | Weighted (p : list Q).
 (** with the deviation of the norm and of each agent, and the constants of each agent's input *)
 Record func := Func { ly : lyap; diagonal : bool; rate : Q; lowest : Q; highest : Q; overshoot : Q;
   deviation : option (Q * list Q); constants : option (list Q) }.
@@ -57,33 +54,29 @@ Record upper := Upper { bound : Q; inside : list nat; because : reason }.
 Record piece := Piece { members : list nat; row : nat; some_balanced : bool; undirected : bool; cooperative : bool;
   whole : balance }.
 Inductive protocol := Nominal (T : Q) | SlidingMode (T_r T_s mu1 mu2 mu3 delta : Q).
-(** final states are middle and radius; a leader group is its weights, 0 elsewhere, and its rate; [sliding_input] bounds what
-    the sliding mode adds to the input, by agent *)
+(** final states are middle and radius; of many nodes they are [enclosed], and no weights tell them; a leader group is its
+    weights, 0 elsewhere, and its rate; [sliding_input] bounds what the sliding mode adds to the input, by agent *)
 Record cert := Cert { order : nat; edges : list edge; kind : protocol; rho1 : Q; rho2 : Q; kappa : Q;
   comps : list comp; pieces : list piece; all_balanced : balance; sign_symmetric : bool; funcs : list func;
-  start : list Q; sliding : list Q; final : list (Q * Q); margins : list margin; leaders : list (list Q * Q);
-  upper_bound : option upper; proved : option Q; best_diagonal : option Q; best_overshoot : option Q;
-  bounded_input : bool; sliding_input : list Q }.
+  start : list Q; sliding : list Q; final : list (Q * Q); enclosed : bool; margins : list margin;
+  leaders : list (list Q * Q); upper_bound : option upper; proved : option Q; best_diagonal : option Q;
+  best_overshoot : option Q; bounded_input : bool; sliding_input : list Q }.
 
 (** * Words *)
 Definition shift (x : nat -> R) : nat -> R := fun i => x (S i).
-Fixpoint qdot (l : list Q) (x : nat -> R) : R :=
-  match l with [] => 0 | a :: l' => Q2R a * x 0%nat + qdot l' (shift x) end.
-Fixpoint qbil (A : list (list Q)) (x y : nat -> R) : R :=
-  match A with [] => 0 | r :: A' => x 0%nat * qdot r y + qbil A' (shift x) y end.
-Definition sq (x : R) := x * x.
+Fixpoint qdot l (x : nat -> R) : R := match l with [] => 0 | a :: l' => Q2R a * x O + qdot l' (shift x) end.
+Fixpoint qbil A (x y : nat -> R) : R := match A with [] => 0 | r :: A' => x O * qdot r y + qbil A' (shift x) y end.
+Definition sq (x : R) := x * x. Definition sgn (g : list Z) (i : nat) : R := IZR (nth i g 0%Z).
 Definition norm2 (n : nat) (x : nat -> R) : R := fold_right (fun i a => sq (x i) + a) 0 (seq 0 n).
-Definition sgn (g : list Z) (i : nat) : R := IZR (nth i g 0%Z).
 Definition mean (p : list Q) (g : list Z) (x : nat -> R) : R := qdot p (fun i => sgn g i * x i) / qdot p (fun _ => 1).
 (** the coordinates of a Lyapunov function, and its value *)
 Definition coords (es : list edge) (m : lyap) (x : nat -> R) : nat -> R :=
-  match m with InE _ => lap es x | InEps p g => fun i => x i - mean p g x * sgn g i end.
+  match m with InE _ | Weighted _ => lap es x | InEps p g => fun i => x i - mean p g x * sgn g i end.
 Definition V (es : list edge) (m : lyap) (x : nat -> R) : R := let z := coords es m x in
-  match m with InE P => qbil P z z | InEps p g => qdot p (fun i => sq (z i)) end.
+  match m with InE P => qbil P z z | InEps p _ | Weighted p => qdot p (fun i => sq (z i)) end.
 (** the final state [Q x]: sum over balanced closed components of the weight on agent [i] times the value *)
 Definition is_balanced (C : comp) : bool := match camps C with Gauge _ => true | Cycle _ => false end.
-Definition balanced_comps (cs : list comp) : list (nat * (list Q * list Q)) :=
-  map (fun C => (hd O (nodes C), (share C, null C))) (filter is_balanced cs).
+Definition balanced_comps cs := map (fun C => (hd O (nodes C), (share C, null C))) (filter is_balanced cs).
 Definition end_state (c : cert) (x : nat -> R) (i : nat) : R :=
   fold_right (fun b a => Q2R (nth i (fst (snd b)) 0%Q) * qdot (snd (snd b)) x + a) 0 (balanced_comps (comps c)).
 
@@ -139,8 +132,9 @@ Definition claims (c : cert) : Prop := (forall P, In P (pieces c) -> piece_claim
      (0 < wt e * wt f)%Q).
 (** the intervals of the final state hold [Q (X(0) - sigma(0))] *)
 Definition begin (c : cert) (j : nat) : R := Q2R (nth j (start c) 0%Q) - Q2R (nth j (sliding c) 0%Q).
-Definition final_claim (c : cert) : Prop := forall i, (i < length (final c))%nat -> (i < order c)%nat ->
-  let p := nth i (final c) (0%Q, 0%Q) in Rabs (Q2R (fst p) - end_state c (begin c) i) <= Q2R (snd p).
+Definition within (c : cert) (y : nat -> R) : Prop := forall i, (i < length (final c))%nat -> (i < order c)%nat ->
+  let p := nth i (final c) (0%Q, 0%Q) in Rabs (Q2R (fst p) - y i) <= Q2R (snd p).
+Definition final_claim (c : cert) : Prop := enclosed c = false -> within c (end_state c (begin c)).
 (** Proposition 1: whatever the disturbance, sliding variables shrink by [psi] and are 0 from [T_r] on; what they add to the
     input at most *)
 Definition sliding_claim (c : cert) : Prop := match kind c with Nominal _ => True
@@ -168,9 +162,17 @@ Definition margin_claim (c : cert) (m : margin) : Prop := forall x j,
 Definition leader_claim (c : cert) (l : list Q * Q) : Prop := forall X S t0 t, moves_from c X S t0 ->
   let W x := qdot (fst l) (fun i => sq (lap (edges c) x i)) in
   t0 <= t < deadline c -> W (X t) <= exp (- (Q2R (snd l) * (s c t - s c t0))) * W (X t0).
+(** where nothing moves: components by camps, and nobody beyond the largest value of a balanced one of its own *)
+Definition at_rest (c : cert) (y : nat -> R) : Prop := (forall i, (i < order c)%nat -> lap (edges c) y i = 0) /\
+  (forall C i, In C (comps c) -> In i (nodes C) -> let h := hd O (nodes C) in
+    match camps C with Gauge g => y i = sgn g i * (sgn g h * y h) | Cycle _ => y i = 0 end) /\
+  forall P M i, In P (pieces c) -> In i (members P) -> (i < order c)%nat -> 0 <= M ->
+    (forall C, In C (own c P) -> is_balanced C = true -> Rabs (y (hd O (nodes C))) <= M) -> Rabs (y i) <= M.
 (** the end is reached at the deadline *)
-Definition limit_claim (c : cert) : Prop := forall X S i, moves c X S -> (i < order c)%nat ->
-  filterlim (fun t => X t i) (at_left (deadline c)) (locally (end_state c (fun j => X 0 j - S 0 j) i)).
+Definition limit_claim (c : cert) : Prop := forall X S, moves c X S -> exists y, (forall i, (i < order c)%nat ->
+  filterlim (fun t => X t i) (at_left (deadline c)) (locally (y i))) /\ let x0 j := X 0 j - S 0 j in
+  if enclosed c then at_rest c y /\ ((forall j, (j < order c)%nat -> x0 j = begin c j) -> within c y)
+  else y = end_state c x0.
 (** the input stays bounded *)
 Definition input_claim (c : cert) : Prop := bounded_input c = true -> forall X S t0, moves_from c X S t0 ->
   exists K, forall t i, t0 <= t < deadline c -> (i < order c)%nat ->
@@ -193,6 +195,5 @@ Definition upper_claim (c : cert) (u : upper) : Prop := forall (F : (nat -> R) -
 
 Definition true_certificate (c : cert) : Prop :=
   structure c /\ behaviour c /\ claims c /\ final_claim c /\ (forall f, In f (funcs c) -> function_claim c f) /\
-  limit_claim c /\ input_claim c /\ rates_claim c /\
-  (forall m, In m (margins c) -> margin_claim c m) /\ (forall l, In l (leaders c) -> leader_claim c l) /\
-  (forall u, upper_bound c = Some u -> upper_claim c u) /\ sliding_claim c.
+  limit_claim c /\ input_claim c /\ rates_claim c /\ sliding_claim c /\ (forall m, In m (margins c) -> margin_claim c m)
+  /\ (forall l, In l (leaders c) -> leader_claim c l) /\ forall u, upper_bound c = Some u -> upper_claim c u.

@@ -51,7 +51,7 @@ Proof.
   assert (L0 : 0 < Q2R (lowest f)).
   { apply Z.ltb_lt in H1. unfold Q2R. apply Rmult_lt_0_compat; [apply IZR_lt; assumption|].
     apply Rinv_0_lt_compat. apply IZR_lt. reflexivity. }
-  split; [exact L0|]. destruct (ly f) as [P|p g].
+  split; [exact L0|]. destruct (ly f) as [P|p g|p]; [| |discriminate].
   - cbv zeta in H3. set (e := common (concat P)) in *. set (PZ := map (map (scaled e)) P) in *.
     apply andb_prop in H3 as [H3 H5]. apply andb_prop in H3 as [H3 H4]. apply andb_prop in H3 as [G E0].
     apply Z.ltb_lt in E0. apply IZR_lt in E0.
@@ -85,7 +85,7 @@ Qed.
 Lemma constants_ok f cs : check_constants c d f = true -> constants f = Some cs -> forall x i, (i < n)%nat ->
   sq (lap es x i) <= Q2R (nth i cs 0%Q) * V es (ly f) x.
 Proof.
-  unfold check_constants. intros H E x i Hi. rewrite E in H. destruct (ly f) as [P|]; [|discriminate].
+  unfold check_constants. intros H E x i Hi. rewrite E in H. destruct (ly f) as [P| |]; [|discriminate|discriminate].
   cbv zeta in H. set (e := common (concat P)) in *. set (PZ := map (map (scaled e)) P) in *.
   apply andb_prop in H as [H H']. apply andb_prop in H as [G E0]. apply Z.ltb_lt in E0. apply IZR_lt in E0.
   fold n in H'. destruct (factor_off n (dsrc d) PZ) as [r|] eqn:ER; [|discriminate].
@@ -135,10 +135,10 @@ Lemma lap_linear x y m i : lap es (fun j => x j - m * y j) i = lap es x i - m * 
 Proof.
   unfold lap. generalize es. clear. intros l. induction l as [|e l IH]; simpl; [ring|]. rewrite IH. unfold lap_edge. destruct (tgt e =? i)%nat; ring.
 Qed.
-Lemma coords_ok f : match ly f with InE _ => true | InEps _ g => forallb (fun r => (zdot r g =? 0)%Z) (dL d) end = true ->
+Lemma coords_ok f : match ly f with InE _ => true | InEps _ g => forallb (fun r => (zdot r g =? 0)%Z) (dL d) | Weighted _ => false end = true ->
   exists B, 0 <= B /\ forall x i, (i < n)%nat -> sq (lap es x i) <= B * norm2 n (coords es (ly f) x).
 Proof.
-  intros H. destruct lap_bound as [B [B0 HB]]. destruct (ly f) as [P|p g]; cbn [coords].
+  intros H. destruct lap_bound as [B [B0 HB]]. destruct (ly f) as [P|p g|p]; cbn [coords]; [| |discriminate].
   - exists 1. split; [lra|]. intros x i Hi. rewrite Rmult_1_l. apply (norm2_entry n (lap es x) i Hi).
   - exists B. split; [exact B0|]. intros x i Hi. specialize (HB (fun j => x j - mean p g x * sgn g j) i Hi).
     rewrite lap_linear in HB. assert (Z : lap es (sgn g) i = 0); [|rewrite Z, Rmult_0_r, Rminus_0_r in HB; exact HB].

@@ -98,6 +98,7 @@ let line_text s =
 type proof = { mutable rest : Json.t list; mutable checked : (string * string) list; mutable unchecked : (string * string) list }
 let proof_of v = { rest = entries "proof" v; checked = []; unchecked = [] }
 let following p = match p.rest with Obj l :: _ -> (match List.assoc_opt "kind" l with Some (Str s) -> s | _ -> "") | _ -> ""
+let following_witness p = match p.rest with Obj l :: _ -> Option.value (List.assoc_opt "witness" l) ~default:Null | _ -> Null
 (* the next obligation, which must be this one: its numbers, and its witness *)
 let take p kind of_ keys =
   match p.rest with

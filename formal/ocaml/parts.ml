@@ -17,3 +17,15 @@ let of_check c d : (string * (unit -> bool)) list =
   @ List.mapi (fun k l -> Printf.sprintf "leader-decrease of paper, group %d" (k + 1), (fun () -> check_leader c d l)) c.leaders
   @ (match c.upper_bound with
      | Some u -> [ "rate-upper-bound of rates", (fun () -> check_upper c d u) ] | None -> [])
+let of_large (h : hints) c : (string * (unit -> bool)) list =
+  [ "graph: an edge", (fun () -> check_edges c (common (List.map (fun e -> e.wt) c.edges)));
+    "protocol: a parameter", (fun () -> check_protocol c);
+    "structure of graph", (fun () -> wide_structure c);
+    "claim of graph", (fun () -> wide_claims c);
+    "dominance of a Lyapunov function", (fun () -> check_functions c h.vectors);
+    "final-state of graph: no Lyapunov function proves that it is reached", (fun () -> check_moves c);
+    "final-state of graph", (fun () -> check_final_large c h.around);
+    "input-threshold of input", (fun () -> check_input_large c);
+    "rates, or overshoot, are not what was proved", (fun () -> check_rates c);
+    "input-sliding of input", (fun () -> check_sliding c) ]
+let of_either h c d = if c.enclosed then of_large h c else of_check c (Lazy.force d)

@@ -23,6 +23,7 @@ let spread g root camps back =
         found := j :: !found; Queue.add j queue end) g.beside.(i)
   done;
   List.sort compare !found
+let inside n own = let m = Array.make n false in List.iter (fun i -> m.(i) <- true) own; fun i -> m.(i)
 
 type found = { pieces : (int list * balance) list; balance : balance }
 (* camps of nodes, 0 elsewhere; or a closed walk whose signs multiply to -1 *)
@@ -34,8 +35,7 @@ let balance g camps back own =
 let find g =
   let camps = Array.make g.n 0 and back = Array.make g.n [] in
   let groups = List.filter_map (fun i -> if camps.(i) = 0 then Some (spread g i camps back) else None) (List.init g.n Fun.id) in
-  let within own = let inside = Array.make g.n false in List.iter (fun i -> inside.(i) <- true) own; fun i -> inside.(i) in
-  { pieces = List.map (fun own -> own, balance g camps back (within own)) groups; balance = balance g camps back (fun _ -> true) }
+  { pieces = List.map (fun own -> own, balance g camps back (inside g.n own)) groups; balance = balance g camps back (fun _ -> true) }
 
 let strong_component g i =
   let reached next =
@@ -47,18 +47,19 @@ let strong_component g i =
   List.filter (fun j -> there.(j) && back.(j)) (List.init g.n Fun.id)
 
 let twin e f = f.src = e.tgt && f.tgt = e.src
-let undirected g own = List.for_all (fun e -> not (List.mem e.tgt own)
+let undirected g own = List.for_all (fun e -> not (own e.tgt)
   || List.exists (fun f -> twin e f && Number.equal f.wt e.wt) g.beside.(e.tgt)) g.edges
-let cooperative g own = List.for_all (fun e -> not (List.mem e.tgt own) || Number.Z.sign e.wt.qnum > 0) g.edges
+let cooperative g own = List.for_all (fun e -> not (own e.tgt) || Number.Z.sign e.wt.qnum > 0) g.edges
 let sign_symmetric g = List.for_all (fun e -> List.for_all (fun f -> not (twin e f)
   || Number.Z.sign e.wt.qnum * Number.Z.sign f.wt.qnum > 0) g.beside.(e.tgt)) g.edges
 
 (* the record of a weak component with these closed ones *)
 let piece g (comps : comp list) (members, whole) =
-  let own = List.filter (fun (one : comp) -> List.mem (List.hd one.nodes) members) comps in
+  let here = inside g.n members in
+  let own = List.filter (fun (one : comp) -> here (List.hd one.nodes)) comps in
   let row = match own with [ one ] -> if List.length one.nodes = List.length members then 1 else 2 | _ -> 3 in
   let some_balanced = List.exists is_balanced own in
-  { members; row; some_balanced; undirected = undirected g members; cooperative = cooperative g members; whole }
+  { members; row; some_balanced; undirected = undirected g here; cooperative = cooperative g here; whole }
 
 let connectivity (p : piece) = List.nth [ "strong"; "quasi-strong"; "weak" ] (p.row - 1)
 let theorem is_sliding (p : piece) =
@@ -82,7 +83,7 @@ let claim is_sliding p v =
   need (get "corollaries" = Arr (List.map (fun s -> Str s) (corollaries is_sliding p))) "claim: other corollaries"
 
 (* the final states of some nodes, as the document has them *)
-let part members = function Obj l -> Obj (List.map (fun i -> List.nth l i) members) | _ -> Null
+let part members = function Obj l -> let a = Array.of_list l in Obj (List.map (fun i -> a.(i)) members) | _ -> Null
 (* compares the claims of the document; returns the theorem whose row is used *)
 let compare_claims nodes is_sliding pieces kind claim_of components final =
   match pieces with

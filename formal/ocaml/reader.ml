@@ -7,7 +7,8 @@ module Z = Number.Z
 
 type t = {
   nodes : nodes; cert : cert; sha256 : string; theorem : string;
-  verdict : string; checked : (string * string) list; unchecked : (string * string) list; sections : string list }
+  verdict : string; checked : (string * string) list; unchecked : (string * string) list; sections : string list;
+  hints : Checker.hints }
 
 let keys = [ "schema"; "producer"; "graph"; "structure"; "claim"; "protocol"; "paper"; "lyapunov"; "rates"; "overshoot";
   "initial_state"; "sliding_variable"; "influence"; "final_state"; "reaching_time"; "input"; "proof"; "verdict"; "digest";
@@ -61,6 +62,35 @@ let protocol v =
       let q = number_of get in
       Nominal (q "T"), q "rho1", q "rho2", q "kappa"
 
+let interval what = function
+  | Obj l when List.mem_assoc "mid" l ->
+      let get = fields what [ "mid"; "radius" ] (Obj l) in
+      let mid, radius = number what (get "mid"), number what (get "radius") in
+      need (Z.sign radius.qnum > 0) (what ^ ": a radius is not positive"); mid, radius
+  | v -> number what v, Number.zero
+
+(* camps of a balanced component, by node into an array *)
+let into_camps g own v =
+  let camps = List.map (integer "gauge") (entries "gauge" v) in
+  need (List.length camps = List.length own && Z.equal (List.hd camps) Z.one) "camps of a component";
+  List.iter2 (fun i s -> need (Z.equal (Z.abs s) Z.one) "camps of a component"; g.(i) <- s) own camps
+let cycle_of nodes v = Cycle (List.map (fun e -> match positions nodes "negative_cycle" e with
+  | [ s; t ] -> (s, t) | _ -> bad "negative_cycle: an edge has two ends") (entries "negative_cycle" v))
+(* the closed components of a large form: no weights and no left null vectors, which the theorem does not speak of *)
+let large_components nodes listed vectors =
+  let groups = List.filter (fun (own, balanced, _) -> balanced && List.length own > 1) listed in
+  let vectors = entries "influence.components" vectors in
+  need (List.length vectors = List.length groups) "influence.components: one for each balanced group";
+  List.iter2 (fun (own, _, _) v ->
+    let one = fields "a component of influence" [ "nodes"; "left_null_vector" ] v in
+    need (positions nodes "influence" (one "nodes") = own) "influence: another component";
+    let eta = List.map (interval "left_null_vector") (entries "left_null_vector" (one "left_null_vector")) in
+    need (List.length eta = List.length own) "left_null_vector: a number for each node") groups vectors;
+  let g = Array.make (Array.length nodes.labels) Z.zero in
+  List.iter (fun (own, balanced, get) -> if balanced then into_camps g own (get "gauge")) listed;
+  let all = Array.to_list g in
+  List.map (fun (own, balanced, get) ->
+    { nodes = own; share = []; null = []; camps = if balanced then Gauge all else cycle_of nodes (get "negative_cycle") }) listed
 (* closed components with their witnesses, and what influence says of the balanced ones *)
 let components nodes structure influence =
   let n = Array.length nodes.labels in
@@ -80,7 +110,8 @@ let components nodes structure influence =
   let followers = List.filter (fun i -> not is_leader.(i)) (List.init n Fun.id) in
   need (positions nodes "leaders" (structure "leaders") = leading) "other leaders";
   need (positions nodes "followers" (structure "followers") = followers) "other followers";
-  if get "containment_weights" = Null then unsupported "a final state of the large form";
+  if get "containment_weights" = Null then large_components nodes listed (get "components"), followers, get "degenerate", true
+  else
   let balanced = List.length (List.filter (fun (_, b, _) -> b) listed) in
   let rows = ordered (List.map (fun i -> nodes.labels.(i)) followers) "containment_weights" (get "containment_weights") in
   let rows = List.map2 (fun i row ->
@@ -92,11 +123,9 @@ let components nodes structure influence =
   let comps = List.map (fun (own, is_balanced, get) ->
     if is_balanced then begin
       incr k;
-      let camps = List.map (integer "gauge") (entries "gauge" (get "gauge")) in
-      need (List.length camps = List.length own && Z.equal (List.hd camps) Z.one) "camps of a component";
-      List.iter (fun g -> need (Z.equal (Z.abs g) Z.one) "camps of a component") camps;
       let g = Array.make n Z.zero and w = Array.make n Number.zero and v = Array.make n Number.zero in
-      List.iter2 (fun i s -> g.(i) <- s; w.(i) <- Number.of_z s) own camps;
+      into_camps g own (get "gauge");
+      List.iter (fun i -> w.(i) <- Number.of_z g.(i)) own;
       List.iter (fun (i, ws) -> w.(i) <- List.nth ws !k) rows;
       let one = fields "a component of influence" [ "nodes"; "left_null_vector" ] (List.nth vectors !k) in
       need (positions nodes "influence" (one "nodes") = own) "influence: another component";
@@ -105,17 +134,8 @@ let components nodes structure influence =
       List.iter2 (fun i x -> v.(i) <- number "left_null_vector" x) own eta;
       { nodes = own; camps = Gauge (Array.to_list g); share = Array.to_list w; null = Array.to_list v } end
     else
-      { nodes = own; share = []; null = []; camps = Cycle (List.map (fun e -> match positions nodes "negative_cycle" e with
-          | [ s; t ] -> (s, t) | _ -> bad "negative_cycle: an edge has two ends")
-          (entries "negative_cycle" (get "negative_cycle"))) }) listed in
-  comps, followers, get "degenerate"
-
-let interval what = function
-  | Obj l when List.mem_assoc "mid" l ->
-      let get = fields what [ "mid"; "radius" ] (Obj l) in
-      let mid, radius = number what (get "mid"), number what (get "radius") in
-      need (Z.sign radius.qnum > 0) (what ^ ": a radius is not positive"); mid, radius
-  | v -> number what v, Number.zero
+      { nodes = own; share = []; null = []; camps = cycle_of nodes (get "negative_cycle") }) listed in
+  comps, followers, get "degenerate", false
 
 (* a Lyapunov matrix on all nodes, 0 elsewhere; the weights of a diagonal one *)
 let matrix nodes what own rows =
@@ -143,7 +163,29 @@ let block nodes listening shape v =
   need (List.sort_uniq compare own |> List.length = List.length own) "nodes of a block: one occurs twice";
   need (List.sort compare own = listening) "nodes of a block: not those that listen to somebody";
   text "name" (get "name"), own, get shape, truth "times_rho" (get "times_rho")
-let function_ nodes listening proof gauge paper number_of v =
+(* weights of a large form, 0 of nodes that listen to nobody; the vector of its rows, and the rates of leader groups *)
+let dominance nodes comps proof of_ rate v =
+  let name, own, d, times_rho = v in
+  need (name = "P" && not times_rho) "another block";
+  let numbers, witness = proved proof "dominance" of_ [ "b" ] in
+  need (Number.equal (numbers "b") rate) (of_ ^ ": b is not the rate");
+  let get = fields "the witness" [ "vector"; "groups" ] witness in
+  let by_node what v =
+    if beside v then unsupported "side files" else
+    let a = Array.make (Array.length nodes.labels) Number.zero in
+    let listed = List.map (number what) (entries what v) in
+    need (List.length listed = List.length own) (what ^ ": a number for each node");
+    List.iter2 (fun i x -> need (Z.sign x.qnum > 0) (what ^ " is not positive"); a.(i) <- x) own listed; a in
+  let weights = by_node "diagonal" d and vector = by_node "vector" (get "vector") in
+  let rest = ref (entries "groups" (get "groups")) in
+  let alone = List.map (fun (one : comp) -> match one.nodes, !rest with
+    | [ _ ], _ -> Number.zero
+    | _, [] -> bad "groups: one for each leader group"
+    | _, Obj _ :: _ -> unsupported "a leader group of a large form that is proved by a factor"
+    | _, g :: l -> rest := l; number "groups" g) comps in
+  need (!rest = []) "groups: one for each leader group";
+  List.map (fun i -> i, weights.(i)) own, Array.to_list weights, (Array.to_list vector, alone)
+let function_ nodes listening comps vectors proof gauge paper number_of v =
   let of_ = Printf.sprintf "lyapunov.functions[%d]" number_of in
   let get = fields "a Lyapunov function" [ "class"; "coordinates"; "blocks"; "rho"; "rate"; "overshoot"; "deviation" ] v in
   let rate = number "rate" (get "rate") and overshoot = number "overshoot" (get "overshoot") in
@@ -171,7 +213,12 @@ let function_ nodes listening proof gauge paper number_of v =
              let e = bare proof "overshoot" of_ [ "lowest"; "highest" ] in
              InE (matrix nodes "lower_triangle" (Array.of_list own) (entries "lower_triangle" rows)), false, e "lowest", e "highest"
          | "perron" | "lmi" ->
-             if following proof = "dominance" then unsupported "dominance";
+             if following proof = "dominance" then begin
+               let weights, ly, vector = dominance nodes comps proof of_ rate (block nodes listening "diagonal" one) in
+               vectors := vector :: !vectors;
+               let lo, hi = ends weights in
+               Weighted ly, true, lo, hi end
+             else
              let name, own, d, times_rho = block nodes listening "diagonal" one in
              need (name = "P" && not times_rho) "another block";
              let d = List.map (number "diagonal") (entries "diagonal" d) in
@@ -190,7 +237,7 @@ let function_ nodes listening proof gauge paper number_of v =
   { ly; diagonal; rate; lowest; highest; overshoot; deviation; constants = None }
 
 (* some function tells that a state at which nothing moves is one at which agents end *)
-let has_kernel = List.exists (fun f -> f.deviation <> None && (match f.ly with InE _ -> true | InEps _ -> false))
+let has_kernel = List.exists (fun f -> f.deviation <> None && (match f.ly with InE _ -> true | InEps _ | Weighted _ -> false))
 (* the upper bound on the rate: of two vectors, the combination that the left null vector annihilates *)
 let upper nodes comps proof bound =
   let numbers, witness = proved proof "rate-upper-bound" "rates" [ "upper_bound" ] in
@@ -248,7 +295,7 @@ let certificate (j : Json.t) : t =
   bare_of proof "structure" "graph";
   bare_of proof "claim" "graph";
   if get "influence" = Null then unsupported "an undecided certificate, without influence";
-  let comps, followers, degenerate = components nodes structure (get "influence") in
+  let comps, followers, degenerate, enclosed = components nodes structure (get "influence") in
   let all = Pieces.graph (Array.length nodes.labels) edges in
   let found = Pieces.find all in
   let pieces = List.map (Pieces.piece all comps) found.pieces in
@@ -267,19 +314,36 @@ let certificate (j : Json.t) : t =
     | None, _ -> bad "a final state without an initial state" in
   if start = None then need (degenerate = Null) "influence.degenerate without an initial state"
   else not_checked "influence.degenerate";
-  (match proved proof "final-state" "graph" [] with
-   | _, Null -> () | _ -> unsupported "a final state that is enclosed by a witness");
+  let balanced_groups = List.exists (fun (one : comp) -> is_balanced one && List.length one.nodes > 1) comps in
+  (* of a balanced group nothing tells where it ends but a left null vector, which is not believed *)
+  let unproved = enclosed && (balanced_groups || (following_witness proof = Null && followers <> [])) in
+  if unproved && start <> None then not_checked "final_state";
+  let around, final =
+    if unproved then (skipped proof "final-state" "graph"; [], [])
+    else match proved proof "final-state" "graph" [] with
+      | _, Null -> [], final
+      | _ when not enclosed -> unsupported "a final state that is enclosed by a witness"
+      | _, w -> by_agent nodes number "the witness u" ((fields "the witness" [ "u" ] w) "u"), final in
+  if enclosed && entries "influence.components" ((fields "influence" [ "components"; "containment_weights"; "degenerate" ]
+    (get "influence")) "components") <> [] then not_checked "influence.components";
   let closed = List.mapi (fun k (one : Checker.comp) -> k + 1, one.nodes, is_balanced one) comps in
   let setting = { Paper.n = Array.length nodes.labels; edges; closed; followers; theorem } in
   let paper = optional (fun _ v -> Paper.read setting nodes proof v) "paper" (get "paper") in
   (match paper with Some { Paper.any_rho = true; _ } -> not_checked "paper.rho_interval, that every rho is admissible" | _ -> ());
   let gauge () = match comps with [ { camps = Gauge g; _ } ] -> g | _ -> bad "coordinates eps of another graph" in
-  let listening = List.filter (fun i -> List.exists (fun e -> e.tgt = i) edges) (List.init (Array.length nodes.labels) Fun.id) in
+  let is_target = Array.make (Array.length nodes.labels) false in
+  List.iter (fun e -> is_target.(e.tgt) <- true) edges;
+  let listening = List.filter (fun i -> is_target.(i)) (List.init (Array.length nodes.labels) Fun.id) in
   let listed = entries "functions" ((fields "lyapunov" [ "functions" ] (get "lyapunov")) "functions") in
-  let functions = List.mapi (function_ nodes listening proof gauge paper) listed in
+  let vectors = ref [] in
+  let functions = List.mapi (function_ nodes listening comps vectors proof gauge paper) listed in
+  let is_weighted f = match f.ly with Weighted _ -> true | _ -> false in
+  let own_rate = Option.bind paper (fun (p : Paper.t) -> p.own_rate) in
+  if enclosed && not (own_rate = None && List.for_all is_weighted functions) then unsupported "a large form with dense matrices";
+  if not enclosed && List.exists is_weighted functions then unsupported "dominance with weights of followers";
   let rates = fields "rates" [ "paper"; "diagonal"; "proved"; "upper_bound" ] (get "rates") in
   let rate k = optional number ("rates." ^ k) (rates k) in
-  (match rate "paper", Option.bind paper (fun (p : Paper.t) -> p.own_rate) with
+  (match rate "paper", own_rate with
    | None, None -> () | Some a, Some b when Number.equal a b -> () | _ -> bad "rates.paper is not that of the paper's function");
   let best_overshoot = match get "overshoot" with
     | Null -> None
@@ -287,7 +351,7 @@ let certificate (j : Json.t) : t =
         let of_ = text "overshoot.of" (o "of") in
         let value = number "overshoot.value" (o "value") in
         need (List.exists (fun f -> (match rate "proved" with Some r -> Number.equal f.rate r | None -> false)
-          && Number.equal f.overshoot value && of_ = (match f.ly with InE _ -> "||E||^2" | InEps _ -> "||eps||^2")) functions)
+          && Number.equal f.overshoot value && of_ = (match f.ly with InE _ | Weighted _ -> "||E||^2" | InEps _ -> "||eps||^2")) functions)
           "overshoot.of: other coordinates than those of a Lyapunov function with the largest rate";
         Some value in
   let upper_bound = match rate "upper_bound" with
@@ -361,11 +425,12 @@ let certificate (j : Json.t) : t =
   let verdict = text "verdict" (get "verdict") in
   let certified = rate "proved" <> None || edges = [] in
   need (verdict = (if certified then "certified" else "undecided")) "what was proved makes another verdict";
-  { nodes; sha256; verdict; theorem; checked = List.rev proof.checked; unchecked = List.rev proof.unchecked;
+  if enclosed && not certified then unsupported "an undecided certificate of the large form";
+  { nodes; hints = { vectors = List.rev !vectors; around }; sha256; verdict; theorem; checked = List.rev proof.checked; unchecked = List.rev proof.unchecked;
     sections = List.rev !left_out;
     cert = { order = Array.length nodes.labels; edges; kind; rho1; rho2; kappa; comps; pieces; all_balanced = found.balance;
       sign_symmetric = Pieces.sign_symmetric all; funcs = functions;
-      start = Option.value start ~default:[]; sliding; final; sliding_input;
+      start = Option.value start ~default:[]; sliding; final; enclosed; sliding_input;
       margins = (match paper with Some p -> p.inequalities | None -> []);
       leaders = (match paper with Some p -> p.groups | None -> []);
       upper_bound;

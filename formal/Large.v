@@ -1,0 +1,233 @@
+(** The check of certificates of many nodes, whose final states are enclosed. *)
+Require Import ZArith QArith Qabs Qreals List Bool Reals Lra Lia Psatz.
+From Coquelicot Require Import Coquelicot.
+Import ListNotations.
+Require Import Vec Definite Graph Flow Certificate Checker Sound Claims Input Mean Slide Main Table Dominance Weighted Rest Enclose Wide Group.
+Open Scope R_scope.
+
+(** what is found by search: of each Lyapunov function the vector of its rows, and the rates of closed components by
+    themselves, 0 of single nodes; of followers what encloses them *)
+Record hints := Hints { vectors : list (list Q * list Q); around : list Q }.
+
+Definition leads (c : cert) (i : nat) : bool := match M.find i (places (map nodes (comps c))) with Some _ => true | None => false end.
+(** leaders: unbalanced ones end at 0, single ones where they are *)
+Definition check_leaders (c : cert) : bool :=
+  let sf := scale_of c in
+  let X := table (map (scaled sf) (map fst (final c))) in let S := table (map (scaled sf) (map snd (final c))) in
+  let B := table (map (scaled sf) (start c)) in let B' := table (map (scaled sf) (sliding c)) in
+  let E := listens (edges c) in
+  good sf (start c) && good sf (sliding c) && good sf (map fst (final c)) && good sf (map snd (final c)) &&
+  forallb (fun C => match camps C, nodes C with
+    | Cycle _, l => forallb (fun i => Z.abs (get X i) <=? get S i)%Z l
+    | Gauge _, [i] => (get E i =? 0)%Z && (Z.abs (get X i - (get B i - get B' i)) <=? get S i)%Z
+    | Gauge _, _ => false end) (comps c).
+Definition check_final_large (c : cert) (u : list Q) : bool :=
+  match final c with [] => true | _ => let pl := places (map nodes (comps c)) in
+    check_leaders c && check_followers c (fun i => match M.find i pl with Some _ => true | None => false end) u end.
+Definition weights_of (f : func) : list Q := match ly f with Weighted p => p | _ => [] end.
+Definition check_function_large (c : cert) (pl : place) (into : ways) (f : func) (v : list Q * list Q) : bool :=
+  let K := common (rate f :: snd v) in
+  let gz := table (map (scaled K) (snd v)) in
+  good K (rate f :: snd v) &&
+  numbered 0 (fun k C => check_group (from_ into (S k)) (nodes C) (camps C) (weights_of f) (nth k (snd v) 0%Q)) (comps c) &&
+  check_weighted c (from_ into 0) (fst v) (fun i => match M.find i pl with Some k => get gz k | None => 0%Z end) K f.
+Definition check_functions (c : cert) (vs : list (list Q * list Q)) : bool :=
+  let Cs := map nodes (comps c) in let pl := places Cs in let into := by_key (number pl) (edges c) in
+  (length (funcs c) =? length vs)%nat && forallb ascending Cs &&
+  forallb (fun p : func * (list Q * list Q) => check_function_large c pl into (fst p) (snd p)) (combine (funcs c) vs).
+Definition check_moves (c : cert) : bool :=
+  match edges c with [] => true | _ => existsb (fun f => pos (rate f)) (funcs c) end.
+Definition check_input_large (c : cert) : bool :=
+  negb (bounded_input c) || (match edges c with [] => true | _ => false end) ||
+  existsb (fun f => Qle_bool 2 (rho2 c * kappa c * rate f)) (funcs c).
+Definition check_rest (c : cert) : bool :=
+  match margins c, leaders c, upper_bound c with [], [], None => true | _, _, _ => false end.
+Definition check_large (h : hints) (c : cert) : bool :=
+  enclosed c && check_edges c (common (map wt (edges c))) && check_protocol c && wide_structure c && wide_claims c &&
+  check_functions c (vectors h) && check_moves c && check_final_large c (around h) && check_input_large c && check_rates c &&
+  check_rest c && check_sliding c.
+
+Section Large.
+Variables (h : hints) (c : cert).
+Let es := edges c.
+Let n := order c.
+Hypothesis Hedges : check_edges c (common (map wt (edges c))) = true.
+Hypothesis Hprot : check_protocol c = true.
+Hypothesis Hstructure : wide_structure c = true.
+Hypothesis Hclaims : wide_claims c = true.
+Hypothesis Hfunctions : check_functions c (vectors h) = true.
+Lemma edges_in e : In e es -> (tgt e < n)%nat /\ (src e < n)%nat.
+Proof.
+  intros He. unfold check_edges in Hedges. apply andb_prop in Hedges as [_ H]. rewrite forallb_forall in H. specialize (H e He).
+  apply andb_prop in H as [H _]. apply andb_prop in H as [H _]. apply andb_prop in H as [H1 H2].
+  split; apply Nat.ltb_lt; assumption.
+Qed.
+Lemma edges_not_zero e : In e es -> Q2R (wt e) <> 0.
+Proof.
+  intros He. unfold check_edges in Hedges. apply andb_prop in Hedges as [_ H]. rewrite forallb_forall in H. specialize (H e He).
+  apply andb_prop in H as [_ H]. apply negb_true_iff, Z.eqb_neq in H. unfold Q2R. intros Z. apply Rmult_integral in Z as [Z|Z].
+  - apply eq_IZR in Z. contradiction.
+  - assert (0 < / IZR (Zpos (Qden (wt e)))) by (apply Rinv_0_lt_compat; apply IZR_lt; reflexivity). lra.
+Qed.
+Lemma function_large f : In f (funcs c) -> function_claim c f /\ exists p, ly f = Weighted p.
+Proof.
+  intros Hf. unfold check_functions in Hfunctions. cbv zeta in Hfunctions. set (Cs := map nodes (comps c)) in *.
+  apply andb_prop in Hfunctions as [L H]. apply andb_prop in L as [L Asc]. apply Nat.eqb_eq in L.
+  rewrite forallb_forall in H, Asc. destruct (in_nth (funcs c) f f Hf) as [k [Hk E]]. set (v := nth k (vectors h) ([], [])).
+  assert (Kin : In (f, v) (combine (funcs c) (vectors h))).
+  { replace (f, v) with (nth k (combine (funcs c) (vectors h)) (f, ([], []))).
+    - apply nth_In. rewrite combine_length. lia.
+    - rewrite combine_nth by exact L. rewrite E. reflexivity. }
+  specialize (H _ Kin). unfold check_function_large in H. cbv zeta in H. cbn [fst snd] in H.
+  set (K := common (rate f :: snd v)) in *. set (gz := table (map (scaled K) (snd v))) in *.
+  apply andb_prop in H as [H HW]. apply andb_prop in H as [HK HG].
+  assert (HK' : good K (snd v) = true).
+  { unfold good in *. apply andb_prop in HK as [A B]. simpl in B. apply andb_prop in B as [_ B]. rewrite A, B. reflexivity. }
+  destruct (good_ok _ _ HK) as [K0 _]. destruct (wide_parts c Hstructure) as [W0 [W1 [W2 _]]]. fold Cs in W0.
+  pose proof HW as H'. unfold check_weighted in H'. destruct (ly f) as [P|p g|p] eqn:El; try discriminate.
+  split; [|exists p; reflexivity].
+  assert (Eout : from_ (by_key (number (places Cs)) es) 0 = filter (fun e => (number (places Cs) e =? 0)%nat) es) by apply key_filter.
+  apply (weighted_ok c (from_ (by_key (number (places Cs)) es) 0) (fst v) _ K f p edges_in Hprot) in HW; [exact HW| |exact El|].
+  - intros e He. rewrite Eout in He. apply filter_In in He. apply He.
+  - intros x z. fold es n. rewrite Eout.
+    rewrite (fsum_ext _ _ (fun i => gamma_of Cs (snd v) i * (Q2R (nth i p 0%Q) * sq (z i)))).
+    + apply (groups_ok n es Cs (snd v) p W0 (fun C HC => Asc C HC)).
+      * intros C i HC Hi. apply in_map_iff in HC as [D [<- HD]]. apply (W1 D i HD Hi).
+      * intros j Hj. rewrite <- key_filter. unfold Cs in Hj. rewrite map_length in Hj. set (C0 := Comp [] (Cycle []) [] []).
+        pose proof (numbered_ok _ _ C0 0%nat HG j Hj) as G. rewrite Nat.add_0_l in G. cbv beta in G.
+        assert (EC : nth j Cs [] = nodes (nth j (comps c) C0)) by (unfold Cs; change (@nil nat) with (nodes C0); apply map_nth).
+        unfold weights_of in G. rewrite El in G. rewrite <- EC in G.
+        assert (Hj' : (j < length Cs)%nat) by (unfold Cs; rewrite map_length; exact Hj).
+        apply (group_ok es _ (nth j Cs []) (camps (nth j (comps c) C0)) p (nth j (snd v) 0%Q) x).
+        -- intros i Hi y. rewrite key_filter. apply lap_filter. intros e He Hkey Et. apply Nat.eqb_neq in Hkey. apply Hkey.
+           assert (In e (from_ (by_key (number (places Cs)) es) (S j))).
+           { apply (number_In Cs es j e W0 Hj'). split; [exact He|]. rewrite Et. exact Hi. }
+           apply key_In in H. apply H.
+        -- intros e He. apply (number_In Cs es j e W0 Hj') in He. apply He.
+        -- exact G.
+    + intros i _. f_equal. unfold gamma_of. destruct (M.find i (places Cs)) as [j|].
+      * unfold gz. rewrite get_table, nth_scaled by exact HK'. apply IZR_lt in K0. field. lra.
+      * unfold Rdiv. ring.
+Qed.
+Lemma lap_bounded : exists B, 0 <= B /\ forall x i, (i < n)%nat -> sq (lap es x i) <= B * norm2 n x.
+Proof. apply (lap_bound c). intros e He. apply (edges_in e He). Qed.
+
+(** the limit of one motion *)
+Lemma settles_down : check_moves c = true -> forall X Sl t0, moves_from c X Sl t0 -> exists y r C, 0 < r /\ 0 <= C /\
+  (forall i, (i < n)%nat -> filterlim (fun t => X t i) (at_left (deadline c)) (locally (y i))) /\
+  (forall i, (i < n)%nat -> lap es y i = 0) /\
+  (forall t i, t0 <= t < deadline c -> (i < n)%nat -> Rabs (X t i - y i) <= 2 * C / r * exp (- (r / 2 * s c t))) /\
+  forall v, (forall t, t0 <= t < deadline c -> Rabs v <= 2 * C / r * exp (- (r / 2 * s c t))) -> v = 0.
+Proof.
+  intros H X Sl t0 HX. pose proof HX as [[HM _] HQ]. destruct (T_pos c Hprot) as [P1 [P2 P3]].
+  assert (E : exists r C, 0 < r /\ 0 <= C /\ forall t i, t0 <= t < deadline c -> (i < n)%nat ->
+    sq (lap es (X t) i) <= sq C * exp (- (r * clock (deadline c) (Q2R (rho1 c)) (k c) t))).
+  { unfold check_moves in H. fold es in H. destruct es as [|e l] eqn:Ee.
+    - exists 1, 0. split; [lra|]. split; [lra|]. intros t i _ _. unfold lap. simpl. unfold sq. lra.
+    - rewrite <- Ee. apply existsb_exists in H as [f [Hf Hr]]. destruct (function_large f Hf) as [Cl [p El]].
+      set (a := Rabs (Q2R (overshoot f) * (exp (Q2R (rate f) * s c t0) * norm2 n (lap es (X t0))))).
+      exists (Q2R (rate f)), (sqrt a). split; [exact (pos_ok c _ Hr)|]. split; [apply sqrt_pos|]. intros t i Ht Hi.
+      destruct (Cl X Sl t0 t HX Ht) as [_ [N _]]. rewrite El in N. cbn [coords] in N. fold es n in N.
+      eapply Rle_trans; [apply (norm2_entry n (lap es (X t)) i Hi)|]. eapply Rle_trans; [exact N|].
+      assert (A : sq (sqrt a) = a) by (unfold sq; apply sqrt_sqrt; apply Rabs_pos). rewrite A. fold (s c t).
+      replace (- (Q2R (rate f) * (s c t - s c t0))) with (Q2R (rate f) * s c t0 + - (Q2R (rate f) * s c t)) by ring.
+      rewrite exp_plus. set (e1 := exp (- (Q2R (rate f) * s c t))). assert (0 < e1) by apply exp_pos.
+      replace (Q2R (overshoot f) * (exp (Q2R (rate f) * s c t0) * e1 * norm2 n (lap es (X t0))))
+        with (Q2R (overshoot f) * (exp (Q2R (rate f) * s c t0) * norm2 n (lap es (X t0))) * e1) by ring.
+      apply Rmult_le_compat_r; [lra|]. apply Rle_abs. }
+  destruct E as [r [C [R0 [C0 E]]]].
+  destruct (comes_to_rest n es _ _ _ P1 P2 P3 lap_bounded X Sl t0 HM HQ r C R0 C0 E) as [y [Y1 [Y2 Y3]]].
+  exists y, r, C. split; [exact R0|]. split; [exact C0|]. split; [exact Y1|]. split; [exact Y2|]. split; [exact Y3|].
+  intros v Hv. apply (vanishes n _ _ _ P1 P2 P3 Sl t0 HQ r C R0 C0 v). exact Hv.
+Qed.
+
+(** leaders within their intervals *)
+Lemma leaders_ok X Sl t0 y : check_leaders c = true -> moves_from c X Sl t0 -> at_rest c y ->
+  (forall j, (j < n)%nat -> X 0 j - Sl 0 j = begin c j) ->
+  (forall i, (i < n)%nat -> (forall t, t0 <= t < deadline c -> X t i = X 0 i - Sl 0 i) -> y i = X 0 i - Sl 0 i) ->
+  forall i, (i < n)%nat -> leads c i = true -> Rabs (Q2R (fst (nth i (final c) (0%Q, 0%Q))) - y i) <= Q2R (snd (nth i (final c) (0%Q, 0%Q))).
+Proof.
+  intros H HX [_ [HC _]] H0 Hk i Hi Hl. unfold check_leaders in H. cbv zeta in H. set (sf := scale_of c) in *.
+  apply andb_prop in H as [H H5]. apply andb_prop in H as [H H4]. apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2].
+  rewrite forallb_forall in H5. unfold leads in Hl. destruct (M.find i _) as [j|] eqn:E; [|discriminate]. clear Hl.
+  apply places_some in E as [Hj Hin]. rewrite map_length in Hj. set (C0 := Comp [] (Cycle []) [] []).
+  change (@nil nat) with (nodes C0) in Hin. rewrite map_nth in Hin. set (C := nth j (comps c) C0) in *.
+  assert (HCin : In C (comps c)) by (apply nth_In; exact Hj). specialize (H5 C HCin). specialize (HC C i HCin Hin).
+  set (p := nth i (final c) (0%Q, 0%Q)).
+  assert (EX : IZR (get (table (map (scaled sf) (map fst (final c)))) i) = IZR sf * Q2R (fst p)).
+  { rewrite get_table, nth_scaled by exact H3. unfold p. change 0%Q with (fst (0%Q, 0%Q)) at 1. rewrite map_nth. reflexivity. }
+  assert (ES : IZR (get (table (map (scaled sf) (map snd (final c)))) i) = IZR sf * Q2R (snd p)).
+  { rewrite get_table, nth_scaled by exact H4. unfold p. change 0%Q with (snd (0%Q, 0%Q)) at 1. rewrite map_nth. reflexivity. }
+  destruct (good_ok _ _ H1) as [L _]. apply IZR_lt in L.
+  assert (Fin : forall v, IZR sf * Rabs (Q2R (fst p) - v) <= IZR sf * Q2R (snd p) -> Rabs (Q2R (fst p) - v) <= Q2R (snd p)).
+  { intros v Hv. apply (Rmult_le_reg_l (IZR sf)); assumption. }
+  apply Fin. rewrite <- ES, <- (Rabs_right (IZR sf)) at 1 by lra. rewrite <- Rabs_mult, Rmult_minus_distr_l, <- EX.
+  destruct (camps C) as [g|cy] eqn:Ec.
+  - destruct (nodes C) as [|a [|b l]] eqn:En; try discriminate. destruct Hin as [->|[]]. apply andb_prop in H5 as [A B].
+    apply Z.eqb_eq in A. apply Z.leb_le, IZR_le in B. rewrite abs_IZR, !minus_IZR in B.
+    assert (EB : IZR (get (table (map (scaled sf) (start c))) i) - IZR (get (table (map (scaled sf) (sliding c))) i) = IZR sf * begin c i).
+    { rewrite !get_table, !nth_scaled by assumption. unfold begin. ring. }
+    rewrite EB in B.
+    assert (Ey : y i = begin c i).
+    { rewrite <- (H0 i Hi). apply Hk; [exact Hi|]. intros t Ht. pose proof HX as [[HM _] HQ]. destruct (T_pos c Hprot) as [P1 _].
+      pose proof (kept n (lap es) _ _ _ P1 X Sl t0 HM HQ (unit i 1)) as Kp. unfold unit in Kp at 1. rewrite app_length, repeat_length in Kp.
+      simpl length in Kp. specialize (Kp ltac:(lia)). rewrite !dot_unit in Kp.
+      assert (Z : forall x, dot (unit i 1) (lap es x) = 0) by (intros x; rewrite dot_unit, (quiet_node es x i A); ring).
+      specialize (Kp Z t Ht). rewrite !dot_unit in Kp. lra. }
+    rewrite Ey. exact B.
+  - rewrite forallb_forall in H5. specialize (H5 i Hin). apply Z.leb_le, IZR_le in H5. rewrite abs_IZR in H5.
+    rewrite HC. rewrite Rmult_0_r, Rminus_0_r. exact H5.
+Qed.
+Lemma limit_large : enclosed c = true -> check_moves c = true -> check_final_large c (around h) = true -> limit_claim c.
+Proof.
+  intros HE HM HF X Sl HX. destruct (settles c Hprot X Sl HX) as [t0 HS].
+  destruct (settles_down HM X Sl t0 HS) as [y [r [C [R0 [C0 [Y1 [Y2 [Y3 Y4]]]]]]]].
+  exists y. split; [exact Y1|]. rewrite HE. cbv zeta.
+  destruct (wide_parts c Hstructure) as [_ [W1 [_ W2]]]. destruct (wide_claims_ok c Hclaims) as [K1 _].
+  assert (HR : at_rest c y).
+  { apply (rests_ok c edges_in edges_not_zero (wide_structure_ok c Hstructure) K1 W2 y Y2). }
+  split; [exact HR|]. intros H0 i Hl Hi. cbv zeta. unfold check_final_large in HF.
+  destruct (final c) as [|p0 l] eqn:Ef; [simpl in Hl; lia|]. rewrite <- Ef in *. apply andb_prop in HF as [F1 F2].
+  apply (followers_ok c (leads c) (around h) y edges_in Y2 F2); [|exact Hi].
+  intros j Hj Lj. apply (leaders_ok X Sl t0 y F1 HS HR H0); [|exact Hj|exact Lj].
+  intros m Hm Hk. symmetry. apply Rminus_diag_uniq. apply Y4. intros t Ht. rewrite <- (Hk t Ht). apply Y3; assumption.
+Qed.
+Lemma input_large : check_input_large c = true -> input_claim c.
+Proof.
+  intros H Hb X Sl t0 HX. unfold check_input_large in H. rewrite Hb in H. simpl in H. destruct (T_pos c Hprot) as [P1 [P2 P3]].
+  apply orb_prop in H as [H|H].
+  - exists 0. intros t i _ _. destruct (edges c) eqn:E; [|discriminate]. simpl. rewrite Rmult_0_r, Rabs_R0. lra.
+  - apply existsb_exists in H as [f [Hf Hr]]. destruct (function_large f Hf) as [Cl [p El]].
+    apply Qle_bool_iff, Qle_Rle in Hr. rewrite !Q2R_mult in Hr. fold (k c) in Hr. replace (Q2R 2) with 2 in Hr by (unfold Q2R; simpl; lra).
+    pose proof HX as [_ HQ].
+    apply (input_bounded n _ _ _ P1 P2 P3 (Q2R (rate f)) t0 (proj1 HQ) ltac:(lra) (fun t i => lap (edges c) (X t) i)
+      (Rabs (Q2R (overshoot f)) * norm2 n (lap (edges c) (X t0)))).
+    intros t i Ht Hi. destruct (Cl X Sl t0 t HX Ht) as [_ [N _]]. rewrite El in N. cbn [coords] in N. fold n in N.
+    eapply Rle_trans; [apply (norm2_entry n (lap (edges c) (X t)) i Hi)|]. eapply Rle_trans; [exact N|].
+    fold (s c t) (s c t0). set (e := exp _). set (N0 := norm2 _ _).
+    assert (0 <= N0) by apply norm2_pos. assert (0 < e) by apply exp_pos.
+    replace (Q2R (overshoot f) * (e * N0)) with (Q2R (overshoot f) * (N0 * e)) by ring. rewrite Rmult_assoc.
+    apply Rmult_le_compat_r; [apply Rmult_le_pos; lra|apply Rle_abs].
+Qed.
+End Large.
+
+Theorem large_sound h c : check_large h c = true -> true_certificate c.
+Proof.
+  intros H. unfold check_large in H. apply andb_prop in H as [H H12]. apply andb_prop in H as [H H11].
+  apply andb_prop in H as [H H10]. apply andb_prop in H as [H H9]. apply andb_prop in H as [H H8]. apply andb_prop in H as [H H7].
+  apply andb_prop in H as [H H6]. apply andb_prop in H as [H H5]. apply andb_prop in H as [H H4]. apply andb_prop in H as [H H3].
+  apply andb_prop in H as [H1 H2].
+  destruct (wide_claims_ok c H5) as [K1 K2]. unfold check_rest in H11.
+  destruct (margins c) eqn:Em; [|discriminate]. destruct (leaders c) eqn:El; [|discriminate]. destruct (upper_bound c) eqn:Eu; [discriminate|].
+  split; [apply wide_structure_ok; exact H4|]. split; [exact K2|]. split; [exact K1|].
+  split; [intros E; rewrite H1 in E; discriminate|].
+  split; [intros f Hf; apply (function_large h c H2 H3 H4 H6 f Hf)|].
+  split; [apply (limit_large h c H2 H3 H4 H5 H6 H1 H7 H8)|]. split; [apply (input_large h c H2 H3 H4 H6 H9)|].
+  split; [apply rates_ok; exact H10|]. split; [apply sliding_ok; assumption|].
+  split; [intros m Hm; rewrite Em in Hm; destruct Hm|]. split; [intros l Hl; rewrite El in Hl; destruct Hl|].
+  intros u Hu. rewrite Eu in Hu. discriminate.
+Qed.
+(** a certificate of either form *)
+Definition accepts (h : hints) (c : cert) : bool := if enclosed c then check_large h c else check c.
+Theorem accepts_sound h c : accepts h c = true -> true_certificate c.
+Proof. unfold accepts. destruct (enclosed c) eqn:E; [apply large_sound|apply small_sound; exact E]. Qed.
