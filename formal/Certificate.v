@@ -1,8 +1,7 @@
 (** The certificate as a record, and what it claims: all that must be read to believe the theorem of [Main.v]. *)
 Require Import ZArith QArith Qreals List Bool Reals.
 From Coquelicot Require Import Coquelicot.
-Import ListNotations.
-Open Scope R_scope.
+Import ListNotations. Open Scope R_scope.
 
 (** * Signed digraphs *)
 (** Information flows from [src] to [tgt]: the target listens. *)
@@ -13,11 +12,9 @@ Definition lap_edge (i : nat) (x : nat -> R) (e : edge) : R :=
   if (tgt e =? i)%nat then Rabs (Q2R (wt e)) * x i - Q2R (wt e) * x (src e) else 0.
 Definition lap (es : list edge) (x : nat -> R) (i : nat) : R := fold_right (fun e a => lap_edge i x e + a) 0 es.
 Inductive path (es : list edge) : nat -> nat -> Prop :=
-| path_refl i : path es i i
-| path_step i e : In e es -> path es i (src e) -> path es i (tgt e).
+| path_refl i : path es i i | path_step i e : In e es -> path es i (src e) -> path es i (tgt e).
 (** connected if directions are ignored *)
-Definition swap (e : edge) := Edge (src e) (tgt e) (wt e).
-Definition linked (es : list edge) : nat -> nat -> Prop := path (es ++ map swap es).
+Definition linked (es : list edge) := path (es ++ map (fun e => Edge (src e) (tgt e) (wt e)) es).
 (** a strong component that listens to nobody else *)
 Definition closed_component es (C : nat -> Prop) := (exists i, C i) /\
   (forall e, In e es -> C (tgt e) -> C (src e)) /\ (forall i j, C i -> C j -> path es i j).
@@ -31,8 +28,7 @@ Definition clock (T rho1 k t : R) : R := rho1 * t + k * ln (T / (T - t)).
     what stands left of 0 does not matter *)
 Definition motion (n : nat) (Lf : (nat -> R) -> nat -> R) (T rho1 k : R) (X S : R -> nat -> R) : Prop :=
   (forall t i, 0 < t < T -> (i < n)%nat -> is_derive (fun u => X u i - S u i) t (- (gain T rho1 k t * Lf (X t) i))) /\
-  (forall t i, t < T -> (i < n)%nat ->
-     continuous (fun u => X (Rmax 0 u) i) t /\ continuous (fun u => S (Rmax 0 u) i) t).
+  forall t i, t < T -> (i < n)%nat -> continuous (fun u => X (Rmax 0 u) i) t /\ continuous (fun u => S (Rmax 0 u) i) t.
 (** from [t0] on all sliding variables are 0 *)
 Definition quiet (n : nat) (T : R) (S : R -> nat -> R) (t0 : R) : Prop :=
   0 <= t0 < T /\ forall t i, t0 <= t < T -> (i < n)%nat -> S t i = 0.
@@ -56,6 +52,9 @@ Record upper := Upper { bound : Q; inside : list nat; because : reason }.
 (** a weak component: [row] 1, 2, 3 if one closed component is all of it, if there is one, if there are several *)
 Record piece := Piece { members : list nat; row : nat; some_balanced : bool; undirected : bool; cooperative : bool;
   whole : balance }.
+(** what the input takes at most from the initial state, and what proves it: a Lyapunov function; two forms, how they fall,
+    and where the gain is compared with them *)
+Inductive effort := PathLength (most : Q) (f : nat) | Energy (most : Q) (W0 W1 : list (list Q)) (m0 m1 p : Q).
 Inductive protocol := Nominal (T : Q) | SlidingMode (T_r T_s mu1 mu2 mu3 delta : Q).
 (** final states are middle and radius; a leader group is its weights, 0 elsewhere, and its rate; [sliding_input] bounds what
     the sliding mode adds to the input, by agent *)
@@ -63,12 +62,11 @@ Record cert := Cert { order : nat; edges : list edge; kind : protocol; rho1 : Q;
   comps : list comp; pieces : list piece; all_balanced : balance; sign_symmetric : bool; funcs : list func;
   start : list Q; sliding : list Q; final : list (Q * Q); margins : list margin; leaders : list (list Q * Q);
   upper_bound : option upper; proved : option Q; best_diagonal : option Q; best_overshoot : option Q;
-  bounded_input : bool; sliding_input : list Q }.
+  bounded_input : bool; sliding_input : list Q; efforts : list effort }.
 
 (** * Words *)
 Definition shift (x : nat -> R) : nat -> R := fun i => x (S i).
-Fixpoint qdot (l : list Q) (x : nat -> R) : R :=
-  match l with [] => 0 | a :: l' => Q2R a * x 0%nat + qdot l' (shift x) end.
+Fixpoint qdot (l : list Q) (x : nat -> R) := match l with [] => 0 | a :: l' => Q2R a * x 0%nat + qdot l' (shift x) end.
 Fixpoint qbil (A : list (list Q)) (x y : nat -> R) : R :=
   match A with [] => 0 | r :: A' => x 0%nat * qdot r y + qbil A' (shift x) y end.
 Definition sq (x : R) := x * x.
@@ -87,8 +85,7 @@ Definition balanced_comps (cs : list comp) : list (nat * (list Q * list Q)) :=
 Definition end_state (c : cert) (x : nat -> R) (i : nat) : R :=
   fold_right (fun b a => Q2R (nth i (fst (snd b)) 0%Q) * qdot (snd (snd b)) x + a) 0 (balanced_comps (comps c)).
 
-Definition deadline (c : cert) : R :=
-  match kind c with Nominal T => Q2R T | SlidingMode T_r T_s _ _ _ _ => Q2R T_r + Q2R T_s end.
+Definition deadline c := match kind c with Nominal T => Q2R T | SlidingMode T_r T_s _ _ _ _ => Q2R T_r + Q2R T_s end.
 Definition k (c : cert) : R := Q2R (rho2 c) * Q2R (kappa c).
 Definition s (c : cert) (t : R) : R := clock (deadline c) (Q2R (rho1 c)) (k c) t.
 (** what draws a sliding variable to 0, besides [mu1] against the disturbance; and what stays of it *)
@@ -171,10 +168,16 @@ Definition leader_claim (c : cert) (l : list Q * Q) : Prop := forall X S t0 t, m
 (** the end is reached at the deadline *)
 Definition limit_claim (c : cert) : Prop := forall X S i, moves c X S -> (i < order c)%nat ->
   filterlim (fun t => X t i) (at_left (deadline c)) (locally (end_state c (fun j => X 0 j - S 0 j) i)).
-(** the input stays bounded *)
+(** the nominal part of the input; it stays bounded *)
+Definition input (c : cert) (X : R -> nat -> R) (t : R) (i : nat) : R :=
+  - (gain (deadline c) (Q2R (rho1 c)) (k c) t * lap (edges c) (X t) i).
 Definition input_claim (c : cert) : Prop := bounded_input c = true -> forall X S t0, moves_from c X S t0 ->
-  exists K, forall t i, t0 <= t < deadline c -> (i < order c)%nat ->
-    Rabs (gain (deadline c) (Q2R (rho1 c)) (k c) t * lap (edges c) (X t) i) <= K.
+  exists K, forall t i, t0 <= t < deadline c -> (i < order c)%nat -> Rabs (input c X t i) <= K.
+(** the length of its path and its energy, if all sliding variables are 0 *)
+Definition effort_claim (c : cert) (e : effort) : Prop := forall X S t, moves_from c X S 0 -> 0 <= t < deadline c ->
+  (forall i, (i < order c)%nat -> X 0 i = Q2R (nth i (start c) 0%Q)) ->
+  let I f q := ex_RInt f 0 t /\ RInt f 0 t <= Q2R q in let N u := norm2 (order c) (input c X u) in
+  match e with PathLength q _ => I (fun u => sqrt (N u)) q | Energy q _ _ _ _ _ => I N q end.
 (** the rates that are stated are the largest ones *)
 Definition largest (l : list Q) (r : option Q) : Prop := match r with
   | Some q => (0 < q)%Q /\ (exists a, In a l /\ (a == q)%Q) /\ forall a, In a l -> (a <= q)%Q
@@ -193,6 +196,6 @@ Definition upper_claim (c : cert) (u : upper) : Prop := forall (F : (nat -> R) -
 
 Definition true_certificate (c : cert) : Prop :=
   structure c /\ behaviour c /\ claims c /\ final_claim c /\ (forall f, In f (funcs c) -> function_claim c f) /\
-  limit_claim c /\ input_claim c /\ rates_claim c /\
-  (forall m, In m (margins c) -> margin_claim c m) /\ (forall l, In l (leaders c) -> leader_claim c l) /\
-  (forall u, upper_bound c = Some u -> upper_claim c u) /\ sliding_claim c.
+  limit_claim c /\ input_claim c /\ rates_claim c /\ (forall m, In m (margins c) -> margin_claim c m) /\
+  (forall l, In l (leaders c) -> leader_claim c l) /\ (forall u, upper_bound c = Some u -> upper_claim c u) /\
+  sliding_claim c /\ forall e, In e (efforts c) -> effort_claim c e.
