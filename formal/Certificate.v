@@ -53,8 +53,9 @@ Record upper := Upper { bound : Q; inside : list nat; because : reason }.
 Record piece := Piece { members : list nat; row : nat; some_balanced : bool; undirected : bool; cooperative : bool;
   whole : balance }.
 (** what the input takes at most from the initial state, and what proves it: a Lyapunov function; two forms, how they fall,
-    and where the gain is compared with them *)
-Inductive effort := PathLength (most : Q) (f : nat) | Energy (most : Q) (W0 W1 : list (list Q)) (m0 m1 p : Q).
+    and where the gain is compared with them; functions and instants, by agent and for the norm *)
+Inductive effort := PathLength (most : Q) (f : nat) | Energy (most : Q) (W0 W1 : list (list Q)) (m0 m1 p : Q)
+  | Peak (each : list Q) (norm : Q) (ways : list (nat * Q)) (last : nat * Q).
 Inductive protocol := Nominal (T : Q) | SlidingMode (T_r T_s mu1 mu2 mu3 delta : Q).
 (** final states are middle and radius; a leader group is its weights, 0 elsewhere, and its rate; [sliding_input] bounds what
     the sliding mode adds to the input, by agent *)
@@ -122,12 +123,11 @@ Definition piece_claim (c : cert) (P : piece) : Prop :=
   (forall i j, In i (members P) -> (In j (members P) <-> linked (edges c) i j)) /\
   own c P <> [] /\ row P = match own c P with
     | [C] => if forallb (fun i => mem i (nodes C)) (members P) then 1%nat else 2%nat | _ => 3%nat end /\
-  some_balanced P = existsb is_balanced (own c P) /\
-  (undirected P = true <-> forall e, In e (edges c) -> In (tgt e) (members P) ->
-     exists f, In f (edges c) /\ src f = tgt e /\ tgt f = src e /\ (wt f == wt e)%Q) /\
+  some_balanced P = existsb is_balanced (own c P) /\ (undirected P = true <-> forall e, In e (edges c) ->
+     In (tgt e) (members P) -> exists f, In f (edges c) /\ src f = tgt e /\ tgt f = src e /\ (wt f == wt e)%Q) /\
   (cooperative P = true <-> forall e, In e (edges c) -> In (tgt e) (members P) -> (0 < wt e)%Q) /\
-  balance_claim (edges c) (members P) (whole P) /\
-  forall x M i, 0 <= M -> (forall C, In C (own c P) -> is_balanced C = true -> Rabs (qdot (null C) x) <= M) ->
+  balance_claim (edges c) (members P) (whole P) /\ forall x M i, 0 <= M ->
+    (forall C, In C (own c P) -> is_balanced C = true -> Rabs (qdot (null C) x) <= M) ->
     In i (members P) -> (i < order c)%nat -> Rabs (end_state c x i) <= M.
 Definition claims (c : cert) : Prop := (forall P, In P (pieces c) -> piece_claim c P) /\
   (forall i, (i < order c)%nat -> exists P, In P (pieces c) /\ In i (members P)) /\
@@ -173,19 +173,19 @@ Definition input (c : cert) (X : R -> nat -> R) (t : R) (i : nat) : R :=
   - (gain (deadline c) (Q2R (rho1 c)) (k c) t * lap (edges c) (X t) i).
 Definition input_claim (c : cert) : Prop := bounded_input c = true -> forall X S t0, moves_from c X S t0 ->
   exists K, forall t i, t0 <= t < deadline c -> (i < order c)%nat -> Rabs (input c X t i) <= K.
-(** the length of its path and its energy, if all sliding variables are 0 *)
+(** the length of its path, its energy and how large it gets, if all sliding variables are 0 *)
 Definition effort_claim (c : cert) (e : effort) : Prop := forall X S t, moves_from c X S 0 -> 0 <= t < deadline c ->
   (forall i, (i < order c)%nat -> X 0 i = Q2R (nth i (start c) 0%Q)) ->
   let I f q := ex_RInt f 0 t /\ RInt f 0 t <= Q2R q in let N u := norm2 (order c) (input c X u) in
-  match e with PathLength q _ => I (fun u => sqrt (N u)) q | Energy q _ _ _ _ _ => I N q end.
+  match e with PathLength q _ => I (fun u => sqrt (N u)) q | Energy q _ _ _ _ _ => I N q | Peak qs q _ _ =>
+    sqrt (N t) <= Q2R q /\ forall i, (i < order c)%nat -> Rabs (input c X t i) <= Q2R (nth i qs 0%Q) end.
 (** the rates that are stated are the largest ones *)
 Definition largest (l : list Q) (r : option Q) : Prop := match r with
   | Some q => (0 < q)%Q /\ (exists a, In a l /\ (a == q)%Q) /\ forall a, In a l -> (a <= q)%Q
   | None => forall a, In a l -> (a <= 0)%Q end.
 Definition rates_claim (c : cert) : Prop := largest (map rate (funcs c)) (proved c) /\
-  largest (map rate (filter diagonal (funcs c))) (best_diagonal c) /\
-  forall q o, proved c = Some q -> best_overshoot c = Some o ->
-    (exists f, In f (funcs c) /\ (rate f == q)%Q /\ (overshoot f == o)%Q) /\
+  largest (map rate (filter diagonal (funcs c))) (best_diagonal c) /\ forall q o, proved c = Some q ->
+    best_overshoot c = Some o -> (exists f, In f (funcs c) /\ (rate f == q)%Q /\ (overshoot f == o)%Q) /\
     forall f, In f (funcs c) -> (rate f == q)%Q -> (o <= overshoot f)%Q.
 (** no quadratic form of the state that vanishes only where nothing moves decays faster than the upper bound *)
 Definition upper_claim (c : cert) (u : upper) : Prop := forall (F : (nat -> R) -> (nat -> R) -> R) (b : R),

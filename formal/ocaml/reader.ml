@@ -346,7 +346,9 @@ let certificate (j : Json.t) : t =
           | _ -> bad "input.sliding of the nominal protocol" in
         let alone = start <> None && not (there (input "initial_set")) && List.for_all (Number.equal Number.zero) sliding in
         let triangle what v = matrix nodes what (Array.of_list listening) (entries what v) in
-        let efforts, left = Effort.read proof functions triangle alone input in
+        let pace = match kind with
+          | Nominal t -> Some (Number.add (Number.mul rho1 t) (Number.mul rho2 kappa)) | SlidingMode _ -> None in
+        let efforts, left = Effort.read proof nodes functions triangle alone pace input in
         List.iteri (fun i _ -> skipped proof "limited-gain" (Printf.sprintf "input.residual[%d]" i))
           (entries "residual" (input "residual"));
         if there (input "disturbed") then skipped proof "nominal-disturbed" "input";

@@ -218,6 +218,34 @@ def test_a_shorter_path_or_a_lower_energy_than_is_proved_is_rejected(tmp_path: P
             assert not check(mutant).accepted and said(mutant, tmp_path).code == 1, path
 
 
+def test_a_lower_peak_than_is_proved_is_rejected(tmp_path: Path) -> None:
+    program()
+    edges, start = [("a", "b", 1), ("b", "a", -1), ("b", "c", -2), ("c", "d", 1)], [1, 2, 3, -4]
+    document = json.loads(certify(edges, NominalProtocol(2, 3, 1, 2), start, simulation=False).to_json())
+    code, text = said(document, tmp_path)
+    assert code == 0 and "verified    input-peak of input" in text and not any("input" in part for part in named(text))
+    place = next(i for i, o in enumerate(document["proof"]) if o["kind"] == "input-peak")
+    ways = document["proof"][place]["witness"]["agents"]
+    assert any(z != "0" for _, z in ways.values())  # an instant up to which the error is bounded by its begin
+    peak = document["input"]["peak"]
+    for share, right in ((1 - Fraction(1, 10**9), False), (1 + Fraction(1, 10**9), True)):
+        for label in (*"abcd", None):
+            agents = {key: str(Fraction(x) * (share if key == label else 1)) for key, x in peak["agents"].items()}
+            norm = str(Fraction(peak["norm"]) * (1 if label else share))
+            new = {"agents": agents, "largest": str(max(map(Fraction, agents.values()))), "norm": norm}
+            mutant = resealed(changed(document, ("input", "peak"), new))
+            assert check(mutant).accepted == right and (said(mutant, tmp_path).code == 0) == right, (label, share)
+    for path, new in (
+        (("input", "peak", "largest"), str(2 * Fraction(peak["largest"]))),
+        (("proof", place, "witness", "agents", "d"), [99, "0"]),
+        (("proof", place, "witness", "agents", "d"), [0, "-1"]),
+        (("proof", place, "witness", "agents", "d"), [0, "1"]),
+        (("proof", place, "numbers", "z"), "1"),
+    ):
+        mutant = resealed(changed(document, path, new))
+        assert not check(mutant).accepted and said(mutant, tmp_path).code == 1, path
+
+
 def test_efforts_of_a_set_of_initial_states_or_of_moving_sliding_variables_are_named(tmp_path: Path) -> None:
     program()
     gains = {"T_r": "0.5", "T_s": 1, "mu1": 2, "mu2": 1, "mu3": 1, "delta": 1, "rho1": 1, "rho2": 1, "kappa": 2}
