@@ -40,6 +40,21 @@ Proof.
   rewrite <- E. lra.
 Qed.
 
+(** * A form at the begin *)
+Lemma value_ok n F f l x0 : (0 < f)%Z -> fits n F = true -> good (common l) l = true ->
+  (forall i, (i < n)%nat -> x0 i = Q2R (nth i l 0%Q)) -> Q2R (value F f l) = bil F x0 x0 / IZR f.
+Proof.
+  intros Hf HF G H0. destruct (fits_ok _ _ HF) as [A B]. destruct (good_ok _ _ G) as [E0 _]. unfold value.
+  set (e := common l) in *. set (z := map (scaled e) l).
+  assert (Z : forall i, (i < n)%nat -> vec_of z i = IZR e * x0 i).
+  { intros i Hi. rewrite H0 by assumption. apply nth_scaled. exact G. }
+  rewrite Q2R_div, !Q2R_inject by (unfold Qeq; cbn [Qnum Qden inject_Z]; nia).
+  rewrite <- zdot_ok, <- bil_vec_l.
+  rewrite (bil_ext_l F (vec_of z) (fun i => IZR e * x0 i)) by (intros; apply Z; lia).
+  rewrite (bil_ext_r F n _ (vec_of z) (fun i => IZR e * x0 i) B) by (intros; apply Z; assumption).
+  rewrite bil_scal_l, bil_scal_r, !mult_IZR. apply IZR_lt in Hf, E0. field. lra.
+Qed.
+
 (** * The integral of what is less than the decrease of something that stays positive *)
 Lemma integral_below (T : R) (g F dF : R -> R) : 0 < T -> (forall u, u < T -> continuous g u) ->
   (forall u, 0 < u < T -> is_derive F u (dF u)) -> (forall u, 0 <= u < T -> continuous F u) ->

@@ -419,6 +419,34 @@ Proof.
   destruct i as [|i]; [lra|]. specialize (IH H (shift z) i ltac:(intros; apply Hz)). unfold shift at 1 in IH. lra.
 Qed.
 
+Lemma shares_ok r : forall p z, forallb pos p = true -> (length r <= length p)%nat ->
+  0 <= Q2R (shares r p) /\ 0 <= qdot p (fun i => sq (z i)) /\ sq (dot r z) <= Q2R (shares r p) * qdot p (fun i => sq (z i)).
+Proof.
+  assert (P0 : forall p z, forallb pos p = true -> 0 <= qdot p (fun i => sq (z i))).
+  { induction p as [|q p IH]; intros z H; simpl in *; [lra|]. apply andb_prop in H as [Hq H]. apply pos_Q in Hq.
+    specialize (IH (shift z) H). change (shift (fun i => sq (z i))) with (fun i => sq (shift z i)).
+    assert (0 <= Q2R q * sq (z 0%nat)) by (apply Rmult_le_pos; [lra|apply sq_pos]). lra. }
+  induction r as [|a r IH]; intros p z Hp Hl.
+  - simpl. rewrite Q2R_0. unfold sq. specialize (P0 p z Hp). unfold sq in P0. lra.
+  - destruct p as [|q p]; [simpl in Hl; lia|]. cbn [shares dot qdot]. simpl in Hp. apply andb_prop in Hp as [Hq Hp].
+    destruct (IH p (shift z) Hp ltac:(simpl in Hl; lia)) as [A0 [B0 K]]. apply pos_Q in Hq.
+    rewrite Q2R_plus, Q2R_div, Q2R_inject, mult_IZR by (apply nonzero; lra).
+    change (shift (fun i => sq (z i))) with (fun i => sq (shift z i)).
+    set (A := Q2R (shares r p)) in *. set (B := qdot p (fun i => sq (shift z i))) in *. set (S := dot r (shift z)) in *.
+    set (y := z 0%nat). set (b := IZR a). set (w := Q2R q) in *.
+    assert (U0 : 0 <= b * b / w) by (apply Rmult_le_pos; [apply Rle_0_sqr|left; apply Rinv_0_lt_compat; exact Hq]).
+    assert (Y0 : 0 <= w * sq y) by (apply Rmult_le_pos; [lra|apply sq_pos]).
+    split; [lra|]. split; [lra|].
+    assert (M1 : 0 <= b * b / w * B) by (apply Rmult_le_pos; assumption). assert (M2 : 0 <= w * sq y * A) by (apply Rmult_le_pos; assumption).
+    assert (M : sq (b * y * S) <= b * b / w * B * (w * sq y * A)).
+    { replace (b * b / w * B * (w * sq y * A)) with (sq (b * y) * (A * B)) by (unfold sq; field; lra).
+      replace (sq (b * y * S)) with (sq (b * y) * sq S) by (unfold sq; ring). apply Rmult_le_compat_l; [apply sq_pos|exact K]. }
+    assert (N : 2 * (b * y * S) <= b * b / w * B + w * sq y * A).
+    { set (u := b * b / w * B) in *. set (x := w * sq y * A) in *. set (m := b * y * S) in *. unfold sq in M.
+      pose proof (Rle_0_sqr (u - x)) as Q. unfold Rsqr in Q. nra. }
+    replace (sq (b * y + S)) with (b * b / w * (w * sq y) + 2 * (b * y * S) + sq S) by (unfold sq; field; lra). nra.
+Qed.
+
 Section Known.
 Variable c : cert.
 Let d := prepare c.
@@ -426,6 +454,7 @@ Let n := order c.
 Let es := edges c.
 Hypothesis Hls : good (dls d) (map wt es) = true.
 Hypothesis Hsrc : forall e, In e es -> (src e < n)%nat.
+Hypothesis Hfit : fits n (dL d) = true.
 Hypothesis G : good (common (start c)) (start c) = true.
 Variable x0 : nat -> R.
 Hypothesis H0 : forall i, (i < n)%nat -> x0 i = Q2R (nth i (start c) 0%Q).
@@ -438,10 +467,49 @@ Proof.
 Qed.
 Lemma len_dL : length (dL d) = n.
 Proof. change (dL d) with (lmat (dls d) es n). unfold lmat. rewrite map_length. apply seq_length. Qed.
-Lemma bounds_ok f v cs : check_constants c d f = true -> bounds_of c d f = Some (v, cs) -> (exists P, ly f = InE P) /\
-  Q2R v = V es (ly f) x0 /\ forall x i, (i < n)%nat -> sq (lap es x i) <= Q2R (nth i cs 0%Q) * V es (ly f) x.
+Lemma sum_ok cs z v : length cs = n -> (forall i, (i < n)%nat -> sq (z i) <= Q2R (nth i cs 0%Q) * v) ->
+  norm2 n z <= Q2R (fold_right Qplus 0%Q cs) * v.
 Proof.
-  intros HC H. unfold bounds_of in H. destruct (ly f) as [P|] eqn:El; [|discriminate]. cbv zeta in H. fold b in H.
+  clear. generalize n as m. intros m Hl. revert m z Hl. induction cs as [|q cs IH]; intros m z Hl H; simpl in Hl; subst m.
+  - unfold norm2. simpl. rewrite Q2R_0. lra.
+  - rewrite norm2_shift. cbn [fold_right]. rewrite Q2R_plus, Rmult_plus_distr_r.
+    apply Rplus_le_compat; [apply (H 0%nat); lia|]. apply IH; [reflexivity|]. intros i Hi. apply (H (S i)). lia.
+Qed.
+Lemma bounds_ok f v cs cn : check_constants c d f = true -> check_ends c d f = true -> bounds_of c d f = Some (v, cs, cn) ->
+  Q2R v = V es (ly f) x0 /\ (forall x i, (i < n)%nat -> sq (lap es x i) <= Q2R (nth i cs 0%Q) * V es (ly f) x) /\
+  forall x, norm2 n (lap es x) <= Q2R cn * V es (ly f) x.
+Proof.
+  intros HC HE H. unfold bounds_of in H. destruct (ly f) as [P|p g] eqn:El.
+  2: { destruct (form (order c) (dls d) (dL d) (InEps p g)) as [[F m]|] eqn:EF; [|discriminate].
+    set (cs' := map _ (dL d)) in H. destruct (_ && _) eqn:E in H; [|discriminate]. injection H as <- <- <-.
+    apply andb_prop in E as [E E3]. apply andb_prop in E as [E1 E2]. apply Nat.eqb_eq in E2. rewrite forallb_forall in E3.
+    destruct (form_ok n _ _ _ _ _ _ Hls eq_refl EF) as [Hm [HF HV]]. destruct (good_ok _ _ Hls) as [Hl _].
+    assert (K : forall x i, (i < n)%nat -> sq (lap es x i) <= Q2R (nth i cs' 0%Q) * V es (InEps p g) x).
+    { intros x i Hi. assert (Hin : In (nth i (dL d) []) (dL d)) by (apply nth_In; rewrite len_dL; exact Hi).
+      unfold cs'. rewrite nth_indep with (d' := (fun r => (shares r p / inject_Z (dls d * dls d))%Q) []) by (rewrite map_length, len_dL; exact Hi).
+      rewrite (map_nth (fun r => (shares r p / inject_Z (dls d * dls d))%Q)).
+      specialize (E3 _ Hin). apply Z.eqb_eq in E3. destruct (fits_ok _ _ Hfit) as [_ F2]. unfold rows_le in F2. rewrite Forall_forall in F2.
+      specialize (F2 _ Hin). assert (ER : dot (nth i (dL d) []) x = IZR (dls d) * lap es x i).
+      { change (dL d) with (lmat (dls d) es n). unfold lmat. rewrite nth_map_seq by exact Hi. apply lrow_ok. exact Hls. }
+      set (r := nth i (dL d) []) in *. cbn [V coords]. set (z := fun j => x j - mean p g x * sgn g j).
+      assert (EZ : dot r z = dot r x).
+      { unfold z. rewrite (dot_ext r _ (fun j => x j + - mean p g x * sgn g j)) by (intros; ring). rewrite dot_plus, dot_scal.
+        change (sgn g) with (vec_of g). rewrite zdot_ok, E3. ring. }
+      destruct (shares_ok r p z E1 ltac:(unfold n in F2; lia)) as [_ [_ S]]. rewrite EZ, ER in S.
+      rewrite Q2R_div, Q2R_inject, mult_IZR by (unfold Qeq; cbn [Qnum Qden inject_Z]; nia). apply IZR_lt in Hl.
+      change (fun j => sq (x j - mean p g x * sgn g j)) with (fun j => sq (z j)).
+      set (l := IZR (dls d)) in *. apply (Rmult_le_reg_l (l * l)); [nra|].
+      replace (l * l * (Q2R (shares r p) / (l * l) * qdot p (fun j => sq (z j)))) with (Q2R (shares r p) * qdot p (fun j => sq (z j))) by (field; lra).
+      replace (l * l * sq (lap es x i)) with (sq (l * lap es x i)) by (unfold sq; ring). exact S. }
+    split; [|split; [exact K|]].
+    - rewrite (value_ok n F m (start c) x0 Hm HF G H0), HV. apply IZR_lt in Hm. field. lra.
+    - intros x. apply sum_ok; [unfold cs'; rewrite map_length; apply len_dL|]. apply K. }
+  enough (K : Q2R v = V es (InE P) x0 /\ cn = (/ lowest f)%Q /\
+    forall x i, (i < n)%nat -> sq (lap es x i) <= Q2R (nth i cs 0%Q) * V es (InE P) x).
+  { destruct K as [K1 [-> K2]]. split; [exact K1|]. split; [exact K2|]. intros x. destruct (ends_ok c f HE) as [L0 [L1 _]].
+    specialize (L1 x). rewrite El in L1. rewrite Q2R_inv by (apply nonzero; lra).
+    apply (Rmult_le_reg_l (Q2R (lowest f))); [exact L0|]. rewrite <- Rmult_assoc, Rinv_r, Rmult_1_l by lra. exact L1. }
+  cbv zeta in H. fold b in H.
   set (a := common (concat P)) in *. set (PZ := map (map (scaled a)) P) in *.
   set (e := map (fun r => zdot r (map (scaled b) (start c))) (dL d)) in *.
   destruct (forallb (good a) P && (0 <? a)%Z && fits (order c) PZ) eqn:E; [|discriminate].
@@ -459,9 +527,9 @@ Proof.
     rewrite (bil_ext_l PZ (vec_of e) (fun i => IZR (dls d) * IZR b * lap es x0 i)) by (intros; apply Ee; unfold n; lia).
     rewrite (bil_ext_r PZ n _ (vec_of e) (fun i => IZR (dls d) * IZR b * lap es x0 i) F2) by (intros; apply Ee; assumption).
     rewrite bil_scal_l, bil_scal_r, B, !mult_IZR. apply IZR_lt in Ha, Hl, Hb. cbn [V coords]. field. lra. }
-  split; [exists P; reflexivity|]. destruct (constants f) as [cs'|] eqn:EC.
-  - injection H as <- <-. split; [exact EV|]. intros x i Hi. rewrite <- El. apply (constants_ok c f cs' HC EC x i Hi).
-  - destruct (forallb (Z.leb 0) (slack PZ) && _) eqn:ES; [|discriminate]. injection H as <- <-. split; [exact EV|].
+  destruct (constants f) as [cs'|] eqn:EC.
+  - injection H as <- <- <-. split; [exact EV|]. split; [reflexivity|]. intros x i Hi. rewrite <- El. apply (constants_ok c f cs' HC EC x i Hi).
+  - destruct (forallb (Z.leb 0) (slack PZ) && _) eqn:ES; [|discriminate]. injection H as <- <- <-. split; [exact EV|]. split; [reflexivity|].
     apply andb_prop in ES as [S1 S2]. rewrite forallb_forall in S2. intros x i Hi. specialize (S2 i ltac:(apply in_seq; unfold n in Hi; lia)).
     pose proof (slack_ok PZ (lap es x)) as K. rewrite B in K. cbn [V coords]. set (q := qbil P (lap es x) (lap es x)) in *.
     pose proof (dot_part (slack PZ) S1 (squares (lap es x)) i ltac:(intros; apply Rle_0_sqr)) as D. unfold squares at 1 in D.

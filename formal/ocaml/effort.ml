@@ -18,7 +18,7 @@ let index kind functions v =
   let at = integer "a Lyapunov function" v in
   need (Z.sign at >= 0 && Z.compare at (Z.of_int (List.length functions)) < 0) (kind ^ ": there is no such Lyapunov function");
   Z.to_int at
-(* functions in [E] with instants, of [e^z] and [e^(-rate s)] that are known well enough: [rate s <= rate (rho1 T + k) z] *)
+(* functions with instants, of [e^z] and [e^(-rate s)] that are known well enough: [rate s <= rate (rho1 T + k) z] *)
 let peak proof (functions : func list) nodes pace v =
   let get = fields "peak" [ "agents"; "largest"; "norm" ] v in
   let each = by_agent nodes number "peak.agents" (get "agents") in
@@ -31,18 +31,15 @@ let peak proof (functions : func list) nodes pace v =
     let ways = List.map way (ordered (Array.to_list nodes.labels) "agents" (of_ "agents")) in
     let last = index "input-peak" functions (of_ "norm"), numbers "z" in
     let known (f, z) =
-      let f = List.nth functions f in
-      (match f.ly with InE _ -> true | InEps _ -> false)
-      && Number.compare (Number.mul (Number.max Number.one (Number.mul f.rate pace)) z) (Number.of_z (Z.of_int 40)) <= 0 in
+      let rate = (List.nth functions f).rate in
+      Number.compare (Number.mul (Number.max Number.one (Number.mul rate pace)) z) (Number.of_z (Z.of_int 40)) <= 0 in
     if List.for_all known (last :: ways) then Some (Peak (each, number "peak.norm" (get "norm"), ways, last)) else None)
 (* a Lyapunov function from the first instant on *)
 let path_length proof (functions : func list) v =
   let most = number "path_length" v in
   claim proof "input-length" [ "z" ] (fun numbers witness ->
     let f = index "input-length" functions witness in
-    match (List.nth functions f).ly with
-    | InE _ when Number.equal (numbers "z") Number.zero -> Some (PathLength (most, f))
-    | _ -> None)
+    if Number.equal (numbers "z") Number.zero then Some (PathLength (most, f)) else None)
 (* two matrices; [e^-p] is known well enough up to [p = 40] *)
 let energy proof triangle v =
   let most = number "energy" v in
