@@ -13,8 +13,7 @@ Definition lap (es : list edge) (x : nat -> R) (i : nat) : R := fold_right (fun 
 Inductive path (es : list edge) : nat -> nat -> Prop :=
 | path_refl i : path es i i | path_step i e : In e es -> path es i (src e) -> path es i (tgt e).
 (** connected if directions are ignored *)
-Definition swap (e : edge) := Edge (src e) (tgt e) (wt e).
-Definition linked (es : list edge) : nat -> nat -> Prop := path (es ++ map swap es).
+Definition linked (es : list edge) := path (es ++ map (fun e => Edge (src e) (tgt e) (wt e)) es).
 (** a strong component that listens to nobody else *)
 Definition closed_component es (C : nat -> Prop) := (exists i, C i) /\
   (forall e, In e es -> C (tgt e) -> C (src e)) /\ (forall i j, C i -> C j -> path es i j).
@@ -28,8 +27,7 @@ Definition clock (T rho1 k t : R) : R := rho1 * t + k * ln (T / (T - t)).
     what stands left of 0 does not matter *)
 Definition motion (n : nat) (Lf : (nat -> R) -> nat -> R) (T rho1 k : R) (X S : R -> nat -> R) : Prop :=
   (forall t i, 0 < t < T -> (i < n)%nat -> is_derive (fun u => X u i - S u i) t (- (gain T rho1 k t * Lf (X t) i))) /\
-  (forall t i, t < T -> (i < n)%nat ->
-     continuous (fun u => X (Rmax 0 u) i) t /\ continuous (fun u => S (Rmax 0 u) i) t).
+  forall t i, t < T -> (i < n)%nat -> continuous (fun u => X (Rmax 0 u) i) t /\ continuous (fun u => S (Rmax 0 u) i) t.
 (** from [t0] on all sliding variables are 0 *)
 Definition quiet (n : nat) (T : R) (S : R -> nat -> R) (t0 : R) : Prop :=
   0 <= t0 < T /\ forall t i, t0 <= t < T -> (i < n)%nat -> S t i = 0.
@@ -53,6 +51,10 @@ Record upper := Upper { bound : Q; inside : list nat; because : reason }.
 (** a weak component: [row] 1, 2, 3 if one closed component is all of it, if there is one, if there are several *)
 Record piece := Piece { members : list nat; row : nat; some_balanced : bool; undirected : bool; cooperative : bool;
   whole : balance }.
+(** what the input takes at most from the initial state, and what proves it: a Lyapunov function; two forms, how they fall,
+    and where the gain is compared with them; functions and instants, by agent and for the norm *)
+Inductive effort := PathLength (most : Q) (f : nat) | Energy (most : Q) (W0 W1 : list (list Q)) (m0 m1 p : Q)
+  | Peak (each : list Q) (norm : Q) (ways : list (nat * Q)) (last : nat * Q).
 Inductive protocol := Nominal (T : Q) | SlidingMode (T_r T_s mu1 mu2 mu3 delta : Q).
 (** final states are middle and radius; of many nodes they are [enclosed], and no weights tell them; a leader group is its
     weights, 0 elsewhere, and its rate; [sliding_input] bounds what the sliding mode adds to the input, by agent *)
@@ -60,7 +62,7 @@ Record cert := Cert { order : nat; edges : list edge; kind : protocol; rho1 : Q;
   comps : list comp; pieces : list piece; all_balanced : balance; sign_symmetric : bool; funcs : list func;
   start : list Q; sliding : list Q; final : list (Q * Q); enclosed : bool; margins : list margin;
   leaders : list (list Q * Q); upper_bound : option upper; proved : option Q; best_diagonal : option Q;
-  best_overshoot : option Q; bounded_input : bool; sliding_input : list Q }.
+  best_overshoot : option Q; bounded_input : bool; sliding_input : list Q; efforts : list effort }.
 
 (** * Words *)
 Definition shift (x : nat -> R) : nat -> R := fun i => x (S i).
@@ -80,23 +82,19 @@ Definition balanced_comps cs := map (fun C => (hd O (nodes C), (share C, null C)
 Definition end_state (c : cert) (x : nat -> R) (i : nat) : R :=
   fold_right (fun b a => Q2R (nth i (fst (snd b)) 0%Q) * qdot (snd (snd b)) x + a) 0 (balanced_comps (comps c)).
 
-Definition deadline (c : cert) : R :=
-  match kind c with Nominal T => Q2R T | SlidingMode T_r T_s _ _ _ _ => Q2R T_r + Q2R T_s end.
+Definition deadline c := match kind c with Nominal T => Q2R T | SlidingMode T_r T_s _ _ _ _ => Q2R T_r + Q2R T_s end.
 Definition k (c : cert) : R := Q2R (rho2 c) * Q2R (kappa c).
 Definition s (c : cert) (t : R) : R := clock (deadline c) (Q2R (rho1 c)) (k c) t.
 (** what draws a sliding variable to 0, besides [mu1] against the disturbance; and what stays of it *)
-Definition pull (c : cert) (T_r mu2 mu3 : Q) (t : R) : R :=
-  Q2R mu2 + if Rlt_dec t (Q2R T_r) then Q2R mu3 * Q2R (kappa c) / (Q2R T_r - t) else 0.
-Definition psi (c : cert) (T_r mu2 mu3 : Q) (t : R) : R :=
-  exp (- (Q2R mu2 * t)) * Rpower ((Q2R T_r - t) / Q2R T_r) (Q2R mu3 * Q2R (kappa c)).
+Definition pull c T_r mu2 mu3 t := Q2R mu2 + if Rlt_dec t (Q2R T_r) then Q2R mu3 * Q2R (kappa c) / (Q2R T_r - t) else 0.
+Definition psi c T_r mu2 mu3 t := exp (- (Q2R mu2 * t)) * Rpower ((Q2R T_r - t) / Q2R T_r) (Q2R mu3 * Q2R (kappa c)).
 (** Where a sliding variable is not 0, its upper right derivative in size is at most [-(mu1 - delta) - pull |S|]: so all
     solutions of Filippov do, whatever the disturbance within [delta]. Of the nominal protocol it is 0. *)
 Definition slides (c : cert) (S : R -> nat -> R) : Prop := match kind c with Nominal _ => forall t i, S t i = 0
   | SlidingMode T_r _ mu1 mu2 mu3 delta => forall t i e, 0 <= t < deadline c -> (i < order c)%nat -> S t i <> 0 ->
       0 < e -> exists eta, 0 < eta /\ forall h, 0 < h < eta -> Rabs (S (t + h) i) <=
         Rabs (S t i) - h * (Q2R mu1 - Q2R delta + pull c T_r mu2 mu3 t * Rabs (S t i) - e) end.
-Definition moves (c : cert) (X S : R -> nat -> R) : Prop :=
-  motion (order c) (lap (edges c)) (deadline c) (Q2R (rho1 c)) (k c) X S /\ slides c S.
+Definition moves c X S : Prop := motion (order c) (lap (edges c)) (deadline c) (Q2R (rho1 c)) (k c) X S /\ slides c S.
 Definition moves_from c (X S : R -> nat -> R) (t0 : R) : Prop := moves c X S /\ quiet (order c) (deadline c) S t0.
 
 (** * What it claims *)
@@ -118,12 +116,11 @@ Definition piece_claim (c : cert) (P : piece) : Prop :=
   (forall i j, In i (members P) -> (In j (members P) <-> linked (edges c) i j)) /\
   own c P <> [] /\ row P = match own c P with
     | [C] => if forallb (fun i => mem i (nodes C)) (members P) then 1%nat else 2%nat | _ => 3%nat end /\
-  some_balanced P = existsb is_balanced (own c P) /\
-  (undirected P = true <-> forall e, In e (edges c) -> In (tgt e) (members P) ->
-     exists f, In f (edges c) /\ src f = tgt e /\ tgt f = src e /\ (wt f == wt e)%Q) /\
+  some_balanced P = existsb is_balanced (own c P) /\ (undirected P = true <-> forall e, In e (edges c) ->
+     In (tgt e) (members P) -> exists f, In f (edges c) /\ src f = tgt e /\ tgt f = src e /\ (wt f == wt e)%Q) /\
   (cooperative P = true <-> forall e, In e (edges c) -> In (tgt e) (members P) -> (0 < wt e)%Q) /\
-  balance_claim (edges c) (members P) (whole P) /\
-  forall x M i, 0 <= M -> (forall C, In C (own c P) -> is_balanced C = true -> Rabs (qdot (null C) x) <= M) ->
+  balance_claim (edges c) (members P) (whole P) /\ forall x M i, 0 <= M ->
+    (forall C, In C (own c P) -> is_balanced C = true -> Rabs (qdot (null C) x) <= M) ->
     In i (members P) -> (i < order c)%nat -> Rabs (end_state c x i) <= M.
 Definition claims (c : cert) : Prop := (forall P, In P (pieces c) -> piece_claim c P) /\
   (forall i, (i < order c)%nat -> exists P, In P (pieces c) /\ In i (members P)) /\
@@ -173,18 +170,23 @@ Definition limit_claim (c : cert) : Prop := forall X S, moves c X S -> exists y,
   filterlim (fun t => X t i) (at_left (deadline c)) (locally (y i))) /\ let x0 j := X 0 j - S 0 j in
   if enclosed c then at_rest c y /\ ((forall j, (j < order c)%nat -> x0 j = begin c j) -> within c y)
   else y = end_state c x0.
-(** the input stays bounded *)
+(** the nominal part of the input; it stays bounded *)
+Definition input c (X : R -> nat -> R) t i : R := - (gain (deadline c) (Q2R (rho1 c)) (k c) t * lap (edges c) (X t) i).
 Definition input_claim (c : cert) : Prop := bounded_input c = true -> forall X S t0, moves_from c X S t0 ->
-  exists K, forall t i, t0 <= t < deadline c -> (i < order c)%nat ->
-    Rabs (gain (deadline c) (Q2R (rho1 c)) (k c) t * lap (edges c) (X t) i) <= K.
+  exists K, forall t i, t0 <= t < deadline c -> (i < order c)%nat -> Rabs (input c X t i) <= K.
+(** the length of its path, its energy and how large it gets, if all sliding variables are 0 *)
+Definition effort_claim (c : cert) (e : effort) : Prop := forall X S t, moves_from c X S 0 -> 0 <= t < deadline c ->
+  (forall i, (i < order c)%nat -> X 0 i = Q2R (nth i (start c) 0%Q)) ->
+  let I f q := ex_RInt f 0 t /\ RInt f 0 t <= Q2R q in let N u := norm2 (order c) (input c X u) in
+  match e with PathLength q _ => I (fun u => sqrt (N u)) q | Energy q _ _ _ _ _ => I N q | Peak qs q _ _ =>
+    sqrt (N t) <= Q2R q /\ forall i, (i < order c)%nat -> Rabs (input c X t i) <= Q2R (nth i qs 0%Q) end.
 (** the rates that are stated are the largest ones *)
 Definition largest (l : list Q) (r : option Q) : Prop := match r with
   | Some q => (0 < q)%Q /\ (exists a, In a l /\ (a == q)%Q) /\ forall a, In a l -> (a <= q)%Q
   | None => forall a, In a l -> (a <= 0)%Q end.
 Definition rates_claim (c : cert) : Prop := largest (map rate (funcs c)) (proved c) /\
-  largest (map rate (filter diagonal (funcs c))) (best_diagonal c) /\
-  forall q o, proved c = Some q -> best_overshoot c = Some o ->
-    (exists f, In f (funcs c) /\ (rate f == q)%Q /\ (overshoot f == o)%Q) /\
+  largest (map rate (filter diagonal (funcs c))) (best_diagonal c) /\ forall q o, proved c = Some q ->
+    best_overshoot c = Some o -> (exists f, In f (funcs c) /\ (rate f == q)%Q /\ (overshoot f == o)%Q) /\
     forall f, In f (funcs c) -> (rate f == q)%Q -> (o <= overshoot f)%Q.
 (** no quadratic form of the state that vanishes only where nothing moves decays faster than the upper bound *)
 Definition upper_claim (c : cert) (u : upper) : Prop := forall (F : (nat -> R) -> (nat -> R) -> R) (b : R),
@@ -196,4 +198,5 @@ Definition upper_claim (c : cert) (u : upper) : Prop := forall (F : (nat -> R) -
 Definition true_certificate (c : cert) : Prop :=
   structure c /\ behaviour c /\ claims c /\ final_claim c /\ (forall f, In f (funcs c) -> function_claim c f) /\
   limit_claim c /\ input_claim c /\ rates_claim c /\ sliding_claim c /\ (forall m, In m (margins c) -> margin_claim c m)
-  /\ (forall l, In l (leaders c) -> leader_claim c l) /\ forall u, upper_bound c = Some u -> upper_claim c u.
+  /\ (forall l, In l (leaders c) -> leader_claim c l) /\ (forall u, upper_bound c = Some u -> upper_claim c u) /\
+  forall e, In e (efforts c) -> effort_claim c e.

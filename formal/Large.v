@@ -41,7 +41,7 @@ Definition check_input_large (c : cert) : bool :=
   negb (bounded_input c) || (match edges c with [] => true | _ => false end) ||
   existsb (fun f => Qle_bool 2 (rho2 c * kappa c * rate f)) (funcs c).
 Definition check_rest (c : cert) : bool :=
-  match margins c, leaders c, upper_bound c with [], [], None => true | _, _, _ => false end.
+  match margins c, leaders c, upper_bound c, efforts c with [], [], None, [] => true | _, _, _, _ => false end.
 Definition check_large (h : hints) (c : cert) : bool :=
   enclosed c && check_edges c (common (map wt (edges c))) && check_protocol c && wide_structure c && wide_claims c &&
   check_functions c (vectors h) && check_moves c && check_final_large c (around h) && check_input_large c && check_rates c &&
@@ -194,7 +194,11 @@ Proof.
 Qed.
 Lemma input_large : check_input_large c = true -> input_claim c.
 Proof.
-  intros H Hb X Sl t0 HX. unfold check_input_large in H. rewrite Hb in H. simpl in H. destruct (T_pos c Hprot) as [P1 [P2 P3]].
+  intros H Hb X Sl t0 HX.
+  enough (exists K, forall t i, t0 <= t < deadline c -> (i < order c)%nat ->
+    Rabs (gain (deadline c) (Q2R (rho1 c)) (k c) t * lap (edges c) (X t) i) <= K) as [K HK]
+    by (exists K; intros; unfold input; rewrite Rabs_Ropp; auto).
+  unfold check_input_large in H. rewrite Hb in H. simpl in H. destruct (T_pos c Hprot) as [P1 [P2 P3]].
   apply orb_prop in H as [H|H].
   - exists 0. intros t i _ _. destruct (edges c) eqn:E; [|discriminate]. simpl. rewrite Rmult_0_r, Rabs_R0. lra.
   - apply existsb_exists in H as [f [Hf Hr]]. destruct (function_large f Hf) as [Cl [p El]].
@@ -218,14 +222,14 @@ Proof.
   apply andb_prop in H as [H H6]. apply andb_prop in H as [H H5]. apply andb_prop in H as [H H4]. apply andb_prop in H as [H H3].
   apply andb_prop in H as [H1 H2].
   destruct (wide_claims_ok c H5) as [K1 K2]. unfold check_rest in H11.
-  destruct (margins c) eqn:Em; [|discriminate]. destruct (leaders c) eqn:El; [|discriminate]. destruct (upper_bound c) eqn:Eu; [discriminate|].
+  destruct (margins c) eqn:Em; [|discriminate]. destruct (leaders c) eqn:El; [|discriminate]. destruct (upper_bound c) eqn:Eu; [discriminate|]. destruct (efforts c) eqn:Ee; [|discriminate].
   split; [apply wide_structure_ok; exact H4|]. split; [exact K2|]. split; [exact K1|].
   split; [intros E; rewrite H1 in E; discriminate|].
   split; [intros f Hf; apply (function_large h c H2 H3 H4 H6 f Hf)|].
   split; [apply (limit_large h c H2 H3 H4 H5 H6 H1 H7 H8)|]. split; [apply (input_large h c H2 H3 H4 H6 H9)|].
   split; [apply rates_ok; exact H10|]. split; [apply sliding_ok; assumption|].
   split; [intros m Hm; rewrite Em in Hm; destruct Hm|]. split; [intros l Hl; rewrite El in Hl; destruct Hl|].
-  intros u Hu. rewrite Eu in Hu. discriminate.
+  split; [intros u Hu; rewrite Eu in Hu; discriminate|]. intros e He. rewrite Ee in He. destruct He.
 Qed.
 (** a certificate of either form *)
 Definition accepts (h : hints) (c : cert) : bool := if enclosed c then check_large h c else check c.

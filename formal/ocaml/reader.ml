@@ -368,8 +368,8 @@ let certificate (j : Json.t) : t =
     bare_of proof "sliding-bound" "protocol"; not_checked "reaching_time.z";
     if following proof = "reaching-time" then skipped proof "reaching-time" "reaching_time" end
   else need (get "reaching_time" = Null) "reaching times without sliding variables";
-  let bounded_input, sliding_input, functions = match get "input" with
-    | Null -> false, [], functions
+  let bounded_input, sliding_input, functions, efforts = match get "input" with
+    | Null -> false, [], functions, []
     | v ->
         let input = fields "input" [ "bounded"; "threshold"; "initial_set"; "constants"; "peak"; "energy"; "path_length";
           "sliding"; "residual"; "disturbed" ] v in
@@ -408,14 +408,19 @@ let certificate (j : Json.t) : t =
               if not (there (part "agents")) then []
               else (bare_of proof "input-sliding" "input"; by_agent nodes number "input.sliding.agents" (part "agents"))
           | _ -> bad "input.sliding of the nominal protocol" in
-        List.iter (fun (listed, kind) -> if listed then skipped proof kind "input")
-          [ there (input "peak"), "input-peak"; there (input "energy"), "input-energy";
-            there (input "path_length"), "input-length" ];
+        let alone = not enclosed && start <> None && not (there (input "initial_set")) && List.for_all (Number.equal Number.zero) sliding in
+        let triangle what v = matrix nodes what (Array.of_list listening) (entries what v) in
+        let pace = match kind with
+          | Nominal t -> Some (Number.add (Number.mul rho1 t) (Number.mul rho2 kappa)) | SlidingMode _ -> None in
+        let efforts, left = Effort.read proof nodes functions triangle alone pace input in
         List.iteri (fun i _ -> skipped proof "limited-gain" (Printf.sprintf "input.residual[%d]" i))
           (entries "residual" (input "residual"));
         if there (input "disturbed") then skipped proof "nominal-disturbed" "input";
-        not_checked "input.initial_set, .peak, .energy, .path_length, .sliding.bounded, .residual, .disturbed";
-        bounded, sliding_input, functions in
+        let left = List.filter (fun key -> there (input key)) [ "initial_set" ] @ left
+          @ (if is_sliding then [ "sliding.bounded" ] else []) @ (if input "residual" <> Arr [] then [ "residual" ] else [])
+          @ List.filter (fun key -> there (input key)) [ "disturbed" ] in
+        List.iter (fun key -> not_checked ("input." ^ key)) left;
+        bounded, sliding_input, functions, efforts in
   let and_besides o = match o with
     | Obj l -> (match List.assoc_opt "kind" l, List.assoc_opt "of" l with
         | Some (Str k), Some (Str o) when more <> [] && of_besides k && named k && named o -> unknown proof k o
@@ -430,7 +435,7 @@ let certificate (j : Json.t) : t =
     sections = List.rev !left_out;
     cert = { order = Array.length nodes.labels; edges; kind; rho1; rho2; kappa; comps; pieces; all_balanced = found.balance;
       sign_symmetric = Pieces.sign_symmetric all; funcs = functions;
-      start = Option.value start ~default:[]; sliding; final; enclosed; sliding_input;
+      start = Option.value start ~default:[]; sliding; final; enclosed; sliding_input; efforts;
       margins = (match paper with Some p -> p.inequalities | None -> []);
       leaders = (match paper with Some p -> p.groups | None -> []);
       upper_bound;

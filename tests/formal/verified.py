@@ -13,17 +13,10 @@ from ptcc_certify.cli.verified import executable
 from ptcc_certify.errors import ParameterError
 
 Path_ = tuple[str | int, ...]
-#: Kinds of obligations that the theorem of ``formal/`` does not speak of.
-SKIPPED = {
-    *("reaching-time", "input-threshold"),
-    *("input-peak", "input-energy", "input-length", "limited-gain", "nominal-disturbed"),
-}
-#: Parts of the document that are not checked; what stands in these may be false.
-UNCHECKED: tuple[Path_, ...] = (
-    *(("influence", "degenerate"), ("reaching_time", "z")),
-    *(("input", key) for key in ("initial_set", "peak", "energy", "path_length", "residual")),
-    *(("input", "disturbed"), ("input", "bounded")),
-)
+#: Kinds of obligations that the theorem of ``formal/`` does not speak of, or not always.
+SKIPPED = {"reaching-time", "input-threshold", "input-peak", "limited-gain", "nominal-disturbed"}
+#: Those that it speaks of where no sliding variable moves.
+AT_REST = {"input-energy", "input-length"}
 #: What the executable says of a form that it does not read.
 UNREAD = (
     "100 weak components",
@@ -61,11 +54,19 @@ def said(document: dict[str, Any], folder: Path) -> Said:
     return Said(run.returncode, run.stdout + run.stderr)
 
 
-def unchecked(document: dict[str, Any], path: Path_) -> bool:
-    """Whether what stands at a path is a part that is named as not checked, or a witness, which claims nothing."""
-    if path[:1] == ("proof",) and path[2:3] == ("witness",):
-        return True
+def named(text: str) -> set[str]:
+    """What the executable names as not checked: obligations, and parts of the document."""
+    lines = (line.removeprefix("not checked ") for line in text.splitlines() if line.startswith("not checked "))
+    return {part for line in lines for part in line.split(", ")}
+
+
+def unchecked(document: dict[str, Any], path: Path_, left: set[str]) -> bool:
+    """Whether what stands at a path is named as not checked, or is a witness, which claims nothing."""
     if path[:1] == ("proof",) and len(path) > 1:
-        proof = document["proof"]
-        return isinstance(path[1], int) and path[1] < len(proof) and proof[path[1]]["kind"] in SKIPPED
-    return any(path[: len(part)] == part for part in UNCHECKED)
+        proof, place = document["proof"], path[1]
+        if path[2:3] == ("witness",):
+            return True
+        return (
+            isinstance(place, int) and place < len(proof) and f"{proof[place]['kind']} of {proof[place]['of']}" in left
+        )
+    return any(".".join(map(str, path[:depth])) in left for depth in range(1, len(path) + 1))
