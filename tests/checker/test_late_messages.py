@@ -26,7 +26,7 @@ from ptcc_certify.checker import check, graph
 from ptcc_certify.checker.array_digraph import ArrayDigraph
 from ptcc_certify.checker.array_steps import ArraySteps
 from ptcc_certify.checker.digraph import Digraph
-from ptcc_certify.checker.late_steps import Steps
+from ptcc_certify.checker.late_steps import Steps, decay_above
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
@@ -449,6 +449,13 @@ def test_steps_of_arrays_are_those_of_integers_and_bound_the_solution(seed: int)
     exact = y[-1][followers] * 2**30
     assert all(a >= b * (1 - 1e-9) for a, b in zip(found[0], exact, strict=True))
     assert all(a <= 2**30 for a in found[0])
+
+
+def test_decays_of_arrays_are_those_of_integers_at_every_size():
+    rng = np.random.default_rng(3)
+    near = [(1 << b) + d for b in range(2, 62) for d in (-1, 0, 1)]
+    x = np.array([*range(99), *near, *(int(v) for b in range(5, 62) for v in rng.integers(0, 1 << b, 50))])
+    assert ArraySteps._decay(x).tolist() == [decay_above(v) for v in x.tolist()]
 
 
 # ---------------------------------------------------------------------- a missed deadline, and deadlines of their own
