@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import re
 from pathlib import Path
@@ -17,8 +19,11 @@ from ptcc_certify import (
     MovingLeaders,
     NominalProtocol,
     SignedDigraph,
+    analyse,
     certify,
     read_certificate,
+    read_graph,
+    simulate,
 )
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.simulation.late_messages import simulate_late
@@ -277,7 +282,6 @@ def test_a_delay_that_would_do_is_told_as_an_age() -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("simulate",), "s.toml: [messages] delay: ptcc simulate does not take late messages; ptcc certify -o c.json"),
         (("design", "--max-input", "9", "--initial-bound", "1", "--deadline", "1"), "ptcc design does not take late"),
         (("plot", "--what", "states"), "ptcc plot --what states does not take late messages"),
     ],
@@ -288,6 +292,101 @@ def test_commands_that_would_leave_late_messages_out_refuse_their_scenario(words
     assert run.code == 2, run
     assert said in run.err
     assert ptcc("classify", "s.toml").code == ptcc("plot", "s.toml", "--what", "graph").code == 0
+
+
+def table(text: str) -> dict[str, np.ndarray]:
+    """Return the columns of a run by their heads."""
+    head, *rows = csv.reader(io.StringIO(text))
+    return dict(zip(head, np.array(rows, dtype=float).T, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("words", "messages", "pattern"),
+    [
+        (("--delay", "0.05"), LateMessages(delay="0.05"), "oldest"),
+        (("--delay", "0.01", "--period", "0.02", "--packet-loss", "2"), LateMessages("0.01", "0.02", 2), "square"),
+        (
+            ("--delay", "0.01", "--own-delay", "--gain-cap", "9"),
+            LateMessages("0.01", own_delay=True, gain_cap=9),
+            "oldest",
+        ),
+        (("--quantisation", "0.5"), LateMessages(value_error="0.25"), "varying"),
+    ],
+)
+def test_simulate_runs_with_late_messages(words: tuple[str, ...], messages: LateMessages, pattern: str) -> None:
+    """Its columns obey the closed loop: where the step is short the input is the slope of the states."""
+    run = ptcc(
+        "simulate", "team.csv", *words, *START, "--rho2", "3", "--kappa", "1", "--pattern", pattern, "--seed", "4"
+    )
+    assert run.code == 0, run
+    columns, protocol = table(run.out), NominalProtocol(T=1, rho1=1, rho2=3, kappa=1)
+    graph = read_graph("team.csv")
+    own = simulate(graph, protocol, [1, 3, 4, -4], messages=messages, pattern=pattern, seed=4)
+    direct = simulate_late(graph, protocol, messages, [1, 3, 4, -4], pattern=pattern, seed=4)
+    assert own == direct and own.deadline_index == own.t.size - 1
+    for label, states, inputs in zip(graph.labels, own.states, own.input, strict=True):
+        assert columns[label].tolist() == states.tolist()
+        assert columns[f"u({label})"].tolist() == (inputs + 0.0).tolist()
+    slope, early = np.diff(own.states) / np.diff(own.t), own.t[:-1] < 0.5
+    assert np.abs(slope - own.input[:, :-1])[:, early].max() < 0.05 * np.abs(slope).max()
+
+
+def test_simulate_runs_leaders_that_move_with_their_targets() -> None:
+    run = ptcc("simulate", "team.csv", "--leader-speed", "1", *START, "--rho2", "3", "--kappa", "1")
+    assert run.code == 0, run
+    columns, graph = table(run.out), read_graph("team.csv")
+    at = int(np.argmin(np.abs(columns["t"] - 1)))
+    x, goal = (np.array([columns[name.format(k)] for k in graph.labels]) for name in ("{}", "target({})"))
+    assert columns["t"][-1] > 1 and np.abs(x - goal)[:, at].max() < 1e-5
+    lead = analyse(graph).leaders[0]
+    assert np.abs(columns[f"u({graph.labels[lead]})"]).max() <= 1 + 1e-9
+    assert np.allclose(
+        x[lead][-1] - x[lead][0], np.sum(columns[f"u({graph.labels[lead]})"][:-1] * np.diff(columns["t"]))
+    )
+
+
+@pytest.mark.parametrize("words", [("--delay", "0.1"), ("--leader-speed", "1")])
+def test_simulate_draws_such_runs_and_takes_them_from_a_scenario(words: tuple[str, ...]) -> None:
+    assert ptcc("simulate", "team.csv", *words, *START, "-o", "run.png").code == 0
+    assert Path("run.png").stat().st_size > 5000
+    section = "[messages]\ndelay = 0.1\n" if words[0] == "--delay" else "[leaders]\nspeed = 1\n"
+    Path("s.toml").write_text(SCENARIO + section)
+    heads = [table(ptcc("simulate", *given).out) for given in (("s.toml",), ("team.csv", *words, *START))]
+    assert heads[0].keys() == heads[1].keys() and (len(heads[0]) == 2 + 4 * (2 + (words[0] != "--delay")))
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--delay", "0.1", "--noise", "1", "--gain-cap", "9"), "--noise: is not simulated with late messages"),
+        (("--delay", "0.1", "--stop-before", "0.1"), "--stop-before: is not simulated with late messages"),
+        (("--delay", "0.1", "--steps", "9"), "--steps: is not simulated with late messages"),
+        (("--delay", "0.1", "--samples", "9"), "--samples: is not simulated with late messages"),
+        (("--delay", "0.1", "--leader-speed", "1"), "messages and leaders together are not simulated yet"),
+        (("--leader-speed", "1", "--gain-cap", "9"), "--gain-cap: is not simulated with leaders that move"),
+        (("--delay", "0.1", "--agents", "double-integrator"), "--delay: is not simulated of agents of order n"),
+        (("--delay", "0.1", "--uncertainty", "10%"), "--delay: is not simulated of families of graphs"),
+        (("--delay", "1e-9"), "more than 20,000 steps"),
+    ],
+)
+def test_what_is_not_simulated_beside_late_messages_is_refused(words: tuple[str, ...], said: str) -> None:
+    run = ptcc("simulate", "team.csv", *words, *START)
+    assert run.code == 2 and said in run.err and run.err.count("\n") == 1, run
+
+
+def test_what_is_not_simulated_beside_is_refused_in_python() -> None:
+    graph, p = SignedDigraph.from_edges([(1, 2, 1)]), NominalProtocol(T=1, rho1=1, rho2=1, kappa=1)
+    late = LateMessages(delay="0.1")
+    for more, said in (({"actuator": GainLimits(gain_cap=9)}, "gain_cap="), ({"times": [1]}, "times: is not")):
+        with pytest.raises(ParameterError, match=said):
+            simulate(graph, p, [1, 0], messages=late, **more)
+    with pytest.raises(ParameterError, match="messages and leaders together"):
+        simulate(graph, p, [1, 0], messages=late, leaders=MovingLeaders(speed=1))
+    with pytest.raises(ParameterError, match="sigma0: leaders that move ask"):
+        simulate(graph, p, [1, 0], leaders=MovingLeaders(speed=1), sigma0=[1, 0])
+    many = SignedDigraph.from_edges([(0, k, 1) for k in range(1, 60_000)])
+    with pytest.raises(ParameterError, match="more than 50,000,000 states"):
+        simulate(many, p, [0.0] * 60_000, messages=late)
 
 
 def test_page_and_statement_tell_of_late_messages_and_moving_leaders() -> None:
