@@ -59,11 +59,11 @@ def late_obligations(late: LateBounds | None) -> Iterator[Obligation]:
         yield Obligation("late-form", "messages.form", numbers, {"function": form.function, "phi": phi})
 
 
-def asked_messages(messages: LateMessages, graph: SignedDigraph) -> dict[str, Any]:
+def asked_messages(messages: LateMessages, graph: SignedDigraph, out: Writer) -> dict[str, Any]:
     """Return how late, how often lost and how inexact messages are, as files have it."""
     latencies, period = messages.latencies(graph), messages.period
     return {
-        "latency": [format_exact(x) for x in latencies] if isinstance(latencies, tuple) else format_exact(latencies),
+        "latency": out.numbers("latency", latencies) if isinstance(latencies, tuple) else format_exact(latencies),
         "packets": None if period is None else {"period": format_exact(period), "losses": str(messages.losses)},
         "delay": format_exact(messages.age),
         "own": "late" if messages.own_delay else "fresh",
@@ -77,7 +77,7 @@ def messages_section(late: LateBounds, out: Writer) -> dict[str, Any]:
     graph, missed, staged = late.structure.graph, late.missed, late.staged
     followers = [graph.labels[v] for v in late.structure.followers]
     return {
-        **asked_messages(late.messages, graph),
+        **asked_messages(late.messages, graph, out),
         "rows": [
             {name: text(getattr(row, name)) for name in ("cap", "clock", "left", "initial", "floor")}
             for row in late.rows
@@ -169,7 +169,7 @@ def read_messages(section: Mapping[str, Any], structure: Structure, data: Reader
     latency, packets = section["latency"], section["packets"]
     delay: Any = exact(latency) if isinstance(latency, str) else None
     if delay is None:
-        values = [exact(x) for x in latency] if isinstance(latency, list) else data.agents(latency)
+        values = data.numbers(latency, structure.graph.n_edges)
         delay = {(s, t): x for (s, t, _), x in zip(structure.graph.edges, values, strict=True)}
     return LateMessages(
         delay=delay,

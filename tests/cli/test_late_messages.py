@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import re
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,7 @@ from ptcc_certify import (
     read_graph,
     simulate,
 )
+from ptcc_certify.certificate import format_vectors
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.simulation.late_messages import simulate_late
 
@@ -292,6 +294,18 @@ def test_commands_that_would_leave_late_messages_out_refuse_their_scenario(words
     assert run.code == 2, run
     assert said in run.err
     assert ptcc("classify", "s.toml").code == ptcc("plot", "s.toml", "--what", "graph").code == 0
+
+
+def test_delays_of_many_edges_stand_in_a_side_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(format_vectors, "LONG", 3)
+    run = ptcc("certify", "team.csv", "--delay", "delay", *START, *QUICK, "-o", "c.json")
+    assert run.code == ptcc("check", "c.json").code == 0, run
+    section, messages = json.loads(Path("c.json").read_text())["messages"], read_certificate("c.json").late.messages
+    assert section["latency"]["count"] == 4 and section["latency"]["scale"] == "200"
+    given = {
+        edge: Fraction(x) for edge, x in zip(("ab", "bc", "cb", "cd"), ("0.01", "0.02", "0.01", "0.005"), strict=True)
+    }
+    assert {"".join(edge): x for edge, x in messages.delay.items()} == given
 
 
 def table(text: str) -> dict[str, np.ndarray]:
