@@ -57,6 +57,8 @@ def late_obligations(late: LateBounds | None) -> Iterator[Obligation]:
         phi = dict(zip(late.structure.graph.labels, map(format_exact, form.phi), strict=True))
         numbers = {"q": form.q, "b": form.b, "kap": form.kap}
         yield Obligation("late-form", "messages.form", numbers, {"function": form.function, "phi": phi})
+    if late.input is not None:
+        yield Obligation("late-input", "messages.input")
 
 
 def asked_messages(messages: LateMessages, graph: SignedDigraph, out: Writer) -> dict[str, Any]:
@@ -87,6 +89,7 @@ def messages_section(late: LateBounds, out: Writer) -> dict[str, Any]:
         "missed": missed and {"agent": graph.labels[missed.agent], "bound": format_exact(missed.bound)},
         "staged": staged and dict(zip(followers, map(format_exact, staged), strict=True)),
         "form": None if late.form is None else _form_section(late.form, graph.labels),
+        "input": None if late.input is None else agents_section(graph.labels, "late-input", late.input, out),
     }
 
 
@@ -161,6 +164,7 @@ def read_late(
         staged and tuple(map(exact, staged.values())),
         None if residual is None else np.array([float_up(x) for x in data.agents(residual)]),
         _read_form(section["form"], steps.get(("late-form", "messages.form")), data),
+        input=None if section["input"] is None else np.array([float_up(x) for x in data.agents(section["input"])]),
     )
 
 

@@ -96,7 +96,8 @@ def test_a_behaviour_asked_for_at_T_is_refuted_where_an_agent_is_proved_to_miss_
             ("--quantisation", "0.1"),
             "left open: bipartite consensus at T with late messages (nobody is proved to settle at T)",
         ),
-        (("--delay", "0.005", "--gain-cap", "50", "--max-input", "1e6"), "(no bound is proved with late messages)"),
+        (("--delay", "0.005", "--gain-cap", "50", "--max-input", "100"), "left open: |u_k| <= 100 (proved: "),
+        (("--delay", "0.005", "--max-input", "1e6"), "left open: |u_k| <= 1000000 (no bound is proved with late"),
         (("--leader-speed", "1", "--max-input", "100"), "left open: |u_k| <= 100 (proved: "),
         (("--leader-speed", "1", "--max-input", "1"), "refuted: |u_k| <= 1 (it is up to"),
     ],
@@ -110,6 +111,9 @@ def test_what_holds_without_late_messages_and_with_leaders_at_rest_is_not_said_t
 
 
 def test_a_behaviour_and_an_input_are_met_where_they_are_proved_of_late_messages_and_moving_leaders() -> None:
+    capped = ptcc("certify", "team.csv", "--delay", "0.005", "--gain-cap", "50", "--max-input", "1e6", *START, *QUICK)
+    assert capped.code == 0 and "met: |u_k| <= 1000000" in " ".join(capped.out.split()), capped
+    assert "bounded up to T; |u_k| <= " in capped.out
     star = ("--delay", "0.1", "--expect", "bipartite-consensus")  # all listen to a leader at rest alone
     Path("star.csv").write_text("a,b,1\na,c,-1\n")
     assert ptcc("certify", "star.csv", *star, "--x0", "1,0,2", *QUICK).code == 0
