@@ -41,12 +41,12 @@ MEMORY = 4
 READING = ("--edges", "listens", "--drop-self-loops")
 
 
-def generated(n: int) -> ptcc.SignedDigraph:
-    """A random sparse digraph with leaders and followers."""
+def generated(n: int, rings: bool = True) -> ptcc.SignedDigraph:
+    """A random sparse digraph with leaders and followers; without rings all leaders listen to nobody."""
     from scipy import sparse
 
     rng = np.random.default_rng(n)
-    alone, ringed = n // 10, n // 20 // 4 * 4
+    alone, ringed = n // 10, n // 20 // 4 * 4 * rings
     ring = np.arange(alone, alone + ringed)
     following = np.arange(alone + ringed, n)
     target = np.concatenate([ring, np.repeat(following, 7)])

@@ -113,18 +113,52 @@ def solve(B: Any, right: np.ndarray, diagonal: np.ndarray, tolerance: float = _R
     array([1., 1.])
     """
     if B.shape[0] <= DIRECT_ROWS:
-        return _direct(B, right)
+        return Factor(B).solve(right)
+    x, converged = _krylov(B, right, diagonal, tolerance)
+    return x if converged or fill_core(B) > FILL_ROWS else Factor(B).solve(right)
+
+
+def solve_columns(B: Any, right: np.ndarray, diagonal: np.ndarray) -> np.ndarray | None:
+    """Solve ``B X = right`` for the columns of ``right`` as :func:`solve` does, with one factor for all of them.
+
+    None where a column is not converged: a factor would fill in, and no other column is tried.
+
+    Examples
+    --------
+    >>> solve_columns(sparse.csr_array([[2.0, -1.0], [-1.0, 2.0]]), np.eye(2), np.full(2, 2.0)).round(3).tolist()
+    [[0.667, 0.333], [0.333, 0.667]]
+    """
+    factor = Factor(B) if B.shape[0] <= DIRECT_ROWS else None
+    result = np.empty(right.shape)
+    for k, column in enumerate(right.T):
+        converged = False
+        if factor is None:
+            result[:, k], converged = _krylov(B, column, diagonal, _RESIDUAL)
+        if not converged and factor is None:
+            if fill_core(B) > FILL_ROWS:
+                return None
+            factor = Factor(B)
+        if factor is not None:
+            result[:, k] = factor.solve(column)
+    return result if np.isfinite(result).all() else None
+
+
+def _krylov(B: Any, right: np.ndarray, diagonal: np.ndarray, tolerance: float) -> tuple[np.ndarray, bool]:
+    """Solve by BiCGSTAB, refined once if the tolerance is small; tell whether it converged."""
     own = LinearOperator(B.shape, matvec=lambda r: r / diagonal)
-    x, _ = bicgstab(B, right, rtol=tolerance, maxiter=_PRODUCTS, M=own)
+    x, info = bicgstab(B, right, rtol=tolerance, maxiter=_PRODUCTS, M=own)
+    if info < 0:  # from a right-hand side of few rows the search reaches few a step, and breaks down: begin everywhere
+        start = np.random.default_rng(0).uniform(-1, 1, right.size) * np.abs(right / diagonal).max()
+        x, _ = bicgstab(B, right, x0=start, rtol=tolerance, maxiter=_PRODUCTS, M=own)
     residual = right - B @ x
     loose = tolerance > _REFINED
     if not np.linalg.norm(residual) <= (2 if loose else 1e3) * tolerance * np.linalg.norm(right):
-        return _direct(B, right) if fill_core(B) <= FILL_ROWS else x
+        return x, False
     if loose:
-        return x
+        return x, True
     correction, _ = bicgstab(B, residual, rtol=1e-6, maxiter=_PRODUCTS, M=own)
     better = x + correction
-    return better if np.abs(right - B @ better).max() < np.abs(residual).max() else x
+    return (better if np.abs(right - B @ better).max() < np.abs(residual).max() else x), True
 
 
 def fill_core(block: Any) -> int:
@@ -148,16 +182,32 @@ def fill_core(block: Any) -> int:
     return int(remaining.sum())
 
 
-def _direct(B: Any, right: np.ndarray) -> np.ndarray:
-    """Solve by a sparse factor of the matrix with rows scaled to a unit diagonal, and refine once."""
-    scale = 1 / np.abs(B.diagonal())
-    scaled = sparse.csc_array(sparse.diags_array(scale) @ B)
-    try:
-        factor = diagonal_factor(scaled)
-    except RuntimeError:  # exactly singular
-        return np.full(right.shape, np.nan)
-    x = factor.solve(scale * right)
-    return x + factor.solve(scale * (right - B @ x))
+class Factor:
+    """A sparse factor of a matrix with its rows scaled to a unit diagonal.
+
+    Parameters
+    ----------
+    B : (n, n) sparse matrix
+
+    Examples
+    --------
+    >>> Factor(sparse.csr_array([[0.0, 2.0], [4.0, 1.0]]) + 4 * sparse.eye_array(2)).solve(np.ones(2)).round(3)
+    array([0.25, 0.  ])
+    """
+
+    def __init__(self, B: Any):
+        self._B, self._scale = B, 1 / np.abs(B.diagonal())
+        try:
+            self._factor: Any = diagonal_factor(sparse.csc_array(sparse.diags_array(self._scale) @ B))
+        except RuntimeError:  # exactly singular
+            self._factor = None
+
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        """Solve ``B x = right`` and refine once; NaN of a matrix that is exactly singular."""
+        if self._factor is None:
+            return np.full(right.shape, np.nan)
+        x = self._factor.solve(self._scale * right)
+        return np.asarray(x + self._factor.solve(self._scale * (right - self._B @ x)))
 
 
 def diagonal_factor(A: Any) -> Any:

@@ -125,6 +125,31 @@ class Late:
         r = self.k / (cap - self.rho1)
         return self.rho1 * (self.T - r) + self.k * log(self.T / r)[0] + cap * r
 
+    def largest_gain(self, b: Fraction, gain_cap: Fraction, cap: Fraction | None) -> Fraction:
+        """The supremum of ``g e^(-b s_c)``, a little above."""
+        first, lower = self.rho1 + self.k / self.T, min(gain_cap, gain_cap if cap is None else cap)
+        found = [min(first, gain_cap)]
+        turn = self.k / (lower - self.rho1) if lower > first else self.T
+        for level in (lower, gain_cap):
+            if level > first:
+                r = self.k / (level - self.rho1)
+                clock = self.rho1 * (self.T - turn) + self.k * log(self.T / turn)[0] + lower * (turn - r)
+                found.append(level * exp(-b * clock)[1])
+        return max(found) * (1 + ROOM)
+
+    def inputs(self, step: Json, entry: Json, error: Fraction, gain_cap: Fraction) -> list[Fraction]:
+        """What an entry of ``rows`` proves of the inputs of all agents."""
+        u, b, floor, found = step["bound"][0], number(step["numbers"]["b"]), number(entry["floor"]), []
+        y = self.largest_gain(b, gain_cap, None if entry["cap"] is None else number(entry["cap"]))
+        for v in range(len(self.labels)):
+            if v not in u:
+                found.append(Fraction(0))
+                continue
+            heard, D = sum((w * u[s] for s, w in self.heard[v]), Fraction(0)), self.D[v]
+            most = (2 * D - b) * u[v] * number(entry["initial"]) * y
+            found.append((most + gain_cap * (floor * (D * u[v] + heard) + error * D)) * (1 + ROOM))
+        return found
+
     # ------------------------------------------------------------------ parts
 
     def row(self, q: Fraction, delay: Fraction, error: Fraction, gain_cap: Fraction | None) -> tuple[Json, Json] | None:
@@ -309,8 +334,10 @@ class Late:
         deviation = [number(function["deviation"]["agents"][label]) for label in self.labels]
         rest = [(m + sqrt(c)[1] * root * left) * (1 + ROOM) for m, c in zip(moved, deviation, strict=True)]
         told = {"q": text(q), "b": text(b), "kap": text(kap)}
+        y = root * self.largest_gain(b, gain_cap, None) * (1 + ROOM)
         said = {"left": text(left), "moved": self.by_agent(moved), "residual": self.by_agent(rest)}
-        return said, {"numbers": told, "witness": {"function": k, "phi": self.by_agent(phi)}}
+        witness = {"function": k, "phi": self.by_agent(phi)}
+        return said, {"numbers": told, "witness": witness, "inputs": [x * y for x in phi]}
 
     def by_agent(self, values: Sequence[Fraction]) -> Json:
         return {label: text(x) for label, x in zip(self.labels, values, strict=True)}
@@ -338,6 +365,7 @@ def with_messages(
     missed: bool = False,
     staged: bool = False,
     form: Fraction | None = None,
+    bounded: bool = True,
 ) -> Json:
     """The certificate with late messages: as many of the parts as there are."""
     data = copy.deepcopy(data)
@@ -360,12 +388,14 @@ def with_messages(
         "missed": None,
         "staged": None,
         "form": None,
+        "input": None,
     }
-    proof, bounds = [], []
+    proof, bounds, inputs = [], [], []
     for q in () if late else qs:
         if (found := case.row(Fraction(q), delay, error, cap)) is not None:
             entry, step = found
             bounds.append({v: step["bound"][0][v] * step["bound"][1] for v in case.followers})
+            inputs += [] if cap is None else [case.inputs(step, entry, error, cap)]
             proof.append(
                 obligation("late-rows", f"messages.rows[{len(said['rows'])}]", step["numbers"], step["witness"])
             )
@@ -390,7 +420,11 @@ def with_messages(
             if (found := case.form(delay, cap, late, k, form)) is not None:
                 said["form"] = found[0]
                 proof.append(obligation("late-form", "messages.form", found[1]["numbers"], found[1]["witness"]))
+                inputs.append(found[1]["inputs"])
                 break
+    if inputs and bounded:
+        said["input"] = case.by_agent([min(own) for own in zip(*inputs, strict=True)])
+        proof.append(obligation("late-input", "messages.input"))
     data["messages"] = said
     data["proof"] += proof
     return resealed(data)

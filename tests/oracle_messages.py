@@ -190,6 +190,17 @@ class LateOracle(Oracle):
             self.deadlines()
         if self.said["form"] is not None:
             self.small_delays()
+        if self.said["input"] is not None:
+            self.slopes()
+
+    def slopes(self) -> None:
+        """Motions whose states change as fast as their inputs."""
+        most = np.array(list(map(float, self.vector(self.said["input"]))))
+        self.require(self.cap is not None and (most >= 0).all(), "input: what it needs")
+        for runs, _ in self.loop():
+            way = np.abs(np.diff(runs.states))
+            allowed = most[:, None] * np.diff(runs.times) * (1 + SLACK) + FLOOR
+            self.require(not np.any(way > allowed), "input: a motion")
 
     def clock(self, cap: Fraction | None, t: Fraction | None = None) -> Any:
         """The integral of ``min(gain, cap)`` up to ``t``, or ``T``, a ball."""

@@ -17,7 +17,6 @@ the certificate forms them exactly.
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
@@ -84,7 +83,7 @@ class Influence:
         component meets at ``c_k = sum left_null_vectors * X(0)`` times its gauge.
     containment_weights : tuple of tuple, or None
         For each follower, its weight on each balanced closed component (``varpi``; absolute sum at most 1). None where
-        followers times components are more than ``MANY_WEIGHTS``.
+        followers times components are more than ``MANY_WEIGHTS``, or no solve in floats converges.
     exact : bool
         Whether the numbers are rationals.
     enclosure : Enclosure or None
@@ -284,8 +283,8 @@ def influence(graph: Any, *, exact: bool | None = None, orientation: str | None 
     if exact:
         weights = exact_containment_weights(structure)
     elif structure.followers.size * len(balanced) <= MANY_WEIGHTS:
-        with suppress(RuntimeError):  # of a factor in floats that is exactly singular
-            weights = containment_weights(structure).tolist()
+        found = containment_weights(structure)
+        weights = None if found is None else found.tolist()
     rows = None if weights is None else tuple(map(tuple, weights))
     return Influence(structure, tuple(left_null_vectors), rows, exact)
 

@@ -28,6 +28,7 @@ from ptcc_certify.bounds.missed_deadline import Missed, find_missed
 from ptcc_certify.bounds.small_delays import SmallDelays
 from ptcc_certify.bounds.staged_deadlines import stage_deadlines
 from ptcc_certify.checker.input_formulas import BITS, Limits, decay_above
+from ptcc_certify.checker.late_input import gain_above
 from ptcc_certify.checker.late_messages import PARTS
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness
@@ -96,6 +97,8 @@ class LateBounds:
         About the longest delay that such functions forgive: this certificate's limit. None if it was not asked.
     unarrived : bool
         Whether deadlines of stages fail since information takes longer than ``T`` to come from leaders to all.
+    input : (N,) array or None
+        What bounds ``|x_k'|`` up to ``T``, the sliding term left out, in floats from above; None where nothing does.
     enough : Fraction or None
         A delay with which no more is left than was asked, near to the longest one that is proved.
     """
@@ -112,6 +115,7 @@ class LateBounds:
     form: SmallDelays | None = None
     longest_delay: float | None = None
     unarrived: bool = False
+    input: np.ndarray | None = None
     enough: Fraction | None = None
 
     @property
@@ -202,7 +206,10 @@ def bound_late(
             steps = search_steps(rows, gain, messages.age, float(messages.value_error) * _MORE, first)
     each = [row.residual() for row in found]
     each += [] if steps is None else [steps.bounds[-1] * _MORE + 1e-300]
-    bounds = replace(bounds, rows=found, steps=steps, residual=_least(structure, each))
+    inputs = _least(
+        structure, [] if messages.gain_cap is None else [_inputs(rows, gain, messages, row) for row in found]
+    )
+    bounds = replace(bounds, rows=found, steps=steps, residual=_least(structure, each), input=inputs)
     if messages.value_error or messages.gain_cap is not None:
         return bounds
     if initial_state is not None and ends is not None:
@@ -210,6 +217,15 @@ def bound_late(
     staged = stage_deadlines(rows, protocol.T, messages.age)
     unarrived = staged is None and stage_deadlines(rows, protocol.T, Fraction(0)) is not None
     return replace(bounds, staged=staged, unarrived=unarrived)
+
+
+def _inputs(rows: FollowerRows, gain: LimitedGain, messages: LateMessages, row: RowBound) -> np.ndarray:
+    """Bound ``gain (D_k |eps_k| + sum_l |w_kl| |eps_l(t - tau_kl)| + value_error D_k)`` of every follower."""
+    cap, u, b = messages.gain_cap, row.witness.u, float_up(row.witness.b)
+    assert cap is not None
+    y = float_up(row.initial * gain_above(gain.gain.exact, cap, row.witness.b, row.cap))
+    wrong = float_up(cap * row.floor) * (rows.D * u + rows.W @ u) + float_up(cap * messages.value_error) * rows.D
+    return ((2 * rows.D - b * (1 - 1e-15)) * u * y + wrong) * _MORE + 1e-300
 
 
 def _away(
@@ -255,7 +271,7 @@ def _least(structure: Structure, bounds: Sequence[np.ndarray]) -> np.ndarray | N
 def search_rows(
     rows: FollowerRows, gain: LimitedGain, messages: LateMessages, first: np.ndarray
 ) -> tuple[RowBound, ...]:
-    """Return the row bound that leaves least at ``T`` of those found; none if no vector was found."""
+    """Return the row bound that leaves least at ``T`` of those found, and under a cap that of the least input."""
     candidates: list[RowBound] = []
 
     def offer(q: float, loss: float) -> None:
@@ -281,7 +297,13 @@ def search_rows(
             best_q = _best_q(rows, gain, messages, _LARGEST_Q)
             for loss in _LOSSES[1:]:
                 offer(best_q, loss)
-    return (min(candidates, key=_largest),) if candidates else ()
+    if not candidates:
+        return ()
+    least, cap = min(candidates, key=_largest), messages.gain_cap
+    if cap is None:
+        return (least,)
+    lowest = min(candidates, key=lambda row: float(_inputs(rows, gain, messages, row).max()))
+    return (least,) if lowest is least else (least, lowest)
 
 
 def _largest(bound: RowBound) -> float:

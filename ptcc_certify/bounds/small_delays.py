@@ -17,9 +17,11 @@ from fractions import Fraction
 
 import numpy as np
 
+from lmi.exact.decimal_rounding import float_up
 from lmi.exact.elementary_enclosures import exp, rounded
 from ptcc_certify.bounds.final_state import Influence
 from ptcc_certify.checker.input_formulas import BITS, Limits, decay_above, root_above
+from ptcc_certify.checker.late_input import gain_above
 from ptcc_certify.checker.quadratic_form import Form
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.protocols.gain import Gain
@@ -142,13 +144,21 @@ class SmallDelayBounds:
         pushed = [sum((x * exact[v] for v, x in row.items()), Fraction(0)) for row in self.B]
         kap = Fraction(self._kap(self._weights(one), np.array([float(x) for x in pushed])) * (1 + _MORE))
         left = rounded(decay_above(b * self.clock), BITS, up=True)
-        root = root_above(one.form.value([self.errors[v] for v in one.form.nodes]))
-        moved, residual = [], []
+        root, moved, residual = self._root(one), list[Fraction](), list[Fraction]()
         for k, c in enumerate(one.deviations):
             share = sum((abs(Fraction(x)) * pushed[v] for v, x in self.influence.row(k).items()), Fraction(0))
             moved.append(rounded(h * q / b * share * root, BITS, up=True))
             residual.append(rounded(moved[-1] + root_above(c * (1 + Fraction(_MORE))) * root * left, BITS, up=True))
         return SmallDelays(one.function, q, b, kap, tuple(exact), left, tuple(moved), tuple(residual))
+
+    def inputs(self, one: DecayingForm, bound: SmallDelays) -> np.ndarray:
+        """Return what bounds ``|x_k'| <= g phi_k sqrt(V(0)) e^(-b s)`` up to ``T``, ``(N,)`` floats from above."""
+        y = self._root(one) * gain_above(self.gain.exact, self.cap, bound.b)
+        return np.array([float_up(x * y) for x in bound.phi]) * (1 + _MORE) + 1e-300
+
+    def _root(self, one: DecayingForm) -> Fraction:
+        """Bound ``sqrt(V(0))`` from above."""
+        return root_above(one.form.value([self.errors[v] for v in one.form.nodes]))
 
     def _weights(self, one: DecayingForm) -> np.ndarray:
         """Return ``|L'P L|`` in floats."""

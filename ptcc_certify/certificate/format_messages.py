@@ -57,13 +57,15 @@ def late_obligations(late: LateBounds | None) -> Iterator[Obligation]:
         phi = dict(zip(late.structure.graph.labels, map(format_exact, form.phi), strict=True))
         numbers = {"q": form.q, "b": form.b, "kap": form.kap}
         yield Obligation("late-form", "messages.form", numbers, {"function": form.function, "phi": phi})
+    if late.input is not None:
+        yield Obligation("late-input", "messages.input")
 
 
-def asked_messages(messages: LateMessages, graph: SignedDigraph) -> dict[str, Any]:
+def asked_messages(messages: LateMessages, graph: SignedDigraph, out: Writer) -> dict[str, Any]:
     """Return how late, how often lost and how inexact messages are, as files have it."""
     latencies, period = messages.latencies(graph), messages.period
     return {
-        "latency": [format_exact(x) for x in latencies] if isinstance(latencies, tuple) else format_exact(latencies),
+        "latency": out.numbers("latency", latencies) if isinstance(latencies, tuple) else format_exact(latencies),
         "packets": None if period is None else {"period": format_exact(period), "losses": str(messages.losses)},
         "delay": format_exact(messages.age),
         "own": "late" if messages.own_delay else "fresh",
@@ -77,7 +79,7 @@ def messages_section(late: LateBounds, out: Writer) -> dict[str, Any]:
     graph, missed, staged = late.structure.graph, late.missed, late.staged
     followers = [graph.labels[v] for v in late.structure.followers]
     return {
-        **asked_messages(late.messages, graph),
+        **asked_messages(late.messages, graph, out),
         "rows": [
             {name: text(getattr(row, name)) for name in ("cap", "clock", "left", "initial", "floor")}
             for row in late.rows
@@ -87,6 +89,7 @@ def messages_section(late: LateBounds, out: Writer) -> dict[str, Any]:
         "missed": missed and {"agent": graph.labels[missed.agent], "bound": format_exact(missed.bound)},
         "staged": staged and dict(zip(followers, map(format_exact, staged), strict=True)),
         "form": None if late.form is None else _form_section(late.form, graph.labels),
+        "input": None if late.input is None else agents_section(graph.labels, "late-input", late.input, out),
     }
 
 
@@ -161,6 +164,7 @@ def read_late(
         staged and tuple(map(exact, staged.values())),
         None if residual is None else np.array([float_up(x) for x in data.agents(residual)]),
         _read_form(section["form"], steps.get(("late-form", "messages.form")), data),
+        input=None if section["input"] is None else np.array([float_up(x) for x in data.agents(section["input"])]),
     )
 
 
@@ -169,7 +173,7 @@ def read_messages(section: Mapping[str, Any], structure: Structure, data: Reader
     latency, packets = section["latency"], section["packets"]
     delay: Any = exact(latency) if isinstance(latency, str) else None
     if delay is None:
-        values = [exact(x) for x in latency] if isinstance(latency, list) else data.agents(latency)
+        values = data.numbers(latency, structure.graph.n_edges)
         delay = {(s, t): x for (s, t, _), x in zip(structure.graph.edges, values, strict=True)}
     return LateMessages(
         delay=delay,

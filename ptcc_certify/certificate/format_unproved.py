@@ -13,7 +13,7 @@ from ptcc_certify.bounds.late_messages import LateBounds
 from ptcc_certify.certificate.certificate_data import Content
 from ptcc_certify.certificate.format_leaders import asked_leaders, read_leaders
 from ptcc_certify.certificate.format_messages import asked_messages, read_messages
-from ptcc_certify.certificate.format_vectors import Reader, readable
+from ptcc_certify.certificate.format_vectors import Reader, Writer, readable
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.protocols.base import Protocol
 from ptcc_certify.protocols.gain_limits import GainLimits
@@ -24,7 +24,7 @@ def write_unproved(content: Content) -> dict[str, Any]:
     """Return the late messages or moving leaders that were asked for where nothing is proved of them."""
     messages, leaders, late = content.request.messages, content.request.leaders, content.late
     if messages is not None and not (late is not None and late.says_something):
-        return {"messages": asked_messages(messages, content.graph)}
+        return {"messages": asked_messages(messages, content.graph, Writer(content.graph.labels))}
     if leaders is not None and content.tracking is None:
         return {"leaders": asked_leaders(leaders)}
     return {}

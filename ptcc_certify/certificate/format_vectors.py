@@ -90,13 +90,23 @@ class Writer:
         """Write one number of each agent: by label, or as a side file of integers over a common denominator."""
         if state is None:
             return None
-        if self.aside(len(state)):
-            scale = math.lcm(*{x.denominator for x in state})
-            if scale.bit_length() < 63:
-                whole = [x.numerator * (scale // x.denominator) for x in state]
-                if max(map(abs, whole)) < 2**63:
-                    return {**self.vector(name, np.array(whole, dtype=np.int64)), "scale": str(scale)}
-        return dict(zip(self.labels, map(format_exact, state), strict=True))
+        return self._over_scale(name, state) or dict(zip(self.labels, map(format_exact, state), strict=True))
+
+    def numbers(self, name: str, values: Sequence[Fraction]) -> Any:
+        """Write numbers as texts, or as a side file of integers over a common denominator."""
+        return self._over_scale(name, values) or [format_exact(x) for x in values]
+
+    def _over_scale(self, name: str, values: Sequence[Fraction]) -> dict[str, Any] | None:
+        """Put many numbers into a side file of integers over a common denominator; None where int64 is too short."""
+        if not self.aside(len(values)):
+            return None
+        scale = math.lcm(*{x.denominator for x in values})
+        if scale.bit_length() >= 63:
+            return None
+        whole = [x.numerator * (scale // x.denominator) for x in values]
+        if max(map(abs, whole)) >= 2**63:
+            return None
+        return {**self.vector(name, np.array(whole, dtype=np.int64)), "scale": str(scale)}
 
 
 class Reader:
@@ -132,6 +142,10 @@ class Reader:
         if beside(section):
             return tuple(self.files.numbers(section, "a vector", self._count))
         return tuple(map(exact, section.values()))
+
+    def numbers(self, section: Any, count: int) -> tuple[Fraction, ...]:
+        """Read what :meth:`Writer.numbers` wrote."""
+        return tuple(self.files.numbers(section, "a vector", count))
 
     def agents(self, section: Any) -> tuple[Fraction, ...]:
         """Read one number of each agent, which is there."""

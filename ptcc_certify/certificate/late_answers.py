@@ -12,6 +12,7 @@ from ptcc_certify.bounds.tracking import Tracking
 from ptcc_certify.certificate.answer import MET, OPEN, REFUTED, Answer
 from ptcc_certify.certificate.certificate_data import Content
 from ptcc_certify.lyapunov.search import USEFUL
+from ptcc_certify.protocols.base import Protocol
 
 
 def at_deadline(certificate: Content, answer: Answer) -> Answer:
@@ -82,8 +83,26 @@ def judge_input_beside(certificate: Content, most: Fraction, what: str, first: F
     if first > most and not (late is not None and late.messages.value_error):
         return Answer(REFUTED, what, f"it is up to {down(first)} at the start, proved")
     if late is not None:
-        return Answer(OPEN, what, "no bound is proved with late messages")
+        return _judge_late_input(certificate, late, most, what)
     return _judge_tracking(tracking, most, what)
+
+
+def _judge_late_input(certificate: Content, late: LateBounds, most: Fraction, what: str) -> Answer:
+    """Tell whether every input stays within so much with late messages."""
+    largest = largest_late_input(late, certificate.protocol)
+    if largest is None:
+        why = "no bound is proved with late messages"
+        why += "; a gain without a cap makes ever more of what is left at T" * (late.messages.gain_cap is None)
+        return Answer(OPEN, what, why)
+    what += " from within 1 of the final states" * late.relative
+    return Answer(MET, what) if largest <= most else Answer(OPEN, what, f"proved: {up(largest)}")
+
+
+def largest_late_input(late: LateBounds, protocol: Protocol) -> Fraction | None:
+    """Return what bounds every ``|u_k|`` with late messages, the sliding term included; None where nothing does."""
+    if late.input is None:
+        return None
+    return Fraction(float(late.input.max())) + (0 if protocol.reaching is None else protocol.reaching.mu1)
 
 
 def _judge_tracking(tracking: Tracking | None, most: Fraction, what: str) -> Answer:
@@ -110,7 +129,7 @@ def use_of_late(late: LateBounds, longest_way: float | None) -> tuple[bool | Non
         None where nothing is proved of what is left. The rest of the certificate knows of no delay: what it tells of
         the input does not hold here.
     """
-    caveat = "" if late.messages.gain_cap is not None else "the input is not proved bounded"
+    caveat = "" if late.input is not None else "the input is not proved bounded"
     if math.isinf(late.largest):
         return None, "", caveat
     way = 1.0 if late.relative else longest_way

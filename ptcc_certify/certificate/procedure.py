@@ -330,7 +330,11 @@ def _with_small_delays(certificate: Certificate) -> Certificate:
         bounds = SmallDelayBounds(
             certificate.structure, certificate.protocol.gain, late.messages, certificate.influence, x0
         )
-        late = replace(late, form=bounds.best(forms), longest_delay=bounds.longest_delay(forms))
+        form, inputs = bounds.best(forms), late.input
+        if form is not None:
+            own = bounds.inputs(next(one for one in forms if one.function == form.function), form)
+            inputs = own if inputs is None else np.minimum(inputs, own)
+        late = replace(late, form=form, input=inputs, longest_delay=bounds.longest_delay(forms))
     asked, final = certificate.expectations.max_residual, certificate.final_state
     if asked is not None and late.rows and late.largest > asked and late.messages.age:
         ends = None if final is None else final.intervals

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
+from itertools import chain
 from typing import Any
 
 from lmi.exact.matrix_exponential import expm
@@ -13,13 +14,15 @@ from ptcc_certify.checker.agent_model import Agents
 from ptcc_certify.checker.final_state import FinalState
 from ptcc_certify.checker.graph import ordered
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import Interval, entries, exact, interval, need
+from ptcc_certify.checker.reading import Interval, entries, exact, interval, length, need
 from ptcc_certify.checker.side_files import Numbers
 
 #: Bits to which an integral is enclosed.
 BITS = 96
 #: Largest exponent ``w`` of :func:`rest_integral`.
 LARGEST_EXPONENT = 1000
+#: What an entry of the final states costs, in products, and more for each derivative where the motion is rounded.
+ENTRY, ROUNDED_ENTRY = 800, 800
 #: By agent, coordinate by coordinate, numbers for position, velocity and so on.
 States = Sequence[Sequence[Sequence[Fraction]]]
 
@@ -101,12 +104,15 @@ def check_final_states(
     """Verify the interval of every agent, coordinate and derivative: ``h_k + sum_l Q_kl sum_j M_ij g_lj``."""
     doc.open("agent-final-state", "agents")
     labels, n = final.structure.graph.labels, agents.n
+    rounded = any(wide for row in M for _, wide in row)
+    bits = length(chain((x for row in M for pair in row for x in pair), *chain.from_iterable(states)))
+    products = ENTRY + (n * ROUNDED_ENTRY if rounded else 0)
+    spend(products * len(labels) * agents.d * n, bits, bits, "the final states of agents")
     section = ordered(labels, doc.data["agents"]["final_state"], "final_state")
     claimed = [
         [[interval(x) for x in entries(row, "derivatives", n)] for row in entries(rows, "coordinates", agents.d)]
         for rows in section.values()
     ]
-    rounded = any(wide for row in M for _, wide in row)
     for axis in range(agents.d):
         G = [[row[axis][j] - (offsets[v][axis] if j == 0 else 0) for v, row in enumerate(states)] for j in range(n)]
         each = [final.enclosures(final.values(Numbers(g))) for g in G] if rounded else []

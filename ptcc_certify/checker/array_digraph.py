@@ -7,7 +7,7 @@ Nothing here decides what :class:`~ptcc_certify.checker.digraph.Digraph` does no
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -46,6 +46,21 @@ class ArrayDigraph(Digraph):
         for first in range(0, self.n_edges, step):
             i, j, k = (np.asarray(part)[first : first + step] for part in (of, to, self.which))
             np.add.at(total, j, weights[k] * numbers[i])
+        return total.tolist()
+
+    def _add_by_part(
+        self, sizes: Sequence[int], x: Sequence[int], parts: Sequence[int], factors: Mapping[int, int]
+    ) -> list[int]:
+        if longest(sizes) + longest(x) + self.degree_bits > INT64_BITS:
+            return super()._add_by_part(sizes, x, parts, factors)
+        weights, numbers, each = np.array(sizes), np.array(x), np.asarray(parts)
+        total = np.zeros(self.n, dtype=object)
+        for part in np.unique(each).tolist():
+            of, to, which = (np.asarray(y)[each == part] for y in (self.source, self.target, self.which))
+            sums = np.zeros(self.n, dtype=np.int64)
+            np.add.at(sums, to, weights[which] * numbers[of])
+            heard = np.flatnonzero(sums)
+            total[heard] += factors[part] * sums[heard].astype(object)
         return total.tolist()
 
     @staticmethod

@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from ptcc_certify.checker.late_steps import FIXED, ONE, Steps, decay_above
+from ptcc_certify.checker.late_steps import FIXED, ONE, Steps
 
-#: Arguments below ``2^SMALL`` units have powers that int64 holds; half of the bits of a share and of a fixed-point one.
-SMALL, HALF_SHARE, HALF = 35, 20, 15
+#: From ``2^FARTHEST`` units on a decay is rounded up to one unit; half of the bits of a share and of a fixed-point one.
+FARTHEST, HALF_SHARE, HALF = 39, 20, 15
 
 
 class ArraySteps(Steps):
@@ -55,11 +55,11 @@ class ArraySteps(Steps):
 
     @staticmethod
     def _decay(x: Any) -> Any:
-        total, small = np.full(len(x), ONE), np.minimum(x, (1 << SMALL) - 1)
-        high, low = small >> HALF, small & ((1 << HALF) - 1)
+        # below the farthest argument the sums are less than 2^54 before the last product, and that less than 2^63
+        total, near = np.full(len(x), ONE), np.minimum(x, (1 << FARTHEST) - 1)
+        high, low = near >> HALF, near & ((1 << HALF) - 1)
         for n in (4, 3, 2, 1):
-            total = ONE + ((high * total + (low * total >> HALF)) >> HALF) // n
-        result = -(-(ONE * ONE) // total)
-        for k in np.flatnonzero(x >> SMALL).tolist():
-            result[k] = decay_above(int(x[k]))
-        return result
+            rest = total & (ONE - 1)
+            product = near * (total >> FIXED) + ((high * rest + (low * rest >> HALF)) >> HALF)
+            total = ONE + product // n
+        return -(-(ONE * ONE) // total)

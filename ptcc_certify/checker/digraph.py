@@ -10,7 +10,7 @@ import json
 from array import array
 from bisect import bisect_left
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import cached_property
 from itertools import accumulate, pairwise, starmap
@@ -156,6 +156,19 @@ class Digraph:
         """Return the sums of ``|w| x[t]`` over the edges out of every node; weights times ``unit``."""
         return self._sums(self.target, self.source, x, False)
 
+    def sums_by_part(self, x: Sequence[int], parts: Sequence[int], factors: Mapping[int, int]) -> list[int]:
+        """Return the sums of ``factors[part] |w| x[s]`` over the edges into every node, of a part each; times ``unit``.
+
+        Examples
+        --------
+        >>> Digraph("abc", [0, 1], [2, 2], [3, -4], 1).sums_by_part([1, 10, 0], [5, 7], {5: 1, 7: 100})
+        [0, 0, 4003]
+        """
+        sizes, bits, more = [abs(w) for w in self.values], longest(x), longest(factors.values())
+        sized(self.n, self.bits + bits + more)
+        spend(2 * self.n_edges, self.bits + more, bits, "sums over edges")
+        return self._add_by_part(sizes, x, parts, factors)
+
     def laplacian_product(self, x: Sequence[int], signed: bool = True) -> list[int]:
         """Return ``L x``, or ``M(L) x`` with the comparison matrix of ``L``; times ``unit``."""
         return [d * y - h for d, y, h in zip(self.diagonal, x, self.sums_in(x, signed), strict=True)]
@@ -179,6 +192,14 @@ class Digraph:
         total = [0] * self.n
         for j, y in zip(to, map(mul, map(values.__getitem__, self.which), map(x.__getitem__, of)), strict=True):
             total[j] += y
+        return total
+
+    def _add_by_part(
+        self, sizes: Sequence[int], x: Sequence[int], parts: Sequence[int], factors: Mapping[int, int]
+    ) -> list[int]:
+        total = [0] * self.n
+        for s, t, k, part in zip(self.source, self.target, self.which, parts, strict=True):
+            total[t] += factors[part] * sizes[k] * x[s]
         return total
 
     # ------------------------------------------------------------------ connection

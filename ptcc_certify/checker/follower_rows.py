@@ -6,7 +6,7 @@ Where ages differ from edge to edge an edge has a power of ``q``, as what is hea
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -54,12 +54,14 @@ class Followers:
         """Read a vector of followers: an array of numbers, or side numbers."""
         return doc.files.numbers(entry, what, len(self.nodes))
 
-    def heard(self, values: Sequence[int]) -> list[int]:
-        """Return ``|W_F| u`` by follower, times the unit of the graph."""
-        whole = [0] * self.structure.graph.n
+    def heard(
+        self, values: Sequence[int], parts: Sequence[int] = (), factors: Mapping[int, int] | None = None
+    ) -> list[int]:
+        """Return ``|W_F| u`` by follower, times the unit of the graph; edges by factors of their parts, if given."""
+        graph, whole = self.structure.graph, [0] * self.structure.graph.n
         for v, x in zip(self.nodes, values, strict=True):
             whole[v] = x
-        sums = self.structure.graph.sums_in(whole)
+        sums = graph.sums_in(whole) if factors is None else graph.sums_by_part(whole, parts, factors)
         return [sums[v] for v in self.nodes]
 
     def label(self, k: int) -> str:
@@ -129,19 +131,12 @@ class Rows:
         """Bound ``sum_l q^(part_kl/64) |w_kl| u_l`` from above, over a common denominator and the unit of the graph."""
         if len(parts) == 1:
             return [q.numerator * x for x in self.heard], q.denominator
-        graph, log_q = self.graph, log(q)[1]
+        log_q = log(q)[1]
         power = {part: rounded(exp(log_q * Fraction(part, PARTS))[1], BITS, up=True) for part in set(parts)}
         power |= {0: Fraction(1), PARTS: q}
         common = math.lcm(*(x.denominator for x in power.values()))
         factors = {part: x.numerator * (common // x.denominator) for part, x in power.items()}
-        bits = longest(factors.values())
-        sized(graph.n, bits + graph.bits + longest(self.u), "rows of followers")
-        spend(2 * graph.n_edges, bits + graph.bits, longest(self.u), "rows of followers")
-        value, total, sizes = dict(zip(self.followers.nodes, self.u, strict=True)), [0] * graph.n, graph.values
-        for s, t, k, part in zip(graph.source, graph.target, graph.which, parts, strict=True):
-            if s in value:
-                total[t] += factors[part] * abs(sizes[k]) * value[s]
-        return [total[v] for v in self.followers.nodes], common
+        return self.followers.heard(self.u, parts, factors), common
 
     def above_initial(self, initial: Fraction) -> None:
         """Verify ``initial u_k >= |x_k(0) - x*_k|``."""

@@ -17,6 +17,7 @@ from ptcc_certify.checker import input_formulas as formulas
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.graph import by_agent
 from ptcc_certify.checker.input import Verified
+from ptcc_certify.checker.late_input import Inputs
 from ptcc_certify.checker.late_messages import Messages
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.quadratic_form import Form
@@ -36,8 +37,10 @@ class Constants:
     deviations: Sequence[Fraction]
 
 
-def check_form(doc: Document, messages: Messages, verified: Verified, section: Any) -> None:
-    """Verify ``sqrt(V) <= e^(-b s) sqrt(V(0))`` under late messages, and how far the final state may move."""
+def check_form(
+    doc: Document, messages: Messages, verified: Verified, section: Any, inputs: Inputs | None = None
+) -> None:
+    """Verify ``sqrt(V) <= e^(-b s) sqrt(V(0))`` under late messages, how far the final state may move, and inputs."""
     doc.at = "messages.form"
     fields(section, ("left", "moved", "residual"), "form")
     graph, cap = verified.structure.graph, messages.gain_cap
@@ -67,6 +70,8 @@ def check_form(doc: Document, messages: Messages, verified: Verified, section: A
     claimed = _above(doc, graph, section["moved"], "moved", moved)
     rest = [x + formulas.root_above(c) * root * left for x, c in zip(claimed, known.deviations, strict=True)]
     _above(doc, graph, section["residual"], "residual", rest)
+    if inputs is not None:
+        inputs.by_form(list(phi), b, root)
     doc.done(f"b = {down(b)}, gain at most {down(cap)}")
 
 

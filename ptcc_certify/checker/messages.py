@@ -16,6 +16,7 @@ from ptcc_certify.checker.follower_rows import Followers, Rows, followers_of
 from ptcc_certify.checker.graph import MANY_EDGES, by_agent
 from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.late_form import check_form
+from ptcc_certify.checker.late_input import Inputs
 from ptcc_certify.checker.late_messages import Messages, read_messages
 from ptcc_certify.checker.late_steps import FIXED, Steps, clock_below
 from ptcc_certify.checker.missed_deadline import check_missed, check_staged
@@ -25,7 +26,7 @@ from ptcc_certify.checker.side_files import Numbers
 
 KEYS = (
     *("latency", "packets", "delay", "own", "value_error", "gain_cap"),
-    *("rows", "steps", "residual", "missed", "staged", "form"),
+    *("rows", "steps", "residual", "missed", "staged", "form", "input"),
 )
 #: Witnesses of rows, and instants of steps, that are read.
 MANY_ROWS, MANY_INSTANTS = 100, 2001
@@ -68,21 +69,30 @@ def check_messages(doc: Document, verified: Verified) -> None:
     need(by_rows or section["form"] is not None, "nothing is stated of late messages")
     bounded = bool(section["rows"]) or section["steps"] is not None
     need(bounded == (section["residual"] is not None), "a residual is stated iff rows or steps bound it")
+    inputs = None if section["input"] is None else Inputs(doc, graph, messages, section["input"])
     if by_rows:
         need(not messages.late, "rows, steps, missed or staged of a late own state")
-        _check_followers(doc, messages, verified, followers_of(doc, verified.structure, verified.begin), section)
+        followers = followers_of(doc, verified.structure, verified.begin)
+        _check_followers(doc, messages, verified, followers, section, inputs)
     if section["form"] is not None:
-        check_form(doc, messages, verified, section["form"])
+        check_form(doc, messages, verified, section["form"], inputs)
+    if inputs is not None:
+        inputs.close(doc)
 
 
 def _check_followers(
-    doc: Document, messages: Messages, verified: Verified, followers: Followers, section: dict[str, Any]
+    doc: Document,
+    messages: Messages,
+    verified: Verified,
+    followers: Followers,
+    section: dict[str, Any],
+    inputs: Inputs | None,
 ) -> None:
     """Verify what is said of the followers of leaders that rest."""
     residual = None if section["residual"] is None else _residual(doc, followers, section["residual"])
     parts = messages.parts()
     for k, entry in enumerate(section["rows"]):
-        _check_rows(doc, messages, followers, parts, entry, f"messages.rows[{k}]", residual)
+        _check_rows(doc, messages, followers, parts, entry, f"messages.rows[{k}]", residual, inputs)
     if section["steps"] is not None:
         _check_steps(doc, messages, followers, parts, section["steps"], residual)
     if residual is not None:
@@ -113,6 +123,7 @@ def _check_rows(
     entry: Any,
     of: str,
     residual: Residual | None,
+    inputs: Inputs | None,
 ) -> None:
     """Verify ``|x_k - x*_k| <= u_k (initial e^(-b s) + floor)`` by one witness of rows."""
     doc.at = of
@@ -141,6 +152,8 @@ def _check_rows(
     rows.above_floor(floor, messages.value_error)
     if residual is not None:
         residual.meet(rows.u, (initial * left + floor) / rows.scale)
+    if inputs is not None:
+        inputs.by_rows(rows, b, cap, initial, floor)
     doc.done(f"b = {down(b)}, q = {down(q)}")
 
 

@@ -29,7 +29,7 @@ MAX_BYTES = 1_000_000
 MEMORY = "ptcc_certify.scenario"
 #: Commands for which it does not matter what the agents are.
 _OF_THE_GRAPH_ALONE = ("classify", "check")
-#: Options of late messages and moving leaders, under which ``ptcc certify`` alone works.
+#: Options of late messages and moving leaders.
 BESIDE = ("delay", "period", "packet_loss", "quantisation", "own_delay", "leader_speed", "sign_gain")
 #: Where the context of its command is kept.
 COMMAND = "ptcc_certify.command"
@@ -139,7 +139,12 @@ SECTIONS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
     ),
     "simulation": (
         "How ptcc simulate runs it.",
-        {"samples": ("samples", "201"), "steps": ("steps", "100"), "boundary_layer": ("boundary_layer", "0.01")},
+        {
+            "samples": ("samples", "201"),
+            "steps": ("steps", "100"),
+            "boundary_layer": ("boundary_layer", "0.01"),
+            "pattern": ("age_pattern", '"oldest"'),
+        },
     ),
     "design": (
         "What ptcc design asks, beside max_input and initial_bound.",
@@ -383,7 +388,7 @@ def graph_of(context: click.Context, parameter: click.Parameter, graph: Any) -> 
                     f"ptcc {context.command.name} takes single integrators; ptcc certify, simulate and plot take others"
                 )
                 raise ParameterError(f"{scenario.place(key)}: {why}")
-    if context.command.name in ("simulate", "design"):
+    if context.command.name == "design":
         refuse_beside(scenario, context.command.name)
     if "x0" in own and "dimension" not in own and scenario.options.get("dimension", "1") != "1":
         why = f"ptcc {context.command.name} takes scalar agents; what is proved of one component holds for each"

@@ -20,6 +20,8 @@ from ptcc_certify.cli.families import (
     refuse_options,
     refuse_restricted,
 )
+from ptcc_certify.cli.messages import leader_options, leaders_of, message_options, messages_of
+from ptcc_certify.cli.scenario import BESIDE
 from ptcc_certify.cli.terminal import FIGURES, print_lines, refuse_output
 from ptcc_certify.errors import ExitCode, ParameterError
 from ptcc_certify.graphs.rationals import shorten
@@ -53,6 +55,15 @@ _TABLES = ("", ".csv", ".txt")
 )
 @agents_options
 @shared.method_option
+@message_options
+@click.option(
+    "--pattern",
+    "age_pattern",
+    type=click.Choice(["oldest", "fresh", "varying", "square"]),
+    default="oldest",
+    help="With late messages: as old as allowed, fresh, between the two, or now this, now that (with --seed).",
+)
+@leader_options
 @click.option("--dimension", type=click.IntRange(1, 1000), default=1, help="State components per agent.")
 @click.option("--samples", type=click.IntRange(2, 100_000), default=201, help="Instants up to T, dense towards it.")
 @click.option("--steps", type=click.IntRange(1, 100_000), help="Instead: so many equal steps of t from 0 to T.")
@@ -74,6 +85,10 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
     Agents of order n run with the gains that `certify` proves under the same --method, up to the deadline; beside
     their positions there are columns v(<label>), a(<label>).
 
+    With late messages (--delay, --period, --packet-loss, --quantisation, --own-delay) one run in which they are as late
+    as --pattern tells; with --leader-speed one in which leaders move away from the farthest follower as fast as they
+    may, with columns target(<label>). Both have instants of their own.
+
     Of a family - several graphs with --switching, weights in intervals, --uncertainty, --optional - one run under one
     signal, with a column mode: the number of the graph that acts.
     """
@@ -91,6 +106,8 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
     if vectors and options["kind"] != "nominal" and not special:
         raise ParameterError("the sliding-mode protocol is simulated for scalar agents; leave out --dimension")
     signed = read_graph_or_family(graph, options)
+    if special or isinstance(signed, Family):
+        _refuse_messages(options, "families of graphs" if isinstance(signed, Family) else "agents of order n")
     if special:
         if isinstance(signed, Family):
             raise ParameterError("--agents: is not for families of graphs yet; simulate one graph")
@@ -101,8 +118,11 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
         return ExitCode.OK
     if click.get_current_context().get_parameter_source("method") is ParameterSource.COMMANDLINE:
         raise ParameterError("--method: chooses the gains of agents of order n; leave it out, or add --agents")
-    trajectory = _run(signed, protocol, options)
+    beside = None if isinstance(signed, Family) else _run_beside(graph[0], signed, protocol, options)
+    trajectory = beside or _run(signed, protocol, options)
     _write(trajectory, output, plot_of_run, {"wide": wide, "time_unit": time_unit})
+    if beside is not None:
+        return ExitCode.OK
     if protocol.prescribed and trajectory.actuator is None and not trajectory.deadline_resolved:
         click.echo("note: the run had not settled at the deadline; raise rho2 * kappa", err=True)
     return ExitCode.OK
@@ -157,6 +177,36 @@ def _run_agents(signed: SignedDigraph, protocol: Protocol, options: shared.Optio
     if protocol.reaching is not None:
         more |= {"sigma0": shared.sliding_keywords(protocol, options, signed)["sigma0"]}
     return run_of_agents(signed, protocol, more | {"method": options["method"]}, options["samples"])
+
+
+def _refuse_messages(options: shared.Options, what: str) -> None:
+    """Refuse late messages and moving leaders where they are not simulated."""
+    for name in BESIDE:
+        if options[name] not in (None, False):
+            raise ParameterError(f"{shared.flag_of(name)}: is not simulated of {what}; leave it out")
+
+
+def _run_beside(graph: str, signed: SignedDigraph, protocol: Protocol, options: shared.Options) -> Trajectory | None:
+    """Return the run with late messages or leaders that move; None if nothing is asked of them."""
+    from ptcc_certify.simulation.run import simulate as run
+
+    messages, leaders = messages_of(graph, signed, options), leaders_of(options)
+    if messages is None and leaders is None:
+        return None
+    source, name = click.get_current_context().get_parameter_source, "leaders that move" if leaders else "late messages"
+    refused = ["steps", "boundary_layer", "noise", "stop_before", "sample_period"]
+    refused += ["gain_cap"] if leaders else ["delta"] * (protocol.reaching is None)
+    refused += ["disturbance"] * (protocol.reaching is None)
+    given = [option for option in refused if options[option] is not None]
+    given += [option for option in ("samples", "signal") if source(option) == ParameterSource.COMMANDLINE]
+    given += ["dimension"] * (options["dimension"] > 1)
+    if given:
+        raise ParameterError(f"{shared.flag_of(given[0])}: is not simulated with {name}; leave it out")
+    refuse_restricted(options)
+    sigma0 = shared.sliding_keywords(protocol, options, signed).get("sigma0")
+    x0 = shared.read_initial_state(options["x0"], options["seed"], signed)
+    more: Any = {"messages": messages, "leaders": leaders, "pattern": options["age_pattern"], "seed": options["seed"]}
+    return run(signed, protocol, x0, sigma0=sigma0, **more)
 
 
 def _run(signed: SignedDigraph | Family, protocol: Protocol, options: shared.Options) -> Trajectory:

@@ -9,7 +9,7 @@ that came is held, so that what is heard is at most ``delay + (losses + 1) perio
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from numbers import Integral
 from typing import Any
@@ -73,11 +73,14 @@ diverge, for its gain grows without limit before T; give gain_cap, or measure th
     value_error: NotNegative = NotNegative(0)
     own_delay: bool = False
     gain_cap: Given = Given()
+    _of_graph: tuple[SignedDigraph, tuple[Fraction, ...]] | None = field(
+        default=None, init=False, repr=False, compare=False
+    )
 
     def __post_init__(self) -> None:
         put = object.__setattr__
         if isinstance(self.delay, Mapping):
-            put(self, "delay", {edge: parameter(_of(edge), x, True) for edge, x in self.delay.items()})
+            put(self, "delay", _read(self.delay))
         else:
             put(self, "delay", parameter("delay", self.delay, True))
         if (
@@ -133,14 +136,20 @@ diverge, for its gain grows without limit before T; give gain_cap, or measure th
         """
         if not isinstance(self.delay, Mapping):
             return Fraction(self.delay)
-        given = {(str(source), str(target)): Fraction(x) for (source, target), x in self.delay.items()}
-        edges = [(source, target) for source, target, _ in graph.edges]
-        for source, target in given.keys() - set(edges):
+        if self._of_graph is None or self._of_graph[0] is not graph:
+            object.__setattr__(self, "_of_graph", (graph, self._by_edge(graph)))
+        return self._of_graph[1]  # type: ignore[index]
+
+    def _by_edge(self, graph: SignedDigraph) -> tuple[Fraction, ...]:
+        assert isinstance(self.delay, Mapping)
+        given: dict[tuple[str, str], Any] = {(str(s), str(t)): x for (s, t), x in self.delay.items()}
+        none, found = Fraction(0), [given.pop(edge[:2], None) for edge in graph.edges]
+        for source, target in given:
             raise ParameterError(
                 f"a delay of {shorten(source)} -> {shorten(target)}, but the graph has no such edge; "
                 "(source, target) is the way that information flows"
             )
-        return tuple(given.get(edge, Fraction(0)) for edge in edges)
+        return tuple(none if x is None else x for x in found)
 
     def __repr__(self) -> str:
         parts = [f"delay={readable(self.largest_delay)}"]
@@ -149,6 +158,22 @@ diverge, for its gain grows without limit before T; give gain_cap, or measure th
         parts += ["own_delay=True"] * self.own_delay
         parts += [] if self.gain_cap is None else [f"gain_cap={readable(self.gain_cap)}"]
         return f"LateMessages({', '.join(parts)})"
+
+
+def _read(delays: Mapping[Any, Any]) -> dict[Any, Fraction]:
+    """Return delays by edge; each number is read once, for there may be many edges and few delays."""
+    known: dict[Any, Fraction] = {}
+    return {edge: _known(edge, x, known) for edge, x in delays.items()}
+
+
+def _known(edge: Any, x: Any, known: dict[Any, Fraction]) -> Fraction:
+    name = _of(edge)
+    try:
+        if (value := known.get((type(x), x))) is None:
+            value = known[type(x), x] = Fraction(parameter(name, x, True))
+        return value
+    except TypeError:  # not hashable, which no number is
+        return Fraction(parameter(name, x, True))
 
 
 def _of(edge: Any) -> str:

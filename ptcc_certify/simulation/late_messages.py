@@ -10,6 +10,7 @@ exact where the gain has its pole. With an own state that is late the whole righ
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -25,30 +26,32 @@ from ptcc_certify.protocols.base import Protocol, refuse_no_protocol
 from ptcc_certify.protocols.gain import Gain
 from ptcc_certify.protocols.gain_limits import GainLimits, LimitedGain
 from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.simulation.trajectory import Trajectory
 
 Pattern = Literal["oldest", "fresh", "varying", "square"]
 PATTERNS = ("oldest", "fresh", "varying", "square")
 #: Instants of a run, and at most; the share of ``T`` down to which they come nearer to it.
 STEPS, MOST_STEPS, NEAREST = 1500, 20_000, 1e-9
+#: States of a run at most.
+MOST_STATES = 50_000_000
+#: What a step loses, relatively.
+_ROUNDING = 2.0**-50
 #: Steps in the largest delay, at least, and steps of a run that the least one may ask for.
 IN_DELAY, _MOST_FOR_LEAST = 6, 5000
 
 
-@dataclass(frozen=True, eq=False)
-class LateRun:
-    """A run with late messages.
+@dataclass(frozen=True, eq=False, repr=False)
+class LateRun(Trajectory):
+    """A run with late messages, up to ``T``: its input is of what agents hear, ``gain sum_l w_kl (y_kl -+ x_k)``.
 
     Attributes
     ----------
-    t : (M,) array
-        Instants from 0 to ``T``, in units of time.
-    states : (N, M) array
+    messages : LateMessages
     pattern : str
         How old is what agents hear.
     """
 
-    t: np.ndarray
-    states: np.ndarray
+    messages: LateMessages
     pattern: str
 
 
@@ -93,8 +96,8 @@ def simulate_late(
     Raises
     ------
     ParameterError
-        The pattern is unknown, a number is outside its domain, the state does not fit the graph, or the delay is so
-        short that the run would take more than 20,000 steps.
+        The pattern is unknown, a number is outside its domain, the state does not fit the graph, the delay is so short
+        that the run would take more than 20,000 steps, or steps and agents are so many that it would not fit memory.
 
     References
     ----------
@@ -120,16 +123,21 @@ def simulate_late(
         raise ParameterError(f"deadlines are {len(deadlines)} for {graph.n_nodes} agents; give one for each")
     first = [float(x) for x in as_state(x0, graph, "x0")]
     t = _grid(float(protocol.T), float(messages.age), _least_age(graph, messages), steps)
-    clocks = _clocks(graph, protocol, messages, t, deadlines)
+    if t.size * graph.n_nodes > MOST_STATES:
+        raise ParameterError(
+            f"{t.size:,} instants of {graph.n_nodes:,} agents are more than {MOST_STATES:,} states; "
+            "the bound needs no run"
+        )
+    begin, clocks = time.perf_counter(), _clocks(graph, protocol, messages, t, deadlines)
     with np.errstate(invalid="ignore"):
         steps_of_clock = np.where(np.isinf(clocks[1:]), np.inf, clocks[1:] - clocks[:-1])
     hearing = _Hearing(graph, messages, t, pattern, np.random.default_rng(seed))
-    states = np.empty((t.size, graph.n_nodes))
+    states, errors = np.empty((2, t.size, graph.n_nodes))
     states[0] = first
     D = graph.in_weight()
     for i in range(t.size - 1):
         pushes, pulls = hearing.sums(i, states)
-        step = steps_of_clock[i]
+        step, errors[i] = steps_of_clock[i], pushes - (pulls if messages.own_delay else D * states[i])
         if messages.own_delay:
             states[i + 1] = states[i] + step * (pushes - pulls)
             continue
@@ -137,7 +145,46 @@ def simulate_late(
             goal = np.where(D > 0, pushes / D, states[i])
             left = np.where(np.isfinite(step), np.exp(-D * step), D <= 0)
         states[i + 1] = goal + (states[i] - goal) * left
-    return LateRun(t, states.T, pattern)
+    errors[-1] = pushes - (pulls if messages.own_delay else D * states[-1])
+    return _run(graph, protocol, messages, pattern, t, states.T, errors.T, time.perf_counter() - begin)
+
+
+def _run(
+    graph: SignedDigraph,
+    protocol: Protocol,
+    messages: LateMessages,
+    pattern: str,
+    t: np.ndarray,
+    states: np.ndarray,
+    errors: np.ndarray,
+    seconds: float,
+) -> LateRun:
+    """Return what was run as a trajectory; ``errors`` are those that agents hear of."""
+    limits, remaining = GainLimits(gain_cap=messages.gain_cap), np.maximum(1 - t / t[-1], 0)
+    gain = limits.limit(protocol.gain)
+    return LateRun(
+        graph=graph,
+        protocol=protocol,
+        t=t,
+        remaining=remaining,
+        clock=gain.clock(t, remaining=remaining),
+        states=states,
+        rtol=_ROUNDING,
+        atol=_ROUNDING,
+        deadline_index=t.size - 1,
+        deadline_residual=residual_at_end(graph, states),
+        stats={"steps": t.size - 1, "rhs": t.size - 1, "seconds": seconds},
+        actuator=None if limits.ideal else limits,
+        held_input=gain.value(t, remaining) * errors,
+        messages=messages,
+        pattern=pattern,
+    )
+
+
+def residual_at_end(graph: SignedDigraph, states: np.ndarray) -> float:
+    """Return ``max_k |e_k|/(2 D_k)`` at the last of ``(N, M)`` states, relative to the largest entry at first."""
+    D, error = graph.in_weight(), np.abs(graph.laplacian() @ states[:, -1])
+    return float((error / np.maximum(2 * D, 1e-300)).max() / max(float(np.abs(states[:, 0]).max()), 1e-300))
 
 
 def can_run(protocol: Protocol, messages: LateMessages) -> bool:

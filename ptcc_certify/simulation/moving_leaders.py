@@ -11,6 +11,7 @@ steps.
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,6 +25,8 @@ from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.lyapunov.follower_rows import refuse_leader_groups
 from ptcc_certify.protocols.base import Protocol, refuse_no_protocol
 from ptcc_certify.protocols.moving_leaders import MovingLeaders
+from ptcc_certify.simulation.late_messages import residual_at_end
+from ptcc_certify.simulation.trajectory import Trajectory
 
 #: Steps up to T; the share of what is left of T that a step takes; how near they come; where a run with sign term ends.
 STEPS, SHARE, NEAREST, PAST = 800, 0.02, 1e-7, 0.5
@@ -31,21 +34,22 @@ STEPS, SHARE, NEAREST, PAST = 800, 0.02, 1e-7, 0.5
 MOST_STEPS = 20_000
 
 
-@dataclass(frozen=True, eq=False)
-class TrackingRun:
-    """A run with moving leaders.
+@dataclass(frozen=True, eq=False, repr=False)
+class TrackingRun(Trajectory):
+    """A run with moving leaders, from 0 beyond ``T``; the input of a leader is its velocity.
 
     Attributes
     ----------
-    t : (M,) array
-        Instants from 0 beyond ``T``, in units of time.
-    states, targets : (N, M) array
-        Of leaders both are the same.
+    leaders : MovingLeaders
+    targets : (N, M) array
+        ``-L_F^-1 L_FL X_L`` of followers; of leaders their states.
     """
 
-    t: np.ndarray
-    states: np.ndarray
+    leaders: MovingLeaders
     targets: np.ndarray
+
+    def _more_columns(self) -> list[tuple[str, np.ndarray]]:
+        return [(f"target({label})", row) for label, row in zip(self.labels, self.targets, strict=True)]
 
 
 @gated
@@ -120,16 +124,36 @@ def simulate_tracking(
         raise ParameterError(f"u is not {F.size} positive numbers, one for each follower; leave it out")
     t, clock, last = _grid(protocol, steps)
     step_of = _Step(L_F, leaders, Q)
-    states, targets = np.empty((t.size, n)), np.empty((t.size, n))
-    lead, eps = x[heads], x[F] - Q @ x[heads]
+    states, targets, inputs = np.zeros((3, t.size, n))
+    lead, eps, begin = x[heads], x[F] - Q @ x[heads], time.perf_counter()
+    remaining = np.maximum(1 - t / float(protocol.T), 0)
+    gain = protocol.gain.value_at_remaining(remaining)
     for i in range(t.size):
         states[i, heads] = targets[i, heads] = lead
         targets[i, F] = Q @ lead
         states[i, F] = targets[i, F] + eps
+        j = min(i, t.size - 2)
+        inputs[i, F] = -gain[i] * (L_F @ eps) + step_of.sign_term(eps, t[j + 1] - t[j])
         if i + 1 < t.size:
             moved, eps = step_of(eps, weights, clock[i], last[i], t[i + 1] - t[i])
-            lead = lead + moved
-    return TrackingRun(t, states.T, targets.T)
+            lead, inputs[i, heads] = lead + moved, moved / (t[i + 1] - t[i])
+    end = int(np.argmax(remaining == 0))
+    return TrackingRun(
+        graph=structure.graph,
+        protocol=protocol,
+        t=t,
+        remaining=remaining,
+        clock=protocol.gain.clock_at_remaining(remaining),
+        states=states.T,
+        rtol=NEAREST,
+        atol=NEAREST,
+        deadline_index=end,
+        deadline_residual=residual_at_end(structure.graph, states[: end + 1].T),
+        stats={"steps": t.size - 1, "rhs": t.size - 1, "seconds": time.perf_counter() - begin},
+        held_input=inputs.T,
+        leaders=leaders,
+        targets=targets.T,
+    )
 
 
 def _grid(protocol: Protocol, steps: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -168,13 +192,17 @@ class _Step:
         side = 1.0 if eps[k] >= 0 else -1.0
         v = -side * np.sign(self.Q[k]) * self.speed
         push = self.delta * np.where(eps >= 0, 1.0, -1.0) - self.Q @ v
-        if self.sign is not None:
-            e = -self.L_F @ eps
-            layer = 2 * self.sign * max(dt, 1e-300) * np.abs(self.L_F).sum(axis=1)
-            push = push + self.sign * np.clip(e / layer, -1, 1)
+        push = push + self.sign_term(eps, dt)
         E = _decay(self.L_F * ds)
         new = E @ eps + (np.eye(eps.size) - E) @ (self.inverse @ push) / gain
         return v * ds / gain, new
+
+    def sign_term(self, eps: np.ndarray, dt: float) -> np.ndarray:
+        """Return ``mu sign(e)`` with a boundary layer, or zeros without the sign term."""
+        if not self.sign:
+            return np.zeros_like(eps)
+        layer = 2 * self.sign * max(dt, 1e-300) * np.abs(self.L_F).sum(axis=1)
+        return self.sign * np.clip(-(self.L_F @ eps) / layer, -1, 1)
 
 
 def _decay(A: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ corroborates a certificate; it proves nothing.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -24,10 +24,14 @@ from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.base import refuse_no_protocol
 from ptcc_certify.protocols.disturbance import as_disturbance
 from ptcc_certify.protocols.gain_limits import GainLimits
+from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.protocols.moving_leaders import MovingLeaders
 from ptcc_certify.simulation.cvodes import Tolerances
 from ptcc_certify.simulation.filippov import simulate_sliding
 from ptcc_certify.simulation.instants import PAST, default_instants, wanted_instants
 from ptcc_certify.simulation.interrupt import interruptible
+from ptcc_certify.simulation.late_messages import Pattern, simulate_late
+from ptcc_certify.simulation.moving_leaders import simulate_tracking
 from ptcc_certify.simulation.nominal import as_forcing, simulate_nominal
 from ptcc_certify.simulation.trajectory import Trajectory
 
@@ -49,6 +53,10 @@ def simulate(
     delta: Exact | None = None,
     noise: Any = None,
     noise_bound: Exact | None = None,
+    messages: LateMessages | None = None,
+    leaders: MovingLeaders | None = None,
+    pattern: Pattern = "oldest",
+    seed: int = 0,
     times: Iterable[Exact] | None = None,
     remaining: float = 1e-8,
     samples: int = 201,
@@ -93,6 +101,15 @@ def simulate(
         gain.
     noise_bound : int, float, str or Fraction, optional
         The bound of ``noise``, needed with it; in units of the states.
+    messages : LateMessages, optional
+        The run of :func:`ptcc_certify.simulate_late`, with ``pattern`` and ``seed``, at instants of its own up to
+        ``T``; nothing else acts on it, and sliding variables are 0.
+    leaders : MovingLeaders, optional
+        The run of :func:`ptcc_certify.simulate_tracking`, at instants of its own; nothing else acts on it.
+    pattern : {"oldest", "fresh", "varying", "square"}
+        Of ``messages``: how old is what agents hear.
+    seed : int
+        Of what is random in ``pattern``.
     times : increasing numbers >= 0, optional
         The instants wanted, in units of time. One that a float cannot tell from ``T`` counts as ``T``.
     remaining : float
@@ -140,6 +157,14 @@ def simulate(
     begin = time.perf_counter()
     graph = as_graph(graph, orientation)
     refuse_no_protocol(protocol)
+    if messages is not None or leaders is not None:
+        beside = {"boundary_layer": boundary_layer, "delta": delta, "noise": noise, "noise_bound": noise_bound}
+        beside |= {"disturbance": disturbance, "actuator": actuator, "times": times}
+        _refuse_beside(graph, messages, leaders, sigma0, beside)
+        if messages is not None:
+            return simulate_late(graph, protocol, messages, x0, pattern=pattern, seed=seed)
+        assert leaders is not None
+        return simulate_tracking(graph, protocol, leaders, x0)
     initial_state = _floats(x0, graph, "x0")
     manifold = None if sigma0 is None else _floats(sigma0, graph, "sigma0")
     tolerances = Tolerances.within(rtol, atol)
@@ -175,6 +200,25 @@ def simulate(
             forcing = as_forcing(graph, protocol.T, disturbance, delta, noise, noise_bound, until)
             run = simulate_nominal(graph, protocol, initial_state, instants, actuator, forcing, tolerances)
     return replace(run, stats=dict(run.stats) | {"seconds": time.perf_counter() - begin})
+
+
+def _refuse_beside(
+    graph: SignedDigraph,
+    messages: LateMessages | None,
+    leaders: MovingLeaders | None,
+    sigma0: Any,
+    beside: Mapping[str, Any],
+) -> None:
+    """Refuse what is not simulated beside late messages or moving leaders."""
+    if messages is not None and leaders is not None:
+        raise ParameterError("messages and leaders together are not simulated yet; ask for one of them")
+    name = "late messages" if leaders is None else "leaders that move"
+    for what, value in beside.items():
+        if value is not None:
+            mend = "; give LateMessages(gain_cap=..)" if what == "actuator" and leaders is None else "; leave it out"
+            raise ParameterError(f"{what}: is not simulated with {name}{mend}")
+    if sigma0 is not None and _floats(sigma0, graph, "sigma0").any():
+        raise ParameterError(f"sigma0: {name} ask for sigma(0) = 0, so that no sliding variable moves; leave it out")
 
 
 def _floats(values: Any, graph: SignedDigraph, name: str) -> np.ndarray:

@@ -251,11 +251,7 @@ def _sparse_left_vector(graph: SignedDigraph) -> np.ndarray:
     M = sparse.csc_array(sparse.diags_array(graph.in_weight()) - abs(graph.adjacency()))
     rest, last = sparse.csc_array(M[:-1, :-1].T), -M[[-1], :-1].toarray().ravel()
     if fill_core(M) > FILL_ROWS:
-        rows = sparse.csr_array(rest)
-        p = np.append(solve(rows, last, rest.diagonal()), 1.0)
-        if not (p > 0).all():  # from 0 the search reaches few nodes a step, and may break down: begin everywhere
-            start = np.random.default_rng(0).uniform(0.5, 1.5, rest.shape[0])
-            p = np.append(start + solve(rows, last - rows @ start, rest.diagonal()), 1.0)
+        p = np.append(solve(sparse.csr_array(rest), last, rest.diagonal()), 1.0)
     else:
         options = {"SymmetricMode": True}
         factor = splu(rest, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
@@ -444,7 +440,7 @@ def follower_lyapunov(structure: Any) -> lmi.DiagonalCertificate:
     return lmi.h_matrix_lyapunov(structure.graph.laplacian()[F][:, F])
 
 
-def containment_weights(structure: Any) -> np.ndarray:
+def containment_weights(structure: Any) -> np.ndarray | None:
     """Lemmas 8 and 9.2: ``varpi_k = -L_F^-1 L_FLk G_k 1``, the pull of balanced closed component k on each follower.
 
     Absolute row sums are at most 1. With one closed component (Lemma 8) the column is ``zeta``, and ``|zeta| = 1``
@@ -456,8 +452,9 @@ def containment_weights(structure: Any) -> np.ndarray:
 
     Returns
     -------
-    (N_F, m_b) array
-        One column for each balanced closed component, in order; unbalanced ones pull to zero and have none.
+    (N_F, m_b) array, or None
+        One column for each balanced closed component, in order; unbalanced ones pull to zero and have none. None
+        where neither BiCGSTAB converges nor a sparse factor is cheap.
 
     Examples
     --------
@@ -466,7 +463,7 @@ def containment_weights(structure: Any) -> np.ndarray:
     array([[ 0.25, -0.75]])
     """
     structure = analyse(structure)
-    from scipy.sparse.linalg import splu
+    from lmi.sparse_h_matrix import solve_columns
 
     balanced, F = [c for c in structure.closed_components if c.balanced], structure.followers
     if F.size == 0 or not balanced:
@@ -474,11 +471,9 @@ def containment_weights(structure: Any) -> np.ndarray:
     ends = np.zeros((structure.graph.n_nodes, len(balanced)))  # G_k 1 on each balanced closed component
     for column, component in enumerate(balanced):
         ends[list(component.nodes), column] = component.gauge
-    rows = structure.graph.laplacian()[F]
-    L_F = rows[:, F]
-    scale = 1 / L_F.diagonal()
-    factor = splu((scale[:, None] * L_F).tocsc())
-    return np.asarray(factor.solve(-scale[:, None] * (rows @ ends)))
+    rows = structure.graph.laplacian().tocsr()[F]
+    L_F = rows[:, F].tocsr()
+    return solve_columns(L_F, -(rows @ ends), L_F.diagonal())
 
 
 def exact_containment_weights(structure: Any) -> list[list[Fraction]]:

@@ -20,6 +20,8 @@ from ptcc_certify.bounds.small_delays import delay_threshold
 from ptcc_certify.bounds.staged_deadlines import levels
 from ptcc_certify.bounds.tracking import bound_tracking
 from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.checker.input_formulas import PrescribedGain
+from ptcc_certify.checker.late_input import gain_above
 from ptcc_certify.errors import HypothesisError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import Structure, analyse
@@ -395,3 +397,66 @@ def test_certificates_show_and_draw_late_messages_and_moving_leaders() -> None:
         assert len(repr(getattr(cert, name))) < 120
         assert "<svg" in cert._repr_html_() or "<img" in cert._repr_html_()
     assert certify(chain, p, method="perron", messages=LateMessages(delay="0.1")).late.relative
+
+
+def _input_bound(seed: int) -> tuple[Structure, NominalProtocol, LateMessages, list[Fraction], np.ndarray | None]:
+    """A case with a capped gain, every third with an own state that is late, and what bounds its inputs."""
+    rng, structure, protocol, x0, end = _case(seed)
+    own, share = seed % 3 == 0, Fraction(int(rng.choice([60, 100, 140, 400, 3000])), 100)
+    delay = protocol.T * (Fraction(1, 1500) if own else Fraction(int(10 ** rng.uniform(0.5, 2)), 1000))
+    error = Fraction(0) if own or seed % 2 else Fraction(1, 5)
+    cap = protocol.gain.first * (min(share, Fraction(6, 10)) if own else share)
+    messages = LateMessages(delay=delay, value_error=error, own_delay=own, gain_cap=cap)
+    if own:
+        cert = certify(structure, protocol, x0, messages=messages, simulation=False, method="paper")
+        assert cert.checked is not None and cert.checked.accepted, cert.notes
+        return structure, protocol, messages, x0, None if cert.late is None else cert.late.input
+    return structure, protocol, messages, x0, bound_late(structure, protocol, messages, x0, end.intervals).input
+
+
+def _largest_share(seeds: Iterator[int] | range) -> list[float]:
+    """Verify that no run has an input above its bound; return the largest input over the largest bound, each."""
+    worst, kinds = [], set()
+    for seed in seeds:
+        structure, protocol, messages, x0, bound = _input_bound(seed)
+        for pattern in ("oldest", "square") if bound is not None else ():
+            run = simulate_late(structure, protocol, messages, x0, pattern=pattern, steps=300)  # type: ignore[arg-type]
+            seen = np.abs(run.input).max(axis=1)
+            assert (seen <= bound * (1 + ROUNDING) + FLOOR * np.abs(seen).max()).all(), seed
+            worst.append(float(seen.max() / bound.max()))
+            kinds.add((messages.own_delay, bool(messages.value_error)))
+    assert kinds == {(False, False), (False, True), (True, False)}
+    return worst
+
+
+def test_no_input_of_a_run_is_above_its_bound_under_a_capped_gain() -> None:
+    """The input is that of what agents hear, at every instant of runs as late as allowed, and now late, now not."""
+    assert max(_largest_share(range(9))) > 0.3  # the bound is not idle
+
+
+@pytest.mark.campaign
+def test_no_input_of_many_runs_is_above_its_bound_under_a_capped_gain() -> None:
+    worst = _largest_share(range(9, 120))
+    assert len(worst) > 150 and float(np.median(worst)) > 0.1 and max(worst) > 0.9
+
+
+def test_the_largest_gain_under_a_decay_is_where_it_comes_to_a_cap() -> None:
+    rng = np.random.default_rng(8)
+    for _ in range(60):
+        T, rho1, k, b = (Fraction(int(x), 10) for x in rng.integers([2, 1, 1, 1], [30, 30, 50, 40]))
+        gain = PrescribedGain(T, rho1, k)
+        top = (rho1 + k / T) * Fraction(int(rng.integers(50, 900)), 100)
+        cap = None if rng.random() < 0.3 else top * Fraction(int(rng.integers(5, 120)), 100)
+        t = np.linspace(0, float(T), 40_001)[:-1]
+        g = np.minimum(float(rho1) + float(k) / (float(T) - t), float(top))
+        slow = g if cap is None else np.minimum(g, float(cap))
+        clock = np.concatenate([[0], np.cumsum((slow[1:] + slow[:-1]) / 2 * np.diff(t))])
+        seen, bound = (g * np.exp(-float(b) * clock)).max(), float(gain_above(gain, top, b, cap))
+        assert seen * (1 - 1e-4) <= bound <= seen * (1 + 2e-3)
+
+
+def test_without_a_cap_no_input_is_bounded() -> None:
+    _, structure, protocol, x0, _ = _case(4)
+    for messages in (LateMessages(delay="0.01"), LateMessages(value_error="0.1")):
+        late = certify(structure, protocol, x0, messages=messages, simulation=False, method="paper").late
+        assert late is not None and late.rows and late.input is None

@@ -17,6 +17,7 @@ import pytest
 from bad_inputs import ptcc
 
 import lmi
+from lmi import search_time
 from lmi.child_process import apart
 from lmi.search_time import checkpoint, seconds_left, share_of_time, time_limit
 from ptcc_certify import NominalProtocol, SignedDigraph, certify, check, simulate
@@ -87,15 +88,17 @@ def test_without_time_nothing_is_claimed_and_everything_is_named(name: str):
 
 
 def test_what_is_proved_before_the_limit_stands(monkeypatch: pytest.MonkeyPatch):
-    search = search_functions._lmi_candidates
+    """On a clock that goes on in a search without end alone, however busy the machine is."""
+    search, now = search_functions._lmi_candidates, [0.0]
 
     def without_end(system: ErrorSystem, thorough: bool) -> Iterator[Candidate]:
         yield next(search(system, thorough))
         while True:
-            time.sleep(0.01)
+            now[0] += 0.01
             checkpoint()
 
     monkeypatch.setattr(search_functions, "_lmi_candidates", without_end)
+    monkeypatch.setattr(search_time, "_now", lambda: now[0])
     cert = certify(load_graph("fig1a"), PROTOCOL, [1] * 6, time_limit=8)
     assert cert.cut_off == ("class lmi",)
     assert cert.verdict == "certified" and {"perron", "full", "lmi"} == set(cert.search.searched)

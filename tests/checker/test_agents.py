@@ -30,7 +30,7 @@ from oracle_agents import false_claims_of_agents
 from ptcc_certify import checker
 from ptcc_certify.certificate.family_certificate import certify_family
 from ptcc_certify.certificate.procedure import certify
-from ptcc_certify.checker import check
+from ptcc_certify.checker import agent_motion, check
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.protocols import NominalProtocol
@@ -610,3 +610,9 @@ def test_what_the_program_makes_is_true_and_stays_so(seed: int):
     own = ((path, x) for path, x in mutants(data, 29, seed) if path[0] in ("agents", "protocol", "proof"))
     for changes in (own, nudges(data, seed, 20)):
         judged(data, changes)
+
+
+def test_final_states_that_cost_too_much_are_refused_before_they_are_read(monkeypatch: pytest.MonkeyPatch):
+    data = made()
+    monkeypatch.setattr(agent_motion, "ENTRY", 10**10)
+    rejected(data, "agent-final-state|agents", "the final states of agents would take too long")

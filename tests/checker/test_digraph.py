@@ -94,6 +94,12 @@ def test_both_are_what_the_definitions_say(seed: int):
         assert g.laplacian_product(x) == [d * y - h for d, y, h in zip(diagonal, x, signed, strict=True)]
         assert g.laplacian_product(x, signed=False) == [d * y - h for d, y, h in zip(diagonal, x, heard, strict=True)]
         assert g.left_product(range(n), x) == [d * y - h for d, y, h in zip(diagonal, x, hearing, strict=True)]
+        factors = {3: 1 << 70, 5: 0, 64: int(rng.integers(1, 9))}
+        parts = [int(p) for p in np.random.default_rng(seed).choice([3, 5, 64], len(edges))]
+        apart = [0] * n
+        for s, t, part in zip(g.source, g.target, parts, strict=True):
+            apart[t] += factors[part] * int(abs(exact[s, t])) * x[s]
+        assert g.sums_by_part(x, parts, factors) == apart
         assert g.sums_in(x) == heard and g.sums_in(x, signed=True) == signed and g.sums_out(x) == hearing
         for v in range(n):
             row = {s: -int(w) for (s, t), w in exact.items() if t == v}

@@ -26,7 +26,7 @@ from ptcc_certify.checker import check, graph
 from ptcc_certify.checker.array_digraph import ArrayDigraph
 from ptcc_certify.checker.array_steps import ArraySteps
 from ptcc_certify.checker.digraph import Digraph
-from ptcc_certify.checker.late_steps import Steps
+from ptcc_certify.checker.late_steps import Steps, decay_above
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
@@ -332,6 +332,7 @@ def test_without_followers_nothing_is_late():
 def test_parts_that_stand_alone_or_are_missing_are_refused():
     data = full()
     empty = {"rows": [], "steps": None, "residual": None, "missed": None, "staged": None, "form": None}
+    empty["input"] = None
     assert "nothing is stated" in reason(changed(data, TOP, {**data["messages"], **empty}))
     assert "iff rows or steps" in reason(data, (*TOP, "residual"), None)
     assert '"more" is not known' in reason(data, TOP, {**data["messages"], "more": None})
@@ -451,6 +452,13 @@ def test_steps_of_arrays_are_those_of_integers_and_bound_the_solution(seed: int)
     assert all(a <= 2**30 for a in found[0])
 
 
+def test_decays_of_arrays_are_those_of_integers_at_every_size():
+    rng = np.random.default_rng(3)
+    near = [(1 << b) + d for b in range(2, 62) for d in (-1, 0, 1)]
+    x = np.array([*range(99), *near, *(int(v) for b in range(5, 62) for v in rng.integers(0, 1 << b, 50))])
+    assert ArraySteps._decay(x).tolist() == [decay_above(v) for v in x.tolist()]
+
+
 # ---------------------------------------------------------------------- a missed deadline, and deadlines of their own
 
 
@@ -559,13 +567,54 @@ def test_no_other_lyapunov_function_stands_for_it():
         assert "no such Lyapunov function" in reason(data, told, k)
     strong = plain(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)]), nominal(), [3, 5], method="paper")
     said = {**data["messages"], "form": {"left": "1", "moved": {"1": "1", "2": "1"}, "residual": {"1": "9", "2": "9"}}}
+    said["input"] = None
     witness = {"function": 0, "phi": {"1": "9", "2": "9"}}
     proof = [*strong["proof"], obligation("late-form", "messages.form", {"q": "2", "b": "1/9", "kap": "9"}, witness)]
     assert "of deviations" in reason({**strong, "messages": said, "proof": proof})
     bare = with_messages(base(1, "mixed", True, state=False), "1/5000", gain_cap=20)
     forged = changed(bare, (*TOP, "form"), data["messages"]["form"])
-    forged = {**forged, "proof": [*forged["proof"], data["proof"][-1]]}
+    forged = {**forged, "proof": [*forged["proof"], data["proof"][step(data, "messages.form")[1]]]}
     assert reason(forged)
+
+
+@pytest.mark.parametrize("error", ["0", "1/10"])
+def test_inputs_that_are_stated_too_small_are_rejected(error: str):
+    data = with_messages(base(1, "mixed", True), "1/50", value_error=error, gain_cap=20, qs=("21/20",))
+    assert data["messages"]["form"] is None and check(data).accepted
+    _forge_inputs(data)
+
+
+@pytest.mark.parametrize("late", [False, True])
+def test_inputs_by_a_lyapunov_function_are_rejected_where_too_small(late: bool):
+    data = with_messages(base(1, "mixed", True), "1/5000", gain_cap=20, late=late, form=F(1, 2), qs=())
+    assert data["messages"]["form"] and not data["messages"]["rows"] and check(data).accepted
+    _forge_inputs(data)
+
+
+def _forge_inputs(data: Json) -> None:
+    """Lower every input, one by one."""
+    stated = data["messages"]["input"]
+    assert any(map(F, stated.values()))
+    for label, x in stated.items():
+        if F(x):
+            less = str(F(x) * F(9999, 10000))
+            assert f"the input of agent {label} is not proved" in reason(data, (*TOP, "input", label), less)
+        assert "an input is negative" in reason(data, (*TOP, "input", label), "-1/9")
+    assert reason(data, (*TOP, "input"), {**stated, "more": "1"}) and reason(data, (*TOP, "input"), "1")
+    assert reason(data, (*TOP, "input"), None)  # its obligation is left
+
+
+def test_no_input_is_taken_without_a_cap_or_without_what_bounds_it():
+    free = with_messages(base(1, "mixed", True), "1/50")
+    stated = dict.fromkeys(free["graph"]["nodes"], "1000000")
+    forged = changed(free, (*TOP, "input"), stated)
+    assert "input without a cap" in reason(
+        {**forged, "proof": [*forged["proof"], obligation("late-input", "messages.input")]}
+    )
+    bare = with_messages(base(1, "mixed", True), "1/50", gain_cap=20, qs=(), steps=40)
+    forged = changed(bare, (*TOP, "input"), stated)
+    forged = {**forged, "proof": [*forged["proof"], obligation("late-input", "messages.input")]}
+    assert "is not proved" in reason(forged)
 
 
 # ---------------------------------------------------------------------- leaders that move

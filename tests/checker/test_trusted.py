@@ -218,7 +218,7 @@ def of_messages() -> list[str]:
     made = [certify(chain, protocol, x0, simulation=False, method="paper", messages=messages) for messages in late]
     made.append(certify(chain, protocol, x0, simulation=False, method="paper", leaders=MovingLeaders(speed=1)))
     kinds = {step["kind"] for one in made for step in json.loads(one.to_json())["proof"]}
-    assert {"late-rows", "late-steps", "late-residual", "late-staged", "late-form", "tracking"} <= kinds
+    assert {"late-rows", "late-steps", "late-residual", "late-staged", "late-form", "late-input", "tracking"} <= kinds
     return [one.to_json() for one in made]
 
 

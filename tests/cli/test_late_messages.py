@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import re
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -17,9 +20,13 @@ from ptcc_certify import (
     MovingLeaders,
     NominalProtocol,
     SignedDigraph,
+    analyse,
     certify,
     read_certificate,
+    read_graph,
+    simulate,
 )
+from ptcc_certify.certificate import format_vectors
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.simulation.late_messages import simulate_late
 
@@ -89,7 +96,8 @@ def test_a_behaviour_asked_for_at_T_is_refuted_where_an_agent_is_proved_to_miss_
             ("--quantisation", "0.1"),
             "left open: bipartite consensus at T with late messages (nobody is proved to settle at T)",
         ),
-        (("--delay", "0.005", "--gain-cap", "50", "--max-input", "1e6"), "(no bound is proved with late messages)"),
+        (("--delay", "0.005", "--gain-cap", "50", "--max-input", "100"), "left open: |u_k| <= 100 (proved: "),
+        (("--delay", "0.005", "--max-input", "1e6"), "left open: |u_k| <= 1000000 (no bound is proved with late"),
         (("--leader-speed", "1", "--max-input", "100"), "left open: |u_k| <= 100 (proved: "),
         (("--leader-speed", "1", "--max-input", "1"), "refuted: |u_k| <= 1 (it is up to"),
     ],
@@ -103,6 +111,9 @@ def test_what_holds_without_late_messages_and_with_leaders_at_rest_is_not_said_t
 
 
 def test_a_behaviour_and_an_input_are_met_where_they_are_proved_of_late_messages_and_moving_leaders() -> None:
+    capped = ptcc("certify", "team.csv", "--delay", "0.005", "--gain-cap", "50", "--max-input", "1e6", *START, *QUICK)
+    assert capped.code == 0 and "met: |u_k| <= 1000000" in " ".join(capped.out.split()), capped
+    assert "bounded up to T; |u_k| <= " in capped.out
     star = ("--delay", "0.1", "--expect", "bipartite-consensus")  # all listen to a leader at rest alone
     Path("star.csv").write_text("a,b,1\na,c,-1\n")
     assert ptcc("certify", "star.csv", *star, "--x0", "1,0,2", *QUICK).code == 0
@@ -277,7 +288,6 @@ def test_a_delay_that_would_do_is_told_as_an_age() -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("simulate",), "s.toml: [messages] delay: ptcc simulate does not take late messages; ptcc certify -o c.json"),
         (("design", "--max-input", "9", "--initial-bound", "1", "--deadline", "1"), "ptcc design does not take late"),
         (("plot", "--what", "states"), "ptcc plot --what states does not take late messages"),
     ],
@@ -288,6 +298,113 @@ def test_commands_that_would_leave_late_messages_out_refuse_their_scenario(words
     assert run.code == 2, run
     assert said in run.err
     assert ptcc("classify", "s.toml").code == ptcc("plot", "s.toml", "--what", "graph").code == 0
+
+
+def test_delays_of_many_edges_stand_in_a_side_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(format_vectors, "LONG", 3)
+    run = ptcc("certify", "team.csv", "--delay", "delay", *START, *QUICK, "-o", "c.json")
+    assert run.code == ptcc("check", "c.json").code == 0, run
+    section, messages = json.loads(Path("c.json").read_text())["messages"], read_certificate("c.json").late.messages
+    assert section["latency"]["count"] == 4 and section["latency"]["scale"] == "200"
+    given = {
+        edge: Fraction(x) for edge, x in zip(("ab", "bc", "cb", "cd"), ("0.01", "0.02", "0.01", "0.005"), strict=True)
+    }
+    assert {"".join(edge): x for edge, x in messages.delay.items()} == given
+
+
+def table(text: str) -> dict[str, np.ndarray]:
+    """Return the columns of a run by their heads."""
+    head, *rows = csv.reader(io.StringIO(text))
+    return dict(zip(head, np.array(rows, dtype=float).T, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("words", "messages", "pattern"),
+    [
+        (("--delay", "0.05"), LateMessages(delay="0.05"), "oldest"),
+        (("--delay", "0.01", "--period", "0.02", "--packet-loss", "2"), LateMessages("0.01", "0.02", 2), "square"),
+        (
+            ("--delay", "0.01", "--own-delay", "--gain-cap", "9"),
+            LateMessages("0.01", own_delay=True, gain_cap=9),
+            "oldest",
+        ),
+        (("--quantisation", "0.5"), LateMessages(value_error="0.25"), "varying"),
+    ],
+)
+def test_simulate_runs_with_late_messages(words: tuple[str, ...], messages: LateMessages, pattern: str) -> None:
+    """Its columns obey the closed loop: where the step is short the input is the slope of the states."""
+    run = ptcc(
+        "simulate", "team.csv", *words, *START, "--rho2", "3", "--kappa", "1", "--pattern", pattern, "--seed", "4"
+    )
+    assert run.code == 0, run
+    columns, protocol = table(run.out), NominalProtocol(T=1, rho1=1, rho2=3, kappa=1)
+    graph = read_graph("team.csv")
+    own = simulate(graph, protocol, [1, 3, 4, -4], messages=messages, pattern=pattern, seed=4)
+    direct = simulate_late(graph, protocol, messages, [1, 3, 4, -4], pattern=pattern, seed=4)
+    assert own == direct and own.deadline_index == own.t.size - 1
+    for label, states, inputs in zip(graph.labels, own.states, own.input, strict=True):
+        assert columns[label].tolist() == states.tolist()
+        assert columns[f"u({label})"].tolist() == (inputs + 0.0).tolist()
+    slope, early = np.diff(own.states) / np.diff(own.t), own.t[:-1] < 0.5
+    assert np.abs(slope - own.input[:, :-1])[:, early].max() < 0.05 * np.abs(slope).max()
+
+
+def test_simulate_runs_leaders_that_move_with_their_targets() -> None:
+    run = ptcc("simulate", "team.csv", "--leader-speed", "1", *START, "--rho2", "3", "--kappa", "1")
+    assert run.code == 0, run
+    columns, graph = table(run.out), read_graph("team.csv")
+    at = int(np.argmin(np.abs(columns["t"] - 1)))
+    x, goal = (np.array([columns[name.format(k)] for k in graph.labels]) for name in ("{}", "target({})"))
+    assert columns["t"][-1] > 1 and np.abs(x - goal)[:, at].max() < 1e-5
+    lead = analyse(graph).leaders[0]
+    assert np.abs(columns[f"u({graph.labels[lead]})"]).max() <= 1 + 1e-9
+    assert np.allclose(
+        x[lead][-1] - x[lead][0], np.sum(columns[f"u({graph.labels[lead]})"][:-1] * np.diff(columns["t"]))
+    )
+
+
+@pytest.mark.parametrize("words", [("--delay", "0.1"), ("--leader-speed", "1")])
+def test_simulate_draws_such_runs_and_takes_them_from_a_scenario(words: tuple[str, ...]) -> None:
+    assert ptcc("simulate", "team.csv", *words, *START, "-o", "run.png").code == 0
+    assert Path("run.png").stat().st_size > 5000
+    section = "[messages]\ndelay = 0.1\n" if words[0] == "--delay" else "[leaders]\nspeed = 1\n"
+    Path("s.toml").write_text(SCENARIO + section)
+    heads = [table(ptcc("simulate", *given).out) for given in (("s.toml",), ("team.csv", *words, *START))]
+    assert heads[0].keys() == heads[1].keys() and (len(heads[0]) == 2 + 4 * (2 + (words[0] != "--delay")))
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--delay", "0.1", "--noise", "1", "--gain-cap", "9"), "--noise: is not simulated with late messages"),
+        (("--delay", "0.1", "--stop-before", "0.1"), "--stop-before: is not simulated with late messages"),
+        (("--delay", "0.1", "--steps", "9"), "--steps: is not simulated with late messages"),
+        (("--delay", "0.1", "--samples", "9"), "--samples: is not simulated with late messages"),
+        (("--delay", "0.1", "--leader-speed", "1"), "messages and leaders together are not simulated yet"),
+        (("--leader-speed", "1", "--gain-cap", "9"), "--gain-cap: is not simulated with leaders that move"),
+        (("--delay", "0.1", "--agents", "double-integrator"), "--delay: is not simulated of agents of order n"),
+        (("--delay", "0.1", "--uncertainty", "10%"), "--delay: is not simulated of families of graphs"),
+        (("--delay", "1e-9"), "more than 20,000 steps"),
+    ],
+)
+def test_what_is_not_simulated_beside_late_messages_is_refused(words: tuple[str, ...], said: str) -> None:
+    run = ptcc("simulate", "team.csv", *words, *START)
+    assert run.code == 2 and said in run.err and run.err.count("\n") == 1, run
+
+
+def test_what_is_not_simulated_beside_is_refused_in_python() -> None:
+    graph, p = SignedDigraph.from_edges([(1, 2, 1)]), NominalProtocol(T=1, rho1=1, rho2=1, kappa=1)
+    late = LateMessages(delay="0.1")
+    for more, said in (({"actuator": GainLimits(gain_cap=9)}, "gain_cap="), ({"times": [1]}, "times: is not")):
+        with pytest.raises(ParameterError, match=said):
+            simulate(graph, p, [1, 0], messages=late, **more)
+    with pytest.raises(ParameterError, match="messages and leaders together"):
+        simulate(graph, p, [1, 0], messages=late, leaders=MovingLeaders(speed=1))
+    with pytest.raises(ParameterError, match="sigma0: leaders that move ask"):
+        simulate(graph, p, [1, 0], leaders=MovingLeaders(speed=1), sigma0=[1, 0])
+    many = SignedDigraph.from_edges([(0, k, 1) for k in range(1, 60_000)])
+    with pytest.raises(ParameterError, match="more than 50,000,000 states"):
+        simulate(many, p, [0.0] * 60_000, messages=late)
 
 
 def test_page_and_statement_tell_of_late_messages_and_moving_leaders() -> None:

@@ -12,6 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import lmi
+from lmi import sparse_h_matrix
+from ptcc_certify.bounds.final_state import influence
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import analyse
@@ -170,8 +172,10 @@ def test_lemmas_8_and_9_2_followers_stay_within_the_leaders(made: Made):
     exact = exact_containment_weights(structure)
     assert len(exact) == structure.followers.size
     assert all(sum(map(abs, row), Fraction(0)) <= 1 for row in exact)
-    floats = np.array([[float(x) for x in row] for row in exact]).reshape(containment_weights(structure).shape)
-    assert containment_weights(structure) == pytest.approx(floats, abs=1e-9)
+    weights = containment_weights(structure)
+    assert weights is not None
+    floats = np.array([[float(x) for x in row] for row in exact]).reshape(weights.shape)
+    assert weights == pytest.approx(floats, abs=1e-9)
     if made.connectivity == "quasi-strong" and structure.balanced:
         assert all(abs(row[0]) == 1 for row in exact)
         camps = structure.gauge
@@ -192,3 +196,43 @@ def test_the_inverse_of_the_follower_block_contracts(made: Made):
 
 def test_a_singular_system_has_no_solution():
     assert solve_exact([[Fraction(1), Fraction(1)], [Fraction(1), Fraction(1)]], [[Fraction(1)], [Fraction(0)]]) is None
+
+
+def test_followers_of_a_random_graph_need_no_sparse_factor_for_their_weights(monkeypatch: pytest.MonkeyPatch):
+    """Its factor fills in: of 20,000 followers it takes many minutes."""
+    monkeypatch.setattr(sparse_h_matrix, "diagonal_factor", None)
+    n, leaders = 6000, 5
+    rng = np.random.default_rng(2)
+    source, target = rng.integers(0, n, 6 * n), rng.integers(leaders, n, 6 * n)
+    edges = {(int(s), int(t)): int(w) for s, t, w in zip(source, target, rng.choice([-1, 2], 6 * n), strict=True)}
+    graph = SignedDigraph.from_edges([(s, t, w) for (s, t), w in edges.items() if s != t])
+    structure = analyse(graph)
+    weights, L = containment_weights(structure), graph.laplacian().tocsr()
+    assert weights is not None and structure.closed_components
+    ends = np.zeros((graph.n_nodes, weights.shape[1]))
+    for column, component in enumerate(c for c in structure.closed_components if c.balanced):
+        ends[list(component.nodes), column] = component.gauge
+    ends[structure.followers] = weights
+    assert np.abs((L @ ends)[structure.followers]).max() < 1e-7 * graph.in_weight().max()
+    assert np.abs(weights).sum(axis=1).max() <= 1 + 1e-7
+
+
+def test_followers_on_a_long_line_between_two_leaders_share_them_by_their_place():
+    """No iterative solve converges on it, its factor is sparse: made once for both columns."""
+    n = 4000
+    edges = [e for k in range(1, n) for e in ((k + 1, k, 1), (k, k + 1, 1)) if e[1] < n]
+    weights = containment_weights(analyse(SignedDigraph.from_edges([(0, 1, 1), *edges])))
+    share = np.arange(1, n) / n
+    assert weights is not None
+    assert np.abs(weights - np.column_stack([1 - share, share])).max() < 1e-6
+
+
+def test_weights_that_no_solve_finds_are_not_given(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(sparse_h_matrix, "_PRODUCTS", 1)
+    monkeypatch.setattr(sparse_h_matrix, "DIRECT_ROWS", 2)
+    star = [(0, 1, 1), (1, 2, 1), (2, 3, 1), (3, 1, -1), (9, 3, 2)]
+    by_factor = np.array([[3, -2], [3, -2], [1, 4]]) / 7
+    assert containment_weights(analyse(star)) == pytest.approx(by_factor)
+    monkeypatch.setattr(sparse_h_matrix, "FILL_ROWS", -1)
+    assert containment_weights(analyse(star)) is None
+    assert influence(analyse(star), exact=False).containment_weights is None

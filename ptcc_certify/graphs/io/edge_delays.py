@@ -49,6 +49,7 @@ def read_delays(path: Source, graph: SignedDigraph, title: str = "delay") -> dic
         raise FormatError(f'{place}: no column "{shorten(title)}"; begin with a header source,target,weight,{title}')
     first, second = ends[:2] if graph.read["orientation"] != "listens" else (ends[1], ends[0])
     delays: dict[tuple[str, str], Fraction] = {}
+    known: dict[str, Fraction] = {}  # many edges, few delays
     for number, row in rows:
         if len([field for field in row if field.strip()]) < 2:
             continue
@@ -57,7 +58,9 @@ def read_delays(path: Source, graph: SignedDigraph, title: str = "delay") -> dic
         if source == target:
             continue  # a self-loop that was dropped
         try:
-            value = parse_exact(text)
+            if text not in known:
+                known[text] = parse_exact(text)
+            value = known[text]
         except NumberError:
             edge = f"{shorten(source)} -> {shorten(target)}"
             raise FormatError(

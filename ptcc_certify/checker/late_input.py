@@ -1,0 +1,107 @@
+"""Verifies bounds of the input under late messages and a capped gain: by rows, or by a Lyapunov function."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any
+
+from lmi.exact.decimal_rounding import up
+from lmi.exact.numbers import longest, shorten
+from lmi.exact.work import spend
+from ptcc_certify.checker.digraph import Digraph
+from ptcc_certify.checker.follower_rows import Rows
+from ptcc_certify.checker.graph import by_agent
+from ptcc_certify.checker.input_formulas import PrescribedGain, decay_above
+from ptcc_certify.checker.late_messages import Messages
+from ptcc_certify.checker.late_steps import clock_below
+from ptcc_certify.checker.proof_cursor import Document
+from ptcc_certify.checker.reading import RejectedError, need
+
+
+def gain_above(gain: PrescribedGain, gain_cap: Fraction, b: Fraction, cap: Fraction | None = None) -> Fraction:
+    """Bound ``sup_t g e^(-b s_c)``, ``g = min(gain, gain_cap)``, ``s_c`` the integral of ``min(g, cap)`` from 0 to t.
+
+    While ``gain`` grows past neither cap, or past ``cap`` alone, the product falls, grows, or first falls and then
+    grows; under ``gain_cap`` it falls: the supremum is where ``t = 0``, or where the gain comes to a cap.
+
+    Examples
+    --------
+    >>> gain = PrescribedGain(Fraction(1), Fraction(1), Fraction(2))
+    >>> gain_above(gain, Fraction(9), Fraction(1)), gain_above(gain, Fraction(2), Fraction(1))
+    (Fraction(3, 1), Fraction(2, 1))
+    >>> 9 * 0.6 < gain_above(gain, Fraction(9), Fraction(1, 8)) < 9 * 0.7
+    True
+    """
+    first, lower = gain.value(Fraction(1)), gain_cap if cap is None else min(cap, gain_cap)
+    found = [min(first, gain_cap)]
+    for level in (lower, gain_cap):
+        if level > first:
+            t = gain.T - gain.k / (level - gain.rho1)
+            found.append(level * decay_above(b * (clock_below(gain, lower, Fraction(0), t) or Fraction(0))))
+    return max(found)
+
+
+class Inputs:
+    """What is stated of ``|u_k|`` up to the deadline by agent, and which of it was met by a bound.
+
+    Parameters
+    ----------
+    doc : Document
+    graph : Digraph
+    messages : Messages
+    entry : JSON value
+        Numbers by agent.
+
+    Raises
+    ------
+    RejectedError
+        The gain has no cap.
+    """
+
+    def __init__(self, doc: Document, graph: Digraph, messages: Messages, entry: Any):
+        doc.at = "messages.input"
+        if messages.gain_cap is None:
+            raise RejectedError("input without a cap of the gain")
+        self.graph, self.messages, self.gain_cap = graph, messages, messages.gain_cap
+        self.values, self.scale = by_agent(doc, graph, entry, "input").over(range(graph.n))
+        need(min(self.values) >= 0, "an input is negative")
+        self.met = bytearray(graph.n)
+
+    def by_rows(self, rows: Rows, b: Fraction, cap: Fraction | None, initial: Fraction, floor: Fraction) -> None:
+        """Mark what is at least ``(2 D_k - b) u_k initial y + gain_cap (floor (D_k u_k + heard_k) + error D_k)``."""
+        graph, error = self.graph, self.messages.value_error
+        y = initial * gain_above(self.messages.gain, self.gain_cap, b, cap)
+        each = self.gain_cap * floor
+        factors = [2 * y + each, y * b * graph.unit, each, self.gain_cap * error * rows.scale]
+        factors = [x * self.scale / (rows.scale * graph.unit) for x in factors]
+        bits = longest(n for x in factors for n in x.as_integer_ratio())
+        long = longest(rows.u) + longest(rows.heard) + graph.bits
+        spend(8 * len(rows.u), 4 * bits, long + longest(self.values), "inputs of followers")
+        common = 1
+        for x in factors:
+            common *= x.denominator
+        own, less, heard, wrong = (int(x * common) for x in factors)
+        for v, u, D, h in zip(rows.followers.nodes, rows.u, rows.followers.degrees, rows.heard, strict=True):
+            if common * self.values[v] >= D * u * own - u * less + h * heard + D * wrong:
+                self.met[v] = 1
+        for group in rows.followers.structure.closed:  # leaders that rest
+            for v in group:
+                self.met[v] = 1
+
+    def by_form(self, phi: Sequence[Fraction], b: Fraction, root: Fraction) -> None:
+        """Mark what is at least ``phi_k sqrt(V(0)) y``."""
+        y = root * gain_above(self.messages.gain, self.gain_cap, b)
+        bits = longest(n for x in (y, *phi) for n in x.as_integer_ratio())
+        spend(4 * len(self.values), bits, bits + longest(self.values), "inputs of agents")
+        for v, x in enumerate(phi):
+            if Fraction(self.values[v], self.scale) >= x * y:
+                self.met[v] = 1
+
+    def close(self, doc: Document) -> None:
+        """Verify that a bound meets what is stated of every agent."""
+        doc.at = "messages.input"
+        doc.open("late-input", "messages.input")
+        low = self.met.find(0)
+        need(low < 0, f"the input of agent {shorten(self.graph.labels[max(low, 0)])} is not proved")
+        doc.done(f"at most {up(Fraction(max(self.values), self.scale))}")
