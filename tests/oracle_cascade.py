@@ -19,8 +19,8 @@ from oracle import Json, Oracle, number
 from oracle_agents import SLACK, AgentOracle, of_graph_alone
 from scipy.integrate import quad, solve_ivp
 
-#: ``z = ln(T/(T - t))`` up to which the motion is formed, and instants.
-LATEST, COUNT = 12.0, 25
+#: ``z = ln(T/(T - t))`` up to which the motion is formed, unless it decays by ``e^-MOST`` before; and instants.
+LATEST, MOST, COUNT = 12.0, 60.0, 25
 
 
 class Motion(NamedTuple):
@@ -168,10 +168,12 @@ def moved(laplacian: bytes, states: bytes, shape: tuple[int, ...], numbers: tupl
         w = flat.reshape(begin.shape)
         return (T * math.exp(-z) * np.stack([w[:, :, 1], control(z, w)], axis=2)).ravel()
 
-    places, w, found = np.linspace(0, LATEST, COUNT), begin, [begin]
+    fastest = (rho1 * T + k) * max(2 * np.abs(np.diag(L)).max(initial=0), alpha, 1 / k)
+    places, w, found = np.linspace(0, min(LATEST, MOST / fastest), COUNT), begin, [begin]
     for low, high in pairwise(places):
-        # velocities and positions decay by factors: each stretch has a tolerance of its own
-        size = np.maximum(np.abs(w).max(axis=(0, 1), initial=0), 1e-300)
+        # positions and velocities decay by factors: each stretch has a tolerance of its own
+        eta, (x, v) = rho1 + k / T * math.exp(low), np.abs(w).max(axis=(0, 1), initial=0)
+        size = np.maximum([max(x, v / eta), max(v, eta * x)], 1e-290)
         atol = np.broadcast_to(1e-12 * size, w.shape).ravel()
         run = solve_ivp(field, (low, high), w.ravel(), "LSODA", rtol=1e-10, atol=atol) if w.size else None
         assert run is None or run.success

@@ -97,7 +97,7 @@ def worst_ratio(certificate: Certificate) -> float:
     numbers = (float(gain.T), float(gain.rho1), float(gain.pole), float(part.alpha))
     run = moved(L.tobytes(), states.tobytes(), states.shape, numbers)
     bounds = part.deviation_bound(np.exp(-run.z))  # agents, derivatives, instants
-    sizes = np.moveaxis(np.linalg.norm(run.states, axis=2), 0, -1).transpose(2, 1, 0)
+    sizes = np.moveaxis(np.linalg.norm(run.states, axis=2), 0, -1)
     known = np.isfinite(bounds)
     with np.errstate(invalid="ignore", divide="ignore"):
         ratios = np.where(known & (sizes > 1e-13 * sizes.max(initial=1e-300)), sizes / bounds, 0)
@@ -192,47 +192,51 @@ def test_agents_that_begin_with_the_commanded_velocity_move_as_single_integrator
     assert np.allclose(part.deviation_bound(late)[:, 0], plain.deviation_bound(late), rtol=1e-7, atol=0)
     run, single = part.simulate(), certify(TEAM, FAST, x0, method="paper").simulate()
     same = np.interp(single.t[single.t < 1.9], run.t, run.positions[0, 0])
-    assert np.allclose(same, single.x[0][single.t < 1.9], atol=2e-2)
+    assert np.allclose(same, single.states[0][single.t < 1.9], atol=2e-2)
     holds(certificate)
 
 
 # ---------------------------------------------------------------------- boundary cases
 
 
+#: The rate that is proved of the pair, a little below 2.
+RATE = part_of(made(PAIR, FAST, None, Agents(order=2, cascade=1), simulation=False)).best
+
+
+def pair(rho2: Any, alpha: Any) -> Certificate:
+    protocol = NominalProtocol(T=2, rho1=1, rho2=rho2, kappa=1)
+    return made(PAIR, protocol, [3, 1], Agents(order=2, cascade=alpha), v0=[1, 2])
+
+
 def test_an_input_at_both_limits_is_not_claimed_to_be_bounded():
-    k2 = NominalProtocol(T=2, rho1=1, rho2=2, kappa=1)  # rate k = 4
-    both = part_of(made(PAIR, k2, [3, 1], Agents(order=2, cascade="1/2"), v0=[1, 2]))  # alpha k = 1
-    assert both.best == 2 and both.input is None and "1/(rho2 kappa)" in both.unbounded[0][0]
-    for agents, protocol in (
-        (Agents(order=2, cascade="0.51"), k2),
-        (Agents(order=2, cascade="10/21"), NominalProtocol(T=2, rho1=1, rho2="2.1", kappa=1)),  # alpha k = 1
-    ):
-        certificate = made(PAIR, protocol, [3, 1], agents, v0=[1, 2])
+    rho2 = 4 / RATE  # rate k = 4
+    both = part_of(pair(rho2, 1 / rho2))
+    assert both.best == RATE and both.input is None and "one must be above" in both.unbounded[0][0]
+    for certificate in (pair(rho2, 1 / rho2 + F(1, 1000)), pair(rho2 + F(1, 1000), 1 / (rho2 + F(1, 1000)))):
         assert part_of(certificate).input is not None and part_of(certificate).unbounded == ()
         holds(certificate)
 
 
 @pytest.mark.parametrize(
-    ("rho2", "alpha", "mends"),
+    ("rho2", "alpha", "names"),
     [
-        (1, 3, ["--rho2 2"]),
-        (3, "1/5", ["--cascade 0.3334"]),
-        (1, "1/5", ["--rho2 2", "--cascade 2"]),
-        (2, "1/2", ["--cascade 1"]),
+        (1, 3, ["--rho2"]),
+        (3, "1/5", ["--cascade"]),
+        (1, "1/5", ["--rho2", "--cascade"]),
+        (4 / RATE, RATE / 4, ["--cascade"]),
     ],
 )
-def test_what_keeps_the_input_from_being_bounded_is_told_with_its_mend(rho2: Any, alpha: Any, mends: list[str]):
-    part = part_of(made(PAIR, NominalProtocol(T=2, rho1=1, rho2=rho2, kappa=1), [3, 1], Agents(order=2, cascade=alpha)))
-    assert [mend for _, mend in part.unbounded] == mends and part.input is None
-    values = dict(mend.replace("--", "").split() for mend in mends)
-    mended = NominalProtocol(T=2, rho1=1, rho2=values.get("rho2", rho2), kappa=1)
-    again = part_of(made(PAIR, mended, [3, 1], Agents(order=2, cascade=values.get("cascade", alpha))))
+def test_what_keeps_the_input_from_being_bounded_is_told_with_its_mend(rho2: Any, alpha: Any, names: list[str]):
+    part = part_of(pair(rho2, alpha))
+    mends = dict(mend.split() for _, mend in part.unbounded)
+    assert list(mends) == names and part.input is None
+    again = part_of(pair(mends.get("--rho2", rho2), mends.get("--cascade", alpha)))
     assert again.input is not None
 
 
 def test_alpha_that_is_half_the_rate_is_no_exception():
-    certificate = made(PAIR, FAST, [3, 1], Agents(order=2, cascade=1), v0=[1, 2])
-    assert part_of(certificate).best == 2 and worst_ratio(certificate) <= 1 + 1e-7
+    certificate = pair(6, RATE / 2)
+    assert part_of(certificate).best == RATE and worst_ratio(certificate) <= 1 + 1e-7
     holds(certificate)
 
 
