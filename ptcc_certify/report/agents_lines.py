@@ -30,7 +30,7 @@ def agents_text(part: AgentsAnswer) -> str:
     protocol = part.protocol
     more = ["in formation"] * part.formation
     more += [f"in {part.dimension} dimensions"] * (part.dimension > 1)
-    more += ["meeting at rest"] * (any(protocol.own) and not part.moving)
+    more += ["meeting at rest"] * (any(protocol.own) and part.derivatives_agree)
     texts = [
         f"{plant_text(protocol.plant)} {', '.join(more)}".strip(),
         *([] if protocol.gain_cap is None else [f"gain at most {near(protocol.gain_cap)}"]),
@@ -57,7 +57,7 @@ def _final_lines(part: AgentsAnswer, width: int) -> Iterator[tuple[str, str]]:
         return
     labels = part.structure.graph.labels
     rest = not part.moving and part.settled > 1
-    open_end = "; velocities are not proved to vanish" * (part.settled < part.order)
+    open_end = "; velocities are not proved to vanish" * (not part.derivatives_agree)
     for i in range(part.settled):
         ends = [[chain[i] for chain in agent] for agent in part.final_state]
         if i and not any(m or r for row in ends for m, r in row):
