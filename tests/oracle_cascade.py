@@ -20,7 +20,7 @@ from oracle_agents import SLACK, AgentOracle, of_graph_alone
 from scipy.integrate import quad, solve_ivp
 
 #: ``z = ln(T/(T - t))`` up to which the motion is formed, unless it decays by ``e^-MOST`` before; and instants.
-LATEST, MOST, COUNT = 12.0, 60.0, 25
+LATEST, MOST, COUNT = 12.0, 60.0, 17
 
 
 class Motion(NamedTuple):

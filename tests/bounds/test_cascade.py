@@ -26,17 +26,17 @@ def exact_integral(gain: Gain, rate: Fraction, alpha: Fraction, q: float) -> flo
     return float(flint.acb.integral(field, flint.acb(0), z).real.lower())
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", [*range(3), *(pytest.param(x, marks=pytest.mark.campaign) for x in range(3, 24))])
 def test_the_integral_is_bounded_from_above_up_to_the_deadline(seed: int):
     rng = np.random.default_rng([5, seed])
-    rho1 = F(0) if seed % 3 == 0 else F(int(rng.integers(1, 60)), 10)
+    rho1 = F(0) if seed % 3 == 2 else F(int(rng.integers(1, 60)), 10)
     gain = Gain(
         T=F(int(rng.integers(1, 30)), 10), rho1=rho1 or F(1, 10**12), rho2=F(int(rng.integers(1, 60)), 10), kappa=1
     )
     rate, alpha = F(int(rng.integers(1, 80)), 10), F(int(rng.integers(1, 50)), 10)
-    if seed % 4 == 1:
+    if seed % 4 == 0:
         alpha = rate / 2
-    if seed % 4 == 2 and rate * gain.pole > 2:
+    if seed % 4 == 1 and rate * gain.pole > 2:
         alpha = rate / 2 - 1 / gain.pole  # the powers of the closed form coincide
     q = np.array([0.9, 0.5, 0.03, 1e-4, 1e-9])
     bounds = drive_integral(gain, rate, alpha, q)

@@ -81,16 +81,15 @@ def rejected(data: Json, where: str, reason: str) -> None:
 
 
 @pytest.mark.parametrize("name", SETTINGS)
-def test_every_kind_of_cascade_is_accepted_and_true(name: str):
-    for kind in ("camps", "enemies") if name in ("plain", "slow") else ("camps",):
-        data = made(name, kind)
-        accepted(data)
-        assert data["verdict"] == "certified" and VALIDATOR.is_valid(data)
-        assert false_claims_of_cascade(data) == []
+def test_every_kind_of_cascade_is_accepted_and_has_the_shape_of_the_schema(name: str):
+    data = made(name)
+    accepted(data)
+    assert data["verdict"] == "certified" and VALIDATOR.is_valid(data)
 
 
-def test_single_leaders_are_accepted_and_true():
-    data = made("formation", "singles")
+@pytest.mark.parametrize(("name", "kind"), [("every function", "camps"), ("slow", "enemies"), ("formation", "singles")])
+def test_what_is_accepted_is_true(name: str, kind: str):
+    data = made(name, kind)
     accepted(data)
     assert false_claims_of_cascade(data) == []
 
@@ -353,9 +352,10 @@ def nudges(data: Json, seed: int, count: int) -> Iterator[tuple[Any, Json]]:
 
 def test_mutants_that_are_accepted_are_true():
     data = made("formation")
-    count, _ = judged(data, mutants(data, 41, 2))
-    more, passed = judged(data, nudges(data, 1, 40))
-    assert count > 20 and more > 30 and passed
+    own = ((path, x) for path, x in mutants(data, 41, 1) if path[0] in ("agents", "proof"))
+    count, _ = judged(data, own)
+    more, passed = judged(data, nudges(data, 1, 20))
+    assert count > 20 and more > 15 and passed
 
 
 @pytest.mark.campaign
@@ -365,6 +365,7 @@ def test_mutants_of_every_kind_of_cascade_that_are_accepted_are_true(name: str):
     for kind in ("camps", "singles", "enemies"):
         data = made(name, kind)
         own = ((path, x) for path, x in mutants(data, 3, 1) if path[0] in ("agents", "protocol", "proof", "verdict"))
+        assert false_claims_of_cascade(data) == []
         for changes in (own, nudges(data, len(name), int(os.environ.get("PTCC_FUZZ_COUNT", "60")))):
             count, through = judged(data, changes)
             total, passed = total + count, passed + through
