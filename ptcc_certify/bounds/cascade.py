@@ -89,12 +89,12 @@ def drive_integral(gain: Gain, rate: Fraction, alpha: Fraction, remaining: np.nd
     Examples
     --------
     >>> late = drive_integral(Gain(T=1, rho1=1, rho2=1, kappa=2), Fraction(4), Fraction(1), np.array([1.0, 0.01]))
-    >>> late[0], bool(late[1] < 1e-3)
+    >>> float(late[0]), bool(0 < late[1] < 1e-3)
     (0.0, True)
     """
     q, T, rho1 = np.asarray(remaining, dtype=float), float(gain.T), float(gain.rho1)
     a, b, k = float_down(alpha), float_down(rate / 2), float(gain.pole)
-    z, slowest = -np.log(q), min(a, b)
+    z, slowest = np.log(1 / q), min(a, b)
     s = gain.clock_at_remaining(q)
     first = T * np.exp(-slowest * rho1 * T * (1 - q) - min(b * k, a * k + 1) * z) * _falling(abs(a * k + 1 - b * k), z)
     second = np.exp(-slowest * s) * _falling(abs(a - b), s) / float(gain.first)
@@ -103,7 +103,7 @@ def drive_integral(gain: Gain, rate: Fraction, alpha: Fraction, remaining: np.nd
 
 def _falling(x: float, z: np.ndarray) -> np.ndarray:
     """Return ``(1 - e^(-x z))/x``; ``z`` for ``x = 0``."""
-    return -np.expm1(-x * z) / x if x else z
+    return np.abs(np.expm1(-x * z)) / x if x else z
 
 
 def input_constants(structure: Structure, constants: Sequence[Fraction], k: Fraction) -> tuple[Fraction, ...]:
