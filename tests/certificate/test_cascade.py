@@ -314,7 +314,7 @@ REFUSED: list[tuple[dict[str, Any], dict[str, Any], str]] = [
     ({"order": 2}, {"at": 1}, "at is for single integrators"),
     ({"order": 2}, {"delta": 1}, "take the sliding-mode protocol"),
     ({"order": 2, "biases": [1, 0, 0, 0]}, {}, "biases fit no formation"),
-    ({"order": 2, "cascade": 10**6}, {}, "take a smaller alpha"),
+    ({"order": 2, "cascade": 10**6}, {}, "take a smaller rest, or cascade"),
 ]
 
 
