@@ -25,7 +25,8 @@ from lmi.errors import NoCertificate
 from lmi.exact.decimal_rounding import down, float_up, up
 from ptcc_certify.bounds.input.tightest_bound import log
 from ptcc_certify.bounds.shortest_time import shortest_time
-from ptcc_certify.certificate.agents_part import AgentsPart, prove_agents
+from ptcc_certify.certificate.agents_answer import AgentsAnswer
+from ptcc_certify.certificate.agents_part import prove_agents
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.format_vectors import agents_ends
 from ptcc_certify.certificate.procedure import certify
@@ -74,7 +75,7 @@ class Candidate:
 
     deadline: Fraction
     protocol: Protocol
-    part: AgentsPart
+    part: AgentsAnswer
 
     @cached_property
     def peak(self) -> Fraction | None:
@@ -353,6 +354,10 @@ def _refuse(agents: Any, request: AgentsRequest) -> None:
         raise ParameterError(f"agents = {shorten(repr(agents))} is none; give Agents(order=2), say")
     if agents.plain:
         raise ParameterError("agents: these are single integrators; design(graph, ..) finds their gains")
+    if agents.cascade is not None:
+        raise ParameterError(
+            "cascade: no deadline is searched for it, only for gains as they are designed; leave it out"
+        )
     if agents.rest is not None:
         raise ParameterError("rest: no number is proved of the input of agents that meet at rest; leave it out")
     if agents.decay_rate < 2 * agents.degree and agents.cap is None:
@@ -397,7 +402,7 @@ def _least_time(base: Certificate, request: AgentsRequest) -> Fraction | None:
     return max(shortest_time(rows, request.max_input) for rows in deviations) or None
 
 
-def _unusable(base: Certificate, part: AgentsPart, request: AgentsRequest) -> str | None:
+def _unusable(base: Certificate, part: AgentsAnswer, request: AgentsRequest) -> str | None:
     """Tell what is missing, whatever the deadline; None if nothing is."""
     if not base.graph.n_edges:
         return "no agent listens to another, so that no gains act"

@@ -5,11 +5,14 @@ from __future__ import annotations
 import copy
 import json
 import re
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from typing import Any
 
-from ptcc_certify.checker import digest
+import numpy as np
+
+from ptcc_certify.checker import check, digest
 
 Path = tuple[str | int, ...]
 Json = dict[str, Any]
@@ -118,3 +121,34 @@ def resealed(data: Json) -> Json:
 def same_claim(one: Json, other: Json) -> bool:
     """Whether two certificates say the same outside ``unverified``; the order of the keys of an object says nothing."""
     return json.dumps(one, sort_keys=True) == json.dumps(other, sort_keys=True)
+
+
+def judged_mutants(
+    data: Json, changes: Iterator[tuple[Any, Json]], false_claims: Callable[[Json], list[str]]
+) -> tuple[int, Counter[str]]:
+    """Check mutants, with digests that fit; whatever is accepted must be true. Return their number, and what was."""
+    count, passed = 0, Counter[str]()
+    for path, mutant in changes:
+        if same_claim(mutant, data):
+            continue
+        count += 1
+        mutant = resealed(mutant)
+        if check(mutant, stdlib=bool(count % 2)).accepted:
+            assert false_claims(mutant) == [], path
+            passed[re.sub(r"\d+", "k", ".".join(map(str, path[:3])))] += 1
+    return count, passed
+
+
+def nudged(
+    data: Json, parts: Sequence[str], seed: int, count: int, again: Callable[[Json, Any, str], Json]
+) -> Iterator[tuple[Any, Json]]:
+    """Numbers of some parts, a little larger or smaller or of the other sign; ``again`` tells them once more."""
+    rng = np.random.default_rng(seed)
+    places = [(path, x) for path, x in leaves(data) if path[0] in parts]
+    places = [(path, x) for path, x in places if isinstance(x, str) and re.fullmatch(r"-?[0-9./]+", x)]
+    for _ in range(count):
+        path, text = places[int(rng.integers(len(places)))]
+        value, step = Fraction(text), Fraction(1, 2 ** int(rng.integers(1, 60)))
+        more = [value * (1 + step), value * (1 - step), value + step, value - step, value * 2, value / 2, -value]
+        new = str([*more, Fraction(0)][int(rng.integers(8))])
+        yield path, again(changed(data, path, new), path, new)

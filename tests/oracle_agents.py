@@ -31,21 +31,22 @@ def false_claims_of_agents(data: Json, files: Mapping[str, bytes] | None = None)
     """Say what is false in an accepted certificate of agents of order n; an empty list if nothing is."""
     agents, functions = data["agents"], data["agents"]["functions"]
     known = data["influence"] is not None
-    proved = data["rates"]["proved"] is not None or not data["graph"]["edges"]
-    of_graph = {key: x for key, x in data.items() if key != "agents"}
-    of_graph["verdict"] = "certified" if known and proved else "undecided"
     judge = AgentOracle(data, files or {})
     certified = known and (bool(functions) or not data["graph"]["edges"])
     judge.require((data["verdict"] == "certified") is certified, "verdict")
     empty = data["initial_state"] is None and data["input"] is None and agents is not None
     judge.require(empty and not any(judge.sigma0), "what is said of agents of order 1")
     judge.judged()
-    of_graph["proof"] = [step for step in data["proof"] if step["of"] != "agents"]
-    return [*_of_graph(json.dumps({**of_graph, "digest": "", "unverified": {}}), files), *judge.false]
+    return [*of_graph_alone(data, files), *judge.false]
 
 
-def _of_graph(text: str, files: Mapping[str, bytes] | None) -> list[str]:
+def of_graph_alone(data: Json, files: Mapping[str, bytes] | None) -> list[str]:
     """Say what is false of the graph alone; most mutants of agents have the same."""
+    proved = data["rates"]["proved"] is not None or not data["graph"]["edges"]
+    of_graph = {key: x for key, x in data.items() if key != "agents"}
+    of_graph["verdict"] = "certified" if data["influence"] is not None and proved else "undecided"
+    of_graph["proof"] = [step for step in data["proof"] if step["of"] != "agents"]
+    text = json.dumps({**of_graph, "digest": "", "unverified": {}})
     return false_claims(json.loads(text), files) if files else list(_without_files(text))
 
 

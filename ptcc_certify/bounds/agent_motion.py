@@ -84,7 +84,9 @@ def decay_integral(w: Fraction, p: Fraction) -> Interval:
     ['1/4', '0']
     """
     if abs(w) > LARGEST_DECAY:
-        raise ParameterError(f"(a_2 + alpha rho1) T = {float(w):.4g} is beyond {LARGEST_DECAY}; take a smaller rest")
+        raise ParameterError(
+            f"(a_2 + alpha rho1) T = {float(w):.4g} is beyond {LARGEST_DECAY}; take a smaller rest, or cascade"
+        )
     term, total = 1 / (p + 1), Fraction(0)
     for j in range(MOST_TERMS):
         total += term

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -86,16 +86,50 @@ def compare_agents(
     pulls = np.sqrt((pull**2).sum(axis=1)).max(axis=-1)
     sizes = np.sqrt((z**2).sum(axis=1)).max(axis=-1)
     known = np.isfinite(deviation).all()
-    total = None
-    if bounds is not None:
-        actual = np.sqrt((run.input[..., later] ** 2).sum(axis=1)).max(axis=-1)
-        total = float(_ratio(actual, np.array([float_up(x) for x in bounds])).max())
     return AgentsComparison(
         decay,
         tuple(_ratio(sizes, deviation).max(axis=0).tolist()) if known else (),
         float(_ratio(pulls, relative).max()) if np.isfinite(relative).all() else None,
-        total,
+        _input_ratio(run, later, bounds),
     )
+
+
+def compare_with_bounds(
+    structure: Structure,
+    functions: Sequence[LyapunovFunction],
+    roots: Callable[[np.ndarray], Sequence[np.ndarray]],
+    deviations: Callable[[np.ndarray], np.ndarray],
+    bounds: Sequence[Fraction] | None,
+    run: AgentsTrajectory,
+) -> AgentsComparison:
+    """Compare a run with bounds over time: ``sqrt(V)`` of positions, deviations of every derivative, and the input.
+
+    Parameters
+    ----------
+    roots : callable
+        Of ``1 - t/T``, (M,), to bounds of ``sqrt(V)`` of every function.
+    deviations : callable
+        Of the same to (N, n, M) bounds.
+    """
+    later = np.isfinite(run.scaled).all(axis=(0, 1, 2)) & (run.t > 0)
+    z, q, L = run.scaled[..., later], run.remaining[later], structure.graph.laplacian()
+    weight, eta = np.exp(run.rate * run.clock[later] / 2), np.array([run.protocol.value(x) for x in q])
+    decay = 0.0
+    for V, bound in zip(functions, roots(q), strict=True):
+        values = (V.scaled(V.coordinates_of(z[:, :, :1], L)) ** 2).sum(axis=(0, 1, 2))
+        decay = max(decay, float(_ratio(np.sqrt(values), bound * weight).max()))
+    most = deviations(q) * weight / eta ** np.arange(z.shape[2])[:, None]
+    sizes = np.sqrt((z**2).sum(axis=1))
+    ratios = _ratio(sizes, most).max(axis=(0, 2)).tolist() if np.isfinite(most).all() else []
+    return AgentsComparison(decay, tuple(ratios), None, _input_ratio(run, later, bounds))
+
+
+def _input_ratio(run: AgentsTrajectory, later: np.ndarray, bounds: Sequence[Fraction] | None) -> float | None:
+    """Return the largest input over its bound; None without one."""
+    if bounds is None:
+        return None
+    actual = np.sqrt((run.input[..., later] ** 2).sum(axis=1)).max(axis=-1)
+    return float(_ratio(actual, np.array([float_up(x) for x in bounds])).max())
 
 
 def _ratio(size: np.ndarray, bound: np.ndarray) -> np.ndarray:

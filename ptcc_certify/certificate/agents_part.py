@@ -7,11 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
-from lmi.exact.decimal_rounding import down, float_down, float_up, up
+from lmi.exact.decimal_rounding import down, float_down, float_up, near, up
 from ptcc_certify.bounds.agent_motion import Interval, common_motion
 from ptcc_certify.bounds.agents import (
     States,
@@ -24,38 +23,20 @@ from ptcc_certify.bounds.agents import (
 from ptcc_certify.bounds.agents_comparison import AgentsComparison, compare_agents
 from ptcc_certify.bounds.final_state import Influence
 from ptcc_certify.bounds.input.tightest_bound import round_up
-from ptcc_certify.certificate.format_vectors import agents_ends, weighted_sum
+from ptcc_certify.certificate.agents_answer import AgentsAnswer, Intervals, Residual, UsedFunction, final_states
+from ptcc_certify.certificate.format_vectors import agents_ends
 from ptcc_certify.checker.input_formulas import Limits, decay_above
-from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.agents import Agents, AgentsProtocol
-from ptcc_certify.simulation.agents import AgentsTrajectory, simulate_agents
+from ptcc_certify.simulation.agents import AgentsTrajectory
 from ptcc_certify.theorems.agent_decrease import AgentMatrix, ScaledAgent, agent_matrix, paper_matrix, round_and_prove
 from ptcc_certify.theorems.theorem import Obligation
 
-Intervals = tuple[tuple[tuple[Interval, ...], ...], ...]
-
-
-@dataclass(frozen=True)
-class UsedFunction:
-    """A Lyapunov function of the graph that is used: its number, and the input constants of a full matrix."""
-
-    number: int
-    inputs: tuple[Fraction, ...] | None
-
-
-@dataclass(frozen=True)
-class Residual:
-    """What is left at ``T`` under a bounded gain: of each agent, of its position, velocity and so on."""
-
-    clock: Fraction
-    agents: tuple[tuple[Fraction, ...], ...]
-
 
 @dataclass(frozen=True, eq=False)
-class AgentsPart:
+class AgentsPart(AgentsAnswer):
     """What is proved of agents of order n.
 
     Attributes
@@ -91,16 +72,6 @@ class AgentsPart:
     notes: tuple[str, ...] = field(default=())
 
     @property
-    def order(self) -> int:
-        """``n``."""
-        return self.protocol.order
-
-    @property
-    def dimension(self) -> int:
-        """``d``, the coordinates of space."""
-        return len(self.protocol.offsets[0])
-
-    @property
     def decay(self) -> Fraction:
         """``R = r rho2 kappa``."""
         return self.matrix.rate * self.protocol.gain.pole
@@ -112,22 +83,12 @@ class AgentsPart:
         return gain if cap is None else min(gain, cap)
 
     @property
-    def formation(self) -> bool:
-        """Whether an agent has a place other than 0."""
-        return any(any(row) for row in self.protocol.offsets)
-
-    @property
     def settles(self) -> bool:
         """Whether the behaviour of the claim is proved at ``T`` itself, of positions less their places in a formation.
 
         A capped gain leaves something there, and gains without a Lyapunov function prove nothing.
         """
         return self.structure.graph.n_edges == 0 or (bool(self.functions) and self.protocol.gain_cap is None)
-
-    @property
-    def moving(self) -> bool:
-        """Whether some derivative of a final state is not 0."""
-        return any(m or r for agent in self.final_state or () for chain in agent for m, r in chain[1:])
 
     @property
     def unbounded(self) -> tuple[tuple[str, str], ...]:
@@ -148,16 +109,6 @@ class AgentsPart:
             if alpha < least:
                 found.append((f"rest {down(alpha)} is below {up(least, 4)}", f"--rest {up(least, 4)}"))
         return tuple(found)
-
-    @property
-    def longest_way(self) -> float:
-        """The longest way of an agent from its initial to its final position (numerical); 0 without a final state."""
-        begin, end = self.initial_state or (), self.final_state or ()
-        squares = [
-            sum(float(x[0] - m[0][0]) ** 2 for x, m in zip(agent, place, strict=True))
-            for agent, place in zip(begin, end, strict=False)
-        ]
-        return math.sqrt(max(squares, default=0.0))
 
     @cached_property
     def initial_values(self) -> tuple[Fraction, ...]:
@@ -207,38 +158,39 @@ class AgentsPart:
             )
             return roots[:, :, None] * np.exp(fall + 1e-9)
 
-    def columns(self) -> dict[str, list[float]]:
-        """Return initial and final states in floats, and bounds of the input, one number for each agent."""
-        names = ["x", "v", "a", *(f"x^({i})_" for i in range(3, self.order))][: self.order]
-        marks = [""] if self.dimension == 1 else [f"_{q + 1}" for q in range(self.dimension)]
-        table: dict[str, list[float]] = {}
-        for i, name in enumerate(names):
-            for q, mark in enumerate(marks):
-                if self.initial_state is not None:
-                    table[f"{name}{mark}(0)"] = [float(agent[q][i]) for agent in self.initial_state]
-                if self.final_state is not None:
-                    table[f"{name}{mark}(T)"] = [float(agent[q][i][0]) for agent in self.final_state]
-        return table | ({} if self.input is None else {"input": [float_up(x) for x in self.input]})
-
-    def simulate(self, **options: Any) -> AgentsTrajectory:
-        """Run the agents from their initial states; options are those of :func:`simulate_agents`.
-
-        Raises
-        ------
-        ParameterError
-            There are no initial states.
-        SimulationError
-            The integrator failed.
-        """
-        if self.initial_state is None:
-            raise ParameterError("the certificate has no initial state; certify the graph with x0")
-        states = [[[float(x) for x in chain] for chain in agent] for agent in self.initial_state]
-        return simulate_agents(self.structure.graph, self.protocol, states, float(self.matrix.rate), **options)
-
     def compare(self, run: AgentsTrajectory) -> AgentsComparison | None:
         """Compare a run with what is proved of it; None where nothing disagrees."""
         inputs = [one.inputs for one in self.used]
         return compare_agents(self.structure, self.matrix, self.functions, self.initial_values, inputs, self.input, run)
+
+    @property
+    def rate(self) -> Fraction:
+        """``r``, per unit of the stretched clock."""
+        return self.matrix.rate
+
+    @property
+    def weighing_rate(self) -> float:
+        """``r``."""
+        return float(self.matrix.rate)
+
+    def fall(self, remaining: float) -> float:
+        """Return ``e^(-r s/2)``, which deviations are of the first ones at most, in the norm of ``V``."""
+        return math.exp(-float(self.matrix.rate) * float(self.protocol.clock(np.array([remaining]))[0]) / 2)
+
+    @property
+    def nearer(self) -> str:
+        """What leaves less by ``T``."""
+        return f"a larger --decay, such as {2 * math.ceil(self.decay)}, leaves less"
+
+    @property
+    def proof_text(self) -> tuple[str, str]:
+        """What the long screen tells of gains and of the proof."""
+        matrix = self.matrix
+        gains = ", ".join(str(float(K)) for K in self.protocol.gains)
+        pieces, count = max(len(matrix.points) - 1, 0), len(self.used)
+        proof = f"V <= e^(-r s) V(0), r = {down(matrix.rate)}, R = r rho2 kappa = {near(self.decay)}; one matrix for "
+        proof += f"{count} Lyapunov function{'s' * (count != 1)}, {pieces} pieces"
+        return f"K = ({gains}), coupling {near(matrix.coupling)}", proof
 
     def __repr__(self) -> str:
         size = "" if self.input is None else f", |u_k| <= {up(max(self.input), 4)}"
@@ -304,33 +256,13 @@ def prove_agents(
         common_motion(agents.coefficients, agents.own, gain),
     )
     decided = initial_state is not None and bool(used or not structure.graph.n_edges)
-    final = _final_state(part, influence) if influence.exact and decided else None
+    final = final_states(part, influence) if influence.exact and decided else None
     return replace(part, final_state=final, residual=_residual(part), input=_input(part, influence))
 
 
 def _coupling(rate: Fraction) -> Fraction:
     """Return a short number not below the reciprocal of a rate."""
     return Fraction(up(1 / rate, 6))
-
-
-def _final_state(part: AgentsPart, influence: Influence) -> Intervals:
-    """Return where the agents end, with their velocities and so on."""
-    offsets, zero = part.protocol.offsets, Fraction(0)
-    coordinates = []
-    for q in range(part.dimension):
-        begin = [
-            [(x - (h[q] if i == 0 else 0), zero) for i, x in enumerate(agent[q])]
-            for agent, h in zip(part.initial_state or (), offsets, strict=True)
-        ]
-        columns = [agents_ends(influence, [weighted_sum(row, chain) for chain in begin]) for row in part.motion]
-        coordinates.append(list(zip(*columns, strict=True)))
-    return tuple(
-        tuple(
-            tuple((m + (offsets[k][q] if i == 0 else 0), r) for i, (m, r) in enumerate(coordinates[q][k]))
-            for q in range(part.dimension)
-        )
-        for k in range(len(offsets))
-    )
 
 
 def _residual(part: AgentsPart) -> Residual | None:

@@ -106,7 +106,7 @@ class Certificate(Content, FromFile, Shown):
         What holds while leaders move; None where nothing was asked of that.
     source : Source or None
         The file that it was read from.
-    agents : AgentsPart or None
+    agents : AgentsAnswer or None
         What is proved of agents of order n; then initial and final states are there, and not above.
 
     References

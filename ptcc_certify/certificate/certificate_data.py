@@ -26,7 +26,7 @@ from ptcc_certify.bounds.late_messages import LateBounds
 from ptcc_certify.bounds.sliding_envelope import SlidingEnvelope
 from ptcc_certify.bounds.small_delays import DecayingForm
 from ptcc_certify.bounds.tracking import Tracking
-from ptcc_certify.certificate.agents_part import AgentsPart
+from ptcc_certify.certificate.agents_answer import AgentsAnswer
 from ptcc_certify.certificate.format_leaders import tracking_obligations
 from ptcc_certify.certificate.format_messages import late_obligations
 from ptcc_certify.certificate.format_vectors import final_state_witness
@@ -143,7 +143,7 @@ class Content:
     late: LateBounds | None = None
     tracking: Tracking | None = None
     source: Source | None = None
-    agents: AgentsPart | None = None
+    agents: AgentsAnswer | None = None
 
     def changed(self, **values: Any) -> Self:
         """Return the certificate with other parts, in whichever group they are; what follows is computed anew.

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
-from ptcc_certify.certificate.agents_part import AgentsPart, Residual, UsedFunction
+from ptcc_certify.bounds.cascade import Roots
+from ptcc_certify.certificate.agents_answer import AgentsAnswer, Residual, UsedFunction
+from ptcc_certify.certificate.agents_part import AgentsPart
+from ptcc_certify.certificate.cascade_part import CascadePart
 from ptcc_certify.certificate.format_vectors import Writer, interval_text, number, text
 from ptcc_certify.checker.reading import exact, interval, triangle
 from ptcc_certify.graphs.rationals import format_exact
@@ -14,13 +17,22 @@ from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.agents import AgentsProtocol
+from ptcc_certify.protocols.cascade import CascadeProtocol
 from ptcc_certify.theorems.agent_decrease import AgentMatrix
 
 Section = Mapping[str, Any]
 
 
-def agents_section(part: AgentsPart, out: Writer) -> dict[str, Any]:
+def agents_section(part: AgentsAnswer, out: Writer) -> dict[str, Any]:
     """Return the section ``agents``."""
+    writers: dict[type, Callable[[Any, Writer], dict[str, Any]]] = {
+        AgentsPart: _section_of_matrix,
+        CascadePart: _section_of_cascade,
+    }
+    return writers[type(part)](part, out)
+
+
+def _section_of_matrix(part: AgentsPart, out: Writer) -> dict[str, Any]:
     protocol, matrix, residual = part.protocol, part.matrix, part.residual
     return {
         "order": part.order,
@@ -47,6 +59,25 @@ def agents_section(part: AgentsPart, out: Writer) -> dict[str, Any]:
     }
 
 
+def _section_of_cascade(part: CascadePart, out: Writer) -> dict[str, Any]:
+    used = [{"function": one.number, "inputs": out.state("inputs", one.inputs)} for one in part.used]
+    known = part.initial_state is not None
+    roots = [dict(zip(("initial", "drive"), map(format_exact, root), strict=True)) for root in part.roots]
+    absent = {"initial": None, "drive": None}
+    begin, final, bounds = part.initial_state, part.final_state, part.input
+    return {
+        "cascade": format_exact(part.alpha),
+        "dimension": part.dimension,
+        "functions": [one | (roots[k] if known else absent) for k, one in enumerate(used)],
+        "offsets": _by_agent(out, [_texts(row) for row in part.protocol.offsets]),
+        "initial_state": begin and _by_agent(out, [[_texts(chain) for chain in agent] for agent in begin]),
+        "motion": [list(map(interval_text, row)) for row in part.motion],
+        "final_state": final
+        and _by_agent(out, [[list(map(interval_text, chain)) for chain in agent] for agent in final]),
+        "input": bounds and {"agents": _by_agent(out, _texts(bounds)), "largest": format_exact(max(bounds))},
+    }
+
+
 def _texts(values: Sequence[Fraction]) -> list[str]:
     return list(map(format_exact, values))
 
@@ -57,30 +88,72 @@ def _by_agent(out: Writer, values: Sequence[Any]) -> dict[str, Any]:
 
 def read_agents(
     section: Section | None, structure: Structure, base: Protocol, functions: Sequence[LyapunovFunction]
-) -> AgentsPart | None:
+) -> AgentsAnswer | None:
     """Read the section of an accepted certificate; None if it has none."""
     if section is None:
         return None
-    plant, own, gains, points = (tuple(map(exact, section[key])) for key in ("plant", "own", "gains", "points"))
-    W = tuple(map(tuple, triangle(section["lower_triangle"], section["order"])))
-    matrix = AgentMatrix(W, exact(section["rate"]), points, exact(section["coupling"]), gains)
-    offsets = tuple(tuple(map(exact, row)) for row in section["offsets"].values())
-    protocol = AgentsProtocol(base, plant, own, gains, offsets, number(section["gain_cap"]))
-    used = tuple(
+    read = _read_cascade if "cascade" in section else _read_matrix
+    return read(section, structure, base, functions)
+
+
+def _read_cascade(
+    section: Section, structure: Structure, base: Protocol, functions: Sequence[LyapunovFunction]
+) -> CascadePart:
+    entries = section["functions"]
+    roots = [Roots(exact(one["initial"]), exact(one["drive"])) for one in entries if one["initial"] is not None]
+    return CascadePart(
+        structure,
+        CascadeProtocol.of(base, exact(section["cascade"]), _offsets(section)),
+        _used(section),
+        tuple(functions[one["function"]] for one in entries),
+        tuple(roots),
+        _states(section["initial_state"], exact),
+        tuple(tuple(map(interval, row)) for row in section["motion"]),
+        _states(section["final_state"], interval),
+        _bounds(section),
+    )
+
+
+def _used(section: Section) -> tuple[UsedFunction, ...]:
+    return tuple(
         UsedFunction(one["function"], one["inputs"] and tuple(map(exact, one["inputs"].values())))
         for one in section["functions"]
     )
-    begin, end, residual, bounds = (section[key] for key in ("initial_state", "final_state", "residual", "input"))
+
+
+def _offsets(section: Section) -> tuple[tuple[Fraction, ...], ...]:
+    return tuple(tuple(map(exact, row)) for row in section["offsets"].values())
+
+
+def _states(section: Section | None, read: Callable[[Any], Any]) -> tuple[tuple[tuple[Any, ...], ...], ...] | None:
+    if section is None:
+        return None
+    return tuple(tuple(tuple(map(read, chain)) for chain in agent) for agent in section.values())
+
+
+def _bounds(section: Section) -> tuple[Fraction, ...] | None:
+    bounds = section["input"]
+    return bounds and tuple(map(exact, bounds["agents"].values()))
+
+
+def _read_matrix(
+    section: Section, structure: Structure, base: Protocol, functions: Sequence[LyapunovFunction]
+) -> AgentsPart:
+    plant, own, gains, points = (tuple(map(exact, section[key])) for key in ("plant", "own", "gains", "points"))
+    W = tuple(map(tuple, triangle(section["lower_triangle"], section["order"])))
+    matrix = AgentMatrix(W, exact(section["rate"]), points, exact(section["coupling"]), gains)
+    protocol = AgentsProtocol(base, plant, own, gains, _offsets(section), number(section["gain_cap"]))
+    used, residual = _used(section), section["residual"]
     return AgentsPart(
         structure,
         protocol,
         matrix,
         used,
         tuple(functions[one.number] for one in used),
-        begin and tuple(tuple(tuple(map(exact, chain)) for chain in agent) for agent in begin.values()),
+        _states(section["initial_state"], exact),
         tuple(tuple(map(interval, row)) for row in section["motion"]),
-        end and tuple(tuple(tuple(map(interval, chain)) for chain in agent) for agent in end.values()),
+        _states(section["final_state"], interval),
         residual
         and Residual(exact(residual["clock"]), tuple(tuple(map(exact, row)) for row in residual["agents"].values())),
-        bounds and tuple(map(exact, bounds["agents"].values())),
+        _bounds(section),
     )

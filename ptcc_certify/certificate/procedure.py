@@ -36,6 +36,7 @@ from ptcc_certify.bounds.small_delays import SmallDelayBounds
 from ptcc_certify.bounds.tracking import Tracking, bound_tracking
 from ptcc_certify.certificate.agents_part import prove_agents
 from ptcc_certify.certificate.agents_request import Chains, read_chains, refuse_agents
+from ptcc_certify.certificate.cascade_part import prove_cascade
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.certificate_data import Observations
 from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
@@ -300,7 +301,8 @@ def _with_agents(certificate: Certificate, agents: Agents, chains: Chains, run: 
     """Return the certificate of a graph as one of agents of order n on it."""
     functions = certificate.functions
     try:
-        part = prove_agents(
+        prove = prove_agents if agents.cascade is None else prove_cascade
+        part = prove(
             certificate.structure,
             certificate.protocol,
             agents,

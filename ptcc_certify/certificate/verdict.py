@@ -24,7 +24,7 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.bounds.envelope import Envelope
-from ptcc_certify.certificate.agents_part import AgentsPart
+from ptcc_certify.certificate.agents_answer import AgentsAnswer
 from ptcc_certify.certificate.answer import MET, OPEN, REFUTED, Answer
 from ptcc_certify.certificate.certificate_data import Content
 from ptcc_certify.certificate.late_answers import (
@@ -272,7 +272,7 @@ def judge_rate(certificate: Content, least: Fraction) -> Answer:
     """Tell whether a rate of at least so much is proved, or excluded by the proved upper bound."""
     what, rate, bound = f"rate >= {near(least, 12)}", certificate.rate, certificate.upper_bound
     if certificate.agents is not None:
-        rate, bound = certificate.agents.matrix.rate if certificate.agents.functions else None, None
+        rate, bound = certificate.agents.rate if certificate.agents.functions else None, None
     if certificate.constant or (rate is not None and rate >= least):
         return Answer(MET, what)
     if bound is not None and least > bound:
@@ -393,7 +393,7 @@ def _usefulness(certificate: Content) -> tuple[bool, str, Fraction | None]:
     return False, remark, _useful_rho2(envelope, constant, p.kappa)
 
 
-def _assess_agents(part: AgentsPart) -> tuple[bool | None, str, str, str]:
+def _assess_agents(part: AgentsAnswer) -> tuple[bool | None, str, str, str]:
     """Return whether bounds of agents of order n say something by ``T``, what, what is not proved, and a mend."""
     capped, caveat, advice = part.protocol.gain_cap is not None, "", ""
     if part.unbounded:
@@ -401,7 +401,7 @@ def _assess_agents(part: AgentsPart) -> tuple[bool | None, str, str, str]:
         caveat = "the input is not certified bounded"
         advice = f"{' and '.join(mends)} bound{'s' * (len(mends) == 1)} it"
     last = np.array([0.0 if capped else float(LAST)])
-    fall = math.exp(-float(part.matrix.rate) * float(part.protocol.clock(last)[0]) / 2)
+    fall = part.fall(float(last[0]))
     worst = float(part.deviation_bound(last)[:, 0].max(initial=0.0))
     when = "T" if capped else "0.99 T"
     remark = f"every position within {up(worst, 2)} of its place at {when}"
@@ -409,7 +409,7 @@ def _assess_agents(part: AgentsPart) -> tuple[bool | None, str, str, str]:
         return fall <= USEFUL, f"deviations at {when} are {up(fall, 2)} of the first ones", caveat, advice
     useful = worst <= USEFUL * part.longest_way if part.longest_way else fall <= USEFUL
     if not useful and not capped and not advice:
-        advice = f"a larger --decay, such as {2 * math.ceil(part.decay)}, leaves less"
+        advice = part.nearer
     return useful, remark, caveat, advice
 
 

@@ -19,6 +19,7 @@ from ptcc_certify.checker.agent_motion import States
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.final_state import FinalState
 from ptcc_certify.checker.graph import by_agent, ordered
+from ptcc_certify.checker.input import Verified, check_constants
 from ptcc_certify.checker.input_formulas import Limits, root_above
 from ptcc_certify.checker.lyapunov import Function
 from ptcc_certify.checker.matrix_products import Matrix
@@ -38,11 +39,14 @@ class Used:
 
     Attributes
     ----------
+    number : int
+        Of ``lyapunov.functions``.
     function : Function
     inputs : list of Fraction or None
         ``c_k`` with ``e_k^2 <= c_k E'P E`` of a full matrix; None: not known, or those of a diagonal one.
     """
 
+    number: int
     function: Function
     inputs: Sequence[Fraction] | None
 
@@ -59,6 +63,17 @@ class Used:
         nodes, weights = (form.nodes, form.diagonal or ()) if form is not None else function.by_rows or ((), ())
         own = dict(zip(nodes, weights, strict=True))
         return [1 / own[v] if v in own else Fraction(0) for v in range(graph.n)]
+
+
+def read_used(doc: Document, verified: Verified, entry: Any, before: int) -> Used:
+    """Read which Lyapunov function is used, after the one of number ``before``, and verify its constants."""
+    doc.at, k, known = "agents.functions", entry["function"], verified.functions
+    need(type(k) is int and before < k < len(known), "functions that are used: none such, or in another order")
+    need(known[k].rate > 0, "a Lyapunov function that is used and does not decay")
+    constants = None
+    if entry["inputs"] is not None:
+        constants = check_constants(doc, verified.structure.graph, known[k], k, entry["inputs"])
+    return Used(k, known[k], constants)
 
 
 @dataclass(frozen=True)

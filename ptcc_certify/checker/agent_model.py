@@ -24,21 +24,16 @@ MANY_POINTS = 257
 
 
 @dataclass(frozen=True)
-class Agents:
-    """Agents ``x^(n) + a_n x^(n-1) + .. + a_1 x = u`` in ``d`` coordinates, and what they run.
+class Chains:
+    """What agents of order n are, and what they feed back of their own state, in ``d`` coordinates.
 
     Attributes
     ----------
     n, d : int
-    plant, own, gains : n numbers
-        ``a``, ``f`` and ``K``.
-    coupling, rate : Fraction
-        ``c`` and ``r``, both positive.
-    W : n rows of n numbers
-        Symmetric.
+    plant, own : n numbers
+        ``a`` and ``f``.
     cap : Fraction or None
-        Positive.
-    points : list of Fraction
+        What the gain is at most; positive.
     gain : PrescribedGain
         Before the cap; its ``rho1`` may be 0.
     """
@@ -47,12 +42,7 @@ class Agents:
     d: int
     plant: Sequence[Fraction]
     own: Sequence[Fraction]
-    gains: Sequence[Fraction]
-    coupling: Fraction
-    W: Sequence[Sequence[Fraction]]
-    rate: Fraction
     cap: Fraction | None
-    points: Sequence[Fraction]
     gain: PrescribedGain
 
     @property
@@ -64,6 +54,28 @@ class Agents:
     def eta_0(self) -> Fraction:
         """The gain at time 0."""
         return self.first_gain if self.cap is None else min(self.first_gain, self.cap)
+
+
+@dataclass(frozen=True)
+class Agents(Chains):
+    """Agents ``x^(n) + a_n x^(n-1) + .. + a_1 x = u`` in ``d`` coordinates, and what they run.
+
+    Attributes
+    ----------
+    gains : n numbers
+        ``K``.
+    coupling, rate : Fraction
+        ``c`` and ``r``, both positive.
+    W : n rows of n numbers
+        Symmetric.
+    points : list of Fraction
+    """
+
+    gains: Sequence[Fraction]
+    coupling: Fraction
+    W: Sequence[Sequence[Fraction]]
+    rate: Fraction
+    points: Sequence[Fraction]
 
     @cached_property
     def scaled_W(self) -> tuple[Matrix, int]:
@@ -84,14 +96,14 @@ class Agents:
 
 def read_agents(section: Any, gain: PrescribedGain) -> Agents:
     """Return what the section says of one agent, within its limits; the section has its keys."""
-    n, d = (_count(section, *limit) for limit in (("order", LARGEST_ORDER), ("dimension", LARGEST_DIMENSION)))
+    n, d = (count(section, *limit) for limit in (("order", LARGEST_ORDER), ("dimension", LARGEST_DIMENSION)))
     plant, own, gains = (_each(section[key], n, key) for key in ("plant", "own", "gains"))
     W = triangle(section["lower_triangle"], n)
     need(len(entries(section["points"], "points")) <= MANY_POINTS, f"more than {MANY_POINTS} points")
     points = [exact(x) for x in section["points"]]
     coupling, rate = exact(section["coupling"]), exact(section["rate"])
     cap = None if section["gain_cap"] is None else exact(section["gain_cap"])
-    agents = Agents(n, d, plant, own, gains, coupling, W, rate, cap, points, gain)
+    agents = Agents(n, d, plant, own, cap, gain, gains, coupling, W, rate, points)
     numbers = (*plant, *own, *gains, *points, *(x for row in W for x in row), coupling, rate, cap or coupling)
     longest = length((*numbers, gain.T, gain.rho1, gain.k))
     need(longest <= LONGEST, f"agents: a number of {longest} bits; {LONGEST} are taken")
@@ -118,7 +130,8 @@ def _check_own(agents: Agents) -> None:
         need(agents.cap is None, "feedback of the own velocity with a gain that is capped")
 
 
-def _count(section: Any, key: str, largest: int) -> int:
+def count(section: Any, key: str, largest: int) -> int:
+    """Read an integer from 1 to ``largest``."""
     value = section[key]
     need(type(value) is int and 1 <= value <= largest, f"{key} is no integer from 1 to {largest}")
     return value

@@ -10,7 +10,7 @@ from typing import Any
 from lmi.exact.matrix_exponential import expm
 from lmi.exact.numbers import integers, longest, shorten
 from lmi.exact.work import spend
-from ptcc_certify.checker.agent_model import Agents
+from ptcc_certify.checker.agent_model import Chains
 from ptcc_certify.checker.final_state import FinalState
 from ptcc_certify.checker.graph import ordered
 from ptcc_certify.checker.proof_cursor import Document
@@ -27,7 +27,7 @@ ENTRY, ROUNDED_ENTRY = 800, 800
 States = Sequence[Sequence[Sequence[Fraction]]]
 
 
-def check_motion(doc: Document, agents: Agents, section: Any) -> list[list[Interval]]:
+def check_motion(doc: Document, agents: Chains, section: Any) -> list[list[Interval]]:
     """Verify ``M``, which takes the common motion from time 0 to the deadline; return it."""
     doc.open("agent-motion", "agents")
     n = agents.n
@@ -41,7 +41,7 @@ def check_motion(doc: Document, agents: Agents, section: Any) -> list[list[Inter
     return M
 
 
-def _motion(agents: Agents) -> tuple[list[list[Interval]], Fraction]:
+def _motion(agents: Chains) -> tuple[list[list[Interval]], Fraction]:
     """Return ends of the entries of ``M``, and how far it may be beyond them."""
     n, T, zero = agents.n, agents.gain.T, Fraction(0)
     if any(agents.own):  # at rest
@@ -99,9 +99,12 @@ def rest_integral(p: Fraction, w: Fraction, bits: int = BITS) -> Interval:
 
 
 def check_final_states(
-    doc: Document, agents: Agents, final: FinalState, M: Sequence[Sequence[Interval]], states: States, offsets: Any
+    doc: Document, agents: Chains, final: FinalState, M: Sequence[Sequence[Interval]], states: States, offsets: Any
 ) -> None:
-    """Verify the interval of every agent, coordinate and derivative: ``h_k + sum_l Q_kl sum_j M_ij g_lj``."""
+    """Verify the interval of every agent, coordinate and derivative: ``h_k + sum_l Q_kl sum_j M_ij g_lj``.
+
+    Of as many derivatives as ``M`` has rows.
+    """
     doc.open("agent-final-state", "agents")
     labels, n = final.structure.graph.labels, agents.n
     rounded = any(wide for row in M for _, wide in row)
@@ -110,7 +113,7 @@ def check_final_states(
     spend(products * len(labels) * agents.d * n, bits, bits, "the final states of agents")
     section = ordered(labels, doc.data["agents"]["final_state"], "final_state")
     claimed = [
-        [[interval(x) for x in entries(row, "derivatives", n)] for row in entries(rows, "coordinates", agents.d)]
+        [[interval(x) for x in entries(row, "derivatives", len(M))] for row in entries(rows, "coordinates", agents.d)]
         for rows in section.values()
     ]
     for axis in range(agents.d):
@@ -138,10 +141,16 @@ def _combined(row: Sequence[Fraction], G: Sequence[Sequence[Fraction]]) -> list[
     return [Fraction(x, unit * scale) for x in sums]
 
 
-def read_states(labels: Sequence[str], entry: Any, what: str, agents: Agents) -> States:
+def read_states(labels: Sequence[str], entry: Any, what: str, agents: Chains) -> States:
     """Read by agent numbers for every coordinate and derivative."""
     section = ordered(labels, entry, what)
     return [
         [[exact(x) for x in entries(row, "derivatives", agents.n)] for row in entries(rows, "coordinates", agents.d)]
         for rows in section.values()
     ]
+
+
+def read_offsets(section: Any, labels: Sequence[str], agents: Chains) -> list[list[Fraction]]:
+    """Read the offset of every agent, coordinate by coordinate."""
+    rows = ordered(labels, section, "offsets").values()
+    return [[exact(x) for x in entries(row, "an offset", agents.d)] for row in rows]

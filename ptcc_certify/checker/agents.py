@@ -7,14 +7,14 @@ from fractions import Fraction
 from typing import Any
 
 from lmi.exact.work import spend
-from ptcc_certify.checker.agent_bounds import Begin, Used, check_input, check_residual
+from ptcc_certify.checker.agent_bounds import Begin, Used, check_input, check_residual, read_used
+from ptcc_certify.checker.agent_cascade import check_cascade
 from ptcc_certify.checker.agent_decrease import check_decrease
 from ptcc_certify.checker.agent_model import Agents, read_agents
-from ptcc_certify.checker.agent_motion import check_final_states, check_motion, read_states
-from ptcc_certify.checker.graph import ordered
-from ptcc_certify.checker.input import Verified, check_constants
+from ptcc_certify.checker.agent_motion import check_final_states, check_motion, read_offsets, read_states
+from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import entries, exact, fields, length, need
+from ptcc_certify.checker.reading import entries, fields, length, need
 
 KEYS = (
     *("order", "dimension", "plant", "own", "gains", "coupling", "lower_triangle", "rate", "gain_cap", "points"),
@@ -28,9 +28,11 @@ def check_agents(doc: Document, verified: Verified) -> bool:
     The initial state of the document is null: that of the agents stands here.
     """
     _check_document(doc, verified)
+    if isinstance(doc.data["agents"], dict) and "cascade" in doc.data["agents"]:
+        return check_cascade(doc, verified)
     section, graph = fields(doc.section("agents"), KEYS, "agents"), verified.structure.graph
     agents = read_agents(section, verified.gain)
-    offsets = _offsets(section["offsets"], graph.labels, agents)
+    offsets = read_offsets(section["offsets"], graph.labels, agents)
     states = section["initial_state"]
     begin = None
     if states is not None:
@@ -60,24 +62,12 @@ def _check_document(doc: Document, verified: Verified) -> None:
     need(not any(verified.begin.sigma or ()), "agents of order n begin with sliding variables that are 0")
 
 
-def _offsets(section: Any, labels: Sequence[str], agents: Agents) -> list[list[Fraction]]:
-    """Read the offset of every agent, coordinate by coordinate."""
-    rows = ordered(labels, section, "offsets").values()
-    return [[exact(x) for x in entries(row, "an offset", agents.d)] for row in rows]
-
-
 def _functions(doc: Document, verified: Verified, section: Any) -> list[Used]:
     """Read which Lyapunov functions are used, and verify constants of the input of full ones."""
-    used, before, known = list[Used](), -1, verified.functions
+    used = list[Used]()
     for entry in entries(section, "functions"):
-        doc.at = "agents.functions"
-        k = fields(entry, ("function", "inputs"), "a function that is used")["function"]
-        need(type(k) is int and before < k < len(known), "functions that are used: none such, or in another order")
-        need(known[k].rate > 0, "a Lyapunov function that is used and does not decay")
-        before, constants = k, None
-        if entry["inputs"] is not None:
-            constants = check_constants(doc, verified.structure.graph, known[k], k, entry["inputs"])
-        used.append(Used(known[k], constants))
+        before = used[-1].number if used else -1
+        used.append(read_used(doc, verified, fields(entry, ("function", "inputs"), "a function that is used"), before))
     return used
 
 

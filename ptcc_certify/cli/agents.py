@@ -22,7 +22,7 @@ NAMES = {"integrator": 1, "double-integrator": 2, "triple-integrator": 3}
 #: The largest order, which the library refuses to exceed.
 _MOST_ORDER = 8
 #: Options that need ``--agents``.
-_OWN = ("drag", "plant", "v0", "a0", "offsets", "biases", "rest", "decay")
+_OWN = ("drag", "plant", "v0", "a0", "offsets", "biases", "rest", "cascade", "decay")
 
 #: Options that are of single integrators alone, and what to do instead.
 _OF_SINGLE_INTEGRATORS = {
@@ -47,6 +47,9 @@ agents_options = options_of(
     click.option("--offsets", metavar="STATE", help="Agents: their places in a formation, like --x0."),
     click.option("--biases", metavar="STATE", help="Agents: what is added to their relative positions, like --x0."),
     click.option("--rest", metavar="ALPHA", help="Double integrators meet at rest: damping of their own velocity."),
+    click.option(
+        "--cascade", metavar="ALPHA", help="Double integrators track the plain protocol's velocity, at this rate."
+    ),
     click.option("--decay", metavar="R", help="Agents: deviations fall like (1 - t/T)^(R/2).  [default: 2 n]"),
 )
 #: Of commands that take vectors of agents of order n alone.
@@ -76,7 +79,7 @@ def agents_of(options: Options) -> Agents | None:
         plant = [exact_number(text, "--plant") for text in options["plant"].split(",")]
     numbers = {
         name: None if options[name] is None else exact_number(options[name], flag_of(name))
-        for name in ("drag", "rest", "decay")
+        for name in ("drag", "rest", "cascade", "decay")
     }
     return Agents(
         int(order), plant, offsets=options["offsets"], biases=options["biases"], gain_cap=options["gain_cap"], **numbers

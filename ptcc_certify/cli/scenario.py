@@ -90,6 +90,7 @@ SECTIONS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
             "offsets": ("offsets", '"offsets.csv"'),
             "biases": ("biases", '"biases.csv"'),
             "rest": ("rest", "1"),
+            "cascade": ("cascade", "1"),
             "decay": ("decay", "4"),
         },
     ),

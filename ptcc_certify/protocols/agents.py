@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lmi.exact.decimal_rounding import near
 from ptcc_certify.errors import NumberError, ParameterError, gated
 from ptcc_certify.graphs.digraph import Exact
 from ptcc_certify.graphs.io import as_graph
@@ -49,7 +50,10 @@ class Agents:
     drag : number or str, optional
         ``a_n`` alone, such as the drag of a vehicle; may be negative.
     rest : number or str, optional
-        ``alpha > 0``: agents of order 2 meet at rest, by ``-alpha eta`` times their own velocity.
+        ``alpha > 0``: agents of order 2 meet at rest, by ``-alpha eta`` times their own velocity; gains as designed.
+    cascade : number or str, optional
+        ``alpha > 0``: double integrators track the velocity that the paper's protocol commands, at this rate per unit
+        of the clock. No gain depends on the graph; see :class:`~ptcc_certify.protocols.cascade.CascadeProtocol`.
     decay : number or str, optional
         ``R = r rho2 kappa``: deviations decay like ``(1 - t/T)^(R/2)`` near ``T``; above ``2 (n - 1)``. By default
         ``2 n``, from which on the input is bounded; single integrators without it run the paper's protocol, ``K = 1``.
@@ -79,6 +83,7 @@ give 4, from which on the input is bounded
     plant: Sequence[Exact] | None = None
     drag: Exact | None = None
     rest: Exact | None = None
+    cascade: Exact | None = None
     decay: Exact | None = None
     offsets: Any = None
     biases: Any = None
@@ -102,7 +107,7 @@ give 4, from which on the input is bounded
                 raise ParameterError("drag is the last number of plant; give one of them")
             plant[-1] = _number("drag", self.drag)
         values: dict[str, Any] = {"order": order, "plant": tuple(plant), "drag": None}
-        for name in ("rest", "decay", "gain_cap"):
+        for name in ("rest", "cascade", "decay", "gain_cap"):
             value = getattr(self, name)
             values[name] = None if value is None else parameter(name, value)
         for name, value in values.items():
@@ -111,6 +116,8 @@ give 4, from which on the input is bounded
 
     def _refuse(self) -> None:
         """Refuse what does not fit together."""
+        if self.cascade is not None:
+            self._refuse_beside_cascade()
         n, decay = self.degree, self.decay_rate
         if decay > MOST_DECAY:
             raise ParameterError(f"decay = {float(decay):.6g} is above {MOST_DECAY}; no input follows such gains")
@@ -129,6 +136,20 @@ give 4, from which on the input is bounded
             if why:
                 raise ParameterError(f"rest = {readable(self.alpha)}: meeting at rest is proved for {why}")
 
+    def _refuse_beside_cascade(self) -> None:
+        """Refuse what the cascade does not take."""
+        own = "; its gains are its own" if self.decay is not None else "; it brings agents to rest by itself"
+        given = next((name for name in ("rest", "decay", "gain_cap") if getattr(self, name) is not None), None)
+        why = ""
+        if given is not None:
+            why = f"leave {given} out{own if given != 'gain_cap' else ': it is proved of an unlimited gain'}"
+        elif self.degree != 2:
+            why = f"it is proved of agents of order 2; these are of order {self.degree}"
+        elif any(self.coefficients):
+            why = "it is proved of double integrators without drag or forces; cancel them by the input, or leave it out"
+        if why:
+            raise ParameterError(f"cascade = {readable(self.alpha)}: {why}")
+
     @property
     def degree(self) -> int:
         """``n``."""
@@ -142,12 +163,13 @@ give 4, from which on the input is bounded
     @property
     def alpha(self) -> Fraction:
         """``alpha`` of the own velocity; 0 if the agents need not rest."""
-        return Fraction(0) if self.rest is None else Fraction(self.rest)
+        value = self.rest if self.cascade is None else self.cascade
+        return Fraction(0) if value is None else Fraction(value)
 
     @property
     def own(self) -> tuple[Fraction, ...]:
         """``f_1`` to ``f_n``: what each agent feeds back of its own state."""
-        return tuple(self.alpha if i == 1 and self.rest is not None else Fraction(0) for i in range(self.degree))
+        return tuple(self.alpha if i == 1 else Fraction(0) for i in range(self.degree))
 
     @property
     def cap(self) -> Fraction | None:
@@ -289,6 +311,33 @@ class AgentsProtocol:
         cap = 0.0 if self.gain_cap is None else float(self.gain_cap)
         return self.gain.clock_at_remaining(np.maximum(q, turn)) + cap * float(self.gain.T) * np.maximum(turn - q, 0)
 
+    def shrinking(self, eta: np.ndarray) -> np.ndarray:
+        """Return ``theta = (1 - rho1/eta)^2/k``, minus the derivative of ``1/eta``, while the gain is not capped."""
+        return (1 - float(self.gain.rho1) / eta) ** 2 / float(self.gain.pole)
+
+    def gains_at(self, theta: Any) -> tuple[Any, ...]:
+        """Return ``K`` where ``d(1/eta)/dt = -theta``: here the same at all times."""
+        return tuple(map(float, self.gains))
+
+    def agree_if_above(self, slowest: float) -> bool:
+        """Tell whether derivatives agree at ``T`` where ``k Re lambda`` is this at least: gains as designed do it."""
+        return True
+
+    def law(self) -> str:
+        """Tell the input in one line, ``g`` standing for the gain.
+
+        Examples
+        --------
+        >>> from ptcc_certify.protocols import NominalProtocol
+        >>> base, zero = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), Fraction(0)
+        >>> AgentsProtocol(base, (zero,) * 2, (zero, Fraction(1)), (Fraction(3), Fraction(2)), ((zero,),), None).law()
+        "3 g^2 e + 2 g e' - 1 g x'"
+        """
+        n = self.order
+        terms = [f"{near(K)} {_power(n - i)}{_primed('e', i)}" for i, K in enumerate(self.gains)]
+        own = [f" - {near(f)} {_power(n - i)}{_primed('x', i)}" for i, f in enumerate(self.own) if f]
+        return " + ".join(terms) + "".join(own)
+
     def _gain(self, t: ca.SX) -> ca.SX:
         import casadi as ca
 
@@ -316,11 +365,12 @@ class AgentsProtocol:
         import casadi as ca
 
         graph, eta, n = as_graph(graph), self._gain(t), self.order
+        gains = self.gains_at(ca.jacobian(eta, t) / eta**2)
         h = ca.vertcat(*(float(row[coordinate]) for row in self.offsets))
         total = float(self.plant[0]) * ca.SX(h)
         for i in range(n):
             y = states[i] - h if i == 0 else states[i]
-            total = total + eta ** (n - i) * (float(self.gains[i]) * coupling(graph, y) - float(self.own[i]) * y)
+            total = total + eta ** (n - i) * (gains[i] * coupling(graph, y) - float(self.own[i]) * y)
         return total
 
     def closed_loop(self, graph: Any, coordinate: int = 0) -> dict[str, ca.SX]:
@@ -363,16 +413,29 @@ class AgentsProtocol:
             total += float(K) * g ** (n - i) * ca.SX.sym(_derivative("e_{k}", i))
             total -= float(f) * g ** (n - i) * ca.SX.sym(_derivative(own if i == 0 else "x_{k}", i)) if f else 0
         total += float(self.plant[0]) * ca.SX.sym("h_{k}") if self.plant[0] and shown else 0
+        return aligned([f"u_{{k}} &= {to_latex(total)}", *self._where()])
+
+    def _where(self) -> list[str]:
+        """Return the LaTeX of the relative positions and of the gain."""
+        shown = any(any(row) for row in self.offsets)
         listener, source = (f"\\left(x_{{{v}}} - h_{{{v}}}\\right)" if shown else f"x_{{{v}}}" for v in "kl")
         pull = rf"\left({source} - \operatorname{{sign}}\left(w_{{kl}}\right) {listener}\right)"
         error = rf"\sum_{{l=1}}^{{N}} w_{{kl}} {pull}"
         gain = self.gain.latex(numbers=True)
         if self.gain_cap is not None:
             gain = rf"\min\left({float(self.gain_cap):g}, {gain}\right)"
-        return aligned([f"u_{{k}} &= {to_latex(total)}", f"e_{{k}} &= {error}", f"g &= {gain}"])
+        return [f"e_{{k}} &= {error}", f"g &= {gain}"]
 
     def _repr_latex_(self) -> str:
         return f"$${self.latex()}$$"
+
+
+def _power(m: int) -> str:
+    return "g " if m == 1 else f"g^{m} "
+
+
+def _primed(letter: str, i: int) -> str:
+    return letter + ("'" * i if i < 4 else f"^({i})")
 
 
 def _derivative(letter: str, i: int) -> str:

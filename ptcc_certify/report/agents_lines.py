@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lmi.exact.decimal_rounding import down, near, up
+from lmi.exact.decimal_rounding import near, up
 from ptcc_certify.protocols.agents import DERIVATIVES, PLURALS, plant_text
 from ptcc_certify.report.text_layout import TEXT, columns, short_number, shorten_label, shorten_list
 
 if TYPE_CHECKING:
     from ptcc_certify.bounds.agent_motion import Interval
-    from ptcc_certify.certificate.agents_part import AgentsPart
+    from ptcc_certify.certificate.agents_answer import AgentsAnswer
 
 #: Names of final derivatives on the screen.
 _ENDS = ("x(T)", "v(T)", "a(T)")
@@ -23,36 +22,24 @@ _ENDS = ("x(T)", "v(T)", "a(T)")
 _INSTANTS = ((0.5, "0.5 T"), (0.1, "0.9 T"), (0.01, "0.99 T"), (1e-6, "T(1-1e-6)"))
 
 
-def agents_text(part: AgentsPart) -> str:
+def agents_text(part: AgentsAnswer) -> str:
     """Tell the agents and their protocol in one line.
 
     The gains are those of relative positions, velocities and so on, each times a power of the gain.
     """
-    protocol, n = part.protocol, part.order
-    terms = [f"{near(K)} {_power(n - i)}{_primed('e', i)}" for i, K in enumerate(protocol.gains)]
-    terms += [f"{near(f)} {_power(n - i)}{_primed('x', i)}" for i, f in enumerate(protocol.own) if f]
-    signs = [" + "] * (n - 1) + [" - "] * (len(terms) - n)
-    law = terms[0] + "".join(sign + term for sign, term in zip(signs, terms[1:], strict=True))
+    protocol = part.protocol
     more = ["in formation"] * part.formation
     more += [f"in {part.dimension} dimensions"] * (part.dimension > 1)
-    more += ["meeting at rest"] * any(protocol.own)
+    more += ["meeting at rest"] * (any(protocol.own) and part.derivatives_agree)
     texts = [
         f"{plant_text(protocol.plant)} {', '.join(more)}".strip(),
         *([] if protocol.gain_cap is None else [f"gain at most {near(protocol.gain_cap)}"]),
     ]
     driven = part.functions or not part.structure.graph.n_edges  # else no gains are proved
-    return "; ".join([*texts, *[f"u = {law}"] * bool(driven)])
+    return "; ".join([*texts, *[f"u = {protocol.law()}"] * bool(driven)])
 
 
-def _power(m: int) -> str:
-    return "g " if m == 1 else f"g^{m} "
-
-
-def _primed(letter: str, i: int) -> str:
-    return letter + ("'" * i if i < 4 else f"^({i})")
-
-
-def answers(part: AgentsPart) -> Iterator[tuple[str, str]]:
+def answers(part: AgentsAnswer) -> Iterator[tuple[str, str]]:
     """Return the lines of the short screen: where agents end, bounds of deviations, and of the input."""
     yield "agents", agents_text(part)
     yield from _final_lines(part, 2 * TEXT)
@@ -64,19 +51,20 @@ def answers(part: AgentsPart) -> Iterator[tuple[str, str]]:
     yield _input_line(part)
 
 
-def _final_lines(part: AgentsPart, width: int) -> Iterator[tuple[str, str]]:
+def _final_lines(part: AgentsAnswer, width: int) -> Iterator[tuple[str, str]]:
     """Tell positions at ``T``, and velocities and so on unless all are 0."""
     if part.final_state is None:
         return
     labels = part.structure.graph.labels
-    rest = not part.moving and part.order > 1
-    for i in range(part.order):
+    rest = not part.moving and part.settled > 1
+    open_end = "; velocities are not proved to vanish" * (not part.derivatives_agree)
+    for i in range(part.settled):
         ends = [[chain[i] for chain in agent] for agent in part.final_state]
         if i and not any(m or r for row in ends for m, r in row):
             continue
         places = [_place(row) for row in ends]
         words = [f"{shorten_label(label)}={place}" for label, place in zip(labels, places, strict=True)]
-        kind = f"({_accuracy(ends)}{', at rest' * (rest and i == 0)})"
+        kind = f"({_accuracy(ends)}{', at rest' * (rest and i == 0)}{open_end})"
         text = shorten_list(words, width - columns(kind) - 1)
         if len(set(places)) == 1 < len(places):
             text = f"{places[0]}, of every agent"
@@ -107,18 +95,17 @@ def _named(bounds: Sequence[float]) -> str:
     return ", ".join(words) + " of the common motion"
 
 
-def _error_text(part: AgentsPart) -> str:
+def _error_text(part: AgentsAnswer) -> str:
     """Tell how near agents are to the common motion at ``0.99 T``, or at ``T`` under a cap."""
     if part.residual is not None:
         return "at T " + _named([float(max(row[i] for row in part.residual.agents)) for i in range(part.order)])
     bounds = part.deviation_bound(np.array([0.01]))[:, :, 0].max(axis=0)
     if not np.isfinite(bounds).all():
-        fall = math.exp(-float(part.matrix.rate) * float(part.protocol.clock(np.array([0.01]))[0]) / 2)
-        return f"at 0.99 T deviations are {up(fall * (1 + 1e-9), 2)} of the first ones, in the norm of V"
+        return f"at 0.99 T deviations are {up(part.fall(0.01) * (1 + 1e-9), 2)} of the first ones, in the norm of V"
     return "at 0.99 T " + _named(bounds.tolist())
 
 
-def _input_line(part: AgentsPart) -> tuple[str, str]:
+def _input_line(part: AgentsAnswer) -> tuple[str, str]:
     """Tell whether the input is bounded, its proved size, and whose it is."""
     if part.input is None:
         if part.unbounded:
@@ -132,14 +119,11 @@ def _input_line(part: AgentsPart) -> tuple[str, str]:
     return "input", text + agent * (columns(text + agent) <= TEXT)
 
 
-def long_lines(part: AgentsPart) -> Iterator[tuple[str, str]]:
+def long_lines(part: AgentsAnswer) -> Iterator[tuple[str, str]]:
     """Return what the long screen tells besides."""
-    matrix, rest = part.matrix, f"R = r rho2 kappa = {near(part.decay)}"
-    gains = ", ".join(str(float(K)) for K in part.protocol.gains)
-    yield "agents", f"{agents_text(part)}; K = ({gains}), coupling {near(matrix.coupling)}"
-    pieces = max(len(matrix.points) - 1, 0)
-    used = f"{len(part.used)} Lyapunov function{'s' * (len(part.used) != 1)}"
-    yield "", f"V <= e^(-r s) V(0), r = {down(matrix.rate)}, {rest}; one matrix for {used}, {pieces} pieces"
+    gains, proof = part.proof_text
+    yield "agents", f"{agents_text(part)}; {gains}"
+    yield "", proof
     yield from _final_lines(part, 12 * TEXT)
     if part.functions and part.initial_state is not None:
         for i in range(part.order):
@@ -156,7 +140,7 @@ def long_lines(part: AgentsPart) -> Iterator[tuple[str, str]]:
         yield _input_line(part)
 
 
-def claimed_of(part: AgentsPart) -> str:
+def claimed_of(part: AgentsAnswer) -> str:
     """Tell of what the claim of the graph holds, where it is not just of the positions."""
     if part.settles:
         return " of x - offsets" * part.formation

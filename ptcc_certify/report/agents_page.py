@@ -19,7 +19,7 @@ from ptcc_certify.report.plots.agents_motion import plot_formation, plot_motion
 from ptcc_certify.report.plots.graph import plot_graph
 
 if TYPE_CHECKING:
-    from ptcc_certify.certificate.agents_part import AgentsPart
+    from ptcc_certify.certificate.agents_answer import AgentsAnswer
     from ptcc_certify.certificate.certificate import Certificate
 
 #: Agents that have a row, and agents up to which a run is drawn.
@@ -31,7 +31,7 @@ _HEADS |= {"error": "How near", "input": "Input", "INPUT": "Input"}
 _INSTANTS = {0.5: "0.5 T", 0.1: "0.9 T", 0.01: "0.99 T", 1e-6: "T(1 \N{MINUS SIGN} 10^-6)"}
 
 
-def agents_view(saved: Certificate, part: AgentsPart) -> dict[str, Any]:
+def agents_view(saved: Certificate, part: AgentsAnswer) -> dict[str, Any]:
     """Return everything that the template shows."""
     name, protocol = shlex.quote(saved.path.name), part.protocol
     figures, run_text = _figures(saved)
@@ -59,7 +59,7 @@ def _title(saved: Certificate) -> str:
     return text[:1].upper() + text[1:] if saved.verdict == "certified" else "Undecided: " + text
 
 
-def _states(saved: Certificate, part: AgentsPart) -> tuple[list[str], list[list[str]]]:
+def _states(saved: Certificate, part: AgentsAnswer) -> tuple[list[str], list[list[str]]]:
     """Return head and rows of the table of initial and final states, and inputs."""
     agents, letters = (
         range(min(saved.graph.n_nodes, ROWS)),
@@ -69,7 +69,7 @@ def _states(saved: Certificate, part: AgentsPart) -> tuple[list[str], list[list[
     for i, letter in enumerate(letters[: part.order]):
         if part.initial_state is not None:
             columns[f"{letter}(0)"] = [_vector([float(c[i]) for c in part.initial_state[k]]) for k in agents]
-        if part.final_state is not None:
+        if part.final_state is not None and i < part.settled:
             columns[f"{letter}(T)"] = [_vector([float(c[i][0]) for c in part.final_state[k]]) for k in agents]
     if part.input is not None:
         bound = part.input
@@ -86,7 +86,7 @@ def _vector(numbers: Sequence[float]) -> str:
     return told[0] if len(told) == 1 else f"({', '.join(told)})"
 
 
-def _remaining(part: AgentsPart) -> tuple[list[str], list[list[str]]] | None:
+def _remaining(part: AgentsAnswer) -> tuple[list[str], list[list[str]]] | None:
     """Return head and rows of bounds of the largest deviation of each derivative."""
     worst = part.deviation_bound(np.array(list(_INSTANTS))).max(axis=0)
     if not part.functions or part.initial_state is None or not np.isfinite(worst).all():

@@ -56,6 +56,8 @@ class AgentsTrajectory:
         What the agents do, without sliding terms.
     rtol : float
         Of the integrator.
+    rate : float
+        By which ``scaled`` is weighed.
     """
 
     graph: SignedDigraph
@@ -67,6 +69,7 @@ class AgentsTrajectory:
     scaled: np.ndarray
     input: np.ndarray
     rtol: float
+    rate: float
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -147,11 +150,10 @@ class _Deviations(Motion):
         plant, own = (list(map(float, part)) for part in (self._of.plant, self._of.own))
         last = ca.hcat([-own[i] - plant[i] * zeta ** (n - i) for i in range(n)])
         A = A + ca.mtimes(ca.DM(np.eye(n)[:, [-1]]), last)
-        feedback = np.zeros((n, n))
-        feedback[:, -1] = list(map(float, self._of.gains))  # K'b'
+        feedback = ca.horzcat(ca.MX(n, n - 1), ca.vertcat(*self._of.gains_at(theta)))  # K'b'
         copies = ca.DM.eye(x.shape[1] // n)
         free = ca.mtimes(x, ca.kron(copies, A.T))
-        driven = ca.mtimes(ca.DM(self._block), ca.mtimes(x, ca.kron(copies, ca.DM(feedback))))
+        driven = ca.mtimes(ca.DM(self._block), ca.mtimes(x, ca.kron(copies, feedback)))
         return g * (free - driven)
 
 
@@ -217,8 +219,11 @@ def simulate_agents(
     all_states[:, :, 0] += h[:, :, None]
     control += float(protocol.plant[0]) * h[:, :, None]
     t = float(protocol.gain.T) * (1 - q)
-    run = AgentsTrajectory(graph, protocol, t, q, clock, all_states, scaled, control, rtol)
-    return run if protocol.gain_cap is not None else _with_deadline(run, common.reshape(N, d, n), h)
+    run = AgentsTrajectory(graph, protocol, t, q, clock, all_states, scaled, control, rtol, rate)
+    if protocol.gain_cap is not None:
+        return run
+    slowest = np.linalg.eigvals(block).real.min(initial=np.inf) * float(protocol.gain.pole)
+    return _with_deadline(run, common.reshape(N, d, n), h, protocol.agree_if_above(slowest))
 
 
 def _split(graph: SignedDigraph) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -289,18 +294,23 @@ def _input(
 ) -> np.ndarray:
     """Return ``eta^n (K eps - f'y)``, (N, d, M), of deviations in the coordinates ``y`` and the common motion."""
     n, N = protocol.order, len(deviations)
-    gains, own = (np.array(list(map(float, part))) for part in (protocol.gains, protocol.own))
+    gains = np.array(np.broadcast_arrays(*protocol.gains_at(protocol.shrinking(eta))))
+    own = np.array(list(map(float, protocol.own)))
     eps = -(graph.laplacian() @ deviations.reshape(N, -1)).reshape(deviations.shape)
     y = deviations + free / eta ** np.arange(n)[:, None]
-    return eta**n * (np.einsum("i,kdim->kdm", gains, eps) - np.einsum("i,kdim->kdm", own, y))
+    return eta**n * (
+        np.einsum("im,kdim->kdm" if gains.ndim > 1 else "i,kdim->kdm", gains, eps) - np.einsum("i,kdim->kdm", own, y)
+    )
 
 
-def _with_deadline(run: AgentsTrajectory, common: np.ndarray, h: np.ndarray) -> AgentsTrajectory:
-    """Return the run with ``T`` itself, where deviations are 0."""
+def _with_deadline(run: AgentsTrajectory, common: np.ndarray, h: np.ndarray, agreed: bool) -> AgentsTrajectory:
+    """Return the run with ``T`` itself, where deviations are 0; those of derivatives only if they agree."""
     last = np.einsum("ij,kdj->kdi", _free_motion(run.protocol, np.array([1.0, _NEXT]))[-1], common)
     if any(run.protocol.own):
         last[:, :, 1:] = 0.0  # they rest
     last[:, :, 0] += h
+    if not agreed:
+        last[:, :, 1:] = np.nan
     gone = np.full(run.scaled.shape[:3], np.nan)
     at_T: dict[str, Any] = {"t": [float(run.protocol.gain.T)], "remaining": [0.0], "clock": [np.inf]}
     at_T |= {"states": last[..., None], "scaled": gone[..., None], "input": gone[:, :, 0, None]}

@@ -24,7 +24,7 @@ from agent_cases import agent_case
 from agent_documents import Setting, damping_bound, document, final_state, obligations, of_graph
 from generators import all_classes, random_graph
 from jsonschema import Draft202012Validator  # type: ignore[import-untyped]
-from mutations import Json, at, changed, leaves, mutants, resealed, same_claim
+from mutations import Json, at, changed, judged_mutants, mutants, nudged, resealed
 from oracle_agents import false_claims_of_agents
 
 from ptcc_certify import checker
@@ -517,35 +517,20 @@ def test_nothing_takes_long(monkeypatch: pytest.MonkeyPatch):
 
 
 def judged(data: Json, changes: Iterator[tuple[Any, Json]]) -> tuple[int, Counter[str]]:
-    """Check mutants, with digests that fit; whatever is accepted must be true. Return their number, and what was."""
-    count, passed = 0, Counter[str]()
-    for path, mutant in changes:
-        if same_claim(mutant, data):
-            continue
-        count += 1
-        mutant = resealed(mutant)
-        if check(mutant, stdlib=bool(count % 2)).accepted:
-            assert false_claims_of_agents(mutant) == [], path
-            passed[re.sub(r"\d+", "k", ".".join(map(str, path[:3])))] += 1
-    return count, passed
+    return judged_mutants(data, changes, false_claims_of_agents)
+
+
+def told_again(mutant: Json, path: Any, new: str) -> Json:
+    """The proof tells some numbers once more."""
+    for k, stated in enumerate(mutant["proof"]):
+        for key in ("rate", "coupling"):
+            if stated["of"] == "agents" and key in stated["numbers"] and path == ("agents", key):
+                mutant = changed(mutant, ("proof", k, "numbers", key), new)
+    return mutant
 
 
 def nudges(data: Json, seed: int, count: int) -> Iterator[tuple[Any, Json]]:
-    """Numbers of the section and of the protocol that are a little larger or smaller, or of the other sign."""
-    rng = np.random.default_rng(seed)
-    places = [(path, x) for path, x in leaves(data) if path[0] in ("agents", "protocol", "graph", "lyapunov")]
-    places = [(path, x) for path, x in places if isinstance(x, str) and re.fullmatch(r"-?[0-9./]+", x)]
-    for _ in range(count):
-        path, text = places[int(rng.integers(len(places)))]
-        value, step = F(text), F(1, 2 ** int(rng.integers(1, 60)))
-        more = [value * (1 + step), value * (1 - step), value + step, value - step, value * 2, value / 2, -value, F(0)]
-        new = str(more[int(rng.integers(8))])
-        mutant = changed(data, path, new)
-        for k, stated in enumerate(mutant["proof"]):  # the proof tells some of them once more
-            for key in ("rate", "coupling"):
-                if stated["of"] == "agents" and key in stated["numbers"] and path == ("agents", key):
-                    mutant = changed(mutant, ("proof", k, "numbers", key), new)
-        yield path, mutant
+    return nudged(data, ("agents", "protocol", "graph", "lyapunov"), seed, count, told_again)
 
 
 def test_mutants_of_agents_that_are_accepted_are_true():

@@ -184,3 +184,48 @@ def test_the_page_writes_a_vector_in_one_cell(tmp_path: Path):
     text = page.read_text(encoding="utf-8")
     assert "(10, 11)" in text and "\N{DOUBLE VERTICAL LINE}u\N{DOUBLE VERTICAL LINE} at most" in text
     assert "fall like" not in text  # which they do under an unlimited gain alone
+
+
+CASCADE = '[agents]\nkind = "double-integrator"\ncascade = {alpha}\n[protocol]\nT = 2\nrho2 = {rho2}\n'
+
+
+@pytest.mark.campaign
+def test_the_page_of_the_cascade_says_that_no_gain_depends_on_the_graph(tmp_path: Path):
+    saved, page = tmp_path / "c.json", tmp_path / "c.html"
+    ptcc("certify", _scenario(tmp_path, CASCADE.format(alpha=2, rho2=2)), "--method", "paper", "-o", str(saved))
+    assert ptcc("report", str(saved), "-o", str(page)).code == 0
+    assert "No gain depends on the graph" in page.read_text(encoding="utf-8")
+
+
+def test_the_cascade_is_certified_and_checked_from_a_scenario(tmp_path: Path):
+    """A rate that bounds the input; below it, what mends that, and velocities of which nothing is claimed."""
+    saved, wide = tmp_path / "c.json", _scenario(tmp_path, CASCADE.format(alpha=2, rho2=2))
+    done = ptcc("certify", wide, "--method", "paper", "--no-simulation", "-o", str(saved))
+    assert done.code == 0 and "u = (2 g^2 + g') e + g e' - 2 g x'" in " ".join(done.out.split())
+    assert "(exact, at rest)" in done.out and "input      bounded" in done.out
+    assert ptcc("check", str(saved)).code == 0
+    slow = _scenario(tmp_path, CASCADE.format(alpha='"1/4"', rho2="0.05"))
+    done = ptcc("certify", slow, "--method", "paper", "--no-simulation")
+    told = " ".join(done.out.split())
+    assert "velocities are not proved to vanish" in told and "meeting at rest" not in told
+    assert "NOT CERTIFIED BOUNDED: rate" in told and "--rho2" in told and "and --cascade" in told
+
+
+@pytest.mark.parametrize(
+    ("command", "options", "says"),
+    [
+        ("certify", ("--cascade", "1"), "--cascade: is for agents of order n; give --agents double-integrator"),
+        ("certify", ("--agents", "3", "--cascade", "1"), "agents of order 2; these are of order 3"),
+        ("certify", ("--agents", "2", "--cascade", "-1"), "cascade = -1 is outside its domain"),
+        ("certify", ("--agents", "2", "--cascade", "x"), '--cascade: "x" is not a number'),
+        ("certify", ("--agents", "2", "--cascade", "1", "--drag", "1"), "double integrators without drag or forces"),
+        ("certify", ("--agents", "2", "--cascade", "1", "--rest", "1"), "leave rest out"),
+        ("certify", ("--agents", "2", "--cascade", "1", "--gain-cap", "9"), "leave gain_cap out"),
+        ("certify", ("--agents", "2", "--cascade", "1", "--delay", "0.1"), "messages is for single integrators"),
+        ("certify", ("--agents", "2", "--cascade", "1", "--leader-speed", "1"), "leaders is for single integrators"),
+        ("design", ("--agents", "2", "--cascade", "1", "--max-input", "9", "--shortest-deadline"), "no deadline is"),
+    ],
+)
+def test_what_the_cascade_does_not_take_is_refused_in_one_line(command: str, options: tuple[str, ...], says: str):
+    done = ptcc(command, "fig1a", *options)
+    assert done.code == 2 and says in done.err and len(done.err.strip().splitlines()) == 1

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ptcc_certify.certificate.agents_part import AgentsPart
+from ptcc_certify.certificate.agents_answer import AgentsAnswer
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.structure import analyse
@@ -34,7 +34,7 @@ def agents_run(subject: Any) -> AgentsTrajectory:
     """
     if isinstance(subject, Certificate) and subject.agents is not None:
         return subject.observed.agents_run or subject.agents.simulate()
-    if isinstance(subject, AgentsPart):
+    if isinstance(subject, AgentsAnswer):
         return subject.simulate()
     if isinstance(subject, AgentsTrajectory):
         return subject

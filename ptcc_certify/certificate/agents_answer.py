@@ -1,0 +1,209 @@
+"""What every certificate of agents of order n says, whatever their protocol: where they end, and how near."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from lmi.exact.decimal_rounding import float_up
+from ptcc_certify.bounds.agent_motion import Interval
+from ptcc_certify.bounds.agents import States
+from ptcc_certify.bounds.agents_comparison import AgentsComparison
+from ptcc_certify.bounds.final_state import Influence
+from ptcc_certify.certificate.format_vectors import agents_ends, weighted_sum
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.lyapunov.function import LyapunovFunction
+from ptcc_certify.protocols.agents import AgentsProtocol
+from ptcc_certify.simulation.agents import AgentsTrajectory, simulate_agents
+from ptcc_certify.theorems.theorem import Obligation
+
+Intervals = tuple[tuple[tuple[Interval, ...], ...], ...]
+
+
+@dataclass(frozen=True)
+class UsedFunction:
+    """A Lyapunov function of the graph that is used: its number, and the input constants of a full matrix."""
+
+    number: int
+    inputs: tuple[Fraction, ...] | None
+
+
+@dataclass(frozen=True)
+class Residual:
+    """What is left at ``T`` under a bounded gain: of each agent, of its position, velocity and so on."""
+
+    clock: Fraction
+    agents: tuple[tuple[Fraction, ...], ...]
+
+
+class AgentsAnswer(ABC):
+    """What is proved of agents of order n.
+
+    Attributes
+    ----------
+    structure : Structure
+    protocol : AgentsProtocol
+        As the agents run it.
+    functions : tuple of LyapunovFunction
+        Those that are used.
+    initial_state : N tuples of d tuples of n Fraction, or None
+        Position, velocity and so on of every agent in every coordinate.
+    motion : n by n intervals
+        ``M``: the common motion from 0 to ``T``.
+    final_state : like initial_state, with intervals, or None
+        Fewer derivatives where not all of them are proved to agree.
+    residual : Residual or None
+        What a bounded gain leaves at ``T``.
+    input : tuple of N Fraction, or None
+        Bounds of the Euclidean norm of every agent's input.
+    """
+
+    structure: Structure
+    protocol: AgentsProtocol
+    functions: tuple[LyapunovFunction, ...]
+    initial_state: States | None
+    motion: tuple[tuple[Interval, ...], ...]
+    final_state: Intervals | None
+    residual: Residual | None
+    input: tuple[Fraction, ...] | None
+
+    @property
+    def order(self) -> int:
+        """``n``."""
+        return self.protocol.order
+
+    @property
+    def dimension(self) -> int:
+        """``d``, the coordinates of space."""
+        return len(self.protocol.offsets[0])
+
+    @property
+    def formation(self) -> bool:
+        """Whether an agent has a place other than 0."""
+        return any(any(row) for row in self.protocol.offsets)
+
+    @property
+    def settled(self) -> int:
+        """Of how many derivatives, the position the first of them, final values are proved."""
+        return 0 if self.final_state is None else len(self.final_state[0][0])
+
+    @property
+    def derivatives_agree(self) -> bool:
+        """Whether all derivatives are proved to agree at ``T`` where positions are."""
+        return True
+
+    @property
+    def moving(self) -> bool:
+        """Whether some derivative of a final state is not 0."""
+        return any(m or r for agent in self.final_state or () for chain in agent for m, r in chain[1:])
+
+    @property
+    def longest_way(self) -> float:
+        """The longest way of an agent from its initial to its final position (numerical); 0 without a final state."""
+        begin, end = self.initial_state or (), self.final_state or ()
+        squares = [
+            sum(float(x[0] - m[0][0]) ** 2 for x, m in zip(agent, place, strict=True))
+            for agent, place in zip(begin, end, strict=False)
+        ]
+        return math.sqrt(max(squares, default=0.0))
+
+    def columns(self) -> dict[str, list[float]]:
+        """Return initial and final states in floats, and bounds of the input, one number for each agent."""
+        names = ["x", "v", "a", *(f"x^({i})_" for i in range(3, self.order))][: self.order]
+        marks = [""] if self.dimension == 1 else [f"_{q + 1}" for q in range(self.dimension)]
+        table: dict[str, list[float]] = {}
+        for i, name in enumerate(names):
+            for q, mark in enumerate(marks):
+                if self.initial_state is not None:
+                    table[f"{name}{mark}(0)"] = [float(agent[q][i]) for agent in self.initial_state]
+                if i < self.settled:
+                    table[f"{name}{mark}(T)"] = [float(agent[q][i][0]) for agent in self.final_state or ()]
+        return table | ({} if self.input is None else {"input": [float_up(x) for x in self.input]})
+
+    def simulate(self, **options: Any) -> AgentsTrajectory:
+        """Run the agents from their initial states; options are those of :func:`simulate_agents`.
+
+        Raises
+        ------
+        ParameterError
+            There are no initial states.
+        SimulationError
+            The integrator failed.
+        """
+        if self.initial_state is None:
+            raise ParameterError("the certificate has no initial state; certify the graph with x0")
+        states = [[[float(x) for x in chain] for chain in agent] for agent in self.initial_state]
+        return simulate_agents(self.structure.graph, self.protocol, states, self.weighing_rate, **options)
+
+    @property
+    @abstractmethod
+    def rate(self) -> Fraction | None:
+        """The rate at which all deviations decay, per unit of the stretched clock; None if there is no single one."""
+
+    @property
+    @abstractmethod
+    def weighing_rate(self) -> float:
+        """The rate by which deviations are weighed where they are integrated."""
+
+    @property
+    @abstractmethod
+    def settles(self) -> bool:
+        """Whether the behaviour of the claim is proved at ``T`` itself."""
+
+    @property
+    @abstractmethod
+    def unbounded(self) -> tuple[tuple[str, str], ...]:
+        """What leaves the input without a bound, and what mends it; empty where nothing does."""
+
+    @property
+    @abstractmethod
+    def nearer(self) -> str:
+        """What leaves less by ``T``."""
+
+    @property
+    @abstractmethod
+    def proof_text(self) -> tuple[str, str]:
+        """What the long screen tells of gains and of the proof."""
+
+    @property
+    @abstractmethod
+    def obligations(self) -> list[Obligation]:
+        """What the independent check verifies, in its order."""
+
+    @abstractmethod
+    def fall(self, remaining: float) -> float:
+        """Return what deviations are of the first ones at most, in the norm of ``V``."""
+
+    @abstractmethod
+    def deviation_bound(self, remaining: np.ndarray) -> np.ndarray:
+        """Return (N, n, M) bounds of the deviation of each derivative from the common motion."""
+
+    @abstractmethod
+    def compare(self, run: AgentsTrajectory) -> AgentsComparison | None:
+        """Compare a run with what is proved of it; None where nothing disagrees."""
+
+
+def final_states(part: AgentsAnswer, influence: Influence) -> Intervals:
+    """Return where the agents end, with their velocities and so on."""
+    offsets, zero = part.protocol.offsets, Fraction(0)
+    coordinates = []
+    for q in range(part.dimension):
+        begin = [
+            [(x - (h[q] if i == 0 else 0), zero) for i, x in enumerate(agent[q])]
+            for agent, h in zip(part.initial_state or (), offsets, strict=True)
+        ]
+        columns = [agents_ends(influence, [weighted_sum(row, chain) for chain in begin]) for row in part.motion]
+        coordinates.append(list(zip(*columns, strict=True)))
+    return tuple(
+        tuple(
+            tuple((m + (offsets[k][q] if i == 0 else 0), r) for i, (m, r) in enumerate(coordinates[q][k]))
+            for q in range(part.dimension)
+        )
+        for k in range(len(offsets))
+    )

@@ -1,0 +1,268 @@
+"""What a certificate says of double integrators of the cascade: where they end, bounds over time, and the input."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cached_property
+
+import numpy as np
+
+from lmi.exact.decimal_rounding import down, float_down, float_up, near, up
+from ptcc_certify.bounds.agent_motion import Interval, common_motion
+from ptcc_certify.bounds.agents import States, error_constants, root_product
+from ptcc_certify.bounds.agents_comparison import AgentsComparison, compare_with_bounds
+from ptcc_certify.bounds.cascade import (
+    Roots,
+    Rows,
+    drive_integral,
+    input_from,
+    input_is_bounded,
+    positions_of,
+    roots_of,
+    tracking_error,
+)
+from ptcc_certify.bounds.final_state import Influence
+from ptcc_certify.certificate.agents_answer import AgentsAnswer, Intervals, Residual, UsedFunction, final_states
+from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.lyapunov.function import LyapunovFunction
+from ptcc_certify.protocols import Protocol
+from ptcc_certify.protocols.agents import Agents
+from ptcc_certify.protocols.cascade import CascadeProtocol
+from ptcc_certify.simulation.agents import AgentsTrajectory
+from ptcc_certify.theorems.theorem import Obligation
+
+
+@dataclass(frozen=True, eq=False)
+class CascadePart(AgentsAnswer):
+    """What is proved of double integrators of the cascade.
+
+    Attributes
+    ----------
+    structure : Structure
+    protocol : CascadeProtocol
+    used : tuple of UsedFunction
+    functions : tuple of LyapunovFunction
+        Those that are used: all that decay.
+    roots : tuple of Roots
+        Of every function used; empty without an initial state.
+    initial_state : N tuples of d tuples of 2 Fraction, or None
+        Position and velocity of every agent in every coordinate.
+    motion : 2 by 2 intervals
+        ``M``: the common motion from 0 to ``T``.
+    final_state : like initial_state, with intervals, or None
+        Positions alone where velocities are not proved to vanish.
+    input : tuple of N Fraction, or None
+        Bounds of the Euclidean norm of every agent's input.
+    """
+
+    structure: Structure
+    protocol: CascadeProtocol
+    used: tuple[UsedFunction, ...]
+    functions: tuple[LyapunovFunction, ...]
+    roots: tuple[Roots, ...]
+    initial_state: States | None
+    motion: tuple[tuple[Interval, ...], ...]
+    final_state: Intervals | None = None
+    input: tuple[Fraction, ...] | None = None
+    residual: Residual | None = None
+
+    @property
+    def settles(self) -> bool:
+        """Whether the behaviour of the claim is proved at ``T``, of positions less their places in a formation."""
+        return self.structure.graph.n_edges == 0 or bool(self.functions)
+
+    @property
+    def alpha(self) -> Fraction:
+        """``alpha``."""
+        return self.protocol.alpha
+
+    @property
+    def rate(self) -> None:
+        """There is none: what decays is driven by what decays at another rate."""
+        return
+
+    @property
+    def best(self) -> Fraction:
+        """The largest rate of a function used; 0 without one."""
+        return max((V.proved_rate for V in self.functions), default=Fraction(0))
+
+    @property
+    def weighing_rate(self) -> float:
+        """What decays most slowly, by the bounds."""
+        slowest = 2 * (self.alpha + 1 / self.protocol.gain.pole)
+        return float(min(self.best, slowest) if self.functions else slowest)
+
+    @property
+    def derivatives_agree(self) -> bool:
+        """Whether velocities are proved to vanish at ``T``."""
+        return not self.structure.graph.n_edges or self.best * self.protocol.gain.pole > 2
+
+    @property
+    def unbounded(self) -> tuple[tuple[str, str], ...]:
+        """What leaves the input without a bound, and what mends it; empty where nothing does."""
+        k, best, found = self.protocol.gain.pole, self.best, []
+        if not self.functions or any(input_is_bounded(k, V.proved_rate, self.alpha) for V in self.functions):
+            return ()
+        if best * k < 4:
+            rho2 = up(4 / (best * self.protocol.base.kappa), 4)
+            found.append((f"rate {down(best)} is below 4/(rho2 kappa) = {up(4 / k, 4)}", f"--rho2 {rho2}"))
+            k = Fraction(rho2) * self.protocol.base.kappa
+        if not input_is_bounded(k, best, self.alpha):
+            least = up(1 / k, 4)
+            mend = least if input_is_bounded(k, best, Fraction(least)) else up(2 / k, 4)
+            limit = f"below 1/(rho2 kappa) = {least}" if self.alpha * k < 1 else "just 1/(rho2 kappa), as is rate/4"
+            found.append((f"cascade {down(self.alpha)} is {limit}", f"--cascade {mend}"))
+        return tuple(found)
+
+    @property
+    def nearer(self) -> str:
+        """What leaves less by ``T``."""
+        return f"a larger --rho2, such as {up(2 * self.protocol.base.rho2, 4)}, leaves less"
+
+    @property
+    def proof_text(self) -> tuple[str, str]:
+        """What the long screen tells of gains and of the proof."""
+        proof = "no Lyapunov function is used"
+        if self.functions:
+            proof = (
+                f"sqrt V <= e^(-r s/2) sqrt V(x(0)) + I sqrt V(q(0)), r up to {down(self.best)}; q = x' - g e falls "
+            )
+            proof += f"like e^(-{near(self.alpha)} s)"
+        return f"alpha {near(self.alpha)}", proof
+
+    @property
+    def obligations(self) -> list[Obligation]:
+        """What the independent check verifies, in its order."""
+        full = (one.number for one in self.used if one.inputs is not None)
+        result = [Obligation("input-constants", f"lyapunov.functions[{number}]") for number in full]
+        result += [Obligation("agent-cascade", "agents", {"alpha": self.alpha}), Obligation("agent-motion", "agents")]
+        parts = {"final-state": self.final_state, "input": self.input}
+        return result + [Obligation(f"agent-{name}", "agents") for name, part in parts.items() if part is not None]
+
+    # ------------------------------------------------------------------ bounds over time
+
+    def fall(self, remaining: float) -> float:
+        """Return ``e^(-r s/2) + eta(0) I``: of the first ones, of positions and ``q/eta(0)`` together."""
+        ones = [Roots(Fraction(1), self.protocol.gain.first)] * len(self.functions)
+        return min((float(x[0]) for x in self._values(ones, remaining)), default=1.0)
+
+    def _values(self, roots: Sequence[Roots], remaining: np.ndarray | float) -> list[np.ndarray]:
+        """Return bounds of ``sqrt(V)`` of every function used."""
+        q, gain = np.atleast_1d(np.asarray(remaining, dtype=float)), self.protocol.gain
+        clock, found = gain.clock_at_remaining(q), []
+        for V, root in zip(self.functions, roots, strict=True):
+            own = float_up(root.state) * np.exp(-float_down(V.proved_rate) / 2 * clock)
+            found.append(own + float_up(root.drive) * drive_integral(gain, V.proved_rate, self.alpha, q))
+        return found
+
+    @cached_property
+    def error_constants(self) -> tuple[tuple[Fraction, ...] | None, ...]:
+        """``c_k^E`` of every function used."""
+        pairs = zip(self.used, self.functions, strict=True)
+        return tuple(one.inputs if V.matrix is not None else error_constants(self.structure, V) for one, V in pairs)
+
+    def deviation_bound(self, remaining: np.ndarray) -> np.ndarray:
+        """Return (N, 2, M) bounds of the deviation of positions and velocities from the common motion.
+
+        ``sqrt(c_k) sqrt(V)`` and ``eta sqrt(c_k^E) sqrt(V) + e^(-alpha s) sqrt(c_k V(q(0)))``. Infinite where nothing
+        is proved, or without an initial state.
+        """
+        if not self.roots:
+            return np.full((self.structure.graph.n_nodes, 2, len(np.atleast_1d(remaining))), np.inf)
+        q, N, gain = np.atleast_1d(np.asarray(remaining, dtype=float)), self.structure.graph.n_nodes, self.protocol.gain
+        near, errors, drive = (np.full((N, len(q)), np.inf) for _ in range(3))
+        fading = np.exp(-float_down(self.alpha) * gain.clock_at_remaining(q))
+        each = zip(self.functions, self.roots, self._values(self.roots, q), self.error_constants, strict=True)
+        for V, root, value, constants in each:
+            if V.deviation is not None:
+                c = np.array([float_up(root_product(x)) for x in V.deviation.agents])
+                near = np.minimum(near, np.outer(c, value))
+                drive = np.minimum(drive, np.outer(c, float_up(root.drive) * fading))
+            if constants is not None:
+                c = np.array([float_up(root_product(x)) for x in constants])
+                errors = np.minimum(errors, np.outer(c, value))
+        eta = np.array([self.protocol.value(x) for x in q])
+        return np.stack([near, eta * errors + drive], axis=1) * (1 + 1e-9)
+
+    def compare(self, run: AgentsTrajectory) -> AgentsComparison | None:
+        """Compare a run with what is proved of it; None where nothing disagrees."""
+        if not any(x for root in self.roots for x in root):
+            return None
+        return compare_with_bounds(
+            self.structure, self.functions, lambda q: self._values(self.roots, q), self.deviation_bound, self.input, run
+        )
+
+    def __repr__(self) -> str:
+        size = "" if self.input is None else f", |u_k| <= {up(max(self.input), 4)}"
+        return f"CascadePart(alpha = {near(self.alpha)}{size})"
+
+
+def prove_cascade(
+    structure: Structure,
+    base: Protocol,
+    agents: Agents,
+    functions: Sequence[LyapunovFunction],
+    influence: Influence,
+    offsets: Sequence[Sequence[Fraction]],
+    initial_state: States | None,
+) -> CascadePart:
+    """Prove what double integrators of the cascade do, by the Lyapunov functions of their graph.
+
+    Parameters
+    ----------
+    structure : Structure
+    base : Protocol
+        Gain, clock and deadline.
+    agents : Agents
+        With ``cascade``.
+    functions : sequence of LyapunovFunction
+    influence : Influence
+    offsets : N rows of d Fraction
+    initial_state : N tuples of d tuples of 2 Fraction, or None
+
+    Raises
+    ------
+    ParameterError
+        ``alpha rho1 T`` is beyond what the common motion is enclosed for.
+    """
+    numbers = [k for k, V in enumerate(functions) if V.proved_rate > 0]
+    used = tuple(functions[k] for k in numbers)
+    full = [error_constants(structure, V) if V.matrix is not None else None for V in used]
+    protocol = CascadeProtocol.of(base, agents.alpha, offsets)
+    error: Rows | None = None
+    roots: tuple[Roots, ...] = ()
+    if initial_state is not None:
+        error = tracking_error(structure, initial_state, offsets, base.gain.first)
+        begin = positions_of(initial_state, offsets)
+        roots = tuple(roots_of(structure, V, begin, error) for V in used)
+    part = CascadePart(
+        structure,
+        protocol,
+        tuple(map(UsedFunction, numbers, full)),
+        used,
+        roots,
+        initial_state,
+        common_motion(agents.coefficients, agents.own, base.gain),
+    )
+    final = None
+    if influence.exact and initial_state is not None and part.settles:
+        final = final_states(part, influence)
+        if not part.derivatives_agree:
+            final = tuple(tuple(chain[:1] for chain in agent) for agent in final)
+    return replace(part, final_state=final, input=None if error is None else _input(part, error))
+
+
+def _input(part: CascadePart, error: Rows) -> tuple[Fraction, ...] | None:
+    """Return the least bounds of the whole input, agent by agent; None where none is proved."""
+    gain, base = part.protocol.gain, part.protocol.base
+    bounds = [
+        input_from(part.structure, gain, part.alpha, V.proved_rate, constants, root, error)
+        for V, constants, root in zip(part.functions, part.error_constants, part.roots, strict=True)
+        if constants is not None and input_is_bounded(gain.pole, V.proved_rate, part.alpha)
+    ]
+    if not bounds:
+        return None
+    extra = base.reaching.mu1 * part.dimension if base.reaching is not None else Fraction(0)
+    return tuple(min(each) + extra for each in zip(*bounds, strict=True))

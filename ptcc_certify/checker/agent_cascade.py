@@ -1,0 +1,173 @@
+"""Verifies double integrators that track the velocity of the paper's protocol: section 21 of the format."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from itertools import chain
+from operator import mul
+from typing import Any, NamedTuple
+
+from lmi.exact.decimal_rounding import down, up
+from lmi.exact.elementary_enclosures import rounded
+from lmi.exact.numbers import integers, longest, shorten, sized
+from lmi.exact.work import spend
+from ptcc_certify.checker.agent_bounds import BITS, Used, Weights, read_used
+from ptcc_certify.checker.agent_model import LARGEST_DIMENSION, LONGEST, Chains, count
+from ptcc_certify.checker.agent_motion import States, check_final_states, check_motion, read_offsets, read_states
+from ptcc_certify.checker.digraph import Digraph
+from ptcc_certify.checker.graph import by_agent
+from ptcc_certify.checker.input import Verified
+from ptcc_certify.checker.input_formulas import root_above
+from ptcc_certify.checker.lyapunov import Function
+from ptcc_certify.checker.proof_cursor import Document
+from ptcc_certify.checker.reading import entries, exact, fields, length, need
+
+KEYS = ("cascade", "dimension", "functions", "offsets", "initial_state", "motion", "final_state", "input")
+FUNCTION = ("function", "inputs", "initial", "drive")
+
+
+class Vectors(NamedTuple):
+    """A number of every agent in each coordinate of space, in integers over a scale."""
+
+    columns: Sequence[Sequence[int]]
+    scale: int
+
+    def value(self, graph: Digraph, function: Function) -> Fraction:
+        """Bound ``V``, summed over the coordinates of space, from above, to many bits."""
+        form, total, unit = Weights.of(function), 0, 1
+        for x in self.columns:
+            z, unit = form.coordinates(graph, x)
+            u = form.times(z)
+            spend(len(z), longest(z), longest(u), "initial values")
+            total += sum(map(mul, z, u))
+        return rounded(Fraction(total, form.scale * (self.scale * unit) ** 2), BITS, up=True)
+
+
+class Drive(NamedTuple):
+    """Positions less places ``x(0)``, what drives them, ``q(0) = v(0) + eta(0) L x(0)``, and ``(L + alpha) q(0)``."""
+
+    positions: Vectors
+    error: Vectors
+    pushed: Vectors
+
+
+class Tracked(NamedTuple):
+    """A Lyapunov function that is used; not below ``sqrt(V)`` of initial positions, and of ``q(0)``."""
+
+    use: Used
+    initial: Fraction
+    drive: Fraction
+
+
+def check_cascade(doc: Document, verified: Verified) -> bool:
+    """Verify the section ``agents`` of the cascade; return whether agreement and where it happens were proved."""
+    section, graph = fields(doc.section("agents"), KEYS, "agents"), verified.structure.graph
+    alpha, d = exact(section["cascade"]), count(section, "dimension", LARGEST_DIMENSION)
+    gain = verified.gain
+    longest_number = length((alpha, gain.T, gain.rho1, gain.k))
+    need(longest_number <= LONGEST, f"agents: a number of {longest_number} bits; {LONGEST} are taken")
+    need(alpha > 0, "the rate of the cascade is not positive")
+    agents = Chains(2, d, (Fraction(0),) * 2, (Fraction(0), alpha), None, gain)
+    offsets, begin = read_offsets(section["offsets"], graph.labels, agents), section["initial_state"]
+    states = None if begin is None else read_states(graph.labels, begin, "initial_state", agents)
+    drive = None if states is None else _drive(graph, agents, states, offsets)
+    used = _functions(doc, verified, section["functions"], drive)
+    doc.at = "agents.motion"
+    M = check_motion(doc, agents, section["motion"])
+    doc.at = "agents.final_state"
+    moves = bool(graph.listening)
+    proved = doc.data["influence"] is not None and (bool(used) or not moves)
+    if section["final_state"] is not None:
+        told = proved and verified.final.weights is not None
+        need(told and states is not None, "a final state without initial states, weights, or a proof")
+        rests = not moves or any(one.use.function.rate * gain.k > 2 for one in used)
+        check_final_states(doc, agents, verified.final, M[: 1 + rests], states or (), offsets)
+    doc.at = "agents.input"
+    if section["input"] is not None:
+        need(drive is not None, "a bound of the input without initial states")
+        if drive is not None:
+            _check_input(doc, verified, agents, used, drive)
+    return proved
+
+
+def _drive(graph: Digraph, agents: Chains, states: States, offsets: Sequence[Sequence[Fraction]]) -> Drive:
+    """Return what the motion begins with, in integers."""
+    longest_state = length(x for part in (*states, offsets) for row in part for x in row)
+    spend(40 * agents.d * graph.n, longest_state, longest_state, "the initial states")
+    pairs = [(row, h) for own, at in zip(states, offsets, strict=True) for row, h in zip(own, at, strict=True)]
+    (X, V), scale = integers([[row[0] - h for row, h in pairs], [row[1] for row, _ in pairs]])
+    (p, q), (a, c) = agents.eta_0.as_integer_ratio(), agents.own[1].as_integer_ratio()
+    sized(len(X), scale.bit_length() + longest(chain(X, V)) + graph.bits + longest((p, q, a, c)), "the initial states")
+    axes, unit = range(agents.d), graph.unit
+    positions, velocities = ([part[axis :: agents.d] for axis in axes] for part in (X, V))
+    errors, pushed = list[list[int]](), list[list[int]]()
+    for x, v in zip(positions, velocities, strict=True):
+        spend(4 * graph.n, longest(x) + graph.bits + longest((unit, p, q)), longest((a, c, p, q)), "the initial states")
+        e = [q * unit * y + p * z for y, z in zip(v, graph.laplacian_product(x), strict=True)]
+        errors.append(e)
+        pushed.append([c * z + a * unit * y for y, z in zip(e, graph.laplacian_product(e), strict=True)])
+    whole = scale * q * unit
+    return Drive(Vectors(positions, scale), Vectors(errors, whole), Vectors(pushed, whole * c * unit))
+
+
+def _functions(doc: Document, verified: Verified, section: Any, drive: Drive | None) -> list[Tracked]:
+    """Read which Lyapunov functions are used, and verify what they are worth at the beginning."""
+    graph, read = verified.structure.graph, list[tuple[Used, Any]]()
+    for entry in entries(section, "functions"):
+        before = read[-1][0].number if read else -1
+        read.append((read_used(doc, verified, fields(entry, FUNCTION, "a function that is used"), before), entry))
+    numbers = doc.open("agent-cascade", "agents", ["alpha"])
+    need(numbers["alpha"] == exact(doc.data["agents"]["cascade"]), "alpha is another than that of the cascade")
+    used = list[Tracked]()
+    for use, entry in read:
+        roots = [None if entry[key] is None else exact(entry[key]) for key in ("initial", "drive")]
+        need(all((x is None) == (drive is None) for x in roots), "initial values are told iff there are initial states")
+        bits = length(x for x in roots if x is not None)
+        spend(4, bits, bits, "initial values")
+        for x, of, what in zip(roots, drive or (), ("initial positions", "initial drive"), strict=False):
+            holds = x is not None and x >= 0 and x**2 >= of.value(graph, use.function)
+            need(holds, f"the value of function {use.number} of the {what} is not proved")
+        used.append(Tracked(use, *(x or Fraction(0) for x in roots)))
+    doc.done(f"alpha = {down(numbers['alpha'])}, {len(used)} Lyapunov functions")
+    return used
+
+
+def _check_input(doc: Document, verified: Verified, agents: Chains, used: Sequence[Tracked], drive: Drive) -> None:
+    """Verify the bound of every agent's input, in Euclidean norm over space."""
+    graph, k, alpha, eta = verified.structure.graph, agents.gain.k, agents.own[1], agents.eta_0
+    sizes = list[tuple[Sequence[Fraction], Fraction]]()
+    for one in used:
+        rate, constants = one.use.function.rate, one.use.error_constants(graph)
+        if constants is not None and rate * k >= 4 and alpha * k >= 1 and rate * k + alpha * k > 5:
+            spare = alpha - 1 / k + rate / 2 - 2 / k
+            size = rounded(eta**2 * one.initial + eta * one.drive / spare, BITS, up=True)
+            sizes.append((_input_constants(graph, constants, k), size))
+    need(bool(sizes), "a bound of the input though no function and no alpha bound it")
+    doc.open("agent-input", "agents")
+    section = fields(doc.data["agents"]["input"], ("agents", "largest"), "input")
+    values = by_agent(doc, graph, section["agents"], "the input", files=False)
+    added = (verified.protocol.gains["mu1"] if verified.protocol.sliding else Fraction(0)) * agents.d
+    columns, scale = drive.pushed
+    bits = longest(chain.from_iterable(columns))
+    spend(agents.d * graph.n, bits, bits, "the input")
+    for v, x in enumerate(values):
+        late = root_above(Fraction(sum(column[v] ** 2 for column in columns), scale**2))
+        least = min(each[v] * size for each, size in sizes)
+        need(x >= least + eta * late + added, f"the input of agent {shorten(graph.labels[v])} is not proved")
+    need(exact(section["largest"]) == max(values), "the largest input is another")
+    doc.done(f"at most {up(max(values))}")
+
+
+def _input_constants(graph: Digraph, constants: Sequence[Fraction], k: Fraction) -> list[Fraction]:
+    """Return ``G_k``, ``|(theta e - L e)_k| <= G_k sqrt(V)`` for ``theta`` from 0 to ``1/k``, ``e_l^2 <= c_l V``."""
+    spend(40 * graph.n, BITS, BITS, "constants of the input")
+    spend(graph.n + graph.n_edges, graph.bits, BITS, "constants of the input")
+    roots = [root_above(c) for c in constants]
+    found = []
+    for v in range(graph.n):
+        row = graph.row(v)
+        own = Fraction(row.get(v, 0), graph.unit)
+        others = sum((abs(x) * roots[j] for j, x in row.items() if j != v), Fraction(0)) / graph.unit
+        found.append(rounded(max(own, 1 / k - own) * roots[v] + others, BITS, up=True))
+    return found

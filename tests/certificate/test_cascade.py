@@ -1,0 +1,325 @@
+"""Double integrators that track the velocity of the paper's protocol: what is proved of them, and what is refused."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from generators import all_classes, random_graph
+from oracle_cascade import false_claims_of_cascade, moved
+from scipy.integrate import solve_ivp
+
+from ptcc_certify.certificate.cascade_part import CascadePart
+from ptcc_certify.certificate.certificate import Certificate, read_certificate
+from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.checker import check
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.protocols.agents import Agents
+
+F = Fraction
+CLASSES = all_classes()
+TEAM = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("a", "c", -1), ("c", "d", 1), ("d", "c", 1)])
+ENEMIES = SignedDigraph.from_edges([("a", "b", -1), ("b", "c", -2), ("c", "a", -1), ("b", "a", -1)])
+PAIR = SignedDigraph.from_edges([("a", "b", 1)])  # a leads; the rate is 2
+FAST = NominalProtocol(T=2, rho1=1, rho2=6, kappa=1)
+
+
+def made(graph: Any, protocol: Any, x0: Any, agents: Agents, **options: Any) -> Certificate:
+    return certify(graph, protocol, x0, agents=agents, **{"method": "paper", "simulation": False, **options})
+
+
+def part_of(certificate: Certificate) -> CascadePart:
+    assert isinstance(certificate.agents, CascadePart)
+    return certificate.agents
+
+
+def holds(certificate: Certificate) -> None:
+    """Accepted, read back the same, true, and above what was simulated."""
+    data = json.loads(certificate.to_json())
+    report = check(data)
+    assert report.accepted, (report.rejected, report.reason)
+    assert false_claims_of_cascade(data) == []
+    seen = certificate.agents_comparison
+    assert seen is None or not seen.violated, seen
+
+
+# ---------------------------------------------------------------------- random cases
+
+
+@dataclass(frozen=True)
+class Case:
+    """A graph, gains, and where agents begin."""
+
+    graph: SignedDigraph
+    protocol: Any
+    alpha: Fraction
+    x0: list[list[Fraction]]
+    v0: list[list[Fraction]]
+    offsets: list[list[Fraction]] | None
+
+
+def case_of(seed: int) -> Case:
+    rng = np.random.default_rng([33, seed])
+    _, keywords = CLASSES[seed % len(CLASSES)]
+    graph = random_graph(rng, **{"weights": "decimals", **keywords}).graph
+    N, d = graph.n_nodes, int(rng.integers(1, 3))
+    rows = lambda: [[F(int(x), 100) for x in row] for row in rng.integers(-500, 501, (N, d))]  # noqa: E731
+    T, k = F(int(rng.integers(5, 30)), 10), F(int(rng.integers(1, 60)), 10)
+    rho1 = F(int(rng.integers(1, 20)), 10) if rng.random() < 0.6 else F(1, 10**12)
+    protocol: Any = NominalProtocol(T=T, rho1=rho1, rho2=k, kappa=1)
+    if rng.random() < 0.2:
+        protocol = SlidingModeProtocol(T_r=T / 3, T_s=2 * T / 3, rho1=rho1, rho2=k, kappa=1)
+    alpha = F(int(rng.integers(1, 40)), 10)
+    return Case(graph, protocol, alpha, rows(), rows(), rows() if rng.random() < 0.4 else None)
+
+
+def certified(case: Case, method: str) -> Certificate:
+    agents = Agents(order=2, cascade=case.alpha, offsets=case.offsets)
+    return made(case.graph, case.protocol, case.x0, agents, v0=case.v0, method=method, simulation=True)
+
+
+def worst_ratio(certificate: Certificate) -> float:
+    """The largest deviation over its bound, of a motion formed in positions and velocities."""
+    part, gain = part_of(certificate), certificate.protocol.gain
+    states = np.array([[[float(x) for x in chain] for chain in agent] for agent in part.initial_state or ()])
+    states[:, :, 0] -= np.array([[float(x) for x in row] for row in part.protocol.offsets])
+    L = np.ascontiguousarray(certificate.graph.laplacian().toarray())
+    numbers = (float(gain.T), float(gain.rho1), float(gain.pole), float(part.alpha))
+    run = moved(L.tobytes(), states.tobytes(), states.shape, numbers)
+    bounds = part.deviation_bound(np.exp(-run.z))  # agents, derivatives, instants
+    sizes = np.moveaxis(np.linalg.norm(run.states, axis=2), 0, -1)
+    known = np.isfinite(bounds)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ratios = np.where(known & (sizes > 1e-13 * sizes.max(initial=1e-300)), sizes / bounds, 0)
+    return float(ratios.max(initial=0))
+
+
+def test_deviations_stay_within_their_bounds_on_every_kind_of_graph():
+    for seed in (5, 12):
+        certificate = certified(case_of(seed), ("paper", "best")[seed % 2])
+        assert certificate.verdict == "certified" and worst_ratio(certificate) <= 1 + 1e-7
+        holds(certificate)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("first", range(0, 160, 20))
+def test_bounds_final_states_and_inputs_of_many_graphs(first: int):
+    """160 graphs of every class, ``rho1`` next to 0 and not, formations, sliding variables."""
+    ratios = []
+    for seed in range(first, first + 20):
+        certificate = certified(case_of(seed), ("paper", "best")[seed % 2])
+        assert certificate.verdict == "certified"
+        holds(certificate)
+        ratios.append(worst_ratio(certificate))
+    assert max(ratios) <= 1 + 1e-7 and max(ratios) > 0.5
+    print(f"\nlargest ratio {max(ratios):.6f}, median {np.median(ratios):.3f}")
+
+
+# ---------------------------------------------------------------------- where they end
+
+
+def ends_of(certificate: Certificate) -> list[Sequence[Fraction]]:
+    final = part_of(certificate).final_state
+    assert final is not None
+    return [[m for m, _ in chain] for (chain,) in final]
+
+
+def motion_in_full(certificate: Certificate, until: float) -> np.ndarray:
+    """Positions and velocities at ``z = until``, from the closed loop as CasADi has it."""
+    import casadi as ca
+
+    part = part_of(certificate)
+    loop = part.protocol.closed_loop(certificate.graph)
+    slope, T = ca.Function("slope", [loop["t"], loop["x"]], [loop["ode"]]), float(certificate.protocol.gain.T)
+    begin = np.array([[float(x) for x in chain] for (chain,) in part.initial_state or ()]).T.ravel()
+    field = lambda z, x: T * math.exp(-z) * np.array(slope(-T * math.expm1(-z), x)).ravel()  # noqa: E731
+    run = solve_ivp(field, (0, until), begin, "LSODA", rtol=1e-11, atol=1e-12)
+    assert run.success
+    return np.array(run.y[:, -1].reshape(2, -1))
+
+
+@pytest.mark.parametrize("graph", [TEAM, pytest.param(ENEMIES, marks=pytest.mark.campaign)], ids=["team", "enemies"])
+def test_agents_end_at_rest_where_the_final_state_says(graph: SignedDigraph):
+    N = graph.n_nodes
+    certificate = made(graph, FAST, [5, 2, 4, -1][:N], Agents(order=2, cascade="1.5"), v0=[1, 0, 3, -2][:N])
+    x, v = motion_in_full(certificate, 6)
+    ends = ends_of(certificate)
+    assert np.allclose(x, [float(end[0]) for end in ends], atol=1e-5) and [end[1] for end in ends] == [0] * N
+    assert np.abs(v).max() < 1e-2
+    holds(certificate)
+
+
+def test_positions_settle_where_velocities_do_not():
+    """``k Re lambda < 1``: the velocity grows without limit, and nothing is claimed of it."""
+    slow = NominalProtocol(T=2, rho1=1, rho2="1/2", kappa=1)
+    certificate = made(PAIR, slow, [5, 2], Agents(order=2, cascade=3), v0=[1, 0])
+    x, v = motion_in_full(certificate, 14)
+    ends = ends_of(certificate)
+    assert all(len(end) == 1 for end in ends) and np.abs(v).max() > 10
+    assert np.allclose(x, [float(end[0]) for end in ends], atol=1e-2)
+    run = part_of(certificate).simulate()
+    assert np.isnan(run.velocities[..., -1]).all() and np.isfinite(run.positions).all()
+    holds(certificate)
+
+
+def test_without_velocities_allies_end_where_single_integrators_do():
+    """``q(0) = -eta(0) e(0)``, whose mean is 0: the same place, whatever alpha."""
+    plain = certify(TEAM, FAST, [5, 2, 4, -1], method="paper", simulation=False)
+    assert isinstance(plain, Certificate) and plain.final_state is not None
+    for alpha in (1, 7):
+        certificate = made(TEAM, FAST, [5, 2, 4, -1], Agents(order=2, cascade=alpha))
+        assert [end[0] for end in ends_of(certificate)] == list(plain.final_state.states)
+
+
+def test_agents_that_begin_with_the_commanded_velocity_move_as_single_integrators():
+    x0 = [5, 2, 4, -1]
+    v0 = (float(FAST.gain.first) * -(TEAM.laplacian() @ np.array(x0, dtype=float))).tolist()
+    certificate = made(TEAM, FAST, x0, Agents(order=2, cascade="0.7"), v0=v0)
+    part = part_of(certificate)
+    assert all(root.drive == 0 for root in part.roots)
+    plain = certify(TEAM, FAST, x0, method="paper", simulation=False)
+    late = np.array([0.01, 1e-6])
+    assert np.allclose(part.deviation_bound(late)[:, 0], plain.deviation_bound(late), rtol=1e-7, atol=0)
+    run, single = part.simulate(), certify(TEAM, FAST, x0, method="paper").simulate()
+    same = np.interp(single.t[single.t < 1.9], run.t, run.positions[0, 0])
+    assert np.allclose(same, single.states[0][single.t < 1.9], atol=2e-2)
+    holds(certificate)
+
+
+# ---------------------------------------------------------------------- boundary cases
+
+
+#: The rate that is proved of the pair, a little below 2.
+RATE = part_of(made(PAIR, FAST, None, Agents(order=2, cascade=1))).best
+
+
+def pair(rho2: Any, alpha: Any) -> Certificate:
+    protocol = NominalProtocol(T=2, rho1=1, rho2=rho2, kappa=1)
+    return made(PAIR, protocol, [3, 1], Agents(order=2, cascade=alpha), v0=[1, 2])
+
+
+def test_an_input_at_both_limits_is_not_claimed_to_be_bounded():
+    rho2 = 4 / RATE  # rate k = 4
+    both = part_of(pair(rho2, 1 / rho2))
+    assert both.best == RATE and both.input is None and "as is rate/4" in both.unbounded[0][0]
+    for certificate in (pair(rho2, 1 / rho2 + F(1, 1000)), pair(rho2 + F(1, 1000), 1 / (rho2 + F(1, 1000)))):
+        assert part_of(certificate).input is not None and part_of(certificate).unbounded == ()
+        holds(certificate)
+
+
+@pytest.mark.parametrize(
+    ("rho2", "alpha", "names"),
+    [
+        (1, 3, ["--rho2"]),
+        (3, "1/5", ["--cascade"]),
+        (1, "1/5", ["--rho2", "--cascade"]),
+        (4 / RATE, RATE / 4, ["--cascade"]),
+    ],
+)
+def test_what_keeps_the_input_from_being_bounded_is_told_with_its_mend(rho2: Any, alpha: Any, names: list[str]):
+    part = part_of(pair(rho2, alpha))
+    mends = dict(mend.split() for _, mend in part.unbounded)
+    assert list(mends) == names and part.input is None
+    again = part_of(pair(mends.get("--rho2", rho2), mends.get("--cascade", alpha)))
+    assert again.input is not None
+
+
+def test_alpha_that_is_half_the_rate_is_no_exception():
+    certificate = pair(6, RATE / 2)
+    assert part_of(certificate).best == RATE and worst_ratio(certificate) <= 1 + 1e-7
+    holds(certificate)
+
+
+def test_one_agent_comes_to_rest_by_itself():
+    certificate = made(SignedDigraph.from_edges([], ["a"]), FAST, [3], Agents(order=2, cascade=2), v0=[-1])
+    part = part_of(certificate)
+    assert certificate.verdict == "certified" and part.functions == () and part.final_state is not None
+    ((place, rest),) = part.final_state[0]
+    m = part.motion[0][1]
+    assert rest == (0, 0) and abs(place[0] - (3 - m[0])) <= place[1] + m[1] and 0 < m[0] < 2
+    holds(certificate)
+
+
+def test_single_leaders_and_disconnected_and_unbalanced_graphs():
+    led = made(SignedDigraph.from_edges([("a", "b", -2)]), FAST, [3, 5], Agents(order=2, cascade=2), v0=[-1, 4])
+    (a, _), (b, _) = ends_of(led)
+    assert a == -b and a != 3
+    apart = SignedDigraph.from_edges([("a", "b", 1), ("c", "d", -1)])
+    certificate = made(apart, FAST, [1, 2, 3, 4], Agents(order=2, cascade=2))
+    assert [end[0] for end in ends_of(certificate)] == [1, 1, 3, -3]
+    unbalanced = made(ENEMIES, FAST, [1, 2, 3], Agents(order=2, cascade=2, offsets=[7, 8, 9]), v0=[1, 1, 1])
+    assert ends_of(unbalanced) == [[7, 0], [8, 0], [9, 0]]
+    for one in (led, certificate, unbalanced):
+        holds(one)
+
+
+def test_without_initial_states_the_certificate_holds_for_all():
+    certificate = made(TEAM, FAST, None, Agents(order=2, cascade=2))
+    part = part_of(certificate)
+    assert certificate.verdict == "certified" and part.roots == () and part.final_state is None
+    assert np.isinf(part.deviation_bound(np.array([0.5]))).all() and 0 < part.fall(0.01) < part.fall(0.5)
+    holds(certificate)
+
+
+def test_disturbances_under_sliding_variables_move_nothing():
+    sliding = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=6, kappa=1, mu1=3, delta=2)
+    certificates = [
+        made(TEAM, protocol, [5, 2, 4, -1], Agents(order=2, cascade=2), v0=[1, 0, 0, -2])
+        for protocol in (sliding, NominalProtocol(T=2, rho1=1, rho2=6, kappa=1))
+    ]
+    one, other = map(part_of, certificates)
+    assert one.final_state == other.final_state and one.roots == other.roots
+    assert one.input is not None and one.input == tuple(x + 3 for x in other.input or ())
+    holds(certificates[0])
+
+
+def test_a_file_says_what_the_certificate_says(tmp_path: Path):
+    first = made(TEAM, FAST, [[5, 1], [2, 2], [4, 3], [-1, 4]], Agents(order=2, cascade=2, offsets=[[0, 1]] * 4))
+    first.save(tmp_path / "c.json")
+    again = read_certificate(tmp_path / "c.json")
+    assert isinstance(again, Certificate) and again == first
+    one, other = part_of(first), part_of(again)
+    assert one.protocol == other.protocol and one.input == other.input and one.roots == other.roots
+    assert np.array_equal(one.deviation_bound(np.array([0.5])), other.deviation_bound(np.array([0.5])))
+
+
+def test_the_gain_of_the_protocol_does_not_depend_on_the_graph():
+    laws = {
+        part_of(made(graph, FAST, None, Agents(order=2, cascade=2))).protocol.latex() for graph in (TEAM, ENEMIES, PAIR)
+    }
+    assert len(laws) == 1
+
+
+REFUSED: list[tuple[dict[str, Any], dict[str, Any], str]] = [
+    ({"order": 3}, {}, "it is proved of agents of order 2; these are of order 3"),
+    ({"order": 1}, {}, "it is proved of agents of order 2; these are of order 1"),
+    ({"order": 2, "drag": "0.1"}, {}, "double integrators without drag or forces"),
+    ({"plant": [1, 0]}, {}, "double integrators without drag or forces"),
+    ({"order": 2, "gain_cap": 30}, {}, "leave gain_cap out: it is proved of an unlimited gain"),
+    ({"order": 2, "decay": 6}, {}, "leave decay out; its gains are its own"),
+    ({"order": 2, "rest": 1}, {}, "leave rest out; it brings agents to rest by itself"),
+    ({"order": 2, "cascade": 0}, {}, "cascade = 0 is outside its domain"),
+    ({"order": 2, "cascade": -1}, {}, "cascade = -1 is outside its domain"),
+    ({"order": 2, "cascade": "nan"}, {}, "cascade"),
+    ({"order": 2}, {"v0": [1, 2]}, "2 values for 4 agents"),
+    ({"order": 2}, {"at": 1}, "at is for single integrators"),
+    ({"order": 2}, {"delta": 1}, "take the sliding-mode protocol"),
+    ({"order": 2, "biases": [1, 0, 0, 0]}, {}, "biases fit no formation"),
+    ({"order": 2, "cascade": 10**6}, {}, "take a smaller rest, or cascade"),
+]
+
+
+@pytest.mark.parametrize(("agents", "options", "says"), REFUSED)
+def test_what_is_not_proved_is_refused_with_the_reason(agents: Any, options: Any, says: str):
+    with pytest.raises(ParameterError) as caught:
+        made(TEAM, FAST, [5, 2, 4, -1], Agents(**{"cascade": 2, **agents}), **options)
+    assert says in str(caught.value) and "\n" not in str(caught.value)
