@@ -96,7 +96,6 @@ def test_a_behaviour_asked_for_at_T_is_refuted_where_an_agent_is_proved_to_miss_
             ("--quantisation", "0.1"),
             "left open: bipartite consensus at T with late messages (nobody is proved to settle at T)",
         ),
-        (("--delay", "0.005", "--gain-cap", "50", "--max-input", "100"), "left open: |u_k| <= 100 (proved: "),
         (("--delay", "0.005", "--max-input", "1e6"), "left open: |u_k| <= 1000000 (no bound is proved with late"),
         (("--leader-speed", "1", "--max-input", "100"), "left open: |u_k| <= 100 (proved: "),
         (("--leader-speed", "1", "--max-input", "1"), "refuted: |u_k| <= 1 (it is up to"),
