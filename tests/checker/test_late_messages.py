@@ -266,7 +266,7 @@ def test_ages_that_do_not_fit_are_refused():
 
 def test_a_late_own_state_diverges_without_a_cap():
     assert "the protocol diverges" in reason(full(), (*TOP, "own"), "late")
-    assert "form without a cap" in reason(form(False), (*TOP, "gain_cap"), None)
+    assert "form without a cap" in reason(changed(form(False), (*TOP, "input"), None), (*TOP, "gain_cap"), None)
     assert "the protocol diverges" in reason(form(), (*TOP, "gain_cap"), None)
     assert "of a late own state" in reason(capped(), (*TOP, "own"), "late")
 

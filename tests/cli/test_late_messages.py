@@ -96,8 +96,10 @@ def test_a_behaviour_asked_for_at_T_is_refuted_where_an_agent_is_proved_to_miss_
             ("--quantisation", "0.1"),
             "left open: bipartite consensus at T with late messages (nobody is proved to settle at T)",
         ),
-        (("--delay", "0.005", "--gain-cap", "50", "--max-input", "100"), "left open: |u_k| <= 100 (proved: "),
-        (("--delay", "0.005", "--max-input", "1e6"), "left open: |u_k| <= 1000000 (no bound is proved with late"),
+        (
+            ("--delay", "0.005", "--max-input", "1e6"),
+            "|u_k| <= 1000000 (no bound is proved with late messages; a gain without a cap",
+        ),
         (("--leader-speed", "1", "--max-input", "100"), "left open: |u_k| <= 100 (proved: "),
         (("--leader-speed", "1", "--max-input", "1"), "refuted: |u_k| <= 1 (it is up to"),
     ],
@@ -225,7 +227,7 @@ def test_messages_that_take_longer_than_the_deadline_are_certified_to_leave_what
 def test_screens_say_first_what_cannot_be_and_then_what_is_left() -> None:
     run = ptcc("certify", "chain.csv", "--delay", "0.02", "--x0", "1,0,2", *QUICK)
     heads = [line.split()[0] for line in run.out.splitlines() if not line.startswith(" ")]
-    assert heads == ["graph", "read", "protocol", "messages", "late", "claim", "x(T)", "verdict"]
+    assert heads == ["graph", "read", "protocol", "messages", "late", "INPUT", "claim", "x(T)", "verdict"]
     words = " ".join(run.out.split())
     assert "late agent c is off its final state at T by" in words
     assert words.index("at least, if none comes sooner") < words.index("every agent within") < words.index("claim")
