@@ -106,7 +106,8 @@ Definition structure (c : cert) : Prop :=
   (forall D, closed_component (edges c) D -> (forall i, D i -> (i < order c)%nat) ->
      exists C, In C (comps c) /\ forall i, D i <-> In i (nodes C)) /\
   (forall C, In C (comps c) -> balance_claim (edges c) (nodes C) (camps C)).
-(** balanced components end at [c_k] or [-c_k] by camps, unbalanced ones at 0 *)
+(** balanced components end at [c_k] or [-c_k] by camps, unbalanced ones at 0; where final states are [enclosed] there are
+    no weights, [end_state] is 0, and [limit_claim] says this instead *)
 Definition behaviour (c : cert) : Prop := forall x C i, In C (comps c) -> In i (nodes C) ->
   end_state c x i = match camps C with Gauge g => sgn g i * qdot (null C) x | Cycle _ => 0 end.
 (** the hypotheses of the theorem and of the corollaries, by weak component; nobody ends beyond the largest [|c_k|] of its

@@ -16,7 +16,9 @@ let of_check c d : (string * (unit -> bool)) list =
   @ List.mapi (fun k m -> Printf.sprintf "paper: inequality %d of its own function" (k + 1), (fun () -> check_margin c d m)) c.margins
   @ List.mapi (fun k l -> Printf.sprintf "leader-decrease of paper, group %d" (k + 1), (fun () -> check_leader c d l)) c.leaders
   @ (match c.upper_bound with
-     | Some u -> [ "rate-upper-bound of rates", (fun () -> check_upper c d u) ] | None -> [])
+     | Some u -> [ (match u.because with ByTrace -> "rate-mean of rates" | ByForm _ -> "rate-upper-bound of rates"),
+         (fun () -> check_upper c d u) ]
+     | None -> [])
   @ List.map (fun e -> (match e with
       | Peak _ -> "input-peak of input" | Energy _ -> "input-energy of input" | PathLength _ -> "input-length of input"),
       (fun () -> check_effort c d e)) c.efforts

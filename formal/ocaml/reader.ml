@@ -316,7 +316,7 @@ let certificate (j : Json.t) : t =
   else not_checked "influence.degenerate";
   let balanced_groups = List.exists (fun (one : comp) -> is_balanced one && List.length one.nodes > 1) comps in
   (* of a balanced group nothing tells where it ends but a left null vector, which is not believed *)
-  let unproved = enclosed && (balanced_groups || (following_witness proof = Null && followers <> [])) in
+  let unproved = enclosed && (start = None || balanced_groups || (following_witness proof = Null && followers <> [])) in
   if unproved && start <> None then not_checked "final_state";
   let around, final =
     if unproved then (skipped proof "final-state" "graph"; [], [])
@@ -430,7 +430,7 @@ let certificate (j : Json.t) : t =
   let verdict = text "verdict" (get "verdict") in
   let certified = rate "proved" <> None || edges = [] in
   need (verdict = (if certified then "certified" else "undecided")) "what was proved makes another verdict";
-  if enclosed && not certified then unsupported "an undecided certificate of the large form";
+  if not certified then unsupported "an undecided certificate";
   { nodes; hints = { vectors = List.rev !vectors; around }; sha256; verdict; theorem; checked = List.rev proof.checked; unchecked = List.rev proof.unchecked;
     sections = List.rev !left_out;
     cert = { order = Array.length nodes.labels; edges; kind; rho1; rho2; kappa; comps; pieces; all_balanced = found.balance;

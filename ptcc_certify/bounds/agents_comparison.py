@@ -111,7 +111,7 @@ def compare_with_bounds(
     deviations : callable
         Of the same to (N, n, M) bounds.
     """
-    later = np.isfinite(run.scaled).all(axis=(0, 1, 2)) & (run.t > 0)
+    later = np.isfinite(run.scaled).all(axis=(0, 1, 2)) & (run.t > 0) & (run.rate * run.clock < 1200)  # e^600
     z, q, L = run.scaled[..., later], run.remaining[later], structure.graph.laplacian()
     weight, eta = np.exp(run.rate * run.clock[later] / 2), np.array([run.protocol.value(x) for x in q])
     decay = 0.0

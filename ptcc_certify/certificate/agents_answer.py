@@ -176,9 +176,14 @@ class AgentsAnswer(ABC):
     def obligations(self) -> list[Obligation]:
         """What the independent check verifies, in its order."""
 
+    @property
+    def first_ones(self) -> str:
+        """What :meth:`fall` is a share of."""
+        return "the first ones"
+
     @abstractmethod
     def fall(self, remaining: float) -> float:
-        """Return what deviations are of the first ones at most, in the norm of ``V``."""
+        """Return what deviations are of :attr:`first_ones` at most, in the norm of ``V``."""
 
     @abstractmethod
     def deviation_bound(self, remaining: np.ndarray) -> np.ndarray:

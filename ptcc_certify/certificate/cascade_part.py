@@ -144,9 +144,21 @@ class CascadePart(AgentsAnswer):
     # ------------------------------------------------------------------ bounds over time
 
     def fall(self, remaining: float) -> float:
-        """Return ``e^(-r s/2) + eta(0) I``: of the first ones, of positions and ``q/eta(0)`` together."""
+        """Return what deviations are of :attr:`first_ones` at most, in the norm of ``V``.
+
+        Without an initial state, or from one in agreement, that is the larger of ``sqrt V(x(0))`` and
+        ``sqrt V(q(0))/eta(0)``.
+        """
         ones = [Roots(Fraction(1), self.protocol.gain.first)] * len(self.functions)
-        return min((float(x[0]) for x in self._values(ones, remaining)), default=1.0)
+        roots = self.roots if any(root.state for root in self.roots) else ones
+        pairs = zip(self._values(roots, remaining), roots, strict=True)
+        return min((float(x[0]) / float_down(r.state) for x, r in pairs if r.state), default=1.0)
+
+    @property
+    def first_ones(self) -> str:
+        """What :meth:`fall` is a share of."""
+        own = any(root.state for root in self.roots)
+        return "the first ones" if own else "the larger of the first ones and of q(0)/g(0)"
 
     def _values(self, roots: Sequence[Roots], remaining: np.ndarray | float) -> list[np.ndarray]:
         """Return bounds of ``sqrt(V)`` of every function used."""

@@ -278,6 +278,8 @@ def judge_rate(certificate: Content, least: Fraction) -> Answer:
     if bound is not None and least > bound:
         return Answer(REFUTED, what, f"upper bound {up(bound, 8)}, proved")
     reason = "none is proved" if rate is None else f"proved: {down(rate)}"
+    if rate is None and certificate.agents is not None and certificate.agents.functions:
+        reason = "deviations of the cascade fall by two laws, not by one rate"
     return Answer(OPEN, what, reason if bound is None else f"{reason}, at most {up(bound, 8)} can be")
 
 
@@ -406,7 +408,7 @@ def _assess_agents(part: AgentsAnswer) -> tuple[bool | None, str, str, str]:
     when = "T" if capped else "0.99 T"
     remark = f"every position within {up(worst, 2)} of its place at {when}"
     if part.initial_state is None or not math.isfinite(worst):
-        return fall <= USEFUL, f"deviations at {when} are {up(fall, 2)} of the first ones", caveat, advice
+        return fall <= USEFUL, f"deviations at {when} are {up(fall, 2)} of {part.first_ones}", caveat, advice
     useful = worst <= USEFUL * part.longest_way if part.longest_way else fall <= USEFUL
     if not useful and not capped and not advice:
         advice = part.nearer

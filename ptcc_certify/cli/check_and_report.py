@@ -46,7 +46,7 @@ def check(
     certificate says that it was read, which is printed; the options about reading override that. Of a family name all
     its graphs, in any order. Prints claim and verdict; -v tells every obligation with what was verified. Exit code 0
     if the claim is proved, 1 if it is rejected, 4 if the certificate itself says undecided. With --verified all that
-    was not checked is named.
+    was not checked is named, and an undecided certificate is not read.
     `python -m ptcc_certify.checker` does the same, without other packages.
     """
     from ptcc_certify.certificate.checking import read_and_check

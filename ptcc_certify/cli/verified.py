@@ -91,7 +91,7 @@ def verified_check(certificate: str) -> VerifiedCheck:
     except OSError as error:
         raise ParameterError(f"{program} cannot be run ({error.strerror}); {BUILD}") from None
     output = run.stdout.decode("utf-8", "replace").rstrip("\n").split("\n")
-    if run.returncode not in (0, 1, 4) or not output[0]:
+    if run.returncode not in (0, 1) or not output[0]:
         message = run.stderr.decode("utf-8", "replace").strip().removeprefix(f"{PROGRAM}: ")
         raise FormatError(f"{certificate}: {message or f'{PROGRAM} ended with code {run.returncode}'}")
     return VerifiedCheck(document, _report(output, run.returncode), tuple(_after("not checked ", output)))
@@ -111,10 +111,9 @@ def _report(output: list[str], code: int) -> CheckReport:
             obligations.append(VerifiedObligation(kind, of, "by the verified checker"))
     rejected = " ".join(_after("rejected ", output)) or None
     sha256 = output[0].rpartition(" ")[2] if output[0].startswith("graph ") else ""
-    verdict = {0: "certified", 4: "undecided"}.get(code, "")
     return CheckReport(
-        accepted=code != 1,
-        verdict=verdict,
+        accepted=code == 0,
+        verdict="certified" if code == 0 else "",
         obligations=tuple(obligations),
         rejected=rejected and rejected.partition(":")[0],
         reason=rejected and (rejected.partition(": ")[2] or "not proved"),

@@ -101,7 +101,7 @@ def _error_text(part: AgentsAnswer) -> str:
         return "at T " + _named([float(max(row[i] for row in part.residual.agents)) for i in range(part.order)])
     bounds = part.deviation_bound(np.array([0.01]))[:, :, 0].max(axis=0)
     if not np.isfinite(bounds).all():
-        return f"at 0.99 T deviations are {up(part.fall(0.01) * (1 + 1e-9), 2)} of the first ones, in the norm of V"
+        return f"at 0.99 T deviations are {up(part.fall(0.01) * (1 + 1e-9), 2)} of {part.first_ones}, in the norm of V"
     return "at 0.99 T " + _named(bounds.tolist())
 
 

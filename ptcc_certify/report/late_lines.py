@@ -11,7 +11,6 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import down, float_up, near, up
 from ptcc_certify.bounds.small_delays import delay_threshold
-from ptcc_certify.certificate.late_answers import largest_late_input
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.report.structure_text import Lines
 from ptcc_certify.report.text_layout import shorten_label, shorten_list
@@ -34,6 +33,8 @@ def late_lines(certificate: Certificate) -> Lines:
         texts.append(f"at t = {near(at)} every agent within {up(float(late.deviation_bound([float(at)]).max()), 2)}")
     yield "late" if late.says_something else "LATE", texts[0]
     yield from (("", text) for text in texts[1:])
+    from ptcc_certify.certificate.late_answers import largest_late_input  # ``classify`` has no use for solvers
+
     largest, whole = largest_late_input(late, certificate.protocol), ", from within 1 of it at first" * late.relative
     if largest is not None:
         sliding = "" if certificate.protocol.reaching is None else ", the sliding term included"

@@ -379,7 +379,7 @@ def certificate_lines(
         yield "structure", structure_text(structure)
         yield from late_lines(certificate)
         if by_agent := residual_text(certificate):
-            yield "", f"by agent: {by_agent}"
+            yield "", f"left at T by agent: {by_agent}"
         yield from tracking_lines(certificate)
         if certificate.late is not None or certificate.tracking is not None:
             yield "", f"the lines below are of {'messages at once' if certificate.late else 'leaders at rest'}"

@@ -31,7 +31,6 @@ from ptcc_certify.simulation.filippov import simulate_sliding
 from ptcc_certify.simulation.instants import PAST, default_instants, wanted_instants
 from ptcc_certify.simulation.interrupt import interruptible
 from ptcc_certify.simulation.late_messages import Pattern, simulate_late
-from ptcc_certify.simulation.moving_leaders import simulate_tracking
 from ptcc_certify.simulation.nominal import as_forcing, simulate_nominal
 from ptcc_certify.simulation.trajectory import Trajectory
 
@@ -164,6 +163,8 @@ def simulate(
         if messages is not None:
             return simulate_late(graph, protocol, messages, x0, pattern=pattern, seed=seed)
         assert leaders is not None
+        from ptcc_certify.simulation.moving_leaders import simulate_tracking  # it loads SciPy
+
         return simulate_tracking(graph, protocol, leaders, x0)
     initial_state = _floats(x0, graph, "x0")
     manifold = None if sigma0 is None else _floats(sigma0, graph, "sigma0")

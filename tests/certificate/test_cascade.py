@@ -270,6 +270,28 @@ def test_without_initial_states_the_certificate_holds_for_all():
     holds(certificate)
 
 
+def test_the_share_of_the_first_deviations_is_one_where_no_agent_has_a_bound_of_its_own():
+    followers, slow = 130, NominalProtocol(T=1, rho1=1, rho2="1/2", kappa=1)
+    star = SignedDigraph.from_edges([("L", k, 50) for k in range(followers)])
+    part = part_of(made(star, slow, [0] + [1] * followers, Agents(order=2, cascade=1)))
+    assert not np.isfinite(part.deviation_bound(np.array([0.01]))).all()
+    # Every follower moves as the only one of a pair: x' = v, v' = u.
+    pair = SignedDigraph.from_edges([("L", "f", 50)])
+    run = certify(pair, slow, [0, 1], agents=Agents(order=2, cascade=1), method="paper").agents.simulate()
+    later = (run.remaining >= 0.01) & (run.remaining < 1)
+    left = np.abs(run.states[1, 0, 0, later])
+    assert all(part.fall(q) >= share * (1 - 1e-6) for q, share in zip(run.remaining[later], left, strict=True))
+    agreed = part_of(made(star, slow, [1] * (followers + 1), Agents(order=2, cascade=1), v0=[0] + [1] * followers))
+    assert "q(0)" in agreed.first_ones and "q(0)" not in part.first_ones
+
+
+def test_a_run_whose_weights_leave_float64_is_compared_as_far_as_they_go():
+    steep = NominalProtocol(T=1, rho1=1, rho2=50, kappa=1)
+    agents = Agents(order=2, cascade=90)
+    seen = made(ENEMIES, steep, [1, -2, 3], agents, simulation=True).agents_comparison
+    assert seen is not None and 0 < seen.decay <= 1 and seen.deviations and all(0 < x <= 1 for x in seen.deviations)
+
+
 def test_disturbances_under_sliding_variables_move_nothing():
     sliding = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=6, kappa=1, mu1=3, delta=2)
     certificates = [

@@ -152,7 +152,7 @@ def test_a_lower_bound_on_all_rates_than_is_proved_is_rejected(kind: str, tmp_pa
     forged = resealed(changed(forged, ("input", "threshold", "upper"), upper))
     assert check(forged).rejected == f"{kind} of rates"
     code, text = said(forged, tmp_path)
-    assert code == 1 and "rate-upper-bound of rates" in text
+    assert code == 1 and f"{kind} of rates" in text
 
 
 def test_what_the_sliding_mode_adds_to_the_input_is_verified(tmp_path: Path) -> None:
@@ -308,7 +308,7 @@ def test_agents_of_order_n_and_families_are_not_read_as_agents_of_order_1(tmp_pa
 def compare(document: dict, path: tuple, folder: Path) -> str:
     """The cause of a difference between the two checkers on a mutant; empty if they agree."""
     python, (code, text) = check(resealed(document)), said(resealed(document), folder)
-    accepted = code in (0, 4)
+    accepted = code == 0
     if python.accepted == accepted:
         return ""
     if accepted:
@@ -358,4 +358,4 @@ def test_what_the_checker_accepts_of_random_graphs_the_verified_one_accepts(
         document = json.loads(certify(graph, protocol, start, simulation=False, time_limit=3600, **more).to_json())
         code, text = said(document, tmp_path)
         assert check(document).accepted
-        assert code in (0, 4) or (code == 2 and any(word in text for word in UNREAD)), (name, seed, text)
+        assert code == 0 or (code == 2 and any(word in text for word in UNREAD)), (name, seed, text)

@@ -118,7 +118,7 @@ def _set_text(run: Trajectory, certificate: Certificate) -> str:
     """Name the set of initial states for which a peak is proved, and say whether a run begins outside a box."""
     region = certificate.effort and certificate.effort.initial_set
     if not region:
-        return ""
+        return ", messages at once" * (certificate.late is not None)
     outside = False
     if region.radius:
         center, radius = (np.array(list(map(float, numbers))) for numbers in (region.center, region.radius))
