@@ -130,7 +130,8 @@ def lyapunov_matrix(s: Setting) -> tuple[tuple[Fraction, ...], ...]:
     for A in bernstein_matrices(s):
         B = back @ np.array([[float(x) for x in row] for row in A]) @ scale
         limits.append(b @ b.T - r * W - B @ W - W @ B.T >> 0)
-    cp.Problem(cp.Minimize(size), limits).solve(solver=cp.CLARABEL)
+    # The trace keeps the oldest Clarabel from solutions that run away where the size alone leaves one free.
+    cp.Problem(cp.Minimize(size + 1e-6 * cp.trace(W)), limits).solve(solver=cp.CLARABEL)
     assert W.value is not None
     found = scale @ W.value @ scale
     step = [2.0 ** (math.floor(math.log2(abs(found[i, i]))) // 2) for i in range(n)]

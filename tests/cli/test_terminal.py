@@ -116,6 +116,7 @@ def test_work_that_lasts_says_where_it_is_without_a_terminal(
                 break
     assert printed.out == "" and re.search(r"ptcc: after 0 s: 1 of 2 done, another step\n", printed.err)
     assert threading.active_count() == threads
+    capsys.readouterr()  # a second line may have come before the work ended
     with terminal.progress(("one step",), quiet=True) as begin:
         begin("one step")
         threading.Event().wait(0.05)
