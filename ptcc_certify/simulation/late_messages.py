@@ -136,16 +136,16 @@ def simulate_late(
     states[0] = first
     D = graph.in_weight()
     for i in range(t.size - 1):
-        pushes, pulls = hearing.sums(i, states)
-        step, errors[i] = steps_of_clock[i], pushes - (pulls if messages.own_delay else D * states[i])
+        heard, own = hearing.sums(i, states)
+        step, errors[i] = steps_of_clock[i], heard - (own if messages.own_delay else D * states[i])
         if messages.own_delay:
-            states[i + 1] = states[i] + step * (pushes - pulls)
+            states[i + 1] = states[i] + step * (heard - own)
             continue
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            goal = np.where(D > 0, pushes / D, states[i])
+            goal = np.where(D > 0, heard / D, states[i])
             left = np.where(np.isfinite(step), np.exp(-D * step), D <= 0)
         states[i + 1] = goal + (states[i] - goal) * left
-    errors[-1] = pushes - (pulls if messages.own_delay else D * states[-1])
+    errors[-1] = heard - (own if messages.own_delay else D * states[-1])
     return _run(graph, protocol, messages, pattern, t, states.T, errors.T, time.perf_counter() - begin)
 
 
@@ -266,11 +266,11 @@ class _Hearing:
         if self.error:
             self.signs = np.where(self.random.random(self.signs.size) < 0.05, -self.signs, self.signs)
             values = values + self.error * self.signs
-        pushes = np.bincount(self.target, self.weights * values, minlength=self.n)
+        heard = np.bincount(self.target, self.weights * values, minlength=self.n)
         if not self.own:
-            return pushes, np.zeros(self.n)
+            return heard, np.zeros(self.n)
         own = states[j, self.target] + (self.error * self.signs if self.error else 0.0)
-        return pushes, np.bincount(self.target, np.abs(self.weights) * own, minlength=self.n)
+        return heard, np.bincount(self.target, np.abs(self.weights) * own, minlength=self.n)
 
     def _instants(self, i: int) -> np.ndarray:
         """Return for every edge the number of the instant that is heard over the next step."""
