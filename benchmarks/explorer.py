@@ -117,16 +117,19 @@ def in_browser(server: ExplorerServer) -> None:
         browser.close()
 
 
-#: Moves the slider of rho2, and tells the milliseconds until image and text have changed.
+#: Moves the slider of rho2, and tells the milliseconds until image and text have changed and are painted.
 MOVE_ON_PAGE = """value => new Promise(resolve => {
   const image = document.querySelector("#panel-states img"), text = document.querySelector('dd[data-head="error"]');
   const before = [image.src, text.textContent], began = performance.now();
-  const look = () => image.src !== before[0] && text.textContent !== before[1] && image.complete
-    ? resolve(performance.now() - began) : requestAnimationFrame(look);
+  const look = () => image.src !== before[0] && text.textContent !== before[1] && image.complete;
+  const watch = new MutationObserver(() => look() && requestAnimationFrame(() => setTimeout(() => {
+    watch.disconnect();
+    resolve(performance.now() - began);
+  })));
+  watch.observe(document.body, { subtree: true, childList: true, characterData: true, attributes: true });
   const slider = document.querySelector('[data-of="rho2"]');
   slider.value = value;
   slider.dispatchEvent(new Event("input", { bubbles: true }));
-  look();
 })"""
 
 
@@ -139,6 +142,7 @@ def main() -> None:
     heads = ("image and text", "verdict", "image: CPU", "verdict: CPU")
     print(f"{'seconds: median, max':<34}{'moves':>6}   {'   '.join(f'{head:<15}' for head in heads)}".rstrip())
     server = ExplorerServer(Explorer(random_graph(40), FORTY), Settings(FORTY), 0)
+    server.warm_up()
     threading.Thread(target=server.serve_forever, daemon=True).start()
     everything: list[tuple[float, ...]] = []
     for kind in KINDS:

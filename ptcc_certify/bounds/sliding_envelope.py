@@ -214,9 +214,12 @@ class SlidingEnvelope(Envelope):
         Of those that bound the reaching phase: one that bounds only the growth would end in infinity.
         """
         reaching = np.isfinite(at.z)
-        knots = np.unique(np.concatenate([self._phase.pieces, at.z[reaching]]))
+        parts = [self._phase.pieces, np.unique(at.z[reaching])]
+        knots, kept = np.unique(np.concatenate(parts), return_index=True)
         place = np.where(reaching, np.searchsorted(knots, at.z), knots.size)
-        size, s, last = self._sliding(knots) / unit, *map(self.protocol.clock_while_reaching, (knots, np.array(np.inf)))
+        size = np.hstack([self._sliding(part) for part in parts])[:, kept] / unit
+        s, last = map(self.protocol.clock_while_reaching, (knots, np.array(np.inf)))
+        at_size = np.hstack([size, np.zeros((len(size), 1))])[:, place]
         later = np.where(reaching, 0.0, np.maximum(at.clock - last, 0.0))
         y0 = [x / Fraction(unit) for x in self._nominal_state(x0)]
         for function, root in self._initial_values((m for m in functions if m.rate_below > 0), y0):
@@ -226,7 +229,7 @@ class SlidingEnvelope(Envelope):
             gained = forcing * (-np.expm1(-step) / half)
             pieces = zip(np.exp(-step).tolist(), gained.tolist(), strict=True)
             v = np.array(list(accumulate(pieces, lambda v, piece: piece[0] * v + piece[1], initial=root)))
-            yield function, v[place] * np.exp(-half * later), np.append(_column_norms(C @ size), 0.0)[place]
+            yield function, v[place] * np.exp(-half * later), _column_norms(C @ at_size)
 
     @cached_property
     def _cache(self) -> dict[bytes, np.ndarray]:
@@ -243,7 +246,7 @@ class SlidingEnvelope(Envelope):
 
     def _drive(self, function: LyapunovFunction) -> tuple[np.ndarray, np.ndarray]:
         """Return ``|R C|`` and ``|R B|``, ``P = R'R``: how sliding variables enter the coordinates and drive them."""
-        L = self.structure.graph.laplacian()
+        L: Any = self._laplacian
         if function.coordinates == "E":
             rows = L[function.rows]
             return np.abs(function.scaled(rows.toarray())), np.abs(function.scaled((rows @ L).toarray()))

@@ -599,7 +599,7 @@ class InputBounds:
         entries = root_above(form.value([initial_set.largest(row) for row in rows], sizes=True))
         return min(entries, middle + root_above(excess))
 
-    def _pieces(self, k: int, z: Fraction) -> tuple[list[Piece], Fraction, Fraction]:
+    def pieces(self, k: int, z: Fraction) -> tuple[list[Piece], Fraction, Fraction]:
         """Bound ``sqrt(V)`` in pieces of the time up to ``z``, while sliding variables move.
 
         Returned besides are what ``gain sqrt(V)`` is at most up to ``z``, if ``gain e^(-rate s / 2)`` never grows; and
@@ -682,7 +682,7 @@ class InputBounds:
         c, rate = self.root_constant(k, v), self.form(k).rate
         if self.reaching is None:
             return of(self.gain, error_bound, c * self.initial_root(k), rate, z)
-        pieces, most, begin = self._pieces(k, z)
+        pieces, most, begin = self.pieces(k, z)
         late = of(self.gain, Fraction(0), c * begin, rate, z)
         if of is peak_above:
             return rounded(max(late, min(c * most, error_bound * pieces[-1].last)), BITS, up=True)

@@ -17,7 +17,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -126,7 +126,7 @@ def certified_reaching_times(protocol: ReachingProtocol, sigma0: Sequence[Fracti
     >>> certified_reaching_times(p, [Fraction(0), Fraction(-1)])
     (ReachingTime(0, 1 before T_r), ReachingTime(0.43409, 0.565 before T_r))
     """
-    worst = ReachingProblem(protocol, np.array([float(x) for x in sigma0]), WorstCaseDisturbance(protocol.delta))
+    worst = _worst_case(protocol, tuple(float(x) for x in sigma0))
     pole, push = protocol.mu3 * protocol.kappa, protocol.mu1 - protocol.delta
     instants = {Fraction(0): Fraction(0)}
 
@@ -394,6 +394,12 @@ def sliding_bound(
     disturbance; 0 from the proved reaching times on, which are computed unless they are given. Below 1e-300 floats
     lose digits, and may be 0.
     """
-    worst = ReachingProblem(protocol, np.array([float(x) for x in sigma0]), WorstCaseDisturbance(protocol.delta))
+    worst = _worst_case(protocol, tuple(float(x) for x in sigma0))
     times = certified_reaching_times(protocol, sigma0) if reaching is None else reaching
     return worst.above(z, np.array([math.inf if r.z is None else float(r.z) for r in times]) * (1 + 1e-15))
+
+
+@lru_cache(maxsize=2)
+def _worst_case(protocol: ReachingProtocol, sigma0: tuple[float, ...]) -> ReachingProblem:
+    """Return the problem whose run is the bound; what is told and what is drawn ask for it at instants of their own."""
+    return ReachingProblem(protocol, np.array(sigma0), WorstCaseDisturbance(protocol.delta))

@@ -67,23 +67,31 @@ def decaying(bounds: InputBounds, k: int, agent: int | None) -> Fraction:
     return bounds.root_constant(k, agent) * bounds.initial_root(k)
 
 
+def _driven_peak(bounds: InputBounds, k: int, agent: int | None) -> tuple[float, float]:
+    """Return about what a function bounds the peak by while sliding variables move, and without ``|e|``, for ties."""
+    pieces, most, begin = bounds.pieces(k, _quiet(bounds))
+    last, clock = nearest_float(pieces[-1].last), math.fsum(float(p.clock) for p in pieces)
+    constant = bounds.error_norm if agent is None else bounds.error_bounds[agent]
+    c = nearest_float(bounds.root_constant(k, agent))
+    late = c * math.exp(log(begin) - nearest_float(bounds.form(k).rate) / 2 * clock) * last if begin else 0.0
+    alone = c * nearest_float(most)
+    return max(late, min(alone, nearest_float(constant) * last)), alone
+
+
+def _quiet(bounds: InputBounds) -> Fraction:
+    """Return the end of the reaching phase, short of which another checker may find it, with other roundings."""
+    return rounded(bounds.quiet, BOUND_BITS, up=True)
+
+
 def best_bound(bounds: InputBounds, of: Of, agent: int | None, functions: Sequence[int]) -> Witness | None:
-    """Return the bound of the function whose decay takes over first, the least peak; the least while driven."""
-    best: Witness | None = None
-    for z, _, k in sorted((_crossing(bounds, agent, k), decaying(bounds, k, agent), k) for k in functions):
+    """Return the bound of the function whose decay takes over first, the least peak; about the least while driven."""
+    size = _driven_peak if bounds.reaching else decaying
+    for z, _, k in sorted((_crossing(bounds, agent, k), size(bounds, k, agent), k) for k in functions):
         if z <= LATEST:
-            # Short of what another checker may find, with other roundings, for the end of the reaching phase.
-            quiet = rounded(bounds.quiet, BOUND_BITS, up=True)
-            instant = max(Fraction(math.ceil(z * 2**INSTANT_BITS), 2**INSTANT_BITS), quiet)
-            try:
-                own = Witness(round_up(bounds.bound(of, agent, k, instant)), k, instant)
-            except (ValueError, ArithmeticError):
-                continue
-            if best is None or own.value < best.value:
-                best = own
-            if bounds.reaching is None:
-                break
-    return best
+            instant = max(Fraction(math.ceil(z * 2**INSTANT_BITS), 2**INSTANT_BITS), _quiet(bounds))
+            with suppress(ValueError, ArithmeticError):
+                return Witness(round_up(bounds.bound(of, agent, k, instant)), k, instant)
+    return None
 
 
 def least_bound(bounds: InputBounds, of: Of, functions: Sequence[int]) -> Witness | None:

@@ -115,5 +115,5 @@ def _draw_decay(certificate: Certificate, ax: Axes) -> None:
         axis.set_ticks([10.0**k for k in _TICKS], list(_TICKS.values()))
     ax.set_xlim(1, _LAST)
     ax.set_ylim(_LEAST, 1e4)
-    name = "E" if envelope.coordinates == "E" else r"\varepsilon"
-    finished(ax, "remaining time, $1 - t/T$", rf"$\|{name}(t)\| / \|{name}(0)\|$")
+    name = "E" if envelope.coordinates == "E" else "ε"
+    finished(ax, "remaining time, 1 − t/T", f"‖{name}(t)‖ / ‖{name}(0)‖")

@@ -7,6 +7,7 @@ this machine's or from the page of another site. It only computes; there is noth
 from __future__ import annotations
 
 import errno
+import gc
 import json
 import os
 import secrets
@@ -117,8 +118,12 @@ class ExplorerServer(ThreadingHTTPServer):
             print(f"ptcc: {explain(error)}", file=sys.stderr)
 
     def warm_up(self) -> None:
-        """Compute what the page begins with, before the browser asks: libraries are loaded by then."""
-        self._shown(lambda: self.explorer.preview(self.settings))  # where it fails, the page will ask again and tell
+        """Compute what the page begins with, before the browser asks.
+
+        What libraries have loaded by then stays for good: while a control is moved, nobody looks for garbage in it.
+        """
+        shown = self._shown(lambda: self.explorer.preview(self.settings))
+        shown.add_done_callback(lambda _: gc.freeze())  # where it failed, the page will ask again and tell
 
     def page(self) -> str:
         """Return the page."""
