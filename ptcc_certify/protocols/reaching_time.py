@@ -126,7 +126,7 @@ def certified_reaching_times(protocol: ReachingProtocol, sigma0: Sequence[Fracti
     >>> certified_reaching_times(p, [Fraction(0), Fraction(-1)])
     (ReachingTime(0, 1 before T_r), ReachingTime(0.43409, 0.565 before T_r))
     """
-    worst = _worst_case(protocol, tuple(float(x) for x in sigma0))
+    worst = worst_case(protocol, tuple(float(x) for x in sigma0))
     pole, push = protocol.mu3 * protocol.kappa, protocol.mu1 - protocol.delta
     instants = {Fraction(0): Fraction(0)}
 
@@ -198,7 +198,10 @@ class ReachingProblem:
         0 for one that starts there or below 1e-290, infinite for one that is 0 at ``T_r`` only.
         """
         z = np.zeros(self._unit.size)
-        z[self._agents] = [self._root(row) for row in range(self._agents.size)]
+        _, rows, same = np.unique(self._unit[self._agents], return_index=True, return_inverse=True)
+        if not self._worst:  # the disturbances of two agents differ, though they start equally far
+            rows = same = np.arange(self._agents.size)
+        z[self._agents] = np.array([self._root(row) for row in rows.tolist()])[same]
         return z
 
     def sigma(self, z: np.ndarray) -> np.ndarray:
@@ -394,12 +397,12 @@ def sliding_bound(
     disturbance; 0 from the proved reaching times on, which are computed unless they are given. Below 1e-300 floats
     lose digits, and may be 0.
     """
-    worst = _worst_case(protocol, tuple(float(x) for x in sigma0))
+    worst = worst_case(protocol, tuple(float(x) for x in sigma0))
     times = certified_reaching_times(protocol, sigma0) if reaching is None else reaching
     return worst.above(z, np.array([math.inf if r.z is None else float(r.z) for r in times]) * (1 + 1e-15))
 
 
 @lru_cache(maxsize=2)
-def _worst_case(protocol: ReachingProtocol, sigma0: tuple[float, ...]) -> ReachingProblem:
-    """Return the problem whose run is the bound; what is told and what is drawn ask for it at instants of their own."""
+def worst_case(protocol: ReachingProtocol, sigma0: tuple[float, ...]) -> ReachingProblem:
+    """Return the problem whose run is the bound: times, bounds and runs ask for it, at instants of their own."""
     return ReachingProblem(protocol, np.array(sigma0), WorstCaseDisturbance(protocol.delta))

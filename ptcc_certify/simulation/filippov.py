@@ -19,7 +19,7 @@ import numpy as np
 from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.protocols.disturbance import TOLERANCE, Disturbance, StateDependent, WorstCaseDisturbance
 from ptcc_certify.protocols.gain_limits import GainLimits
-from ptcc_certify.protocols.reaching_time import LAST_Z, ReachingProblem
+from ptcc_certify.protocols.reaching_time import LAST_Z, ReachingProblem, worst_case
 from ptcc_certify.simulation.cvodes import Motion, Phase, Tolerances
 from ptcc_certify.simulation.cvodes_nominal import MANY_STEPS, NominalMotion, signal
 from ptcc_certify.simulation.instants import Instants, tau_before
@@ -173,7 +173,10 @@ class _SlidingMotion(Motion):
 
     def _solve_decoupled(self, z: np.ndarray, out: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
         """Fill ``out`` until all sliding variables are 0; return the reaching times, the last of them, ``y`` there."""
-        scalar = ReachingProblem(self.protocol, self.sigma0, self.disturbance)
+        if self.disturbance == WorstCaseDisturbance(self.protocol.delta):
+            scalar = worst_case(self.protocol, tuple(self.sigma0.tolist()))
+        else:
+            scalar = ReachingProblem(self.protocol, self.sigma0, self.disturbance)
         end = min(float(scalar.z.max(initial=0.0)), self._last_z)
         self.reaching_z, early = scalar.z, z < end
         out[early] = self.sample(self.reaching, z[early], end, events=scalar.z)
