@@ -19,10 +19,14 @@ import os
 import platform
 import shutil
 import statistics
+import subprocess
+import sys
+import tempfile
 import threading
 import time
 from collections.abc import Sequence
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 from urllib.parse import urlencode
 
@@ -97,24 +101,34 @@ def tell(label: str, moves: Sequence[tuple[float, ...]]) -> None:
     print(f"{label:<34}{len(moves):>6}   {'   '.join(columns)}", flush=True)
 
 
-def in_browser(server: ExplorerServer) -> None:
-    """Move a slider on the page ten times, with every graph and protocol."""
+def in_browser() -> None:
+    """Move a slider on the page of ``ptcc explore`` ten times, with every graph and protocol, after one to warm up."""
     from playwright.sync_api import sync_playwright
 
-    with sync_playwright() as tools:
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as tools:
+        rows = [f"{source},{target},{weight}" for source, target, weight in random_graph(40).edges]
+        path = Path(folder, f"{FORTY}.csv")
+        path.write_text("\n".join(["source,target,weight", *rows]) + "\n", encoding="utf-8")
+        command = [sys.executable, "-m", "ptcc_certify", "explore", str(path), "--no-browser"]
+        explorer = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        assert explorer.stdout is not None
+        address = next(word for line in explorer.stdout for word in line.split() if word.startswith("http://"))
         browser = tools.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
         page = browser.new_page(viewport={"width": 1280, "height": 900})
-        page.goto(server.address)
+        page.goto(address)
+        graphs = page.eval_on_selector_all("#graph option", "options => options.map(option => option.value)")
         for kind in KINDS:
             page.select_option("#kind", kind)
-            for graph in server.explorer.graphs:
+            for graph in graphs:
                 page.select_option("#graph", graph)
                 seconds = []
-                for k in range(10):
+                for k in range(11):
                     page.wait_for_selector("#verdict:not(.open)")
                     seconds.append((page.evaluate(MOVE_ON_PAGE, str(0.5 + k / 10)) / 1000,))
-                tell(f"{graph}, {kind}, in Chromium", seconds)
+                tell(f"{graph}, {kind}, in Chromium", seconds[1:])
         browser.close()
+        explorer.terminate()
+        explorer.wait()
 
 
 #: Moves the slider of rho2, and tells the milliseconds until image and text have changed and are painted.
@@ -152,9 +166,10 @@ def main() -> None:
             tell(f"{graph}, {kind}", moves)
             everything += moves
     tell("all", everything)
-    if browser:
-        in_browser(server)
     server.shutdown()
+    server.server_close()
+    if browser:
+        in_browser()
 
 
 if __name__ == "__main__":

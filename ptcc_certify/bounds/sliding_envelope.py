@@ -42,8 +42,10 @@ from ptcc_certify.protocols.reaching_time import ReachingTime, sliding_bound
 if TYPE_CHECKING:
     from ptcc_certify.simulation.trajectory import Trajectory
 
-#: Arrays of instants whose bounds are cached.
-_CACHE_SIZE = 8
+#: Lyapunov functions and arrays of instants whose bounds are kept.
+_CACHE_SIZE = 32
+#: A function, ``|R C|``, and where each piece begins, and at ``T_r``, its bound and what drives it.
+_Driven = tuple[LyapunovFunction, np.ndarray, np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -213,36 +215,59 @@ class SlidingEnvelope(Envelope):
 
         Of those that bound the reaching phase: one that bounds only the growth would end in infinity.
         """
+        pieces, s = self._pieces
         reaching = np.isfinite(at.z)
-        parts = [self._phase.pieces, np.unique(at.z[reaching])]
-        knots, kept = np.unique(np.concatenate(parts), return_index=True)
-        place = np.where(reaching, np.searchsorted(knots, at.z), knots.size)
-        size = np.hstack([self._sliding(part) for part in parts])[:, kept] / unit
-        s, last = map(self.protocol.clock_while_reaching, (knots, np.array(np.inf)))
-        at_size = np.hstack([size, np.zeros((len(size), 1))])[:, place]
-        later = np.where(reaching, 0.0, np.maximum(at.clock - last, 0.0))
-        y0 = [x / Fraction(unit) for x in self._nominal_state(x0)]
-        for function, root in self._initial_values((m for m in functions if m.rate_below > 0), y0):
+        place = np.where(reaching, np.searchsorted(pieces, at.z, side="right") - 1, pieces.size)
+        clock = np.where(reaching, self.protocol.clock_while_reaching(at.z), at.clock)
+        since = np.maximum(clock - s[place], 0.0)
+        instants, same = np.unique(at.z[reaching], return_inverse=True)
+        size = np.zeros((len(x0), *at.z.shape))
+        size[:, reaching] = self._sliding(instants)[:, same] / unit
+        for function, C, v, forcing in self._driven([m for m in functions if m.rate_below > 0], tuple(x0), unit):
             half = function.rate_below / 2
-            C, B = self._drive(function)
-            forcing, step = _column_norms(B @ size), half * np.diff(s, append=last)
-            gained = forcing * (-np.expm1(-step) / half)
-            pieces = zip(np.exp(-step).tolist(), gained.tolist(), strict=True)
-            v = np.array(list(accumulate(pieces, lambda v, piece: piece[0] * v + piece[1], initial=root)))
-            yield function, v[place] * np.exp(-half * later), _column_norms(C @ at_size)
+            gained = forcing[place] * (-np.expm1(-half * since) / half)
+            yield function, v[place] * np.exp(-half * since) + gained, _column_norms(C @ size)
 
     @cached_property
-    def _cache(self) -> dict[bytes, np.ndarray]:
+    def _pieces(self) -> tuple[np.ndarray, np.ndarray]:
+        """The instants ``z`` at which the pieces of the reaching phase begin; the clock there and at ``T_r``."""
+        pieces = self._phase.pieces
+        return pieces, self.protocol.clock_while_reaching(np.append(pieces, np.inf))
+
+    def _driven(
+        self, functions: Sequence[LyapunovFunction], x0: tuple[Fraction, ...], unit: float
+    ) -> Iterator[_Driven]:
+        """Yield functions with what they are until ``T_r``, kept for whoever asks about other instants."""
+        known = {id(one): self._cache[key] for one in functions if (key := (id(one), x0, unit)) in self._cache}
+        anew = [one for one in functions if id(one) not in known]
+        pieces, s = self._pieces
+        size = self._sliding(pieces) / unit
+        for function, root in self._initial_values(anew, [x / Fraction(unit) for x in self._nominal_state(x0)]):
+            C, B = self._drive(function)
+            forcing, half = np.append(_column_norms(B @ size), 0.0), function.rate_below / 2
+            step = half * np.diff(s)
+            each = zip(np.exp(-step).tolist(), (forcing[:-1] * (-np.expm1(-step) / half)).tolist(), strict=True)
+            v = np.array(list(accumulate(each, lambda v, piece: piece[0] * v + piece[1], initial=root)))
+            known[id(function)] = self._keep((id(function), x0, unit), (function, C, v, forcing))
+        yield from (known[id(function)] for function in functions)
+
+    @cached_property
+    def _cache(self) -> dict[Any, Any]:
         return {}
+
+    def _keep(self, key: Any, value: Any) -> Any:
+        """Keep what was computed for the questions that come next, and return it."""
+        if len(self._cache) > _CACHE_SIZE:
+            self._cache.clear()
+        self._cache[key] = value
+        return value
 
     def _sliding(self, z: np.ndarray) -> np.ndarray:
         """Return :func:`sliding_bound`, which every Lyapunov function asks for at the same instants."""
-        key = z.tobytes()
-        if key not in self._cache:
-            if len(self._cache) > _CACHE_SIZE:
-                self._cache.clear()
-            self._cache[key] = sliding_bound(self.protocol, self.sigma0, z, self.reaching)
-        return self._cache[key]
+        known = self._cache.get(z.tobytes())
+        if known is None:
+            known = self._keep(z.tobytes(), sliding_bound(self.protocol, self.sigma0, z, self.reaching))
+        return np.asarray(known)
 
     def _drive(self, function: LyapunovFunction) -> tuple[np.ndarray, np.ndarray]:
         """Return ``|R C|`` and ``|R B|``, ``P = R'R``: how sliding variables enter the coordinates and drive them."""
