@@ -15,11 +15,12 @@ from ptcc_certify.bounds.agents import States, error_constants, root_product
 from ptcc_certify.bounds.agents_comparison import AgentsComparison, compare_with_bounds
 from ptcc_certify.bounds.cascade import (
     Roots,
-    Rows,
+    combined_state,
     drive_integral,
     input_from,
     input_is_bounded,
     positions_of,
+    root_of,
     roots_of,
     tracking_error,
 )
@@ -243,7 +244,6 @@ def prove_cascade(
     used = tuple(functions[k] for k in numbers)
     full = [error_constants(structure, V) if V.matrix is not None else None for V in used]
     protocol = CascadeProtocol.of(base, agents.alpha, offsets)
-    error: Rows | None = None
     roots: tuple[Roots, ...] = ()
     if initial_state is not None:
         error = tracking_error(structure, initial_state, offsets, base.gain.first)
@@ -263,14 +263,26 @@ def prove_cascade(
         final = final_states(part, influence)
         if not part.derivatives_agree:
             final = tuple(tuple(chain[:1] for chain in agent) for agent in final)
-    return replace(part, final_state=final, input=None if error is None else _input(part, error))
+    return replace(part, final_state=final, input=_input(part))
 
 
-def _input(part: CascadePart, error: Rows) -> tuple[Fraction, ...] | None:
+def _input(part: CascadePart) -> tuple[Fraction, ...] | None:
     """Return the least bounds of the whole input, agent by agent; None where none is proved."""
-    gain, base = part.protocol.gain, part.protocol.base
+    gain, base, begin = part.protocol.gain, part.protocol.base, part.initial_state
+    if begin is None:
+        return None
+    combined = combined_state(begin, part.protocol.offsets, gain, part.alpha)
+    speeds = [root_product(sum((chain[1] ** 2 for chain in agent), Fraction(0))) for agent in begin]
     bounds = [
-        input_from(part.structure, gain, part.alpha, V.proved_rate, constants, root, error)
+        input_from(
+            gain,
+            part.alpha,
+            V.proved_rate,
+            constants,
+            root.state,
+            root_of(part.structure, V, combined),
+            speeds,
+        )
         for V, constants, root in zip(part.functions, part.error_constants, part.roots, strict=True)
         if constants is not None and input_is_bounded(gain.pole, V.proved_rate, part.alpha)
     ]

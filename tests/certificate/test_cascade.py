@@ -124,6 +124,32 @@ def test_bounds_final_states_and_inputs_of_many_graphs(first: int):
     print(f"\nlargest ratio {max(ratios):.6f}, median {np.median(ratios):.3f}")
 
 
+@pytest.mark.campaign
+@pytest.mark.parametrize("first", range(0, len(CLASSES), 13))
+def test_inputs_of_every_class_stay_within_their_bounds(first: int):
+    """Gains by which the input is bounded, from just so to by far; velocities at random, or none."""
+    ratios = []
+    for seed in range(first, min(first + 13, len(CLASSES))):
+        case, rng = case_of(seed), np.random.default_rng([34, seed])
+        free = Agents(order=2, cascade=1, offsets=case.offsets)
+        best = part_of(made(case.graph, case.protocol, None, free, method="best")).best
+        if not best:
+            continue
+        k = 4 / best * F(str(rng.choice([1.02, 1.5, 3, 8])))
+        gain = case.protocol.gain
+        protocol = NominalProtocol(T=gain.T, rho1=gain.rho1, rho2=k, kappa=1)
+        agents = Agents(order=2, cascade=F(str(rng.choice([1.02, 2, 4, 10]))) / k, offsets=case.offsets)
+        v0 = case.v0 if rng.random() < 0.7 else None
+        certificate = made(case.graph, protocol, case.x0, agents, v0=v0, method="best", simulation=True)
+        seen = certificate.agents_comparison
+        assert part_of(certificate).input is not None and seen is not None and seen.input is not None
+        holds(certificate)
+        ratios.append(seen.input)
+    assert 0 < max(ratios) <= 1 + 1e-7 and np.median(ratios) > 0.1
+    text = ", ".join(f"{x:.3g}" for x in np.quantile(ratios, [0, 0.25, 0.5, 0.75, 1]))
+    print(f"\n{len(ratios)} graphs: input over its bound, least to largest by quarters: {text}")
+
+
 # ---------------------------------------------------------------------- where they end
 
 
