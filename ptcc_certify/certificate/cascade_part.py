@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from lmi.exact.decimal_rounding import down, float_down, float_up, near, up
-from ptcc_certify.bounds.agent_motion import Interval, common_motion
+from ptcc_certify.bounds.agent_motion import LARGEST_DECAY, Interval, common_motion
 from ptcc_certify.bounds.agents import States, error_constants, root_product
 from ptcc_certify.bounds.agents_comparison import AgentsComparison, compare_with_bounds
 from ptcc_certify.bounds.cascade import (
@@ -26,6 +26,7 @@ from ptcc_certify.bounds.cascade import (
 )
 from ptcc_certify.bounds.final_state import Influence
 from ptcc_certify.certificate.agents_answer import AgentsAnswer, Intervals, Residual, UsedFunction, final_states
+from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.protocols import Protocol
@@ -240,6 +241,12 @@ def prove_cascade(
     ParameterError
         ``alpha rho1 T`` is beyond what the common motion is enclosed for.
     """
+    falls = base.gain.rho1 * base.gain.T
+    if agents.alpha * falls > LARGEST_DECAY:
+        raise ParameterError(
+            f"cascade = {near(agents.alpha)} is too large to enclose the common motion: beyond "
+            f"{LARGEST_DECAY}/(rho1 T); take at most {down(LARGEST_DECAY / falls, 4)}, or a smaller rho1"
+        )
     numbers = [k for k, V in enumerate(functions) if V.proved_rate > 0]
     used = tuple(functions[k] for k in numbers)
     full = [error_constants(structure, V) if V.matrix is not None else None for V in used]

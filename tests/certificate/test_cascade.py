@@ -341,6 +341,12 @@ def test_a_file_says_what_the_certificate_says(tmp_path: Path):
     assert np.array_equal(one.deviation_bound(np.array([0.5])), other.deviation_bound(np.array([0.5])))
 
 
+def test_velocities_that_were_not_given_are_told_to_be_0():
+    agents = Agents(order=2, cascade=2)
+    still, moving = made(TEAM, FAST, [5, 2, 4, -1], agents), made(TEAM, FAST, [5, 2, 4, -1], agents, v0=[0, 0, 0, 1])
+    assert "x(0) given, v(0) 0\n" in still.summary() and "x(0) given, v(0) given\n" in moving.summary()
+
+
 def test_the_gain_of_the_protocol_does_not_depend_on_the_graph():
     laws = {
         part_of(made(graph, FAST, None, Agents(order=2, cascade=2))).protocol.latex() for graph in (TEAM, ENEMIES, PAIR)
@@ -363,7 +369,7 @@ REFUSED: list[tuple[dict[str, Any], dict[str, Any], str]] = [
     ({"order": 2}, {"at": 1}, "at is for single integrators"),
     ({"order": 2}, {"delta": 1}, "take the sliding-mode protocol"),
     ({"order": 2, "biases": [1, 0, 0, 0]}, {}, "biases fit no formation"),
-    ({"order": 2, "cascade": 10**6}, {}, "take a smaller rest, or cascade"),
+    ({"order": 2, "cascade": 10**6}, {}, "cascade = 1e+06 is too large to enclose the common motion"),
 ]
 
 
