@@ -22,10 +22,10 @@ def test_a_certificate_of_double_integrators_is_written_checked_drawn_and_shown(
     assert "input      bounded; ||u_k|| <=" in made.out
     checked = ptcc("check", file)
     assert checked.code == 0 and "v(0) as in the file" in " ".join(checked.out.split())
-    for what in ("motion", "formation"):
+    for what in ("motion", "formation", "input"):
         assert ptcc("plot", file, "--what", what, "-o", str(tmp_path / f"{what}.svg")).code == 0
     refused = ptcc("plot", file, "--what", "decay", "-o", str(tmp_path / "d.png"))
-    assert refused.code == 2 and "ask for --what motion or formation" in refused.err
+    assert refused.code == 2 and "ask for --what motion or formation or input" in refused.err
     assert ptcc("report", file, "-o", str(tmp_path / "c.html")).code == 0
     page = (tmp_path / "c.html").read_text(encoding="utf-8")
     assert "of double integrators</h1>" in page and "single integrators" not in page
