@@ -119,9 +119,27 @@ class CascadePart(AgentsAnswer):
         return tuple(found)
 
     @property
+    def bounding_rho2(self) -> Fraction | None:
+        """Of the least ``rho2`` half as much again: just above that one the bound of the input is large."""
+        if not self.unbounded:
+            return None
+        return Fraction(up(Fraction(3, 2) * max(4 / self.best, 1 / self.alpha) / self.protocol.base.kappa, 4))
+
+    @property
     def nearer(self) -> str:
         """What leaves less by ``T``."""
         return f"a larger --rho2, such as {up(2 * self.protocol.base.rho2, 4)}, leaves less"
+
+    @property
+    def in_place(self) -> bool:
+        """Whether agents begin in agreement, at rest."""
+        moving = any(chain[1] for agent in self.initial_state or () for chain in agent)
+        return not moving and not any(x for root in self.roots for x in root)
+
+    @property
+    def gains_text(self) -> str:
+        """``alpha``."""
+        return f"alpha {near(self.alpha)}"
 
     @property
     def proof_text(self) -> tuple[str, str]:
@@ -132,7 +150,7 @@ class CascadePart(AgentsAnswer):
                 f"sqrt V <= e^(-r s/2) sqrt V(x(0)) + I sqrt V(q(0)), r up to {down(self.best)}; q = x' - g e falls "
             )
             proof += f"like e^(-{near(self.alpha)} s)"
-        return f"alpha {near(self.alpha)}", proof
+        return self.gains_text, proof
 
     @property
     def obligations(self) -> list[Obligation]:

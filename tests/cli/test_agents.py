@@ -5,6 +5,8 @@ from __future__ import annotations
 import csv
 import io
 import json
+import re
+import shlex
 from fractions import Fraction
 from pathlib import Path
 
@@ -226,9 +228,23 @@ def test_the_cascade_is_certified_and_checked_from_a_scenario(tmp_path: Path):
         ("certify", ("--agents", "2", "--cascade", "1e6"), "cascade = 1e+06 is too large to enclose the common motion"),
         ("certify", ("--agents", "2", "--rest", "1e6"), "take a smaller rest, or rho1"),
         ("certify", ("--agents", "2", "--cascade", "1", "--leader-speed", "1"), "--leader-speed: is not proved of"),
-        ("design", ("--agents", "2", "--cascade", "1", "--max-input", "9", "--shortest-deadline"), "no deadline is"),
+        (
+            "design",
+            ("--agents", "3", "--cascade", "1", "--max-input", "9", "--shortest-deadline"),
+            "these are of order 3",
+        ),
     ],
 )
 def test_what_the_cascade_does_not_take_is_refused_in_one_line(command: str, options: tuple[str, ...], says: str):
     done = ptcc(command, "fig1a", *options)
     assert done.code == 2 and says in done.err and len(done.err.strip().splitlines()) == 1
+
+
+def test_a_deadline_of_the_cascade_is_designed_and_proved_again_by_the_command_that_is_told():
+    asked = ("--agents", "2", "--cascade", "2", "--v0", "random", "--max-input", "40", "--shortest-deadline")
+    done = ptcc("design", "fig1a", *asked)
+    told = " ".join(done.out.replace("\\\n", " ").split())
+    assert done.code == 0 and "verdict met: ||u_k|| <= " in told and "alpha 2" in told
+    (command,) = re.findall(r"ptcc (certify fig1a .*?--max-input 40)", told)
+    again = ptcc(*shlex.split(command), "--no-simulation")
+    assert again.code == 0 and "met: |u_k| <= 40" in " ".join(again.out.split())
