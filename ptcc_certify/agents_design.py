@@ -4,29 +4,23 @@ Of chains of integrators gain and bound scale with the deadline alone: the Lyapu
 gains ``K`` up to the decay ``R``, which is least at ``R = 2 n``, where the input is bounded; multiplying ``rho1`` and
 ``rho2`` by one number changes ``K`` and nothing else; and a larger share ``rho1 T/(rho2 kappa)`` of the constant
 part of the gain raised the bound wherever it was tried. So the deadline is sought, with ``rho1 T``, ``rho2 kappa`` and
-``R`` as they are.
+``R`` as they are: :mod:`ptcc_certify.agents_deadlines`. Of the cascade ``alpha`` takes the place of ``R``, and
+``rho2 kappa`` is raised, where the input is not bounded by the one that is given.
 
-The search is bisection with secants in the logarithms of deadline and bound. Every candidate is proved, by
-:func:`~ptcc_certify.certificate.agents_part.prove_agents`, and compared with the limit exactly; it ends where a
-deadline keeps the limit and one that is shorter by a thousandth does not. The bound need not be monotone in the
-deadline (agents may fly towards each other), so that much shorter ones, which were not tried, are excluded by nothing
-but what holds for all gains of the protocol: :mod:`ptcc_certify.bounds.shortest_time`.
+Deadlines that were not tried are excluded by nothing but what holds for all gains of the protocol:
+:mod:`ptcc_certify.bounds.shortest_time`.
 """
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from lmi.errors import NoCertificate
 from lmi.exact.decimal_rounding import down, float_up, up
-from ptcc_certify.bounds.input.tightest_bound import log
+from ptcc_certify.agents_deadlines import AgentsRequest, Candidate, Search, at_deadline, longest
 from ptcc_certify.bounds.shortest_time import shortest_time
 from ptcc_certify.certificate.agents_answer import AgentsAnswer
-from ptcc_certify.certificate.agents_part import prove_agents
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.format_vectors import agents_ends
 from ptcc_certify.certificate.procedure import certify
@@ -36,70 +30,11 @@ from ptcc_certify.gain_design import INFEASIBLE, MET, UNPROVED
 from ptcc_certify.graphs.display_hook import Shown
 from ptcc_certify.graphs.rationals import format_exact, short_exact, shorten
 from ptcc_certify.protocols import NominalProtocol, Protocol
-from ptcc_certify.protocols.agents import MOST_MOTION, Agents
+from ptcc_certify.protocols.agents import Agents
 from ptcc_certify.protocols.parameters import parameter
 
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import Exact
-
-#: A deadline that is shorter by this share than the one that is found does not keep the limit.
-TOLERANCE = Fraction(1, 1000)
-#: Significant digits of deadlines and of ``rho1``.
-DIGITS = 7
-#: How often the deadline is doubled or halved until it is bracketed.
-_DOUBLINGS = 60
-#: The logarithm of the excess of what is not proved at all.
-_HOPELESS = 700.0
-
-
-@dataclass(frozen=True)
-class AgentsRequest:
-    """What is asked.
-
-    Attributes
-    ----------
-    max_input : Fraction
-        ``U`` of the Euclidean norm of every agent's input.
-    deadline, residual : Fraction or None
-        In units of time; how far a position may be from its place at the deadline, under a gain cap.
-    """
-
-    max_input: Fraction
-    deadline: Fraction | None
-    residual: Fraction | None
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A deadline, and what is proved of it."""
-
-    deadline: Fraction
-    protocol: Protocol
-    part: AgentsAnswer
-
-    @cached_property
-    def peak(self) -> Fraction | None:
-        """The largest bound of an input; None if none is proved."""
-        return None if self.part.input is None else max(self.part.input)
-
-    @cached_property
-    def residual(self) -> Fraction | None:
-        """The largest deviation of a position at the deadline; None if none is proved."""
-        if self.part.protocol.gain_cap is None:
-            return Fraction(0)
-        return None if self.part.residual is None else max(row[0] for row in self.part.residual.agents)
-
-    def excess(self, request: AgentsRequest) -> Fraction | None:
-        """Return what is proved over what is asked, the larger of two; at most 1 if it is met, None if it is open."""
-        if self.peak is None or self.residual is None:
-            return None
-        beyond = self.residual / request.residual if request.residual else Fraction(0)
-        return max(self.peak / request.max_input, beyond)
-
-    def meets(self, request: AgentsRequest) -> bool:
-        """Tell whether what is proved suffices."""
-        excess = self.excess(request)
-        return excess is not None and excess <= 1
 
 
 @dataclass(frozen=True, repr=False)
@@ -124,7 +59,7 @@ class AgentsDesign(Shown):
         The longest deadline below ``deadline`` that was tried, and whose bounds do not keep the limit.
     shortest_possible : Fraction or None
         No input within the limit brings the agents where the protocol does by a shorter deadline, proved; None if
-        nothing is known: under a gain cap, and of agents that move by themselves.
+        nothing is known: under a gain cap, of agents that move by themselves, and of the cascade.
     repeatable : bool
         Whether :func:`ptcc_certify.certify` proves the same by the functions that it finds itself.
 
@@ -189,8 +124,7 @@ class AgentsDesign(Shown):
         if self.protocol is None or self.certificate is None or self.certificate.agents is None:
             return ""
         text = ", ".join(f"{name}={short_exact(value)}" for name, value in self.protocol.parameters.items())
-        gains = ", ".join(str(float(K)) for K in self.certificate.agents.protocol.gains)
-        return f"{text}; K = ({gains})"
+        return f"{text}; {self.certificate.agents.gains_text}"
 
     @property
     def deadline_text(self) -> str:
@@ -256,7 +190,8 @@ def design_agents(
     graph : graph-like
         In whatever form :func:`ptcc_certify.as_graph` takes.
     agents : Agents
-        Of order n, or in a formation; their ``decay`` is ``2 n`` unless it is given.
+        Of order n, or in a formation; their ``decay`` is ``2 n`` unless it is given. Of the cascade ``rho2`` is raised
+        where that of ``protocol`` does not bound the input.
     x0 : state-like, or N rows of coordinates
         Initial positions, in node order or by label, in units of length.
     v0 : state-like, optional
@@ -306,11 +241,14 @@ def design_agents(
         None if residual is None else parameter("residual", residual),
     )
     _refuse(agents, request)
-    agents = replace(agents, decay=agents.decay_rate)
+    agents = agents if agents.cascade is not None else replace(agents, decay=agents.decay_rate)
     template = NominalProtocol(T=1, rho1="0.001", rho2=1, kappa=1) if protocol is None else protocol
     given = {"agents": agents, "v0": v0, "derivatives": derivatives, "orientation": orientation, "simulation": False}
-    first = request.deadline or min(Fraction(1), _longest(agents) / 2)
+    first = request.deadline or min(Fraction(1), longest(agents) / 2)
     base = certify(graph, at_deadline(template, first), x0, **given)
+    if base.agents is not None and base.agents.bounding_rho2 is not None:
+        template = template.replace(rho2=base.agents.bounding_rho2)
+        base = certify(graph, at_deadline(template, first), x0, **given)
     part = base.agents
     if part is None or part.initial_state is None:
         raise ParameterError("design of agents of order n starts from an initial state; give x0")
@@ -318,7 +256,7 @@ def design_agents(
     if (reason := _unusable(base, part, request)) is not None:
         return replace(blank, binding=reason)
     search = Search(base, agents, template, request)
-    if request.deadline is not None or not any(part.initial_values):  # agents in place need no input, nor more time
+    if request.deadline is not None or part.in_place:  # agents in place need no input, nor more time
         candidate = search.at(first)
         if candidate is None or not candidate.meets(request):
             return _without(blank, search, candidate)
@@ -332,35 +270,15 @@ def design_agents(
     return _with(replace(blank, too_short=search.too_short), candidate, base, again)
 
 
-def at_deadline(protocol: Protocol, T: Fraction) -> Protocol:
-    """Return a protocol with another deadline: ``rho1 T`` is kept, but for rounding, and so are shares of ``T``.
-
-    Examples
-    --------
-    >>> at_deadline(NominalProtocol(T=1, rho1=1, rho2=3, kappa=2), Fraction(4))
-    NominalProtocol(T=4, rho1=0.25, rho2=3, kappa=2)
-    """
-    share = T / protocol.T
-    rho1, reaching = Fraction(up(protocol.rho1 / share, DIGITS)), protocol.reaching
-    if reaching is None:
-        return protocol.replace(T=T, rho1=rho1)
-    T_r = min(Fraction(up(reaching.T_r * share, DIGITS)), T * (1 - Fraction(1, 10**DIGITS)))
-    return protocol.replace(T_r=T_r, T_s=T - T_r, rho1=rho1)
-
-
 def _refuse(agents: Any, request: AgentsRequest) -> None:
     """Refuse what is not searched."""
     if not isinstance(agents, Agents):
         raise ParameterError(f"agents = {shorten(repr(agents))} is none; give Agents(order=2), say")
     if agents.plain:
         raise ParameterError("agents: these are single integrators; design(graph, ..) finds their gains")
-    if agents.cascade is not None:
-        raise ParameterError(
-            "cascade: no deadline is searched for it, only for gains as they are designed; leave it out"
-        )
     if agents.rest is not None:
         raise ParameterError("rest: no number is proved of the input of agents that meet at rest; leave it out")
-    if agents.decay_rate < 2 * agents.degree and agents.cap is None:
+    if agents.cascade is None and agents.decay_rate < 2 * agents.degree and agents.cap is None:
         raise ParameterError(
             f"decay: below 2 n = {2 * agents.degree} no input is proved to be bounded; leave it out, or cap the gain"
         )
@@ -373,19 +291,12 @@ def _refuse(agents: Any, request: AgentsRequest) -> None:
         raise ParameterError("gain_cap: leaves something at every deadline; give residual, how far a position may be")
 
 
-def _longest(agents: Agents) -> Fraction:
-    """Return the longest deadline of agents that move by themselves; that of others is as good as without a limit."""
-    if not any(agents.coefficients):
-        return Fraction(2) ** _DOUBLINGS
-    return MOST_MOTION / (1 + max(map(abs, agents.coefficients)))
-
-
 def _least_time(base: Certificate, request: AgentsRequest) -> Fraction | None:
     """Return a deadline below which no input within the limit suffices; None if nothing is known."""
     part = base.agents
     if part is None or part.initial_state is None or any(part.protocol.plant) or part.protocol.gain_cap is not None:
         return None
-    if not base.influence.exact:
+    if any(part.protocol.own) or not base.influence.exact:  # where agents that rest end depends on the gains
         return None
     zero, offsets = Fraction(0), part.protocol.offsets
     deviations: list[list[list[Fraction]]] = [[[] for _ in row] for row in offsets]
@@ -422,82 +333,6 @@ def _unusable(base: Certificate, part: AgentsAnswer, request: AgentsRequest) -> 
     return f"whatever the deadline, the limit is taken by {' and '.join(named)}: give a larger limit or a smaller mu1"
 
 
-@dataclass
-class Search:
-    """The search of a deadline: candidates by their deadlines, each proved once."""
-
-    base: Certificate
-    agents: Agents
-    template: Protocol
-    request: AgentsRequest
-    tried: dict[Fraction, Candidate | None] = field(default_factory=dict)
-
-    def at(self, T: Fraction) -> Candidate | None:
-        """Return what is proved of a deadline; None if no matrix is found."""
-        if T not in self.tried:
-            self.tried[T] = self._prove(T)
-        return self.tried[T]
-
-    def _prove(self, T: Fraction) -> Candidate | None:
-        first, protocol = self.base.agents, at_deadline(self.template, T)
-        assert first is not None
-        try:
-            part = prove_agents(
-                self.base.structure,
-                protocol,
-                self.agents,
-                self.base.functions,
-                self.base.influence,
-                first.protocol.offsets,
-                first.initial_state,
-            )
-        except NoCertificate:
-            return None
-        return Candidate(T, protocol, part)
-
-    def run(self, start: Fraction) -> None:
-        """Bracket the limit from a first deadline on, and narrow it down to the tolerance."""
-        from scipy.optimize import brentq
-
-        longest = log(_longest(self.agents))
-        ends = [min(log(start), longest)]
-        outside = self.margin(ends[0]) > 0
-        for _ in range(_DOUBLINGS):
-            following = ends[-1] + (math.log(2) if outside else -math.log(2))
-            if ends[-1] == longest and outside:
-                return
-            ends.append(min(following, longest))
-            if (self.margin(ends[-1]) > 0) != outside:
-                break
-        else:
-            return
-        brentq(self.margin, *sorted(ends[-2:]), xtol=float(TOLERANCE) / 2)
-
-    def margin(self, z: float) -> float:
-        """Return the logarithm of what is proved over what is asked, at the deadline ``e^z``."""
-        candidate = self.at(Fraction(up(math.exp(z), DIGITS)))
-        excess = None if candidate is None else candidate.excess(self.request)
-        return _HOPELESS if excess is None else min(max(log(excess), -_HOPELESS), _HOPELESS)
-
-    @property
-    def best(self) -> Candidate | None:
-        """The shortest deadline that is proved to meet what is asked."""
-        met = [c for c in self.tried.values() if c is not None and c.meets(self.request)]
-        return min(met, key=lambda c: c.deadline, default=None)
-
-    @property
-    def nearest(self) -> Candidate | None:
-        """The candidate that exceeds what is asked least."""
-        found = [(c.excess(self.request), c) for c in self.tried.values() if c is not None]
-        return min(((x, c) for x, c in found if x is not None), key=lambda pair: pair[0], default=(0, None))[1]
-
-    @property
-    def too_short(self) -> Fraction | None:
-        """The longest deadline tried that is shorter than the best one."""
-        best = self.best
-        return None if best is None else max((T for T in self.tried if best.deadline > T), default=None)
-
-
 def _with(blank: AgentsDesign, candidate: Candidate, base: Certificate, again: Certificate) -> AgentsDesign:
     """Return the answer with a certificate: the one that certify makes by itself, if it meets what is asked."""
     asked = blank.asked
@@ -513,7 +348,7 @@ def _with(blank: AgentsDesign, candidate: Candidate, base: Certificate, again: C
     peak, residual, inputs = own.peak, own.residual, own.part.input
     assert peak is not None and residual is not None and inputs is not None
     label = again.graph.labels[inputs.index(peak)]
-    binding = f"the input of agent {shorten(label)} at t = 0, {up(100 * peak / asked.max_input, 4)} % of the limit"
+    binding = f"the bound of the input of agent {shorten(label)}, {up(100 * peak / asked.max_input, 4)} % of the limit"
     if asked.residual is not None and residual / asked.residual > peak / asked.max_input:
         binding = f"what the gain cap leaves, {up(100 * residual / asked.residual, 4)} % of what is allowed"
     if not peak:

@@ -23,6 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lmi.exact.decimal_rounding import float_down
+from lmi.exact.elementary_enclosures import rounded
 from ptcc_certify.bounds.agents import States, initial_value, root_product
 from ptcc_certify.bounds.input.tightest_bound import round_up
 from ptcc_certify.graphs.structure import Structure
@@ -30,8 +31,8 @@ from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.protocols.gain import Gain
 
 Rows = tuple[tuple[Fraction, ...], ...]
-#: By this share what is formed in floats is enlarged.
-_ROOM = 1e-9
+#: By this share what is formed in floats is enlarged; bits to which what bounds every agent is rounded.
+_ROOM, BITS = 1e-9, 256
 
 
 class Roots(NamedTuple):
@@ -73,14 +74,36 @@ def tracking_error(structure: Structure, states: States, offsets: Sequence[Seque
     )
 
 
+def combined_state(states: States, offsets: Sequence[Sequence[Fraction]], gain: Gain, alpha: Fraction) -> Rows:
+    """Return ``r_k(0) = x_k'(0)/eta + (alpha + theta)(x_k(0) - h_k)``, ``theta = eta'/eta^2``, all at time 0.
+
+    Examples
+    --------
+    >>> one, gain = Fraction(1), Gain(T=1, rho1=1, rho2=1, kappa=1)  # eta = 2, theta = 1/4
+    >>> combined_state((((3 * one, one),),), [[one]], gain, one)
+    ((Fraction(3, 1),),)
+    """
+    X, own = positions_of(states, offsets), alpha + first_theta(gain)
+    pairs = zip(states, X, strict=True)
+    return tuple(
+        tuple(chain[1] / gain.first + own * x for chain, x in zip(agent, at, strict=True)) for agent, at in pairs
+    )
+
+
+def first_theta(gain: Gain) -> Fraction:
+    """Return ``eta'/eta^2 = (1 - rho1/eta)^2/k`` at time 0."""
+    return (1 - gain.rho1 / gain.first) ** 2 / gain.pole
+
+
 def roots_of(structure: Structure, V: LyapunovFunction, positions: Rows, error: Rows) -> Roots:
     """Return ``sqrt(V)`` of positions and of ``q(0)``, rounded up."""
+    return Roots(root_of(structure, V, positions), root_of(structure, V, error))
+
+
+def root_of(structure: Structure, V: LyapunovFunction, rows: Rows) -> Fraction:
+    """Return ``sqrt(V)`` of one number for each agent and coordinate, rounded up."""
     one = ((Fraction(1),),)
-    state, drive = (
-        root_product(initial_value(structure, V, one, tuple(tuple((x,) for x in row) for row in rows)))
-        for rows in (positions, error)
-    )
-    return Roots(state, drive)
+    return root_product(initial_value(structure, V, one, tuple(tuple((x,) for x in row) for row in rows)))
 
 
 def drive_integral(gain: Gain, rate: Fraction, alpha: Fraction, remaining: np.ndarray) -> np.ndarray:
@@ -106,30 +129,10 @@ def _falling(x: float, z: np.ndarray) -> np.ndarray:
     return np.abs(np.expm1(-x * z)) / x if x else z
 
 
-def input_constants(structure: Structure, constants: Sequence[Fraction], k: Fraction) -> tuple[Fraction, ...]:
-    """Return ``G_k`` with ``|(theta e - L e)_k| <= G_k sqrt(V)`` for ``theta`` from 0 to ``1/k``, ``e_l^2 <= c_l V``.
-
-    ``G_k = sum_l R_kl sqrt(c_l)``, ``R_kl = |L_kl|``, ``R_kk = max(L_kk, 1/k - L_kk)``.
-
-    Examples
-    --------
-    >>> leader_and_follower = analyse(SignedDigraph.from_edges([("a", "b", 1)]))
-    >>> [float(x) for x in input_constants(leader_and_follower, [Fraction(0), Fraction(4)], Fraction(1, 3))]
-    [0.0, 4.0]
-    """
-    roots = [root_product(c) for c in constants]
-    found = []
-    for v, row in enumerate(structure.graph.exact_rows(range(structure.graph.n_nodes))):
-        own = row.get(v, Fraction(0))
-        others = sum((abs(a) * roots[j] for j, a in row.items() if j != v), Fraction(0))
-        found.append(max(own, 1 / k - own) * roots[v] + others)
-    return tuple(found)
-
-
 def input_is_bounded(k: Fraction, rate: Fraction, alpha: Fraction) -> bool:
-    """Tell whether ``eta^2 |e|`` and ``eta |q|`` are proved not to grow without limit: ``b k >= 2``, ``alpha k >= 1``.
+    """Tell whether the input is proved not to grow without limit: ``b k >= 2``, ``alpha k >= 1``.
 
-    Not with both as equations: then ``eta^2 I`` grows like ``s``.
+    Not with both as equations: then its bound grows like ``s``.
 
     Examples
     --------
@@ -140,30 +143,39 @@ def input_is_bounded(k: Fraction, rate: Fraction, alpha: Fraction) -> bool:
 
 
 def input_from(
-    structure: Structure,
     gain: Gain,
     alpha: Fraction,
     rate: Fraction,
     constants: Sequence[Fraction],
-    roots: Roots,
-    error: Rows,
+    state: Fraction,
+    combined: Fraction,
+    speeds: Sequence[Fraction],
 ) -> tuple[Fraction, ...]:
     """Return bounds of the input from one Lyapunov function by which it is bounded.
 
-        u = eta^2 (theta e - L e) - eta (L + alpha) q
-        eta^2 I <= eta(0)/(a + b),   a = alpha - 1/k,   b = rate/2 - 2/k
+        u = -eta^2 (L r + alpha X'),   r = X' + (alpha + theta) X,   ' = d/ds,   theta = eta'/eta^2
+        |u_k| <= sqrt(c_k) eta(0)^2 (|r(0)| + (1/k - theta(0)) |X(0)|) max(1, (a + alpha)/(a + b)) + alpha eta(0) |v_k|
 
-    so ``|u_k| <= G_k (eta(0)^2 sqrt(V(x)) + eta(0) sqrt(V(q(0)))/(a + b)) + eta(0) |((L + alpha) q(0))_k|``: neither
-    ``eta^2 e^(-rate s/2)`` nor ``eta e^(-alpha s)`` grows.
+    with ``a = alpha - 1/k``, ``b = rate/2 - 2/k``, ``e_k^2 <= c_k V``.
+
+    Parameters
+    ----------
+    constants : sequence of N Fraction
+        ``c_k``.
+    state, combined : Fraction
+        Not below ``sqrt(V)`` of ``X(0)``, and of ``r(0)``.
+    speeds : sequence of N Fraction
+        Not below ``|v_k|``, the initial speeds.
+
+    Examples
+    --------
+    >>> one, gain = Fraction(1), Gain(T=1, rho1=1, rho2=1, kappa=1)  # eta = 2, k = 1, theta = 1/4
+    >>> [round(float(x), 6) for x in input_from(gain, 2 * one, 4 * one, [4 * one], one, 3 * one, [one])]
+    [94.0]
     """
     k, eta = gain.pole, gain.first
-    spare = alpha - 1 / k + rate / 2 - 2 / k
-    size = eta**2 * roots.state + eta * roots.drive / spare
-    each = input_constants(structure, constants, k)
-    rows = structure.graph.exact_rows(range(structure.graph.n_nodes))
-    bounds = []
-    for v, (row, factor) in enumerate(zip(rows, each, strict=True)):
-        pushed = [sum((a * error[j][axis] for j, a in row.items()), alpha * x) for axis, x in enumerate(error[v])]
-        late = root_product(sum((x * x for x in pushed), Fraction(0)))
-        bounds.append(round_up(factor * size + eta * late))
-    return tuple(bounds)
+    a, b = alpha - 1 / k, rate / 2 - 2 / k
+    most = max(Fraction(1), (a + alpha) / (a + b))
+    size = rounded(eta**2 * (combined + (1 / k - first_theta(gain)) * state) * most, BITS, up=True)
+    pairs = zip(constants, speeds, strict=True)
+    return tuple(round_up(root_product(c) * size + alpha * eta * speed) for c, speed in pairs)

@@ -162,9 +162,24 @@ class AgentsAnswer(ABC):
         """What leaves the input without a bound, and what mends it; empty where nothing does."""
 
     @property
+    def bounding_rho2(self) -> Fraction | None:
+        """A ``rho2`` by which the input is proved to be bounded; None where it is, or other numbers decide that."""
+        return None
+
+    @property
     @abstractmethod
     def nearer(self) -> str:
         """What leaves less by ``T``."""
+
+    @property
+    @abstractmethod
+    def in_place(self) -> bool:
+        """Whether nothing steers the agents from their initial state."""
+
+    @property
+    @abstractmethod
+    def gains_text(self) -> str:
+        """The numbers of the protocol beside those of the gain."""
 
     @property
     @abstractmethod

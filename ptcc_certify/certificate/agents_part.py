@@ -183,14 +183,23 @@ class AgentsPart(AgentsAnswer):
         return f"a larger --decay, such as {2 * math.ceil(self.decay)}, leaves less"
 
     @property
+    def in_place(self) -> bool:
+        """Whether agents begin in agreement, with a common motion: then nothing steers them."""
+        return not any(self.initial_values)
+
+    @property
+    def gains_text(self) -> str:
+        """The gains of relative positions, velocities and so on."""
+        return f"K = ({', '.join(str(float(K)) for K in self.protocol.gains)})"
+
+    @property
     def proof_text(self) -> tuple[str, str]:
         """What the long screen tells of gains and of the proof."""
         matrix = self.matrix
-        gains = ", ".join(str(float(K)) for K in self.protocol.gains)
         pieces, count = max(len(matrix.points) - 1, 0), len(self.used)
         proof = f"V <= e^(-r s) V(0), r = {down(matrix.rate)}, R = r rho2 kappa = {near(self.decay)}; one matrix for "
         proof += f"{count} Lyapunov function{'s' * (count != 1)}, {pieces} pieces"
-        return f"K = ({gains}), coupling {near(matrix.coupling)}", proof
+        return f"{self.gains_text}, coupling {near(matrix.coupling)}", proof
 
     def __repr__(self) -> str:
         size = "" if self.input is None else f", |u_k| <= {up(max(self.input), 4)}"

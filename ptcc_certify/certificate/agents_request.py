@@ -22,7 +22,7 @@ _NOT_OF_AGENTS = {
     "limits": "give Agents(gain_cap=..) instead of a gain cap; a stop and sampling are not proved for them",
     "delta": "take the sliding-mode protocol, which disturbances within delta do not move",
     "noise": "leave it out",
-    "messages": "leave it out; late messages are proved of single integrators",
+    "messages": "leave it out, or leave out agents; with late messages nothing is proved of them",
     "leaders": "leave it out; their leaders move as their plant does",
     "disturbance": "leave it out: what holds holds for every disturbance within delta",
 }

@@ -10,21 +10,23 @@ from functools import cached_property
 import numpy as np
 
 from lmi.exact.decimal_rounding import down, float_down, float_up, near, up
-from ptcc_certify.bounds.agent_motion import Interval, common_motion
+from ptcc_certify.bounds.agent_motion import LARGEST_DECAY, Interval, common_motion
 from ptcc_certify.bounds.agents import States, error_constants, root_product
 from ptcc_certify.bounds.agents_comparison import AgentsComparison, compare_with_bounds
 from ptcc_certify.bounds.cascade import (
     Roots,
-    Rows,
+    combined_state,
     drive_integral,
     input_from,
     input_is_bounded,
     positions_of,
+    root_of,
     roots_of,
     tracking_error,
 )
 from ptcc_certify.bounds.final_state import Influence
 from ptcc_certify.certificate.agents_answer import AgentsAnswer, Intervals, Residual, UsedFunction, final_states
+from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.protocols import Protocol
@@ -117,9 +119,27 @@ class CascadePart(AgentsAnswer):
         return tuple(found)
 
     @property
+    def bounding_rho2(self) -> Fraction | None:
+        """Of the least ``rho2`` half as much again: just above that one the bound of the input is large."""
+        if not self.unbounded:
+            return None
+        return Fraction(up(Fraction(3, 2) * max(4 / self.best, 1 / self.alpha) / self.protocol.base.kappa, 4))
+
+    @property
     def nearer(self) -> str:
         """What leaves less by ``T``."""
         return f"a larger --rho2, such as {up(2 * self.protocol.base.rho2, 4)}, leaves less"
+
+    @property
+    def in_place(self) -> bool:
+        """Whether agents begin in agreement, at rest."""
+        moving = any(chain[1] for agent in self.initial_state or () for chain in agent)
+        return not moving and not any(x for root in self.roots for x in root)
+
+    @property
+    def gains_text(self) -> str:
+        """``alpha``."""
+        return f"alpha {near(self.alpha)}"
 
     @property
     def proof_text(self) -> tuple[str, str]:
@@ -130,7 +150,7 @@ class CascadePart(AgentsAnswer):
                 f"sqrt V <= e^(-r s/2) sqrt V(x(0)) + I sqrt V(q(0)), r up to {down(self.best)}; q = x' - g e falls "
             )
             proof += f"like e^(-{near(self.alpha)} s)"
-        return f"alpha {near(self.alpha)}", proof
+        return self.gains_text, proof
 
     @property
     def obligations(self) -> list[Obligation]:
@@ -239,11 +259,16 @@ def prove_cascade(
     ParameterError
         ``alpha rho1 T`` is beyond what the common motion is enclosed for.
     """
+    falls = base.gain.rho1 * base.gain.T
+    if agents.alpha * falls > LARGEST_DECAY:
+        raise ParameterError(
+            f"cascade = {near(agents.alpha)} is too large to enclose the common motion: beyond "
+            f"{LARGEST_DECAY}/(rho1 T); take at most {down(LARGEST_DECAY / falls, 4)}, or a smaller rho1"
+        )
     numbers = [k for k, V in enumerate(functions) if V.proved_rate > 0]
     used = tuple(functions[k] for k in numbers)
     full = [error_constants(structure, V) if V.matrix is not None else None for V in used]
     protocol = CascadeProtocol.of(base, agents.alpha, offsets)
-    error: Rows | None = None
     roots: tuple[Roots, ...] = ()
     if initial_state is not None:
         error = tracking_error(structure, initial_state, offsets, base.gain.first)
@@ -263,14 +288,26 @@ def prove_cascade(
         final = final_states(part, influence)
         if not part.derivatives_agree:
             final = tuple(tuple(chain[:1] for chain in agent) for agent in final)
-    return replace(part, final_state=final, input=None if error is None else _input(part, error))
+    return replace(part, final_state=final, input=_input(part))
 
 
-def _input(part: CascadePart, error: Rows) -> tuple[Fraction, ...] | None:
+def _input(part: CascadePart) -> tuple[Fraction, ...] | None:
     """Return the least bounds of the whole input, agent by agent; None where none is proved."""
-    gain, base = part.protocol.gain, part.protocol.base
+    gain, base, begin = part.protocol.gain, part.protocol.base, part.initial_state
+    if begin is None:
+        return None
+    combined = combined_state(begin, part.protocol.offsets, gain, part.alpha)
+    speeds = [root_product(sum((chain[1] ** 2 for chain in agent), Fraction(0))) for agent in begin]
     bounds = [
-        input_from(part.structure, gain, part.alpha, V.proved_rate, constants, root, error)
+        input_from(
+            gain,
+            part.alpha,
+            V.proved_rate,
+            constants,
+            root.state,
+            root_of(part.structure, V, combined),
+            speeds,
+        )
         for V, constants, root in zip(part.functions, part.error_constants, part.roots, strict=True)
         if constants is not None and input_is_bounded(gain.pole, V.proved_rate, part.alpha)
     ]

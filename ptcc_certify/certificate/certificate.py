@@ -235,7 +235,7 @@ class Certificate(Content, FromFile, Shown):
         ----------
         what : {"decay", "input", "graph", "spectrum", "states", "motion", "formation", "late", "tracking", None}
             Run and bound, inputs and their proved peaks, the graph, the eigenvalues, or the states; of agents of order
-            n positions and velocities, or their ways in the plane. None: :attr:`main_figure`.
+            n positions and velocities, their inputs, or their ways in the plane. None: :attr:`main_figure`.
         **keywords : Any
             ``ax`` and others of the function ``ptcc_certify.plot_<what>``.
 

@@ -45,11 +45,22 @@ class Vectors(NamedTuple):
 
 
 class Drive(NamedTuple):
-    """Positions less places ``x(0)``, what drives them, ``q(0) = v(0) + eta(0) L x(0)``, and ``(L + alpha) q(0)``."""
+    """Positions less places ``x(0)``, what drives them, ``q(0) = v(0) + eta(0) L x(0)``, and velocities ``v(0)``."""
 
     positions: Vectors
     error: Vectors
-    pushed: Vectors
+    velocities: Vectors
+
+    def combined(self, agents: Chains, theta: Fraction) -> Vectors:
+        """Return ``r(0) = v(0)/eta(0) + (alpha + theta) x(0)``."""
+        (p, q), (a, c) = agents.eta_0.as_integer_ratio(), (agents.own[1] + theta).as_integer_ratio()
+        X, V = self.positions, self.velocities
+        numbers = list(chain.from_iterable(chain(X.columns, V.columns)))
+        sized(len(numbers), longest(numbers) + longest((p, q)) + longest((a, c)), "the input")
+        spend(4 * len(numbers), longest(numbers) + longest((p, q)), longest((a, c)), "the input")
+        pairs = zip(X.columns, V.columns, strict=True)
+        columns = [[q * c * y + p * a * z for z, y in zip(x, v, strict=True)] for x, v in pairs]
+        return Vectors(columns, X.scale * p * c)
 
 
 class Tracked(NamedTuple):
@@ -97,18 +108,15 @@ def _drive(graph: Digraph, agents: Chains, states: States, offsets: Sequence[Seq
     spend(40 * agents.d * graph.n, longest_state, longest_state, "the initial states")
     pairs = [(row, h) for own, at in zip(states, offsets, strict=True) for row, h in zip(own, at, strict=True)]
     (X, V), scale = integers([[row[0] - h for row, h in pairs], [row[1] for row, _ in pairs]])
-    (p, q), (a, c) = agents.eta_0.as_integer_ratio(), agents.own[1].as_integer_ratio()
-    sized(len(X), scale.bit_length() + longest(chain(X, V)) + graph.bits + longest((p, q, a, c)), "the initial states")
+    p, q = agents.eta_0.as_integer_ratio()
+    sized(len(X), scale.bit_length() + longest(chain(X, V)) + graph.bits + longest((p, q)), "the initial states")
     axes, unit = range(agents.d), graph.unit
     positions, velocities = ([part[axis :: agents.d] for axis in axes] for part in (X, V))
-    errors, pushed = list[list[int]](), list[list[int]]()
+    errors = list[list[int]]()
     for x, v in zip(positions, velocities, strict=True):
-        spend(4 * graph.n, longest(x) + graph.bits + longest((unit, p, q)), longest((a, c, p, q)), "the initial states")
-        e = [q * unit * y + p * z for y, z in zip(v, graph.laplacian_product(x), strict=True)]
-        errors.append(e)
-        pushed.append([c * z + a * unit * y for y, z in zip(e, graph.laplacian_product(e), strict=True)])
-    whole = scale * q * unit
-    return Drive(Vectors(positions, scale), Vectors(errors, whole), Vectors(pushed, whole * c * unit))
+        spend(2 * graph.n, longest(x) + graph.bits + longest((unit, p, q)), longest((p, q)), "the initial states")
+        errors.append([q * unit * y + p * z for y, z in zip(v, graph.laplacian_product(x), strict=True)])
+    return Drive(Vectors(positions, scale), Vectors(errors, scale * q * unit), Vectors(velocities, scale))
 
 
 def _functions(doc: Document, verified: Verified, section: Any, drive: Drive | None) -> list[Tracked]:
@@ -136,38 +144,28 @@ def _functions(doc: Document, verified: Verified, section: Any, drive: Drive | N
 def _check_input(doc: Document, verified: Verified, agents: Chains, used: Sequence[Tracked], drive: Drive) -> None:
     """Verify the bound of every agent's input, in Euclidean norm over space."""
     graph, k, alpha, eta = verified.structure.graph, agents.gain.k, agents.own[1], agents.eta_0
-    sizes = list[tuple[Sequence[Fraction], Fraction]]()
+    theta = (1 - agents.gain.rho1 / eta) ** 2 / k
+    combined = drive.combined(agents, theta)
+    bounds = list[list[Fraction]]()
     for one in used:
         rate, constants = one.use.function.rate, one.use.error_constants(graph)
         if constants is not None and rate * k >= 4 and alpha * k >= 1 and rate * k + alpha * k > 5:
-            spare = alpha - 1 / k + rate / 2 - 2 / k
-            size = rounded(eta**2 * one.initial + eta * one.drive / spare, BITS, up=True)
-            sizes.append((_input_constants(graph, constants, k), size))
-    need(bool(sizes), "a bound of the input though no function and no alpha bound it")
+            a, b = alpha - 1 / k, rate / 2 - 2 / k
+            root = root_above(combined.value(graph, one.use.function)) + (1 / k - theta) * one.initial
+            size = rounded(eta**2 * root * max(Fraction(1), (a + alpha) / (a + b)), BITS, up=True)
+            spend(40 * graph.n, BITS, BITS, "the input")
+            bounds.append([root_above(c) * size for c in constants])
+    need(bool(bounds), "a bound of the input though no function and no alpha bound it")
     doc.open("agent-input", "agents")
     section = fields(doc.data["agents"]["input"], ("agents", "largest"), "input")
     values = by_agent(doc, graph, section["agents"], "the input", files=False)
     added = (verified.protocol.gains["mu1"] if verified.protocol.sliding else Fraction(0)) * agents.d
-    columns, scale = drive.pushed
+    columns, scale = drive.velocities
     bits = longest(chain.from_iterable(columns))
     spend(agents.d * graph.n, bits, bits, "the input")
     for v, x in enumerate(values):
-        late = root_above(Fraction(sum(column[v] ** 2 for column in columns), scale**2))
-        least = min(each[v] * size for each, size in sizes)
-        need(x >= least + eta * late + added, f"the input of agent {shorten(graph.labels[v])} is not proved")
+        speed = root_above(Fraction(sum(column[v] ** 2 for column in columns), scale**2))
+        least = min(each[v] for each in bounds) + alpha * eta * speed
+        need(x >= least + added, f"the input of agent {shorten(graph.labels[v])} is not proved")
     need(exact(section["largest"]) == max(values), "the largest input is another")
     doc.done(f"at most {up(max(values))}")
-
-
-def _input_constants(graph: Digraph, constants: Sequence[Fraction], k: Fraction) -> list[Fraction]:
-    """Return ``G_k``, ``|(theta e - L e)_k| <= G_k sqrt(V)`` for ``theta`` from 0 to ``1/k``, ``e_l^2 <= c_l V``."""
-    spend(40 * graph.n, BITS, BITS, "constants of the input")
-    spend(graph.n + graph.n_edges, graph.bits, BITS, "constants of the input")
-    roots = [root_above(c) for c in constants]
-    found = []
-    for v in range(graph.n):
-        row = graph.row(v)
-        own = Fraction(row.get(v, 0), graph.unit)
-        others = sum((abs(x) * roots[j] for j, x in row.items() if j != v), Fraction(0)) / graph.unit
-        found.append(rounded(max(own, 1 / k - own) * roots[v] + others, BITS, up=True))
-    return found

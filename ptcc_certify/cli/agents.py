@@ -24,6 +24,8 @@ _MOST_ORDER = 8
 #: Options that need ``--agents``.
 _OWN = ("drag", "plant", "v0", "a0", "offsets", "biases", "rest", "cascade", "decay")
 
+#: What is said where late messages are asked of agents of order n.
+_MESSAGES = "late messages are proved of single integrators alone: leave it out, or leave out --agents"
 #: Options that are of single integrators alone, and what to do instead.
 _OF_SINGLE_INTEGRATORS = {
     "stop_before": "leave it out, or cap the gain with --gain-cap",
@@ -31,6 +33,8 @@ _OF_SINGLE_INTEGRATORS = {
     "noise": "leave it out",
     "at": "leave it out; -v tells bounds at several instants",
     "initial_bound": "give the initial state with --x0 and --v0 instead",
+    **dict.fromkeys(("delay", "period", "packet_loss", "quantisation"), _MESSAGES),
+    **dict.fromkeys(("leader_speed", "sign_gain"), "leave it out; their leaders move as their plant does"),
 }
 
 agents_options = options_of(

@@ -30,8 +30,9 @@ if TYPE_CHECKING:
 _OF_CERTIFICATES = ("graph", "what", "output", "wide", "time_unit", "memory", "x0", "seed")
 #: Figures of a simulated run.
 OF_A_RUN = ("states", "input", "decay")
-#: Figures of agents of order n.
+#: Figures of agents of order n; and which they share with others.
 OF_AGENTS = ("motion", "formation")
+_SHARED = ("input",)
 
 
 #: Figures of a certificate with late messages, or with moving leaders.
@@ -61,8 +62,8 @@ class _Figure(click.Choice):  # type: ignore[type-arg]  # no generic class befor
     "--what",
     type=_Figure([*OF_A_RUN, "graph", "spectrum", *OF_AGENTS, *OF_A_CERTIFICATE]),
     help="States, input, or error under its proved bounds over time; the graph; its eigenvalues; of agents of order n "
-    "positions and velocities, or their ways in the plane; of a certificate with late messages, or moving leaders, "
-    "what is proved then.  [default: of a certificate what it claims, else graph]",
+    "positions and velocities, their inputs, or their ways in the plane; of a certificate with late messages, or "
+    "moving leaders, what is proved then.  [default: of a certificate what it claims, else graph]",
 )
 @click.option(
     "-o",
@@ -146,10 +147,10 @@ def _of_certificate(
             raise ParameterError(f"--x0 is for what holds no initial state; the certificate {path} has its own")
         of_agents = isinstance(certificate, Certificate) and certificate.agents is not None
         what = what or (certificate.main_figure if isinstance(certificate, Certificate) else "decay")
-        if what in (*OF_A_RUN, *OF_AGENTS) and of_agents != (what in OF_AGENTS):
-            other = " or ".join(OF_AGENTS if of_agents else OF_A_RUN)
-            raise ParameterError(f"--what {what} is not drawn of {path}; ask for --what {other}")
-        if what not in OF_A_RUN:
+        drawn, others = ((*OF_AGENTS, *_SHARED), OF_A_RUN) if of_agents else (OF_A_RUN, OF_AGENTS)
+        if what in others and what not in drawn:
+            raise ParameterError(f"--what {what} is not drawn of {path}; ask for --what {' or '.join(drawn)}")
+        if of_agents or what not in OF_A_RUN:
             return what, certificate
         if begins:
             one = certificate.graph if isinstance(certificate, Certificate) else certificate.family.modes[0].mandatory
@@ -221,10 +222,9 @@ def _of_agents(signed: SignedDigraph, protocol: Protocol, what: str, options: sh
     of_agents = agents_keywords(options, signed)
     if not of_agents:
         raise ParameterError(f"--what {what}: is of agents of order n; add --agents double-integrator, say")
-    if what not in OF_AGENTS:
-        raise ParameterError(
-            f"--what {what}: is not drawn of agents of order n; ask for --what {' or '.join(OF_AGENTS)}"
-        )
+    drawn = (*OF_AGENTS, *_SHARED)
+    if what not in drawn:
+        raise ParameterError(f"--what {what}: is not drawn of agents of order n; ask for --what {' or '.join(drawn)}")
     if what == "formation" and options["dimension"] != 2:
         raise ParameterError("--what formation: is drawn in the plane; add --dimension 2")
     search = {name: options[name] for name in ("method", "time_limit")}

@@ -51,6 +51,7 @@ from ptcc_certify.theorems.family_behaviour import DEPENDS
 if TYPE_CHECKING:
     from ptcc_certify.bounds.final_state import FinalState
     from ptcc_certify.bounds.input.effort import Effort
+    from ptcc_certify.certificate.agents_answer import AgentsAnswer
     from ptcc_certify.certificate.certificate import Certificate
     from ptcc_certify.checker import CheckReport
     from ptcc_certify.protocols.base import Protocol
@@ -179,13 +180,19 @@ def _protocol_text(certificate: Certificate, origins: Mapping[str, str]) -> str:
     begin = [] if certificate.initial_state is None else [f"x(0) {origins.get('x(0)', 'given')}"]
     if certificate.agents is not None and certificate.agents.initial_state is not None:
         names = ("x(0)", "v(0)", "a(0)")[: certificate.agents.order]
-        begin = [f"{name} {origins.get(name, 'given')}" for name in names]
+        begin = [f"{name} {origins.get(name, _origin(certificate.agents, i))}" for i, name in enumerate(names)]
     if certificate.initial_set is not None and (not begin or _is_set_asked(certificate)):
         begin = [initial_states_text(certificate.initial_set)]
     if certificate.sigma0 is not None:
         begin += ["sigma(0) 0" if certificate.direct else f"sigma(0) {origins.get('sigma(0)', 'given')}"]
     lines = wrap_text("; ".join([_gains_text(certificate.protocol), ", ".join(begin) or "no x(0)"]))
     return " ".join(lines[:2]) if len(lines) <= 2 else f"{lines[0]} {shorten_text(f'{lines[1]} ...', TEXT)}"
+
+
+def _origin(part: AgentsAnswer, i: int) -> str:
+    """Tell of initial positions, velocities and so on that they are given, or that all are 0."""
+    still = i > 0 and not any(chain[i] for agent in part.initial_state or () for chain in agent)
+    return "0" if still else "given"
 
 
 def _gains_text(p: Protocol) -> str:

@@ -17,6 +17,7 @@ from markupsafe import Markup
 from ptcc_certify.bounds.envelope import FRACTIONS, Envelope
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
+from ptcc_certify.certificate.late_answers import largest_late_input
 from ptcc_certify.certificate.restricted_claims import WindowClaim
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import STABILITY
@@ -298,12 +299,14 @@ def _shares(saved: Certificate) -> list[tuple[float, float]]:
     return [(f, float(sliding.norm_factor(s * (1 - 1e-12)))) for f, s in zip(FRACTIONS, clocks, strict=True)]
 
 
-def _late(saved: Certificate) -> dict[str, float | str | None]:
-    """Return what is left at ``T`` with late messages, who misses it, and how far followers drift off after ``T``."""
+def _late(saved: Certificate) -> dict[str, Fraction | float | str | None]:
+    """Return what is left at ``T`` with late messages, the input, who misses it, and followers' drift after ``T``."""
     late, tracking = saved.late, saved.tracking
     missed = None if late is None else late.missed
     return {
         "late_largest": None if late is None or math.isinf(late.largest) else late.largest,
+        "late_input": None if late is None else largest_late_input(late, saved.protocol),
+        "whole_late": ", from within 1 of the final states" if late is not None and late.relative else "",
         "late_missed": None if missed is None else _cut(saved.graph.labels[missed.agent]),
         "tracking_after": None if tracking is None else tracking.distance_after,
     }

@@ -226,6 +226,8 @@ FORGERIES: dict[str, tuple[str, Change, str, str]] = {
     "a smaller input": ("plain", scaled("input", "agents", "f", factor=F(99, 100)), "agent-input", "input of agent f"),
     "a smaller input beside sliding terms": (
         "sliding variables", scaled("input", "agents", "a", factor=F(99, 100)), "agent-input", "input of agent a"),
+    "a smaller input by several functions": (
+        "every function", scaled("input", "agents", "f", factor=F(999, 1000)), "agent-input", "input of agent f"),
     "another largest input": ("plain", scaled("input", "largest"), "agent-input", "largest input"),
     "an input of a slow graph": ("slow", with_input, "agents.input", "no function and no alpha bound it"),
     "an input of a weak alpha": ("weak alpha", with_input, "agents.input", "no function and no alpha bound it"),

@@ -5,6 +5,8 @@ from __future__ import annotations
 import csv
 import io
 import json
+import re
+import shlex
 from fractions import Fraction
 from pathlib import Path
 
@@ -22,10 +24,10 @@ def test_a_certificate_of_double_integrators_is_written_checked_drawn_and_shown(
     assert "input      bounded; ||u_k|| <=" in made.out
     checked = ptcc("check", file)
     assert checked.code == 0 and "v(0) as in the file" in " ".join(checked.out.split())
-    for what in ("motion", "formation"):
+    for what in ("motion", "formation", "input"):
         assert ptcc("plot", file, "--what", what, "-o", str(tmp_path / f"{what}.svg")).code == 0
     refused = ptcc("plot", file, "--what", "decay", "-o", str(tmp_path / "d.png"))
-    assert refused.code == 2 and "ask for --what motion or formation" in refused.err
+    assert refused.code == 2 and "ask for --what motion or formation or input" in refused.err
     assert ptcc("report", file, "-o", str(tmp_path / "c.html")).code == 0
     page = (tmp_path / "c.html").read_text(encoding="utf-8")
     assert "of double integrators</h1>" in page and "single integrators" not in page
@@ -221,11 +223,28 @@ def test_the_cascade_is_certified_and_checked_from_a_scenario(tmp_path: Path):
         ("certify", ("--agents", "2", "--cascade", "1", "--drag", "1"), "double integrators without drag or forces"),
         ("certify", ("--agents", "2", "--cascade", "1", "--rest", "1"), "leave rest out"),
         ("certify", ("--agents", "2", "--cascade", "1", "--gain-cap", "9"), "leave gain_cap out"),
-        ("certify", ("--agents", "2", "--cascade", "1", "--delay", "0.1"), "messages is for single integrators"),
-        ("certify", ("--agents", "2", "--cascade", "1", "--leader-speed", "1"), "leaders is for single integrators"),
-        ("design", ("--agents", "2", "--cascade", "1", "--max-input", "9", "--shortest-deadline"), "no deadline is"),
+        ("certify", ("--agents", "2", "--cascade", "1", "--delay", "0.1"), "--delay: is not proved of agents of order"),
+        ("certify", ("--agents", "2", "--packet-loss", "1", "--period", "0.1"), "--period: is not proved of agents of"),
+        ("certify", ("--agents", "2", "--cascade", "1e6"), "cascade = 1e+06 is too large to enclose the common motion"),
+        ("certify", ("--agents", "2", "--rest", "1e6"), "take a smaller rest, or rho1"),
+        ("certify", ("--agents", "2", "--cascade", "1", "--leader-speed", "1"), "--leader-speed: is not proved of"),
+        (
+            "design",
+            ("--agents", "3", "--cascade", "1", "--max-input", "9", "--shortest-deadline"),
+            "these are of order 3",
+        ),
     ],
 )
 def test_what_the_cascade_does_not_take_is_refused_in_one_line(command: str, options: tuple[str, ...], says: str):
     done = ptcc(command, "fig1a", *options)
     assert done.code == 2 and says in done.err and len(done.err.strip().splitlines()) == 1
+
+
+def test_a_deadline_of_the_cascade_is_designed_and_proved_again_by_the_command_that_is_told():
+    asked = ("--agents", "2", "--cascade", "2", "--v0", "random", "--max-input", "40", "--shortest-deadline")
+    done = ptcc("design", "fig1a", *asked)
+    told = " ".join(done.out.replace("\\\n", " ").split())
+    assert done.code == 0 and "verdict met: ||u_k|| <= " in told and "alpha 2" in told
+    (command,) = re.findall(r"ptcc (certify fig1a .*?--max-input 40)", told)
+    again = ptcc(*shlex.split(command), "--no-simulation")
+    assert again.code == 0 and "met: |u_k| <= 40" in " ".join(again.out.split())

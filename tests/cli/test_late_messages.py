@@ -187,8 +187,14 @@ def test_followers_track_leaders_that_move_and_the_file_says_so() -> None:
         (("team.csv", "--leader-speed", "1", "--sign-gain", "0.5"), "is below speed + disturbance = 1"),
         (("team.csv", "--leader-speed=-1"), "speed = -1 is outside its domain"),
         (("team.csv", "--leader-speed", "1", "--delay", "1"), "messages and leaders together are not certified yet"),
-        (("team.csv", "--delay", "1", "--agents", "double-integrator"), "messages is for single integrators"),
-        (("team.csv", "--leader-speed", "1", "--agents", "double-integrator"), "leaders is for single integrators"),
+        (
+            ("team.csv", "--delay", "1", "--agents", "double-integrator"),
+            "--delay: is not proved of agents of order n; late messages are proved of",
+        ),
+        (
+            ("team.csv", "--leader-speed", "1", "--agents", "double-integrator"),
+            "--leader-speed: is not proved of agents of order n; leave it out",
+        ),
     ],
 )
 def test_what_cannot_be_is_refused_in_one_line_that_tells_what_to_do(words: tuple[str, ...], said: str) -> None:

@@ -13,7 +13,8 @@ from generators import all_classes, random_graph
 from scipy.optimize import linprog
 
 from ptcc_certify import agents_design
-from ptcc_certify.agents_design import TOLERANCE, AgentsDesign, Candidate, at_deadline, design_agents
+from ptcc_certify.agents_deadlines import TOLERANCE, Candidate, at_deadline
+from ptcc_certify.agents_design import AgentsDesign, design_agents
 from ptcc_certify.bounds.shortest_time import shortest_time
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
@@ -38,6 +39,8 @@ CASES: dict[str, tuple[Agents, Any, Fraction, dict[str, Any]]] = {
         {"v0": V0},
     ),
     "capped": (Agents(order=2, gain_cap=3), None, Fraction(20), {"v0": V0, "residual": "0.2"}),
+    "cascade": (Agents(order=2, cascade=2), None, Fraction(8), {"v0": V0}),
+    "cascade under disturbances": (Agents(order=2, cascade="1.5", offsets=PLACES), SLIDING, Fraction(9), {"v0": V0}),
     "single in formation": (Agents(order=1, offsets=PLACES), None, Fraction(5), {}),
 }
 
@@ -159,8 +162,9 @@ def test_what_is_missing_whatever_the_deadline_is_named():
     assert unstable.verdict == UNPROVED and "no deadline that was tried keeps the limit" in unstable.binding
 
 
-def test_agents_in_place_need_no_input():
-    agents = Agents(order=2, offsets=PLACES)
+@pytest.mark.parametrize("cascade", [None, 2])
+def test_agents_in_place_need_no_input(cascade: int | None):
+    agents = Agents(order=2, offsets=PLACES, cascade=cascade)
     answer = design_agents(TRIO, agents, PLACES, max_input="0.01")
     assert answer.verdict == MET and answer.peak == 0 and "no input" in answer.binding
 
@@ -208,3 +212,22 @@ def test_designs_on_random_graphs_are_accepted_minimal_and_kept_by_runs(seed: in
     assert answer.shortest_possible is None or answer.shortest_possible <= answer.deadline
     part = answer.certificate.agents
     assert part is not None and part.compare(part.simulate(samples=101)).input <= 1 + 1e-9
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("first", range(0, 78, 13))
+def test_designs_of_the_cascade_on_every_class_are_accepted_and_kept_by_runs(first: int, monkeypatch):
+    monkeypatch.setattr(agents_design, "certify", certify)
+    for seed in range(first, min(first + 13, len(all_classes()))):
+        _, kwargs = all_classes()[seed]
+        rng = np.random.default_rng([35, seed])
+        graph = random_graph(rng, **kwargs).graph
+        if not graph.n_edges:  # no gains act
+            continue
+        x0, v0 = rng.integers(-9, 10, (2, graph.n_nodes)).tolist()
+        agents = Agents(order=2, cascade=Fraction(int(rng.integers(1, 60)), 10))
+        answer = design_agents(graph, agents, x0, v0=v0, max_input=40)
+        assert answer.verdict == MET and answer.certificate is not None and answer.peak <= 40, (seed, answer)
+        assert answer.certificate.verdict == "certified" and answer.shortest_possible is None
+        part = answer.certificate.agents
+        assert part is not None and part.compare(part.simulate(samples=101)).input <= 1 + 1e-9

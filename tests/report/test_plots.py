@@ -231,6 +231,39 @@ def test_of_a_certificate_under_limits_the_run_under_them_is_drawn_and_they_are_
     assert titles == {"held": "held over 0.01", "capped": "gain at most 0.5", "both": "without the limits of the gain"}
 
 
+CAPPED = ptcc_certify.LateMessages(delay="0.01", gain_cap=40)
+
+
+@pytest.mark.parametrize(
+    ("agents", "x0"),
+    [
+        (ptcc_certify.Agents(order=2, cascade=3), [5, 2, -4, 3, -2, 1]),
+        (ptcc_certify.Agents(order=2), [[5, 1], [2, 2], [-4, 0], [3, -1], [-2, 6], [1, 1]]),
+    ],
+)
+def test_inputs_of_agents_of_order_n_are_drawn_below_their_proved_peak(agents: Any, x0: Any) -> None:
+    protocol = NominalProtocol(T=1, rho1=1, rho2=4, kappa=1)
+    cert = certify(graph_of("fig3a"), protocol, x0, agents=agents, method="perron", simulation=False)
+    assert cert.agents is not None and cert.agents.input is not None
+    ax, run = drawn(cert.plot("input")), cert.agents.simulate()
+    peak = peak_of(ax)
+    assert peak is not None and float(peak.get_text().split()[2].rstrip(",")) >= max(cert.agents.input)
+    highest = max(np.nanmax(line.get_ydata()) for line in agent_lines(ax))  # type: ignore[type-var]
+    assert highest == pytest.approx(np.nanmax(np.linalg.norm(run.input, axis=1)), rel=1e-6)
+    assert highest <= max(cert.agents.input)
+
+
+def test_with_late_messages_their_bound_is_drawn_beside_that_of_messages_at_once() -> None:
+    graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1), ("a", "c", 2)])
+    protocol = NominalProtocol(T=1, rho1=1, rho2=3, kappa=1)
+    cert = certify(graph, protocol, [1, 2, 3], messages=CAPPED, method="perron")
+    assert cert.late is not None and cert.late.input is not None
+    texts = [text.get_text() for text in drawn(plot_input(cert)).texts]
+    (told,) = [text for text in texts if text.startswith("late messages: at most ")]
+    assert float(told.split()[4].rstrip(",")) >= cert.late.input.max()
+    assert any("certified peak" in text and "messages at once" in text for text in texts)
+
+
 def test_a_held_input_is_drawn_in_steps_where_every_period_is_sampled() -> None:
     graph, protocol = graph_of("fig1a"), NominalProtocol(T=1, rho1=1, rho2=1, kappa=1)
     for period, style in (("0.05", "steps-post"), ("0.001", "default")):

@@ -31,7 +31,8 @@ from jinja2 import UndefinedError
 from report_examples import HOSTILE, MADE, NOMINAL, SLIDING, example, forged, undecided
 
 import ptcc_certify
-from ptcc_certify import Agents, Certificate, GainLimits, NominalProtocol, SignedDigraph, certify, design
+from lmi.exact.decimal_rounding import up
+from ptcc_certify import Agents, Certificate, GainLimits, LateMessages, NominalProtocol, SignedDigraph, certify, design
 from ptcc_certify.certificate.certificate import RejectedCertificate, read_certificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import load_graph
@@ -562,6 +563,17 @@ def test_a_statement_fits_a_column_of_two(n: int, size: Any, sliding: bool, tmp_
     assert subprocess.run(command, cwd=tmp_path, capture_output=True, timeout=60).returncode == 0
     log = (tmp_path / "main.log").read_text(errors="replace")
     assert all(float(excess) <= 2 for excess in re.findall(r"Overfull \\hbox \(([0-9.]+)pt", log)), log
+
+
+@pytest.mark.parametrize("x0", [[1, 2, 3], None])
+def test_a_statement_tells_the_input_with_late_messages(x0: Any):
+    graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1), ("a", "c", 2)])
+    messages = LateMessages(delay="0.01", gain_cap=40)
+    certificate = certify(graph, NOMINAL, x0, messages=messages, method="perron", simulation=False)
+    text = report_latex(read_certificate(certificate.to_dict()))
+    largest = up(Fraction(float(certificate.late.input.max())), 4)
+    told = f"The input then satisfies $|u_{{k}}| \\le {largest}$ up to $T$"
+    assert told + (", from within 1 of the final states" if x0 is None else "") + "." in text
 
 
 def test_a_matrix_too_wide_for_a_column_of_two_is_a_list_of_weights(tmp_path: Path):

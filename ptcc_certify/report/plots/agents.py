@@ -71,7 +71,13 @@ def text_width(text: str) -> float:
 
 
 def draw_agents(
-    ax: Axes, run: Trajectory, values: np.ndarray, structure: Structure, *, size: bool = False, **style: Any
+    ax: Axes,
+    run: Trajectory | AgentsTrajectory,
+    values: np.ndarray,
+    structure: Structure,
+    *,
+    size: bool = False,
+    **style: Any,
 ) -> dict[int, str]:
     """Draw a quantity of every agent, (N, M), in the colours and lines of camps; return the colours of single lines.
 

@@ -11,23 +11,21 @@ from lmi.exact.decimal_rounding import up
 from ptcc_certify.bounds.input.effort import Effort
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
+from ptcc_certify.certificate.late_answers import largest_late_input
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.report.input_lines import initial_states_text
-from ptcc_certify.report.plots.agents import NAME_SIZE, draw_agents, draw_deadlines, name_agents
+from ptcc_certify.report.plots.agents import draw_agents, draw_deadlines, name_agents
+from ptcc_certify.report.plots.agents_input import plot_agents_input
 from ptcc_certify.report.plots.family_input import plot_family_input
-from ptcc_certify.report.plots.style import RUN, axes_of, finished, styled, time_label
+from ptcc_certify.report.plots.peaks import Peak, draw_peaks
+from ptcc_certify.report.plots.style import BOUND, RUN, axes_of, finished, styled, time_label
 from ptcc_certify.report.plots.subject import limits_text, require_same, structure_of, trajectory_of
+from ptcc_certify.simulation.agents import AgentsTrajectory
 from ptcc_certify.simulation.trajectory import Trajectory
 
 #: An error ``|e_k|`` below so many tolerances of the integrator, in units of what it is made of, is not resolved.
 RESOLVED_ERROR = 10
-#: An input that grows to so many times its initial size is drawn on a logarithmic axis,
-LARGE_GROWTH = 3
-#: from so many decades below its initial size on; changes of sign go further down.
-INPUT_DECADES = 3
-#: A certified peak is drawn as a line up to so many times the largest input of the run, else named at the top.
-HIGH_PEAK = 2.5
 
 
 @styled
@@ -42,12 +40,13 @@ def plot_input(
     drawn where the integrator no longer resolves what the gain multiplies. No peak is drawn where none holds: for runs
     that begin later than 0, sampled inputs, disturbance or noise of the nominal protocol, boundary layers. Of a
     certificate with one set of limits of the gain the run under these is drawn, and their peak; the legend names them.
-    A held input is drawn in steps if every period is sampled. Of a family the largest input under each of many signals
-    is drawn, below its bound for every signal.
+    A held input is drawn in steps if every period is sampled. With late messages their bound is drawn besides, as far
+    as there is one. Of a family the largest input under each of many signals is drawn, below its bound for every
+    signal; of agents of order n the size of each agent's input.
 
     Parameters
     ----------
-    subject : Certificate, FamilyCertificate or Trajectory
+    subject : Certificate, FamilyCertificate, Trajectory or AgentsTrajectory
         Of one initial state. The run of a certificate that holds none is simulated.
     ax : Axes, optional
     certificate : Certificate, optional
@@ -75,23 +74,14 @@ def plot_input(
     """
     if isinstance(subject, FamilyCertificate):
         return plot_family_input(subject, ax=ax, time_unit=time_unit)
+    if isinstance(subject, AgentsTrajectory) or (isinstance(subject, Certificate) and subject.agents is not None):
+        return plot_agents_input(subject, ax=ax, time_unit=time_unit)
     run, structure = _run_under_limits(subject), structure_of(subject)
     certificate = subject if isinstance(subject, Certificate) else certificate
-    peak = None if certificate is None else _certified_peak(run, certificate)
     ax, size = axes_of(ax), np.abs(_resolved_input(run))
     steps = "steps-post" if _every_period_sampled(run) else "default"
     named = draw_agents(ax, run, size, structure, size=True, drawstyle=steps)
-    largest = np.nan_to_num(size)
-    first, top = float(largest[:, :1].max(initial=0)), float(largest.max(initial=0))
-    shown = peak is not None and (peak <= HIGH_PEAK * top or top == 0)
-    height = max(top, peak or 0.0) if shown else top
-    if first and top > LARGE_GROWTH * first:
-        ax.set_yscale("log", nonpositive="clip")
-        ax.set_ylim(first * 10.0**-INPUT_DECADES, height * 2)
-    else:
-        ax.set_ylim(0, 1.12 * height or 1)
-    if peak is not None and certificate is not None:
-        _draw_peak(ax, peak, shown, _set_text(run, certificate))
+    draw_peaks(ax, size, [] if certificate is None else _peaks(run, certificate))
     draw_deadlines(ax, run)
     name_agents(ax, run, size, named)
     return finished(ax, time_label("time $t$", time_unit), "input $|u_k|$", limits_text(run, certificate))
@@ -114,6 +104,16 @@ def _every_period_sampled(run: Trajectory) -> bool:
     return bool(longest <= (1 + 1e-9) * float(run.actuator.sample_period))
 
 
+def _peaks(run: Trajectory, certificate: Certificate) -> list[Peak]:
+    """Return what bounds the input of a run, and with late messages."""
+    peak, late = _certified_peak(run, certificate), certificate.late
+    found = [] if peak is None else [Peak(peak, f"certified peak {up(peak, 4)}{_set_text(run, certificate)}")]
+    if late is not None and (largest := largest_late_input(late, certificate.protocol)) is not None:
+        whole = ", from within 1 of the final states" * late.relative
+        found.append(Peak(float(largest), f"late messages: at most {up(largest, 4)}{whole}", BOUND))
+    return found
+
+
 def _set_text(run: Trajectory, certificate: Certificate) -> str:
     """Name the set of initial states for which a peak is proved, and say whether a run begins outside a box."""
     region = certificate.effort and certificate.effort.initial_set
@@ -125,19 +125,6 @@ def _set_text(run: Trajectory, certificate: Certificate) -> str:
         outside = bool((np.abs(run.states[:, 0] - center) > radius * (1 + 1e-12)).any())
     states = initial_states_text(region).replace("|x_k(0)| <=", r"$|x_k(0)| \leq$")
     return f" ({states}" + (",\nnot from where this run begins)" if outside else ")")
-
-
-def _draw_peak(ax: Axes, peak: float, shown: bool, whom: str) -> None:
-    """Draw the certified peak with its value, rounded up; at the top, if it is far above what is drawn."""
-    ground = {"boxstyle": "square,pad=0.05", "facecolor": "white", "edgecolor": "none"}
-    style: dict[str, Any] = {"ha": "right", "fontsize": NAME_SIZE, "textcoords": "offset points", "bbox": ground}
-    if not shown:
-        text = f"certified peak {up(peak, 4)}{whom}, above"
-        ax.annotate(text, (1, 1), (0, -2), xycoords="axes fraction", va="top", **style)
-        return
-    ax.axhline(peak, color="black", linewidth=0.9, linestyle="--")
-    text = f"certified peak {up(peak, 4)}{whom}"
-    ax.annotate(text, (1, peak), (0, 2), xycoords=("axes fraction", "data"), va="bottom", **style)
 
 
 @styled
