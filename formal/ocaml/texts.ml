@@ -39,9 +39,9 @@ let obligations = [
   "input-peak", ("gain |e_k| <= peak_k up to the deadline",
     "|e_k| <= min(A_k, sqrt(c_k V(0)) e^(-rate s / 2))");
   "input-energy", ("int ||gain E||^2 dt <= energy",
-    "||E|| <= min(A, sqrt(c V(0)) e^(-rate s / 2)), or two Lyapunov equations");
+    "the same in norm, or two Lyapunov equations");
   "input-length", ("int ||gain E|| dt <= path length",
-    "||E|| <= min(A, sqrt(c V(0)) e^(-rate s / 2))");
+    "the same in norm");
   "limited-gain", ("what remains at the deadline under gain saturation, switch-off or zero-order hold",
     "Lyapunov decrease");
   "nominal-disturbed", ("|d_k| <= delta adds at most these to the inputs of the nominal protocol and to where the agents end",
