@@ -2,12 +2,12 @@
 Require Import ZArith QArith Qabs Qreals List Bool Reals Lra Lia Psatz.
 From Coquelicot Require Import Coquelicot.
 Import ListNotations.
-Require Import Vec Definite Graph Flow Certificate Checker Sound Claims Input Mean Slide Main Table Dominance Weighted Rest Enclose Wide Group.
+Require Import Vec Definite Graph Flow Certificate Checker Sound Claims Input Mean Slide Main Table Dominance Weighted Rest Enclose Wide Group Sparse Factor.
 Open Scope R_scope.
 
 (** what is found by search: of each Lyapunov function the vector of its rows, and the rates of closed components by
-    themselves, 0 of single nodes; of followers what encloses them *)
-Record hints := Hints { vectors : list (list Q * list Q); around : list Q }.
+    themselves, 0 of single nodes; what sparse factors prove of some of these; of followers what encloses them *)
+Record hints := Hints { vectors : list (list Q * list Q); facts : list fact; around : list Q }.
 
 Definition leads (c : cert) (i : nat) : bool := match M.find i (places (map nodes (comps c))) with Some _ => true | None => false end.
 (** leaders: unbalanced ones end at 0, single ones where they are *)
@@ -25,16 +25,17 @@ Definition check_final_large (c : cert) (u : list Q) : bool :=
   match final c with [] => true | _ => let pl := places (map nodes (comps c)) in
     check_leaders c && check_followers c (fun i => match M.find i pl with Some _ => true | None => false end) u end.
 Definition weights_of (f : func) : list Q := match ly f with Weighted p => p | _ => [] end.
-Definition check_function_large (c : cert) (pl : place) (into : ways) (f : func) (v : list Q * list Q) : bool :=
-  let K := common (rate f :: snd v) in
+Definition check_function_large (c : cert) (pl : place) (into : ways) (facts : list fact) (f : func) (v : list Q * list Q) : bool :=
+  let K := common (rate f :: snd v) in let p := weights_of f in let P := table (map (scaled (common p)) p) in
   let gz := table (map (scaled K) (snd v)) in
-  good K (rate f :: snd v) &&
-  numbered 0 (fun k C => check_group (from_ into (S k)) (nodes C) (camps C) (weights_of f) (nth k (snd v) 0%Q)) (comps c) &&
+  good K (rate f :: snd v) && good (common p) p &&
+  numbered 0 (fun k C => existsb (fun F => fits F k (nodes C) P (nth k (snd v) 0%Q)) facts || check_group (from_ into (S k)) (nodes C) (camps C) (weights_of f) (nth k (snd v) 0%Q)) (comps c) &&
   check_weighted c (from_ into 0) (fst v) (fun i => match M.find i pl with Some k => get gz k | None => 0%Z end) K f.
-Definition check_functions (c : cert) (vs : list (list Q * list Q)) : bool :=
+Definition check_functions (c : cert) (vs : list (list Q * list Q)) (facts : list fact) : bool :=
   let Cs := map nodes (comps c) in let pl := places Cs in let into := by_key (number pl) (edges c) in
   (length (funcs c) =? length vs)%nat && forallb ascending Cs &&
-  forallb (fun p : func * (list Q * list Q) => check_function_large c pl into (fst p) (snd p)) (combine (funcs c) vs).
+  forallb (fun F => check_factor (from_ into (S (whose F))) (nth (whose F) Cs []) F) facts &&
+  forallb (fun p : func * (list Q * list Q) => check_function_large c pl into facts (fst p) (snd p)) (combine (funcs c) vs).
 Definition check_moves (c : cert) : bool :=
   match edges c with [] => true | _ => existsb (fun f => pos (rate f)) (funcs c) end.
 Definition check_input_large (c : cert) : bool :=
@@ -44,7 +45,7 @@ Definition check_rest (c : cert) : bool :=
   match margins c, leaders c, upper_bound c, efforts c with [], [], None, [] => true | _, _, _, _ => false end.
 Definition check_large (h : hints) (c : cert) : bool :=
   enclosed c && check_edges c (common (map wt (edges c))) && check_protocol c && wide_structure c && wide_claims c &&
-  check_functions c (vectors h) && check_moves c && check_final_large c (around h) && check_input_large c && check_rates c &&
+  check_functions c (vectors h) (facts h) && check_moves c && check_final_large c (around h) && check_input_large c && check_rates c &&
   check_rest c && check_sliding c.
 
 Section Large.
@@ -55,7 +56,7 @@ Hypothesis Hedges : check_edges c (common (map wt (edges c))) = true.
 Hypothesis Hprot : check_protocol c = true.
 Hypothesis Hstructure : wide_structure c = true.
 Hypothesis Hclaims : wide_claims c = true.
-Hypothesis Hfunctions : check_functions c (vectors h) = true.
+Hypothesis Hfunctions : check_functions c (vectors h) (facts h) = true.
 Lemma edges_in e : In e es -> (tgt e < n)%nat /\ (src e < n)%nat.
 Proof.
   intros He. unfold check_edges in Hedges. apply andb_prop in Hedges as [_ H]. rewrite forallb_forall in H. specialize (H e He).
@@ -72,7 +73,7 @@ Qed.
 Lemma function_large f : In f (funcs c) -> function_claim c f /\ exists p, ly f = Weighted p.
 Proof.
   intros Hf. unfold check_functions in Hfunctions. cbv zeta in Hfunctions. set (Cs := map nodes (comps c)) in *.
-  apply andb_prop in Hfunctions as [L H]. apply andb_prop in L as [L Asc]. apply Nat.eqb_eq in L.
+  apply andb_prop in Hfunctions as [L H]. apply andb_prop in L as [L Hfacts]. apply andb_prop in L as [L Asc]. rewrite forallb_forall in Hfacts. apply Nat.eqb_eq in L.
   rewrite forallb_forall in H, Asc. destruct (in_nth (funcs c) f f Hf) as [k [Hk E]]. set (v := nth k (vectors h) ([], [])).
   assert (Kin : In (f, v) (combine (funcs c) (vectors h))).
   { replace (f, v) with (nth k (combine (funcs c) (vectors h)) (f, ([], []))).
@@ -80,7 +81,7 @@ Proof.
     - rewrite combine_nth by exact L. rewrite E. reflexivity. }
   specialize (H _ Kin). unfold check_function_large in H. cbv zeta in H. cbn [fst snd] in H.
   set (K := common (rate f :: snd v)) in *. set (gz := table (map (scaled K) (snd v))) in *.
-  apply andb_prop in H as [H HW]. apply andb_prop in H as [HK HG].
+  apply andb_prop in H as [H HW]. apply andb_prop in H as [HK HG]. apply andb_prop in HK as [HK Hp].
   assert (HK' : good K (snd v) = true).
   { unfold good in *. apply andb_prop in HK as [A B]. simpl in B. apply andb_prop in B as [_ B]. rewrite A, B. reflexivity. }
   destruct (good_ok _ _ HK) as [K0 _]. destruct (wide_parts c Hstructure) as [W0 [W1 [W2 _]]]. fold Cs in W0.
@@ -96,15 +97,19 @@ Proof.
       * intros j Hj. rewrite <- key_filter. unfold Cs in Hj. rewrite map_length in Hj. set (C0 := Comp [] (Cycle []) [] []).
         pose proof (numbered_ok _ _ C0 0%nat HG j Hj) as G. rewrite Nat.add_0_l in G. cbv beta in G.
         assert (EC : nth j Cs [] = nodes (nth j (comps c) C0)) by (unfold Cs; change (@nil nat) with (nodes C0); apply map_nth).
-        unfold weights_of in G. rewrite El in G. rewrite <- EC in G.
+        unfold weights_of in G, Hp. rewrite El in G, Hp. rewrite <- EC in G.
         assert (Hj' : (j < length Cs)%nat) by (unfold Cs; rewrite map_length; exact Hj).
-        apply (group_ok es _ (nth j Cs []) (camps (nth j (comps c) C0)) p (nth j (snd v) 0%Q) x).
-        -- intros i Hi y. rewrite key_filter. apply lap_filter. intros e He Hkey Et. apply Nat.eqb_neq in Hkey. apply Hkey.
+        assert (Own : forall i, In i (nth j Cs []) -> forall y, lap (from_ (by_key (number (places Cs)) es) (S j)) y i = lap es y i).
+        { intros i Hi y. rewrite key_filter. apply lap_filter. intros e He Hkey Et. apply Nat.eqb_neq in Hkey. apply Hkey.
            assert (In e (from_ (by_key (number (places Cs)) es) (S j))).
            { apply (number_In Cs es j e W0 Hj'). split; [exact He|]. rewrite Et. exact Hi. }
-           apply key_In in H. apply H.
-        -- intros e He. apply (number_In Cs es j e W0 Hj') in He. apply He.
-        -- exact G.
+           apply key_In in H. apply H. }
+        apply orb_prop in G as [G|G].
+        -- apply existsb_exists in G as [F [HF G]]. specialize (Hfacts F HF).
+           assert (W : whose F = j) by (unfold fits in G; apply andb_prop in G as [G _]; apply andb_prop in G as [G _]; apply Nat.eqb_eq; exact G).
+           rewrite W in Hfacts. apply (fact_ok es _ (nth j Cs []) F j p _ x); auto. apply ascending_NoDup. apply Asc. apply nth_In. exact Hj'.
+        -- apply (group_ok es _ (nth j Cs []) (camps (nth j (comps c) C0)) p (nth j (snd v) 0%Q) x Own); [|exact G].
+           intros e He. apply (number_In Cs es j e W0 Hj') in He. apply He.
     + intros i _. f_equal. unfold gamma_of. destruct (M.find i (places Cs)) as [j|].
       * unfold gz. rewrite get_table, nth_scaled by exact HK'. apply IZR_lt in K0. field. lra.
       * unfold Rdiv. ring.
