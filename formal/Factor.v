@@ -91,30 +91,38 @@ Lemma weight_abs e : In e own -> IZR (Z.abs (scaled ls (wt e))) = IZR ls * Rabs 
 Proof.
   intros He. destruct (good_ok _ _ Hls) as [L _]. apply IZR_lt in L. rewrite abs_IZR, (weight e He), Rabs_mult, (Rabs_right (IZR ls)) by lra. reflexivity.
 Qed.
-Lemma fsum_bump i v m y : In i C -> fsum C (fun j => IZR (get (bump i v m) j) * y j) = fsum C (fun j => IZR (get m j) * y j) + IZR v * y i.
+(** [lam'L], by node: [(lam'L) x = lam'(L x)] *)
+Definition column (lam : nat -> R) (j : nat) : R := esum own (fun e =>
+  (if (tgt e =? j)%nat then Rabs (Q2R (wt e)) * lam (tgt e) else 0) - if (src e =? j)%nat then Q2R (wt e) * lam (tgt e) else 0).
+Lemma column_ok lam x : fsum C (fun j => column lam j * x j) = fsum C (fun i => lam i * lap own x i).
 Proof.
-  intros Hi. rewrite <- (fsum_one C i (fun j => IZR v * y j) HN Hi), <- fsum_plus. apply fsum_ext. intros j _. rewrite get_bump.
-  destruct (i =? j)%nat; [rewrite plus_IZR; ring|ring].
-Qed.
-(** [(eta'L) x = eta'(L x)] *)
-Lemma left_ok x : fsum C (fun j => IZR (get (left_product ls own eta) j) * x j) =
-  IZR ls * fsum C (fun i => IZR (get eta i) * lap own x i).
-Proof.
-  unfold lap. rewrite (fsum_ext C (fun i => IZR (get eta i) * _)
-    (fun i => IZR (get eta i) * esum own (fun e => if (tgt e =? i)%nat then Rabs (Q2R (wt e)) * x (tgt e) - Q2R (wt e) * x (src e) else 0))).
+  unfold lap. rewrite (fsum_ext C (fun i => lam i * _)
+    (fun i => lam i * esum own (fun e => if (tgt e =? i)%nat then Rabs (Q2R (wt e)) * x (tgt e) - Q2R (wt e) * x (src e) else 0))).
   2: { intros i _. f_equal. unfold esum. clear. induction own as [|e l IH]; simpl; [reflexivity|]. rewrite IH. unfold lap_edge.
        destruct (Nat.eqb_spec (tgt e) i) as [<-|]; ring. }
-  rewrite (fsum_edges C own (fun e => Rabs (Q2R (wt e)) * x (tgt e) - Q2R (wt e) * x (src e)) (fun i => IZR (get eta i)) HN (fun e He => proj1 (Hin e He))).
-  assert (G : forall l, (forall e, In e l -> In e own) -> fsum C (fun j => IZR (get (left_product ls l eta) j) * x j) =
-    IZR ls * esum l (fun e => IZR (get eta (tgt e)) * (Rabs (Q2R (wt e)) * x (tgt e) - Q2R (wt e) * x (src e)))).
-  { induction l as [|e l IH]; intros Hl.
-    - simpl. rewrite (fsum_ext C _ (fun _ => 0 * 1)) by (intros; rewrite get_empty; simpl; ring). rewrite fsum_scal. ring.
-    - cbn [left_product fold_right esum]. cbv zeta. fold (left_product ls l eta). destruct (Hin e (Hl e ltac:(left; reflexivity))) as [A B].
-      rewrite !fsum_bump by assumption. rewrite IH by (intros; apply Hl; right; assumption).
-      assert (He : In e own) by (apply Hl; left; reflexivity).
-      rewrite opp_IZR, !mult_IZR, (weight e He), (weight_abs e He). fold (esum l). unfold esum. ring. }
+  rewrite (fsum_edges C own (fun e => Rabs (Q2R (wt e)) * x (tgt e) - Q2R (wt e) * x (src e)) lam HN (fun e He => proj1 (Hin e He))).
+  unfold column. clear ls Hls. revert Hin. induction own as [|e l IH]; intros Hl; simpl.
+  - rewrite (fsum_ext C _ (fun _ => 0 * 1)) by (intros; ring). rewrite fsum_scal. ring.
+  - rewrite <- IH by (intros; apply Hl; right; assumption). destruct (Hl e ltac:(left; reflexivity)) as [A B].
+    transitivity (fsum C (fun i => if (tgt e =? i)%nat then Rabs (Q2R (wt e)) * lam (tgt e) * x i else 0) +
+      fsum C (fun i => if (src e =? i)%nat then - (Q2R (wt e) * lam (tgt e) * x i) else 0) +
+      fsum C (fun j => esum l (fun e => (if (tgt e =? j)%nat then Rabs (Q2R (wt e)) * lam (tgt e) else 0) - (if (src e =? j)%nat then Q2R (wt e) * lam (tgt e) else 0)) * x j)).
+    + rewrite <- !fsum_plus. apply fsum_ext. intros i _. fold (esum l). destruct (tgt e =? i)%nat, (src e =? i)%nat; unfold esum; ring.
+    + rewrite (fsum_one C (tgt e) (fun i => Rabs (Q2R (wt e)) * lam (tgt e) * x i) HN A), (fsum_one C (src e) (fun i => - (Q2R (wt e) * lam (tgt e) * x i)) HN B). fold (esum l). unfold esum. ring.
+Qed.
+Lemma left_entry j : IZR (get (left_product ls own eta) j) = IZR ls * column (fun i => IZR (get eta i)) j.
+Proof.
+  assert (G : forall l, (forall e, In e l -> In e own) -> IZR (get (left_product ls l eta) j) = IZR ls * esum l (fun e =>
+    (if (tgt e =? j)%nat then Rabs (Q2R (wt e)) * IZR (get eta (tgt e)) else 0) - if (src e =? j)%nat then Q2R (wt e) * IZR (get eta (tgt e)) else 0)).
+  { induction l as [|e l IH]; intros Hl; [simpl; rewrite get_empty; simpl; ring|].
+    cbn [left_product fold_right esum]. cbv zeta. fold (left_product ls l eta) (esum l). rewrite !get_bump.
+    specialize (IH ltac:(intros; apply Hl; right; assumption)). assert (He : In e own) by (apply Hl; left; reflexivity).
+    pose proof (weight e He) as W. pose proof (weight_abs e He) as W'. unfold esum in *.
+    destruct (tgt e =? j)%nat, (src e =? j)%nat; rewrite ?plus_IZR, ?opp_IZR, ?mult_IZR, ?W, ?W', IH; ring. }
   apply G. auto.
 Qed.
+Lemma left_ok x : fsum C (fun j => IZR (get (left_product ls own eta) j) * x j) = IZR ls * fsum C (fun i => IZR (get eta i) * lap own x i).
+Proof. rewrite <- column_ok, <- fsum_scal. apply fsum_ext. intros j _. rewrite left_entry. ring. Qed.
 End Left.
 
 (** * The basis *)

@@ -8,7 +8,7 @@ module Z = Number.Z
 let keys = [ "order"; "indptr"; "indices"; "data"; "exponents"; "bits"; "power"; "weights"; "parents" ]
 let largest_shift = 65_536 and largest_bits = 400_000_000
 let small what v = match v with Num s when String.length s <= 18 -> int_of_string s | _ -> bad (what ^ ": an integer of at most 18 digits is due")
-let ints what count v = List.map (fun z -> if Z.fits_int z then Z.to_int z else bad (what ^ ": an integer is too large")) (integers what count v)
+let ints what count v = map (fun z -> if Z.fits_int z then Z.to_int z else bad (what ^ ": an integer is too large")) (integers what count v)
 
 (* weights in lowest terms: integers, and the rational that they are multiplied by *)
 let in_ratios weights =

@@ -88,21 +88,30 @@ let into_camps g own v =
   List.iter2 (fun i s -> need (Z.equal (Z.abs s) Z.one) "camps of a component"; g.(i) <- s) own camps
 let cycle_of nodes v = Cycle (List.map (fun e -> match positions nodes "negative_cycle" e with
   | [ s; t ] -> (s, t) | _ -> bad "negative_cycle: an edge has two ends") (entries "negative_cycle" v))
-(* the closed components of a large form: no weights and no left null vectors, which the theorem does not speak of *)
+(* a left null vector as integers, in its own scale, and where it is largest *)
+let stated number own eta =
+  let d = List.fold_left (fun d ((x : q), _) -> Z.lcm d x.qden) Z.one eta in
+  let whole = List.map (fun ((x : q), _) -> Z.mul x.qnum (Z.divexact d x.qden)) eta in
+  let entries = List.map2 (fun i z -> i, z) own whole in
+  let fixed, _ = List.fold_left (fun (i, a) (j, b) -> if Z.gt (Z.abs b) (Z.abs a) then j, b else i, a) (List.hd entries) entries in
+  { which = number; vector_of = entries; fixed }
+(* the closed components of a large form, without weights; the left null vectors of groups, which the check does not believe *)
 let large_components nodes listed vectors =
   let groups = List.filter (fun (own, balanced, _) -> balanced && List.length own > 1) listed in
   let vectors = entries "influence.components" vectors in
   need (List.length vectors = List.length groups) "influence.components: one for each balanced group";
-  List.iter2 (fun (own, _, _) v ->
+  let vectors = List.map2 (fun (own, _, _) v ->
     let one = fields "a component of influence" [ "nodes"; "left_null_vector" ] v in
     need (positions nodes "influence" (one "nodes") = own) "influence: another component";
     let eta = List.map (interval "left_null_vector") (entries "left_null_vector" (one "left_null_vector")) in
-    need (List.length eta = List.length own) "left_null_vector: a number for each node") groups vectors;
+    need (List.length eta = List.length own) "left_null_vector: a number for each node"; own, eta) groups vectors in
   let g = Array.make (Array.length nodes.labels) Z.zero in
   List.iter (fun (own, balanced, get) -> if balanced then into_camps g own (get "gauge")) listed;
   let all = Array.to_list g in
   List.map (fun (own, balanced, get) ->
-    { nodes = own; share = []; null = []; camps = if balanced then Gauge all else cycle_of nodes (get "negative_cycle") }) listed
+    { nodes = own; share = []; null = []; camps = if balanced then Gauge all else cycle_of nodes (get "negative_cycle") }) listed,
+  List.concat (List.mapi (fun k (own, _, _) ->
+    match List.assoc_opt own vectors with Some eta -> [ stated k own eta ] | None -> []) listed)
 (* closed components with their witnesses, and what influence says of the balanced ones *)
 let components nodes structure influence =
   let n = Array.length nodes.labels in
@@ -122,7 +131,8 @@ let components nodes structure influence =
   let followers = List.filter (fun i -> not is_leader.(i)) (List.init n Fun.id) in
   need (positions nodes "leaders" (structure "leaders") = leading) "other leaders";
   need (positions nodes "followers" (structure "followers") = followers) "other followers";
-  if get "containment_weights" = Null then large_components nodes listed (get "components"), followers, get "degenerate", true
+  if get "containment_weights" = Null then
+    let comps, lefts = large_components nodes listed (get "components") in comps, lefts, followers, get "degenerate", true
   else
   let balanced = List.length (List.filter (fun (_, b, _) -> b) listed) in
   let rows = ordered (List.map (fun i -> nodes.labels.(i)) followers) "containment_weights" (get "containment_weights") in
@@ -147,7 +157,7 @@ let components nodes structure influence =
       { nodes = own; camps = Gauge (Array.to_list g); share = Array.to_list w; null = Array.to_list v } end
     else
       { nodes = own; share = []; null = []; camps = cycle_of nodes (get "negative_cycle") }) listed in
-  comps, followers, get "degenerate", false
+  comps, [], followers, get "degenerate", false
 
 (* a Lyapunov matrix on all nodes, 0 elsewhere; the weights of a diagonal one *)
 let matrix nodes what own rows =
@@ -322,7 +332,7 @@ let certificate (j : Json.t) : t =
   bare_of proof "structure" "graph";
   bare_of proof "claim" "graph";
   if get "influence" = Null then unsupported "an undecided certificate, without influence";
-  let comps, followers, degenerate, enclosed = components nodes structure (get "influence") in
+  let comps, lefts, followers, degenerate, enclosed = components nodes structure (get "influence") in
   let all = Pieces.graph (Array.length nodes.labels) edges in
   let found = Pieces.find all in
   let pieces = List.map (Pieces.piece all comps) found.pieces in
@@ -346,9 +356,7 @@ let certificate (j : Json.t) : t =
     | None, _ -> bad "a final state without an initial state" in
   if start = None then need (degenerate = Null) "influence.degenerate without an initial state"
   else not_checked "influence.degenerate";
-  let balanced_groups = List.exists (fun (one : comp) -> is_balanced one && List.length one.nodes > 1) comps in
-  (* of a balanced group nothing tells where it ends but a left null vector, which is not believed *)
-  let unproved = enclosed && (start = None || balanced_groups || (following_witness proof = Null && followers <> [])) in
+  let unproved = enclosed && (start = None || (following_witness proof = Null && followers <> [])) in
   if unproved && start <> None then not_checked "final_state";
   let around, final =
     if unproved then (skipped proof "final-state" "graph"; [], [])
@@ -463,7 +471,7 @@ let certificate (j : Json.t) : t =
   let certified = rate "proved" <> None || edges = [] in
   need (verdict = (if certified then "certified" else "undecided")) "what was proved makes another verdict";
   if not certified then unsupported "an undecided certificate";
-  { nodes; hints = { vectors = List.rev !vectors; facts = !facts; around }; sha256; verdict; theorem; checked = List.rev proof.checked; unchecked = List.rev proof.unchecked;
+  { nodes; hints = { vectors = List.rev !vectors; facts = !facts; lefts; around }; sha256; verdict; theorem; checked = List.rev proof.checked; unchecked = List.rev proof.unchecked;
     sections = List.rev !left_out;
     cert = { order = Array.length nodes.labels; edges; kind; rho1; rho2; kappa; comps; pieces; all_balanced = found.balance;
       sign_symmetric = Pieces.sign_symmetric all; funcs = functions;

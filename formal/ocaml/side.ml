@@ -55,11 +55,11 @@ let integers what count v = match vector what count v with
   | Integers l, None -> l
   | _ -> bad (what ^ ": integers are due, without a scale")
 let numbers what count v = match vector what count v with
-  | Floats l, None -> List.map exactly l
+  | Floats l, None -> List.rev (List.rev_map exactly l)
   | Floats _, Some _ -> bad (what ^ ": only integers have a scale")
-  | Integers l, None -> List.map Number.of_z l
+  | Integers l, None -> List.rev (List.rev_map Number.of_z l)
   | Integers l, Some (Str s) ->
       let scale = Number.rational s in
       if Z.sign scale.Checker.qnum <= 0 then bad (what ^ ": the scale is not positive");
-      List.map (fun z -> Number.div (Number.of_z z) scale) l
+      List.rev (List.rev_map (fun z -> Number.div (Number.of_z z) scale) l)
   | _ -> bad (what ^ ": the scale is no number")
