@@ -72,7 +72,7 @@ def compare(document: Json, path: tuple, folder: Path) -> bool:
         narrow = path[0] == "final_state" and any(word in str(python.reason) for word in ("radius", "wider than"))
         assert told or narrow or str(python.rejected) in left, (path, python.rejected, python.reason)
     else:
-        # radii of followers are proved by ``u`` from the intervals of leaders as stated, be they wider than they need be
+        # radii of followers are proved by ``u`` from the intervals of leaders as stated, however wide they are
         at = path[0] == "final_state" or path[2:4] == ("witness", "u")
         wide = code == 1 and at and "final-state of graph" in text
         assert wide or (code == 2 and any(word in text for word in UNREAD)), (path, python, text)
