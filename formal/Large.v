@@ -2,39 +2,43 @@
 Require Import ZArith QArith Qabs Qreals List Bool Reals Lra Lia Psatz.
 From Coquelicot Require Import Coquelicot.
 Import ListNotations.
-Require Import Vec Definite Graph Flow Certificate Checker Sound Claims Input Mean Slide Main Table Dominance Weighted Rest Enclose Wide Group.
+Require Import Vec Definite Graph Flow Certificate Checker Sound Claims Input Mean Slide Main Table Dominance Weighted Rest Enclose Wide Group Sparse Factor Kept.
 Open Scope R_scope.
 
 (** what is found by search: of each Lyapunov function the vector of its rows, and the rates of closed components by
-    themselves, 0 of single nodes; of followers what encloses them *)
-Record hints := Hints { vectors : list (list Q * list Q); around : list Q }.
+    themselves, 0 of single nodes; what sparse factors prove of some of these; left null vectors of
+    balanced groups; of their nodes and of followers what encloses them *)
+Record hints := Hints { vectors : list (list Q * list Q); facts : list fact; lefts : list stated; around : list Q }.
 
 Definition leads (c : cert) (i : nat) : bool := match M.find i (places (map nodes (comps c))) with Some _ => true | None => false end.
-(** leaders: unbalanced ones end at 0, single ones where they are *)
-Definition check_leaders (c : cert) : bool :=
+(** leaders: unbalanced ones end at 0, single ones where they are, balanced groups where their left null vectors tell *)
+Definition check_leaders (c : cert) (ls : list stated) (u : list Q) : bool :=
   let sf := scale_of c in
-  let X := table (map (scaled sf) (map fst (final c))) in let S := table (map (scaled sf) (map snd (final c))) in
+  let X := table (map (scaled sf) (map fst (final c))) in let R := table (map (scaled sf) (map snd (final c))) in
   let B := table (map (scaled sf) (start c)) in let B' := table (map (scaled sf) (sliding c)) in
-  let E := listens (edges c) in
+  let E := listens (edges c) in let U := table (map (scaled (common u)) u) in
+  let into := by_key (number (places (map nodes (comps c)))) (edges c) in
   good sf (start c) && good sf (sliding c) && good sf (map fst (final c)) && good sf (map snd (final c)) &&
-  forallb (fun C => match camps C, nodes C with
-    | Cycle _, l => forallb (fun i => Z.abs (get X i) <=? get S i)%Z l
-    | Gauge _, [i] => (get E i =? 0)%Z && (Z.abs (get X i - (get B i - get B' i)) <=? get S i)%Z
-    | Gauge _, _ => false end) (comps c).
-Definition check_final_large (c : cert) (u : list Q) : bool :=
+  numbered 0 (fun k C => match camps C, nodes C with
+    | Cycle _, l => forallb (fun i => Z.abs (get X i) <=? get R i)%Z l
+    | Gauge _, [i] => (get E i =? 0)%Z && (Z.abs (get X i - (get B i - get B' i)) <=? get R i)%Z
+    | Gauge g, l => ascending l && existsb (fun v => (which v =? k)%nat && check_kept (from_ into (S k)) l
+        (by_node (map (fun i => (i, nth i g 0%Z)) l)) U X R (fun i => get B i - get B' i)%Z v) ls end) (comps c).
+Definition check_final_large (c : cert) (ls : list stated) (u : list Q) : bool :=
   match final c with [] => true | _ => let pl := places (map nodes (comps c)) in
-    check_leaders c && check_followers c (fun i => match M.find i pl with Some _ => true | None => false end) u end.
+    check_leaders c ls u && check_followers c (fun i => match M.find i pl with Some _ => true | None => false end) u end.
 Definition weights_of (f : func) : list Q := match ly f with Weighted p => p | _ => [] end.
-Definition check_function_large (c : cert) (pl : place) (into : ways) (f : func) (v : list Q * list Q) : bool :=
-  let K := common (rate f :: snd v) in
+Definition check_function_large (c : cert) (pl : place) (into : ways) (facts : list fact) (f : func) (v : list Q * list Q) : bool :=
+  let K := common (rate f :: snd v) in let p := weights_of f in let P := table (map (scaled (common p)) p) in
   let gz := table (map (scaled K) (snd v)) in
-  good K (rate f :: snd v) &&
-  numbered 0 (fun k C => check_group (from_ into (S k)) (nodes C) (camps C) (weights_of f) (nth k (snd v) 0%Q)) (comps c) &&
+  good K (rate f :: snd v) && good (common p) p &&
+  numbered 0 (fun k C => existsb (fun F => fits F k (nodes C) P (nth k (snd v) 0%Q)) facts || check_group (from_ into (S k)) (nodes C) (camps C) (weights_of f) (nth k (snd v) 0%Q)) (comps c) &&
   check_weighted c (from_ into 0) (fst v) (fun i => match M.find i pl with Some k => get gz k | None => 0%Z end) K f.
-Definition check_functions (c : cert) (vs : list (list Q * list Q)) : bool :=
+Definition check_functions (c : cert) (vs : list (list Q * list Q)) (facts : list fact) : bool :=
   let Cs := map nodes (comps c) in let pl := places Cs in let into := by_key (number pl) (edges c) in
   (length (funcs c) =? length vs)%nat && forallb ascending Cs &&
-  forallb (fun p : func * (list Q * list Q) => check_function_large c pl into (fst p) (snd p)) (combine (funcs c) vs).
+  forallb (fun F => check_factor (from_ into (S (whose F))) (nth (whose F) Cs []) F) facts &&
+  forallb (fun p : func * (list Q * list Q) => check_function_large c pl into facts (fst p) (snd p)) (combine (funcs c) vs).
 Definition check_moves (c : cert) : bool :=
   match edges c with [] => true | _ => existsb (fun f => pos (rate f)) (funcs c) end.
 Definition check_input_large (c : cert) : bool :=
@@ -44,7 +48,7 @@ Definition check_rest (c : cert) : bool :=
   match margins c, leaders c, upper_bound c, efforts c with [], [], None, [] => true | _, _, _, _ => false end.
 Definition check_large (h : hints) (c : cert) : bool :=
   enclosed c && check_edges c (common (map wt (edges c))) && check_protocol c && wide_structure c && wide_claims c &&
-  check_functions c (vectors h) && check_moves c && check_final_large c (around h) && check_input_large c && check_rates c &&
+  check_functions c (vectors h) (facts h) && check_moves c && check_final_large c (lefts h) (around h) && check_input_large c && check_rates c &&
   check_rest c && check_sliding c.
 
 Section Large.
@@ -55,7 +59,7 @@ Hypothesis Hedges : check_edges c (common (map wt (edges c))) = true.
 Hypothesis Hprot : check_protocol c = true.
 Hypothesis Hstructure : wide_structure c = true.
 Hypothesis Hclaims : wide_claims c = true.
-Hypothesis Hfunctions : check_functions c (vectors h) = true.
+Hypothesis Hfunctions : check_functions c (vectors h) (facts h) = true.
 Lemma edges_in e : In e es -> (tgt e < n)%nat /\ (src e < n)%nat.
 Proof.
   intros He. unfold check_edges in Hedges. apply andb_prop in Hedges as [_ H]. rewrite forallb_forall in H. specialize (H e He).
@@ -69,10 +73,19 @@ Proof.
   - apply eq_IZR in Z. contradiction.
   - assert (0 < / IZR (Zpos (Qden (wt e)))) by (apply Rinv_0_lt_compat; apply IZR_lt; reflexivity). lra.
 Qed.
+Lemma own_lap j i y : let Cs := map nodes (comps c) in (j < length Cs)%nat -> In i (nth j Cs []) ->
+  lap (from_ (by_key (number (places Cs)) es) (S j)) y i = lap es y i.
+Proof.
+  intros Cs Hj Hi. destruct (wide_parts c Hstructure) as [W0 _]. fold Cs in W0.
+  rewrite key_filter. apply lap_filter. intros e He Hkey Et. apply Nat.eqb_neq in Hkey. apply Hkey.
+  assert (K : In e (from_ (by_key (number (places Cs)) es) (S j))).
+  { apply (number_In Cs es j e W0 Hj). split; [exact He|]. rewrite Et. exact Hi. }
+  apply key_In in K. apply K.
+Qed.
 Lemma function_large f : In f (funcs c) -> function_claim c f /\ exists p, ly f = Weighted p.
 Proof.
   intros Hf. unfold check_functions in Hfunctions. cbv zeta in Hfunctions. set (Cs := map nodes (comps c)) in *.
-  apply andb_prop in Hfunctions as [L H]. apply andb_prop in L as [L Asc]. apply Nat.eqb_eq in L.
+  apply andb_prop in Hfunctions as [L H]. apply andb_prop in L as [L Hfacts]. apply andb_prop in L as [L Asc]. rewrite forallb_forall in Hfacts. apply Nat.eqb_eq in L.
   rewrite forallb_forall in H, Asc. destruct (in_nth (funcs c) f f Hf) as [k [Hk E]]. set (v := nth k (vectors h) ([], [])).
   assert (Kin : In (f, v) (combine (funcs c) (vectors h))).
   { replace (f, v) with (nth k (combine (funcs c) (vectors h)) (f, ([], []))).
@@ -80,7 +93,7 @@ Proof.
     - rewrite combine_nth by exact L. rewrite E. reflexivity. }
   specialize (H _ Kin). unfold check_function_large in H. cbv zeta in H. cbn [fst snd] in H.
   set (K := common (rate f :: snd v)) in *. set (gz := table (map (scaled K) (snd v))) in *.
-  apply andb_prop in H as [H HW]. apply andb_prop in H as [HK HG].
+  apply andb_prop in H as [H HW]. apply andb_prop in H as [HK HG]. apply andb_prop in HK as [HK Hp].
   assert (HK' : good K (snd v) = true).
   { unfold good in *. apply andb_prop in HK as [A B]. simpl in B. apply andb_prop in B as [_ B]. rewrite A, B. reflexivity. }
   destruct (good_ok _ _ HK) as [K0 _]. destruct (wide_parts c Hstructure) as [W0 [W1 [W2 _]]]. fold Cs in W0.
@@ -96,15 +109,16 @@ Proof.
       * intros j Hj. rewrite <- key_filter. unfold Cs in Hj. rewrite map_length in Hj. set (C0 := Comp [] (Cycle []) [] []).
         pose proof (numbered_ok _ _ C0 0%nat HG j Hj) as G. rewrite Nat.add_0_l in G. cbv beta in G.
         assert (EC : nth j Cs [] = nodes (nth j (comps c) C0)) by (unfold Cs; change (@nil nat) with (nodes C0); apply map_nth).
-        unfold weights_of in G. rewrite El in G. rewrite <- EC in G.
+        unfold weights_of in G, Hp. rewrite El in G, Hp. rewrite <- EC in G.
         assert (Hj' : (j < length Cs)%nat) by (unfold Cs; rewrite map_length; exact Hj).
-        apply (group_ok es _ (nth j Cs []) (camps (nth j (comps c) C0)) p (nth j (snd v) 0%Q) x).
-        -- intros i Hi y. rewrite key_filter. apply lap_filter. intros e He Hkey Et. apply Nat.eqb_neq in Hkey. apply Hkey.
-           assert (In e (from_ (by_key (number (places Cs)) es) (S j))).
-           { apply (number_In Cs es j e W0 Hj'). split; [exact He|]. rewrite Et. exact Hi. }
-           apply key_In in H. apply H.
-        -- intros e He. apply (number_In Cs es j e W0 Hj') in He. apply He.
-        -- exact G.
+        assert (Own : forall i, In i (nth j Cs []) -> forall y, lap (from_ (by_key (number (places Cs)) es) (S j)) y i = lap es y i)
+          by (intros i Hi y; apply own_lap; assumption).
+        apply orb_prop in G as [G|G].
+        -- apply existsb_exists in G as [F [HF G]]. specialize (Hfacts F HF).
+           assert (W : whose F = j) by (unfold fits in G; apply andb_prop in G as [G _]; apply andb_prop in G as [G _]; apply Nat.eqb_eq; exact G).
+           rewrite W in Hfacts. apply (fact_ok es _ (nth j Cs []) F j p _ x); auto. apply ascending_NoDup. apply Asc. apply nth_In. exact Hj'.
+        -- apply (group_ok es _ (nth j Cs []) (camps (nth j (comps c) C0)) p (nth j (snd v) 0%Q) x Own); [|exact G].
+           intros e He. apply (number_In Cs es j e W0 Hj') in He. apply He.
     + intros i _. f_equal. unfold gamma_of. destruct (M.find i (places Cs)) as [j|].
       * unfold gz. rewrite get_table, nth_scaled by exact HK'. apply IZR_lt in K0. field. lra.
       * unfold Rdiv. ring.
@@ -142,17 +156,19 @@ Proof.
 Qed.
 
 (** leaders within their intervals *)
-Lemma leaders_ok X Sl t0 y : check_leaders c = true -> moves_from c X Sl t0 -> at_rest c y ->
+Lemma leaders_ok X Sl t0 y : check_leaders c (lefts h) (around h) = true -> moves_from c X Sl t0 -> at_rest c y ->
   (forall j, (j < n)%nat -> X 0 j - Sl 0 j = begin c j) ->
-  (forall i, (i < n)%nat -> (forall t, t0 <= t < deadline c -> X t i = X 0 i - Sl 0 i) -> y i = X 0 i - Sl 0 i) ->
+  (forall D lam, (forall i, In i D -> (i < n)%nat) -> (forall x, fsum D (fun i => lam i * lap es x i) = 0) ->
+    fsum D (fun i => lam i * y i) = fsum D (fun i => lam i * (X 0 i - Sl 0 i))) ->
   forall i, (i < n)%nat -> leads c i = true -> Rabs (Q2R (fst (nth i (final c) (0%Q, 0%Q))) - y i) <= Q2R (snd (nth i (final c) (0%Q, 0%Q))).
 Proof.
   intros H HX [_ [HC _]] H0 Hk i Hi Hl. unfold check_leaders in H. cbv zeta in H. set (sf := scale_of c) in *.
   apply andb_prop in H as [H H5]. apply andb_prop in H as [H H4]. apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2].
-  rewrite forallb_forall in H5. unfold leads in Hl. destruct (M.find i _) as [j|] eqn:E; [|discriminate]. clear Hl.
+  unfold leads in Hl. destruct (M.find i _) as [j|] eqn:E; [|discriminate]. clear Hl.
   apply places_some in E as [Hj Hin]. rewrite map_length in Hj. set (C0 := Comp [] (Cycle []) [] []).
   change (@nil nat) with (nodes C0) in Hin. rewrite map_nth in Hin. set (C := nth j (comps c) C0) in *.
-  assert (HCin : In C (comps c)) by (apply nth_In; exact Hj). specialize (H5 C HCin). specialize (HC C i HCin Hin).
+  assert (HCin : In C (comps c)) by (apply nth_In; exact Hj). pose proof (numbered_ok _ _ C0 0%nat H5 j Hj) as H5'.
+  clear H5. rename H5' into H5. rewrite Nat.add_0_l in H5. fold C in H5. cbv beta in H5. pose proof HC as HC'. specialize (HC C i HCin Hin).
   set (p := nth i (final c) (0%Q, 0%Q)).
   assert (EX : IZR (get (table (map (scaled sf) (map fst (final c)))) i) = IZR sf * Q2R (fst p)).
   { rewrite get_table, nth_scaled by exact H3. unfold p. change 0%Q with (fst (0%Q, 0%Q)) at 1. rewrite map_nth. reflexivity. }
@@ -161,24 +177,44 @@ Proof.
   destruct (good_ok _ _ H1) as [L _]. apply IZR_lt in L.
   assert (Fin : forall v, IZR sf * Rabs (Q2R (fst p) - v) <= IZR sf * Q2R (snd p) -> Rabs (Q2R (fst p) - v) <= Q2R (snd p)).
   { intros v Hv. apply (Rmult_le_reg_l (IZR sf)); assumption. }
-  apply Fin. rewrite <- ES, <- (Rabs_right (IZR sf)) at 1 by lra. rewrite <- Rabs_mult, Rmult_minus_distr_l, <- EX.
+  assert (EB : forall i, IZR (get (table (map (scaled sf) (start c))) i - get (table (map (scaled sf) (sliding c))) i) = IZR sf * begin c i).
+  { intros j0. rewrite minus_IZR, !get_table, !nth_scaled by assumption. unfold begin. ring. }
   destruct (camps C) as [g|cy] eqn:Ec.
-  - destruct (nodes C) as [|a [|b l]] eqn:En; try discriminate. destruct Hin as [->|[]]. apply andb_prop in H5 as [A B].
-    apply Z.eqb_eq in A. apply Z.leb_le, IZR_le in B. rewrite abs_IZR, !minus_IZR in B.
-    assert (EB : IZR (get (table (map (scaled sf) (start c))) i) - IZR (get (table (map (scaled sf) (sliding c))) i) = IZR sf * begin c i).
-    { rewrite !get_table, !nth_scaled by assumption. unfold begin. ring. }
-    rewrite EB in B.
-    assert (Ey : y i = begin c i).
-    { rewrite <- (H0 i Hi). apply Hk; [exact Hi|]. intros t Ht. pose proof HX as [[HM _] HQ]. destruct (T_pos c Hprot) as [P1 _].
-      pose proof (kept n (lap es) _ _ _ P1 X Sl t0 HM HQ (unit i 1)) as Kp. unfold unit in Kp at 1. rewrite app_length, repeat_length in Kp.
-      simpl length in Kp. specialize (Kp ltac:(lia)). rewrite !dot_unit in Kp.
-      assert (Z : forall x, dot (unit i 1) (lap es x) = 0) by (intros x; rewrite dot_unit, (quiet_node es x i A); ring).
-      specialize (Kp Z t Ht). rewrite !dot_unit in Kp. lra. }
-    rewrite Ey. exact B.
+  - destruct (nodes C) as [|a [|b l]] eqn:En; [destruct Hin| |].
+    + destruct Hin as [->|[]]. apply andb_prop in H5 as [A B]. apply Z.eqb_eq in A. apply Z.leb_le, IZR_le in B. rewrite abs_IZR, minus_IZR, EB in B.
+      assert (Ey : y i = begin c i).
+      { rewrite <- (H0 i Hi). specialize (Hk [i] (fun _ => 1)). simpl in Hk. rewrite !Rmult_1_l, !Rplus_0_r in Hk. apply Hk.
+        - intros k [<-|[]]. exact Hi.
+        - intros x. rewrite (quiet_node es x i A). ring. }
+      apply Fin. rewrite <- ES, <- (Rabs_right (IZR sf)) at 1 by lra. rewrite <- Rabs_mult, Rmult_minus_distr_l, <- EX, Ey. exact B.
+    + rewrite <- En in *. apply andb_prop in H5 as [As H5]. apply existsb_exists in H5 as [v [_ Hv]]. apply andb_prop in Hv as [_ Hv].
+      pose proof (ascending_NoDup _ As) as ND. destruct (wide_parts c Hstructure) as [_ [W1 _]].
+      assert (EC : nth j (map nodes (comps c)) [] = nodes C) by (change (@nil nat) with (nodes C0); apply map_nth).
+      assert (Hj' : (j < length (map nodes (comps c)))%nat) by (rewrite map_length; exact Hj).
+      set (gm := by_node _) in Hv.
+      assert (Eg : forall k, In k (nodes C) -> IZR (get gm k) = sgn g k).
+      { intros k Hk'. unfold gm. rewrite (by_node_at (fun i => nth i g 0%Z)) by exact Hk'. reflexivity. }
+      apply (kept_ok _ (nodes C) gm _ _ _ _ v Hv ND (IZR sf) (begin c) y (fun k => Q2R (fst (nth k (final c) (0%Q, 0%Q)))) (fun k => Q2R (snd (nth k (final c) (0%Q, 0%Q)))) L); auto.
+      * intros k. rewrite get_table, nth_scaled by exact H3. change 0%Q with (fst (0%Q, 0%Q)) at 1. rewrite map_nth. reflexivity.
+      * intros k. rewrite get_table, nth_scaled by exact H4. change 0%Q with (snd (0%Q, 0%Q)) at 1. rewrite map_nth. reflexivity.
+      * intros k Hk'. specialize (HC' C k HCin Hk'). cbv zeta in HC'. rewrite Ec in HC'.
+        assert (Hh : In (hd O (nodes C)) (nodes C)) by (rewrite En; left; reflexivity). rewrite !Eg by assumption. exact HC'.
+      * intros w Hw. rewrite (Hk (nodes C) w).
+        -- apply fsum_ext. intros k Hk'. rewrite (H0 k); [reflexivity|apply (W1 C k HCin Hk')].
+        -- intros k Hk'. apply (W1 C k HCin Hk').
+        -- intros x. set (own := from_ _ _) in *.
+           assert (Hin' : forall e, In e own -> In (tgt e) (nodes C) /\ In (src e) (nodes C)).
+           { unfold check_kept in Hv. cbv zeta in Hv. do 8 (apply andb_prop in Hv as [Hv _]). apply andb_prop in Hv as [_ Hv].
+             rewrite forallb_forall in Hv. intros e He. specialize (Hv e He). apply andb_prop in Hv as [P Q]. split; apply marked_In; assumption. }
+           transitivity (fsum (nodes C) (fun k => w k * lap own x k)).
+           { apply fsum_ext. intros k Hk'. f_equal. symmetry. apply own_lap; [exact Hj'|rewrite EC; exact Hk']. }
+           rewrite <- (column_ok own (nodes C) Hin' ND w x). rewrite (fsum_ext _ _ (fun _ => 0 * 1)); [rewrite fsum_scal; ring|].
+           intros k Hk'. rewrite (Hw k Hk'). ring.
   - rewrite forallb_forall in H5. specialize (H5 i Hin). apply Z.leb_le, IZR_le in H5. rewrite abs_IZR in H5.
+    apply Fin. rewrite <- ES, <- (Rabs_right (IZR sf)) at 1 by lra. rewrite <- Rabs_mult, Rmult_minus_distr_l, <- EX.
     rewrite HC. rewrite Rmult_0_r, Rminus_0_r. exact H5.
 Qed.
-Lemma limit_large : enclosed c = true -> check_moves c = true -> check_final_large c (around h) = true -> limit_claim c.
+Lemma limit_large : enclosed c = true -> check_moves c = true -> check_final_large c (lefts h) (around h) = true -> limit_claim c.
 Proof.
   intros HE HM HF X Sl HX. destruct (settles c Hprot X Sl HX) as [t0 HS].
   destruct (settles_down HM X Sl t0 HS) as [y [r [C [R0 [C0 [Y1 [Y2 [Y3 Y4]]]]]]]].
@@ -190,7 +226,23 @@ Proof.
   destruct (final c) as [|p0 l] eqn:Ef; [simpl in Hl; lia|]. rewrite <- Ef in *. apply andb_prop in HF as [F1 F2].
   apply (followers_ok c (leads c) (around h) y edges_in Y2 F2); [|exact Hi].
   intros j Hj Lj. apply (leaders_ok X Sl t0 y F1 HS HR H0); [|exact Hj|exact Lj].
-  intros m Hm Hk. symmetry. apply Rminus_diag_uniq. apply Y4. intros t Ht. rewrite <- (Hk t Ht). apply Y3; assumption.
+  intros D lam HD HL. pose proof HS as [[HM0 _] HQ]. destruct (T_pos c Hprot) as [P1 _].
+  pose proof (kept_sum n es _ _ _ X Sl t0 D lam P1 HM0 HQ HD HL) as Kp.
+  set (a := fsum D (fun i => Rabs (lam i)) + 1).
+  assert (A0 : 0 < a).
+  { unfold a. assert (0 <= fsum D (fun i => Rabs (lam i))); [|lra]. clear. induction D as [|i D IH]; simpl; [lra|]. pose proof (Rabs_pos (lam i)). lra. }
+  apply Rminus_diag_uniq. set (d := _ - _). assert (Z : d / a = 0); [|apply (Rmult_eq_reg_r (/ a)); [unfold Rdiv in Z; lra|apply Rinv_neq_0_compat; lra]].
+  apply Y4. intros t Ht. set (e := 2 * C / r * exp (- (r / 2 * s c t))).
+  assert (E0 : 0 <= e).
+  { unfold e. apply Rmult_le_pos; [|left; apply exp_pos]. apply Rmult_le_pos; [lra|]. left. apply Rinv_0_lt_compat. exact R0. }
+  assert (B : Rabs d <= fsum D (fun i => Rabs (lam i)) * e).
+  { unfold d. rewrite <- (Kp t Ht). clear Kp HL d. revert HD. clear - Y3 Ht. induction D as [|i D IH]; intros HD; simpl; [rewrite Rminus_0_r, Rabs_R0; lra|].
+    replace (lam i * y i + fsum D (fun i => lam i * y i) - (lam i * X t i + fsum D (fun i => lam i * X t i)))
+      with (- (lam i * (X t i - y i)) + (fsum D (fun i => lam i * y i) - fsum D (fun i => lam i * X t i))) by ring.
+    eapply Rle_trans; [apply Rabs_triang|]. rewrite Rmult_plus_distr_r. apply Rplus_le_compat; [|apply IH; intros; apply HD; right; assumption].
+    rewrite Rabs_Ropp, Rabs_mult. apply Rmult_le_compat_l; [apply Rabs_pos|]. apply Y3; [exact Ht|apply HD; left; reflexivity]. }
+  unfold Rdiv. rewrite Rabs_mult, (Rabs_right (/ a)) by (left; apply Rinv_0_lt_compat; exact A0).
+  apply (Rmult_le_reg_r a); [exact A0|]. rewrite Rmult_assoc, Rinv_l, Rmult_1_r by lra. unfold a. rewrite (Rmult_comm e). lra.
 Qed.
 Lemma input_large : check_input_large c = true -> input_claim c.
 Proof.

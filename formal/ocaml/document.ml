@@ -4,6 +4,8 @@ exception Unsupported of string
 let bad m = raise (Bad m)
 let unsupported m = raise (Unsupported m)
 
+(* of long lists too: [List.map] takes the stack *)
+let map f l = List.rev (List.rev_map f l)
 let entries what = function Arr l -> l | _ -> bad (what ^ ": an array is due")
 let text what = function Str s -> s | _ -> bad (what ^ ": a text is due")
 let truth what = function Bool b -> b | _ -> bad (what ^ ": true or false is due")
@@ -36,13 +38,28 @@ let nodes_of v =
   { labels; index }
 let node nodes what v = match Hashtbl.find_opt nodes.index (text what v) with
   | Some i -> i | None -> bad (what ^ ": an unknown node")
-let positions nodes what v = if beside v then unsupported "side files" else List.map (node nodes what) (entries what v)
+(* so many integers, or any number of them where a list is given *)
+let integers what count v =
+  if beside v then Side.integers what count v else
+  let l = map (integer what) (entries what v) in need (List.length l = count) (what ^ ": another number of entries"); l
+let count_of = function Obj l -> (match List.assoc_opt "count" l with Some (Num s) when Number.digits s && String.length s <= 9 -> int_of_string s | _ -> bad "a side vector: its count") | _ -> 0
+(* as many numbers as there are of these *)
+let numbers what count v =
+  if beside v then Side.numbers what count v else
+  let l = map (number what) (entries what v) in need (List.length l = count) (what ^ ": a number for each node"); l
+let positions nodes what v =
+  if not (beside v) then map (node nodes what) (entries what v) else
+  map (fun z -> need (Number.Z.sign z >= 0 && Number.Z.lt z (Number.Z.of_int (Array.length nodes.labels))) (what ^ ": an unknown node"); Number.Z.to_int z)
+    (Side.integers what (count_of v) v)
 (* an object that has these labels as keys, in this order *)
 let ordered labels what = function
   | Obj l -> need (List.map fst l = labels) (what ^ ": agents are others, or in another order"); List.map snd l
   | _ -> bad (what ^ ": an object by agent is due")
 let by_agent nodes read what v =
-  if beside v then unsupported "side files" else List.map (read what) (ordered (Array.to_list nodes.labels) what v)
+  if beside v then unsupported (what ^ " in a side vector") else List.map (read what) (ordered (Array.to_list nodes.labels) what v)
+(* numbers by agent that may stand in a side vector *)
+let state nodes what v =
+  if beside v then Side.numbers what (Array.length nodes.labels) v else by_agent nodes number what v
 
 (* JSON as section 16 hashes it *)
 let hashed (v : Json.t) : string =

@@ -27,9 +27,9 @@ let of_large (h : hints) c : (string * (unit -> bool)) list =
     "protocol: a parameter", (fun () -> check_protocol c);
     "structure of graph", (fun () -> wide_structure c);
     "claim of graph", (fun () -> wide_claims c);
-    "dominance of a Lyapunov function", (fun () -> check_functions c h.vectors);
+    "dominance of a Lyapunov function", (fun () -> check_functions c h.vectors h.facts);
     "final-state of graph: no Lyapunov function proves that it is reached", (fun () -> check_moves c);
-    "final-state of graph", (fun () -> check_final_large c h.around);
+    "final-state of graph", (fun () -> check_final_large c h.lefts h.around);
     "input-threshold of input", (fun () -> check_input_large c);
     "rates, or overshoot, are not what was proved", (fun () -> check_rates c);
     "input-sliding of input", (fun () -> check_sliding c) ]

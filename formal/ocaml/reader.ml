@@ -34,7 +34,19 @@ let graph v =
   need (loops = "refused" || dropped) "graph.read: self_loops";
   ignore (truth "graph.read: undirected" (read "undirected"));
   let edges = match get "edges" with
-    | Obj _ -> unsupported "edges in side files"
+    | Obj _ as v ->
+        let get = fields "edges" [ "count"; "source"; "target"; "weight"; "scale" ] v in
+        let count = match get "count" with
+          | Num s when Number.digits s && String.length s <= 9 -> int_of_string s | _ -> bad "edges: the count is no integer" in
+        let scale = number "scale" (get "scale") in
+        need (Z.equal scale.qden Z.one && Z.sign scale.qnum > 0) "edges: the scale is no positive integer";
+        let column what = Side.column (get what) count in
+        let ends what = match column what with
+          | Side.Integers l -> List.map (fun z -> need (Z.sign z >= 0 && Z.lt z (Z.of_int (Array.length nodes.labels))) "edges: an unknown node"; Z.to_int z) l
+          | _ -> bad "edges: positions are integers" in
+        let weights = match column "weight" with
+          | Side.Integers l -> List.map Number.of_z l | Side.Floats l -> List.map Side.exactly l in
+        List.map2 (fun (s, t) w -> { tgt = t; src = s; wt = Number.div w scale }) (List.combine (ends "source") (ends "target")) weights
     | e -> List.map (fun e -> match entries "an edge" e with
         | [ s; t; w ] -> { tgt = node nodes "an edge" t; src = node nodes "an edge" s; wt = number "a weight" w }
         | _ -> bad "an edge has three entries") (entries "edges" e) in
@@ -76,21 +88,30 @@ let into_camps g own v =
   List.iter2 (fun i s -> need (Z.equal (Z.abs s) Z.one) "camps of a component"; g.(i) <- s) own camps
 let cycle_of nodes v = Cycle (List.map (fun e -> match positions nodes "negative_cycle" e with
   | [ s; t ] -> (s, t) | _ -> bad "negative_cycle: an edge has two ends") (entries "negative_cycle" v))
-(* the closed components of a large form: no weights and no left null vectors, which the theorem does not speak of *)
+(* a left null vector as integers, in its own scale, and where it is largest *)
+let stated number own eta =
+  let d = List.fold_left (fun d ((x : q), _) -> Z.lcm d x.qden) Z.one eta in
+  let whole = List.map (fun ((x : q), _) -> Z.mul x.qnum (Z.divexact d x.qden)) eta in
+  let entries = List.map2 (fun i z -> i, z) own whole in
+  let fixed, _ = List.fold_left (fun (i, a) (j, b) -> if Z.gt (Z.abs b) (Z.abs a) then j, b else i, a) (List.hd entries) entries in
+  { which = number; vector_of = entries; fixed }
+(* the closed components of a large form, without weights; the left null vectors of groups, which the check does not believe *)
 let large_components nodes listed vectors =
   let groups = List.filter (fun (own, balanced, _) -> balanced && List.length own > 1) listed in
   let vectors = entries "influence.components" vectors in
   need (List.length vectors = List.length groups) "influence.components: one for each balanced group";
-  List.iter2 (fun (own, _, _) v ->
+  let vectors = List.map2 (fun (own, _, _) v ->
     let one = fields "a component of influence" [ "nodes"; "left_null_vector" ] v in
     need (positions nodes "influence" (one "nodes") = own) "influence: another component";
     let eta = List.map (interval "left_null_vector") (entries "left_null_vector" (one "left_null_vector")) in
-    need (List.length eta = List.length own) "left_null_vector: a number for each node") groups vectors;
+    need (List.length eta = List.length own) "left_null_vector: a number for each node"; own, eta) groups vectors in
   let g = Array.make (Array.length nodes.labels) Z.zero in
   List.iter (fun (own, balanced, get) -> if balanced then into_camps g own (get "gauge")) listed;
   let all = Array.to_list g in
   List.map (fun (own, balanced, get) ->
-    { nodes = own; share = []; null = []; camps = if balanced then Gauge all else cycle_of nodes (get "negative_cycle") }) listed
+    { nodes = own; share = []; null = []; camps = if balanced then Gauge all else cycle_of nodes (get "negative_cycle") }) listed,
+  List.concat (List.mapi (fun k (own, _, _) ->
+    match List.assoc_opt own vectors with Some eta -> [ stated k own eta ] | None -> []) listed)
 (* closed components with their witnesses, and what influence says of the balanced ones *)
 let components nodes structure influence =
   let n = Array.length nodes.labels in
@@ -110,7 +131,8 @@ let components nodes structure influence =
   let followers = List.filter (fun i -> not is_leader.(i)) (List.init n Fun.id) in
   need (positions nodes "leaders" (structure "leaders") = leading) "other leaders";
   need (positions nodes "followers" (structure "followers") = followers) "other followers";
-  if get "containment_weights" = Null then large_components nodes listed (get "components"), followers, get "degenerate", true
+  if get "containment_weights" = Null then
+    let comps, lefts = large_components nodes listed (get "components") in comps, lefts, followers, get "degenerate", true
   else
   let balanced = List.length (List.filter (fun (_, b, _) -> b) listed) in
   let rows = ordered (List.map (fun i -> nodes.labels.(i)) followers) "containment_weights" (get "containment_weights") in
@@ -135,7 +157,7 @@ let components nodes structure influence =
       { nodes = own; camps = Gauge (Array.to_list g); share = Array.to_list w; null = Array.to_list v } end
     else
       { nodes = own; share = []; null = []; camps = cycle_of nodes (get "negative_cycle") }) listed in
-  comps, followers, get "degenerate", false
+  comps, [], followers, get "degenerate", false
 
 (* a Lyapunov matrix on all nodes, 0 elsewhere; the weights of a diagonal one *)
 let matrix nodes what own rows =
@@ -164,28 +186,36 @@ let block nodes listening shape v =
   need (List.sort compare own = listening) "nodes of a block: not those that listen to somebody";
   text "name" (get "name"), own, get shape, truth "times_rho" (get "times_rho")
 (* weights of a large form, 0 of nodes that listen to nobody; the vector of its rows, and the rates of leader groups *)
-let dominance nodes comps proof of_ rate v =
+let dominance nodes comps facts edges_in proof of_ rate v =
   let name, own, d, times_rho = v in
   need (name = "P" && not times_rho) "another block";
-  let numbers, witness = proved proof "dominance" of_ [ "b" ] in
-  need (Number.equal (numbers "b") rate) (of_ ^ ": b is not the rate");
+  let from_document, witness = proved proof "dominance" of_ [ "b" ] in
+  need (Number.equal (from_document "b") rate) (of_ ^ ": b is not the rate");
   let get = fields "the witness" [ "vector"; "groups" ] witness in
   let by_node what v =
-    if beside v then unsupported "side files" else
     let a = Array.make (Array.length nodes.labels) Number.zero in
-    let listed = List.map (number what) (entries what v) in
-    need (List.length listed = List.length own) (what ^ ": a number for each node");
-    List.iter2 (fun i x -> need (Z.sign x.qnum > 0) (what ^ " is not positive"); a.(i) <- x) own listed; a in
+    List.iter2 (fun i x -> need (Z.sign x.qnum > 0) (what ^ " is not positive"); a.(i) <- x) own (numbers what (List.length own) v); a in
   let weights = by_node "diagonal" d and vector = by_node "vector" (get "vector") in
   let rest = ref (entries "groups" (get "groups")) in
-  let alone = List.map (fun (one : comp) -> match one.nodes, !rest with
+  let alone = List.mapi (fun k (one : comp) -> match one.nodes, !rest with
     | [ _ ], _ -> Number.zero
     | _, [] -> bad "groups: one for each leader group"
-    | _, Obj _ :: _ -> unsupported "a leader group of a large form that is proved by a factor"
-    | _, g :: l -> rest := l; number "groups" g) comps in
+    | own, (Obj _ as g) :: l ->
+        rest := l;
+        let get = fields "a leader group" [ "rate"; "factor" ] g in
+        let g = number "groups" (get "rate") in
+        let ratios = Factors.ratios weights own in
+        need (not (List.exists (Factors.same k g ratios) !facts)) "a factor of a leader group that is proved already";
+        facts := !facts @ [ Factors.of_group (edges_in k) k one weights g (get "factor") ]; g
+    | own, g :: l ->
+        rest := l;
+        let g = number "groups" g in
+        need (List.length own <= Factors.largest_dense || List.exists (Factors.same k g (Factors.ratios weights own)) !facts)
+          (Printf.sprintf "a leader group of more than %d nodes is not proved" Factors.largest_dense);
+        g) comps in
   need (!rest = []) "groups: one for each leader group";
   List.map (fun i -> i, weights.(i)) own, Array.to_list weights, (Array.to_list vector, alone)
-let function_ nodes listening comps vectors proof gauge paper number_of v =
+let function_ nodes listening comps vectors facts edges_in proof gauge paper number_of v =
   let of_ = Printf.sprintf "lyapunov.functions[%d]" number_of in
   let get = fields "a Lyapunov function" [ "class"; "coordinates"; "blocks"; "rho"; "rate"; "overshoot"; "deviation" ] v in
   let rate = number "rate" (get "rate") and overshoot = number "overshoot" (get "overshoot") in
@@ -214,7 +244,7 @@ let function_ nodes listening comps vectors proof gauge paper number_of v =
              InE (matrix nodes "lower_triangle" (Array.of_list own) (entries "lower_triangle" rows)), false, e "lowest", e "highest"
          | "perron" | "lmi" ->
              if following proof = "dominance" then begin
-               let weights, ly, vector = dominance nodes comps proof of_ rate (block nodes listening "diagonal" one) in
+               let weights, ly, vector = dominance nodes comps facts edges_in proof of_ rate (block nodes listening "diagonal" one) in
                vectors := vector :: !vectors;
                let lo, hi = ends weights in
                Weighted ly, true, lo, hi end
@@ -269,6 +299,13 @@ let mean nodes all proof bound =
   need (List.hd inside = first) "rate-mean: not the first node of its component";
   { bound; inside; because = ByTrace }
 
+(* the edges into each closed component, by its number *)
+let edges_into nodes comps edges =
+  let k = Array.make (Array.length nodes.labels) (-1) and into = Array.make (List.length comps) [] in
+  List.iteri (fun number (one : comp) -> List.iter (fun i -> k.(i) <- number) one.nodes) comps;
+  List.iter (fun e -> let c = k.(e.tgt) in if c >= 0 then into.(c) <- e :: into.(c)) edges;
+  fun number -> into.(number)
+
 let certificate (j : Json.t) : t =
   (match j with
    | Obj l when List.assoc_opt "schema" l = Some (Str "ptcc-certificate/2") ->
@@ -295,35 +332,38 @@ let certificate (j : Json.t) : t =
   bare_of proof "structure" "graph";
   bare_of proof "claim" "graph";
   if get "influence" = Null then unsupported "an undecided certificate, without influence";
-  let comps, followers, degenerate, enclosed = components nodes structure (get "influence") in
+  let comps, lefts, followers, degenerate, enclosed = components nodes structure (get "influence") in
   let all = Pieces.graph (Array.length nodes.labels) edges in
   let found = Pieces.find all in
   let pieces = List.map (Pieces.piece all comps) found.pieces in
-  let final_text = match get "final_state" with Obj l when List.length l = Array.length nodes.labels -> Obj l | _ -> Null in
+  let final_beside = match get "final_state" with
+    | Obj l -> (match List.assoc_opt "mid" l with Some m -> beside m | None -> false) | _ -> false in
+  let final_text = match get "final_state" with Obj l when not final_beside && List.length l = Array.length nodes.labels -> Obj l | _ -> Null in
   let theorem = Pieces.compare_claims nodes is_sliding pieces (structure "connectivity") (get "claim")
     (match j with Obj l -> List.assoc_opt "components" l | _ -> None) final_text in
   need (structure "balanced" = Bool (match found.balance with Gauge _ -> true | Cycle _ -> false)) "structure: balance of the graph";
   need (structure "sign_symmetric" = Bool (Pieces.sign_symmetric all)) "structure: sign symmetry";
-  let start = match get "initial_state" with Null -> None | v -> Some (by_agent nodes number "initial_state" v) in
-  let sliding = match get "sliding_variable" with Null -> [] | v -> by_agent nodes number "sliding_variable" v in
+  let start = match get "initial_state" with Null -> None | v -> Some (state nodes "initial_state" v) in
+  let sliding = match get "sliding_variable" with Null -> [] | v -> state nodes "sliding_variable" v in
   need (is_sliding = (get "sliding_variable" <> Null)) "sigma(0) belongs to the sliding-mode protocol, and is part of it";
   let final = match start, get "final_state" with
     | None, Null -> []
-    | Some _, Obj l when (match List.assoc_opt "mid" l with Some m -> beside m | None -> false) -> unsupported "side files"
+    | Some _, v when final_beside ->
+        let get = fields "final_state" [ "mid"; "radius" ] v in
+        let column k = need (beside (get k)) ("final_state: " ^ k ^ " is no side vector"); state nodes ("final_state." ^ k) (get k) in
+        List.map2 (fun x r -> need (Z.sign r.qnum >= 0) "final_state: a radius is negative"; x, r) (column "mid") (column "radius")
     | Some _, v -> by_agent nodes interval "final_state" v
     | None, _ -> bad "a final state without an initial state" in
   if start = None then need (degenerate = Null) "influence.degenerate without an initial state"
   else not_checked "influence.degenerate";
-  let balanced_groups = List.exists (fun (one : comp) -> is_balanced one && List.length one.nodes > 1) comps in
-  (* of a balanced group nothing tells where it ends but a left null vector, which is not believed *)
-  let unproved = enclosed && (start = None || balanced_groups || (following_witness proof = Null && followers <> [])) in
+  let unproved = enclosed && (start = None || (following_witness proof = Null && followers <> [])) in
   if unproved && start <> None then not_checked "final_state";
   let around, final =
     if unproved then (skipped proof "final-state" "graph"; [], [])
     else match proved proof "final-state" "graph" [] with
       | _, Null -> [], final
       | _ when not enclosed -> unsupported "a final state that is enclosed by a witness"
-      | _, w -> by_agent nodes number "the witness u" ((fields "the witness" [ "u" ] w) "u"), final in
+      | _, w -> state nodes "the witness u" ((fields "the witness" [ "u" ] w) "u"), final in
   if enclosed && entries "influence.components" ((fields "influence" [ "components"; "containment_weights"; "degenerate" ]
     (get "influence")) "components") <> [] then not_checked "influence.components";
   let closed = List.mapi (fun k (one : Checker.comp) -> k + 1, one.nodes, is_balanced one) comps in
@@ -335,8 +375,8 @@ let certificate (j : Json.t) : t =
   List.iter (fun e -> is_target.(e.tgt) <- true) edges;
   let listening = List.filter (fun i -> is_target.(i)) (List.init (Array.length nodes.labels) Fun.id) in
   let listed = entries "functions" ((fields "lyapunov" [ "functions" ] (get "lyapunov")) "functions") in
-  let vectors = ref [] in
-  let functions = List.mapi (function_ nodes listening comps vectors proof gauge paper) listed in
+  let vectors = ref [] and facts = ref [] in
+  let functions = List.mapi (function_ nodes listening comps vectors facts (edges_into nodes comps edges) proof gauge paper) listed in
   let is_weighted f = match f.ly with Weighted _ -> true | _ -> false in
   let own_rate = Option.bind paper (fun (p : Paper.t) -> p.own_rate) in
   if enclosed && not (own_rate = None && List.for_all is_weighted functions) then unsupported "a large form with dense matrices";
@@ -431,7 +471,7 @@ let certificate (j : Json.t) : t =
   let certified = rate "proved" <> None || edges = [] in
   need (verdict = (if certified then "certified" else "undecided")) "what was proved makes another verdict";
   if not certified then unsupported "an undecided certificate";
-  { nodes; hints = { vectors = List.rev !vectors; around }; sha256; verdict; theorem; checked = List.rev proof.checked; unchecked = List.rev proof.unchecked;
+  { nodes; hints = { vectors = List.rev !vectors; facts = !facts; lefts; around }; sha256; verdict; theorem; checked = List.rev proof.checked; unchecked = List.rev proof.unchecked;
     sections = List.rev !left_out;
     cert = { order = Array.length nodes.labels; edges; kind; rho1; rho2; kappa; comps; pieces; all_balanced = found.balance;
       sign_symmetric = Pieces.sign_symmetric all; funcs = functions;

@@ -68,7 +68,8 @@ def read(path: str | Path) -> dict[str, Any]:
             tenths = -(-loaded // 10**8)
             raise ValueError(f"it may take {tenths // 10}.{tenths % 10} GB in memory; allow more by --memory")
         del content
-        integer = lambda text: int(text) if len(text) <= 18 else number(text)  # noqa: E731
+        # integers of 64 bits, as side files have them too; longer ones have no place in a certificate
+        integer = lambda text: int(text) if len(text) <= 20 else number(text)  # noqa: E731
         data = json.loads(text, object_pairs_hook=unique, parse_constant=number, parse_float=number, parse_int=integer)
     except (OSError, ValueError, RecursionError) as error:
         detail = _why(error)

@@ -1122,3 +1122,11 @@ def test_weights_of_one_hash_are_told_apart_in_time():
     begin = time.perf_counter()
     distinct, which = numbered([1 + k * (2**61 - 1) for k in range(20_001)])
     assert len(distinct) == len(which) == 20_001 and time.perf_counter() - begin < 5
+
+
+def test_integers_of_64_bits_in_a_file_are_integers(tmp_path: Path) -> None:
+    """Entries of a sparse factor have up to 64 bits, 20 characters."""
+    values = [2**63 - 1, -(2**63), 4433355791554358272]
+    (tmp_path / "c.json").write_text(json.dumps({"schema": "ptcc-certificate/2", "data": values}))
+    found = checker.read(tmp_path / "c.json")["data"]
+    assert found == values and {type(x) for x in found} == {int}

@@ -21,7 +21,6 @@ AT_REST = {"input-energy", "input-length"}
 UNREAD = (
     "100 weak components",
     "family",
-    "side files",
     "side vector",
     "large form",
     "witness",
