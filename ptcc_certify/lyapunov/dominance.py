@@ -270,8 +270,9 @@ def _prove_large_group(
         size = abs(half) + abs(half.T) + abs(g) * P
         if basis is not None:
             S, size = sparse.csc_array(basis.T @ S @ basis), sparse.csc_array(abs(basis).T @ size @ abs(basis))
-        # What rounding may have changed in a row is taken off the diagonal.
-        spare = _ROUNDING * np.asarray(size.sum(axis=1)).ravel()
+        # What rounding may have changed in a row is taken off the diagonal, in the scaling in which rows are judged.
+        root = np.sqrt(np.where((own := S.diagonal()) > 0, own, 1.0))
+        spare = _ROUNDING * root * (size @ (1 / root))
         S = sparse.csc_array((S + S.T) / 2 - sparse.diags_array(spare))
         factor = prove_sparse_positive_definite(S)
         if factor is not None:

@@ -195,6 +195,18 @@ def test_large_leader_groups_are_proved_by_a_sparse_factor(balanced: bool, follo
     assert max(cert.final_state.radius) < 1e-8
 
 
+def test_a_factor_is_of_the_matrix_that_the_checker_forms():
+    """Rounding is judged in the scaling of the factor, where a small diagonal makes its row's entries large."""
+    rng, n = np.random.default_rng(5), 180
+    camps, ring = rng.choice([-1, 1], n), np.arange(n)
+    source, target = (np.concatenate([own, rng.integers(0, n, n // 2)]) for own in ((ring - 1) % n, ring))
+    weights = rng.integers(1, 10, source.size) * camps[source] * camps[target]
+    edges = {(s, t): w for s, t, w in zip(source.tolist(), target.tolist(), weights.tolist(), strict=True) if s != t}
+    edges |= {(t, s): w for (s, t), w in edges.items()}
+    graph = SignedDigraph.from_edges([(s, t, w) for (s, t), w in edges.items()])
+    assert certify(graph, NOMINAL, simulation=False).verdict == "certified"
+
+
 @pytest.mark.parametrize("balanced", [True, False])
 def test_leader_groups_of_hundreds_take_the_best_diagonal_matrix(balanced: bool):
     graph = strong_graph(125, balanced, 1)
