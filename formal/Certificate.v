@@ -21,8 +21,7 @@ Definition balanced es (C : list nat) (g : nat -> Z) : Prop := (forall i, In i C
   forall e, In e es -> In (src e) C -> In (tgt e) C -> (0 < wt e * inject_Z (g (tgt e) * g (src e)))%Q.
 
 (** * Motions *)
-Definition gain (T rho1 k t : R) : R := rho1 + k / (T - t).
-Definition clock (T rho1 k t : R) : R := rho1 * t + k * ln (T / (T - t)).
+Definition gain T rho1 k t := rho1 + k / (T - t). Definition clock T rho1 k t := rho1 * t + k * ln (T / (T - t)).
 (** on [0, T): the state [X] and the sliding variables [S] are continuous, and [(X - S)' = - gain(t) L X] where [t > 0];
     what stands left of 0 does not matter *)
 Definition motion (n : nat) (Lf : (nat -> R) -> nat -> R) (T rho1 k : R) (X S : R -> nat -> R) : Prop :=
@@ -83,8 +82,7 @@ Definition end_state (c : cert) (x : nat -> R) (i : nat) : R :=
   fold_right (fun b a => Q2R (nth i (fst (snd b)) 0%Q) * qdot (snd (snd b)) x + a) 0 (balanced_comps (comps c)).
 
 Definition deadline c := match kind c with Nominal T => Q2R T | SlidingMode T_r T_s _ _ _ _ => Q2R T_r + Q2R T_s end.
-Definition k (c : cert) : R := Q2R (rho2 c) * Q2R (kappa c).
-Definition s (c : cert) (t : R) : R := clock (deadline c) (Q2R (rho1 c)) (k c) t.
+Definition k c := Q2R (rho2 c) * Q2R (kappa c). Definition s c t := clock (deadline c) (Q2R (rho1 c)) (k c) t.
 (** what draws a sliding variable to 0, besides [mu1] against the disturbance; and what stays of it *)
 Definition pull c T_r mu2 mu3 t := Q2R mu2 + if Rlt_dec t (Q2R T_r) then Q2R mu3 * Q2R (kappa c) / (Q2R T_r - t) else 0.
 Definition psi c T_r mu2 mu3 t := exp (- (Q2R mu2 * t)) * Rpower ((Q2R T_r - t) / Q2R T_r) (Q2R mu3 * Q2R (kappa c)).
@@ -98,6 +96,9 @@ Definition moves c X S : Prop := motion (order c) (lap (edges c)) (deadline c) (
 Definition moves_from c (X S : R -> nat -> R) (t0 : R) : Prop := moves c X S /\ quiet (order c) (deadline c) S t0.
 
 (** * What it claims *)
+(** from every state, and from all values of the sliding variables, a motion starts: nothing that is said of all is void *)
+Definition existence (c : cert) : Prop := forall x0 s0, (forall T i, kind c = Nominal T -> s0 i = 0) ->
+  exists X S, moves c X S /\ forall i, (i < order c)%nat -> X 0 i = x0 i /\ S 0 i = s0 i.
 Definition balance_claim (es : list edge) (C : list nat) (b : balance) : Prop :=
   match b with Gauge g => balanced es C (fun i => nth i g 0%Z) | Cycle _ => forall g, ~ balanced es C g end.
 (** closed components are these, and there are no others; camps and negative cycles are those of the edges *)
@@ -198,6 +199,6 @@ Definition upper_claim (c : cert) (u : upper) : Prop := forall (F : (nat -> R) -
 
 Definition true_certificate (c : cert) : Prop :=
   structure c /\ behaviour c /\ claims c /\ final_claim c /\ (forall f, In f (funcs c) -> function_claim c f) /\
-  limit_claim c /\ input_claim c /\ rates_claim c /\ sliding_claim c /\ (forall m, In m (margins c) -> margin_claim c m)
-  /\ (forall l, In l (leaders c) -> leader_claim c l) /\ (forall u, upper_bound c = Some u -> upper_claim c u) /\
-  forall e, In e (efforts c) -> effort_claim c e.
+  limit_claim c /\ input_claim c /\ rates_claim c /\ sliding_claim c /\ existence c /\
+  (forall m, In m (margins c) -> margin_claim c m) /\ (forall l, In l (leaders c) -> leader_claim c l) /\
+  (forall u, upper_bound c = Some u -> upper_claim c u) /\ forall e, In e (efforts c) -> effort_claim c e.
