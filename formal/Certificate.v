@@ -5,8 +5,7 @@ Import ListNotations. Open Scope R_scope.
 
 (** * Signed digraphs *)
 (** Information flows from [src] to [tgt]: the target listens. *)
-Record edge := Edge { tgt : nat; src : nat; wt : Q }.
-Definition mem (i : nat) (l : list nat) : bool := existsb (Nat.eqb i) l.
+Record edge := Edge { tgt : nat; src : nat; wt : Q }. Definition mem i l := existsb (Nat.eqb i) l.
 (** (L x)_i = sum over edges into i of |w| x_i - w x_src *)
 Definition lap_edge i x e := if (tgt e =? i)%nat then Rabs (Q2R (wt e)) * x i - Q2R (wt e) * x (src e) else 0.
 Definition lap (es : list edge) (x : nat -> R) (i : nat) : R := fold_right (fun e a => lap_edge i x e + a) 0 es.
@@ -56,12 +55,14 @@ Inductive effort := PathLength (most : Q) (f : nat) | Energy (most : Q) (W0 W1 :
   | Peak (each : list Q) (norm : Q) (ways : list (nat * Q)) (last : nat * Q).
 Inductive protocol := Nominal (T : Q) | SlidingMode (T_r T_s mu1 mu2 mu3 delta : Q).
 (** final states are middle and radius; of many nodes they are [enclosed], and no weights tell them; a leader group is its
-    weights, 0 elsewhere, and its rate; [sliding_input] bounds what the sliding mode adds to the input, by agent *)
+    weights, 0 elsewhere, and its rate; [sliding_input] bounds what the sliding mode adds to the input, by agent;
+    [reaching] are instants [z = ln(T_r/(T_r - t))] *)
 Record cert := Cert { order : nat; edges : list edge; kind : protocol; rho1 : Q; rho2 : Q; kappa : Q;
   comps : list comp; pieces : list piece; all_balanced : balance; sign_symmetric : bool; funcs : list func;
   start : list Q; sliding : list Q; final : list (Q * Q); enclosed : bool; margins : list margin;
   leaders : list (list Q * Q); upper_bound : option upper; proved : option Q; best_diagonal : option Q;
-  best_overshoot : option Q; bounded_input : bool; sliding_input : list Q; efforts : list effort }.
+  best_overshoot : option Q; bounded_input : bool; reaching : list (option Q); sliding_input : list Q;
+  efforts : list effort }.
 
 (** * Words *)
 Definition shift (x : nat -> R) : nat -> R := fun i => x (S i).
@@ -134,13 +135,14 @@ Definition begin (c : cert) (j : nat) : R := Q2R (nth j (start c) 0%Q) - Q2R (nt
 Definition within (c : cert) (y : nat -> R) : Prop := forall i, (i < length (final c))%nat -> (i < order c)%nat ->
   let p := nth i (final c) (0%Q, 0%Q) in Rabs (Q2R (fst p) - y i) <= Q2R (snd p).
 Definition final_claim (c : cert) : Prop := enclosed c = false -> within c (end_state c (begin c)).
-(** Proposition 1: whatever the disturbance, sliding variables shrink by [psi] and are 0 from [T_r] on; what they add to the
-    input at most *)
+(** Proposition 1: whatever the disturbance, sliding variables shrink by [psi] and are 0 from [T_r] on; from the file's
+    initial values on they are 0 from their reaching times on; what they add to the input at most *)
 Definition sliding_claim (c : cert) : Prop := match kind c with Nominal _ => True
   | SlidingMode T_r _ mu1 mu2 mu3 _ => forall X S, moves c X S -> quiet (order c) (deadline c) S (Q2R T_r) /\
       forall t i, 0 <= t < Q2R T_r -> (i < order c)%nat -> Rabs (S t i) <= psi c T_r mu2 mu3 t * Rabs (S 0 i) /\
-        ((i < length (sliding_input c))%nat -> S 0 i = Q2R (nth i (sliding c) 0%Q) ->
-           Q2R mu1 + pull c T_r mu2 mu3 t * Rabs (S t i) <= Q2R (nth i (sliding_input c) 0%Q)) end.
+        (S 0 i = Q2R (nth i (sliding c) 0%Q) -> ((i < length (sliding_input c))%nat ->
+           Q2R mu1 + pull c T_r mu2 mu3 t * Rabs (S t i) <= Q2R (nth i (sliding_input c) 0%Q)) /\
+         forall z, nth i (reaching c) None = Some z -> Q2R T_r * (1 - exp (- Q2R z)) <= t -> S t i = 0) end.
 (** what one Lyapunov function proves, along every motion *)
 Definition function_claim (c : cert) (f : func) : Prop := forall X S t0 t, moves_from c X S t0 ->
   let q := exp (- (Q2R (rate f) * (s c t - s c t0))) in
@@ -183,9 +185,8 @@ Definition effort_claim (c : cert) (e : effort) : Prop := forall X S t, moves_fr
   match e with PathLength q _ => I (fun u => sqrt (N u)) q | Energy q _ _ _ _ _ => I N q | Peak qs q _ _ =>
     sqrt (N t) <= Q2R q /\ forall i, (i < order c)%nat -> Rabs (input c X t i) <= Q2R (nth i qs 0%Q) end.
 (** the rates that are stated are the largest ones *)
-Definition largest (l : list Q) (r : option Q) : Prop := match r with
-  | Some q => (0 < q)%Q /\ (exists a, In a l /\ (a == q)%Q) /\ forall a, In a l -> (a <= q)%Q
-  | None => forall a, In a l -> (a <= 0)%Q end.
+Definition largest (l : list Q) (r : option Q) : Prop := match r with None => forall a, In a l -> (a <= 0)%Q
+  | Some q => (0 < q)%Q /\ (exists a, In a l /\ (a == q)%Q) /\ forall a, In a l -> (a <= q)%Q end.
 Definition rates_claim (c : cert) : Prop := largest (map rate (funcs c)) (proved c) /\
   largest (map rate (filter diagonal (funcs c))) (best_diagonal c) /\ forall q o, proved c = Some q ->
     best_overshoot c = Some o -> (exists f, In f (funcs c) /\ (rate f == q)%Q /\ (overshoot f == o)%Q) /\

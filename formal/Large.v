@@ -2,7 +2,7 @@
 Require Import ZArith QArith Qabs Qreals List Bool Reals Lra Lia Psatz.
 From Coquelicot Require Import Coquelicot.
 Import ListNotations.
-Require Import Vec Definite Graph Flow Certificate Checker Sound Claims Input Mean Slide Exist Main Table Dominance Weighted Rest Enclose Wide Group.
+Require Import Vec Definite Graph Flow Certificate Checker Sound Claims Input Mean Slide Exist Reach Main Table Dominance Weighted Rest Enclose Wide Group.
 Open Scope R_scope.
 
 (** what is found by search: of each Lyapunov function the vector of its rows, and the rates of closed components by
