@@ -242,7 +242,7 @@ let reaching_times proof kind kappa sliding z not_checked =
   let both = List.combine sliding z in
   let at_0 s = Number.equal s Number.zero in
   List.iter (function
-    | s, Some z -> need (Number.compare z Number.zero >= 0 && not (at_0 s && not (at_0 z))) "reaching_time.z: not of such a variable"
+    | s, Some z -> need (Number.compare z Number.zero >= 0 && at_0 s = at_0 z) "reaching_time.z: not of such a variable"
     | _, None -> ()) both;
   let moving = List.filter_map (fun (s, z) -> if at_0 s then None else z) both in
   let push = match kind with
