@@ -5,8 +5,7 @@ Import ListNotations. Open Scope R_scope.
 
 (** * Signed digraphs *)
 (** Information flows from [src] to [tgt]: the target listens. *)
-Record edge := Edge { tgt : nat; src : nat; wt : Q }.
-Definition mem (i : nat) (l : list nat) : bool := existsb (Nat.eqb i) l.
+Record edge := Edge { tgt : nat; src : nat; wt : Q }. Definition mem i l := existsb (Nat.eqb i) l.
 (** (L x)_i = sum over edges into i of |w| x_i - w x_src *)
 Definition lap_edge i x e := if (tgt e =? i)%nat then Rabs (Q2R (wt e)) * x i - Q2R (wt e) * x (src e) else 0.
 Definition lap (es : list edge) (x : nat -> R) (i : nat) : R := fold_right (fun e a => lap_edge i x e + a) 0 es.
@@ -21,8 +20,7 @@ Definition balanced es (C : list nat) (g : nat -> Z) : Prop := (forall i, In i C
   forall e, In e es -> In (src e) C -> In (tgt e) C -> (0 < wt e * inject_Z (g (tgt e) * g (src e)))%Q.
 
 (** * Motions *)
-Definition gain (T rho1 k t : R) : R := rho1 + k / (T - t).
-Definition clock (T rho1 k t : R) : R := rho1 * t + k * ln (T / (T - t)).
+Definition gain T rho1 k t := rho1 + k / (T - t). Definition clock T rho1 k t := rho1 * t + k * ln (T / (T - t)).
 (** on [0, T): the state [X] and the sliding variables [S] are continuous, and [(X - S)' = - gain(t) L X] where [t > 0];
     what stands left of 0 does not matter *)
 Definition motion (n : nat) (Lf : (nat -> R) -> nat -> R) (T rho1 k : R) (X S : R -> nat -> R) : Prop :=
@@ -57,12 +55,14 @@ Inductive effort := PathLength (most : Q) (f : nat) | Energy (most : Q) (W0 W1 :
   | Peak (each : list Q) (norm : Q) (ways : list (nat * Q)) (last : nat * Q).
 Inductive protocol := Nominal (T : Q) | SlidingMode (T_r T_s mu1 mu2 mu3 delta : Q).
 (** final states are middle and radius; of many nodes they are [enclosed], and no weights tell them; a leader group is its
-    weights, 0 elsewhere, and its rate; [sliding_input] bounds what the sliding mode adds to the input, by agent *)
+    weights, 0 elsewhere, and its rate; [sliding_input] bounds what the sliding mode adds to the input, by agent;
+    [reaching] are instants [z = ln(T_r/(T_r - t))] *)
 Record cert := Cert { order : nat; edges : list edge; kind : protocol; rho1 : Q; rho2 : Q; kappa : Q;
   comps : list comp; pieces : list piece; all_balanced : balance; sign_symmetric : bool; funcs : list func;
   start : list Q; sliding : list Q; final : list (Q * Q); enclosed : bool; margins : list margin;
   leaders : list (list Q * Q); upper_bound : option upper; proved : option Q; best_diagonal : option Q;
-  best_overshoot : option Q; bounded_input : bool; sliding_input : list Q; efforts : list effort }.
+  best_overshoot : option Q; bounded_input : bool; reaching : list (option Q); sliding_input : list Q;
+  efforts : list effort }.
 
 (** * Words *)
 Definition shift (x : nat -> R) : nat -> R := fun i => x (S i).
@@ -83,8 +83,7 @@ Definition end_state (c : cert) (x : nat -> R) (i : nat) : R :=
   fold_right (fun b a => Q2R (nth i (fst (snd b)) 0%Q) * qdot (snd (snd b)) x + a) 0 (balanced_comps (comps c)).
 
 Definition deadline c := match kind c with Nominal T => Q2R T | SlidingMode T_r T_s _ _ _ _ => Q2R T_r + Q2R T_s end.
-Definition k (c : cert) : R := Q2R (rho2 c) * Q2R (kappa c).
-Definition s (c : cert) (t : R) : R := clock (deadline c) (Q2R (rho1 c)) (k c) t.
+Definition k c := Q2R (rho2 c) * Q2R (kappa c). Definition s c t := clock (deadline c) (Q2R (rho1 c)) (k c) t.
 (** what draws a sliding variable to 0, besides [mu1] against the disturbance; and what stays of it *)
 Definition pull c T_r mu2 mu3 t := Q2R mu2 + if Rlt_dec t (Q2R T_r) then Q2R mu3 * Q2R (kappa c) / (Q2R T_r - t) else 0.
 Definition psi c T_r mu2 mu3 t := exp (- (Q2R mu2 * t)) * Rpower ((Q2R T_r - t) / Q2R T_r) (Q2R mu3 * Q2R (kappa c)).
@@ -98,6 +97,9 @@ Definition moves c X S : Prop := motion (order c) (lap (edges c)) (deadline c) (
 Definition moves_from c (X S : R -> nat -> R) (t0 : R) : Prop := moves c X S /\ quiet (order c) (deadline c) S t0.
 
 (** * What it claims *)
+(** from every state, and from all values of the sliding variables, a motion starts: nothing that is said of all is void *)
+Definition existence (c : cert) : Prop := forall x0 s0, (forall T i, kind c = Nominal T -> s0 i = 0) ->
+  exists X S, moves c X S /\ forall i, (i < order c)%nat -> X 0 i = x0 i /\ S 0 i = s0 i.
 Definition balance_claim (es : list edge) (C : list nat) (b : balance) : Prop :=
   match b with Gauge g => balanced es C (fun i => nth i g 0%Z) | Cycle _ => forall g, ~ balanced es C g end.
 (** closed components are these, and there are no others; camps and negative cycles are those of the edges *)
@@ -133,13 +135,14 @@ Definition begin (c : cert) (j : nat) : R := Q2R (nth j (start c) 0%Q) - Q2R (nt
 Definition within (c : cert) (y : nat -> R) : Prop := forall i, (i < length (final c))%nat -> (i < order c)%nat ->
   let p := nth i (final c) (0%Q, 0%Q) in Rabs (Q2R (fst p) - y i) <= Q2R (snd p).
 Definition final_claim (c : cert) : Prop := enclosed c = false -> within c (end_state c (begin c)).
-(** Proposition 1: whatever the disturbance, sliding variables shrink by [psi] and are 0 from [T_r] on; what they add to the
-    input at most *)
+(** Proposition 1: whatever the disturbance, sliding variables shrink by [psi] and are 0 from [T_r] on; from the file's
+    initial values on they are 0 from their reaching times on; what they add to the input at most *)
 Definition sliding_claim (c : cert) : Prop := match kind c with Nominal _ => True
   | SlidingMode T_r _ mu1 mu2 mu3 _ => forall X S, moves c X S -> quiet (order c) (deadline c) S (Q2R T_r) /\
       forall t i, 0 <= t < Q2R T_r -> (i < order c)%nat -> Rabs (S t i) <= psi c T_r mu2 mu3 t * Rabs (S 0 i) /\
-        ((i < length (sliding_input c))%nat -> S 0 i = Q2R (nth i (sliding c) 0%Q) ->
-           Q2R mu1 + pull c T_r mu2 mu3 t * Rabs (S t i) <= Q2R (nth i (sliding_input c) 0%Q)) end.
+        (S 0 i = Q2R (nth i (sliding c) 0%Q) -> ((i < length (sliding_input c))%nat ->
+           Q2R mu1 + pull c T_r mu2 mu3 t * Rabs (S t i) <= Q2R (nth i (sliding_input c) 0%Q)) /\
+         forall z, nth i (reaching c) None = Some z -> Q2R T_r * (1 - exp (- Q2R z)) <= t -> S t i = 0) end.
 (** what one Lyapunov function proves, along every motion *)
 Definition function_claim (c : cert) (f : func) : Prop := forall X S t0 t, moves_from c X S t0 ->
   let q := exp (- (Q2R (rate f) * (s c t - s c t0))) in
@@ -182,9 +185,8 @@ Definition effort_claim (c : cert) (e : effort) : Prop := forall X S t, moves_fr
   match e with PathLength q _ => I (fun u => sqrt (N u)) q | Energy q _ _ _ _ _ => I N q | Peak qs q _ _ =>
     sqrt (N t) <= Q2R q /\ forall i, (i < order c)%nat -> Rabs (input c X t i) <= Q2R (nth i qs 0%Q) end.
 (** the rates that are stated are the largest ones *)
-Definition largest (l : list Q) (r : option Q) : Prop := match r with
-  | Some q => (0 < q)%Q /\ (exists a, In a l /\ (a == q)%Q) /\ forall a, In a l -> (a <= q)%Q
-  | None => forall a, In a l -> (a <= 0)%Q end.
+Definition largest (l : list Q) (r : option Q) : Prop := match r with None => forall a, In a l -> (a <= 0)%Q
+  | Some q => (0 < q)%Q /\ (exists a, In a l /\ (a == q)%Q) /\ forall a, In a l -> (a <= q)%Q end.
 Definition rates_claim (c : cert) : Prop := largest (map rate (funcs c)) (proved c) /\
   largest (map rate (filter diagonal (funcs c))) (best_diagonal c) /\ forall q o, proved c = Some q ->
     best_overshoot c = Some o -> (exists f, In f (funcs c) /\ (rate f == q)%Q /\ (overshoot f == o)%Q) /\
@@ -198,6 +200,6 @@ Definition upper_claim (c : cert) (u : upper) : Prop := forall (F : (nat -> R) -
 
 Definition true_certificate (c : cert) : Prop :=
   structure c /\ behaviour c /\ claims c /\ final_claim c /\ (forall f, In f (funcs c) -> function_claim c f) /\
-  limit_claim c /\ input_claim c /\ rates_claim c /\ sliding_claim c /\ (forall m, In m (margins c) -> margin_claim c m)
-  /\ (forall l, In l (leaders c) -> leader_claim c l) /\ (forall u, upper_bound c = Some u -> upper_claim c u) /\
-  forall e, In e (efforts c) -> effort_claim c e.
+  limit_claim c /\ input_claim c /\ rates_claim c /\ sliding_claim c /\ existence c /\
+  (forall m, In m (margins c) -> margin_claim c m) /\ (forall l, In l (leaders c) -> leader_claim c l) /\
+  (forall u, upper_bound c = Some u -> upper_claim c u) /\ forall e, In e (efforts c) -> effort_claim c e.

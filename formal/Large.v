@@ -2,7 +2,8 @@
 Require Import ZArith QArith Qabs Qreals List Bool Reals Lra Lia Psatz.
 From Coquelicot Require Import Coquelicot.
 Import ListNotations.
-Require Import Vec Definite Graph Flow Certificate Checker Sound Claims Input Mean Slide Main Table Dominance Weighted Rest Enclose Wide Group Sparse Factor Kept.
+Require Import Vec Definite Graph Flow Certificate Checker Sound Claims Input Mean Slide Exist Reach Main Table Dominance.
+Require Import Weighted Rest Enclose Wide Group Sparse Factor Kept.
 Open Scope R_scope.
 
 (** what is found by search: of each Lyapunov function the vector of its rows, and the rates of closed components by
@@ -279,7 +280,7 @@ Proof.
   split; [intros E; rewrite H1 in E; discriminate|].
   split; [intros f Hf; apply (function_large h c H2 H3 H4 H6 f Hf)|].
   split; [apply (limit_large h c H2 H3 H4 H5 H6 H1 H7 H8)|]. split; [apply (input_large h c H2 H3 H4 H6 H9)|].
-  split; [apply rates_ok; exact H10|]. split; [apply sliding_ok; assumption|].
+  split; [apply rates_ok; exact H10|]. split; [apply sliding_ok; assumption|]. split; [apply motions_exist; assumption|].
   split; [intros m Hm; rewrite Em in Hm; destruct Hm|]. split; [intros l Hl; rewrite El in Hl; destruct Hl|].
   split; [intros u Hu; rewrite Eu in Hu; discriminate|]. intros e He. rewrite Ee in He. destruct He.
 Qed.

@@ -180,10 +180,10 @@ Proof.
   apply (held Tr t (fun _ => e / 2) (fun _ => 0)); [lra|lra| |rewrite reached, Rabs_R0; lra].
   intros u _. split; [apply @is_derive_const|]. split; [lra|]. pose proof (pull_pos u). nra.
 Qed.
-Lemma input_part t l : check_sliding c = true -> sliding_input c = l -> 0 <= t < Tr -> (i < length l)%nat ->
+Lemma input_part t l : check_sliding_input c = true -> sliding_input c = l -> 0 <= t < Tr -> (i < length l)%nat ->
   S 0 i = Q2R (nth i (sliding c) 0%Q) -> Q2R mu1 + p t * Rabs (S t i) <= Q2R (nth i l 0%Q).
 Proof.
-  intros H E Ht Hl H0. destruct parts as [A [_ [Pn Pm]]]. unfold check_sliding in H. rewrite Hkind, E in H.
+  intros H E Ht Hl H0. destruct parts as [A [_ [Pn Pm]]]. unfold check_sliding_input in H. rewrite Hkind, E in H.
   destruct l as [|a l']; [simpl in Hl; lia|]. set (l := a :: l') in *. apply andb_prop in H as [H1 H2].
   rewrite forallb_forall in H2. specialize (H2 i ltac:(apply in_seq; lia)). apply Qle_bool_iff, Qle_Rle in H2.
   assert (Z : ~ (T_r == 0)%Q) by (intros Z; apply Qeq_eqR in Z; fold Tr in Z; unfold Q2R in Z at 1; simpl in Z; lra).
@@ -213,14 +213,6 @@ Qed.
 End Agent.
 End Slide.
 
-Theorem sliding_ok c : check_protocol c = true -> check_sliding c = true -> sliding_claim c.
-Proof.
-  intros HP HS. unfold sliding_claim. destruct (kind c) as [|T_r T_s mu1 mu2 mu3 delta] eqn:K; [exact I|]. intros X S HM.
-  destruct (parts c _ _ _ _ _ _ HP K) as [A _]. split.
-  - split; [lra|]. intros t i Ht Hi. apply (rests c _ _ _ _ _ _ HP K X S i HM Hi t Ht).
-  - intros t i Ht Hi. split; [apply (shrinks c _ _ _ _ _ _ HP K X S i HM Hi t Ht)|]. intros Hl H0.
-    apply (input_part c _ _ _ _ _ _ HP K X S i HM Hi t (sliding_input c) HS eq_refl Ht Hl H0).
-Qed.
 (** every motion has an instant from which all sliding variables are 0 *)
 Theorem settles c : check_protocol c = true -> forall X S, moves c X S -> exists t0, moves_from c X S t0.
 Proof.

@@ -12,7 +12,8 @@ let of_check c d : (string * (unit -> bool)) list =
       "final_state: not what was proved", (fun () -> check_final c d);
       "input-threshold of input", (fun () -> check_input c d);
       "rates, or overshoot, are not what was proved", (fun () -> check_rates c);
-      "input-sliding of input", (fun () -> check_sliding c) ]
+      "input-sliding of input", (fun () -> check_sliding_input c);
+      "reaching-time of reaching_time", (fun () -> check_reaching c) ]
   @ List.mapi (fun k m -> Printf.sprintf "paper: inequality %d of its own function" (k + 1), (fun () -> check_margin c d m)) c.margins
   @ List.mapi (fun k l -> Printf.sprintf "leader-decrease of paper, group %d" (k + 1), (fun () -> check_leader c d l)) c.leaders
   @ (match c.upper_bound with
@@ -32,5 +33,6 @@ let of_large (h : hints) c : (string * (unit -> bool)) list =
     "final-state of graph", (fun () -> check_final_large c h.lefts h.around);
     "input-threshold of input", (fun () -> check_input_large c);
     "rates, or overshoot, are not what was proved", (fun () -> check_rates c);
-    "input-sliding of input", (fun () -> check_sliding c) ]
+    "input-sliding of input", (fun () -> check_sliding_input c);
+    "reaching-time of reaching_time", (fun () -> check_reaching c) ]
 let of_either h c d = if c.enclosed then of_large h c else of_check c (Lazy.force d)

@@ -266,6 +266,24 @@ let function_ nodes listening comps vectors facts edges_in proof gauge paper num
         Some (number "deviation.norm" (d "norm"), by_agent nodes number "deviation.agents" (d "agents")) in
   { ly; diagonal; rate; lowest; highest; overshoot; deviation; constants = None }
 
+(* reaching times that the panels of the check can place; of many agents, of instants near 0 or far away none *)
+let most_instants = 100
+let reaching_times proof kind kappa sliding z not_checked =
+  let both = List.combine sliding z in
+  let at_0 s = Number.equal s Number.zero in
+  List.iter (function
+    | s, Some z -> need (Number.compare z Number.zero >= 0 && at_0 s = at_0 z) "reaching_time.z: not of such a variable"
+    | _, None -> ()) both;
+  let moving = List.filter_map (fun (s, z) -> if at_0 s then None else z) both in
+  let push = match kind with
+    | SlidingMode (t_r, _, _, mu2, mu3, _) -> Number.add (Number.mul t_r mu2) (Number.mul mu3 kappa) | Nominal _ -> Number.zero in
+  let whole k = Number.of_z (Z.of_int k) in
+  let near z = Number.compare z (whole 25) <= 0 && Number.compare (Number.mul z (whole (1 lsl 30))) Number.one >= 0 in
+  if moving = [] then z
+  else if List.length moving <= most_instants && Number.compare push (whole 100) <= 0 && List.for_all near moving then
+    (bare_of proof "reaching-time" "reaching_time"; z)
+  else (skipped proof "reaching-time" "reaching_time"; not_checked "reaching_time.z"; [])
+
 (* some function tells that a state at which nothing moves is one at which agents end *)
 let has_kernel = List.exists (fun f -> f.deviation <> None && (match f.ly with InE _ -> true | InEps _ | Weighted _ -> false))
 (* the upper bound on the rate: of two vectors, the combination that the left null vector annihilates *)
@@ -402,12 +420,12 @@ let certificate (j : Json.t) : t =
     | Some _ ->
         skipped proof (if following proof = "rate-mean" then "rate-mean" else "rate-upper-bound") "rates";
         not_checked "rates.upper_bound, input.threshold.upper"; None in
-  if is_sliding then begin
+  let reaching = if is_sliding then begin
     let times = fields "reaching_time" [ "bound"; "clock"; "z" ] (get "reaching_time") in
     need (times "bound" = Str Texts.sliding_bound && times "clock" = Str Texts.sliding_clock) "reaching_time: another bound or clock";
-    bare_of proof "sliding-bound" "protocol"; not_checked "reaching_time.z";
-    if following proof = "reaching-time" then skipped proof "reaching-time" "reaching_time" end
-  else need (get "reaching_time" = Null) "reaching times without sliding variables";
+    bare_of proof "sliding-bound" "protocol";
+    reaching_times proof kind kappa sliding (by_agent nodes (optional number) "reaching_time.z" (times "z")) not_checked end
+  else (need (get "reaching_time" = Null) "reaching times without sliding variables"; []) in
   let bounded_input, sliding_input, functions, efforts = match get "input" with
     | Null -> false, [], functions, []
     | v ->
@@ -475,7 +493,7 @@ let certificate (j : Json.t) : t =
     sections = List.rev !left_out;
     cert = { order = Array.length nodes.labels; edges; kind; rho1; rho2; kappa; comps; pieces; all_balanced = found.balance;
       sign_symmetric = Pieces.sign_symmetric all; funcs = functions;
-      start = Option.value start ~default:[]; sliding; final; enclosed; sliding_input; efforts;
+      start = Option.value start ~default:[]; sliding; final; enclosed; reaching; sliding_input; efforts;
       margins = (match paper with Some p -> p.inequalities | None -> []);
       leaders = (match paper with Some p -> p.groups | None -> []);
       upper_bound;

@@ -155,6 +155,40 @@ def test_a_lower_bound_on_all_rates_than_is_proved_is_rejected(kind: str, tmp_pa
     assert code == 1 and f"{kind} of rates" in text
 
 
+def test_reaching_times_are_verified_and_shorter_ones_are_rejected(tmp_path: Path) -> None:
+    program()
+    gains = {"T_r": "0.5", "T_s": 1, "rho1": 1, "rho2": 1, "kappa": 2, "mu1": 2, "mu2": 1, "delta": 1}
+    edges, listed = [("a", "b", 1), ("b", "a", -1), ("b", "c", -2)], "reaching-time of reaching_time"
+    for mu3 in ("0.2", "0.5", "3"):  # the exponent mu3 kappa of psi below, at and above 1
+        protocol = SlidingModeProtocol(**gains, mu3=mu3)
+        sigma = [0, "-0.2", "0.3"]
+        document = json.loads(certify(edges, protocol, [1, 2, 3], sigma0=sigma, simulation=False).to_json())
+        code, text = said(document, tmp_path)
+        assert code == 0 and f"verified    {listed}" in text
+        for label in "bc":  # stated to a part in 10^12
+            z = Fraction(document["reaching_time"]["z"][label])
+            later = resealed(changed(document, ("reaching_time", "z", label), str(z * 2)))
+            assert said(later, tmp_path).code == 0  # true as well
+            for sooner in (z * (1 - Fraction(1, 10**6)), Fraction(0)):
+                forged = resealed(changed(document, ("reaching_time", "z", label), str(sooner)))
+                assert said(forged, tmp_path).code == 1 and not check(forged).accepted
+        for wrong in ("1", "-1"):  # of the variable that is 0 from the begin on
+            forged = resealed(changed(document, ("reaching_time", "z", "a"), wrong))
+            assert said(forged, tmp_path).code == 1 and not check(forged).accepted
+
+
+def test_reaching_times_far_away_are_named(tmp_path: Path) -> None:
+    program()
+    gains = {"T_r": "0.5", "T_s": 1, "rho1": 1, "rho2": 1, "kappa": 2, "mu1": 2, "mu2": 1, "mu3": 3, "delta": 1}
+    edges = [("a", "b", 1), ("b", "a", -1)]
+    document = json.loads(
+        certify(edges, SlidingModeProtocol(**gains), [1, 2], sigma0=[0, 1], simulation=False).to_json()
+    )
+    far = resealed(changed(document, ("reaching_time", "z", "b"), "26"))
+    code, text = said(far, tmp_path)
+    assert code == 0 and "not checked reaching-time of reaching_time" in text and "not checked reaching_time.z" in text
+
+
 def test_what_the_sliding_mode_adds_to_the_input_is_verified(tmp_path: Path) -> None:
     program()
     gains = {"T_r": "0.5", "T_s": 1, "rho1": 1, "rho2": 1, "kappa": 2, "mu1": 2, "mu2": 1, "delta": 1}

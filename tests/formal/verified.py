@@ -13,7 +13,7 @@ from ptcc_certify.cli.verified import executable
 from ptcc_certify.errors import ParameterError
 
 Path_ = tuple[str | int, ...]
-#: Kinds of obligations that the theorem of ``formal/`` does not speak of, or not always.
+#: Kinds of obligations that the theorem of ``formal/`` does not speak of, or not always (reaching times far away).
 SKIPPED = {"reaching-time", "input-threshold", "input-peak", "limited-gain", "nominal-disturbed"}
 #: Those that it speaks of where no sliding variable moves.
 AT_REST = {"input-energy", "input-length"}
