@@ -273,7 +273,7 @@ def design_agents(
 def _refuse(agents: Any, request: AgentsRequest) -> None:
     """Refuse what is not searched."""
     if not isinstance(agents, Agents):
-        raise ParameterError(f"agents = {shorten(repr(agents))} is none; give Agents(order=2), say")
+        raise ParameterError(f"agents = {shorten(repr(agents))}: give Agents(order=2) for double integrators")
     if agents.plain:
         raise ParameterError("agents: these are single integrators; design(graph, ..) finds their gains")
     if agents.rest is not None:

@@ -200,6 +200,8 @@ _AT_ONCE |= {"check": _COMPARE}
 _SIGNALS = dict.fromkeys(("dwell", "dwell_time", "clock_dwell"), "DwellTime(...)")
 _SIGNALS |= dict.fromkeys(("window", "windows", "clock_window", "window_on"), "JointWindows(...)")
 _SIGNALS |= dict.fromkeys(("share", "shares"), "ClockShares(...)")
+#: What is said of messages.
+_MESSAGES = ("delay", "own_delay", "period", "losses", "value_error")
 
 
 def gated(called: Called) -> Called:
@@ -244,8 +246,8 @@ def _misfit(called: Any, signature: inspect.Signature, args: tuple[Any, ...], ke
         call = [f"{key}=..." if parameters[key].kind is inspect.Parameter.KEYWORD_ONLY else key for key in required]
         also = _MAKERS.get(name, "") if name == "SignedDigraph" or "protocol" in missing else ""
         return f"{name} asks for {', '.join(missing)}; write {name}({', '.join(call)}){also}"
-    mend = _AT_ONCE.get(name, "write any other as name=value")
-    return f"{name} takes {', '.join(places) or 'nothing'} without a name, each once; {mend}"
+    mend, once = _AT_ONCE.get(name, "write any other as name=value"), ", each once" * bool(keywords.keys() & set(given))
+    return f"{name} takes {', '.join(places) or 'nothing'} without a name{once}; {mend}"
 
 
 def unknown_parameter(name: str, unknown: str, parameters: Iterable[str]) -> str:
@@ -262,6 +264,8 @@ def unknown_parameter(name: str, unknown: str, parameters: Iterable[str]) -> str
         hint = f"; did you mean {meant}?"
     elif "signal" in parameters and (signal := _SIGNALS.get(unknown)):
         hint = f"; say signal={signal} of ptcc_certify.theorems.restricted_signals"
+    elif "messages" in parameters and unknown in _MESSAGES:
+        hint = f"; say messages=LateMessages({unknown}=...)"
     elif unknown == "optional" and "uncertainty" in parameters:
         hint = "; an edge that may fail has 0 at one end: Family.from_intervals([(source, target, 0, weight), ...])"
     elif name == "check" and unknown in ("graph", "family"):

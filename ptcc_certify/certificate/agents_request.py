@@ -46,7 +46,7 @@ def refuse_agents(agents: Any, protocol: Protocol, asked: dict[str, Any]) -> Non
         Says what, and what to do instead.
     """
     if not isinstance(agents, Agents):
-        raise ParameterError(f"agents = {shorten(repr(agents))} is none; give Agents(order=2), say")
+        raise ParameterError(f"agents = {shorten(repr(agents))}: give Agents(order=2) for double integrators")
     for name, value in asked.items():
         empty = value is None or (isinstance(value, list | tuple) and not any(one is not None for one in value))
         if name in _NOT_OF_AGENTS and not empty:

@@ -13,6 +13,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from lmi import search_time as deadline
 from lmi.exact.decimal_rounding import down
 from lmi.search_time import share_of_time
@@ -125,14 +127,20 @@ class FamilyCertificate(FamilyContent, FromFile, Shown):
         """Return what ``ptcc certify`` prints of it."""
         return family_summary(self)
 
-    def plot(self, what: str = "decay", **keywords: Any) -> Any:
+    @property
+    def main_figure(self) -> str:
+        """The figure that is drawn where none is named: the decay, or the states where nothing of one is proved."""
+        nothing = self.initial_state is not None and not np.isfinite(self.deviation_bound([0.5])).any()
+        return "states" if nothing else "decay"
+
+    def plot(self, what: str | None = None, **keywords: Any) -> Any:
         """Draw a figure of the certificate.
 
         Parameters
         ----------
-        what : {"decay", "input", "graph", "states"}
+        what : {"decay", "input", "graph", "states"}, optional
             Runs under many signals within what is proved for every signal: their error, their inputs, their states; or
-            the graphs.
+            the graphs. None: :attr:`main_figure`.
         **keywords : Any
             ``ax`` and others of the function that draws it: ``plot_family_decay``, ``plot_input``, ``plot_graph`` or
             ``plot_family``.
@@ -146,7 +154,7 @@ class FamilyCertificate(FamilyContent, FromFile, Shown):
         ParameterError
             No figure is called so, or there is nothing to draw.
         """
-        return plot_of_family(self, what, **keywords)
+        return plot_of_family(self, what or self.main_figure, **keywords)
 
     # ------------------------------------------------------------------ the file
 

@@ -146,7 +146,7 @@ def _of_certificate(
         if begins and certificate.initial_state is not None:
             raise ParameterError(f"--x0 is for what holds no initial state; the certificate {path} has its own")
         of_agents = isinstance(certificate, Certificate) and certificate.agents is not None
-        what = what or (certificate.main_figure if isinstance(certificate, Certificate) else "decay")
+        what = what or certificate.main_figure
         drawn, others = ((*OF_AGENTS, *_SHARED), OF_A_RUN) if of_agents else (OF_A_RUN, OF_AGENTS)
         if what in others and what not in drawn:
             raise ParameterError(f"--what {what} is not drawn of {path}; ask for --what {' or '.join(drawn)}")

@@ -58,7 +58,7 @@ def tracking_lines(certificate: Certificate) -> Lines:
         instants = {f"t = {near(at)}": 1 - at / certificate.protocol.T}
     bounds = {when: up(float(tracking.distance_bound([float(q)]).max()), 2) for when, q in instants.items()}
     after = "and ever after" if not tracking.after else f"within {up(tracking.distance_after, 2)} of it from then on"
-    yield "tracking", f"every follower on its target at T = {T}, {after}"
+    yield "tracking", f"every follower on its target at T = {T}, {after};"
     whole = " from within 1 of it at first" * tracking.relative
     yield "", f"before T within {', '.join(f'{x} of it at {when}' for when, x in bounds.items())}{whole}"
     if tracking.input is not None:

@@ -152,6 +152,14 @@ def test_states_are_drawn_where_no_limit_is_claimed():
         plot_family_decay(certificate, runs=runs)
 
 
+def test_states_come_first_where_no_bound_of_a_decay_is_proved():
+    """An edge that may fail, on which it depends who leads."""
+    edges = [(1, 2, 1, 1), (2, 3, -1, 0), (3, 4, 1, 1)]
+    cert = certify_family(Family.from_intervals(edges), NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2, 3, 4])
+    assert cert.main_figure == "states"
+    assert cert.plot().get_ylabel() == cert.plot("states").get_ylabel()
+
+
 def test_a_certificate_draws_its_figures_by_name(drawn):
     certificate, runs = drawn
     assert certificate.plot("states", runs=runs).get_ylabel() == "state $x_k$"

@@ -194,7 +194,7 @@ def plot_family_decay(
     before = first.remaining > 0
     bound = subject.deviation_bound(first.remaining[before]).max(axis=0)
     if not np.isfinite(bound).any():
-        raise ParameterError("the certificate holds no proved bound of a decay")
+        raise ParameterError("the certificate holds no proved bound of a decay; draw its states")
     places = {"left": first.remaining, "time": first.t, "clock": first.clock}[axis][before]
     scale = float(np.abs(first.states[:, 0]).max()) or 1.0
     floor = FLOOR_FACTOR * first.rtol * scale
