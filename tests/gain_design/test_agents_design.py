@@ -173,7 +173,7 @@ def test_agents_in_place_need_no_input(cascade: int | None):
     ("agents", "asked", "says"),
     [
         (Agents(order=1), {}, "single integrators"),
-        (2, {}, "agents = 2 is none"),
+        (2, {}, "agents = 2: give Agents"),
         (Agents(order=2, rest=1), {}, "rest: no number"),
         (Agents(order=2, decay=3), {}, "decay: below 2 n = 4"),
         (Agents(order=2), {"residual": 1}, "residual: nothing is left"),
