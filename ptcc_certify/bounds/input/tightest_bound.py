@@ -68,12 +68,18 @@ def decaying(bounds: InputBounds, k: int, agent: int | None) -> Fraction:
 
 
 def _driven_peak(bounds: InputBounds, k: int, agent: int | None) -> tuple[float, float]:
-    """Return about what a function bounds the peak by while sliding variables move, and without ``|e|``, for ties."""
-    pieces, most, begin = bounds.pieces(k, _quiet(bounds))
-    last, clock = nearest_float(pieces[-1].last), math.fsum(float(p.clock) for p in pieces)
-    constant = bounds.error_norm if agent is None else bounds.error_bounds[agent]
-    c = nearest_float(bounds.root_constant(k, agent))
-    late = c * math.exp(log(begin) - nearest_float(bounds.form(k).rate) / 2 * clock) * last if begin else 0.0
+    """Return about what a function bounds the peak by while sliding variables move, and without ``|e|``, for ties.
+
+    Infinite where floats or the kernel form no numbers of this size.
+    """
+    try:
+        pieces, most, begin = bounds.pieces(k, _quiet(bounds))
+        last, clock = nearest_float(pieces[-1].last), math.fsum(nearest_float(p.clock) for p in pieces)
+        constant = bounds.error_norm if agent is None else bounds.error_bounds[agent]
+        c = nearest_float(bounds.root_constant(k, agent))
+        late = c * math.exp(log(begin) - nearest_float(bounds.form(k).rate) / 2 * clock) * last
+    except (ValueError, ArithmeticError):
+        return math.inf, math.inf
     alone = c * nearest_float(most)
     return max(late, min(alone, nearest_float(constant) * last)), alone
 
