@@ -3,7 +3,7 @@
 Wall time, and beside it CPU time of the server and of the processes that it has ended, which other work on the machine
 changes little. Every control is moved twice on every packaged graph and on one of 40 nodes, through the server of the
 page: settings in, text and figures out, both in one answer. With a browser (playwright and Chromium) a slider is moved
-there besides, and the seconds are those until image and text on the page have changed.
+there besides, and the seconds are those until text and first image on the page have changed, and until the last image.
 
 Usage
 -----
@@ -124,21 +124,26 @@ def in_browser() -> None:
                 seconds = []
                 for k in range(11):
                     page.wait_for_selector("#verdict:not(.open)")
-                    seconds.append((page.evaluate(MOVE_ON_PAGE, str(0.5 + k / 10)) / 1000,))
+                    told = page.evaluate(MOVE_ON_PAGE, str(0.5 + k / 10))
+                    seconds.append(tuple(milliseconds / 1000 for milliseconds in told))
                 tell(f"{graph}, {kind}, in Chromium", seconds[1:])
         browser.close()
         explorer.terminate()
         explorer.wait()
 
 
-#: Moves the slider of rho2, and tells the milliseconds until image and text have changed and are painted.
+#: Moves the slider of rho2, and tells the milliseconds until image and text are painted, and until the last image is.
 MOVE_ON_PAGE = """value => new Promise(resolve => {
   const image = document.querySelector("#panel-states img"), text = document.querySelector('dd[data-head="error"]');
   const before = [image.src, text.textContent], began = performance.now();
-  const look = () => image.src !== before[0] && text.textContent !== before[1] && image.complete;
+  const last = document.querySelector("#panel-input img"), lastBefore = last.src, seen = [];
+  const look = () => seen.length ? last.src !== lastBefore && last.complete
+    : image.src !== before[0] && text.textContent !== before[1] && image.complete;
   const watch = new MutationObserver(() => look() && requestAnimationFrame(() => setTimeout(() => {
+    if (look()) seen.push(performance.now() - began);
+    if (seen.length < 2) return;
     watch.disconnect();
-    resolve(performance.now() - began);
+    resolve(seen);
   })));
   watch.observe(document.body, { subtree: true, childList: true, characterData: true, attributes: true });
   const slider = document.querySelector('[data-of="rho2"]');

@@ -62,11 +62,22 @@ def test_the_page_names_every_control_and_loads_nothing_from_elsewhere(server: E
         assert status == 200 and "http" not in text
 
 
+def whole(parts: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return what the parts of an answer tell together."""
+    return {**{key: value for part in parts for key, value in part.items()}, "panels": panels_of(parts)}
+
+
+def panels_of(parts: list[dict[str, Any]]) -> dict[str, str]:
+    return {name: svg for part in parts for name, svg in part.get("panels", {}).items()}
+
+
 def test_a_view_is_text_figures_and_code(server: ExplorerServer):
     query = "graph=fig1a&kind=sliding-mode&method=paper&seed=3&reaching=false&T_r=0.6"
     for name, checked in (("preview", False), ("view", True)):
         status, text, _ = get(server, f"{server.root}{name}?{query}")
-        view = json.loads(text)
+        parts = [json.loads(line) for line in text.splitlines()]
+        view = whole(parts)
+        assert "facts" in parts[0] and "verdict" in parts[-1]  # on all that is shown by then
         assert status == 200 and view["checked"] is checked
         assert view["verdict"].startswith("certified" if checked else "not checked")
         assert list(view["panels"]) == ["states", "decay", "graph", "input", "sliding"]
@@ -142,13 +153,24 @@ def test_a_certificate_in_the_making_gives_way_to_a_control_that_is_moved():
 
         server.explorer.view = moved_meanwhile  # type: ignore[method-assign, assignment]
         with pytest.raises(Superseded):
-            server.view(FEW)
+            list(server.view(FEW))
         server.explorer.view = explorer_view  # type: ignore[method-assign]
-        assert server.view(FEW)["checked"]
+        assert whole(list(server.view(FEW)))["checked"]
+        told = server._told
+
+        def moved_while_it_is_drawn(view: Any) -> Any:
+            for part in told(view):
+                server._moves += "panels" in part
+                yield part
+
+        server._told = moved_while_it_is_drawn  # type: ignore[method-assign]
+        with pytest.raises(Superseded):
+            list(server.view(FEW))
+        server._told = told  # type: ignore[method-assign]
         with ThreadPoolExecutor(1) as other:
             done = threading.Event()
-            server._shown(lambda: done.wait() and server.explorer.preview(FEW))  # something else is at work
-            waiting = other.submit(server.view, FEW)
+            server._parts(lambda: iter([{}][: not done.wait()]))  # something else is at work
+            waiting = other.submit(lambda: list(server.view(FEW)))
             while server._work.empty():
                 time.sleep(0.01)
             server._moves += 1

@@ -62,24 +62,37 @@ async function show(view) {
     verdict.className = "bad";
     return setText(verdict.lastElementChild, view.refusal);
   }
-  const names = [...document.querySelectorAll("figure")].map((figure) => figure.id.slice("panel-".length));
-  await Promise.all(names.map((name) => showPanel(name, view.panels[name])));
-  verdict.className = view.grade;
-  setText(verdict.lastElementChild, unbroken(view.verdict));
-  for (const place of document.querySelectorAll("dd")) setText(place, unbroken(view.facts[place.dataset.head]));
-  setText(document.getElementById("python"), view.python);
-  showWords(document.getElementById("command"), view.command);
+  if ("facts" in view) {
+    for (const place of document.querySelectorAll("dd")) setText(place, unbroken(view.facts[place.dataset.head]));
+    setText(document.getElementById("python"), view.python);
+    showWords(document.getElementById("command"), view.command);
+    for (const name of Object.keys(drawn)) if (!view.names.includes(name)) await showPanel(name);
+  }
+  for (const [name, svg] of Object.entries(view.panels ?? {})) await showPanel(name, svg);
+  if ("verdict" in view) {
+    verdict.className = view.grade;
+    setText(verdict.lastElementChild, unbroken(view.verdict));
+  }
 }
 
 function tellGone() {
   show({ refusal: "ptcc explore has ended or does not answer; start it again in the terminal" });
 }
 
-async function ask(what, signal) {
+// One line of JSON for every part of the answer, shown as it comes; false where a control was moved meanwhile.
+async function ask(what, wished, signal) {
   const answer = await fetch(`${what}?${settings()}`, { signal });
-  if (answer.status === 409) return null;
+  if (answer.status === 409) return false;
   if (!answer.ok) throw new Error(await answer.text());
-  return answer.json();
+  const reader = answer.body.pipeThrough(new TextDecoderStream()).getReader();
+  let text = "";
+  for (;;) {
+    const { value, done } = await reader.read();
+    if (done) return true;
+    const lines = (text + value).split("\n");
+    text = lines.pop();
+    for (const line of lines) if (wished()) await show(JSON.parse(line));
+  }
 }
 
 async function preview() {
@@ -89,9 +102,8 @@ async function preview() {
   try {
     do {
       seen = wanted;
-      const view = await ask("preview");
-      await show(view);
-      if (!("refusal" in view)) timer = setTimeout(certify, REST);
+      await ask("preview", () => true);
+      if (!document.body.classList.contains("refused")) timer = setTimeout(certify, REST);
     } while (seen !== wanted);
   } catch (error) {
     tellGone();
@@ -103,10 +115,8 @@ async function certify() {
   const seen = wanted;
   certifying = new AbortController();
   try {
-    const view = await ask("view", certifying.signal);
-    if (seen !== wanted) return;
-    if (view === null) timer = setTimeout(certify, REST);
-    else await show(view);
+    const shown = await ask("view", () => seen === wanted, certifying.signal);
+    if (!shown && seen === wanted) timer = setTimeout(certify, REST);
   } catch (error) {
     if (error.name !== "AbortError") tellGone();
   }

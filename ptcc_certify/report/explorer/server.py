@@ -13,11 +13,11 @@ import os
 import secrets
 import sys
 import threading
-from collections.abc import Callable
-from concurrent.futures import Future
+from collections.abc import Callable, Iterator
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib import resources
+from itertools import chain
 from pathlib import PurePosixPath
 from queue import SimpleQueue
 from socketserver import TCPServer
@@ -37,7 +37,7 @@ from ptcc_certify.report.explorer.settings import DISTURBANCES, KINDS, LARGEST_S
 HOSTS = ("127.0.0.1", "localhost")
 #: How many ports after the one that is asked for are tried.
 TRIED = 50
-_TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".json": "application/json"}
+_TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".json": "application/x-ndjson"}
 #: The page may load from this server alone, figures besides from itself, and stands in no frame.
 _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; "
@@ -50,6 +50,11 @@ _HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "Cache-Control": "no-store",
 }
+
+
+#: What is shown of a view, part by part.
+Parts = Iterator[dict[str, Any]]
+_Queue = SimpleQueue[dict[str, Any] | Exception | None]
 
 
 class Superseded(Exception):
@@ -87,7 +92,7 @@ class ExplorerServer(ThreadingHTTPServer):
         refuse_unknown("graph", settings.graph, explorer.graphs)
         self.explorer, self.settings, self._moves = explorer, settings, 0
         self._token = secrets.token_urlsafe(16)
-        self._work: SimpleQueue[tuple[Future[Any], Callable[[], View]] | None] = SimpleQueue()
+        self._work: SimpleQueue[tuple[_Queue, Callable[[], Parts]] | None] = SimpleQueue()
         super().__init__((HOSTS[0], port), _Handler)
         threading.Thread(target=self._draw, daemon=True).start()
 
@@ -122,8 +127,12 @@ class ExplorerServer(ThreadingHTTPServer):
 
         What libraries have loaded by then stays for good: while a control is moved, nobody looks for garbage in it.
         """
-        shown = self._shown(lambda: self.explorer.preview(self.settings))
-        shown.add_done_callback(lambda _: gc.freeze())  # where it failed, the page will ask again and tell
+
+        def begun() -> Parts:
+            yield from self._told(self.explorer.preview(self.settings))
+            gc.freeze()
+
+        self._parts(begun)  # where it fails, the page will ask again and tell
 
     def page(self) -> str:
         """Return the page."""
@@ -146,12 +155,12 @@ class ExplorerServer(ThreadingHTTPServer):
             )
         )
 
-    def preview(self, settings: Settings) -> dict[str, Any]:
-        """Return what is shown at once; a certificate that is being made gives way."""
+    def preview(self, settings: Settings) -> Parts:
+        """Return what is shown at once, as it is made; a certificate that is being made gives way."""
         self._moves += 1
-        return self._shown(lambda: self.explorer.preview(settings)).result()
+        return self._parts(lambda: self._told(self.explorer.preview(settings)))
 
-    def view(self, settings: Settings) -> dict[str, Any]:
+    def view(self, settings: Settings) -> Parts:
         """Return what ``certify`` certifies.
 
         Raises
@@ -165,41 +174,50 @@ class ExplorerServer(ThreadingHTTPServer):
             if self._moves != moves:
                 raise Superseded
 
-        def certified() -> View:
+        def certified() -> Parts:
             give_way("waiting")
-            return self.explorer.view(settings, give_way)
+            for part in self._told(self.explorer.view(settings, give_way)):
+                yield part
+                give_way("drawing")
 
-        return self._shown(certified).result()
+        return self._parts(certified)
 
-    def _shown(self, work: Callable[[], View]) -> Future[dict[str, Any]]:
-        """Return what is shown of the view that some work makes, when its turn has come."""
-        shown: Future[dict[str, Any]] = Future()
-        self._work.put((shown, work))
-        return shown
+    def _parts(self, work: Callable[[], Parts]) -> Parts:
+        """Have some work done when its turn comes, and return its parts as they come."""
+        queue: _Queue = SimpleQueue()
+        self._work.put((queue, work))
+        return _read(queue)
 
     def _draw(self) -> None:
         """Do the work, in one thread: Matplotlib keeps files of fonts open for every thread that draws.
 
         The thread is a daemon, unlike those of an executor: Ctrl-C does not wait for a certificate.
         """
-        for shown, work in iter(self._work.get, None):
+        for queue, work in iter(self._work.get, None):
             try:
-                shown.set_result(self._told(work()))
+                for part in work():
+                    queue.put(part)
+                queue.put(None)
             except Exception as error:
-                shown.set_exception(error)
+                queue.put(error)
 
-    def _told(self, view: View) -> dict[str, Any]:
+    def _told(self, view: View) -> Parts:
+        """Yield what is claimed, then one panel after another, and the verdict on all that is shown by then."""
         if view.refusal:
-            return {"refusal": view.refusal}
-        return {
-            "verdict": view.verdict,
-            "grade": view.grade,
-            "checked": view.checked,
-            "facts": view.facts,
-            "panels": {name: self.explorer.svg(view, name) for name in view.panels},
-            "python": view.python,
-            "command": view.command,
-        }
+            yield {"refusal": view.refusal}
+            return
+        yield {"facts": view.facts, "python": view.python, "command": view.command, "names": view.panels}
+        for name in view.panels:
+            yield {"panels": {name: self.explorer.svg(view, name)}}
+        yield {"verdict": view.verdict, "grade": view.grade, "checked": view.checked}
+
+
+def _read(queue: _Queue) -> Parts:
+    """Yield the parts of some work, and raise what it raised."""
+    while (part := queue.get()) is not None:
+        if isinstance(part, Exception):
+            raise part
+        yield part
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -209,6 +227,7 @@ class _Handler(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
     server_version, sys_version = "ptcc", ""
     timeout = 60  # seconds that an idle connection is kept
+    disable_nagle_algorithm = True  # no part waits for the next
 
     def do_GET(self) -> None:
         """Answer with the page, a part of it, or what it asks to be computed."""
@@ -229,14 +248,21 @@ class _Handler(BaseHTTPRequestHandler):
             return self._send(HTTPStatus.NOT_FOUND, "there is no such page", ".txt")
         return self._compute(answers[name], parts.query)
 
-    def _compute(self, answer: Callable[[Settings], dict[str, Any]], query: str) -> None:
+    def _compute(self, answer: Callable[[Settings], Parts], query: str) -> None:
+        """Answer with one line of JSON for every part, as soon as it is there."""
         try:
-            shown = answer(Settings.from_texts(dict(parse_qsl(query, keep_blank_values=True))))
+            parts = answer(Settings.from_texts(dict(parse_qsl(query, keep_blank_values=True))))
+            first = next(parts)
         except Superseded:
-            return self._send(HTTPStatus.CONFLICT, "a control was moved meanwhile", ".txt")
+            self._send(HTTPStatus.CONFLICT, "a control was moved meanwhile", ".txt")
+            return
         except Exception as error:  # of whatever kind: the page tells it in one line
-            shown = {"refusal": explain(error)}
-        return self._send(HTTPStatus.OK, json.dumps(shown), ".json")
+            parts, first = iter(()), {"refusal": explain(error)}
+        self._begin(HTTPStatus.OK, ".json", {"Transfer-Encoding": "chunked"})
+        for part in chain([first], _explained(parts)):
+            line = json.dumps(part).encode() + b"\n"
+            self.wfile.write(b"%x\r\n%s\r\n" % (len(line), line))
+        self.wfile.write(b"0\r\n\r\n")
 
     def _foreign(self, path: str) -> str | None:
         """Tell why a request is not answered: it does not come from a browser to which the address was given."""
@@ -252,16 +278,28 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _send(self, status: HTTPStatus, text: str, suffix: str) -> None:
         body = text.encode()
+        self._begin(status, suffix, {"Content-Length": str(len(body))})
+        self.wfile.write(body)
+
+    def _begin(self, status: HTTPStatus, suffix: str, length: dict[str, str]) -> None:
         self.send_response(status)
         self.send_header("Content-Type", f"{_TYPES.get(suffix, 'text/plain')}; charset=utf-8")
-        self.send_header("Content-Length", str(len(body)))
-        for name, value in _HEADERS.items():
+        for name, value in (length | _HEADERS).items():
             self.send_header(name, value)
         self.end_headers()
-        self.wfile.write(body)
 
     def log_message(self, format: str, *args: Any) -> None:
         """Keep still about requests."""
+
+
+def _explained(parts: Parts) -> Parts:
+    """Yield parts as long as they are wanted, and where one fails why in one line."""
+    try:
+        yield from parts
+    except Superseded:
+        return
+    except Exception as error:
+        yield {"refusal": explain(error)}
 
 
 def open_server(explorer: Explorer, settings: Settings, port: int) -> ExplorerServer:
