@@ -94,17 +94,18 @@ class _Commands(click.Group):
         except (PTCCError, click.BadParameter) as error:
             raise placed(ctx, error) from None
         except click.NoSuchOption as error:
-            if files := [word for word in sys.argv[1:] if word[:1] == "-" and os.path.exists(word)]:  # noqa: PTH110
-                raise click.UsageError(f"{error.message} A file of this name is written ./{files[0]}") from None
             flag, others = error.option_name, self.commands.items()
+            unknown = f"No such option '{flag}'"  # click's own sentence differs from version to version
+            if files := [word for word in sys.argv[1:] if word[:1] == "-" and os.path.exists(word)]:  # noqa: PTH110
+                raise click.UsageError(f"{unknown}. A file of this name is written ./{files[0]}") from None
             if ctx.invoked_subcommand == "design" and flag in _OF_DESIGN:
-                raise click.UsageError(f"{error.message.rstrip('.')}; here it is {_OF_DESIGN[flag]}") from None
+                raise click.UsageError(f"{unknown}; here it is {_OF_DESIGN[flag]}") from None
             if not (having := [f"ptcc {name}" for name, c in others if any(flag in p.opts for p in c.params)]):
                 options = [p for p in error.possibilities or () if did_you_mean(flag.lstrip("-"), [p.lstrip("-")])]
                 hint = f" Did you mean {' or '.join(options)}?" if options else ""  # click's counts the dashes as alike
-                raise click.UsageError(error.message + hint) from None
+                raise click.UsageError(f"{unknown}.{hint}") from None
             each = f"; of many graphs certify each: ptcc certify GRAPH {flag}" * (ctx.invoked_subcommand == "batch")
-            raise click.UsageError(f"{error.message} It is an option of {', '.join(having)}{each}") from None
+            raise click.UsageError(f"{unknown}. It is an option of {', '.join(having)}{each}") from None
 
 
 @click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"], "show_default": True})
