@@ -46,12 +46,11 @@ def refuse_of_agents() -> None:
     context = click.get_current_context()
     for name in _OWN:
         if context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
-            mend = "give it to ptcc certify, or --agents double-integrator, say, to this command"
+            flag = flag_of("protocol" if name == "kind" else name)
+            says = "is not searched for single integrators; give it to ptcc certify, or add --agents double-integrator"
             if name == "x0":
-                mend = "every initial state within a bound is; here it is --initial-bound R"
-            raise ParameterError(
-                f"{flag_of('protocol' if name == 'kind' else name)}: is not searched for single integrators; {mend}"
-            )
+                says = "single integrators are designed for all states within a bound; here it is --initial-bound R"
+            raise ParameterError(f"{flag}: {says}")
 
 
 def design_of_agents(signed: SignedDigraph, options: Options) -> AgentsDesign:

@@ -98,8 +98,8 @@ diverge, for its gain grows without limit before T; give gain_cap, or measure th
             raise ParameterError(f"own_delay = {shorten(repr(self.own_delay))} is neither True nor False")
         if self.own_delay and self.gain_cap is None:
             raise ParameterError(
-                "own_delay without gain_cap: an own state that is late makes the protocol diverge, for its gain grows "
-                "without limit before T; give gain_cap, or measure the own state without delay"
+                "an own state that is late makes the protocol diverge, for its gain grows without limit before T; "
+                "add a gain cap, or measure the own state without delay"
             )
         if not self.age and not self.value_error:
             raise ParameterError(

@@ -141,7 +141,7 @@ def _limits(late: LateBounds) -> str:
         return ""
     threshold = _threshold(late)
     more = "" if math.isinf(threshold) else f", the loop's {threshold:.3g} at constant gain"
-    return f"; this certificate's limit is a delay of {late.longest_delay:.2g}{more}"
+    return f"; this certificate's limit is a delay of {late.longest_delay:.2g} (double under half the cap){more}"
 
 
 def _stages(late: LateBounds) -> list[str]:

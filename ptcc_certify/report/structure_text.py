@@ -60,17 +60,19 @@ def _reading_text(structure: Structure) -> str:
 def leader_lines(structure: Structure, most: int, width: int = 40) -> Lines:
     """Tell of the groups of leaders; of many, the largest that are more than single leaders."""
     closed, labels = structure.closed_components, structure.graph.labels
-    numbered = sorted(enumerate(closed, start=1), key=lambda item: -len(item[1].nodes))[:most]
+    largest = sorted(enumerate(closed, start=1), key=lambda item: -len(item[1].nodes))[:most]
     many = len(closed) > most
+    told = [(number, component) for number, component in sorted(largest) if not many or len(component.nodes) > 1]
     if many:
         single, balanced = sum(len(c.nodes) == 1 for c in closed), sum(c.balanced for c in closed)
-        size = len(numbered[0][1].nodes)
-        yield "leaders", f"{len(closed):,} groups, {balanced:,} balanced; {single:,} of one node, largest {size:,}"
-    for number, component in sorted(numbered):
-        if not many or len(component.nodes) > 1:
-            text = leaders_text(component, labels, width)
-            head = "leaders" if len(closed) == 1 else f"leaders {number}"
-            yield ("", f"group {number}: {text}") if many else (head, text)
+        larger, size = len(closed) - single, len(largest[0][1].nodes)
+        whole = f"{single:,} of one node, {larger:,} larger, up to {size:,}" if larger else "all of one node"
+        these = ", such as" * (larger > len(told))
+        yield "leaders", f"{len(closed):,} groups, {balanced:,} balanced; {whole}{these}"
+    for number, component in told:
+        text = leaders_text(component, labels, width)
+        head = "leaders" if len(closed) == 1 else f"leaders {number}"
+        yield ("", f"group {number}: {text}") if many else (head, text)
 
 
 def leaders_text(component: ClosedComponent, labels: Sequence[str], width: int = 40) -> str:

@@ -155,7 +155,10 @@ def test_design_takes_a_scenario_of_agents_and_prints_the_command_that_proves_it
         (("--agents", "2", "--gain-cap", "9"), "gain_cap: leaves something at every deadline; give residual"),
         (("--agents", "2", "--delta", "1"), "--delta: is not proved of agents of order n under the nominal"),
         (("--initial-bound", "1", "--protocol", "sliding-mode"), "--protocol: is not searched for single integrators"),
-        (("--initial-bound", "1", "--x0", "1,2"), "--x0: is not searched for single integrators"),
+        (
+            ("--initial-bound", "1", "--x0", "1,2"),
+            "--x0: single integrators are designed for all states within a bound",
+        ),
         (("--initial-bound", "1", "--v0", "1,2"), "--v0: is for agents of order n"),
     ],
 )

@@ -198,8 +198,11 @@ def test_a_long_label_keeps_the_end_that_tells_it_apart():
 def test_of_many_groups_of_leaders_the_large_ones_are_told():
     edges = [(f"s{k}", "hub", 1) for k in range(9)] + [("a", "b", -1), ("b", "a", -1), ("a", "hub", 1)]
     lines = structure_summary(analyse(SignedDigraph.from_edges(edges)), "g")
-    assert "leaders    10 groups, 10 balanced; 9 of one node, largest 2" in lines
+    assert "leaders    10 groups, 10 balanced; 9 of one node, 1 larger, up to 2" in lines
     assert "           group 10: balanced, camps {a} against {b}" in lines
+    edges += [(f"{x}{k}", f"{y}{k}", 1) for k in range(40) for x, y in ("pq", "qp")]
+    lines = structure_summary(analyse(SignedDigraph.from_edges(edges)), "g")
+    assert "leaders    50 groups, 50 balanced; 9 of one node, 41 larger, up to 2, such as" in lines
 
 
 def test_a_header_that_swaps_the_columns_is_told(tmp_path):
