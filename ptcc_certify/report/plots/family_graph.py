@@ -146,6 +146,7 @@ def _draw_modes(panels: Sequence[Axes], family: Family, modes: Sequence[Mode], l
     camps, edges = family_camps(family), [_ranges(mode) for mode in modes]
     groups = family_groups(family) if camps is None else camps
     largest = max((arrow.size for some in edges for arrow, _ in some), default=1.0)
+    differ = len({edge.text for some in edges for edge in some}) > 1
     for panel, structure, some in zip(panels, structures, edges, strict=True):
         _draw_nodes(panel, place, radius, groups, structure.leaders)
         bends = _bends(some)
@@ -154,7 +155,8 @@ def _draw_modes(panels: Sequence[Axes], family: Family, modes: Sequence[Mode], l
         taken = None if inside else [box for line in lines for box in line]
         written = draw_labels(panel, family.labels, place, radius, taken)
         arrows, texts = [arrow for arrow, _ in some], [edge.text for edge in some]
-        draw_sizes(panel, arrows, texts, place, bends, written, lines)
+        if differ:
+            draw_sizes(panel, arrows, texts, place, bends, written, lines)
         panel.set_aspect("equal")
         panel.set_xlim(-size[0] / 2, size[0] / 2)
         panel.set_ylim(-size[1] / 2, size[1] / 2)

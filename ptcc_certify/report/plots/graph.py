@@ -86,7 +86,8 @@ def plot_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
     lines = boxes_along(arrows, place, bends)
     written = draw_labels(ax, graph.labels, place, radius, None if inside else [box for line in lines for box in line])
     sizes = [f"{arrow.size:.3g}" for arrow in arrows]
-    draw_sizes(ax, arrows, sizes, place, bends, written, lines)
+    if len(set(sizes)) > 1:
+        draw_sizes(ax, arrows, sizes, place, bends, written, lines)
     ax.set_aspect("equal")
     ax.set_xlim(-width / 2, width / 2)
     ax.set_ylim(-height / 2, height / 2)

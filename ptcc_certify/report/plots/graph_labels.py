@@ -65,8 +65,8 @@ def draw_sizes(
     taken: list[np.ndarray],
     lines: list[list[np.ndarray]],
 ) -> None:
-    """Write the sizes of weights at their arrows, where no other one crosses, if they differ and there are few."""
-    if len(set(texts)) < 2 or len(arrows) > WEIGHED_ARROWS:
+    """Write the sizes of weights at their arrows, where no other one crosses, if there are few."""
+    if len(arrows) > WEIGHED_ARROWS:
         return
     ground = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none"}
     for k, (arrow, text, bend) in enumerate(zip(arrows, texts, bends, strict=True)):
