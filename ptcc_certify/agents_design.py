@@ -316,7 +316,7 @@ def _least_time(base: Certificate, request: AgentsRequest) -> Fraction | None:
 def _unusable(base: Certificate, part: AgentsAnswer, request: AgentsRequest) -> str | None:
     """Tell what is missing, whatever the deadline; None if nothing is."""
     if not base.graph.n_edges:
-        return "no agent listens to another, so that no gains act"
+        return "no agent listens to another, so that there is nothing to bound"
     if not part.functions:
         return base.notes[0] if base.notes else "no decay was proved"
     if part.input is None:

@@ -143,11 +143,14 @@ def _of_certificate(
     with progress(("independent check", "simulation")) as begin:
         begin("independent check")
         certificate = read_certificate(path, memory=options["memory"])
-        if begins and certificate.initial_state is not None:
-            raise ParameterError(f"--x0 is for what holds no initial state; the certificate {path} has its own")
-        of_agents = isinstance(certificate, Certificate) and certificate.agents is not None
+        agents = certificate.agents if isinstance(certificate, Certificate) else None
+        of_agents = agents is not None
+        if begins and (of_agents or certificate.initial_state is not None):
+            mend = "certify agents of order n with it" if of_agents else f"the certificate {path} has its own"
+            raise ParameterError(f"--x0 is for what holds no initial state; {mend}")
         what = what or certificate.main_figure
-        drawn, others = ((*OF_AGENTS, *_SHARED), OF_A_RUN) if of_agents else (OF_A_RUN, OF_AGENTS)
+        of_these = OF_AGENTS if agents is None or agents.dimension == 2 else ("motion",)
+        drawn, others = ((*of_these, *_SHARED), OF_A_RUN) if of_agents else (OF_A_RUN, OF_AGENTS)
         if what in others and what not in drawn:
             raise ParameterError(f"--what {what} is not drawn of {path}; ask for --what {' or '.join(drawn)}")
         if of_agents or what not in OF_A_RUN:

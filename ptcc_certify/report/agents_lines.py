@@ -45,7 +45,8 @@ def answers(part: AgentsAnswer) -> Iterator[tuple[str, str]]:
     yield from _final_lines(part, 2 * TEXT)
     if not part.functions:
         if part.structure.graph.n_edges == 0:
-            yield "error", "none: no agent listens to another, each moves by itself"
+            alone = "comes to rest" if part.derivatives_agree and any(part.protocol.own) else "moves"
+            yield "error", f"none: no agent listens to another, each {alone} by itself"
         return
     yield "error", _error_text(part)
     yield _input_line(part)

@@ -42,9 +42,11 @@ function showWords(place, text) {
 const drawn = {}; // the panels as they are shown
 
 async function showPanel(name, svg) {
+  const panel = document.getElementById(`panel-${name}`);
+  panel.classList.remove("old");
   if (drawn[name] === svg) return;
   drawn[name] = svg;
-  const image = document.querySelector(`#panel-${name} img`);
+  const image = panel.querySelector("img");
   const old = image.src;
   if (svg === undefined) {
     image.removeAttribute("src");
@@ -79,19 +81,24 @@ function tellGone() {
   show({ refusal: "ptcc explore has ended or does not answer; start it again in the terminal" });
 }
 
-// One line of JSON for every part of the answer, shown as it comes; false where a control was moved meanwhile.
+// One line of JSON for every part of the answer, shown as it comes; false where a control was moved meanwhile, on this
+// page or on another of this server, so that no verdict came.
 async function ask(what, wished, signal) {
   const answer = await fetch(`${what}?${settings()}`, { signal });
   if (answer.status === 409) return false;
   if (!answer.ok) throw new Error(await answer.text());
   const reader = answer.body.pipeThrough(new TextDecoderStream()).getReader();
   let text = "";
+  let ended = false;
   for (;;) {
     const { value, done } = await reader.read();
-    if (done) return true;
+    if (done) return ended;
     const lines = (text + value).split("\n");
     text = lines.pop();
-    for (const line of lines) if (wished()) await show(JSON.parse(line));
+    for (const view of lines.map((line) => JSON.parse(line))) {
+      ended = "verdict" in view || "refusal" in view;
+      if (wished()) await show(view);
+    }
   }
 }
 
@@ -103,6 +110,7 @@ async function preview() {
     do {
       seen = wanted;
       await ask("preview", () => true);
+      clearTimeout(timer);
       if (!document.body.classList.contains("refused")) timer = setTimeout(certify, REST);
     } while (seen !== wanted);
   } catch (error) {
@@ -127,7 +135,9 @@ function move() {
   clearTimeout(timer);
   if (certifying) certifying.abort();
   verdict.className = "open"; // nothing is called certified but what is shown
+  setText(verdict.firstElementChild, "Verdict");
   setText(verdict.lastElementChild, "computing");
+  for (const panel of document.querySelectorAll("figure")) panel.classList.add("old");
   history.replaceState(null, "", `?${settings()}`);
   preview();
 }
