@@ -24,9 +24,6 @@ Proof.
   - rewrite Rmin_left, Rmax_right in Hc by lra. rewrite RInt_point in Eq. unfold zero in Eq; simpl in Eq.
     specialize (L c ltac:(lra)). assert ((H c - dG c) * (t - a) <= 0) by nra. lra.
 Qed.
-Lemma least_ok a b y : y <= Q2R a -> y <= Q2R b -> y <= Q2R (least_of a b).
-Proof. intros. unfold least_of. destruct (Qle_bool a b); assumption. Qed.
-
 Section Spent.
 Variables (c : cert) (T_r T_s mu1 mu2 mu3 delta : Q).
 Hypothesis Hprot : check_protocol c = true.
@@ -38,7 +35,7 @@ Let gain := gain T r1 kk.
 Let s := s c.
 Let pos3 : 0 < T /\ 0 < r1 /\ 0 < kk.
 Proof. exact (Driven.positive c T_r T_s mu1 mu2 mu3 delta Hprot Hkind). Qed.
-Variables (U : R -> R) (r x A : Q) (l : list stretch) (y : Q) (o : instant).
+Variables (U : R -> R) (r x : Q) (l : list stretch) (y : Q) (o : instant).
 Hypotheses (Hr : 0 < Q2R r) (Hx : 0 <= Q2R x).
 Hypothesis U0 : forall t, 0 <= U t.
 Hypothesis HS : stands c T_r mu2 mu3 o.
@@ -47,7 +44,7 @@ Hypothesis HC : covers c U r l 0 te.
 Hypothesis Hy : U te <= Q2R y.
 Hypothesis late : forall t, te <= t < T -> U t <= exp (- (Q2R r / 2 * (s t - s te))) * U te.
 Variable E : R -> R.
-Hypothesis HE : forall t, 0 <= t < T -> 0 <= E t /\ E t <= Q2R x * U t /\ E t <= Q2R A.
+Hypothesis HE : forall t, 0 <= t < T -> 0 <= E t /\ E t <= Q2R x * U t.
 Let Ht : 0 <= te < T.
 Proof. exact (proj1 HS). Qed.
 Let G0 : Q2R (gain_at c o) = gain te.
@@ -55,7 +52,7 @@ Proof. exact (gain_ok c T_r T_s mu1 mu2 mu3 delta Hprot Hkind o HS). Qed.
 Lemma y0 : 0 <= Q2R y. Proof. pose proof (U0 te). lra. Qed.
 Lemma later t : te <= t < T -> E t <= exp (- (Q2R r / 2 * (s t - s te))) * (Q2R x * Q2R y).
 Proof.
-  intros H. destruct (HE t ltac:(lra)) as [_ [B _]]. eapply Rle_trans; [exact B|]. specialize (late t H).
+  intros H. destruct (HE t ltac:(lra)) as [_ B]. eapply Rle_trans; [exact B|]. specialize (late t H).
   pose proof (exp_pos (- (Q2R r / 2 * (s t - s te)))) as P. set (e := exp _) in *.
   replace (e * (Q2R x * Q2R y)) with (Q2R x * (e * Q2R y)) by ring. apply Rmult_le_compat_l; [exact Hx|].
   eapply Rle_trans; [exact late|]. apply Rmult_le_compat_l; [left; exact P|exact Hy].
@@ -68,20 +65,18 @@ Proof.
   - right. exists p. destruct H as [_ [_ [H _]]]. destruct (H t ltac:(lra)) as [H1 H2]. split; [left; reflexivity|]. split; assumption.
   - destruct (IH b C t ltac:(lra)) as [K|[q [K1 K2]]]; [left; exact K|right]. exists q. split; [right; exact K1|exact K2].
 Qed.
-Lemma peak_ok b : peak_moving c A b x o (l, y) r = true -> forall t, 0 <= t < T -> gain t * E t <= Q2R b.
+Lemma peak_ok b : peak_moving c b x o (l, y) r = true -> forall t, 0 <= t < T -> gain t * E t <= Q2R b.
 Proof.
   unfold peak_moving. cbn [fst snd]. intros H t H0. apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2].
   apply Qle_ok in H1, H2. rewrite !Q2R_mult, G0 in H2. rewrite !Q2R_mult, Q2R_2 in H1. fold (k c) in H1. fold kk in H1.
-  destruct (HE t H0) as [E0 [E1 E2]]. destruct pos3 as [P1 [P2 P3]]. assert (G : 0 < gain t) by (apply gain_pos; lra).
+  destruct (HE t H0) as [E0 E1]. destruct pos3 as [P1 [P2 P3]]. assert (G : 0 < gain t) by (apply gain_pos; lra).
   assert (L : te <= t -> gain t * E t <= Q2R b).
   { intros L. eapply Rle_trans; [|exact H2]. pose proof (later t (Logic.conj L (proj2 H0))) as B.
     pose proof (gain_decays c T_r T_s mu1 mu2 mu3 delta Hprot Hkind r te t H1 (Logic.conj (proj1 Ht) L) (proj2 H0)) as D. fold T r1 kk in D. fold gain s in D.
     pose proof y0. set (e := exp _) in *. eapply Rle_trans; [apply Rmult_le_compat_l; [lra|exact B]|].
     replace (gain t * (e * (Q2R x * Q2R y))) with (Q2R x * Q2R y * (gain t * e)) by ring. apply Rmult_le_compat_l; [apply Rmult_le_pos; assumption|exact D]. }
-  destruct (Rle_lt_dec te t) as [K|K]; [apply L; exact K|]. apply orb_prop in H3 as [H3|H3].
-  - apply Qle_ok in H3. rewrite Q2R_mult, G0 in H3. assert (M : gain t <= gain te) by (apply gain_grows; lra).
-    eapply Rle_trans; [apply Rmult_le_compat; [lra|exact E0|exact M|exact E2]|]. lra.
-  - destruct (covered l 0 HC t ltac:(lra)) as [->|[p [I [B1 B2]]]]; [lra|]. rewrite forallb_forall in H3. specialize (H3 p I).
+  destruct (Rle_lt_dec te t) as [K|K]; [apply L; exact K|].
+  destruct (covered l 0 HC t ltac:(lra)) as [->|[p [I [B1 B2]]]]; [lra|]. rewrite forallb_forall in H3. specialize (H3 p I).
     apply Qle_ok in H3. rewrite Q2R_mult in H3. eapply Rle_trans; [|exact H3]. specialize (B2 H1).
     apply Rle_trans with (gain t * (Q2R x * U t)); [apply Rmult_le_compat_l; lra|].
     replace (gain t * (Q2R x * U t)) with (Q2R x * (gain t * U t)) by ring. apply Rmult_le_compat_l; lra.
@@ -133,20 +128,20 @@ Proof.
       - specialize (Hd u ltac:(lra)). lra. }
     rewrite <- Rmult_minus_distr_l, (Rmult_comm q). apply Rmult_le_compat_l; lra.
 Qed.
-Lemma size_ok p a b t : holds_in c U r p a b -> a <= t <= b -> 0 <= E t /\ E t <= Q2R (least_of (x * size_in p) A).
+Lemma size_ok p a b t : holds_in c U r p a b -> a <= t <= b -> 0 <= E t /\ E t <= Q2R ((x * size_in p)).
 Proof.
-  intros [K1 [K2 [K3 _]]] Hat. fold T in K2. destruct (HE t ltac:(lra)) as [E0 [E1 E2]]. split; [exact E0|]. apply least_ok; [|exact E2].
+  intros [K1 [K2 [K3 _]]] Hat. fold T in K2. destruct (HE t ltac:(lra)) as [E0 E1]. split; [exact E0|].
   rewrite Q2R_mult. eapply Rle_trans; [exact E1|]. apply Rmult_le_compat_l; [exact Hx|]. apply (K3 t Hat).
 Qed.
-Lemma length_ok b : (forall u, 0 <= u < T -> H u = gain u * E u) -> length_moving A b x (l, y) r = true ->
+Lemma length_ok b : (forall u, 0 <= u < T -> H u = gain u * E u) -> length_moving b x (l, y) r = true ->
   forall t, 0 <= t < T -> RInt H 0 t <= Q2R b.
 Proof.
-  intros HH HL t H0. unfold length_moving in HL. cbn [fst snd] in HL. apply andb_prop in HL as [_ HL]. apply Qle_ok in HL.
+  intros HH HL t H0. unfold length_moving in HL. cbn [fst snd] in HL. apply Qle_ok in HL.
   rewrite Q2R_plus, !Q2R_mult, Q2R_div, Q2R_2 in HL by (apply nonzero; lra). eapply Rle_trans; [|exact HL]. rewrite Rplus_comm.
   destruct pos3 as [P1 [P2 P3]]. assert (Gp : forall u, u < T -> 0 < gain u) by (intros; apply gain_pos; lra). pose proof y0 as Y0.
-  apply (cover_int (fun p => clock_in p * least_of (x * size_in p) A)%Q) with (l0 := l); [| |lra|exact HC|exact H0].
+  apply (cover_int (fun p => clock_in p * (x * size_in p))%Q) with (l0 := l); [| |lra|exact HC|exact H0].
   - intros p a b' K u Hu. pose proof K as [K1 [K2 [_ [K4 _]]]]. fold T in K2. rewrite Q2R_mult.
-    apply (piece_int p a b' (Q2R (least_of (x * size_in p) A)) s gain (Q2R (clock_in p)) K); auto.
+    apply (piece_int p a b' (Q2R ((x * size_in p))) s gain (Q2R (clock_in p)) K); auto.
     + destruct (size_ok p a b' a K ltac:(lra)). lra.
     + intros v Hv. apply clock_derive; [exact P1|exact Hv].
     + intros v Hv. left. apply Gp. exact Hv.
@@ -160,7 +155,7 @@ Proof.
       { apply Rmult_le_pos; [|left; apply exp_pos]. apply Rmult_le_pos; [left; apply Rdiv_lt_0_compat; lra|apply Rmult_le_pos; lra]. }
       lra.
 Qed.
-Lemma energy_ok b : (forall u, 0 <= u < T -> H u = sq (gain u * E u)) -> energy_moving c A b x o (l, y) r = true ->
+Lemma energy_ok b : (forall u, 0 <= u < T -> H u = sq (gain u * E u)) -> energy_moving c b x o (l, y) r = true ->
   forall t, 0 <= t < T -> RInt H 0 t <= Q2R b.
 Proof.
   intros HH HL t H0. unfold energy_moving in HL. cbn [fst snd] in HL. cbv zeta in HL. apply andb_prop in HL as [HR HL]. apply Qle_ok in HL.
@@ -178,8 +173,8 @@ Proof.
     rewrite !Q2R_div by assumption. rewrite Q2R_minus, !Q2R_mult, EK, ET, Q2R_1, HS2. fold q z. unfold more. f_equal. f_equal. f_equal. f_equal. field. split; lra. }
   rewrite Q2R_plus, EL in HL. eapply Rle_trans; [|exact HL]. rewrite Rplus_comm.
   assert (Gp : forall u, u < T -> 0 < gain u) by (intros; apply gain_pos; lra).
-  apply (cover_int (fun p => square_in p * (least_of (x * size_in p) A * least_of (x * size_in p) A))%Q) with (l0 := l); [| |lra|exact HC|exact H0].
-  - intros p a b' K u Hu. pose proof K as [K1 [K2 [_ [_ K5]]]]. fold T in K2. rewrite !Q2R_mult. set (m := Q2R (least_of (x * size_in p) A)) in *.
+  apply (cover_int (fun p => square_in p * ((x * size_in p) * (x * size_in p)))%Q) with (l0 := l); [| |lra|exact HC|exact H0].
+  - intros p a b' K u Hu. pose proof K as [K1 [K2 [_ [_ K5]]]]. fold T in K2. rewrite !Q2R_mult. set (m := Q2R ((x * size_in p))) in *.
     apply (piece_int p a b' (m * m) (squared c) (fun u => gain u * gain u) (Q2R (square_in p)) K); auto.
     + apply Rle_0_sqr.
     + intros v Hv. apply (squared_derive c T_r T_s mu1 mu2 mu3 delta Hprot Hkind v Hv).
