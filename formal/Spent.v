@@ -140,7 +140,7 @@ Proof.
   rewrite Q2R_plus, !Q2R_mult, Q2R_div, Q2R_2 in HL by (apply nonzero; lra). eapply Rle_trans; [|exact HL]. rewrite Rplus_comm.
   destruct pos3 as [P1 [P2 P3]]. assert (Gp : forall u, u < T -> 0 < gain u) by (intros; apply gain_pos; lra). pose proof y0 as Y0.
   apply (cover_int (fun p => clock_in p * (x * size_in p))%Q) with (l0 := l); [| |lra|exact HC|exact H0].
-  - intros p a b' K u Hu. pose proof K as [K1 [K2 [_ [K4 _]]]]. fold T in K2. rewrite Q2R_mult.
+  - intros p a b' K u Hu. pose proof K as [K1 [K2 [_ [K4 _]]]]. fold T in K2. rewrite (Q2R_mult (clock_in p)).
     apply (piece_int p a b' (Q2R ((x * size_in p))) s gain (Q2R (clock_in p)) K); auto.
     + destruct (size_ok p a b' a K ltac:(lra)). lra.
     + intros v Hv. apply clock_derive; [exact P1|exact Hv].
@@ -174,7 +174,7 @@ Proof.
   rewrite Q2R_plus, EL in HL. eapply Rle_trans; [|exact HL]. rewrite Rplus_comm.
   assert (Gp : forall u, u < T -> 0 < gain u) by (intros; apply gain_pos; lra).
   apply (cover_int (fun p => square_in p * ((x * size_in p) * (x * size_in p)))%Q) with (l0 := l); [| |lra|exact HC|exact H0].
-  - intros p a b' K u Hu. pose proof K as [K1 [K2 [_ [_ K5]]]]. fold T in K2. rewrite !Q2R_mult. set (m := Q2R ((x * size_in p))) in *.
+  - intros p a b' K u Hu. pose proof K as [K1 [K2 [_ [_ K5]]]]. fold T in K2. rewrite (Q2R_mult (square_in p)), (Q2R_mult (x * size_in p) (x * size_in p)). set (m := Q2R (x * size_in p)) in *.
     apply (piece_int p a b' (m * m) (squared c) (fun u => gain u * gain u) (Q2R (square_in p)) K); auto.
     + apply Rle_0_sqr.
     + intros v Hv. apply (squared_derive c T_r T_s mu1 mu2 mu3 delta Hprot Hkind v Hv).
