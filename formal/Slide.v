@@ -67,12 +67,6 @@ Proof.
   apply negb_true_iff in Hd. destruct (Qlt_le_dec delta mu1) as [L|L]; [apply Qlt_Rlt in L; lra|].
   apply Qle_bool_iff in L. congruence.
 Qed.
-Lemma delta_pos : 0 <= Q2R delta.
-Proof.
-  assert (H := Hprot). unfold check_protocol in H. rewrite Hkind in H. apply andb_prop in H as [_ H].
-  apply andb_prop in H as [H _]. apply andb_prop in H as [_ H]. apply Z.leb_le in H. unfold Q2R.
-  apply Rmult_le_pos; [apply IZR_le; exact H|]. left. apply Rinv_0_lt_compat. apply IZR_lt. reflexivity.
-Qed.
 Lemma pull_pos t : 0 < p t.
 Proof.
   destruct parts as [A [_ [B C]]]. unfold p, pull. fold Tr m. destruct (Rlt_dec t Tr) as [L|L]; [|lra].
@@ -103,15 +97,9 @@ Section Agent.
 Variables (X S : R -> nat -> R) (i : nat).
 Hypothesis HM : moves c X S.
 Hypothesis Hi : (i < order c)%nat.
-Lemma laws t e : 0 <= t < deadline c -> S t i <> 0 -> 0 < e -> exists eta, 0 < eta /\ forall h, 0 < h < eta ->
-  Rabs (Rabs (S (t + h) i) - (Rabs (S t i) - h * (Q2R mu1 + p t * Rabs (S t i)))) <= h * (Q2R delta + e).
-Proof. intros Ht N He. destruct HM as [_ H]. unfold slides in H. rewrite Hkind in H. exact (H t i e Ht Hi N He). Qed.
 Lemma law t e : 0 <= t < deadline c -> S t i <> 0 -> 0 < e -> exists eta, 0 < eta /\ forall h, 0 < h < eta ->
   Rabs (S (t + h) i) <= Rabs (S t i) - h * (Q2R mu1 - Q2R delta + p t * Rabs (S t i) - e).
-Proof.
-  intros Ht N He. destruct (laws t e Ht N He) as [eta [E H]]. exists eta. split; [exact E|]. intros h Hh. specialize (H h Hh).
-  apply Rabs_le_between in H. lra.
-Qed.
+Proof. intros Ht N He. destruct HM as [_ H]. unfold slides in H. rewrite Hkind in H. exact (H t i e Ht Hi N He). Qed.
 Lemma size_cont t : t < deadline c -> continuous (fun u => Rabs (S (Rmax 0 u) i)) t.
 Proof.
   intros Ht. destruct HM as [[_ C] _]. apply (continuous_comp (fun u => S (Rmax 0 u) i) Rabs); [|apply continuous_Rabs].
@@ -193,9 +181,8 @@ Proof.
   intros u _. split; [apply @is_derive_const|]. split; [lra|]. pose proof (pull_pos u). nra.
 Qed.
 Lemma input_part t l : check_sliding_input c = true -> sliding_input c = l -> 0 <= t < Tr -> (i < length l)%nat ->
-  S 0 i = Q2R (nth i (sliding c) 0%Q) -> added c S t i <= Q2R (nth i l 0%Q).
+  S 0 i = Q2R (nth i (sliding c) 0%Q) -> Q2R mu1 + p t * Rabs (S t i) <= Q2R (nth i l 0%Q).
 Proof.
-  unfold added. rewrite Hkind. fold p.
   intros H E Ht Hl H0. destruct parts as [A [_ [Pn Pm]]]. unfold check_sliding_input in H. rewrite Hkind, E in H.
   destruct l as [|a l']; [simpl in Hl; lia|]. set (l := a :: l') in *. apply andb_prop in H as [H1 H2].
   rewrite forallb_forall in H2. specialize (H2 i ltac:(apply in_seq; lia)). apply Qle_bool_iff, Qle_Rle in H2.
