@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 from fractions import Fraction
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -133,6 +134,55 @@ def test_the_claim_of_every_weak_component_is_verified(tmp_path: Path) -> None:
         assert not check(forged).accepted
         code, text = said(forged, tmp_path)
         assert code == 1, (path, text)
+
+
+def many_components() -> dict:
+    """A certificate of 102 weak components, of all kinds of one to three nodes."""
+    edges: list[tuple[str, str, int]] = []
+    for k in range(0, 102, 3):
+        edges += [(f"a{k}", f"b{k}", 1), (f"b{k}", f"a{k}", 2)]  # balanced
+        edges += [(f"c{k}", f"d{k}", 1), (f"d{k}", f"c{k}", -1)]  # not balanced
+        edges += [(f"e{k}", f"f{k}", 1), (f"g{k}", f"f{k}", -2)]  # two leaders
+    return json.loads(certify(edges, NominalProtocol(1, 1, 1, 2), simulation=False).to_json())
+
+
+def test_the_claims_of_more_than_100_weak_components_are_verified(tmp_path: Path) -> None:
+    program()
+    document = many_components()
+    section = document["components"]
+    code, text = said(document, tmp_path)
+    assert code == 0 and "verified    claim of graph" in text and len(section["nodes"]) == 102
+    objects = [
+        {"nodes": nodes, "connectivity": kind, "claim": None, "final_state": None}
+        for nodes, kind in zip(section["nodes"], section["connectivity"], strict=True)
+    ]
+    for path, new in (
+        (("components", "theorem", 0), "1.2"),
+        (("components", "behaviour", 101), "stability"),
+        (("components", "corollaries", 0), []),
+        (("components", "connectivity", 1), "weak"),
+        (("components", "nodes", 5), section["nodes"][5][:-1]),
+        (("components", "nodes"), section["nodes"][1:] + section["nodes"][:1]),
+        (("components", "theorem"), section["theorem"][:-1]),
+        (("components",), objects),
+    ):
+        forged = resealed(changed(document, path, new))
+        assert not check(forged).accepted
+        code, text = said(forged, tmp_path)
+        assert code == 1, (path, text)
+
+
+@pytest.mark.campaign
+def test_no_mutant_of_the_claims_of_many_weak_components_is_accepted(tmp_path: Path) -> None:
+    program()
+    document = {**many_components(), "unverified": {}}
+    of_components = ((path, mutant) for path, mutant in mutants(document) if path[:1] == ("components",))
+    count = 0
+    for path, mutant in islice(of_components, 0, None, 3):
+        if mutant["components"] != document["components"]:
+            count += 1
+            assert said(resealed(mutant), tmp_path).code == 1, path
+    assert count >= 500
 
 
 @pytest.mark.parametrize("kind", ["rate-mean", "rate-upper-bound"])

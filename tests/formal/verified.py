@@ -19,7 +19,7 @@ SKIPPED = {"reaching-time", "input-threshold", "input-peak", "limited-gain", "no
 AT_REST = {"input-energy", "input-length"}
 #: What the executable says of a form that it does not read.
 UNREAD = (
-    "100 weak components",
+    "weak components of",
     "family",
     "side vector",
     "large form",
