@@ -1,0 +1,128 @@
+(** The executable check of a family: quadratic functions of what is left to the states at rest, for all members. *)
+Require Import ZArith QArith Qabs List Bool.
+Import ListNotations.
+Require Import Vec Definite Graph Certificate Checker Wide FamilyCertificate.
+Open Scope Z_scope.
+
+(** * One weight: [|w|] in [[lo, hi]] times [f h'] *)
+Definition positive (e : tie) : bool := Qle_bool 0 (from_ e).
+Definition sign_of (e : tie) : Z := if positive e then 1 else -1.
+Definition lo (e : tie) : Q := if positive e then from_ e else (- upto_ e)%Q.
+Definition hi (e : tie) : Q := if positive e then upto_ e else (- from_ e)%Q.
+Definition middle (e : tie) : Q := ((lo e + hi e) * (1 # 2))%Q.
+Definition radius (e : tie) : Q := ((hi e - lo e) * (1 # 2))%Q.
+Definition hvec (e : tie) : vec := vadd (unit (head e) 1) (unit (tail e) (- sign_of e)).
+Definition fvec (e : tie) : vec := if mutual e then hvec e else unit (head e) 1.
+Definition check_tie (n : nat) (e : tie) : bool :=
+  (head e <? n)%nat && (tail e <? n)%nat && Qle_bool 0 (lo e) && Qle_bool (lo e) (hi e).
+
+(** * The decrease of a form for all weights of a mode *)
+Definition grad (F : mat) (f : vec) : vec := vadd (lincomb f F) (map (fun r => zdot r f) F).
+(** with a multiplier, or at the smallest size: which does if no other is possible, or if what comes on top is a square *)
+Definition check_term (n : nat) (F : mat) (t : tie * option Q) : bool :=
+  let e := fst t in let G := grad F (fvec e) in (length G <=? n)%nat && match snd t with
+  | Some tau => notneg tau
+  | None => Qeq_bool (lo e) (hi e) || (let c := nth (head e) G 0 in (0 <=? c) && zero_vec (vadd G (scale (- c) (hvec e)))) end.
+Fixpoint build (dq : Z) (F : mat) (k : nat) (l : list (tie * option Q)) : mat :=
+  match l with
+  | [] => []
+  | (e, None) :: l' => madd (outer (hvec e) (scale (scaled dq (lo e)) (grad F (fvec e)))) (build dq F k l')
+  | (e, Some tau) :: l' => let G := grad F (fvec e) in let t := scaled dq tau in
+      madd (madd (outer (hvec e) (vadd (scale (scaled dq (middle e)) G) (scale (- t) (hvec e))))
+        (outer (unit k 1) (vadd (scale (scaled dq (radius e)) G) (unit k t)))) (build dq F (S k) l') end.
+Definition terms (l : list (tie * option Q)) : list Q :=
+  flat_map (fun t => match snd t with None => [lo (fst t)] | Some tau => [middle (fst t); radius (fst t); tau] end) l.
+Definition taus (l : list (tie * option Q)) : nat := length (filter (fun t => match snd t with Some _ => true | None => false end) l).
+Definition check_decay (n : nat) (sw : Z) (fw : kernel) (F : mat) (b : Q) (l : list (tie * option Q)) : bool :=
+  let dq := common (b :: terms l) in
+  good dq (b :: terms l) && forallb (check_term n F) l &&
+  nonneg (n + taus l) sw fw (madd (build dq F n l) (mscale (- scaled dq b) F)).
+
+(** * Forms of what is left to the states at rest *)
+Definition crow (sw : Z) (B : list (nat * list Q)) (i : nat) : vec :=
+  vadd (unit i sw) (fold_right (fun b a => vadd (unit (fst b) (- scaled sw (nth i (snd b) 0%Q))) a) [] B).
+Record quotient := Quotient { qn : nat; qsw : Z; qfw : kernel; qF : mat; qm : Z }.
+Definition common_of (B : list (nat * list Q)) : Z := common (concat (map snd B)).
+Definition kernel_of (n : nat) (P : part) : kernel := let sw := common_of (basis P) in
+  map (fun b => (fst b, map (scaled sw) (snd b))) (basis P) ++
+  map (fun i => (i, unit i sw)) (filter (fun i => negb (mem i (agents P))) (seq 0 n)).
+Definition quotient_of (n : nat) (p : part) (P : list (list Q)) : quotient :=
+  let sw := common_of (basis p) in let d := common (concat P) in
+  let C := map (crow sw (basis p)) (seq 0 n) in
+  Quotient n sw (kernel_of n p) (tmul C (mmul (map (map (scaled d)) P) C)) (d * (sw * sw)).
+Definition check_quotient (p : part) (P : list (list Q)) (q : quotient) : bool :=
+  let d := common (concat P) in
+  forallb (good d) P && (0 <? d) && (0 <? qsw q) && forallb (fun b => good (qsw q) (snd b)) (basis p) &&
+  fits (qn q) (map (map (scaled d)) P) && fits (qn q) (qF q).
+(** how large linear functions are: [(d'x)^2 <= a^2 V] *)
+Definition check_size (q : quotient) (r : factor) (d : vec) (scale_ : Z) (a : Q) : bool :=
+  notneg a && bounded_mod (qfw q) r d (Qnum a * Qnum a * (scale_ * scale_)) (Zpos (Qden a) * Zpos (Qden a) * qm q).
+Definition near (P : part) (e : tie) : bool := mem (head e) (agents P) || mem (tail e) (agents P).
+Definition abs_entry (l : vec) (i : nat) : Q := inject_Z (Z.abs (nth i l 0)).
+(** row [i] at the middle, times [dq] *)
+Definition mid_row (dq : Z) (l : list tie) (i : nat) : vec :=
+  fold_right (fun e a => vadd (scale (scaled dq (middle e) * nth i (fvec e) 0) (hvec e)) a) [] l.
+Definition spread (l : list (tie * Q)) (i : nat) : Q :=
+  fold_right (fun t a => (radius (fst t) * abs_entry (fvec (fst t)) i * snd t + a)%Q) 0%Q l.
+(** roots: of each weight, and of each agent *)
+Definition check_inputs (q : quotient) (r : factor) (P : part) (ins : list Q) (l : list tie) (roots : list Q * list Q) : bool :=
+  let dq := common (map middle l) in let t := combine l (fst roots) in
+  good dq (map middle l) && (length l =? length (fst roots))%nat &&
+  forallb (fun t => negb (near P (fst t)) || Qeq_bool (radius (fst t)) 0 && notneg (snd t) || check_size q r (hvec (fst t)) 1 (snd t)) t &&
+  forallb (fun i => let a := nth i (snd roots) 0%Q in
+    check_size q r (mid_row dq l i) dq a &&
+    (let s := (a + spread t i)%Q in Qle_bool (s * s) (nth i ins 0%Q))) (agents P).
+Definition check_offs (q : quotient) (r : factor) (P : part) (cs : list Q) : bool :=
+  forallb (fun i => let c := nth i cs 0%Q in notneg c &&
+    bounded_mod (qfw q) r (crow (qsw q) (basis P) i) (Qnum c * (qsw q * qsw q)) (Zpos (Qden c) * qm q)) (agents P).
+
+(** * What is at rest in all members *)
+Definition rest_vec (dl : Z) (l : list tie) (v : vec) : vec :=
+  fold_right (fun e a => vadd (scale (scaled dl (lo e) * zdot (hvec e) v) (fvec e)) a) [] l.
+Definition check_rest (sw : Z) (l : list tie) (v : list Q) : bool :=
+  let vz := map (scaled sw) v in let dl := common (map lo l) in
+  good sw v && good dl (map lo l) &&
+  forallb (fun e => Qeq_bool (lo e) (hi e) || (zdot (hvec e) vz =? 0)) l && zero_vec (rest_vec dl l vz).
+
+(** * Hints, which are not believed *)
+Record hint := Hint { multipliers : list (list (option Q)); roots : list (list Q * list Q) }.
+Definition check_form (F : family) (b : bound) (h : hint) (P : list (list Q)) : bool :=
+  let p := about b in let q := quotient_of (order (frame F)) p P in
+  let n := order (frame F) in
+  check_quotient p P q && (length (multipliers h) =? length (modes F))%nat && (length (roots h) =? length (modes F))%nat &&
+  forallb (fun mt => (length (ties (fst mt)) =? length (snd mt))%nat &&
+    check_decay n (qsw q) (qfw q) (qF q) (decay b) (combine (ties (fst mt)) (snd mt))) (combine (modes F) (multipliers h)) &&
+  match factor_mod n (qsw q) (qfw q) (qF q) with
+  | Some r => check_offs q r p (offs b) &&
+      forallb (fun mr => check_inputs q r p (inputs b) (ties (fst mr)) (snd mr)) (combine (modes F) (roots h))
+  | None => false end.
+Definition check_bound (F : family) (b : bound) (h : hint) : bool :=
+  forallb (fun i => (i <? order (frame F))%nat) (agents (about b)) &&
+  match by_ b with Form P => check_form F b h P | _ => false end.
+
+(** * Modes and parts *)
+Definition same_edge (e f : edge) : bool := (tgt e =? tgt f)%nat && (src e =? src f)%nat && (Qnum (wt e) =? Qnum (wt f)) && (Zpos (Qden (wt e)) =? Zpos (Qden (wt f))).
+Fixpoint same_edges (l m : list edge) : bool :=
+  match l, m with [], [] => true | e :: l', f :: m' => same_edge e f && same_edges l' m' | _, _ => false end.
+Definition check_mode (F : family) (m : mode) : bool :=
+  let c := mandatory m in
+  forallb (check_tie (order (frame F))) (ties m) && same_edges (edges c) (smallest (ties m)) &&
+  (order c =? order (frame F))%nat && wide_structure c && wide_claims c.
+Definition every_edge (F : family) : list edge := flat_map (fun e => there e 1%Q) (flat_map ties (modes F)).
+Definition check_part (F : family) (P : part) : bool :=
+  let n := order (frame F) in let es := every_edge F in let C := agents P in
+  let R := reach n (es ++ map swap es) [hd O C] in
+  (match C with [] => false | _ => true end) && forallb (fun i => mem i R) C &&
+  forallb (fun e => Bool.eqb (mem (src e) C) (mem (tgt e) C)) es &&
+  match becomes P with Depends => true | _ =>
+    forallb (fun m => (length (filter is_balanced (owned m P)) =? length (basis P))%nat &&
+      forallb (fun b => check_rest (common_of (basis P)) (ties m) (snd b)) (basis P)) (modes F) end &&
+  match becomes P with
+  | Depends => true
+  | Stability => match basis P with [] => true | _ => false end
+  | Consensus => match basis P with [(_, v)] => forallb (fun i => Qeq_bool (nth i v 0%Q * nth i v 0%Q) 1) C | _ => false end
+  | Interval => forallb (fun m => match owned m P with [_] => true | _ => false end) (modes F)
+  | Containment => existsb (fun m => match owned m P with _ :: _ :: _ => true | _ => false end) (modes F) end.
+Definition check_frame (F : family) : bool :=
+  let c := frame F in check_protocol c && check_sliding_input c && check_reaching c && (match edges c with [] => true | _ => false end) &&
+  forallb (fun i => existsb (fun P => mem i (agents P)) (parts F)) (seq 0 (order c)).
