@@ -7,7 +7,7 @@ Require Import Certificate. Open Scope R_scope.
 
 (** * Families *)
 (** a weight of the edge from [tail] to [head], between two numbers; if [mutual], of the reverse edge too: they change together *)
-Record tie := Tie { head : nat; tail : nat; from_ : Q; upto_ : Q; mutual : bool }.
+Record tie := Tie { head : nat; tail : nat; bottom : Q; top : Q; mutual : bool }.
 (** a mode: its weights; and the graph of its mandatory edges, which cannot fail, at the smallest sizes *)
 Record mode := Mode { ties : list tie; mandatory : cert }.
 Definition heard t s w x i := if (t =? i)%nat then Rabs w * x t - w * x s else 0.
@@ -15,10 +15,10 @@ Definition pulls e w x i := heard (head e) (tail e) w x i + if mutual e then hea
 (** [L x] with the weights [w], which the mode admits *)
 Fixpoint member (l : list tie) (w : nat -> R) (x : nat -> R) (i : nat) : R :=
   match l with [] => 0 | e :: l' => pulls e (w O) x i + member l' (shift w) x i end.
-Definition admits (l : list tie) (w : nat -> R) := forall j e, nth_error l j = Some e -> Q2R (from_ e) <= w j <= Q2R (upto_ e).
+Definition admits (l : list tie) (w : nat -> R) := forall j e, nth_error l j = Some e -> Q2R (bottom e) <= w j <= Q2R (top e).
 Definition there (e : tie) (w : Q) := Edge (head e) (tail e) w :: if mutual e then [Edge (tail e) (head e) w] else [].
-Definition smallest (l : list tie) := flat_map (fun e => if Qlt_le_dec 0 (from_ e) then there e (from_ e)
-  else if Qlt_le_dec (upto_ e) 0 then there e (upto_ e) else []) l.
+Definition smallest (l : list tie) := flat_map (fun e => if Qlt_le_dec 0 (bottom e) then there e (bottom e)
+  else if Qlt_le_dec (top e) 0 then there e (top e) else []) l.
 
 (** * The record *)
 (** what becomes of a part, nodes that edges join: all end at 0; at one value, up to signs; at multiples of it; between several *)
@@ -84,7 +84,8 @@ Definition inputs_claim (F : family) : Prop := let c := frame F in
      (i < order c)%nat -> In m (modes F) -> admits (ties m) w -> Rabs (u m w X t i) <= K) /\
   forall X S t i m w, starts F X S -> 0 <= t < deadline c -> (i < length (peaks F))%nat -> In m (modes F) ->
     admits (ties m) w -> Rabs (u m w X t i) <= Q2R (nth i (peaks F) 0%Q).
+(** sliding variables do not hear the graph: what is said of them is what holds without edges, of [X = S] *)
 Definition true_family (F : family) : Prop := (forall m, In m (modes F) -> mode_claim F m) /\
   (forall P, In P (parts F) -> part_claim F P) /\
   (forall i, (i < order (frame F))%nat -> exists P, In P (parts F) /\ In i (agents P)) /\
-  (forall b, In b (bounds F) -> bound_claim F b) /\ ends_claim F /\ inputs_claim F.
+  (edges (frame F) = [] /\ sliding_claim (frame F)) /\ (forall b, In b (bounds F) -> bound_claim F b) /\ ends_claim F /\ inputs_claim F.

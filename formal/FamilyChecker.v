@@ -5,10 +5,10 @@ Require Import Vec Definite Graph Certificate Checker Wide FamilyCertificate.
 Open Scope Z_scope.
 
 (** * One weight: [|w|] in [[lo, hi]] times [f h'] *)
-Definition positive (e : tie) : bool := Qle_bool 0 (from_ e).
+Definition positive (e : tie) : bool := Qle_bool 0 (bottom e).
 Definition sign_of (e : tie) : Z := if positive e then 1 else -1.
-Definition lo (e : tie) : Q := if positive e then from_ e else (- upto_ e)%Q.
-Definition hi (e : tie) : Q := if positive e then upto_ e else (- from_ e)%Q.
+Definition lo (e : tie) : Q := if positive e then bottom e else (- top e)%Q.
+Definition hi (e : tie) : Q := if positive e then top e else (- bottom e)%Q.
 Definition middle (e : tie) : Q := ((lo e + hi e) * (1 # 2))%Q.
 Definition radius (e : tie) : Q := ((hi e - lo e) * (1 # 2))%Q.
 Definition hvec (e : tie) : vec := vadd (unit (head e) 1) (unit (tail e) (- sign_of e)).
@@ -85,19 +85,22 @@ Definition check_rest (sw : Z) (l : list tie) (v : list Q) : bool :=
   forallb (fun e => Qeq_bool (lo e) (hi e) || (zdot (hvec e) vz =? 0)) l && zero_vec (rest_vec dl l vz).
 
 (** * Hints, which are not believed *)
-Record hint := Hint { multipliers : list (list (option Q)); roots : list (list Q * list Q) }.
+(** the rate of each mode, with its multipliers; roots *)
+Record hint := Hint { multipliers : list (Q * list (option Q)); roots : list (list Q * list Q) }.
 Definition check_form (F : family) (b : bound) (h : hint) (P : list (list Q)) : bool :=
   let p := about b in let q := quotient_of (order (frame F)) p P in
   let n := order (frame F) in
   check_quotient p P q && (length (multipliers h) =? length (modes F))%nat && (length (roots h) =? length (modes F))%nat &&
-  forallb (fun mt => (length (ties (fst mt)) =? length (snd mt))%nat &&
-    check_decay n (qsw q) (qfw q) (qF q) (decay b) (combine (ties (fst mt)) (snd mt))) (combine (modes F) (multipliers h)) &&
+  forallb (fun mt => let l := ties (fst mt) in let rate := fst (snd mt) in
+    (length l =? length (snd (snd mt)))%nat && Qle_bool (decay b) rate &&
+    check_decay n (qsw q) (qfw q) (qF q) rate (combine l (snd (snd mt)))) (combine (modes F) (multipliers h)) &&
   match factor_mod n (qsw q) (qfw q) (qF q) with
   | Some r => check_offs q r p (offs b) &&
       forallb (fun mr => check_inputs q r p (inputs b) (ties (fst mr)) (snd mr)) (combine (modes F) (roots h))
   | None => false end.
 Definition check_bound (F : family) (b : bound) (h : hint) : bool :=
   forallb (fun i => (i <? order (frame F))%nat) (agents (about b)) &&
+  forallb (fun v => mem (fst v) (agents (about b))) (basis (about b)) &&
   match by_ b with Form P => check_form F b h P | _ => false end.
 
 (** * Modes and parts *)
@@ -126,3 +129,31 @@ Definition check_part (F : family) (P : part) : bool :=
 Definition check_frame (F : family) : bool :=
   let c := frame F in check_protocol c && check_sliding_input c && check_reaching c && (match edges c with [] => true | _ => false end) &&
   forallb (fun i => existsb (fun P => mem i (agents P)) (parts F)) (seq 0 (order c)).
+
+(** * From the initial state *)
+Definition start_at (F : family) (i : nat) : Q := nth i (start (frame F)) 0%Q.
+Definition left_at (F : family) (P : part) (i : nat) : Q :=
+  Qred (start_at F i - fold_right (fun b a => nth i (snd b) 0 * start_at F (fst b) + a) 0 (basis P))%Q.
+Fixpoint dotQ (l : list Q) (x : nat -> Q) (i : nat) : Q := match l with [] => 0%Q | a :: l' => Qred (a * x i + dotQ l' x (S i)) end.
+Fixpoint bilQ (A : list (list Q)) (x : nat -> Q) (i : nat) : Q :=
+  match A with [] => 0%Q | r :: A' => Qred (x i * dotQ r x O + bilQ A' x (S i)) end.
+Definition value_at (F : family) (b : bound) : option Q := let P := about b in match by_ b with
+  | Form A => Some (bilQ A (fun i => nth i (map (left_at F P) (seq 0 (order (frame F)))) 0%Q) O) | _ => None end.
+
+(** * The input *)
+Definition unmoved (F : family) (i : nat) : bool :=
+  forallb (fun m => forallb (fun e => negb (head e =? i)%nat && negb (mutual e && (tail e =? i)%nat)) (ties m)) (modes F).
+Definition fast (F : family) (b : bound) : bool := let c := frame F in Qle_bool 2 (rho2 c * kappa c * decay b).
+Definition check_stays (F : family) : bool := negb (stays F) || forallb (fun i => unmoved F i ||
+  existsb (fun b => fast F b && mem i (agents (about b))) (bounds F)) (seq 0 (order (frame F))).
+Definition check_peak (F : family) (i : nat) (peak : Q) : bool := let c := frame F in notneg peak && (unmoved F i ||
+  existsb (fun b => fast F b && mem i (agents (about b)) && match value_at F b with
+    | Some v => let g := (rho1 c + rho2 c * kappa c * / span c)%Q in Qle_bool (g * g * (nth i (inputs b) 0%Q * v)) (peak * peak)
+    | None => false end) (bounds F)).
+Definition check_peaks (F : family) : bool := forallb (fun p => check_peak F (fst p) (snd p)) (combine (seq 0 (length (peaks F))) (peaks F)).
+
+Definition check_ends (F : family) : bool := forallb (fun e => match e with None => true | Some _ => false end) (ends F).
+Definition check_family (F : family) (hs : list hint) : bool :=
+  check_frame F && forallb (check_mode F) (modes F) && forallb (check_part F) (parts F) &&
+  ((length (bounds F) =? length hs)%nat && forallb (fun bh => check_bound F (fst bh) (snd bh)) (combine (bounds F) hs)) &&
+  check_ends F && check_stays F && check_peaks F.

@@ -26,7 +26,7 @@ Qed.
 
 (** * Members *)
 Definition between (e : tie) (a : R) := Q2R (lo e) <= a <= Q2R (hi e).
-Lemma tie_ok n e w : check_tie n e = true -> Q2R (from_ e) <= w <= Q2R (upto_ e) -> exists a, between e a /\
+Lemma tie_ok n e w : check_tie n e = true -> Q2R (bottom e) <= w <= Q2R (top e) -> exists a, between e a /\
   forall x i, pulls e w x i = a * (vec_of (fvec e) i * dot (hvec e) x).
 Proof.
   intros H Hw. unfold check_tie in H. apply andb_prop in H as [H H4]. apply andb_prop in H as [_ H3].
