@@ -23,13 +23,13 @@ Definition smallest (l : list tie) := flat_map (fun e => if Qlt_le_dec 0 (bottom
 (** * The record *)
 (** what becomes of a part, nodes that edges join: all end at 0; at one value, up to signs; at multiples of it; between several *)
 Inductive outcome := Stability | Consensus | Interval | Containment | Depends.
-(** [basis]: of the states at rest, by columns, each with its pivot *)
-Record part := Part { agents : list nat; becomes : outcome; basis : list (nat * list Q) }.
+(** [still]: a basis of the states at rest, by columns, each with its pivot *)
+Record part := Part { agents : list nat; becomes : outcome; still : list (nat * list Q) }.
 (** [xi' P xi]; the largest [xi_k^2 / d_k^2]; the sum of the [p_k x_k^2] *)
 Inductive shape := Form (P : list (list Q)) | Rows (d : list Q) | Squares (p : list Q).
-Record bound := Bound { about : part; by_ : shape; decay : Q; inputs : list Q; offs : list Q }.
+Record lyapunov := Lyapunov { about : part; by_ : shape; decay : Q; inputs : list Q; offs : list Q }.
 (** order, protocol, initial state and sliding variables are those of [frame] *)
-Record family := Family { frame : cert; modes : list mode; parts : list part; bounds : list bound;
+Record family := Family { frame : cert; modes : list mode; parts : list part; bounds : list lyapunov;
   ends : list (option (Q * Q)); stays : bool; peaks : list Q }.
 
 (** * Motions *)
@@ -49,24 +49,24 @@ Definition mode_claim (F : family) (m : mode) : Prop := edges (mandatory m) = sm
   order (mandatory m) = order (frame F) /\ structure (mandatory m) /\ claims (mandatory m).
 (** deviation from the states at rest *)
 Definition xi (P : part) (x : nat -> R) (i : nat) : R :=
-  x i - fold_right (fun b a => Q2R (nth i (snd b) 0%Q) * x (fst b) + a) 0 (basis P).
+  x i - fold_right (fun b a => Q2R (nth i (snd b) 0%Q) * x (fst b) + a) 0 (still P).
 Definition owned (m : mode) (P : part) := filter (fun C => mem (hd O (nodes C)) (agents P)) (comps (mandatory m)).
 (** the basis is at rest in every member, and has as many columns as each mandatory graph balanced closed components *)
 Definition part_claim (F : family) (P : part) : Prop :=
   (forall i j, In i (agents P) -> (In j (agents P) <-> linked (flat_map (fun e => there e 1%Q) (flat_map ties (modes F))) i j)) /\
-  (becomes P <> Depends -> forall m, In m (modes F) -> length (filter is_balanced (owned m P)) = length (basis P) /\
-     forall w p v i, admits (ties m) w -> In (p, v) (basis P) -> In i (agents P) -> member (ties m) w (fun j => Q2R (nth j v 0%Q)) i = 0) /\
-  match becomes P with Stability => basis P = [] | Depends => True
-  | Consensus => exists p v, basis P = [(p, v)] /\ forall i, In i (agents P) -> sq (Q2R (nth i v 0%Q)) = 1
+  (becomes P <> Depends -> forall m, In m (modes F) -> length (filter is_balanced (owned m P)) = length (still P) /\
+     forall w p v i, admits (ties m) w -> In (p, v) (still P) -> In i (agents P) -> member (ties m) w (fun j => Q2R (nth j v 0%Q)) i = 0) /\
+  match becomes P with Stability => still P = [] | Depends => True
+  | Consensus => exists p v, still P = [(p, v)] /\ forall i, In i (agents P) -> sq (Q2R (nth i v 0%Q)) = 1
   | Interval => forall m, In m (modes F) -> exists C, owned m P = [C]
   | Containment => exists m C C' l, In m (modes F) /\ owned m P = C :: C' :: l end.
 (** the function is at most [a] *)
-Definition below (b : bound) (a : R) (x : nat -> R) : Prop := let z := xi (about b) x in match by_ b with
+Definition below (b : lyapunov) (a : R) (x : nat -> R) : Prop := let z := xi (about b) x in match by_ b with
   | Form P => qbil P z z <= a | Squares p => qdot p (fun i => sq (x i)) <= a
   | Rows d => forall i, In i (agents (about b)) -> sq (z i) <= a * sq (Q2R (nth i d 0%Q)) end.
 (** it decays along every motion, and bounds the input of every agent and what is left to the states at rest; if it has a
     positive rate, the part comes to rest, at a state that is at rest in every member *)
-Definition bound_claim (F : family) (b : bound) : Prop := let c := frame F in
+Definition bound_claim (F : family) (b : lyapunov) : Prop := let c := frame F in
   (forall X S t0 t a, switches_from F X S t0 -> t0 <= t < deadline c -> 0 <= a -> below b a (X t0) ->
      below b (exp (- (Q2R (decay b) * (s c t - s c t0))) * a) (X t)) /\
   (forall x a i, 0 <= a -> below b a x -> In i (agents (about b)) -> sq (xi (about b) x i) <= Q2R (nth i (offs b) 0%Q) * a /\

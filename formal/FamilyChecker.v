@@ -43,16 +43,16 @@ Definition crow (sw : Z) (B : list (nat * list Q)) (i : nat) : vec :=
   vadd (unit i sw) (fold_right (fun b a => vadd (unit (fst b) (- scaled sw (nth i (snd b) 0%Q))) a) [] B).
 Record quotient := Quotient { qn : nat; qsw : Z; qfw : kernel; qF : mat; qm : Z }.
 Definition common_of (B : list (nat * list Q)) : Z := common (concat (map snd B)).
-Definition kernel_of (n : nat) (P : part) : kernel := let sw := common_of (basis P) in
-  map (fun b => (fst b, map (scaled sw) (snd b))) (basis P) ++
+Definition kernel_of (n : nat) (P : part) : kernel := let sw := common_of (still P) in
+  map (fun b => (fst b, map (scaled sw) (snd b))) (still P) ++
   map (fun i => (i, unit i sw)) (filter (fun i => negb (mem i (agents P))) (seq 0 n)).
 Definition quotient_of (n : nat) (p : part) (P : list (list Q)) : quotient :=
-  let sw := common_of (basis p) in let d := common (concat P) in
-  let C := map (crow sw (basis p)) (seq 0 n) in
+  let sw := common_of (still p) in let d := common (concat P) in
+  let C := map (crow sw (still p)) (seq 0 n) in
   Quotient n sw (kernel_of n p) (tmul C (mmul (map (map (scaled d)) P) C)) (d * (sw * sw)).
 Definition check_quotient (p : part) (P : list (list Q)) (q : quotient) : bool :=
   let d := common (concat P) in
-  forallb (good d) P && (0 <? d) && (0 <? qsw q) && forallb (fun b => good (qsw q) (snd b)) (basis p) &&
+  forallb (good d) P && (0 <? d) && (0 <? qsw q) && forallb (fun b => good (qsw q) (snd b)) (still p) &&
   fits (qn q) (map (map (scaled d)) P) && fits (qn q) (qF q).
 (** how large linear functions are: [(d'x)^2 <= a^2 V] *)
 Definition check_size (q : quotient) (r : factor) (d : vec) (scale_ : Z) (a : Q) : bool :=
@@ -74,12 +74,12 @@ Definition check_inputs (q : quotient) (r : factor) (P : part) (ins : list Q) (l
     (let s := (a + spread t i)%Q in Qle_bool (s * s) (nth i ins 0%Q))) (agents P).
 Definition check_offs (q : quotient) (r : factor) (P : part) (cs : list Q) : bool :=
   forallb (fun i => let c := nth i cs 0%Q in notneg c &&
-    bounded_mod (qfw q) r (crow (qsw q) (basis P) i) (Qnum c * (qsw q * qsw q)) (Zpos (Qden c) * qm q)) (agents P).
+    bounded_mod (qfw q) r (crow (qsw q) (still P) i) (Qnum c * (qsw q * qsw q)) (Zpos (Qden c) * qm q)) (agents P).
 
 (** * What is at rest in all members *)
 Definition rest_vec (dl : Z) (l : list tie) (v : vec) : vec :=
   fold_right (fun e a => vadd (scale (scaled dl (lo e) * zdot (hvec e) v) (fvec e)) a) [] l.
-Definition check_rest (sw : Z) (l : list tie) (v : list Q) : bool :=
+Definition check_at_rest (sw : Z) (l : list tie) (v : list Q) : bool :=
   let vz := map (scaled sw) v in let dl := common (map lo l) in
   good sw v && good dl (map lo l) &&
   forallb (fun e => Qeq_bool (lo e) (hi e) || (zdot (hvec e) vz =? 0)) l && zero_vec (rest_vec dl l vz).
@@ -87,7 +87,7 @@ Definition check_rest (sw : Z) (l : list tie) (v : list Q) : bool :=
 (** * Hints, which are not believed *)
 (** the rate of each mode, with its multipliers; roots *)
 Record hint := Hint { multipliers : list (Q * list (option Q)); roots : list (list Q * list Q) }.
-Definition check_form (F : family) (b : bound) (h : hint) (P : list (list Q)) : bool :=
+Definition check_family_form (F : family) (b : lyapunov) (h : hint) (P : list (list Q)) : bool :=
   let p := about b in let q := quotient_of (order (frame F)) p P in
   let n := order (frame F) in
   check_quotient p P q && (length (multipliers h) =? length (modes F))%nat && (length (roots h) =? length (modes F))%nat &&
@@ -98,10 +98,10 @@ Definition check_form (F : family) (b : bound) (h : hint) (P : list (list Q)) : 
   | Some r => check_offs q r p (offs b) &&
       forallb (fun mr => check_inputs q r p (inputs b) (ties (fst mr)) (snd mr)) (combine (modes F) (roots h))
   | None => false end.
-Definition check_bound (F : family) (b : bound) (h : hint) : bool :=
+Definition check_bound (F : family) (b : lyapunov) (h : hint) : bool :=
   forallb (fun i => (i <? order (frame F))%nat) (agents (about b)) &&
-  forallb (fun v => mem (fst v) (agents (about b))) (basis (about b)) &&
-  match by_ b with Form P => check_form F b h P | _ => false end.
+  forallb (fun v => mem (fst v) (agents (about b))) (still (about b)) &&
+  match by_ b with Form P => check_family_form F b h P | _ => false end.
 
 (** * Modes and parts *)
 Definition same_edge (e f : edge) : bool := (tgt e =? tgt f)%nat && (src e =? src f)%nat && (Qnum (wt e) =? Qnum (wt f)) && (Zpos (Qden (wt e)) =? Zpos (Qden (wt f))).
@@ -118,12 +118,12 @@ Definition check_part (F : family) (P : part) : bool :=
   (match C with [] => false | _ => true end) && forallb (fun i => mem i R) C &&
   forallb (fun e => Bool.eqb (mem (src e) C) (mem (tgt e) C)) es &&
   match becomes P with Depends => true | _ =>
-    forallb (fun m => (length (filter is_balanced (owned m P)) =? length (basis P))%nat &&
-      forallb (fun b => check_rest (common_of (basis P)) (ties m) (snd b)) (basis P)) (modes F) end &&
+    forallb (fun m => (length (filter is_balanced (owned m P)) =? length (still P))%nat &&
+      forallb (fun b => check_at_rest (common_of (still P)) (ties m) (snd b)) (still P)) (modes F) end &&
   match becomes P with
   | Depends => true
-  | Stability => match basis P with [] => true | _ => false end
-  | Consensus => match basis P with [(_, v)] => forallb (fun i => Qeq_bool (nth i v 0%Q * nth i v 0%Q) 1) C | _ => false end
+  | Stability => match still P with [] => true | _ => false end
+  | Consensus => match still P with [(_, v)] => forallb (fun i => Qeq_bool (nth i v 0%Q * nth i v 0%Q) 1) C | _ => false end
   | Interval => forallb (fun m => match owned m P with [_] => true | _ => false end) (modes F)
   | Containment => existsb (fun m => match owned m P with _ :: _ :: _ => true | _ => false end) (modes F) end.
 Definition check_frame (F : family) : bool :=
@@ -133,17 +133,17 @@ Definition check_frame (F : family) : bool :=
 (** * From the initial state *)
 Definition start_at (F : family) (i : nat) : Q := nth i (start (frame F)) 0%Q.
 Definition left_at (F : family) (P : part) (i : nat) : Q :=
-  Qred (start_at F i - fold_right (fun b a => nth i (snd b) 0 * start_at F (fst b) + a) 0 (basis P))%Q.
+  Qred (start_at F i - fold_right (fun b a => nth i (snd b) 0 * start_at F (fst b) + a) 0 (still P))%Q.
 Fixpoint dotQ (l : list Q) (x : nat -> Q) (i : nat) : Q := match l with [] => 0%Q | a :: l' => Qred (a * x i + dotQ l' x (S i)) end.
 Fixpoint bilQ (A : list (list Q)) (x : nat -> Q) (i : nat) : Q :=
   match A with [] => 0%Q | r :: A' => Qred (x i * dotQ r x O + bilQ A' x (S i)) end.
-Definition value_at (F : family) (b : bound) : option Q := let P := about b in match by_ b with
+Definition value_at (F : family) (b : lyapunov) : option Q := let P := about b in match by_ b with
   | Form A => Some (bilQ A (fun i => nth i (map (left_at F P) (seq 0 (order (frame F)))) 0%Q) O) | _ => None end.
 
 (** * The input *)
 Definition unmoved (F : family) (i : nat) : bool :=
   forallb (fun m => forallb (fun e => negb (head e =? i)%nat && negb (mutual e && (tail e =? i)%nat)) (ties m)) (modes F).
-Definition fast (F : family) (b : bound) : bool := let c := frame F in Qle_bool 2 (rho2 c * kappa c * decay b).
+Definition fast (F : family) (b : lyapunov) : bool := let c := frame F in Qle_bool 2 (rho2 c * kappa c * decay b).
 Definition check_stays (F : family) : bool := negb (stays F) || forallb (fun i => unmoved F i ||
   existsb (fun b => fast F b && mem i (agents (about b))) (bounds F)) (seq 0 (order (frame F))).
 Definition check_peak (F : family) (i : nat) (peak : Q) : bool := let c := frame F in notneg peak && (unmoved F i ||
@@ -152,8 +152,8 @@ Definition check_peak (F : family) (i : nat) (peak : Q) : bool := let c := frame
     | None => false end) (bounds F)).
 Definition check_peaks (F : family) : bool := forallb (fun p => check_peak F (fst p) (snd p)) (combine (seq 0 (length (peaks F))) (peaks F)).
 
-Definition check_ends (F : family) : bool := forallb (fun e => match e with None => true | Some _ => false end) (ends F).
+Definition check_family_ends (F : family) : bool := forallb (fun e => match e with None => true | Some _ => false end) (ends F).
 Definition check_family (F : family) (hs : list hint) : bool :=
   check_frame F && forallb (check_mode F) (modes F) && forallb (check_part F) (parts F) &&
   ((length (bounds F) =? length hs)%nat && forallb (fun bh => check_bound F (fst bh) (snd bh)) (combine (bounds F) hs)) &&
-  check_ends F && check_stays F && check_peaks F.
+  check_family_ends F && check_stays F && check_peaks F.

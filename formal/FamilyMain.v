@@ -166,7 +166,7 @@ Qed.
 
 (** * Bounds *)
 Section Bound.
-Variable b : bound.
+Variable b : lyapunov.
 Let P := about b.
 Definition decays : Prop := forall X Sl t0 t a, switches_from F X Sl t0 -> t0 <= t < T -> 0 <= a -> below b a (X t0) ->
   below b (exp (- (Q2R (decay b) * (s c t - s c t0))) * a) (X t).
@@ -174,7 +174,7 @@ Definition sizes : Prop := forall x a i, 0 <= a -> below b a x -> In i (agents P
   forall m w, In m (modes F) -> admits (ties m) w -> sq (member (ties m) w x i) <= Q2R (nth i (inputs b) 0%Q) * a.
 Hypotheses (HD : decays) (HS : sizes) (HV : forall x, exists a, 0 <= a /\ below b a x).
 Hypothesis Hagents : forall i, In i (agents P) -> (i < n)%nat.
-Hypothesis Hpivots : forall v, In v (basis P) -> In (fst v) (agents P).
+Hypothesis Hpivots : forall v, In v (still P) -> In (fst v) (agents P).
 (** how near to its end an agent is *)
 Lemma nears X Sl t0 a i : 0 < Q2R (decay b) -> switches_from F X Sl t0 -> 0 <= a -> below b a (X t0) -> In i (agents P) ->
   exists v, forall t, t0 <= t < T -> Rabs (X t i - v) <=
@@ -220,10 +220,10 @@ Proof.
   exists y. intros i Hi. split; [apply Hy; auto|].
   assert (L : filterlim (fun t => xi P (X t) i) (at_left T) (locally (xi P y i))).
   { unfold xi. apply (filterlim_comp_2 (F := at_left T) (G := locally (y i))
-      (H := locally (fold_right (fun v a => Q2R (nth i (snd v) 0%Q) * y (fst v) + a) 0 (basis P)))
-      (fun t => X t i) (fun t => fold_right (fun v a => Q2R (nth i (snd v) 0%Q) * X t (fst v) + a) 0 (basis P)) (fun u v => minus u v)).
+      (H := locally (fold_right (fun v a => Q2R (nth i (snd v) 0%Q) * y (fst v) + a) 0 (still P)))
+      (fun t => X t i) (fun t => fold_right (fun v a => Q2R (nth i (snd v) 0%Q) * X t (fst v) + a) 0 (still P)) (fun u v => minus u v)).
     - apply Hy; auto.
-    - clear - Hy Hpivots Hagents. induction (basis P) as [|v l IH]; simpl; [apply filterlim_const|].
+    - clear - Hy Hpivots Hagents. induction (still P) as [|v l IH]; simpl; [apply filterlim_const|].
       apply (filterlim_comp_2 (F := at_left T) (G := locally (Q2R (nth i (snd v) 0%Q) * y (fst v)))
         (H := locally (fold_right (fun v a => Q2R (nth i (snd v) 0%Q) * y (fst v) + a) 0 l))
         (fun t => Q2R (nth i (snd v) 0%Q) * X t (fst v)) (fun t => fold_right (fun v a => Q2R (nth i (snd v) 0%Q) * X t (fst v) + a) 0 l) (fun u v => plus u v)).
@@ -232,10 +232,10 @@ Proof.
         * apply (filterlim_scal_r (Q2R (nth i (snd v) 0%Q)) (y (fst v))).
       + apply IH. intros; apply Hpivots; right; assumption.
       + apply (filterlim_plus (Q2R (nth i (snd v) 0%Q) * y (fst v))).
-    - apply (filterlim_comp_2 (F := filter_prod (locally (y i)) (locally (fold_right (fun v a => Q2R (nth i (snd v) 0%Q) * y (fst v) + a) 0 (basis P))))
-        (G := locally (y i)) (H := locally (opp (fold_right (fun v a => Q2R (nth i (snd v) 0%Q) * y (fst v) + a) 0 (basis P)))) fst (fun p => opp (snd p)) plus).
+    - apply (filterlim_comp_2 (F := filter_prod (locally (y i)) (locally (fold_right (fun v a => Q2R (nth i (snd v) 0%Q) * y (fst v) + a) 0 (still P))))
+        (G := locally (y i)) (H := locally (opp (fold_right (fun v a => Q2R (nth i (snd v) 0%Q) * y (fst v) + a) 0 (still P)))) fst (fun p => opp (snd p)) plus).
       + apply filterlim_fst.
-      + apply (filterlim_comp _ _ _ snd opp _ (locally (fold_right (fun v a => Q2R (nth i (snd v) 0%Q) * y (fst v) + a) 0 (basis P)))); [apply filterlim_snd|apply (@filterlim_opp R_AbsRing R_NormedModule)].
+      + apply (filterlim_comp _ _ _ snd opp _ (locally (fold_right (fun v a => Q2R (nth i (snd v) 0%Q) * y (fst v) + a) 0 (still P)))); [apply filterlim_snd|apply (@filterlim_opp R_AbsRing R_NormedModule)].
       + apply (filterlim_plus (y i)). }
   assert (Z : filterlim (fun t => xi P (X t) i) (at_left T) (locally 0)).
   { destruct positive_ as [P1 [P2 P3]]. set (r := Q2R (decay b)) in *.
@@ -261,10 +261,10 @@ Proof.
 Qed.
 Lemma map_fst_combine {A B} (l : list A) : forall l' : list B, length l = length l' -> map fst (combine l l') = l.
 Proof. induction l as [|a l IH]; intros [|b l'] L; try discriminate L; [reflexivity|]. simpl. rewrite IH by (injection L; auto). reflexivity. Qed.
-Lemma form_bound b h A : by_ b = Form A -> check_form F b h A = true ->
+Lemma form_bound b h A : by_ b = Form A -> check_family_form F b h A = true ->
   decays b /\ sizes b /\ forall x, exists a, 0 <= a /\ below b a x.
 Proof.
-  intros EA H. unfold check_form in H. cbv zeta in H. fold c n in H. set (q := quotient_of n (about b) A) in *.
+  intros EA H. unfold check_family_form in H. cbv zeta in H. fold c n in H. set (q := quotient_of n (about b) A) in *.
   apply andb_prop in H as [H H5]. apply andb_prop in H as [H H4]. apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2].
   apply Nat.eqb_eq in H2, H3. rewrite forallb_forall in H4. destruct (factor_mod n (qsw q) (qfw q) (qF q)) as [r|] eqn:Er; [|discriminate].
   apply andb_prop in H5 as [H5 H6]. rewrite forallb_forall in H6.
@@ -290,7 +290,7 @@ Proof.
     unfold below. rewrite EA. lra.
 Qed.
 Lemma bound_parts b h : check_bound F b h = true -> (forall i, In i (agents (about b)) -> (i < n)%nat) /\
-  (forall v, In v (basis (about b)) -> In (fst v) (agents (about b))) /\ decays b /\ sizes b /\ forall x, exists a, 0 <= a /\ below b a x.
+  (forall v, In v (still (about b)) -> In (fst v) (agents (about b))) /\ decays b /\ sizes b /\ forall x, exists a, 0 <= a /\ below b a x.
 Proof.
   intros H. unfold check_bound in H. apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2]. rewrite forallb_forall in H1, H2.
   split; [intros i Hi; apply Nat.ltb_lt; apply H1; exact Hi|]. split; [intros v Hv; apply mem_In; apply H2; exact Hv|].
@@ -320,10 +320,10 @@ Proof.
   intros H i. unfold vec_of. destruct (Nat.lt_ge_cases i (length l)) as [L|L]; [|rewrite nth_overflow by exact L; reflexivity].
   unfold zero_vec in H. rewrite forallb_forall in H. specialize (H _ (nth_In l 0%Z L)). apply Z.eqb_eq in H. rewrite <- H. reflexivity.
 Qed.
-Lemma rest_ok sw m v : In m (modes F) -> check_rest sw (ties m) v = true -> forall w i, admits (ties m) w ->
+Lemma rest_ok sw m v : In m (modes F) -> check_at_rest sw (ties m) v = true -> forall w i, admits (ties m) w ->
   member (ties m) w (fun j => Q2R (nth j v 0%Q)) i = 0.
 Proof.
-  intros Hm H w i Hw. unfold check_rest in H. cbv zeta in H. set (vz := map (scaled sw) v) in *. set (dl := common _) in *.
+  intros Hm H w i Hw. unfold check_at_rest in H. cbv zeta in H. set (vz := map (scaled sw) v) in *. set (dl := common _) in *.
   apply andb_prop in H as [H H4]. apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2].
   destruct (member_ok n (ties m) (ties_ok m Hm) w Hw) as [a [B E]]. rewrite E.
   destruct (good_ok _ _ H1) as [S0 _]. destruct (good_ok _ _ H2) as [D0 _]. apply IZR_lt in S0, D0.
@@ -354,10 +354,10 @@ Proof.
     + intros L. exact (linked_in es C H3 i j L Hi).
   - intros ND m Hm. destruct (becomes P); try (exfalso; apply ND; reflexivity); rewrite forallb_forall in H4; specialize (H4 m Hm);
       apply andb_prop in H4 as [L R]; apply Nat.eqb_eq in L; (split; [exact L|]); intros w p v i Hw Hv Hi; rewrite forallb_forall in R;
-      apply (rest_ok (common_of (basis P)) m v Hm (R _ Hv) w i Hw).
+      apply (rest_ok (common_of (still P)) m v Hm (R _ Hv) w i Hw).
   - destruct (becomes P).
-    + destruct (basis P); [reflexivity|discriminate].
-    + destruct (basis P) as [|[p v] [|]]; try discriminate. exists p, v. split; [reflexivity|]. intros i Hi.
+    + destruct (still P); [reflexivity|discriminate].
+    + destruct (still P) as [|[p v] [|]]; try discriminate. exists p, v. split; [reflexivity|]. intros i Hi.
       rewrite forallb_forall in H5. specialize (H5 i Hi). apply Qeq_R in H5. rewrite Q2R_mult in H5. unfold sq. rewrite H5. unfold Q2R. simpl. lra.
     + intros m Hm. rewrite forallb_forall in H5. specialize (H5 m Hm). destruct (owned m P) as [|C0 [|]]; try discriminate. exists C0. reflexivity.
     + apply existsb_exists in H5 as [m [Hm H5]]. destruct (owned m P) as [|C0 [|C1 l]] eqn:E; try discriminate. exists m, C0, C1, l. auto.
@@ -444,11 +444,11 @@ Proof.
     intros j. apply H. }
   apply E. intros j. unfold shift. f_equal. f_equal. lia.
 Qed.
-Lemma left_ok P X i : (forall j, (j < n)%nat -> X j = Q2R (start_at F j)) -> (forall v, In v (basis P) -> (fst v < n)%nat) -> (i < n)%nat ->
+Lemma left_ok P X i : (forall j, (j < n)%nat -> X j = Q2R (start_at F j)) -> (forall v, In v (still P) -> (fst v < n)%nat) -> (i < n)%nat ->
   Q2R (left_at F P i) = xi P X i.
 Proof.
   intros H HB Hi. unfold left_at, xi. rewrite Qred_R, Q2R_minus, <- (H i Hi). f_equal.
-  induction (basis P) as [|v l IH]; simpl; [apply Q2R_0|]. rewrite Q2R_plus, Q2R_mult, <- H by (apply HB; left; reflexivity).
+  induction (still P) as [|v l IH]; simpl; [apply Q2R_0|]. rewrite Q2R_plus, Q2R_mult, <- H by (apply HB; left; reflexivity).
   rewrite IH by (intros; apply HB; right; assumption). reflexivity.
 Qed.
 Lemma qbil_ext A : forall x x' y y', List.Forall (fun r : list Q => (length r <= n)%nat) A -> (forall i, (i < length A)%nat -> x i = x' i) ->
@@ -465,7 +465,7 @@ Proof.
   unfold value_at in Hv. cbv zeta in Hv. unfold below. destruct (by_ b) as [A|d|p]; try discriminate. injection Hv as <-. fold c n.
   set (P := about b) in *. set (x0 := fun i => nth i (map (left_at F P) (seq 0 n)) 0%Q).
   assert (E : Q2R (bilQ A x0 0) = qbil A (xi P X) (xi P X)).
-  { rewrite bilQ_ok. unfold check_form in Hb. cbv zeta in Hb. do 4 apply andb_prop in Hb as [Hb _]. fold c n P in Hb.
+  { rewrite bilQ_ok. unfold check_family_form in Hb. cbv zeta in Hb. do 4 apply andb_prop in Hb as [Hb _]. fold c n P in Hb.
     unfold check_quotient in Hb. cbv zeta in Hb. apply andb_prop in Hb as [Hb _]. apply andb_prop in Hb as [_ Hf]. cbn [qn quotient_of] in Hf.
     destruct (fits_ok _ _ Hf) as [F1 F2]. rewrite map_length in F1.
     assert (E0 : forall i, (i < n)%nat -> Q2R (x0 i) = xi P X i).
@@ -475,7 +475,7 @@ Proof.
     unfold rows_le in F2. rewrite List.Forall_forall in F2 |- *. intros r Hr. specialize (F2 (map (scaled (common (concat A))) r) ltac:(apply in_map; exact Hr)).
     rewrite map_length in F2. exact F2. }
   rewrite E. split; [|lra].
-  unfold check_form in Hb. cbv zeta in Hb. apply andb_prop in Hb as [Hb H5]. do 3 apply andb_prop in Hb as [Hb _].
+  unfold check_family_form in Hb. cbv zeta in Hb. apply andb_prop in Hb as [Hb H5]. do 3 apply andb_prop in Hb as [Hb _].
   destruct (factor_mod _ _ _ _) as [r|] eqn:Er in H5; [|discriminate]. apply (value_pos n P A Hb r Er).
 Qed.
 Theorem peaks_ok : check_peaks F = true -> forall X S t i m w, starts F X S -> 0 <= t < T -> (i < length (peaks F))%nat ->
@@ -513,7 +513,7 @@ Proof.
   split; [exact A4|]. split; [split; [exact A3|apply (sliding_ok _ A1 A2)]|].
   split; [intros b Hb; destruct (bound_of F hs H4 b Hb) as [h Hh]; apply (bounds_claim F H1 H2 b h Hh)|].
   split.
-  - intros X S i m r _ E. unfold check_ends in H5. rewrite forallb_forall in H5.
+  - intros X S i m r _ E. unfold check_family_ends in H5. rewrite forallb_forall in H5.
     destruct (nth_in_or_default i (ends F) None) as [I|I]; [|rewrite I in E; discriminate]. specialize (H5 _ I). rewrite E in H5. discriminate.
   - split; [apply (stays_ok F H1 H2 hs H4 H6)|apply (peaks_ok F H1 H2 hs H4 H7)].
 Qed.

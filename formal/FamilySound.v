@@ -190,7 +190,7 @@ Proof.
 Qed.
 
 (** * The form of what is left *)
-Lemma crow_ok sw B i x : (0 < sw)%Z -> (forall b, In b B -> good sw (snd b) = true) -> forall P, basis P = B ->
+Lemma crow_ok sw B i x : (0 < sw)%Z -> (forall b, In b B -> good sw (snd b) = true) -> forall P, still P = B ->
   dot (crow sw B i) x = IZR sw * xi P x i.
 Proof.
   intros Hs HB P EP. unfold crow, xi. rewrite EP, dot_vadd, dot_unit. clear EP.
@@ -209,7 +209,7 @@ Section Quotient.
 Variables (n : nat) (p : part) (P : list (list Q)).
 Let q := quotient_of n p P.
 Hypothesis H : check_quotient p P q = true.
-Lemma quotient_parts : (0 < qsw q)%Z /\ (0 < qm q)%Z /\ (forall b, In b (basis p) -> good (qsw q) (snd b) = true) /\ fits n (qF q) = true.
+Lemma quotient_parts : (0 < qsw q)%Z /\ (0 < qm q)%Z /\ (forall b, In b (still p) -> good (qsw q) (snd b) = true) /\ fits n (qF q) = true.
 Proof.
   unfold check_quotient in H. cbv zeta in H. apply andb_prop in H as [H0 H6]. apply andb_prop in H0 as [H0 H5].
   apply andb_prop in H0 as [H0 H4]. apply andb_prop in H0 as [H0 H3]. apply andb_prop in H0 as [H1 H2].
@@ -222,10 +222,10 @@ Proof.
   unfold check_quotient in H. cbv zeta in H. apply andb_prop in H as [H0 H6]. apply andb_prop in H0 as [H0 H5].
   apply andb_prop in H0 as [H0 _]. apply andb_prop in H0 as [H0 _]. apply andb_prop in H0 as [H1 H2].
   destruct (fits_ok _ _ H5) as [P1 P2]. unfold q, quotient_of in *. cbn [qF qm qsw qn] in *.
-  set (sw := common_of (basis p)) in *. set (d := common (concat P)) in *. set (C := map (crow sw (basis p)) (seq 0 n)).
+  set (sw := common_of (still p)) in *. set (d := common (concat P)) in *. set (C := map (crow sw (still p)) (seq 0 n)).
   set (PZ := map (map (scaled d)) P) in *.
   assert (A : forall i, (i < n)%nat -> app C x i = IZR sw * xi p x i).
-  { intros i Hi. unfold app, C. rewrite (nth_map_seq _ n i) by exact Hi. apply (crow_ok sw (basis p) i x S HB p eq_refl). }
+  { intros i Hi. unfold app, C. rewrite (nth_map_seq _ n i) by exact Hi. apply (crow_ok sw (still p) i x S HB p eq_refl). }
   rewrite bil_tmul, bil_mmul, (bil_ext_l PZ (app C x) (fun i => IZR sw * xi p x i)) by (intros; apply A; lia).
   rewrite (bil_ext_r PZ n _ (app C x) (fun i => IZR sw * xi p x i) P2) by (intros; apply A; assumption).
   rewrite bil_scal_l, bil_scal_r. unfold PZ. rewrite bil_scaled by exact H1. rewrite !mult_IZR. ring.
@@ -266,7 +266,7 @@ Proof.
   set (c := nth i cs 0%Q) in *. apply andb_prop in HC as [C0 C1]. destruct quotient_parts as [S [_ [HB _]]].
   pose proof (proj1 (Z.leb_le _ _) C0) as C0'.
   pose proof (square_ok _ _ (Zpos (Qden c)) x a C1 ltac:(nia) ltac:(lia) Ha) as K.
-  rewrite (crow_ok (qsw q) (basis p) i x S HB p eq_refl), !mult_IZR in K. apply IZR_lt in S.
+  rewrite (crow_ok (qsw q) (still p) i x S HB p eq_refl), !mult_IZR in K. apply IZR_lt in S.
   assert (D : 0 < IZR (Zpos (Qden c))) by (apply IZR_lt; reflexivity).
   assert (E : Q2R c * IZR (Zpos (Qden c)) = IZR (Qnum c)) by (unfold Q2R; field; lra). rewrite <- E in K.
   apply (Rmult_le_reg_l (IZR (Zpos (Qden c)) * (IZR (qsw q) * IZR (qsw q)))); [apply Rmult_lt_0_compat; nra|].
