@@ -98,10 +98,30 @@ Definition check_family_form (F : family) (b : lyapunov) (h : hint) (P : list (l
   | Some r => check_offs q r p (offs b) &&
       forallb (fun mr => check_inputs q r p (inputs b) (ties (fst mr)) (snd mr)) (combine (modes F) (roots h))
   | None => false end.
+(** * Rows *)
+Definition unmoved (F : family) (i : nat) : bool :=
+  forallb (fun m => forallb (fun e => negb (head e =? i)%nat && negb (mutual e && (tail e =? i)%nat)) (ties m)) (modes F).
+(** the least that the weights of a mode draw agent [i], times [d]; the most that they move it *)
+Definition entry (d : list Q) (i : nat) : Q := nth i d 0%Q.
+Definition worst (e : tie) (a : Q) : Q := ((if Qle_bool 0 a then lo e else hi e) * a)%Q.
+Definition over (l : list tie) (g : tie -> nat -> nat -> Q) (i : nat) : Q :=
+  fold_right (fun e a => Qred ((if (head e =? i)%nat then g e (head e) (tail e) else 0) +
+    (if mutual e && (tail e =? i)%nat then g e (tail e) (head e) else 0) + a))%Q 0%Q l.
+Definition drawn (d : list Q) (e : tie) (t s : nat) : Q := worst e (entry d t - entry d s).
+Definition moved (d : list Q) (e : tie) (t s : nat) : Q := (hi e * (entry d t + entry d s))%Q.
+Definition check_rows_of (F : family) (b : lyapunov) (d : list Q) : bool :=
+  let P := about b in let sw := common_of (still P) in let pivots := map fst (still P) in
+  (0 <? sw) && forallb (fun v => good sw (snd v)) (still P) &&
+  forallb (fun m => forallb (fun e => Bool.eqb (mem (head e) (agents P)) (mem (tail e) (agents P))) (ties m) &&
+    forallb (fun v => check_at_rest sw (ties m) (snd v)) (still P)) (modes F) &&
+  forallb (fun i => if mem i pivots then unmoved F i && zero_vec (crow sw (still P) i) && Qeq_bool (entry d i) 0
+    else pos (entry d i) && forallb (fun m => Qle_bool (decay b * entry d i) (2 * over (ties m) (drawn d) i)) (modes F)) (agents P) &&
+  forallb (fun i => Qle_bool (entry d i * entry d i) (nth i (offs b) 0%Q) && forallb (fun m =>
+    let u := over (ties m) (moved d) i in Qle_bool (u * u) (nth i (inputs b) 0%Q)) (modes F)) (agents P).
 Definition check_bound (F : family) (b : lyapunov) (h : hint) : bool :=
   forallb (fun i => (i <? order (frame F))%nat) (agents (about b)) &&
   forallb (fun v => mem (fst v) (agents (about b))) (still (about b)) &&
-  match by_ b with Form P => check_family_form F b h P | _ => false end.
+  match by_ b with Form P => check_family_form F b h P | Rows d => check_rows_of F b d | Squares _ => false end.
 
 (** * Modes and parts *)
 Definition same_edge (e f : edge) : bool := (tgt e =? tgt f)%nat && (src e =? src f)%nat && (Qnum (wt e) =? Qnum (wt f)) && (Zpos (Qden (wt e)) =? Zpos (Qden (wt f))).
@@ -141,8 +161,6 @@ Definition value_at (F : family) (b : lyapunov) : option Q := let P := about b i
   | Form A => Some (bilQ A (fun i => nth i (map (left_at F P) (seq 0 (order (frame F)))) 0%Q) O) | _ => None end.
 
 (** * The input *)
-Definition unmoved (F : family) (i : nat) : bool :=
-  forallb (fun m => forallb (fun e => negb (head e =? i)%nat && negb (mutual e && (tail e =? i)%nat)) (ties m)) (modes F).
 Definition fast (F : family) (b : lyapunov) : bool := let c := frame F in Qle_bool 2 (rho2 c * kappa c * decay b).
 Definition check_stays (F : family) : bool := negb (stays F) || forallb (fun i => unmoved F i ||
   existsb (fun b => fast F b && mem i (agents (about b))) (bounds F)) (seq 0 (order (frame F))).

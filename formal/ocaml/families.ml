@@ -190,6 +190,7 @@ let lyapunov_of nodes parts modes proof work left k v =
   let spread own what v = let l = List.combine own (List.map (number what) (ordered (labels own) what v)) in
     List.init n (fun i -> Option.value (List.assoc_opt i l) ~default:Number.zero) in
   let moves = moving part n in
+  let q = quotient_of n part p in
   let multipliers = List.mapi (fun i m ->
     let numbers, witness = proved proof "family-rate" (Printf.sprintf "%s.modes[%d]" of_ i) [ "b" ] in
     let b = numbers "b" in
@@ -198,7 +199,7 @@ let lyapunov_of nodes parts modes proof work left k v =
       | w ->
           let given = ref (List.map (number "multipliers") (entries "multipliers" ((fields "the witness" [ "multipliers" ] w) "multipliers"))) in
           let l = map (fun e -> if moves e then match !given with
-            | tau :: rest -> given := rest; need (Z.sign tau.qnum > 0) "multipliers: one is not positive"; Some tau
+            | tau :: rest -> given := rest; need (Z.sign tau.qnum > 0) "multipliers: one is not positive"; Some (Number.mul tau (Number.of_z q.qm))
             | [] -> bad "multipliers: one for each weight" else None) m.ties in
           need (!given = []) "multipliers: one for each weight"; l in
     let size = n + List.length (List.filter Option.is_some taus) in
@@ -213,7 +214,7 @@ let lyapunov_of nodes parts modes proof work left k v =
   if get "means" <> Arr [] then begin
     skipped proof "family-constants" of_; left := (of_ ^ ".means, so that its constants are verified but for these") :: !left end
   else bare_of proof "family-constants" of_;
-  b, { multipliers; roots = roots_of n part (quotient_of n part p) modes }
+  b, { multipliers; roots = roots_of n part q modes }
 
 (* * The document *)
 let keys = [ "boxes", "boxes that draw followers in"; "restricted", "signals that are restricted" ]
@@ -272,6 +273,14 @@ let certificate (j : Json.t) : t =
   need (List.length functions <= most_functions) "lyapunov.functions: more than 100";
   let work = ref 0 in
   let bounds = List.mapi (lyapunov_of nodes parts modes proof work left) functions in
+  (* the theorem says that a component comes to rest where a function has a positive rate *)
+  let at_rest p = p.becomes = Depends || (match p.agents with [ _ ] -> true
+    | _ -> List.exists (fun (b, _) -> b.about == p && Z.sign b.decay.qnum > 0) bounds) in
+  let unproved = List.filter (fun (_, p) -> not (at_rest p)) (List.mapi (fun i p -> i, p) parts) in
+  List.iter (fun (i, _) -> not_checked (Printf.sprintf "claim, that component %d comes to rest under every signal" i)) unproved;
+  if unproved <> [] && not unknown_end then begin
+    proof.checked <- List.filter (fun o -> o <> ("family-claim", "graph")) proof.checked;
+    proof.unchecked <- proof.unchecked @ [ "family-claim", "graph" ] end;
   let start = match get "initial_state" with Null -> None | v -> Some (by_agent nodes number "initial_state" v) in
   let sliding = match get "sliding_variable" with Null -> [] | v -> by_agent nodes number "sliding_variable" v in
   need (is_sliding = (get "sliding_variable" <> Null)) "sigma(0) belongs to the sliding-mode protocol, and is part of it";
