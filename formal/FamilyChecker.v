@@ -104,20 +104,20 @@ Definition unmoved (F : family) (i : nat) : bool :=
 (** the least that the weights of a mode draw agent [i], times [d]; the most that they move it *)
 Definition entry (d : list Q) (i : nat) : Q := nth i d 0%Q.
 Definition worst (e : tie) (a : Q) : Q := ((if Qle_bool 0 a then lo e else hi e) * a)%Q.
-Definition over (l : list tie) (g : tie -> nat -> nat -> Q) (i : nat) : Q :=
+Definition row_sum (l : list tie) (g : tie -> nat -> nat -> Q) (i : nat) : Q :=
   fold_right (fun e a => Qred ((if (head e =? i)%nat then g e (head e) (tail e) else 0) +
     (if mutual e && (tail e =? i)%nat then g e (tail e) (head e) else 0) + a))%Q 0%Q l.
 Definition drawn (d : list Q) (e : tie) (t s : nat) : Q := worst e (entry d t - entry d s).
-Definition moved (d : list Q) (e : tie) (t s : nat) : Q := (hi e * (entry d t + entry d s))%Q.
+Definition row_moved (d : list Q) (e : tie) (t s : nat) : Q := (hi e * (entry d t + entry d s))%Q.
 Definition check_rows_of (F : family) (b : lyapunov) (d : list Q) : bool :=
   let P := about b in let sw := common_of (still P) in let pivots := map fst (still P) in
   (0 <? sw) && forallb (fun v => good sw (snd v)) (still P) &&
   forallb (fun m => forallb (fun e => Bool.eqb (mem (head e) (agents P)) (mem (tail e) (agents P))) (ties m) &&
     forallb (fun v => check_at_rest sw (ties m) (snd v)) (still P)) (modes F) &&
   forallb (fun i => if mem i pivots then unmoved F i && zero_vec (crow sw (still P) i) && Qeq_bool (entry d i) 0
-    else pos (entry d i) && forallb (fun m => Qle_bool (decay b * entry d i) (2 * over (ties m) (drawn d) i)) (modes F)) (agents P) &&
+    else pos (entry d i) && forallb (fun m => Qle_bool (decay b * entry d i) (2 * row_sum (ties m) (drawn d) i)) (modes F)) (agents P) &&
   forallb (fun i => Qle_bool (entry d i * entry d i) (nth i (offs b) 0%Q) && forallb (fun m =>
-    let u := over (ties m) (moved d) i in Qle_bool (u * u) (nth i (inputs b) 0%Q)) (modes F)) (agents P).
+    let u := row_sum (ties m) (row_moved d) i in Qle_bool (u * u) (nth i (inputs b) 0%Q)) (modes F)) (agents P).
 Definition check_bound (F : family) (b : lyapunov) (h : hint) : bool :=
   forallb (fun i => (i <? order (frame F))%nat) (agents (about b)) &&
   forallb (fun v => mem (fst v) (agents (about b))) (still (about b)) &&
@@ -157,8 +157,13 @@ Definition left_at (F : family) (P : part) (i : nat) : Q :=
 Fixpoint dotQ (l : list Q) (x : nat -> Q) (i : nat) : Q := match l with [] => 0%Q | a :: l' => Qred (a * x i + dotQ l' x (S i)) end.
 Fixpoint bilQ (A : list (list Q)) (x : nat -> Q) (i : nat) : Q :=
   match A with [] => 0%Q | r :: A' => Qred (x i * dotQ r x O + bilQ A' x (S i)) end.
+Definition larger (q a : Q) : Q := if Qle_bool a q then q else a.
+Definition share (F : family) (P : part) (d : list Q) (i : nat) : Q :=
+  if pos (entry d i) then let q := (left_at F P i / entry d i)%Q in Qred (q * q) else 0%Q.
 Definition value_at (F : family) (b : lyapunov) : option Q := let P := about b in match by_ b with
-  | Form A => Some (bilQ A (fun i => nth i (map (left_at F P) (seq 0 (order (frame F)))) 0%Q) O) | _ => None end.
+  | Form A => Some (bilQ A (fun i => nth i (map (left_at F P) (seq 0 (order (frame F)))) 0%Q) O)
+  | Rows d => Some (fold_right (fun i a => larger (share F P d i) a) 0%Q (agents P))
+  | Squares _ => None end.
 
 (** * The input *)
 Definition fast (F : family) (b : lyapunov) : bool := let c := frame F in Qle_bool 2 (rho2 c * kappa c * decay b).

@@ -180,8 +180,27 @@ Qed.
 Lemma value_ok b h v X : check_bound F b h = true -> value_at F b = Some v -> (forall j, (j < n)%nat -> X j = Q2R (start_at F j)) ->
   0 <= Q2R v /\ below b (Q2R v) X.
 Proof.
-  intros Hb Hv HX. destruct (bound_parts b h Hb) as [HA [HB [_ [_ _]]]]. unfold check_bound in Hb. apply andb_prop in Hb as [_ Hb].
-  unfold value_at in Hv. cbv zeta in Hv. unfold below. destruct (by_ b) as [A|d|p]; try discriminate. injection Hv as <-. fold c n.
+  intros Hb Hv HX. destruct (bound_parts b h Hb) as [HA [HB [_ [_ _]]]]. pose proof Hb as Hb0. unfold check_bound in Hb0.
+  assert (HL : forall i, In i (agents (about b)) -> Q2R (left_at F (about b) i) = xi (about b) X i).
+  { intros i Hi. apply left_ok; [exact HX|intros v' Hv'; apply HA, HB, Hv'|apply HA; exact Hi]. }
+  clear Hb. apply andb_prop in Hb0 as [_ Hb]. unfold value_at in Hv. cbv zeta in Hv. destruct (by_ b) as [A|d|p] eqn:Ep; try discriminate; injection Hv as <-.
+  2:{ set (P := about b) in *. set (M := fold_right _ _ _). assert (G : 0 <= Q2R M /\ forall i, In i (agents P) -> Q2R (share F P d i) <= Q2R M).
+      { unfold M. generalize (agents P). clear. intros l. assert (L : forall q a, Q2R q <= Q2R (larger q a) /\ Q2R a <= Q2R (larger q a)).
+        { intros q a. unfold larger. destruct (Qle_bool a q) eqn:E; [apply Qle_R in E; lra|].
+          assert (Q2R q < Q2R a); [|lra]. apply Rnot_le_lt. intros N. apply Rle_Qle in N. apply Qle_bool_iff in N. congruence. }
+        induction l as [|j l [I1 I2]]; [split; [rewrite <- Q2R_0; apply Rle_refl|intros i []]|]. cbn [fold_right].
+        destruct (L (share F P d j) (fold_right (fun i a => larger (share F P d i) a) 0%Q l)) as [L1 L2]. split; [lra|].
+        intros i [<-|Hi]; [exact L1|]. specialize (I2 i Hi). lra. }
+      destruct G as [G0 G1]. split; [exact G0|]. unfold below. rewrite Ep. fold P. intros i Hi. specialize (G1 i Hi). unfold share in G1. fold (entry d i).
+      destruct (rows_parts F Hmodes b d Hb) as [_ [R2 _]]. fold P in R2. destruct (R2 i Hi) as [[_ [_ [Z0 Z1]]]|[_ [Dp _]]].
+      - rewrite Z0, Z1. unfold sq. lra.
+      - destruct (pos (entry d i)) eqn:Ed.
+        2:{ exfalso. unfold pos in Ed. apply Z.ltb_ge, IZR_le in Ed. unfold Q2R in Dp.
+            assert (0 < / IZR (Zpos (Qden (entry d i)))) by (apply Rinv_0_lt_compat, IZR_lt; reflexivity). nra. }
+        cbv zeta in G1. assert (N : ~ (entry d i == 0)%Q) by (intros E; apply Qeq_eqR in E; rewrite Q2R_0 in E; lra).
+        rewrite Qred_R, Q2R_mult, Q2R_div, (HL i Hi) in G1 by exact N. set (di := Q2R (entry d i)) in *. set (y := xi P X i) in *.
+        replace y with (y / di * di) by (field; lra). unfold sq. set (w := y / di) in *. assert (0 <= di * di) by nra. nra. }
+  unfold below. rewrite Ep. fold c n.
   set (P := about b) in *. set (x0 := fun i => nth i (map (left_at F P) (seq 0 n)) 0%Q).
   assert (E : Q2R (bilQ A x0 0) = qbil A (xi P X) (xi P X)).
   { rewrite bilQ_ok. unfold check_family_form in Hb. cbv zeta in Hb. do 4 apply andb_prop in Hb as [Hb _]. fold c n P in Hb.

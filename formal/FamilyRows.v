@@ -71,11 +71,11 @@ Proof.
 Qed.
 Lemma heard_moves e w t s0 i : check_tie n e = true -> Q2R (bottom e) <= w <= Q2R (top e) -> (t = i -> In s0 A) -> In i A ->
   (forall j, In j A -> 0 <= Q2R (entry d j)) ->
-  Rabs (heard t s0 w z i) <= W * (if (t =? i)%nat then Q2R (moved d e t s0) else 0).
+  Rabs (heard t s0 w z i) <= W * (if (t =? i)%nat then Q2R (row_moved d e t s0) else 0).
 Proof.
   intros HT Hw Hs Hi Hd. pose proof (size_between n e w HT Hw) as B. unfold between in B. unfold heard. destruct (Nat.eqb_spec t i) as [->|]; [|rewrite Rabs_R0; lra].
   pose proof (Hz s0 (Hs eq_refl)) as Z1. pose proof (Hz i Hi) as Z2. pose proof (Hd s0 (Hs eq_refl)) as D1. pose proof (Hd i Hi) as D2.
-  unfold moved. rewrite Q2R_mult, Q2R_plus. pose proof (Rabs_pos w) as P.
+  unfold row_moved. rewrite Q2R_mult, Q2R_plus. pose proof (Rabs_pos w) as P.
   assert (E1 : Rabs (Rabs w * z i) <= Rabs w * (W * Q2R (entry d i))) by (rewrite Rabs_mult, Rabs_Rabsolu; apply Rmult_le_compat_l; assumption).
   assert (E2 : Rabs (w * z s0) <= Rabs w * (W * Q2R (entry d s0))) by (rewrite Rabs_mult; apply Rmult_le_compat_l; assumption).
   pose proof (Rabs_triang (Rabs w * z i) (- (w * z s0))) as T. rewrite Rabs_Ropp in T. unfold Rminus.
@@ -83,16 +83,16 @@ Proof.
   assert (Rabs w * (W * (Q2R (entry d i) + Q2R (entry d s0))) <= Q2R (hi e) * (W * (Q2R (entry d i) + Q2R (entry d s0)))) by (apply Rmult_le_compat_r; lra).
   lra.
 Qed.
-Lemma over_R l g i : Q2R (over l g i) = fold_right (fun e a => (if (head e =? i)%nat then Q2R (g e (head e) (tail e)) else 0) +
+Lemma row_sum_R l g i : Q2R (row_sum l g i) = fold_right (fun e a => (if (head e =? i)%nat then Q2R (g e (head e) (tail e)) else 0) +
   (if mutual e then if (tail e =? i)%nat then Q2R (g e (tail e) (head e)) else 0 else 0) + a) 0 l.
 Proof.
-  induction l as [|e l IH]; [apply Q2R_0|]. unfold over. cbn [fold_right]. fold (over l g i). rewrite Qred_R, !Q2R_plus, IH.
+  induction l as [|e l IH]; [apply Q2R_0|]. unfold row_sum. cbn [fold_right]. fold (row_sum l g i). rewrite Qred_R, !Q2R_plus, IH.
   destruct (head e =? i)%nat, (mutual e); simpl; destruct (tail e =? i)%nat; rewrite ?Q2R_0; ring.
 Qed.
 Lemma rows_draw l : forallb (check_tie n) l = true -> (forall e, In e l -> In (head e) A <-> In (tail e) A) -> forall w i g,
-  admits l w -> In i A -> (g = 1 \/ g = -1) -> g * z i = W * Q2R (entry d i) -> W * Q2R (over l (drawn d) i) <= g * member l w z i.
+  admits l w -> In i A -> (g = 1 \/ g = -1) -> g * z i = W * Q2R (entry d i) -> W * Q2R (row_sum l (drawn d) i) <= g * member l w z i.
 Proof.
-  intros HT HC w i g Hw Hi Hg Ei. rewrite over_R. revert w Hw. induction l as [|e l IH]; intros w Hw; simpl; [lra|].
+  intros HT HC w i g Hw Hi Hg Ei. rewrite row_sum_R. revert w Hw. induction l as [|e l IH]; intros w Hw; simpl; [lra|].
   simpl in HT. apply andb_prop in HT as [HT1 HT2].
   specialize (IH HT2 (fun e0 H => HC e0 (or_intror H)) (shift w) (fun j e0 E => Hw (S j) e0 E)).
   pose proof (Hw 0%nat e eq_refl) as W0. destruct (HC e (or_introl eq_refl)) as [C1 C2].
@@ -101,9 +101,9 @@ Proof.
   unfold pulls. destruct (mutual e); lra.
 Qed.
 Lemma rows_move l : forallb (check_tie n) l = true -> (forall e, In e l -> In (head e) A <-> In (tail e) A) ->
-  (forall j, In j A -> 0 <= Q2R (entry d j)) -> forall w i, admits l w -> In i A -> Rabs (member l w z i) <= W * Q2R (over l (moved d) i).
+  (forall j, In j A -> 0 <= Q2R (entry d j)) -> forall w i, admits l w -> In i A -> Rabs (member l w z i) <= W * Q2R (row_sum l (row_moved d) i).
 Proof.
-  intros HT HC Hd w i Hw Hi. rewrite over_R. revert w Hw. induction l as [|e l IH]; intros w Hw; simpl; [rewrite Rabs_R0; lra|].
+  intros HT HC Hd w i Hw Hi. rewrite row_sum_R. revert w Hw. induction l as [|e l IH]; intros w Hw; simpl; [rewrite Rabs_R0; lra|].
   simpl in HT. apply andb_prop in HT as [HT1 HT2].
   specialize (IH HT2 (fun e0 H => HC e0 (or_intror H)) (shift w) (fun j e0 E => Hw (S j) e0 E)).
   pose proof (Hw 0%nat e eq_refl) as W0. destruct (HC e (or_introl eq_refl)) as [C1 C2].
@@ -139,9 +139,9 @@ Qed.
 Lemma rows_parts : (forall m, In m (modes F) -> (forall e, In e (ties m) -> In (head e) (agents P) <-> In (tail e) (agents P)) /\
     forall w i v, admits (ties m) w -> In v (still P) -> member (ties m) w (fun j => Q2R (nth j (snd v) 0%Q)) i = 0) /\
   (forall i, In i (agents P) -> (In i (map fst (still P)) /\ unmoved F i = true /\ (forall x, xi P x i = 0) /\ Q2R (entry d i) = 0) \/
-    (~ In i (map fst (still P)) /\ 0 < Q2R (entry d i) /\ forall m, In m (modes F) -> Q2R (decay b) * Q2R (entry d i) <= 2 * Q2R (over (ties m) (drawn d) i))) /\
+    (~ In i (map fst (still P)) /\ 0 < Q2R (entry d i) /\ forall m, In m (modes F) -> Q2R (decay b) * Q2R (entry d i) <= 2 * Q2R (row_sum (ties m) (drawn d) i))) /\
   forall i, In i (agents P) -> Q2R (entry d i) * Q2R (entry d i) <= Q2R (nth i (offs b) 0%Q) /\
-    forall m, In m (modes F) -> sq (Q2R (over (ties m) (moved d) i)) <= Q2R (nth i (inputs b) 0%Q).
+    forall m, In m (modes F) -> sq (Q2R (row_sum (ties m) (row_moved d) i)) <= Q2R (nth i (inputs b) 0%Q).
 Proof.
   pose proof H as K. unfold check_rows_of in K. cbv zeta in K. fold P in K. apply andb_prop in K as [K K5]. apply andb_prop in K as [K K4].
   apply andb_prop in K as [K K3]. apply andb_prop in K as [K1 K2]. apply Z.ltb_lt in K1. rewrite forallb_forall in K2, K3, K4, K5. split; [|split].
@@ -181,7 +181,7 @@ Proof.
     replace (sqrt a * q * (sqrt a * q)) with (q * q * (sqrt a * sqrt a)) by ring. rewrite S1. apply Rmult_le_compat_r; assumption.
   - intros m w Hm Hw. destruct (R1 m Hm) as [C Z]. rewrite (member_xi (ties m) w P i (fun v Hv => Z w i v Hw Hv) x).
     pose proof (rows_move n d (agents P) (xi P x) (sqrt a) S0 Hx (ties m) (ties_ok F Hmodes m Hm) C d_pos w i Hw Hi) as K.
-    specialize (B m Hm). set (u := Q2R (over (ties m) (moved d) i)) in *. apply Rabs_le_between in K.
+    specialize (B m Hm). set (u := Q2R (row_sum (ties m) (row_moved d) i)) in *. apply Rabs_le_between in K.
     apply Rle_trans with (sq (sqrt a * u)); [unfold sq; nra|]. unfold sq in *.
     replace (sqrt a * u * (sqrt a * u)) with (u * u * (sqrt a * sqrt a)) by ring. rewrite S1. apply Rmult_le_compat_r; assumption.
 Qed.

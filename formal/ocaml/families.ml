@@ -168,19 +168,36 @@ let moving part n =
          let a = if here e.head then entry e.head k else Number.zero in
          let a = if e.mutual then Number.sub a (Number.mul (Number.of_z (Z.of_int (sign e))) (entry e.tail k)) else a in
          Z.sign a.qnum <> 0) rows
-let lyapunov_of nodes parts modes proof work left k v =
-  let n = Array.length nodes.labels in
-  let of_ = Printf.sprintf "lyapunov.functions[%d]" k in
-  (match v with
-   | Obj l -> (match List.assoc_opt "class" l with
-       | Some (Str ("rows" | "squares" as c)) -> unsupported ("a family with a function of " ^ c) | _ -> ())
-   | _ -> ());
-  let get = fields "a Lyapunov function" [ "class"; "component"; "nodes"; "lower_triangle"; "rate"; "inputs"; "coordinates"; "means" ] v in
-  need (List.mem (text "class" (get "class")) [ "full"; "diagonal"; "undirected" ]) "an unknown class";
-  let z = integer "component" (get "component") in
+let component_of parts v =
+  let z = integer "component" v in
   need (Z.sign z >= 0 && Z.lt z (Z.of_int (List.length parts))) "component: there is no such";
   let part = List.nth parts (Z.to_int z) in
-  need (part.becomes <> Depends) "a Lyapunov function of a component without a common kernel";
+  need (part.becomes <> Depends) "a Lyapunov function of a component without a common kernel"; part
+(* the largest [|xi_k| / d_k] of followers, whose leaders are at rest *)
+let rows_of nodes parts modes proof of_ v =
+  let n = Array.length nodes.labels in
+  let get = fields "a Lyapunov function" [ "class"; "component"; "vector"; "parts"; "rate" ] v in
+  if get "parts" <> Arr [] then unsupported "a family with a function of rows whose parts have forms of their own";
+  let part = component_of parts (get "component") in
+  let pivot = Pieces.inside n (List.map fst part.still) in
+  let own = List.filter (fun i -> not (pivot i)) part.agents in
+  need (own <> []) "a function of rows without followers";
+  let d = Array.make n Number.zero in
+  List.iter2 (fun i x -> need (Z.sign x.qnum > 0) "vector: a number is not positive"; d.(i) <- x) own (numbers "vector" (List.length own) (get "vector"));
+  let rate = number "rate" (get "rate") in
+  need (Number.equal (bare proof "family-rows" of_ [ "b" ] "b") rate) (of_ ^ ": b is not the rate");
+  let d = Array.to_list d in
+  let squared x = Number.mul x x in
+  let here = Pieces.inside n part.agents in
+  let inputs = List.init n (fun i -> if not (here i) then Number.zero else
+    List.fold_left (fun a m -> Number.max a (squared (row_sum m.ties (row_moved d) i))) Number.zero modes) in
+  { about = part; by_ = Rows d; decay = rate; inputs; offs = List.map squared d }, { multipliers = []; roots = [] }
+let form_of nodes parts modes proof work left k v =
+  let n = Array.length nodes.labels in
+  let of_ = Printf.sprintf "lyapunov.functions[%d]" k in
+  let get = fields "a Lyapunov function" [ "class"; "component"; "nodes"; "lower_triangle"; "rate"; "inputs"; "coordinates"; "means" ] v in
+  need (List.mem (text "class" (get "class")) [ "full"; "diagonal"; "undirected" ]) "an unknown class";
+  let part = component_of parts (get "component") in
   let pivot = Pieces.inside n (List.map fst part.still) in
   let own = positions nodes "nodes of a function" (get "nodes") in
   need (own <> [] && own = List.filter (fun i -> not (pivot i)) part.agents) "nodes of a function";
@@ -215,6 +232,11 @@ let lyapunov_of nodes parts modes proof work left k v =
     skipped proof "family-constants" of_; left := (of_ ^ ".means, so that its constants are verified but for these") :: !left end
   else bare_of proof "family-constants" of_;
   b, { multipliers; roots = roots_of n part q modes }
+let lyapunov_of nodes parts modes proof work left k v =
+  match v with
+  | Obj l when List.assoc_opt "class" l = Some (Str "rows") -> rows_of nodes parts modes proof (Printf.sprintf "lyapunov.functions[%d]" k) v
+  | Obj l when List.assoc_opt "class" l = Some (Str "squares") -> unsupported "a family with a function of squares"
+  | _ -> form_of nodes parts modes proof work left k v
 
 (* * The document *)
 let keys = [ "boxes", "boxes that draw followers in"; "restricted", "signals that are restricted" ]
