@@ -27,7 +27,8 @@ Inductive outcome := Stability | Consensus | Interval | Containment | Depends.
 Record part := Part { agents : list nat; becomes : outcome; still : list (nat * list Q) }.
 (** [xi' P xi]; the largest [xi_k^2 / d_k^2]; the sum of the [p_k x_k^2] *)
 Inductive shape := Form (P : list (list Q)) | Rows (d : list Q) | Squares (p : list Q).
-Record lyapunov := Lyapunov { about : part; by_ : shape; decay : Q; inputs : list Q; offs : list Q }.
+Record lyapunov := Lyapunov { about : part; by_ : shape; decay : Q; inputs : list Q; offs : list Q;
+  means : list (list Q * Q) }.
 (** order, protocol, initial state and sliding variables are those of [frame] *)
 Record family := Family { frame : cert; modes : list mode; parts : list part; bounds : list lyapunov;
   ends : list (option (Q * Q)); stays : bool; peaks : list Q }.
@@ -71,6 +72,8 @@ Definition bound_claim (F : family) (b : lyapunov) : Prop := let c := frame F in
      below b (exp (- (Q2R (decay b) * (s c t - s c t0))) * a) (X t)) /\
   (forall x a i, 0 <= a -> below b a x -> In i (agents (about b)) -> sq (xi (about b) x i) <= Q2R (nth i (offs b) 0%Q) * a /\
      forall m w, In m (modes F) -> admits (ties m) w -> sq (member (ties m) w x i) <= Q2R (nth i (inputs b) 0%Q) * a) /\
+  (forall x a q, 0 <= a -> below b a x -> In q (means b) -> forall m w, In m (modes F) -> admits (ties m) w ->
+     sq (qdot (fst q) (member (ties m) w x)) <= Q2R (snd q) * a) /\
   (0 < Q2R (decay b) -> forall X S, switches F X S -> exists y, forall i, In i (agents (about b)) ->
      filterlim (fun t => X t i) (at_left (deadline c)) (locally (y i)) /\ xi (about b) y i = 0).
 (** from the initial state on, if no sliding variable moves: where the agents end, and the nominal part of their input *)

@@ -58,20 +58,25 @@ Definition check_quotient (p : part) (P : list (list Q)) (q : quotient) : bool :
 Definition check_size (q : quotient) (r : factor) (d : vec) (scale_ : Z) (a : Q) : bool :=
   notneg a && bounded_mod (qfw q) r d (Qnum a * Qnum a * (scale_ * scale_)) (Zpos (Qden a) * Zpos (Qden a) * qm q).
 Definition near (P : part) (e : tie) : bool := mem (head e) (agents P) || mem (tail e) (agents P).
-Definition abs_entry (l : vec) (i : nat) : Q := inject_Z (Z.abs (nth i l 0)).
-(** row [i] at the middle, times [dq] *)
-Definition mid_row (dq : Z) (l : list tie) (i : nat) : vec :=
-  fold_right (fun e a => vadd (scale (scaled dq (middle e) * nth i (fvec e) 0) (hvec e)) a) [] l.
-Definition spread (l : list (tie * Q)) (i : nat) : Q :=
-  fold_right (fun t a => (radius (fst t) * abs_entry (fvec (fst t)) i * snd t + a)%Q) 0%Q l.
-(** roots: of each weight, and of each agent *)
-Definition check_inputs (q : quotient) (r : factor) (P : part) (ins : list Q) (l : list tie) (roots : list Q * list Q) : bool :=
-  let dq := common (map middle l) in let t := combine l (fst roots) in
+Definition weighed (u : vec) (e : tie) : Z := zdot u (fvec e).
+(** the row [u'L] at the middle, times [dq]; how far it is from that *)
+Definition mid_row (dq : Z) (l : list tie) (u : vec) : vec :=
+  fold_right (fun e a => vadd (scale (scaled dq (middle e) * weighed u e) (hvec e)) a) [] l.
+Definition spread (l : list (tie * Q)) (u : vec) : Q :=
+  fold_right (fun t a => (radius (fst t) * inject_Z (Z.abs (weighed u (fst t))) * snd t + a)%Q) 0%Q l.
+(** roots: of each weight; of each agent, then of each mean *)
+Definition check_functional (q : quotient) (r : factor) (dq : Z) (l : list tie) (t : list ((tie * Q) * bool)) (u : vec) (a c : Q) : bool :=
+  forallb (fun tb => (weighed u (fst (fst tb)) =? 0) || snd tb) t && check_size q r (mid_row dq l u) dq a &&
+  (let s := (a + spread (map fst t) u)%Q in Qle_bool (s * s) c).
+Definition check_inputs (q : quotient) (r : factor) (b : lyapunov) (l : list tie) (roots : list Q * list Q) : bool :=
+  let dq := common (map middle l) in let P := about b in
+  let t := map (fun t => (t, Qeq_bool (radius (fst t)) 0 && notneg (snd t) || near P (fst t) && check_size q r (hvec (fst t)) 1 (snd t)))
+    (combine l (fst roots)) in
   good dq (map middle l) && (length l =? length (fst roots))%nat &&
-  forallb (fun t => negb (near P (fst t)) || Qeq_bool (radius (fst t)) 0 && notneg (snd t) || check_size q r (hvec (fst t)) 1 (snd t)) t &&
-  forallb (fun i => let a := nth i (snd roots) 0%Q in
-    check_size q r (mid_row dq l i) dq a &&
-    (let s := (a + spread t i)%Q in Qle_bool (s * s) (nth i ins 0%Q))) (agents P).
+  forallb (fun i => check_functional q r dq l t (unit i 1) (nth i (snd roots) 0%Q) (nth i (inputs b) 0%Q)) (agents P) &&
+  forallb (fun km => let m := snd km in let d := common (fst m) in good d (fst m) &&
+    check_functional q r dq l t (map (scaled d) (fst m)) (nth (fst km) (snd roots) 0%Q) (snd m * inject_Z (d * d)))
+    (combine (seq (qn q) (length (means b))) (means b)).
 Definition check_offs (q : quotient) (r : factor) (P : part) (cs : list Q) : bool :=
   forallb (fun i => let c := nth i cs 0%Q in notneg c &&
     bounded_mod (qfw q) r (crow (qsw q) (still P) i) (Qnum c * (qsw q * qsw q)) (Zpos (Qden c) * qm q)) (agents P).
@@ -96,7 +101,7 @@ Definition check_family_form (F : family) (b : lyapunov) (h : hint) (P : list (l
     check_decay n (qsw q) (qfw q) (qF q) rate (combine l (snd (snd mt)))) (combine (modes F) (multipliers h)) &&
   match factor_mod n (qsw q) (qfw q) (qF q) with
   | Some r => check_offs q r p (offs b) &&
-      forallb (fun mr => check_inputs q r p (inputs b) (ties (fst mr)) (snd mr)) (combine (modes F) (roots h))
+      forallb (fun mr => check_inputs q r b (ties (fst mr)) (snd mr)) (combine (modes F) (roots h))
   | None => false end.
 (** * Rows *)
 Definition unmoved (F : family) (i : nat) : bool :=
@@ -111,7 +116,7 @@ Definition drawn (d : list Q) (e : tie) (t s : nat) : Q := worst e (entry d t - 
 Definition row_moved (d : list Q) (e : tie) (t s : nat) : Q := (hi e * (entry d t + entry d s))%Q.
 Definition check_rows_of (F : family) (b : lyapunov) (d : list Q) : bool :=
   let P := about b in let sw := common_of (still P) in let pivots := map fst (still P) in
-  (0 <? sw) && forallb (fun v => good sw (snd v)) (still P) &&
+  (match means b with [] => true | _ => false end) && (0 <? sw) && forallb (fun v => good sw (snd v)) (still P) &&
   forallb (fun m => forallb (fun e => Bool.eqb (mem (head e) (agents P)) (mem (tail e) (agents P))) (ties m) &&
     forallb (fun v => check_at_rest sw (ties m) (snd v)) (still P)) (modes F) &&
   forallb (fun i => if mem i pivots then unmoved F i && zero_vec (crow sw (still P) i) && Qeq_bool (entry d i) 0

@@ -16,6 +16,7 @@ Hypothesis Hframe : check_frame F = true.
 Hypothesis Hmodes : forallb (check_mode F) (modes F) = true.
 Local Notation decays := (FamilyMotion.decays F).
 Local Notation sizes := (FamilyMotion.sizes F).
+Local Notation means_too := (FamilyMotion.means_too F).
 (** * Forms *)
 Lemma in_combine {A B} (l : list A) (l' : list B) x : length l = length l' -> In x l -> exists y, In (x, y) (combine l l').
 Proof.
@@ -25,7 +26,7 @@ Qed.
 Lemma map_fst_combine {A B} (l : list A) : forall l' : list B, length l = length l' -> map fst (combine l l') = l.
 Proof. induction l as [|a l IH]; intros [|b l'] L; try discriminate L; [reflexivity|]. simpl. rewrite IH by (injection L; auto). reflexivity. Qed.
 Lemma form_bound b h A : by_ b = Form A -> check_family_form F b h A = true ->
-  decays b /\ sizes b /\ forall x, exists a, 0 <= a /\ below b a x.
+  decays b /\ sizes b /\ means_too b /\ forall x, exists a, 0 <= a /\ below b a x.
 Proof.
   intros EA H. unfold check_family_form in H. cbv zeta in H. fold c n in H. set (q := quotient_of n (about b) A) in *.
   apply andb_prop in H as [H H5]. apply andb_prop in H as [H H4]. apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2].
@@ -33,7 +34,13 @@ Proof.
   apply andb_prop in H5 as [H5 H6]. rewrite forallb_forall in H6.
   destruct (quotient_parts n (about b) A H1) as [Q1 [Q2 [Q3 Q4]]]. fold q in Q1, Q2, Q3, Q4.
   pose proof (quotient_ok n (about b) A H1) as QV. fold q in QV. apply IZR_lt in Q2.
-  split; [|split].
+  assert (SI : forall m w x a, In m (modes F) -> admits (ties m) w -> 0 <= a -> below b a x ->
+    (forall i, In i (agents (about b)) -> sq (member (ties m) w x i) <= Q2R (nth i (inputs b) 0%Q) * a) /\
+    forall v, In v (means b) -> sq (qdot (fst v) (member (ties m) w x)) <= Q2R (snd v) * a).
+  { intros m w x a Hm Hw Ha H0. unfold below in H0. rewrite EA in H0.
+    destruct (in_combine _ (roots h) m ltac:(symmetry; exact H3) Hm) as [rs Hrs]. specialize (H6 _ Hrs). cbn [fst snd] in H6.
+    apply (inputs_ok n (about b) A H1 r Er b (ties m) rs eq_refl (ties_ok F Hmodes m Hm) H6 w x a Ha H0 Hw). }
+  split; [|split; [|split]].
   - intros X Sl t0 t a HM Ht Ha H0. unfold below in *. rewrite EA in *.
     assert (K : bil (qF q) (X t) (X t) <= exp (- (Q2R (decay b) * (s c t - s c t0))) * bil (qF q) (X t0) (X t0)).
     { apply (form_decays F Hframe X Sl t0 HM (qF q) (Q2R (decay b)) Q4); [|exact Ht]. intros m w x Hm Hw.
@@ -45,27 +52,27 @@ Proof.
     rewrite !QV in K. set (e := exp _) in *. assert (Pe : 0 < e) by apply exp_pos. apply (Rmult_le_reg_l (IZR (qm q))); [exact Q2|].
     eapply Rle_trans; [exact K|].
     replace (IZR (qm q) * (e * a)) with (e * (IZR (qm q) * a)) by ring. apply Rmult_le_compat_l; [lra|]. apply Rmult_le_compat_l; lra.
-  - intros x a i Ha H0 Hi. unfold below in H0. rewrite EA in H0. split.
-    + apply (offs_ok n (about b) A H1 r Er (offs b) H5 x a i Hi H0).
-    + intros m w Hm Hw. destruct (in_combine _ (roots h) m ltac:(symmetry; exact H3) Hm) as [rs Hrs]. specialize (H6 _ Hrs). cbn [fst snd] in H6.
-      apply (inputs_ok n (about b) A H1 r Er (inputs b) (ties m) rs (ties_ok F Hmodes m Hm) H6 w x a i Ha H0 Hw Hi).
+  - intros x a i Ha H0 Hi. split; [|intros m w Hm Hw; apply (SI m w x a Hm Hw Ha H0); exact Hi].
+    unfold below in H0. rewrite EA in H0. apply (offs_ok n (about b) A H1 r Er (offs b) H5 x a i Hi H0).
+  - intros x a v Ha H0 Hv m w Hm Hw. apply (SI m w x a Hm Hw Ha H0). exact Hv.
   - intros x. exists (qbil A (xi (about b) x) (xi (about b) x)). split; [apply (value_pos n (about b) A H1 r Er)|].
     unfold below. rewrite EA. lra.
 Qed.
 Lemma bound_parts b h : check_bound F b h = true -> (forall i, In i (agents (about b)) -> (i < n)%nat) /\
-  (forall v, In v (still (about b)) -> In (fst v) (agents (about b))) /\ decays b /\ sizes b /\ forall x, exists a, 0 <= a /\ below b a x.
+  (forall v, In v (still (about b)) -> In (fst v) (agents (about b))) /\ decays b /\ sizes b /\ means_too b /\ forall x, exists a, 0 <= a /\ below b a x.
 Proof.
   intros H. unfold check_bound in H. apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2]. rewrite forallb_forall in H1, H2.
   split; [intros i Hi; apply Nat.ltb_lt; apply H1; exact Hi|]. split; [intros v Hv; apply mem_In; apply H2; exact Hv|].
   assert (HA : forall i, In i (agents (about b)) -> (i < n)%nat) by (intros i Hi; apply Nat.ltb_lt; apply H1; exact Hi).
   assert (HP : forall v, In v (still (about b)) -> In (fst v) (agents (about b))) by (intros v Hv; apply mem_In; apply H2; exact Hv).
   destruct (by_ b) as [A|d|p] eqn:E; try discriminate; [apply (form_bound b h A E H3)|].
-  split; [apply (rows_decay F Hframe Hmodes b d E HA HP H3)|]. split; [apply (rows_size F Hmodes b d E H3)|apply (rows_value F Hmodes b d E H3)].
+  split; [apply (rows_decay F Hframe Hmodes b d E HA HP H3)|]. split; [apply (rows_size F Hmodes b d E H3)|].
+  split; [|apply (rows_value F Hmodes b d E H3)]. intros x a v _ _ Hv. rewrite (rows_means F b d H3) in Hv. destruct Hv.
 Qed.
 Theorem bounds_claim b h : check_bound F b h = true -> bound_claim F b.
 Proof.
-  intros H. destruct (bound_parts b h H) as [H1 [H2 [H3 [H4 H5]]]]. split; [exact H3|]. split; [exact H4|].
-  intros Hr X Sl HM. apply (comes_to_rest_family F Hframe b H3 H4 H5 H1 H2 Hr X Sl HM).
+  intros H. destruct (bound_parts b h H) as [H1 [H2 [H3 [H4 [H5 H6]]]]]. split; [exact H3|]. split; [exact H4|]. split; [exact H5|].
+  intros Hr X Sl HM. apply (comes_to_rest_family F Hframe b H3 H4 H6 H1 H2 Hr X Sl HM).
 Qed.
 
 (** * Parts *)
@@ -135,7 +142,7 @@ Proof.
   { intros i Hi. specialize (H i ltac:(apply in_seq; lia)). apply orb_prop in H as [H|H].
     - exists 0. intros t m w _ Hm _. rewrite (unmoved_ok F i m w (X t) H Hm). unfold sq. lra.
     - apply existsb_exists in H as [b [Hb H]]. apply andb_prop in H as [H1 H2]. apply mem_In in H2. destruct (bound_of b Hb) as [h Hh].
-      destruct (bound_parts b h Hh) as [_ [_ [_ [_ HV]]]]. destruct (HV (X t0)) as [a [Ha H0]].
+      destruct (bound_parts b h Hh) as [_ [_ [_ [_ [_ HV]]]]]. destruct (HV (X t0)) as [a [Ha H0]].
       exists (sq (rho + k c / T) * (Q2R (nth i (inputs b) 0%Q) * a * exp (Q2R (decay b) * s c t0))). intros t m w Ht Hm Hw.
       apply (inputs_fall b h i X Sl t0 a t m w); assumption. }
   destruct (finite_choice n (fun i K => forall t m w, t0 <= t < T -> In m (modes F) -> admits (ties m) w ->

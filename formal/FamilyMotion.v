@@ -172,6 +172,8 @@ Definition decays : Prop := forall X Sl t0 t a, switches_from F X Sl t0 -> t0 <=
   below b (exp (- (Q2R (decay b) * (s c t - s c t0))) * a) (X t).
 Definition sizes : Prop := forall x a i, 0 <= a -> below b a x -> In i (agents P) -> sq (xi P x i) <= Q2R (nth i (offs b) 0%Q) * a /\
   forall m w, In m (modes F) -> admits (ties m) w -> sq (member (ties m) w x i) <= Q2R (nth i (inputs b) 0%Q) * a.
+Definition means_too : Prop := forall x a q, 0 <= a -> below b a x -> In q (means b) -> forall m w, In m (modes F) ->
+  admits (ties m) w -> sq (qdot (fst q) (member (ties m) w x)) <= Q2R (snd q) * a.
 Hypotheses (HD : decays) (HS : sizes) (HV : forall x, exists a, 0 <= a /\ below b a x).
 Hypothesis Hagents : forall i, In i (agents P) -> (i < n)%nat.
 Hypothesis Hpivots : forall v, In v (still P) -> In (fst v) (agents P).

@@ -136,6 +136,10 @@ Proof.
   induction (ties m) as [|e l IH]; intros w; [reflexivity|]. simpl in Hu. apply andb_prop in Hu as [H1 H2]. apply andb_prop in H1 as [A B].
   cbn [member]. rewrite (IH H2). unfold pulls, heard. apply negb_true_iff in A, B. rewrite A. destruct (mutual e); [simpl in B; rewrite B|]; ring.
 Qed.
+Lemma rows_means : means b = [].
+Proof.
+  unfold check_rows_of in H. cbv zeta in H. do 5 apply andb_prop in H as [H _]. destruct (means b); [reflexivity|discriminate].
+Qed.
 Lemma rows_parts : (forall m, In m (modes F) -> (forall e, In e (ties m) -> In (head e) (agents P) <-> In (tail e) (agents P)) /\
     forall w i v, admits (ties m) w -> In v (still P) -> member (ties m) w (fun j => Q2R (nth j (snd v) 0%Q)) i = 0) /\
   (forall i, In i (agents P) -> (In i (map fst (still P)) /\ unmoved F i = true /\ (forall x, xi P x i = 0) /\ Q2R (entry d i) = 0) \/
@@ -144,7 +148,7 @@ Lemma rows_parts : (forall m, In m (modes F) -> (forall e, In e (ties m) -> In (
     forall m, In m (modes F) -> sq (Q2R (row_sum (ties m) (row_moved d) i)) <= Q2R (nth i (inputs b) 0%Q).
 Proof.
   pose proof H as K. unfold check_rows_of in K. cbv zeta in K. fold P in K. apply andb_prop in K as [K K5]. apply andb_prop in K as [K K4].
-  apply andb_prop in K as [K K3]. apply andb_prop in K as [K1 K2]. apply Z.ltb_lt in K1. rewrite forallb_forall in K2, K3, K4, K5. split; [|split].
+  apply andb_prop in K as [K K3]. apply andb_prop in K as [K K2]. apply andb_prop in K as [_ K1]. apply Z.ltb_lt in K1. rewrite forallb_forall in K2, K3, K4, K5. split; [|split].
   - intros m Hm. specialize (K3 m Hm). apply andb_prop in K3 as [A B]. rewrite forallb_forall in A, B. split.
     + intros e He. specialize (A e He). apply eqb_prop in A. rewrite <- !mem_In, A. reflexivity.
     + intros w i v Hw Hv. apply (rest_ok F Hmodes (common_of (still P)) m (snd v) Hm (B v Hv) w i Hw).

@@ -272,34 +272,48 @@ Proof.
   apply (Rmult_le_reg_l (IZR (Zpos (Qden c)) * (IZR (qsw q) * IZR (qsw q)))); [apply Rmult_lt_0_compat; nra|].
   unfold sq in *. lra.
 Qed.
-Lemma mid_row_ok dq l i x : good dq (map middle l) = true ->
-  dot (mid_row dq l i) x = IZR dq * combined_at l (fun j => Q2R (middle (nth j l (Tie 0 0 0 0 false)))) x i.
+Definition functional (l : list tie) (u : vec) (a : nat -> R) (x : nat -> R) : R := dot u (combined_at l a x).
+Lemma functional_cons e l u a x : functional (e :: l) u a x = a O * (IZR (weighed u e) * dot (hvec e) x) + functional l u (shift a) x.
+Proof.
+  unfold functional, weighed. rewrite <- zdot_ok.
+  rewrite (dot_ext u (combined_at (e :: l) a x) (fun i => (a O * dot (hvec e) x) * vec_of (fvec e) i + combined_at l (shift a) x i))
+    by (intros; simpl; ring).
+  rewrite dot_plus, dot_scal. ring.
+Qed.
+Lemma functional_nil u a x : functional [] u a x = 0.
+Proof. unfold functional. apply dot_zero. reflexivity. Qed.
+Definition middles (l : list tie) (j : nat) : R := Q2R (middle (nth j l (Tie 0 0 0 0 false))).
+Lemma mid_row_ok dq l u x : good dq (map middle l) = true -> dot (mid_row dq l u) x = IZR dq * functional l u (middles l) x.
 Proof.
   intros G. apply good_ok in G as [D0 D1]. unfold mid_row.
-  induction l as [|e l IH]; simpl; [ring|]. rewrite dot_vadd, dot_scale, IH by (intros; apply D1; right; assumption).
-  rewrite mult_IZR, scaled_ok by (try exact D0; apply D1; left; reflexivity). unfold vec_of, shift. simpl. ring.
+  induction l as [|e l IH]; [rewrite functional_nil; simpl; ring|]. cbn [fold_right].
+  rewrite dot_vadd, dot_scale, IH by (intros; apply D1; right; assumption).
+  rewrite functional_cons, mult_IZR, scaled_ok by (try exact D0; apply D1; left; reflexivity).
+  change (shift (middles (e :: l))) with (middles l). change (middles (e :: l) O) with (Q2R (middle e)). ring.
 Qed.
-Lemma spread_ok x i c l : 0 <= c -> forall rs a, length l = length rs -> all_between l a ->
-  (forall t, In t (combine l rs) -> nth i (fvec (fst t)) 0%Z = 0%Z \/ Q2R (radius (fst t)) = 0 /\ 0 <= Q2R (snd t) \/
+Lemma spread_ok x u c l : 0 <= c -> forall rs a, length l = length rs -> all_between l a ->
+  (forall t, In t (combine l rs) -> weighed u (fst t) = 0%Z \/ Q2R (radius (fst t)) = 0 /\ 0 <= Q2R (snd t) \/
      0 <= Q2R (snd t) /\ Rabs (dot (hvec (fst t)) x) <= Q2R (snd t) * sqrt c) ->
-  Rabs (combined_at l a x i - combined_at l (fun j => Q2R (middle (nth j l (Tie 0 0 0 0 false)))) x i)
-    <= Q2R (FamilyChecker.spread (combine l rs) i) * sqrt c /\ 0 <= Q2R (FamilyChecker.spread (combine l rs) i).
+  Rabs (functional l u a x - functional l u (middles l) x)
+    <= Q2R (FamilyChecker.spread (combine l rs) u) * sqrt c /\ 0 <= Q2R (FamilyChecker.spread (combine l rs) u).
 Proof.
   intros Hc. pose proof (sqrt_pos c) as S0.
-  induction l as [|e l IH]; intros [|t rs] a L B K; try discriminate L; simpl.
-  - rewrite Rminus_0_r, Rabs_R0, Q2R_0. split; lra.
+  induction l as [|e l IH]; intros [|t rs] a L B K; try discriminate L.
+  - rewrite !functional_nil. simpl. rewrite Rminus_0_r, Rabs_R0, Q2R_0. split; lra.
   - destruct (IH rs (shift a) ltac:(injection L; auto) (fun j e0 E => B (S j) e0 E) ltac:(intros; apply K; right; assumption)) as [I1 I2].
     specialize (K (e, t) ltac:(left; reflexivity)). cbn [fst snd] in K. pose proof (B 0%nat e eq_refl) as Be. unfold between in Be.
-    unfold shift in I1 |- *. set (v := combined_at l (fun j => Q2R (middle (nth j l _))) x i) in *. set (u := combined_at l (fun j => a (S j)) x i) in *.
-    rewrite Q2R_plus, !Q2R_mult. set (W := Q2R (FamilyChecker.spread (combine l rs) i)) in *.
-    assert (Ef : Q2R (abs_entry (fvec e) i) = Rabs (vec_of (fvec e) i)).
-    { unfold abs_entry, vec_of, Q2R, inject_Z. simpl. rewrite Rinv_1, Rmult_1_r. apply abs_IZR. }
-    rewrite Ef. set (f := vec_of (fvec e) i) in *. set (h := dot (hvec e) x) in *. set (m := Q2R (middle e)). set (ra := Q2R (radius e)) in *.
+    rewrite !functional_cons. change (shift (middles (e :: l))) with (middles l). change (middles (e :: l) O) with (Q2R (middle e)).
+    set (v := functional l u (middles l) x) in *. set (y := functional l u (shift a) x) in *.
+    unfold FamilyChecker.spread. cbn [combine fold_right fst snd]. fold (FamilyChecker.spread (combine l rs) u).
+    rewrite Q2R_plus, !Q2R_mult. set (W := Q2R (FamilyChecker.spread (combine l rs) u)) in *.
+    assert (Ef : Q2R (inject_Z (Z.abs (weighed u e))) = Rabs (IZR (weighed u e))).
+    { unfold Q2R, inject_Z. simpl. rewrite Rinv_1, Rmult_1_r. apply abs_IZR. }
+    rewrite Ef. set (f := IZR (weighed u e)) in *. set (h := dot (hvec e) x) in *. set (m := Q2R (middle e)). set (ra := Q2R (radius e)) in *.
     assert (Er : ra = (Q2R (hi e) - Q2R (lo e)) / 2) by (unfold ra, radius; rewrite Q2R_mult, Q2R_minus; unfold Q2R at 3; simpl; lra).
     assert (Em : m = (Q2R (hi e) + Q2R (lo e)) / 2) by (unfold m, middle; rewrite Q2R_mult, Q2R_plus; unfold Q2R at 3; simpl; lra).
     assert (D : Rabs ((a 0%nat - m) * (f * h)) <= ra * Rabs f * Q2R t * sqrt c /\ 0 <= ra * Rabs f * Q2R t).
     { pose proof (Rabs_pos f) as F0. destruct K as [K|[[K1 K2]|[K1 K2]]].
-      - assert (f = 0) by (unfold f, vec_of; rewrite K; reflexivity). rewrite H0, Rabs_R0. rewrite !Rmult_0_l, !Rmult_0_r, Rmult_0_l, Rabs_R0. lra.
+      - assert (f = 0) by (unfold f; rewrite K; reflexivity). rewrite H0, Rabs_R0. rewrite !Rmult_0_l, !Rmult_0_r, Rmult_0_l, Rabs_R0. lra.
       - rewrite K1. assert (a 0%nat - m = 0) by lra. rewrite H0, !Rmult_0_l, Rabs_R0. lra.
       - assert (R0 : 0 <= ra) by lra. assert (P0 : 0 <= ra * Rabs f) by (apply Rmult_le_pos; assumption).
         split; [|apply Rmult_le_pos; assumption]. rewrite !Rabs_mult.
@@ -307,35 +321,59 @@ Proof.
         apply Rmult_le_compat; [apply Rabs_pos|apply Rmult_le_pos; apply Rabs_pos|apply Rabs_le; lra|].
         apply Rmult_le_compat_l; assumption. }
     destruct D as [D1 D2]. split; [|lra].
-    replace (a 0%nat * (f * h) + u - (m * (f * h) + v)) with ((a 0%nat - m) * (f * h) + (u - v)) by ring.
+    replace (a 0%nat * (f * h) + y - (m * (f * h) + v)) with ((a 0%nat - m) * (f * h) + (y - v)) by ring.
     eapply Rle_trans; [apply Rabs_triang|]. rewrite Rmult_plus_distr_r. apply Rplus_le_compat; assumption.
 Qed.
-Lemma inputs_ok ins l roots : forallb (check_tie n) l = true -> check_inputs q r p ins l roots = true ->
-  forall w x a i, 0 <= a -> qbil P (xi p x) (xi p x) <= a -> admits l w -> In i (agents p) ->
-  sq (member l w x i) <= Q2R (nth i ins 0%Q) * a.
+Definition sized_ties (b : lyapunov) (l : list tie) (rs : list Q) := map (fun t => (t, Qeq_bool (radius (fst t)) 0 && notneg (snd t) ||
+  near (about b) (fst t) && check_size q r (hvec (fst t)) 1 (snd t))) (combine l rs).
+Lemma functional_ok b l rs dq u a0 c0 x a bs : good dq (map middle l) = true -> length l = length rs ->
+  check_functional q r dq l (sized_ties b l rs) u a0 c0 = true -> 0 <= a -> qbil P (xi p x) (xi p x) <= a -> all_between l bs ->
+  sq (functional l u bs x) <= Q2R c0 * a.
 Proof.
-  intros HT HC w x a i Ha Hv Hw Hi. unfold check_inputs in HC. cbv zeta in HC. set (dq := common _) in *.
-  apply andb_prop in HC as [HC C4]. apply andb_prop in HC as [HC C3]. apply andb_prop in HC as [C1 C2].
-  apply Nat.eqb_eq in C2. rewrite forallb_forall in C3, C4. specialize (C4 i Hi). apply andb_prop in C4 as [C4 C5].
-  destruct (member_ok n l HT w Hw) as [b [B E]]. rewrite E. destruct (good_ok _ _ C1) as [D0 _].
-  destruct (size_ok _ _ _ x a C4 D0 Ha Hv) as [A0 A1]. rewrite (mid_row_ok dq l i x C1) in A1.
-  set (y0 := combined_at l (fun j => Q2R (middle _)) x i) in *. apply IZR_lt in D0. rewrite Rabs_mult, (Rabs_right (IZR dq)) in A1 by lra.
+  intros C1 C2 C4 Ha Hv B. unfold check_functional in C4. cbv zeta in C4. apply andb_prop in C4 as [C4 C5]. apply andb_prop in C4 as [C3 C4].
+  rewrite forallb_forall in C3. destruct (good_ok _ _ C1) as [D0 _].
+  destruct (size_ok _ _ _ x a C4 D0 Ha Hv) as [A0 A1]. rewrite (mid_row_ok dq l u x C1) in A1.
+  set (y0 := functional l u (middles l) x) in *. apply IZR_lt in D0. rewrite Rabs_mult, (Rabs_right (IZR dq)) in A1 by lra.
   apply (Rmult_le_reg_l (IZR dq)) in A1; [|exact D0].
-  destruct (spread_ok x i a l Ha (fst roots) b C2 B) as [S1 S2].
-  { intros t Ht. specialize (C3 t Ht). apply orb_prop in C3 as [C3|C3]; [apply orb_prop in C3 as [C3|C3]|].
-    - left. unfold near in C3. apply negb_true_iff, orb_false_iff in C3 as [N1 N2].
-      assert (M : forall j, mem j (agents p) = false -> (j =? i)%nat = false).
-      { intros j Mj. destruct (Nat.eqb_spec j i) as [->|]; [|reflexivity]. apply mem_In in Hi. congruence. }
-      unfold fvec. destruct (mutual (fst t)); unfold hvec; rewrite ?nth_vadd, ?nth_unit, ?(M _ N1), ?(M _ N2); reflexivity.
-    - right. left. apply andb_prop in C3 as [R0 R1]. apply Qeq_R in R0. rewrite Q2R_0 in R0. split; [exact R0|apply notneg_R; exact R1].
-    - right. right. destruct (size_ok _ 1 _ x a C3 ltac:(lia) Ha Hv) as [T0 T1]. split; [exact T0|]. rewrite Rmult_1_l in T1. exact T1. }
-  fold y0 in S1. set (W := Q2R (FamilyChecker.spread _ i)) in *. apply Qle_R in C5. rewrite Q2R_mult, Q2R_plus in C5. fold W in C5.
-  set (a0 := Q2R (nth i (snd roots) 0%Q)) in *. pose proof (sqrt_pos a) as S0. pose proof (sqrt_sqrt a Ha) as Sa.
-  assert (K : Rabs (combined_at l b x i) <= (a0 + W) * sqrt a).
-  { replace (combined_at l b x i) with (y0 + (combined_at l b x i - y0)) by ring. eapply Rle_trans; [apply Rabs_triang|]. lra. }
-  apply Rabs_le_between in K. assert (P0 : 0 <= (a0 + W) * sqrt a) by (apply Rmult_le_pos; lra).
-  eapply Rle_trans with (sq ((a0 + W) * sqrt a)); [unfold sq; nra|]. unfold sq.
-  replace ((a0 + W) * sqrt a * ((a0 + W) * sqrt a)) with ((a0 + W) * (a0 + W) * (sqrt a * sqrt a)) by ring. rewrite Sa.
+  assert (Em : map fst (sized_ties b l rs) = combine l rs) by (unfold sized_ties; rewrite map_map; apply map_id). rewrite Em in C5.
+  destruct (spread_ok x u a l Ha rs bs C2 B) as [S1 S2].
+  { intros t Ht. assert (I : In (t, Qeq_bool (radius (fst t)) 0 && notneg (snd t) || near (about b) (fst t) && check_size q r (hvec (fst t)) 1 (snd t))
+      (sized_ties b l rs)) by (unfold sized_ties; apply in_map_iff; exists t; split; [reflexivity|exact Ht]).
+    specialize (C3 _ I). cbn [fst snd] in C3. apply orb_prop in C3 as [C3|C3]; [left; apply Z.eqb_eq; exact C3|]. right.
+    apply orb_prop in C3 as [C3|C3]; apply andb_prop in C3 as [R0 R1].
+    - left. apply Qeq_R in R0. rewrite Q2R_0 in R0. split; [exact R0|apply notneg_R; exact R1].
+    - right. destruct (size_ok _ 1 _ x a R1 ltac:(lia) Ha Hv) as [T0 T1]. split; [exact T0|]. rewrite Rmult_1_l in T1. exact T1. }
+  fold y0 in S1. set (W := Q2R (FamilyChecker.spread _ u)) in *. apply Qle_R in C5. rewrite Q2R_mult, Q2R_plus in C5. fold W in C5.
+  set (k0 := Q2R a0) in *. pose proof (sqrt_pos a) as S0. pose proof (sqrt_sqrt a Ha) as Sa. set (y := functional l u bs x) in *.
+  assert (K : Rabs y <= (k0 + W) * sqrt a).
+  { replace y with (y0 + (y - y0)) by ring. eapply Rle_trans; [apply Rabs_triang|]. lra. }
+  apply Rabs_le_between in K. assert (P0 : 0 <= (k0 + W) * sqrt a) by (apply Rmult_le_pos; lra).
+  eapply Rle_trans with (sq ((k0 + W) * sqrt a)); [unfold sq; nra|]. unfold sq.
+  replace ((k0 + W) * sqrt a * ((k0 + W) * sqrt a)) with ((k0 + W) * (k0 + W) * (sqrt a * sqrt a)) by ring. rewrite Sa.
   apply Rmult_le_compat_r; assumption.
+Qed.
+Lemma inputs_ok b l roots : about b = p -> forallb (check_tie n) l = true -> check_inputs q r b l roots = true ->
+  forall w x a, 0 <= a -> qbil P (xi p x) (xi p x) <= a -> admits l w ->
+  (forall i, In i (agents p) -> sq (member l w x i) <= Q2R (nth i (inputs b) 0%Q) * a) /\
+  forall m, In m (means b) -> sq (qdot (fst m) (member l w x)) <= Q2R (snd m) * a.
+Proof.
+  intros Ep HT HC w x a Ha Hv Hw. unfold check_inputs in HC. cbv zeta in HC. set (dq := common (map middle l)) in *.
+  fold (sized_ties b l (fst roots)) in HC.
+  apply andb_prop in HC as [HC C4]. apply andb_prop in HC as [HC C3]. apply andb_prop in HC as [C1 C2].
+  apply Nat.eqb_eq in C2. rewrite forallb_forall in C3, C4. rewrite Ep in C3.
+  destruct (member_ok n l HT w Hw) as [bs [B E]]. split.
+  - intros i Hi. pose proof (functional_ok b l (fst roots) dq _ _ _ x a bs C1 C2 (C3 i Hi) Ha Hv B) as K.
+    unfold functional in K. rewrite dot_unit, Rmult_1_l in K. rewrite E. exact K.
+  - intros m Hm. destruct (In_nth _ _ m Hm) as [j [Hj Ej]].
+    assert (I : In ((qn q + j)%nat, m) (combine (seq (qn q) (length (means b))) (means b))).
+    { replace ((qn q + j)%nat, m) with (nth j (combine (seq (qn q) (length (means b))) (means b)) (0%nat, m)).
+      - apply nth_In. rewrite combine_length, seq_length. lia.
+      - rewrite combine_nth by apply seq_length. rewrite seq_nth by exact Hj. rewrite Ej. reflexivity. }
+    specialize (C4 _ I). cbn [fst snd] in C4. set (d := common (fst m)) in *. apply andb_prop in C4 as [G C4].
+    pose proof (functional_ok b l (fst roots) dq _ _ _ x a bs C1 C2 C4 Ha Hv B) as K. unfold functional in K.
+    rewrite (dot_scaled d (fst m) G) in K. destruct (good_ok _ _ G) as [G0 _]. apply IZR_lt in G0.
+    rewrite (qdot_ext (fst m) (member l w x) (combined_at l bs x)) by (intros; apply E).
+    rewrite Q2R_mult in K. assert (Ed : Q2R (inject_Z (d * d)) = IZR d * IZR d) by (unfold Q2R, inject_Z; simpl; rewrite Rinv_1, Rmult_1_r; apply mult_IZR).
+    rewrite Ed in K. unfold sq in *. set (y := qdot _ _) in *. apply (Rmult_le_reg_l (IZR d * IZR d)); [nra|]. lra.
 Qed.
 End Quotient.
