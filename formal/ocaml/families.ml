@@ -143,7 +143,7 @@ let root (v : q) =
     let scaled = Z.add (Z.div (Z.shift_left v.qnum (2 * bits)) v.qden) Z.one in
     Number.make (Z.add (Z.sqrt scaled) Z.one) (Z.shift_left Z.one bits) end
 let middle_common ties = List.fold_left (fun a e -> Z.lcm a (middle e).qden) Z.one ties
-let roots_of n part (q : quotient) modes = match factor_mod n q.qsw q.qfw q.qF with
+let roots_of n part (q : quotient) means modes = match factor_mod n q.qsw q.qfw q.qF with
   | None -> bad "P is not definite"
   | Some r ->
       let fs = List.map fst q.qfw in
@@ -152,7 +152,8 @@ let roots_of n part (q : quotient) modes = match factor_mod n q.qsw q.qfw q.qF w
       List.map (fun m ->
         let dq = middle_common m.ties in
         List.map (fun e -> if known e || not (here e.head) then Number.zero else above (hvec e) Z.one) m.ties,
-        List.init n (fun i -> if here i then above (mid_row dq m.ties i) dq else Number.zero)) modes
+        List.init n (fun i -> if here i then above (mid_row dq m.ties (List.init (i + 1) (fun j -> if i = j then Z.one else Z.zero))) dq else Number.zero)
+        @ List.map (fun (u, _) -> let d = common u in above (mid_row dq m.ties (List.map (scaled d) u)) dq) means) modes
 (* the weights of a mode that have a multiplier: those that move what is left to the states at rest *)
 let moving part n =
   let pivots = List.map fst part.still in
@@ -191,8 +192,24 @@ let rows_of nodes parts modes proof of_ v =
   let here = Pieces.inside n part.agents in
   let inputs = List.init n (fun i -> if not (here i) then Number.zero else
     List.fold_left (fun a m -> Number.max a (squared (row_sum m.ties (row_moved d) i))) Number.zero modes) in
-  { about = part; by_ = Rows d; decay = rate; inputs; offs = List.map squared d }, { multipliers = []; roots = [] }
-let form_of nodes parts modes proof work left k v =
+  { about = part; by_ = Rows d; decay = rate; inputs; offs = List.map squared d; means = [] }, { multipliers = []; roots = [] }
+(* weights of agents that end at one value up to signs, which do not cancel *)
+let mean_of nodes part v =
+  let n = Array.length nodes.labels in
+  let get = fields "a mean" [ "weights"; "constant" ] v in
+  let weights = match get "weights" with
+    | Obj l -> List.map (fun (label, x) -> node nodes "means" (Str label), number "means" x) l | _ -> bad "means: an object is due" in
+  let here = Pieces.inside n part.agents in
+  need (weights <> [] && List.for_all (fun (i, _) -> here i) weights) "means: of agents of the component";
+  let row i = List.map (fun (_, v) -> List.nth v i) part.still in
+  let size l = List.map (fun x -> if Number.compare x Number.zero < 0 then Number.sub Number.zero x else x) l in
+  let first = size (row (fst (List.hd weights))) in
+  let total l = List.fold_left Number.add Number.zero l in
+  need (Number.equal (total first) Number.one && List.for_all (fun x -> Number.equal x Number.one || Number.equal x Number.zero) first
+    && List.for_all (fun (i, _) -> List.for_all2 Number.equal (size (row i)) first) weights) "means: of agents that end at one value";
+  need (not (Number.equal (total (List.map (fun (i, x) -> Number.mul x (total (row i))) weights)) Number.zero)) "means: weights that cancel";
+  List.init n (fun i -> Option.value (List.assoc_opt i weights) ~default:Number.zero), number "constant" (get "constant")
+let form_of nodes parts modes proof work k v =
   let n = Array.length nodes.labels in
   let of_ = Printf.sprintf "lyapunov.functions[%d]" k in
   let get = fields "a Lyapunov function" [ "class"; "component"; "nodes"; "lower_triangle"; "rate"; "inputs"; "coordinates"; "means" ] v in
@@ -226,17 +243,17 @@ let form_of nodes parts modes proof work left k v =
     b, taus) modes in
   let least = List.fold_left (fun a (b, _) -> Number.min a b) (fst (List.hd multipliers)) multipliers in
   need (Number.equal least rate) (of_ ^ ": the rate is not the least of all modes");
+  bare_of proof "family-constants" of_;
+  let means = map (mean_of nodes part) (entries "means" (get "means")) in
+  need (List.length means <= 100) "means: more than 100";
   let b = { about = part; by_ = Form p; decay = rate; inputs = spread part.agents "inputs" (get "inputs");
-    offs = spread own "coordinates" (get "coordinates") } in
-  if get "means" <> Arr [] then begin
-    skipped proof "family-constants" of_; left := (of_ ^ ".means, so that its constants are verified but for these") :: !left end
-  else bare_of proof "family-constants" of_;
-  b, { multipliers; roots = roots_of n part q modes }
-let lyapunov_of nodes parts modes proof work left k v =
+    offs = spread own "coordinates" (get "coordinates"); means } in
+  b, { multipliers; roots = roots_of n part q means modes }
+let lyapunov_of nodes parts modes proof work k v =
   match v with
   | Obj l when List.assoc_opt "class" l = Some (Str "rows") -> rows_of nodes parts modes proof (Printf.sprintf "lyapunov.functions[%d]" k) v
   | Obj l when List.assoc_opt "class" l = Some (Str "squares") -> unsupported "a family with a function of squares"
-  | _ -> form_of nodes parts modes proof work left k v
+  | _ -> form_of nodes parts modes proof work k v
 
 (* * The document *)
 let keys = [ "boxes", "boxes that draw followers in"; "restricted", "signals that are restricted" ]
@@ -294,7 +311,7 @@ let certificate (j : Json.t) : t =
   let functions = entries "functions" (lyapunov "functions") in
   need (List.length functions <= most_functions) "lyapunov.functions: more than 100";
   let work = ref 0 in
-  let bounds = List.mapi (lyapunov_of nodes parts modes proof work left) functions in
+  let bounds = List.mapi (lyapunov_of nodes parts modes proof work) functions in
   (* the theorem says that a component comes to rest where a function has a positive rate *)
   let at_rest p = p.becomes = Depends || (match p.agents with [ _ ] -> true
     | _ -> List.exists (fun (b, _) -> b.about == p && Z.sign b.decay.qnum > 0) bounds) in
