@@ -180,7 +180,11 @@ Definition check_peak (F : family) (i : nat) (peak : Q) : bool := let c := frame
     | None => false end) (bounds F)).
 Definition check_peaks (F : family) : bool := forallb (fun p => check_peak F (fst p) (snd p)) (combine (seq 0 (length (peaks F))) (peaks F)).
 
-Definition check_family_ends (F : family) : bool := forallb (fun e => match e with None => true | Some _ => false end) (ends F).
+(** agents that a function draws to 0 *)
+Definition check_end_of (F : family) (i : nat) (e : Q * Q) : bool := Qle_bool (Qabs (fst e)) (snd e) &&
+  existsb (fun b => pos (decay b) && mem i (agents (about b)) && match still (about b) with [] => true | _ => false end) (bounds F).
+Definition check_family_ends (F : family) : bool := forallb (fun ie => match snd ie with None => true | Some e => check_end_of F (fst ie) e end)
+  (combine (seq 0 (length (ends F))) (ends F)).
 Definition check_family (F : family) (hs : list hint) : bool :=
   check_frame F && forallb (check_mode F) (modes F) && forallb (check_part F) (parts F) &&
   ((length (bounds F) =? length hs)%nat && forallb (fun bh => check_bound F (fst bh) (snd bh)) (combine (bounds F) hs)) &&

@@ -245,6 +245,25 @@ Proof.
     rewrite ES in H3. change (Q2R (rho2 c) * Q2R (kappa c)) with (k c) in H3. change (k c * / T) with (k c / T) in H3. change (Q2R (rho1 c)) with rho in H3.
     set (u := _ * member _ _ _ _) in *. unfold sq in B. apply Rabs_le. split; nra.
 Qed.
+Theorem ends_ok : check_family_ends F = true -> ends_claim F.
+Proof.
+  intros H X S i m r [[HM _] _] E. unfold check_family_ends in H. rewrite forallb_forall in H.
+  assert (L : (i < length (ends F))%nat).
+  { destruct (Nat.lt_ge_cases i (length (ends F))) as [L|L]; [exact L|]. rewrite nth_overflow in E by exact L. discriminate. }
+  assert (K : In (i, nth i (ends F) None) (combine (seq 0 (length (ends F))) (ends F))).
+  { replace (i, nth i (ends F) None) with (nth i (combine (seq 0 (length (ends F))) (ends F)) (0%nat, None)).
+    - apply nth_In. rewrite combine_length, seq_length. lia.
+    - rewrite combine_nth by apply seq_length. rewrite seq_nth by exact L. reflexivity. }
+  specialize (H _ K). cbn [fst snd] in H. rewrite E in H. unfold check_end_of in H. cbn [fst snd] in H. apply andb_prop in H as [A H].
+  apply existsb_exists in H as [b [Hb H]]. apply andb_prop in H as [H B3]. apply andb_prop in H as [B1 B2]. apply Qpos in B1. apply mem_In in B2.
+  destruct (bound_of b Hb) as [h Hh]. destruct (bounds_claim b h Hh) as [_ [_ [_ G]]]. destruct (G B1 X S HM) as [y Hy].
+  destruct (Hy i B2) as [Y1 Y2]. exists (y i). split; [exact Y1|]. unfold xi in Y2. destruct (still (about b)); [|discriminate]. simpl in Y2.
+  replace (y i) with 0 by lra. unfold Rminus. rewrite Rplus_0_l, Rabs_Ropp. apply Qle_R in A.
+  assert (N : Q2R (Qabs m) = Rabs (Q2R m)).
+  { unfold Q2R. destruct m as [nm dm]. simpl. rewrite Rabs_mult, abs_IZR. f_equal. symmetry. apply Rabs_right. apply Rle_ge. left.
+    apply Rinv_0_lt_compat. apply IZR_lt. reflexivity. }
+  rewrite N in A. exact A.
+Qed.
 End Main.
 
 Definition accepts_family (F : family) (hs : list hint) : bool := check_family F hs.
@@ -258,7 +277,6 @@ Proof.
   split; [exact A4|]. split; [split; [exact A3|apply (sliding_ok _ A1 A2)]|].
   split; [intros b Hb; destruct (bound_of F hs H4 b Hb) as [h Hh]; apply (bounds_claim F H1 H2 b h Hh)|].
   split.
-  - intros X S i m r _ E. unfold check_family_ends in H5. rewrite forallb_forall in H5.
-    destruct (nth_in_or_default i (ends F) None) as [I|I]; [|rewrite I in E; discriminate]. specialize (H5 _ I). rewrite E in H5. discriminate.
+  - apply (ends_ok F H1 H2 hs H4 H5).
   - split; [apply (stays_ok F H1 H2 hs H4 H6)|apply (peaks_ok F H1 H2 hs H4 H7)].
 Qed.

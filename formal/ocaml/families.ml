@@ -333,7 +333,15 @@ let certificate (j : Json.t) : t =
     not_checked "lyapunov.drives";
     List.iteri (fun k _ -> skipped proof "family-drive" (Printf.sprintf "lyapunov.functions[%d]" k)) functions end;
   need ((start = None) = (get "final_state" = Null)) "a final state without an initial state, or none";
-  if start <> None then (skipped proof "family-final-state" "final_state"; not_checked "final_state");
+  (* ends of agents that are drawn to 0; others are not read *)
+  let stable = List.for_all (fun p -> p.becomes = Stability) parts && unproved = [] in
+  let ends = match start with
+    | None -> []
+    | Some _ when stable ->
+        let _, witness = proved proof "family-final-state" "final_state" [] in
+        need (witness = Null || List.for_all (fun w -> w = Null) (entries "family-final-state" witness)) "kept means of a component that is stable";
+        List.map (fun e -> Some e) (by_agent nodes Reader.interval "final_state" (get "final_state"))
+    | Some _ -> skipped proof "family-final-state" "final_state"; not_checked "final_state"; [] in
   let input = fields "input" ([ "bounded"; "peaks" ] @ if is_sliding then [ "sliding" ] else []) (get "input") in
   let sliding_input = if not is_sliding then [] else begin
     let part = fields "input.sliding" [ "bounded"; "agents" ] (input "sliding") in
@@ -357,7 +365,7 @@ let certificate (j : Json.t) : t =
     reaching; sliding_input } in
   { nodes; sha256; checked = List.rev proof.checked; unchecked = List.rev proof.unchecked; sections = List.rev !left;
     hints = List.map snd bounds;
-    family = { frame; modes; parts; bounds = List.map fst bounds; ends = []; stays; peaks } }
+    family = { frame; modes; parts; bounds = List.map fst bounds; ends; stays; peaks } }
 
 (* the parts of the check one by one, to name the first that fails *)
 let of_family (f : family) hs : (string * (unit -> bool)) list =
