@@ -1,5 +1,5 @@
-(** A certificate of a family as a record, and what it claims: with what [Certificate.v] says of graphs, motions, components
-    and sliding variables all that must be read to believe the theorem of [FamilyMain.v]. *)
+(** A certificate of a family as a record, and what it claims: with what [Certificate.v] says of graphs, motions,
+    components and sliding variables all that must be read to believe the theorem of [FamilyMain.v]. *)
 Require Import ZArith QArith Qreals List Bool Reals.
 From Coquelicot Require Import Coquelicot.
 Import ListNotations.
@@ -70,7 +70,7 @@ Definition part_claim (F : family) (P : part) : Prop :=
 Definition below (b : lyapunov) (a : R) (x : nat -> R) : Prop := let z := xi (about b) x in match by_ b with
   | Form P => qbil P z z <= a | Squares p => qdot p (fun i => sq (x i)) <= a
   | Rows d => forall i, In i (agents (about b)) -> sq (z i) <= a * sq (Q2R (nth i d 0%Q)) end.
-(** it decays along every motion, and bounds the input of agents and means and what is left to the states at rest; with a
+(** it decays along every motion, bounds what agents and means are moved and what is left to the states at rest; with a
     positive rate, the part comes to rest, at a state that is at rest in every member *)
 Definition bound_claim (F : family) (b : lyapunov) : Prop := let c := frame F in
   (forall X S t0 t a, switches_from F X S t0 -> t0 <= t < deadline c -> 0 <= a -> below b a (X t0) ->

@@ -1,7 +1,7 @@
 (** The executable check of a family: quadratic functions of what is left to the states at rest, for all members. *)
 Require Import ZArith QArith Qabs List Bool.
 Import ListNotations.
-Require Import Vec Definite Graph Certificate Checker Wide FamilyCertificate.
+Require Import Vec Definite Graph Certificate Checker Table Wide FamilyCertificate.
 Open Scope Z_scope.
 
 (** * One weight: [|w|] in [[lo, hi]] times [f h'] *)
@@ -139,8 +139,8 @@ Definition check_mode (F : family) (m : mode) : bool :=
 Definition every_edge (F : family) : list edge := flat_map (fun e => there e 1%Q) (flat_map ties (modes F)).
 Definition check_part (F : family) (P : part) : bool :=
   let n := order (frame F) in let es := every_edge F in let C := agents P in
-  let R := reach n (es ++ map swap es) [hd O C] in
-  (match C with [] => false | _ => true end) && forallb (fun i => mem i R) C &&
+  let R := reached n (by_source (es ++ map swap es)) [hd O C] in
+  (match C with [] => false | _ => true end) && forallb (fun i => seen i R) C &&
   forallb (fun e => Bool.eqb (mem (src e) C) (mem (tgt e) C)) es &&
   match becomes P with Depends => true | _ =>
     forallb (fun m => (length (filter is_balanced (owned m P)) =? length (still P))%nat &&

@@ -2,7 +2,7 @@
 Require Import ZArith QArith Qabs Qreals List Bool Reals Lra Lia Psatz.
 From Coquelicot Require Import Coquelicot.
 Import ListNotations.
-Require Import Vec Definite Graph Flow Certificate Checker Sound Claims Input Slide Peak Reach Main Rest Wide FamilyCertificate FamilyFlow
+Require Import Vec Definite Graph Flow Certificate Checker Sound Claims Input Slide Peak Reach Main Rest Table Wide FamilyCertificate FamilyFlow
   FamilyChecker FamilySound FamilyMotion FamilyRows.
 Open Scope R_scope.
 
@@ -82,7 +82,7 @@ Proof.
   apply andb_prop in H as [H H5]. apply andb_prop in H as [H H4]. apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2].
   split; [|split].
   - assert (K : forall j, In j C -> linked es (hd O C) j).
-    { intros j Hj. rewrite forallb_forall in H2. specialize (H2 j Hj). apply mem_In, reach_ok in H2 as [st [[<-|[]] L]]. exact L. }
+    { intros j Hj. rewrite forallb_forall in H2. specialize (H2 j Hj). apply reached_ok in H2 as [st [[<-|[]] L]]. exact L. }
     intros i j Hi. split.
     + intros Hj. apply (path_trans _ i (hd O C) j); [apply linked_back; apply K; exact Hi|apply K; exact Hj].
     + intros L. exact (linked_in es C H3 i j L Hi).
