@@ -9,7 +9,7 @@ type t = { nodes : nodes; family : family; hints : hint list; sha256 : string; c
 
 let most_nodes = 400
 let most_modes = 1000
-let most_functions = 100
+let most_functions = 1000
 (* entries of the matrices of all rates: so much is formed and factorised *)
 let most_work = 30_000_000
 
@@ -309,7 +309,7 @@ let certificate (j : Json.t) : t =
     { agents = own; becomes; still = columns nodes first own camps becomes w }) (List.combine found claims) witnesses in
   let lyapunov = fields "lyapunov" (if (match get "lyapunov" with Obj l -> List.mem_assoc "drives" l | _ -> false) then [ "functions"; "drives" ] else [ "functions" ]) (get "lyapunov") in
   let functions = entries "functions" (lyapunov "functions") in
-  need (List.length functions <= most_functions) "lyapunov.functions: more than 100";
+  need (List.length functions <= most_functions) "lyapunov.functions: more than 1,000";
   let work = ref 0 in
   let bounds = List.mapi (lyapunov_of nodes parts modes proof work) functions in
   (* the theorem says that a component comes to rest where a function has a positive rate *)
