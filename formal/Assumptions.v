@@ -1,2 +1,3 @@
-Require Import Large.
+Require Import Large FamilyMain.
 Print Assumptions accepts_sound.
+Print Assumptions accepts_family_sound.

@@ -88,6 +88,13 @@ let into_camps g own v =
   List.iter2 (fun i s -> need (Z.equal (Z.abs s) Z.one) "camps of a component"; g.(i) <- s) own camps
 let cycle_of nodes v = Cycle (List.map (fun e -> match positions nodes "negative_cycle" e with
   | [ s; t ] -> (s, t) | _ -> bad "negative_cycle: an edge has two ends") (entries "negative_cycle" v))
+(* closed components by camps or negative cycles alone *)
+let without_weights nodes listed =
+  let g = Array.make (Array.length nodes.labels) Z.zero in
+  List.iter (fun (own, balanced, get) -> if balanced then into_camps g own (get "gauge")) listed;
+  let all = Array.to_list g in
+  List.map (fun (own, balanced, get) ->
+    { nodes = own; share = []; null = []; camps = if balanced then Gauge all else cycle_of nodes (get "negative_cycle") }) listed
 (* a left null vector as integers, in its own scale, and where it is largest *)
 let stated number own eta =
   let d = List.fold_left (fun d ((x : q), _) -> Z.lcm d x.qden) Z.one eta in
@@ -105,17 +112,12 @@ let large_components nodes listed vectors =
     need (positions nodes "influence" (one "nodes") = own) "influence: another component";
     let eta = List.map (interval "left_null_vector") (entries "left_null_vector" (one "left_null_vector")) in
     need (List.length eta = List.length own) "left_null_vector: a number for each node"; own, eta) groups vectors in
-  let g = Array.make (Array.length nodes.labels) Z.zero in
-  List.iter (fun (own, balanced, get) -> if balanced then into_camps g own (get "gauge")) listed;
-  let all = Array.to_list g in
-  List.map (fun (own, balanced, get) ->
-    { nodes = own; share = []; null = []; camps = if balanced then Gauge all else cycle_of nodes (get "negative_cycle") }) listed,
+  without_weights nodes listed,
   List.concat (List.mapi (fun k (own, _, _) ->
     match List.assoc_opt own vectors with Some eta -> [ stated k own eta ] | None -> []) listed)
-(* closed components with their witnesses, and what influence says of the balanced ones *)
-let components nodes structure influence =
+(* closed components as they are listed, and the followers *)
+let listed_components nodes structure =
   let n = Array.length nodes.labels in
-  let get = fields "influence" [ "components"; "containment_weights"; "degenerate" ] influence in
   let listed = List.map (fun item ->
     let get = match item with
       | Obj l when List.assoc_opt "balanced" l = Some (Bool true) -> fields "a closed component" [ "nodes"; "balanced"; "gauge" ] item
@@ -131,6 +133,12 @@ let components nodes structure influence =
   let followers = List.filter (fun i -> not is_leader.(i)) (List.init n Fun.id) in
   need (positions nodes "leaders" (structure "leaders") = leading) "other leaders";
   need (positions nodes "followers" (structure "followers") = followers) "other followers";
+  listed, followers
+(* closed components with their witnesses, and what influence says of the balanced ones *)
+let components nodes structure influence =
+  let n = Array.length nodes.labels in
+  let get = fields "influence" [ "components"; "containment_weights"; "degenerate" ] influence in
+  let listed, followers = listed_components nodes structure in
   if get "containment_weights" = Null then
     let comps, lefts = large_components nodes listed (get "components") in comps, lefts, followers, get "degenerate", true
   else

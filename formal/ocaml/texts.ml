@@ -48,6 +48,22 @@ let obligations = [
     "variation of constants");
   "final-state", ("L Q = 0 and Q(x - sigma) is kept, so the agents end at Q(X(0) - sigma(0))",
     "Lemmas 2, 8 and 9");
+  "family-claim", ("all members have one kernel, or a state at rest in one member moves in another",
+    "common kernel");
+  "family-rate", ("P A + A'P - b P >= 0 for all members of the mode, P > 0",
+    "Lyapunov decrease");
+  "family-constants", ("|(L X)_k|^2 <= inputs_k V for every member, xi_k^2 <= coordinates_k V",
+    "Schur complement");
+  "family-rows", ("every row of the followers decays at this rate at the worst weights, and so does what they hear",
+    "comparison row by row");
+  "family-squares", ("P L(w-) + L(w-)'P - (1/2) diag_l(sum_k p_k (w+ - w-)) - b P > 0, P = diag(p)",
+    "least weights, and what is above them");
+  "family-drive", ("sqrt(V) of all states with |x_k| <= sum_l w+ (|sigma_k(0)| + |sigma_l(0)|) is at most this, in every mode",
+    "variation of constants");
+  "family-final-state", ("for every signal the agents end between these ends",
+    "kept means, integral of the input");
+  "family-input", ("for every signal the input is bounded, by these peaks",
+    "integral of the input");
 ]
 (* and of section 13 *)
 let sliding_bound = "||sigma(t)|| <= phi(t,T_r)^(-mu3) e^(-mu2 t) ||sigma(0)||"

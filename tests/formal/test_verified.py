@@ -19,14 +19,12 @@ from mutations import changed, mutants, resealed
 from paper_examples import paper_examples
 from verified import AT_REST, SKIPPED, UNREAD, named, program, said, unchecked
 
-from ptcc_certify.certificate.family_certificate import certify_family
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
 from ptcc_certify.checker.obligations import OBLIGATIONS
 from ptcc_certify.cli.verified import VARIABLE, executable, verified_check
 from ptcc_certify.errors import FormatError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.graphs.family import Family
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.gain_limits import GainLimits
 
@@ -42,15 +40,21 @@ def test_nothing_is_admitted_and_no_axiom_is_added() -> None:
         assert not words.search(text), file.name
 
 
-def test_the_statement_is_one_file_of_as_many_lines_as_is_said() -> None:
-    text = re.sub(r"\(\*.*?\*\)", "", (SOURCES / "Certificate.v").read_text("utf-8"), flags=re.DOTALL)
+@pytest.mark.parametrize(("name", "after"), [("Certificate.v", 0), ("FamilyCertificate.v", 1)])
+def test_the_statement_is_one_file_of_as_many_lines_as_is_said(name: str, after: int) -> None:
+    """That of a family is a second file, which asks for the first one."""
+    text = re.sub(r"\(\*.*?\*\)", "", (SOURCES / name).read_text("utf-8"), flags=re.DOTALL)
     lines = [line for line in text.splitlines() if line.strip()]
     assert max(map(len, lines)) <= 120
     asked = [line for line in lines if "Require" in line]
-    assert asked == [
-        "Require Import ZArith QArith Qreals List Bool Reals.",
-        "From Coquelicot Require Import Coquelicot.",
-    ]
+    assert (
+        asked
+        == [
+            "Require Import ZArith QArith Qreals List Bool Reals.",
+            "From Coquelicot Require Import Coquelicot.",
+            "Require Import Certificate. Open Scope R_scope.",
+        ][: 2 + after]
+    )
     for page in (SOURCES / "README.md", SOURCES.parent / "docs" / "theory" / "verified-checker.md"):
         assert f"{len(lines)} lines" in page.read_text("utf-8")
 
@@ -374,19 +378,12 @@ def test_no_text_of_the_file_is_printed_as_a_line_of_its_own(tmp_path: Path) -> 
     assert proved.report.accepted and "lyapunov.functions[99]" not in {o.of for o in proved.report.obligations}
 
 
-def test_agents_of_order_n_and_families_are_not_read_as_agents_of_order_1(tmp_path: Path) -> None:
+def test_agents_of_order_n_are_not_read_as_agents_of_order_1(tmp_path: Path) -> None:
     program()
-    family = certify_family(
-        Family.switching([SignedDigraph.from_edges([("a", "b", w)]) for w in (1, 2)]), NominalProtocol(1, 1, 1, 1)
-    )
-    of_agents = agents_document(SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)]), Setting())
-    for document, what in (
-        (json.loads(family.to_json()), "family"),
-        (of_agents, "agents of order n, section agents"),
-    ):
-        assert check(document).accepted
-        code, text = said(document, tmp_path)
-        assert code == 2 and what in text and "use ptcc check" in text
+    document = agents_document(SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)]), Setting())
+    assert check(document).accepted
+    code, text = said(document, tmp_path)
+    assert code == 2 and "agents of order n, section agents" in text and "use ptcc check" in text
 
 
 def compare(document: dict, path: tuple, folder: Path) -> str:

@@ -1,0 +1,377 @@
+(* A certificate of a family: from the document, sections 18 and 19 of FORMAT.md, to the record that the theorem speaks of. *)
+open Checker
+open Json
+open Document
+module Z = Number.Z
+
+type t = { nodes : nodes; family : family; hints : hint list; sha256 : string; checked : (string * string) list;
+  unchecked : (string * string) list; sections : string list }
+
+let most_nodes = 400
+let most_modes = 1000
+let most_functions = 1000
+(* entries of the matrices of all rates: so much is formed and factorised *)
+let most_work = 30_000_000
+
+let is_family = function
+  | Obj l -> (match List.assoc_opt "graph" l with Some (Obj g) -> List.mem_assoc "modes" g | _ -> false)
+  | _ -> false
+
+(* * The modes *)
+let sign_of_bounds low high = if Z.sign high.qnum <> 0 then Z.sign high.qnum else -1
+let edge_of nodes v = match entries "an edge" v with
+  | s :: t :: rest ->
+      let low, high = match rest with
+        | [ w ] -> let w = number "a weight" w in w, w
+        | [ a; b ] ->
+            let a = number "a weight" a and b = number "a weight" b in
+            need (Number.compare a b < 0) "an edge: least < largest is due"; a, b
+        | _ -> bad "an edge has three or four entries" in
+      need (Z.sign low.qnum * Z.sign high.qnum >= 0 && (Z.sign low.qnum <> 0 || Z.sign high.qnum <> 0)) "an edge: weights of two signs, or none";
+      let s = node nodes "an edge" s and t = node nodes "an edge" t in
+      need (s <> t) "an edge from a node to itself";
+      { head = t; tail = s; bottom = low; top = high; mutual = false }
+  | _ -> bad "an edge has three or four entries"
+let sign e = sign_of_bounds e.bottom e.top
+let known e = Number.equal e.bottom e.top
+let may_fail e = Z.sign e.bottom.qnum = 0 || Z.sign e.top.qnum = 0
+let mode_of nodes v =
+  let get = fields "a mode" [ "name"; "undirected"; "edges" ] v in
+  ignore (text "the name of a mode" (get "name"));
+  let paired = truth "undirected" (get "undirected") in
+  if beside (get "edges") then unsupported "a family with edges in side files";
+  let edges = map (edge_of nodes) (entries "edges" (get "edges")) in
+  ignore (List.fold_left (fun last e ->
+    let at = (e.head, e.tail, sign e) in need (compare last at < 0) "edges are in another order"; at) (-1, -1, 0) edges);
+  let table = Hashtbl.create 64 in
+  List.iter (fun e ->
+    let at = (e.head, e.tail) in
+    (match Hashtbl.find_opt table at with
+     | Some f -> need (may_fail e && may_fail f) "two edges of one pair of nodes, of which one cannot fail" | None -> ());
+    Hashtbl.add table at e) edges;
+  if paired then List.iter (fun e -> need (List.exists (fun f -> Number.equal f.bottom e.bottom && Number.equal f.top e.top)
+    (Hashtbl.find_all table (e.tail, e.head))) "undirected: an edge without its reverse") edges;
+  let ties = if paired then List.filter_map (fun e -> if e.tail < e.head then Some { e with mutual = true } else None) edges else edges in
+  paired, edges, ties
+let hash nodes modes =
+  let name i = nodes.labels.(i) in
+  let line e =
+    let ends = Printf.sprintf "%s, %s" (line_text (name e.tail)) (line_text (name e.head)) in
+    if known e then Printf.sprintf "[%s, \"%s\"]\n" ends (Number.text e.top)
+    else Printf.sprintf "[%s, \"%s\", \"%s\"]\n" ends (Number.text e.bottom) (Number.text e.top) in
+  let of_mode (paired, edges, _) =
+    (if paired && not (List.for_all known edges) then "{\"undirected\": true}\n" else "")
+    ^ String.concat "" (List.map line (List.sort (fun a b -> compare (name a.tail, name a.head, sign a) (name b.tail, name b.head, sign b)) edges)) in
+  Sha256.hex (String.concat "" (List.map (fun s -> "[" ^ line_text s ^ "]\n") (List.sort compare (Array.to_list nodes.labels)))
+    ^ String.concat "{}\n" (List.map of_mode modes))
+
+(* the mandatory graph of a mode with the components that are listed *)
+let mandatory nodes ties structure =
+  let get = fields "structure" [ "connectivity"; "closed_components"; "leaders"; "followers"; "balanced"; "sign_symmetric" ] structure in
+  let n = Array.length nodes.labels in
+  let listed, _ = Reader.listed_components nodes get in
+  let comps = Reader.without_weights nodes listed in
+  let edges = smallest ties in
+  let all = Pieces.graph n edges in
+  let found = Pieces.find all in
+  let pieces = List.map (Pieces.piece all comps) found.pieces in
+  let kind = match pieces with [ p ] -> Pieces.connectivity p | _ -> "disconnected" in
+  need (get "connectivity" = Str kind) ("structure: the mandatory graph is " ^ kind);
+  need (get "balanced" = Bool (match found.balance with Gauge _ -> true | Cycle _ -> false)) "structure: balance of a mandatory graph";
+  need (get "sign_symmetric" = Bool (Pieces.sign_symmetric all)) "structure: sign symmetry";
+  { order = n; edges; kind = Nominal Number.one; rho1 = Number.one; rho2 = Number.one; kappa = Number.one; comps; pieces;
+    all_balanced = found.balance; sign_symmetric = Pieces.sign_symmetric all; funcs = []; start = []; sliding = []; final = [];
+    enclosed = true; margins = []; leaders = []; upper_bound = None; proved = None; best_diagonal = None; best_overshoot = None;
+    bounded_input = false; reaching = []; sliding_input = []; efforts = [] }
+
+(* * Components, and what becomes of them *)
+let outcomes = [ "stability", Stability; "bipartite consensus", Consensus; "interval bipartite consensus", Interval;
+  "bipartite containment", Containment; "depends on the signal", Depends ]
+let claim v =
+  let get = fields "claim" [ "theorem"; "behaviour"; "signal" ] v in
+  need (get "theorem" = Str "common kernel" && get "signal" = Str "any") "claim: another theorem or signal";
+  let b = text "behaviour" (get "behaviour") in
+  try List.assoc b outcomes with Not_found -> bad "claim: an unknown behaviour"
+(* closed components of the first mode by number, and the columns of the balanced ones *)
+let columns nodes (first : cert) own camps outcome witness =
+  let n = Array.length nodes.labels in
+  let here = Pieces.inside n own in
+  let mine = List.filter (fun (_, (one : comp)) -> here (List.hd one.nodes) && is_balanced one) (List.mapi (fun k one -> k + 1, one) first.comps) in
+  let column entry = List.init n (fun i -> if here i then entry i else Number.zero) in
+  match outcome, witness with
+  | Depends, _ -> []
+  | (Stability | Consensus), w ->
+      need (w = Null) "family-claim: a witness that nothing asks for";
+      (match outcome, mine, camps with
+       | Stability, _, _ -> []
+       | _, (_, one) :: _, Gauge g ->
+           let g = Array.of_list g in
+           let pivot = List.hd one.nodes in
+           [ pivot, column (fun i -> Number.of_z (Z.mul g.(i) g.(pivot))) ]
+       | _ -> bad "claim: no camps fit all edges")
+  | _, w ->
+      let rows = match (fields "the witness" [ "rows" ] w) "rows" with Obj l -> l | _ -> bad "rows: an object is due" in
+      let rows = List.map (fun (label, row) -> node nodes "rows" (Str label), match row with
+        | Obj l -> List.map (fun (k, x) -> k, number "rows" x) l | _ -> bad "rows: an object is due") rows in
+      let leader = Array.make n false in
+      List.iter (fun (one : comp) -> List.iter (fun i -> leader.(i) <- true) one.nodes) first.comps;
+      List.iter (fun (i, row) -> need (here i && not leader.(i)) "rows: not of a follower";
+        List.iter (fun (k, _) -> need (List.exists (fun (j, _) -> string_of_int j = k) mine) "rows: no balanced component of this number") row) rows;
+      List.map (fun (k, (one : comp)) ->
+        let g = match one.camps with Gauge g -> Array.of_list g | Cycle _ -> [||] in
+        let inside = Pieces.inside n one.nodes in
+        List.hd one.nodes, column (fun i ->
+          if inside i then Number.of_z g.(i) else if leader.(i) then Number.zero
+          else match List.assoc_opt i rows with
+            | Some row -> Option.value (List.assoc_opt (string_of_int k) row) ~default:Number.zero | None -> Number.zero)) mine
+
+(* * Functions *)
+(* an upper bound of [(d'x)^2 / V], and of its root *)
+let square r (q : quotient) fs d =
+  let f : factor = r in
+  let rec pad n l = if n = 0 then [] else match l with [] -> Z.zero :: pad (n - 1) [] | x :: l' -> x :: pad (n - 1) l' in
+  let masked = List.mapi (fun i x -> if List.mem i fs then Z.zero else x) d in
+  let u = pad (List.length f.fD) (List.map (Z.mul f.fs) (hmul f.fD masked)) in
+  let y, rest = solve f.fT u in
+  let m = List.fold_left Z.min (List.hd f.fe) f.fe in
+  let two = Z.of_int 2 in
+  Number.make (Z.mul two (Z.mul q.qm (Z.add (Z.mul m (size2 y)) (size2 rest)))) (Z.mul m (Z.mul f.fs f.fs))
+(* above the root, and near it *)
+let root (v : q) =
+  if Z.sign v.qnum <= 0 then Number.zero else begin
+    let bits = 80 + max 0 ((Z.numbits v.qden - Z.numbits v.qnum) / 2) in
+    let scaled = Z.add (Z.div (Z.shift_left v.qnum (2 * bits)) v.qden) Z.one in
+    Number.make (Z.add (Z.sqrt scaled) Z.one) (Z.shift_left Z.one bits) end
+let middle_common ties = List.fold_left (fun a e -> Z.lcm a (middle e).qden) Z.one ties
+let roots_of n part (q : quotient) means modes = match factor_mod n q.qsw q.qfw q.qF with
+  | None -> bad "P is not definite"
+  | Some r ->
+      let fs = List.map fst q.qfw in
+      let here = Pieces.inside n part.agents in
+      let above d scale = root (Number.div (square r q fs d) (Number.of_z (Z.mul scale scale))) in
+      List.map (fun m ->
+        let dq = middle_common m.ties in
+        List.map (fun e -> if known e || not (here e.head) then Number.zero else above (hvec e) Z.one) m.ties,
+        List.init n (fun i -> if here i then above (mid_row dq m.ties (List.init (i + 1) (fun j -> if i = j then Z.one else Z.zero))) dq else Number.zero)
+        @ List.map (fun (u, _) -> let d = common u in above (mid_row dq m.ties (List.map (scaled d) u)) dq) means) modes
+(* the weights of a mode that have a multiplier: those that move what is left to the states at rest *)
+let moving part n =
+  let pivots = List.map fst part.still in
+  let here = Pieces.inside n part.agents and pivot = Pieces.inside n pivots in
+  let columns = List.map (fun (p, v) -> p, Array.of_list v) part.still in
+  let of_pivot p k = match List.assoc_opt p columns with Some v -> v.(k) | None -> Number.zero in
+  let entry j k = (* column j of C at k, which is no pivot *)
+    if pivot j then Number.sub Number.zero (of_pivot j k) else if j = k then Number.one else Number.zero in
+  let rows = List.filter (fun k -> not (pivot k)) part.agents in
+  fun e -> here e.head && not (known e)
+    && not (pivot e.head && pivot e.tail)
+    && List.exists (fun k ->
+         let a = if here e.head then entry e.head k else Number.zero in
+         let a = if e.mutual then Number.sub a (Number.mul (Number.of_z (Z.of_int (sign e))) (entry e.tail k)) else a in
+         Z.sign a.qnum <> 0) rows
+let component_of parts v =
+  let z = integer "component" v in
+  need (Z.sign z >= 0 && Z.lt z (Z.of_int (List.length parts))) "component: there is no such";
+  let part = List.nth parts (Z.to_int z) in
+  need (part.becomes <> Depends) "a Lyapunov function of a component without a common kernel"; part
+(* the largest [|xi_k| / d_k] of followers, whose leaders are at rest *)
+let rows_of nodes parts modes proof of_ v =
+  let n = Array.length nodes.labels in
+  let get = fields "a Lyapunov function" [ "class"; "component"; "vector"; "parts"; "rate" ] v in
+  if get "parts" <> Arr [] then unsupported "a family with a function of rows whose parts have forms of their own";
+  let part = component_of parts (get "component") in
+  let pivot = Pieces.inside n (List.map fst part.still) in
+  let own = List.filter (fun i -> not (pivot i)) part.agents in
+  need (own <> []) "a function of rows without followers";
+  let d = Array.make n Number.zero in
+  List.iter2 (fun i x -> need (Z.sign x.qnum > 0) "vector: a number is not positive"; d.(i) <- x) own (numbers "vector" (List.length own) (get "vector"));
+  let rate = number "rate" (get "rate") in
+  need (Number.equal (bare proof "family-rows" of_ [ "b" ] "b") rate) (of_ ^ ": b is not the rate");
+  let d = Array.to_list d in
+  let squared x = Number.mul x x in
+  let here = Pieces.inside n part.agents in
+  let inputs = List.init n (fun i -> if not (here i) then Number.zero else
+    List.fold_left (fun a m -> Number.max a (squared (row_sum m.ties (row_moved d) i))) Number.zero modes) in
+  { about = part; by_ = Rows d; decay = rate; inputs; offs = List.map squared d; means = [] }, { multipliers = []; roots = [] }
+(* weights of agents that end at one value up to signs, which do not cancel *)
+let mean_of nodes part v =
+  let n = Array.length nodes.labels in
+  let get = fields "a mean" [ "weights"; "constant" ] v in
+  let weights = match get "weights" with
+    | Obj l -> List.map (fun (label, x) -> node nodes "means" (Str label), number "means" x) l | _ -> bad "means: an object is due" in
+  let here = Pieces.inside n part.agents in
+  need (weights <> [] && List.for_all (fun (i, _) -> here i) weights) "means: of agents of the component";
+  let row i = List.map (fun (_, v) -> List.nth v i) part.still in
+  let size l = List.map (fun x -> if Number.compare x Number.zero < 0 then Number.sub Number.zero x else x) l in
+  let first = size (row (fst (List.hd weights))) in
+  let total l = List.fold_left Number.add Number.zero l in
+  need (Number.equal (total first) Number.one && List.for_all (fun x -> Number.equal x Number.one || Number.equal x Number.zero) first
+    && List.for_all (fun (i, _) -> List.for_all2 Number.equal (size (row i)) first) weights) "means: of agents that end at one value";
+  need (not (Number.equal (total (List.map (fun (i, x) -> Number.mul x (total (row i))) weights)) Number.zero)) "means: weights that cancel";
+  List.init n (fun i -> Option.value (List.assoc_opt i weights) ~default:Number.zero), number "constant" (get "constant")
+let form_of nodes parts modes proof work k v =
+  let n = Array.length nodes.labels in
+  let of_ = Printf.sprintf "lyapunov.functions[%d]" k in
+  let get = fields "a Lyapunov function" [ "class"; "component"; "nodes"; "lower_triangle"; "rate"; "inputs"; "coordinates"; "means" ] v in
+  need (List.mem (text "class" (get "class")) [ "full"; "diagonal"; "undirected" ]) "an unknown class";
+  let part = component_of parts (get "component") in
+  let pivot = Pieces.inside n (List.map fst part.still) in
+  let own = positions nodes "nodes of a function" (get "nodes") in
+  need (own <> [] && own = List.filter (fun i -> not (pivot i)) part.agents) "nodes of a function";
+  let p = Reader.matrix nodes "lower_triangle" (Array.of_list own) (entries "lower_triangle" (get "lower_triangle")) in
+  let rate = number "rate" (get "rate") in
+  let labels = List.map (fun i -> nodes.labels.(i)) in
+  let spread own what v = let l = List.combine own (List.map (number what) (ordered (labels own) what v)) in
+    List.init n (fun i -> Option.value (List.assoc_opt i l) ~default:Number.zero) in
+  let moves = moving part n in
+  let q = quotient_of n part p in
+  let multipliers = List.mapi (fun i m ->
+    let numbers, witness = proved proof "family-rate" (Printf.sprintf "%s.modes[%d]" of_ i) [ "b" ] in
+    let b = numbers "b" in
+    let taus = match witness with
+      | Null -> List.map (fun _ -> None) m.ties
+      | w ->
+          let given = ref (List.map (number "multipliers") (entries "multipliers" ((fields "the witness" [ "multipliers" ] w) "multipliers"))) in
+          let l = map (fun e -> if moves e then match !given with
+            | tau :: rest -> given := rest; need (Z.sign tau.qnum > 0) "multipliers: one is not positive"; Some (Number.mul tau (Number.of_z q.qm))
+            | [] -> bad "multipliers: one for each weight" else None) m.ties in
+          need (!given = []) "multipliers: one for each weight"; l in
+    let size = n + List.length (List.filter Option.is_some taus) in
+    need (size <= 800 + most_nodes) "multipliers: more than 800 rows";
+    work := !work + size * size;
+    if !work > most_work then unsupported "a family whose rates take more than 30,000,000 entries";
+    b, taus) modes in
+  let least = List.fold_left (fun a (b, _) -> Number.min a b) (fst (List.hd multipliers)) multipliers in
+  need (Number.equal least rate) (of_ ^ ": the rate is not the least of all modes");
+  bare_of proof "family-constants" of_;
+  let means = map (mean_of nodes part) (entries "means" (get "means")) in
+  need (List.length means <= 100) "means: more than 100";
+  let b = { about = part; by_ = Form p; decay = rate; inputs = spread part.agents "inputs" (get "inputs");
+    offs = spread own "coordinates" (get "coordinates"); means } in
+  b, { multipliers; roots = roots_of n part q means modes }
+let lyapunov_of nodes parts modes proof work k v =
+  match v with
+  | Obj l when List.assoc_opt "class" l = Some (Str "rows") -> rows_of nodes parts modes proof (Printf.sprintf "lyapunov.functions[%d]" k) v
+  | Obj l when List.assoc_opt "class" l = Some (Str "squares") -> unsupported "a family with a function of squares"
+  | _ -> form_of nodes parts modes proof work k v
+
+(* * The document *)
+let keys = [ "boxes", "boxes that draw followers in"; "restricted", "signals that are restricted" ]
+let certificate (j : Json.t) : t =
+  let there key = match j with Obj l -> List.mem_assoc key l | _ -> false in
+  let more = List.filter (fun (key, _) -> there key) keys in
+  let get = fields "the certificate" (Reader.keys @ List.map fst more @ (if there "components" then [ "components" ] else [])) j in
+  let left = ref [] in
+  let not_checked s = left := s :: !left in
+  List.iter (fun (key, what) -> not_checked (Printf.sprintf "%s, all that is said of %s" key what)) more;
+  ignore (text "producer" (get "producer"));
+  need (match get "unverified" with Obj _ -> true | _ -> false) "unverified is not an object";
+  let outside = match j with Obj l -> List.filter (fun (k, _) -> k <> "digest" && k <> "unverified") l | _ -> [] in
+  need (get "digest" = Str (Sha256.hex (hashed (Obj outside)))) "digest: the certificate was changed after it was made";
+  List.iter (fun key -> need (get key = Null) (key ^ " of a family")) [ "paper"; "rates"; "overshoot"; "influence" ];
+  let graph = fields "graph" [ "nodes"; "modes"; "sha256" ] (get "graph") in
+  let nodes = nodes_of (graph "nodes") in
+  let n = Array.length nodes.labels in
+  if n > most_nodes then unsupported (Printf.sprintf "a family of more than %d nodes" most_nodes);
+  let listed = entries "modes" (graph "modes") in
+  need (listed <> [] && List.length listed <= most_modes) "graph.modes: 1 to 1,000 are due";
+  let read = map (mode_of nodes) listed in
+  let sha256 = hash nodes read in
+  need (graph "sha256" = Str sha256) "graph: another SHA-256 than that of the modes";
+  let structures = entries "structure.modes" ((fields "structure" [ "modes" ] (get "structure")) "modes") in
+  need (List.length structures = List.length read) "structure.modes: one for each mode";
+  let modes = List.map2 (fun (_, _, ties) s -> { ties; mandatory = mandatory nodes ties s }) read structures in
+  let kind, rho1, rho2, kappa = Reader.protocol (get "protocol") in
+  let is_sliding = match kind with SlidingMode _ -> true | Nominal _ -> false in
+  let proof = proof_of (get "proof") in
+  List.iteri (fun i _ -> bare_of proof "structure" (Printf.sprintf "graph.modes[%d]" i)) modes;
+  (* camps that fit all edges of all modes *)
+  let every = List.concat_map (fun (_, edges, _) -> List.map (fun e -> { tgt = e.head; src = e.tail; wt = Number.of_z (Z.of_int (sign e)) }) edges) read in
+  let found = (Pieces.find (Pieces.graph n every)).pieces in
+  let claims = match found with
+    | [ _ ] -> need (not (there "components")) "components of a connected family"; [ claim (get "claim") ]
+    | _ ->
+        need (get "claim" = Null && there "components") "claim: the family is not connected";
+        let l = entries "components" (get "components") in
+        need (List.length l = List.length found) "components: one for each weak component";
+        List.map2 (fun v (own, _) ->
+          let get = fields "a component" [ "nodes"; "claim" ] v in
+          need (positions nodes "a component" (get "nodes") = own) "components: other nodes"; claim (get "claim")) l found in
+  let unknown_end = List.exists (fun o -> o = Depends) claims in
+  let _, witness = (if unknown_end then take proof "family-claim" "graph" None else proved proof "family-claim" "graph" []) in
+  if unknown_end then begin
+    proof.unchecked <- ("family-claim", "graph") :: proof.unchecked;
+    not_checked "claim, that what becomes of a component depends on the signal" end;
+  let witnesses = entries "family-claim" witness in
+  need (List.length witnesses = List.length found) "family-claim: one for each component";
+  let first = (List.hd modes).mandatory in
+  let parts = List.map2 (fun ((own, camps), becomes) w ->
+    { agents = own; becomes; still = columns nodes first own camps becomes w }) (List.combine found claims) witnesses in
+  let lyapunov = fields "lyapunov" (if (match get "lyapunov" with Obj l -> List.mem_assoc "drives" l | _ -> false) then [ "functions"; "drives" ] else [ "functions" ]) (get "lyapunov") in
+  let functions = entries "functions" (lyapunov "functions") in
+  need (List.length functions <= most_functions) "lyapunov.functions: more than 1,000";
+  let work = ref 0 in
+  let bounds = List.mapi (lyapunov_of nodes parts modes proof work) functions in
+  (* the theorem says that a component comes to rest where a function has a positive rate *)
+  let at_rest p = p.becomes = Depends || (match p.agents with [ _ ] -> true
+    | _ -> List.exists (fun (b, _) -> b.about == p && Z.sign b.decay.qnum > 0) bounds) in
+  let unproved = List.filter (fun (_, p) -> not (at_rest p)) (List.mapi (fun i p -> i, p) parts) in
+  List.iter (fun (i, _) -> not_checked (Printf.sprintf "claim, that component %d comes to rest under every signal" i)) unproved;
+  if unproved <> [] && not unknown_end then begin
+    proof.checked <- List.filter (fun o -> o <> ("family-claim", "graph")) proof.checked;
+    proof.unchecked <- proof.unchecked @ [ "family-claim", "graph" ] end;
+  let start = match get "initial_state" with Null -> None | v -> Some (by_agent nodes number "initial_state" v) in
+  let sliding = match get "sliding_variable" with Null -> [] | v -> by_agent nodes number "sliding_variable" v in
+  need (is_sliding = (get "sliding_variable" <> Null)) "sigma(0) belongs to the sliding-mode protocol, and is part of it";
+  let reaching = if is_sliding then begin
+    let times = fields "reaching_time" [ "bound"; "clock"; "z" ] (get "reaching_time") in
+    need (times "bound" = Str Texts.sliding_bound && times "clock" = Str Texts.sliding_clock) "reaching_time: another bound or clock";
+    bare_of proof "sliding-bound" "protocol";
+    Reader.reaching_times proof kind kappa sliding (by_agent nodes (optional number) "reaching_time.z" (times "z")) not_checked end
+  else (need (get "reaching_time" = Null) "reaching times without sliding variables"; []) in
+  if following proof = "family-drive" then begin
+    not_checked "lyapunov.drives";
+    List.iteri (fun k _ -> skipped proof "family-drive" (Printf.sprintf "lyapunov.functions[%d]" k)) functions end;
+  need ((start = None) = (get "final_state" = Null)) "a final state without an initial state, or none";
+  (* ends of agents that are drawn to 0; others are not read *)
+  let stable = List.for_all (fun p -> p.becomes = Stability) parts && unproved = [] in
+  let ends = match start with
+    | None -> []
+    | Some _ when stable ->
+        let _, witness = proved proof "family-final-state" "final_state" [] in
+        need (witness = Null || List.for_all (fun w -> w = Null) (entries "family-final-state" witness)) "kept means of a component that is stable";
+        List.map (fun e -> Some e) (by_agent nodes Reader.interval "final_state" (get "final_state"))
+    | Some _ -> skipped proof "family-final-state" "final_state"; not_checked "final_state"; [] in
+  let input = fields "input" ([ "bounded"; "peaks" ] @ if is_sliding then [ "sliding" ] else []) (get "input") in
+  let sliding_input = if not is_sliding then [] else begin
+    let part = fields "input.sliding" [ "bounded"; "agents" ] (input "sliding") in
+    ignore (truth "input.sliding.bounded" (part "bounded")); not_checked "input.sliding.bounded";
+    if part "agents" = Null then [] else (bare_of proof "input-sliding" "input"; by_agent nodes number "input.sliding.agents" (part "agents")) end in
+  let stays, peaks = match input "bounded" with
+    | Null -> need (input "peaks" = Null) "peaks of an input that may grow"; false, []
+    | b ->
+        need (truth "input.bounded" b) "input.bounded is true, or null";
+        if input "peaks" = Null then (need (start = None || is_sliding) "input.peaks are due"; bare_of proof "family-input" "input"; true, [])
+        else if is_sliding then (skipped proof "family-input" "input"; not_checked "input.peaks"; true, [])
+        else (need (start <> None) "peaks without an initial state"; bare_of proof "family-input" "input"; true, by_agent nodes number "input.peaks" (input "peaks")) in
+  let rest o = match o with
+    | Obj l -> (match List.assoc_opt "kind" l, List.assoc_opt "of" l with
+        | Some (Str k), Some (Str o) when more <> [] && Reader.named k && Reader.named o -> unknown proof k o
+        | _ -> bad "an obligation that nothing asks for")
+    | _ -> bad "an obligation is not an object" in
+  while proof.rest <> [] do rest (List.hd proof.rest) done;
+  need (get "verdict" = Str "certified") "verdict: a family is certified";
+  let frame = { first with edges = []; comps = []; pieces = []; kind; rho1; rho2; kappa; start = Option.value start ~default:[]; sliding;
+    reaching; sliding_input } in
+  { nodes; sha256; checked = List.rev proof.checked; unchecked = List.rev proof.unchecked; sections = List.rev !left;
+    hints = List.map snd bounds;
+    family = { frame; modes; parts; bounds = List.map fst bounds; ends; stays; peaks } }
+
+(* the parts of the check one by one, to name the first that fails *)
+let of_family (f : family) hs : (string * (unit -> bool)) list =
+  [ "protocol, or what is said of sliding variables", (fun () -> check_frame f) ]
+  @ List.mapi (fun i m -> Printf.sprintf "structure of graph.modes[%d]" i, (fun () -> check_mode f m)) f.modes
+  @ List.mapi (fun i p -> Printf.sprintf "family-claim of graph, component %d" i, (fun () -> check_part f p)) f.parts
+  @ List.mapi (fun i (b, h) -> Printf.sprintf "lyapunov.functions[%d]" i, (fun () -> check_bound f b h)) (List.combine f.bounds hs)
+  @ [ "family-final-state of final_state", (fun () -> check_family_ends f);
+      "family-input of input", (fun () -> check_stays f && check_peaks f) ]

@@ -1,0 +1,183 @@
+"""Families and the checker that is itself proved: it accepts what ``ptcc check`` accepts, or says why not."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import re
+from fractions import Fraction
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from common_kernel_families import KINDS as SHARED
+from common_kernel_families import random_family as with_common_kernel
+from families import KINDS, random_family
+from mutations import changed, mutants, resealed
+from row_families import random_followers
+from verified import named, program, said, unchecked
+
+from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate, certify_family
+from ptcc_certify.checker import check
+from ptcc_certify.graphs.family import Family
+from ptcc_certify.lyapunov.follower_function import follower_functions
+from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.theorems.family_behaviour import decide
+
+Json = dict[str, Any]
+NOMINAL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
+SLIDING = SlidingModeProtocol(T_r="0.5", T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
+SIGNED = Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 1), ("b", "c", -2, -1)])
+#: What the executable says of a form of a family that it does not read.
+UNREAD = ("function of rows", "function of squares", "side files", "more than 400 nodes", "entries")
+
+
+def document(family: Family, seed: int = 0, protocol: Any = NOMINAL, **more: Any) -> Json:
+    """A certificate of a family, from a random state."""
+    draw = random.Random(seed)
+    x0 = [Fraction(draw.randint(-1000, 1000), 100) for _ in range(family.n_nodes)]
+    made = certify_family(family, protocol, x0, time_limit=3600, **more)
+    return {**json.loads(made.to_json()), "unverified": {}}
+
+
+def compare(found: Json, path: tuple[str | int, ...], folder: Path) -> str:
+    """The cause of a difference between the two checkers on a mutant; empty if they agree."""
+    sealed = resealed(found)
+    python, (code, text) = check(sealed), said(sealed, folder)
+    if python.accepted == (code == 0):
+        return ""
+    if code == 0:
+        at, left = str(python.rejected), named(text)
+        assert at in left or unchecked(found, path, left), (path, at, python.reason, text)
+        return "a part that is not checked"
+    assert code == 2 and any(word in text for word in UNREAD), (path, text)
+    return "a form that is not read"
+
+
+def random_families(count: int) -> list[tuple[str, Family]]:
+    """Families of all kinds, of 1 to 8 nodes."""
+    found = []
+    for seed in range(count):
+        kind = KINDS[seed % len(KINDS)]
+        found.append((f"{kind} {seed}", random_family(random.Random(seed), kind).family))
+        shared = SHARED[seed % len(SHARED)]
+        draw = np.random.default_rng(seed)
+        uncertain = with_common_kernel(draw, shared, 3 + seed % 4, 1 + seed % 3, Fraction(seed % 3, 10), 0.3)
+        found.append((f"shared {shared} {seed}", uncertain))
+    return found
+
+
+@cache
+def signed(protocol: Any = NOMINAL) -> str:
+    """The certificate of one uncertain mode with camps, as a text."""
+    return json.dumps(document(SIGNED, protocol=protocol))
+
+
+def rows(seed: int) -> Json:
+    """The certificate of a family of which every agent but one follows, with functions of rows alone."""
+    family = random_followers(random.Random(seed), 1 + seed % 3, agree=True)
+    parts = tuple(ComponentProof(c, tuple(follower_functions(c))) for c in decide(family))
+    state = tuple(Fraction(k) for k in range(1, family.n_nodes + 1))
+    return {**json.loads(FamilyCertificate(family, NOMINAL, parts, state).to_json()), "unverified": {}}
+
+
+def test_a_family_is_accepted_and_every_obligation_is_verified_or_named(tmp_path: Path) -> None:
+    program()
+    for protocol in (NOMINAL, SLIDING):
+        found = json.loads(signed(protocol))
+        assert check(found).accepted
+        code, text = said(found, tmp_path)
+        assert code == 0, text
+        lines = re.findall(r"^(verified    |not checked )(\S+ of \S+)$", text, re.MULTILINE)
+        assert sorted(what for _, what in lines) == sorted(f"{o['kind']} of {o['of']}" for o in found["proof"])
+        assert "family-rate of lyapunov.functions[0].modes[0]" in {
+            w for mark, w in lines if mark.startswith("verified")
+        }
+
+
+def test_higher_rates_and_smaller_constants_than_are_proved_are_rejected(tmp_path: Path) -> None:
+    program()
+    found = json.loads(signed())
+    function = found["lyapunov"]["functions"][0]
+    rate = str(Fraction(function["rate"]) * Fraction(101, 100))
+    faster = changed(found, ("lyapunov", "functions", 0, "rate"), rate)
+    for k, o in enumerate(faster["proof"]):
+        if o["kind"] == "family-rate" and "functions[0]" in o["of"]:
+            faster = changed(faster, ("proof", k, "numbers", "b"), rate)
+    cases = [(faster, "lyapunov.functions[0]")]
+    for key in ("inputs", "coordinates"):
+        at = ("lyapunov", "functions", 0, key, "b")
+        cases.append(
+            (changed(found, at, str(Fraction(function[key]["b"]) * Fraction(99, 100))), "lyapunov.functions[0]")
+        )
+    mean = ("lyapunov", "functions", 0, "means", 0, "constant")
+    smaller = str(Fraction(function["means"][0]["constant"]) * Fraction(99, 100))
+    cases.append((changed(found, mean, smaller), "lyapunov.functions[0]"))
+    lower = str(Fraction(found["input"]["peaks"]["b"]) * Fraction(1, 2))
+    cases.append((changed(found, ("input", "peaks", "b"), lower), "family-input of input"))
+    cases.append((changed(found, ("claim", "behaviour"), "stability"), "nodes of a function"))
+    for wrong, where in cases:
+        code, text = said(resealed(wrong), tmp_path)
+        assert code == 1 and where in text
+
+
+def test_rows_are_verified_and_a_higher_rate_of_theirs_is_rejected(tmp_path: Path) -> None:
+    program()
+    found = rows(2)
+    code, text = said(found, tmp_path)
+    assert code == 0 and "verified    family-rows of lyapunov.functions[0]" in text, text
+    rate = str(Fraction(found["lyapunov"]["functions"][0]["rate"]) * Fraction(1001, 1000))
+    place = next(k for k, o in enumerate(found["proof"]) if o["kind"] == "family-rows")
+    faster = changed(found, ("lyapunov", "functions", 0, "rate"), rate)
+    code, text = said(resealed(changed(faster, ("proof", place, "numbers", "b"), rate)), tmp_path)
+    assert code == 1 and "lyapunov.functions[0]" in text, text
+
+
+def test_a_weight_of_the_other_sign_is_rejected(tmp_path: Path) -> None:
+    program()
+    found = json.loads(signed())
+    edges = found["graph"]["modes"][0]["edges"]
+    at = next(k for k, e in enumerate(edges) if e[:2] == ["b", "c"])
+    code, text = said(resealed(changed(found, ("graph", "modes", 0, "edges", at), ["b", "c", "1", "2"])), tmp_path)
+    assert code == 1 and "SHA-256" in text
+
+
+def test_of_some_mutants_of_a_family_none_is_accepted_unless_true_or_not_checked(tmp_path: Path) -> None:
+    program()
+    found = json.loads(signed())
+    for path, mutant in mutants(found, every=23):
+        compare(mutant, path, tmp_path)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("number", range(4))
+def test_of_many_mutants_of_rows_none_is_accepted_unless_true_or_not_checked(number: int, tmp_path: Path) -> None:
+    program()
+    every = int(os.environ.get("PTCC_MUTANTS_EVERY", 1))
+    count = sum(1 for path, m in mutants(rows(2 + 4 * number), every=every) if compare(m, path, tmp_path) is not None)
+    assert count > 100 // every
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("number", range(6))
+def test_of_many_mutants_of_families_none_is_accepted_unless_true_or_not_checked(number: int, tmp_path: Path) -> None:
+    program()
+    every = int(os.environ.get("PTCC_MUTANTS_EVERY", 1))
+    name, family = random_families(12)[number + 4]
+    found = document(family, number, NOMINAL if number % 3 else SLIDING)
+    count = sum(1 for path, mutant in mutants(found, every=every) if compare(mutant, path, tmp_path) is not None)
+    assert count > 100 // every, name
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("number", range(6))
+def test_what_the_checker_accepts_of_random_families_the_verified_one_accepts(number: int, tmp_path: Path) -> None:
+    program()
+    for seed, (name, family) in list(enumerate(random_families(60)))[number::6]:
+        found = document(family, seed, SLIDING if seed % 5 == 4 else NOMINAL)
+        assert check(found).accepted
+        code, text = said(found, tmp_path)
+        assert code == 0 or (code == 2 and any(word in text for word in UNREAD)), (name, text)
