@@ -397,6 +397,37 @@ def test_of_two_sliders_moved_fast_the_last_state_wins_without_a_backlog(browser
 
 
 @pytest.mark.browser
+def test_an_answer_that_another_page_cut_off_is_asked_for_again(browser: Any, address: str):
+    page, asked = Page(browser, address, 1280, 900), []
+
+    def cut(route: Any) -> None:
+        """Answer as the server does where a control was moved on another page after the first part."""
+        asked.append(route.request.url)
+        answer = route.fetch()
+        route.fulfill(
+            response=answer, body=answer.text().splitlines(keepends=True)[0] if len(asked) == 1 else answer.text()
+        )
+
+    page.page.route("**/view?*", cut)
+    page.move("rho2", "1.7")
+    page.settle()
+    assert len(asked) == 2
+    assert page.page.inner_text("#verdict").startswith("Verdict")
+
+
+@pytest.mark.browser
+def test_what_is_computed_after_a_refusal_is_not_called_refused(browser: Any, address: str):
+    page = Page(browser, address, 1280, 900)
+    page.write("rho2", "-1")
+    page.page.wait_for_selector("#verdict.bad")
+    page.write("rho2", "1.3")
+    assert page.page.inner_text("#verdict").split() == ["Verdict", "computing"]
+    assert page.page.eval_on_selector_all("figure", "all => all.every(one => one.classList.contains('old'))")
+    page.settle()
+    assert not page.page.query_selector_all("figure.old")
+
+
+@pytest.mark.browser
 def test_nothing_is_asked_of_the_network_and_no_script_of_another_is_run(browser: Any, server: ExplorerServer):
     page = Page(browser, server.address, 1280, 900)
     page.page.select_option("#kind", "sliding-mode")

@@ -68,7 +68,10 @@ async function show(view) {
     for (const place of document.querySelectorAll("dd")) setText(place, unbroken(view.facts[place.dataset.head]));
     setText(document.getElementById("python"), view.python);
     showWords(document.getElementById("command"), view.command);
-    for (const name of Object.keys(drawn)) if (!view.names.includes(name)) await showPanel(name);
+    for (const { id } of document.querySelectorAll("figure")) {
+      const name = id.slice("panel-".length);
+      if (!view.names.includes(name)) await showPanel(name);
+    }
   }
   for (const [name, svg] of Object.entries(view.panels ?? {})) await showPanel(name, svg);
   if ("verdict" in view) {
