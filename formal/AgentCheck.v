@@ -1,0 +1,49 @@
+(** The executable check of agents of order n, beside that of their graph. *)
+Require Import ZArith QArith Qabs Qreals List Bool Reals.
+Import ListNotations.
+Require Import Certificate Checker AgentCertificate AgentForms.
+Open Scope Q_scope.
+
+(** whoever factors: a matrix as a sum of squares, its coefficients and rows *)
+Definition splitting := list (list Q) -> list (Q * list Q).
+Definition reduced (q : Q) : Q := let g := Z.gcd (Qnum q) (Zpos (Qden q)) in
+  let r := (Qnum q / g)%Z # Z.to_pos (Zpos (Qden q) / g) in if Qeq_bool r q then r else q.
+Definition table (n : nat) (f : nat -> nat -> list Q) : list (list (list Q)) :=
+  map (fun i => map (f i) (seq 0 n)) (seq 0 n).
+Definition choose (b : bool) (p : list Q) : list Q := if b then p else [].
+
+(** an entry of [A_z], and of [b b' - r W - A_z W - W A_z'], as polynomials of [zeta] *)
+Definition pull_in (a : agents) : Q := rho2 (graph a) * kappa (graph a).
+Definition chain (a : agents) (i l : nat) : list Q :=
+  padd (choose (S i =? l)%nat [1])
+    (padd (choose (i =? l)%nat (pscale (- (index i / pull_in a)) [1; - (2 * slope a); slope a * slope a]))
+      (choose (S i =? degree a)%nat
+        (padd [- nth l (damping a) 0] (repeat 0 (degree a - l) ++ [- nth l (plant a) 0])))).
+Definition fall_entry (a : agents) (A : nat -> nat -> list Q) (i j : nat) : list Q :=
+  padd [(if (S i =? degree a)%nat && (S j =? degree a)%nat then 1 else 0) - falls a * cell (W a) i j]
+    (pscale (-1) (fold_right (fun l p => padd (padd (pscale (cell (W a) l j) (A i l)) (pscale (cell (W a) i l) (A j l))) p)
+      [] (seq 0 (degree a)))).
+Definition look (T : list (list (list Q))) (i j : nat) : list Q := nth j (nth i T []) [].
+Definition fall_table (a : agents) : list (list (list Q)) :=
+  let A := table (degree a) (chain a) in table (degree a) (fun i j => map reduced (fall_entry a (look A) i j)).
+(** nonnegative for all [zeta] from [low] to [high]: its Bernstein matrices are *)
+Definition check_interval (split : splitting) (n m : nat) (T : list (list (list Q))) (low high : Q) : bool :=
+  let B := map (map (fun p => map reduced (bernstein m (moved low (high - low) p)))) T in
+  forallb (fun i => psd split n (map (map (fun p => nth i p 0)) B)) (seq 0 (S m)).
+Fixpoint check_points (check : Q -> Q -> bool) (low : Q) (points : list Q) (last : Q) : bool :=
+  match points with [] => Qeq_bool low last | p :: l => check low p && check_points check p l last end.
+Definition check_decrease (split : splitting) (a : agents) (points : list Q) : bool :=
+  let n := degree a in let m := Nat.max n 2 in let T := fall_table a in
+  forallb (forallb (fun p : list Q => (length p <=? S m)%nat)) T &&
+  match points with
+  | low :: p :: l => Qle_bool low 0 && check_points (check_interval split n m T) low (p :: l) (/ (slope a + pull_in a / span (graph a)))
+  | _ => false end.
+Definition row_times (n : nat) (r c : nat -> Q) : Q := qsum (map (fun l => r l * c l) (seq 0 n)).
+Definition check_matrices (split : splitting) (a : agents) : bool :=
+  let n := degree a in psd split n (W a) && forallb pos [coupling a; falls a] && notneg (slope a) && (0 <? n)%nat &&
+  square n (fun i j => Qeq_bool (cell (P a) i j) (cell (P a) j i) &&
+    Qeq_bool (row_times n (cell (W a) i) (fun l => cell (P a) l j)) (if (i =? j)%nat then 1 else 0)) &&
+  forallb (fun i => Qeq_bool (row_times n (cell (W a) i) (fun l => nth l (gains a) 0))
+    (if (S i =? n)%nat then coupling a else 0)) (seq 0 n).
+Definition check_coupling (a : agents) : bool := forallb (fun k => match nth_error (funcs (graph a)) k with
+  | Some f => Qle_bool 1 (coupling a * rate f) | None => false end) (used a).
