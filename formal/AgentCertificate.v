@@ -4,12 +4,10 @@ From Coquelicot Require Import Coquelicot.
 Require Import Certificate.
 Import ListNotations. Open Scope R_scope.
 
-(** one coordinate of space: the offsets by agent; by derivative and agent where the agents begin and end *)
-Record axis := Axis { offsets : list Q; begins : list (list Q); ends : list (list (Q * Q)) }.
 (** [x^(n) + a_n x^(n-1) + .. + a_1 x = u] of every node of [graph], under the protocol of it but for [slope], which takes
-    the place of [rho1]; the functions of [graph] that are used; [tops] bounds the inputs by agent *)
+    the place of [rho1]; which functions of [graph] are used *)
 Record agents := Agents { graph : cert; degree : nat; slope : Q; plant : list Q; damping : list Q; gains : list Q;
-  W : list (list Q); P : list (list Q); coupling : Q; falls : Q; used : list nat; axes : list axis; meets : bool; tops : list Q }.
+  W : list (list Q); P : list (list Q); coupling : Q; falls : Q; used : list nat }.
 
 Definition at_ (l : list Q) (i : nat) : R := Q2R (nth i l 0%Q).
 Definition sum (n : nat) (f : nat -> R) : R := fold_right (fun i a => f i + a) 0 (seq 0 n).
@@ -47,3 +45,6 @@ Definition agent_claim (a : agents) (f : func) : Prop := forall h X S t, flies a
   value a f (y a h (X t) t) <= v /\ forall b cs i j, deviation f = Some (b, cs) -> (i < degree a)%nat ->
     (j < order (graph a))%nat -> let x := placed h (X t) i in
     sq (x j - end_state (graph a) x j) <= sq (eta a t ^ i) * (at_ cs j * at_ (nth i (W a) []) i * v).
+
+Definition true_agents (a : agents) : Prop := true_certificate (graph a) /\ definite a /\
+  forall j, In j (used a) -> exists f, nth_error (funcs (graph a)) j = Some f /\ agent_claim a f.

@@ -1,2 +1,3 @@
-Require Import Large.
+Require Import Large Agents.
 Print Assumptions accepts_sound.
+Print Assumptions accepts_agents_sound.

@@ -1,0 +1,278 @@
+(** The theorem of agents of order n: what the check accepts is true. *)
+Require Import ZArith QArith Qabs Qreals List Bool Reals Lra Lia Psatz FunctionalExtensionality.
+From Coquelicot Require Import Coquelicot.
+Import ListNotations.
+Require Import Vec Definite Graph Flow Certificate Checker Sound Input Slide Main Mean Large AgentCertificate AgentForms AgentCheck AgentFall AgentMotion.
+Open Scope R_scope.
+
+(** * Rationals and polynomials of the check *)
+Lemma reduced_ok q : Q2R (reduced q) = Q2R q.
+Proof. unfold reduced. cbv zeta. destruct (Qeq_bool _ q) eqn:E; [|reflexivity]. apply Qeq_bool_eq, Qeq_eqR in E. exact E. Qed.
+Lemma index_ok i : Q2R (index i) = INR i.
+Proof. unfold index, Q2R. simpl. rewrite INR_IZR_INZ. field. Qed.
+Lemma peval_reduced p x : peval (map reduced p) x = peval p x.
+Proof. induction p as [|q p IH]; simpl; [reflexivity|]. rewrite reduced_ok, IH. reflexivity. Qed.
+Lemma hom_reduced p x z : hom (map reduced p) x z = hom p x z.
+Proof. induction p as [|q p IH]; simpl; [reflexivity|]. rewrite reduced_ok, IH, map_length. reflexivity. Qed.
+Lemma peval_shifted m q x : peval (repeat 0%Q m ++ [q]) x = x ^ m * Q2R q.
+Proof. induction m as [|m IH]; simpl; [ring|]. rewrite IH, Q2R_0. ring. Qed.
+Lemma peval_choose b p x : peval (choose b p) x = if b then peval p x else 0.
+Proof. destruct b; reflexivity. Qed.
+Lemma qsum_ok n (g : nat -> Q) : Q2R (qsum (map g (seq 0 n))) = sum n (fun l => Q2R (g l)).
+Proof. unfold sum. induction (seq 0 n) as [|i s IH]; simpl; [apply Q2R_0|]. rewrite Q2R_plus, IH. reflexivity. Qed.
+Lemma table_ok n g i j : (i < n)%nat -> (j < n)%nat -> look (table n g) i j = g i j.
+Proof. intros Hi Hj. unfold look, table. rewrite nth_map_seq by exact Hi. apply nth_map_seq. exact Hj. Qed.
+Lemma table_row n g i : (i < n)%nat -> length (nth i (table n g) []) = n.
+Proof. intros Hi. unfold table. rewrite nth_map_seq by exact Hi. rewrite map_length, seq_length. reflexivity. Qed.
+
+Section Agents.
+Variables (h : hints) (split : splitting) (points : list Q) (a : agents).
+Let c := graph a.
+Let n := degree a.
+Let T := deadline c.
+Let d := prepare c.
+Let es := edges c.
+Let rho := Q2R (slope a).
+
+Lemma chain_ok i l z : Q2R (pull_in a) <> 0 ->
+  peval (chain a i l) z = entry_at a z (sq (1 - rho * z) / Q2R (pull_in a)) i l.
+Proof.
+  intros Hk. unfold chain, entry_at. rewrite !peval_padd, !peval_choose, peval_pscale, peval_padd, peval_shifted.
+  assert (K : ~ (pull_in a == 0)%Q) by (intros E; apply Hk; rewrite (Qeq_eqR _ _ E); apply Q2R_0).
+  simpl peval. rewrite Q2R_opp, Q2R_div, index_ok by exact K. rewrite !Q2R_opp, !Q2R_mult, Q2R_1.
+  assert (Q2 : Q2R 2 = 2) by (unfold Q2R; simpl; field). rewrite Q2. fold rho. unfold at_, sq.
+  destruct (S i =? l)%nat, (i =? l)%nat, (S i =? degree a)%nat; field; exact Hk.
+Qed.
+Lemma fall_ok A z i j : peval (fall_entry a A i j) z
+  = (if (S i =? n)%nat && (S j =? n)%nat then 1 else 0) - Q2R (falls a) * at_ (nth i (W a) []) j
+    - sum n (fun l => peval (A i l) z * at_ (nth l (W a) []) j + peval (A j l) z * at_ (nth i (W a) []) l).
+Proof.
+  unfold fall_entry. fold n. rewrite peval_padd, peval_pscale.
+  assert (E : forall s, peval (fold_right (fun l p => padd (padd (pscale (cell (W a) l j) (A i l)) (pscale (cell (W a) i l) (A j l))) p) [] s) z
+    = fold_right (fun l b => peval (A i l) z * at_ (nth l (W a) []) j + peval (A j l) z * at_ (nth i (W a) []) l + b) 0 s).
+  { induction s as [|l s IH]; cbn [fold_right]; [reflexivity|]. rewrite !peval_padd, !peval_pscale, IH. unfold cell, at_. ring. }
+  rewrite E. unfold sum. set (q := fold_right _ 0 (seq 0 n)). cbn [peval]. rewrite Q2R_minus, Q2R_mult. unfold cell.
+  change (Q2R (nth j (nth i (W a) []) 0%Q)) with (at_ (nth i (W a) []) j).
+  assert (M : Q2R (-1) = -1) by (unfold Q2R; simpl; field). rewrite M.
+  destruct ((S i =? n)%nat && (S j =? n)%nat); rewrite ?Q2R_1, ?Q2R_0; ring.
+Qed.
+(** the table is nonnegative beside every form where a polynomial of it is taken at [zeta] between two points *)
+Let m := Nat.max n 2.
+Lemma interval_ok tab low high z F Y : positive F -> check_interval split n m tab low high = true ->
+  forallb (forallb (fun p : list Q => (length p <=? S m)%nat)) tab = true -> length tab = n -> (forall i, (i < n)%nat -> length (nth i tab []) = n) ->
+  Q2R low <= z <= Q2R high -> 0 <= sum n (fun i => sum n (fun j => peval (look tab i j) z * F (Y i) (Y j))).
+Proof.
+  intros HF H HL L1 L2 Hz. unfold check_interval in H. cbv zeta in H.
+  set (x := if Req_EM_T (Q2R low) (Q2R high) then 0 else (z - Q2R low) / (Q2R high - Q2R low)).
+  assert (Hx : 0 <= x <= 1 /\ Q2R low + Q2R (high - low) * x = z).
+  { unfold x. rewrite Q2R_minus. destruct (Req_EM_T (Q2R low) (Q2R high)) as [E|E]; [split; [lra|]; rewrite Rmult_0_r; lra|].
+    split; [|field; lra]. split.
+    - apply Rmult_le_pos; [lra|]. left. apply Rinv_0_lt_compat. lra.
+    - apply (Rmult_le_reg_r (Q2R high - Q2R low)); [lra|]. unfold Rdiv. rewrite Rmult_assoc, Rinv_l by lra. lra. }
+  destruct Hx as [X1 X2]. set (B := fun i j => map reduced (bernstein m (moved low (high - low) (look tab i j)))).
+  assert (LB : forall i j, length (B i j) = S m) by (intros; unfold B; rewrite map_length; apply bernstein_length).
+  assert (Elook : forall i j, (i < n)%nat -> (j < n)%nat -> peval (look tab i j) z = sum (S m) (fun u => at_ (B i j) u * (x ^ u * (1 - x) ^ (m - u)))).
+  { intros i j Hi Hj. rewrite <- X2, <- moved_ok, <- (bernstein_ok m).
+    - rewrite <- hom_reduced. fold (B i j). rewrite hom_sum, LB. reflexivity.
+    - assert (Lm : forall p, (length (moved low (high - low) p) <= length p)%nat).
+      { clear. assert (Lp : forall p q, (length (padd p q) = Nat.max (length p) (length q))%nat)
+          by (induction p as [|u p IH]; intros [|v q]; simpl; auto).
+        induction p as [|u p IH]; [simpl; lia|]. cbn [moved]. cbv zeta. rewrite !Lp. unfold pscale. cbn [length]. rewrite !map_length. lia. }
+      eapply Nat.le_trans; [apply Lm|]. rewrite forallb_forall in HL. specialize (HL (nth i tab [])). rewrite forallb_forall in HL.
+      apply Nat.leb_le. apply HL; [apply nth_In; lia|]. apply nth_In. rewrite L2 by exact Hi. exact Hj. }
+  rewrite (sum_ext n _ (fun i => sum (S m) (fun u => (x ^ u * (1 - x) ^ (m - u)) * sum n (fun j => at_ (B i j) u * F (Y i) (Y j))))).
+  2: { intros i Hi. rewrite (sum_ext n _ (fun j => sum (S m) (fun u => (x ^ u * (1 - x) ^ (m - u)) * (at_ (B i j) u * F (Y i) (Y j))))).
+    - rewrite sum_swap. apply sum_ext. intros u _. apply sum_scal.
+    - intros j Hj. rewrite Elook by assumption. rewrite Rmult_comm, <- sum_scal. apply sum_ext. intros. ring. }
+  rewrite sum_swap. rewrite <- (sum_zero (S m) (fun _ => 0)) by reflexivity. apply sum_le. intros u Hu. rewrite sum_scal.
+  apply Rmult_le_pos; [apply Rmult_le_pos; apply pow_le; lra|].
+  rewrite forallb_forall in H. specialize (H u ltac:(apply in_seq; lia)). pose proof (psd_ok _ _ _ F Y HF H) as K. unfold double in K.
+  eapply Rle_trans; [exact K|]. apply Req_le. apply sum_ext. intros i Hi. apply sum_ext. intros j Hj. f_equal. unfold at_. f_equal.
+  set (g := fun p => map reduced (bernstein m (moved low (high - low) p))). fold g.
+  rewrite nth_indep with (d' := map (fun p => nth u p 0%Q) (map g [])) by (rewrite !map_length; lia).
+  rewrite (map_nth (map (fun p => nth u p 0%Q))), (map_nth (map g)).
+  rewrite nth_indep with (d' := (fun p => nth u p 0%Q) (g [])) by (rewrite !map_length, L2; lia).
+  rewrite (map_nth (fun p => nth u p 0%Q)), (map_nth g). reflexivity.
+Qed.
+Lemma points_ok check last z : forall points low, check_points check low points last = true -> Q2R low <= z <= Q2R last ->
+  points <> [] -> exists low high, check low high = true /\ Q2R low <= z <= Q2R high.
+Proof.
+  induction points0 as [|p l IH]; intros low H Hz Hp; [contradiction|]. simpl in H. apply andb_prop in H as [H1 H2].
+  destruct (Rle_lt_dec z (Q2R p)) as [L|L]; [exists low, p; split; [exact H1|lra]|].
+  destruct l as [|q l]; [|apply (IH p); [exact H2|lra|discriminate]].
+  simpl in H2. apply Qeq_bool_eq, Qeq_eqR in H2. lra.
+Qed.
+End Agents.
+
+Definition check_agents_only (split : splitting) (points : list Q) (a : agents) : bool :=
+  check_matrices split a && check_decrease split a points && check_coupling a.
+Definition accepts_agents (h : hints) (split : splitting) (points : list Q) (a : agents) : bool :=
+  accepts h (graph a) && negb (enclosed (graph a)) && check_agents_only split points a.
+
+Section Sound.
+Variables (h : hints) (split : splitting) (points : list Q) (a : agents).
+Let c := graph a.
+Let n := degree a.
+Let d := prepare c.
+Hypothesis Hedges : check_edges c (dls d) = true.
+Hypothesis Hprot : check_protocol c = true.
+Hypothesis Hend : check_end c d = true.
+Hypothesis Hfuncs : forallb (check_function c d) (funcs c) = true.
+Hypothesis Hmatrices : check_matrices split a = true.
+Hypothesis Hdecrease : check_decrease split a points = true.
+Hypothesis Hcoupling : check_coupling a = true.
+
+Lemma pull_ok : Q2R (pull_in a) = k c.
+Proof. unfold pull_in, k. rewrite Q2R_mult. reflexivity. Qed.
+Lemma span_ok : Q2R (span c) = deadline c.
+Proof. unfold span, deadline. destruct (kind c); [reflexivity|]. apply Q2R_plus. Qed.
+Lemma matrices : psd split n (W a) = true /\ 0 < Q2R (coupling a) /\ 0 < Q2R (falls a) /\ 0 <= Q2R (slope a) /\ (0 < n)%nat /\
+  (forall i j, (i < n)%nat -> (j < n)%nat -> at_ (nth i (P a) []) j = at_ (nth j (P a) []) i) /\
+  (forall i j, (i < n)%nat -> (j < n)%nat -> sum n (fun l => at_ (nth i (W a) []) l * at_ (nth l (P a) []) j) = if (i =? j)%nat then 1 else 0) /\
+  forall i, (i < n)%nat -> sum n (fun l => at_ (nth i (W a) []) l * at_ (gains a) l) = if (S i =? n)%nat then Q2R (coupling a) else 0.
+Proof.
+  unfold check_matrices in Hmatrices. fold n in Hmatrices. cbv zeta in Hmatrices.
+  apply andb_prop in Hmatrices as [H H6]. apply andb_prop in H as [H H5]. apply andb_prop in H as [H H4].
+  apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2]. simpl in H2. apply andb_prop in H2 as [P1 P2].
+  apply andb_prop in P2 as [P2 _]. split; [exact H1|]. split; [apply Qpos; exact P1|]. split; [apply Qpos; exact P2|].
+  split; [apply notneg_ok; exact H3|]. split; [apply Nat.ltb_lt; exact H4|]. split; [|split].
+  - intros i j Hi Hj. pose proof (square_ok _ _ H5 i j Hi Hj) as K. cbv beta in K. apply andb_prop in K as [K _].
+    apply Qeq_bool_eq, Qeq_eqR in K. exact K.
+  - intros i j Hi Hj. pose proof (square_ok _ _ H5 i j Hi Hj) as K. cbv beta in K. apply andb_prop in K as [_ K].
+    apply Qeq_bool_eq, Qeq_eqR in K. unfold row_times in K. rewrite qsum_ok in K.
+    rewrite (sum_ext n _ (fun l => Q2R (cell (W a) i l * cell (P a) l j))) by (intros; rewrite Q2R_mult; reflexivity).
+    rewrite K. destruct (i =? j)%nat; [apply Q2R_1|apply Q2R_0].
+  - intros i Hi. rewrite forallb_forall in H6. specialize (H6 i ltac:(apply in_seq; lia)). apply Qeq_bool_eq, Qeq_eqR in H6.
+    unfold row_times in H6. rewrite qsum_ok in H6.
+    rewrite (sum_ext n _ (fun l => Q2R (cell (W a) i l * nth l (gains a) 0%Q))) by (intros; rewrite Q2R_mult; reflexivity).
+    rewrite H6. destruct (S i =? n)%nat; [reflexivity|apply Q2R_0].
+Qed.
+Lemma definite_ok : definite a.
+Proof.
+  destruct matrices as [M1 [_ [_ [_ [_ [_ [M7 M8]]]]]]]. split.
+  - intros x. assert (PF : positive (fun u v : nat -> R => u O * v O)).
+    { constructor; intros; try ring. apply Rle_0_sqr. }
+    apply (psd_ok split n (W a) _ (fun i _ => x i) PF M1).
+  - intros i Hi. split; [apply M8; exact Hi|]. intros j Hj. apply M7; assumption.
+Qed.
+Lemma gain_slope t : 0 <= t < deadline c -> 0 < eta a t /\ eta a 0 <= eta a t.
+Proof.
+  intros Ht. destruct matrices as [_ [_ [_ [M4 _]]]]. destruct (T_k a Hprot) as [A B]. fold c in A, B.
+  unfold eta, gain. fold c. set (T := deadline c) in *. rewrite Rminus_0_r.
+  assert (0 < k c / (T - t)) by (apply Rdiv_lt_0_compat; lra). split; [lra|]. apply Rplus_le_compat_l.
+  apply Rmult_le_compat_l; [lra|]. apply Rinv_le_contravar; lra.
+Qed.
+(** the matrix of the decrease, at every instant *)
+Lemma falls_ok F Y t : positive F -> 0 <= t < deadline c -> let z := / eta a t in let th := sq (1 - Q2R (slope a) * z) / k c in
+  0 <= sum n (fun i => sum n (fun j => ((if (S i =? n)%nat && (S j =? n)%nat then 1 else 0) - Q2R (falls a) * at_ (nth i (W a) []) j
+    - sum n (fun l => entry_at a z th i l * at_ (nth l (W a) []) j + entry_at a z th j l * at_ (nth i (W a) []) l)) * F (Y i) (Y j))).
+Proof.
+  intros HF Ht z th. destruct (gain_slope t Ht) as [E0 E1]. destruct (T_k a Hprot) as [A B]. fold c in A, B.
+  unfold check_decrease in Hdecrease. cbv zeta in Hdecrease. apply andb_prop in Hdecrease as [HL H].
+  destruct points as [|low [|p l]]; try discriminate. apply andb_prop in H as [H0 H]. fold n in HL, H.
+  assert (E2 : 0 < eta a 0) by (apply gain_slope; lra).
+  assert (Last : Q2R (/ (slope a + pull_in a / span (graph a))) = / eta a 0).
+  { assert (Es : ~ (span (graph a) == 0)%Q) by (intros E; apply Qeq_eqR in E; rewrite Q2R_0 in E; pose proof span_ok as SO; unfold c in *; lra).
+    assert (Ev : Q2R (slope a + pull_in a / span (graph a)) = eta a 0).
+    { rewrite Q2R_plus, Q2R_div, pull_ok by exact Es. fold c. rewrite span_ok. unfold eta, gain. fold c. rewrite Rminus_0_r. reflexivity. }
+    rewrite Q2R_inv, Ev; [reflexivity|]. intros E. apply Qeq_eqR in E. rewrite Ev, Q2R_0 in E. lra. }
+  apply Qle_bool_iff, Qle_Rle in H0. rewrite Q2R_0 in H0.
+  assert (Hz : Q2R low <= z <= / eta a 0).
+  { split; [|apply Rinv_le_contravar; assumption]. assert (0 < z) by (apply Rinv_0_lt_compat; exact E0). lra. }
+  rewrite <- Last in Hz. destruct (points_ok _ _ z (p :: l) low H Hz ltac:(discriminate)) as [lo [hi [HC Hz']]].
+  assert (L1 : length (fall_table a) = n) by (unfold fall_table, table; rewrite map_length, seq_length; reflexivity).
+  assert (L2 : forall i, (i < n)%nat -> length (nth i (fall_table a) []) = n).
+  { intros i Hi. apply (table_row n _ i Hi). }
+  pose proof (interval_ok split a (fall_table a) lo hi z F Y HF HC HL L1 L2 Hz') as K. fold n in K.
+  eapply Rle_trans; [exact K|]. apply Req_le. apply sum_ext. intros i Hi. apply sum_ext. intros j Hj. f_equal.
+  unfold fall_table. cbv zeta. rewrite table_ok by assumption. rewrite peval_reduced, fall_ok. f_equal.
+  apply sum_ext. intros l' Hl. rewrite !table_ok by assumption.
+  assert (Nk : Q2R (pull_in a) <> 0) by (rewrite pull_ok; lra). rewrite !chain_ok by exact Nk. rewrite pull_ok. reflexivity.
+Qed.
+Lemma end_scal q x i : end_state c (fun j => q * x j) i = q * end_state c x i.
+Proof. unfold end_state. induction (balanced_comps (comps c)) as [|b l IH]; simpl; [ring|]. rewrite IH, qdot_scal. ring. Qed.
+Lemma end_plus x z i : end_state c (fun j => x j + z j) i = end_state c x i + end_state c z i.
+Proof. unfold end_state. induction (balanced_comps (comps c)) as [|b l IH]; simpl; [ring|]. rewrite IH, qdot_plus. ring. Qed.
+Lemma end_comb l Z i : end_state c (comb n l Z) i = sum n (fun u => l u * end_state c (Z u) i).
+Proof.
+  unfold comb, sum. induction (seq 0 n) as [|u s IH]; cbn [fold_right].
+  - transitivity (0 * end_state c (fun _ => 0) i); [|ring]. rewrite <- end_scal. f_equal. apply functional_extensionality. intros. ring.
+  - rewrite (end_plus (fun j => l u * Z u j)), (end_scal (l u)), IH. reflexivity.
+Qed.
+Theorem claim_ok j f : In j (used a) -> nth_error (funcs c) j = Some f -> agent_claim a f.
+Proof.
+  intros Hj Ef. assert (Hf : In f (funcs c)) by (apply (nth_error_In _ _ Ef)).
+  assert (Hc : 1 <= Q2R (coupling a) * Q2R (rate f)).
+  { unfold check_coupling in Hcoupling. rewrite forallb_forall in Hcoupling. specialize (Hcoupling j Hj). fold c in Hcoupling. rewrite Ef in Hcoupling.
+    apply Qle_bool_iff, Qle_Rle in Hcoupling. rewrite Q2R_mult, Q2R_1 in Hcoupling. exact Hcoupling. }
+  rewrite forallb_forall in Hfuncs. specialize (Hfuncs f Hf). unfold check_function in Hfuncs.
+  destruct (Checker.form (order c) (dls d) (dL d) (ly f)) as [[F m]|] eqn:EF; [|discriminate].
+  apply andb_prop in Hfuncs as [H H4]. apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2].
+  pose proof (Main.Hls c Hedges) as HL. fold d in HL.
+  set (S := pair (edges c) (ly f)). assert (PS : positive S) by (apply (pair_positive c f HL F m EF H2)).
+  destruct matrices as [M1 [M2 [M3 [M4 [M5 [M6 [M7 M8]]]]]]].
+  assert (Wsym : forall i j, (i < n)%nat -> (j < n)%nat -> at_ (nth i (W a) []) j = at_ (nth j (W a) []) i)
+    by (intros; apply (psd_symmetric split n); assumption).
+  intros off X Sl t HX Ht v. fold c in Ht.
+  assert (D : value a f (y a off (X t) t) <= v).
+  { apply (value_falls a off X Sl Hprot M4 M5 HX f (Q2R (falls a))); [| | | |exact Ht].
+    - apply (pair_derive c f HL F m EF).
+    - apply (pair_continuous c f HL F m EF).
+    - exact PS.
+    - intros u Y Hu m'. apply (falling S (lap (edges c)) n (fun i j => at_ (nth i (W a) []) j) (fun i j => at_ (nth i (P a) []) j)
+        (entry_at a (/ eta a u) (sq (1 - Q2R (slope a) * / eta a u) / k c)) (at_ (gains a)) (Q2R (coupling a)) (Q2R (falls a)) (Q2R (rate f)) Y PS);
+        try assumption.
+      + intros. apply lap_comb.
+      + apply (pair_rate c f HL F m EF H1).
+      + split; assumption.
+      + apply (falls_ok S (fun i => comb n (fun l => at_ (nth i (P a) []) l) Y) u PS Hu). }
+  split; [exact D|]. intros b cs i jj Edev Hi Hjj x. rewrite Edev in H4.
+  set (dev := fun z : nat -> R => z jj - end_state c z jj).
+  assert (DV : forall z, 0 <= at_ cs jj /\ sq (dev z) <= at_ cs jj * S z z).
+  { intros z. destruct (deviation_ok c Hedges Hend f F m EF b cs H4 z) as [_ K]. specialize (K jj Hjj).
+    unfold S. rewrite (pair_self c f HL F m EF). exact K. }
+  assert (PD : positive (fun z z' => at_ cs jj * S z z' - dev z * dev z')).
+  { constructor.
+    - intros. rewrite (swaps S PS). ring.
+    - intros. rewrite (adds S PS). unfold dev. rewrite end_plus. ring.
+    - intros. rewrite (scales S PS). unfold dev. rewrite end_scal. ring.
+    - intros z. destruct (DV z) as [_ K]. unfold sq in K. lra. }
+  assert (E : x = fun j => eta a t ^ i * y a off (X t) t i j).
+  { apply functional_extensionality. intros j'. apply (y_times a off Hprot M4). apply Ht. }
+  assert (Ex : x jj - end_state (graph a) x jj = eta a t ^ i * dev (y a off (X t) t i)).
+  { rewrite E. fold c. rewrite end_scal. unfold dev. ring. }
+  rewrite Ex. unfold sq at 1 2. replace (eta a t ^ i * dev (y a off (X t) t i) * (eta a t ^ i * dev (y a off (X t) t i)))
+    with (eta a t ^ i * eta a t ^ i * sq (dev (y a off (X t) t i))) by (unfold sq; ring).
+  apply Rmult_le_compat_l; [apply Rle_0_sqr|].
+  assert (WP : forall u : nat -> R, 0 <= sum n (fun i => sum n (fun j => at_ (nth i (W a) []) j * (u i * u j)))) by (apply definite_ok).
+  pose proof (one_part S n (fun i j => at_ (nth i (W a) []) j) (fun i j => at_ (nth i (P a) []) j) (y a off (X t) t) PS Wsym M7
+    dev (at_ cs jj) i) as K. cbv beta in K.
+  assert (K' : sq (dev (y a off (X t) t i)) <= at_ (nth i (W a) []) i * (at_ cs jj * value a f (y a off (X t) t))).
+  { apply K; [|intros Z; apply (psd_ok split n (W a) _ Z PD M1)|exact WP|exact Hi].
+    intros l Z. unfold dev. rewrite end_comb. unfold comb at 1. rewrite (sum_ext n (fun i0 => l i0 * (Z i0 jj - end_state c (Z i0) jj))
+      (fun i0 => l i0 * Z i0 jj + -1 * (l i0 * end_state c (Z i0) jj))) by (intros; ring). rewrite sum_plus, sum_scal. ring. }
+  eapply Rle_trans; [exact K'|]. destruct (DV (fun _ => 0)) as [C0 _].
+  assert (W0 : 0 <= at_ (nth i (W a) []) i).
+  { specialize (WP (fun l => if (i =? l)%nat then 1 else 0)).
+    rewrite (sum_ext n _ (fun l => (if (i =? l)%nat then 1 else 0) * sum n (fun j => (if (i =? j)%nat then 1 else 0) * at_ (nth l (W a) []) j))) in WP.
+    - rewrite (sum_at' n i (fun l => sum n (fun j => (if (i =? j)%nat then 1 else 0) * at_ (nth l (W a) []) j))),
+        (sum_at' n i (fun j => at_ (nth i (W a) []) j)) in WP by exact Hi. exact WP.
+    - intros l _. rewrite <- sum_scal. apply sum_ext. intros. ring. }
+  replace (at_ cs jj * at_ (nth i (W a) []) i * v) with (at_ (nth i (W a) []) i * (at_ cs jj * v)) by ring.
+  apply Rmult_le_compat_l; [exact W0|]. apply Rmult_le_compat_l; [exact C0|exact D].
+Qed.
+End Sound.
+
+Theorem accepts_agents_sound h split points a : accepts_agents h split points a = true -> true_agents a.
+Proof.
+  intros H. unfold accepts_agents in H. apply andb_prop in H as [H HA]. apply andb_prop in H as [HG HE].
+  apply negb_true_iff in HE. split; [apply (accepts_sound h); exact HG|]. unfold accepts in HG. rewrite HE in HG.
+  unfold check in HG. set (d := prepare (graph a)) in *.
+  repeat match type of HG with (_ && _ = true) => let K := fresh "G" in apply andb_prop in HG as [HG K] end.
+  unfold check_agents_only in HA. apply andb_prop in HA as [HA A3]. apply andb_prop in HA as [A1 A2].
+  split; [apply (definite_ok split); assumption|]. intros j Hj.
+  assert (E : exists f, nth_error (funcs (graph a)) j = Some f).
+  { unfold check_coupling in A3. rewrite forallb_forall in A3. specialize (A3 j Hj).
+    destruct (nth_error (funcs (graph a)) j) as [f|]; [exists f; reflexivity|discriminate]. }
+  destruct E as [f E]. exists f. split; [exact E|]. apply (claim_ok split points a) with (j := j); assumption.
+Qed.
