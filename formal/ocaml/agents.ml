@@ -1,0 +1,123 @@
+(* Certificates of agents of order n: section 21 of FORMAT.md, after the certificate of their graph. *)
+open Checker
+open Json
+open Document
+module Z = Number.Z
+
+type t = { base : Reader.t; record : Checker.agents; points : q list }
+
+let keys = [ "order"; "dimension"; "plant"; "own"; "gains"; "coupling"; "lower_triangle"; "rate"; "gain_cap"; "points";
+  "functions"; "offsets"; "initial_state"; "motion"; "final_state"; "residual"; "input" ]
+let section = function Obj l -> List.assoc_opt "agents" l | _ -> None
+let null_in json key = match json with Obj l -> List.assoc_opt key l = Some Null | _ -> false
+let many_points = 257 and longest = 2000
+
+(* a matrix of few rows as a sum of squares, where it is one: coefficients and rows, by elimination; none is believed *)
+let split rows =
+  let a = Array.of_list (List.map Array.of_list rows) in
+  let n = Array.length a in
+  let step k =
+    let d = a.(k).(k) in
+    if Z.sign d.qnum = 0 then None
+    else begin
+      let l = Array.init n (fun i -> if i < k then Number.zero else Number.div_signed a.(k).(i) d) in
+      for i = k to n - 1 do for j = k to n - 1 do
+        a.(i).(j) <- Number.sub a.(i).(j) (Number.mul d (Number.mul l.(i) l.(j))) done done;
+      Some (d, Array.to_list l) end in
+  List.filter_map step (List.init n Fun.id)
+
+(* the inverse of a matrix, which the check verifies *)
+let inverse rows =
+  let n = List.length rows in
+  let a = Array.of_list (List.mapi (fun i r ->
+    Array.append (Array.of_list r) (Array.init n (fun j -> if i = j then Number.one else Number.zero))) rows) in
+  for k = 0 to n - 1 do
+    need (Z.sign a.(k).(k).qnum > 0) "agent-positive of agents";
+    let d = a.(k).(k) in
+    a.(k) <- Array.map (fun x -> Number.div x d) a.(k);
+    for i = 0 to n - 1 do
+      if i <> k then begin
+        let c = a.(i).(k) in
+        a.(i) <- Array.map2 (fun x y -> Number.sub x (Number.mul c y)) a.(i) a.(k) end done done;
+  Array.to_list (Array.map (fun r -> Array.to_list (Array.sub r n n)) a)
+
+let count what v =
+  let z = integer what v in
+  need (Z.sign z > 0 && Z.leq z (Z.of_int 8)) (what ^ " is no integer from 1 to 8"); Z.to_int z
+let short what (x : q) =
+  need (Z.numbits x.qnum <= longest && Z.numbits x.qden <= longest) (Printf.sprintf "%s: a number of more than %d bits" what longest); x
+let shorts what length v =
+  let l = entries what v in
+  need (List.length l = length) (Printf.sprintf "%s: %d numbers are due" what length); List.map (fun x -> short what (number what x)) l
+let symmetric n v =
+  let rows = entries "lower_triangle" v in
+  need (List.length rows = n) "lower_triangle: another number of rows";
+  let rows = Array.of_list (List.mapi (fun i r -> Array.of_list (shorts "lower_triangle" (i + 1) r)) rows) in
+  List.init n (fun i -> List.init n (fun j -> rows.(max i j).(min i j)))
+
+(* the functions that are used, with constants of their input, which the certificate of the graph bears in its record *)
+let functions (r : Reader.t) proof is_full v =
+  let one (before, funcs) v =
+    let get = fields "a function that is used" [ "function"; "inputs" ] v in
+    let z = integer "function" (get "function") in
+    need (Z.gt z (Z.of_int before) && Z.lt z (Z.of_int (List.length funcs))) "functions that are used: none such, or in another order";
+    let k = Z.to_int z in
+    need (Z.sign (List.nth funcs k).rate.qnum > 0) "a Lyapunov function that is used and does not decay";
+    k, match get "inputs" with
+    | Null -> funcs
+    | v ->
+        need (is_full k) "constants of the input of a Lyapunov function that is not full";
+        bare_of proof "input-constants" (Printf.sprintf "lyapunov.functions[%d]" k);
+        let constants = by_agent r.nodes number "inputs" v in
+        List.mapi (fun i f -> if i = k then { f with constants = Some constants } else f) funcs in
+  let used, _, funcs = List.fold_left (fun (used, before, funcs) v -> let k, funcs = one (before, funcs) v in k :: used, k, funcs)
+    ([], -1, r.cert.funcs) (entries "functions" v) in
+  List.rev used, funcs
+
+let certificate json : t =
+  let get = match section json with
+    | Some (Obj l) when List.mem_assoc "cascade" l -> unsupported "agents that track a velocity, section agents.cascade"
+    | Some v -> fields "agents" keys v
+    | None -> bad "no agents of order n" in
+  let r = Reader.certificate json in
+  List.iter (fun key -> need (null_in json key) (key ^ " beside that of the agents")) [ "initial_state"; "final_state"; "input" ];
+  List.iter (fun x -> need (Number.equal x Number.zero) "agents of order n begin with sliding variables that are 0") r.cert.sliding;
+  if r.cert.enclosed then unsupported "agents of order n on a large form";
+  if get "gain_cap" <> Null then unsupported "agents of order n with a gain that is capped";
+  let n = count "order" (get "order") in
+  let _dimension = count "dimension" (get "dimension") in
+  let row key = shorts key n (get key) in
+  let single key = short key (number key (get key)) in
+  let w = symmetric n (get "lower_triangle") in
+  let points = entries "points" (get "points") in
+  need (List.length points <= many_points) (Printf.sprintf "more than %d points" many_points);
+  let points = List.map (fun x -> short "points" (number "points" x)) points in
+  let proof = { rest = r.rest; checked = []; unchecked = [] } in
+  let listed = match json with
+    | Obj l -> (match List.assoc_opt "lyapunov" l with Some (Obj l) -> entries "functions" (List.assoc "functions" l) | _ -> []) | _ -> [] in
+  let is_full k = match List.nth listed k with Obj l -> List.assoc_opt "class" l = Some (Str "full") | _ -> false in
+  let used, funcs = functions r proof is_full (get "functions") in
+  need (used <> [] || r.cert.edges = []) "what was proved makes another verdict";
+  let coupling, rate = single "coupling", single "rate" in
+  bare_of proof "agent-positive" "agents";
+  need (Number.equal (bare proof "agent-decrease" "agents" [ "rate" ] "rate") rate) "agent-decrease: another rate";
+  need (Number.equal (bare proof "agent-coupling" "agents" [ "coupling" ] "coupling") coupling) "agent-coupling: another coupling";
+  let left = ref [] in
+  let skip kind key = if get key <> Null then (skipped proof kind "agents"; left := ("agents." ^ key) :: !left) in
+  skip "agent-motion" "motion";
+  skip "agent-final-state" "final_state";
+  skip "agent-residual" "residual";
+  skip "agent-input" "input";
+  need (proof.rest = []) "an obligation that nothing asks for";
+  let slope = r.cert.rho1 in
+  let cert = { r.cert with funcs; rho1 = if Z.sign slope.qnum = 0 then Number.one else slope } in
+  let record = { graph = cert; degree = n; slope; plant = row "plant"; damping = row "own"; gains = row "gains"; w; p = inverse w;
+    coupling; falls = rate; used } in
+  { base = { r with cert; rest = []; checked = r.checked @ List.rev proof.checked; unchecked = r.unchecked @ List.rev proof.unchecked;
+      sections = r.sections @ List.rev !left };
+    record; points }
+let accepts a = accepts_agents a.base.hints split a.points a.record
+(* the parts of the check one by one *)
+let parts a = [ "agent-positive of agents", (fun () -> check_matrices split a.record);
+  "agent-decrease of agents", (fun () -> check_decrease split a.record a.points);
+  "agent-coupling of agents", (fun () -> check_coupling a.record) ]
