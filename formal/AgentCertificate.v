@@ -4,10 +4,14 @@ From Coquelicot Require Import Coquelicot.
 Require Import Certificate.
 Import ListNotations. Open Scope R_scope.
 
+(** one coordinate of space: the offsets by agent; by derivative and agent where the agents begin, and where they end *)
+Record axis := Axis { offsets : list Q; begins : list (list Q); ends : list (list (Q * Q)) }.
 (** [x^(n) + a_n x^(n-1) + .. + a_1 x = u] of every node of [graph], under the protocol of it but for [slope], which takes
-    the place of [rho1]; which functions of [graph] are used *)
+    the place of [rho1]; which functions of [graph] are used, and whether all agree
+    at the deadline; [common] takes the common motion there from time 0 *)
 Record agents := Agents { graph : cert; degree : nat; slope : Q; plant : list Q; damping : list Q; gains : list Q;
-  W : list (list Q); P : list (list Q); coupling : Q; falls : Q; used : list nat }.
+  W : list (list Q); P : list (list Q); coupling : Q; falls : Q; used : list nat; agree : bool;
+  common : option (list (list Q)); axes : list axis }.
 
 Definition at_ (l : list Q) (i : nat) : R := Q2R (nth i l 0%Q).
 Definition sum (n : nat) (f : nat -> R) : R := fold_right (fun i a => f i + a) 0 (seq 0 n).
@@ -45,6 +49,17 @@ Definition agent_claim (a : agents) (f : func) : Prop := forall h X S t, flies a
   value a f (y a h (X t) t) <= v /\ forall b cs i j, deviation f = Some (b, cs) -> (i < degree a)%nat ->
     (j < order (graph a))%nat -> let x := placed h (X t) i in
     sq (x j - end_state (graph a) x j) <= sq (eta a t ^ i) * (at_ cs j * at_ (nth i (W a) []) i * v).
+(** at the deadline all derivatives of all agents are those of the common motion, where it is known: they end there *)
+Definition outcome a M h x i j : R := (if (i =? 0)%nat then h j else 0) +
+  sum (degree a) (fun l => at_ (nth i M []) l * end_state (graph a) (placed h x l) j).
+Definition agreement (a : agents) : Prop := agree a = true -> forall h X S i j, flies a h X S -> (i < degree a)%nat ->
+  (j < order (graph a))%nat -> let tends f y := filterlim f (at_left (deadline (graph a))) (locally y) in
+  tends (fun t => placed h (X t) i j - end_state (graph a) (placed h (X t) i) j) 0 /\
+  forall M, common a = Some M -> tends (fun t => X t i j) (outcome a M h (X 0) i j).
+(** the intervals of the final states hold these *)
+Definition ends_claim (a : agents) : Prop := forall M x i j, common a = Some M -> In x (axes a) -> (i < length (ends x))%nat ->
+  (j < order (graph a))%nat -> let p := nth j (nth i (ends x) []) (0%Q, 0%Q) in
+  Rabs (Q2R (fst p) - outcome a M (at_ (offsets x)) (fun l => at_ (nth l (begins x) [])) i j) <= Q2R (snd p).
 
-Definition true_agents (a : agents) : Prop := true_certificate (graph a) /\ definite a /\
+Definition true_agents (a : agents) : Prop := true_certificate (graph a) /\ definite a /\ agreement a /\ ends_claim a /\
   forall j, In j (used a) -> exists f, nth_error (funcs (graph a)) j = Some f /\ agent_claim a f.

@@ -47,3 +47,27 @@ Definition check_matrices (split : splitting) (a : agents) : bool :=
     (if (S i =? n)%nat then coupling a else 0)) (seq 0 n).
 Definition check_coupling (a : agents) : bool := forallb (fun k => match nth_error (funcs (graph a)) k with
   | Some f => Qle_bool 1 (coupling a * rate f) | None => false end) (used a).
+
+(** where they end *)
+Definition check_agree (a : agents) : bool := negb (agree a) ||
+  (negb (Qle_bool (falls a * pull_in a) (2 * index (pred (degree a)))) && existsb (fun k => match nth_error (funcs (graph a)) k with
+    | Some f => match deviation f with Some _ => true | None => false end | None => false end) (used a)).
+(** [q^m / m!] *)
+Fixpoint part (q : Q) (m : nat) : Q := match m with O => 1 | S m' => q / index (S m') * part q m' end.
+Definition check_common (a : agents) : bool := match common a with None => true | Some M =>
+  forallb (Qeq_bool 0) (plant a ++ damping a) && square (degree a) (fun i l =>
+    Qeq_bool (cell M i l) (if (i <=? l)%nat then part (span (graph a)) (l - i) else 0)) end.
+Fixpoint dotq (l x : list Q) : Q := match l, x with q :: l', v :: x' => reduced (q * v + dotq l' x') | _, _ => 0 end.
+Definition ends_q (c : cert) (x : list Q) : list Q :=
+  let vs := map (fun b : nat * (list Q * list Q) => (fst (snd b), dotq (snd (snd b)) x)) (balanced_comps (comps c)) in
+  map (fun j => reduced (fold_right (fun (p : list Q * Q) s => nth j (fst p) 0 * snd p + s) 0 vs)) (seq 0 (order c)).
+Definition less (x h : list Q) : list Q := map (fun p : Q * Q => fst p - snd p) (combine x h).
+Definition placed_q (x : axis) (l : nat) : list Q := let y := nth l (begins x) [] in if (l =? 0)%nat then less y (offsets x) else y.
+Definition check_axis (a : agents) (M : list (list Q)) (x : axis) : bool :=
+  let n := degree a in let N := order (graph a) in
+  let E := map (fun l => ends_q (graph a) (placed_q x l)) (seq 0 n) in
+  (length (ends x) <=? n)%nat && (length (nth 0 (begins x) []) =? N)%nat && (length (offsets x) =? N)%nat &&
+  forallb (fun i => forallb (fun j => let p := nth j (nth i (ends x) []) (0, 0) in
+    Qle_bool (Qabs (fst p - ((if (i =? 0)%nat then nth j (offsets x) 0 else 0) + row_times n (cell M i) (fun l => cell E l j)))) (snd p))
+    (seq 0 N)) (seq 0 (length (ends x))).
+Definition check_ends_of (a : agents) : bool := match common a with None => true | Some M => forallb (check_axis a M) (axes a) end.

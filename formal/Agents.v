@@ -2,7 +2,7 @@
 Require Import ZArith QArith Qabs Qreals List Bool Reals Lra Lia Psatz FunctionalExtensionality.
 From Coquelicot Require Import Coquelicot.
 Import ListNotations.
-Require Import Vec Definite Graph Flow Certificate Checker Sound Input Slide Main Mean Large AgentCertificate AgentForms AgentCheck AgentFall AgentMotion.
+Require Import Vec Definite Graph Flow Certificate Checker Sound Input Slide Main Mean Large AgentCertificate AgentForms AgentCheck AgentFall AgentMotion AgentEnd.
 Open Scope R_scope.
 
 (** * Rationals and polynomials of the check *)
@@ -105,7 +105,7 @@ Qed.
 End Agents.
 
 Definition check_agents_only (split : splitting) (points : list Q) (a : agents) : bool :=
-  check_matrices split a && check_decrease split a points && check_coupling a.
+  check_matrices split a && check_decrease split a points && check_coupling a && check_agree a && check_common a && check_ends_of a.
 Definition accepts_agents (h : hints) (split : splitting) (points : list Q) (a : agents) : bool :=
   accepts h (graph a) && negb (enclosed (graph a)) && check_agents_only split points a.
 
@@ -189,16 +189,6 @@ Proof.
   apply sum_ext. intros l' Hl. rewrite !table_ok by assumption.
   assert (Nk : Q2R (pull_in a) <> 0) by (rewrite pull_ok; lra). rewrite !chain_ok by exact Nk. rewrite pull_ok. reflexivity.
 Qed.
-Lemma end_scal q x i : end_state c (fun j => q * x j) i = q * end_state c x i.
-Proof. unfold end_state. induction (balanced_comps (comps c)) as [|b l IH]; simpl; [ring|]. rewrite IH, qdot_scal. ring. Qed.
-Lemma end_plus x z i : end_state c (fun j => x j + z j) i = end_state c x i + end_state c z i.
-Proof. unfold end_state. induction (balanced_comps (comps c)) as [|b l IH]; simpl; [ring|]. rewrite IH, qdot_plus. ring. Qed.
-Lemma end_comb l Z i : end_state c (comb n l Z) i = sum n (fun u => l u * end_state c (Z u) i).
-Proof.
-  unfold comb, sum. induction (seq 0 n) as [|u s IH]; cbn [fold_right].
-  - transitivity (0 * end_state c (fun _ => 0) i); [|ring]. rewrite <- end_scal. f_equal. apply functional_extensionality. intros. ring.
-  - rewrite (end_plus (fun j => l u * Z u j)), (end_scal (l u)), IH. reflexivity.
-Qed.
 Theorem claim_ok j f : In j (used a) -> nth_error (funcs c) j = Some f -> agent_claim a f.
 Proof.
   intros Hj Ef. assert (Hf : In f (funcs c)) by (apply (nth_error_In _ _ Ef)).
@@ -234,13 +224,13 @@ Proof.
   assert (PD : positive (fun z z' => at_ cs jj * S z z' - dev z * dev z')).
   { constructor.
     - intros. rewrite (swaps S PS). ring.
-    - intros. rewrite (adds S PS). unfold dev. rewrite end_plus. ring.
-    - intros. rewrite (scales S PS). unfold dev. rewrite end_scal. ring.
+    - intros. rewrite (adds S PS). unfold dev. rewrite (end_plus a). fold c. ring.
+    - intros. rewrite (scales S PS). unfold dev. rewrite (end_scal a). fold c. ring.
     - intros z. destruct (DV z) as [_ K]. unfold sq in K. lra. }
   assert (E : x = fun j => eta a t ^ i * y a off (X t) t i j).
   { apply functional_extensionality. intros j'. apply (y_times a off Hprot M4). apply Ht. }
   assert (Ex : x jj - end_state (graph a) x jj = eta a t ^ i * dev (y a off (X t) t i)).
-  { rewrite E. fold c. rewrite end_scal. unfold dev. ring. }
+  { rewrite E. rewrite (end_scal a). fold c. unfold dev. ring. }
   rewrite Ex. unfold sq at 1 2. replace (eta a t ^ i * dev (y a off (X t) t i) * (eta a t ^ i * dev (y a off (X t) t i)))
     with (eta a t ^ i * eta a t ^ i * sq (dev (y a off (X t) t i))) by (unfold sq; ring).
   apply Rmult_le_compat_l; [apply Rle_0_sqr|].
@@ -249,7 +239,7 @@ Proof.
     dev (at_ cs jj) i) as K. cbv beta in K.
   assert (K' : sq (dev (y a off (X t) t i)) <= at_ (nth i (W a) []) i * (at_ cs jj * value a f (y a off (X t) t))).
   { apply K; [|intros Z; apply (psd_ok split n (W a) _ Z PD M1)|exact WP|exact Hi].
-    intros l Z. unfold dev. rewrite end_comb. unfold comb at 1. rewrite (sum_ext n (fun i0 => l i0 * (Z i0 jj - end_state c (Z i0) jj))
+    intros l Z. unfold dev. rewrite (end_comb a). fold c. unfold comb at 1. rewrite (sum_ext n (fun i0 => l i0 * (Z i0 jj - end_state c (Z i0) jj))
       (fun i0 => l i0 * Z i0 jj + -1 * (l i0 * end_state c (Z i0) jj))) by (intros; ring). rewrite sum_plus, sum_scal. ring. }
   eapply Rle_trans; [exact K'|]. destruct (DV (fun _ => 0)) as [C0 _].
   assert (W0 : 0 <= at_ (nth i (W a) []) i).
@@ -261,6 +251,105 @@ Proof.
   replace (at_ cs jj * at_ (nth i (W a) []) i * v) with (at_ (nth i (W a) []) i * (at_ cs jj * v)) by ring.
   apply Rmult_le_compat_l; [exact W0|]. apply Rmult_le_compat_l; [exact C0|exact D].
 Qed.
+(** * Where they end *)
+Hypothesis Hagree : check_agree a = true.
+Hypothesis Hcommon : check_common a = true.
+Hypothesis Hends : check_ends_of a = true.
+Lemma part_ok q m : Q2R (part q m) = Q2R q ^ m / INR (fact m).
+Proof.
+  induction m as [|m IH]; cbn [part]; [rewrite Q2R_1; simpl; field|].
+  assert (N : ~ (index (S m) == 0)%Q) by (unfold index, inject_Z, Qeq; simpl; lia).
+  rewrite Q2R_mult, Q2R_div, IH, index_ok by exact N. change (fact (S m)) with (S m * fact m)%nat. rewrite mult_INR, <- tech_pow_Rmult.
+  pose proof (INR_fact_neq_0 m). assert (INR (S m) <> 0) by (apply not_0_INR; lia). field. split; assumption.
+Qed.
+Lemma zeros l i : forallb (Qeq_bool 0) l = true -> at_ l i = 0.
+Proof.
+  intros H. unfold at_. destruct (nth_in_or_default i l 0%Q) as [I|E]; [|rewrite E; apply Q2R_0].
+  rewrite forallb_forall in H. specialize (H _ I). apply Qeq_bool_eq, Qeq_eqR in H. rewrite <- H. apply Q2R_0.
+Qed.
+Theorem agreement_ok : agreement a.
+Proof.
+  intros HA off X Sl i j HX Hi Hj tends.
+  destruct matrices as [M1 [M2 [M3 [M4 [M5 [M6 [M7 M8]]]]]]].
+  assert (D : tends (fun t => placed off (X t) i j - end_state (graph a) (placed off (X t) i) j) 0).
+  { unfold check_agree in Hagree. rewrite HA in Hagree. simpl in Hagree. apply andb_prop in Hagree as [G1 G2].
+    apply existsb_exists in G2 as [kf [Hk G2]]. destruct (nth_error (funcs (graph a)) kf) as [f|] eqn:Ef; [|discriminate].
+    destruct (deviation f) as [[b cs]|] eqn:Ed; [|discriminate].
+    pose proof (claim_ok kf f Hk Ef off X Sl) as CL.
+    apply negb_true_iff in G1. destruct (Qlt_le_dec (2 * index (pred n)) (falls a * pull_in a)) as [L|L]; [|apply Qle_bool_iff in L; unfold n in L; congruence].
+    apply Qlt_Rlt in L. rewrite !Q2R_mult, index_ok, pull_ok in L. assert (Q2 : Q2R 2 = 2) by (unfold Q2R; simpl; field). rewrite Q2 in L.
+    set (C := at_ cs j * at_ (nth i (W a) []) i * value a f (y a off (X 0) 0)).
+    assert (B : forall t, 0 <= t < deadline (graph a) -> sq (placed off (X t) i j - end_state (graph a) (placed off (X t) i) j)
+      <= sq (eta a t ^ i) * (C * exp (- (Q2R (falls a) * turns a t)))).
+    { intros t Ht. destruct (CL t HX Ht) as [_ K]. specialize (K b cs i j Ed Hi Hj). cbv zeta in K. eapply Rle_trans; [exact K|].
+      apply Req_le. unfold C. ring. }
+    apply (vanishes a Hprot M4 _ i (Q2R (falls a)) (Rmax 0 C)).
+    - apply Rmax_l.
+    - eapply Rle_lt_trans; [|exact L]. apply Rmult_le_compat_l; [lra|]. apply le_INR. unfold n in *. lia.
+    - intros t Ht. eapply Rle_trans; [apply (B t Ht)|]. apply Rmult_le_compat_l; [apply Rle_0_sqr|].
+      apply Rmult_le_compat_r; [left; apply exp_pos|apply Rmax_r]. }
+  split; [exact D|]. intros M EM. unfold check_common in Hcommon. rewrite EM in Hcommon. apply andb_prop in Hcommon as [Z HM].
+  rewrite forallb_app in Z. apply andb_prop in Z as [Z1 Z2].
+  destruct (T_k a Hprot) as [T0 K0]. fold c in T0, K0. set (T := deadline c) in *.
+  set (wj := fun t => taylor (n - i) (fun l => end_state c (placed off (X (Rmax 0 0)) (i + l)) j) t).
+  assert (EW : forall t, 0 <= t < T -> end_state c (placed off (X t) i) j = wj t).
+  { intros t Ht. pose proof (drifts a off X Sl Hedges Hend Hprot M5 HX (fun l => zeros _ l Z1) (fun l => zeros _ l Z2) j (n - i) i
+      ltac:(unfold n in *; lia) ltac:(unfold n in *; lia) t Ht) as K. cbv beta zeta in K. rewrite (Rmax_right 0 t) in K by lra. exact K. }
+  assert (EO : outcome a M off (X 0) i j = (if (i =? 0)%nat then off j else 0) + wj T).
+  { unfold outcome. f_equal. fold n c. unfold wj, taylor. rewrite Rmax_left by lra.
+    rewrite <- (sum_from i n (fun u v => T ^ u / INR (fact u) * end_state c (placed off (X 0) v) j)) by (unfold n in *; lia).
+    apply sum_ext. intros l Hl. pose proof (square_ok _ _ HM i l Hi Hl) as K. cbv beta in K. apply Qeq_bool_eq, Qeq_eqR in K.
+    change (at_ (nth i M []) l) with (Q2R (cell M i l)). rewrite K. destruct (i <=? l)%nat; [|rewrite Q2R_0; ring].
+    rewrite part_ok. fold c. rewrite span_ok. reflexivity. }
+  rewrite EO. unfold tends in *. fold c T in D |- *.
+  assert (CW : filterlim (fun t => (if (i =? 0)%nat then off j else 0) + wj t) (at_left T) (locally ((if (i =? 0)%nat then off j else 0) + wj T))).
+  { apply (filterlim_filter_le_1 (G := at_left T) (F := at_left T) (fun t => (if (i =? 0)%nat then off j else 0) + wj t) (fun P HP => HP)).
+    eapply filterlim_filter_le_1; [|apply (continuous_plus (fun _ => if (i =? 0)%nat then off j else 0) wj);
+      [apply continuous_const|apply @ex_derive_continuous]].
+    - intros P [e He]. exists e. intros u Hu _. apply He. exact Hu.
+    - destruct (n - i)%nat as [|u] eqn:Eu; [unfold n in *; lia|]. unfold wj. eexists. apply taylor_derive. }
+  apply (filterlim_ext_loc (fun t => (placed off (X t) i j - end_state c (placed off (X t) i) j) + ((if (i =? 0)%nat then off j else 0) + wj t))).
+  - exists (mkposreal T T0). intros t Bt Lt. unfold ball in Bt; simpl in Bt; unfold AbsRing_ball, abs, minus, plus, opp in Bt; simpl in Bt.
+    apply Rabs_def2 in Bt. rewrite EW by lra. unfold placed. ring.
+  - evar_last.
+    + apply (filterlim_comp_2 (F := at_left T) (G := locally 0) (H := locally ((if (i =? 0)%nat then off j else 0) + wj T))
+        (fun t => placed off (X t) i j - end_state c (placed off (X t) i) j) (fun t => (if (i =? 0)%nat then off j else 0) + wj t) Rplus D CW).
+      apply (filterlim_plus 0 ((if (i =? 0)%nat then off j else 0) + wj T)).
+    + unfold plus; simpl. f_equal. ring.
+Qed.
+Lemma dotq_ok l : forall x, Q2R (dotq l x) = qdot l (at_ x).
+Proof.
+  induction l as [|q l IH]; intros [|v x]; cbn [dotq qdot]; try apply Q2R_0.
+  - rewrite (qdot_ext _ _ (fun i => 0 * 1)) by (intros i _; unfold shift, at_; destruct i; simpl; rewrite Q2R_0; ring).
+    rewrite qdot_scal. unfold at_. simpl. rewrite Q2R_0. ring.
+  - rewrite reduced_ok, Q2R_plus, Q2R_mult, IH. reflexivity.
+Qed.
+Lemma ends_q_ok x j : (j < order c)%nat -> Q2R (nth j (ends_q c x) 0%Q) = end_state c (at_ x) j.
+Proof.
+  intros Hj. unfold ends_q. cbv zeta. rewrite nth_map_seq by exact Hj. rewrite reduced_ok. unfold end_state.
+  induction (balanced_comps (comps c)) as [|b l IH]; simpl; [apply Q2R_0|]. rewrite Q2R_plus, Q2R_mult, IH, dotq_ok. reflexivity.
+Qed.
+Lemma less_ok x : forall v j, length x = length v -> at_ (less x v) j = at_ x j - at_ v j.
+Proof.
+  unfold at_, less. induction x as [|q x IH]; intros [|u v] j L; simpl in *; try discriminate.
+  - destruct j; rewrite Q2R_0; ring.
+  - destruct j as [|j]; simpl; [apply Q2R_minus|]. apply IH. lia.
+Qed.
+Theorem ends_ok : ends_claim a.
+Proof.
+  intros M x i j EM Hx Hi Hj p. unfold check_ends_of in Hends. rewrite EM in Hends. rewrite forallb_forall in Hends.
+  specialize (Hends x Hx). unfold check_axis in Hends. cbv zeta in Hends. apply andb_prop in Hends as [H H4].
+  apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2]. apply Nat.leb_le in H1. apply Nat.eqb_eq in H2, H3.
+  rewrite forallb_forall in H4. specialize (H4 i ltac:(apply in_seq; lia)). rewrite forallb_forall in H4.
+  specialize (H4 j ltac:(apply in_seq; lia)). fold p in H4. apply Qle_bool_iff, Qle_Rle in H4. eapply Rle_trans; [|exact H4].
+  assert (AB : forall q, Q2R (Qabs q) = Rabs (Q2R q)).
+  { intros [u v]. unfold Q2R. simpl. rewrite abs_IZR, Rabs_mult. f_equal. symmetry. apply Rabs_right. apply Rle_ge. left.
+    apply Rinv_0_lt_compat. apply IZR_lt. reflexivity. }
+  rewrite AB, Q2R_minus, Q2R_plus. apply Req_le. f_equal. f_equal. unfold outcome. f_equal; [destruct (i =? 0)%nat; [reflexivity|symmetry; apply Q2R_0]|].
+  unfold row_times. rewrite qsum_ok. apply sum_ext. intros l Hl. rewrite Q2R_mult. f_equal. unfold cell. rewrite nth_map_seq by exact Hl.
+  fold c. rewrite ends_q_ok by exact Hj. f_equal. apply functional_extensionality. intros v. unfold placed, placed_q. cbv zeta.
+  destruct (Nat.eqb_spec l 0) as [->|]; [symmetry; apply less_ok; congruence|ring].
+Qed.
 End Sound.
 
 Theorem accepts_agents_sound h split points a : accepts_agents h split points a = true -> true_agents a.
@@ -269,8 +358,10 @@ Proof.
   apply negb_true_iff in HE. split; [apply (accepts_sound h); exact HG|]. unfold accepts in HG. rewrite HE in HG.
   unfold check in HG. set (d := prepare (graph a)) in *.
   repeat match type of HG with (_ && _ = true) => let K := fresh "G" in apply andb_prop in HG as [HG K] end.
-  unfold check_agents_only in HA. apply andb_prop in HA as [HA A3]. apply andb_prop in HA as [A1 A2].
-  split; [apply (definite_ok split); assumption|]. intros j Hj.
+  unfold check_agents_only in HA. apply andb_prop in HA as [HA A6]. apply andb_prop in HA as [HA A5].
+  apply andb_prop in HA as [HA A4]. apply andb_prop in HA as [HA A3]. apply andb_prop in HA as [A1 A2].
+  split; [apply (definite_ok split); assumption|]. split; [apply (agreement_ok split points a); assumption|].
+  split; [apply (ends_ok a); assumption|]. intros j Hj.
   assert (E : exists f, nth_error (funcs (graph a)) j = Some f).
   { unfold check_coupling in A3. rewrite forallb_forall in A3. specialize (A3 j Hj).
     destruct (nth_error (funcs (graph a)) j) as [f|]; [exists f; reflexivity|discriminate]. }
