@@ -8,10 +8,10 @@ Import ListNotations. Open Scope R_scope.
 Record axis := Axis { offsets : list Q; begins : list (list Q); ends : list (list (Q * Q)) }.
 (** [x^(n) + a_n x^(n-1) + .. + a_1 x = u] of every node of [graph], under the protocol of it but for [slope], which takes
     the place of [rho1]; which functions of [graph] are used, and whether all agree
-    at the deadline; [common] takes the common motion there from time 0 *)
+    at the deadline; [drift] takes the common motion there from time 0 *)
 Record agents := Agents { graph : cert; degree : nat; slope : Q; plant : list Q; damping : list Q; gains : list Q;
   W : list (list Q); P : list (list Q); coupling : Q; falls : Q; used : list nat; agree : bool;
-  common : option (list (list Q)); axes : list axis }.
+  drift : option (list (list Q)); axes : list axis }.
 
 Definition at_ (l : list Q) (i : nat) : R := Q2R (nth i l 0%Q).
 Definition sum (n : nat) (f : nat -> R) : R := fold_right (fun i a => f i + a) 0 (seq 0 n).
@@ -55,9 +55,9 @@ Definition outcome a M h x i j : R := (if (i =? 0)%nat then h j else 0) +
 Definition agreement (a : agents) : Prop := agree a = true -> forall h X S i j, flies a h X S -> (i < degree a)%nat ->
   (j < order (graph a))%nat -> let tends f y := filterlim f (at_left (deadline (graph a))) (locally y) in
   tends (fun t => placed h (X t) i j - end_state (graph a) (placed h (X t) i) j) 0 /\
-  forall M, common a = Some M -> tends (fun t => X t i j) (outcome a M h (X 0) i j).
+  forall M, drift a = Some M -> tends (fun t => X t i j) (outcome a M h (X 0) i j).
 (** the intervals of the final states hold these *)
-Definition ends_claim (a : agents) : Prop := forall M x i j, common a = Some M -> In x (axes a) -> (i < length (ends x))%nat ->
+Definition ends_claim (a : agents) : Prop := forall M x i j, drift a = Some M -> In x (axes a) -> (i < length (ends x))%nat ->
   (j < order (graph a))%nat -> let p := nth j (nth i (ends x) []) (0%Q, 0%Q) in
   Rabs (Q2R (fst p) - outcome a M (at_ (offsets x)) (fun l => at_ (nth l (begins x) [])) i j) <= Q2R (snd p).
 

@@ -54,7 +54,7 @@ Definition check_agree (a : agents) : bool := negb (agree a) ||
     | Some f => match deviation f with Some _ => true | None => false end | None => false end) (used a)).
 (** [q^m / m!] *)
 Fixpoint part (q : Q) (m : nat) : Q := match m with O => 1 | S m' => q / index (S m') * part q m' end.
-Definition check_common (a : agents) : bool := match common a with None => true | Some M =>
+Definition check_common (a : agents) : bool := match drift a with None => true | Some M =>
   forallb (Qeq_bool 0) (plant a ++ damping a) && square (degree a) (fun i l =>
     Qeq_bool (cell M i l) (if (i <=? l)%nat then part (span (graph a)) (l - i) else 0)) end.
 Fixpoint dotq (l x : list Q) : Q := match l, x with q :: l', v :: x' => reduced (q * v + dotq l' x') | _, _ => 0 end.
@@ -70,4 +70,4 @@ Definition check_axis (a : agents) (M : list (list Q)) (x : axis) : bool :=
   forallb (fun i => forallb (fun j => let p := nth j (nth i (ends x) []) (0, 0) in
     Qle_bool (Qabs (fst p - ((if (i =? 0)%nat then nth j (offsets x) 0 else 0) + row_times n (cell M i) (fun l => cell E l j)))) (snd p))
     (seq 0 N)) (seq 0 (length (ends x))).
-Definition check_ends_of (a : agents) : bool := match common a with None => true | Some M => forallb (check_axis a M) (axes a) end.
+Definition check_ends_of (a : agents) : bool := match drift a with None => true | Some M => forallb (check_axis a M) (axes a) end.

@@ -74,6 +74,25 @@ let functions (r : Reader.t) proof is_full v =
     ([], -1, r.cert.funcs) (entries "functions" v) in
   List.rev used, funcs
 
+(* by coordinate: offsets by agent, and states by derivative and agent *)
+let axes (r : Reader.t) n dimension get ends_known =
+  let boxes key read v = by_agent r.nodes (fun what v ->
+    let l = entries what v in
+    need (List.length l = dimension) (Printf.sprintf "%s: %d coordinates are due" what dimension); List.map (read what) l) key v in
+  let row read what v =
+    let l = entries what v in
+    need (List.length l = n) (Printf.sprintf "%s: %d derivatives are due" what n); List.map (read what) l in
+  let offsets = boxes "offsets" number (get "offsets") in
+  let states = match get "initial_state" with Null -> None | v -> Some (boxes "initial_state" (row number) v) in
+  let finals = match get "final_state" with
+    | Null -> None
+    | v -> need (states <> None) "a final state without initial states"; Some (boxes "final_state" (row Reader.interval) v) in
+  let turned axis rows = List.init n (fun i -> List.map (fun row -> List.nth (List.nth row axis) i) rows) in
+  match states with
+  | None -> []
+  | Some states -> List.init dimension (fun axis -> { offsets = List.map (fun row -> List.nth row axis) offsets; begins = turned axis states;
+      ends = match finals with Some l when ends_known -> turned axis l | _ -> [] })
+
 let certificate json : t =
   let get = match section json with
     | Some (Obj l) when List.mem_assoc "cascade" l -> unsupported "agents that track a velocity, section agents.cascade"
@@ -85,7 +104,7 @@ let certificate json : t =
   if r.cert.enclosed then unsupported "agents of order n on a large form";
   if get "gain_cap" <> Null then unsupported "agents of order n with a gain that is capped";
   let n = count "order" (get "order") in
-  let _dimension = count "dimension" (get "dimension") in
+  let dimension = count "dimension" (get "dimension") in
   let row key = shorts key n (get key) in
   let single key = short key (number key (get key)) in
   let w = symmetric n (get "lower_triangle") in
@@ -104,15 +123,24 @@ let certificate json : t =
   need (Number.equal (bare proof "agent-coupling" "agents" [ "coupling" ] "coupling") coupling) "agent-coupling: another coupling";
   let left = ref [] in
   let skip kind key = if get key <> Null then (skipped proof kind "agents"; left := ("agents." ^ key) :: !left) in
-  skip "agent-motion" "motion";
-  skip "agent-final-state" "final_state";
+  let plant = row "plant" and damping = row "own" in
+  let agree = List.exists (fun k -> (List.nth funcs k).deviation <> None) used in
+  let chains = List.for_all (fun x -> Number.equal x Number.zero) (plant @ damping) in
+  let motion = List.map (fun row -> let l = entries "motion" row in
+    need (List.length l = n) "motion: another number of columns"; List.map (Reader.interval "motion") l) (entries "motion" (get "motion")) in
+  need (List.length motion = n) "motion: another number of rows";
+  let common = if not chains then None else Some (List.map (List.map (fun (x, radius) ->
+    need (Number.equal radius Number.zero) "motion: a radius where the common motion is known exactly"; x)) motion) in
+  let known = agree && chains in
+  if known then bare_of proof "agent-motion" "agents" else skip "agent-motion" "motion";
+  if known && get "final_state" <> Null then bare_of proof "agent-final-state" "agents" else skip "agent-final-state" "final_state";
   skip "agent-residual" "residual";
   skip "agent-input" "input";
   need (proof.rest = []) "an obligation that nothing asks for";
   let slope = r.cert.rho1 in
   let cert = { r.cert with funcs; rho1 = if Z.sign slope.qnum = 0 then Number.one else slope } in
-  let record = { graph = cert; degree = n; slope; plant = row "plant"; damping = row "own"; gains = row "gains"; w; p = inverse w;
-    coupling; falls = rate; used } in
+  let record = { graph = cert; degree = n; slope; plant; damping; gains = row "gains"; w; p = inverse w;
+    coupling; falls = rate; used; agree; drift = common; axes = axes r n dimension get known } in
   { base = { r with cert; rest = []; checked = r.checked @ List.rev proof.checked; unchecked = r.unchecked @ List.rev proof.unchecked;
       sections = r.sections @ List.rev !left };
     record; points }
@@ -120,4 +148,7 @@ let accepts a = accepts_agents a.base.hints split a.points a.record
 (* the parts of the check one by one *)
 let parts a = [ "agent-positive of agents", (fun () -> check_matrices split a.record);
   "agent-decrease of agents", (fun () -> check_decrease split a.record a.points);
-  "agent-coupling of agents", (fun () -> check_coupling a.record) ]
+  "agent-coupling of agents", (fun () -> check_coupling a.record);
+  "agent-decrease of agents: derivatives need not agree at T", (fun () -> check_agree a.record);
+  "agent-motion of agents", (fun () -> check_common a.record);
+  "agent-final-state of agents", (fun () -> check_ends_of a.record) ]
