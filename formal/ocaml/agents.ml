@@ -111,6 +111,8 @@ let certificate json : t =
   let points = entries "points" (get "points") in
   need (List.length points <= many_points) (Printf.sprintf "more than %d points" many_points);
   let points = List.map (fun x -> short "points" (number "points" x)) points in
+  let rec ascending = function a :: (b :: _ as l) -> Number.compare a b < 0 && ascending l | _ -> true in
+  need (ascending points && points <> [] && Number.equal (List.hd points) Number.zero) "points do not ascend from 0";
   let proof = { rest = r.rest; checked = []; unchecked = [] } in
   let listed = match json with
     | Obj l -> (match List.assoc_opt "lyapunov" l with Some (Obj l) -> entries "functions" (List.assoc "functions" l) | _ -> []) | _ -> [] in
@@ -124,6 +126,14 @@ let certificate json : t =
   let left = ref [] in
   let skip kind key = if get key <> Null then (skipped proof kind "agents"; left := ("agents." ^ key) :: !left) in
   let plant = row "plant" and damping = row "own" in
+  let of_int i = Number.of_z (Z.of_int i) and largest = List.fold_left (fun m (x : q) -> Number.max m { x with qnum = Z.abs x.qnum }) Number.zero in
+  let pace = Number.mul r.cert.rho2 r.cert.kappa and most = largest plant in
+  let span = match r.cert.kind with Nominal t -> t | SlidingMode (a, b, _, _, _, _) -> Number.add a b in
+  need (Number.equal most Number.zero || Number.compare (Number.mul span (Number.add Number.one most)) (of_int 100) <= 0)
+    "agents that move too far before T";
+  need (Number.compare (Number.mul rate pace) (of_int (2 * (n - 1))) > 0) "r k is not above 2 (n - 1): derivatives need not agree at T";
+  need (Number.equal (largest damping) Number.zero || (n = 2 && Z.sign (List.hd damping).qnum = 0 && Z.sign (List.nth damping 1).qnum > 0
+    && Z.sign (List.hd plant).qnum = 0)) "feedback of the own state that is not that of meeting at rest";
   let agree = List.exists (fun k -> (List.nth funcs k).deviation <> None) used in
   let chains = List.for_all (fun x -> Number.equal x Number.zero) (plant @ damping) in
   let motion = List.map (fun row -> let l = entries "motion" row in
@@ -134,7 +144,7 @@ let certificate json : t =
   let known = agree && chains in
   if known then bare_of proof "agent-motion" "agents" else skip "agent-motion" "motion";
   if known && get "final_state" <> Null then bare_of proof "agent-final-state" "agents" else skip "agent-final-state" "final_state";
-  skip "agent-residual" "residual";
+  need (get "residual" = Null) "what is left at the deadline of a gain that is not capped";
   skip "agent-input" "input";
   need (proof.rest = []) "an obligation that nothing asks for";
   let slope = r.cert.rho1 in
