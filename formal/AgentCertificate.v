@@ -8,10 +8,10 @@ Import ListNotations. Open Scope R_scope.
 Record axis := Axis { offsets : list Q; begins : list (list Q); ends : list (list (Q * Q)) }.
 (** [x^(n) + a_n x^(n-1) + .. + a_1 x = u] of every node of [graph], under the protocol of it but for [slope], which takes
     the place of [rho1]; which functions of [graph] are used, and whether all agree
-    at the deadline; [drift] takes the common motion there from time 0 *)
+    at the deadline; [drift] takes the common motion there from time 0; [tops] bounds the inputs by agent *)
 Record agents := Agents { graph : cert; degree : nat; slope : Q; plant : list Q; damping : list Q; gains : list Q;
   W : list (list Q); P : list (list Q); coupling : Q; falls : Q; used : list nat; agree : bool;
-  drift : option (list (list Q)); axes : list axis }.
+  drift : option (list (list Q)); axes : list axis; tops : list Q }.
 
 Definition at_ (l : list Q) (i : nat) : R := Q2R (nth i l 0%Q).
 Definition sum (n : nat) (f : nat -> R) : R := fold_right (fun i a => f i + a) 0 (seq 0 n).
@@ -40,9 +40,8 @@ Definition value a (f : func) (x : nat -> nat -> R) : R :=
 (** [W] is positive definite, [P] its inverse, and the gains are the last row of it times [coupling] *)
 Definition definite (a : agents) : Prop := (forall x, 0 <= double (degree a) (W a) (fun i j => x i * x j)) /\
   forall i, (i < degree a)%nat ->
-    sum (degree a) (fun l => at_ (nth i (W a) []) l * at_ (gains a) l) = (if (1 + i =? degree a)%nat then Q2R (coupling a) else 0) /\
-    forall j, (j < degree a)%nat ->
-      sum (degree a) (fun l => at_ (nth i (W a) []) l * at_ (nth l (P a) []) j) = if (i =? j)%nat then 1 else 0.
+    sum (degree a) (fun l => at_ (nth i (W a) []) l * at_ (gains a) l) =
+      (if (1 + i =? degree a)%nat then Q2R (coupling a) else 0) /\ forall j, (j < degree a)%nat -> sum (degree a) (fun l => at_ (nth i (W a) []) l * at_ (nth l (P a) []) j) = if (i =? j)%nat then 1 else 0.
 (** along every motion: [V] falls, and so does what parts every derivative of every agent from the common motion *)
 Definition agent_claim (a : agents) (f : func) : Prop := forall h X S t, flies a h X S ->
   0 <= t < deadline (graph a) -> let v := exp (- (Q2R (falls a) * turns a t)) * value a f (y a h (X 0) 0) in
@@ -57,9 +56,16 @@ Definition agreement (a : agents) : Prop := agree a = true -> forall h X S i j, 
   tends (fun t => placed h (X t) i j - end_state (graph a) (placed h (X t) i) j) 0 /\
   forall M, drift a = Some M -> tends (fun t => X t i j) (outcome a M h (X 0) i j).
 (** the intervals of the final states hold these *)
-Definition ends_claim (a : agents) : Prop := forall M x i j, drift a = Some M -> In x (axes a) -> (i < length (ends x))%nat ->
-  (j < order (graph a))%nat -> let p := nth j (nth i (ends x) []) (0%Q, 0%Q) in
+Definition ends_claim (a : agents) : Prop := forall M x i j, drift a = Some M -> In x (axes a) ->
+  (i < length (ends x))%nat -> (j < order (graph a))%nat -> let p := nth j (nth i (ends x) []) (0%Q, 0%Q) in
   Rabs (Q2R (fst p) - outcome a M (at_ (offsets x)) (fun l => at_ (nth l (begins x) [])) i j) <= Q2R (snd p).
+(** the input from the states of the file on, in Euclidean norm over space, and what sliding variables take of it *)
+Definition tops_claim (a : agents) : Prop := tops a <> [] -> forall X S t j, (j < order (graph a))%nat ->
+  (forall x c, nth_error (axes a) c = Some x -> flies a (at_ (offsets x)) (X c) (S c) /\ forall i j, (i < degree a)%nat ->
+     (j < order (graph a))%nat -> X c 0 i j = at_ (nth i (begins x) []) j) -> 0 <= t < deadline (graph a) ->
+  let m := length (axes a) in let h c := at_ (offsets (nth c (axes a) (Axis [] [] []))) in
+  sqrt (sum m (fun c => sq (control a (h c) (X c t) t j))) +
+    match kind (graph a) with Nominal _ => 0 | SlidingMode _ _ mu1 _ _ _ => Q2R mu1 * INR m end <= at_ (tops a) j.
 
-Definition true_agents (a : agents) : Prop := true_certificate (graph a) /\ definite a /\ agreement a /\ ends_claim a /\
+Definition true_agents (a : agents) : Prop := true_certificate (graph a) /\ definite a /\ agreement a /\ ends_claim a /\ tops_claim a /\
   forall j, In j (used a) -> exists f, nth_error (funcs (graph a)) j = Some f /\ agent_claim a f.

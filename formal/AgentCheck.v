@@ -71,3 +71,30 @@ Definition check_axis (a : agents) (M : list (list Q)) (x : axis) : bool :=
     Qle_bool (Qabs (fst p - ((if (i =? 0)%nat then nth j (offsets x) 0 else 0) + row_times n (cell M i) (fun l => cell E l j)))) (snd p))
     (seq 0 N)) (seq 0 (length (ends x))).
 Definition check_ends_of (a : agents) : bool := match drift a with None => true | Some M => forallb (check_axis a M) (axes a) end.
+
+(** the input: by each function the square of what relative states take at most, over its value at the begin; that *)
+Fixpoint powq (q : Q) (m : nat) : Q := match m with O => 1 | S m' => q * powq q m' end.
+Definition begin_rows (a : agents) (x : axis) : list (list Q) :=
+  let g := / (slope a + pull_in a / span (graph a)) in
+  map (fun i => map (fun q => reduced (q * powq g i)) (placed_q x i)) (seq 0 (degree a)).
+Definition worth_q (a : agents) (F : Vec.mat) (m : Z) (rows : list (list Q)) : Q :=
+  let n := degree a in let e := common (concat rows) in let zs := map (map (scaled e)) rows in
+  let G := map (fun z => let l := Vec.lincomb z F in map (zdot l) zs) zs in
+  qsum (map (fun i => qsum (map (fun j => reduced (cell (P a) i j *
+    (inject_Z (nth j (nth i G []) 0%Z + nth i (nth j G []) 0%Z) / inject_Z (2 * m * (e * e))))) (seq 0 n))) (seq 0 n)).
+Definition check_rows (N : nat) (rows : list (list Q)) : bool :=
+  forallb (fun r : list Q => (length r =? N)%nat && good (common (concat rows)) r) rows.
+Definition check_tops (a : agents) : bool := match tops a with [] => true | l =>
+  let c := graph a in let n := degree a in let d := prepare c in let rows := map (begin_rows a) (axes a) in
+  let g := slope a + pull_in a / span c in
+  let added := match kind c with Nominal _ => 0 | SlidingMode _ _ mu1 _ _ _ => mu1 * index (length (axes a)) end in
+  let known := flat_map (fun k => match nth_error (funcs c) k with None => [] | Some f =>
+    match bounds_of c d f, form (order c) (dls d) (dL d) (ly f) with
+    | Some (_, cs, _), Some (F, m) => [(cs, reduced (powq g (2 * n) * (coupling a * nth (pred n) (gains a) 0) *
+        qsum (map (worth_q a F m) rows)))]
+    | _, _ => [] end end) (used a) in
+  forallb (Qeq_bool 0) (damping a) && Qle_bool (2 * index n) (falls a * pull_in a) && fits (order c) (dL d) && good (common (start c)) (start c) &&
+  forallb (fun x => (length (offsets x) =? order c)%nat && (length (nth 0 (begins x) []) =? order c)%nat) (axes a) &&
+  forallb (check_rows (order c)) rows &&
+  forallb (fun j => let rest := nth j l 0 - added - qsum (map (fun x => Qabs (nth 0 (plant a) 0 * nth j (offsets x) 0)) (axes a)) in
+    Qle_bool 0 rest && existsb (fun p : list Q * Q => Qle_bool (nth j (fst p) 0 * snd p) (rest * rest)) known) (seq 0 (order c)) end.

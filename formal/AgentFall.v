@@ -104,40 +104,41 @@ Proof.
   pose proof (Hb (Z b)) as B. destruct Hc as [C0 C1]. pose proof (above0 F HF (Z b)) as G0. fold (G b b) in B, G0.
   assert (c * (beta * G b b) <= c * (2 * F (L (Z b)) (Z b))) by (apply Rmult_le_compat_l; lra). nra.
 Qed.
-(** how large one derivative, or the highest of [P Y], is against all: [d] any linear function *)
+(** how large a combination of derivatives is against all: [d] any linear function *)
+Let S (x z : nat -> R) := sum n (fun i => sum n (fun j => w i j * (x i * z j))).
+Lemma any_part (d : (nat -> R) -> R) c0 q : (forall l Z, d (comb n l Z) = sum n (fun i => l i * d (Z i))) ->
+  (forall Z, 0 <= sum n (fun i => sum n (fun j => w i j * (c0 * F (Z i) (Z j) - d (Z i) * d (Z j))))) ->
+  (forall u, 0 <= S u u) ->
+  sq (d (comb n q Y)) <= S q q * (c0 * sum n (fun i => sum n (fun j => p i j * F (Y i) (Y j)))).
+Proof.
+  intros Hd HD HW. rewrite worth_self, Hd. set (u := fun j => d (Z j)). specialize (HD Z).
+  assert (E : sum n (fun i => q i * d (Y i)) = S q u).
+  { apply sum_ext. intros i Hlt. replace (d (Y i)) with (d (comb n (w i) Z)) by (rewrite <- (back i Hlt); reflexivity).
+    rewrite Hd, <- sum_scal. apply sum_ext. intros j _. unfold u. ring. }
+  rewrite E. assert (PS : positive S).
+  { constructor; unfold S.
+    - intros x z. rewrite sum_swap. apply sum_ext. intros j Hj. apply sum_ext. intros l Hl. rewrite (Hw l j) by assumption. ring.
+    - intros x x' z. rewrite <- sum_plus. apply sum_ext. intros l _. rewrite <- sum_plus. apply sum_ext. intros. ring.
+    - intros v x z. rewrite <- sum_scal. apply sum_ext. intros l _. rewrite <- sum_scal. apply sum_ext. intros. ring.
+    - exact HW. }
+  eapply Rle_trans; [apply (cauchy S PS)|]. apply Rmult_le_compat_l; [apply HW|].
+  rewrite <- sum_scal. assert (X : sum n (fun i => sum n (fun j => w i j * (c0 * F (Z i) (Z j) - d (Z i) * d (Z j))))
+    = sum n (fun i => c0 * sum n (fun j => w i j * G i j)) + -1 * S u u).
+  { unfold S. rewrite <- sum_scal, <- sum_plus. apply sum_ext. intros l _. rewrite <- !sum_scal, <- sum_plus. apply sum_ext. intros j _.
+    unfold G, u. ring. }
+  lra.
+Qed.
 Lemma one_part (d : (nat -> R) -> R) c0 i : (forall l Z, d (comb n l Z) = sum n (fun i => l i * d (Z i))) ->
   (forall Z, 0 <= sum n (fun i => sum n (fun j => w i j * (c0 * F (Z i) (Z j) - d (Z i) * d (Z j))))) ->
-  (forall u, 0 <= sum n (fun i => sum n (fun j => w i j * (u i * u j)))) -> (i < n)%nat ->
+  (forall u, 0 <= S u u) -> (i < n)%nat ->
   sq (d (Y i)) <= w i i * (c0 * sum n (fun i => sum n (fun j => p i j * F (Y i) (Y j)))).
 Proof.
-  intros Hd HD HW Hlt. rewrite worth_self. replace (d (Y i)) with (d (comb n (w i) Z)) by (rewrite <- (back i Hlt); reflexivity). rewrite Hd.
-  set (u := fun j => d (Z j)). specialize (HD Z).
-  assert (C : sq (sum n (fun j => w i j * u j)) <= w i i * sum n (fun i => sum n (fun j => w i j * (u i * u j)))).
-  { set (S := fun x z : nat -> R => sum n (fun i => sum n (fun j => w i j * (x i * z j)))).
-    assert (PS : positive S).
-    { constructor; unfold S.
-      - intros x z. rewrite sum_swap. apply sum_ext. intros j Hj. apply sum_ext. intros l Hl. rewrite (Hw l j) by assumption. ring.
-      - intros x x' z. rewrite <- sum_plus. apply sum_ext. intros l _. rewrite <- sum_plus. apply sum_ext. intros. ring.
-      - intros q x z. rewrite <- sum_scal. apply sum_ext. intros l _. rewrite <- sum_scal. apply sum_ext. intros. ring.
-      - exact HW. }
-    set (e := fun l => if (i =? l)%nat then 1 else 0). pose proof (cauchy S PS e u) as CS.
-    assert (X1 : S e u = sum n (fun j => w i j * u j)).
-    { unfold S. rewrite (sum_ext n _ (fun l => (if (i =? l)%nat then 1 else 0) * sum n (fun j => w l j * u j))); [apply (sum_at' n i (fun l => sum n (fun j => w l j * u j))); exact Hlt|].
-      intros l _. rewrite <- sum_scal. apply sum_ext. intros. unfold e. ring. }
-    assert (X2 : S e e = w i i).
-    { unfold S. rewrite (sum_ext n _ (fun l => (if (i =? l)%nat then 1 else 0) * sum n (fun j => (if (i =? j)%nat then 1 else 0) * w l j))).
-      - rewrite (sum_at' n i), (sum_at' n i) by exact Hlt. reflexivity.
-      - intros l _. rewrite <- sum_scal. apply sum_ext. intros. unfold e. ring. }
-    rewrite X1, X2 in CS. exact CS. }
-  eapply Rle_trans; [exact C|]. apply Rmult_le_compat_l.
-  - specialize (HW (fun l => if (i =? l)%nat then 1 else 0)).
-    rewrite (sum_ext n _ (fun l => (if (i =? l)%nat then 1 else 0) * sum n (fun j => (if (i =? j)%nat then 1 else 0) * w l j))) in HW.
-    + rewrite (sum_at' n i), (sum_at' n i) in HW by exact Hlt. exact HW.
-    + intros l _. rewrite <- sum_scal. apply sum_ext. intros. ring.
-  - rewrite <- sum_scal. assert (X : sum n (fun i => sum n (fun j => w i j * (c0 * F (Z i) (Z j) - d (Z i) * d (Z j))))
-      = sum n (fun i => c0 * sum n (fun j => w i j * G i j)) + -1 * sum n (fun i => sum n (fun j => w i j * (u i * u j)))).
-    { rewrite <- sum_scal, <- sum_plus. apply sum_ext. intros l _. rewrite <- !sum_scal, <- sum_plus. apply sum_ext. intros j _.
-      unfold G, u. ring. }
-    lra.
+  intros Hd HD HW Hlt. set (e := fun l => if (i =? l)%nat then 1 else 0).
+  assert (E : comb n e Y = Y i) by (apply functional_extensionality; intros j; apply (sum_at' n i (fun l => Y l j) Hlt)).
+  assert (W1 : S e e = w i i).
+  { unfold S. rewrite (sum_ext n _ (fun l => (if (i =? l)%nat then 1 else 0) * sum n (fun j => (if (i =? j)%nat then 1 else 0) * w l j))).
+    - rewrite (sum_at' n i), (sum_at' n i) by exact Hlt. reflexivity.
+    - intros l _. rewrite <- sum_scal. apply sum_ext. intros. unfold e. ring. }
+  rewrite <- W1, <- E at 1. apply any_part; assumption.
 Qed.
 End Fall.

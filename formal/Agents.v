@@ -2,7 +2,7 @@
 Require Import ZArith QArith Qabs Qreals List Bool Reals Lra Lia Psatz FunctionalExtensionality.
 From Coquelicot Require Import Coquelicot.
 Import ListNotations.
-Require Import Vec Definite Graph Flow Certificate Checker Sound Input Slide Main Mean Large AgentCertificate AgentForms AgentCheck AgentFall AgentMotion AgentEnd.
+Require Import Vec Definite Graph Flow Certificate Checker Sound Input Slide Main Mean Peak Weighted Large AgentCertificate AgentForms AgentCheck AgentFall AgentMotion AgentEnd.
 Open Scope R_scope.
 
 (** * Rationals and polynomials of the check *)
@@ -105,7 +105,7 @@ Qed.
 End Agents.
 
 Definition check_agents_only (split : splitting) (points : list Q) (a : agents) : bool :=
-  check_matrices split a && check_decrease split a points && check_coupling a && check_agree a && check_common a && check_ends_of a.
+  check_matrices split a && check_decrease split a points && check_coupling a && check_agree a && check_common a && check_ends_of a && check_tops a.
 Definition accepts_agents (h : hints) (split : splitting) (points : list Q) (a : agents) : bool :=
   accepts h (graph a) && negb (enclosed (graph a)) && check_agents_only split points a.
 
@@ -350,6 +350,224 @@ Proof.
   fold c. rewrite ends_q_ok by exact Hj. f_equal. apply functional_extensionality. intros v. unfold placed, placed_q. cbv zeta.
   destruct (Nat.eqb_spec l 0) as [->|]; [symmetry; apply less_ok; congruence|ring].
 Qed.
+
+(** * The input *)
+Hypothesis Htops : check_tops a = true.
+Lemma eta_0_ok : Q2R (slope a + pull_in a / span (graph a)) = eta a 0.
+Proof.
+  destruct (T_k a Hprot) as [A B]. fold c in A, B.
+  assert (Es : ~ (span (graph a) == 0)%Q) by (intros E; apply Qeq_eqR in E; rewrite Q2R_0 in E; pose proof span_ok as SO; unfold c in *; lra).
+  rewrite Q2R_plus, Q2R_div, pull_ok by exact Es. fold c. rewrite span_ok. unfold eta, gain. fold c. rewrite Rminus_0_r. reflexivity.
+Qed.
+Lemma powq_ok q m : Q2R (powq q m) = Q2R q ^ m.
+Proof. induction m as [|m IH]; simpl; [apply Q2R_1|]. rewrite Q2R_mult, IH. reflexivity. Qed.
+Lemma rows_ok x i j : length (offsets x) = order c -> length (nth 0 (begins x) []) = order c -> (i < n)%nat ->
+  at_ (nth i (begin_rows a x) []) j = y a (at_ (offsets x)) (fun l => at_ (nth l (begins x) [])) 0 i j.
+Proof.
+  intros L1 L2 Hi. unfold begin_rows. cbv zeta. fold n. rewrite nth_map_seq by exact Hi.
+  assert (E : forall u (g : Q -> Q), Q2R (g 0%Q) = 0 -> at_ (map g u) j = Q2R (g (nth j u 0%Q))).
+  { intros u g G. unfold at_. destruct (Nat.lt_ge_cases j (length u)) as [L|L].
+    - rewrite nth_indep with (d' := g 0%Q) by (rewrite map_length; exact L). rewrite map_nth. reflexivity.
+    - rewrite !nth_overflow by (try rewrite map_length; exact L). rewrite G. apply Q2R_0. }
+  rewrite E by (rewrite reduced_ok, Q2R_mult, Q2R_0; ring). rewrite reduced_ok, Q2R_mult, powq_ok. unfold y.
+  pose proof eta_0_ok as E0. assert (P0 : 0 < eta a 0) by (apply gain_slope; split; [lra|apply (T_k a Hprot)]).
+  rewrite Q2R_inv by (intros Z; apply Qeq_eqR in Z; rewrite E0, Q2R_0 in Z; lra). rewrite E0. unfold Rdiv. rewrite <- pow_inv. f_equal.
+  unfold placed_q, placed. cbv zeta. change (Q2R (nth j ?u 0%Q)) with (at_ u j).
+  destruct (Nat.eqb_spec i 0) as [->|]; [apply less_ok; congruence|unfold at_; ring].
+Qed.
+Lemma worth_ok f F m rows x : Checker.form (order c) (dls d) (dL d) (ly f) = Some (F, m) -> check_rows (order c) rows = true -> length rows = n ->
+  (forall i, (i < n)%nat -> at_ (nth i rows []) = x i) -> Q2R (worth_q a F m rows) = value a f x.
+Proof.
+  intros EF HR HL Hx. pose proof (Main.Hls c Hedges) as Hl. fold d in Hl.
+  destruct (form_ok _ _ _ _ _ _ _ Hl eq_refl EF) as [M _]. apply IZR_lt in M.
+  unfold check_rows in HR. rewrite forallb_forall in HR. set (e := common (concat rows)) in *.
+  unfold worth_q. fold n. cbv zeta. fold e. rewrite qsum_ok. unfold value, double. fold n. apply sum_ext. intros i Hi.
+  rewrite qsum_ok. apply sum_ext. intros j Hj. rewrite reduced_ok, Q2R_mult. change (Q2R (cell (P a) i j)) with (at_ (nth i (P a) []) j). f_equal.
+  assert (Gd : forall l, (l < n)%nat -> good e (nth l rows []) = true).
+  { intros l Hl'. assert (K : In (nth l rows []) rows) by (apply nth_In; lia). specialize (HR _ K). apply andb_prop in HR. apply HR. }
+  assert (E0 : 0 < IZR e) by (apply IZR_lt; apply (good_ok _ _ (Gd i Hi))).
+  assert (Vx : forall l, (l < n)%nat -> vec_of (map (scaled e) (nth l rows [])) = fun v => IZR e * x l v).
+  { intros l Hl'. apply functional_extensionality. intros v. unfold vec_of. rewrite nth_scaled by (apply Gd; exact Hl').
+    rewrite <- (Hx l Hl'). reflexivity. }
+  assert (EG : forall l v, (l < n)%nat -> (v < n)%nat -> IZR (nth v (nth l (map (fun z => map (zdot (lincomb z F)) (map (map (scaled e)) rows))
+      (map (map (scaled e)) rows)) []) 0%Z) = IZR e * IZR e * bil F (x l) (x v)).
+  { intros l v Hl' Hv. set (zs := map (map (scaled e)) rows). assert (Lz : length zs = n) by (unfold zs; rewrite map_length; exact HL).
+    rewrite nth_indep with (d' := (fun z => map (zdot (lincomb z F)) zs) []) by (rewrite map_length; exact (eq_ind_r (fun q => (l < q)%nat) Hl' Lz)).
+    rewrite (map_nth (fun z => map (zdot (lincomb z F)) zs)).
+    rewrite nth_indep with (d' := zdot (lincomb (nth l zs []) F) []) by (rewrite map_length; exact (eq_ind_r (fun q => (v < q)%nat) Hv Lz)).
+    rewrite (map_nth (zdot (lincomb (nth l zs []) F))). rewrite <- zdot_ok, <- bil_vec_l.
+    assert (Ez : forall u, (u < n)%nat -> vec_of (nth u zs []) = fun q => IZR e * x u q).
+    { intros u Hu. unfold zs. rewrite (nth_indep _ [] (map (scaled e) [])) by (rewrite map_length, HL; exact Hu). rewrite map_nth. apply Vx. exact Hu. }
+    rewrite !Ez by assumption. rewrite bil_scal_l, bil_scal_r. ring. }
+  rewrite (pair_bil c f Hl F m EF).
+  assert (IZ : forall u, Q2R (inject_Z u) = IZR u) by (intros u; unfold Q2R; simpl; field).
+  assert (NZ : ~ (inject_Z (2 * m * (e * e)) == 0)%Q).
+  { intros Z. apply Qeq_eqR in Z. rewrite IZ, Q2R_0, !mult_IZR in Z.
+    assert (0 < 2 * IZR m * (IZR e * IZR e)) by (apply Rmult_lt_0_compat; [lra|apply Rmult_lt_0_compat; assumption]). lra. }
+  rewrite Q2R_div by exact NZ.
+  rewrite !IZ, plus_IZR, !EG, !mult_IZR by assumption. field. split; lra.
+Qed.
+(** the relative part of the input *)
+Lemma relative_ok kf f F m v cs cn off X Sl t j : In kf (used a) -> nth_error (funcs c) kf = Some f ->
+  bounds_of c d f = Some (v, cs, cn) -> Checker.form (order c) (dls d) (dL d) (ly f) = Some (F, m) ->
+  fits (order c) (dL d) = true -> good (common (start c)) (start c) = true ->
+  flies a off X Sl -> 0 <= t < deadline c -> (j < order c)%nat -> 2 * INR n <= Q2R (falls a) * k c ->
+  sq (eta a t ^ n * sum n (fun i => at_ (gains a) i * lap (edges c) (y a off (X t) t i) j))
+    <= eta a 0 ^ (2 * n) * (Q2R (coupling a) * at_ (gains a) (pred n)) * value a f (y a off (X 0) 0) * at_ cs j.
+Proof.
+  intros Hu Ef EB EF Hfit Gs HX Ht Hj Hr. destruct matrices as [M1 [M2 [M3 [M4 [M5 [M6 [M7 M8]]]]]]].
+  pose proof (nth_error_In _ _ Ef) as Hf. pose proof Hfuncs as HC. rewrite forallb_forall in HC. specialize (HC f Hf). unfold check_function in HC.
+  fold c d in HC. rewrite EF in HC. apply andb_prop in HC as [HC _]. apply andb_prop in HC as [HC H3]. apply andb_prop in HC as [_ H2].
+  pose proof (Main.Hls c Hedges) as Hl. fold d in Hl.
+  assert (B : forall x, sq (lap (edges c) x j) <= at_ cs j * V (edges c) (ly f) x).
+  { intros x. destruct (bounds_ok c Hl (fun e He => Main.Hsrc c Hedges e He) Hfit Gs (at_ (start c)) (fun _ _ => eq_refl) f v cs cn H3 H2 EB) as [_ [K _]].
+    apply (K x j Hj). }
+  destruct (claim_ok kf f Hu Ef off X Sl t HX Ht) as [CV _].
+  set (S := pair (edges c) (ly f)). assert (PS : positive S) by (apply (pair_positive c f Hl F m EF H2)).
+  set (ell := fun x : nat -> R => lap (edges c) x j).
+  assert (C0 : 0 <= at_ cs j \/ forall x, V (edges c) (ly f) x = 0).
+  { destruct (Rle_lt_dec 0 (at_ cs j)) as [|Ng]; [left; assumption|right]. intros x. specialize (B x).
+    pose proof (above0 S PS x) as V0. unfold S in V0. rewrite (pair_self c f Hl F m EF) in V0. pose proof (Rle_0_sqr (lap (edges c) x j)).
+    unfold sq, Rsqr in *. nra. }
+  assert (PD : positive (fun x z => at_ cs j * S x z - ell x * ell z)).
+  { constructor.
+    - intros. rewrite (swaps S PS). ring.
+    - intros x x' z. rewrite (adds S PS). unfold ell.
+      assert (EL : lap (edges c) (fun i => x i + x' i) j = lap (edges c) x j + lap (edges c) x' j).
+      { transitivity (1 * lap (edges c) x j + lap (edges c) x' j); [|ring]. rewrite <- lap_two. f_equal. apply functional_extensionality. intros. ring. }
+      rewrite EL. ring.
+    - intros. rewrite (scales S PS). unfold ell. rewrite lap_scal. ring.
+    - intros z. specialize (B z). unfold S. rewrite (pair_self c f Hl F m EF). unfold ell, sq in *. lra. }
+  set (w := fun i j => at_ (nth i (W a) []) j). set (K := at_ (gains a)). set (Y := y a off (X t) t).
+  assert (WP : forall u : nat -> R, 0 <= sum n (fun i => sum n (fun j => w i j * (u i * u j)))) by (apply definite_ok).
+  assert (A : sq (ell (comb n K Y)) <= sum n (fun i => sum n (fun j => w i j * (K i * K j))) * (at_ cs j * value a f Y)).
+  { apply (any_part S n w (fun i j => at_ (nth i (P a) []) j) Y PS).
+    - intros u z Hu' Hz. apply (psd_symmetric split n); assumption.
+    - exact M7.
+    - intros l Z. unfold ell. rewrite lap_comb. reflexivity.
+    - intros Z. apply (psd_ok split n (W a) _ Z PD M1).
+    - exact WP. }
+  assert (EK : sum n (fun i => sum n (fun j => w i j * (K i * K j))) = Q2R (coupling a) * K (pred n)).
+  { rewrite (sum_ext n _ (fun i => (if (pred n =? i)%nat then Q2R (coupling a) * K i else 0))); [apply (sum_at n (pred n)); lia|].
+    intros i Hi. transitivity (K i * sum n (fun j => w i j * K j)); [rewrite <- sum_scal; apply sum_ext; intros; ring|].
+    change (sum n (fun j => w i j * K j)) with (sum n (fun l => at_ (nth i (W a) []) l * at_ (gains a) l)). rewrite (M8 i Hi). fold K. destruct (Nat.eqb_spec (Datatypes.S i) n), (Nat.eqb_spec (pred n) i); try lia; ring. }
+  rewrite EK in A.
+  assert (Erel : sum n (fun i => K i * lap (edges c) (Y i) j) = ell (comb n K Y)) by (unfold ell; rewrite lap_comb; reflexivity).
+  fold K Y. rewrite Erel. assert (CK : 0 <= Q2R (coupling a) * K (pred n)) by (rewrite <- EK; apply WP).
+  pose proof (powers a Hprot M4 (2 * n) (Q2R (falls a)) ltac:(rewrite mult_INR; exact Hr) t Ht) as PW.
+  set (V0 := value a f (y a off (X 0) 0)) in *. set (x := exp (- (Q2R (falls a) * turns a t))) in *. set (e := eta a t) in *.
+  assert (Sq : sq (e ^ n * ell (comb n K Y)) = e ^ (2 * n) * sq (ell (comb n K Y))).
+  { unfold sq. replace (2 * n)%nat with (n + n)%nat by lia. rewrite pow_add. ring. }
+  rewrite Sq. assert (E2 : 0 <= e ^ (2 * n)) by (replace (2 * n)%nat with (n + n)%nat by lia; rewrite pow_add; apply Rle_0_sqr).
+  assert (V1 : 0 <= value a f Y).
+  { unfold value. fold n. pose proof (worth_self S n w (fun i j => at_ (nth i (P a) []) j) Y PS M7) as WS. unfold double.
+    change (sum n (fun i => sum n (fun j => at_ (nth i (P a) []) j * pair (edges (graph a)) (ly f) (Y i) (Y j)))) with
+      (sum n (fun i => sum n (fun j => at_ (nth i (P a) []) j * S (Y i) (Y j)))). rewrite WS. apply (psd_ok split n (W a) S _ PS M1). }
+  assert (csV : at_ cs j * value a f Y <= at_ cs j * (x * V0)).
+  { destruct C0 as [C0|Z]; [apply Rmult_le_compat_l; assumption|].
+    assert (ZV : forall u, value a f u = 0).
+    { intros u. unfold value, double. apply sum_zero. intros i _. apply sum_zero. intros i' _. unfold pair. fold c. rewrite !Z. field. }
+    unfold V0. rewrite !ZV. lra. }
+  apply Rle_trans with (e ^ (2 * n) * (Q2R (coupling a) * K (pred n) * (at_ cs j * (x * V0)))).
+  - apply Rmult_le_compat_l; [exact E2|]. eapply Rle_trans; [exact A|]. apply Rmult_le_compat_l; assumption.
+  - assert (CV0 : 0 <= at_ cs j * V0).
+    { assert (0 <= at_ cs j * value a f Y).
+      { destruct C0 as [C0|Z]; [apply Rmult_le_pos; assumption|]. unfold value, double. rewrite sum_zero; [lra|].
+        intros i _. apply sum_zero. intros i' _. unfold pair. fold c. rewrite !Z. field. }
+      pose proof (exp_pos (- (Q2R (falls a) * turns a t))) as X0. fold x in X0. nra. }
+    replace (e ^ (2 * n) * (Q2R (coupling a) * K (pred n) * (at_ cs j * (x * V0))))
+      with (x * e ^ (2 * n) * (Q2R (coupling a) * K (pred n) * (at_ cs j * V0))) by ring.
+    replace (eta a 0 ^ (2 * n) * (Q2R (coupling a) * K (pred n)) * V0 * at_ cs j)
+      with (eta a 0 ^ (2 * n) * (Q2R (coupling a) * K (pred n) * (at_ cs j * V0))) by ring.
+    apply Rmult_le_compat_r; [apply Rmult_le_pos; [exact CK|exact CV0]|exact PW].
+Qed.
+Lemma value_ext f F m x z : Checker.form (order c) (dls d) (dL d) (ly f) = Some (F, m) ->
+  (forall i j, (i < n)%nat -> (j < order c)%nat -> x i j = z i j) -> value a f x = value a f z.
+Proof.
+  intros EF H. pose proof (Main.Hls c Hedges) as Hl. fold d in Hl. destruct (form_ok _ _ _ _ _ _ _ Hl eq_refl EF) as [_ [Hfit _]].
+  destruct (fits_ok _ _ Hfit) as [F1 F2]. unfold value. apply double_ext. intros i j Hi Hj. fold c. rewrite !(pair_bil c f Hl F m EF).
+  assert (E : forall u v, (u < n)%nat -> (v < n)%nat -> bil F (x u) (x v) = bil F (z u) (z v)).
+  { intros u v Hu Hv. rewrite (bil_ext_l F (x u) (z u)) by (intros; apply H; [assumption|lia]).
+    apply (bil_ext_r F (order c)); [exact F2|]. intros; apply H; assumption. }
+  rewrite !E by assumption. reflexivity.
+Qed.
+Lemma minkowski m (u p r : nat -> R) R : (forall i, (i < m)%nat -> Rabs (u i) <= p i + r i /\ 0 <= p i /\ 0 <= r i) ->
+  sum m (fun i => sq (r i)) <= R * R -> 0 <= R -> sqrt (sum m (fun i => sq (u i))) <= sum m p + R.
+Proof.
+  intros H HR R0. set (T := sum m p).
+  assert (One : forall g i, (forall j, (j < m)%nat -> 0 <= g j) -> (i < m)%nat -> g i <= sum m g).
+  { intros g i G Hi. rewrite <- (sum_at m i g Hi). apply sum_le. intros j Hj. specialize (G j Hj). destruct (i =? j)%nat; lra. }
+  assert (T0 : 0 <= T).
+  { unfold T. rewrite <- (sum_zero m (fun _ => 0)) by reflexivity. apply sum_le. intros i Hi. apply (H i Hi). }
+  rewrite <- (sqrt_square (T + R)) by lra. apply sqrt_le_1_alt.
+  apply Rle_trans with (sum m (fun i => (T + 2 * R) * p i + sq (r i))).
+  - apply sum_le. intros i Hi. destruct (H i Hi) as [A [P0 R1]].
+    assert (p i <= T) by (apply (One p i); [intros; apply H; assumption|exact Hi]).
+    assert (r i <= R).
+    { apply Rsqr_incr_0; [|assumption|assumption]. unfold Rsqr. eapply Rle_trans; [|exact HR].
+      apply (One (fun i => sq (r i)) i); [intros; apply Rle_0_sqr|exact Hi]. }
+    apply Rle_trans with (sq (p i + r i)).
+    + unfold sq. rewrite <- (Rabs_right (u i * u i)) by (apply Rle_ge; apply Rle_0_sqr). rewrite Rabs_mult.
+      apply Rmult_le_compat; try apply Rabs_pos; assumption.
+    + unfold sq. assert (p i * p i <= T * p i) by (apply Rmult_le_compat_r; assumption).
+      assert (p i * r i <= p i * R) by (apply Rmult_le_compat_l; assumption). lra.
+  - rewrite sum_plus, sum_scal. fold T. lra.
+Qed.
+Lemma qsum_list {A} (g : A -> Q) l x0 : Q2R (qsum (map g l)) = sum (length l) (fun i => Q2R (g (nth i l x0))).
+Proof.
+  induction l as [|x l IH]; [apply Q2R_0|]. cbn [map length]. rewrite sum_front. cbn [nth]. rewrite <- IH. unfold qsum. cbn [fold_right].
+  apply Q2R_plus.
+Qed.
+Theorem tops_ok : tops_claim a.
+Proof.
+  intros Ne X Sl t j Hj HX Ht m hh. fold c in Hj, Ht. unfold check_tops in Htops. destruct (tops a) as [|q0 l0] eqn:Et; [contradiction|].
+  set (l := q0 :: l0) in *. cbv zeta in Htops. fold c n d in Htops.
+  apply andb_prop in Htops as [H H7]. apply andb_prop in H as [H H6]. apply andb_prop in H as [H H5]. apply andb_prop in H as [H H4].
+  apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2].
+  apply Qle_bool_iff, Qle_Rle in H2. rewrite !Q2R_mult, index_ok, pull_ok in H2.
+  assert (Q2 : Q2R 2 = 2) by (unfold Q2R; simpl; field). rewrite Q2 in H2.
+  rewrite forallb_forall in H5, H6, H7. specialize (H7 j ltac:(apply in_seq; lia)). apply andb_prop in H7 as [R0 H7].
+  set (added := match kind c with Nominal _ => 0%Q | SlidingMode _ _ mu1 _ _ _ => (mu1 * index (length (axes a)))%Q end) in *.
+  assert (EA : Q2R added = match kind c with Nominal _ => 0 | SlidingMode _ _ mu1 _ _ _ => Q2R mu1 * INR m end).
+  { unfold added. destruct (kind c); [apply Q2R_0|]. rewrite Q2R_mult, index_ok. reflexivity. }
+  fold c. rewrite <- EA. set (rest := (nth j l 0 - added - _)%Q) in *.
+  apply existsb_exists in H7 as [[cs B] [Hk HB]]. cbn [fst snd] in HB. apply in_flat_map in Hk as [kf [Hu Hk]].
+  destruct (nth_error (funcs c) kf) as [f|] eqn:Ef; [|destruct Hk].
+  destruct (bounds_of c d f) as [[[v cs'] cn]|] eqn:EB; [|destruct Hk].
+  destruct (Checker.form (order c) (dls d) (dL d) (ly f)) as [[F mm]|] eqn:EF; [|destruct Hk].
+  destruct Hk as [Hk|[]]. injection Hk as <- EBq. apply Qle_bool_iff, Qle_Rle in HB. rewrite <- EBq in HB. clear EBq.
+  pose proof eta_0_ok as E0. fold c in E0. rewrite !Q2R_mult, reduced_ok, !Q2R_mult, powq_ok, E0 in HB. rewrite map_map in HB.
+  set (dflt := Axis [] [] []). rewrite (qsum_list _ _ dflt) in HB. fold m in HB.
+  apply Qle_bool_iff, Qle_Rle in R0. rewrite Q2R_0 in R0.
+  assert (Er : Q2R rest = at_ l j - Q2R added - sum m (fun i => Rabs (at_ (plant a) 0 * hh i j))).
+  { unfold rest. rewrite !Q2R_minus. f_equal. rewrite (qsum_list _ _ dflt). apply sum_ext. intros i _.
+    assert (AB : forall q, Q2R (Qabs q) = Rabs (Q2R q)).
+    { intros [u w]. unfold Q2R. simpl. rewrite abs_IZR, Rabs_mult. f_equal. symmetry. apply Rabs_right. apply Rle_ge. left.
+      apply Rinv_0_lt_compat. apply IZR_lt. reflexivity. }
+    rewrite AB, Q2R_mult. reflexivity. }
+  assert (HXi : forall i, (i < m)%nat -> nth_error (axes a) i = Some (nth i (axes a) dflt)) by (intros i Hi; apply nth_error_nth'; exact Hi).
+  set (rel := fun i => eta a t ^ n * sum n (fun u => at_ (gains a) u * lap (edges c) (y a (hh i) (X i t) t u) j)).
+  assert (MK : sqrt (sum m (fun i => sq (control a (hh i) (X i t) t j))) <= sum m (fun i => Rabs (at_ (plant a) 0 * hh i j)) + Q2R rest).
+  { apply (minkowski m _ _ (fun i => Rabs (rel i))); [| |exact R0].
+    - intros i Hi. split; [|split; apply Rabs_pos]. unfold control. fold n c.
+      rewrite (sum_ext n _ (fun u => at_ (gains a) u * lap (edges c) (y a (hh i) (X i t) t u) j)) by (intros u _; rewrite (zeros _ u H1); ring).
+      fold (rel i). unfold Rminus. eapply Rle_trans; [apply Rabs_triang|]. rewrite Rabs_Ropp. apply Rle_refl.
+    - eapply Rle_trans; [|exact HB]. set (g := eta a 0 ^ (2 * n)). set (CK := Q2R (coupling a) * _).
+      apply Rle_trans with (sum m (fun i => at_ cs' j * (g * CK) * Q2R (worth_q a F mm (begin_rows a (nth i (axes a) dflt))))); [|rewrite sum_scal; apply Req_le; unfold at_; change (eta a 0 ^ (n + (n + 0))) with g; ring].
+      apply sum_le. intros i Hi. destruct (HX _ i (HXi i Hi)) as [HF HB0].
+      assert (Ai : In (nth i (axes a) dflt) (axes a)) by (apply nth_In; exact Hi).
+      specialize (H5 _ Ai). apply andb_prop in H5 as [L1 L2]. apply Nat.eqb_eq in L1, L2.
+      assert (Ri : check_rows (order c) (begin_rows a (nth i (axes a) dflt)) = true) by (apply H6; apply in_map; exact Ai).
+      rewrite (worth_ok f F mm (begin_rows a (nth i (axes a) dflt)) (y a (hh i) (fun u => at_ (nth u (begins (nth i (axes a) dflt)) [])) 0) EF Ri).
+      + rewrite (value_ext f F mm _ (y a (hh i) (X i 0) 0) EF).
+        * replace (sq (Rabs (rel i))) with (sq (rel i)) by (unfold sq; rewrite <- Rabs_mult; symmetry; apply Rabs_right; apply Rle_ge; apply Rle_0_sqr).
+          eapply Rle_trans; [apply (relative_ok kf f F mm v cs' cn (hh i) (X i) (Sl i) t j Hu Ef EB EF H3 H4 HF Ht Hj H2)|].
+          apply Req_le. unfold g, CK, at_. ring.
+        * intros u w Hu' Hw. unfold y, placed. rewrite (HB0 u w Hu' Hw). reflexivity.
+      + unfold begin_rows. cbv zeta. rewrite map_length, seq_length. reflexivity.
+      + intros u Hu'. apply functional_extensionality. intros w. apply rows_ok; assumption. }
+  rewrite Er in MK. lra.
+Qed.
 End Sound.
 
 Theorem accepts_agents_sound h split points a : accepts_agents h split points a = true -> true_agents a.
@@ -358,10 +576,11 @@ Proof.
   apply negb_true_iff in HE. split; [apply (accepts_sound h); exact HG|]. unfold accepts in HG. rewrite HE in HG.
   unfold check in HG. set (d := prepare (graph a)) in *.
   repeat match type of HG with (_ && _ = true) => let K := fresh "G" in apply andb_prop in HG as [HG K] end.
-  unfold check_agents_only in HA. apply andb_prop in HA as [HA A6]. apply andb_prop in HA as [HA A5].
+  unfold check_agents_only in HA. apply andb_prop in HA as [HA A7]. apply andb_prop in HA as [HA A6].
+  apply andb_prop in HA as [HA A5].
   apply andb_prop in HA as [HA A4]. apply andb_prop in HA as [HA A3]. apply andb_prop in HA as [A1 A2].
   split; [apply (definite_ok split); assumption|]. split; [apply (agreement_ok split points a); assumption|].
-  split; [apply (ends_ok a); assumption|]. intros j Hj.
+  split; [apply (ends_ok a); assumption|]. split; [apply (tops_ok split points a); assumption|]. intros j Hj.
   assert (E : exists f, nth_error (funcs (graph a)) j = Some f).
   { unfold check_coupling in A3. rewrite forallb_forall in A3. specialize (A3 j Hj).
     destruct (nth_error (funcs (graph a)) j) as [f|]; [exists f; reflexivity|discriminate]. }
