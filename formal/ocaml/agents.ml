@@ -145,12 +145,20 @@ let certificate json : t =
   if known then bare_of proof "agent-motion" "agents" else skip "agent-motion" "motion";
   if known && get "final_state" <> Null then bare_of proof "agent-final-state" "agents" else skip "agent-final-state" "final_state";
   need (get "residual" = Null) "what is left at the deadline of a gain that is not capped";
-  skip "agent-input" "input";
+  let tops = match get "input" with
+    | Null -> []
+    | _ when not (Number.equal (largest damping) Number.zero) -> skip "agent-input" "input"; []
+    | v ->
+        need (get "initial_state" <> Null && used <> []) "a bound of the input without initial states or Lyapunov functions";
+        bare_of proof "agent-input" "agents";
+        let get = fields "input" [ "agents"; "largest" ] v in
+        let tops = by_agent r.nodes number "input" (get "agents") in
+        need (Number.equal (number "largest" (get "largest")) (largest tops)) "the largest input is another"; tops in
   need (proof.rest = []) "an obligation that nothing asks for";
   let slope = r.cert.rho1 in
   let cert = { r.cert with funcs; rho1 = if Z.sign slope.qnum = 0 then Number.one else slope } in
   let record = { graph = cert; degree = n; slope; plant; damping; gains = row "gains"; w; p = inverse w;
-    coupling; falls = rate; used; agree; drift = common; axes = axes r n dimension get known } in
+    coupling; falls = rate; used; agree; drift = common; axes = axes r n dimension get known; tops } in
   { base = { r with cert; rest = []; checked = r.checked @ List.rev proof.checked; unchecked = r.unchecked @ List.rev proof.unchecked;
       sections = r.sections @ List.rev !left };
     record; points }
@@ -161,4 +169,5 @@ let parts a = [ "agent-positive of agents", (fun () -> check_matrices split a.re
   "agent-coupling of agents", (fun () -> check_coupling a.record);
   "agent-decrease of agents: derivatives need not agree at T", (fun () -> check_agree a.record);
   "agent-motion of agents", (fun () -> check_common a.record);
-  "agent-final-state of agents", (fun () -> check_ends_of a.record) ]
+  "agent-final-state of agents", (fun () -> check_ends_of a.record);
+  "agent-input of agents", (fun () -> check_tops a.record) ]
