@@ -37,7 +37,7 @@ SETTINGS = {
     "every Lyapunov function": Setting(order=3, method="best"),
     "order 4 without states": Setting(order=4, start=False),
 }
-#: What is not checked of them: the common motion of agents that are no chains of integrators, the input of those at rest.
+#: What is not checked of them: the common motion of agents that are no chains of integrators, the input at rest.
 SKIPPED = {"agent-input", "agent-motion", "agent-final-state"}
 #: What the executable says of a form that it does not read.
 UNREAD = ("large form", "undecided", "radius", "capped", "cascade", "dominance", "weak components")
