@@ -7,8 +7,8 @@ Import ListNotations. Open Scope R_scope.
 (** one coordinate of space: the offsets by agent; by derivative and agent where the agents begin, and where they end *)
 Record axis := Axis { offsets : list Q; begins : list (list Q); ends : list (list (Q * Q)) }.
 (** [x^(n) + a_n x^(n-1) + .. + a_1 x = u] of every node of [graph], under the protocol of it but for [slope], which
-    takes the place of [rho1]; which functions of [graph] are used, and whether all agree at the deadline; [drift] takes the
-    common motion there from time 0; [tops] bounds the inputs by agent *)
+    takes the place of [rho1]; which functions of [graph] are used, and whether all agree at the deadline; [drift] takes
+    the common motion there from time 0; [tops] bounds the inputs by agent *)
 Record agents := Agents { graph : cert; degree : nat; slope : Q; plant : list Q; damping : list Q; gains : list Q;
   W : list (list Q); P : list (list Q); coupling : Q; falls : Q; used : list nat; agree : bool;
   drift : option (list (list Q)); axes : list axis; tops : list Q }.
@@ -65,7 +65,8 @@ Definition ends_claim (a : agents) : Prop := forall M x i j, drift a = Some M ->
 Definition tops_claim (a : agents) : Prop := tops a <> [] -> forall X S t j, (j < order (graph a))%nat ->
   (forall x c, nth_error (axes a) c = Some x -> flies a (at_ (offsets x)) (X c) (S c) /\
      forall i j, (i < degree a)%nat -> (j < order (graph a))%nat -> X c 0 i j = at_ (nth i (begins x) []) j) ->
-  0 <= t < deadline (graph a) -> let m := length (axes a) in let h c := at_ (offsets (nth c (axes a) (Axis [] [] []))) in
+  0 <= t < deadline (graph a) ->
+  let m := length (axes a) in let h c := at_ (offsets (nth c (axes a) (Axis [] [] []))) in
   sqrt (sum m (fun c => sq (control a (h c) (X c t) t j))) +
     match kind (graph a) with Nominal _ => 0 | SlidingMode _ _ mu1 _ _ _ => Q2R mu1 * INR m end <= at_ (tops a) j.
 
