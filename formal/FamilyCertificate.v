@@ -27,7 +27,7 @@ Definition smallest (l : list tie) := flat_map (fun e => if Qlt_le_dec 0 (bottom
     several *)
 Inductive outcome := Stability | Consensus | Interval | Containment | Depends.
 (** [still]: a basis of the states at rest, by columns, each with its pivot *)
-Record part := Part { agents : list nat; becomes : outcome; still : list (nat * list Q) }.
+Record part := Part { its_agents : list nat; becomes : outcome; still : list (nat * list Q) }.
 (** [xi' P xi]; the largest [xi_k^2 / d_k^2]; the sum of the [p_k x_k^2] *)
 Inductive shape := Form (P : list (list Q)) | Rows (d : list Q) | Squares (p : list Q).
 Record lyapunov := Lyapunov { about : part; by_ : shape; decay : Q; inputs : list Q; offs : list Q;
@@ -54,33 +54,33 @@ Definition mode_claim (F : family) (m : mode) : Prop := edges (mandatory m) = sm
 (** deviation from the states at rest *)
 Definition xi (P : part) (x : nat -> R) (i : nat) : R :=
   x i - fold_right (fun b a => Q2R (nth i (snd b) 0%Q) * x (fst b) + a) 0 (still P).
-Definition owned (m : mode) (P : part) := filter (fun C => mem (hd O (nodes C)) (agents P)) (comps (mandatory m)).
+Definition owned (m : mode) (P : part) := filter (fun C => mem (hd O (nodes C)) (its_agents P)) (comps (mandatory m)).
 (** the basis is at rest in every member, and has as many columns as each mandatory graph balanced closed components *)
 Definition part_claim (F : family) (P : part) : Prop :=
-  (forall i j, In i (agents P) ->
-    (In j (agents P) <-> linked (flat_map (fun e => there e 1%Q) (flat_map ties (modes F))) i j)) /\
+  (forall i j, In i (its_agents P) ->
+    (In j (its_agents P) <-> linked (flat_map (fun e => there e 1%Q) (flat_map ties (modes F))) i j)) /\
   (becomes P <> Depends -> forall m, In m (modes F) -> length (filter is_balanced (owned m P)) = length (still P) /\
-     forall w p v i, admits (ties m) w -> In (p, v) (still P) -> In i (agents P) ->
+     forall w p v i, admits (ties m) w -> In (p, v) (still P) -> In i (its_agents P) ->
        member (ties m) w (fun j => Q2R (nth j v 0%Q)) i = 0) /\
   match becomes P with Stability => still P = [] | Depends => True
-  | Consensus => exists p v, still P = [(p, v)] /\ forall i, In i (agents P) -> sq (Q2R (nth i v 0%Q)) = 1
+  | Consensus => exists p v, still P = [(p, v)] /\ forall i, In i (its_agents P) -> sq (Q2R (nth i v 0%Q)) = 1
   | Interval => forall m, In m (modes F) -> exists C, owned m P = [C]
   | Containment => exists m C C' l, In m (modes F) /\ owned m P = C :: C' :: l end.
 (** the function is at most [a] *)
 Definition below (b : lyapunov) (a : R) (x : nat -> R) : Prop := let z := xi (about b) x in match by_ b with
   | Form P => qbil P z z <= a | Squares p => qdot p (fun i => sq (x i)) <= a
-  | Rows d => forall i, In i (agents (about b)) -> sq (z i) <= a * sq (Q2R (nth i d 0%Q)) end.
+  | Rows d => forall i, In i (its_agents (about b)) -> sq (z i) <= a * sq (Q2R (nth i d 0%Q)) end.
 (** it decays along every motion, bounds what agents and means are moved and what is left to the states at rest; with a
     positive rate, the part comes to rest, at a state that is at rest in every member *)
 Definition bound_claim (F : family) (b : lyapunov) : Prop := let c := frame F in
   (forall X S t0 t a, switches_from F X S t0 -> t0 <= t < deadline c -> 0 <= a -> below b a (X t0) ->
      below b (exp (- (Q2R (decay b) * (s c t - s c t0))) * a) (X t)) /\
-  (forall x a i, 0 <= a -> below b a x -> In i (agents (about b)) ->
+  (forall x a i, 0 <= a -> below b a x -> In i (its_agents (about b)) ->
      sq (xi (about b) x i) <= Q2R (nth i (offs b) 0%Q) * a /\
      forall m w, In m (modes F) -> admits (ties m) w -> sq (member (ties m) w x i) <= Q2R (nth i (inputs b) 0%Q) * a) /\
   (forall x a q, 0 <= a -> below b a x -> In q (means b) -> forall m w, In m (modes F) -> admits (ties m) w ->
      sq (qdot (fst q) (member (ties m) w x)) <= Q2R (snd q) * a) /\
-  (0 < Q2R (decay b) -> forall X S, switches F X S -> exists y, forall i, In i (agents (about b)) ->
+  (0 < Q2R (decay b) -> forall X S, switches F X S -> exists y, forall i, In i (its_agents (about b)) ->
      filterlim (fun t => X t i) (at_left (deadline c)) (locally (y i)) /\ xi (about b) y i = 0).
 (** from the initial state on, if no sliding variable moves: where agents end, and the nominal part of their input *)
 Definition starts (F : family) X S := switches_from F X S 0 /\
@@ -96,6 +96,6 @@ Definition inputs_claim (F : family) : Prop := let c := frame F in
 (** sliding variables do not hear the graph: what is said of them is what holds without edges, of [X = S] *)
 Definition true_family (F : family) : Prop := (forall m, In m (modes F) -> mode_claim F m) /\
   (forall P, In P (parts F) -> part_claim F P) /\
-  (forall i, (i < order (frame F))%nat -> exists P, In P (parts F) /\ In i (agents P)) /\
+  (forall i, (i < order (frame F))%nat -> exists P, In P (parts F) /\ In i (its_agents P)) /\
   (edges (frame F) = [] /\ sliding_claim (frame F)) /\ (forall b, In b (bounds F) -> bound_claim F b) /\
   ends_claim F /\ inputs_claim F.

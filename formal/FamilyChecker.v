@@ -45,7 +45,7 @@ Record quotient := Quotient { qn : nat; qsw : Z; qfw : kernel; qF : mat; qm : Z 
 Definition common_of (B : list (nat * list Q)) : Z := common (concat (map snd B)).
 Definition kernel_of (n : nat) (P : part) : kernel := let sw := common_of (still P) in
   map (fun b => (fst b, map (scaled sw) (snd b))) (still P) ++
-  map (fun i => (i, unit i sw)) (filter (fun i => negb (mem i (agents P))) (seq 0 n)).
+  map (fun i => (i, unit i sw)) (filter (fun i => negb (mem i (its_agents P))) (seq 0 n)).
 Definition quotient_of (n : nat) (p : part) (P : list (list Q)) : quotient :=
   let sw := common_of (still p) in let d := common (concat P) in
   let C := map (crow sw (still p)) (seq 0 n) in
@@ -57,7 +57,7 @@ Definition check_quotient (p : part) (P : list (list Q)) (q : quotient) : bool :
 (** how large linear functions are: [(d'x)^2 <= a^2 V] *)
 Definition check_size (q : quotient) (r : factor) (d : vec) (scale_ : Z) (a : Q) : bool :=
   notneg a && bounded_mod (qfw q) r d (Qnum a * Qnum a * (scale_ * scale_)) (Zpos (Qden a) * Zpos (Qden a) * qm q).
-Definition near (P : part) (e : tie) : bool := mem (head e) (agents P) || mem (tail e) (agents P).
+Definition near (P : part) (e : tie) : bool := mem (head e) (its_agents P) || mem (tail e) (its_agents P).
 Definition weighed (u : vec) (e : tie) : Z := zdot u (fvec e).
 (** the row [u'L] at the middle, times [dq]; how far it is from that *)
 Definition mid_row (dq : Z) (l : list tie) (u : vec) : vec :=
@@ -73,13 +73,13 @@ Definition check_inputs (q : quotient) (r : factor) (b : lyapunov) (l : list tie
   let t := map (fun t => (t, Qeq_bool (radius (fst t)) 0 && notneg (snd t) || near P (fst t) && check_size q r (hvec (fst t)) 1 (snd t)))
     (combine l (fst roots)) in
   good dq (map middle l) && (length l =? length (fst roots))%nat &&
-  forallb (fun i => check_functional q r dq l t (unit i 1) (nth i (snd roots) 0%Q) (nth i (inputs b) 0%Q)) (agents P) &&
+  forallb (fun i => check_functional q r dq l t (unit i 1) (nth i (snd roots) 0%Q) (nth i (inputs b) 0%Q)) (its_agents P) &&
   forallb (fun km => let m := snd km in let d := common (fst m) in good d (fst m) &&
     check_functional q r dq l t (map (scaled d) (fst m)) (nth (fst km) (snd roots) 0%Q) (snd m * inject_Z (d * d)))
     (combine (seq (qn q) (length (means b))) (means b)).
 Definition check_offs (q : quotient) (r : factor) (P : part) (cs : list Q) : bool :=
   forallb (fun i => let c := nth i cs 0%Q in notneg c &&
-    bounded_mod (qfw q) r (crow (qsw q) (still P) i) (Qnum c * (qsw q * qsw q)) (Zpos (Qden c) * qm q)) (agents P).
+    bounded_mod (qfw q) r (crow (qsw q) (still P) i) (Qnum c * (qsw q * qsw q)) (Zpos (Qden c) * qm q)) (its_agents P).
 
 (** * What is at rest in all members *)
 Definition rest_vec (dl : Z) (l : list tie) (v : vec) : vec :=
@@ -117,15 +117,15 @@ Definition row_moved (d : list Q) (e : tie) (t s : nat) : Q := (hi e * (entry d 
 Definition check_rows_of (F : family) (b : lyapunov) (d : list Q) : bool :=
   let P := about b in let sw := common_of (still P) in let pivots := map fst (still P) in
   (match means b with [] => true | _ => false end) && (0 <? sw) && forallb (fun v => good sw (snd v)) (still P) &&
-  forallb (fun m => forallb (fun e => Bool.eqb (mem (head e) (agents P)) (mem (tail e) (agents P))) (ties m) &&
+  forallb (fun m => forallb (fun e => Bool.eqb (mem (head e) (its_agents P)) (mem (tail e) (its_agents P))) (ties m) &&
     forallb (fun v => check_at_rest sw (ties m) (snd v)) (still P)) (modes F) &&
   forallb (fun i => if mem i pivots then unmoved F i && zero_vec (crow sw (still P) i) && Qeq_bool (entry d i) 0
-    else pos (entry d i) && forallb (fun m => Qle_bool (decay b * entry d i) (2 * row_sum (ties m) (drawn d) i)) (modes F)) (agents P) &&
+    else pos (entry d i) && forallb (fun m => Qle_bool (decay b * entry d i) (2 * row_sum (ties m) (drawn d) i)) (modes F)) (its_agents P) &&
   forallb (fun i => Qle_bool (entry d i * entry d i) (nth i (offs b) 0%Q) && forallb (fun m =>
-    let u := row_sum (ties m) (row_moved d) i in Qle_bool (u * u) (nth i (inputs b) 0%Q)) (modes F)) (agents P).
+    let u := row_sum (ties m) (row_moved d) i in Qle_bool (u * u) (nth i (inputs b) 0%Q)) (modes F)) (its_agents P).
 Definition check_bound (F : family) (b : lyapunov) (h : hint) : bool :=
-  forallb (fun i => (i <? order (frame F))%nat) (agents (about b)) &&
-  forallb (fun v => mem (fst v) (agents (about b))) (still (about b)) &&
+  forallb (fun i => (i <? order (frame F))%nat) (its_agents (about b)) &&
+  forallb (fun v => mem (fst v) (its_agents (about b))) (still (about b)) &&
   match by_ b with Form P => check_family_form F b h P | Rows d => check_rows_of F b d | Squares _ => false end.
 
 (** * Modes and parts *)
@@ -138,7 +138,7 @@ Definition check_mode (F : family) (m : mode) : bool :=
   (order c =? order (frame F))%nat && wide_structure c && wide_claims c.
 Definition every_edge (F : family) : list edge := flat_map (fun e => there e 1%Q) (flat_map ties (modes F)).
 Definition check_part (F : family) (P : part) : bool :=
-  let n := order (frame F) in let es := every_edge F in let C := agents P in
+  let n := order (frame F) in let es := every_edge F in let C := its_agents P in
   let R := reached n (by_source (es ++ map swap es)) [hd O C] in
   (match C with [] => false | _ => true end) && forallb (fun i => seen i R) C &&
   forallb (fun e => Bool.eqb (mem (src e) C) (mem (tgt e) C)) es &&
@@ -153,7 +153,7 @@ Definition check_part (F : family) (P : part) : bool :=
   | Containment => existsb (fun m => match owned m P with _ :: _ :: _ => true | _ => false end) (modes F) end.
 Definition check_frame (F : family) : bool :=
   let c := frame F in check_protocol c && check_sliding_input c && check_reaching c && (match edges c with [] => true | _ => false end) &&
-  forallb (fun i => existsb (fun P => mem i (agents P)) (parts F)) (seq 0 (order c)).
+  forallb (fun i => existsb (fun P => mem i (its_agents P)) (parts F)) (seq 0 (order c)).
 
 (** * From the initial state *)
 Definition start_at (F : family) (i : nat) : Q := nth i (start (frame F)) 0%Q.
@@ -167,22 +167,22 @@ Definition share (F : family) (P : part) (d : list Q) (i : nat) : Q :=
   if pos (entry d i) then let q := (left_at F P i / entry d i)%Q in Qred (q * q) else 0%Q.
 Definition value_at (F : family) (b : lyapunov) : option Q := let P := about b in match by_ b with
   | Form A => Some (bilQ A (fun i => nth i (map (left_at F P) (seq 0 (order (frame F)))) 0%Q) O)
-  | Rows d => Some (fold_right (fun i a => larger (share F P d i) a) 0%Q (agents P))
+  | Rows d => Some (fold_right (fun i a => larger (share F P d i) a) 0%Q (its_agents P))
   | Squares _ => None end.
 
 (** * The input *)
 Definition fast (F : family) (b : lyapunov) : bool := let c := frame F in Qle_bool 2 (rho2 c * kappa c * decay b).
 Definition check_stays (F : family) : bool := negb (stays F) || forallb (fun i => unmoved F i ||
-  existsb (fun b => fast F b && mem i (agents (about b))) (bounds F)) (seq 0 (order (frame F))).
+  existsb (fun b => fast F b && mem i (its_agents (about b))) (bounds F)) (seq 0 (order (frame F))).
 Definition check_peak (F : family) (i : nat) (peak : Q) : bool := let c := frame F in notneg peak && (unmoved F i ||
-  existsb (fun b => fast F b && mem i (agents (about b)) && match value_at F b with
+  existsb (fun b => fast F b && mem i (its_agents (about b)) && match value_at F b with
     | Some v => let g := (rho1 c + rho2 c * kappa c * / span c)%Q in Qle_bool (g * g * (nth i (inputs b) 0%Q * v)) (peak * peak)
     | None => false end) (bounds F)).
 Definition check_peaks (F : family) : bool := forallb (fun p => check_peak F (fst p) (snd p)) (combine (seq 0 (length (peaks F))) (peaks F)).
 
 (** agents that a function draws to 0 *)
 Definition check_end_of (F : family) (i : nat) (e : Q * Q) : bool := Qle_bool (Qabs (fst e)) (snd e) &&
-  existsb (fun b => pos (decay b) && mem i (agents (about b)) && match still (about b) with [] => true | _ => false end) (bounds F).
+  existsb (fun b => pos (decay b) && mem i (its_agents (about b)) && match still (about b) with [] => true | _ => false end) (bounds F).
 Definition check_family_ends (F : family) : bool := forallb (fun ie => match snd ie with None => true | Some e => check_end_of F (fst ie) e end)
   (combine (seq 0 (length (ends F))) (ends F)).
 Definition check_family (F : family) (hs : list hint) : bool :=

@@ -35,7 +35,7 @@ Proof.
   destruct (quotient_parts n (about b) A H1) as [Q1 [Q2 [Q3 Q4]]]. fold q in Q1, Q2, Q3, Q4.
   pose proof (quotient_ok n (about b) A H1) as QV. fold q in QV. apply IZR_lt in Q2.
   assert (SI : forall m w x a, In m (modes F) -> admits (ties m) w -> 0 <= a -> below b a x ->
-    (forall i, In i (agents (about b)) -> sq (member (ties m) w x i) <= Q2R (nth i (inputs b) 0%Q) * a) /\
+    (forall i, In i (its_agents (about b)) -> sq (member (ties m) w x i) <= Q2R (nth i (inputs b) 0%Q) * a) /\
     forall v, In v (means b) -> sq (qdot (fst v) (member (ties m) w x)) <= Q2R (snd v) * a).
   { intros m w x a Hm Hw Ha H0. unfold below in H0. rewrite EA in H0.
     destruct (in_combine _ (roots h) m ltac:(symmetry; exact H3) Hm) as [rs Hrs]. specialize (H6 _ Hrs). cbn [fst snd] in H6.
@@ -58,13 +58,13 @@ Proof.
   - intros x. exists (qbil A (xi (about b) x) (xi (about b) x)). split; [apply (value_pos n (about b) A H1 r Er)|].
     unfold below. rewrite EA. lra.
 Qed.
-Lemma bound_parts b h : check_bound F b h = true -> (forall i, In i (agents (about b)) -> (i < n)%nat) /\
-  (forall v, In v (still (about b)) -> In (fst v) (agents (about b))) /\ decays b /\ sizes b /\ means_too b /\ forall x, exists a, 0 <= a /\ below b a x.
+Lemma bound_parts b h : check_bound F b h = true -> (forall i, In i (its_agents (about b)) -> (i < n)%nat) /\
+  (forall v, In v (still (about b)) -> In (fst v) (its_agents (about b))) /\ decays b /\ sizes b /\ means_too b /\ forall x, exists a, 0 <= a /\ below b a x.
 Proof.
   intros H. unfold check_bound in H. apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2]. rewrite forallb_forall in H1, H2.
   split; [intros i Hi; apply Nat.ltb_lt; apply H1; exact Hi|]. split; [intros v Hv; apply mem_In; apply H2; exact Hv|].
-  assert (HA : forall i, In i (agents (about b)) -> (i < n)%nat) by (intros i Hi; apply Nat.ltb_lt; apply H1; exact Hi).
-  assert (HP : forall v, In v (still (about b)) -> In (fst v) (agents (about b))) by (intros v Hv; apply mem_In; apply H2; exact Hv).
+  assert (HA : forall i, In i (its_agents (about b)) -> (i < n)%nat) by (intros i Hi; apply Nat.ltb_lt; apply H1; exact Hi).
+  assert (HP : forall v, In v (still (about b)) -> In (fst v) (its_agents (about b))) by (intros v Hv; apply mem_In; apply H2; exact Hv).
   destruct (by_ b) as [A|d|p] eqn:E; try discriminate; [apply (form_bound b h A E H3)|].
   split; [apply (rows_decay F Hframe Hmodes b d E HA HP H3)|]. split; [apply (rows_size F Hmodes b d E H3)|].
   split; [|apply (rows_value F Hmodes b d E H3)]. intros x a v _ _ Hv. rewrite (rows_means F b d H3) in Hv. destruct Hv.
@@ -78,7 +78,7 @@ Qed.
 (** * Parts *)
 Theorem parts_claim P : check_part F P = true -> part_claim F P.
 Proof.
-  unfold check_part. cbv zeta. set (C := agents P). set (es := every_edge F). intros H.
+  unfold check_part. cbv zeta. set (C := its_agents P). set (es := every_edge F). intros H.
   apply andb_prop in H as [H H5]. apply andb_prop in H as [H H4]. apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2].
   split; [|split].
   - assert (K : forall j, In j C -> linked es (hd O C) j).
@@ -112,7 +112,7 @@ Proof.
   replace (Q2R 2) with 2 in H by (unfold Q2R; simpl; lra). exact H.
 Qed.
 (** gain times what a fast bound lets the agents move *)
-Lemma inputs_fall b h i X Sl t0 a t m w : check_bound F b h = true -> fast F b = true -> In i (agents (about b)) ->
+Lemma inputs_fall b h i X Sl t0 a t m w : check_bound F b h = true -> fast F b = true -> In i (its_agents (about b)) ->
   switches_from F X Sl t0 -> 0 <= a -> below b a (X t0) -> t0 <= t < T -> In m (modes F) -> admits (ties m) w ->
   sq (gain T rho (k c) t * member (ties m) w (X t) i) <=
     sq (rho + k c / T) * (Q2R (nth i (inputs b) 0%Q) * a * exp (Q2R (decay b) * s c t0)).
@@ -188,11 +188,11 @@ Lemma value_ok b h v X : check_bound F b h = true -> value_at F b = Some v -> (f
   0 <= Q2R v /\ below b (Q2R v) X.
 Proof.
   intros Hb Hv HX. destruct (bound_parts b h Hb) as [HA [HB [_ [_ _]]]]. pose proof Hb as Hb0. unfold check_bound in Hb0.
-  assert (HL : forall i, In i (agents (about b)) -> Q2R (left_at F (about b) i) = xi (about b) X i).
+  assert (HL : forall i, In i (its_agents (about b)) -> Q2R (left_at F (about b) i) = xi (about b) X i).
   { intros i Hi. apply left_ok; [exact HX|intros v' Hv'; apply HA, HB, Hv'|apply HA; exact Hi]. }
   clear Hb. apply andb_prop in Hb0 as [_ Hb]. unfold value_at in Hv. cbv zeta in Hv. destruct (by_ b) as [A|d|p] eqn:Ep; try discriminate; injection Hv as <-.
-  2:{ set (P := about b) in *. set (M := fold_right _ _ _). assert (G : 0 <= Q2R M /\ forall i, In i (agents P) -> Q2R (share F P d i) <= Q2R M).
-      { unfold M. generalize (agents P). clear. intros l. assert (L : forall q a, Q2R q <= Q2R (larger q a) /\ Q2R a <= Q2R (larger q a)).
+  2:{ set (P := about b) in *. set (M := fold_right _ _ _). assert (G : 0 <= Q2R M /\ forall i, In i (its_agents P) -> Q2R (share F P d i) <= Q2R M).
+      { unfold M. generalize (its_agents P). clear. intros l. assert (L : forall q a, Q2R q <= Q2R (larger q a) /\ Q2R a <= Q2R (larger q a)).
         { intros q a. unfold larger. destruct (Qle_bool a q) eqn:E; [apply Qle_R in E; lra|].
           assert (Q2R q < Q2R a); [|lra]. apply Rnot_le_lt. intros N. apply Rle_Qle in N. apply Qle_bool_iff in N. congruence. }
         induction l as [|j l [I1 I2]]; [split; [rewrite <- Q2R_0; apply Rle_refl|intros i []]|]. cbn [fold_right].

@@ -66,7 +66,7 @@ Hypothesis Hframe : check_frame F = true.
 Hypothesis Hmodes : forallb (check_mode F) (modes F) = true.
 
 Lemma frame_parts : check_protocol c = true /\ check_sliding c = true /\ edges c = [] /\
-  forall i, (i < n)%nat -> exists P, In P (parts F) /\ In i (agents P).
+  forall i, (i < n)%nat -> exists P, In P (parts F) /\ In i (its_agents P).
 Proof.
   unfold check_frame in Hframe. cbv zeta in Hframe. fold c in Hframe. apply andb_prop in Hframe as [H H5].
   apply andb_prop in H as [H H4]. apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2].
@@ -170,15 +170,15 @@ Variable b : lyapunov.
 Let P := about b.
 Definition decays : Prop := forall X Sl t0 t a, switches_from F X Sl t0 -> t0 <= t < T -> 0 <= a -> below b a (X t0) ->
   below b (exp (- (Q2R (decay b) * (s c t - s c t0))) * a) (X t).
-Definition sizes : Prop := forall x a i, 0 <= a -> below b a x -> In i (agents P) -> sq (xi P x i) <= Q2R (nth i (offs b) 0%Q) * a /\
+Definition sizes : Prop := forall x a i, 0 <= a -> below b a x -> In i (its_agents P) -> sq (xi P x i) <= Q2R (nth i (offs b) 0%Q) * a /\
   forall m w, In m (modes F) -> admits (ties m) w -> sq (member (ties m) w x i) <= Q2R (nth i (inputs b) 0%Q) * a.
 Definition means_too : Prop := forall x a q, 0 <= a -> below b a x -> In q (means b) -> forall m w, In m (modes F) ->
   admits (ties m) w -> sq (qdot (fst q) (member (ties m) w x)) <= Q2R (snd q) * a.
 Hypotheses (HD : decays) (HS : sizes) (HV : forall x, exists a, 0 <= a /\ below b a x).
-Hypothesis Hagents : forall i, In i (agents P) -> (i < n)%nat.
-Hypothesis Hpivots : forall v, In v (still P) -> In (fst v) (agents P).
+Hypothesis Hagents : forall i, In i (its_agents P) -> (i < n)%nat.
+Hypothesis Hpivots : forall v, In v (still P) -> In (fst v) (its_agents P).
 (** how near to its end an agent is *)
-Lemma nears X Sl t0 a i : 0 < Q2R (decay b) -> switches_from F X Sl t0 -> 0 <= a -> below b a (X t0) -> In i (agents P) ->
+Lemma nears X Sl t0 a i : 0 < Q2R (decay b) -> switches_from F X Sl t0 -> 0 <= a -> below b a (X t0) -> In i (its_agents P) ->
   exists v, forall t, t0 <= t < T -> Rabs (X t i - v) <=
     2 * sqrt (Q2R (nth i (inputs b) 0%Q) * a * exp (Q2R (decay b) * s c t0)) / Q2R (decay b) * exp (- (Q2R (decay b) / 2 * s c t)).
 Proof.
@@ -212,12 +212,12 @@ Proof.
   rewrite E. set (e := exp _) in *. assert (0 < e) by apply exp_pos. apply Rabs_le_between in Hv. unfold sq.
   replace (C * C * (e * e)) with (C * e * (C * e)) by ring. nra.
 Qed.
-Theorem comes_to_rest_family : 0 < Q2R (decay b) -> forall X Sl, switches F X Sl -> exists y, forall i, In i (agents P) ->
+Theorem comes_to_rest_family : 0 < Q2R (decay b) -> forall X Sl, switches F X Sl -> exists y, forall i, In i (its_agents P) ->
   filterlim (fun t => X t i) (at_left T) (locally (y i)) /\ xi P y i = 0.
 Proof.
   intros Hr X Sl HM. destruct (settles_family X Sl HM) as [t0 HM0]. destruct (HV (X t0)) as [a [Ha H0]]. pose proof HM0 as [_ HQ].
-  destruct (finite_choice n (fun i v => In i (agents P) -> filterlim (fun t => X t i) (at_left T) (locally v))) as [y Hy].
-  { intros i Hi. destruct (in_dec Nat.eq_dec i (agents P)) as [I|I]; [|exists 0; intros; contradiction].
+  destruct (finite_choice n (fun i v => In i (its_agents P) -> filterlim (fun t => X t i) (at_left T) (locally v))) as [y Hy].
+  { intros i Hi. destruct (in_dec Nat.eq_dec i (its_agents P)) as [I|I]; [|exists 0; intros; contradiction].
     destruct (nears X Sl t0 a i Hr HM0 Ha H0 I) as [v Hv]. exists v. intros _. apply (near_limit X Sl t0 i v _ _ Hr HM0 Hv). }
   exists y. intros i Hi. split; [apply Hy; auto|].
   assert (L : filterlim (fun t => xi P (X t) i) (at_left T) (locally (xi P y i))).

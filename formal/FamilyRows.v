@@ -126,8 +126,8 @@ Hypothesis Hmodes : forallb (check_mode F) (modes F) = true.
 Variables (b : lyapunov) (d : list Q).
 Let P := about b.
 Hypothesis Hby : by_ b = Rows d.
-Hypothesis Hagents : forall i, In i (agents P) -> (i < n)%nat.
-Hypothesis Hpivots : forall v, In v (still P) -> In (fst v) (agents P).
+Hypothesis Hagents : forall i, In i (its_agents P) -> (i < n)%nat.
+Hypothesis Hpivots : forall v, In v (still P) -> In (fst v) (its_agents P).
 Hypothesis H : check_rows_of F b d = true.
 
 Lemma unmoved_ok i m w x : unmoved F i = true -> In m (modes F) -> member (ties m) w x i = 0.
@@ -140,11 +140,11 @@ Lemma rows_means : means b = [].
 Proof.
   unfold check_rows_of in H. cbv zeta in H. do 5 apply andb_prop in H as [H _]. destruct (means b); [reflexivity|discriminate].
 Qed.
-Lemma rows_parts : (forall m, In m (modes F) -> (forall e, In e (ties m) -> In (head e) (agents P) <-> In (tail e) (agents P)) /\
+Lemma rows_parts : (forall m, In m (modes F) -> (forall e, In e (ties m) -> In (head e) (its_agents P) <-> In (tail e) (its_agents P)) /\
     forall w i v, admits (ties m) w -> In v (still P) -> member (ties m) w (fun j => Q2R (nth j (snd v) 0%Q)) i = 0) /\
-  (forall i, In i (agents P) -> (In i (map fst (still P)) /\ unmoved F i = true /\ (forall x, xi P x i = 0) /\ Q2R (entry d i) = 0) \/
+  (forall i, In i (its_agents P) -> (In i (map fst (still P)) /\ unmoved F i = true /\ (forall x, xi P x i = 0) /\ Q2R (entry d i) = 0) \/
     (~ In i (map fst (still P)) /\ 0 < Q2R (entry d i) /\ forall m, In m (modes F) -> Q2R (decay b) * Q2R (entry d i) <= 2 * Q2R (row_sum (ties m) (drawn d) i))) /\
-  forall i, In i (agents P) -> Q2R (entry d i) * Q2R (entry d i) <= Q2R (nth i (offs b) 0%Q) /\
+  forall i, In i (its_agents P) -> Q2R (entry d i) * Q2R (entry d i) <= Q2R (nth i (offs b) 0%Q) /\
     forall m, In m (modes F) -> sq (Q2R (row_sum (ties m) (row_moved d) i)) <= Q2R (nth i (inputs b) 0%Q).
 Proof.
   pose proof H as K. unfold check_rows_of in K. cbv zeta in K. fold P in K. apply andb_prop in K as [K K5]. apply andb_prop in K as [K K4].
@@ -162,9 +162,9 @@ Proof.
   - intros i Hi. specialize (K5 i Hi). apply andb_prop in K5 as [A B]. apply Qle_R in A. rewrite Q2R_mult in A. split; [exact A|].
     intros m Hm. rewrite forallb_forall in B. specialize (B m Hm). cbv zeta in B. apply Qle_R in B. rewrite Q2R_mult in B. exact B.
 Qed.
-Lemma d_pos i : In i (agents P) -> 0 <= Q2R (entry d i).
+Lemma d_pos i : In i (its_agents P) -> 0 <= Q2R (entry d i).
 Proof. intros Hi. destruct rows_parts as [_ [R _]]. destruct (R i Hi) as [[_ [_ [_ E]]]|[_ [E _]]]; [rewrite E; apply Rle_refl|apply Rlt_le; exact E]. Qed.
-Lemma below_rows a x : 0 <= a -> below b a x <-> forall i, In i (agents P) -> Rabs (xi P x i) <= sqrt a * Q2R (entry d i).
+Lemma below_rows a x : 0 <= a -> below b a x <-> forall i, In i (its_agents P) -> Rabs (xi P x i) <= sqrt a * Q2R (entry d i).
 Proof.
   intros Ha. unfold below. rewrite Hby. fold P. pose proof (sqrt_pos a) as S0. pose proof (sqrt_sqrt a Ha) as S1.
   split; intros K i Hi; specialize (K i Hi); pose proof (d_pos i Hi) as D; fold (entry d i) in K |- *; set (q := Q2R (entry d i)) in *.
@@ -184,7 +184,7 @@ Proof.
     apply Rle_trans with (sq (sqrt a * q)); [unfold sq; nra|]. unfold sq.
     replace (sqrt a * q * (sqrt a * q)) with (q * q * (sqrt a * sqrt a)) by ring. rewrite S1. apply Rmult_le_compat_r; assumption.
   - intros m w Hm Hw. destruct (R1 m Hm) as [C Z]. rewrite (member_xi (ties m) w P i (fun v Hv => Z w i v Hw Hv) x).
-    pose proof (rows_move n d (agents P) (xi P x) (sqrt a) S0 Hx (ties m) (ties_ok F Hmodes m Hm) C d_pos w i Hw Hi) as K.
+    pose proof (rows_move n d (its_agents P) (xi P x) (sqrt a) S0 Hx (ties m) (ties_ok F Hmodes m Hm) C d_pos w i Hw Hi) as K.
     specialize (B m Hm). set (u := Q2R (row_sum (ties m) (row_moved d) i)) in *. apply Rabs_le_between in K.
     apply Rle_trans with (sq (sqrt a * u)); [unfold sq; nra|]. unfold sq in *.
     replace (sqrt a * u * (sqrt a * u)) with (u * u * (sqrt a * sqrt a)) by ring. rewrite S1. apply Rmult_le_compat_r; assumption.
@@ -209,9 +209,9 @@ Proof.
   - apply (continuous_mult (fun _ => Q2R (nth i (snd v) 0%Q))); [apply continuous_const|]. apply HY. apply Hp. left. reflexivity.
   - apply IH. intros; apply Hp; right; assumption.
 Qed.
-Lemma follower_dec i : {In i (agents P) /\ ~ In i (map fst (still P))} + {~ (In i (agents P) /\ ~ In i (map fst (still P)))}.
+Lemma follower_dec i : {In i (its_agents P) /\ ~ In i (map fst (still P))} + {~ (In i (its_agents P) /\ ~ In i (map fst (still P)))}.
 Proof.
-  destruct (in_dec Nat.eq_dec i (agents P)) as [A|A]; [|right; intros [B _]; exact (A B)].
+  destruct (in_dec Nat.eq_dec i (its_agents P)) as [A|A]; [|right; intros [B _]; exact (A B)].
   destruct (in_dec Nat.eq_dec i (map fst (still P))) as [B|B]; [right; intros [_ C]; exact (C B)|left; split; assumption].
 Qed.
 Theorem rows_decay : decays F b.
@@ -251,7 +251,7 @@ Proof.
         assert (Eq : q i = / Q2R (entry d i)) by (unfold q; destruct (follower_dec i) as [_|Nf]; [reflexivity|exfalso; apply Nf; split; assumption]).
         set (di := Q2R (entry d i)) in *. set (W := sg j * xi P (Y u) i / di).
         assert (Fj : f j u = e u * W) by (unfold f, W; fold i; rewrite Eq; field; lra).
-        assert (All : forall v, In v (agents P) -> Rabs (xi P (Y u) v) <= W * Q2R (entry d v)).
+        assert (All : forall v, In v (its_agents P) -> Rabs (xi P (Y u) v) <= W * Q2R (entry d v)).
         { intros v Hv. destruct (R2 v Hv) as [[_ [_ [Z0 Z1]]]|[Nv [Dv _]]]; [rewrite Z0, Z1, Rabs_R0; lra|].
           assert (Ev : q v = / Q2R (entry d v)) by (unfold q; destruct (follower_dec v) as [_|Nf]; [reflexivity|exfalso; apply Nf; split; assumption]).
           pose proof (Hagents v Hv) as Hvn. set (dv := Q2R (entry d v)) in *.
@@ -264,7 +264,7 @@ Proof.
         assert (W0 : 0 <= W). { pose proof (All i A) as K. pose proof (Rabs_pos (xi P (Y u) i)). fold di in K. nra. }
         destruct (R1 m Hm) as [C Z].
         assert (Ei : sg j * xi P (Y u) i = W * di) by (unfold W; field; lra).
-        pose proof (rows_draw n d (agents P) (xi P (Y u)) W W0 All (ties m) (ties_ok F Hmodes m Hm) C w i (sg j) Hw A (Hsg j) Ei) as K.
+        pose proof (rows_draw n d (its_agents P) (xi P (Y u)) W W0 All (ties m) (ties_ok F Hmodes m Hm) C w i (sg j) Hw A (Hsg j) Ei) as K.
         rewrite <- (member_xi (ties m) w P i (fun v Hv => Z w i v Hw Hv) (Y u)) in K. fold L in K.
         assert (EL : xi P (fun v => - (g * L v)) i = - (g * L i)).
         { unfold xi. assert (S0 : fold_right (fun v a0 => Q2R (nth i (snd v) 0%Q) * - (g * L (fst v)) + a0) 0 (still P) = 0); [|rewrite S0; ring].
@@ -307,9 +307,9 @@ Qed.
 Lemma rows_value x : exists a, 0 <= a /\ below b a x.
 Proof.
   set (g := fun i => sq (xi P x i / Q2R (entry d i))). assert (G0 : forall i, 0 <= g i) by (intros; apply sq_pos).
-  set (a := fold_right (fun i a => g i + a) 0 (agents P)).
-  assert (S : 0 <= a /\ forall i, In i (agents P) -> g i <= a).
-  { unfold a. generalize (agents P). clear a. induction l as [|j l [I1 I2]]; simpl; [split; [lra|intros i []]|]. pose proof (G0 j). split; [lra|].
+  set (a := fold_right (fun i a => g i + a) 0 (its_agents P)).
+  assert (S : 0 <= a /\ forall i, In i (its_agents P) -> g i <= a).
+  { unfold a. generalize (its_agents P). clear a. induction l as [|j l [I1 I2]]; simpl; [split; [lra|intros i []]|]. pose proof (G0 j). split; [lra|].
     intros i [->|Hi]; [lra|]. specialize (I2 i Hi). lra. }
   destruct S as [S0 S1]. exists a. split; [exact S0|]. unfold below. rewrite Hby. fold P. intros i Hi. fold (entry d i).
   destruct rows_parts as [_ [R2 _]]. destruct (R2 i Hi) as [[_ [_ [Z0 Z1]]]|[_ [Dp _]]].

@@ -259,7 +259,7 @@ Proof.
   unfold sq in K'. apply Rabs_le.
   assert (0 <= IZR s * (Q2R a * sqrt c)) by (apply Rmult_le_pos; [lra|apply Rmult_le_pos; assumption]). split; nra.
 Qed.
-Lemma offs_ok cs : check_offs q r p cs = true -> forall x a i, In i (agents p) -> qbil P (xi p x) (xi p x) <= a ->
+Lemma offs_ok cs : check_offs q r p cs = true -> forall x a i, In i (its_agents p) -> qbil P (xi p x) (xi p x) <= a ->
   sq (xi p x i) <= Q2R (nth i cs 0%Q) * a.
 Proof.
   intros HC x a i Hi Ha. unfold check_offs in HC. rewrite forallb_forall in HC. specialize (HC i Hi). cbv zeta in HC.
@@ -354,7 +354,7 @@ Proof.
 Qed.
 Lemma inputs_ok b l roots : about b = p -> forallb (check_tie n) l = true -> check_inputs q r b l roots = true ->
   forall w x a, 0 <= a -> qbil P (xi p x) (xi p x) <= a -> admits l w ->
-  (forall i, In i (agents p) -> sq (member l w x i) <= Q2R (nth i (inputs b) 0%Q) * a) /\
+  (forall i, In i (its_agents p) -> sq (member l w x i) <= Q2R (nth i (inputs b) 0%Q) * a) /\
   forall m, In m (means b) -> sq (qdot (fst m) (member l w x)) <= Q2R (snd m) * a.
 Proof.
   intros Ep HT HC w x a Ha Hv Hw. unfold check_inputs in HC. cbv zeta in HC. set (dq := common (map middle l)) in *.

@@ -147,7 +147,7 @@ let roots_of n part (q : quotient) means modes = match factor_mod n q.qsw q.qfw 
   | None -> bad "P is not definite"
   | Some r ->
       let fs = List.map fst q.qfw in
-      let here = Pieces.inside n part.agents in
+      let here = Pieces.inside n part.its_agents in
       let above d scale = root (Number.div (square r q fs d) (Number.of_z (Z.mul scale scale))) in
       List.map (fun m ->
         let dq = middle_common m.ties in
@@ -157,12 +157,12 @@ let roots_of n part (q : quotient) means modes = match factor_mod n q.qsw q.qfw 
 (* the weights of a mode that have a multiplier: those that move what is left to the states at rest *)
 let moving part n =
   let pivots = List.map fst part.still in
-  let here = Pieces.inside n part.agents and pivot = Pieces.inside n pivots in
+  let here = Pieces.inside n part.its_agents and pivot = Pieces.inside n pivots in
   let columns = List.map (fun (p, v) -> p, Array.of_list v) part.still in
   let of_pivot p k = match List.assoc_opt p columns with Some v -> v.(k) | None -> Number.zero in
   let entry j k = (* column j of C at k, which is no pivot *)
     if pivot j then Number.sub Number.zero (of_pivot j k) else if j = k then Number.one else Number.zero in
-  let rows = List.filter (fun k -> not (pivot k)) part.agents in
+  let rows = List.filter (fun k -> not (pivot k)) part.its_agents in
   fun e -> here e.head && not (known e)
     && not (pivot e.head && pivot e.tail)
     && List.exists (fun k ->
@@ -181,7 +181,7 @@ let rows_of nodes parts modes proof of_ v =
   if get "parts" <> Arr [] then unsupported "a family with a function of rows whose parts have forms of their own";
   let part = component_of parts (get "component") in
   let pivot = Pieces.inside n (List.map fst part.still) in
-  let own = List.filter (fun i -> not (pivot i)) part.agents in
+  let own = List.filter (fun i -> not (pivot i)) part.its_agents in
   need (own <> []) "a function of rows without followers";
   let d = Array.make n Number.zero in
   List.iter2 (fun i x -> need (Z.sign x.qnum > 0) "vector: a number is not positive"; d.(i) <- x) own (numbers "vector" (List.length own) (get "vector"));
@@ -189,7 +189,7 @@ let rows_of nodes parts modes proof of_ v =
   need (Number.equal (bare proof "family-rows" of_ [ "b" ] "b") rate) (of_ ^ ": b is not the rate");
   let d = Array.to_list d in
   let squared x = Number.mul x x in
-  let here = Pieces.inside n part.agents in
+  let here = Pieces.inside n part.its_agents in
   let inputs = List.init n (fun i -> if not (here i) then Number.zero else
     List.fold_left (fun a m -> Number.max a (squared (row_sum m.ties (row_moved d) i))) Number.zero modes) in
   { about = part; by_ = Rows d; decay = rate; inputs; offs = List.map squared d; means = [] }, { multipliers = []; roots = [] }
@@ -199,7 +199,7 @@ let mean_of nodes part v =
   let get = fields "a mean" [ "weights"; "constant" ] v in
   let weights = match get "weights" with
     | Obj l -> List.map (fun (label, x) -> node nodes "means" (Str label), number "means" x) l | _ -> bad "means: an object is due" in
-  let here = Pieces.inside n part.agents in
+  let here = Pieces.inside n part.its_agents in
   need (weights <> [] && List.for_all (fun (i, _) -> here i) weights) "means: of agents of the component";
   let row i = List.map (fun (_, v) -> List.nth v i) part.still in
   let size l = List.map (fun x -> if Number.compare x Number.zero < 0 then Number.sub Number.zero x else x) l in
@@ -217,7 +217,7 @@ let form_of nodes parts modes proof work k v =
   let part = component_of parts (get "component") in
   let pivot = Pieces.inside n (List.map fst part.still) in
   let own = positions nodes "nodes of a function" (get "nodes") in
-  need (own <> [] && own = List.filter (fun i -> not (pivot i)) part.agents) "nodes of a function";
+  need (own <> [] && own = List.filter (fun i -> not (pivot i)) part.its_agents) "nodes of a function";
   let p = Reader.matrix nodes "lower_triangle" (Array.of_list own) (entries "lower_triangle" (get "lower_triangle")) in
   let rate = number "rate" (get "rate") in
   let labels = List.map (fun i -> nodes.labels.(i)) in
@@ -246,7 +246,7 @@ let form_of nodes parts modes proof work k v =
   bare_of proof "family-constants" of_;
   let means = map (mean_of nodes part) (entries "means" (get "means")) in
   need (List.length means <= 100) "means: more than 100";
-  let b = { about = part; by_ = Form p; decay = rate; inputs = spread part.agents "inputs" (get "inputs");
+  let b = { about = part; by_ = Form p; decay = rate; inputs = spread part.its_agents "inputs" (get "inputs");
     offs = spread own "coordinates" (get "coordinates"); means } in
   b, { multipliers; roots = roots_of n part q means modes }
 let lyapunov_of nodes parts modes proof work k v =
@@ -306,14 +306,14 @@ let certificate (j : Json.t) : t =
   need (List.length witnesses = List.length found) "family-claim: one for each component";
   let first = (List.hd modes).mandatory in
   let parts = List.map2 (fun ((own, camps), becomes) w ->
-    { agents = own; becomes; still = columns nodes first own camps becomes w }) (List.combine found claims) witnesses in
+    { its_agents = own; becomes; still = columns nodes first own camps becomes w }) (List.combine found claims) witnesses in
   let lyapunov = fields "lyapunov" (if (match get "lyapunov" with Obj l -> List.mem_assoc "drives" l | _ -> false) then [ "functions"; "drives" ] else [ "functions" ]) (get "lyapunov") in
   let functions = entries "functions" (lyapunov "functions") in
   need (List.length functions <= most_functions) "lyapunov.functions: more than 1,000";
   let work = ref 0 in
   let bounds = List.mapi (lyapunov_of nodes parts modes proof work) functions in
   (* the theorem says that a component comes to rest where a function has a positive rate *)
-  let at_rest p = p.becomes = Depends || (match p.agents with [ _ ] -> true
+  let at_rest p = p.becomes = Depends || (match p.its_agents with [ _ ] -> true
     | _ -> List.exists (fun (b, _) -> b.about == p && Z.sign b.decay.qnum > 0) bounds) in
   let unproved = List.filter (fun (_, p) -> not (at_rest p)) (List.mapi (fun i p -> i, p) parts) in
   List.iter (fun (i, _) -> not_checked (Printf.sprintf "claim, that component %d comes to rest under every signal" i)) unproved;

@@ -12,6 +12,8 @@ let mul a b = make (Z.mul a.qnum b.qnum) (Z.mul a.qden b.qden)
 let div a b = (* b is not 0 *)
   let p = Z.mul a.qnum b.qden and d = Z.mul a.qden b.qnum in
   if Z.sign d > 0 then make p d else make (Z.neg p) (Z.neg d)
+let div_signed a b = (* b is not 0 *)
+  if Z.sign b.qnum > 0 then div a b else div { a with qnum = Z.neg a.qnum } { b with qnum = Z.neg b.qnum }
 let compare a b = Z.compare (Z.mul a.qnum b.qden) (Z.mul b.qnum a.qden)
 let add a b = make (Z.add (Z.mul a.qnum b.qden) (Z.mul b.qnum a.qden)) (Z.mul a.qden b.qden)
 let sub a b = add a { b with qnum = Z.neg b.qnum }

@@ -8,7 +8,7 @@ module Z = Number.Z
 type t = {
   nodes : nodes; cert : cert; sha256 : string; theorem : string;
   verdict : string; checked : (string * string) list; unchecked : (string * string) list; sections : string list;
-  hints : Checker.hints }
+  hints : Checker.hints; rest : Json.t list }
 
 let keys = [ "schema"; "producer"; "graph"; "structure"; "claim"; "protocol"; "paper"; "lyapunov"; "rates"; "overshoot";
   "initial_state"; "sliding_variable"; "influence"; "final_state"; "reaching_time"; "input"; "proof"; "verdict"; "digest";
@@ -16,7 +16,7 @@ let keys = [ "schema"; "producer"; "graph"; "structure"; "claim"; "protocol"; "p
 (* keys of some certificates alone: their claims are of other motions, and are not read; or they are claims besides the
    others, which keep their meaning: named, and not believed, with their obligations *)
 let not_read = [ "boxes", "a certificate of a family";
-  "restricted", "a certificate of a family"; "agents", "a certificate of agents of order n, section agents" ]
+  "restricted", "a certificate of a family" ]
 let besides = [ "messages", "messages that are late, lost or rounded"; "leaders", "leaders that move" ]
 (* kinds of obligations and what they are of have these letters alone: what is printed of them can be no other line *)
 let named = String.for_all (function 'a' .. 'z' | '0' .. '9' | '-' | '.' | '[' | ']' -> true | _ -> false)
@@ -341,7 +341,9 @@ let certificate (j : Json.t) : t =
    | _ -> bad "not a certificate of schema \"ptcc-certificate/2\"");
   let more = List.filter (fun (key, _) -> match j with Obj l -> List.mem_assoc key l | _ -> false) besides in
   let apart = match j with Obj l -> List.mem_assoc "components" l | _ -> false in
-  let get = fields "the certificate" (keys @ List.map fst more @ (if apart then [ "components" ] else [])) j in
+  let of_agents = match j with Obj l -> List.mem_assoc "agents" l | _ -> false in
+  let get = fields "the certificate" (keys @ List.map fst more @ (if apart then [ "components" ] else [])
+    @ (if of_agents then [ "agents" ] else [])) j in
   let left_out = ref [] in
   let not_checked s = left_out := s :: !left_out in
   List.iter (fun (key, what) -> not_checked (Printf.sprintf "%s, all that is said of %s" key what)) more;
@@ -492,12 +494,13 @@ let certificate (j : Json.t) : t =
         | Some (Str k), Some (Str o) when more <> [] && of_besides k && named k && named o -> unknown proof k o
         | _ -> bad "an obligation that nothing asks for")
     | _ -> bad "an obligation is not an object" in
-  while proof.rest <> [] do and_besides (List.hd proof.rest) done;
+  (* of agents of order n: [Agents] reads them *)
+  while not of_agents && proof.rest <> [] do and_besides (List.hd proof.rest) done;
   let verdict = text "verdict" (get "verdict") in
-  let certified = rate "proved" <> None || edges = [] in
+  let certified = if of_agents then verdict = "certified" else rate "proved" <> None || edges = [] in
   need (verdict = (if certified then "certified" else "undecided")) "what was proved makes another verdict";
   if not certified then unsupported "an undecided certificate";
-  { nodes; hints = { vectors = List.rev !vectors; facts = !facts; lefts; around }; sha256; verdict; theorem; checked = List.rev proof.checked; unchecked = List.rev proof.unchecked;
+  { nodes; rest = proof.rest; hints = { vectors = List.rev !vectors; facts = !facts; lefts; around }; sha256; verdict; theorem; checked = List.rev proof.checked; unchecked = List.rev proof.unchecked;
     sections = List.rev !left_out;
     cert = { order = Array.length nodes.labels; edges; kind; rho1; rho2; kappa; comps; pieces; all_balanced = found.balance;
       sign_symmetric = Pieces.sign_symmetric all; funcs = functions;

@@ -64,6 +64,20 @@ let obligations = [
     "kept means, integral of the input");
   "family-input", ("for every signal the input is bounded, by these peaks",
     "integral of the input");
+  "agent-positive", ("W > 0",
+    "Lyapunov matrix of one agent");
+  "agent-decrease", ("A W + W A' - b b' + rate W <= 0 at all values of zeta, by Bernstein matrices",
+    "one matrix for all agents");
+  "agent-coupling", ("K = c b'W^-1, and c times the rate of every function used is at least 1",
+    "Lyapunov decrease of a Kronecker product");
+  "agent-motion", ("the common motion is M times its initial value at the deadline",
+    "one agent without neighbours");
+  "agent-final-state", ("Q and M take the initial states to these final states",
+    "L Q = 0 and Q L = 0");
+  "agent-residual", ("what is left at the deadline with a bounded gain",
+    "Schur complement");
+  "agent-input", ("the input of no agent exceeds these",
+    "error constants, Lyapunov decrease");
 ]
 (* and of section 13 *)
 let sliding_bound = "||sigma(t)|| <= phi(t,T_r)^(-mu3) e^(-mu2 t) ||sigma(0)||"

@@ -12,8 +12,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from agent_documents import Setting
-from agent_documents import document as agents_document
 from generators import all_classes, random_graph, smallest
 from mutations import changed, mutants, resealed
 from paper_examples import paper_examples
@@ -24,7 +22,6 @@ from ptcc_certify.checker import check
 from ptcc_certify.checker.obligations import OBLIGATIONS
 from ptcc_certify.cli.verified import VARIABLE, executable, verified_check
 from ptcc_certify.errors import FormatError, ParameterError
-from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.gain_limits import GainLimits
 
@@ -376,14 +373,6 @@ def test_no_text_of_the_file_is_printed_as_a_line_of_its_own(tmp_path: Path) -> 
     (tmp_path / "c.json").write_text(named.to_json(), encoding="utf-8")
     proved = verified_check(str(tmp_path / "c.json"))
     assert proved.report.accepted and "lyapunov.functions[99]" not in {o.of for o in proved.report.obligations}
-
-
-def test_agents_of_order_n_are_not_read_as_agents_of_order_1(tmp_path: Path) -> None:
-    program()
-    document = agents_document(SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)]), Setting())
-    assert check(document).accepted
-    code, text = said(document, tmp_path)
-    assert code == 2 and "agents of order n, section agents" in text and "use ptcc check" in text
 
 
 def compare(document: dict, path: tuple, folder: Path) -> str:

@@ -1,0 +1,75 @@
+(** Agents of order n as a record, and what it claims: what must be read besides [Certificate.v]. *)
+Require Import ZArith QArith Qreals List Bool Reals.
+From Coquelicot Require Import Coquelicot.
+Require Import Certificate.
+Import ListNotations. Open Scope R_scope.
+
+(** one coordinate of space: the offsets by agent; by derivative and agent where the agents begin, and where they end *)
+Record axis := Axis { offsets : list Q; begins : list (list Q); arrivals : list (list (Q * Q)) }.
+(** [x^(n) + a_n x^(n-1) + .. + a_1 x = u] of every node of [graph], under the protocol of it but for [slope], which
+    takes the place of [rho1]; which functions of [graph] are used, and whether all agree at the deadline; [drift] takes
+    the common motion there from time 0; [tops] bounds the inputs by agent *)
+Record agents := Agents { graph : cert; degree : nat; slope : Q; plant : list Q; damping : list Q; gains : list Q;
+  W : list (list Q); P : list (list Q); coupling : Q; falls : Q; used : list nat; agree : bool;
+  drift : option (list (list Q)); axes : list axis; tops : list Q }.
+
+Definition at_ (l : list Q) (i : nat) : R := Q2R (nth i l 0%Q).
+Definition sum (n : nat) (f : nat -> R) : R := fold_right (fun i a => f i + a) 0 (seq 0 n).
+Definition double (n : nat) (A : list (list Q)) (G : nat -> nat -> R) : R :=
+  sum n (fun i => sum n (fun j => at_ (nth i A []) j * G i j)).
+Definition eta (a : agents) t : R := gain (deadline (graph a)) (Q2R (slope a)) (k (graph a)) t.
+Definition turns (a : agents) t : R := clock (deadline (graph a)) (Q2R (slope a)) (k (graph a)) t.
+(** [x i j] is derivative [i] of agent [j]; less its offset [h j]; by powers of the gain *)
+Definition placed (h : nat -> R) (x : nat -> nat -> R) i j : R := x i j - if (i =? 0)%nat then h j else 0.
+Definition y a (h : nat -> R) x t i j : R := placed h x i j / eta a t ^ i.
+Definition control a h x t j : R := at_ (plant a) 0 * h j - eta a t ^ degree a * sum (degree a) (fun i =>
+  at_ (gains a) i * lap (edges (graph a)) (y a h x t i) j + at_ (damping a) i * y a h x t i j).
+(** On [0, T) derivatives are derivatives, and the highest less the sliding variable, which begins at 0, obeys the
+    equation where [t > 0]; all are continuous. *)
+Definition flies a h (X : R -> nat -> nat -> R) (S : R -> nat -> R) : Prop := slides (graph a) S /\
+  (forall j, (j < order (graph a))%nat -> S 0 j = 0) /\
+  forall t j, (j < order (graph a))%nat -> t < deadline (graph a) -> (0 < t ->
+   is_derive (fun u => X u (pred (degree a)) j - S u j) t
+     (control a h (X t) t j - sum (degree a) (fun i => at_ (plant a) i * X t i j)) /\
+   forall i, (i < pred (degree a))%nat -> is_derive (fun u => X u i j) t (X t (1 + i)%nat j)) /\
+  continuous (fun u => S (Rmax 0 u) j) t /\ forall i, (i < degree a)%nat -> continuous (fun u => X (Rmax 0 u) i j) t.
+(** the function of two states of which [V] is that of one; of all derivatives *)
+Definition pair es m (x z : nat -> R) : R := (V es m (fun j => x j + z j) - V es m (fun j => x j - z j)) / 4.
+Definition value a (f : func) (x : nat -> nat -> R) : R :=
+  double (degree a) (P a) (fun i j => pair (edges (graph a)) (ly f) (x i) (x j)).
+
+(** [W] is positive definite, [P] its inverse, and the gains are the last row of it times [coupling] *)
+Definition definite (a : agents) : Prop := (forall x, 0 <= double (degree a) (W a) (fun i j => x i * x j)) /\
+  forall i, (i < degree a)%nat ->
+    sum (degree a) (fun l => at_ (nth i (W a) []) l * at_ (gains a) l) =
+      (if (1 + i =? degree a)%nat then Q2R (coupling a) else 0) /\ forall j, (j < degree a)%nat ->
+    sum (degree a) (fun l => at_ (nth i (W a) []) l * at_ (nth l (P a) []) j) = if (i =? j)%nat then 1 else 0.
+(** along every motion: [V] falls, and so does what parts every derivative of every agent from the common motion *)
+Definition agent_claim (a : agents) (f : func) : Prop := forall h X S t, flies a h X S ->
+  0 <= t < deadline (graph a) -> let v := exp (- (Q2R (falls a) * turns a t)) * value a f (y a h (X 0) 0) in
+  value a f (y a h (X t) t) <= v /\ forall b cs i j, deviation f = Some (b, cs) -> (i < degree a)%nat ->
+    (j < order (graph a))%nat -> let x := placed h (X t) i in
+    sq (x j - end_state (graph a) x j) <= sq (eta a t ^ i) * (at_ cs j * at_ (nth i (W a) []) i * v).
+(** at the deadline all derivatives of all agents are those of the common motion, where it is known: they end there *)
+Definition outcome a M h x i j : R := (if (i =? 0)%nat then h j else 0) +
+  sum (degree a) (fun l => at_ (nth i M []) l * end_state (graph a) (placed h x l) j).
+Definition agreement (a : agents) : Prop := agree a = true -> forall h X S i j, flies a h X S -> (i < degree a)%nat ->
+  (j < order (graph a))%nat -> let tends f y := filterlim f (at_left (deadline (graph a))) (locally y) in
+  tends (fun t => placed h (X t) i j - end_state (graph a) (placed h (X t) i) j) 0 /\
+  forall M, drift a = Some M -> tends (fun t => X t i j) (outcome a M h (X 0) i j).
+(** the intervals of the final states hold these *)
+Definition ends_claim (a : agents) : Prop := forall M x i j, drift a = Some M -> In x (axes a) ->
+  (i < length (arrivals x))%nat -> (j < order (graph a))%nat -> let p := nth j (nth i (arrivals x) []) (0%Q, 0%Q) in
+  Rabs (Q2R (fst p) - outcome a M (at_ (offsets x)) (fun l => at_ (nth l (begins x) [])) i j) <= Q2R (snd p).
+(** the input from the states of the file on, in Euclidean norm over space, and what sliding variables take of it *)
+Definition tops_claim (a : agents) : Prop := tops a <> [] -> forall X S t j, (j < order (graph a))%nat ->
+  (forall x c, nth_error (axes a) c = Some x -> flies a (at_ (offsets x)) (X c) (S c) /\
+     forall i j, (i < degree a)%nat -> (j < order (graph a))%nat -> X c 0 i j = at_ (nth i (begins x) []) j) ->
+  0 <= t < deadline (graph a) ->
+  let m := length (axes a) in let h c := at_ (offsets (nth c (axes a) (Axis [] [] []))) in
+  sqrt (sum m (fun c => sq (control a (h c) (X c t) t j))) +
+    match kind (graph a) with Nominal _ => 0 | SlidingMode _ _ mu1 _ _ _ => Q2R mu1 * INR m end <= at_ (tops a) j.
+
+Definition true_agents (a : agents) : Prop := true_certificate (graph a) /\ definite a /\ agreement a /\
+  ends_claim a /\ tops_claim a /\ forall j, In j (used a) ->
+  exists f, nth_error (funcs (graph a)) j = Some f /\ agent_claim a f.

@@ -1,0 +1,588 @@
+(** The theorem of agents of order n: what the check accepts is true. *)
+Require Import ZArith QArith Qabs Qreals List Bool Reals Lra Lia Psatz FunctionalExtensionality.
+From Coquelicot Require Import Coquelicot.
+Import ListNotations.
+Require Import Vec Definite Graph Flow Certificate Checker Sound Input Slide Main Mean Peak Weighted Large AgentCertificate AgentForms AgentCheck AgentFall AgentMotion AgentEnd.
+Open Scope R_scope.
+
+(** * Rationals and polynomials of the check *)
+Lemma reduced_ok q : Q2R (reduced q) = Q2R q.
+Proof. unfold reduced. cbv zeta. destruct (Qeq_bool _ q) eqn:E; [|reflexivity]. apply Qeq_bool_eq, Qeq_eqR in E. exact E. Qed.
+Lemma index_ok i : Q2R (index i) = INR i.
+Proof. unfold index, Q2R. simpl. rewrite INR_IZR_INZ. field. Qed.
+Lemma peval_reduced p x : peval (map reduced p) x = peval p x.
+Proof. induction p as [|q p IH]; simpl; [reflexivity|]. rewrite reduced_ok, IH. reflexivity. Qed.
+Lemma hom_reduced p x z : hom (map reduced p) x z = hom p x z.
+Proof. induction p as [|q p IH]; simpl; [reflexivity|]. rewrite reduced_ok, IH, map_length. reflexivity. Qed.
+Lemma peval_shifted m q x : peval (repeat 0%Q m ++ [q]) x = x ^ m * Q2R q.
+Proof. induction m as [|m IH]; simpl; [ring|]. rewrite IH, Q2R_0. ring. Qed.
+Lemma peval_choose b p x : peval (choose b p) x = if b then peval p x else 0.
+Proof. destruct b; reflexivity. Qed.
+Lemma qsum_ok n (g : nat -> Q) : Q2R (qsum (map g (seq 0 n))) = sum n (fun l => Q2R (g l)).
+Proof. unfold sum. induction (seq 0 n) as [|i s IH]; simpl; [apply Q2R_0|]. rewrite Q2R_plus, IH. reflexivity. Qed.
+Lemma table_ok n g i j : (i < n)%nat -> (j < n)%nat -> look (table n g) i j = g i j.
+Proof. intros Hi Hj. unfold look, table. rewrite nth_map_seq by exact Hi. apply nth_map_seq. exact Hj. Qed.
+Lemma table_row n g i : (i < n)%nat -> length (nth i (table n g) []) = n.
+Proof. intros Hi. unfold table. rewrite nth_map_seq by exact Hi. rewrite map_length, seq_length. reflexivity. Qed.
+
+Section Agents.
+Variables (h : hints) (split : splitting) (points : list Q) (a : agents).
+Let c := graph a.
+Let n := degree a.
+Let T := deadline c.
+Let d := prepare c.
+Let es := edges c.
+Let rho := Q2R (slope a).
+
+Lemma chain_ok i l z : Q2R (pull_in a) <> 0 ->
+  peval (chain a i l) z = entry_at a z (sq (1 - rho * z) / Q2R (pull_in a)) i l.
+Proof.
+  intros Hk. unfold chain, entry_at. rewrite !peval_padd, !peval_choose, peval_pscale, peval_padd, peval_shifted.
+  assert (K : ~ (pull_in a == 0)%Q) by (intros E; apply Hk; rewrite (Qeq_eqR _ _ E); apply Q2R_0).
+  simpl peval. rewrite Q2R_opp, Q2R_div, index_ok by exact K. rewrite !Q2R_opp, !Q2R_mult, Q2R_1.
+  assert (Q2 : Q2R 2 = 2) by (unfold Q2R; simpl; field). rewrite Q2. fold rho. unfold at_, sq.
+  destruct (S i =? l)%nat, (i =? l)%nat, (S i =? degree a)%nat; field; exact Hk.
+Qed.
+Lemma fall_ok A z i j : peval (fall_entry a A i j) z
+  = (if (S i =? n)%nat && (S j =? n)%nat then 1 else 0) - Q2R (falls a) * at_ (nth i (W a) []) j
+    - sum n (fun l => peval (A i l) z * at_ (nth l (W a) []) j + peval (A j l) z * at_ (nth i (W a) []) l).
+Proof.
+  unfold fall_entry. fold n. rewrite peval_padd, peval_pscale.
+  assert (E : forall s, peval (fold_right (fun l p => padd (padd (pscale (cell (W a) l j) (A i l)) (pscale (cell (W a) i l) (A j l))) p) [] s) z
+    = fold_right (fun l b => peval (A i l) z * at_ (nth l (W a) []) j + peval (A j l) z * at_ (nth i (W a) []) l + b) 0 s).
+  { induction s as [|l s IH]; cbn [fold_right]; [reflexivity|]. rewrite !peval_padd, !peval_pscale, IH. unfold cell, at_. ring. }
+  rewrite E. unfold sum. set (q := fold_right _ 0 (seq 0 n)). cbn [peval]. rewrite Q2R_minus, Q2R_mult. unfold cell.
+  change (Q2R (nth j (nth i (W a) []) 0%Q)) with (at_ (nth i (W a) []) j).
+  assert (M : Q2R (-1) = -1) by (unfold Q2R; simpl; field). rewrite M.
+  destruct ((S i =? n)%nat && (S j =? n)%nat); rewrite ?Q2R_1, ?Q2R_0; ring.
+Qed.
+(** the table is nonnegative beside every form where a polynomial of it is taken at [zeta] between two points *)
+Let m := Nat.max n 2.
+Lemma interval_ok tab low high z F Y : positive F -> check_interval split n m tab low high = true ->
+  forallb (forallb (fun p : list Q => (length p <=? S m)%nat)) tab = true -> length tab = n -> (forall i, (i < n)%nat -> length (nth i tab []) = n) ->
+  Q2R low <= z <= Q2R high -> 0 <= sum n (fun i => sum n (fun j => peval (look tab i j) z * F (Y i) (Y j))).
+Proof.
+  intros HF H HL L1 L2 Hz. unfold check_interval in H. cbv zeta in H.
+  set (x := if Req_EM_T (Q2R low) (Q2R high) then 0 else (z - Q2R low) / (Q2R high - Q2R low)).
+  assert (Hx : 0 <= x <= 1 /\ Q2R low + Q2R (high - low) * x = z).
+  { unfold x. rewrite Q2R_minus. destruct (Req_EM_T (Q2R low) (Q2R high)) as [E|E]; [split; [lra|]; rewrite Rmult_0_r; lra|].
+    split; [|field; lra]. split.
+    - apply Rmult_le_pos; [lra|]. left. apply Rinv_0_lt_compat. lra.
+    - apply (Rmult_le_reg_r (Q2R high - Q2R low)); [lra|]. unfold Rdiv. rewrite Rmult_assoc, Rinv_l by lra. lra. }
+  destruct Hx as [X1 X2]. set (B := fun i j => map reduced (bernstein m (moved low (high - low) (look tab i j)))).
+  assert (LB : forall i j, length (B i j) = S m) by (intros; unfold B; rewrite map_length; apply bernstein_length).
+  assert (Elook : forall i j, (i < n)%nat -> (j < n)%nat -> peval (look tab i j) z = sum (S m) (fun u => at_ (B i j) u * (x ^ u * (1 - x) ^ (m - u)))).
+  { intros i j Hi Hj. rewrite <- X2, <- moved_ok, <- (bernstein_ok m).
+    - rewrite <- hom_reduced. fold (B i j). rewrite hom_sum, LB. reflexivity.
+    - assert (Lm : forall p, (length (moved low (high - low) p) <= length p)%nat).
+      { clear. assert (Lp : forall p q, (length (padd p q) = Nat.max (length p) (length q))%nat)
+          by (induction p as [|u p IH]; intros [|v q]; simpl; auto).
+        induction p as [|u p IH]; [simpl; lia|]. cbn [moved]. cbv zeta. rewrite !Lp. unfold pscale. cbn [length]. rewrite !map_length. lia. }
+      eapply Nat.le_trans; [apply Lm|]. rewrite forallb_forall in HL. specialize (HL (nth i tab [])). rewrite forallb_forall in HL.
+      apply Nat.leb_le. apply HL; [apply nth_In; lia|]. apply nth_In. rewrite L2 by exact Hi. exact Hj. }
+  rewrite (sum_ext n _ (fun i => sum (S m) (fun u => (x ^ u * (1 - x) ^ (m - u)) * sum n (fun j => at_ (B i j) u * F (Y i) (Y j))))).
+  2: { intros i Hi. rewrite (sum_ext n _ (fun j => sum (S m) (fun u => (x ^ u * (1 - x) ^ (m - u)) * (at_ (B i j) u * F (Y i) (Y j))))).
+    - rewrite sum_swap. apply sum_ext. intros u _. apply sum_scal.
+    - intros j Hj. rewrite Elook by assumption. rewrite Rmult_comm, <- sum_scal. apply sum_ext. intros. ring. }
+  rewrite sum_swap. rewrite <- (sum_zero (S m) (fun _ => 0)) by reflexivity. apply sum_le. intros u Hu. rewrite sum_scal.
+  apply Rmult_le_pos; [apply Rmult_le_pos; apply pow_le; lra|].
+  rewrite forallb_forall in H. specialize (H u ltac:(apply in_seq; lia)). pose proof (psd_ok _ _ _ F Y HF H) as K. unfold double in K.
+  eapply Rle_trans; [exact K|]. apply Req_le. apply sum_ext. intros i Hi. apply sum_ext. intros j Hj. f_equal. unfold at_. f_equal.
+  set (g := fun p => map reduced (bernstein m (moved low (high - low) p))). fold g.
+  rewrite nth_indep with (d' := map (fun p => nth u p 0%Q) (map g [])) by (rewrite !map_length; lia).
+  rewrite (map_nth (map (fun p => nth u p 0%Q))), (map_nth (map g)).
+  rewrite nth_indep with (d' := (fun p => nth u p 0%Q) (g [])) by (rewrite !map_length, L2; lia).
+  rewrite (map_nth (fun p => nth u p 0%Q)), (map_nth g). reflexivity.
+Qed.
+Lemma points_ok check last z : forall points low, check_points check low points last = true -> Q2R low <= z <= Q2R last ->
+  points <> [] -> exists low high, check low high = true /\ Q2R low <= z <= Q2R high.
+Proof.
+  induction points0 as [|p l IH]; intros low H Hz Hp; [contradiction|]. simpl in H. apply andb_prop in H as [H1 H2].
+  destruct (Rle_lt_dec z (Q2R p)) as [L|L]; [exists low, p; split; [exact H1|lra]|].
+  destruct l as [|q l]; [|apply (IH p); [exact H2|lra|discriminate]].
+  simpl in H2. apply Qeq_bool_eq, Qeq_eqR in H2. lra.
+Qed.
+End Agents.
+
+Definition check_agents_only (split : splitting) (points : list Q) (a : agents) : bool :=
+  check_matrices split a && check_decrease split a points && check_coupling a && check_agree a && check_common a && check_ends_of a && check_tops a.
+Definition accepts_agents (h : hints) (split : splitting) (points : list Q) (a : agents) : bool :=
+  accepts h (graph a) && negb (enclosed (graph a)) && check_agents_only split points a.
+
+Section Sound.
+Variables (h : hints) (split : splitting) (points : list Q) (a : agents).
+Let c := graph a.
+Let n := degree a.
+Let d := prepare c.
+Hypothesis Hedges : check_edges c (dls d) = true.
+Hypothesis Hprot : check_protocol c = true.
+Hypothesis Hend : check_end c d = true.
+Hypothesis Hfuncs : forallb (check_function c d) (funcs c) = true.
+Hypothesis Hmatrices : check_matrices split a = true.
+Hypothesis Hdecrease : check_decrease split a points = true.
+Hypothesis Hcoupling : check_coupling a = true.
+
+Lemma pull_ok : Q2R (pull_in a) = k c.
+Proof. unfold pull_in, k. rewrite Q2R_mult. reflexivity. Qed.
+Lemma span_ok : Q2R (span c) = deadline c.
+Proof. unfold span, deadline. destruct (kind c); [reflexivity|]. apply Q2R_plus. Qed.
+Lemma matrices : psd split n (W a) = true /\ 0 < Q2R (coupling a) /\ 0 < Q2R (falls a) /\ 0 <= Q2R (slope a) /\ (0 < n)%nat /\
+  (forall i j, (i < n)%nat -> (j < n)%nat -> at_ (nth i (P a) []) j = at_ (nth j (P a) []) i) /\
+  (forall i j, (i < n)%nat -> (j < n)%nat -> sum n (fun l => at_ (nth i (W a) []) l * at_ (nth l (P a) []) j) = if (i =? j)%nat then 1 else 0) /\
+  forall i, (i < n)%nat -> sum n (fun l => at_ (nth i (W a) []) l * at_ (gains a) l) = if (S i =? n)%nat then Q2R (coupling a) else 0.
+Proof.
+  unfold check_matrices in Hmatrices. fold n in Hmatrices. cbv zeta in Hmatrices.
+  apply andb_prop in Hmatrices as [H H6]. apply andb_prop in H as [H H5]. apply andb_prop in H as [H H4].
+  apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2]. simpl in H2. apply andb_prop in H2 as [P1 P2].
+  apply andb_prop in P2 as [P2 _]. split; [exact H1|]. split; [apply Qpos; exact P1|]. split; [apply Qpos; exact P2|].
+  split; [apply notneg_ok; exact H3|]. split; [apply Nat.ltb_lt; exact H4|]. split; [|split].
+  - intros i j Hi Hj. pose proof (square_ok _ _ H5 i j Hi Hj) as K. cbv beta in K. apply andb_prop in K as [K _].
+    apply Qeq_bool_eq, Qeq_eqR in K. exact K.
+  - intros i j Hi Hj. pose proof (square_ok _ _ H5 i j Hi Hj) as K. cbv beta in K. apply andb_prop in K as [_ K].
+    apply Qeq_bool_eq, Qeq_eqR in K. unfold row_times in K. rewrite qsum_ok in K.
+    rewrite (sum_ext n _ (fun l => Q2R (cell (W a) i l * cell (P a) l j))) by (intros; rewrite Q2R_mult; reflexivity).
+    rewrite K. destruct (i =? j)%nat; [apply Q2R_1|apply Q2R_0].
+  - intros i Hi. rewrite forallb_forall in H6. specialize (H6 i ltac:(apply in_seq; lia)). apply Qeq_bool_eq, Qeq_eqR in H6.
+    unfold row_times in H6. rewrite qsum_ok in H6.
+    rewrite (sum_ext n _ (fun l => Q2R (cell (W a) i l * nth l (gains a) 0%Q))) by (intros; rewrite Q2R_mult; reflexivity).
+    rewrite H6. destruct (S i =? n)%nat; [reflexivity|apply Q2R_0].
+Qed.
+Lemma definite_ok : definite a.
+Proof.
+  destruct matrices as [M1 [_ [_ [_ [_ [_ [M7 M8]]]]]]]. split.
+  - intros x. assert (PF : positive (fun u v : nat -> R => u O * v O)).
+    { constructor; intros; try ring. apply Rle_0_sqr. }
+    apply (psd_ok split n (W a) _ (fun i _ => x i) PF M1).
+  - intros i Hi. split; [apply M8; exact Hi|]. intros j Hj. apply M7; assumption.
+Qed.
+Lemma gain_slope t : 0 <= t < deadline c -> 0 < eta a t /\ eta a 0 <= eta a t.
+Proof.
+  intros Ht. destruct matrices as [_ [_ [_ [M4 _]]]]. destruct (T_k a Hprot) as [A B]. fold c in A, B.
+  unfold eta, gain. fold c. set (T := deadline c) in *. rewrite Rminus_0_r.
+  assert (0 < k c / (T - t)) by (apply Rdiv_lt_0_compat; lra). split; [lra|]. apply Rplus_le_compat_l.
+  apply Rmult_le_compat_l; [lra|]. apply Rinv_le_contravar; lra.
+Qed.
+(** the matrix of the decrease, at every instant *)
+Lemma falls_ok F Y t : positive F -> 0 <= t < deadline c -> let z := / eta a t in let th := sq (1 - Q2R (slope a) * z) / k c in
+  0 <= sum n (fun i => sum n (fun j => ((if (S i =? n)%nat && (S j =? n)%nat then 1 else 0) - Q2R (falls a) * at_ (nth i (W a) []) j
+    - sum n (fun l => entry_at a z th i l * at_ (nth l (W a) []) j + entry_at a z th j l * at_ (nth i (W a) []) l)) * F (Y i) (Y j))).
+Proof.
+  intros HF Ht z th. destruct (gain_slope t Ht) as [E0 E1]. destruct (T_k a Hprot) as [A B]. fold c in A, B.
+  unfold check_decrease in Hdecrease. cbv zeta in Hdecrease. apply andb_prop in Hdecrease as [HL H].
+  destruct points as [|low [|p l]]; try discriminate. apply andb_prop in H as [H0 H]. fold n in HL, H.
+  assert (E2 : 0 < eta a 0) by (apply gain_slope; lra).
+  assert (Last : Q2R (/ (slope a + pull_in a / span (graph a))) = / eta a 0).
+  { assert (Es : ~ (span (graph a) == 0)%Q) by (intros E; apply Qeq_eqR in E; rewrite Q2R_0 in E; pose proof span_ok as SO; unfold c in *; lra).
+    assert (Ev : Q2R (slope a + pull_in a / span (graph a)) = eta a 0).
+    { rewrite Q2R_plus, Q2R_div, pull_ok by exact Es. fold c. rewrite span_ok. unfold eta, gain. fold c. rewrite Rminus_0_r. reflexivity. }
+    rewrite Q2R_inv, Ev; [reflexivity|]. intros E. apply Qeq_eqR in E. rewrite Ev, Q2R_0 in E. lra. }
+  apply Qle_bool_iff, Qle_Rle in H0. rewrite Q2R_0 in H0.
+  assert (Hz : Q2R low <= z <= / eta a 0).
+  { split; [|apply Rinv_le_contravar; assumption]. assert (0 < z) by (apply Rinv_0_lt_compat; exact E0). lra. }
+  rewrite <- Last in Hz. destruct (points_ok _ _ z (p :: l) low H Hz ltac:(discriminate)) as [lo [hi [HC Hz']]].
+  assert (L1 : length (fall_table a) = n) by (unfold fall_table, table; rewrite map_length, seq_length; reflexivity).
+  assert (L2 : forall i, (i < n)%nat -> length (nth i (fall_table a) []) = n).
+  { intros i Hi. apply (table_row n _ i Hi). }
+  pose proof (interval_ok split a (fall_table a) lo hi z F Y HF HC HL L1 L2 Hz') as K. fold n in K.
+  eapply Rle_trans; [exact K|]. apply Req_le. apply sum_ext. intros i Hi. apply sum_ext. intros j Hj. f_equal.
+  unfold fall_table. cbv zeta. rewrite table_ok by assumption. rewrite peval_reduced, fall_ok. f_equal.
+  apply sum_ext. intros l' Hl. rewrite !table_ok by assumption.
+  assert (Nk : Q2R (pull_in a) <> 0) by (rewrite pull_ok; lra). rewrite !chain_ok by exact Nk. rewrite pull_ok. reflexivity.
+Qed.
+Theorem claim_ok j f : In j (used a) -> nth_error (funcs c) j = Some f -> agent_claim a f.
+Proof.
+  intros Hj Ef. assert (Hf : In f (funcs c)) by (apply (nth_error_In _ _ Ef)).
+  assert (Hc : 1 <= Q2R (coupling a) * Q2R (rate f)).
+  { unfold check_coupling in Hcoupling. rewrite forallb_forall in Hcoupling. specialize (Hcoupling j Hj). fold c in Hcoupling. rewrite Ef in Hcoupling.
+    apply Qle_bool_iff, Qle_Rle in Hcoupling. rewrite Q2R_mult, Q2R_1 in Hcoupling. exact Hcoupling. }
+  rewrite forallb_forall in Hfuncs. specialize (Hfuncs f Hf). unfold check_function in Hfuncs.
+  destruct (Checker.form (order c) (dls d) (dL d) (ly f)) as [[F m]|] eqn:EF; [|discriminate].
+  apply andb_prop in Hfuncs as [H H4]. apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2].
+  pose proof (Main.Hls c Hedges) as HL. fold d in HL.
+  set (S := pair (edges c) (ly f)). assert (PS : positive S) by (apply (pair_positive c f HL F m EF H2)).
+  destruct matrices as [M1 [M2 [M3 [M4 [M5 [M6 [M7 M8]]]]]]].
+  assert (Wsym : forall i j, (i < n)%nat -> (j < n)%nat -> at_ (nth i (W a) []) j = at_ (nth j (W a) []) i)
+    by (intros; apply (psd_symmetric split n); assumption).
+  intros off X Sl t HX Ht v. fold c in Ht.
+  assert (D : value a f (y a off (X t) t) <= v).
+  { apply (value_falls a off X Sl Hprot M4 M5 HX f (Q2R (falls a))); [| | | |exact Ht].
+    - apply (pair_derive c f HL F m EF).
+    - apply (pair_continuous c f HL F m EF).
+    - exact PS.
+    - intros u Y Hu m'. apply (falling S (lap (edges c)) n (fun i j => at_ (nth i (W a) []) j) (fun i j => at_ (nth i (P a) []) j)
+        (entry_at a (/ eta a u) (sq (1 - Q2R (slope a) * / eta a u) / k c)) (at_ (gains a)) (Q2R (coupling a)) (Q2R (falls a)) (Q2R (rate f)) Y PS);
+        try assumption.
+      + intros. apply lap_comb.
+      + apply (pair_rate c f HL F m EF H1).
+      + split; assumption.
+      + apply (falls_ok S (fun i => comb n (fun l => at_ (nth i (P a) []) l) Y) u PS Hu). }
+  split; [exact D|]. intros b cs i jj Edev Hi Hjj x. rewrite Edev in H4.
+  set (dev := fun z : nat -> R => z jj - end_state c z jj).
+  assert (DV : forall z, 0 <= at_ cs jj /\ sq (dev z) <= at_ cs jj * S z z).
+  { intros z. destruct (deviation_ok c Hedges Hend f F m EF b cs H4 z) as [_ K]. specialize (K jj Hjj).
+    unfold S. rewrite (pair_self c f HL F m EF). exact K. }
+  assert (PD : positive (fun z z' => at_ cs jj * S z z' - dev z * dev z')).
+  { constructor.
+    - intros. rewrite (swaps S PS). ring.
+    - intros. rewrite (adds S PS). unfold dev. rewrite (end_plus a). fold c. ring.
+    - intros. rewrite (scales S PS). unfold dev. rewrite (end_scal a). fold c. ring.
+    - intros z. destruct (DV z) as [_ K]. unfold sq in K. lra. }
+  assert (E : x = fun j => eta a t ^ i * y a off (X t) t i j).
+  { apply functional_extensionality. intros j'. apply (y_times a off Hprot M4). apply Ht. }
+  assert (Ex : x jj - end_state (graph a) x jj = eta a t ^ i * dev (y a off (X t) t i)).
+  { rewrite E. rewrite (end_scal a). fold c. unfold dev. ring. }
+  rewrite Ex. unfold sq at 1 2. replace (eta a t ^ i * dev (y a off (X t) t i) * (eta a t ^ i * dev (y a off (X t) t i)))
+    with (eta a t ^ i * eta a t ^ i * sq (dev (y a off (X t) t i))) by (unfold sq; ring).
+  apply Rmult_le_compat_l; [apply Rle_0_sqr|].
+  assert (WP : forall u : nat -> R, 0 <= sum n (fun i => sum n (fun j => at_ (nth i (W a) []) j * (u i * u j)))) by (apply definite_ok).
+  pose proof (one_part S n (fun i j => at_ (nth i (W a) []) j) (fun i j => at_ (nth i (P a) []) j) (y a off (X t) t) PS Wsym M7
+    dev (at_ cs jj) i) as K. cbv beta in K.
+  assert (K' : sq (dev (y a off (X t) t i)) <= at_ (nth i (W a) []) i * (at_ cs jj * value a f (y a off (X t) t))).
+  { apply K; [|intros Z; apply (psd_ok split n (W a) _ Z PD M1)|exact WP|exact Hi].
+    intros l Z. unfold dev. rewrite (end_comb a). fold c. unfold comb at 1. rewrite (sum_ext n (fun i0 => l i0 * (Z i0 jj - end_state c (Z i0) jj))
+      (fun i0 => l i0 * Z i0 jj + -1 * (l i0 * end_state c (Z i0) jj))) by (intros; ring). rewrite sum_plus, sum_scal. ring. }
+  eapply Rle_trans; [exact K'|]. destruct (DV (fun _ => 0)) as [C0 _].
+  assert (W0 : 0 <= at_ (nth i (W a) []) i).
+  { specialize (WP (fun l => if (i =? l)%nat then 1 else 0)).
+    rewrite (sum_ext n _ (fun l => (if (i =? l)%nat then 1 else 0) * sum n (fun j => (if (i =? j)%nat then 1 else 0) * at_ (nth l (W a) []) j))) in WP.
+    - rewrite (sum_at' n i (fun l => sum n (fun j => (if (i =? j)%nat then 1 else 0) * at_ (nth l (W a) []) j))),
+        (sum_at' n i (fun j => at_ (nth i (W a) []) j)) in WP by exact Hi. exact WP.
+    - intros l _. rewrite <- sum_scal. apply sum_ext. intros. ring. }
+  replace (at_ cs jj * at_ (nth i (W a) []) i * v) with (at_ (nth i (W a) []) i * (at_ cs jj * v)) by ring.
+  apply Rmult_le_compat_l; [exact W0|]. apply Rmult_le_compat_l; [exact C0|exact D].
+Qed.
+(** * Where they end *)
+Hypothesis Hagree : check_agree a = true.
+Hypothesis Hcommon : check_common a = true.
+Hypothesis Hends : check_ends_of a = true.
+Lemma part_ok q m : Q2R (part q m) = Q2R q ^ m / INR (fact m).
+Proof.
+  induction m as [|m IH]; cbn [part]; [rewrite Q2R_1; simpl; field|].
+  assert (N : ~ (index (S m) == 0)%Q) by (unfold index, inject_Z, Qeq; simpl; lia).
+  rewrite Q2R_mult, Q2R_div, IH, index_ok by exact N. change (fact (S m)) with (S m * fact m)%nat. rewrite mult_INR, <- tech_pow_Rmult.
+  pose proof (INR_fact_neq_0 m). assert (INR (S m) <> 0) by (apply not_0_INR; lia). field. split; assumption.
+Qed.
+Lemma zeros l i : forallb (Qeq_bool 0) l = true -> at_ l i = 0.
+Proof.
+  intros H. unfold at_. destruct (nth_in_or_default i l 0%Q) as [I|E]; [|rewrite E; apply Q2R_0].
+  rewrite forallb_forall in H. specialize (H _ I). apply Qeq_bool_eq, Qeq_eqR in H. rewrite <- H. apply Q2R_0.
+Qed.
+Theorem agreement_ok : agreement a.
+Proof.
+  intros HA off X Sl i j HX Hi Hj tends.
+  destruct matrices as [M1 [M2 [M3 [M4 [M5 [M6 [M7 M8]]]]]]].
+  assert (D : tends (fun t => placed off (X t) i j - end_state (graph a) (placed off (X t) i) j) 0).
+  { unfold check_agree in Hagree. rewrite HA in Hagree. simpl in Hagree. apply andb_prop in Hagree as [G1 G2].
+    apply existsb_exists in G2 as [kf [Hk G2]]. destruct (nth_error (funcs (graph a)) kf) as [f|] eqn:Ef; [|discriminate].
+    destruct (deviation f) as [[b cs]|] eqn:Ed; [|discriminate].
+    pose proof (claim_ok kf f Hk Ef off X Sl) as CL.
+    apply negb_true_iff in G1. destruct (Qlt_le_dec (2 * index (pred n)) (falls a * pull_in a)) as [L|L]; [|apply Qle_bool_iff in L; unfold n in L; congruence].
+    apply Qlt_Rlt in L. rewrite !Q2R_mult, index_ok, pull_ok in L. assert (Q2 : Q2R 2 = 2) by (unfold Q2R; simpl; field). rewrite Q2 in L.
+    set (C := at_ cs j * at_ (nth i (W a) []) i * value a f (y a off (X 0) 0)).
+    assert (B : forall t, 0 <= t < deadline (graph a) -> sq (placed off (X t) i j - end_state (graph a) (placed off (X t) i) j)
+      <= sq (eta a t ^ i) * (C * exp (- (Q2R (falls a) * turns a t)))).
+    { intros t Ht. destruct (CL t HX Ht) as [_ K]. specialize (K b cs i j Ed Hi Hj). cbv zeta in K. eapply Rle_trans; [exact K|].
+      apply Req_le. unfold C. ring. }
+    apply (vanishes a Hprot M4 _ i (Q2R (falls a)) (Rmax 0 C)).
+    - apply Rmax_l.
+    - eapply Rle_lt_trans; [|exact L]. apply Rmult_le_compat_l; [lra|]. apply le_INR. unfold n in *. lia.
+    - intros t Ht. eapply Rle_trans; [apply (B t Ht)|]. apply Rmult_le_compat_l; [apply Rle_0_sqr|].
+      apply Rmult_le_compat_r; [left; apply exp_pos|apply Rmax_r]. }
+  split; [exact D|]. intros M EM. unfold check_common in Hcommon. rewrite EM in Hcommon. apply andb_prop in Hcommon as [Z HM].
+  rewrite forallb_app in Z. apply andb_prop in Z as [Z1 Z2].
+  destruct (T_k a Hprot) as [T0 K0]. fold c in T0, K0. set (T := deadline c) in *.
+  set (wj := fun t => taylor (n - i) (fun l => end_state c (placed off (X (Rmax 0 0)) (i + l)) j) t).
+  assert (EW : forall t, 0 <= t < T -> end_state c (placed off (X t) i) j = wj t).
+  { intros t Ht. pose proof (drifts a off X Sl Hedges Hend Hprot M5 HX (fun l => zeros _ l Z1) (fun l => zeros _ l Z2) j (n - i) i
+      ltac:(unfold n in *; lia) ltac:(unfold n in *; lia) t Ht) as K. cbv beta zeta in K. rewrite (Rmax_right 0 t) in K by lra. exact K. }
+  assert (EO : outcome a M off (X 0) i j = (if (i =? 0)%nat then off j else 0) + wj T).
+  { unfold outcome. f_equal. fold n c. unfold wj, taylor. rewrite Rmax_left by lra.
+    rewrite <- (sum_from i n (fun u v => T ^ u / INR (fact u) * end_state c (placed off (X 0) v) j)) by (unfold n in *; lia).
+    apply sum_ext. intros l Hl. pose proof (square_ok _ _ HM i l Hi Hl) as K. cbv beta in K. apply Qeq_bool_eq, Qeq_eqR in K.
+    change (at_ (nth i M []) l) with (Q2R (cell M i l)). rewrite K. destruct (i <=? l)%nat; [|rewrite Q2R_0; ring].
+    rewrite part_ok. fold c. rewrite span_ok. reflexivity. }
+  rewrite EO. unfold tends in *. fold c T in D |- *.
+  assert (CW : filterlim (fun t => (if (i =? 0)%nat then off j else 0) + wj t) (at_left T) (locally ((if (i =? 0)%nat then off j else 0) + wj T))).
+  { apply (filterlim_filter_le_1 (G := at_left T) (F := at_left T) (fun t => (if (i =? 0)%nat then off j else 0) + wj t) (fun P HP => HP)).
+    eapply filterlim_filter_le_1; [|apply (continuous_plus (fun _ => if (i =? 0)%nat then off j else 0) wj);
+      [apply continuous_const|apply @ex_derive_continuous]].
+    - intros P [e He]. exists e. intros u Hu _. apply He. exact Hu.
+    - destruct (n - i)%nat as [|u] eqn:Eu; [unfold n in *; lia|]. unfold wj. eexists. apply taylor_derive. }
+  apply (filterlim_ext_loc (fun t => (placed off (X t) i j - end_state c (placed off (X t) i) j) + ((if (i =? 0)%nat then off j else 0) + wj t))).
+  - exists (mkposreal T T0). intros t Bt Lt. unfold ball in Bt; simpl in Bt; unfold AbsRing_ball, abs, minus, plus, opp in Bt; simpl in Bt.
+    apply Rabs_def2 in Bt. rewrite EW by lra. unfold placed. ring.
+  - evar_last.
+    + apply (filterlim_comp_2 (F := at_left T) (G := locally 0) (H := locally ((if (i =? 0)%nat then off j else 0) + wj T))
+        (fun t => placed off (X t) i j - end_state c (placed off (X t) i) j) (fun t => (if (i =? 0)%nat then off j else 0) + wj t) Rplus D CW).
+      apply (filterlim_plus 0 ((if (i =? 0)%nat then off j else 0) + wj T)).
+    + unfold plus; simpl. f_equal. ring.
+Qed.
+Lemma dotq_ok l : forall x, Q2R (dotq l x) = qdot l (at_ x).
+Proof.
+  induction l as [|q l IH]; intros [|v x]; cbn [dotq qdot]; try apply Q2R_0.
+  - rewrite (qdot_ext _ _ (fun i => 0 * 1)) by (intros i _; unfold shift, at_; destruct i; simpl; rewrite Q2R_0; ring).
+    rewrite qdot_scal. unfold at_. simpl. rewrite Q2R_0. ring.
+  - rewrite reduced_ok, Q2R_plus, Q2R_mult, IH. reflexivity.
+Qed.
+Lemma ends_q_ok x j : (j < order c)%nat -> Q2R (nth j (ends_q c x) 0%Q) = end_state c (at_ x) j.
+Proof.
+  intros Hj. unfold ends_q. cbv zeta. rewrite nth_map_seq by exact Hj. rewrite reduced_ok. unfold end_state.
+  induction (balanced_comps (comps c)) as [|b l IH]; simpl; [apply Q2R_0|]. rewrite Q2R_plus, Q2R_mult, IH, dotq_ok. reflexivity.
+Qed.
+Lemma less_ok x : forall v j, length x = length v -> at_ (less x v) j = at_ x j - at_ v j.
+Proof.
+  unfold at_, less. induction x as [|q x IH]; intros [|u v] j L; simpl in *; try discriminate.
+  - destruct j; rewrite Q2R_0; ring.
+  - destruct j as [|j]; simpl; [apply Q2R_minus|]. apply IH. lia.
+Qed.
+Theorem ends_ok : ends_claim a.
+Proof.
+  intros M x i j EM Hx Hi Hj p. unfold check_ends_of in Hends. rewrite EM in Hends. rewrite forallb_forall in Hends.
+  specialize (Hends x Hx). unfold check_axis in Hends. cbv zeta in Hends. apply andb_prop in Hends as [H H4].
+  apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2]. apply Nat.leb_le in H1. apply Nat.eqb_eq in H2, H3.
+  rewrite forallb_forall in H4. specialize (H4 i ltac:(apply in_seq; lia)). rewrite forallb_forall in H4.
+  specialize (H4 j ltac:(apply in_seq; lia)). fold p in H4. apply Qle_bool_iff, Qle_Rle in H4. eapply Rle_trans; [|exact H4].
+  assert (AB : forall q, Q2R (Qabs q) = Rabs (Q2R q)).
+  { intros [u v]. unfold Q2R. simpl. rewrite abs_IZR, Rabs_mult. f_equal. symmetry. apply Rabs_right. apply Rle_ge. left.
+    apply Rinv_0_lt_compat. apply IZR_lt. reflexivity. }
+  rewrite AB, Q2R_minus, Q2R_plus. apply Req_le. f_equal. f_equal. unfold outcome. f_equal; [destruct (i =? 0)%nat; [reflexivity|symmetry; apply Q2R_0]|].
+  unfold row_times. rewrite qsum_ok. apply sum_ext. intros l Hl. rewrite Q2R_mult. f_equal. unfold cell. rewrite nth_map_seq by exact Hl.
+  fold c. rewrite ends_q_ok by exact Hj. f_equal. apply functional_extensionality. intros v. unfold placed, placed_q. cbv zeta.
+  destruct (Nat.eqb_spec l 0) as [->|]; [symmetry; apply less_ok; congruence|ring].
+Qed.
+
+(** * The input *)
+Hypothesis Htops : check_tops a = true.
+Lemma eta_0_ok : Q2R (slope a + pull_in a / span (graph a)) = eta a 0.
+Proof.
+  destruct (T_k a Hprot) as [A B]. fold c in A, B.
+  assert (Es : ~ (span (graph a) == 0)%Q) by (intros E; apply Qeq_eqR in E; rewrite Q2R_0 in E; pose proof span_ok as SO; unfold c in *; lra).
+  rewrite Q2R_plus, Q2R_div, pull_ok by exact Es. fold c. rewrite span_ok. unfold eta, gain. fold c. rewrite Rminus_0_r. reflexivity.
+Qed.
+Lemma powq_ok q m : Q2R (powq q m) = Q2R q ^ m.
+Proof. induction m as [|m IH]; simpl; [apply Q2R_1|]. rewrite Q2R_mult, IH. reflexivity. Qed.
+Lemma rows_ok x i j : length (offsets x) = order c -> length (nth 0 (begins x) []) = order c -> (i < n)%nat ->
+  at_ (nth i (begin_rows a x) []) j = y a (at_ (offsets x)) (fun l => at_ (nth l (begins x) [])) 0 i j.
+Proof.
+  intros L1 L2 Hi. unfold begin_rows. cbv zeta. fold n. rewrite nth_map_seq by exact Hi.
+  assert (E : forall u (g : Q -> Q), Q2R (g 0%Q) = 0 -> at_ (map g u) j = Q2R (g (nth j u 0%Q))).
+  { intros u g G. unfold at_. destruct (Nat.lt_ge_cases j (length u)) as [L|L].
+    - rewrite nth_indep with (d' := g 0%Q) by (rewrite map_length; exact L). rewrite map_nth. reflexivity.
+    - rewrite !nth_overflow by (try rewrite map_length; exact L). rewrite G. apply Q2R_0. }
+  rewrite E by (rewrite reduced_ok, Q2R_mult, Q2R_0; ring). rewrite reduced_ok, Q2R_mult, powq_ok. unfold y.
+  pose proof eta_0_ok as E0. assert (P0 : 0 < eta a 0) by (apply gain_slope; split; [lra|apply (T_k a Hprot)]).
+  rewrite Q2R_inv by (intros Z; apply Qeq_eqR in Z; rewrite E0, Q2R_0 in Z; lra). rewrite E0. unfold Rdiv. rewrite <- pow_inv. f_equal.
+  unfold placed_q, placed. cbv zeta. change (Q2R (nth j ?u 0%Q)) with (at_ u j).
+  destruct (Nat.eqb_spec i 0) as [->|]; [apply less_ok; congruence|unfold at_; ring].
+Qed.
+Lemma worth_ok f F m rows x : Checker.form (order c) (dls d) (dL d) (ly f) = Some (F, m) -> check_rows (order c) rows = true -> length rows = n ->
+  (forall i, (i < n)%nat -> at_ (nth i rows []) = x i) -> Q2R (worth_q a F m rows) = value a f x.
+Proof.
+  intros EF HR HL Hx. pose proof (Main.Hls c Hedges) as Hl. fold d in Hl.
+  destruct (form_ok _ _ _ _ _ _ _ Hl eq_refl EF) as [M _]. apply IZR_lt in M.
+  unfold check_rows in HR. rewrite forallb_forall in HR. set (e := common (concat rows)) in *.
+  unfold worth_q. fold n. cbv zeta. fold e. rewrite qsum_ok. unfold value, double. fold n. apply sum_ext. intros i Hi.
+  rewrite qsum_ok. apply sum_ext. intros j Hj. rewrite reduced_ok, Q2R_mult. change (Q2R (cell (P a) i j)) with (at_ (nth i (P a) []) j). f_equal.
+  assert (Gd : forall l, (l < n)%nat -> good e (nth l rows []) = true).
+  { intros l Hl'. assert (K : In (nth l rows []) rows) by (apply nth_In; lia). specialize (HR _ K). apply andb_prop in HR. apply HR. }
+  assert (E0 : 0 < IZR e) by (apply IZR_lt; apply (good_ok _ _ (Gd i Hi))).
+  assert (Vx : forall l, (l < n)%nat -> vec_of (map (scaled e) (nth l rows [])) = fun v => IZR e * x l v).
+  { intros l Hl'. apply functional_extensionality. intros v. unfold vec_of. rewrite nth_scaled by (apply Gd; exact Hl').
+    rewrite <- (Hx l Hl'). reflexivity. }
+  assert (EG : forall l v, (l < n)%nat -> (v < n)%nat -> IZR (nth v (nth l (map (fun z => map (zdot (lincomb z F)) (map (map (scaled e)) rows))
+      (map (map (scaled e)) rows)) []) 0%Z) = IZR e * IZR e * bil F (x l) (x v)).
+  { intros l v Hl' Hv. set (zs := map (map (scaled e)) rows). assert (Lz : length zs = n) by (unfold zs; rewrite map_length; exact HL).
+    rewrite nth_indep with (d' := (fun z => map (zdot (lincomb z F)) zs) []) by (rewrite map_length; exact (eq_ind_r (fun q => (l < q)%nat) Hl' Lz)).
+    rewrite (map_nth (fun z => map (zdot (lincomb z F)) zs)).
+    rewrite nth_indep with (d' := zdot (lincomb (nth l zs []) F) []) by (rewrite map_length; exact (eq_ind_r (fun q => (v < q)%nat) Hv Lz)).
+    rewrite (map_nth (zdot (lincomb (nth l zs []) F))). rewrite <- zdot_ok, <- bil_vec_l.
+    assert (Ez : forall u, (u < n)%nat -> vec_of (nth u zs []) = fun q => IZR e * x u q).
+    { intros u Hu. unfold zs. rewrite (nth_indep _ [] (map (scaled e) [])) by (rewrite map_length, HL; exact Hu). rewrite map_nth. apply Vx. exact Hu. }
+    rewrite !Ez by assumption. rewrite bil_scal_l, bil_scal_r. ring. }
+  rewrite (pair_bil c f Hl F m EF).
+  assert (IZ : forall u, Q2R (inject_Z u) = IZR u) by (intros u; unfold Q2R; simpl; field).
+  assert (NZ : ~ (inject_Z (2 * m * (e * e)) == 0)%Q).
+  { intros Z. apply Qeq_eqR in Z. rewrite IZ, Q2R_0, !mult_IZR in Z.
+    assert (0 < 2 * IZR m * (IZR e * IZR e)) by (apply Rmult_lt_0_compat; [lra|apply Rmult_lt_0_compat; assumption]). lra. }
+  rewrite Q2R_div by exact NZ.
+  rewrite !IZ, plus_IZR, !EG, !mult_IZR by assumption. field. split; lra.
+Qed.
+(** the relative part of the input *)
+Lemma relative_ok kf f F m v cs cn off X Sl t j : In kf (used a) -> nth_error (funcs c) kf = Some f ->
+  bounds_of c d f = Some (v, cs, cn) -> Checker.form (order c) (dls d) (dL d) (ly f) = Some (F, m) ->
+  fits (order c) (dL d) = true -> good (common (start c)) (start c) = true ->
+  flies a off X Sl -> 0 <= t < deadline c -> (j < order c)%nat -> 2 * INR n <= Q2R (falls a) * k c ->
+  sq (eta a t ^ n * sum n (fun i => at_ (gains a) i * lap (edges c) (y a off (X t) t i) j))
+    <= eta a 0 ^ (2 * n) * (Q2R (coupling a) * at_ (gains a) (pred n)) * value a f (y a off (X 0) 0) * at_ cs j.
+Proof.
+  intros Hu Ef EB EF Hfit Gs HX Ht Hj Hr. destruct matrices as [M1 [M2 [M3 [M4 [M5 [M6 [M7 M8]]]]]]].
+  pose proof (nth_error_In _ _ Ef) as Hf. pose proof Hfuncs as HC. rewrite forallb_forall in HC. specialize (HC f Hf). unfold check_function in HC.
+  fold c d in HC. rewrite EF in HC. apply andb_prop in HC as [HC _]. apply andb_prop in HC as [HC H3]. apply andb_prop in HC as [_ H2].
+  pose proof (Main.Hls c Hedges) as Hl. fold d in Hl.
+  assert (B : forall x, sq (lap (edges c) x j) <= at_ cs j * V (edges c) (ly f) x).
+  { intros x. destruct (bounds_ok c Hl (fun e He => Main.Hsrc c Hedges e He) Hfit Gs (at_ (start c)) (fun _ _ => eq_refl) f v cs cn H3 H2 EB) as [_ [K _]].
+    apply (K x j Hj). }
+  destruct (claim_ok kf f Hu Ef off X Sl t HX Ht) as [CV _].
+  set (S := pair (edges c) (ly f)). assert (PS : positive S) by (apply (pair_positive c f Hl F m EF H2)).
+  set (ell := fun x : nat -> R => lap (edges c) x j).
+  assert (C0 : 0 <= at_ cs j \/ forall x, V (edges c) (ly f) x = 0).
+  { destruct (Rle_lt_dec 0 (at_ cs j)) as [|Ng]; [left; assumption|right]. intros x. specialize (B x).
+    pose proof (above0 S PS x) as V0. unfold S in V0. rewrite (pair_self c f Hl F m EF) in V0. pose proof (Rle_0_sqr (lap (edges c) x j)).
+    unfold sq, Rsqr in *. nra. }
+  assert (PD : positive (fun x z => at_ cs j * S x z - ell x * ell z)).
+  { constructor.
+    - intros. rewrite (swaps S PS). ring.
+    - intros x x' z. rewrite (adds S PS). unfold ell.
+      assert (EL : lap (edges c) (fun i => x i + x' i) j = lap (edges c) x j + lap (edges c) x' j).
+      { transitivity (1 * lap (edges c) x j + lap (edges c) x' j); [|ring]. rewrite <- lap_two. f_equal. apply functional_extensionality. intros. ring. }
+      rewrite EL. ring.
+    - intros. rewrite (scales S PS). unfold ell. rewrite lap_scal. ring.
+    - intros z. specialize (B z). unfold S. rewrite (pair_self c f Hl F m EF). unfold ell, sq in *. lra. }
+  set (w := fun i j => at_ (nth i (W a) []) j). set (K := at_ (gains a)). set (Y := y a off (X t) t).
+  assert (WP : forall u : nat -> R, 0 <= sum n (fun i => sum n (fun j => w i j * (u i * u j)))) by (apply definite_ok).
+  assert (A : sq (ell (comb n K Y)) <= sum n (fun i => sum n (fun j => w i j * (K i * K j))) * (at_ cs j * value a f Y)).
+  { apply (any_part S n w (fun i j => at_ (nth i (P a) []) j) Y PS).
+    - intros u z Hu' Hz. apply (psd_symmetric split n); assumption.
+    - exact M7.
+    - intros l Z. unfold ell. rewrite lap_comb. reflexivity.
+    - intros Z. apply (psd_ok split n (W a) _ Z PD M1).
+    - exact WP. }
+  assert (EK : sum n (fun i => sum n (fun j => w i j * (K i * K j))) = Q2R (coupling a) * K (pred n)).
+  { rewrite (sum_ext n _ (fun i => (if (pred n =? i)%nat then Q2R (coupling a) * K i else 0))); [apply (sum_at n (pred n)); lia|].
+    intros i Hi. transitivity (K i * sum n (fun j => w i j * K j)); [rewrite <- sum_scal; apply sum_ext; intros; ring|].
+    change (sum n (fun j => w i j * K j)) with (sum n (fun l => at_ (nth i (W a) []) l * at_ (gains a) l)). rewrite (M8 i Hi). fold K. destruct (Nat.eqb_spec (Datatypes.S i) n), (Nat.eqb_spec (pred n) i); try lia; ring. }
+  rewrite EK in A.
+  assert (Erel : sum n (fun i => K i * lap (edges c) (Y i) j) = ell (comb n K Y)) by (unfold ell; rewrite lap_comb; reflexivity).
+  fold K Y. rewrite Erel. assert (CK : 0 <= Q2R (coupling a) * K (pred n)) by (rewrite <- EK; apply WP).
+  pose proof (powers a Hprot M4 (2 * n) (Q2R (falls a)) ltac:(rewrite mult_INR; exact Hr) t Ht) as PW.
+  set (V0 := value a f (y a off (X 0) 0)) in *. set (x := exp (- (Q2R (falls a) * turns a t))) in *. set (e := eta a t) in *.
+  assert (Sq : sq (e ^ n * ell (comb n K Y)) = e ^ (2 * n) * sq (ell (comb n K Y))).
+  { unfold sq. replace (2 * n)%nat with (n + n)%nat by lia. rewrite pow_add. ring. }
+  rewrite Sq. assert (E2 : 0 <= e ^ (2 * n)) by (replace (2 * n)%nat with (n + n)%nat by lia; rewrite pow_add; apply Rle_0_sqr).
+  assert (V1 : 0 <= value a f Y).
+  { unfold value. fold n. pose proof (worth_self S n w (fun i j => at_ (nth i (P a) []) j) Y PS M7) as WS. unfold double.
+    change (sum n (fun i => sum n (fun j => at_ (nth i (P a) []) j * pair (edges (graph a)) (ly f) (Y i) (Y j)))) with
+      (sum n (fun i => sum n (fun j => at_ (nth i (P a) []) j * S (Y i) (Y j)))). rewrite WS. apply (psd_ok split n (W a) S _ PS M1). }
+  assert (csV : at_ cs j * value a f Y <= at_ cs j * (x * V0)).
+  { destruct C0 as [C0|Z]; [apply Rmult_le_compat_l; assumption|].
+    assert (ZV : forall u, value a f u = 0).
+    { intros u. unfold value, double. apply sum_zero. intros i _. apply sum_zero. intros i' _. unfold pair. fold c. rewrite !Z. field. }
+    unfold V0. rewrite !ZV. lra. }
+  apply Rle_trans with (e ^ (2 * n) * (Q2R (coupling a) * K (pred n) * (at_ cs j * (x * V0)))).
+  - apply Rmult_le_compat_l; [exact E2|]. eapply Rle_trans; [exact A|]. apply Rmult_le_compat_l; assumption.
+  - assert (CV0 : 0 <= at_ cs j * V0).
+    { assert (0 <= at_ cs j * value a f Y).
+      { destruct C0 as [C0|Z]; [apply Rmult_le_pos; assumption|]. unfold value, double. rewrite sum_zero; [lra|].
+        intros i _. apply sum_zero. intros i' _. unfold pair. fold c. rewrite !Z. field. }
+      pose proof (exp_pos (- (Q2R (falls a) * turns a t))) as X0. fold x in X0. nra. }
+    replace (e ^ (2 * n) * (Q2R (coupling a) * K (pred n) * (at_ cs j * (x * V0))))
+      with (x * e ^ (2 * n) * (Q2R (coupling a) * K (pred n) * (at_ cs j * V0))) by ring.
+    replace (eta a 0 ^ (2 * n) * (Q2R (coupling a) * K (pred n)) * V0 * at_ cs j)
+      with (eta a 0 ^ (2 * n) * (Q2R (coupling a) * K (pred n) * (at_ cs j * V0))) by ring.
+    apply Rmult_le_compat_r; [apply Rmult_le_pos; [exact CK|exact CV0]|exact PW].
+Qed.
+Lemma value_ext f F m x z : Checker.form (order c) (dls d) (dL d) (ly f) = Some (F, m) ->
+  (forall i j, (i < n)%nat -> (j < order c)%nat -> x i j = z i j) -> value a f x = value a f z.
+Proof.
+  intros EF H. pose proof (Main.Hls c Hedges) as Hl. fold d in Hl. destruct (form_ok _ _ _ _ _ _ _ Hl eq_refl EF) as [_ [Hfit _]].
+  destruct (fits_ok _ _ Hfit) as [F1 F2]. unfold value. apply double_ext. intros i j Hi Hj. fold c. rewrite !(pair_bil c f Hl F m EF).
+  assert (E : forall u v, (u < n)%nat -> (v < n)%nat -> bil F (x u) (x v) = bil F (z u) (z v)).
+  { intros u v Hu Hv. rewrite (bil_ext_l F (x u) (z u)) by (intros; apply H; [assumption|lia]).
+    apply (bil_ext_r F (order c)); [exact F2|]. intros; apply H; assumption. }
+  rewrite !E by assumption. reflexivity.
+Qed.
+Lemma minkowski m (u p r : nat -> R) R : (forall i, (i < m)%nat -> Rabs (u i) <= p i + r i /\ 0 <= p i /\ 0 <= r i) ->
+  sum m (fun i => sq (r i)) <= R * R -> 0 <= R -> sqrt (sum m (fun i => sq (u i))) <= sum m p + R.
+Proof.
+  intros H HR R0. set (T := sum m p).
+  assert (One : forall g i, (forall j, (j < m)%nat -> 0 <= g j) -> (i < m)%nat -> g i <= sum m g).
+  { intros g i G Hi. rewrite <- (sum_at m i g Hi). apply sum_le. intros j Hj. specialize (G j Hj). destruct (i =? j)%nat; lra. }
+  assert (T0 : 0 <= T).
+  { unfold T. rewrite <- (sum_zero m (fun _ => 0)) by reflexivity. apply sum_le. intros i Hi. apply (H i Hi). }
+  rewrite <- (sqrt_square (T + R)) by lra. apply sqrt_le_1_alt.
+  apply Rle_trans with (sum m (fun i => (T + 2 * R) * p i + sq (r i))).
+  - apply sum_le. intros i Hi. destruct (H i Hi) as [A [P0 R1]].
+    assert (p i <= T) by (apply (One p i); [intros; apply H; assumption|exact Hi]).
+    assert (r i <= R).
+    { apply Rsqr_incr_0; [|assumption|assumption]. unfold Rsqr. eapply Rle_trans; [|exact HR].
+      apply (One (fun i => sq (r i)) i); [intros; apply Rle_0_sqr|exact Hi]. }
+    apply Rle_trans with (sq (p i + r i)).
+    + unfold sq. rewrite <- (Rabs_right (u i * u i)) by (apply Rle_ge; apply Rle_0_sqr). rewrite Rabs_mult.
+      apply Rmult_le_compat; try apply Rabs_pos; assumption.
+    + unfold sq. assert (p i * p i <= T * p i) by (apply Rmult_le_compat_r; assumption).
+      assert (p i * r i <= p i * R) by (apply Rmult_le_compat_l; assumption). lra.
+  - rewrite sum_plus, sum_scal. fold T. lra.
+Qed.
+Lemma qsum_list {A} (g : A -> Q) l x0 : Q2R (qsum (map g l)) = sum (length l) (fun i => Q2R (g (nth i l x0))).
+Proof.
+  induction l as [|x l IH]; [apply Q2R_0|]. cbn [map length]. rewrite sum_front. cbn [nth]. rewrite <- IH. unfold qsum. cbn [fold_right].
+  apply Q2R_plus.
+Qed.
+Theorem tops_ok : tops_claim a.
+Proof.
+  intros Ne X Sl t j Hj HX Ht m hh. fold c in Hj, Ht. unfold check_tops in Htops. destruct (tops a) as [|q0 l0] eqn:Et; [contradiction|].
+  set (l := q0 :: l0) in *. cbv zeta in Htops. fold c n d in Htops.
+  apply andb_prop in Htops as [H H7]. apply andb_prop in H as [H H6]. apply andb_prop in H as [H H5]. apply andb_prop in H as [H H4].
+  apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2].
+  apply Qle_bool_iff, Qle_Rle in H2. rewrite !Q2R_mult, index_ok, pull_ok in H2.
+  assert (Q2 : Q2R 2 = 2) by (unfold Q2R; simpl; field). rewrite Q2 in H2.
+  rewrite forallb_forall in H5, H6, H7. specialize (H7 j ltac:(apply in_seq; lia)). apply andb_prop in H7 as [R0 H7].
+  set (added := match kind c with Nominal _ => 0%Q | SlidingMode _ _ mu1 _ _ _ => (mu1 * index (length (axes a)))%Q end) in *.
+  assert (EA : Q2R added = match kind c with Nominal _ => 0 | SlidingMode _ _ mu1 _ _ _ => Q2R mu1 * INR m end).
+  { unfold added. destruct (kind c); [apply Q2R_0|]. rewrite Q2R_mult, index_ok. reflexivity. }
+  fold c. rewrite <- EA. set (rest := (nth j l 0 - added - _)%Q) in *.
+  apply existsb_exists in H7 as [[cs B] [Hk HB]]. cbn [fst snd] in HB. apply in_flat_map in Hk as [kf [Hu Hk]].
+  destruct (nth_error (funcs c) kf) as [f|] eqn:Ef; [|destruct Hk].
+  destruct (bounds_of c d f) as [[[v cs'] cn]|] eqn:EB; [|destruct Hk].
+  destruct (Checker.form (order c) (dls d) (dL d) (ly f)) as [[F mm]|] eqn:EF; [|destruct Hk].
+  destruct Hk as [Hk|[]]. injection Hk as <- EBq. apply Qle_bool_iff, Qle_Rle in HB. rewrite <- EBq in HB. clear EBq.
+  pose proof eta_0_ok as E0. fold c in E0. rewrite !Q2R_mult, reduced_ok, !Q2R_mult, powq_ok, E0 in HB. rewrite map_map in HB.
+  set (dflt := Axis [] [] []). rewrite (qsum_list _ _ dflt) in HB. fold m in HB.
+  apply Qle_bool_iff, Qle_Rle in R0. rewrite Q2R_0 in R0.
+  assert (Er : Q2R rest = at_ l j - Q2R added - sum m (fun i => Rabs (at_ (plant a) 0 * hh i j))).
+  { unfold rest. rewrite !Q2R_minus. f_equal. rewrite (qsum_list _ _ dflt). apply sum_ext. intros i _.
+    assert (AB : forall q, Q2R (Qabs q) = Rabs (Q2R q)).
+    { intros [u w]. unfold Q2R. simpl. rewrite abs_IZR, Rabs_mult. f_equal. symmetry. apply Rabs_right. apply Rle_ge. left.
+      apply Rinv_0_lt_compat. apply IZR_lt. reflexivity. }
+    rewrite AB, Q2R_mult. reflexivity. }
+  assert (HXi : forall i, (i < m)%nat -> nth_error (axes a) i = Some (nth i (axes a) dflt)) by (intros i Hi; apply nth_error_nth'; exact Hi).
+  set (rel := fun i => eta a t ^ n * sum n (fun u => at_ (gains a) u * lap (edges c) (y a (hh i) (X i t) t u) j)).
+  assert (MK : sqrt (sum m (fun i => sq (control a (hh i) (X i t) t j))) <= sum m (fun i => Rabs (at_ (plant a) 0 * hh i j)) + Q2R rest).
+  { apply (minkowski m _ _ (fun i => Rabs (rel i))); [| |exact R0].
+    - intros i Hi. split; [|split; apply Rabs_pos]. unfold control. fold n c.
+      rewrite (sum_ext n _ (fun u => at_ (gains a) u * lap (edges c) (y a (hh i) (X i t) t u) j)) by (intros u _; rewrite (zeros _ u H1); ring).
+      fold (rel i). unfold Rminus. eapply Rle_trans; [apply Rabs_triang|]. rewrite Rabs_Ropp. apply Rle_refl.
+    - eapply Rle_trans; [|exact HB]. set (g := eta a 0 ^ (2 * n)). set (CK := Q2R (coupling a) * _).
+      apply Rle_trans with (sum m (fun i => at_ cs' j * (g * CK) * Q2R (worth_q a F mm (begin_rows a (nth i (axes a) dflt))))); [|rewrite sum_scal; apply Req_le; unfold at_; change (eta a 0 ^ (n + (n + 0))) with g; ring].
+      apply sum_le. intros i Hi. destruct (HX _ i (HXi i Hi)) as [HF HB0].
+      assert (Ai : In (nth i (axes a) dflt) (axes a)) by (apply nth_In; exact Hi).
+      specialize (H5 _ Ai). apply andb_prop in H5 as [L1 L2]. apply Nat.eqb_eq in L1, L2.
+      assert (Ri : check_rows (order c) (begin_rows a (nth i (axes a) dflt)) = true) by (apply H6; apply in_map; exact Ai).
+      rewrite (worth_ok f F mm (begin_rows a (nth i (axes a) dflt)) (y a (hh i) (fun u => at_ (nth u (begins (nth i (axes a) dflt)) [])) 0) EF Ri).
+      + rewrite (value_ext f F mm _ (y a (hh i) (X i 0) 0) EF).
+        * replace (sq (Rabs (rel i))) with (sq (rel i)) by (unfold sq; rewrite <- Rabs_mult; symmetry; apply Rabs_right; apply Rle_ge; apply Rle_0_sqr).
+          eapply Rle_trans; [apply (relative_ok kf f F mm v cs' cn (hh i) (X i) (Sl i) t j Hu Ef EB EF H3 H4 HF Ht Hj H2)|].
+          apply Req_le. unfold g, CK, at_. ring.
+        * intros u w Hu' Hw. unfold y, placed. rewrite (HB0 u w Hu' Hw). reflexivity.
+      + unfold begin_rows. cbv zeta. rewrite map_length, seq_length. reflexivity.
+      + intros u Hu'. apply functional_extensionality. intros w. apply rows_ok; assumption. }
+  rewrite Er in MK. lra.
+Qed.
+End Sound.
+
+Theorem accepts_agents_sound h split points a : accepts_agents h split points a = true -> true_agents a.
+Proof.
+  intros H. unfold accepts_agents in H. apply andb_prop in H as [H HA]. apply andb_prop in H as [HG HE].
+  apply negb_true_iff in HE. split; [apply (accepts_sound h); exact HG|]. unfold accepts in HG. rewrite HE in HG.
+  unfold check in HG. set (d := prepare (graph a)) in *.
+  repeat match type of HG with (_ && _ = true) => let K := fresh "G" in apply andb_prop in HG as [HG K] end.
+  unfold check_agents_only in HA. apply andb_prop in HA as [HA A7]. apply andb_prop in HA as [HA A6].
+  apply andb_prop in HA as [HA A5].
+  apply andb_prop in HA as [HA A4]. apply andb_prop in HA as [HA A3]. apply andb_prop in HA as [A1 A2].
+  split; [apply (definite_ok split); assumption|]. split; [apply (agreement_ok split points a); assumption|].
+  split; [apply (ends_ok a); assumption|]. split; [apply (tops_ok split points a); assumption|]. intros j Hj.
+  assert (E : exists f, nth_error (funcs (graph a)) j = Some f).
+  { unfold check_coupling in A3. rewrite forallb_forall in A3. specialize (A3 j Hj).
+    destruct (nth_error (funcs (graph a)) j) as [f|]; [exists f; reflexivity|discriminate]. }
+  destruct E as [f E]. exists f. split; [exact E|]. apply (claim_ok split points a) with (j := j); assumption.
+Qed.

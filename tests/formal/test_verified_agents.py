@@ -1,0 +1,199 @@
+"""Agents of order n before the checker that is itself proved: what is true is accepted, and what is forged is not."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from agent_documents import Setting
+from agent_documents import document as made
+from generators import all_classes, random_graph
+from mutations import Json, at, changed, mutants, nudged, resealed
+from verified import named, program, said, unchecked
+
+from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.checker import check
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.protocols.agents import Agents
+
+F = Fraction
+SOURCES = Path(__file__).resolve().parents[2] / "formal"
+CAMPS = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -2), ("c", "a", "-1/2"), ("c", "f", -1), ("a", "f", 2)])
+SETTINGS = {
+    "double integrators": Setting(),
+    "drag in the plane": Setting(plant=(F(0), F(1, 3)), dimension=2),
+    "oscillators, three pieces": Setting(plant=(F(1), F(-1, 3)), pieces=3, R=F(5)),
+    "no rho1": Setting(order=3, rho1=F(0)),
+    "order 1": Setting(order=1),
+    "at rest": Setting(damping=F(2), plant=(F(0), F(1, 3))),
+    "sliding variables": Setting(slides=True, dimension=2),
+    "every Lyapunov function": Setting(order=3, method="best"),
+    "order 4 without states": Setting(order=4, start=False),
+}
+#: What is not checked of them: the common motion of agents that are no chains of integrators, the input at rest.
+SKIPPED = {"agent-input", "agent-motion", "agent-final-state"}
+#: What the executable says of a form that it does not read.
+UNREAD = ("large form", "undecided", "radius", "capped", "cascade", "dominance", "weak components")
+
+
+@pytest.mark.parametrize("name", SETTINGS)
+def test_certificates_of_agents_are_accepted_and_every_obligation_is_verified_or_named(
+    name: str, tmp_path: Path
+) -> None:
+    program()
+    setting = SETTINGS[name]
+    document = made(CAMPS, setting)
+    assert check(document).accepted
+    code, text = said(document, tmp_path)
+    assert code == 0, text
+    listed = [f"{o['kind']} of {o['of']}" for o in document["proof"]]
+    verified = re.findall(r"^verified    (.*)$", text, re.MULTILINE)
+    left = [line for line in named(text) if line in listed]
+    assert sorted(verified + left) == sorted(listed)
+    skipped = SKIPPED if setting.damping else SKIPPED - {"agent-input"} if any(setting.a) else set()
+    assert {line.split(" ")[0] for line in left} <= skipped
+
+
+def test_the_statement_is_one_more_file_of_as_many_lines_as_is_said() -> None:
+    text = re.sub(r"\(\*.*?\*\)", "", (SOURCES / "AgentCertificate.v").read_text("utf-8"), flags=re.DOTALL)
+    lines = [line for line in text.splitlines() if line.strip()]
+    assert max(map(len, lines)) <= 120
+    assert [line for line in lines if "Require" in line] == [
+        "Require Import ZArith QArith Qreals List Bool Reals.",
+        "From Coquelicot Require Import Coquelicot.",
+        "Require Import Certificate.",
+    ]
+    for page in (SOURCES / "README.md", SOURCES.parent / "docs" / "theory" / "verified-checker.md"):
+        assert f"{len(lines)} more" in page.read_text("utf-8")
+
+
+def test_forms_of_agents_that_are_not_read_are_told_in_one_line(tmp_path: Path) -> None:
+    program()
+    options: dict[str, Any] = {"simulation": False, "derivatives": [[0, 0, 0, 0]]}
+    cascade = certify(CAMPS, NominalProtocol(1, 1, 1, 4), [1, 2, 3, 4], agents=Agents(order=2, cascade=1), **options)
+    for document, what in (
+        (made(CAMPS, Setting(cap=F(7), R=F(5))), "capped"),
+        (json.loads(cascade.to_json()), "cascade"),
+    ):
+        assert check(document).accepted
+        code, text = said(document, tmp_path)
+        assert code == 2 and what in text and "use ptcc check" in text and text.count("\n") == 1
+
+
+def told(document: Json, path: tuple[str | int, ...], new: Any) -> Json:
+    """A change that the proof tells as well, and a digest that fits."""
+    for k, stated in enumerate(document["proof"]):
+        if stated["of"] == "agents" and path[0] == "agents" and path[-1] in stated["numbers"]:
+            document = changed(document, ("proof", k, "numbers", path[-1]), new)
+    return resealed(changed(document, path, new))
+
+
+def test_what_is_forged_is_rejected_by_both_checkers(tmp_path: Path) -> None:
+    program()
+    document = made(CAMPS, Setting())
+    own = document["agents"]
+    more = lambda text: str(F(text) * F(1001, 1000))  # noqa: E731
+    for path, new, where in (
+        (("agents", "rate"), str(F(own["rate"]) * F(11, 10)), "agent-decrease"),
+        (("agents", "coupling"), more(own["coupling"]), "agent-"),
+        (("agents", "gains", 1), more(own["gains"][1]), "agent-"),
+        (("agents", "lower_triangle", 1, 1), more(own["lower_triangle"][1][1]), "agent-"),
+        (("agents", "points"), ["0", "1/10"], "agent-decrease"),
+        (("agents", "motion", 0, 1), more(own["motion"][0][1]), "agent-motion"),
+        (
+            ("agents", "final_state", "f", 0, 1),
+            str(F(own["final_state"]["f"][0][1]) + F(1, 10**9)),
+            "agent-final-state",
+        ),
+        (("agents", "offsets", "b", 0), "77", "agent-final-state"),
+        (("agents", "input", "agents", "b"), str(F(own["input"]["agents"]["b"]) * F(999, 1000)), "input"),
+        (("agents", "plant", 0), "30", "agent-"),
+        (("agents", "own", 0), "1", "feedback"),
+        (("agents", "initial_state", "b", 0), ["1"], "derivatives"),
+        (("agents", "order"), 3, "number of rows"),
+        (("protocol", "rho2"), "1/4", "r k is not above"),
+    ):
+        forged = told(document, path, new)
+        assert not check(forged).accepted, path
+        code, text = said(forged, tmp_path)
+        assert code == 1 and where in text, (path, text)
+
+
+def compare(document: Json, path: tuple[str | int, ...], folder: Path) -> str:
+    """The cause of a difference between the two checkers on a mutant; empty if they agree."""
+    document = resealed(document)
+    python, (code, text) = check(document), said(document, folder)
+    if python.accepted == (code == 0):
+        return ""
+    if code == 0:
+        place, left = str(python.rejected), named(text)
+        assert place in left or unchecked(document, path, left), (path, place, python.reason)
+        return "a part that is not checked"
+    assert code == 2 and any(word in text for word in UNREAD), (path, text)
+    return "a form that is not read"
+
+
+def again(mutant: Json, path: Any, new: str) -> Json:
+    return told(mutant, path, new)
+
+
+def own_mutants(document: Json, every: int, start: int, nudges: int) -> list[tuple[tuple[str | int, ...], Json]]:
+    """Changes of what agents of order n have, and small ones of numbers anywhere."""
+    parts = ("agents", "protocol", "proof", "verdict")
+    small = nudged(document, ("agents", "protocol", "graph", "lyapunov"), start, nudges, again)
+    return [(path, x) for path, x in mutants(document, every, start) if path[0] in parts] + list(small)
+
+
+@pytest.mark.parametrize("name", ["double integrators", "drag in the plane"])
+def test_of_some_mutants_of_agents_none_is_accepted_unless_true_or_not_checked(name: str, tmp_path: Path) -> None:
+    program()
+    document = {**made(CAMPS, SETTINGS[name]), "unverified": {}}
+    for path, mutant in own_mutants(document, 97, 5, 10):
+        compare(mutant, path, tmp_path)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("name", SETTINGS)
+def test_of_hundreds_of_mutants_of_agents_none_is_accepted_unless_true_or_not_checked(
+    name: str, tmp_path: Path
+) -> None:
+    """At least 1,000 in all."""
+    program()
+    document = {**made(CAMPS, SETTINGS[name]), "unverified": {}}
+    every, nudges = int(os.environ.get("PTCC_MUTANTS_EVERY", 5)), int(os.environ.get("PTCC_FUZZ_COUNT", "60"))
+    found = own_mutants(document, every, 1, nudges)
+    causes = [compare(mutant, path, tmp_path) for path, mutant in found]
+    assert len(causes) > 120 and at(document, ("verdict",)) == "certified"
+
+
+def random_setting(seed: int) -> Setting:
+    """Orders 1 to 4, chains and others, with and without ``rho1``, sliding variables, and slow decay."""
+    rng = np.random.default_rng([7, seed])
+    n = 1 + seed % 4
+    plant = tuple(F(int(x), 10) for x in rng.integers(-10, 11, n)) if seed % 3 == 0 else ()
+    rate = F(2 * n - 1) if seed % 7 == 0 else None
+    return Setting(
+        order=n, dimension=1 + seed % 2, plant=plant, R=rate, rho1=F(seed % 5, 8), slides=seed % 4 == 1,
+        method=("paper", "best")[seed % 11 == 0],
+    )  # fmt: skip
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("part", range(5))
+def test_what_the_checker_accepts_of_random_agents_the_verified_one_accepts(part: int, tmp_path: Path) -> None:
+    program()
+    classes = all_classes()
+    for seed in range(part, int(os.environ.get("PTCC_VERIFIED_AGENTS", 150)), 5):
+        name, kwargs = classes[seed % len(classes)]
+        graph = random_graph(np.random.default_rng(seed), **kwargs).graph
+        document = made(graph, random_setting(seed), seed)
+        assert check(document).accepted
+        code, text = said(document, tmp_path)
+        assert code == 0 or (code == 2 and any(word in text for word in UNREAD)), (name, seed, text)
