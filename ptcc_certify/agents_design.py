@@ -283,9 +283,9 @@ def _refuse(agents: Any, request: AgentsRequest) -> None:
             f"decay: below 2 n = {2 * agents.degree} no input is proved to be bounded; leave it out, or cap the gain"
         )
     if request.residual is not None and agents.cap is None:
+        mend = "leave residual out" if agents.cascade is not None else "leave residual out, or give gain_cap"
         raise ParameterError(
-            "residual: nothing is left at T without a gain cap, and no cap is searched for agents of order n; "
-            "leave it out, or give gain_cap"
+            f"residual: nothing is left at T without a gain cap, and no cap is searched for agents of order n; {mend}"
         )
     if agents.cap is not None and request.residual is None:
         raise ParameterError("gain_cap: leaves something at every deadline; give residual, how far a position may be")

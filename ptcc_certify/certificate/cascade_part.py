@@ -263,7 +263,7 @@ def prove_cascade(
     if agents.alpha * falls > LARGEST_DECAY:
         raise ParameterError(
             f"cascade = {near(agents.alpha)} is too large to enclose the common motion: beyond "
-            f"{LARGEST_DECAY}/(rho1 T); take at most {down(LARGEST_DECAY / falls, 4)}, or a smaller rho1"
+            f"{LARGEST_DECAY}/(rho1 T); take at most {down(LARGEST_DECAY / falls, 4)}"
         )
     numbers = [k for k, V in enumerate(functions) if V.proved_rate > 0]
     used = tuple(functions[k] for k in numbers)

@@ -30,8 +30,9 @@ from ptcc_certify.cli import (
     plot,
     simulate,
 )
-from ptcc_certify.cli.scenario import placed
-from ptcc_certify.errors import ExitCode, PTCCError, did_you_mean, explain, one_line
+from ptcc_certify.cli.options import with_flags
+from ptcc_certify.cli.scenario import MEMORY, placed
+from ptcc_certify.errors import ExitCode, ParameterError, PTCCError, did_you_mean, explain, one_line
 from ptcc_certify.graphs.rationals import shorten
 
 __all__ = ["cli", "main"]
@@ -91,6 +92,9 @@ class _Commands(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         try:
             return super().invoke(ctx)
+        except ParameterError as error:
+            command = self.commands[ctx.invoked_subcommand or ""]
+            raise placed(ctx, error) if MEMORY in ctx.meta else with_flags(command, error) from None
         except (PTCCError, click.BadParameter) as error:
             raise placed(ctx, error) from None
         except click.NoSuchOption as error:

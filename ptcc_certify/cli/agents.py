@@ -22,7 +22,7 @@ NAMES = {"integrator": 1, "double-integrator": 2, "triple-integrator": 3}
 #: The largest order, which the library refuses to exceed.
 _MOST_ORDER = 8
 #: Options that need ``--agents``.
-_OWN = ("drag", "plant", "v0", "a0", "offsets", "biases", "rest", "cascade", "decay")
+_OWN = ("cascade", "rest", "decay", "drag", "plant", "v0", "a0", "offsets", "biases")
 
 #: What is said where late messages are asked of agents of order n.
 _MESSAGES = "late messages are proved of single integrators alone: leave it out, or leave out --agents"

@@ -5,6 +5,7 @@ Commands take theirs as keywords; the functions here take what they need from th
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable, Mapping
 from fractions import Fraction
@@ -18,6 +19,7 @@ from ptcc_certify.cli.completion import CERTIFICATES, GRAPHS, PACKAGED, complete
 from ptcc_certify.cli.kinds_of_file import TOML, kind_of, refuse_as_certificate, refuse_as_graph, shell_word
 from ptcc_certify.cli.scenario import (
     FOREIGN,
+    IN_LIBRARY,
     graph_of,
     is_scenario,
     kind_of_protocol,
@@ -53,6 +55,23 @@ _TIMES = ("--sample-period", "--stop-before", "--deadline", "--at")
 def flag_of(name: str) -> str:
     """Return the flag of a parameter."""
     return f"--{name.replace('_', '-')}"
+
+
+def with_flags(command: click.Command, error: ParameterError) -> ParameterError:
+    """Return an error of the library that names flags of a command where it named parameters.
+
+    Examples
+    --------
+    >>> command = click.Command("certify", params=[click.Option(["--gain-cap"]), click.Option(["--rest"])])
+    >>> print(with_flags(command, ParameterError("rest = 1: for an unlimited gain; leave gain_cap out")))
+    --rest = 1: for an unlimited gain; leave --gain-cap out
+    """
+    flags = {p.name: p.opts[0] for p in command.params if isinstance(p, click.Option)}
+
+    def flag(match: re.Match[str]) -> str:
+        return flags.get(IN_LIBRARY.get(match[0], match[0]), match[0])
+
+    return ParameterError(re.sub(r"^\w+(?= = |: )|(?<=leave )\w+(?= out)|(?<=give )\w+(?=[,;]|$)", flag, str(error)))
 
 
 def _exact(context: click.Context, parameter: click.Parameter, text: str | None) -> Fraction | None:

@@ -147,7 +147,7 @@ def _of_certificate(
         of_agents = agents is not None
         if begins and (of_agents or certificate.initial_state is not None):
             mend = "certify agents of order n with it" if of_agents else f"the certificate {path} has its own"
-            raise ParameterError(f"--x0 is for what holds no initial state; {mend}")
+            raise ParameterError(f"--x0, or --seed, is for what holds no initial state; {mend}")
         what = what or certificate.main_figure
         of_these = OF_AGENTS if agents is None or agents.dimension == 2 else ("motion",)
         drawn, others = ((*of_these, *_SHARED), OF_A_RUN) if of_agents else (OF_A_RUN, OF_AGENTS)

@@ -33,6 +33,8 @@ _OF_THE_GRAPH_ALONE = ("classify", "check")
 BESIDE = ("delay", "period", "packet_loss", "quantisation", "own_delay", "leader_speed", "sign_gain")
 #: Where the context of its command is kept.
 COMMAND = "ptcc_certify.command"
+#: What the library calls some options.
+IN_LIBRARY = {"initial_state": "x0", "initial": "x0", "behaviour": "expect", "speed": "leader_speed"}
 
 #: The sections: what they are about, and of each key the option that it stands for, and an example of its value.
 SECTIONS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
@@ -481,9 +483,7 @@ def placed(context: click.Context, error: PTCCError | click.BadParameter) -> Exc
         text = str(error)
         match = re.match(r"(?:--)?([A-Za-z][\w-]*)(: | = | )", text)
         option = match[1].replace("-", "_") if match else ""
-        option = {"initial_state": "x0", "initial": "x0", "behaviour": "expect", "speed": "leader_speed"}.get(
-            option, option
-        )
+        option = IN_LIBRARY.get(option, option)
         if match and match[0].startswith("--"):
             text = text[match.end() :]
     if context.meta[COMMAND].get_parameter_source(option) is ParameterSource.DEFAULT_MAP:
