@@ -63,8 +63,8 @@ class LateMessages:
     Fraction(3, 100)
     >>> LateMessages(delay=1, own_delay=True)
     Traceback (most recent call last):
-    ptcc_certify.errors.ParameterError: own_delay without gain_cap: an own state that is late makes the protocol \
-diverge, for its gain grows without limit before T; give gain_cap, or measure the own state without delay
+    ptcc_certify.errors.ParameterError: an own state that is late makes the protocol diverge, for its gain grows \
+without limit before T; add a gain cap, or measure the own state without delay
     """
 
     delay: Exact | Mapping[tuple[str, str], Exact] = 0

@@ -268,7 +268,7 @@ def test_a_limit_that_is_not_positive_is_refused(seconds: float):
     with pytest.raises(ParameterError, match="time_limit"):
         certify(ring(3), PROTOCOL, time_limit=seconds)
     run = ptcc("certify", "fig1a", "--time-limit", str(seconds))
-    assert run.code == 2 and run.err.count("\n") == 1 and "time_limit" in run.err
+    assert run.code == 2 and run.err.count("\n") == 1 and "--time-limit" in run.err
 
 
 def test_the_integrator_ends_at_the_limit_and_leaves_signals_as_they_were():
