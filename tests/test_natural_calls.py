@@ -276,7 +276,7 @@ FAMILIES = {
     "ptcc.certify(day, p, [1, 2]).plot('picture')": "ParameterError: what = 'picture' is unknown; one of decay, input",
     "ptcc.certify(day, p, [1, 2]).to_pandas().shape": "(2, 8)",
     "ptcc.certify(day, p).to_pandas()[['least', 'largest']].isna().all(axis=None)": "True",
-    "cert.to_pandas().loc['eve', ['role', 'x(0)']].tolist()": "['follower', np.float64(-4.0)]",
+    "cert.to_pandas().loc['eve', ['role', 'x(0)']].tolist()": "-4.0",
     "ptcc.certify(day, p).report": "... for a page or LaTeX: write_report(certificate, path)",
     "ptcc.certify(day, p).summary()": "claim      bipartite consensus at T = 1 for every signal",
     "ptcc.write_report(ptcc.certify(day, p), 'f.html')": "certified",
