@@ -15,7 +15,7 @@ import pytest
 from generators import all_classes, random_graph, smallest
 from mutations import changed, mutants, resealed
 from paper_examples import paper_examples
-from verified import AT_REST, SKIPPED, UNREAD, named, program, said, unchecked
+from verified import AT_REST, SKIPPED, UNREAD, compare, named, program, said
 
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
@@ -373,20 +373,6 @@ def test_no_text_of_the_file_is_printed_as_a_line_of_its_own(tmp_path: Path) -> 
     (tmp_path / "c.json").write_text(named.to_json(), encoding="utf-8")
     proved = verified_check(str(tmp_path / "c.json"))
     assert proved.report.accepted and "lyapunov.functions[99]" not in {o.of for o in proved.report.obligations}
-
-
-def compare(document: dict, path: tuple, folder: Path) -> str:
-    """The cause of a difference between the two checkers on a mutant; empty if they agree."""
-    python, (code, text) = check(resealed(document)), said(resealed(document), folder)
-    accepted = code == 0
-    if python.accepted == accepted:
-        return ""
-    if accepted:
-        at, left = str(python.rejected), named(text)  # what Python found false must be of a part that is named
-        assert at in left or unchecked(document, path, left), (path, at, python.reason)
-        return "a part that is not checked"
-    assert code == 2 and any(word in text for word in UNREAD), (path, text)
-    return "a form that is not read"
 
 
 @pytest.mark.parametrize("number", range(12))

@@ -15,7 +15,7 @@ from agent_documents import Setting
 from agent_documents import document as made
 from generators import all_classes, random_graph
 from mutations import Json, at, changed, mutants, nudged, resealed
-from verified import named, program, said, unchecked
+from verified import compare, named, program, said
 
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
@@ -126,20 +126,6 @@ def test_what_is_forged_is_rejected_by_both_checkers(tmp_path: Path) -> None:
         assert code == 1 and where in text, (path, text)
 
 
-def compare(document: Json, path: tuple[str | int, ...], folder: Path) -> str:
-    """The cause of a difference between the two checkers on a mutant; empty if they agree."""
-    document = resealed(document)
-    python, (code, text) = check(document), said(document, folder)
-    if python.accepted == (code == 0):
-        return ""
-    if code == 0:
-        place, left = str(python.rejected), named(text)
-        assert place in left or unchecked(document, path, left), (path, place, python.reason)
-        return "a part that is not checked"
-    assert code == 2 and any(word in text for word in UNREAD), (path, text)
-    return "a form that is not read"
-
-
 def again(mutant: Json, path: Any, new: str) -> Json:
     return told(mutant, path, new)
 
@@ -156,7 +142,7 @@ def test_of_some_mutants_of_agents_none_is_accepted_unless_true_or_not_checked(n
     program()
     document = {**made(CAMPS, SETTINGS[name]), "unverified": {}}
     for path, mutant in own_mutants(document, 97, 5, 10):
-        compare(mutant, path, tmp_path)
+        compare(mutant, path, tmp_path, UNREAD)
 
 
 @pytest.mark.campaign
@@ -169,7 +155,7 @@ def test_of_hundreds_of_mutants_of_agents_none_is_accepted_unless_true_or_not_ch
     document = {**made(CAMPS, SETTINGS[name]), "unverified": {}}
     every, nudges = int(os.environ.get("PTCC_MUTANTS_EVERY", 5)), int(os.environ.get("PTCC_FUZZ_COUNT", "60"))
     found = own_mutants(document, every, 1, nudges)
-    causes = [compare(mutant, path, tmp_path) for path, mutant in found]
+    causes = [compare(mutant, path, tmp_path, UNREAD) for path, mutant in found]
     assert len(causes) > 120 and at(document, ("verdict",)) == "certified"
 
 

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 import subprocess
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
+from mutations import resealed
 
+from ptcc_certify.checker import check
 from ptcc_certify.cli.verified import executable
 from ptcc_certify.errors import ParameterError
 
@@ -69,3 +72,27 @@ def unchecked(document: dict[str, Any], path: Path_, left: set[str]) -> bool:
             isinstance(place, int) and place < len(proof) and f"{proof[place]['kind']} of {proof[place]['of']}" in left
         )
     return any(".".join(map(str, path[:depth])) in left for depth in range(1, len(path) + 1))
+
+
+def compare(
+    document: dict[str, Any],
+    path: Path_,
+    folder: Path,
+    unread: Collection[str] = UNREAD,
+    more: Callable[[dict[str, Any], Path_, str, set[str]], bool] = lambda *_: False,
+) -> str:
+    """The cause of a difference between the two checkers on a mutant; empty if they agree.
+
+    What Python found false must be of a part that is named as not checked; or ``more`` knows why both are right.
+    """
+    sealed = resealed(document)
+    python, (code, text) = check(sealed), said(sealed, folder)
+    if python.accepted == (code == 0):
+        return ""
+    if code == 0:
+        place, left = str(python.rejected), named(text)
+        known = place in left or unchecked(document, path, left) or more(document, path, place, left)
+        assert known, (path, place, python.reason, text)
+        return "a part that is not checked"
+    assert code == 2 and any(word in text for word in unread), (path, text)
+    return "a form that is not read"
