@@ -30,7 +30,7 @@ from ptcc_certify.report.plots.counterexample import plot_counterexample
 from ptcc_certify.report.plots.family import keeps_dwell, plot_family, plot_family_decay
 from ptcc_certify.report.plots.family_graph import plot_family_graph
 from ptcc_certify.report.plots.family_input import plot_family_input
-from ptcc_certify.report.restricted_screen import restricted_entries, rests, signal_text
+from ptcc_certify.report.restricted_screen import agreement_text, restricted_entries, rests, signal_text
 from ptcc_certify.report.structure_text import structure_text
 from ptcc_certify.report.text_layout import arithmetic
 from ptcc_certify.report.told_instants import FEW, told_instants
@@ -280,7 +280,7 @@ def _states(saved: FamilyCertificate) -> tuple[list[str], list[list[Any]]]:
     which = "every signal" if states_of_signal(saved) == list(saved.final_states or ()) else "these signals"
     which += " and disturbance" * (saved.protocol.reaching is not None)
     last = "State at the deadline" if rests(saved) else "State at any instant"
-    return [*heads, f"{last}, for {which}"], written
+    return [*heads, f"{last}{agreement_text(saved)}, for {which}"], written
 
 
 def remaining(saved: FamilyCertificate, of_signal: bool = False) -> list[tuple[str, Markup]]:

@@ -15,7 +15,7 @@ from ptcc_certify.certificate.restricted_states import constant_states, last_sta
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import STABILITY
-from ptcc_certify.report.restricted_screen import RESTS, restricted_entries, rests
+from ptcc_certify.report.restricted_screen import RESTS, agreement_text, restricted_entries, rests
 from ptcc_certify.report.sliding_lines import sliding_lines
 from ptcc_certify.report.structure_text import Lines, structure_text
 from ptcc_certify.report.text_layout import (
@@ -475,7 +475,8 @@ def _final_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
         width = 12 * TEXT if long else 2 * TEXT - 20
         ends = _interval_entries(certificate.family.labels, states_of_signal(certificate), width)
         what = "x(T)" if rests(certificate) else "x(t)"
-        yield from ((name and what, f"{text} (these signals)") for name, text in ends)
+        agree = agreement_text(certificate)
+        yield from ((name and what, f"{text}{agree} (these signals)") for name, text in ends)
     if text := constant_text(certificate, 12 * TEXT if long else 2 * TEXT - 20):
         yield "" if certificate.common else "x(T)", f"{text} (constant weights)"
 

@@ -140,6 +140,29 @@ def rests(certificate: FamilyContent) -> bool:
     return not any(isinstance(claim, LastModeClaim) and None in claim.behaviours for claim in claims)
 
 
+def agreement_text(certificate: FamilyContent) -> str:
+    """Tell that all agents end at one value, up to camps, where every mode that may be the last one sees to it.
+
+    The ends between which they stay bound that value; they do not say that the agents agree.
+
+    Examples
+    --------
+    >>> both, one, rivals = ([("a", "b", 1), ("b", "a", 1)], [("a", "b", 1)], [("a", "b", -1), ("b", "a", -1)])
+    >>> for pair in ([both, one], [both, rivals]):
+    ...     family = Family.switching([SignedDigraph.from_edges(edges) for edges in pair])
+    ...     cert = certify(family, NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), [3, 1], signal=DwellTime("0.1"))
+    ...     print(cert.parts[0].component.behaviour + agreement_text(cert))
+    bipartite consensus
+    depends on the signal, all at one |x(T)|
+    """
+    of_one = len(certificate.parts) == 1
+    claims = [claim for claim in certificate.ends_of_signal.values() if of_one and isinstance(claim, LastModeClaim)]
+    if not claims or {*claims[0].behaviours} != {BIPARTITE_CONSENSUS}:
+        return ""
+    signs = (mode.sign for mode in certificate.parts[0].component.family.modes)
+    return ", all at one value" if all((sign > 0).all() for sign in signs) else ", all at one |x(T)|"
+
+
 def _rate_text(certificate: FamilyContent, claim: RateClaim) -> str:
     if claim.forms is None:
         more = "" if claim.component in certificate.final_values else "; nothing more is proved"

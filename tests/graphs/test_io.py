@@ -140,6 +140,22 @@ def test_a_separator_is_the_one_that_gives_three_fields():
     assert text("a;b;1\n").labels == ("a", "b")
 
 
+@pytest.mark.parametrize("table", ["a,b,1\nb;a;1\n", "a\tb\t1\nb,a,-0.5\n", "a;b;1\nb\ta\t2e3\n", "c\na b 1\nb,a,1\n"])
+def test_an_edge_with_other_separators_is_no_node(table):
+    """Such a row would declare a lone agent, and the edge would be missing without a word."""
+    line = table.count("\n")
+    with pytest.raises(FormatError, match=f"line {line}: b.a.* is one field here; separate fields as the rows before"):
+        text(table)
+    quoted = "".join(f'"{row}"\n' if row[0] == "b" else f"{row}\n" for row in table.splitlines())
+    assert text(quoted).n_edges == 1
+
+
+def test_nodes_whose_names_look_like_edges_are_written_so_that_they_are_read(tmp_path):
+    graph = SignedDigraph.from_edges([("a", "b", 1)], nodes=["a", "b", "b;a;1", "b\ta\t1", "x; y"])
+    write_graph(graph, tmp_path / "g.csv")
+    assert read_graph(tmp_path / "g.csv") == graph
+
+
 def test_comment_signs_begin_comments_only_at_the_begin_of_a_row():
     graph = text('a,#b,1\n#b,a,1\n"#b",a,-1\n% x\nc,%x,1\n%x,c,2\n%x,c,3\n')
     assert edges(graph) == {("a", "#b", Fraction(1)), ("#b", "a", Fraction(-1)), ("c", "%x", Fraction(1))}

@@ -42,7 +42,11 @@ def records(data: bytes, name: str) -> Iterator[tuple[int, list[str]]]:
             if not detected:
                 separator, detected = _separator(line)
             if '"' not in line:
-                yield number, line.split(separator)
+                row = line.split(separator)
+                if len(row) == 1 and _other_separator(line):
+                    mend = "separate fields as the rows before do, or quote the line if it is the name of a node"
+                    raise FormatError(f"{name}, line {number}: {shorten(line.strip())} is one field here; {mend}")
+                yield number, row
             else:  # a quoted field may go on in the following lines
                 yield number, _csv_fields(chain([line], (text for _, text in numbered)), separator, strict=True)
         except csv.Error as error:
@@ -70,6 +74,11 @@ def _separator(line: str) -> tuple[str | None, bool]:
 
     best = max(_SEPARATORS, key=rank)
     return (best, True) if rank(best) > (1, 1) else (",", False)
+
+
+def _other_separator(line: str) -> bool:
+    """Tell whether a row of one field is an edge of another kind of table, such as ``a;b;1`` among commas."""
+    return re.fullmatch(r"[^\t,;]+([\t,;])[^\t,;]+\1\s*[+-]?\d[\d.,/eE+-]*\s*", line) is not None
 
 
 def column(row: Sequence[str], names: Sequence[str], place: str) -> int | None:
@@ -217,6 +226,6 @@ def _cell(label: str, name: str) -> str:
     if odd or len(label) > MAX_LINE // 5:
         what = f"is empty, not Unicode text, has blanks around it or is longer than {MAX_LINE // 5} characters"
         raise FormatError(f'{name}: label "{shorten(label)}" {what}; rename the node')
-    if label[0] in "#%" or re.search(r'[,"\n\r]', label):
+    if label[0] in "#%" or re.search(r'[,;"\t\n\r]', label):
         return '"' + label.replace('"', '""') + '"'
     return label
