@@ -64,8 +64,8 @@ Definition part_claim (F : family) (P : part) : Prop :=
        member (ties m) w (fun j => Q2R (nth j v 0%Q)) i = 0) /\
   match becomes P with Stability => still P = [] | Depends => True
   | Consensus => exists p v, still P = [(p, v)] /\ forall i, In i (its_agents P) -> sq (Q2R (nth i v 0%Q)) = 1
-  | Interval => forall m, In m (modes F) -> exists C, owned m P = [C]
-  | Containment => exists m C C' l, In m (modes F) /\ owned m P = C :: C' :: l end.
+  | Interval => still P <> [] /\ forall m, In m (modes F) -> exists C, owned m P = [C]
+  | Containment => still P <> [] /\ exists m C C' l, In m (modes F) /\ owned m P = C :: C' :: l end.
 (** the function is at most [a] *)
 Definition below (b : lyapunov) (a : R) (x : nat -> R) : Prop := let z := xi (about b) x in match by_ b with
   | Form P => qbil P z z <= a | Squares p => qdot p (fun i => sq (x i)) <= a

@@ -93,8 +93,9 @@ Proof.
     + destruct (still P); [reflexivity|discriminate].
     + destruct (still P) as [|[p v] [|]]; try discriminate. exists p, v. split; [reflexivity|]. intros i Hi.
       rewrite forallb_forall in H5. specialize (H5 i Hi). apply Qeq_R in H5. rewrite Q2R_mult in H5. unfold sq. rewrite H5. unfold Q2R. simpl. lra.
-    + intros m Hm. rewrite forallb_forall in H5. specialize (H5 m Hm). destruct (owned m P) as [|C0 [|]]; try discriminate. exists C0. reflexivity.
-    + apply existsb_exists in H5 as [m [Hm H5]]. destruct (owned m P) as [|C0 [|C1 l]] eqn:E; try discriminate. exists m, C0, C1, l. auto.
+    + apply andb_prop in H5 as [HN H5]. split; [intros E; rewrite E in HN; discriminate|]. intros m Hm.
+      rewrite forallb_forall in H5. specialize (H5 m Hm). destruct (owned m P) as [|C0 [|]]; try discriminate. exists C0. reflexivity.
+    + apply andb_prop in H5 as [HN H5]. split; [intros E; rewrite E in HN; discriminate|]. apply existsb_exists in H5 as [m [Hm H5]]. destruct (owned m P) as [|C0 [|C1 l]] eqn:E; try discriminate. exists m, C0, C1, l. auto.
     + exact I.
 Qed.
 
