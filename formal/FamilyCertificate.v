@@ -64,8 +64,8 @@ Definition part_claim (F : family) (P : part) : Prop :=
        member (ties m) w (fun j => Q2R (nth j v 0%Q)) i = 0) /\
   match becomes P with Stability => still P = [] | Depends => True
   | Consensus => exists p v, still P = [(p, v)] /\ forall i, In i (its_agents P) -> sq (Q2R (nth i v 0%Q)) = 1
-  | Interval => forall m, In m (modes F) -> exists C, owned m P = [C]
-  | Containment => exists m C C' l, In m (modes F) /\ owned m P = C :: C' :: l end.
+  | Interval => still P <> [] /\ forall m, In m (modes F) -> exists C, owned m P = [C]
+  | Containment => still P <> [] /\ exists m C C' l, In m (modes F) /\ owned m P = C :: C' :: l end.
 (** the function is at most [a] *)
 Definition below (b : lyapunov) (a : R) (x : nat -> R) : Prop := let z := xi (about b) x in match by_ b with
   | Form P => qbil P z z <= a | Squares p => qdot p (fun i => sq (x i)) <= a
@@ -82,8 +82,8 @@ Definition bound_claim (F : family) (b : lyapunov) : Prop := let c := frame F in
      sq (qdot (fst q) (member (ties m) w x)) <= Q2R (snd q) * a) /\
   (0 < Q2R (decay b) -> forall X S, switches F X S -> exists y, forall i, In i (its_agents (about b)) ->
      filterlim (fun t => X t i) (at_left (deadline c)) (locally (y i)) /\ xi (about b) y i = 0).
-(** from the initial state on, if no sliding variable moves: where agents end, and the nominal part of their input *)
-Definition starts (F : family) X S := switches_from F X S 0 /\
+(** from the initial state on: where agents end; if no sliding variable moves, the nominal part of their input *)
+Definition starts (F : family) X S := switches F X S /\
   forall i, (i < order (frame F))%nat -> X 0 i = Q2R (nth i (start (frame F)) 0%Q).
 Definition ends_claim (F : family) : Prop := forall X S i m r, starts F X S -> nth i (ends F) None = Some (m, r) ->
   exists y, filterlim (fun t => X t i) (at_left (deadline (frame F))) (locally y) /\ Rabs (y - Q2R m) <= Q2R r.
@@ -91,8 +91,8 @@ Definition inputs_claim (F : family) : Prop := let c := frame F in
   let u m w X t i := gain (deadline c) (Q2R (rho1 c)) (k c) t * member (ties m) w (X t) i in
   (stays F = true -> forall X S t0, switches_from F X S t0 -> exists K, forall t i m w, t0 <= t < deadline c ->
      (i < order c)%nat -> In m (modes F) -> admits (ties m) w -> Rabs (u m w X t i) <= K) /\
-  forall X S t i m w, starts F X S -> 0 <= t < deadline c -> (i < length (peaks F))%nat -> In m (modes F) ->
-    admits (ties m) w -> Rabs (u m w X t i) <= Q2R (nth i (peaks F) 0%Q).
+  forall X S t i m w, switches_from F X S 0 -> starts F X S -> 0 <= t < deadline c -> (i < length (peaks F))%nat ->
+    In m (modes F) -> admits (ties m) w -> Rabs (u m w X t i) <= Q2R (nth i (peaks F) 0%Q).
 (** sliding variables do not hear the graph: what is said of them is what holds without edges, of [X = S] *)
 Definition true_family (F : family) : Prop := (forall m, In m (modes F) -> mode_claim F m) /\
   (forall P, In P (parts F) -> part_claim F P) /\

@@ -149,8 +149,8 @@ Definition check_part (F : family) (P : part) : bool :=
   | Depends => true
   | Stability => match still P with [] => true | _ => false end
   | Consensus => match still P with [(_, v)] => forallb (fun i => Qeq_bool (nth i v 0%Q * nth i v 0%Q) 1) C | _ => false end
-  | Interval => forallb (fun m => match owned m P with [_] => true | _ => false end) (modes F)
-  | Containment => existsb (fun m => match owned m P with _ :: _ :: _ => true | _ => false end) (modes F) end.
+  | Interval => negb (length (still P) =? 0)%nat && forallb (fun m => match owned m P with [_] => true | _ => false end) (modes F)
+  | Containment => negb (length (still P) =? 0)%nat && existsb (fun m => match owned m P with _ :: _ :: _ => true | _ => false end) (modes F) end.
 Definition check_frame (F : family) : bool :=
   let c := frame F in check_protocol c && check_sliding_input c && check_reaching c && (match edges c with [] => true | _ => false end) &&
   forallb (fun i => existsb (fun P => mem i (its_agents P)) (parts F)) (seq 0 (order c)).

@@ -93,8 +93,9 @@ Proof.
     + destruct (still P); [reflexivity|discriminate].
     + destruct (still P) as [|[p v] [|]]; try discriminate. exists p, v. split; [reflexivity|]. intros i Hi.
       rewrite forallb_forall in H5. specialize (H5 i Hi). apply Qeq_R in H5. rewrite Q2R_mult in H5. unfold sq. rewrite H5. unfold Q2R. simpl. lra.
-    + intros m Hm. rewrite forallb_forall in H5. specialize (H5 m Hm). destruct (owned m P) as [|C0 [|]]; try discriminate. exists C0. reflexivity.
-    + apply existsb_exists in H5 as [m [Hm H5]]. destruct (owned m P) as [|C0 [|C1 l]] eqn:E; try discriminate. exists m, C0, C1, l. auto.
+    + apply andb_prop in H5 as [HN H5]. split; [intros E; rewrite E in HN; discriminate|]. intros m Hm.
+      rewrite forallb_forall in H5. specialize (H5 m Hm). destruct (owned m P) as [|C0 [|]]; try discriminate. exists C0. reflexivity.
+    + apply andb_prop in H5 as [HN H5]. split; [intros E; rewrite E in HN; discriminate|]. apply existsb_exists in H5 as [m [Hm H5]]. destruct (owned m P) as [|C0 [|C1 l]] eqn:E; try discriminate. exists m, C0, C1, l. auto.
     + exact I.
 Qed.
 
@@ -223,10 +224,10 @@ Proof.
   unfold check_family_form in Hb. cbv zeta in Hb. apply andb_prop in Hb as [Hb H5]. do 3 apply andb_prop in Hb as [Hb _].
   destruct (factor_mod _ _ _ _) as [r|] eqn:Er in H5; [|discriminate]. apply (value_pos n P A Hb r Er).
 Qed.
-Theorem peaks_ok : check_peaks F = true -> forall X S t i m w, starts F X S -> 0 <= t < T -> (i < length (peaks F))%nat ->
+Theorem peaks_ok : check_peaks F = true -> forall X S t i m w, switches_from F X S 0 -> starts F X S -> 0 <= t < T -> (i < length (peaks F))%nat ->
   In m (modes F) -> admits (ties m) w -> Rabs (gain T rho (k c) t * member (ties m) w (X t) i) <= Q2R (nth i (peaks F) 0%Q).
 Proof.
-  intros H X Sl t i m w [HM H0] Ht Hi Hm Hw. fold c n in H0. unfold check_peaks in H. rewrite forallb_forall in H.
+  intros H X Sl t i m w HM [_ H0] Ht Hi Hm Hw. fold c n in H0. unfold check_peaks in H. rewrite forallb_forall in H.
   assert (K : In (i, nth i (peaks F) 0%Q) (combine (seq 0 (length (peaks F))) (peaks F))).
   { replace (i, nth i (peaks F) 0%Q) with (nth i (combine (seq 0 (length (peaks F))) (peaks F)) (0%nat, 0%Q)).
     - apply nth_In. rewrite combine_length, seq_length. lia.
@@ -247,7 +248,7 @@ Proof.
 Qed.
 Theorem ends_ok : check_family_ends F = true -> ends_claim F.
 Proof.
-  intros H X S i m r [[HM _] _] E. unfold check_family_ends in H. rewrite forallb_forall in H.
+  intros H X S i m r [HM _] E. unfold check_family_ends in H. rewrite forallb_forall in H.
   assert (L : (i < length (ends F))%nat).
   { destruct (Nat.lt_ge_cases i (length (ends F))) as [L|L]; [exact L|]. rewrite nth_overflow in E by exact L. discriminate. }
   assert (K : In (i, nth i (ends F) None) (combine (seq 0 (length (ends F))) (ends F))).

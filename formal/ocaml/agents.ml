@@ -98,6 +98,9 @@ let certificate json : t =
     | Some (Obj l) when List.mem_assoc "cascade" l -> unsupported "agents that track a velocity, section agents.cascade"
     | Some v -> fields "agents" keys v
     | None -> bad "no agents of order n" in
+  (match json with
+   | Obj l -> List.iter (fun (key, _) -> need (not (List.mem_assoc key l)) (key ^ " beside agents of order n")) Reader.besides
+   | _ -> ());
   let r = Reader.certificate json in
   List.iter (fun key -> need (null_in json key) (key ^ " beside that of the agents")) [ "initial_state"; "final_state"; "input" ];
   List.iter (fun x -> need (Number.equal x Number.zero) "agents of order n begin with sliding variables that are 0") r.cert.sliding;
@@ -135,6 +138,7 @@ let certificate json : t =
   need (Number.equal (largest damping) Number.zero || (n = 2 && Z.sign (List.hd damping).qnum = 0 && Z.sign (List.nth damping 1).qnum > 0
     && Z.sign (List.hd plant).qnum = 0)) "feedback of the own state that is not that of meeting at rest";
   let agree = List.exists (fun k -> (List.nth funcs k).deviation <> None) used in
+  if not agree && used <> [] then left := [ "claim, that all agree at the deadline" ];
   let chains = List.for_all (fun x -> Number.equal x Number.zero) (plant @ damping) in
   let motion = List.map (fun row -> let l = entries "motion" row in
     need (List.length l = n) "motion: another number of columns"; List.map (Reader.interval "motion") l) (entries "motion" (get "motion")) in

@@ -110,6 +110,8 @@ let columns nodes (first : cert) own camps outcome witness =
            [ pivot, column (fun i -> Number.of_z (Z.mul g.(i) g.(pivot))) ]
        | _ -> bad "claim: no camps fit all edges")
   | _, w ->
+      (* of the behaviours of section 18 that fit the first is due *)
+      need (outcome <> Interval || (match camps with Cycle _ -> true | Gauge _ -> false)) "claim: camps fit all edges, which is bipartite consensus";
       let rows = match (fields "the witness" [ "rows" ] w) "rows" with Obj l -> l | _ -> bad "rows: an object is due" in
       let rows = List.map (fun (label, row) -> node nodes "rows" (Str label), match row with
         | Obj l -> List.map (fun (k, x) -> k, number "rows" x) l | _ -> bad "rows: an object is due") rows in
@@ -307,7 +309,9 @@ let certificate (j : Json.t) : t =
   let first = (List.hd modes).mandatory in
   let parts = List.map2 (fun ((own, camps), becomes) w ->
     { its_agents = own; becomes; still = columns nodes first own camps becomes w }) (List.combine found claims) witnesses in
-  let lyapunov = fields "lyapunov" (if (match get "lyapunov" with Obj l -> List.mem_assoc "drives" l | _ -> false) then [ "functions"; "drives" ] else [ "functions" ]) (get "lyapunov") in
+  let sliding = match get "sliding_variable" with Null -> [] | v -> by_agent nodes number "sliding_variable" v in
+  let drives = List.exists (fun x -> not (Number.equal x Number.zero)) sliding in
+  let lyapunov = fields "lyapunov" ("functions" :: if drives then [ "drives" ] else []) (get "lyapunov") in
   let functions = entries "functions" (lyapunov "functions") in
   need (List.length functions <= most_functions) "lyapunov.functions: more than 1,000";
   let work = ref 0 in
@@ -321,7 +325,6 @@ let certificate (j : Json.t) : t =
     proof.checked <- List.filter (fun o -> o <> ("family-claim", "graph")) proof.checked;
     proof.unchecked <- proof.unchecked @ [ "family-claim", "graph" ] end;
   let start = match get "initial_state" with Null -> None | v -> Some (by_agent nodes number "initial_state" v) in
-  let sliding = match get "sliding_variable" with Null -> [] | v -> by_agent nodes number "sliding_variable" v in
   need (is_sliding = (get "sliding_variable" <> Null)) "sigma(0) belongs to the sliding-mode protocol, and is part of it";
   let reaching = if is_sliding then begin
     let times = fields "reaching_time" [ "bound"; "clock"; "z" ] (get "reaching_time") in
@@ -329,7 +332,8 @@ let certificate (j : Json.t) : t =
     bare_of proof "sliding-bound" "protocol";
     Reader.reaching_times proof kind kappa sliding (by_agent nodes (optional number) "reaching_time.z" (times "z")) not_checked end
   else (need (get "reaching_time" = Null) "reaching times without sliding variables"; []) in
-  if following proof = "family-drive" then begin
+  if drives then begin
+    need (List.length (entries "drives" (lyapunov "drives")) = List.length functions) "drives: one for each function";
     not_checked "lyapunov.drives";
     List.iteri (fun k _ -> skipped proof "family-drive" (Printf.sprintf "lyapunov.functions[%d]" k)) functions end;
   need ((start = None) = (get "final_state" = Null)) "a final state without an initial state, or none";
@@ -351,7 +355,9 @@ let certificate (j : Json.t) : t =
     | Null -> need (input "peaks" = Null) "peaks of an input that may grow"; false, []
     | b ->
         need (truth "input.bounded" b) "input.bounded is true, or null";
-        if input "peaks" = Null then (need (start = None || is_sliding) "input.peaks are due"; bare_of proof "family-input" "input"; true, [])
+        let slow = match kind with
+          | SlidingMode (_, _, _, _, mu3, _) -> drives && Number.compare (Number.mul mu3 kappa) Number.one < 0 | Nominal _ -> false in
+        if input "peaks" = Null then (need (start = None || slow) "input.peaks are due"; bare_of proof "family-input" "input"; true, [])
         else if is_sliding then (skipped proof "family-input" "input"; not_checked "input.peaks"; true, [])
         else (need (start <> None) "peaks without an initial state"; bare_of proof "family-input" "input"; true, by_agent nodes number "input.peaks" (input "peaks")) in
   let rest o = match o with

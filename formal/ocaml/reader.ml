@@ -437,7 +437,9 @@ let certificate (j : Json.t) : t =
     reaching_times proof kind kappa sliding (by_agent nodes (optional number) "reaching_time.z" (times "z")) not_checked end
   else (need (get "reaching_time" = Null) "reaching times without sliding variables"; []) in
   let bounded_input, sliding_input, functions, efforts = match get "input" with
-    | Null -> false, [], functions, []
+    | Null ->
+        need (of_agents || rate "proved" = None && edges <> []) "input is null, though a decay was proved, or nothing moves";
+        false, [], functions, []
     | v ->
         let input = fields "input" [ "bounded"; "threshold"; "initial_set"; "constants"; "peak"; "energy"; "path_length";
           "sliding"; "residual"; "disturbed" ] v in

@@ -96,6 +96,34 @@ def test_a_file_that_is_no_certificate_is_unreadable(tmp_path: Path) -> None:
         assert subprocess.run([program(), file], capture_output=True, check=False).returncode == 2
 
 
+def test_the_input_is_spoken_of_iff_a_decay_was_proved(tmp_path: Path) -> None:
+    program()
+    for text in (paper_examples()[0], paper_examples()[6]):
+        document = json.loads(text)
+        kinds = ("input-", "limited-gain", "nominal-disturbed")
+        proof = [o for o in document["proof"] if not o["kind"].startswith(kinds)]
+        forged = resealed({**document, "input": None, "proof": proof})
+        code, text = said(forged, tmp_path)
+        assert code == 1 and "input is null" in text and not check(forged).accepted
+
+
+def test_what_cannot_be_read_or_told_takes_one_line_and_bounded_memory(tmp_path: Path) -> None:
+    program()
+    file = tmp_path / "c.json"
+    for text in ("[" * 10**6, '{"a":[' + "1," * 10**7 + "1]}", "\x00", '{"a": 1'):
+        file.write_text(text)
+        run = subprocess.run([program(), file], capture_output=True, text=True, check=False)
+        assert run.returncode == 2 and run.stdout == "" and run.stderr.count("\n") == 1 and "xception" not in run.stderr
+    file.write_text(paper_examples()[0])
+    for words in ([], [tmp_path], [tmp_path / "none"], [file, file], ["--all", file], ["--obligations"], [""]):
+        run = subprocess.run([program(), *words], capture_output=True, text=True, check=False)
+        assert run.returncode == 2 and run.stdout == "" and run.stderr.count("\n") == 1, words
+    if Path("/dev/full").exists():
+        with Path("/dev/full").open("w") as full:
+            run = subprocess.run([program(), file], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+        assert run.returncode == 2 and run.stderr.count("\n") == 1 and "xception" not in run.stderr
+
+
 def test_claims_besides_those_of_the_graph_are_named_and_not_believed(tmp_path: Path) -> None:
     program()
     document = json.loads(paper_examples()[0])

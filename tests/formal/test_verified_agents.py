@@ -126,6 +126,30 @@ def test_what_is_forged_is_rejected_by_both_checkers(tmp_path: Path) -> None:
         assert code == 1 and where in text, (path, text)
 
 
+def test_where_no_function_used_has_a_deviation_it_is_named_that_all_agree(tmp_path: Path) -> None:
+    program()
+    document = made(CAMPS, Setting(order=3, method="best", start=False))
+    functions = document["lyapunov"]["functions"]
+    k = next(k for k, f in reversed(list(enumerate(functions))) if f["class"] == "full")
+    proof = [o for o in document["proof"] if o["kind"] != "input-constants"]
+    proof = [o for o in proof if (o["kind"], o["of"]) != ("deviation", f"lyapunov.functions[{k}]")]
+    document = changed({**document, "proof": proof}, ("lyapunov", "functions", k, "deviation"), None)
+    document = resealed(changed(document, ("agents", "functions"), [{"function": k, "inputs": None}]))
+    assert check(document).accepted
+    code, text = said(document, tmp_path)
+    assert code == 0 and "not checked claim, that all agree at the deadline" in text
+    assert {"agent-motion of agents", "agents.motion"} <= named(text)
+
+
+def test_late_messages_and_moving_leaders_beside_agents_are_rejected(tmp_path: Path) -> None:
+    program()
+    for key in ("messages", "leaders"):
+        forged = resealed({**made(CAMPS, Setting()), key: {}})
+        assert not check(forged).accepted
+        code, text = said(forged, tmp_path)
+        assert code == 1 and key in text
+
+
 def again(mutant: Json, path: Any, new: str) -> Json:
     return told(mutant, path, new)
 

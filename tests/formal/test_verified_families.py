@@ -131,6 +131,47 @@ def test_rows_are_verified_and_a_higher_rate_of_theirs_is_rejected(tmp_path: Pat
     assert code == 1 and "lyapunov.functions[0]" in text, text
 
 
+def with_witness(found: Json, behaviour: str, witness: Any) -> Json:
+    """The same with another behaviour of its one component, and what is to prove it."""
+    claims = [{**o, "witness": witness} if o["kind"] == "family-claim" else o for o in found["proof"]]
+    return resealed({**changed(found, ("claim", "behaviour"), behaviour), "proof": claims})
+
+
+def test_a_behaviour_that_comes_after_the_one_that_fits_is_rejected(tmp_path: Path) -> None:
+    program()
+    stable = document(Family.from_intervals([("a", "b", 1, 2), ("b", "a", -1, -1), ("b", "c", -2, -1)]))
+    for forged in (
+        with_witness(stable, "interval bipartite consensus", [{"rows": {}}]),
+        with_witness(stable, "bipartite containment", [{"rows": {}}]),
+        with_witness(json.loads(signed()), "interval bipartite consensus", [{"rows": {"c": {"1": "-1"}}}]),
+    ):
+        assert not check(forged).accepted
+        code, text = said(forged, tmp_path)
+        assert code == 1 and "claim" in text
+
+
+def test_what_drives_and_peaks_are_due_of_is_neither_added_nor_left_out(tmp_path: Path) -> None:
+    program()
+    quiet = json.loads(signed())
+    made = certify_family(SIGNED, SLIDING, [1, 2, 3], sigma0=[1, 0, 0], time_limit=3600)
+    moving = {**json.loads(made.to_json()), "unverified": {}}
+    code, text = said(resealed(moving), tmp_path)
+    assert code == 0 and "not checked lyapunov.drives" in text
+    functions = moving["lyapunov"]["functions"]
+    others = [o for o in moving["proof"] if o["kind"] != "family-drive"]
+    for forged in (
+        {**quiet, "lyapunov": {**quiet["lyapunov"], "drives": ["0"] * len(quiet["lyapunov"]["functions"])}},
+        {**quiet, "lyapunov": {**quiet["lyapunov"], "drives": None}},
+        {**moving, "lyapunov": {"functions": functions}, "proof": others},
+        {**moving, "proof": others},
+        changed(moving, ("lyapunov", "drives"), ["0"]),
+        changed(moving, ("lyapunov", "drives"), "0"),
+        changed(moving, ("input", "peaks"), None),
+    ):
+        sealed = resealed(forged)
+        assert not check(sealed).accepted and said(sealed, tmp_path).code == 1
+
+
 def test_a_weight_of_the_other_sign_is_rejected(tmp_path: Path) -> None:
     program()
     found = json.loads(signed())
