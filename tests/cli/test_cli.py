@@ -23,6 +23,7 @@ import pytest
 from bad_inputs import BAD_INPUTS, BadInput, Run, detailed, listing, ptcc, write
 from generators import all_classes, random_graph
 from scipy.linalg import expm
+from selection import thinned
 
 from ptcc_certify.bounds.envelope import Envelope
 from ptcc_certify.checker import read
@@ -194,7 +195,7 @@ def test_an_error_of_the_program_is_not_taken_for_a_violated_bound(monkeypatch: 
         assert (run.code, run.out, len(run.err.strip().splitlines())) == (code, "", 1)
 
 
-@pytest.mark.parametrize("method", ["paper", "perron", "lmi", "full", "best"])
+@pytest.mark.parametrize("method", thinned(["paper", "perron", "lmi", "full", "best"], 2))
 def test_the_method_decides_which_classes_are_searched(method: str):
     data = one_object(ptcc("certify", "fig3a", "--method", method, "--x0", X0, "--json").out)
     classes = [function["class"] for function in data["lyapunov"]["functions"]]
@@ -582,6 +583,7 @@ def test_labels_of_any_kind_are_printed_safely_and_kept():
     assert ptcc("simulate", "surrogate.npz").code == 0
 
 
+@pytest.mark.campaign
 def test_a_terminal_that_lacks_a_letter_is_no_obstacle():
     name = save("labels.csv", [("中", "b", -1), ("b", "中", -1)])
     env = {"PYTHONIOENCODING": "cp1252", "PYTHONUTF8": "0"}
@@ -618,7 +620,7 @@ def test_a_full_disk_is_told():
 # ---------------------------------------------------------------------- the screens
 
 
-@pytest.mark.parametrize("name", GRAPHS)
+@pytest.mark.parametrize("name", thinned(GRAPHS, 3))
 def test_the_screen_of_certify_fits_24_lines(name: str):
     (example, _, _) = select(name)[0]
     parameters = [text for key, value in example.parameters.items() for text in (f"--{key}", value)]
@@ -818,6 +820,7 @@ def test_design_answers_with_gains_a_refutation_or_neither(folder: Path):
     assert data["verdict"] == "met" and data["input_norm"] == 2 and Fraction(data["peak"]) <= 10
 
 
+@pytest.mark.campaign
 def test_the_command_that_design_prints_proves_its_gains_again(folder: Path):
     rng, capped = np.random.default_rng(1), 0
     graphs = ["fig1a", "fig3b", "fig5b"]
@@ -944,6 +947,7 @@ def vectors_of_examples(folder: Path, name: str) -> dict[str, bytes]:
     return {p.name: p.read_bytes() for p in (folder / name).glob("*.svg")}
 
 
+@pytest.mark.campaign
 def test_examples_are_drawn_as_vectors_too(folder: Path):
     drawn = vectors_of_examples(folder, "one")
     assert len(drawn) == 2 + 2 + 4 and all(b"<svg" in content for content in drawn.values())

@@ -11,6 +11,7 @@ from balls import ball, inverse_decay_integral
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
+from selection import thinned
 
 from ptcc_certify.errors import SimulationError
 from ptcc_certify.graphs.digraph import SignedDigraph
@@ -93,7 +94,7 @@ def middle(x):
 # ---------------------------------------------------------------------- the integral
 
 
-@pytest.mark.parametrize("power", POWERS)
+@pytest.mark.parametrize("power", thinned(POWERS))
 @pytest.mark.parametrize("mu2", [F(1, 10**12), F(1, 10**6), F(1, 3), F(50), F(1000)])
 def test_the_incomplete_gamma_form_is_the_integral_of_its_integrand(power, mu2):
     p = protocol(power, mu2, T_r=F(7, 5))
@@ -295,7 +296,7 @@ def test_roots_under_smooth_disturbances_satisfy_their_equation(power, mu2, T_r,
 
 
 @pytest.mark.parametrize("power", [F(1, 2), F(1), F(9, 5), F(4)])
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", thinned(range(4)))
 def test_roots_under_jumping_disturbances_satisfy_their_equation(power, seed):
     p, rng = protocol(power, mu2=F(3, 2), T_r=F(5, 4)), np.random.default_rng(seed)
     noise = telegraph_noise(0.9, 40, 4, 3.0, seed)
