@@ -85,7 +85,7 @@ def test_ends_under_the_last_mode_stand_on_page_and_statement():
     saved = read_certificate(certify(Family.switching([DAY, other]), PROTOCOL, [1, 2, 3], signal=signal).to_dict())
     page, statement = words(report_html(saved)), family_latex(saved)
     assert "each stays within: ann 1; &lt;b&gt; [−1, 2]; eve [−2, 3]." in page.replace("\N{NO-BREAK SPACE}", " ")
-    assert "State at the deadline, for these signals" in page
+    assert "State at the deadline, all at one |x(T)|, for these signals" in page
     assert "& -- & $2$ & $[-1, 2]$" in statement and "U+2013" not in statement
     assert "(at least 0.2 of time between switches) more is proved: the last mode decides, bip" in statement
     runs = [simulate_family(saved.family, PROTOCOL, [1, 2, 3], RandomSignal(1), times=[0, 0.5])]

@@ -205,7 +205,7 @@ def test_a_signal_that_switches_too_often_is_refused_in_time(monkeypatch):
 def test_where_no_limit_exists_a_run_does_not_claim_to_have_settled():
     plus = SignedDigraph.from_edges([("a", "c", 1)], nodes="abc")
     minus = SignedDigraph.from_edges([("b", "c", 1)], nodes="abc")
-    run = simulate_family(Family.switching([plus, minus]), PROTOCOL, [1, -1, 0], PeriodicSignal([(0, 20), (1, 20)]))
+    run = simulate_family(Family.switching([plus, minus]), PROTOCOL, [1, -1, 0], PeriodicSignal([(0, 0.2), (1, 0.2)]))
     assert not run.deadline_resolved
     assert np.array_equal(run.final_state[:2], [1, -1])
     last = simulate_family(Family.switching([plus, minus]), PROTOCOL, [1, -1, 0], [(0, 0), (1, 1)])
