@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from selection import thinned
 
 from ptcc_certify import (
     Expectations,
@@ -84,7 +85,7 @@ def test_ends_under_the_last_mode_stand_on_page_and_statement():
     saved = read_certificate(certify(Family.switching([DAY, other]), PROTOCOL, [1, 2, 3], signal=signal).to_dict())
     page, statement = words(report_html(saved)), family_latex(saved)
     assert "each stays within: ann 1; &lt;b&gt; [−1, 2]; eve [−2, 3]." in page.replace("\N{NO-BREAK SPACE}", " ")
-    assert "State at the deadline, for these signals" in page
+    assert "State at the deadline, all at one |x(T)|, for these signals" in page
     assert "& -- & $2$ & $[-1, 2]$" in statement and "U+2013" not in statement
     assert "(at least 0.2 of time between switches) more is proved: the last mode decides, bip" in statement
     runs = [simulate_family(saved.family, PROTOCOL, [1, 2, 3], RandomSignal(1), times=[0, 0.5])]
@@ -158,12 +159,15 @@ def test_intervals_of_the_page_enclose_what_is_proved():
 
 @pytest.mark.parametrize(
     ("family", "x0", "figures"),
-    [
-        ([("a", "b", 1, 2)], [0, 0], {"graph", "states", "input"}),
-        ([("a", "b", 1, 2), ("c", "d", -2, -1)], [1, 2, 3, 4], {"graph", "states", "decay", "input"}),
-        (Family.switching([SignedDigraph.from_edges([], nodes=["a"])] * 2), [3], {"graph", "states", "input"}),
-        (Family.switching([DAY, SignedDigraph.from_edges([], nodes=DAY.labels)]), [1, 2, 3], None),
-    ],
+    thinned(
+        [
+            ([("a", "b", 1, 2)], [0, 0], {"graph", "states", "input"}),
+            ([("a", "b", 1, 2), ("c", "d", -2, -1)], [1, 2, 3, 4], {"graph", "states", "decay", "input"}),
+            (Family.switching([SignedDigraph.from_edges([], nodes=["a"])] * 2), [3], {"graph", "states", "input"}),
+            (Family.switching([DAY, SignedDigraph.from_edges([], nodes=DAY.labels)]), [1, 2, 3], None),
+        ],
+        2,
+    ),
     ids=["at rest", "two components", "one agent", "outage"],
 )
 def test_what_there_is_nothing_to_draw_of_is_left_out(family, x0, figures):
@@ -182,7 +186,7 @@ def test_a_statement_of_which_one_component_depends_on_the_signal_claims_the_oth
     assert "& no limit claimed" in text and "The theorem" not in text
 
 
-@pytest.mark.parametrize("clock", ["t", "s"])
+@pytest.mark.parametrize("clock", thinned(["s", "t"], 2))
 def test_under_a_dwell_time_the_page_shows_signals_that_keep_it(clock: str):
     promise = DwellTime("0.3", clock=clock)
     saved = read_certificate(certify(SWITCHING, PROTOCOL, [1, 2, 3], signal=promise).to_dict())
@@ -227,7 +231,7 @@ def test_groups_without_negative_edges_agree_and_others_up_to_camps():
         assert told in groups_text(component)
 
 
-@pytest.mark.parametrize("sigma0", [[0, 0, 0], [1, 0, "-1/2"]])
+@pytest.mark.parametrize("sigma0", thinned([[1, 0, "-1/2"], [0, 0, 0]], 2))
 def test_the_bound_of_a_family_through_a_reaching_phase_is_called_numerical_everywhere(sigma0):
     unsure = Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 1), ("b", "c", -2, -1)])
     made = certify(unsure, SLIDING, [1, 2, 3], sigma0=sigma0)
@@ -267,7 +271,7 @@ def test_a_statement_that_speaks_of_the_stretched_clock_defines_it():
         assert text.count(r"\ln\frac{") == 1
 
 
-@pytest.mark.parametrize("sigma0", [[0, 0, 0], [1, 0, 2]])
+@pytest.mark.parametrize("sigma0", thinned([[1, 0, 2], [0, 0, 0]], 2))
 def test_agents_that_listen_to_nobody_end_where_sliding_variables_bring_them(sigma0):
     moved = Family.from_intervals([("a", "c", 1, 3), ("b", "c", 1, 1)])
     made = certify(moved, SLIDING, [0, 4, 100], sigma0=sigma0)

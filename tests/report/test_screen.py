@@ -12,6 +12,7 @@ from generators import KINDS, all_classes, random_graph, smallest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.cells import cell_len
+from selection import thinned
 
 import ptcc_certify as ptcc
 from ptcc_certify.certificate.certificate import read_certificate
@@ -58,7 +59,7 @@ def assert_screen(certificate: ptcc.Certificate, name: str = "graph") -> list[st
     return lines
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", thinned(KINDS))
 def test_of_every_class_the_screens_fit_8_lines_of_80_columns(kind: str):
     kwargs = dict(all_classes())[kind]
     rng = np.random.default_rng(KINDS.index(kind))
@@ -253,7 +254,7 @@ def test_a_certificate_read_back_shows_the_same_screen(tmp_path):
 
 
 @given(st.lists(st.text(max_size=30), min_size=1, max_size=12), st.integers(30, 90))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 def test_a_list_is_shortened_to_its_width(words: list[str], width: int):
     text = shorten_list(words, width)
     assert columns(text) <= width
@@ -262,7 +263,7 @@ def test_a_list_is_shortened_to_its_width(words: list[str], width: int):
 
 
 @given(st.text(max_size=300), st.integers(31, 90))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 def test_wrapping_loses_nothing_and_keeps_to_the_width(text: str, width: int):
     lines = wrap_lines([f"{'head':<11}{text}"], width)
     assert all(columns(line) <= width for line in lines)
