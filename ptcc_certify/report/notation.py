@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from decimal import Decimal, localcontext
 from fractions import Fraction
+from functools import lru_cache
 from typing import Any
 
 import jinja2
@@ -150,6 +151,7 @@ def typeset(text: str) -> Markup:
     return Markup(re.sub(r"\b[\d.]+e[+-]?\d+\b", lambda number: str(power(number[0])), shown))
 
 
+@lru_cache(maxsize=256)
 def formula_svg(latex: str, inline: bool = True) -> Markup:
     r"""Draw a formula as inline SVG, in the colour and the size of the text around it; no font is needed.
 
