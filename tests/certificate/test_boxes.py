@@ -121,24 +121,31 @@ def test_screen_page_and_statement_tell_the_box_and_claim_no_limit():
 # ---------------------------------------------------------------------- forged files
 
 
-@pytest.mark.parametrize("first", thinned(range(4)))
-def test_no_mutant_of_a_box_is_accepted_that_is_false(first: int):
-    """Every fourth mutant of each number."""
-    data = {**moved().to_dict(), "unverified": {}}
-    accepted = rejected = 0
-    for path, value in leaves(data["boxes"]):
+def mutants(boxes: Any) -> list[tuple[tuple[Any, ...], Any]]:
+    """Places in a claim, and what to write there."""
+    found = []
+    for path, value in leaves(boxes):
         others = of_leaf(value, list("abcd"), False)
         if isinstance(value, str) and value not in "abcd":
             others += [str(Fraction(value) * (1 + Fraction(k, 10**6))) for k in (-1, 1)]
             others += [str(Fraction(value) + k) for k in (-1, 1)]
-        for new in others[first::4]:
-            mutant = resealed(changed(data, ("boxes", *path), new))
-            if check(mutant, stdlib=True).accepted:
-                accepted += 1
-                assert false_family_claims(mutant) == [], (path, new)
-            else:
-                rejected += 1
-    assert accepted >= 1 and rejected >= 10
+        found += [(path, new) for new in others]
+    return found
+
+
+@pytest.mark.parametrize("first", thinned(range(7), 7))
+def test_no_mutant_of_a_box_is_accepted_that_is_false(first: int):
+    """Every seventh of them, from the first on."""
+    data = {**moved().to_dict(), "unverified": {}}
+    accepted = rejected = 0
+    for path, new in mutants(data["boxes"])[first::7]:
+        mutant = resealed(changed(data, ("boxes", *path), new))
+        if check(mutant, stdlib=True).accepted:
+            accepted += 1
+            assert false_family_claims(mutant) == [], (path, new)
+        else:
+            rejected += 1
+    assert accepted >= 1 and rejected >= 5
 
 
 @pytest.mark.parametrize(

@@ -283,7 +283,7 @@ def test_a_broken_certificate_is_refused(how: str, tmp_path: Path):
 # ---------------------------------------------------------------------- the proof, anew
 
 
-@pytest.mark.parametrize(("name", "kwargs"), class_cases((*ROWS, "disconnected 1.2 2.2")))
+@pytest.mark.parametrize(("name", "kwargs"), class_cases((*ROWS, "disconnected 1.1 and isolated")))
 def test_the_json_alone_proves_the_claim(name: str, kwargs: dict):
     judge = Recheck(of_class(name))
     judge.everything()
@@ -467,6 +467,7 @@ def test_only_what_the_independent_check_accepts_is_certified(monkeypatch: pytes
 
 #: Larger ones of kinds that others show too.
 REAL_CAMPAIGN = (
+    "bales",
     "regulatory_013",
     "highland_tribes",
     "regulatory_114",
@@ -623,7 +624,9 @@ def ring(n: int, last: int) -> SignedDigraph:
     return SignedDigraph.from_edges([(i, (i + 1) % n, last if i == n - 1 else 1) for i in range(n)])
 
 
-@pytest.mark.parametrize(("n", "last", "searched"), [(121, 1, True), (121, -1, True), (SEARCH_NODES + 1, 1, False)])
+@pytest.mark.parametrize(
+    ("n", "last", "searched"), thinned([(121, 1, True), (121, -1, True), (SEARCH_NODES + 1, 1, False)], 2)
+)
 def test_beyond_120_nodes_the_paper_s_rate_is_floating_point_and_the_certified_one_proved(
     n: int, last: int, searched: bool
 ):
@@ -683,7 +686,7 @@ def test_where_a_proof_is_out_of_reach_nothing_is_claimed_but_an_upper_bound(
 # ---------------------------------------------------------------------- invariance, refusals
 
 
-@settings(max_examples=4)
+@settings(max_examples=3)
 @given(made_graphs(max_nodes=8, weights=("units", "small ints")), st.integers(0, 2**32 - 1))
 def test_relabelling_permutes_the_certificate_and_changes_nothing_else(made: Made, seed: int):
     graph = made.graph
@@ -787,7 +790,7 @@ def test_relabelling_permutes_the_searched_functions(name: str, method: str):
         same_functions(first, second, order)
 
 
-@pytest.mark.parametrize("name", thinned(SOME[::2], 2))
+@pytest.mark.parametrize("name", thinned(SOME[::2]))
 def test_heavier_edges_scale_every_rate(name: str):
     """Three times the weights and a third of the gain is the same motion: the same members, their rates times 3."""
     graph = of_size(name)
@@ -798,7 +801,7 @@ def test_heavier_edges_scale_every_rate(name: str):
     same_functions(*perron, np.arange(graph.n_nodes), 3)
 
 
-@pytest.mark.parametrize("name", thinned(SOME[1::2], 2))
+@pytest.mark.parametrize("name", thinned(SOME[1::2]))
 def test_a_gauge_changes_no_rate(name: str):
     """An agent that joins the other camp: the signs of all its edges change, and no rate."""
     graph = of_size(name)
@@ -825,7 +828,7 @@ def test_a_union_is_as_slow_as_its_slower_part(one: str, other: str):
     assert union.optimality_ratio is not None and 0.99 <= union.optimality_ratio <= 1
 
 
-@pytest.mark.parametrize(("name", "kwargs"), class_cases(("1.1", "3.2"), SOME))
+@pytest.mark.parametrize(("name", "kwargs"), class_cases(("3.2",), SOME))
 def test_a_method_keeps_to_its_class(name: str, kwargs: dict):
     graph = of_size(name, seed=7)
     rates = {}
@@ -987,7 +990,7 @@ def test_the_upper_bound_is_near_the_slowest_mode_and_at_most_twice_the_mean_eig
         assert cert.spectral_rate <= float(cert.upper_bound) * (1 + 1e-12)
 
 
-@pytest.mark.parametrize("seed", thinned(range(3), 2))
+@pytest.mark.parametrize("seed", thinned([0, 2, 1], 2))
 def test_there_is_one_upper_bound_on_the_rate_and_one_optimality_ratio(seed: int, tmp_path: Path):
     """In the object, its file, what is read back, the table of a batch, and what ``--min-rate`` is refuted by."""
     edges = [(1, 2, -1), (2, 1, -3)] if seed == 0 else exact_edges(of_size(SOME[seed], 6, seed))

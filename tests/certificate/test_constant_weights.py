@@ -154,7 +154,9 @@ def test_where_modes_have_camps_of_their_own_each_ends_within_the_ends_of_all():
     modes = [[("a", "b", 1, 2), ("b", "a", 1, 1)], [("a", "b", -2, -1), ("b", "a", -1, -1)]]
     certificate = made(Family.switching([Family.from_intervals(edges) for edges in modes]), [0, 6])
     saved = read_certificate(certificate.to_dict())
-    assert "x(T)       a in [-3, 3], b in [2, 3] (these signals)" in "\n".join(family_summary(saved, "pair"))
+    assert "x(T)       a in [-3, 3], b in [2, 3], all at one |x(T)| (these signals)" in "\n".join(
+        family_summary(saved, "pair")
+    )
     assert "constant weights" not in "\n".join(family_summary(saved, "pair"))
     assert "each stays within: a [\N{MINUS SIGN}3,\N{NO-BREAK SPACE}3]; b" in re.sub(
         " +", " ", re.sub("<[^>]*>", " ", report_html(saved))

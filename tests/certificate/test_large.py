@@ -135,8 +135,10 @@ def random_sparse(n: int, seed: int) -> SignedDigraph:
     return SignedDigraph.from_edges([(j, i, w) for (j, i), w in edges.items()], nodes=range(n))
 
 
-@pytest.mark.parametrize(("n", "slides"), [(1000, False), (400, True)])
-def test_a_sparse_graph_of_a_thousand_nodes(n: int, slides: bool, tmp_path: Path):
+@pytest.mark.parametrize(
+    ("n", "slides"), [(500, False), (400, True), pytest.param(1000, False, marks=pytest.mark.campaign)]
+)
+def test_sparse_graphs_of_hundreds_of_nodes(n: int, slides: bool, tmp_path: Path):
     graph = random_sparse(n, 1)
     start = np.random.default_rng(2).uniform(-10, 10, n).round(2).tolist()
     protocol = NOMINAL
@@ -196,6 +198,7 @@ def test_large_leader_groups_are_proved_by_a_sparse_factor(balanced: bool, follo
     assert max(cert.final_state.radius) < 1e-8
 
 
+@pytest.mark.campaign
 def test_a_factor_is_of_the_matrix_that_the_checker_forms():
     """Rounding is judged in the scaling of the factor, where a small diagonal makes its row's entries large."""
     rng, n = np.random.default_rng(5), 180

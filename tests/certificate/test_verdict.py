@@ -166,8 +166,8 @@ def test_codes_are_worst_first():
     ("options", "code", "says"),
     thinned(
         [
-            (("--sample-period", "0.5"), 4, "left open: limits (certified with a period of 6.4"),
             (("--gain-cap", "20", "--sample-period", "0.5"), 4, "left open: limits (certified with a period of 0.00"),
+            (("--sample-period", "0.5"), 4, "left open: limits (certified with a period of 6.4"),
             (("--noise", "1"), 4, "left open: noise (without a limit it meets an infinite gain"),
             (("--delta", "1", "--rho2", "0.01"), 4, "left open: delta (the rate proves no bounded input)"),
             (("--gain-cap", "20"), 0, "certified; "),
@@ -259,7 +259,7 @@ def test_what_a_file_says_was_asked_need_not_be_sound(asked: Any, tmp_path: Path
 
 
 def test_lines_are_short():
-    assert all(len(weak(k, k % 3 == 0).assessment.text) <= 200 for k in range(12))
+    assert all(len(weak(k, k % 3 == 0).assessment.text) <= 200 for k in range(1, 10, 2))
     assert len(certificate_lines(strong(), "fig1a")[-1]) <= 80
 
 
@@ -286,8 +286,9 @@ def test_noise_from_the_final_state_is_not_a_share_of_nothing():
     assert found.useful is False and "||E|| <= 0.29 at T" in found.remark
 
 
-def test_of_a_set_no_share_is_stated_that_single_states_exceed():
-    hub = SignedDigraph.from_edges([(1, 2, 1), *((2, k, 10) for k in range(3, 103))])
+@pytest.mark.parametrize("followers", thinned([40, 100], 2))
+def test_of_a_set_no_share_is_stated_that_single_states_exceed(followers: int):
+    hub = SignedDigraph.from_edges([(1, 2, 1), *((2, 3 + k, 10) for k in range(followers))])
     protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa="3.3")
     found = limited(
         None, hub, protocol, initial_set=initial_set_within(analyse(hub), 1), limits=[GainLimits(gain_cap="4.5")]
