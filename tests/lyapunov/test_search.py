@@ -110,24 +110,20 @@ def test_choice_prefers_the_smaller_overshoot_among_equal_rates():
     assert any(c.condition == 50.0 for c in chosen) and any(c.kind == "lmi" for c in chosen)
 
 
-def test_the_envelope_lies_below_each_function_and_above_the_motion():
+@pytest.mark.parametrize("name", thinned(["1.1", "1.2", "2.2", "3.1 mixed", "disconnected mixed"], 3))
+def test_the_envelope_lies_below_each_function_and_above_the_motion(name: str):
     rng = np.random.default_rng(2)
-    for name in ("1.1", "1.2", "2.2", "3.1 mixed", "disconnected mixed"):
-        graph = of_class(name, weights="log6")
-        cert = certify(graph, P, simulation=False)
-        envelope, s = cert.envelope, np.linspace(0, 20, 41)
-        whole = envelope.norm_factor(s)
-        for function in envelope.functions:
-            if function.coordinates == envelope.coordinates:
-                alone = np.sqrt(function.overshoot_above) * np.exp(-function.rate_below * s / 2)
-                assert (whole <= alone * (1 + 3e-12)).all()  # bounds are rounded up by 1e-12
-        x0 = rng.normal(size=graph.n_nodes)
-        assert (envelope.bound(s, x0) <= whole * envelope.bound(0.0, x0) * (1 + 1e-9)).all() or len(
-            envelope.functions
-        ) > 1
-        assert (np.diff(envelope.deviation(s, x0), axis=1) <= 1e-300).all() or min(
-            m.rate for m in envelope.functions
-        ) < 0
+    graph = of_class(name, weights="log6")
+    cert = certify(graph, P, simulation=False)
+    envelope, s = cert.envelope, np.linspace(0, 20, 41)
+    whole = envelope.norm_factor(s)
+    for function in envelope.functions:
+        if function.coordinates == envelope.coordinates:
+            alone = np.sqrt(function.overshoot_above) * np.exp(-function.rate_below * s / 2)
+            assert (whole <= alone * (1 + 3e-12)).all()  # bounds are rounded up by 1e-12
+    x0 = rng.normal(size=graph.n_nodes)
+    assert (envelope.bound(s, x0) <= whole * envelope.bound(0.0, x0) * (1 + 1e-9)).all() or len(envelope.functions) > 1
+    assert (np.diff(envelope.deviation(s, x0), axis=1) <= 1e-300).all() or min(m.rate for m in envelope.functions) < 0
 
 
 def test_vector_norm_of_the_deviation_is_bounded():
@@ -210,7 +206,7 @@ def test_agents_that_keep_their_state_are_where_they_end():
     assert slid[0, 0] >= 1 and not slid[1].any() and not slid[:, 1].any()
 
 
-@pytest.mark.parametrize(("name", "kwargs"), thinned(all_classes()[1:24:3]))
+@pytest.mark.parametrize(("name", "kwargs"), thinned(all_classes()[1:24:3], 8))
 def test_the_reported_overshoot_is_not_decided_by_rounding(name: str, kwargs: dict):
     """Members whose rates differ by less than 1e-6 share the smaller one, so that the smaller prefactor is reported."""
     cert = certify(random_graph(np.random.default_rng(6), **kwargs).graph, P, simulation=False)
@@ -251,7 +247,7 @@ def holds_in_balls(graph: SignedDigraph, seed: int) -> str:
     return cert.verdict
 
 
-@pytest.mark.parametrize("seed", thinned(range(12)))
+@pytest.mark.parametrize("seed", thinned(range(12), 6))
 def test_weights_over_twelve_decades_never_give_a_wrong_claim(seed: int):
     rng = np.random.default_rng(seed)
     n = int(rng.integers(3, 9))
@@ -262,7 +258,7 @@ def test_weights_over_twelve_decades_never_give_a_wrong_claim(seed: int):
     holds_in_balls(SignedDigraph.from_edges(edges), seed)
 
 
-@pytest.mark.parametrize("weak", thinned(["1e-12", "1e-9", "1e-6", "1e-3"], 3))
+@pytest.mark.parametrize("weak", thinned(["1e-9", "1e-12", "1e-6", "1e-3"]))
 def test_nearly_balanced_and_nearly_disconnected_graphs(weak: str):
     """One edge of that weight breaks balance, couples two rings, or closes a cycle through both."""
     two = [(i, (i + 1) % 3, 1) for i in range(3)] + [(3 + i, 3 + (i + 1) % 3, -1) for i in range(3)]
