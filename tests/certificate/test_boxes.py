@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 import re
 from fractions import Fraction
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 from mutations import changed, leaves, of_leaf, resealed
 from oracle_family_certificates import false_family_claims
 from row_families import laplacian, random_followers, vertices
+from selection import thinned
 
 from ptcc_certify import Family, NominalProtocol, SlidingModeProtocol
 from ptcc_certify.bounds.attracting_box import box_of_family
@@ -29,6 +31,11 @@ MOVED = Family.from_intervals([("a", "c", 1, 3), ("b", "c", 1, 1), ("c", "d", 1,
 
 def made(family: Family, x0: Any, protocol: Any = PROTOCOL, **more: Any) -> FamilyCertificate:
     return certify_family(family, protocol, x0, time_limit=3, **more)
+
+
+@cache
+def moved() -> FamilyCertificate:
+    return made(MOVED, [0, 4, 100, 3])
 
 
 def compare(seed: int) -> int:
@@ -55,11 +62,11 @@ def compare(seed: int) -> int:
 
 
 def test_the_box_that_is_certified_is_what_constant_weights_attain():
-    assert sum(map(compare, range(8))) >= 4
+    assert sum(map(compare, range(4))) >= 2
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize("start", range(8, 80, 8))
+@pytest.mark.parametrize("start", range(4, 76, 8))
 def test_the_boxes_that_are_certified_are_what_constant_weights_attain(start: int):
     assert sum(map(compare, range(start, start + 8))) >= 3
 
@@ -94,7 +101,7 @@ def test_there_is_no_box_without_a_state_or_followers_or_where_all_come_to_rest_
 
 
 def test_what_is_read_back_says_the_same():
-    certificate = made(MOVED, [0, 4, 100, 3])
+    certificate = moved()
     again = read_certificate(certificate.to_dict())
     assert again == certificate and family_lines(again, "f")[2:] == family_lines(certificate, "f")[2:]
     assert again.boxes[0].excess([0, 4, 100, 3]) == certificate.boxes[0].excess([0, 4, 100, 3]) > 0
@@ -102,7 +109,7 @@ def test_what_is_read_back_says_the_same():
 
 
 def test_screen_page_and_statement_tell_the_box_and_claim_no_limit():
-    saved = read_certificate(made(MOVED, [0, 4, 100, 3]).to_dict())
+    saved = read_certificate(moved().to_dict())
     told = "every signal draws c into [1, 2], d into [0.5, 2], at the rate 1.99004; no limit is claimed"
     screen = re.sub(r"\s+", " ", "\n".join(family_summary(saved, "f")))
     assert f"box {told}" in screen and "x(T)" not in screen
@@ -114,22 +121,31 @@ def test_screen_page_and_statement_tell_the_box_and_claim_no_limit():
 # ---------------------------------------------------------------------- forged files
 
 
-def test_no_mutant_of_a_box_is_accepted_that_is_false():
-    data = {**made(MOVED, [0, 4, 100, 3]).to_dict(), "unverified": {}}
-    accepted = rejected = 0
-    for path, value in leaves(data["boxes"]):
+def mutants(boxes: Any) -> list[tuple[tuple[Any, ...], Any]]:
+    """Places in a claim, and what to write there."""
+    found = []
+    for path, value in leaves(boxes):
         others = of_leaf(value, list("abcd"), False)
         if isinstance(value, str) and value not in "abcd":
             others += [str(Fraction(value) * (1 + Fraction(k, 10**6))) for k in (-1, 1)]
             others += [str(Fraction(value) + k) for k in (-1, 1)]
-        for new in others:
-            mutant = resealed(changed(data, ("boxes", *path), new))
-            if check(mutant, stdlib=True).accepted:
-                accepted += 1
-                assert false_family_claims(mutant) == [], (path, new)
-            else:
-                rejected += 1
-    assert accepted >= 4 and rejected >= 40
+        found += [(path, new) for new in others]
+    return found
+
+
+@pytest.mark.parametrize("first", thinned(range(7), 7))
+def test_no_mutant_of_a_box_is_accepted_that_is_false(first: int):
+    """Every seventh of them, from the first on."""
+    data = {**moved().to_dict(), "unverified": {}}
+    accepted = rejected = 0
+    for path, new in mutants(data["boxes"])[first::7]:
+        mutant = resealed(changed(data, ("boxes", *path), new))
+        if check(mutant, stdlib=True).accepted:
+            accepted += 1
+            assert false_family_claims(mutant) == [], (path, new)
+        else:
+            rejected += 1
+    assert accepted >= 1 and rejected >= 5
 
 
 @pytest.mark.parametrize(
@@ -149,13 +165,13 @@ def test_no_mutant_of_a_box_is_accepted_that_is_false():
     ],
 )
 def test_what_does_not_fit_is_rejected(path: tuple[Any, ...], new: Any, reason: str):
-    data = made(MOVED, [0, 4, 100, 3]).to_dict()
+    data = moved().to_dict()
     assert check(data).accepted
     assert check(resealed(changed(data, ("boxes", 0, *path), new))).reason == reason
 
 
 def test_a_leader_is_no_follower():
-    data = made(MOVED, [0, 4, 100, 3]).to_dict()
+    data = moved().to_dict()
     box = {"nodes": ["b", "c", "d"], "vector": ["1", "1", "1"], "lower": ["4", "1", "1"], "upper": ["4", "2", "2"]}
     wrong = data | {"boxes": [data["boxes"][0] | box]}
     assert check(resealed(wrong)).reason == "a row does not decay fast enough"

@@ -21,6 +21,7 @@ from generators import KINDS, Made, all_classes, class_cases, made_graphs, rando
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from recheck import Recheck, number
+from selection import thinned
 
 from lmi.exact.decimal_rounding import float_up
 from ptcc_certify.batch import certify_many
@@ -44,6 +45,8 @@ from ptcc_certify.protocols import NominalProtocol
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
 CLASSES = all_classes()
+#: One class of each row of the paper.
+ROWS = ("1.1", "1.2", "2.1 K=1", "2.1 K>=2", "2.2", "3.1 mixed no single", "3.2")
 Rows = list[list[Fraction]]
 
 # ---------------------------------------------------------------------- certificates to judge
@@ -209,7 +212,7 @@ def leaves(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
         yield path, value
 
 
-@pytest.mark.parametrize(("name", "kwargs"), class_cases(KINDS[::2]))
+@pytest.mark.parametrize(("name", "kwargs"), class_cases(KINDS[::6]))
 def test_numbers_are_exact_texts(name: str, kwargs: dict):
     data = of_class(name)
     seen = 0
@@ -280,19 +283,19 @@ def test_a_broken_certificate_is_refused(how: str, tmp_path: Path):
 # ---------------------------------------------------------------------- the proof, anew
 
 
-@pytest.mark.parametrize(("name", "kwargs"), class_cases())
+@pytest.mark.parametrize(("name", "kwargs"), class_cases((*ROWS, "disconnected 1.1 and isolated")))
 def test_the_json_alone_proves_the_claim(name: str, kwargs: dict):
     judge = Recheck(of_class(name))
     judge.everything()
     judge.digest()
 
 
-@pytest.mark.parametrize(("name", "kwargs"), class_cases(KINDS[5::7]))
+@pytest.mark.parametrize(("name", "kwargs"), class_cases(("2.2",)))
 def test_the_json_alone_proves_the_claim_of_decimal_weights(name: str, kwargs: dict):
     Recheck(of_class(name, seed=4)).everything()
 
 
-@pytest.mark.parametrize(("name", "kwargs"), class_cases())
+@pytest.mark.parametrize(("name", "kwargs"), class_cases(ROWS))
 def test_a_rate_a_millionth_higher_is_not_proved(name: str, kwargs: dict):
     """The paper's rate is that of its formula, not less: 1e-6 more fails the inequality of the row."""
     data = of_class(name)
@@ -301,10 +304,6 @@ def test_a_rate_a_millionth_higher_is_not_proved(name: str, kwargs: dict):
         rate = number(data["paper"]["rate"])
         assert judge.proves(rate)
         assert not judge.proves(rate * (1 + Fraction(1, 10**6)))
-
-
-#: One class of each row of the paper.
-ROWS = ("1.1", "1.2", "2.1 K=1", "2.1 K>=2", "2.2", "3.1 mixed no single", "3.2")
 
 
 def refused(data: dict[str, Any]) -> bool:
@@ -327,7 +326,7 @@ def refused(data: dict[str, Any]) -> bool:
     return not true or not stands(Recheck(data))
 
 
-@pytest.mark.parametrize(("name", "kwargs"), class_cases(("1.1", "3.1 mixed no single"), ROWS))
+@pytest.mark.parametrize(("name", "kwargs"), class_cases(("3.1 mixed no single",), ROWS))
 def test_the_recheck_sees_what_is_wrong(name: str, kwargs: dict):
     """A judge that accepts everything would prove nothing."""
     Recheck(of_class(name)).everything()
@@ -370,7 +369,7 @@ def written_anew(data: dict[str, Any], old: str, new: Fraction) -> dict[str, Any
     return json.loads(text.replace(f'"{old}"', f'"{new}"'))
 
 
-@pytest.mark.parametrize(("name", "kwargs"), class_cases(("1.1", "3.1 mixed no single"), ROWS))
+@pytest.mark.parametrize(("name", "kwargs"), class_cases(("1.1",), ROWS))
 def test_the_recheck_sees_what_is_wrong_with_a_searched_function(name: str, kwargs: dict):
     data = of_class(name)
     Recheck(data).everything()
@@ -404,7 +403,7 @@ def test_the_recheck_sees_what_is_wrong_with_a_searched_function(name: str, kwar
         assert spoilt(copy)
 
 
-@pytest.mark.parametrize("name", ROWS)
+@pytest.mark.parametrize("name", thinned(ROWS, 7))
 def test_the_recheck_sees_what_is_wrong_with_the_limit_of_rates(name: str):
     """A limit below the slowest mode, an earlier claim about its witness, a witness of less or of something else."""
     data = of_class(name, method="paper")
@@ -467,7 +466,15 @@ def test_only_what_the_independent_check_accepts_is_certified(monkeypatch: pytes
 
 
 #: Larger ones of kinds that others show too.
-REAL_CAMPAIGN = ("regulatory_114", "regulatory_123", "regulatory_143", "regulatory_192")
+REAL_CAMPAIGN = (
+    "bales",
+    "regulatory_013",
+    "highland_tribes",
+    "regulatory_114",
+    "regulatory_123",
+    "regulatory_143",
+    "regulatory_192",
+)
 REAL = {
     "bales": "2.1",
     "highland_tribes": "1.2",
@@ -617,12 +624,14 @@ def ring(n: int, last: int) -> SignedDigraph:
     return SignedDigraph.from_edges([(i, (i + 1) % n, last if i == n - 1 else 1) for i in range(n)])
 
 
-@pytest.mark.parametrize(("n", "last", "searched"), [(121, 1, True), (121, -1, True), (SEARCH_NODES + 1, 1, False)])
+@pytest.mark.parametrize(
+    ("n", "last", "searched"), thinned([(121, 1, True), (121, -1, True), (SEARCH_NODES + 1, 1, False)], 2)
+)
 def test_beyond_120_nodes_the_paper_s_rate_is_floating_point_and_the_certified_one_proved(
     n: int, last: int, searched: bool
 ):
     """A ring: rate 2 (1 - cos(2 pi/n)) if balanced, 2 (1 - cos(pi/n)) if not, which weights of 1 attain."""
-    cert = certify(ring(n, last), PROTOCOL, list(range(n)))
+    cert = certify(ring(n, last), PROTOCOL, list(range(n)), simulation=False)
     data = through_json(cert)
     assert data["verdict"] == "certified" and check(data).accepted
     assert data["rates"]["paper"] is None and cert.upper_bound == Fraction(2 * n, n - 1 if last > 0 else n)
@@ -649,7 +658,7 @@ def test_beyond_120_nodes_the_paper_s_rate_is_floating_point_and_the_certified_o
     assert any("nodes" in note for note in said["notes"])
 
 
-@pytest.mark.parametrize("last", [1, -1])
+@pytest.mark.parametrize("last", thinned([1, -1], 2))
 def test_where_a_proof_is_out_of_reach_nothing_is_claimed_but_an_upper_bound(
     last: int, monkeypatch: pytest.MonkeyPatch
 ):
@@ -677,7 +686,7 @@ def test_where_a_proof_is_out_of_reach_nothing_is_claimed_but_an_upper_bound(
 # ---------------------------------------------------------------------- invariance, refusals
 
 
-@settings(max_examples=8)
+@settings(max_examples=3)
 @given(made_graphs(max_nodes=8, weights=("units", "small ints")), st.integers(0, 2**32 - 1))
 def test_relabelling_permutes_the_certificate_and_changes_nothing_else(made: Made, seed: int):
     graph = made.graph
@@ -767,7 +776,7 @@ def same_functions(first: Certificate, second: Certificate, order: np.ndarray, s
 
 
 @pytest.mark.parametrize(
-    ("name", "method"), [*((name, "perron") for name in SOME), *((name, "best") for name in SOME[::2])]
+    ("name", "method"), thinned([*((name, "perron") for name in SOME), *((name, "best") for name in SOME[::2])])
 )
 def test_relabelling_permutes_the_searched_functions(name: str, method: str):
     graph = of_size(name)
@@ -781,7 +790,7 @@ def test_relabelling_permutes_the_searched_functions(name: str, method: str):
         same_functions(first, second, order)
 
 
-@pytest.mark.parametrize("name", SOME[::2])
+@pytest.mark.parametrize("name", thinned(SOME[::2]))
 def test_heavier_edges_scale_every_rate(name: str):
     """Three times the weights and a third of the gain is the same motion: the same members, their rates times 3."""
     graph = of_size(name)
@@ -792,7 +801,7 @@ def test_heavier_edges_scale_every_rate(name: str):
     same_functions(*perron, np.arange(graph.n_nodes), 3)
 
 
-@pytest.mark.parametrize("name", SOME[1::2])
+@pytest.mark.parametrize("name", thinned(SOME[1::2]))
 def test_a_gauge_changes_no_rate(name: str):
     """An agent that joins the other camp: the signs of all its edges change, and no rate."""
     graph = of_size(name)
@@ -808,7 +817,7 @@ def exact_edges(graph: SignedDigraph) -> list[tuple[str, str, Fraction]]:
     return [(s, t, Fraction(w)) for s, t, w in graph.edges]
 
 
-@pytest.mark.parametrize(("one", "other"), list(pairwise(SOME)))
+@pytest.mark.parametrize(("one", "other"), thinned(pairwise(SOME)))
 def test_a_union_is_as_slow_as_its_slower_part(one: str, other: str):
     parts = [of_size(one, 5), of_size(other, 5, seed=6)]
     edges = [(f"{k}.{s}", f"{k}.{t}", w) for k, g in enumerate(parts) for s, t, w in exact_edges(g)]
@@ -819,7 +828,7 @@ def test_a_union_is_as_slow_as_its_slower_part(one: str, other: str):
     assert union.optimality_ratio is not None and 0.99 <= union.optimality_ratio <= 1
 
 
-@pytest.mark.parametrize(("name", "kwargs"), class_cases(SOME[::2], SOME))
+@pytest.mark.parametrize(("name", "kwargs"), class_cases(("3.2",), SOME))
 def test_a_method_keeps_to_its_class(name: str, kwargs: dict):
     graph = of_size(name, seed=7)
     rates = {}
@@ -849,7 +858,7 @@ UNDIRECTED = [name for name, kwargs in CLASSES if kwargs.get("special") == "undi
 
 
 @pytest.mark.parametrize("weights", ["small ints", "log6"])
-@pytest.mark.parametrize("name", UNDIRECTED)
+@pytest.mark.parametrize("name", thinned(UNDIRECTED, 3))
 def test_the_perron_vector_alone_is_tight_on_undirected_graphs(name: str, weights: str):
     """``L`` is symmetric but for a gauge: the identity reaches every eigenvalue.
 
@@ -864,12 +873,12 @@ def test_the_perron_vector_alone_is_tight_on_undirected_graphs(name: str, weight
 
 def test_an_instant_of_interest_is_served():
     """With ``at`` the bound there is no larger than without; only instants of [0, T) will do."""
-    graph = of_size("2.2")
+    graph = of_size("1.2")
     without, early = functions_of(graph), functions_of(graph, at="0.05")
     assert through_json(without)["unverified"]["search"]["at"] is None
     assert through_json(early)["unverified"]["search"]["at"] == 0.05
     assert early.envelope.residual(0.95) <= without.envelope.residual(0.95) * (1 + 1e-9)
-    functions_of(graph, at=0)
+    functions_of(graph, at=0, method="paper")
 
 
 @pytest.mark.parametrize(
@@ -981,7 +990,7 @@ def test_the_upper_bound_is_near_the_slowest_mode_and_at_most_twice_the_mean_eig
         assert cert.spectral_rate <= float(cert.upper_bound) * (1 + 1e-12)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", thinned([0, 2, 1], 2))
 def test_there_is_one_upper_bound_on_the_rate_and_one_optimality_ratio(seed: int, tmp_path: Path):
     """In the object, its file, what is read back, the table of a batch, and what ``--min-rate`` is refuted by."""
     edges = [(1, 2, -1), (2, 1, -3)] if seed == 0 else exact_edges(of_size(SOME[seed], 6, seed))

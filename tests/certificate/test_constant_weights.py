@@ -6,6 +6,7 @@ import itertools
 import random
 import re
 from fractions import Fraction
+from functools import cache
 from typing import Any
 
 import pytest
@@ -33,6 +34,11 @@ def made(family: Family, x0: Any, protocol: Any = PROTOCOL, **more: Any) -> Fami
     return certify_family(family, protocol, x0, signal="constant", time_limit=3, **more)
 
 
+@cache
+def pair() -> FamilyCertificate:
+    return made(Family.from_intervals(PAIR), [0, 6, 100])
+
+
 def claim_of(certificate: FamilyCertificate) -> FinalValueClaim:
     (claim,) = certificate.final_values.values()
     return claim
@@ -56,11 +62,11 @@ def compare(seed: int) -> int:
 
 
 def test_the_ends_that_are_certified_are_those_of_all_vertices():
-    assert sum(map(compare, range(8))) >= 4
+    assert sum(map(compare, range(4))) >= 2
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize("start", range(8, 128, 12))
+@pytest.mark.parametrize("start", range(4, 124, 12))
 def test_the_ends_that_are_certified_are_those_of_all_vertices_of_more_graphs(start: int):
     assert sum(map(compare, range(start, start + 12))) >= 4
 
@@ -132,7 +138,7 @@ def test_what_is_read_back_says_the_same(monkeypatch: pytest.MonkeyPatch):
 
 
 def test_screen_page_and_statement_tell_the_ends_of_constant_weights():
-    saved = read_certificate(made(Family.from_intervals(PAIR), [0, 6, 100]).to_dict())
+    saved = read_certificate(pair().to_dict())
     text = "\n".join(family_summary(saved, "pair"))
     assert "           a in [-3, -2], b, c in [2, 3] (constant weights)" in text and "(every signal)" in text
     assert "as for every signal\n" in text and "nothing more is proved" not in text
@@ -148,7 +154,9 @@ def test_where_modes_have_camps_of_their_own_each_ends_within_the_ends_of_all():
     modes = [[("a", "b", 1, 2), ("b", "a", 1, 1)], [("a", "b", -2, -1), ("b", "a", -1, -1)]]
     certificate = made(Family.switching([Family.from_intervals(edges) for edges in modes]), [0, 6])
     saved = read_certificate(certificate.to_dict())
-    assert "x(T)       a in [-3, 3], b in [2, 3] (these signals)" in "\n".join(family_summary(saved, "pair"))
+    assert "x(T)       a in [-3, 3], b in [2, 3], all at one |x(T)| (these signals)" in "\n".join(
+        family_summary(saved, "pair")
+    )
     assert "constant weights" not in "\n".join(family_summary(saved, "pair"))
     assert "each stays within: a [\N{MINUS SIGN}3,\N{NO-BREAK SPACE}3]; b" in re.sub(
         " +", " ", re.sub("<[^>]*>", " ", report_html(saved))
@@ -160,7 +168,7 @@ def test_where_modes_have_camps_of_their_own_each_ends_within_the_ends_of_all():
 
 def test_no_other_number_of_a_final_value_is_accepted_unless_it_is_true():
     """Every number of the claim nudged: what is accepted claims no less than the truth."""
-    data = made(Family.from_intervals(PAIR), [0, 6, 100]).to_dict()
+    data = pair().to_dict()
     (place,) = [k for k, claim in enumerate(data["restricted"]) if claim["claim"] == "final value"]
     count = 0
     for path, value in leaves(data["restricted"][place]["modes"]):
@@ -191,7 +199,7 @@ def test_no_other_number_of_a_final_value_is_accepted_unless_it_is_true():
     ],
 )
 def test_what_does_not_fit_is_rejected(path: tuple[Any, ...], new: Any, reason: str):
-    data = made(Family.from_intervals(PAIR), [0, 6, 100]).to_dict()
+    data = pair().to_dict()
     assert check(data).accepted
     assert check(resealed(changed(data, ("restricted", 1, *path), new))).reason == reason
 

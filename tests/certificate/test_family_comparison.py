@@ -55,12 +55,9 @@ def worst_ratios(rng, families, count, steps=(3,), **options):
 
 def test_no_signal_exceeds_what_is_proved():
     rng = np.random.default_rng(11)
-    families = [
-        random_family(rng, "consensus", 3, 2, Fraction(1, 5)),
-        random_family(rng, "stability", 4, 1, Fraction(1, 5), 0.5),
-    ]
+    families = [random_family(rng, "consensus", 3, 2, Fraction(1, 5))]
     worst, runs = worst_ratios(rng, families, 12, samples=30, remaining=1e-4)
-    assert runs >= 24
+    assert runs >= 12
     assert worst["lyapunov_ratio"] > 0.9  # the bound is sharp somewhere
     assert all(0 < worst[name] <= 1.000001 for name in RATIOS)
 
@@ -81,25 +78,24 @@ def test_a_certificate_that_claims_too_much_is_found_out():
     part = certificate.parts[0]
     boast = [replace(V, rates=tuple(r * Fraction(11, 10) for r in V.rates)) for V in part.functions]
     wrong = replace(certificate, parts=(replace(part, functions=tuple(boast)),))
-    seen = [
-        compare(wrong, simulate_family(family, PROTOCOL, [1, 2], s, samples=20, remaining=1e-4))
+    assert any(
+        compare(wrong, simulate_family(family, PROTOCOL, [1, 2], s, samples=20, remaining=1e-4)).violated
         for s in worst_case_signals(wrong)
-    ]
-    assert any(one.violated for one in seen)
+    )
     assert not any(
-        compare(certificate, simulate_family(family, PROTOCOL, [1, 2], s)).violated
+        compare(certificate, simulate_family(family, PROTOCOL, [1, 2], s, samples=20, remaining=1e-4)).violated
         for s in worst_case_signals(certificate)
     )
 
 
 def test_the_worst_case_falls_more_slowly_than_random_signals():
     rng = np.random.default_rng(7)
-    family = random_family(rng, "stability", 4, 2, Fraction(1, 4))
-    certificate = certify_family(family, PROTOCOL, [1, -2, 3, 4])
+    family = random_family(rng, "stability", 3, 2, Fraction(1, 4))
+    certificate = certify_family(family, PROTOCOL, [1, -2, 3])
     worst = worst_case_signals(certificate)[0]
     V_end = []
     for signal in (worst, *map(RandomSignal, range(5))):
-        x = simulate_family(family, PROTOCOL, [1, -2, 3, 4], signal, times=[0.9]).states[:, 0]
+        x = simulate_family(family, PROTOCOL, [1, -2, 3], signal, times=[0.9]).states[:, 0]
         V_end.append(x @ worst.form @ x)
     assert V_end[0] > max(V_end[1:])
 

@@ -11,6 +11,7 @@ import pytest
 from common_kernel_families import KINDS, random_family
 from row_families import laplacian, random_led, random_vertex
 from scipy.integrate import quad
+from selection import thinned
 
 from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate, certify_family
@@ -120,8 +121,8 @@ def worst_ratios(rng, families, played=4, **options):
 def test_neither_signal_nor_disturbance_exceeds_what_is_proved():
     rng = np.random.default_rng(9)
     families = [drawn_family(rng, 3), Family.from_intervals(TRAP)]
-    worst, runs = worst_ratios(rng, families, 4, samples=20, remaining=1e-4, rtol=1e-9, atol=1e-9)
-    assert runs == 8
+    worst, runs = worst_ratios(rng, families, 3, samples=20, remaining=1e-4, rtol=1e-9, atol=1e-9)
+    assert runs == 6
     assert all(0 < worst[name] <= 1.000001 for name in RATIOS)
     assert worst["lyapunov_ratio"] > 0.5 and worst["sliding_ratio"] > 0.5
 
@@ -237,7 +238,7 @@ def test_drive_sizes_bound_what_any_member_makes_of_sliding_variables():
 
 def test_integrals_of_what_drives_are_enclosed_closely():
     rng = np.random.default_rng(1)
-    for _ in range(12):
+    for _ in range(5):
         p = drawn_protocol(rng)
         gains = {name: Fraction(value) for name, value in p.parameters.items()}
         drive = Drive.of(gains, {0: Fraction(1)}, None, [[]])
@@ -255,20 +256,20 @@ def test_integrals_of_what_drives_are_enclosed_closely():
 # ---------------------------------------------------------------------- sigma(0) = 0, and one graph
 
 
-def test_without_sliding_variables_all_is_as_without_disturbances():
+@pytest.mark.parametrize("kind", thinned(KINDS, 2))
+def test_without_sliding_variables_all_is_as_without_disturbances(kind):
     rng = np.random.default_rng(8)
-    for kind in KINDS:
-        family, x0 = random_family(rng, kind, 3, 2, Fraction(1, 10)), [3, -1, 2]
-        nominal = certify_family(family, NominalProtocol(T=2, rho1=1, rho2=1, kappa=3), x0, time_limit=60)
-        zero = (Fraction(0),) * 3  # with the same functions, whatever the searches had time for
-        reaching = certified_reaching_times(PROTOCOL, zero)
-        own = FamilyCertificate(family, PROTOCOL, nominal.parts, nominal.initial_state, zero, reaching)
-        assert own.direct and own.drives is None and own.verdict == "certified"
-        assert own.final_states == nominal.final_states and own.nominal_peaks == nominal.input_peaks
-        if own.input_peaks is not None:
-            assert all(x - y == PROTOCOL.mu1 for x, y in zip(own.input_peaks, nominal.input_peaks, strict=True))
-        q = np.geomspace(1, 1e-6, 9)
-        assert (own.deviation_bound(q) == nominal.deviation_bound(q)).all()
+    family, x0 = random_family(rng, kind, 3, 2, Fraction(1, 10)), [3, -1, 2]
+    nominal = certify_family(family, NominalProtocol(T=2, rho1=1, rho2=1, kappa=3), x0, time_limit=60)
+    zero = (Fraction(0),) * 3  # with the same functions, whatever the searches had time for
+    reaching = certified_reaching_times(PROTOCOL, zero)
+    own = FamilyCertificate(family, PROTOCOL, nominal.parts, nominal.initial_state, zero, reaching)
+    assert own.direct and own.drives is None and own.verdict == "certified"
+    assert own.final_states == nominal.final_states and own.nominal_peaks == nominal.input_peaks
+    if own.input_peaks is not None:
+        assert all(x - y == PROTOCOL.mu1 for x, y in zip(own.input_peaks, nominal.input_peaks, strict=True))
+    q = np.geomspace(1, 1e-6, 9)
+    assert (own.deviation_bound(q) == nominal.deviation_bound(q)).all()
 
 
 def test_a_family_of_one_graph_runs_as_the_graph_does():
@@ -288,21 +289,21 @@ def test_a_family_of_one_graph_runs_as_the_graph_does():
         assert own.to_csv().startswith("t,remaining,0,1,2,3,mode,sigma(0)")
 
 
-def test_functions_of_rows_are_driven_too():
+@pytest.mark.parametrize("kind", thinned(["bipartite consensus", "stability", "bipartite containment"], 3))
+def test_functions_of_rows_are_driven_too(kind):
     draw, rng = random.Random(2), np.random.default_rng(2)
-    for kind in ("bipartite consensus", "stability", "bipartite containment"):
-        family = random_led(draw, kind)
-        parts = tuple(ComponentProof(c, tuple(follower_functions(c))) for c in decide(family))
-        assert [part.component.behaviour for part in parts] == [kind] and parts[0].functions
-        n = family.n_nodes
-        x0 = tuple(Fraction(int(x)) for x in rng.integers(-5, 6, n))
-        sigma0 = tuple(Fraction(int(x), 4) for x in rng.integers(-5, 6, n))
-        reaching = certified_reaching_times(PROTOCOL, sigma0)
-        certificate = FamilyCertificate(family, PROTOCOL, parts, x0, sigma0, reaching)
-        assert certificate.checked.accepted, certificate.checked
-        more = {"sigma0": sigma0, "samples": 25, "past": 0, "remaining": 1e-3}
-        for signal in (RandomSignal(1, 2.0), ConstantSignal(0, 0.0), ConstantSignal(0, 1.0)):
-            assert not compare(certificate, simulate_family(family, PROTOCOL, x0, signal, **more)).violated
+    family = random_led(draw, kind)
+    parts = tuple(ComponentProof(c, tuple(follower_functions(c))) for c in decide(family))
+    assert [part.component.behaviour for part in parts] == [kind] and parts[0].functions
+    n = family.n_nodes
+    x0 = tuple(Fraction(int(x)) for x in rng.integers(-5, 6, n))
+    sigma0 = tuple(Fraction(int(x), 4) for x in rng.integers(-5, 6, n))
+    reaching = certified_reaching_times(PROTOCOL, sigma0)
+    certificate = FamilyCertificate(family, PROTOCOL, parts, x0, sigma0, reaching)
+    assert certificate.checked.accepted, certificate.checked
+    more = {"sigma0": sigma0, "samples": 25, "past": 0, "remaining": 1e-3}
+    for signal in (RandomSignal(1, 2.0), ConstantSignal(0, 0.0), ConstantSignal(0, 1.0)):
+        assert not compare(certificate, simulate_family(family, PROTOCOL, x0, signal, **more)).violated
 
 
 # ---------------------------------------------------------------------- files, and what is refused

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from balls import inverse_decay_integral
 from generators import all_classes, class_cases, random_graph
+from selection import thinned
 
 from ptcc_certify.bounds.final_state import final_state
 from ptcc_certify.bounds.sliding_envelope import SlidingEnvelope
@@ -378,7 +379,7 @@ POWERS = (Fraction(1, 3), Fraction(1), Fraction(9, 5))
 OF_EACH_ROW = ("1.1", "1.2", "2.1 K=1", "2.1 K>=2", "2.2", "3.1 mixed", "3.1 mixed no single", "3.2")
 
 
-@pytest.mark.parametrize(("name", "kwargs"), class_cases((*OF_EACH_ROW, "disconnected 1.2 2.1 isolated")))
+@pytest.mark.parametrize(("name", "kwargs"), class_cases((*OF_EACH_ROW[1::2], "disconnected 1.2 2.1 isolated")))
 def test_every_row_keeps_its_bounds(name: str, kwargs: dict):
     number = [known for known, _ in all_classes()].index(name)
     power = POWERS[number % 3]
@@ -424,7 +425,7 @@ def path_protocol(**other: Any) -> SlidingModeProtocol:
 
 
 @pytest.mark.parametrize("mu1", ["1.001", "1.1", 2])
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", thinned(range(4)))
 def test_a_function_that_is_the_worst_case_is_not_taken_for_a_violation(mu1: Any, seed: int):
     """It attains every certified reaching time; the integrator's last digits must not break one."""
     rng = np.random.default_rng(seed)
@@ -465,13 +466,13 @@ def test_what_rounding_allows_beyond_delta_never_reaches_mu1():
     assert isinstance(run, SlidingTrajectory) and (run.reaching_z > 0).all()
 
 
-def test_a_fast_signal_does_not_hide_between_the_samples():
-    for text in ("3*sin(pi*2**20*19999*t)", "1.9*abs(sin(pi*2**18*19999*t/1.25))"):
-        with pytest.raises(ParameterError, match="beyond delta"):
-            simulate(PATH, path_protocol(), [5, 2, -4], disturbance=text)
+@pytest.mark.parametrize("text", thinned(["3*sin(pi*2**20*19999*t)", "1.9*abs(sin(pi*2**18*19999*t/1.25))"], 2))
+def test_a_fast_signal_does_not_hide_between_the_samples(text: str):
+    with pytest.raises(ParameterError, match="beyond delta"):
+        simulate(PATH, path_protocol(), [5, 2, -4], disturbance=text)
 
 
-@pytest.mark.parametrize("mu1", ["1e-5", "1e-290"])
+@pytest.mark.parametrize("mu1", thinned(["1e-290", "1e-5"], 2))
 def test_starts_of_any_size_keep_their_bounds(mu1: str):
     protocol = path_protocol(mu1=mu1, delta=0, mu3="0.5")
     with np.errstate(all="raise", under="ignore"):

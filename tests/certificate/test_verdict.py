@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from bad_inputs import detailed, ptcc
 from generators import all_classes, random_graph
+from selection import thinned
 
 from ptcc_certify import (
     Expectations,
@@ -53,7 +54,7 @@ def weak(k: int, sliding: bool = False) -> Certificate:
 # ---------------------------------------------------------------------- usefulness
 
 
-@pytest.mark.parametrize(("k", "sliding"), [(k, k % 3 == 0) for k in range(1, 11)])
+@pytest.mark.parametrize(("k", "sliding"), thinned([(k, k % 3 == 0) for k in range(1, 11)], 2))
 def test_the_gains_that_are_named_leave_one_percent_and_bound_the_input(k: int, sliding: bool):
     """Certified with what the line says, nothing else changed, at most a hundredth is left, of a bounded input."""
     cert = weak(k, sliding)
@@ -163,21 +164,36 @@ def test_codes_are_worst_first():
 
 @pytest.mark.parametrize(
     ("options", "code", "says"),
-    [
-        (("--sample-period", "0.5"), 4, "left open: limits (certified with a period of 6.4"),
-        (("--gain-cap", "20", "--sample-period", "0.5"), 4, "left open: limits (certified with a period of 0.00"),
-        (("--noise", "1"), 4, "left open: noise (without a limit it meets an infinite gain"),
-        (("--delta", "1", "--rho2", "0.01"), 4, "left open: delta (the rate proves no bounded input)"),
-        (("--gain-cap", "20"), 0, "certified; "),
-        (
-            ("--gain-cap", "20", "--noise", "1", "--delta", "1"),
-            0,
-            "certified without disturbances, but with these gains the bound says little",
-        ),
-        (("--gain-cap", "0.001"), 0, "certified, but with these gains the bound says little by T: under the limits"),
-        (("--stop-before", "0.9", "--initial-bound", "2"), 0, "certified, but with these gains the bound says little"),
-        (("--expect", "consensus", "--min-rate", "9.0438"), 3, "refuted: consensus (it is stability); left open: rate"),
-    ],
+    thinned(
+        [
+            (("--gain-cap", "20", "--sample-period", "0.5"), 4, "left open: limits (certified with a period of 0.00"),
+            (("--sample-period", "0.5"), 4, "left open: limits (certified with a period of 6.4"),
+            (("--noise", "1"), 4, "left open: noise (without a limit it meets an infinite gain"),
+            (("--delta", "1", "--rho2", "0.01"), 4, "left open: delta (the rate proves no bounded input)"),
+            (("--gain-cap", "20"), 0, "certified; "),
+            (
+                ("--gain-cap", "20", "--noise", "1", "--delta", "1"),
+                0,
+                "certified without disturbances, but with these gains the bound says little",
+            ),
+            (
+                ("--gain-cap", "0.001"),
+                0,
+                "certified, but with these gains the bound says little by T: under the limits",
+            ),
+            (
+                ("--stop-before", "0.9", "--initial-bound", "2"),
+                0,
+                "certified, but with these gains the bound says little",
+            ),
+            (
+                ("--expect", "consensus", "--min-rate", "9.0438"),
+                3,
+                "refuted: consensus (it is stability); left open: rate",
+            ),
+        ],
+        2,
+    ),
 )
 def test_an_expectation_that_is_not_met_is_in_the_verdict_line(options: tuple[str, ...], code: int, says: str):
     run = detailed("certify", "fig1a", "--no-simulation", *options)
@@ -243,7 +259,7 @@ def test_what_a_file_says_was_asked_need_not_be_sound(asked: Any, tmp_path: Path
 
 
 def test_lines_are_short():
-    assert all(len(weak(k, k % 3 == 0).assessment.text) <= 200 for k in range(12))
+    assert all(len(weak(k, k % 3 == 0).assessment.text) <= 200 for k in range(1, 10, 2))
     assert len(certificate_lines(strong(), "fig1a")[-1]) <= 80
 
 
@@ -270,8 +286,9 @@ def test_noise_from_the_final_state_is_not_a_share_of_nothing():
     assert found.useful is False and "||E|| <= 0.29 at T" in found.remark
 
 
-def test_of_a_set_no_share_is_stated_that_single_states_exceed():
-    hub = SignedDigraph.from_edges([(1, 2, 1), *((2, k, 10) for k in range(3, 103))])
+@pytest.mark.parametrize("followers", thinned([40, 100], 2))
+def test_of_a_set_no_share_is_stated_that_single_states_exceed(followers: int):
+    hub = SignedDigraph.from_edges([(1, 2, 1), *((2, 3 + k, 10) for k in range(followers))])
     protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa="3.3")
     found = limited(
         None, hub, protocol, initial_set=initial_set_within(analyse(hub), 1), limits=[GainLimits(gain_cap="4.5")]

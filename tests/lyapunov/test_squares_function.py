@@ -98,12 +98,12 @@ def decays_of(family: Family, p: np.ndarray, rng: random.Random, count: int) -> 
 
 def test_functions_decay_in_all_members():
     proved = 0
-    for seed in range(30):
+    for seed in range(12):
         V = squares_function(family := stable_family(seed))
         if V is not None:
             proved += 1
             assert min(decays_of(family, V.vector, random.Random(seed), 30)) >= float(V.rate) * (1 - 1e-9)
-    assert proved > 8
+    assert proved > 3
 
 
 def test_no_form_proves_a_rate_that_a_member_contradicts():

@@ -126,7 +126,7 @@ def test_lemma_3_1_connectivity_bounds_the_form_from_below(made: Made, seed: int
     assert ((xi * (Lbar @ xi)).sum(0) >= a * (xi * (P @ xi)).sum(0) - 1e-9 * scale * (xi**2).sum(0)).all()
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(made_graphs(only=STRONG_UNBALANCED, max_nodes=8))
 def test_lemma_3_2_unbalanced_strong_graphs_have_a_diagonal_lyapunov_matrix(made: Made):
     found = unbalanced_lyapunov(made.graph)
@@ -146,7 +146,7 @@ def test_lemma_3_names_the_hypothesis_that_fails():
         algebraic_connectivity(unbalanced)
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(made_graphs(only=("2.", "3."), max_nodes=10))
 def test_lemmas_7_and_9_1_the_follower_block(made: Made):
     structure = analyse(made.graph)
