@@ -42,8 +42,8 @@ def longest(T: float, left: Callable[[Fraction], float], most: float) -> float |
     return best
 
 
-def shares(seed: int) -> tuple[float, float] | None:
-    """Return the longest delays that are proved by rows and by steps over that of the run; None without such a run."""
+def shares(seed: int) -> tuple[float, float, bool] | None:
+    """Return the longest delays proved by rows and by steps over that of the run, and whether ``rho2`` is 2 or more."""
     rng = np.random.default_rng(seed)
     signs = str(rng.choice(["mixed", "positive", "gauge"]))
     structure = analyse(led_graph(rng, int(rng.integers(1, 4)), int(rng.integers(1, 7)), signs=signs))
@@ -71,18 +71,19 @@ def shares(seed: int) -> tuple[float, float] | None:
         return None
     by_rows = longest(float(T), proved(lambda bounds: [row.residual() for row in bounds.rows]), most)
     by_steps = longest(float(T), proved(lambda bounds: [] if bounds.steps is None else [bounds.steps.bounds[-1]]), most)
-    return (by_rows or 0) / does, (by_steps or 0) / does
+    return (by_rows or 0) / does, (by_steps or 0) / does, rho2 >= 2
 
 
 def main() -> None:
     """Print quartiles over all seeds."""
     first, last = (int(x) for x in (sys.argv[1:3] if len(sys.argv) > 2 else (0, 200)))
-    found = [pair for seed in range(first, last) if (pair := shares(seed)) is not None]
+    found = [case for seed in range(first, last) if (case := shares(seed)) is not None]
     print(f"{last - first} graphs, {len(found)} with a longest delay between 0.002 T and T; share of it that is proved")
-    print(f"{'':8}{'least':>8}{'1/4':>8}{'1/2':>8}{'3/4':>8}{'largest':>9}")
-    for name, values in zip(("rows", "steps"), zip(*found, strict=True), strict=True):
-        numbers = "".join(f"{x:8.3f}" for x in np.quantile(values, [0, 0.25, 0.5, 0.75, 1]))
-        print(f"{name:8}{numbers}", flush=True)
+    print(f"{'':22}{'least':>8}{'1/4':>8}{'1/2':>8}{'3/4':>8}{'largest':>9}")
+    for what, cases in (("all", found), ("rho2 >= 2", [case for case in found if case[2]])):
+        for k, name in enumerate(("rows", "steps")):
+            quartiles = np.quantile([case[k] for case in cases], [0, 0.25, 0.5, 0.75, 1])
+            print(f"{what:10}{len(cases):5}  {name:5}" + "".join(f"{x:8.3f}" for x in quartiles), flush=True)
 
 
 if __name__ == "__main__":
