@@ -431,7 +431,7 @@ def _largest_share(seeds: Iterator[int] | range) -> list[float]:
 
 def test_no_input_of_a_run_is_above_its_bound_under_a_capped_gain() -> None:
     """The input is that of what agents hear, at every instant of runs as late as allowed, and now late, now not."""
-    assert max(_largest_share(range(9))) > 0.3  # the bound is not idle
+    assert max(_largest_share(range(3))) > 0.3  # the bound is not idle
 
 
 @pytest.mark.campaign

@@ -23,6 +23,7 @@ from families import KINDS, random_family
 from jsonschema import Draft202012Validator  # type: ignore[import-untyped]
 from mutations import Json, at, changed, containers, leaves, of_container, of_leaf, resealed, same_claim
 from oracle_family_certificates import FamilyOracle, false_family_claims
+from selection import thinned
 
 from ptcc_certify import checker
 from ptcc_certify.certificate import format_vectors
@@ -91,12 +92,9 @@ def cases() -> list[tuple[str, Json]]:
     """True certificates of families of every behaviour, small."""
     found = []
     for k, kind in enumerate(KINDS):
-        made = random_family(random.Random(100 + k), kind, nodes=4)
+        made = random_family(random.Random(100 + k), kind, nodes=3 if kind == "bipartite consensus" else 4)
         found.append((kind, document(made.family, k, k % 4 > 0)))
-    draw = np.random.default_rng(1)
-    for kind in ("stability", "consensus", "containment", "undirected"):
-        family = with_common_kernel(draw, kind, 4, 2, Fraction(1, 5), 0.5)
-        found.append((f"uncertain {kind}", document(family)))
+    found += uncertain_cases(("consensus", "containment", "undirected"))
     one = Family.from_intervals([("a", "b", -2, -1), ("b", "a", -1, 0), ("b", "a", 0, 1), ("c", "a", 1, 2)])
     found.append(("opposite signs", document(one)))
     found.append(("known", document(Family.from_intervals([("a", "b", 1, 1), ("b", "c", -1, -1)]))))
@@ -116,7 +114,14 @@ def cases() -> list[tuple[str, Json]]:
     day, night = ([("a", "b", 1, 1)], [("b", "a", 1, 1)])
     modes = {"day": Family.from_intervals(day), "night": Family.from_intervals(night, nodes="ab")}
     found.append(("leaders change", document(Family.switching(modes))))
-    return found + rate_cases(own=True) + box_cases() + restricted_cases() + sliding_cases()
+    return found + rate_cases(own=True) + box_cases() + restricted_cases(4) + sliding_cases()
+
+
+def uncertain_cases(kinds: tuple[str, ...]) -> list[tuple[str, Json]]:
+    """True certificates of families of two modes whose weights are known to a fifth."""
+    draw = np.random.default_rng(1)
+    families = {kind: with_common_kernel(draw, kind, 3, 2, Fraction(1, 5), 0.5) for kind in kinds}
+    return [(f"uncertain {kind}", document(family)) for kind, family in families.items()]
 
 
 def box_cases() -> list[tuple[str, Json]]:
@@ -141,29 +146,30 @@ def more_cases() -> list[tuple[str, Json]]:
     for k, kind in enumerate(KINDS, len(KINDS)):
         made = random_family(random.Random(100 + k), kind, nodes=3)
         found.append((kind, document(made.family, k, k % 4 > 0)))
-    return cases() + found + rate_cases(own=False)
+    found += uncertain_cases(("stability",)) + rate_cases(own=False)
+    return cases() + found + restricted_cases(6)[4:6]
 
 
-SIGNALS = {"time": DwellTime("0.3", clock="t"), "clock": DwellTime(4, clock="s"), "constant": "constant"}
+SIGNALS = {"constant": "constant", "time": DwellTime("0.3", clock="t"), "clock": DwellTime(4, clock="s")}
 
 
 def rate_cases(own: bool) -> list[tuple[str, Json]]:
-    """True certificates with rates for restricted signals: each signal with a family of its own, or with the others."""
+    """True certificates with rates for restricted signals: dwell times with a family of their own, or the others."""
     found, draw = [], np.random.default_rng(3)
     families = (("stability", Fraction(1, 5)), ("consensus", Fraction(0)), ("consensus", Fraction(1, 5)))
     for (kind, share), chosen in zip(families, SIGNALS, strict=True):
         family = with_common_kernel(draw, kind, 3, 2, share, 0.3)
         for name, signal in SIGNALS.items():
-            if (name == chosen) is own:
+            if (name == chosen != "constant") is own:
                 made = certify_family(family, PROTOCOL, time_limit=60, signal=signal)
                 found.append((f"{name} {kind} {share}", {**made.to_dict(), "unverified": {}}))
     return found
 
 
-def restricted_cases() -> list[tuple[str, Json]]:
+def restricted_cases(count: int) -> list[tuple[str, Json]]:
     """True certificates with other claims for restricted signals: the last mode, windows, shares."""
     found = []
-    for k in range(6):
+    for k in range(count):
         made = random_family(random.Random(k), "depends", nodes=4 - k % 2).family
         state = list(range(1, made.n_nodes + 1)) if k else None
         last = certify_family(made, PROTOCOL, state, signal=SIGNALS["constant" if k == 2 else "time"])
@@ -244,12 +250,13 @@ def test_there_are_certificates_of_every_behaviour():
 def test_the_oracle_finds_nothing_false_in_what_is_proved():
     for name, data in cases():
         assert check(data | {"digest": resealed(data)["digest"]}).accepted, name
+    for name, data in cases()[::2]:
         assert false_family_claims(data) == [], name
 
 
 @pytest.mark.campaign
 def test_the_oracle_finds_nothing_false_in_more_of_what_is_proved():
-    for name, data in more_cases()[len(cases()) :]:
+    for name, data in more_cases():
         assert check(data | {"digest": resealed(data)["digest"]}).accepted, name
         assert false_family_claims(data) == [], name
 
@@ -410,7 +417,7 @@ def numbers(most: int) -> Iterator[int]:
 
 
 def test_no_mutant_is_accepted_that_is_false():
-    assert fuzzed(numbers(120), cases())["accepted"] > 0 or os.environ.get("PTCC_FUZZ_ONLY")
+    assert fuzzed(numbers(60), cases())["accepted"] > 0 or os.environ.get("PTCC_FUZZ_ONLY")
 
 
 NEW = ("sliding_variable", "reaching_time", "protocol", "drives", "input", "final_state")
@@ -432,7 +439,7 @@ def of_sliding(count: int) -> Counter[str]:
 
 
 def test_no_mutant_of_what_slides_is_accepted_that_is_false():
-    seen = of_sliding(60)
+    seen = of_sliding(20)
     assert {key.split()[1] for key in seen} == {"accepted", "rejected"}
 
 
@@ -615,6 +622,7 @@ def test_a_row_of_a_kernel_has_columns_of_its_own_component_alone():
         assert report.reason == "a row of a kernel"
 
 
+@pytest.mark.campaign
 def test_many_components_take_time_in_proportion():
     edges = [(f"{s}{i}", f"{t}{i}", 1, 1 + (t == "d")) for i in range(500) for s, t in ("ac", "bc", "cd")]
     family = Family.from_intervals(edges)
@@ -811,23 +819,19 @@ def test_long_numbers_and_many_weights_are_answered_soon(make: Any):
 # ---------------------------------------------------------------------- read back
 
 
-def test_what_is_read_back_says_the_same(tmp_path: Path):
-    for k, kind in enumerate(KINDS[:5]):
-        made = certificate(random_family(random.Random(k), kind, nodes=3).family, k)
-        made.save(tmp_path / f"{k}.json")
-        saved = read_certificate(tmp_path / f"{k}.json")
-        assert (saved.behaviours, saved.rate, saved.family) == (made.behaviours, made.rate, made.family)
-        assert (saved.final_states, saved.input_peaks, saved.bounded) == (
-            made.final_states,
-            made.input_peaks,
-            made.bounded,
-        )
-        assert (saved.deviation_bound([1, 0.5, 0.1]) == made.deviation_bound([1, 0.5, 0.1])).all()
-        assert saved.verdict == made.verdict == "certified" and saved.checked.accepted
-        assert [part.upper_bound for part in saved.parts] == [part.upper_bound for part in made.parts]
-        saved.save(tmp_path / "again.json")
-        assert (tmp_path / "again.json").read_bytes() == (tmp_path / f"{k}.json").read_bytes()
-        assert read_certificate(made.to_dict()).final_states == made.final_states
+@pytest.mark.parametrize(("k", "kind"), thinned(reversed(list(enumerate(KINDS[:5]))), 3))
+def test_what_is_read_back_says_the_same(k: int, kind: str, tmp_path: Path):
+    made = certificate(random_family(random.Random(k), kind, nodes=3).family, k)
+    made.save(tmp_path / "c.json")
+    saved = read_certificate(tmp_path / "c.json")
+    assert (saved.behaviours, saved.rate, saved.family) == (made.behaviours, made.rate, made.family)
+    assert (saved.final_states, saved.input_peaks, saved.bounded) == (made.final_states, made.input_peaks, made.bounded)
+    assert (saved.deviation_bound([1, 0.5, 0.1]) == made.deviation_bound([1, 0.5, 0.1])).all()
+    assert saved.verdict == made.verdict == "certified" and saved.checked.accepted
+    assert [part.upper_bound for part in saved.parts] == [part.upper_bound for part in made.parts]
+    saved.save(tmp_path / "again.json")
+    assert (tmp_path / "again.json").read_bytes() == (tmp_path / "c.json").read_bytes()
+    assert read_certificate(made.to_dict()).final_states == made.final_states
 
 
 def test_functions_of_rows_are_read_back():

@@ -146,7 +146,7 @@ def test_a_smaller_rate_proves_less():
 def test_other_vectors_are_refused():
     data, of = document(), ("lyapunov", "functions", 0, "vector")
     p = data["lyapunov"]["functions"][0]["vector"]
-    for k in range(0, 200, 20):
+    for k in (0, 120):
         for factor in (Fraction(9, 10), Fraction(11, 10)):
             assert reason(changed(data, (*of, k), str(exact(p[k]) * factor)))
         assert reason(changed(data, (*of, k), "0")) == "the vector is not positive"
@@ -160,7 +160,7 @@ def test_other_factors_are_refused():
     of = ("proof", k, "witness", "factor")
     factor = data["proof"][k]["witness"]["factor"]
     draw = random.Random(0)
-    for place in draw.sample(range(len(factor["data"])), 10):
+    for place in draw.sample(range(len(factor["data"])), 2):
         value = factor["data"][place]
         for new in (value + 2**36, -value - 2**36):
             assert reason(changed(data, (*of, "data", place), new))
@@ -179,7 +179,7 @@ def test_other_factors_are_refused():
 
 def test_other_weights_of_the_graph_are_refused():
     data = document()
-    for k in range(0, 1000, 100):
+    for k in (0, 600):
         edges = [list(row) for row in data["graph"]["modes"][0]["edges"]]
         ends = list(map(Fraction, edges[k][2:]))
         wide = [end * (1 if end == min(ends, key=abs) else 30) for end in ends]

@@ -17,6 +17,7 @@ from jsonschema import Draft202012Validator  # type: ignore[import-untyped]
 from late_certificates import Late, led_graph, nominal, obligation, plain, with_leaders, with_messages
 from mutations import Json, at, changed, resealed
 from oracle_messages import late_claims
+from selection import thinned
 from side_files import Side
 
 from lmi.exact.work import WorkError, limited
@@ -139,7 +140,7 @@ def test_what_follows_is_accepted_with_and_without_arrays_and_has_the_shape_of_t
         assert report.obligations == reports[0].obligations
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", thinned(NAMES, 3))
 def test_motions_keep_to_what_is_accepted(name: str):
     assert late_claims(samples()[name]) == []
 
@@ -411,7 +412,7 @@ def test_messages_of_one_edge_that_are_said_to_be_younger_than_they_may_be_are_r
     assert "does not decay so fast" in reason(all_oldest)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", thinned(range(12), 5))
 def test_steps_of_arrays_are_those_of_integers_and_bound_the_solution(seed: int):
     """Against the delay equation by fine steps from below, in floats."""
     rng = np.random.default_rng(seed)

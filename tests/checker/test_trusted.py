@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 from agent_documents import Setting, document
 from paper_examples import paper_examples
+from selection import thinned
 
 import ptcc_certify
 from ptcc_certify.certificate.family_certificate import certify_family
@@ -222,7 +223,7 @@ def of_messages() -> list[str]:
     return [one.to_json() for one in made]
 
 
-@pytest.mark.parametrize("watched", [False, True])
+@pytest.mark.parametrize("watched", thinned([True, False]))
 def test_the_examples_are_accepted_by_these_files_alone(watched: bool, tmp_path: Path):
     """Copied into an empty folder, isolated from all that is installed: no NumPy, no flint, no solver.
 

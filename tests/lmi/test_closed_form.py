@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import sparse
 from test_lmi import random_h_matrix, random_m_matrix
@@ -71,8 +71,8 @@ def signed_ring(rng: np.random.Generator, n: int, magnitude: float = 0.5) -> np.
 # ---------------------------------------------------------------------- M-matrices
 
 
-@pytest.mark.parametrize("count", [200, pytest.param(2000, marks=pytest.mark.campaign)])
-def test_hundreds_of_m_matrices_reach_twice_their_smallest_eigenvalue(count: int):
+@pytest.mark.parametrize("count", [40, pytest.param(2000, marks=pytest.mark.campaign)])
+def test_m_matrices_reach_twice_their_smallest_eigenvalue(count: int):
     rng = np.random.default_rng(20240517)
     irreducible = 0
     for _ in range(count):
@@ -87,6 +87,7 @@ def test_hundreds_of_m_matrices_reach_twice_their_smallest_eigenvalue(count: int
     assert 0.2 < irreducible / count < 0.8
 
 
+@settings(max_examples=20)
 @given(SEEDS, st.integers(1, 10), st.sampled_from([1.0, 3.0]))
 def test_the_inequality_is_proved_exactly(seed, n, magnitude):
     A = random_m_matrix(np.random.default_rng(seed), n, magnitude)
@@ -105,6 +106,7 @@ def test_weights_over_twelve_decades_are_certified_or_refused(seed, n):
     assert proved(A, found)
 
 
+@settings(max_examples=6)
 @given(SEEDS, st.integers(2, 10), st.sampled_from([2.0, 1e2, 1e4]))
 def test_a_bound_on_the_condition_is_kept(seed, n, limit):
     A = random_m_matrix(np.random.default_rng(seed), n)
@@ -119,6 +121,7 @@ def test_a_bound_on_the_condition_is_kept(seed, n, limit):
     assert proved(A, found)
 
 
+@settings(max_examples=8)
 @given(SEEDS, st.integers(1, 10))
 def test_relabelling_permutes_the_certificate(seed, n):
     rng = np.random.default_rng(seed)
@@ -128,6 +131,7 @@ def test_relabelling_permutes_the_certificate(seed, n):
     assert there.log_omega == pytest.approx(here.log_omega[order], abs=1e-5)
 
 
+@settings(max_examples=8)
 @given(SEEDS, st.integers(1, 10), st.floats(1e-6, 1e6))
 def test_the_rate_scales_with_the_matrix(seed, n, c):
     A = random_m_matrix(np.random.default_rng(seed), n)
@@ -136,6 +140,7 @@ def test_the_rate_scales_with_the_matrix(seed, n, c):
     assert perron_certificate(c * L).rate == pytest.approx(c * perron_certificate(L).rate, rel=1e-6)
 
 
+@settings(max_examples=8)
 @given(SEEDS, st.integers(1, 10))
 def test_a_diagonal_similarity_leaves_the_rate(seed, n):
     rng = np.random.default_rng(seed)
@@ -143,6 +148,7 @@ def test_a_diagonal_similarity_leaves_the_rate(seed, n):
     assert m_matrix_certificate(d[:, None] * A / d).rate == pytest.approx(m_matrix_certificate(A).rate, rel=3e-6)
 
 
+@settings(max_examples=8)
 @given(SEEDS, st.integers(1, 12))
 def test_sparse_and_dense_agree(seed, n):
     rng = np.random.default_rng(seed)
@@ -208,8 +214,8 @@ def test_a_chain_under_a_bound_on_the_condition(limit):
 
 
 def test_a_long_chain_under_a_bound_on_the_condition_stays_sparse():
-    found = m_matrix_certificate(sparse.csr_array(chain(2000)), max_condition=1e6)
-    assert found.rate >= 2 * (1 - 1e6 ** (-0.5 / 1999)) * (1 - 1e-6)
+    found = m_matrix_certificate(sparse.csr_array(chain(1600)), max_condition=1e6)
+    assert found.rate >= 2 * (1 - 1e6 ** (-0.5 / 1599)) * (1 - 1e-6)
     assert found.condition <= 1e6
     with pytest.raises(NoCertificate, match="condition of at most 1"):
         m_matrix_certificate([[1.0, 0.0], [-3.0, 1.0]], max_condition=1)
@@ -228,6 +234,7 @@ def test_a_ring_whose_perron_vector_leaves_the_range_of_float64(n):
 # ---------------------------------------------------------------------- witnesses and refusals
 
 
+@settings(max_examples=8)
 @given(SEEDS, st.integers(1, 8))
 def test_given_witnesses_are_used(seed, n):
     A = random_m_matrix(np.random.default_rng(seed), n)
@@ -276,6 +283,7 @@ def test_malformed_matrices_are_refused(function):
 # ---------------------------------------------------------------------- H-matrices
 
 
+@settings(max_examples=8)
 @given(SEEDS, st.integers(1, 10), st.sampled_from([1.0, 3.0]))
 def test_an_h_matrix_is_certified_by_its_comparison_matrix(seed, n, magnitude):
     A = random_h_matrix(np.random.default_rng(seed), n, magnitude)
@@ -341,6 +349,7 @@ def test_the_left_vector_has_full_accuracy_over_twelve_decades(seed, n):
     assert p / p[0] == pytest.approx([float(x) for x in q], rel=1e-12)
 
 
+@settings(max_examples=8)
 @given(SEEDS, st.integers(2, 10))
 def test_perron_vectors_in_other_scales_give_the_same_rate(seed, n):
     """``D L D^-1`` has ``M u = 0`` with ``u = D 1``: the rate does not change."""

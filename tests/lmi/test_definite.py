@@ -58,7 +58,7 @@ def test_forms_are_bounded_up_to_their_best_constant(S: list[list[int]], seed: i
 
 def test_a_margin_of_a_part_in_a_billion_is_told_from_none():
     rng = np.random.default_rng(0)
-    for n, judges in ((5, (PLAIN, FAST)), (40, (PLAIN, FAST)), (90, (FAST,))):
+    for n, judges in ((5, (PLAIN, FAST)), (24, (PLAIN, FAST)), (60, (FAST,))):
         R = [[int(x) for x in row] for row in rng.integers(-99, 100, (n, n - 1))]
         S = [[10**9 * sum(a * b for a, b in zip(x, y, strict=True)) for y in R] for x in R]
         for judge in judges:

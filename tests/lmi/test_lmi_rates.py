@@ -64,7 +64,7 @@ def m_matrix_gap(seed: int) -> float:
 
 
 def test_the_best_diagonal_rate_of_an_m_matrix_is_twice_its_smallest_eigenvalue():
-    gaps = [m_matrix_gap(seed) for seed in range(40)]
+    gaps = [m_matrix_gap(seed) for seed in range(8)]
     assert max(gaps) <= 1e-6, int(np.argmax(gaps))
 
 
@@ -75,7 +75,7 @@ def test_the_best_diagonal_rate_of_a_thousand_m_matrices():
     assert max(gaps) <= 1e-6
 
 
-@settings(deadline=None, max_examples=12)
+@settings(deadline=None, max_examples=6)
 @given(SEEDS, st.integers(2, 10), st.sampled_from([1.0, 6.0]))
 def test_the_optimum_lies_between_a_matrix_and_its_dual_bound(seed, n, decades):
     A = signed_laplacian(np.random.default_rng(seed), n, decades)
@@ -90,7 +90,7 @@ def test_the_optimum_lies_between_a_matrix_and_its_dual_bound(seed, n, decades):
     assert found.rate <= 2 * np.linalg.eigvals(A).real.min() * (1 + 1e-6)
 
 
-@settings(deadline=None, max_examples=8)
+@settings(deadline=None, max_examples=2)
 @given(SEEDS, st.integers(2, 8))
 def test_the_best_rate_is_invariant(seed, n):
     """Permutation, diagonal similarity and gauge change nothing; a factor scales the rate."""
@@ -110,7 +110,7 @@ def test_the_best_rate_is_invariant(seed, n):
 
 def test_a_reducible_matrix_decays_like_its_slowest_block():
     rng = np.random.default_rng(3)
-    for _ in range(4):
+    for _ in range(2):
         blocks = [signed_laplacian(rng, int(rng.integers(2, 5))) for _ in range(3)]
         n = sum(map(len, blocks))
         A, start = np.tril(rng.normal(size=(n, n)), -1) * 5, 0
@@ -124,6 +124,7 @@ def test_a_reducible_matrix_decays_like_its_slowest_block():
         assert lmi.diagonal_rate_limit(A, found.witness[0]) <= found.upper * (1 + 1e-12)
 
 
+@pytest.mark.campaign
 def test_a_chain_of_two_thousand_followers_has_a_certificate():
     n = 2000
     A = np.eye(n) - np.eye(n, k=-1)
@@ -142,7 +143,7 @@ def test_a_chain_of_two_thousand_followers_has_a_certificate():
 @pytest.mark.parametrize("n", [4, 40])
 @pytest.mark.parametrize("condition", [None, 50.0])
 def test_clarabel_finds_a_margin_just_below_the_best_rate_and_none_above(n: int, condition: float | None):
-    for seed in range(2):
+    for seed in range(1 if n == 40 else 2):
         A = signed_laplacian(np.random.default_rng(100 * n + seed), n)
         rate = lmi.diagonal_lyapunov(A, objective="rate", max_condition=condition).rate
         options = {"solver": "clarabel", "max_condition": condition}
@@ -164,7 +165,7 @@ def test_a_singular_matrix_has_no_rate():
 # ---------------------------------------------------------------------- rate against prefactor
 
 
-@settings(deadline=None, max_examples=6)
+@settings(deadline=None, max_examples=2)
 @given(SEEDS, st.integers(2, 8), st.sampled_from([1.0, 4.0]))
 def test_the_frontier_is_monotone_and_bounds_the_motion(seed, n, decades):
     A = signed_laplacian(np.random.default_rng(seed), n, decades)
@@ -230,10 +231,11 @@ def test_a_jordan_chain_has_full_matrices_below_its_rate():
 # ---------------------------------------------------------------------- refusals
 
 
-def test_a_witness_shows_that_no_diagonal_solution_exists():
+@pytest.mark.parametrize("count", [10, pytest.param(40, marks=pytest.mark.campaign)])
+def test_a_witness_shows_that_no_diagonal_solution_exists(count: int):
     """Matrices built around ``diag(A X) < 0``: the witness is found and checked in rationals."""
     found = 0
-    for seed in range(40):
+    for seed in range(count):
         rng = np.random.default_rng(seed)
         A = without_diagonal_solution(rng, int(rng.integers(2, 9)))
         Y = lmi.refute_diagonal_lyapunov(A)
@@ -242,10 +244,10 @@ def test_a_witness_shows_that_no_diagonal_solution_exists():
             assert lmi.no_diagonal_rate_above(exact(A), Y, Fraction(0))
         with pytest.raises(lmi.NoCertificate):
             lmi.diagonal_lyapunov(A)
-    assert found >= 39, found
+    assert found >= count - count // 40, found
 
 
-@settings(deadline=None, max_examples=20)
+@settings(deadline=None, max_examples=8)
 @given(SEEDS, st.integers(1, 8))
 def test_no_witness_is_reported_where_a_diagonal_solution_exists(seed, n):
     A = diagonally_stable(np.random.default_rng(seed), n)
@@ -262,9 +264,10 @@ def rate_refuted(seed: int) -> bool:
     return Y is not None and lmi.no_diagonal_rate_above(exact(A), Y, Fraction(1.001 * best))
 
 
-def test_a_rational_witness_excludes_rates_just_above_the_optimum():
-    refuted = [rate_refuted(seed) for seed in range(20)]
-    assert sum(refuted) == 20, [seed for seed, done in enumerate(refuted) if not done]
+@pytest.mark.parametrize("count", [4, pytest.param(20, marks=pytest.mark.campaign)])
+def test_a_rational_witness_excludes_rates_just_above_the_optimum(count: int):
+    refuted = [rate_refuted(seed) for seed in range(count)]
+    assert sum(refuted) == count, [seed for seed, done in enumerate(refuted) if not done]
 
 
 def test_a_wrong_witness_proves_nothing():
