@@ -88,8 +88,8 @@ _EXPORTS = {
     "box": "bounds.input.initial_set",
     "ellipsoid": "bounds.input.initial_set",
     "worst_initial_state": "bounds.input.worst_initial_state",
-    "design": "gain_design",
-    "design_agents": "agents_design",
+    "design": "gain_design.search",
+    "design_agents": "gain_design.agents_search",
     # Many graphs
     "Ensemble": "graphs.ensembles",
     "certify_many": "batch",

@@ -67,7 +67,7 @@ IN_ROOMS = {
     "certificate.certificate": ("RejectedCertificate",),
     "checker": ("CheckReport",),
     "checker.input_formulas": ("InitialSet",),
-    "gain_design": ("Design",),
+    "gain_design.answer": ("Design",),
     "report.page": ("report_html",),
     "report.statement": ("report_latex",),
 }

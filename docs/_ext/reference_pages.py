@@ -33,8 +33,10 @@ ROOMS = {
         "Theorems and lemmas",
         "theorems.claims theorems.table theorems.theorem theorems.lemmas theorems.symbolic",
     ),
-    "gain_design": ("Design of gains and deadlines", "gain_design"),
-    "agents_design": ("Design of deadlines of agents of order n", "agents_design"),
+    "gain_design": (
+        "Design of gains and deadlines",
+        "gain_design.answer gain_design.search gain_design.agents_answer gain_design.agents_search",
+    ),
     "batch": ("Many graphs", "batch"),
     "report": ("Pages, statements, figures", "report.explorer"),
     "examples": ("The examples of the paper", "examples"),

@@ -28,8 +28,8 @@ from ptcc_certify.errors import ExitCode, ParameterError, one_line
 from ptcc_certify.report.text_layout import wrap_command
 
 if TYPE_CHECKING:
-    from ptcc_certify.agents_design import AgentsDesign
-    from ptcc_certify.gain_design import Design
+    from ptcc_certify.gain_design.agents_answer import AgentsDesign
+    from ptcc_certify.gain_design.answer import Design
     from ptcc_certify.graphs.digraph import SignedDigraph
 
 #: What a scenario may ask that no gains are searched under, and what of these agents of order n take.
@@ -93,7 +93,7 @@ def design(graph: str, curve: str | None, output: str | None, as_json: bool, scr
 
 def _of_single_integrators(signed: SignedDigraph, curve: str | None, screen: Screen, options: Options) -> Design:
     """Return gains of single integrators, and save how their peak input depends on the deadline."""
-    from ptcc_certify.gain_design import design as run
+    from ptcc_certify.gain_design.search import design as run
 
     if curve is not None and Path(curve).suffix.lower() not in (*FIGURES, ".csv"):
         raise ParameterError(f"{curve}: the curve is written to .csv, {', '.join(FIGURES)}; choose one of these")
@@ -125,7 +125,7 @@ def _show(
     ignored: list[str],
 ) -> int:
     """Print the answer, and the command that proves it again; return the exit code."""
-    from ptcc_certify.gain_design import INFEASIBLE, MET
+    from ptcc_certify.gain_design.answer import INFEASIBLE, MET
     from ptcc_certify.report.design_screen import design_lines, design_summary
 
     if as_json:

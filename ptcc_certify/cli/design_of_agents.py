@@ -13,7 +13,7 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import short_exact
 
 if TYPE_CHECKING:
-    from ptcc_certify.agents_design import AgentsDesign
+    from ptcc_certify.gain_design.agents_answer import AgentsDesign
     from ptcc_certify.graphs.digraph import SignedDigraph
 
 #: Sliding terms, which are kept.
@@ -55,7 +55,7 @@ def refuse_of_agents() -> None:
 
 def design_of_agents(signed: SignedDigraph, options: Options) -> AgentsDesign:
     """Return the deadline of the agents that the options tell."""
-    from ptcc_certify.agents_design import design_agents
+    from ptcc_certify.gain_design.agents_search import design_agents
 
     if options["input_norm"]:
         raise ParameterError("--input-norm: is of single integrators; of agents in space U bounds ||u_k|| as it is")

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ptcc_certify.agents_design import AgentsDesign
-from ptcc_certify.gain_design import Design
+from ptcc_certify.gain_design.agents_answer import AgentsDesign
+from ptcc_certify.gain_design.answer import Design
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.report.structure_text import graph_entries

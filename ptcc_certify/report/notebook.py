@@ -13,11 +13,11 @@ from collections.abc import Iterable
 from contextlib import suppress
 from typing import Any
 
-from ptcc_certify.agents_design import AgentsDesign
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.errors import PTCCError
-from ptcc_certify.gain_design import Design
+from ptcc_certify.gain_design.agents_answer import AgentsDesign
+from ptcc_certify.gain_design.answer import Design
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.display_hook import shows
 from ptcc_certify.graphs.family import Family

@@ -176,7 +176,7 @@ def test_check_names_the_agent_of_the_largest_input_of_a_design():
 
 
 def test_gains_whose_proof_is_the_certificate_alone_are_printed(monkeypatch):
-    from ptcc_certify.gain_design import Design
+    from ptcc_certify.gain_design.answer import Design
 
     monkeypatch.setattr(Design, "certify_options", None)
     out = ptcc(*DESIGN, "--deadline", "2", "--residual", "0.01").out

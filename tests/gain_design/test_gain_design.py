@@ -11,7 +11,6 @@ from generators import all_classes, random_graph
 from scipy.linalg import expm
 from selection import thinned
 
-from ptcc_certify import gain_design
 from ptcc_certify.bounds.final_state import influence
 from ptcc_certify.bounds.input.initial_set import box, ellipsoid
 from ptcc_certify.bounds.input.tightest_bound import usable_functions
@@ -19,7 +18,11 @@ from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker.input_formulas import InitialSet
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import GRAPHS, load_graph
-from ptcc_certify.gain_design import INFEASIBLE, MET, UNPROVED, Option, _at, _bounds, design, least_peak, peak_factor
+from ptcc_certify.gain_design import search
+from ptcc_certify.gain_design.answer import INFEASIBLE, MET, UNPROVED
+from ptcc_certify.gain_design.gains import Option, least_peak, peak_factor
+from ptcc_certify.gain_design.request import input_bounds
+from ptcc_certify.gain_design.search import _at, design
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import read_graph
 from ptcc_certify.graphs.structure import analyse
@@ -58,10 +61,10 @@ def _certify_once(monkeypatch):
     def again(graph, protocol, x0=None, initial_set=None, simulation=None, limits=()):
         if initial_set is not None:
             initial_set = tuple(map(tuple, (initial_set.center, initial_set.radius, initial_set.axes)))
-        first = gain_design._first_protocol(analyse(graph))
+        first = search._first_protocol(analyse(graph))
         return certified(graph, first, x0, initial_set).changed(protocol=protocol, limits=tuple(limits))
 
-    monkeypatch.setattr(gain_design, "certify", again)
+    monkeypatch.setattr(search, "certify", again)
 
 
 def influence_matrix(graph):
@@ -158,14 +161,14 @@ def test_what_binds_cannot_be_tightened(name, U, R, asked):
 
 def test_a_shorter_deadline_is_worth_more_than_gains_that_certify_proves_again(monkeypatch):
     graph = graph_of("fig1a")
-    first, shortest = gain_design._first_protocol(analyse(graph)), designed("fig1a", 10, 1)
-    usual = gain_design.certify
+    first, shortest = search._first_protocol(analyse(graph)), designed("fig1a", 10, 1)
+    usual = search.certify
 
     def weaker(graph, protocol, **more):  # proves twice the deadline
         made = usual(graph, protocol, **more)
         return made if protocol == first else made.changed(protocol=protocol.replace(T=2 * protocol.T))
 
-    monkeypatch.setattr(gain_design, "certify", weaker)
+    monkeypatch.setattr(search, "certify", weaker)
     found = design(graph, max_input=10, initial_bound=1)
     assert found.verdict == MET and found.deadline == shortest.deadline
     assert found.certificate.checked.accepted and not found.repeatable and found.certify_options is None
@@ -362,7 +365,7 @@ def test_the_bound_scales_with_one_over_the_deadline(name):
 def test_random_gains_are_not_certified_with_a_smaller_peak(name):
     found = designed(name, 10, 1)
     cert = found.certificate
-    bounds = _bounds(cert, cert.initial_set)
+    bounds = input_bounds(cert, cert.initial_set)
     functions = usable_functions(bounds)
     rng = np.random.default_rng(5)
     least = 2 / max(bounds.form(i).rate for i in functions)

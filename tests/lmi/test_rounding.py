@@ -19,7 +19,7 @@ from lmi.exact.decimal_rounding import down, float_down, float_up, near, up
 from ptcc_certify import GainLimits, NominalProtocol, SlidingModeProtocol, certify, check, read_certificate
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.examples import load_graph
-from ptcc_certify.gain_design import design
+from ptcc_certify.gain_design.search import design
 from ptcc_certify.protocols.reaching_time import ReachingTime
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.screen import certificate_lines

@@ -15,7 +15,7 @@ from selection import thinned
 import ptcc_certify as ptcc
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.examples import load_graph
-from ptcc_certify.gain_design import design
+from ptcc_certify.gain_design.search import design
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.size_limits import SHOWN_NODES
 from ptcc_certify.graphs.structure import analyse

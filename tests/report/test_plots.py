@@ -31,7 +31,7 @@ from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import EXAMPLES, load_graph, select
-from ptcc_certify.gain_design import design
+from ptcc_certify.gain_design.search import design
 from ptcc_certify.graphs.digraph import SignedDigraph, Weights
 from ptcc_certify.graphs.size_limits import LABELLED_NODES
 from ptcc_certify.graphs.structure import Structure, analyse

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.gain_design import Design
+from ptcc_certify.gain_design.answer import Design
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled, time_label
 
 

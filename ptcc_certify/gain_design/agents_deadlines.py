@@ -21,6 +21,7 @@ from ptcc_certify.certificate.agents_answer import AgentsAnswer
 from ptcc_certify.certificate.agents_part import prove_agents
 from ptcc_certify.certificate.cascade_part import prove_cascade
 from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.gain_design.agents_answer import AgentsRequest
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.agents import MOST_MOTION, Agents
 
@@ -32,23 +33,6 @@ DIGITS = 7
 _DOUBLINGS = 60
 #: The logarithm of the excess of what is not proved at all.
 _HOPELESS = 700.0
-
-
-@dataclass(frozen=True)
-class AgentsRequest:
-    """What is asked.
-
-    Attributes
-    ----------
-    max_input : Fraction
-        ``U`` of the Euclidean norm of every agent's input.
-    deadline, residual : Fraction or None
-        In units of time; how far a position may be from its place at the deadline, under a gain cap.
-    """
-
-    max_input: Fraction
-    deadline: Fraction | None
-    residual: Fraction | None
 
 
 @dataclass(frozen=True)
@@ -89,7 +73,7 @@ def at_deadline(protocol: Protocol, T: Fraction) -> Protocol:
 
     Examples
     --------
-    >>> from ptcc_certify.agents_deadlines import at_deadline
+    >>> from ptcc_certify.gain_design.agents_deadlines import at_deadline
     >>> at_deadline(NominalProtocol(T=1, rho1=1, rho2=3, kappa=2), Fraction(4))
     NominalProtocol(T=4, rho1=0.25, rho2=3, kappa=2)
     """

@@ -1,0 +1,163 @@
+"""What is asked of the input of agents of order n, and the answer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from lmi.exact.decimal_rounding import down, float_up, up
+from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.graphs.display_hook import Shown
+from ptcc_certify.graphs.rationals import format_exact, short_exact
+from ptcc_certify.protocols import Protocol
+from ptcc_certify.protocols.agents import Agents
+
+
+@dataclass(frozen=True)
+class AgentsRequest:
+    """What is asked.
+
+    Attributes
+    ----------
+    max_input : Fraction
+        ``U`` of the Euclidean norm of every agent's input.
+    deadline, residual : Fraction or None
+        In units of time; how far a position may be from its place at the deadline, under a gain cap.
+    """
+
+    max_input: Fraction
+    deadline: Fraction | None
+    residual: Fraction | None
+
+
+@dataclass(frozen=True, repr=False)
+class AgentsDesign(Shown):
+    """What was asked of agents of order n, and a deadline that is proved to meet it; made by :func:`design_agents`.
+
+    Attributes
+    ----------
+    verdict : {"met", "infeasible", "not with this certificate"}
+        ``infeasible``: no gains of the protocol can, proved. The third says that these bounds do not suffice.
+    binding : str
+        What binds, or what is missing.
+    asked : AgentsRequest
+    agents : Agents
+    deadline : Fraction or None
+        ``T``, in units of time: the one that is asked for, else the one that is found.
+    certificate : Certificate or None
+        What proves it; None unless the verdict is ``met``.
+    peak, residual : Fraction or None
+        Proved at ``deadline``: the largest input of an agent, and what is left of a position under a gain cap.
+    too_short : Fraction or None
+        The longest deadline below ``deadline`` that was tried, and whose bounds do not keep the limit.
+    shortest_possible : Fraction or None
+        No input within the limit brings the agents where the protocol does by a shorter deadline, proved; None if
+        nothing is known: under a gain cap, of agents that move by themselves, and of the cascade.
+    repeatable : bool
+        Whether :func:`ptcc_certify.certify` proves the same by the functions that it finds itself.
+
+    Examples
+    --------
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -3)])
+    >>> answer = design_agents(pair, Agents(order=2), [1, 1], v0=[0, 1], max_input=10)
+    >>> answer.verdict, answer.certificate.verdict, bool(answer.peak <= 10)
+    ('met', 'certified', True)
+    >>> bool(answer.shortest_possible <= answer.too_short < answer.deadline)
+    True
+    """
+
+    verdict: str
+    binding: str
+    asked: AgentsRequest
+    agents: Agents
+    deadline: Fraction | None = None
+    certificate: Certificate | None = None
+    peak: Fraction | None = None
+    residual: Fraction | None = None
+    too_short: Fraction | None = None
+    shortest_possible: Fraction | None = None
+    repeatable: bool = False
+
+    @property
+    def protocol(self) -> Protocol | None:
+        """The protocol with this deadline; None unless the verdict is ``met``."""
+        return None if self.certificate is None else self.certificate.protocol
+
+    @property
+    def gain_cap(self) -> Fraction | None:
+        """Where the gain is capped; None if it is not."""
+        return self.agents.cap
+
+    @property
+    def ratio(self) -> float | None:
+        """The deadline over the shortest possible one, rounded up; None where one is not known."""
+        if not self.deadline or not self.shortest_possible:
+            return None
+        return float_up(self.deadline / self.shortest_possible)
+
+    @property
+    def request_text(self) -> str:
+        """What was asked, in one line."""
+        asked = self.asked
+        text = f"||u_k|| <= {short_exact(asked.max_input)} from the given initial state, "
+        text += "shortest deadline" if asked.deadline is None else f"deadline {short_exact(asked.deadline)}"
+        return text + ("" if asked.residual is None else f", positions within {short_exact(asked.residual)}")
+
+    @property
+    def bounds_text(self) -> str:
+        """What is proved of input and positions at the deadline, in one line; empty without a certificate."""
+        if self.peak is None or self.residual is None:
+            return ""
+        where = f"every position within {up(self.residual)} of its place" if self.residual else "every agent in place"
+        return f"||u_k|| <= {up(self.peak)}, {where} at T"
+
+    @property
+    def gains_text(self) -> str:
+        """The parameters of the protocol, exact, and the gains of the agents; empty where there are none."""
+        if self.protocol is None or self.certificate is None or self.certificate.agents is None:
+            return ""
+        text = ", ".join(f"{name}={short_exact(value)}" for name, value in self.protocol.parameters.items())
+        return f"{text}; {self.certificate.agents.gains_text}"
+
+    @property
+    def deadline_text(self) -> str:
+        """What is proved of shorter deadlines, in one line; empty where nothing is."""
+        parts = []
+        if self.certificate is not None and self.deadline is not None and self.too_short is not None:
+            parts = [f"{short_exact(self.deadline)} is met, {short_exact(self.too_short)} not by these bounds"]
+        if self.shortest_possible is not None:
+            parts.append(f"no gains meet one below {down(self.shortest_possible)}")
+        return "; ".join(parts)
+
+    def lines(self) -> list[str]:
+        """Return everything as text: request, verdict, what binds, gains, bounds, deadlines."""
+        rows = [("asked", self.request_text), ("verdict", self.verdict), ("", self.binding)]
+        rows += [("gains", self.gains_text), ("proved", self.bounds_text), ("deadline", self.deadline_text)]
+        if self.ratio is not None and self.certificate is not None:
+            rows.append(("", f"the deadline is at most {up(self.ratio, 3)} times the shortest possible one"))
+        return [f"{name:<10} {text}" for name, text in rows if text]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the design as JSON-ready data, exact numbers as texts, without the certificate."""
+
+        def text(x: Fraction | None) -> str | None:
+            return None if x is None else format_exact(x)
+
+        asked = self.asked
+        numbers = ("gain_cap", "deadline", "peak", "residual", "too_short", "shortest_possible")
+        return {
+            "verdict": self.verdict,
+            "binding": self.binding,
+            "agents": self.agents.text(),
+            "max_input": text(asked.max_input),
+            "asked": {"deadline": text(asked.deadline), "residual": text(asked.residual)},
+            "protocol": None if self.protocol is None else self.protocol.to_dict(),
+            **{name: text(getattr(self, name)) for name in numbers},
+            "ratio": self.ratio,
+        }
+
+    def __repr__(self) -> str:
+        if self.deadline is None or self.certificate is None or self.peak is None:
+            return f"AgentsDesign({self.verdict}: {self.binding})"
+        return f"AgentsDesign({self.verdict}, T={short_exact(self.deadline)}, peak {up(self.peak)})"

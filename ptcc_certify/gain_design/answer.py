@@ -1,0 +1,278 @@
+"""The answer to what is asked of an input: gains, deadlines, and what is proved of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from lmi.exact.decimal_rounding import down, float_up, up
+from ptcc_certify.bounds.input.worst_initial_state import WorstInitialState, worst_initial_state
+from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.checker.input_formulas import Limits
+from ptcc_certify.gain_design.request import DesignRequest, fit_of
+from ptcc_certify.graphs.display_hook import Shown
+from ptcc_certify.graphs.rationals import format_exact, nearest_float, short_exact
+from ptcc_certify.protocols import Protocol
+from ptcc_certify.protocols.parameters import parameter
+
+MET, INFEASIBLE, UNPROVED = "met", "infeasible", "not with this certificate"
+#: Significant decimal digits of the gains and deadlines that are found.
+DIGITS = 10
+
+
+class TradeOff(NamedTuple):
+    """Deadlines (M,), the peak input certified at each, and below which none of all gains can stay."""
+
+    deadlines: np.ndarray
+    certified: np.ndarray
+    lower: np.ndarray
+
+
+@dataclass(frozen=True, repr=False)
+class Design(Shown):
+    """What was asked of an input, and the gains that are proved to meet it; made by :func:`design`.
+
+    Attributes
+    ----------
+    verdict : {"met", "infeasible", "not with this certificate"}
+        ``infeasible``: no gains of the nominal protocol can, proved. The third says that the bounds of this
+        certificate do not suffice, and nothing about other gains.
+    binding : str
+        The limit that binds, and how far off it is.
+    asked : DesignRequest
+        The limit, the initial states, deadline and residual.
+    deadline : Fraction or None
+        ``T``, in units of time; None if none was asked for and none is certified.
+    certificate : Certificate or None
+        What proves it; None unless the verdict is ``met``.
+    peak : Fraction or None
+        The certified peak of the input at ``deadline``, also if it is too large.
+    residual : Fraction or None
+        How far from its final state an agent is at the deadline, at most; 0 without a cap.
+    product : Fraction or None
+        ``phi``, peak times deadline: what the gains found certify at any deadline.
+    lower_product : Fraction or None
+        Below which ``U T`` is too small for all gains of the protocol, proved.
+    lower_by : str
+        Why.
+    repeatable : bool
+        Whether :func:`ptcc_certify.certify` proves the same of these gains by the functions that it finds itself.
+
+    References
+    ----------
+    The protocol (4) of [Zhu]_. With ``rho1 T`` and ``rho2 kappa`` fixed, gain and input scale as ``1/T``.
+
+    Examples
+    --------
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -3)])
+    >>> answer = design(pair, max_input=10, initial_bound=1, deadline=1)
+    >>> answer.verdict, bool(answer.shortest_possible <= answer.shortest_certified <= 1)
+    ('met', True)
+    """
+
+    verdict: str
+    binding: str
+    asked: DesignRequest
+    deadline: Fraction | None = None
+    certificate: Certificate | None = None
+    peak: Fraction | None = None
+    residual: Fraction | None = None
+    product: Fraction | None = None
+    lower_product: Fraction | None = None
+    lower_by: str = ""
+    repeatable: bool = False
+
+    @property
+    def protocol(self) -> Protocol | None:
+        """The gains; None unless the verdict is ``met``."""
+        return None if self.certificate is None else self.certificate.protocol
+
+    @property
+    def limits(self) -> Limits | None:
+        """The cap of the gain that belongs to them; None if there is none."""
+        return None if self.certificate is None or not self.certificate.limits else self.certificate.limits[0]
+
+    @property
+    def gain_cap(self) -> Fraction | None:
+        """Where the gain is capped; None if it is not."""
+        return None if self.limits is None else self.limits.gain_cap
+
+    @property
+    def certify_options(self) -> list[str] | None:
+        """Options of ``ptcc certify GRAPH`` that prove the same again, with exit code 0; None where none do.
+
+        Whether every agent is within :attr:`residual` at the deadline, or the norm of the input within its limit,
+        cannot be asked there: both are proved all the same.
+        """
+        initial_set = self.asked.initial_set
+        R = max(initial_set.radius, default=Fraction(0))
+        about_zero = not any(initial_set.center) and R > 0 and min(initial_set.radius) == R
+        if not (self.repeatable and about_zero and self.protocol is not None and self.certificate is not None):
+            return None
+        p = self.protocol
+        options = {"T": p.T, "rho1": p.rho1, "rho2": p.rho2, "kappa": p.kappa, "initial-bound": R}
+        if self.gain_cap is not None:
+            options["gain-cap"] = self.gain_cap
+        agents = fit_of(self.certificate, replace(self.asked, input_norm=None)).peak
+        if agents is not None and agents <= self.asked.max_input:  # of the norm too, but for what is lost in the bounds
+            options["max-input"] = self.asked.max_input
+        return [text for name, value in options.items() for text in (f"--{name}", short_exact(value))]
+
+    @property
+    def shortest_possible(self) -> Fraction | None:
+        """No gains of the protocol meet a shorter deadline within ``max_input``; None if nothing is known."""
+        return None if self.lower_product is None else self.lower_product / self.asked.max_input
+
+    @property
+    def shortest_certified(self) -> Fraction | None:
+        """The deadline from which on the gains found keep to ``max_input``; None if nothing is certified."""
+        return None if self.product is None else self.product / self.asked.max_input
+
+    @property
+    def ratio(self) -> float | None:
+        """Shortest certified deadline over the shortest possible one, rounded up; at least 1."""
+        if not self.product or not self.lower_product:
+            return None
+        return float_up(self.product / self.lower_product)
+
+    @cached_property
+    def worst(self) -> WorstInitialState | None:
+        """The initial state from which the input gets largest under these gains (numerical); None without gains."""
+        if self.certificate is None:
+            return None
+        case = self.certificate.structure, self.certificate.protocol, self.asked.initial_set
+        if self.gain_cap is None:
+            return worst_initial_state(*case)
+        # The gain is constant, and max |e_k| never grows.
+        first = worst_initial_state(*case, samples=1)
+        return replace(first, size=first.size * float(self.gain_cap / self.certificate.protocol.gain.first))
+
+    def trade_off(self, deadlines: Iterable[float]) -> TradeOff:
+        """Return the certified peak at other deadlines, ``phi/T``, and what no gains can undercut; NaN if unknown.
+
+        Peaks are rounded up, what no gains can undercut is rounded down.
+
+        The gains for a deadline ``T`` are those of ``protocol`` with ``rho1 T`` kept.
+
+        Parameters
+        ----------
+        deadlines : iterable of float
+            Positive, in units of time.
+
+        Returns
+        -------
+        TradeOff
+
+        Examples
+        --------
+        >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -3)])
+        >>> design(pair, max_input=10, initial_bound=1).trade_off([1, 2]).lower.round(6)
+        array([1.5 , 0.75])
+        """
+        T = np.array([float(parameter("a deadline", t)) for t in deadlines])
+        products = (self.product, math.inf), (self.lower_product, -math.inf)
+        certified, lower = (
+            np.full(T.shape, math.nan)
+            if x is None
+            else np.nextafter(np.nextafter(nearest_float(x), towards) / T, towards)
+            for x, towards in products
+        )
+        return TradeOff(T, certified, lower)
+
+    def deadlines(self, count: int = 61) -> np.ndarray:
+        """Return deadlines about the one that was found or asked for, evenly spaced in their logarithms.
+
+        Parameters
+        ----------
+        count : int
+            How many.
+
+        Returns
+        -------
+        (count,) array
+            In units of time.
+        """
+        candidates = (self.deadline, self.shortest_certified, self.shortest_possible, Fraction(1))
+        middle = nearest_float(next(T for T in candidates if T))
+        return np.geomspace(middle / 5, middle * 5, count)
+
+    @property
+    def request_text(self) -> str:
+        """What was asked, in one line."""
+        initial_set, deadline, residual = self.asked.initial_set, self.asked.deadline, self.asked.residual
+        R = max(initial_set.radius, default=Fraction(0))
+        box = not any(initial_set.center) and R and min(initial_set.radius) == R
+        states = f"all |x_k(0)| <= {short_exact(R)}" if box else "the given initial states"
+        size = f"{'||u||' if self.asked.input_norm == 2 else '|u_k|'} <= {short_exact(self.asked.max_input)}"
+        text = f"{size} from {states}, "
+        text += "shortest deadline" if deadline is None else f"deadline {short_exact(deadline)}"
+        return text + ("" if residual is None else f", deviation {short_exact(residual)}")
+
+    @property
+    def bounds_text(self) -> str:
+        """What is proved of input and deviation at the deadline, in one line; empty without gains."""
+        if self.peak is None or self.residual is None:
+            return ""
+        size = f"{'||u||' if self.asked.input_norm == 2 else '|u_k|'} <= {up(self.peak)}"
+        ends = f"within {up(self.residual)} of" if self.residual else "at"
+        exact = " (deviation 0)" * (self.asked.residual is not None and not self.residual)
+        return f"{size}, every agent {ends} its final state at T{exact}"
+
+    @property
+    def gains_text(self) -> str:
+        """The gains, exact, in one line; empty where there are none."""
+        if self.protocol is None:
+            return ""
+        text = ", ".join(f"{name}={short_exact(value)}" for name, value in self.protocol.parameters.items())
+        return text + ("" if self.gain_cap is None else f", gain saturated at {short_exact(self.gain_cap)} from t = 0")
+
+    @property
+    def deadline_text(self) -> str:
+        """What is proved of shorter deadlines, in one line; empty where nothing is."""
+        least, most = self.shortest_possible, self.shortest_certified
+        parts = [] if most is None else [f"{up(most, DIGITS)} is met" if most else "every one is met"]
+        if most is not None and self.asked.deadline is not None and most < self.asked.deadline:
+            parts = [f"every one from {up(most, DIGITS)} on is met (a search for the shortest may go lower)"]
+        parts += [] if least is None else [f"no gains meet one below {down(least)}"]
+        return "; ".join(parts)
+
+    def lines(self) -> list[str]:
+        """Return everything as text: request, verdict, what binds, gains, bounds, deadlines, the largest input."""
+        rows = [("asked", self.request_text), ("verdict", self.verdict), ("", self.binding)]
+        rows += [("gains", self.gains_text), ("proved", self.bounds_text), ("deadline", self.deadline_text)]
+        if self.ratio is not None:
+            rows.append(("", f"ratio of the two at most {up(self.ratio, 3)}"))
+        if self.worst is not None and self.protocol is not None:
+            rows.append(("numerical", f"the largest input found is {self.worst.size:.4g}, at t = {self.worst.t:.4g}"))
+        return [f"{name:<10} {text}" for name, text in rows if text]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the design as JSON-ready data, exact numbers as texts, without the certificate."""
+
+        def texts(source: Any, *names: str) -> dict[str, str | None]:
+            values = ((name, getattr(source, name)) for name in names)
+            return {name: None if x is None else format_exact(x) for name, x in values}
+
+        return {
+            "verdict": self.verdict,
+            "binding": self.binding,
+            **texts(self.asked, "max_input"),
+            "input_norm": self.asked.input_norm,
+            "asked": texts(self.asked, "deadline", "residual"),
+            "protocol": None if self.protocol is None else self.protocol.to_dict(),
+            **texts(self, "gain_cap", "deadline", "peak", "residual", "shortest_certified", "shortest_possible"),
+            "ratio": self.ratio,
+        }
+
+    def __repr__(self) -> str:
+        if self.protocol is None or self.peak is None:
+            return f"Design({self.verdict}: {self.binding})"
+        p, cap = self.protocol, "" if self.gain_cap is None else f", gain_cap={short_exact(self.gain_cap)}"
+        gains = f"T={short_exact(p.T)}, rho1={short_exact(p.rho1)}, rho2={short_exact(p.rho2)}{cap}"
+        return f"Design({self.verdict}, {gains}, peak {up(self.peak)})"

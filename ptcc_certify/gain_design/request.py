@@ -1,0 +1,71 @@
+"""What is asked of an input, and what a certificate proves of its gains."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import NamedTuple
+
+from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.checker.input_formulas import InitialSet, InputBounds
+
+
+@dataclass(frozen=True)
+class DesignRequest:
+    """What is asked of an input.
+
+    Attributes
+    ----------
+    max_input : Fraction
+        ``U``, of ``max_k |u_k|``, or of ``||u||_2``; in units of the input.
+    input_norm : {2, None}
+        None: of every agent's input.
+    initial_set : InitialSet
+        For all of which it is to hold.
+    deadline, residual : Fraction or None
+        In units of time and of the states; None where nothing is asked.
+    """
+
+    max_input: Fraction
+    input_norm: int | None
+    initial_set: InitialSet
+    deadline: Fraction | None
+    residual: Fraction | None
+
+    def met_by(self, fit: Fit) -> bool:
+        """Tell whether what is proved of some gains suffices."""
+        if fit.peak is None or fit.residual is None:
+            return False
+        return fit.peak <= self.max_input and fit.residual <= (self.residual or 0)
+
+
+class Fit(NamedTuple):
+    """Gains at a deadline, and what is proved of them; None where nothing is."""
+
+    deadline: Fraction
+    certificate: Certificate
+    peak: Fraction | None
+    residual: Fraction | None
+
+
+def fit_of(cert: Certificate, request: DesignRequest) -> Fit:
+    """Return what a certificate proves of its gains: the peak of the input, and what is left at the deadline."""
+    T, effort, by_norm = cert.protocol.T, cert.effort, request.input_norm == 2
+    if not cert.limits:
+        if effort is None or effort.peak is None:
+            moves = any(input_bounds(cert, request.initial_set).error_bounds)
+            return Fit(T, cert, None if moves else Fraction(0), Fraction(0))
+        return Fit(T, cert, effort.peak.norm if by_norm else effort.peak.largest, Fraction(0))
+    cap = cert.limits[0].gain_cap
+    entries = effort.residual if effort is not None else ()
+    if cap is None or not entries or entries[0].agents is None:
+        return Fit(T, cert, None, None)
+    peak = cap * input_bounds(cert, request.initial_set).error_norm if by_norm else entries[0].largest
+    return Fit(T, cert, peak, max(entries[0].agents))
+
+
+def input_bounds(base: Certificate, initial_set: InitialSet) -> InputBounds:
+    """Return what bounds the input."""
+    constants = base.effort.constants if base.effort is not None else ()
+    rows = base.graph.exact_rows(range(base.graph.n_nodes))
+    return InputBounds(rows, base.protocol.gain.exact, base.forms, constants, initial_set)
