@@ -2,9 +2,45 @@
 Require Import ZArith QArith Qabs Qreals List Bool Reals Lra Lia Psatz.
 From Coquelicot Require Import Coquelicot.
 Import ListNotations.
-Require Import Vec Definite Graph Flow Certificate Checker Sound Claims Input Slide Peak Reach Main Rest Table Wide FamilyCertificate FamilyFlow
+Require Import Vec Definite Graph Flow Certificate Checker Sound Claims Input Slide Exist Peak Reach Main Rest Table Wide FamilyCertificate FamilyFlow
   FamilyChecker FamilySound FamilyMotion FamilyRows.
 Open Scope R_scope.
+
+(** * Motions exist *)
+Lemma pulls_lipschitz e K w : Rabs w <= K -> lipschitz (4 * K) (pulls e w).
+Proof.
+  intros H. replace (4 * K) with (2 * K + 2 * K) by ring. apply lipschitz_plus; [apply lipschitz_edge; exact H|].
+  destruct (mutual e); [apply lipschitz_edge; exact H|]. apply (lipschitz_le 0); [|exact lipschitz_zero].
+  pose proof (Rabs_pos w). lra.
+Qed.
+Lemma member_lipschitz l : exists K, 0 <= K /\ forall w, admits l w -> lipschitz K (member l w).
+Proof.
+  induction l as [|e l [K [HK IH]]]; [exists 0; split; [lra|intros; exact lipschitz_zero]|].
+  set (B := Rmax (- Q2R (bottom e)) (Q2R (top e))). exists (4 * Rabs B + K).
+  split; [pose proof (Rabs_pos B); lra|]. intros w Hw.
+  apply (lipschitz_plus _ _ (pulls e (w O)) (member l (shift w))); [|apply IH; intros j; apply (Hw (S j))].
+  apply pulls_lipschitz. specialize (Hw O e eq_refl). pose proof (Rle_abs B). pose proof (Rmax_l (- Q2R (bottom e)) (Q2R (top e))).
+  pose proof (Rmax_r (- Q2R (bottom e)) (Q2R (top e))). fold B in H0, H1. apply Rabs_le. lra.
+Qed.
+Lemma modes_lipschitz l : exists K, 0 <= K /\ forall m w, In m l -> admits (ties m) w -> lipschitz K (member (ties m) w).
+Proof.
+  induction l as [|m l [K [HK IH]]]; [exists 0; split; [lra|intros m w []]|].
+  destruct (member_lipschitz (ties m)) as [L [HL H]]. exists (L + K). split; [lra|]. intros m' w [<-|Hm] Hw.
+  - apply (lipschitz_le L); [lra|]. apply H. exact Hw.
+  - apply (lipschitz_le K); [lra|]. apply IH; assumption.
+Qed.
+Theorem family_motions_exist F : check_protocol (frame F) = true -> existence_claim F.
+Proof.
+  intros HP. unfold existence_claim. cbv zeta. set (c := frame F) in *. intros m w D x0 s0 Hmw HD H0. destruct (slides_exist c s0 HP H0) as [S [HS [S0 CS]]].
+  destruct (modes_lipschitz (modes F)) as [K [HK L]].
+  destruct (driven (order c) (fun t => member (ties (m t)) (w t)) (deadline c) (Q2R (rho1 c)) (k c) S x0 K) as [X [X0 [CX DX]]];
+    [apply (T_pos c HP)|exact HK|intros t _; apply L; apply Hmw|intros; apply CS|].
+  assert (O : forall t, 0 < t < deadline c -> (forall j, t <> D j) -> obeys F X S t (m t) (w t)).
+  { intros t Ht Hj i Hi. apply DX; [exact Ht|exact Hi|]. intros x. apply HD; assumption. }
+  exists X, S. split; [split; [exact HS|split; [exact CX|]]|split; [|exact O]].
+  - exists D. intros t Ht Hj. exists (m t), (w t). split; [apply Hmw|]. split; [apply Hmw|]. apply O; assumption.
+  - intros i Hi. split; [apply X0; exact Hi|apply S0].
+Qed.
 
 Section Main.
 Variable F : family.
@@ -279,5 +315,6 @@ Proof.
   split; [intros b Hb; destruct (bound_of F hs H4 b Hb) as [h Hh]; apply (bounds_claim F H1 H2 b h Hh)|].
   split.
   - apply (ends_ok F H1 H2 hs H4 H5).
-  - split; [apply (stays_ok F H1 H2 hs H4 H6)|apply (peaks_ok F H1 H2 hs H4 H7)].
+  - split; [split; [apply (stays_ok F H1 H2 hs H4 H6)|apply (peaks_ok F H1 H2 hs H4 H7)]|].
+    apply (family_motions_exist F A1).
 Qed.
