@@ -12,6 +12,8 @@ Fixpoint total (n : nat) (x : nat -> R) : R := match n with O => 0 | S p => tota
 Definition cut (n : nat) (x : nat -> R) (i : nat) : R := if (i <? n)%nat then x i else 0.
 Lemma total_pos n x : 0 <= total n x.
 Proof. induction n as [|n IH]; simpl; [lra|]. pose proof (Rabs_pos (x n)). lra. Qed.
+Lemma cut_in n x i : (i < n)%nat -> cut n x i = x i.
+Proof. intros H. unfold cut. destruct (Nat.ltb_spec i n); [reflexivity|lia]. Qed.
 Lemma total_above n x i : Rabs (cut n x i) <= total n x.
 Proof.
   unfold cut. destruct (Nat.ltb_spec i n) as [H|_]; [|rewrite Rabs_R0; apply total_pos].
@@ -97,16 +99,14 @@ Proof.
       rewrite Rabs_Ropp. assert (Hd : 0 <= d) by (eapply Rle_trans; [apply Rabs_pos|apply (H 0%nat)]).
       apply Rle_trans with (g * K * d); [|apply Rmult_le_compat_r; [exact Hd|]; rewrite <- (Rmult_1_r (g * K)) at 1; apply Rmult_le_compat_l; lra].
       apply F. intros j. replace (_ - _) with (x j - z j) by ring. apply H.
-  - assert (Cut : forall x i, (i < n)%nat -> cut n x i = x i).
-    { intros x i Hi. unfold cut. destruct (Nat.ltb_spec i n); [reflexivity|lia]. }
-    assert (C : forall t i, t < T -> continuous (fun u => S (Rmax 0 u) i) t).
+  - assert (C : forall t i, t < T -> continuous (fun u => S (Rmax 0 u) i) t).
     { intros t i Ht. apply (continuous_comp (Rmax 0) (fun u => S u i)); [apply continuous_Rmax|]. apply CS. apply Rmax_lub_lt; assumption. }
     exists (fun t i => Y t i + cut n (S t) i). split; [|split].
-    + intros i Hi. rewrite Y0. unfold y0. rewrite !Cut by exact Hi. ring.
+    + intros i Hi. rewrite Y0. unfold y0. rewrite !cut_in by exact Hi. ring.
     + intros t i Ht Hi. split; [|apply C; exact Ht].
-      apply (continuous_ext (fun u => Y (Rmax 0 u) i + S (Rmax 0 u) i)); [intros u; rewrite Cut by exact Hi; reflexivity|].
+      apply (continuous_ext (fun u => Y (Rmax 0 u) i + S (Rmax 0 u) i)); [intros u; rewrite cut_in by exact Hi; reflexivity|].
       apply (continuous_plus (fun u => Y (Rmax 0 u) i) (fun u => S (Rmax 0 u) i)); [apply CY|apply C]; exact Ht.
-    + intros t i Ht Hi CG. apply (is_derive_ext (fun u => Y u i)); [intros u; rewrite Cut by exact Hi; simpl; ring|].
+    + intros t i Ht Hi CG. apply (is_derive_ext (fun u => Y u i)); [intros u; rewrite cut_in by exact Hi; simpl; ring|].
       apply (DY t i Ht). intros z. unfold f. apply (continuous_opp (fun u => gain T r k u * G u (fun j => z j + cut n (S u) j) i)).
       apply continuous_times; [apply gain_continuous; lra|].
       (* what [S] moves within [G] vanishes *)
