@@ -265,9 +265,7 @@ Theorem peaks_ok : check_peaks F = true -> forall X S t i m w, switches_from F X
 Proof.
   intros H X Sl t i m w HM [_ H0] Ht Hi Hm Hw. fold c n in H0. unfold check_peaks in H. rewrite forallb_forall in H.
   assert (K : In (i, nth i (peaks F) 0%Q) (combine (seq 0 (length (peaks F))) (peaks F))).
-  { replace (i, nth i (peaks F) 0%Q) with (nth i (combine (seq 0 (length (peaks F))) (peaks F)) (0%nat, 0%Q)).
-    - apply nth_In. rewrite combine_length, seq_length. lia.
-    - rewrite combine_nth by apply seq_length. rewrite seq_nth by exact Hi. reflexivity. }
+  { apply (in_numbered _ (peaks F) 0%nat); [apply nth_error_nth'|]; exact Hi. }
   specialize (H _ K). cbn [fst snd] in H. unfold check_peak in H. cbv zeta in H. fold c in H. apply andb_prop in H as [N H].
   apply notneg_R in N. set (q := nth i (peaks F) 0%Q) in *. apply orb_prop in H as [H|H].
   - rewrite (unmoved_ok F i m w (X t) H Hm), Rmult_0_r, Rabs_R0. exact N.
@@ -288,9 +286,7 @@ Proof.
   assert (L : (i < length (ends F))%nat).
   { destruct (Nat.lt_ge_cases i (length (ends F))) as [L|L]; [exact L|]. rewrite nth_overflow in E by exact L. discriminate. }
   assert (K : In (i, nth i (ends F) None) (combine (seq 0 (length (ends F))) (ends F))).
-  { replace (i, nth i (ends F) None) with (nth i (combine (seq 0 (length (ends F))) (ends F)) (0%nat, None)).
-    - apply nth_In. rewrite combine_length, seq_length. lia.
-    - rewrite combine_nth by apply seq_length. rewrite seq_nth by exact L. reflexivity. }
+  { apply (in_numbered _ (ends F) 0%nat); [apply nth_error_nth'|]; exact L. }
   specialize (H _ K). cbn [fst snd] in H. rewrite E in H. unfold check_end_of in H. cbn [fst snd] in H. apply andb_prop in H as [A H].
   apply existsb_exists in H as [b [Hb H]]. apply andb_prop in H as [H B3]. apply andb_prop in H as [B1 B2]. apply Qpos in B1. apply mem_In in B2.
   destruct (bound_of b Hb) as [h Hh]. destruct (bounds_claim b h Hh) as [_ [_ [_ G]]]. destruct (G B1 X S HM) as [y Hy].
