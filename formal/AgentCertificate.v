@@ -33,6 +33,9 @@ Definition flies a h (X : R -> nat -> nat -> R) (S : R -> nat -> R) : Prop := sl
      (control a h (X t) t j - sum (degree a) (fun i => at_ (plant a) i * X t i j)) /\
    forall i, (i < pred (degree a))%nat -> is_derive (fun u => X u i j) t (X t (1 + i)%nat j)) /\
   continuous (fun u => S (Rmax 0 u) j) t /\ forall i, (i < degree a)%nat -> continuous (fun u => X (Rmax 0 u) i j) t.
+(** from every state, and for all offsets, a motion starts: nothing that is said of all is void *)
+Definition existence_claim (a : agents) : Prop := forall h x0, exists X S, flies a h X S /\
+  forall i j, (i < degree a)%nat -> (j < order (graph a))%nat -> X 0 i j = x0 i j.
 (** the function of two states of which [V] is that of one; of all derivatives *)
 Definition pair es m (x z : nat -> R) : R := (V es m (fun j => x j + z j) - V es m (fun j => x j - z j)) / 4.
 Definition value a (f : func) (x : nat -> nat -> R) : R :=
@@ -71,5 +74,5 @@ Definition tops_claim (a : agents) : Prop := tops a <> [] -> forall X S t j, (j 
     match kind (graph a) with Nominal _ => 0 | SlidingMode _ _ mu1 _ _ _ => Q2R mu1 * INR m end <= at_ (tops a) j.
 
 Definition true_agents (a : agents) : Prop := true_certificate (graph a) /\ definite a /\ agreement a /\
-  ends_claim a /\ tops_claim a /\ forall j, In j (used a) ->
+  ends_claim a /\ tops_claim a /\ existence_claim a /\ forall j, In j (used a) ->
   exists f, nth_error (funcs (graph a)) j = Some f /\ agent_claim a f.

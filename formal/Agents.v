@@ -2,7 +2,7 @@
 Require Import ZArith QArith Qabs Qreals List Bool Reals Lra Lia Psatz FunctionalExtensionality.
 From Coquelicot Require Import Coquelicot.
 Import ListNotations.
-Require Import Vec Definite Graph Flow Certificate Checker Sound Input Slide Main Mean Peak Weighted Large AgentCertificate AgentForms AgentCheck AgentFall AgentMotion AgentEnd.
+Require Import Vec Definite Graph Flow Certificate Checker Sound Input Slide Main Mean Peak Weighted Large AgentCertificate AgentForms AgentCheck AgentFall AgentMotion AgentExist AgentEnd.
 Open Scope R_scope.
 
 (** * Rationals and polynomials of the check *)
@@ -580,7 +580,9 @@ Proof.
   apply andb_prop in HA as [HA A5].
   apply andb_prop in HA as [HA A4]. apply andb_prop in HA as [HA A3]. apply andb_prop in HA as [A1 A2].
   split; [apply (definite_ok split); assumption|]. split; [apply (agreement_ok split points a); assumption|].
-  split; [apply (ends_ok a); assumption|]. split; [apply (tops_ok split points a); assumption|]. intros j Hj.
+  split; [apply (ends_ok a); assumption|]. split; [apply (tops_ok split points a); assumption|]. split.
+  { intros h0 x0. destruct (matrices split a A1) as [_ [_ [_ [Hs [Hn _]]]]]. apply flight; assumption. }
+  intros j Hj.
   assert (E : exists f, nth_error (funcs (graph a)) j = Some f).
   { unfold check_coupling in A3. rewrite forallb_forall in A3. specialize (A3 j Hj).
     destruct (nth_error (funcs (graph a)) j) as [f|]; [exists f; reflexivity|discriminate]. }

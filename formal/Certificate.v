@@ -27,8 +27,7 @@ Definition motion (n : nat) (Lf : (nat -> R) -> nat -> R) (T rho1 k : R) (X S : 
   (forall t i, 0 < t < T -> (i < n)%nat -> is_derive (fun u => X u i - S u i) t (- (gain T rho1 k t * Lf (X t) i))) /\
   forall t i, t < T -> (i < n)%nat -> continuous (fun u => X (Rmax 0 u) i) t /\ continuous (fun u => S (Rmax 0 u) i) t.
 (** from [t0] on all sliding variables are 0 *)
-Definition quiet (n : nat) (T : R) (S : R -> nat -> R) (t0 : R) : Prop :=
-  0 <= t0 < T /\ forall t i, t0 <= t < T -> (i < n)%nat -> S t i = 0.
+Definition quiet n T (S : R -> nat -> R) t0 := 0 <= t0 < T /\ forall t i, t0 <= t < T -> (i < n)%nat -> S t i = 0.
 
 (** * The record *)
 (** camps, or a negative cycle: edges (source, target) *)
@@ -56,13 +55,14 @@ Inductive effort := PathLength (most : Q) (f : nat) | Energy (most : Q) (W0 W1 :
 Inductive protocol := Nominal (T : Q) | SlidingMode (T_r T_s mu1 mu2 mu3 delta : Q).
 (** final states are middle and radius; of many nodes they are [enclosed], and no weights tell them; a leader group is its
     weights, 0 elsewhere, and its rate; [sliding_input] bounds what the sliding mode adds to the input, by agent;
-    [reaching] are instants [z = ln(T_r/(T_r - t))] *)
+    [reaching] are instants [z = ln(T_r/(T_r - t))]; [degenerate], if stated, are the numbers, from 1 on, of the balanced
+    closed components that end at 0 *)
 Record cert := Cert { order : nat; edges : list edge; kind : protocol; rho1 : Q; rho2 : Q; kappa : Q;
   comps : list comp; pieces : list piece; all_balanced : balance; sign_symmetric : bool; funcs : list func;
   start : list Q; sliding : list Q; final : list (Q * Q); enclosed : bool; margins : list margin;
   leaders : list (list Q * Q); upper_bound : option upper; proved : option Q; best_diagonal : option Q;
   best_overshoot : option Q; bounded_input : bool; reaching : list (option Q); sliding_input : list Q;
-  efforts : list effort }.
+  efforts : list effort; degenerate : option (list nat) }.
 
 (** * Words *)
 Definition shift (x : nat -> R) : nat -> R := fun i => x (S i).
@@ -130,11 +130,13 @@ Definition claims (c : cert) : Prop := (forall P, In P (pieces c) -> piece_claim
   balance_claim (edges c) (seq 0 (order c)) (all_balanced c) /\
   (sign_symmetric c = true <-> forall e f, In e (edges c) -> In f (edges c) -> src f = tgt e -> tgt f = src e ->
      (0 < wt e * wt f)%Q).
-(** the intervals of the final state hold [Q (X(0) - sigma(0))] *)
+(** the intervals of the final state hold [Q (X(0) - sigma(0))]; the balanced components whose value is 0 are these *)
 Definition begin (c : cert) (j : nat) : R := Q2R (nth j (start c) 0%Q) - Q2R (nth j (sliding c) 0%Q).
 Definition within (c : cert) (y : nat -> R) : Prop := forall i, (i < length (final c))%nat -> (i < order c)%nat ->
   let p := nth i (final c) (0%Q, 0%Q) in Rabs (Q2R (fst p) - y i) <= Q2R (snd p).
-Definition final_claim (c : cert) : Prop := enclosed c = false -> within c (end_state c (begin c)).
+Definition final_claim (c : cert) : Prop := enclosed c = false -> within c (end_state c (begin c)) /\
+  forall l i, degenerate c = Some l -> (In i l <-> exists j C, i = S j /\ nth_error (comps c) j = Some C /\
+    is_balanced C = true /\ qdot (null C) (begin c) = 0).
 (** Proposition 1: whatever the disturbance, sliding variables shrink by [psi] and are 0 from [T_r] on; from the file's
     initial values on they are 0 from their reaching times on; what they add to the input at most *)
 Definition sliding_claim (c : cert) : Prop := match kind c with Nominal _ => True
@@ -193,8 +195,7 @@ Definition rates_claim (c : cert) : Prop := largest (map rate (funcs c)) (proved
     forall f, In f (funcs c) -> (rate f == q)%Q -> (o <= overshoot f)%Q.
 (** no quadratic form of the state that vanishes only where nothing moves decays faster than the upper bound *)
 Definition upper_claim (c : cert) (u : upper) : Prop := forall (F : (nat -> R) -> (nat -> R) -> R) (b : R),
-  (forall x y, F x y = F y x) -> (forall x y z, F (fun i => x i + y i) z = F x z + F y z) ->
-  (forall a x z, F (fun i => a * x i) z = a * F x z) ->
+  (forall x y, F x y = F y x) -> (forall a x y z, F (fun i => a * x i + y i) z = a * F x z + F y z) ->
   (forall x, 0 <= F x x) -> (forall x, F x x = 0 -> forall i, (i < order c)%nat -> lap (edges c) x i = 0) ->
   (forall x, b * F x x <= 2 * F x (lap (edges c) x)) -> b <= Q2R (bound u).
 

@@ -37,17 +37,27 @@ Record family := Family { frame : cert; modes : list mode; parts : list part; bo
   ends : list (option (Q * Q)); stays : bool; peaks : list Q }.
 
 (** * Motions *)
+(** at [t] the state moves as the member of the mode [m] that has the weights [w] *)
+Definition obeys (F : family) (X S : R -> nat -> R) t m w : Prop := let c := frame F in forall i, (i < order c)%nat ->
+  is_derive (fun u => X u i - S u i) t (- (gain (deadline c) (Q2R (rho1 c)) (k c) t * member (ties m) w (X t) i)).
 (** off a sequence of instants the state moves as some member of some mode: switches may be infinitely many, and
     arbitrarily close to each other; between them weights may change in any way *)
 Definition switches (F : family) (X S : R -> nat -> R) : Prop := let c := frame F in slides c S /\
   (forall t i, t < deadline c -> (i < order c)%nat ->
      continuous (fun u => X (Rmax 0 u) i) t /\ continuous (fun u => S (Rmax 0 u) i) t) /\
   exists D : nat -> R, forall t, 0 < t < deadline c -> (forall j, t <> D j) ->
-    exists m w, In m (modes F) /\ admits (ties m) w /\ forall i, (i < order c)%nat ->
-      is_derive (fun u => X u i - S u i) t (- (gain (deadline c) (Q2R (rho1 c)) (k c) t * member (ties m) w (X t) i)).
+    exists m w, In m (modes F) /\ admits (ties m) w /\ obeys F X S t m w.
 Definition switches_from F X S t0 := switches F X S /\ quiet (order (frame F)) (deadline (frame F)) S t0.
 
 (** * What it claims *)
+(** a signal is a mode and its weights at every instant, so that members change continuously off a sequence of instants:
+    from every state, and all sliding variables, a motion starts under each of them, so nothing that follows is void *)
+Definition existence_claim (F : family) : Prop := let c := frame F in forall m w (D : nat -> R) x0 s0,
+  (forall t, In (m t) (modes F) /\ admits (ties (m t)) (w t)) ->
+  (forall t x i, 0 < t < deadline c -> (forall j, t <> D j) -> continuous (fun u => member (ties (m u)) (w u) x i) t) ->
+  (forall T i, kind c = Nominal T -> s0 i = 0) ->
+  exists X S, switches F X S /\ (forall i, (i < order c)%nat -> X 0 i = x0 i /\ S 0 i = s0 i) /\
+    forall t, 0 < t < deadline c -> (forall j, t <> D j) -> obeys F X S t (m t) (w t).
 (** mandatory edges are those of the mode; their components are those listed *)
 Definition mode_claim (F : family) (m : mode) : Prop := edges (mandatory m) = smallest (ties m) /\
   order (mandatory m) = order (frame F) /\ structure (mandatory m) /\ claims (mandatory m).
@@ -98,4 +108,4 @@ Definition true_family (F : family) : Prop := (forall m, In m (modes F) -> mode_
   (forall P, In P (parts F) -> part_claim F P) /\
   (forall i, (i < order (frame F))%nat -> exists P, In P (parts F) /\ In i (its_agents P)) /\
   (edges (frame F) = [] /\ sliding_claim (frame F)) /\ (forall b, In b (bounds F) -> bound_claim F b) /\
-  ends_claim F /\ inputs_claim F.
+  ends_claim F /\ inputs_claim F /\ existence_claim F.

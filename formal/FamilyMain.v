@@ -2,9 +2,45 @@
 Require Import ZArith QArith Qabs Qreals List Bool Reals Lra Lia Psatz.
 From Coquelicot Require Import Coquelicot.
 Import ListNotations.
-Require Import Vec Definite Graph Flow Certificate Checker Sound Claims Input Slide Peak Reach Main Rest Table Wide FamilyCertificate FamilyFlow
+Require Import Vec Definite Graph Flow Certificate Checker Sound Claims Input Slide Exist Peak Reach Main Rest Table Wide FamilyCertificate FamilyFlow
   FamilyChecker FamilySound FamilyMotion FamilyRows.
 Open Scope R_scope.
+
+(** * Motions exist *)
+Lemma pulls_lipschitz e K w : Rabs w <= K -> lipschitz (4 * K) (pulls e w).
+Proof.
+  intros H. replace (4 * K) with (2 * K + 2 * K) by ring. apply lipschitz_plus; [apply lipschitz_edge; exact H|].
+  destruct (mutual e); [apply lipschitz_edge; exact H|]. apply (lipschitz_le 0); [|exact lipschitz_zero].
+  pose proof (Rabs_pos w). lra.
+Qed.
+Lemma member_lipschitz l : exists K, 0 <= K /\ forall w, admits l w -> lipschitz K (member l w).
+Proof.
+  induction l as [|e l [K [HK IH]]]; [exists 0; split; [lra|intros; exact lipschitz_zero]|].
+  set (B := Rmax (- Q2R (bottom e)) (Q2R (top e))). exists (4 * Rabs B + K).
+  split; [pose proof (Rabs_pos B); lra|]. intros w Hw.
+  apply (lipschitz_plus _ _ (pulls e (w O)) (member l (shift w))); [|apply IH; intros j; apply (Hw (S j))].
+  apply pulls_lipschitz. specialize (Hw O e eq_refl). pose proof (Rle_abs B). pose proof (Rmax_l (- Q2R (bottom e)) (Q2R (top e))).
+  pose proof (Rmax_r (- Q2R (bottom e)) (Q2R (top e))). fold B in H0, H1. apply Rabs_le. lra.
+Qed.
+Lemma modes_lipschitz l : exists K, 0 <= K /\ forall m w, In m l -> admits (ties m) w -> lipschitz K (member (ties m) w).
+Proof.
+  induction l as [|m l [K [HK IH]]]; [exists 0; split; [lra|intros m w []]|].
+  destruct (member_lipschitz (ties m)) as [L [HL H]]. exists (L + K). split; [lra|]. intros m' w [<-|Hm] Hw.
+  - apply (lipschitz_le L); [lra|]. apply H. exact Hw.
+  - apply (lipschitz_le K); [lra|]. apply IH; assumption.
+Qed.
+Theorem family_motions_exist F : check_protocol (frame F) = true -> existence_claim F.
+Proof.
+  intros HP. unfold existence_claim. cbv zeta. set (c := frame F) in *. intros m w D x0 s0 Hmw HD H0. destruct (slides_exist c s0 HP H0) as [S [HS [S0 CS]]].
+  destruct (modes_lipschitz (modes F)) as [K [HK L]].
+  destruct (driven (order c) (fun t => member (ties (m t)) (w t)) (deadline c) (Q2R (rho1 c)) (k c) S x0 K) as [X [X0 [CX DX]]];
+    [apply (T_pos c HP)|exact HK|intros t _; apply L; apply Hmw|intros; apply CS|].
+  assert (O : forall t, 0 < t < deadline c -> (forall j, t <> D j) -> obeys F X S t (m t) (w t)).
+  { intros t Ht Hj i Hi. apply DX; [exact Ht|exact Hi|]. intros x. apply HD; assumption. }
+  exists X, S. split; [split; [exact HS|split; [exact CX|]]|split; [|exact O]].
+  - exists D. intros t Ht Hj. exists (m t), (w t). split; [apply Hmw|]. split; [apply Hmw|]. apply O; assumption.
+  - intros i Hi. split; [apply X0; exact Hi|apply S0].
+Qed.
 
 Section Main.
 Variable F : family.
@@ -229,9 +265,7 @@ Theorem peaks_ok : check_peaks F = true -> forall X S t i m w, switches_from F X
 Proof.
   intros H X Sl t i m w HM [_ H0] Ht Hi Hm Hw. fold c n in H0. unfold check_peaks in H. rewrite forallb_forall in H.
   assert (K : In (i, nth i (peaks F) 0%Q) (combine (seq 0 (length (peaks F))) (peaks F))).
-  { replace (i, nth i (peaks F) 0%Q) with (nth i (combine (seq 0 (length (peaks F))) (peaks F)) (0%nat, 0%Q)).
-    - apply nth_In. rewrite combine_length, seq_length. lia.
-    - rewrite combine_nth by apply seq_length. rewrite seq_nth by exact Hi. reflexivity. }
+  { apply (in_numbered _ (peaks F) 0%nat); [apply nth_error_nth'|]; exact Hi. }
   specialize (H _ K). cbn [fst snd] in H. unfold check_peak in H. cbv zeta in H. fold c in H. apply andb_prop in H as [N H].
   apply notneg_R in N. set (q := nth i (peaks F) 0%Q) in *. apply orb_prop in H as [H|H].
   - rewrite (unmoved_ok F i m w (X t) H Hm), Rmult_0_r, Rabs_R0. exact N.
@@ -252,9 +286,7 @@ Proof.
   assert (L : (i < length (ends F))%nat).
   { destruct (Nat.lt_ge_cases i (length (ends F))) as [L|L]; [exact L|]. rewrite nth_overflow in E by exact L. discriminate. }
   assert (K : In (i, nth i (ends F) None) (combine (seq 0 (length (ends F))) (ends F))).
-  { replace (i, nth i (ends F) None) with (nth i (combine (seq 0 (length (ends F))) (ends F)) (0%nat, None)).
-    - apply nth_In. rewrite combine_length, seq_length. lia.
-    - rewrite combine_nth by apply seq_length. rewrite seq_nth by exact L. reflexivity. }
+  { apply (in_numbered _ (ends F) 0%nat); [apply nth_error_nth'|]; exact L. }
   specialize (H _ K). cbn [fst snd] in H. rewrite E in H. unfold check_end_of in H. cbn [fst snd] in H. apply andb_prop in H as [A H].
   apply existsb_exists in H as [b [Hb H]]. apply andb_prop in H as [H B3]. apply andb_prop in H as [B1 B2]. apply Qpos in B1. apply mem_In in B2.
   destruct (bound_of b Hb) as [h Hh]. destruct (bounds_claim b h Hh) as [_ [_ [_ G]]]. destruct (G B1 X S HM) as [y Hy].
@@ -279,5 +311,6 @@ Proof.
   split; [intros b Hb; destruct (bound_of F hs H4 b Hb) as [h Hh]; apply (bounds_claim F H1 H2 b h Hh)|].
   split.
   - apply (ends_ok F H1 H2 hs H4 H5).
-  - split; [apply (stays_ok F H1 H2 hs H4 H6)|apply (peaks_ok F H1 H2 hs H4 H7)].
+  - split; [split; [apply (stays_ok F H1 H2 hs H4 H6)|apply (peaks_ok F H1 H2 hs H4 H7)]|].
+    apply (family_motions_exist F A1).
 Qed.

@@ -366,9 +366,7 @@ Proof.
     unfold functional in K. rewrite dot_unit, Rmult_1_l in K. rewrite E. exact K.
   - intros m Hm. destruct (In_nth _ _ m Hm) as [j [Hj Ej]].
     assert (I : In ((qn q + j)%nat, m) (combine (seq (qn q) (length (means b))) (means b))).
-    { replace ((qn q + j)%nat, m) with (nth j (combine (seq (qn q) (length (means b))) (means b)) (0%nat, m)).
-      - apply nth_In. rewrite combine_length, seq_length. lia.
-      - rewrite combine_nth by apply seq_length. rewrite seq_nth by exact Hj. rewrite Ej. reflexivity. }
+    { apply in_numbered; [rewrite <- Ej; apply nth_error_nth'|]; exact Hj. }
     specialize (C4 _ I). cbn [fst snd] in C4. set (d := common (fst m)) in *. apply andb_prop in C4 as [G C4].
     pose proof (functional_ok b l (fst roots) dq _ _ _ x a bs C1 C2 C4 Ha Hv B) as K. unfold functional in K.
     rewrite (dot_scaled d (fst m) G) in K. destruct (good_ok _ _ G) as [G0 _]. apply IZR_lt in G0.

@@ -91,9 +91,7 @@ Proof.
   fold n in H'. destruct (factor_off n (dsrc d) PZ) as [r|] eqn:ER; [|discriminate].
   apply andb_prop in H' as [Hl H']. apply Nat.eqb_eq in Hl. rewrite forallb_forall in H'.
   assert (K : In (i, nth i cs 0%Q) (combine (seq 0 n) cs)).
-  { replace (i, nth i cs 0%Q) with (nth i (combine (seq 0 n) cs) (0%nat, 0%Q)).
-    - apply nth_In. rewrite combine_length, seq_length. fold n in Hl. lia.
-    - rewrite combine_nth by (rewrite seq_length; symmetry; exact Hl). rewrite seq_nth by assumption. reflexivity. }
+  { apply (in_numbered _ cs 0%nat); [apply nth_error_nth'; fold n in Hl; lia|assumption]. }
   specialize (H' _ K). cbn [fst snd] in H'. apply andb_prop in H' as [Hn H']. set (q := nth i cs 0%Q) in *.
   destruct (factor_off_ok _ _ _ _ ER (lap es x) (fun i => lap_source n es i x)) as [P0 B].
   assert (EB : bil PZ (lap es x) (lap es x) = IZR e * qbil P (lap es x) (lap es x)) by (apply bil_scaled; assumption).

@@ -141,7 +141,7 @@ Proof.
     - exists 1, 0. split; [lra|]. split; [lra|]. intros t i _ _. unfold lap. simpl. unfold sq. lra.
     - rewrite <- Ee. apply existsb_exists in H as [f [Hf Hr]]. destruct (function_large f Hf) as [Cl [p El]].
       set (a := Rabs (Q2R (overshoot f) * (exp (Q2R (rate f) * s c t0) * norm2 n (lap es (X t0))))).
-      exists (Q2R (rate f)), (sqrt a). split; [exact (pos_ok c _ Hr)|]. split; [apply sqrt_pos|]. intros t i Ht Hi.
+      exists (Q2R (rate f)), (sqrt a). split; [exact (Qpos _ Hr)|]. split; [apply sqrt_pos|]. intros t i Ht Hi.
       destruct (Cl X Sl t0 t HX Ht) as [_ [N _]]. rewrite El in N. cbn [coords] in N. fold es n in N.
       eapply Rle_trans; [apply (norm2_entry n (lap es (X t)) i Hi)|]. eapply Rle_trans; [exact N|].
       assert (A : sq (sqrt a) = a) by (unfold sq; apply sqrt_sqrt; apply Rabs_pos). rewrite A. fold (s c t).

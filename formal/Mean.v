@@ -383,7 +383,7 @@ Qed.
 
 Lemma trace_upper : check_trace c d (bound u) C = true -> upper_claim c u.
 Proof.
-  intros H F b Fs Fp Ft F0 Fk Fb. assert (HF : U.form F) by (split; [exact Fs|exact Fp|exact Ft]).
+  intros H F b Fs Fl F0 Fk Fb. pose proof (linear_form F Fs Fl) as HF.
   destruct (region_parts c Hgood C Hregion) as [_ [_ [HCR [Rn [Own Sub]]]]]. fold n es R in HCR, Rn, Own.
   unfold check_trace in H. cbv zeta in H. fold n own trace in H.
   revert H Own Sub. destruct (ends_of c C) as [|b0 [|b1 l']]; intros H Own Sub; [| |discriminate].

@@ -2,7 +2,7 @@
 Require Import ZArith QArith Qabs Qreals List Bool Reals Lra Lia Psatz.
 From Coquelicot Require Import Coquelicot.
 Import ListNotations.
-Require Import Certificate Checker Flow Sound Slide Linear Exist Effort Peak.
+Require Import Certificate Checker Flow Sound Slide Solution Exist Effort Peak.
 Open Scope R_scope.
 
 (** * Polynomials with rational coefficients *)

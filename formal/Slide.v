@@ -42,6 +42,13 @@ Proof.
   intros H. apply Z.ltb_lt in H. unfold Q2R. apply Rmult_lt_0_compat; [apply IZR_lt; exact H|].
   apply Rinv_0_lt_compat. apply IZR_lt. reflexivity.
 Qed.
+Lemma T_pos c : check_protocol c = true -> 0 < deadline c /\ 0 < Q2R (rho1 c) /\ 0 < k c.
+Proof.
+  intros Hprot. unfold check_protocol in Hprot. apply andb_prop in Hprot as [H H4]. apply andb_prop in H as [H H3].
+  apply andb_prop in H as [H1 H2]. repeat split; [|apply Qpos; assumption|apply Rmult_lt_0_compat; apply Qpos; assumption].
+  unfold deadline. destruct (kind c); [apply Qpos; assumption|].
+  repeat (apply andb_prop in H4 as [H4 ?]). apply Rplus_lt_0_compat; apply Qpos; assumption.
+Qed.
 Lemma power_below y m : 0 < y <= 1 -> 1 <= m -> Rpower y m <= y.
 Proof.
   intros [Y0 Y1] Hm. rewrite <- (exp_ln y) at 2 by exact Y0. unfold Rpower.

@@ -97,6 +97,17 @@ Hypothesis Hrate : forall F x, fits n F = true -> 0 <= bil (rate_form (dls d) (d
   Q2R (bound u) * bil F x x <= bil F (lap es x) x + bil F x (lap es x).
 
 (** a set [R], a linear function [nu] that [L] annihilates, an axis [t] along which it is projected to 0 *)
+Lemma linear_form (F : U.state -> U.state -> Rdefinitions.R) : (forall x y, F x y = F y x) ->
+  (forall a x y z, F (fun i => a * x i + y i) z = a * F x z + F y z) -> U.form F.
+Proof.
+  intros Fs Fl. assert (P : forall x y z, F (U.plus x y) z = F x z + F y z).
+  { intros x y z. replace (U.plus x y) with (fun i => 1 * x i + y i) by (apply functional_extensionality; intros; unfold U.plus; ring).
+    rewrite Fl. ring. }
+  split; [exact Fs|exact P|]. intros a x z. pose proof (P (fun _ => 0) (fun _ => 0) z) as Z.
+  replace (U.plus _ _) with (fun _ : nat => 0) in Z by (apply functional_extensionality; intros; unfold U.plus; ring).
+  replace (U.times a x) with (fun i => a * x i + (fun _ => 0) i) by (apply functional_extensionality; intros; unfold U.times; ring).
+  rewrite Fl. lra.
+Qed.
 Section Projected.
 Variables (R : list nat) (nu : U.state -> Rdefinitions.R) (t : nat) (A : mat) (y : U.state).
 Let T (x : U.state) : U.state := U.plus x (U.times (- nu x) (axis t)).
@@ -122,8 +133,7 @@ Proof. intros H. unfold T. rewrite H. apply functional_extensionality. intros i.
 
 Lemma projected : upper_claim c u.
 Proof.
-  intros F b Fs Fp Ft F0 Fk Fb.
-  assert (HF : U.form F) by (split; [exact Fs|exact Fp|exact Ft]).
+  intros F b Fs Fl F0 Fk Fb. pose proof (linear_form F Fs Fl) as HF.
   set (l := map axis R).
   apply (U.rate_limit l (fun x z => hform A (T x) (T z)) (fun x z => F (T x) (T z)) (fun x => lap es (T x)) y).
   - apply composed_form; [apply hform_form|apply T_plus|apply T_times].

@@ -2,7 +2,7 @@
 Require Import ZArith QArith Qabs Qreals List Bool Reals Lra Lia Psatz.
 From Coquelicot Require Import Coquelicot.
 Import ListNotations.
-Require Import Vec Definite Graph Flow Certificate Checker Sound Input Mean Main Table Dominance.
+Require Import Vec Definite Graph Flow Certificate Checker Sound Input Mean Slide Main Table Dominance.
 Open Scope R_scope.
 
 (** * Decay along a motion *)
@@ -146,7 +146,7 @@ Proof.
     (fun x => rows_ok _ _ _ _ _ _ _ _ Hedges Houter H1 x (Hinner x)) X Sl t0 HM HQ t Ht) as D.
   assert (EV : forall x, V (edges c) (ly f) x = qdot p (fun i => sq (lap (edges c) x i))) by (intros x; rewrite Hp; reflexivity).
   assert (EN : forall x, N x = norm2 (order c) (lap (edges c) x)) by (intros x; unfold N; rewrite Hp; reflexivity).
-  assert (L0 : 0 < Q2R (lowest f)) by (exact (pos_ok c _ H2)).
+  assert (L0 : 0 < Q2R (lowest f)) by (exact (Qpos _ H2)).
   assert (Q0 : 0 < q) by apply exp_pos.
   assert (B : forall x, Q2R (lowest f) * N x <= V' x /\ V' x <= Q2R (highest f) * N x).
   { intros x. unfold V'. rewrite EV, EN, qdot_fsum, Lp, norm2_fsum, <- !fsum_scal. rewrite forallb_forall in H4.

@@ -10,6 +10,7 @@ let of_check c d : (string * (unit -> bool)) list =
   @ List.mapi (fun k f -> Printf.sprintf "lyapunov.functions[%d]" k, (fun () -> check_function c d f)) c.funcs
   @ [ "final-state of graph: no Lyapunov function proves that it is reached", (fun () -> check_reached c d);
       "final_state: not what was proved", (fun () -> check_final c d);
+      "influence.degenerate: other components end at 0", (fun () -> check_degenerate c d);
       "input-threshold of input", (fun () -> check_input c d);
       "rates, or overshoot, are not what was proved", (fun () -> check_rates c);
       "input-sliding of input", (fun () -> check_sliding_input c);

@@ -382,8 +382,14 @@ let certificate (j : Json.t) : t =
         List.map2 (fun x r -> need (Z.sign r.qnum >= 0) "final_state: a radius is negative"; x, r) (column "mid") (column "radius")
     | Some _, v -> by_agent nodes interval "final_state" v
     | None, _ -> bad "a final state without an initial state" in
-  if start = None then need (degenerate = Null) "influence.degenerate without an initial state"
-  else not_checked "influence.degenerate";
+  let degenerate = match start, degenerate with
+    | None, v -> need (v = Null) "influence.degenerate without an initial state"; None
+    | Some _, _ when enclosed -> not_checked "influence.degenerate"; None
+    | Some _, v ->
+        let numbers = List.map (fun v -> let z = integer "degenerate" v in
+          need (Z.sign z > 0 && Z.leq z (Z.of_int (List.length comps))) "degenerate: no closed component has this number";
+          Z.to_int z) (entries "degenerate" v) in
+        need (List.sort_uniq compare numbers = numbers) "degenerate: numbers are not in order"; Some numbers in
   let unproved = enclosed && (start = None || (following_witness proof = Null && followers <> [])) in
   if unproved && start <> None then not_checked "final_state";
   let around, final =
@@ -510,4 +516,4 @@ let certificate (j : Json.t) : t =
       margins = (match paper with Some p -> p.inequalities | None -> []);
       leaders = (match paper with Some p -> p.groups | None -> []);
       upper_bound;
-      proved = rate "proved"; best_diagonal = rate "diagonal"; best_overshoot; bounded_input } }
+      proved = rate "proved"; best_diagonal = rate "diagonal"; best_overshoot; bounded_input; degenerate } }

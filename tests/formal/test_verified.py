@@ -303,6 +303,27 @@ def test_what_the_sliding_mode_adds_to_the_input_is_verified(tmp_path: Path) -> 
             assert said(forged, tmp_path).code == 1 and not check(forged).accepted, path
 
 
+def test_which_balanced_components_end_at_0_is_verified(tmp_path: Path) -> None:
+    program()
+    gains = {"T_r": "0.5", "T_s": 1, "mu1": 2, "mu2": 1, "mu3": 1, "delta": 1, "rho1": 1, "rho2": 1, "kappa": 2}
+    edges = [("a", "b", 1), ("b", "a", 1), ("c", "d", -1), ("d", "c", -1), ("e", "f", 1), ("f", "e", -1)]
+    edges += [("b", "g", 1), ("c", "g", -2), ("e", "g", 1)]
+    start, sigma = [1, -1, 2, 1, 5, -5, 3], [0, 0, "1/2", "-1/2", 0, 0, 0]
+    for protocol, more, listed in (
+        (NominalProtocol(1, 1, 1, 2), {}, [1]),
+        (SlidingModeProtocol(**gains), {"sigma0": sigma}, [1, 2]),
+    ):
+        document = json.loads(certify(edges, protocol, start, simulation=False, **more).to_json())
+        code, text = said(document, tmp_path)
+        assert code == 0 and "influence.degenerate" not in named(text)
+        assert document["influence"]["degenerate"] == listed
+        for wrong in ([], [1], [2], [1, 2], [1, 3], [1, 2, 3], [2, 1], [1, 1], [0, 1], [1, 4], ["1"], [True], 1, None):
+            if repr(wrong) != repr(listed):
+                forged = resealed(changed(document, ("influence", "degenerate"), wrong))
+                code, text = said(forged, tmp_path)
+                assert code == 1 and "degenerate" in text and not check(forged).accepted, (wrong, text)
+
+
 def test_a_shorter_path_or_a_lower_energy_than_is_proved_is_rejected(tmp_path: Path) -> None:
     program()
     gains = {"T_r": "0.5", "T_s": 1, "mu1": 2, "mu2": 1, "mu3": 1, "delta": 1, "rho1": 3, "rho2": 1, "kappa": 2}
