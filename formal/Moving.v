@@ -10,7 +10,9 @@ Lemma ceil_ok q : Q2R q <= Q2R (ceil q).
 Proof. unfold ceil. rewrite Q2R_opp. pose proof (floor_ok (- q)) as H. rewrite Q2R_opp in H. lra. Qed.
 Lemma root_ok q : 0 <= Q2R q -> 0 <= Q2R (root q) /\ Q2R q <= sq (Q2R (root q)).
 Proof.
-  intros H. unfold root. cbv zeta. set (r := (2 ^ 120)%Z). assert (Hr : (0 < r)%Z) by (unfold r; reflexivity). clearbody r.
+  intros H. unfold root. destruct (Qle_bool q 0) eqn:E0.
+  { apply Qle_bool_iff, Qle_Rle in E0. rewrite Q2R_0 in *. unfold sq. lra. }
+  cbv zeta. set (r := (2 ^ 120)%Z). assert (Hr : (0 < r)%Z) by (unfold r; reflexivity). clearbody r.
   set (n := (Qnum q * (r * r) / Zpos (Qden q))%Z).
   assert (Hq : (0 <= Qnum q)%Z).
   { apply le_IZR. unfold Q2R in H. assert (P : 0 < IZR (Zpos (Qden q))) by (apply IZR_lt; reflexivity).
