@@ -48,10 +48,11 @@ Record upper := Upper { bound : Q; inside : list nat; because : reason }.
 (** a weak component: [row] 1, 2, 3 if one closed component is all of it, if there is one, if there are several *)
 Record piece := Piece { members : list nat; row : nat; some_balanced : bool; undirected : bool; cooperative : bool;
   whole : balance }.
-(** what the input takes at most from the initial state, and what proves it: a Lyapunov function; two forms, how they fall,
-    and where the gain is compared with them; functions and instants, by agent and for the norm *)
-Inductive effort := PathLength (most : Q) (f : nat) | Energy (most : Q) (W0 W1 : list (list Q)) (m0 m1 p : Q)
-  | Peak (each : list Q) (norm : Q) (ways : list (nat * Q)) (last : nat * Q).
+(** what the input takes at most from the initial state, and what proves it: a Lyapunov function, and the instant up to
+    which pieces of the time are added up; two forms, how they fall, and where the gain is compared with them; functions
+    and instants, by agent and for the norm *)
+Inductive effort := PathLength (most : Q) (way : nat * Q) | EnergyBy (most : Q) (way : nat * Q) | Energy (most : Q)
+  (W0 W1 : list (list Q)) (m0 m1 p : Q) | Peak (each : list Q) (norm : Q) (ways : list (nat * Q)) (last : nat * Q).
 Inductive protocol := Nominal (T : Q) | SlidingMode (T_r T_s mu1 mu2 mu3 delta : Q).
 (** final states are middle and radius; of many nodes they are [enclosed], and no weights tell them; a leader group is its
     weights, 0 elsewhere, and its rate; [sliding_input] bounds what the sliding mode adds to the input, by agent;
@@ -87,12 +88,15 @@ Definition k c := Q2R (rho2 c) * Q2R (kappa c). Definition s c t := clock (deadl
 (** what draws a sliding variable to 0, besides [mu1] against the disturbance; and what stays of it *)
 Definition pull c T_r mu2 mu3 t := Q2R mu2 + if Rlt_dec t (Q2R T_r) then Q2R mu3 * Q2R (kappa c) / (Q2R T_r - t) else 0.
 Definition psi c T_r mu2 mu3 t := exp (- (Q2R mu2 * t)) * Rpower ((Q2R T_r - t) / Q2R T_r) (Q2R mu3 * Q2R (kappa c)).
-(** Where a sliding variable is not 0, its upper right derivative in size is at most [-(mu1 - delta) - pull |S|]: so all
+(** Where a sliding variable is not 0, its right derivatives in size are within [delta] of [- mu1 - pull |S|]: so all
     solutions of Filippov do, whatever the disturbance within [delta]. Of the nominal protocol it is 0. *)
 Definition slides (c : cert) (S : R -> nat -> R) : Prop := match kind c with Nominal _ => forall t i, S t i = 0
   | SlidingMode T_r _ mu1 mu2 mu3 delta => forall t i e, 0 <= t < deadline c -> (i < order c)%nat -> S t i <> 0 ->
-      0 < e -> exists eta, 0 < eta /\ forall h, 0 < h < eta -> Rabs (S (t + h) i) <=
-        Rabs (S t i) - h * (Q2R mu1 - Q2R delta + pull c T_r mu2 mu3 t * Rabs (S t i) - e) end.
+      0 < e -> exists eta, 0 < eta /\ forall h, 0 < h < eta -> Rabs (Rabs (S (t + h) i) -
+        (Rabs (S t i) - h * (Q2R mu1 + pull c T_r mu2 mu3 t * Rabs (S t i)))) <= h * (Q2R delta + e) end.
+(** what the sliding mode adds to an input, in size *)
+Definition added c (S : R -> nat -> R) t i := match kind c with Nominal _ => 0
+  | SlidingMode T_r _ mu1 mu2 mu3 _ => Q2R mu1 + pull c T_r mu2 mu3 t * Rabs (S t i) end.
 Definition moves c X S : Prop := motion (order c) (lap (edges c)) (deadline c) (Q2R (rho1 c)) (k c) X S /\ slides c S.
 Definition moves_from c (X S : R -> nat -> R) (t0 : R) : Prop := moves c X S /\ quiet (order c) (deadline c) S t0.
 
@@ -140,17 +144,16 @@ Definition final_claim (c : cert) : Prop := enclosed c = false -> within c (end_
 (** Proposition 1: whatever the disturbance, sliding variables shrink by [psi] and are 0 from [T_r] on; from the file's
     initial values on they are 0 from their reaching times on; what they add to the input at most *)
 Definition sliding_claim (c : cert) : Prop := match kind c with Nominal _ => True
-  | SlidingMode T_r _ mu1 mu2 mu3 _ => forall X S, moves c X S -> quiet (order c) (deadline c) S (Q2R T_r) /\
+  | SlidingMode T_r _ _ mu2 mu3 _ => forall X S, moves c X S -> quiet (order c) (deadline c) S (Q2R T_r) /\
       forall t i, 0 <= t < Q2R T_r -> (i < order c)%nat -> Rabs (S t i) <= psi c T_r mu2 mu3 t * Rabs (S 0 i) /\
         (S 0 i = Q2R (nth i (sliding c) 0%Q) -> ((i < length (sliding_input c))%nat ->
-           Q2R mu1 + pull c T_r mu2 mu3 t * Rabs (S t i) <= Q2R (nth i (sliding_input c) 0%Q)) /\
+           added c S t i <= Q2R (nth i (sliding_input c) 0%Q)) /\
          forall z, nth i (reaching c) None = Some z -> Q2R T_r * (1 - exp (- Q2R z)) <= t -> S t i = 0) end.
 (** what one Lyapunov function proves, along every motion *)
 Definition function_claim (c : cert) (f : func) : Prop := forall X S t0 t, moves_from c X S t0 ->
-  let q := exp (- (Q2R (rate f) * (s c t - s c t0))) in
-  let V := V (edges c) (ly f) in let N x := norm2 (order c) (coords (edges c) (ly f) x) in
-  let off i := X t i - end_state c (fun j => X 0 j - S 0 j) i in
-  t0 <= t < deadline c -> V (X t) <= q * V (X t0) /\ N (X t) <= Q2R (overshoot f) * (q * N (X t0)) /\
+  let q := exp (- (Q2R (rate f) * (s c t - s c t0))) in let V := V (edges c) (ly f) in
+  let N x := norm2 (order c) (coords (edges c) (ly f) x) in let off i := X t i - end_state c (fun j => X 0 j - S 0 j) i
+  in t0 <= t < deadline c -> V (X t) <= q * V (X t0) /\ N (X t) <= Q2R (overshoot f) * (q * N (X t0)) /\
   (forall a cs, deviation f = Some (a, cs) -> norm2 (order c) off <= Q2R a * (q * V (X t0)) /\
      forall i, (i < order c)%nat -> sq (off i) <= Q2R (nth i cs 0%Q) * (q * V (X t0))) /\
   forall cs i, constants f = Some cs -> (i < order c)%nat -> sq (lap (edges c) (X t) i) <= Q2R (nth i cs 0%Q) * V (X t).
@@ -158,9 +161,8 @@ Definition function_claim (c : cert) (f : func) : Prop := forall X S t0 t, moves
 Definition margin_form (es : list edge) (n : nat) (m : margin) (r : R) (x : nat -> R) : R :=
   fold_right (fun i a => match nth i (gammas m) None with Some g => Q2R g * sq (x i) | None =>
     2 * (Q2R (nth i (weights m) 0%Q) * if mem i (upto m) then r else 1) * (x i * lap es x i) end + a) 0 (seq 0 n).
-Definition margin_claim (c : cert) (m : margin) : Prop := forall x j,
-  (forall i, (i < order c)%nat -> ~ In i (on m) -> x i = 0) -> (j < order c)%nat -> x j <> 0 ->
-  let S r := margin_form (edges c) (order c) m r x in
+Definition margin_claim (c : cert) (m : margin) : Prop := forall x j, (forall i, (i < order c)%nat -> ~ In i (on m) ->
+  x i = 0) -> (j < order c)%nat -> x j <> 0 -> let S r := margin_form (edges c) (order c) m r x in
   Q2R (least m) * norm2 (order c) x < S 1 /\ (Q2R (least m) = 0 -> forall r, 0 < r <= 1 -> 0 < S r).
 Definition leader_claim (c : cert) (l : list Q * Q) : Prop := forall X S t0 t, moves_from c X S t0 ->
   let W x := qdot (fst l) (fun i => sq (lap (edges c) x i)) in
@@ -173,19 +175,19 @@ Definition at_rest (c : cert) (y : nat -> R) : Prop := (forall i, (i < order c)%
     (forall C, In C (own c P) -> is_balanced C = true -> Rabs (y (hd O (nodes C))) <= M) -> Rabs (y i) <= M.
 (** the end is reached at the deadline *)
 Definition limit_claim (c : cert) : Prop := forall X S, moves c X S -> exists y, (forall i, (i < order c)%nat ->
-  filterlim (fun t => X t i) (at_left (deadline c)) (locally (y i))) /\ let x0 j := X 0 j - S 0 j in
-  if enclosed c then at_rest c y /\ ((forall j, (j < order c)%nat -> x0 j = begin c j) -> within c y)
-  else y = end_state c x0.
+  filterlim (fun t => X t i) (at_left (deadline c)) (locally (y i))) /\ let x0 j := X 0 j - S 0 j in if enclosed c then
+  at_rest c y /\ ((forall j, (j < order c)%nat -> x0 j = begin c j) -> within c y) else y = end_state c x0.
 (** the nominal part of the input; it stays bounded *)
 Definition input c (X : R -> nat -> R) t i : R := - (gain (deadline c) (Q2R (rho1 c)) (k c) t * lap (edges c) (X t) i).
 Definition input_claim (c : cert) : Prop := bounded_input c = true -> forall X S t0, moves_from c X S t0 ->
   exists K, forall t i, t0 <= t < deadline c -> (i < order c)%nat -> Rabs (input c X t i) <= K.
-(** the length of its path, its energy and how large it gets, if all sliding variables are 0 *)
-Definition effort_claim (c : cert) (e : effort) : Prop := forall X S t, moves_from c X S 0 -> 0 <= t < deadline c ->
-  (forall i, (i < order c)%nat -> X 0 i = Q2R (nth i (start c) 0%Q)) ->
+(** the length of its path, its energy, and how large the whole input gets, from the initial values of the file *)
+Definition effort_claim (c : cert) (e : effort) : Prop := forall X S t, moves c X S -> 0 <= t < deadline c ->
+  (forall i, (i < order c)%nat -> X 0 i = Q2R (nth i (start c) 0%Q) /\ S 0 i = Q2R (nth i (sliding c) 0%Q)) ->
   let I f q := ex_RInt f 0 t /\ RInt f 0 t <= Q2R q in let N u := norm2 (order c) (input c X u) in
-  match e with PathLength q _ => I (fun u => sqrt (N u)) q | Energy q _ _ _ _ _ => I N q | Peak qs q _ _ =>
-    sqrt (N t) <= Q2R q /\ forall i, (i < order c)%nat -> Rabs (input c X t i) <= Q2R (nth i qs 0%Q) end.
+  let whole i := Rabs (input c X t i) + added c S t i in match e with PathLength q _ => I (fun u => sqrt (N u)) q
+  | EnergyBy q _ | Energy q _ _ _ _ _ => I N q | Peak qs q _ _ => sqrt (norm2 (order c) whole) <= Q2R q /\
+    forall i, (i < order c)%nat -> whole i <= Q2R (nth i qs 0%Q) end.
 (** the rates that are stated are the largest ones *)
 Definition largest (l : list Q) (r : option Q) : Prop := match r with None => forall a, In a l -> (a <= 0)%Q
   | Some q => (0 < q)%Q /\ (exists a, In a l /\ (a == q)%Q) /\ forall a, In a l -> (a <= q)%Q end.

@@ -123,17 +123,16 @@ Qed.
 Lemma norm2_scal n a x : norm2 n (fun i => - (a * x i)) = sq a * norm2 n x.
 Proof. unfold norm2, sq. induction (seq 0 n) as [|i l IH]; simpl; [ring|]. rewrite IH. ring. Qed.
 
-Section Along.
+Section Continuous.
 Variables (c : cert) (X S : R -> nat -> R).
 Let n := order c.
 Let es := edges c.
 Let T := deadline c.
-Hypotheses (HT : 0 < T) (H1 : 0 < Q2R (rho1 c)) (Hk : 0 < k c).
 Hypothesis Hsrc : forall e, In e es -> (src e < n)%nat.
-Hypothesis HX : moves_from c X S 0.
+Hypothesis HM : moves c X S.
 Let Y (u : R) : nat -> R := X (Rmax 0 u).
 Lemma Y_all t i : t < T -> (i < n)%nat -> continuous (fun u => Y u i) t.
-Proof. intros Ht Hi. destruct HX as [[[_ C] _] _]. apply C; assumption. Qed.
+Proof. intros Ht Hi. destruct HM as [[_ C] _]. apply C; assumption. Qed.
 Lemma input_cont t i : t < T -> (i < n)%nat -> continuous (fun u => input c Y u i) t.
 Proof.
   intros Ht Hi. unfold input.
@@ -154,25 +153,36 @@ Proof.
   { intros u Hu. rewrite Rmin_left in Hu by assumption. unfold input, Y. rewrite Rmax_right by lra. reflexivity. }
   split; [exact (ex_RInt_ext _ _ _ _ K E)|]. rewrite <- (RInt_ext _ _ _ _ K). exact L.
 Qed.
+End Continuous.
+
+Section Along.
+Variables (c : cert) (X S : R -> nat -> R).
+Let n := order c.
+Let es := edges c.
+Let T := deadline c.
+Hypotheses (HT : 0 < T) (H1 : 0 < Q2R (rho1 c)) (Hk : 0 < k c).
+Hypothesis Hsrc : forall e, In e es -> (src e < n)%nat.
+Hypothesis HX : moves_from c X S 0.
+Let Y (u : R) : nat -> R := X (Rmax 0 u).
 Lemma s_0 : s c 0 = 0. Proof. apply clock_0. exact HT. Qed.
 
 Lemma path_length (r b : R) : 0 < r -> 0 <= b ->
   (forall t, 0 <= t < T -> norm2 n (lap es (X t)) <= exp (- (r * s c t)) * sq (r / 2 * b)) ->
   forall t, 0 <= t < T -> ex_RInt (fun u => sqrt (norm2 n (input c X u))) 0 t /\ RInt (fun u => sqrt (norm2 n (input c X u))) 0 t <= b.
 Proof.
-  intros Hr Hb H t Ht. apply (back sqrt); [apply Ht|].
+  intros Hr Hb H t Ht. apply (back c X sqrt); [apply Ht|].
   pose proof (integral_below T (fun u => sqrt (norm2 n (input c Y u))) (fun u => b * exp (- (r / 2 * s c u)))
     (fun u => b * (- (r / 2 * gain T (Q2R (rho1 c)) (k c) u) * exp (- (r / 2 * s c u))))) as K.
   assert (E0 : b * exp (- (r / 2 * s c 0)) = b) by (rewrite s_0, Rmult_0_r, Ropp_0, exp_0; ring).
   cbv beta in K. rewrite E0 in K. apply K; auto; clear K t Ht.
-  - intros u Hu. apply continuous_sqrt_comp. apply power_cont. assumption.
+  - intros u Hu. apply continuous_sqrt_comp. apply (power_cont c X S Hsrc (proj1 HX)). assumption.
   - intros u Hu. apply (is_derive_scal (fun u => exp (- (r / 2 * s c u)))). evar_last.
     + apply is_derive_comp; [apply is_derive_exp|]. apply @is_derive_opp. apply is_derive_scal. apply clock_derive; [exact HT|apply Hu].
     + unfold scal, opp; simpl; unfold mult; simpl. fold T. ring.
   - intros u Hu. apply (continuous_mult (fun _ => b) (fun u => exp (- (r / 2 * s c u)))); [apply continuous_const|].
     apply @ex_derive_continuous. eexists. apply is_derive_comp; [apply is_derive_exp|].
     apply @is_derive_opp. apply is_derive_scal. apply clock_derive; [exact HT|apply Hu].
-  - intros u Hu. specialize (H u Hu). rewrite power_eq by apply Hu. set (g := gain _ _ _ u) in *.
+  - intros u Hu. specialize (H u Hu). rewrite (power_eq c X) by apply Hu. set (g := gain _ _ _ u) in *.
     assert (G : 0 < g) by (apply gain_pos; auto; apply Hu). set (e := exp (- (r / 2 * s c u))).
     assert (E : exp (- (r * s c u)) = e * e) by (unfold e; rewrite <- exp_plus; f_equal; field).
     assert (P : 0 < e) by apply exp_pos. rewrite E in H.
@@ -194,8 +204,8 @@ Lemma energy (F0 F1 : mat) (m0 m1 p z : R) : fits n F0 = true -> fits n F1 = tru
   forall t, 0 <= t < T -> ex_RInt (fun u => norm2 n (input c X u)) 0 t /\ RInt (fun u => norm2 n (input c X u)) 0 t <=
     (Q2R (rho1 c) + k c / T * p) * (bil F0 (X 0) (X 0) / m0) + k c / T * (bil F1 (X 0) (X 0) / m1) * z.
 Proof.
-  intros Hf0 Hf1 M0 M1 Hp Hq Hz P0 P1 D0 D1 t Ht. apply (back (fun x => x)); [apply Ht|].
-  destruct (fits_ok _ _ Hf0) as [A0 B0]. destruct (fits_ok _ _ Hf1) as [A1 B1]. destruct HX as [[HM _] HQ].
+  intros Hf0 Hf1 M0 M1 Hp Hq Hz P0 P1 D0 D1 t Ht. apply (back c X (fun x => x)); [apply Ht|].
+  destruct (fits_ok _ _ Hf0) as [A0 B0]. destruct (fits_ok _ _ Hf1) as [A1 B1]. pose proof HX as [[HM _] HQ].
   assert (KT : 0 < k c / T) by (apply Rdiv_lt_0_compat; assumption). pose proof (exp_pos (- p)) as Pz.
   set (a := (Q2R (rho1 c) + k c / T * p) / m0). set (b := k c / T * z / m1).
   assert (Ha : 0 < a) by (apply Rdiv_lt_0_compat; nra). assert (Hb : 0 < b) by (apply Rdiv_lt_0_compat; nra).
@@ -209,7 +219,7 @@ Proof.
     = (Q2R (rho1 c) + k c / T * p) * (bil F0 (X 0) (X 0) / m0) + k c / T * (bil F1 (X 0) (X 0) / m1) * z).
   { rewrite s_0, !Rmult_0_r, exp_0. unfold Y, a, b. rewrite Rmax_left by lra. field. lra. }
   cbv beta in K. rewrite E0 in K. apply K; auto; clear K E0 t Ht.
-  - intros u Hu. apply power_cont. assumption.
+  - intros u Hu. apply (power_cont c X S Hsrc (proj1 HX)). assumption.
   - intros u Hu. apply (is_derive_plus (fun u => a * (exp (0 * s c u) * bil F0 (Y u) (Y u)))
       (fun u => b * (exp (/ k c * s c u) * bil F1 (Y u) (Y u)))).
     + apply (is_derive_scal (fun u => exp (0 * s c u) * bil F0 (Y u) (Y u))). apply (form_derive n (lap es) _ _ _ HT X S 0 HM HQ); auto.
@@ -220,7 +230,7 @@ Proof.
       apply (form_cont n (lap es) _ _ _ HT X S 0 HM HQ); auto.
     + apply (continuous_mult (fun _ => b) (fun u => exp (/ k c * s c u) * bil F1 (Y u) (Y u))); [apply continuous_const|].
       apply (form_cont n (lap es) _ _ _ HT X S 0 HM HQ); auto.
-  - intros u Hu. rewrite power_eq by apply Hu. unfold Y. rewrite Rmax_right by apply Hu.
+  - intros u Hu. rewrite (power_eq c X) by apply Hu. fold n es T. unfold Y. rewrite Rmax_right by apply Hu.
     pose proof (gain_above T (Q2R (rho1 c)) (k c) p u HT H1 Hk Hp Hq Hu) as G. fold T (s c u) in G.
     change (clock T (Q2R (rho1 c)) (k c) u) with (s c u) in G.
     assert (G0 : 0 < gain T (Q2R (rho1 c)) (k c) u) by (apply gain_pos; auto; apply Hu).

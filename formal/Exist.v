@@ -241,21 +241,24 @@ Qed.
 Lemma slide_0 a : slide a 0 = a.
 Proof. unfold slide. destruct (Req_EM_T a 0) as [->|_]; [reflexivity|]. rewrite remains_0. ring. Qed.
 Lemma slide_law a t e : slide a t <> 0 -> 0 < e -> exists eta, 0 < eta /\ forall h, 0 < h < eta ->
-  Rabs (slide a (t + h)) <= Rabs (slide a t) - h * (Q2R mu1 - Q2R delta + p t * Rabs (slide a t) - e).
+  Rabs (Rabs (slide a (t + h)) - (Rabs (slide a t) - h * (Q2R mu1 + p t * Rabs (slide a t)))) <= h * (Q2R delta + e).
 Proof.
   unfold slide. destruct (Req_EM_T a 0) as [E|N]; [intros H; contradiction (H eq_refl)|]. intros H He.
   set (q := r / Rabs a) in *. pose proof (Rabs_pos_lt a N) as A.
   assert (H2 : remains q t <> 0) by (intros Z; apply H; rewrite Z; ring).
   pose proof (remains_falls q t H2) as D. apply is_derive_Reals in D.
   destruct (D (e / Rabs a) ltac:(apply Rdiv_lt_0_compat; assumption)) as [d Hd]. exists d. split; [apply cond_pos|]. intros h Hh.
-  specialize (Hd h ltac:(lra) ltac:(rewrite Rabs_right; lra)). apply Rabs_def2 in Hd as [Hd _].
+  specialize (Hd h ltac:(lra) ltac:(rewrite Rabs_right; lra)). apply Rabs_def2 in Hd as [Hd Hl].
   rewrite !Rabs_mult, !(Rabs_right (remains _ _)) by (apply Rle_ge, remains_pos).
   apply (Rmult_lt_compat_l (h * Rabs a)) in Hd; [|apply Rmult_lt_0_compat; lra].
+  apply (Rmult_lt_compat_l (h * Rabs a)) in Hl; [|apply Rmult_lt_0_compat; lra].
   replace (h * Rabs a * (e / Rabs a)) with (h * e) in Hd by (field; lra).
+  replace (h * Rabs a * - (e / Rabs a)) with (- (h * e)) in Hl by (field; lra).
   replace (h * Rabs a * ((remains q (t + h) - remains q t) / h - (- (p t * remains q t) - q)))
-    with (Rabs a * remains q (t + h) - Rabs a * remains q t + h * (p t * (Rabs a * remains q t)) + h * r) in Hd
+    with (Rabs a * remains q (t + h) - Rabs a * remains q t + h * (p t * (Rabs a * remains q t)) + h * r) in Hd, Hl
     by (unfold q; field; lra).
-  fold r. lra.
+  assert (Dp : 0 <= h * Q2R delta) by (apply Rmult_le_pos; [lra|apply (delta_pos c T_r T_s mu1 mu2 mu3 delta Hprot Hkind)]).
+  unfold r in *. apply Rabs_le. split; lra.
 Qed.
 End Slides.
 

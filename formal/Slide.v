@@ -74,6 +74,12 @@ Proof.
   apply negb_true_iff in Hd. destruct (Qlt_le_dec delta mu1) as [L|L]; [apply Qlt_Rlt in L; lra|].
   apply Qle_bool_iff in L. congruence.
 Qed.
+Lemma delta_pos : 0 <= Q2R delta.
+Proof.
+  assert (H := Hprot). unfold check_protocol in H. rewrite Hkind in H. apply andb_prop in H as [_ H].
+  apply andb_prop in H as [H _]. apply andb_prop in H as [_ H]. apply Z.leb_le in H. unfold Q2R.
+  apply Rmult_le_pos; [apply IZR_le; exact H|]. left. apply Rinv_0_lt_compat. apply IZR_lt. reflexivity.
+Qed.
 Lemma pull_pos t : 0 < p t.
 Proof.
   destruct parts as [A [_ [B C]]]. unfold p, pull. fold Tr m. destruct (Rlt_dec t Tr) as [L|L]; [|lra].
@@ -104,9 +110,15 @@ Section Agent.
 Variables (X S : R -> nat -> R) (i : nat).
 Hypothesis HM : moves c X S.
 Hypothesis Hi : (i < order c)%nat.
+Lemma laws t e : 0 <= t < deadline c -> S t i <> 0 -> 0 < e -> exists eta, 0 < eta /\ forall h, 0 < h < eta ->
+  Rabs (Rabs (S (t + h) i) - (Rabs (S t i) - h * (Q2R mu1 + p t * Rabs (S t i)))) <= h * (Q2R delta + e).
+Proof. intros Ht N He. destruct HM as [_ H]. unfold slides in H. rewrite Hkind in H. exact (H t i e Ht Hi N He). Qed.
 Lemma law t e : 0 <= t < deadline c -> S t i <> 0 -> 0 < e -> exists eta, 0 < eta /\ forall h, 0 < h < eta ->
   Rabs (S (t + h) i) <= Rabs (S t i) - h * (Q2R mu1 - Q2R delta + p t * Rabs (S t i) - e).
-Proof. intros Ht N He. destruct HM as [_ H]. unfold slides in H. rewrite Hkind in H. exact (H t i e Ht Hi N He). Qed.
+Proof.
+  intros Ht N He. destruct (laws t e Ht N He) as [eta [E H]]. exists eta. split; [exact E|]. intros h Hh. specialize (H h Hh).
+  apply Rabs_le_between in H. lra.
+Qed.
 Lemma size_cont t : t < deadline c -> continuous (fun u => Rabs (S (Rmax 0 u) i)) t.
 Proof.
   intros Ht. destruct HM as [[_ C] _]. apply (continuous_comp (fun u => S (Rmax 0 u) i) Rabs); [|apply continuous_Rabs].
@@ -187,23 +199,12 @@ Proof.
   apply (held Tr t (fun _ => e / 2) (fun _ => 0)); [lra|lra| |rewrite reached, Rabs_R0; lra].
   intros u _. split; [apply @is_derive_const|]. split; [lra|]. pose proof (pull_pos u). nra.
 Qed.
-Lemma input_part t l : check_sliding_input c = true -> sliding_input c = l -> 0 <= t < Tr -> (i < length l)%nat ->
-  S 0 i = Q2R (nth i (sliding c) 0%Q) -> Q2R mu1 + p t * Rabs (S t i) <= Q2R (nth i l 0%Q).
+Lemma pulled_below t : 1 <= m \/ S 0 i = 0 -> 0 <= t < Tr -> p t * Rabs (S t i) <= (Q2R mu2 + m / Tr) * Rabs (S 0 i).
 Proof.
-  intros H E Ht Hl H0. destruct parts as [A [_ [Pn Pm]]]. unfold check_sliding_input in H. rewrite Hkind, E in H.
-  destruct l as [|a l']; [simpl in Hl; lia|]. set (l := a :: l') in *. apply andb_prop in H as [H1 H2].
-  rewrite forallb_forall in H2. specialize (H2 i ltac:(apply in_seq; lia)). apply Qle_bool_iff, Qle_Rle in H2.
-  assert (Z : ~ (T_r == 0)%Q) by (intros Z; apply Qeq_eqR in Z; fold Tr in Z; unfold Q2R in Z at 1; simpl in Z; lra).
-  rewrite Q2R_plus, Q2R_mult, Q2R_plus in H2. unfold Qdiv in H2. rewrite !Q2R_mult, Q2R_inv in H2 by exact Z.
-  assert (Ab : Q2R (Qabs (nth i (sliding c) 0%Q)) = Rabs (S 0 i)).
-  { rewrite H0. destruct (nth i (sliding c) 0%Q) as [x d]. unfold Q2R. simpl. rewrite abs_IZR, Rabs_mult. f_equal.
-    symmetry. apply Rabs_right. apply Rle_ge. left. apply Rinv_0_lt_compat. apply IZR_lt. reflexivity. }
-  rewrite Ab in H2. fold Tr m in H2. eapply Rle_trans; [|exact H2]. apply Rplus_le_compat_l.
+  intros H1 Ht. destruct parts as [A [_ [Pn Pm]]].
   pose proof (shrinks t Ht) as K. pose proof (Rabs_pos (S 0 i)) as S0. pose proof (pull_pos t) as P.
-  apply orb_prop in H1 as [H1|H1].
-  - apply Qle_bool_iff, Qle_Rle in H1. rewrite Q2R_mult in H1. fold m in H1.
-    replace (Q2R 1) with 1 in H1 by (unfold Q2R; simpl; lra). set (y := (Tr - t) / Tr).
-    assert (Y : 0 < y <= 1).
+  destruct H1 as [H1|H1].
+  - set (y := (Tr - t) / Tr). assert (Y : 0 < y <= 1).
     { split; [apply Rdiv_lt_0_compat; lra|]. apply (Rmult_le_reg_r Tr); [lra|]. unfold y, Rdiv. rewrite Rmult_assoc, Rinv_l; lra. }
     pose proof (psi_power t ltac:(lra)) as W. fold y in W. pose proof (power_below y m Y H1) as W2.
     assert (K2 : p t * Rabs (S t i) <= p t * (y * Rabs (S 0 i))).
@@ -211,12 +212,40 @@ Proof.
     eapply Rle_trans; [exact K2|]. rewrite <- Rmult_assoc. apply Rmult_le_compat_r; [exact S0|].
     unfold p, pull. fold Tr m. destruct (Rlt_dec t Tr) as [_|N]; [|lra].
     replace ((Q2R mu2 + m / (Tr - t)) * y) with (Q2R mu2 * y + m * / Tr) by (unfold y; field; lra). nra.
-  - rewrite forallb_forall in H1. assert (E0 : Rabs (S 0 i) = 0).
-    { rewrite H0. destruct (nth_in_or_default i (sliding c) 0%Q) as [I|I].
-      - specialize (H1 _ I). apply Qeq_bool_eq, Qeq_eqR in H1. rewrite H1. unfold Q2R. simpl. rewrite Rmult_0_l. apply Rabs_R0.
-      - rewrite I. unfold Q2R. simpl. rewrite Rmult_0_l. apply Rabs_R0. }
-    rewrite E0 in K. rewrite Rmult_0_r in K. rewrite E0, Rmult_0_r. nra.
+  - rewrite H1, Rabs_R0, Rmult_0_r in K |- *. nra.
 Qed.
+Definition own_part q : Q := (mu1 + (mu2 + mu3 * kappa c / T_r) * Qabs q)%Q.
+Lemma own_part_ok : S 0 i = Q2R (nth i (sliding c) 0%Q) ->
+  Q2R (own_part (nth i (sliding c) 0%Q)) = Q2R mu1 + (Q2R mu2 + m / Tr) * Rabs (S 0 i).
+Proof.
+  intros H0. destruct parts as [A _]. unfold own_part.
+  assert (Z : ~ (T_r == 0)%Q) by (intros Z; apply Qeq_eqR in Z; fold Tr in Z; unfold Q2R in Z at 1; simpl in Z; lra).
+  rewrite Q2R_plus, Q2R_mult, Q2R_plus. unfold Qdiv. rewrite !Q2R_mult, Q2R_inv by exact Z. fold Tr m.
+  replace (Q2R (Qabs (nth i (sliding c) 0%Q))) with (Rabs (S 0 i)); [reflexivity|].
+  rewrite H0. destruct (nth i (sliding c) 0%Q) as [x d]. unfold Q2R. simpl. rewrite abs_IZR, Rabs_mult. f_equal.
+  apply Rabs_right. apply Rle_ge. left. apply Rinv_0_lt_compat. apply IZR_lt. reflexivity.
+Qed.
+Lemma added_below t : 1 <= m \/ S 0 i = 0 -> 0 <= t < deadline c -> S 0 i = Q2R (nth i (sliding c) 0%Q) ->
+  added c S t i <= Q2R (own_part (nth i (sliding c) 0%Q)).
+Proof.
+  intros H1 Ht H0. rewrite (own_part_ok H0). unfold added. rewrite Hkind. fold p. apply Rplus_le_compat_l.
+  destruct (Rlt_le_dec t Tr) as [L|L]; [apply pulled_below; [exact H1|lra]|]. rewrite (rests t) by lra. rewrite Rabs_R0, Rmult_0_r.
+  destruct parts as [A [_ [Pn Pm]]]. apply Rmult_le_pos; [|apply Rabs_pos]. assert (0 < m / Tr) by (apply Rdiv_lt_0_compat; lra). lra.
+Qed.
+Lemma input_part t l : check_sliding_input c = true -> sliding_input c = l -> 0 <= t < Tr -> (i < length l)%nat ->
+  S 0 i = Q2R (nth i (sliding c) 0%Q) -> added c S t i <= Q2R (nth i l 0%Q).
+Proof.
+  intros H E Ht Hl H0. destruct parts as [A _]. unfold check_sliding_input in H. rewrite Hkind, E in H.
+  destruct l as [|a l']; [simpl in Hl; lia|]. set (l := a :: l') in *. apply andb_prop in H as [H1 H2].
+  rewrite forallb_forall in H2. specialize (H2 i ltac:(apply in_seq; lia)). apply Qle_bool_iff, Qle_Rle in H2.
+  eapply Rle_trans; [|exact H2]. apply added_below; [|lra|exact H0]. apply orb_prop in H1 as [H1|H1].
+  - left. apply Qle_bool_iff, Qle_Rle in H1. rewrite Q2R_mult in H1. fold m in H1.
+    replace (Q2R 1) with 1 in H1 by (unfold Q2R; simpl; lra). exact H1.
+  - right. rewrite H0. rewrite forallb_forall in H1. destruct (nth_in_or_default i (sliding c) 0%Q) as [I|I].
+    + specialize (H1 _ I). apply Qeq_bool_eq, Qeq_eqR in H1. rewrite H1. unfold Q2R. simpl. ring.
+    + rewrite I. unfold Q2R. simpl. ring.
+Qed.
+
 End Agent.
 End Slide.
 

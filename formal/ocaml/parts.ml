@@ -22,7 +22,7 @@ let of_check c d : (string * (unit -> bool)) list =
          (fun () -> check_upper c d u) ]
      | None -> [])
   @ List.map (fun e -> (match e with
-      | Peak _ -> "input-peak of input" | Energy _ -> "input-energy of input" | PathLength _ -> "input-length of input"),
+      | Peak _ -> "input-peak of input" | Energy _ | EnergyBy _ -> "input-energy of input" | PathLength _ -> "input-length of input"),
       (fun () -> check_effort c d e)) c.efforts
 let of_large (h : hints) c : (string * (unit -> bool)) list =
   [ "graph: an edge", (fun () -> check_edges c (common (List.map (fun e -> e.wt) c.edges)));

@@ -484,11 +484,16 @@ let certificate (j : Json.t) : t =
               if not (there (part "agents")) then []
               else (bare_of proof "input-sliding" "input"; by_agent nodes number "input.sliding.agents" (part "agents"))
           | _ -> bad "input.sliding of the nominal protocol" in
-        let alone = not enclosed && start <> None && not (there (input "initial_set")) && List.for_all (Number.equal Number.zero) sliding in
+        let begins =
+          if enclosed || start = None || there (input "initial_set") then Effort.Unread
+          else match kind with
+            | Nominal t -> Effort.At_rest (Number.add (Number.mul rho1 t) (Number.mul rho2 kappa))
+            | SlidingMode (t_r, t_s, _, _, _, _) when List.for_all (Number.equal Number.zero) sliding ->
+                Effort.At_rest (Number.add (Number.mul rho1 (Number.add t_r t_s)) (Number.mul rho2 kappa))
+            | SlidingMode (t_r, t_s, _, mu2, mu3, _) ->
+                Effort.Moving (fun z -> reaching <> [] && instants t_r t_s mu2 (Number.mul mu3 kappa) z 16 <> None) in
         let triangle what v = matrix nodes what (Array.of_list listening) (entries what v) in
-        let pace = match kind with
-          | Nominal t -> Some (Number.add (Number.mul rho1 t) (Number.mul rho2 kappa)) | SlidingMode _ -> None in
-        let efforts, left = Effort.read proof nodes functions triangle alone pace input in
+        let efforts, left = Effort.read proof nodes functions triangle begins input in
         List.iteri (fun i _ -> skipped proof "limited-gain" (Printf.sprintf "input.residual[%d]" i))
           (entries "residual" (input "residual"));
         if there (input "disturbed") then skipped proof "nominal-disturbed" "input";

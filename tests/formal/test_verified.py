@@ -9,6 +9,7 @@ import subprocess
 from fractions import Fraction
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -235,6 +236,13 @@ def test_a_lower_bound_on_all_rates_than_is_proved_is_rejected(kind: str, tmp_pa
     assert code == 1 and f"{kind} of rates" in text
 
 
+def without_efforts(document: dict[str, Any]) -> dict[str, Any]:
+    """A certificate that says nothing of peak, energy and path length: they rest on reaching times."""
+    proof = [one for one in document["proof"] if one["kind"] not in (*AT_REST, "input-peak")]
+    none = dict.fromkeys(("peak", "energy", "path_length"))
+    return resealed({**document, "input": {**document["input"], **none}, "proof": proof})
+
+
 def test_reaching_times_are_verified_and_shorter_ones_are_rejected(tmp_path: Path) -> None:
     program()
     gains = {"T_r": "0.5", "T_s": 1, "rho1": 1, "rho2": 1, "kappa": 2, "mu1": 2, "mu2": 1, "delta": 1}
@@ -247,8 +255,8 @@ def test_reaching_times_are_verified_and_shorter_ones_are_rejected(tmp_path: Pat
         assert code == 0 and f"verified    {listed}" in text
         for label in "bc":  # stated to a part in 10^12
             z = Fraction(document["reaching_time"]["z"][label])
-            later = resealed(changed(document, ("reaching_time", "z", label), str(z * 2)))
-            assert said(later, tmp_path).code == 0  # true as well
+            later = resealed(changed(without_efforts(document), ("reaching_time", "z", label), str(z * 2)))
+            assert said(later, tmp_path).code == 0 and check(later).accepted  # true as well
             for sooner in (z * (1 - Fraction(1, 10**6)), Fraction(0)):
                 forged = resealed(changed(document, ("reaching_time", "z", label), str(sooner)))
                 assert said(forged, tmp_path).code == 1 and not check(forged).accepted
@@ -381,16 +389,78 @@ def test_a_lower_peak_than_is_proved_is_rejected(tmp_path: Path) -> None:
         assert not check(mutant).accepted and said(mutant, tmp_path).code == 1, path
 
 
-def test_efforts_of_a_set_of_initial_states_or_of_moving_sliding_variables_are_named(tmp_path: Path) -> None:
+MOVING = {"T_r": "0.5", "T_s": 1, "mu1": 2, "mu2": 1, "mu3": 1, "delta": 1, "rho1": 1, "rho2": 1, "kappa": 2}
+EDGES = [("a", "b", 1), ("b", "a", -1), ("b", "c", -2), ("c", "d", 1)]
+
+
+def moving_document(**gains: float | str) -> dict[str, Any]:
+    """A certificate under the sliding-mode protocol whose sliding variables move."""
+    protocol = SlidingModeProtocol(**{**MOVING, **gains})
+    return json.loads(certify(EDGES, protocol, [1, 2, 3, -4], sigma0=[0, 1, "-0.5", 0], simulation=False).to_json())
+
+
+def scaled(document: dict[str, Any], key: str, share: Fraction, label: str | None = None) -> dict[str, Any]:
+    """A bound of the input times a number: the peak of an agent, or else of the norm."""
+    if key != "peak":
+        return resealed(changed(document, ("input", key), str(Fraction(document["input"][key]) * share)))
+    peak = document["input"]["peak"]
+    agents = {k: str(Fraction(x) * (share if k == label else 1)) for k, x in peak["agents"].items()}
+    norm = str(Fraction(peak["norm"]) * (1 if label else share))
+    new = {"agents": agents, "largest": str(max(map(Fraction, agents.values()))), "norm": norm}
+    return resealed(changed(document, ("input", "peak"), new))
+
+
+@pytest.mark.parametrize("gains", [{}, {"mu3": 4}, {"rho1": 3, "delta": "0.25"}])
+def test_while_sliding_variables_move_what_the_input_takes_is_verified(gains: dict[str, Any], tmp_path: Path) -> None:
+    """A little less than is proved is rejected: of the norm, and of every agent."""
     program()
-    gains = {"T_r": "0.5", "T_s": 1, "mu1": 2, "mu2": 1, "mu3": 1, "delta": 1, "rho1": 1, "rho2": 1, "kappa": 2}
+    document = moving_document(**gains)
+    code, text = said(document, tmp_path)
+    assert code == 0 and not {"input.energy", "input.path_length", "input.peak"} & named(text)
+    for kind in (*AT_REST, "input-peak"):
+        assert f"verified    {kind} of input" in text
+    for key, label in (("energy", None), ("path_length", None), *(("peak", label) for label in (*"abcd", None))):
+        for share, right in ((1 - Fraction(1, 10**9), False), (1 + Fraction(1, 10**9), True)):
+            mutant = scaled(document, key, share, label)
+            assert check(mutant).accepted == right and (said(mutant, tmp_path).code == 0) == right, (key, label, share)
+
+
+def test_while_sliding_variables_move_no_instant_before_they_rest_proves_a_bound(tmp_path: Path) -> None:
+    program()
+    document = moving_document()
+    for number, one in enumerate(document["proof"]):
+        if one["kind"] not in (*AT_REST, "input-peak"):
+            continue
+        z = Fraction(one["numbers"]["z"])
+        for new in (z * Fraction(99, 100), 0, -1):
+            mutant = resealed(changed(document, ("proof", number, "numbers", "z"), str(new)))
+            code, text = said(mutant, tmp_path)
+            assert not check(mutant).accepted and (code == 1 or f"{one['kind']} of input" in named(text)), (one, new)
+    # sliding variables that begin elsewhere are at rest at another instant, and drive the state further
+    for new in ("1.5", "-3"):
+        mutant = resealed(changed(document, ("sliding_variable", "b"), new))
+        assert not check(mutant).accepted and said(mutant, tmp_path).code == 1
+
+
+def test_of_sliding_variables_that_are_0_the_peak_has_what_the_sliding_mode_adds(tmp_path: Path) -> None:
+    program()
+    protocol = SlidingModeProtocol(**MOVING)
+    document = json.loads(certify(EDGES, protocol, [1, 2, 3, -4], sigma0=[0] * 4, simulation=False).to_json())
+    code, text = said(document, tmp_path)
+    assert code == 0 and "verified    input-peak of input" in text
+    for label in (*"abcd", None):
+        for share, right in ((1 - Fraction(1, 10**9), False), (1 + Fraction(1, 10**9), True)):
+            mutant = scaled(document, "peak", share, label)
+            assert check(mutant).accepted == right and (said(mutant, tmp_path).code == 0) == right, (label, share)
+
+
+def test_efforts_of_a_set_of_initial_states_are_named(tmp_path: Path) -> None:
+    program()
     edges, start = [("a", "b", 1), ("b", "a", -1), ("b", "c", -2)], [1, 2, 3]
     nominal = json.loads(certify(edges, NominalProtocol(1, 1, 1, 2), start, simulation=False).to_json())
     box = {"center": dict.fromkeys("abc", "0"), "radius": dict.fromkeys("abc", "1/1000")}
-    moving = certify(edges, SlidingModeProtocol(**gains), start, sigma0=[0, 1, 0], simulation=False)
-    for document in (resealed(changed(nominal, ("input", "initial_set"), box)), json.loads(moving.to_json())):
-        code, text = said(document, tmp_path)
-        assert code == 0 and {f"{kind} of input" for kind in AT_REST} | {"input.energy"} <= named(text)
+    code, text = said(resealed(changed(nominal, ("input", "initial_set"), box)), tmp_path)
+    assert code == 0 and {f"{kind} of input" for kind in AT_REST} | {"input.energy"} <= named(text)
 
 
 def test_limits_disturbance_and_noise_are_named_and_none_can_be_added(tmp_path: Path) -> None:
