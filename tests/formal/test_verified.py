@@ -389,7 +389,17 @@ def test_a_lower_peak_than_is_proved_is_rejected(tmp_path: Path) -> None:
         assert not check(mutant).accepted and said(mutant, tmp_path).code == 1, path
 
 
-MOVING = {"T_r": "0.5", "T_s": 1, "mu1": 2, "mu2": 1, "mu3": 1, "delta": 1, "rho1": 1, "rho2": 1, "kappa": 2}
+MOVING: dict[str, float | str] = {
+    "T_r": "0.5",
+    "T_s": 1,
+    "mu1": 2,
+    "mu2": 1,
+    "mu3": 1,
+    "delta": 1,
+    "rho1": 1,
+    "rho2": 1,
+    "kappa": 2,
+}
 EDGES = [("a", "b", 1), ("b", "a", -1), ("b", "c", -2), ("c", "d", 1)]
 
 
@@ -410,7 +420,7 @@ def scaled(document: dict[str, Any], key: str, share: Fraction, label: str | Non
     return resealed(changed(document, ("input", "peak"), new))
 
 
-@pytest.mark.parametrize("gains", [{}, {"mu3": 4}, {"rho1": 3, "delta": "0.25"}])
+@pytest.mark.parametrize("gains", [{}, {"rho1": 3, "delta": "0.25", "mu3": 4}])
 def test_while_sliding_variables_move_what_the_input_takes_is_verified(gains: dict[str, Any], tmp_path: Path) -> None:
     """A little less than is proved is rejected: of the norm, and of every agent."""
     program()
@@ -437,9 +447,29 @@ def test_while_sliding_variables_move_no_instant_before_they_rest_proves_a_bound
             code, text = said(mutant, tmp_path)
             assert not check(mutant).accepted and (code == 1 or f"{one['kind']} of input" in named(text)), (one, new)
     # sliding variables that begin elsewhere are at rest at another instant, and drive the state further
-    for new in ("1.5", "-3"):
-        mutant = resealed(changed(document, ("sliding_variable", "b"), new))
+    for begin in ("1.5", "-3"):
+        mutant = resealed(changed(document, ("sliding_variable", "b"), begin))
         assert not check(mutant).accepted and said(mutant, tmp_path).code == 1
+
+
+def about_efforts(document: dict[str, Any], path: tuple[str | int, ...]) -> bool:
+    """Whether a path leads to what the input takes, to its proof, or to how sliding variables move."""
+    of_proof = [i for i, one in enumerate(document["proof"]) if one["kind"] in (*AT_REST, "input-peak")]
+    return (
+        path[0] in ("sliding_variable", "reaching_time", "protocol")
+        or (path[0] == "input" and path[1:2] in [(key,) for key in ("peak", "energy", "path_length", "constants")])
+        or (path[0] == "proof" and path[1:2] in [(i,) for i in of_proof])
+    )
+
+
+@pytest.mark.parametrize("every", [20, pytest.param(1, marks=pytest.mark.campaign)])
+def test_of_mutants_of_what_the_input_takes_none_is_accepted_unless_true_or_named(every: int, tmp_path: Path) -> None:
+    program()
+    document = {**moving_document(), "unverified": {}}
+    found = [pair for pair in mutants(document, every=1) if about_efforts(document, pair[0])]
+    assert len(found) > 400
+    for path, mutant in found[::every]:
+        compare(mutant, path, tmp_path)
 
 
 def test_of_sliding_variables_that_are_0_the_peak_has_what_the_sliding_mode_adds(tmp_path: Path) -> None:
