@@ -195,7 +195,7 @@ _MAKERS |= dict.fromkeys(("certify", "certify_vectors"), ", such as ptcc.Nominal
 _AT_ONCE = {"switching": "give one list or dict of graphs"}
 #: What a check is asked for besides: the graph that a certificate should be about.
 _COMPARE = "it reads no graph: compare report.sha256 with as_graph(...).sha256, or use ptcc check CERT GRAPH"
-_AT_ONCE |= {"check": _COMPARE}
+_AT_ONCE |= {"check": _COMPARE, "to_csv": "it returns the text: Path(path).write_text(run.to_csv())"}
 #: Restricted signals, by what may be taken for keywords of certify.
 _SIGNALS = dict.fromkeys(("dwell", "dwell_time", "clock_dwell"), "DwellTime(...)")
 _SIGNALS |= dict.fromkeys(("window", "windows", "clock_window", "window_on"), "JointWindows(...)")

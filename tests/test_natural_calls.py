@@ -5,9 +5,11 @@ with limits of actuators, a student, and a reviewer.
 """
 
 import copy
+import re
 from contextlib import nullcontext
 from fractions import Fraction
 from io import StringIO
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,7 @@ from scipy import sparse
 
 import ptcc_certify as ptcc
 from ptcc_certify.errors import PTCCError
+from ptcc_certify.graphs.other_names import ITS
 
 #: What is typed, and a part of what is shown: of a refusal, its class and beginning, or "... " and a part.
 CONTROL_RESEARCHER = {
@@ -49,7 +52,7 @@ CONTROL_RESEARCHER = {
     "p.gain(0.5)": "5.0",
     "ptcc.as_graph([['0', '-0.3'], ['1/3', '0']], 'listens').edges[0][2]": "-3/10",
     "ptcc.as_graph(np.array([['0', 'x'], ['1', '0']]), 'listens')": 'GraphError: row 1, column 2 of the matrix: "x" is',
-    "ptcc.report(cert, 'r.tex')": "ParameterError: ptcc_certify.report is a package of modules, not a function",
+    "ptcc.report(cert, 'r.tex')": "ParameterError: ptcc_certify.report is a module, not a function; did you mean wri",
     "cert.report()": "... for a page or LaTeX: write_report(certificate, path)",
     "repr(cert.theorem)": "Theorem(2.1: Quasi-strongly connected",
     "repr(cert.effort)": "Effort(bounded, |u_k| <= 43.98",
@@ -291,7 +294,7 @@ FAMILIES = {
 #: Not there; the refusal says where it is.
 ELSEWHERE = {
     "g.plot()": "... UnknownName: SignedDigraph has no attribute 'plot'; draw it with ptcc_certify.plot_graph",
-    "g.nodes": "... UnknownName: SignedDigraph has no attribute 'nodes'; did you mean labels?",
+    "g.nodes": "... UnknownName: SignedDigraph has no attribute 'nodes'; see its labels",
     "g.add_edge('ann', 'eve', 1)": "... UnknownName: SignedDigraph has no attribute 'add_edge'; it stays as it is",
     "g.lables": "... did you mean labels",
     "ptcc.analyse(g).camps": "... UnknownName: Structure has no attribute 'camps'; gauge holds the camp",
@@ -301,6 +304,34 @@ ELSEWHERE = {
     "cert.trajectory.animate()": "... UnknownName: Trajectory has no attribute 'animate'; there are no animations",
     "hasattr(g, 'nodes'), hasattr(g, '_ipython_display_'), copy.copy(g) == g": "(False, False, True)",
     "ptcc.load('c.json')": "... did you mean read_certificate?",
+    "ptcc.batch('e.toml')": "... is a module, not a function; did you mean certify_many?",
+    "ptcc.examples.EXAMPLES and ptcc.examples()": '... did you mean examples.EXAMPLES, or as_graph("fig1a")?',
+    "ptcc.simulation(g, p, x0)": "... did you mean simulate?",
+    "ptcc.protocols()": "... did you mean NominalProtocol?",
+    "ptcc.checker('c.json')": "... did you mean check?",
+    "ptcc.errors()": "ParameterError: ptcc_certify.errors is a module, not a function",
+    "ptcc.read_certificate('c.json').report('x.html')": "... a CheckReport is no function; for a page or LaTeX: write_",
+    "cert.checked.save('x.json')": "... CheckReport has no attribute 'save'; see its to_dict()",
+    "ptcc.SignedDigraph.from_pandas(df)": "... the class SignedDigraph has no attribute 'from_pandas'; make one with",
+    "ptcc.SignedDigraph.from_file('g.csv')": "... as_graph(data), read_graph(path) or SignedDigraph.from_edges(edges)",
+    "ptcc.Certificate.load('c.json')": "... make one with certify(graph, protocol, x0) or read_certificate(path)",
+    "ptcc.Structure.from_graph(g)": "... make one with analyse(graph)",
+    "cert.final_state.to_dict()": "... FinalState has no attribute 'to_dict'; see its items(): dict(final_state)",
+    "g['ann']": "... a SignedDigraph has no ['ann']; its edges are graph.edges, and graph.to_networkx()[label] tells",
+    "g[0]": "... a SignedDigraph has no [0]; its edges are graph.edges",
+    "cert['verdict']": "... a Certificate has no ['verdict']; its parts are attributes, or to_dict() as JSON",
+    "ptcc.analyse(g)['leaders']": "... a Structure has no ['leaders']; its parts are attributes",
+    "cert.behaviour": "... UnknownName: Certificate has no attribute 'behaviour'; see its claim.behaviour",
+    "cert.deadline": "... see its protocol.T",
+    "cert.x0": "... see its initial_state",
+    "cert.certified": "... see its verdict",
+    "cert.peak_input": "... see its effort.peak.agents",
+    "cert.input": "... see its effort",
+    "cert.bound": "... see its norm_bound(q) of ||E(t)|| at q = 1 - t/T",
+    "cert.to_networkx()": "... see its graph.to_networkx()",
+    "ptcc.analyse(g).to_networkx()": "... see its graph.to_networkx()",
+    "cert.trajectory.to_csv('x.csv')": "... it returns the text: Path(path).write_text(run.to_csv())",
+    "ptcc.certify(day, p).deadline": "... FamilyCertificate has no attribute 'deadline'; see its protocol.T",
 }
 CALLS = CONTROL_RESEARCHER | NETWORK_SCIENTIST | ENGINEER | STUDENT | REVIEWER | MISTAKES | FAMILIES | ELSEWHERE
 
@@ -352,3 +383,14 @@ def test_a_natural_call_gives_a_result_or_one_line_that_names_the_mend(call, nam
         shown = f"{caught.type.__name__}: {caught.value}"
         assert "\n" not in shown
     assert CALLS[call].removeprefix("... ") in shown
+
+
+def test_where_an_object_is_said_to_have_something_it_is(names):
+    cert = names["cert"]
+    objects = [cert, cert.structure, cert.graph, cert.trajectory, cert.final_state, cert.checked]
+    objects += [ptcc.certify(names["day"], names["p"])]
+    assert {type(one).__name__ for one in objects} == ITS.keys()
+    for one in objects:
+        for name, place in ITS[type(one).__name__].items():
+            assert name not in dir(one)
+            attrgetter(re.match(r"[\w.]+", place)[0])(one)

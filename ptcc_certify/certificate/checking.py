@@ -11,8 +11,24 @@ from collections.abc import Mapping
 from typing import Any
 
 from ptcc_certify import checker
-from ptcc_certify.errors import FormatError
+from ptcc_certify.errors import FormatError, ParameterError
+from ptcc_certify.graphs.other_names import Hinted
 from ptcc_certify.graphs.rationals import number_within, shorten
+
+
+class CheckReport(Hinted, checker.CheckReport):
+    """The report of the independent check, which says where something is that it does not have.
+
+    Examples
+    --------
+    >>> certify("fig1a", NominalProtocol()).checked("page.html")
+    Traceback (most recent call last):
+    ptcc_certify.errors.ParameterError: a CheckReport is no function; for a page or LaTeX: write_report(certificate, ...
+    """
+
+    def __call__(self, *_: Any, **__: Any) -> Any:
+        """Refuse to be called, as ``certificate.report("page.html")``."""
+        raise ParameterError("a CheckReport is no function; for a page or LaTeX: write_report(certificate, path)")
 
 
 def check(
@@ -21,7 +37,7 @@ def check(
     stdlib: bool = False,
     files: Mapping[str, bytes] | None = None,
     memory: float = 1,
-) -> checker.CheckReport:
+) -> CheckReport:
     """Check a certificate: from its JSON alone, in exact arithmetic, without a solver.
 
     Parameters
@@ -53,7 +69,7 @@ def check(
     return read_and_check(source, stdlib=stdlib, files=files, memory=memory)[1]
 
 
-def read_and_check(source: Any, **options: Any) -> tuple[dict[str, Any], checker.CheckReport]:
+def read_and_check(source: Any, **options: Any) -> tuple[dict[str, Any], CheckReport]:
     """Return the parsed JSON object beside the report of :func:`check`, whose options these are.
 
     Raises
@@ -78,4 +94,4 @@ def read_and_check(source: Any, **options: Any) -> tuple[dict[str, Any], checker
     if not isinstance(source, Mapping) and re.fullmatch(r"side file \S+ cannot be read", report.reason or ""):
         mend = "ask the sender for all files beside it"
         raise FormatError(f"{shorten(os.fspath(source), 200)}: incomplete: {report.reason}; {mend}")
-    return document, report
+    return document, CheckReport(**vars(report))
