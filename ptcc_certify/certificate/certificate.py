@@ -24,6 +24,7 @@ from ptcc_certify.checker import CheckReport
 from ptcc_certify.errors import FormatError, PTCCError, gated
 from ptcc_certify.graphs.display_hook import Shown, plot, summary
 from ptcc_certify.graphs.io.files import refuse_no_path
+from ptcc_certify.graphs.kinds_of_file import refuse_as_certificate
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 
@@ -368,4 +369,5 @@ def _file_hash(path: Path) -> str:
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
+        refuse_as_certificate(str(path))
         raise FormatError(f"{shorten(str(path), 200)}: not a readable certificate ({error.strerror})") from None

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 from collections.abc import Mapping
@@ -12,6 +13,7 @@ from typing import Any
 
 from ptcc_certify import checker
 from ptcc_certify.errors import FormatError, ParameterError
+from ptcc_certify.graphs.kinds_of_file import refuse_as_certificate
 from ptcc_certify.graphs.other_names import Hinted
 from ptcc_certify.graphs.rationals import number_within, shorten
 
@@ -90,8 +92,18 @@ def read_and_check(source: Any, **options: Any) -> tuple[dict[str, Any], CheckRe
     try:
         document, report = checker.read_and_check(source, **options)
     except checker.UnreadableError as error:
+        cause = error.__context__
+        if not isinstance(source, Mapping) and isinstance(cause, OSError | json.JSONDecodeError | UnicodeDecodeError):
+            refuse_as_certificate(os.fspath(source), content=_content_of(cause))
         raise FormatError(str(error)) from None
     if not isinstance(source, Mapping) and re.fullmatch(r"side file \S+ cannot be read", report.reason or ""):
         mend = "ask the sender for all files beside it"
         raise FormatError(f"{shorten(os.fspath(source), 200)}: incomplete: {report.reason}; {mend}")
     return document, CheckReport(**vars(report))
+
+
+def _content_of(cause: OSError | json.JSONDecodeError | UnicodeDecodeError) -> bytes | None:
+    """Return what the check met instead of JSON, as the error tells; None where nothing was read."""
+    if isinstance(cause, json.JSONDecodeError):
+        return cause.doc.encode("utf-8", "replace")
+    return cause.object if isinstance(cause, UnicodeDecodeError) else None
