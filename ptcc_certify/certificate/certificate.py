@@ -16,7 +16,7 @@ import numpy as np
 from lmi.exact.decimal_rounding import down
 from ptcc_certify.certificate.certificate_data import Content, Source
 from ptcc_certify.certificate.certificate_file import FromFile, bytes_of, text_of, write_certificate
-from ptcc_certify.certificate.checking import check, read_and_check
+from ptcc_certify.certificate.checking import check, read_and_check, refuse_no_certificate
 from ptcc_certify.certificate.format import certificate_document, read_document
 from ptcc_certify.certificate.format_vectors import Writer, read_side_files
 from ptcc_certify.certificate.verdict import CERTIFIED, Assessment, assess, verdict_of
@@ -330,6 +330,7 @@ def read_certificate(
     False
     """
     files = None
+    refuse_no_certificate(path)
     if not isinstance(path, str | Path | Mapping) and hasattr(path, "for_check"):
         path, files = path.for_check()
     if isinstance(path, Mapping):

@@ -13,9 +13,12 @@ from typing import Any
 
 from ptcc_certify import checker
 from ptcc_certify.errors import FormatError, ParameterError
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.kinds_of_file import refuse_as_certificate
 from ptcc_certify.graphs.other_names import Hinted
 from ptcc_certify.graphs.rationals import number_within, shorten
+from ptcc_certify.graphs.structure import Structure
 
 
 class CheckReport(Hinted, checker.CheckReport):
@@ -87,8 +90,7 @@ def read_and_check(source: Any, **options: Any) -> tuple[dict[str, Any], CheckRe
     options["memory"] = number_within(options.get("memory", 1), "memory in GB", 1e-9, 1e8)
     if hasattr(source, "for_check"):
         source, options["files"] = source.for_check()
-    elif not isinstance(source, str | os.PathLike | Mapping):
-        raise FormatError(f"{shorten(repr(source))} is no certificate; give its path, its JSON object or a Certificate")
+    refuse_no_certificate(source)
     try:
         document, report = checker.read_and_check(source, **options)
     except checker.UnreadableError as error:
@@ -100,6 +102,22 @@ def read_and_check(source: Any, **options: Any) -> tuple[dict[str, Any], CheckRe
         mend = "ask the sender for all files beside it"
         raise FormatError(f"{shorten(os.fspath(source), 200)}: incomplete: {report.reason}; {mend}")
     return document, CheckReport(**vars(report))
+
+
+def refuse_no_certificate(source: Any) -> None:
+    """Refuse what is neither a certificate nor a path nor a JSON object.
+
+    Examples
+    --------
+    >>> refuse_no_certificate(as_graph("fig1a"))
+    Traceback (most recent call last):
+    ptcc_certify.errors.FormatError: SignedDigraph(6 nodes, 12 edges, 4 negat... is a graph, no certificate; give ...
+    """
+    if isinstance(source, SignedDigraph | Structure | Family) or hasattr(source, "is_multigraph"):
+        mend = "give certify(graph, protocol, x0)"
+        raise FormatError(f"{shorten(repr(source))} is a graph, no certificate; {mend}")
+    if not isinstance(source, str | os.PathLike | Mapping) and not hasattr(source, "for_check"):
+        raise FormatError(f"{shorten(repr(source))} is no certificate; give its path, its JSON object or a Certificate")
 
 
 def _content_of(cause: OSError | json.JSONDecodeError | UnicodeDecodeError) -> bytes | None:
