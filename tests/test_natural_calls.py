@@ -197,7 +197,7 @@ MISTAKES = {
     "ptcc.certify(G, p, progress=None, **fast)": "Certificate(bipartite consensus",
     "ptcc.certify(G, p, progress=True, **fast)": "ParameterError: progress = True is no function; give print, say",
     "ptcc.certify(G, p, scenario='s.toml')": "ParameterError: scenario = 's.toml' is none; give the mapping that",
-    "ptcc.certify_vectors(G, p, [[5, 1], [2, 0], [-4, 2]], columns=2)": "... certify has no parameter columns; help(certify)",
+    "ptcc.certify_vectors(G, p, [[5, 1], [2, 0], [-4, 2]], columns=2)": "... certify has no parameter columns; help(",
     "ptcc.certify_many(G, p, methd='perron')": "ParameterError: certify_many has no parameter methd; did you mean meth",
     "ptcc.certify_many(G, p, uncertainty='20%')": "ParameterError: certify_many has no parameter uncertainty, which ma",
     "ptcc.certify(G, p, dwell=0.5)": "ParameterError: certify has no parameter dwell; say signal=DwellTime(...) of ptc",
