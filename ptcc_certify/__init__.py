@@ -135,20 +135,35 @@ _ALSO_CALLED = {
     "DiGraph": "SignedDigraph",
     "Graph": "SignedDigraph",
     "Protocol": "NominalProtocol",
+    # Rooms that are called like functions
+    "batch": "certify_many",
+    "certificate": "certify",
+    "checker": "check",
+    "examples": 'examples.EXAMPLES, or as_graph("fig1a")',
+    "gain_design": "design",
+    "graphs": "as_graph",
+    "protocols": "NominalProtocol",
+    "report": "write_report",
+    "simulation": "simulate",
+    "theorems": "analyse",
 }
 _ALSO_CALLED |= {name: f"theorems.restricted_signals.{name}" for name in ("DwellTime", "JointWindows", "ClockShares")}
 
 
 class Room(ModuleType):
-    """A package whose modules are loaded when they are named; called like a function, it names what is meant."""
+    """The package, or a module in it, which becomes one when it is loaded; called, it names what is meant."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if type(value) is ModuleType and value.__name__ == f"{self.__name__}.{name}":
+            value.__class__ = Room
+        super().__setattr__(name, value)
 
     def __call__(self, *_: Any, **__: Any) -> Any:
         from ptcc_certify.errors import ParameterError
 
-        name = self.__name__.rpartition(".")[2]
-        near = [public for public in _EXPORTS if name in public.split("_")]
-        hint = f"; did you mean ptcc_certify.{' or '.join(near)}?" if near else ""
-        raise ParameterError(f"{self.__name__} is a package of modules, not a function{hint}")
+        meant = _ALSO_CALLED.get(self.__name__.removeprefix(f"{__name__}."))
+        hint = f"; did you mean {meant}?" if meant else ""
+        raise ParameterError(f"{self.__name__} is a module, not a function{hint}")
 
 
 def modules_of(package: str) -> Callable[[str], Any]:

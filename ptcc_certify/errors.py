@@ -195,11 +195,16 @@ _MAKERS |= dict.fromkeys(("certify", "certify_vectors"), ", such as ptcc.Nominal
 _AT_ONCE = {"switching": "give one list or dict of graphs"}
 #: What a check is asked for besides: the graph that a certificate should be about.
 _COMPARE = "it reads no graph: compare report.sha256 with as_graph(...).sha256, or use ptcc check CERT GRAPH"
-_AT_ONCE |= {"check": _COMPARE}
+_AT_ONCE |= {"check": _COMPARE, "to_csv": "it returns the text: Path(path).write_text(run.to_csv())"}
 #: Restricted signals, by what may be taken for keywords of certify.
 _SIGNALS = dict.fromkeys(("dwell", "dwell_time", "clock_dwell"), "DwellTime(...)")
 _SIGNALS |= dict.fromkeys(("window", "windows", "clock_window", "window_on"), "JointWindows(...)")
 _SIGNALS |= dict.fromkeys(("share", "shares"), "ClockShares(...)")
+#: How to ask a function for what it has no parameter for.
+_INSTEAD = {("design", "shortest_deadline"): "leave deadline out, and the shortest is sought"}
+_INSTEAD |= {("certify", "seed"): "give x0=ptcc_certify.graphs.io.random_states(seed, n)"}
+#: How many parameters are listed.
+_FEW = 12
 #: What is said of messages.
 _MESSAGES = ("delay", "own_delay", "period", "losses", "value_error")
 
@@ -246,7 +251,9 @@ def _misfit(called: Any, signature: inspect.Signature, args: tuple[Any, ...], ke
         call = [f"{key}=..." if parameters[key].kind is inspect.Parameter.KEYWORD_ONLY else key for key in required]
         also = _MAKERS.get(name, "") if name == "SignedDigraph" or "protocol" in missing else ""
         return f"{name} asks for {', '.join(missing)}; write {name}({', '.join(call)}){also}"
-    mend, once = _AT_ONCE.get(name, "write any other as name=value"), ", each once" * bool(keywords.keys() & set(given))
+    certify = f"write {name}(certify(graph, protocol, x0)), and " if name.startswith("plot_") else "write "
+    mend = _AT_ONCE.get(name, f"{certify}any other as name=value")
+    once = ", each once" * bool(keywords.keys() & set(given))
     return f"{name} takes {', '.join(places) or 'nothing'} without a name{once}; {mend}"
 
 
@@ -259,13 +266,16 @@ def unknown_parameter(name: str, unknown: str, parameters: Iterable[str]) -> str
     'certify has no parameter dwell; say signal=DwellTime(...) of ptcc_certify.theorems.restricted_signals'
     """
     parameters = list(parameters)
-    hint = did_you_mean(unknown, parameters) or f"; it has {', '.join(parameters)}"
+    listed = f"it has {', '.join(parameters)}" if len(parameters) <= _FEW else f"help({name}) lists what it has"
+    hint = did_you_mean(unknown, parameters) or f"; {listed}"
     if (meant := _ALSO_CALLED.get(unknown)) in parameters:
         hint = f"; did you mean {meant}?"
     elif "signal" in parameters and (signal := _SIGNALS.get(unknown)):
         hint = f"; say signal={signal} of ptcc_certify.theorems.restricted_signals"
     elif "messages" in parameters and unknown in _MESSAGES:
         hint = f"; say messages=LateMessages({unknown}=...)"
+    elif (name, unknown) in _INSTEAD:
+        hint = f"; {_INSTEAD[name, unknown]}"
     elif unknown == "optional" and "uncertainty" in parameters:
         hint = "; an edge that may fail has 0 at one end: Family.from_intervals([(source, target, 0, weight), ...])"
     elif name == "check" and unknown in ("graph", "family"):

@@ -5,9 +5,11 @@ with limits of actuators, a student, and a reviewer.
 """
 
 import copy
+import re
 from contextlib import nullcontext
 from fractions import Fraction
 from io import StringIO
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,7 @@ from scipy import sparse
 
 import ptcc_certify as ptcc
 from ptcc_certify.errors import PTCCError
+from ptcc_certify.graphs.other_names import ITS
 
 #: What is typed, and a part of what is shown: of a refusal, its class and beginning, or "... " and a part.
 CONTROL_RESEARCHER = {
@@ -42,14 +45,15 @@ CONTROL_RESEARCHER = {
     "ptcc.simulate(g, 0.6, x0)": "ParameterError: protocol = 0.6 is none; give NominalProtocol(",
     "ptcc.simulate(g, p, x0, sigma0=[1, 1, 1])": "ParameterError: sigma0 belongs to the sliding-mode protocol",
     "ptcc.certify_vectors(g, p, [[5, 1], [2, 0], [-4, 2]], **fast)": "VectorCertificate(2 components",
-    "ptcc.certify(g, p, [[5, 1], [2, 0], [-4, 2]])": "... certify_vectors",
+    "ptcc.certify(g, p, [[5, 1], [2, 0], [-4, 2]])": "... certify vectors by certify_vectors(graph, protocol, x0)",
+    "ptcc.NominalProtocol(T='1e500')": 'ParameterError: T: the exponent of "1e500" is beyond 400',
     "cert.rate > 0": "True",
     "cert.norm_bound([0.1]) < cert.norm_bound([1.0])": "True",
     "float(cert.norm_bound(0.1)) > 0": "True",
     "p.gain(0.5)": "5.0",
     "ptcc.as_graph([['0', '-0.3'], ['1/3', '0']], 'listens').edges[0][2]": "-3/10",
     "ptcc.as_graph(np.array([['0', 'x'], ['1', '0']]), 'listens')": 'GraphError: row 1, column 2 of the matrix: "x" is',
-    "ptcc.report(cert, 'r.tex')": "ParameterError: ptcc_certify.report is a package of modules, not a function",
+    "ptcc.report(cert, 'r.tex')": "ParameterError: ptcc_certify.report is a module, not a function; did you mean wri",
     "cert.report()": "... for a page or LaTeX: write_report(certificate, path)",
     "repr(cert.theorem)": "Theorem(2.1: Quasi-strongly connected",
     "repr(cert.effort)": "Effort(bounded, |u_k| <= 43.98",
@@ -149,6 +153,8 @@ STUDENT = {
     "cert.plot('spectrum')": "Axes",
     "cert.plot('pretty')": "ParameterError: what = 'pretty' is unknown; one of decay, input, graph",
     "cert.trajectory.plot()": "Axes",
+    "ptcc.plot_decay('c.json')": "Axes",
+    "ptcc.plot_graph(folder / 'c.json')": "Axes",
     "ptcc.plot_graph('fig1a')": "Axes",
 }
 REVIEWER = {
@@ -167,6 +173,14 @@ REVIEWER = {
     "ptcc.write_report(cert, folder / 'c.docx')": "... a report is written to .html or .tex",
     "ptcc.write_report(cert, folder / 'c.tex', simulation=False)": "certified",
     "cert.save(folder / 'again.json')": "None",
+    "ptcc.read_graph('c.json')": "FormatError: c.json: is a certificate, not a graph; ptcc check c.json checks it",
+    "ptcc.certify(folder / 'c.json', p)": "... in Python read_certificate(path)",
+    "ptcc.as_family('c.json')": "... is a certificate, not a graph",
+    "ptcc.write_graph(g, 'forty.csv') or ptcc.check('forty.csv')": "... not a readable certificate; if it is a graph",
+    "ptcc.write_graph(g, 'forty.csv') or ptcc.read_certificate('forty.csv')": "... ptcc certify forty.csv -o",
+    "ptcc.read_certificate('fig1b')": "FormatError: fig1b: is a packaged graph, not a certificate; ptcc certify fig1b",
+    "ptcc.check(cert.to_json())": "... is JSON text, not a path; give json.loads(text), a path or a Certificate",
+    "ptcc.read_certificate(cert.to_json())": "... is JSON text, not a path; give json.loads(text), a path or a Certi",
     "cert.save(folder / 'nowhere' / 'c.json')": "FormatError: ",
     "{cert: 1}[ptcc.read_certificate(folder / 'c.json')]": "1",
 }
@@ -183,7 +197,7 @@ MISTAKES = {
     "ptcc.certify(G, p, progress=None, **fast)": "Certificate(bipartite consensus",
     "ptcc.certify(G, p, progress=True, **fast)": "ParameterError: progress = True is no function; give print, say",
     "ptcc.certify(G, p, scenario='s.toml')": "ParameterError: scenario = 's.toml' is none; give the mapping that",
-    "ptcc.certify_vectors(G, p, [[5, 1], [2, 0], [-4, 2]], columns=2)": "... certify has no parameter columns; it has",
+    "ptcc.certify_vectors(G, p, [[5, 1], [2, 0], [-4, 2]], columns=2)": "... certify has no parameter columns; help(",
     "ptcc.certify_many(G, p, methd='perron')": "ParameterError: certify_many has no parameter methd; did you mean meth",
     "ptcc.certify_many(G, p, uncertainty='20%')": "ParameterError: certify_many has no parameter uncertainty, which ma",
     "ptcc.certify(G, p, dwell=0.5)": "ParameterError: certify has no parameter dwell; say signal=DwellTime(...) of ptc",
@@ -209,6 +223,14 @@ MISTAKES = {
     "ptcc.read_graph(G)": "... a DiGraph is no file; ptcc_certify.as_graph takes other data",
     "ptcc.read_graph('fig1a')": "FormatError: fig1a: no such file; ptcc_certify.as_graph takes the packaged graph",
     "ptcc.SignedDigraph.from_edges(df)": "... is not a triple (source, target, weight); as_graph takes tables",
+    "ptcc.certify(G, p, 'random', seed=3)": "... no parameter seed; give x0=ptcc_certify.graphs.io.random_states(seed",
+    "ptcc.certify(G, p, ptcc.graphs.io.random_states(3, 3), **fast)": "Certificate(bipartite consensus",
+    "ptcc.certify(G, p, colour='red')": "ParameterError: certify has no parameter colour; help(certify) lists what",
+    "ptcc.design(G, max_input=9, initial_bound=1, shortest_deadline=True)": "... leave deadline out, and the shortest",
+    "ptcc.plot_decay(G, p, x0)": "... without a name; write plot_decay(certify(graph, protocol, x0)), and any other",
+    "ptcc.plot_decay(G)": "... not from DiGraph; give certify(graph, protocol, x0)",
+    "ptcc.write_report(g, 'c.html')": "... is a graph, no certificate; give certify(graph, protocol, x0)",
+    "ptcc.read_certificate(G)": "... is a graph, no certificate; give certify(graph, protocol, x0)",
     "ptcc.plot_states": "... did you mean plot_trajectory?",
     "ptcc.simulate(G, p)": "ParameterError: simulate asks for x0; write simulate(graph, protocol, x0)",
     "ptcc.simulate(G, p, x0, t=[0, 1])": "ParameterError: simulate has no parameter t; did you mean times?",
@@ -291,7 +313,7 @@ FAMILIES = {
 #: Not there; the refusal says where it is.
 ELSEWHERE = {
     "g.plot()": "... UnknownName: SignedDigraph has no attribute 'plot'; draw it with ptcc_certify.plot_graph",
-    "g.nodes": "... UnknownName: SignedDigraph has no attribute 'nodes'; did you mean labels?",
+    "g.nodes": "... UnknownName: SignedDigraph has no attribute 'nodes'; see its labels",
     "g.add_edge('ann', 'eve', 1)": "... UnknownName: SignedDigraph has no attribute 'add_edge'; it stays as it is",
     "g.lables": "... did you mean labels",
     "ptcc.analyse(g).camps": "... UnknownName: Structure has no attribute 'camps'; gauge holds the camp",
@@ -301,6 +323,34 @@ ELSEWHERE = {
     "cert.trajectory.animate()": "... UnknownName: Trajectory has no attribute 'animate'; there are no animations",
     "hasattr(g, 'nodes'), hasattr(g, '_ipython_display_'), copy.copy(g) == g": "(False, False, True)",
     "ptcc.load('c.json')": "... did you mean read_certificate?",
+    "ptcc.batch('e.toml')": "... is a module, not a function; did you mean certify_many?",
+    "ptcc.examples.EXAMPLES and ptcc.examples()": '... did you mean examples.EXAMPLES, or as_graph("fig1a")?',
+    "ptcc.simulation(g, p, x0)": "... did you mean simulate?",
+    "ptcc.protocols()": "... did you mean NominalProtocol?",
+    "ptcc.checker('c.json')": "... did you mean check?",
+    "ptcc.errors()": "ParameterError: ptcc_certify.errors is a module, not a function",
+    "ptcc.read_certificate('c.json').report('x.html')": "... a CheckReport is no function; for a page or LaTeX: write_",
+    "cert.checked.save('x.json')": "... CheckReport has no attribute 'save'; see its to_dict()",
+    "ptcc.SignedDigraph.from_pandas(df)": "... the class SignedDigraph has no attribute 'from_pandas'; make one with",
+    "ptcc.SignedDigraph.from_file('g.csv')": "... as_graph(data), read_graph(path) or SignedDigraph.from_edges(edges)",
+    "ptcc.Certificate.load('c.json')": "... make one with certify(graph, protocol, x0) or read_certificate(path)",
+    "ptcc.Structure.from_graph(g)": "... make one with analyse(graph)",
+    "cert.final_state.to_dict()": "... FinalState has no attribute 'to_dict'; see its items(): dict(final_state)",
+    "g['ann']": "... a SignedDigraph has no ['ann']; its edges are graph.edges, and graph.to_networkx()[label] tells",
+    "g[0]": "... a SignedDigraph has no [0]; its edges are graph.edges",
+    "cert['verdict']": "... a Certificate has no ['verdict']; its parts are attributes, or to_dict() as JSON",
+    "ptcc.analyse(g)['leaders']": "... a Structure has no ['leaders']; its parts are attributes",
+    "cert.behaviour": "... UnknownName: Certificate has no attribute 'behaviour'; see its claim.behaviour",
+    "cert.deadline": "... see its protocol.T",
+    "cert.x0": "... see its initial_state",
+    "cert.certified": "... see its verdict",
+    "cert.peak_input": "... see its effort.peak.agents",
+    "cert.input": "... see its effort",
+    "cert.bound": "... see its norm_bound(q) of ||E(t)|| at q = 1 - t/T",
+    "cert.to_networkx()": "... see its graph.to_networkx()",
+    "ptcc.analyse(g).to_networkx()": "... see its graph.to_networkx()",
+    "cert.trajectory.to_csv('x.csv')": "... it returns the text: Path(path).write_text(run.to_csv())",
+    "ptcc.certify(day, p).deadline": "... FamilyCertificate has no attribute 'deadline'; see its protocol.T",
 }
 CALLS = CONTROL_RESEARCHER | NETWORK_SCIENTIST | ENGINEER | STUDENT | REVIEWER | MISTAKES | FAMILIES | ELSEWHERE
 
@@ -352,3 +402,14 @@ def test_a_natural_call_gives_a_result_or_one_line_that_names_the_mend(call, nam
         shown = f"{caught.type.__name__}: {caught.value}"
         assert "\n" not in shown
     assert CALLS[call].removeprefix("... ") in shown
+
+
+def test_where_an_object_is_said_to_have_something_it_is(names):
+    cert = names["cert"]
+    objects = [cert, cert.structure, cert.graph, cert.trajectory, cert.final_state, cert.checked]
+    objects += [ptcc.certify(names["day"], names["p"])]
+    assert {type(one).__name__ for one in objects} == ITS.keys()
+    for one in objects:
+        for name, place in ITS[type(one).__name__].items():
+            assert name not in dir(one)
+            attrgetter(re.match(r"[\w.]+", place)[0])(one)

@@ -16,7 +16,7 @@ import numpy as np
 from lmi.exact.decimal_rounding import down
 from ptcc_certify.certificate.certificate_data import Content, Source
 from ptcc_certify.certificate.certificate_file import FromFile, bytes_of, text_of, write_certificate
-from ptcc_certify.certificate.checking import check, read_and_check
+from ptcc_certify.certificate.checking import check, read_and_check, refuse_no_certificate
 from ptcc_certify.certificate.format import certificate_document, read_document
 from ptcc_certify.certificate.format_vectors import Writer, read_side_files
 from ptcc_certify.certificate.verdict import CERTIFIED, Assessment, assess, verdict_of
@@ -24,6 +24,7 @@ from ptcc_certify.checker import CheckReport
 from ptcc_certify.errors import FormatError, PTCCError, gated
 from ptcc_certify.graphs.display_hook import Shown, plot, summary
 from ptcc_certify.graphs.io.files import refuse_no_path
+from ptcc_certify.graphs.kinds_of_file import refuse_as_certificate
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 
@@ -329,6 +330,7 @@ def read_certificate(
     False
     """
     files = None
+    refuse_no_certificate(path)
     if not isinstance(path, str | Path | Mapping) and hasattr(path, "for_check"):
         path, files = path.for_check()
     if isinstance(path, Mapping):
@@ -368,4 +370,5 @@ def _file_hash(path: Path) -> str:
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
+        refuse_as_certificate(str(path))
         raise FormatError(f"{shorten(str(path), 200)}: not a readable certificate ({error.strerror})") from None

@@ -5,14 +5,35 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 from collections.abc import Mapping
 from typing import Any
 
 from ptcc_certify import checker
-from ptcc_certify.errors import FormatError
+from ptcc_certify.errors import FormatError, ParameterError
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.family import Family
+from ptcc_certify.graphs.kinds_of_file import refuse_as_certificate
+from ptcc_certify.graphs.other_names import Hinted
 from ptcc_certify.graphs.rationals import number_within, shorten
+from ptcc_certify.graphs.structure import Structure
+
+
+class CheckReport(Hinted, checker.CheckReport):
+    """The report of the independent check, which says where something is that it does not have.
+
+    Examples
+    --------
+    >>> certify("fig1a", NominalProtocol()).checked("page.html")
+    Traceback (most recent call last):
+    ptcc_certify.errors.ParameterError: a CheckReport is no function; for a page or LaTeX: write_report(certificate, ...
+    """
+
+    def __call__(self, *_: Any, **__: Any) -> Any:
+        """Refuse to be called, as ``certificate.report("page.html")``."""
+        raise ParameterError("a CheckReport is no function; for a page or LaTeX: write_report(certificate, path)")
 
 
 def check(
@@ -21,7 +42,7 @@ def check(
     stdlib: bool = False,
     files: Mapping[str, bytes] | None = None,
     memory: float = 1,
-) -> checker.CheckReport:
+) -> CheckReport:
     """Check a certificate: from its JSON alone, in exact arithmetic, without a solver.
 
     Parameters
@@ -53,7 +74,7 @@ def check(
     return read_and_check(source, stdlib=stdlib, files=files, memory=memory)[1]
 
 
-def read_and_check(source: Any, **options: Any) -> tuple[dict[str, Any], checker.CheckReport]:
+def read_and_check(source: Any, **options: Any) -> tuple[dict[str, Any], CheckReport]:
     """Return the parsed JSON object beside the report of :func:`check`, whose options these are.
 
     Raises
@@ -69,13 +90,38 @@ def read_and_check(source: Any, **options: Any) -> tuple[dict[str, Any], checker
     options["memory"] = number_within(options.get("memory", 1), "memory in GB", 1e-9, 1e8)
     if hasattr(source, "for_check"):
         source, options["files"] = source.for_check()
-    elif not isinstance(source, str | os.PathLike | Mapping):
-        raise FormatError(f"{shorten(repr(source))} is no certificate; give its path, its JSON object or a Certificate")
+    refuse_no_certificate(source)
     try:
         document, report = checker.read_and_check(source, **options)
     except checker.UnreadableError as error:
+        cause = error.__context__
+        if not isinstance(source, Mapping) and isinstance(cause, OSError | json.JSONDecodeError | UnicodeDecodeError):
+            refuse_as_certificate(os.fspath(source), content=_content_of(cause))
         raise FormatError(str(error)) from None
     if not isinstance(source, Mapping) and re.fullmatch(r"side file \S+ cannot be read", report.reason or ""):
         mend = "ask the sender for all files beside it"
         raise FormatError(f"{shorten(os.fspath(source), 200)}: incomplete: {report.reason}; {mend}")
-    return document, report
+    return document, CheckReport(**vars(report))
+
+
+def refuse_no_certificate(source: Any) -> None:
+    """Refuse what is neither a certificate nor a path nor a JSON object.
+
+    Examples
+    --------
+    >>> refuse_no_certificate(as_graph("fig1a"))
+    Traceback (most recent call last):
+    ptcc_certify.errors.FormatError: SignedDigraph(6 nodes, 12 edges, 4 negat... is a graph, no certificate; give ...
+    """
+    if isinstance(source, SignedDigraph | Structure | Family) or hasattr(source, "is_multigraph"):
+        mend = "give certify(graph, protocol, x0)"
+        raise FormatError(f"{shorten(repr(source))} is a graph, no certificate; {mend}")
+    if not isinstance(source, str | os.PathLike | Mapping) and not hasattr(source, "for_check"):
+        raise FormatError(f"{shorten(repr(source))} is no certificate; give its path, its JSON object or a Certificate")
+
+
+def _content_of(cause: OSError | json.JSONDecodeError | UnicodeDecodeError) -> bytes | None:
+    """Return what the check met instead of JSON, as the error tells; None where nothing was read."""
+    if isinstance(cause, json.JSONDecodeError):
+        return cause.doc.encode("utf-8", "replace")
+    return cause.object if isinstance(cause, UnicodeDecodeError) else None

@@ -66,8 +66,6 @@ STEPS = ("the decision", "upper bound on the decay rate", "Lyapunov functions", 
 BOXES = "boxes of followers"
 #: GB that the check may take for families whose members have more nodes than are solved for exactly.
 LARGE_MEMORY = 16
-#: What certificates of one graph have, and what is in its place here.
-_OF_FAMILIES = {"final_state": "final_states", "behaviour": "behaviours", "envelope": "deviation_bound"}
 #: Share of the upper bound that ends the search, and share of the time that the bound may take at first.
 _ENOUGH, _BOUND_SHARE = Fraction(99, 100), 0.3
 
@@ -239,13 +237,6 @@ class FamilyCertificate(FamilyContent, FromFile, Shown):
         ([-1.0, -1.0], [True, False])
         """
         return family_table(self, self.verdict == "certified")
-
-    if not TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Any:
-            """Refuse a name that only certificates of one graph have, with that of families."""
-            hint = f"; that of a family has {_OF_FAMILIES[name]}" if name in _OF_FAMILIES else ""
-            raise AttributeError(f"a FamilyCertificate has no {name}{hint}", name=name, obj=self)
 
     def __eq__(self, other: object) -> bool:
         """Two certificates are equal when they claim and prove the same; upper bounds on the rate do not count."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import nullcontext
@@ -75,8 +76,19 @@ def read(path: str | Path) -> dict[str, Any]:
         detail = _why(error)
         raise UnreadableError(f"{name}: not a readable certificate ({shorten(detail, 160)})") from None
     if not isinstance(data, dict) or data.get("schema") != SCHEMA:
-        raise UnreadableError(f'{name}: not a certificate of schema "{SCHEMA}"')
+        raise UnreadableError(f"{name}: {_what(data.get('schema') if isinstance(data, dict) else None)}")
     return data
+
+
+def _what(schema: Any) -> str:
+    """Tell what a file of another schema is."""
+    kind, _, number = str(schema).partition("/")
+    own, _, version = SCHEMA.partition("/")
+    if kind != own or not re.fullmatch("[0-9]{1,4}", number) or int(number) == int(version):
+        return f'not a certificate of schema "{SCHEMA}"'
+    if int(number) < int(version):
+        return f"is {schema}, of an older version; certify again"
+    return f"is {schema}, which needs a newer version of this program; install it"
 
 
 def _why(error: Exception) -> str:

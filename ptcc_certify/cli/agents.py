@@ -133,7 +133,8 @@ def refuse_dimension(options: Options, command: str) -> None:
     """Refuse vectors where there are no agents of order n."""
     if options["agents"] is None and options["dimension"] not in (None, 1):
         why = f"ptcc {command} takes scalar agents, unless --agents tells others"
-        raise ParameterError(f"--dimension: {why}; what is proved of one component holds for each: leave it out")
+        mend = "certify components one by one, or all by certify_vectors(graph, protocol, x0) in Python"
+        raise ParameterError(f"--dimension: {why}; {mend}")
 
 
 def run_of_agents(graph: SignedDigraph, protocol: Protocol, keywords: dict[str, Any], samples: int) -> AgentsTrajectory:

@@ -12,10 +12,10 @@ import click
 
 from ptcc_certify.cli import options as shared
 from ptcc_certify.cli.completion import GRAPHS, PACKAGED, complete
-from ptcc_certify.cli.kinds_of_file import kind_of
 from ptcc_certify.cli.options import READING
 from ptcc_certify.cli.terminal import counting, print_lines
 from ptcc_certify.errors import ExitCode, ParameterError
+from ptcc_certify.graphs.kinds_of_file import kind_of
 
 #: Options that are settings of a row by the same name.
 _SETTINGS = ("x0", "seed", "sigma0", "disturbance", "method", "simulation", "time_limit", "min_rate", "initial_bound")

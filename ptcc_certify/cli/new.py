@@ -10,11 +10,11 @@ from pathlib import Path
 import click
 
 from ptcc_certify.cli.completion import GRAPHS, PACKAGED, complete
-from ptcc_certify.cli.kinds_of_file import kind_of, shell_word
 from ptcc_certify.cli.options import graph_file
 from ptcc_certify.cli.scenario import SECTIONS, is_scenario
 from ptcc_certify.cli.terminal import print_lines
 from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.kinds_of_file import kind_of, shell_word
 from ptcc_certify.graphs.rationals import shorten
 
 #: What is written as it is; the rest are comments.

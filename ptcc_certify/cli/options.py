@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ptcc_certify.cli.completion import CERTIFICATES, GRAPHS, PACKAGED, complete, complete_behaviours
-from ptcc_certify.cli.kinds_of_file import TOML, kind_of, refuse_as_certificate, refuse_as_graph, shell_word
 from ptcc_certify.cli.scenario import (
     FOREIGN,
     IN_LIBRARY,
@@ -27,6 +26,7 @@ from ptcc_certify.cli.scenario import (
     takes_one_graph,
 )
 from ptcc_certify.errors import ParameterError, PTCCError
+from ptcc_certify.graphs.kinds_of_file import TOML, kind_of, refuse_as_certificate, refuse_as_graph, shell_word
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate

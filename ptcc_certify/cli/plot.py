@@ -13,10 +13,10 @@ from ptcc_certify.cli import options as shared
 from ptcc_certify.cli.agents import agents_keywords, agents_of, agents_options, dimension_option, refuse_dimension
 from ptcc_certify.cli.completion import CERTIFICATES, GRAPHS, PACKAGED, complete
 from ptcc_certify.cli.families import mode_options, read_graph_or_family, refuse_options
-from ptcc_certify.cli.kinds_of_file import kind_of
 from ptcc_certify.cli.scenario import MEMORY, graph_of, refuse_beside
 from ptcc_certify.cli.terminal import FIGURES, print_lines, progress, refuse_output
 from ptcc_certify.errors import ExitCode, ParameterError
+from ptcc_certify.graphs.kinds_of_file import kind_of
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate

@@ -18,9 +18,9 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from ptcc_certify.cli.kinds_of_file import TOML, kind_of, refuse_as_graph
 from ptcc_certify.cli.terminal import SCENARIO
 from ptcc_certify.errors import FormatError, ParameterError, PTCCError, did_you_mean
+from ptcc_certify.graphs.kinds_of_file import TOML, kind_of, refuse_as_graph
 from ptcc_certify.graphs.rationals import shorten
 
 #: Largest file, in bytes.

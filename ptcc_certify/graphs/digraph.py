@@ -185,7 +185,7 @@ class SignedDigraph(ReadOnly, Shown):
         self._refuse_bad_edges()
 
     def __setattr__(self, name: str, value: Any) -> None:
-        if name in vars(self) or hasattr(type(self), name):
+        if name in vars(self) or any(name in vars(one) for one in type(self).__mro__):
             raise FrozenInstanceError(f"{name} of a graph stays as it is; make another graph")
         super().__setattr__(name, value)
 

@@ -6,29 +6,16 @@ A function that draws a class is decorated with ``@shows(TheClass)``; it takes t
 
 from functools import singledispatch
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from ptcc_certify.errors import ParameterError, UnknownName, did_you_mean
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.other_names import Hinted, HintedClass
 
 #: The module that registers, loaded when a notebook first asks.
 _DRAWN_BY = "ptcc_certify.report.notebook"
-#: Where something is that one may look for as an attribute.
-_ELSEWHERE = {
-    **dict.fromkeys(("T", "rho1", "rho2", "kappa", "gain", "delta"), "see its protocol"),
-    **dict.fromkeys(("draw", "show", "plot"), "draw it with ptcc_certify.plot_graph"),
-    "animate": "there are no animations; draw it with ptcc_certify.plot_trajectory",
-    "nodes": "did you mean labels?",
-    "camps": "gauge holds the camp of each node, 1 or -1, and to_pandas() a table",
-    "add_edge": "it stays as it is; make another with from_edges([*graph.edges, (source, target, weight)])",
-    "error": "norm_bound(q) bounds ||E(t)|| at q = 1 - t/T",
-    "check": "write ptcc_certify.check(certificate)",
-    "certify": "write ptcc_certify.certify(graph, protocol, x0)",
-    "simulate": "write ptcc_certify.simulate(graph, protocol, x0)",
-    "write": "write ptcc_certify.write_graph(graph, path)",
-}
 
 
-class Shown:
+class Shown(Hinted, metaclass=HintedClass):
     """A class that notebooks show as HTML, and that says where something is that it does not have.
 
     Examples
@@ -44,15 +31,6 @@ class Shown:
     def _repr_html_(self) -> str | None:
         import_module(_DRAWN_BY)
         return _html_of(self)
-
-    if not TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Any:
-            """Refuse a name, with that which may have been meant."""
-            hint = ""
-            if not name.startswith("_"):
-                hint = f"; {_ELSEWHERE[name]}" if name in _ELSEWHERE else did_you_mean(name, dir(self))
-            raise UnknownName(f"{type(self).__name__} has no attribute {name!r}{hint}")
 
 
 @singledispatch

@@ -83,6 +83,20 @@ def as_fraction(value: Rational | Real | str, name: str = "value") -> Fraction:
     return Fraction(number)
 
 
+def no_number(name: str, value: Any, error: NumberError) -> str:
+    """Return what is said of a parameter that is no exact number: that, or which limit of the grammar it exceeds.
+
+    Examples
+    --------
+    >>> no_number("T", "fast", NumberError('"fast" is not a number'))
+    'T = fast is not a finite number'
+    >>> no_number("T", "1e500", NumberError('the exponent of "1e500" is beyond 400'))
+    'T: the exponent of "1e500" is beyond 400'
+    """
+    plain = str(error).endswith(("not a number", "not a finite number"))
+    return f"{name} = {shorten(str(value))} is not a finite number" if plain else f"{name}: {error}"
+
+
 def whole_number(value: Any, name: str, least: int, most: int) -> int:
     """Return an integer, NumPy's included, from ``least`` to ``most``; refuse anything else by name.
 

@@ -13,7 +13,7 @@ from lmi.exact.decimal_rounding import near
 from ptcc_certify.errors import NumberError, ParameterError, gated
 from ptcc_certify.graphs.digraph import Exact
 from ptcc_certify.graphs.io import as_graph
-from ptcc_certify.graphs.rationals import as_fraction, shorten, whole_number
+from ptcc_certify.graphs.rationals import as_fraction, no_number, shorten, whole_number
 from ptcc_certify.protocols.base import Protocol, aligned
 from ptcc_certify.protocols.casadi_latex import to_latex
 from ptcc_certify.protocols.gain import Gain
@@ -236,8 +236,8 @@ def _number(name: str, value: Any) -> Fraction:
     """Return a number of any sign, or refuse it by name."""
     try:
         number = as_fraction(value, name)
-    except NumberError:
-        raise ParameterError(f"{name} = {shorten(str(value))} is not a finite number") from None
+    except NumberError as error:
+        raise ParameterError(no_number(name, value, error)) from None
     if number.numerator.bit_length() + number.denominator.bit_length() > LONGEST_BITS:
         raise ParameterError(f"{name} has too many digits for exact proofs; round it, to 17 digits say")
     return number

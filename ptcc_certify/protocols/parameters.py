@@ -9,7 +9,7 @@ from typing import Any, Self, overload
 
 from ptcc_certify.errors import NumberError, ParameterError, gated
 from ptcc_certify.graphs.digraph import Exact
-from ptcc_certify.graphs.rationals import as_fraction, shorten
+from ptcc_certify.graphs.rationals import as_fraction, no_number, shorten
 
 _SMALLEST, _LARGEST = Fraction(1, 10**300), Fraction(10**300)
 #: Bits of the longest parameter, whose products are written in certificates.
@@ -122,11 +122,11 @@ def parameter(name: str, number: Any, zero_allowed: bool = False) -> Fraction:
     domain = ">= 0" if zero_allowed else "> 0"
     try:
         value = as_fraction(number, name)
-    except NumberError:
+    except NumberError as error:
         text = shorten(str(number))
         comma = isinstance(number, str) and re.fullmatch(r"\s*[-+]?\d+,\d+\s*", number)
         mend = f"write {text.strip().replace(',', '.')}" if comma else f"{name} must be a number {domain}"
-        raise ParameterError(f"{name} = {text} is not a finite number; {mend}") from None
+        raise ParameterError(f"{no_number(name, number, error)}; {mend}") from None
     refuse_out_of_range(name, value)
     if value.numerator.bit_length() + value.denominator.bit_length() > LONGEST_BITS:
         raise ParameterError(f"{name} has too many digits for exact proofs; round it, to 17 digits say")

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate, read_certificate
+from ptcc_certify.certificate.checking import refuse_no_certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.certificate.request import listener
 from ptcc_certify.errors import ParameterError, SimulationError
@@ -85,8 +86,8 @@ def write_report(
     path, suffix = Path(output), Path(output).suffix.lower()
     if suffix not in SUFFIXES:
         raise ParameterError(f"{output}: a report is written to .html or .tex; choose one of these")
-    if not (in_memory := isinstance(certificate, Certificate | FamilyCertificate | Mapping)):
-        refuse_no_path(certificate)
+    refuse_no_certificate(certificate)
+    in_memory = isinstance(certificate, Certificate | FamilyCertificate | Mapping)
     file = None if in_memory else Path(certificate)  # type: ignore[arg-type]
     if file is not None and path.is_file() and file.is_file() and path.samefile(file):
         raise ParameterError(f"{output}: is the certificate itself; name another file")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.graphs.display_hook import Shown, plot
 from ptcc_certify.graphs.equality import ByValue
 from ptcc_certify.graphs.rationals import number_within, shorten
@@ -235,6 +235,7 @@ class Trajectory(ByValue, Shown):
             getattr(self, what).reshape(-1, self.t.size).T + 0.0, index=pandas.Index(self.t, name="t"), columns=names
         )
 
+    @gated
     def to_csv(self) -> str:
         r"""Return ``t,remaining,<label>,...,u(<label>),...`` as text, one row per instant, floats in full.
 

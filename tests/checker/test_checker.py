@@ -965,8 +965,15 @@ def test_huge_and_hostile_files_are_refused(tmp_path: Path, capsys: pytest.Captu
         assert "not a number" in one_line_here(path, capsys)
     path.write_bytes(b"\xff\xfe\x00")
     assert "not a readable certificate (no UTF-8 at byte 0)" in one_line_here(path, capsys)
-    path.write_text('{"schema": "ptcc-certificate/1"}')
+    path.write_text('{"schema": "another/2"}')
     assert 'not a certificate of schema "ptcc-certificate/2"' in one_line_here(path, capsys)
+    for schema, says in (
+        ("ptcc-certificate/1", "is ptcc-certificate/1, of an older version; certify again"),
+        ("ptcc-certificate/3", "is ptcc-certificate/3, which needs a newer version of this program"),
+        ("ptcc-certificate/x", 'not a certificate of schema "ptcc-certificate/2"'),
+    ):
+        path.write_text(json.dumps({"schema": schema}))
+        assert says in one_line_here(path, capsys)
     assert "no such file" in one_line_here(tmp_path / "missing.json", capsys).lower()
     assert "directory" in one_line_here(tmp_path, capsys).lower()
 

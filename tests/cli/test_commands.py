@@ -174,6 +174,17 @@ def test_a_graph_and_a_certificate_in_the_place_of_the_other_are_told_with_the_c
     assert ptcc("classify", "odd.csv").code == 0
 
 
+def test_standard_input_of_the_wrong_kind_is_named_as_a_file_is(certificate: str):
+    content = Path(certificate).read_bytes()
+    for words in (("classify", "-"), ("certify", "-"), ("certify", "-", "fig1a", "--switching")):
+        run = ptcc(*words, stdin=content)
+        assert run.code == 2 and "standard input: is a certificate, not a graph; ptcc check" in run.err
+    for stdin, says in ((Path("team.csv").read_bytes(), "if it is a graph, ptcc certify - -o"), (b"", "is empty")):
+        run = ptcc("check", "-", stdin=stdin)
+        assert run.code == 2 and run.err.startswith("ptcc: standard input: ") and says in run.err
+    assert process("-m", "ptcc_certify", "check", "/dev/stdin", stdin=content).code == 0
+
+
 def test_a_matrix_that_is_an_archive_is_a_graph():
     np.savez("w.npz", np.array([[0.0, 1.0], [-1.0, 0.0]]))
     assert ptcc("classify", "w.npz").code == 0

@@ -772,7 +772,7 @@ BAD_FILES = [
     ("g.csv", b"a,b,1\n\xe9,c,1\n", ["line 2:", "0xe9", "UTF-8"]),
     ("g.csv", "a,b,1\n".encode("utf-16"), ["line 1:", "UTF-16", "UTF-8"]),
     ("g.csv", mtx(), ["Matrix Market", ".mtx"]),
-    ("g.csv", b"PK\3\4\0\0", ["line 1:", "0x00"]),
+    ("g.csv", b"PK\3\4\0\0", ["is a zip archive", "CSV"]),
     ("g.csv.gz", gzip.compress(ROWS.encode() * 99, mtime=0)[:-12], ["gzip"]),
     ("g.csv.gz", gzip.compress(ROWS.encode() * 99, mtime=0)[:40] + b"\xff" * 40, ["gzip"]),
     ("g.csv.gz", ROWS, ["not a gzip file"]),

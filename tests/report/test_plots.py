@@ -718,13 +718,11 @@ def test_every_figure_has_one_signature() -> None:
 
 
 def test_a_subject_that_leads_to_no_figure_is_refused_with_the_mend() -> None:
-    with pytest.raises(ParameterError, match="drawn from a trajectory or a certificate, not from str; simulate first"):
+    with pytest.raises(ParameterError, match="a trajectory or a certificate, not from str; give certify"):
         plot_trajectory("fig1a")
-    with pytest.raises(
-        ParameterError, match="drawn from a certificate, not from SignedDigraph; certify the graph first"
-    ):
+    with pytest.raises(ParameterError, match="drawn from a certificate, not from SignedDigraph; give certify"):
         plot_frontier(graph_of("fig1a"))
-    with pytest.raises(ParameterError, match="drawn from a certificate, not from str; certify the graph first"):
+    with pytest.raises(ParameterError, match="drawn from a certificate, not from str; give certify"):
         plot_late("fig1a")
     with pytest.raises(ParameterError, match="says nothing of moving leaders; certify with leaders"):
         plot_tracking(certified("fig1a"))

@@ -14,8 +14,8 @@ from ptcc_certify.errors import FormatError, GraphError, NumberError, ParameterE
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family, Mode, read_share
 from ptcc_certify.graphs.io.edge_list import column, edge_columns, records
-from ptcc_certify.graphs.io.files import Source, name_and_ending, read_bytes
-from ptcc_certify.graphs.io.graph_files import MATRICES, is_edge_list, read_graph
+from ptcc_certify.graphs.io.files import Source, name_and_ending
+from ptcc_certify.graphs.io.graph_files import MATRICES, graph_bytes, is_edge_list, read_graph
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, parse_exact, shorten
 
 _LEAST = ("weight_min", "min_weight", "w_min", "least", "min", "lower")
@@ -193,7 +193,7 @@ def is_family_file(path: Source) -> bool:
     name, ending = name_and_ending(path)
     if not is_edge_list(ending) or (path == "-") or (hasattr(path, "read") and not hasattr(path, "seek")):
         return False
-    data = read_bytes(path, name)
+    data = graph_bytes(path, name, ending)
     if hasattr(path, "seek"):
         path.seek(0)
     rows = ([field.strip() for field in row] for _, row in records(data, name))
@@ -270,7 +270,7 @@ def _interval_rows(
     name, ending = name_and_ending(path)
     if not is_edge_list(ending) or (path == "-") or (hasattr(path, "read") and not hasattr(path, "seek")):
         return None
-    data = read_bytes(path, name)
+    data = graph_bytes(path, name, ending)
     if hasattr(path, "seek"):
         path.seek(0)
     lines = [(number, [field.strip() for field in row]) for number, row in records(data, name) if any(row)]

@@ -14,6 +14,7 @@ from ptcc_certify.graphs.io.files import Source, name_and_ending, read_bytes, re
 from ptcc_certify.graphs.io.graph_from_rows import graph_of
 from ptcc_certify.graphs.io.matrix_files import read_mat, read_mtx, read_npy, read_npz
 from ptcc_certify.graphs.io.networkx_formats import read_gml, read_graphml, read_pajek
+from ptcc_certify.graphs.kinds_of_file import refuse_content_as_graph
 from ptcc_certify.graphs.rationals import shorten
 
 MATRICES = {"mtx": read_mtx, "npz": read_npz, "npy": read_npy, "mat": read_mat}
@@ -92,11 +93,24 @@ def read_graph(
     _refuse_unknown("orientation", orientation or "information", ("information", "listens"))
     _refuse_unknown("duplicates", duplicates, ("refuse", "sum", "last"))
     _refuse_unknown("format", ending if format else "csv", _READERS)
-    rows = _READERS.get(ending, read_edge_list)(read_bytes(path, name), name)
+    rows = _READERS.get(ending, read_edge_list)(graph_bytes(path, name, ending), name)
     way = "matrix" if ending in MATRICES and orientation != "information" else orientation or "information"
     if way != "information":
         rows.notes = tuple(note for note in rows.notes if note != RATERS)
     return graph_of(rows, name, way, duplicates, bool(drop_self_loops), bool(undirected))
+
+
+def graph_bytes(path: Source, name: str, ending: str) -> bytes:
+    """Read a file, or refuse what is no graph, such as a certificate.
+
+    Examples
+    --------
+    >>> graph_bytes(StringIO("a,b,1"), "input", "csv")
+    b'a,b,1'
+    """
+    data = read_bytes(path, name)
+    refuse_content_as_graph(data, name, ending, path)
+    return data
 
 
 def is_edge_list(ending: str) -> bool:

@@ -15,6 +15,7 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.report.plots.agents import CAMP_STYLES, HALO, NAME_SIZE, NAMED_AGENTS, camp_groups, name_agents
 from ptcc_certify.report.plots.style import SINGLE_COLUMN, axes_of, finished, new_axes, shown, styled, time_label
+from ptcc_certify.report.plots.subject import read_back
 from ptcc_certify.report.text_layout import printable, shorten_text
 from ptcc_certify.simulation.agents import AgentsTrajectory
 
@@ -32,6 +33,7 @@ def agents_run(subject: Any) -> AgentsTrajectory:
     ParameterError
         The subject is none, or of single integrators.
     """
+    subject = read_back(subject)
     if isinstance(subject, Certificate) and subject.agents is not None:
         return subject.observed.agents_run or subject.agents.simulate()
     if isinstance(subject, AgentsAnswer):

@@ -47,7 +47,7 @@ def plot_decay(
 
     Parameters
     ----------
-    subject : Certificate or Trajectory
+    subject : Certificate, its path, or Trajectory
         A certificate with an initial state and a proved rate; without a run its bounds alone are drawn
         (``certificate.with_simulation()`` adds one). A trajectory without ``certificate`` is drawn alone.
     ax : Axes, optional

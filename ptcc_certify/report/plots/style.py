@@ -19,6 +19,7 @@ from matplotlib.ticker import FixedLocator, LogLocator, MaxNLocator, NullFormatt
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.io import write_atomically
 from ptcc_certify.graphs.io.files import refuse_no_path
+from ptcc_certify.report.plots.subject import read_back
 
 #: Matplotlib's name of the style of all figures.
 STYLE = "ptcc_certify.ptcc"
@@ -35,10 +36,14 @@ STEPS = [1, 2, 2.5, 5, 10]
 
 
 def styled(plot: Callable[..., Any]) -> Callable[..., Any]:
-    """Draw in the style of :data:`STYLE` what notebooks show; if ``ax`` is given, they have a style of their own."""
+    """Draw in the style of :data:`STYLE` what notebooks show; if ``ax`` is given, they have a style of their own.
+
+    The subject may be the path of a certificate, which is read back.
+    """
 
     @functools.wraps(plot)
     def drawn(subject: Any, *, ax: Axes | None = None, **keywords: Any) -> Any:
+        subject = read_back(subject)
         if ax is not None:
             if not isinstance(ax, Axes):
                 raise ParameterError(f"ax = {ax!r} is none; give axes of Matplotlib, or leave it out")

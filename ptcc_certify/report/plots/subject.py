@@ -2,18 +2,40 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from lmi.exact.decimal_rounding import near
-from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io import as_graph
+from ptcc_certify.graphs.kinds_of_file import kind_of
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.simulation.trajectory import Trajectory
+
+#: What makes the subject of most figures.
+_CERTIFY = "give certify(graph, protocol, x0)"
+
+
+def read_back(subject: Any) -> Any:
+    """Return the certificate of a file that is one, and anything else as it is.
+
+    Examples
+    --------
+    >>> from ptcc_certify.report.plots.subject import read_back
+    >>> with TemporaryDirectory() as folder:
+    ...     certify("fig1a", NominalProtocol()).save(Path(folder, "c.json"))
+    ...     read_back(Path(folder, "c.json")).verdict, read_back("fig1a")
+    ('certified', 'fig1a')
+    """
+    if isinstance(subject, str | os.PathLike) and kind_of(os.fspath(subject)) == "a certificate":
+        return read_certificate(Path(subject))
+    return subject
 
 
 def refuse_family(subject: Any) -> None:
@@ -58,9 +80,7 @@ def trajectory_of(subject: Any) -> Trajectory:
         run = subject.simulate() if subject.trajectory is None else subject.trajectory
     if not isinstance(run, Trajectory):
         kind = type(subject).__name__
-        raise ParameterError(
-            f"this figure is drawn from a trajectory or a certificate, not from {kind}; simulate first"
-        )
+        raise ParameterError(f"this figure is drawn from a trajectory or a certificate, not from {kind}; {_CERTIFY}")
     if run.states.ndim != 2:
         raise ParameterError(f"the trajectory holds {run.states.shape[1]} initial states; draw a run of one")
     if not np.isfinite(run.states).all():
@@ -81,12 +101,12 @@ def certificate_of(subject: Any) -> Certificate:
     >>> from ptcc_certify.report.plots.subject import certificate_of
     >>> certificate_of("fig1a")
     Traceback (most recent call last):
-    ptcc_certify.errors.ParameterError: this figure is drawn from a certificate, not from str; certify the graph first
+    ptcc_certify.errors.ParameterError: this figure is drawn from a certificate, not from str; give certify(...
     """
     refuse_family(subject)
     if not isinstance(subject, Certificate):
         kind = type(subject).__name__
-        raise ParameterError(f"this figure is drawn from a certificate, not from {kind}; certify the graph first")
+        raise ParameterError(f"this figure is drawn from a certificate, not from {kind}; {_CERTIFY}")
     return subject
 
 

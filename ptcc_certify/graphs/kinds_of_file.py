@@ -26,7 +26,9 @@ _SIGNATURES = {
     b"PK\x05\x06": "a zip archive",
 }
 #: What graphs are kept in that begins like an archive.
-_PACKED = (".npz",)
+_PACKED = ("npz",)
+#: What is read once, and not here.
+PIPE = "a pipe"
 #: What a TOML file is.
 TOML = ("a scenario", "TOML")
 
@@ -37,8 +39,8 @@ def kind_of(path: str) -> str:
     Returns
     -------
     str
-        "missing", "a folder", "empty", "a certificate", "a notebook", "JSON", "a PDF", "an image", "a page", "a zip
-        archive", "a scenario", "TOML" of another kind, and "" for all else, as graphs are.
+        "missing", "a folder", "a pipe" (standard input, too), "empty", "a certificate", "a notebook", "JSON", "a PDF",
+        "an image", "a page", "a zip archive", "a scenario", "TOML" of another kind, and "" for all else, as graphs are.
 
     Examples
     --------
@@ -49,22 +51,30 @@ def kind_of(path: str) -> str:
     ('a certificate', 'a folder', 'missing')
     """
     if path == "-":
-        return ""
+        return PIPE
     if os.path.isdir(path):  # noqa: PTH112 - Path.is_dir may raise
         return "a folder"
     if not os.path.exists(path):  # noqa: PTH110
         return "missing"
-    if not os.path.isfile(path):  # noqa: PTH113 - a pipe is read once
-        return ""
+    if not os.path.isfile(path):  # noqa: PTH113
+        return PIPE
     try:
         with Path(path).open("rb") as file:
             first = file.read(FIRST)
     except OSError:
         return ""  # whoever reads it tells why it cannot be
-    ending = Path(path).suffix.lower()
-    if not first:
-        return "empty"
-    if ending == ".toml":
+    return kind_of_content(first, Path(path).suffix[1:].lower()) if first else "empty"
+
+
+def kind_of_content(first: bytes, ending: str) -> str:
+    """Return what a content is, told from its first bytes and the ending of its name, without a dot.
+
+    Examples
+    --------
+    >>> kind_of_content(b'{"schema": "ptcc-certificate/2"}', ""), kind_of_content(b"a,b,1", "csv")
+    ('a certificate', '')
+    """
+    if ending == "toml":
         return TOML[0] if re.search(rb"^\s*\[graph\]", first, re.MULTILINE) else TOML[1]
     start = first.removeprefix(b"\xef\xbb\xbf").lstrip()
     for signature, kind in _SIGNATURES.items():
@@ -80,13 +90,13 @@ def kind_of(path: str) -> str:
 def _kind_of_json(start: bytes, ending: str) -> str:
     if b'"ptcc-certificate/' in start:
         return "a certificate"
-    if ending == ".ipynb" or b'"cell_type"' in start:
+    if ending == "ipynb" or b'"cell_type"' in start:
         return "a notebook"
-    return "JSON" if ending == ".json" or re.match(rb'\{\s*["}]', start) else ""
+    return "JSON" if ending == "json" or re.match(rb'\{\s*["}]', start) else ""
 
 
 def refuse_as_graph(path: str) -> None:
-    """Refuse what is no graph.
+    """Refuse a path that leads to no graph.
 
     Raises
     ------
@@ -95,23 +105,51 @@ def refuse_as_graph(path: str) -> None:
     """
     from ptcc_certify.graphs.io.packaged import GRAPHS
 
-    name, kind, word = shorten(path, 200) or '""', kind_of(path), shell_word(path)
-    mends = {
-        "a folder": f"name a file in it, or all: ptcc batch {shell_word(str(Path(path, '*.csv')))}",
-        "a certificate": f"ptcc check {word} checks it, ptcc report {word} -o page.html shows it",
-        "a scenario": f"ptcc certify {word} runs it",
-        "a zip archive": "unpack it, or save a spreadsheet as CSV",
-    }
+    name, kind = shorten(path, 200) or '""', kind_of(path)
     if kind == "missing":
         raise FormatError(f"{name}: no such file; check the path{near_files(path, GRAPHS)}")
     if kind == "empty":
         raise FormatError(f"{name}: is empty: no edge and no node in this file; give rows source,target,weight")
-    if kind:
+    _refuse_kind_as_graph(kind, name, path)
+
+
+def refuse_content_as_graph(content: bytes, name: str, ending: str, path: object) -> None:
+    """Refuse what was read of ``path`` and is no graph; ``name`` is that of messages.
+
+    Examples
+    --------
+    >>> refuse_content_as_graph(b'{"schema": "ptcc-certificate/2"}', "standard input", "", "-")
+    Traceback (most recent call last):
+    ptcc_certify.errors.FormatError: standard input: is a certificate, not a graph; ptcc check - checks it, ...
+    """
+    _refuse_kind_as_graph(kind_of_content(content[:FIRST], ending), name, path)
+
+
+def _refuse_kind_as_graph(kind: str, name: str, path: object) -> None:
+    text = os.fspath(path) if isinstance(path, str | os.PathLike) else "FILE"
+    word = shell_word(text)
+    mends = {
+        "a folder": f"name a file in it, or all: ptcc batch {shell_word(str(Path(text, '*.csv')))}",
+        "a certificate": f"ptcc check {word} checks it, ptcc report {word} -o page.html shows it; in Python "
+        "read_certificate(path)",
+        "a scenario": f"ptcc certify {word} runs it",
+        "a zip archive": "unpack it, or save a spreadsheet as CSV",
+    }
+    if kind not in ("", PIPE):
         raise FormatError(f"{name}: is {kind}, not a graph; {mends.get(kind, 'write rows source,target,weight')}")
 
 
-def refuse_as_certificate(path: str, before_graph: bool = False) -> None:
+def refuse_as_certificate(path: str, before_graph: bool = False, content: bytes | None = None) -> None:
     """Refuse what is no certificate; ``before_graph``, where a graph may follow it.
+
+    Parameters
+    ----------
+    path : str
+        ``"-"`` is standard input.
+    before_graph : bool
+        A graph may follow the certificate.
+    content : bytes, optional
+        What was read of a pipe; without it, pipes are not refused.
 
     Raises
     ------
@@ -120,10 +158,15 @@ def refuse_as_certificate(path: str, before_graph: bool = False) -> None:
     """
     from ptcc_certify.graphs.io.packaged import GRAPHS
 
-    name, kind = shorten(path, 200), kind_of(path)
-    if path == "-" or kind in ("a certificate", "JSON"):
+    name, kind = "standard input" if path == "-" else shorten(path, 200), kind_of(path)
+    if kind == PIPE and content is not None:
+        kind = kind_of_content(content[:FIRST], "") if content else "empty"
+    if kind in (PIPE, "a certificate", "JSON"):
         return
-    made = f"ptcc certify {shell_word(path)} -o {shell_word(Path(path).stem + '.json')} makes one"
+    if kind == "missing" and path.lstrip().startswith("{"):
+        raise FormatError(f"{shorten(path)}: is JSON text, not a path; give json.loads(text), a path or a Certificate")
+    output = "certificate.json" if path == "-" else shell_word(f"{Path(path).stem}.json")
+    made = f"ptcc certify {shell_word(path)} -o {output} makes one"
     made += "; the certificate comes first: ptcc check CERTIFICATE GRAPH" * before_graph
     if path in GRAPHS and kind in ("missing", "a folder"):
         raise FormatError(f"{name}: is a packaged graph, not a certificate; {made}")
