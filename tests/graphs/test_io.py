@@ -1193,6 +1193,7 @@ def test_a_wrong_initial_state_is_refused(content, words):
         ("a,1\n\nb,2\nc,3\nd,4\n", ["line 5:", 'node "d" is not in the graph']),
         ("node,value\na,1\na,2\n", ["line 3:", "two values"]),
         ("a,1\nb,nan\n", ["line 2:", "node b", "not a finite number"]),
+        ("node,x,y\na,1,2\nb,1,2\nc,1,2\n", ["line 1:", "coordinates of a vector", "keep one column"]),
         ("a,1\nb\n", ["line 2:", "node,value"]),
         ("1\n2\n3\n", ["line 1:", "node,value"]),
         ('a,1\n"b,2\n', ["line 2:", "quote"]),
