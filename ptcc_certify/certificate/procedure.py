@@ -270,7 +270,7 @@ def certify(
     structure = analyse(graph)
     request = read_request(structure, protocol, options)
     refuse_beside(structure, protocol, request)
-    chains = None if of_agents is None else read_chains(of_agents, graph, x0, v0, derivatives)
+    chains = None if of_agents is None else read_chains(of_agents, graph, protocol.gain, x0, v0, derivatives)
     initial_state = None if x0 is None or chains else read_initial_state(structure, x0, "x0")
     manifold, reaching = read_sliding_variable(structure, protocol, sigma0)
     case = Case(structure, protocol, request, initial_state, manifold, progress)
