@@ -17,6 +17,7 @@ from ptcc_certify.graphs.rationals import shorten, writable
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.agents import DERIVATIVES, MOST_DIMENSION, PLURALS, Agents
 from ptcc_certify.protocols.gain import Gain
+from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.protocols.parameters import readable
 
 #: What is asked of single integrators alone.
@@ -39,6 +40,21 @@ class Chains(NamedTuple):
     dimension: int
     offsets: tuple[tuple[Fraction, ...], ...]
     notes: tuple[str, ...] = ()
+
+
+def single_integrators(agents: Any, protocol: Any, limits: Any) -> tuple[Any, Any]:
+    """Return None for agents that are the paper's, and the limits of the gain with their cap, if they have one.
+
+    Under the sliding-mode protocol limits of the gain are those of agents of order n alone.
+    """
+    limits = list(limits) if isinstance(limits, Iterable) else [limits]
+    if not isinstance(agents, Agents) or not agents.plain:
+        return agents, limits
+    if agents.cap is None:
+        return None, limits
+    if getattr(protocol, "reaching", None) is not None:
+        return agents, limits
+    return None, [GainLimits(gain_cap=agents.cap), *limits]
 
 
 def refuse_agents(agents: Any, protocol: Protocol, asked: dict[str, Any]) -> None:

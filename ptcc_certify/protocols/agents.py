@@ -183,9 +183,11 @@ give 4, from which on the input is bounded
 
     @property
     def plain(self) -> bool:
-        """Whether these are the paper's agents, ``x' = u``, of which the plain certificate tells everything."""
-        formation = self.offsets is not None or self.biases is not None
-        return self.of_paper and not formation and self.cap is None
+        """Whether these are the paper's agents, ``x' = u``, of which the plain certificate tells everything.
+
+        A gain cap may limit their gain: the plain certificate counts it in as ``limits``, under the nominal protocol.
+        """
+        return self.of_paper and self.offsets is None and self.biases is None
 
     @property
     def of_paper(self) -> bool:

@@ -22,6 +22,7 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.agents import Agents
+from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.report.screen import summary_lines
 
 TEAM = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("c", "a", -1), ("c", "d", 1), ("d", "c", 1)])
@@ -126,6 +127,22 @@ def test_agents_meet_at_rest_where_their_own_velocity_is_damped():
 def test_one_integrator_is_the_plain_certificate():
     plain, same = (certify(PAIR, NOMINAL, [3, 1], simulation=False, **more) for more in ({}, {"agents": Agents(1)}))
     assert same == plain and same.agents is None and "agents" not in same.document
+
+
+def test_one_integrator_under_a_gain_cap_is_the_plain_certificate_under_this_limit():
+    plain = certify(TEAM, NOMINAL, [5, 2, 4, -1], simulation=False, limits=GainLimits(gain_cap=4))
+    same = certify(TEAM, NOMINAL, [5, 2, 4, -1], simulation=False, agents=Agents(1, gain_cap=4))
+    assert same == plain and same.agents is None and same.to_dict()["digest"] == plain.to_dict()["digest"]
+    both = certify(TEAM, NOMINAL, [5, 2, 4, -1], simulation=False, agents=Agents(1, gain_cap=4), limits=GainLimits(9))
+    assert [limit.gain_cap for limit in both.limits] == [4, 9]
+    with pytest.raises(ParameterError, match="no velocity"):
+        certify(TEAM, NOMINAL, [5, 2, 4, -1], agents=Agents(1, gain_cap=4), v0=[1, 0, 0, 0])
+
+
+def test_one_integrator_under_a_gain_cap_and_disturbances_is_still_one_of_order_one():
+    robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
+    part = certify(TEAM, robust, [5, 2, 4, -1], simulation=False, agents=Agents(1, gain_cap=40)).agents
+    assert part is not None and part.protocol.gain_cap == 40
 
 
 @pytest.mark.parametrize("graph", [TEAM, ENEMIES, CAMPS], ids=["team", "enemies", "camps"])

@@ -35,6 +35,11 @@ def test_a_certificate_of_double_integrators_is_written_checked_drawn_and_shown(
     assert refused.code == 2 and "no statement in LaTeX" in refused.err
 
 
+def test_single_integrators_under_a_gain_cap_are_those_of_the_plain_command():
+    case = (*CERTIFY, "--gain-cap", "4")
+    assert ptcc(*case, "--agents", "integrator").out == ptcc(*case).out
+
+
 def test_a_scenario_tells_the_agents(tmp_path: Path):
     (tmp_path / "v.csv").write_text("node,x\n" + "".join(f"{k},{k}\n" for k in range(1, 7)))
     text = '[graph]\nfile = "fig1a"\n[agents]\nkind = "double-integrator"\ndrag = 0.2\nv0 = "v.csv"\n'
@@ -50,7 +55,9 @@ def test_a_scenario_tells_the_agents(tmp_path: Path):
     [
         (("--agents", "tricycle"), '--agents: "tricycle" is unknown; one of integrator, double-integrator'),
         (("--v0", "1,2,3,4,5,6"), "--v0: is for agents of order n; give --agents double-integrator"),
-        (("--dimension", "2"), "ptcc certify takes scalar agents, unless --agents tells others"),
+        (("--dimension", "2"), "ptcc certify takes single integrators of one component"),
+        (("--agents", "integrator", "--dimension", "2"), "ptcc certify takes single integrators of one component"),
+        (("--agents", "1", "--gain-cap", "4", "--v0", "1,2,3,4,5,6"), "--v0: agents of order 1 have no velocity"),
         (("--agents", "2", "--decay", "2"), "not above 2 (n - 1) = 2"),
         (("--agents", "2", "--stop-before", "0.1"), "--stop-before: is not proved of agents of order n"),
         (("--agents", "2", "--dimension", "2", "--x0", "1,2"), "--x0 has 2 values for 6 agents of dimension 2"),
