@@ -183,13 +183,14 @@ def _least_time(base: Certificate, request: AgentsRequest) -> Fraction | None:
 
 def _unusable(base: Certificate, part: AgentsAnswer, request: AgentsRequest) -> str | None:
     """Tell what is missing, whatever the deadline; None if nothing is."""
-    if not base.graph.n_edges:
-        return "no agent listens to another, so that there is nothing to bound"
-    if not part.functions:
+    if part.grows:
+        least = up(1 / part.protocol.gain.pole, 4)
+        return f"no agent listens to another, and the input grows without limit: give cascade {least} or more"
+    if not part.functions and not part.alone:
         return base.notes[0] if base.notes else "no decay was proved"
-    if part.input is None:
+    if part.inputs is None:
         return "no input of single agents is proved for a graph of this size"
-    if part.protocol.gain_cap is not None and part.residual is None:
+    if part.protocol.gain_cap is not None and part.residual is None and not part.alone:
         return "no deviation of single agents is proved for a graph of this size"
     reaching, forces = part.protocol.base.reaching, abs(part.protocol.plant[0])
     terms = Fraction(0) if reaching is None else reaching.mu1 * part.dimension
@@ -213,14 +214,15 @@ def _with(blank: AgentsDesign, candidate: Candidate, base: Certificate, again: C
         if report is None or not report.accepted:
             why = "" if report is None else f" {report.rejected}: {report.reason}"
             return replace(blank, binding=f"the independent check does not accept{why}")
-    peak, residual, inputs = own.peak, own.residual, own.part.input
+    peak, residual, inputs = own.peak, own.residual, own.part.inputs
     assert peak is not None and residual is not None and inputs is not None
     label = again.graph.labels[inputs.index(peak)]
     binding = f"the bound of the input of agent {shorten(label)}, {up(100 * peak / asked.max_input, 4)} % of the limit"
     if asked.residual is not None and residual / asked.residual > peak / asked.max_input:
         binding = f"what the gain cap leaves, {up(100 * residual / asked.residual, 4)} % of what is allowed"
     if not peak:
-        binding = "nothing binds: agents are in place and need no input"
+        alone = "no agent listens to another, and none needs an input: every deadline is met"
+        binding = f"nothing binds: {alone if own.part.alone else 'agents are in place and need no input'}"
     return replace(
         blank,
         verdict=MET,

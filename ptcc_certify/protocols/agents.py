@@ -317,6 +317,16 @@ class AgentsProtocol:
         """Return ``theta = (1 - rho1/eta)^2/k``, minus the derivative of ``1/eta``, while the gain is not capped."""
         return (1 - float(self.gain.rho1) / eta) ** 2 / float(self.gain.pole)
 
+    @property
+    def first_gain(self) -> Fraction:
+        """``eta(0)``."""
+        return self.gain.first if self.gain_cap is None else min(self.gain.first, self.gain_cap)
+
+    @property
+    def gains_at_first(self) -> tuple[Fraction, ...]:
+        """``K`` at time 0."""
+        return self.gains
+
     def gains_at(self, theta: Any) -> tuple[Any, ...]:
         """Return ``K`` where ``d(1/eta)/dt = -theta``: here the same at all times."""
         return tuple(map(float, self.gains))

@@ -47,6 +47,8 @@ def answers(part: AgentsAnswer) -> Iterator[tuple[str, str]]:
         if part.structure.graph.n_edges == 0:
             alone = "comes to rest" if part.derivatives_agree and any(part.protocol.own) else "moves"
             yield "error", f"none: no agent listens to another, each {alone} by itself"
+            if part.inputs is not None or part.grows:
+                yield _input_line(part)
         return
     yield "error", _error_text(part)
     yield _input_line(part)
@@ -108,14 +110,17 @@ def _error_text(part: AgentsAnswer) -> str:
 
 def _input_line(part: AgentsAnswer) -> tuple[str, str]:
     """Tell whether the input is bounded, its proved size, and whose it is."""
-    if part.input is None:
+    if part.grows:
+        return "INPUT", "NOT BOUNDED: it grows without limit"
+    if part.inputs is None:
         if part.unbounded:
             return "INPUT", f"NOT CERTIFIED BOUNDED: {', '.join(why for why, _ in part.unbounded)}"
         return "input", "bounded; no number is proved" + " without x(0)" * (part.initial_state is None)
-    largest = max(part.input)
-    label = part.structure.graph.labels[part.input.index(largest)]
-    norm = "|u_k|" if part.dimension == 1 else "||u_k||"
-    text = f"bounded; {norm} <= {up(largest, 4)}"
+    largest = max(part.inputs)
+    if not largest:
+        return "input", "none: u = 0"
+    label = part.structure.graph.labels[part.inputs.index(largest)]
+    text = f"bounded; {part.norm} <= {up(largest, 4)}"
     agent = f", the largest of agent {shorten_label(label, 22)}"
     return "input", text + agent * (columns(text + agent) <= TEXT)
 
@@ -137,7 +142,7 @@ def long_lines(part: AgentsAnswer) -> Iterator[tuple[str, str]]:
                 yield "deviation" if i == 0 else "", f"{name}: from the common motion at most {bounds}"
     if part.residual is not None:
         yield "left", _error_text(part)
-    if part.functions:
+    if part.functions or part.inputs is not None or part.grows:
         yield _input_line(part)
 
 

@@ -40,6 +40,13 @@ def test_single_integrators_under_a_gain_cap_are_those_of_the_plain_command():
     assert ptcc(*case, "--agents", "integrator").out == ptcc(*case).out
 
 
+def test_a_limit_of_the_input_that_is_exceeded_at_first_is_refuted():
+    done = ptcc(*CERTIFY, "--agents", "double-integrator", "--max-input", "1")
+    assert done.code == 3 and "refuted: |u_k| <= 1 (it is up to" in done.out and "at the start, proved" in done.out
+    told = ptcc(*CERTIFY, "--agents", "double-integrator", "--dimension", "2", "--max-input", "1e9")
+    assert told.code == 0 and "met: ||u_k|| <= 1000000000" in told.out
+
+
 def test_a_scenario_tells_the_agents(tmp_path: Path):
     (tmp_path / "v.csv").write_text("node,x\n" + "".join(f"{k},{k}\n" for k in range(1, 7)))
     text = '[graph]\nfile = "fig1a"\n[agents]\nkind = "double-integrator"\ndrag = 0.2\nv0 = "v.csv"\n'

@@ -232,3 +232,23 @@ def test_designs_of_the_cascade_on_every_class_are_accepted_and_kept_by_runs(fir
         assert answer.certificate.verdict == "certified" and answer.shortest_possible is None
         part = answer.certificate.agents
         assert part is not None and part.compare(part.simulate(samples=101)).input <= 1 + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("agents", "verdict", "says"),
+    [
+        (Agents(order=2), "met", "every deadline is met"),
+        (Agents(order=2, gain_cap=5), "met", "every deadline is met"),
+        (Agents(order=2, cascade=2), "met", "% of the limit"),
+        (Agents(order=2, cascade="0.3"), "not with this certificate", "give cascade 1 or more"),
+    ],
+)
+def test_agents_that_listen_to_nobody_have_a_deadline(agents: Agents, verdict: str, says: str):
+    alone = SignedDigraph.from_edges([], ["a"])
+    residual = None if agents.cap is None else 1
+    answer = design_agents(alone, agents, [3], v0=[1], max_input=3, residual=residual)
+    assert answer.verdict == verdict and says in answer.binding
+    if answer.certificate is not None:
+        assert answer.certificate.verdict == "certified" and answer.peak <= 3
+    if agents.cascade is not None and verdict == "met":  # u(0) = -alpha eta(0) v(0), eta(0) = (0.001 + 1)/T
+        assert abs(answer.deadline * 3 - 2 * Fraction("1.001")) < Fraction("0.01")
