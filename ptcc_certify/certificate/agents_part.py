@@ -177,8 +177,16 @@ class AgentsPart(AgentsAnswer):
 
     @property
     def in_place(self) -> bool:
-        """Whether agents begin in agreement, with a common motion: then nothing steers them."""
-        return not any(self.initial_values)
+        """Whether agents begin in agreement, with a common motion: then nothing steers them but to rest."""
+        own = any(self.protocol.own)
+        braked = own and any(chain[1] for agent in self.initial_state or () for chain in agent)
+        return not any(self.initial_values) and not braked
+
+    @property
+    def bounding_rho2(self) -> Fraction | None:
+        """That by which ``alpha rho2 kappa = 1``, if it is less."""
+        alpha, k = max(self.protocol.own), self.protocol.gain.pole
+        return Fraction(up(1 / (alpha * self.protocol.base.kappa), 4)) if alpha and alpha * k < 1 else None
 
     @property
     def gains_text(self) -> str:

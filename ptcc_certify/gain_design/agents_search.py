@@ -4,8 +4,8 @@ Of chains of integrators gain and bound scale with the deadline alone: the Lyapu
 gains ``K`` up to the decay ``R``, which is least at ``R = 2 n``, where the input is bounded; multiplying ``rho1`` and
 ``rho2`` by one number changes ``K`` and nothing else; and a larger share ``rho1 T/(rho2 kappa)`` of the constant
 part of the gain raised the bound wherever it was tried. So the deadline is sought, with ``rho1 T``, ``rho2 kappa`` and
-``R`` as they are: :mod:`ptcc_certify.gain_design.agents_deadlines`. Of the cascade ``alpha`` takes the place of ``R``,
-and ``rho2 kappa`` is raised, where the input is not bounded by the one that is given.
+``R`` as they are: :mod:`ptcc_certify.gain_design.agents_deadlines`. Of the cascade ``alpha`` takes the place of ``R``.
+There, and where agents meet at rest, ``rho2 kappa`` is raised if the input is not bounded by the one that is given.
 
 Deadlines that were not tried are excluded by nothing but what holds for all gains of the protocol:
 :mod:`ptcc_certify.bounds.shortest_time`.
@@ -58,8 +58,8 @@ def design_agents(
     graph : graph-like
         In whatever form :func:`ptcc_certify.as_graph` takes.
     agents : Agents
-        Of order n, or in a formation; their ``decay`` is ``2 n`` unless it is given. Of the cascade ``rho2`` is raised
-        where that of ``protocol`` does not bound the input.
+        Of order n, or in a formation; their ``decay`` is ``2 n`` unless it is given. Of the cascade, and of agents that
+        meet at rest, ``rho2`` is raised where that of ``protocol`` does not bound the input.
     x0 : state-like, or N rows of coordinates
         Initial positions, in node order or by label, in units of length.
     v0 : state-like, optional
@@ -86,7 +86,7 @@ def design_agents(
     ------
     ParameterError
         A number that is not positive, states that do not fit, single integrators without a formation, or something
-        that is not searched: agents at rest, a decay below ``2 n``, a gain cap without a residual.
+        that is not searched: a decay below ``2 n``, a gain cap without a residual.
 
     References
     ----------
@@ -144,8 +144,6 @@ def _refuse(agents: Any, request: AgentsRequest) -> None:
         raise ParameterError(f"agents = {shorten(repr(agents))}: give Agents(order=2) for double integrators")
     if agents.plain:
         raise ParameterError("agents: these are single integrators; design(graph, ..) finds their gains")
-    if agents.rest is not None:
-        raise ParameterError("rest: no number is proved of the input of agents that meet at rest; leave it out")
     if agents.cascade is None and agents.decay_rate < 2 * agents.degree and agents.cap is None:
         raise ParameterError(
             f"decay: below 2 n = {2 * agents.degree} no input is proved to be bounded; leave it out, or cap the gain"
@@ -188,6 +186,9 @@ def _unusable(base: Certificate, part: AgentsAnswer, request: AgentsRequest) -> 
         return f"no agent listens to another, and the input grows without limit: give cascade {least} or more"
     if not part.functions and not part.alone:
         return base.notes[0] if base.notes else "no decay was proved"
+    if part.unbounded:
+        at = f"at T = {short_exact(part.protocol.gain.T)}"
+        return f"the input is not proved bounded {at}: {', '.join(why for why, _ in part.unbounded)}"
     if part.inputs is None:
         return "no input of single agents is proved for a graph of this size"
     if part.protocol.gain_cap is not None and part.residual is None and not part.alone:

@@ -163,7 +163,6 @@ def test_design_takes_a_scenario_of_agents_and_prints_the_command_that_proves_it
         (("--agents", "2", "--initial-bound", "1"), "--initial-bound: is not proved of agents of order n; give"),
         (("--agents", "2", "--curve", "c.csv"), "--curve: is drawn of single integrators; leave it out"),
         (("--agents", "2", "--input-norm", "2"), "--input-norm: is of single integrators"),
-        (("--agents", "2", "--rest", "1"), "rest: no number is proved of the input of agents that meet at rest"),
         (("--agents", "2", "--decay", "3"), "decay: below 2 n = 4 no input is proved to be bounded"),
         (("--agents", "2", "--residual", "1"), "residual: nothing is left at T without a gain cap"),
         (("--agents", "2", "--gain-cap", "9"), "--gain-cap: leaves something at every deadline; give --residual,"),
