@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lmi.exact.decimal_rounding import near, up
+from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.protocols.agents import DERIVATIVES, PLURALS, plant_text
 from ptcc_certify.report.text_layout import TEXT, columns, short_number, shorten_label, shorten_list
 
@@ -57,6 +58,8 @@ def answers(part: AgentsAnswer) -> Iterator[tuple[str, str]]:
 def _final_lines(part: AgentsAnswer, width: int) -> Iterator[tuple[str, str]]:
     """Tell positions at ``T``, and velocities and so on unless all are 0."""
     if part.final_state is None:
+        if part.initial_state is not None and part.structure.graph.n_nodes > EXACT_NODES:
+            yield _ENDS[0], f"not proved of more than {EXACT_NODES} agents of order n"
         return
     labels = part.structure.graph.labels
     rest = not part.moving and part.settled > 1
