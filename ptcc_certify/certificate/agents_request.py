@@ -47,14 +47,14 @@ def single_integrators(agents: Any, protocol: Any, limits: Any) -> tuple[Any, An
 
     Under the sliding-mode protocol limits of the gain are those of agents of order n alone.
     """
-    limits = list(limits) if isinstance(limits, Iterable) else [limits]
+    limits = tuple(limits) if isinstance(limits, Iterable) else (limits,)
     if not isinstance(agents, Agents) or not agents.plain:
         return agents, limits
     if agents.cap is None:
         return None, limits
     if getattr(protocol, "reaching", None) is not None:
         return agents, limits
-    return None, [GainLimits(gain_cap=agents.cap), *limits]
+    return None, (GainLimits(gain_cap=agents.cap), *limits)
 
 
 def refuse_agents(agents: Any, protocol: Protocol, asked: dict[str, Any]) -> None:

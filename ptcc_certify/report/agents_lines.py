@@ -11,7 +11,7 @@ import numpy as np
 from lmi.exact.decimal_rounding import near, up
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.protocols.agents import DERIVATIVES, PLURALS, plant_text
-from ptcc_certify.report.text_layout import TEXT, columns, short_number, shorten_label, shorten_list
+from ptcc_certify.report.text_layout import TEXT, columns, short_number, shorten_label, shorten_list, unbroken
 
 if TYPE_CHECKING:
     from ptcc_certify.bounds.agent_motion import Interval
@@ -37,7 +37,7 @@ def agents_text(part: AgentsAnswer) -> str:
         *([] if protocol.gain_cap is None else [f"gain at most {near(protocol.gain_cap)}"]),
     ]
     driven = part.functions or not part.structure.graph.n_edges  # else no gains are proved
-    return "; ".join([*texts, *[f"u = {protocol.law()}"] * bool(driven)])
+    return "; ".join([*texts, *[unbroken(f"u = {protocol.law()}")] * bool(driven)])
 
 
 def answers(part: AgentsAnswer) -> Iterator[tuple[str, str]]:
