@@ -92,8 +92,7 @@ def _named_agents(options: Options) -> Agents | None:
         for name in ("drag", "rest", "cascade", "decay")
     }
     for least, (name, quantity) in enumerate((("v0", "velocity"), ("a0", "acceleration")), start=2):
-        given = options[name] is not None and options[name].strip() != "0"
-        if given and int(order) < least:
+        if options[name] is not None and options[name].strip() != "0" and int(order) < least:
             why = f"agents of order {order} have no {quantity} to begin with"
             raise ParameterError(f"{flag_of(name)}: {why}; leave it out, or give --agents {least}")
     return Agents(
