@@ -99,7 +99,7 @@ def design_agents(
     >>> start = {"a": [0, 3], "b": [5, 1], "c": [-2, -4]}
     >>> answer = design_agents(trio, square, start, max_input=5)
     >>> answer.verdict, answer.certificate.assessment.text.split(";")[0]
-    ('met', 'met: |u_k| <= 5')
+    ('met', 'met: ||u_k|| <= 5')
     >>> design_agents(trio, square, start, max_input=5, deadline=1).verdict
     'infeasible'
     """
