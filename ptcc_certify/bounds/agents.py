@@ -22,6 +22,7 @@ from ptcc_certify.bounds.input.effort_bounds import full_constants
 from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
+from ptcc_certify.protocols.agents import AgentsProtocol
 from ptcc_certify.theorems.agent_decrease import Matrix
 
 #: Of every agent, in every coordinate of space, its position, velocity and so on.
@@ -70,6 +71,31 @@ def _product(V: LyapunovFunction, x: Sequence[Fraction], y: Sequence[Fraction]) 
         a * sum((p * b for p, b in zip(row, y, strict=True)), Fraction(0)) for a, row in zip(x, V.matrix, strict=True)
     )
     return sum(parts, Fraction(0))
+
+
+def first_inputs(structure: Structure, protocol: AgentsProtocol, states: States) -> tuple[Fraction, ...]:
+    """Return the squares of ``|u_k(0)|``, the inputs at time 0 without sliding terms, exactly.
+
+    Examples
+    --------
+    >>> from ptcc_certify.protocols import NominalProtocol
+    >>> base, zero, one = NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), Fraction(0), Fraction(1)  # eta(0) = 2
+    >>> pair = analyse(SignedDigraph.from_edges([("a", "b", 1)]))
+    >>> protocol = AgentsProtocol(base, (zero,) * 2, (zero,) * 2, (3 * one, one), ((zero,),) * 2, None)
+    >>> [int(x) for x in first_inputs(pair, protocol, (((one, zero),), ((zero, one),)))]  # b: 3 4 (1 - 0) + 2 (0 - 1)
+    [0, 100]
+    """
+    n, gains, own = protocol.order, protocol.gains_at_first, protocol.own
+    scaled = scaled_states(states, protocol.offsets, 1 / protocol.first_gain)
+    rows, squares = structure.graph.exact_rows(range(structure.graph.n_nodes)), []
+    for k, (row, h) in enumerate(zip(rows, protocol.offsets, strict=True)):
+        square = Fraction(0)
+        for q, place in enumerate(h):
+            heard = [sum((a * scaled[j][q][i] for j, a in row.items()), Fraction(0)) for i in range(n)]
+            felt = sum((K * x + f * y for K, x, f, y in zip(gains, heard, own, scaled[k][q], strict=True)), Fraction(0))
+            square += (protocol.plant[0] * place - protocol.first_gain**n * felt) ** 2
+        squares.append(square)
+    return tuple(squares)
 
 
 def error_constants(structure: Structure, V: LyapunovFunction) -> tuple[Fraction, ...] | None:

@@ -83,16 +83,11 @@ def combined_state(states: States, offsets: Sequence[Sequence[Fraction]], gain: 
     >>> combined_state((((3 * one, one),),), [[one]], gain, one)
     ((Fraction(3, 1),),)
     """
-    X, own = positions_of(states, offsets), alpha + first_theta(gain)
+    X, own = positions_of(states, offsets), alpha + gain.first_theta
     pairs = zip(states, X, strict=True)
     return tuple(
         tuple(chain[1] / gain.first + own * x for chain, x in zip(agent, at, strict=True)) for agent, at in pairs
     )
-
-
-def first_theta(gain: Gain) -> Fraction:
-    """Return ``eta'/eta^2 = (1 - rho1/eta)^2/k`` at time 0."""
-    return (1 - gain.rho1 / gain.first) ** 2 / gain.pole
 
 
 def roots_of(structure: Structure, V: LyapunovFunction, positions: Rows, error: Rows) -> Roots:
@@ -176,6 +171,6 @@ def input_from(
     k, eta = gain.pole, gain.first
     a, b = alpha - 1 / k, rate / 2 - 2 / k
     most = max(Fraction(1), (a + alpha) / (a + b))
-    size = rounded(eta**2 * (combined + (1 / k - first_theta(gain)) * state) * most, BITS, up=True)
+    size = rounded(eta**2 * (combined + (1 / k - gain.first_theta) * state) * most, BITS, up=True)
     pairs = zip(constants, speeds, strict=True)
     return tuple(round_up(root_product(c) * size + alpha * eta * speed) for c, speed in pairs)

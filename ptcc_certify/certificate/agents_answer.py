@@ -6,15 +6,18 @@ import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from lmi.exact.decimal_rounding import float_up
+from lmi.exact.decimal_rounding import down, float_up, near, up
+from lmi.exact.elementary_enclosures import sqrt
 from ptcc_certify.bounds.agent_motion import Interval
-from ptcc_certify.bounds.agents import States
+from ptcc_certify.bounds.agents import States, first_inputs
 from ptcc_certify.bounds.agents_comparison import AgentsComparison
 from ptcc_certify.bounds.final_state import Influence
+from ptcc_certify.certificate.answer import MET, OPEN, REFUTED, Answer
 from ptcc_certify.certificate.format_vectors import agents_ends, weighted_sum
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.structure import Structure
@@ -84,6 +87,11 @@ class AgentsAnswer(ABC):
         return len(self.protocol.offsets[0])
 
     @property
+    def norm(self) -> str:
+        """What bounds of the input are of, in signs."""
+        return "|u_k|" if self.dimension == 1 else "||u_k||"
+
+    @property
     def formation(self) -> bool:
         """Whether an agent has a place other than 0."""
         return any(any(row) for row in self.protocol.offsets)
@@ -112,6 +120,59 @@ class AgentsAnswer(ABC):
             for agent, place in zip(begin, end, strict=False)
         ]
         return math.sqrt(max(squares, default=0.0))
+
+    # ------------------------------------------------------------------ input
+
+    @property
+    def alone(self) -> bool:
+        """Whether no agent listens to another."""
+        return not self.structure.graph.n_edges
+
+    @property
+    def least_rest(self) -> Fraction:
+        """What ``alpha`` is at least if ``eta e^(-alpha s - a_2 t)``, the pace of the own velocity, does not grow."""
+        gain = self.protocol.gain
+        return 1 / gain.pole + max(Fraction(0), -self.protocol.plant[1]) / gain.first
+
+    @property
+    def grows(self) -> bool:
+        """Whether the input of agents alone grows without limit: some move, and ``alpha rho2 kappa < 1``."""
+        if not self.alone or not any(self.protocol.own):
+            return False
+        moving = any(chain[1] for agent in self.initial_state or () for chain in agent)
+        return moving and self.protocol.own[1] * self.protocol.gain.pole < 1
+
+    @cached_property
+    def inputs(self) -> tuple[Fraction, ...] | None:
+        """Bounds of the Euclidean norm of every agent's input; of agents alone, too, where :attr:`input` has none.
+
+        Agents alone feel ``a_1 h_k``, their sliding terms, and ``-alpha eta`` times their own velocity, which is
+        largest at first unless it grows.
+        """
+        if self.input is not None or not self.alone:
+            return self.input
+        base, forces = self.protocol.base, abs(self.protocol.plant[0])
+        extra = base.reaching.mu1 * self.dimension if base.reaching is not None else Fraction(0)
+        if not any(self.protocol.own):
+            squares = tuple(forces**2 * sum((x * x for x in h), Fraction(0)) for h in self.protocol.offsets)
+        elif self.initial_state is None or self.protocol.own[1] < self.least_rest:
+            return None
+        else:
+            squares = first_inputs(self.structure, self.protocol, self.initial_state)
+        return tuple(_root(x)[1] + extra for x in squares)
+
+    def judge_input(self, most: Fraction) -> Answer:
+        """Tell whether every input is proved to stay within so much, or exceeds it at time 0, exactly."""
+        what, proved = f"{self.norm} <= {near(most, 12)}", self.inputs
+        if proved is not None and max(proved) <= most:
+            return Answer(MET, what)
+        if self.grows:
+            return Answer(REFUTED, what, "it grows without limit, proved")
+        if self.initial_state is not None and (self.functions or self.alone):
+            first = max(first_inputs(self.structure, self.protocol, self.initial_state))
+            if first > most**2:
+                return Answer(REFUTED, what, f"it is up to {down(_root(first)[0])} at the start, proved")
+        return Answer(OPEN, what, "no bound is proved" if proved is None else f"proved: {up(max(proved))}")
 
     def columns(self) -> dict[str, list[float]]:
         """Return initial and final states in floats, and bounds of the input, one number for each agent."""
@@ -207,6 +268,12 @@ class AgentsAnswer(ABC):
     @abstractmethod
     def compare(self, run: AgentsTrajectory) -> AgentsComparison | None:
         """Compare a run with what is proved of it; None where nothing disagrees."""
+
+
+def _root(square: Fraction) -> Interval:
+    """Enclose a root, in one number where it is rational."""
+    root = Fraction(math.isqrt(square.numerator), math.isqrt(square.denominator))
+    return (root, root) if root**2 == square else sqrt(square)
 
 
 def final_states(part: AgentsAnswer, influence: Influence) -> Intervals:

@@ -77,12 +77,6 @@ class AgentsPart(AgentsAnswer):
         return self.matrix.rate * self.protocol.gain.pole
 
     @property
-    def first_gain(self) -> Fraction:
-        """``eta(0)``."""
-        gain, cap = self.protocol.gain.first, self.protocol.gain_cap
-        return gain if cap is None else min(gain, cap)
-
-    @property
     def settles(self) -> bool:
         """Whether the behaviour of the claim is proved at ``T`` itself, of positions less their places in a formation.
 
@@ -97,15 +91,14 @@ class AgentsPart(AgentsAnswer):
         The deviations' part is ``eta^n e^(-r s/2)`` of what it is at 0; that of the common velocity at rest
         ``eta e^(-alpha s - a_2 t)``, whose logarithm grows by at most ``eta (1/k - alpha) - a_2``.
         """
-        n, gain = self.order, self.protocol.gain
+        n = self.order
         if self.protocol.gain_cap is not None:
             return ()
         found = []
         if self.decay < 2 * n:
             found.append((f"decay {down(self.decay)} is below 2 n = {2 * n}", f"--decay {2 * n}"))
         if any(self.protocol.own):
-            alpha = self.protocol.own[1]
-            least = 1 / gain.pole + max(Fraction(0), -self.protocol.plant[1]) / gain.first
+            alpha, least = self.protocol.own[1], self.least_rest
             if alpha < least:
                 found.append((f"rest {down(alpha)} is below {up(least, 4)}", f"--rest {up(least, 4)}"))
         return tuple(found)
@@ -115,7 +108,7 @@ class AgentsPart(AgentsAnswer):
         """``V(0)`` of every function used."""
         if self.initial_state is None:
             return ()
-        scaled = scaled_states(self.initial_state, self.protocol.offsets, 1 / self.first_gain)
+        scaled = scaled_states(self.initial_state, self.protocol.offsets, 1 / self.protocol.first_gain)
         return tuple(initial_value(self.structure, V, self.matrix.inverse, scaled) for V in self.functions)
 
     @property
@@ -184,8 +177,16 @@ class AgentsPart(AgentsAnswer):
 
     @property
     def in_place(self) -> bool:
-        """Whether agents begin in agreement, with a common motion: then nothing steers them."""
-        return not any(self.initial_values)
+        """Whether agents begin in agreement, with a common motion: then nothing steers them but to rest."""
+        own = any(self.protocol.own)
+        braked = own and any(chain[1] for agent in self.initial_state or () for chain in agent)
+        return not any(self.initial_values) and not braked
+
+    @property
+    def bounding_rho2(self) -> Fraction | None:
+        """That by which ``alpha rho2 kappa = 1``, if it is less."""
+        alpha, k = max(self.protocol.own), self.protocol.gain.pole
+        return Fraction(up(1 / (alpha * self.protocol.base.kappa), 4)) if alpha and alpha * k < 1 else None
 
     @property
     def gains_text(self) -> str:
@@ -202,7 +203,7 @@ class AgentsPart(AgentsAnswer):
         return f"{self.gains_text}, coupling {near(matrix.coupling)}", proof
 
     def __repr__(self) -> str:
-        size = "" if self.input is None else f", |u_k| <= {up(max(self.input), 4)}"
+        size = "" if self.input is None else f", {self.norm} <= {up(max(self.input), 4)}"
         return f"AgentsPart(order {self.order}, R = {float(self.decay):.6g}{size})"
 
 
@@ -297,7 +298,7 @@ def _input(part: AgentsPart, influence: Influence) -> tuple[Fraction, ...] | Non
     n, cap, base = part.order, part.protocol.gain_cap, part.protocol.base
     if part.initial_state is None or part.unbounded or not part.functions:
         return None
-    eta = part.first_gain if part.decay >= 2 * n or cap is None else cap
+    eta = part.protocol.first_gain if part.decay >= 2 * n or cap is None else cap
     pairs = [
         (one.inputs if V.matrix is not None else error_constants(part.structure, V), value)
         for one, V, value in zip(part.used, part.functions, part.initial_values, strict=True)
@@ -317,7 +318,7 @@ def _input(part: AgentsPart, influence: Influence) -> tuple[Fraction, ...] | Non
 
 def _damping(part: AgentsPart, influence: Influence) -> list[Fraction] | None:
     """Return bounds of ``eta f_2 |x_k'|`` of agents that meet at rest, else 0; None where none is proved."""
-    N, eta = part.structure.graph.n_nodes, part.first_gain
+    N, eta = part.structure.graph.n_nodes, part.protocol.first_gain
     if not any(part.protocol.own):
         return [Fraction(0)] * N
     known = [(V.deviation.agents, x) for V, x in zip(part.functions, part.initial_values, strict=True) if V.deviation]

@@ -6,14 +6,19 @@ from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from typing import Any, NamedTuple
 
+from lmi.exact.decimal_rounding import up
 from ptcc_certify.bounds.agents import States
-from ptcc_certify.bounds.formation import formation_of_biases
+from ptcc_certify.bounds.formation import GroupDrift, drift_until_deadline, formation_of_biases
+from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io.initial_state import as_states, random_states
 from ptcc_certify.graphs.rationals import shorten, writable
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.agents import DERIVATIVES, MOST_DIMENSION, PLURALS, Agents
+from ptcc_certify.protocols.gain import Gain
+from ptcc_certify.protocols.gain_limits import GainLimits
+from ptcc_certify.protocols.parameters import readable
 
 #: What is asked of single integrators alone.
 _NOT_OF_AGENTS = {
@@ -35,6 +40,21 @@ class Chains(NamedTuple):
     dimension: int
     offsets: tuple[tuple[Fraction, ...], ...]
     notes: tuple[str, ...] = ()
+
+
+def single_integrators(agents: Any, protocol: Any, limits: Any) -> tuple[Any, Any]:
+    """Return None for agents that are the paper's, and the limits of the gain with their cap, if they have one.
+
+    Under the sliding-mode protocol limits of the gain are those of agents of order n alone.
+    """
+    limits = tuple(limits) if isinstance(limits, Iterable) else (limits,)
+    if not isinstance(agents, Agents) or not agents.plain:
+        return agents, limits
+    if agents.cap is None:
+        return None, limits
+    if getattr(protocol, "reaching", None) is not None:
+        return agents, limits
+    return None, (GainLimits(gain_cap=agents.cap), *limits)
 
 
 def refuse_agents(agents: Any, protocol: Protocol, asked: dict[str, Any]) -> None:
@@ -71,7 +91,7 @@ def _entries(values: Any) -> list[Any]:
         return [values]
 
 
-def read_offsets(agents: Agents, graph: SignedDigraph, dimension: int) -> tuple[tuple[Fraction, ...], ...]:
+def read_offsets(agents: Agents, graph: SignedDigraph, dimension: int, gain: Gain) -> tuple[tuple[Fraction, ...], ...]:
     """Return ``h_k`` of every agent: those that are given, and the places that biases make.
 
     Raises
@@ -85,16 +105,39 @@ def read_offsets(agents: Agents, graph: SignedDigraph, dimension: int) -> tuple[
     if agents.biases is not None:
         made = formation_of_biases(graph, _states(agents.biases, graph, "biases", dimension))
         if made.offsets is None:
-            named = "; ".join(map(str, made.groups[:3])) + "; ..." * (len(made.groups) > 3)
             raise ParameterError(
-                f"biases fit no formation: leader group {named} per unit of the clock, without bound before T; "
+                f"biases fit no formation: they {_drift_text(made.groups, agents, gain)}; "
                 "change them so that their weighted signed sum over each leader group is 0"
             )
         rows = [[x + y for x, y in zip(*pair, strict=True)] for pair in zip(rows, made.offsets, strict=True)]
     return tuple(map(tuple, rows))
 
 
-def read_chains(agents: Agents, graph: SignedDigraph, x0: Any, v0: Any, derivatives: Any) -> Chains:
+def _drift_text(groups: Sequence[GroupDrift], agents: Agents, gain: Gain) -> str:
+    """Tell which leader groups biases drive, how fast, and how far: without bound before ``T``, or under a cap.
+
+    Of chains of integrators that are capped the drift at ``T`` is a number, rounded up, times ``K_1`` where that is a
+    gain to be designed.
+    """
+    n, cap, designed = agents.degree, agents.cap, not agents.of_paper
+    name = f"the {DERIVATIVES[n]}" if n < len(DERIVATIVES) else f"derivative {n}"
+    power = "g" if n == 1 else f"g^{n}"
+    unit = f" times K_1 {power}" if designed else " per unit of the clock"
+    if agents.cascade is not None:
+        unit, designed = f" times ({readable(agents.alpha)} g^2 + g')", False
+    far = None if cap is None or any(agents.coefficients) else drift_until_deadline(gain, cap, n)[1]
+    named = []
+    for group in groups[:3]:
+        most = "" if far is None else f"at most {'K_1 times ' * designed}{up(far * root_above(group.square))} until T"
+        named.append(f"{group}{unit}" + (f", {'positions ' * (n > 1)}{most}" if most else ""))
+    text = f"{'move' if n == 1 else f'change {name} of'} leader group {'; '.join(named)}{'; ...' * (len(groups) > 3)}"
+    text += f", {'positions ' * (n > 1)}without bound before T" * (cap is None)
+    return text + " (K_1 is the gain of relative positions, g the gain)" * designed
+
+
+def read_chains(
+    agents: Agents, graph: SignedDigraph, gain: Gain, x0: Any = None, v0: Any = None, derivatives: Any = None
+) -> Chains:
     """Return position, velocity and so on of every agent, the dimension of space, places, and remarks.
 
     Velocities that are not given are 0.
@@ -115,7 +158,7 @@ def read_chains(agents: Agents, graph: SignedDigraph, x0: Any, v0: Any, derivati
         if any(one is not None for one in given):
             raise ParameterError("v0 without x0: give the positions, too")
         d = _dimension_of(agents, graph)
-        return Chains(None, d, read_offsets(agents, graph, d))
+        return Chains(None, d, read_offsets(agents, graph, d, gain))
     positions = _states(x0, graph, "x0")
     d = len(positions[0])
     if d > MOST_DIMENSION:
@@ -132,7 +175,7 @@ def read_chains(agents: Agents, graph: SignedDigraph, x0: Any, v0: Any, derivati
     if missing and v0 is None and derivatives is None:
         notes.append(f"no {' and '.join(missing)} given: taken for 0")
     chains = tuple(tuple(tuple(columns[i][k][q] for i in range(n)) for q in range(d)) for k in range(graph.n_nodes))
-    return Chains(chains, d, read_offsets(agents, graph, d), tuple(notes))
+    return Chains(chains, d, read_offsets(agents, graph, d, gain), tuple(notes))
 
 
 def _dimension_of(agents: Agents, graph: SignedDigraph) -> int:

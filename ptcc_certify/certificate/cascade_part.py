@@ -227,7 +227,7 @@ class CascadePart(AgentsAnswer):
         )
 
     def __repr__(self) -> str:
-        size = "" if self.input is None else f", |u_k| <= {up(max(self.input), 4)}"
+        size = "" if self.input is None else f", {self.norm} <= {up(max(self.input), 4)}"
         return f"CascadePart(alpha = {near(self.alpha)}{size})"
 
 

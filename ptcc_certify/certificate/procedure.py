@@ -8,7 +8,7 @@ the check; a simulation corroborates and never proves.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import partial
@@ -35,7 +35,7 @@ from ptcc_certify.bounds.longest_delay import longest_delay
 from ptcc_certify.bounds.small_delays import SmallDelayBounds
 from ptcc_certify.bounds.tracking import Tracking, bound_tracking
 from ptcc_certify.certificate.agents_part import prove_agents
-from ptcc_certify.certificate.agents_request import Chains, read_chains, refuse_agents
+from ptcc_certify.certificate.agents_request import Chains, read_chains, refuse_agents, single_integrators
 from ptcc_certify.certificate.cascade_part import prove_cascade
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.certificate_data import Observations
@@ -251,6 +251,7 @@ def certify(
         "scenario": scenario,
     }
     options["origins"] = origins_of(graph, x0, sigma0) | dict(origins or {})
+    agents, options["limits"] = single_integrators(agents, protocol, limits)
     of_agents = _agents_options(
         agents, protocol, {**options, "sigma0": sigma0, "disturbance": disturbance}, v0, derivatives
     )
@@ -263,14 +264,12 @@ def certify(
         return certify_family(family, protocol, x0, **{name: options[name] for name in _OF_FAMILIES})
     if options.pop("signal") != "any":
         raise ParameterError("signal is for families of graphs, which change; this is one graph: leave it out")
-    limits, progress = list(limits) if isinstance(limits, Iterable) else [limits], listener(progress)
-    options["limits"] = limits
-    graph = as_graph(graph, orientation)
-    refuse(graph, protocol, method, {"sigma0": sigma0, "disturbance": disturbance}, [*limits, delta, noise])
+    progress, graph = listener(progress), as_graph(graph, orientation)
+    refuse(graph, protocol, method, {"sigma0": sigma0, "disturbance": disturbance}, [*options["limits"], delta, noise])
     structure = analyse(graph)
     request = read_request(structure, protocol, options)
     refuse_beside(structure, protocol, request)
-    chains = None if of_agents is None else read_chains(of_agents, graph, x0, v0, derivatives)
+    chains = None if of_agents is None else read_chains(of_agents, graph, protocol.gain, x0, v0, derivatives)
     initial_state = None if x0 is None or chains else read_initial_state(structure, x0, "x0")
     manifold, reaching = read_sliding_variable(structure, protocol, sigma0)
     case = Case(structure, protocol, request, initial_state, manifold, progress)
@@ -288,7 +287,7 @@ def certify(
 
 def _agents_options(agents: Any, protocol: Protocol, asked: dict[str, Any], v0: Any, derivatives: Any) -> Agents | None:
     """Return agents of order n, None for single integrators, or refuse what is asked of them."""
-    if agents is None or (isinstance(agents, Agents) and agents.plain):
+    if agents is None:
         if v0 is not None or derivatives is not None:
             raise ParameterError("v0: single integrators have no velocity to begin with; give agents=Agents(order=2)")
         return None

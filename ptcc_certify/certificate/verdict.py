@@ -287,9 +287,7 @@ def judge_input(certificate: Content, most: Fraction) -> Answer:
     """Tell whether every input is proved to stay within so much, under all that was asked for besides."""
     effort, what = certificate.effort, f"|u_k| <= {near(most, 12)}"
     if certificate.agents is not None:
-        proved = certificate.agents.input
-        least_bound = "no bound is proved" if proved is None else f"proved: {up(max(proved))}"
-        return Answer(MET, what) if proved is not None and max(proved) <= most else Answer(OPEN, what, least_bound)
+        return certificate.agents.judge_input(most)
     if certificate.constant:
         return Answer(MET, what)
     beside = (certificate.late, certificate.tracking, certificate.request.leaders)

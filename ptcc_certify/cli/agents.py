@@ -63,7 +63,13 @@ dimension_option = click.option(
 
 
 def agents_of(options: Options) -> Agents | None:
-    """Return the agents that the options tell; None if they tell none."""
+    """Return agents of order n, or in a formation; None for single integrators, which the plain options tell."""
+    agents = _named_agents(options)
+    return None if agents is None or agents.plain else agents
+
+
+def _named_agents(options: Options) -> Agents | None:
+    """Return the agents that the options name, single integrators among them; None if they name none."""
     from ptcc_certify.protocols.agents import Agents
 
     kind = options["agents"]
@@ -85,6 +91,10 @@ def agents_of(options: Options) -> Agents | None:
         name: None if options[name] is None else exact_number(options[name], flag_of(name))
         for name in ("drag", "rest", "cascade", "decay")
     }
+    for least, (name, quantity) in enumerate((("v0", "velocity"), ("a0", "acceleration")), start=2):
+        if options[name] is not None and options[name].strip() != "0" and int(order) < least:
+            why = f"agents of order {order} have no {quantity} to begin with"
+            raise ParameterError(f"{flag_of(name)}: {why}; leave it out, or give --agents {least}")
     return Agents(
         int(order), plant, offsets=options["offsets"], biases=options["biases"], gain_cap=options["gain_cap"], **numbers
     )
@@ -108,10 +118,6 @@ def agents_keywords(options: Options, graph: SignedDigraph) -> dict[str, Any]:
         None if text is None or text.strip() == "0" else read_vectors(text, [options["seed"], i + 2], graph, d, flag)
         for i, (text, flag) in enumerate(zip(given, ("--v0", "--a0"), strict=True))
     ]
-    for i, (flag, name) in enumerate((("--v0", "velocity"), ("--a0", "acceleration"))):
-        if later[i] is not None and agents.degree < i + 2:
-            why = f"agents of order {agents.degree} have no {name} to begin with"
-            raise ParameterError(f"{flag}: {why}; leave it out, or give --agents {i + 2}")
     while later and later[-1] is None:
         later.pop()
     x0 = read_vectors(options["x0"], options["seed"], graph, d, "--x0")
@@ -131,9 +137,9 @@ def _refuse_unproved(options: Options) -> None:
 
 def refuse_dimension(options: Options, command: str) -> None:
     """Refuse vectors where there are no agents of order n."""
-    if options["agents"] is None and options["dimension"] not in (None, 1):
-        why = f"ptcc {command} takes scalar agents, unless --agents tells others"
-        mend = "certify components one by one, or all by certify_vectors(graph, protocol, x0) in Python"
+    if options["dimension"] not in (None, 1) and agents_of(options) is None:
+        why = f"ptcc {command} takes single integrators of one component"
+        mend = "what is proved of one holds for each: leave it out, or use certify_vectors(graph, protocol, x0) in Python"
         raise ParameterError(f"--dimension: {why}; {mend}")
 
 

@@ -65,8 +65,7 @@ def design(graph: str, curve: str | None, output: str | None, as_json: bool, scr
 
     Exit code 0: met, with a certificate. 3: no gains of this protocol can, proved. 4: not with this certificate.
     """
-    agents = agents_of(options)
-    special = agents is not None and not agents.plain
+    special = agents_of(options) is not None
     if not special:
         refuse_of_agents()
     _refuse_incomplete(options, special)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _SLIDING = ("mu1", "mu2", "mu3", "delta")
 #: Options of this command that need ``--agents``, and those that say what the agents are and where they begin.
 _OWN = ("kind", *_SLIDING, "x0", "seed", "gain_cap", "dimension")
-_OF_STATES = ("plant", "drag", "cascade", "x0", "v0", "a0", "offsets", "biases", "dimension")
+_OF_STATES = ("plant", "drag", "rest", "cascade", "x0", "v0", "a0", "offsets", "biases", "dimension")
 #: What is searched: the gains that a deadline ``T = 1`` would have, whose deadline is then sought.
 _TEMPLATE = {"T": None, "T_r": None, "T_s": None, "rho1": "0.001", "rho2": "1", "kappa": "1"}
 

@@ -150,7 +150,8 @@ def _of_certificate(
             raise ParameterError(f"--x0, or --seed, is for what holds no initial state; {mend}")
         what = what or certificate.main_figure
         of_these = OF_AGENTS if agents is None or agents.dimension == 2 else ("motion",)
-        drawn, others = ((*of_these, *_SHARED), OF_A_RUN) if of_agents else (OF_A_RUN, OF_AGENTS)
+        own = tuple({certificate.main_figure} & set(OF_A_CERTIFICATE))  # of late messages, or of moving leaders
+        drawn, others = ((*of_these, *_SHARED), OF_A_RUN) if of_agents else ((*own, *OF_A_RUN), OF_AGENTS)
         if what in others and what not in drawn:
             raise ParameterError(f"--what {what} is not drawn of {path}; ask for --what {' or '.join(drawn)}")
         if of_agents or what not in OF_A_RUN:

@@ -97,8 +97,7 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
     suffix, vectors = Path(output or "").suffix.lower(), options["dimension"] > 1
     if suffix not in (*FIGURES, *_TABLES):
         raise ParameterError(f"{output}: CSV is written to .csv, figures to {', '.join(FIGURES)}; choose one of these")
-    several = agents_of(options)
-    special = several is not None and not several.plain
+    special = agents_of(options) is not None
     if suffix in FIGURES and vectors and not special:
         raise ParameterError("a figure shows one component per agent; leave out --dimension or write CSV")
     refuse_output(output)

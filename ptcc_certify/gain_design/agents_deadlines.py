@@ -46,12 +46,12 @@ class Candidate:
     @cached_property
     def peak(self) -> Fraction | None:
         """The largest bound of an input; None if none is proved."""
-        return None if self.part.input is None else max(self.part.input)
+        return None if self.part.inputs is None else max(self.part.inputs)
 
     @cached_property
     def residual(self) -> Fraction | None:
         """The largest deviation of a position at the deadline; None if none is proved."""
-        if self.part.protocol.gain_cap is None:
+        if self.part.protocol.gain_cap is None or self.part.alone:
             return Fraction(0)
         return None if self.part.residual is None else max(row[0] for row in self.part.residual.agents)
 

@@ -4,8 +4,8 @@ Of chains of integrators gain and bound scale with the deadline alone: the Lyapu
 gains ``K`` up to the decay ``R``, which is least at ``R = 2 n``, where the input is bounded; multiplying ``rho1`` and
 ``rho2`` by one number changes ``K`` and nothing else; and a larger share ``rho1 T/(rho2 kappa)`` of the constant
 part of the gain raised the bound wherever it was tried. So the deadline is sought, with ``rho1 T``, ``rho2 kappa`` and
-``R`` as they are: :mod:`ptcc_certify.gain_design.agents_deadlines`. Of the cascade ``alpha`` takes the place of ``R``,
-and ``rho2 kappa`` is raised, where the input is not bounded by the one that is given.
+``R`` as they are: :mod:`ptcc_certify.gain_design.agents_deadlines`. Of the cascade ``alpha`` takes the place of ``R``.
+There, and where agents meet at rest, ``rho2 kappa`` is raised if the input is not bounded by the one that is given.
 
 Deadlines that were not tried are excluded by nothing but what holds for all gains of the protocol:
 :mod:`ptcc_certify.bounds.shortest_time`.
@@ -58,8 +58,8 @@ def design_agents(
     graph : graph-like
         In whatever form :func:`ptcc_certify.as_graph` takes.
     agents : Agents
-        Of order n, or in a formation; their ``decay`` is ``2 n`` unless it is given. Of the cascade ``rho2`` is raised
-        where that of ``protocol`` does not bound the input.
+        Of order n, or in a formation; their ``decay`` is ``2 n`` unless it is given. Of the cascade, and of agents that
+        meet at rest, ``rho2`` is raised where that of ``protocol`` does not bound the input.
     x0 : state-like, or N rows of coordinates
         Initial positions, in node order or by label, in units of length.
     v0 : state-like, optional
@@ -86,7 +86,7 @@ def design_agents(
     ------
     ParameterError
         A number that is not positive, states that do not fit, single integrators without a formation, or something
-        that is not searched: agents at rest, a decay below ``2 n``, a gain cap without a residual.
+        that is not searched: a decay below ``2 n``, a gain cap without a residual.
 
     References
     ----------
@@ -99,7 +99,7 @@ def design_agents(
     >>> start = {"a": [0, 3], "b": [5, 1], "c": [-2, -4]}
     >>> answer = design_agents(trio, square, start, max_input=5)
     >>> answer.verdict, answer.certificate.assessment.text.split(";")[0]
-    ('met', 'met: |u_k| <= 5')
+    ('met', 'met: ||u_k|| <= 5')
     >>> design_agents(trio, square, start, max_input=5, deadline=1).verdict
     'infeasible'
     """
@@ -144,8 +144,6 @@ def _refuse(agents: Any, request: AgentsRequest) -> None:
         raise ParameterError(f"agents = {shorten(repr(agents))}: give Agents(order=2) for double integrators")
     if agents.plain:
         raise ParameterError("agents: these are single integrators; design(graph, ..) finds their gains")
-    if agents.rest is not None:
-        raise ParameterError("rest: no number is proved of the input of agents that meet at rest; leave it out")
     if agents.cascade is None and agents.decay_rate < 2 * agents.degree and agents.cap is None:
         raise ParameterError(
             f"decay: below 2 n = {2 * agents.degree} no input is proved to be bounded; leave it out, or cap the gain"
@@ -183,13 +181,17 @@ def _least_time(base: Certificate, request: AgentsRequest) -> Fraction | None:
 
 def _unusable(base: Certificate, part: AgentsAnswer, request: AgentsRequest) -> str | None:
     """Tell what is missing, whatever the deadline; None if nothing is."""
-    if not base.graph.n_edges:
-        return "no agent listens to another, so that there is nothing to bound"
-    if not part.functions:
+    if part.grows:
+        least = up(1 / part.protocol.gain.pole, 4)
+        return f"no agent listens to another, and the input grows without limit: give cascade {least} or more"
+    if not part.functions and not part.alone:
         return base.notes[0] if base.notes else "no decay was proved"
-    if part.input is None:
+    if part.unbounded:
+        at = f"at T = {short_exact(part.protocol.gain.T)}"
+        return f"the input is not proved bounded {at}: {', '.join(why for why, _ in part.unbounded)}"
+    if part.inputs is None:
         return "no input of single agents is proved for a graph of this size"
-    if part.protocol.gain_cap is not None and part.residual is None:
+    if part.protocol.gain_cap is not None and part.residual is None and not part.alone:
         return "no deviation of single agents is proved for a graph of this size"
     reaching, forces = part.protocol.base.reaching, abs(part.protocol.plant[0])
     terms = Fraction(0) if reaching is None else reaching.mu1 * part.dimension
@@ -213,14 +215,15 @@ def _with(blank: AgentsDesign, candidate: Candidate, base: Certificate, again: C
         if report is None or not report.accepted:
             why = "" if report is None else f" {report.rejected}: {report.reason}"
             return replace(blank, binding=f"the independent check does not accept{why}")
-    peak, residual, inputs = own.peak, own.residual, own.part.input
+    peak, residual, inputs = own.peak, own.residual, own.part.inputs
     assert peak is not None and residual is not None and inputs is not None
     label = again.graph.labels[inputs.index(peak)]
     binding = f"the bound of the input of agent {shorten(label)}, {up(100 * peak / asked.max_input, 4)} % of the limit"
     if asked.residual is not None and residual / asked.residual > peak / asked.max_input:
         binding = f"what the gain cap leaves, {up(100 * residual / asked.residual, 4)} % of what is allowed"
     if not peak:
-        binding = "nothing binds: agents are in place and need no input"
+        alone = "no agent listens to another, and none needs an input: every deadline is met"
+        binding = f"nothing binds: {alone if own.part.alone else 'agents are in place and need no input'}"
     return replace(
         blank,
         verdict=MET,

@@ -183,9 +183,11 @@ give 4, from which on the input is bounded
 
     @property
     def plain(self) -> bool:
-        """Whether these are the paper's agents, ``x' = u``, of which the plain certificate tells everything."""
-        formation = self.offsets is not None or self.biases is not None
-        return self.of_paper and not formation and self.cap is None
+        """Whether these are the paper's agents, ``x' = u``, of which the plain certificate tells everything.
+
+        A gain cap may limit their gain: the plain certificate counts it in as ``limits``, under the nominal protocol.
+        """
+        return self.of_paper and self.offsets is None and self.biases is None
 
     @property
     def of_paper(self) -> bool:
@@ -314,6 +316,16 @@ class AgentsProtocol:
     def shrinking(self, eta: np.ndarray) -> np.ndarray:
         """Return ``theta = (1 - rho1/eta)^2/k``, minus the derivative of ``1/eta``, while the gain is not capped."""
         return (1 - float(self.gain.rho1) / eta) ** 2 / float(self.gain.pole)
+
+    @property
+    def first_gain(self) -> Fraction:
+        """``eta(0)``."""
+        return self.gain.first if self.gain_cap is None else min(self.gain.first, self.gain_cap)
+
+    @property
+    def gains_at_first(self) -> tuple[Fraction, ...]:
+        """``K`` at time 0."""
+        return self.gains
 
     def gains_at(self, theta: Any) -> tuple[Any, ...]:
         """Return ``K`` where ``d(1/eta)/dt = -theta``: here the same at all times."""

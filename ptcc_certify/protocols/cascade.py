@@ -47,6 +47,11 @@ class CascadeProtocol(AgentsProtocol):
         """``alpha``."""
         return self.own[1]
 
+    @property
+    def gains_at_first(self) -> tuple[Fraction, ...]:
+        """``(alpha + theta, 1)`` at time 0."""
+        return self.alpha + self.gain.first_theta, Fraction(1)
+
     def gains_at(self, theta: Any) -> tuple[Any, ...]:
         """Return ``(alpha + theta, 1)``."""
         return float(self.alpha) + theta, 1.0

@@ -89,6 +89,11 @@ class Gain(Parameters):
         """The gain at 0, ``rho1 + rho2 kappa/T``."""
         return self.rho1 + self.pole / self.T
 
+    @property
+    def first_theta(self) -> Fraction:
+        """``gain'/gain^2 = (1 - rho1/gain)^2/(rho2 kappa)`` at 0."""
+        return (1 - self.rho1 / self.first) ** 2 / self.pole
+
     # ------------------------------------------------------------------ numbers
 
     def __call__(self, t: ArrayLike) -> np.ndarray:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lmi.exact.decimal_rounding import near, up
+from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.protocols.agents import DERIVATIVES, PLURALS, plant_text
-from ptcc_certify.report.text_layout import TEXT, columns, short_number, shorten_label, shorten_list
+from ptcc_certify.report.text_layout import TEXT, columns, short_number, shorten_label, shorten_list, unbroken
 
 if TYPE_CHECKING:
     from ptcc_certify.bounds.agent_motion import Interval
@@ -36,7 +37,7 @@ def agents_text(part: AgentsAnswer) -> str:
         *([] if protocol.gain_cap is None else [f"gain at most {near(protocol.gain_cap)}"]),
     ]
     driven = part.functions or not part.structure.graph.n_edges  # else no gains are proved
-    return "; ".join([*texts, *[f"u = {protocol.law()}"] * bool(driven)])
+    return "; ".join([*texts, *[unbroken(f"u = {protocol.law()}")] * bool(driven)])
 
 
 def answers(part: AgentsAnswer) -> Iterator[tuple[str, str]]:
@@ -47,6 +48,8 @@ def answers(part: AgentsAnswer) -> Iterator[tuple[str, str]]:
         if part.structure.graph.n_edges == 0:
             alone = "comes to rest" if part.derivatives_agree and any(part.protocol.own) else "moves"
             yield "error", f"none: no agent listens to another, each {alone} by itself"
+            if part.inputs is not None or part.grows:
+                yield _input_line(part)
         return
     yield "error", _error_text(part)
     yield _input_line(part)
@@ -55,6 +58,8 @@ def answers(part: AgentsAnswer) -> Iterator[tuple[str, str]]:
 def _final_lines(part: AgentsAnswer, width: int) -> Iterator[tuple[str, str]]:
     """Tell positions at ``T``, and velocities and so on unless all are 0."""
     if part.final_state is None:
+        if part.initial_state is not None and part.structure.graph.n_nodes > EXACT_NODES:
+            yield _ENDS[0], f"not proved of more than {EXACT_NODES} agents of order n"
         return
     labels = part.structure.graph.labels
     rest = not part.moving and part.settled > 1
@@ -108,14 +113,17 @@ def _error_text(part: AgentsAnswer) -> str:
 
 def _input_line(part: AgentsAnswer) -> tuple[str, str]:
     """Tell whether the input is bounded, its proved size, and whose it is."""
-    if part.input is None:
+    if part.grows:
+        return "INPUT", "NOT BOUNDED: it grows without limit"
+    if part.inputs is None:
         if part.unbounded:
             return "INPUT", f"NOT CERTIFIED BOUNDED: {', '.join(why for why, _ in part.unbounded)}"
         return "input", "bounded; no number is proved" + " without x(0)" * (part.initial_state is None)
-    largest = max(part.input)
-    label = part.structure.graph.labels[part.input.index(largest)]
-    norm = "|u_k|" if part.dimension == 1 else "||u_k||"
-    text = f"bounded; {norm} <= {up(largest, 4)}"
+    largest = max(part.inputs)
+    if not largest:
+        return "input", "none: u = 0"
+    label = part.structure.graph.labels[part.inputs.index(largest)]
+    text = f"bounded; {part.norm} <= {up(largest, 4)}"
     agent = f", the largest of agent {shorten_label(label, 22)}"
     return "input", text + agent * (columns(text + agent) <= TEXT)
 
@@ -137,7 +145,7 @@ def long_lines(part: AgentsAnswer) -> Iterator[tuple[str, str]]:
                 yield "deviation" if i == 0 else "", f"{name}: from the common motion at most {bounds}"
     if part.residual is not None:
         yield "left", _error_text(part)
-    if part.functions:
+    if part.functions or part.inputs is not None or part.grows:
         yield _input_line(part)
 
 

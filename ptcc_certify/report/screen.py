@@ -105,8 +105,6 @@ def summary_lines(certificate: Certificate, name: str, origins: Mapping[str, str
     claims = _claim_texts(
         certificate.structure, certificate.claims, _when(certificate, f"at T = {near(p.T)}"), whatever
     )
-    if len(certificate.claims) > 1 and (certificate.late or certificate.tracking):
-        claims.append(whatever.removeprefix(", "))
     drawn = _is_set_asked(certificate)
     entries = [
         *graph_entries(certificate.structure, name),
@@ -129,7 +127,7 @@ def structure_summary(structure: Structure, name: str) -> list[str]:
         for head, text in leader_lines(structure, 3, 20)
     )
     told = [("followers", shorten_list(followers, TEXT))] if followers else []
-    return format_lines([*graph_entries(structure, name), *leaders, *told, *_headed("claim", claims)])
+    return wrap_lines(format_lines([*graph_entries(structure, name), *leaders, *told, *_headed("claim", claims)]))
 
 
 def check_summary(path: str, document: Mapping[str, Any], report: CheckReport) -> list[str]:
@@ -185,8 +183,7 @@ def _protocol_text(certificate: Certificate, origins: Mapping[str, str]) -> str:
         begin = [initial_states_text(certificate.initial_set)]
     if certificate.sigma0 is not None:
         begin += ["sigma(0) 0" if certificate.direct else f"sigma(0) {origins.get('sigma(0)', 'given')}"]
-    lines = wrap_text("; ".join([_gains_text(certificate.protocol), ", ".join(begin) or "no x(0)"]))
-    return " ".join(lines[:2]) if len(lines) <= 2 else f"{lines[0]} {shorten_text(f'{lines[1]} ...', TEXT)}"
+    return "; ".join([_gains_text(certificate.protocol), ", ".join(begin) or "no x(0)"])
 
 
 def _origin(part: AgentsAnswer, i: int) -> str:
@@ -206,20 +203,21 @@ def _headed(head: str, texts: Iterable[str]) -> Lines:
 
 
 def _claim_texts(structure: Structure, claims: Sequence[Claim], when: str = "", also: str = "") -> list[str]:
-    """Name the sharpest behaviour of every component, of the largest four of many; ``also`` where there is room."""
+    """Name the sharpest behaviour of every component, of the largest four of many, and under what ``also``."""
     sharpest = [claim.sharpest for claim in claims]
     if len(claims) == 1:
         (claim,) = claims
         corollary = f", Corollary {claim.corollaries[-1]}" if claim.special else ""
         texts = [f"{sharpest[0]}{when}{also} (Theorem {claim.theorem}{more})" for more in (corollary, "")]
-        return [texts[0] if len(texts[0]) <= TEXT else shorten_text(texts[1], TEXT)]
+        return [texts[0] if len(texts[0]) <= TEXT else texts[1]]
     components, labels, lines = structure.components, structure.graph.labels, []
     for k in sorted(range(len(claims)), key=lambda k: -len(components[k].nodes))[:4]:
-        text = shorten_text(f"{sharpest[k]}{when} (Theorem {claims[k].theorem})", TEXT - 16)
+        text = f"{sharpest[k]}{when} (Theorem {claims[k].theorem})"
         nodes = components[k].nodes
         names = [printable(labels[v]) for v in nodes[:TEXT]]
-        lines.append(f"{shorten_list(names, TEXT - len(text) - 2, len(nodes))}: {text}")
-    return lines + [f"... {len(claims)} components in all"] * (len(claims) > 4)
+        lines.append(f"{shorten_list(names, max(TEXT - len(text) - 2, 14), len(nodes))}: {text}")
+    lines += [f"... {len(claims)} components in all"] * (len(claims) > 4)
+    return lines + [also.removeprefix(", ")] * bool(also)
 
 
 def _short_final_state(certificate: Certificate) -> Lines:

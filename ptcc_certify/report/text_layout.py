@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import unicodedata
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
@@ -10,6 +11,8 @@ from fractions import Fraction
 WIDTH, HEAD = 80, 11
 #: Columns of the text beside the head.
 TEXT = WIDTH - HEAD
+#: A blank at which no line is broken; printed as a blank.
+NO_BREAK = "\N{NO-BREAK SPACE}"
 
 
 def columns(text: str) -> int:
@@ -119,6 +122,8 @@ def wrap_text(text: str, width: int = TEXT) -> list[str]:
     --------
     >>> wrap_text("the state of every agent", 10)
     ['the state', 'of every', 'agent']
+    >>> wrap_text(unbroken("g e' - 3 g x'"), 10)
+    ["g e'", "- 3 g x'"]
     """
     lines, line = [], ""
     for word in text.split(" "):
@@ -132,7 +137,18 @@ def wrap_text(text: str, width: int = TEXT) -> list[str]:
             lines.append(head)
             word = word[len(head) :]
         line = word
-    return [*lines, line]
+    return [one.replace(NO_BREAK, " ") for one in (*lines, line)]
+
+
+def unbroken(formula: str) -> str:
+    """Return a formula whose lines may only be broken before a sign between two terms.
+
+    Examples
+    --------
+    >>> [term.replace(NO_BREAK, "_") for term in unbroken("3 g e - 2 g x'").split(" ")]
+    ['3_g_e', "-_2_g_x'"]
+    """
+    return re.sub(r" (?![+-] )", NO_BREAK, formula)
 
 
 def wrap_lines(lines: Iterable[str], width: int = WIDTH) -> list[str]:
@@ -177,7 +193,7 @@ def wrap_command(words: Sequence[str], width: int = WIDTH) -> list[str]:
 
 def format_lines(entries: Iterable[tuple[str, str]]) -> list[str]:
     """Write each head with its text as one line, whatever its length."""
-    return [f"{head:<{HEAD - 1}} {printable(text)}" for head, text in entries]
+    return [f"{head:<{HEAD - 1}} {NO_BREAK.join(map(printable, text.split(NO_BREAK)))}" for head, text in entries]
 
 
 def _cut(text: str, width: int) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from ptcc_certify.bounds.cascade import drive_integral, first_theta, input_from, input_is_bounded
+from ptcc_certify.bounds.cascade import drive_integral, input_from, input_is_bounded
 from ptcc_certify.protocols.gain import Gain
 
 F = Fraction
@@ -84,7 +84,7 @@ def test_the_input_of_one_agent_stays_within_its_bound_and_comes_near(first: int
         pull = 2 / gain.pole * F(int(rng.integers(100, 500)), 100)
         alpha = 1 / gain.pole * F(int(rng.integers(101, 900)), 100)
         x, v = (F(int(n), 100) for n in rng.integers(-500, 501, 2))
-        combined = abs(v / gain.first + (alpha + first_theta(gain)) * x)
+        combined = abs(v / gain.first + (alpha + gain.first_theta) * x)
         (bound,) = input_from(gain, alpha, 2 * pull, [pull**2], abs(x), combined, [abs(v)])
         ratios.append(largest_input(gain, alpha, pull, x, v) / float(bound))
     assert max(ratios) <= 1 + 1e-9 and max(ratios) > 0.9 and np.median(ratios) > 0.3, np.quantile(ratios, [0, 0.5, 1])

@@ -13,15 +13,16 @@ from agent_cases import agent_case
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
+from ptcc_certify.certificate.answer import MET, OPEN, REFUTED
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.certificate.request import Expectations
-from ptcc_certify.certificate.verdict import MET
 from ptcc_certify.checker import check
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.agents import Agents
+from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.report.screen import summary_lines
 
 TEAM = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("c", "a", -1), ("c", "d", 1), ("d", "c", 1)])
@@ -128,6 +129,22 @@ def test_one_integrator_is_the_plain_certificate():
     assert same == plain and same.agents is None and "agents" not in same.document
 
 
+def test_one_integrator_under_a_gain_cap_is_the_plain_certificate_under_this_limit():
+    plain = certify(TEAM, NOMINAL, [5, 2, 4, -1], simulation=False, limits=GainLimits(gain_cap=4))
+    same = certify(TEAM, NOMINAL, [5, 2, 4, -1], simulation=False, agents=Agents(1, gain_cap=4))
+    assert same == plain and same.agents is None and same.to_dict()["digest"] == plain.to_dict()["digest"]
+    both = certify(TEAM, NOMINAL, [5, 2, 4, -1], simulation=False, agents=Agents(1, gain_cap=4), limits=GainLimits(9))
+    assert [limit.gain_cap for limit in both.limits] == [4, 9]
+    with pytest.raises(ParameterError, match="no velocity"):
+        certify(TEAM, NOMINAL, [5, 2, 4, -1], agents=Agents(1, gain_cap=4), v0=[1, 0, 0, 0])
+
+
+def test_one_integrator_under_a_gain_cap_and_disturbances_is_still_one_of_order_one():
+    robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
+    part = certify(TEAM, robust, [5, 2, 4, -1], simulation=False, agents=Agents(1, gain_cap=40)).agents
+    assert part is not None and part.protocol.gain_cap == 40
+
+
 @pytest.mark.parametrize("graph", [TEAM, ENEMIES, CAMPS], ids=["team", "enemies", "camps"])
 def test_single_integrators_in_a_formation_have_the_plain_bounds_about_their_places(graph: SignedDigraph):
     """Order 1 of the agents is the paper's protocol: gains, final states and bounds are those of ``x - h``."""
@@ -163,6 +180,70 @@ def test_single_integrators_run_the_equation_of_the_plain_protocol():
 def test_a_decay_of_single_integrators_is_not_dropped():
     part = made(PAIR, NOMINAL, [3, 1], Agents(order=1, decay=6)).agents
     assert part is not None and part.decay == 6
+
+
+STARTED = {
+    "designed": (Agents(order=2), NOMINAL),
+    "of order 3 with drag": (Agents(order=3, drag="0.3"), NOMINAL),
+    "with forces, in places": (Agents(plant=[2, 1], offsets=[[1, 0], [0, 1], [3, 3], [2, 0]]), NOMINAL),
+    "at rest": (Agents(order=2, rest=2, offsets=[[1, 0], [0, 1], [3, 3], [2, 0]]), NOMINAL),
+    "cascade": (Agents(order=2, cascade=3, offsets=[[1, 0], [0, 1], [3, 3], [2, 0]]), NOMINAL),
+    "capped": (Agents(order=2, gain_cap=2), NOMINAL),
+    "capped from the start": (Agents(order=2, gain_cap="0.5"), NOMINAL),
+    "disturbed": (Agents(order=2), SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1)),
+}
+
+
+@pytest.mark.parametrize("kind", STARTED)
+def test_a_limit_below_the_input_at_time_0_is_refuted_and_one_above_it_is_not(kind: str):
+    import casadi as ca
+
+    agents, base = STARTED[kind]
+    x0, more = [[5, 2], [2, 1], [4, -1], [-1, 3]], [[[1, 0], [0, 2], [0, 1], [-2, 1]]] * (agents.degree - 1)
+    certificate = certify(TEAM, base, x0, agents=agents, derivatives=more, simulation=False, method="paper")
+    part, t = certificate.agents, ca.SX.sym("t")
+    assert part is not None
+    columns = []
+    for q in range(2):
+        states = [ca.SX(np.array([row[q] for row in rows], dtype=float)) for rows in (x0, *more)]
+        columns.append(np.array(ca.Function("u", [t], [part.protocol.input(TEAM, states, t, q)])(0)).ravel())
+    largest = np.hypot(*columns).max()
+    below, above = (part.judge_input(Fraction(float(largest * x))) for x in (1 - 1e-9, 1 + 1e-9))
+    assert below.status == REFUTED and "at the start, proved" in below.why and below.what.startswith("||u_k|| <=")
+    assert float(below.why.split()[4]) <= largest and above.status != REFUTED
+    asked = certificate.changed(expectations=Expectations(max_input=Fraction(1)))
+    assert asked.assessment.exit_code == 3 and check(asked.to_dict()).accepted
+
+
+ALONE = SignedDigraph.from_edges([], ["p", "q"])
+
+
+@pytest.mark.parametrize(
+    ("agents", "status", "exact"),
+    [
+        (Agents(order=2), MET, 0),
+        (Agents(order=3, drag=-1), MET, 0),
+        (Agents(order=2, cascade="0.5"), MET, 3),  # alpha rho2 kappa = 1, eta(0) = 2, |v(0)| = 3
+        (Agents(order=2, rest=2), MET, 12),
+        (Agents(order=2, rest=2, drag=1), MET, 12),
+        (Agents(order=2, rest=2, drag=-2), MET, 12),
+        (Agents(order=2, rest="0.6", drag=-2), OPEN, None),
+        (Agents(order=2, cascade="0.4"), REFUTED, None),
+        (Agents(order=2, rest="0.4"), REFUTED, None),
+        (Agents(plant=[2, 1], offsets=[3, -4]), MET, 8),
+    ],
+)
+def test_the_input_of_agents_that_listen_to_nobody_is_known(agents: Agents, status: str, exact: int | None):
+    base = NominalProtocol(T=2, rho1=1, rho2=1, kappa=2)
+    part = certify(ALONE, base, [5, 2], agents=agents, v0=[3, -2], simulation=False).agents
+    assert part is not None
+    assert part.judge_input(Fraction(10**9 if exact is None else exact)).status == status
+    assert part.inputs is None or max(part.inputs) == exact
+    if exact is None:
+        return
+    assert not exact or part.judge_input(Fraction(exact) - Fraction(1, 10**30)).status == REFUTED
+    run = part.simulate()
+    assert np.nanmax(np.abs(run.input)) <= exact * (1 + 1e-6)
 
 
 def test_gains_come_near_those_in_closed_form_for_a_small_constant_gain():

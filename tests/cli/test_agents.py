@@ -35,6 +35,18 @@ def test_a_certificate_of_double_integrators_is_written_checked_drawn_and_shown(
     assert refused.code == 2 and "no statement in LaTeX" in refused.err
 
 
+def test_single_integrators_under_a_gain_cap_are_those_of_the_plain_command():
+    case = (*CERTIFY, "--gain-cap", "4")
+    assert ptcc(*case, "--agents", "integrator").out == ptcc(*case).out
+
+
+def test_a_limit_of_the_input_that_is_exceeded_at_first_is_refuted():
+    done = ptcc(*CERTIFY, "--agents", "double-integrator", "--max-input", "1")
+    assert done.code == 3 and "refuted: |u_k| <= 1 (it is up to" in done.out and "at the start, proved" in done.out
+    told = ptcc(*CERTIFY, "--agents", "double-integrator", "--dimension", "2", "--max-input", "1e9")
+    assert told.code == 0 and "met: ||u_k|| <= 1000000000" in told.out
+
+
 def test_a_scenario_tells_the_agents(tmp_path: Path):
     (tmp_path / "v.csv").write_text("node,x\n" + "".join(f"{k},{k}\n" for k in range(1, 7)))
     text = '[graph]\nfile = "fig1a"\n[agents]\nkind = "double-integrator"\ndrag = 0.2\nv0 = "v.csv"\n'
@@ -50,7 +62,9 @@ def test_a_scenario_tells_the_agents(tmp_path: Path):
     [
         (("--agents", "tricycle"), '--agents: "tricycle" is unknown; one of integrator, double-integrator'),
         (("--v0", "1,2,3,4,5,6"), "--v0: is for agents of order n; give --agents double-integrator"),
-        (("--dimension", "2"), "ptcc certify takes scalar agents, unless --agents tells others"),
+        (("--dimension", "2"), "ptcc certify takes single integrators of one component"),
+        (("--agents", "integrator", "--dimension", "2"), "ptcc certify takes single integrators of one component"),
+        (("--agents", "1", "--gain-cap", "4", "--v0", "1,2,3,4,5,6"), "--v0: agents of order 1 have no velocity"),
         (("--agents", "2", "--decay", "2"), "not above 2 (n - 1) = 2"),
         (("--agents", "2", "--stop-before", "0.1"), "--stop-before: is not proved of agents of order n"),
         (("--agents", "2", "--dimension", "2", "--x0", "1,2"), "--x0 has 2 values for 6 agents of dimension 2"),
@@ -149,7 +163,6 @@ def test_design_takes_a_scenario_of_agents_and_prints_the_command_that_proves_it
         (("--agents", "2", "--initial-bound", "1"), "--initial-bound: is not proved of agents of order n; give"),
         (("--agents", "2", "--curve", "c.csv"), "--curve: is drawn of single integrators; leave it out"),
         (("--agents", "2", "--input-norm", "2"), "--input-norm: is of single integrators"),
-        (("--agents", "2", "--rest", "1"), "rest: no number is proved of the input of agents that meet at rest"),
         (("--agents", "2", "--decay", "3"), "decay: below 2 n = 4 no input is proved to be bounded"),
         (("--agents", "2", "--residual", "1"), "residual: nothing is left at T without a gain cap"),
         (("--agents", "2", "--gain-cap", "9"), "--gain-cap: leaves something at every deadline; give --residual,"),

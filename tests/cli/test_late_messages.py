@@ -444,6 +444,7 @@ def test_the_figure_that_is_drawn_unasked_is_of_what_the_certificate_claims() ->
 def test_delays_that_are_too_short_to_run_have_a_page_and_a_figure_of_the_bound() -> None:
     assert ptcc("certify", "chain.csv", "--delay", "1e-5", "--x0", "1,0,2", *QUICK, "-o", "c.json").code == 0
     assert ptcc("report", "c.json", "-o", "c.html").code == ptcc("plot", "c.json", "--what", "late").code == 0
+    assert "ask for --what late or states or input or decay" in ptcc("plot", "c.json", "--what", "formation").err
 
 
 def test_components_are_claimed_of_messages_at_once_too() -> None:

@@ -143,7 +143,7 @@ def test_a_flag_that_changes_the_protocol_leaves_out_the_parameters_of_the_other
         (
             "[expectations]",
             "dimension = 2\n[expectations]",
-            "s.toml: [initial_state] dimension: ptcc certify takes scalar agents",
+            "s.toml: [initial_state] dimension: ptcc certify takes single integrators of one component",
         ),
     ],
 )

@@ -42,6 +42,8 @@ CASES: dict[str, tuple[Agents, Any, Fraction, dict[str, Any]]] = {
     "capped": (Agents(order=2, gain_cap=3), None, Fraction(20), {"v0": V0, "residual": "0.2"}),
     "cascade": (Agents(order=2, cascade=2), None, Fraction(8), {"v0": V0}),
     "cascade under disturbances": (Agents(order=2, cascade="1.5", offsets=PLACES), SLIDING, Fraction(9), {"v0": V0}),
+    "at rest": (Agents(order=2, rest=1, offsets=PLACES), None, Fraction(8), {"v0": V0}),
+    "at rest with drag under disturbances": (Agents(order=2, rest="0.5", drag="0.2"), SLIDING, Fraction(9), {"v0": V0}),
     "single in formation": (Agents(order=1, offsets=PLACES), None, Fraction(5), {}),
 }
 
@@ -170,12 +172,24 @@ def test_agents_in_place_need_no_input(cascade: int | None):
     assert answer.verdict == MET and answer.peak == 0 and "no input" in answer.binding
 
 
+def test_agents_in_agreement_that_must_come_to_rest_need_an_input():
+    together = {"a": [1, 1], "b": [1, 1], "c": [-1, -1]}
+    answer = design_agents(TRIO, Agents(order=2, rest=2), together, v0=together, max_input=3)
+    assert answer.verdict == MET and answer.peak > 0 and answer.too_short is not None
+
+
+def test_rho2_is_raised_until_agents_at_rest_have_a_bounded_input():
+    answer = design_agents(TRIO, Agents(order=2, rest="0.3"), X0, max_input=30)
+    assert answer.verdict == MET and Fraction(3, 10) * answer.protocol.gain.pole >= 1
+    open_one = design_agents(TRIO, Agents(order=2, rest=2, drag=-3), X0, max_input=30, deadline=1)
+    assert open_one.verdict == UNPROVED and "not proved bounded at T = 1: rest 2 is below 3.998" in open_one.binding
+
+
 @pytest.mark.parametrize(
     ("agents", "asked", "says"),
     [
         (Agents(order=1), {}, "single integrators"),
         (2, {}, "agents = 2: give Agents"),
-        (Agents(order=2, rest=1), {}, "rest: no number"),
         (Agents(order=2, decay=3), {}, "decay: below 2 n = 4"),
         (Agents(order=2), {"residual": 1}, "residual: nothing is left"),
         (Agents(order=2, gain_cap=4), {}, "gain_cap: leaves something"),
@@ -232,3 +246,23 @@ def test_designs_of_the_cascade_on_every_class_are_accepted_and_kept_by_runs(fir
         assert answer.certificate.verdict == "certified" and answer.shortest_possible is None
         part = answer.certificate.agents
         assert part is not None and part.compare(part.simulate(samples=101)).input <= 1 + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("agents", "verdict", "says"),
+    [
+        (Agents(order=2), "met", "every deadline is met"),
+        (Agents(order=2, gain_cap=5), "met", "every deadline is met"),
+        (Agents(order=2, cascade=2), "met", "% of the limit"),
+        (Agents(order=2, cascade="0.3"), "not with this certificate", "give cascade 1 or more"),
+    ],
+)
+def test_agents_that_listen_to_nobody_have_a_deadline(agents: Agents, verdict: str, says: str):
+    alone = SignedDigraph.from_edges([], ["a"])
+    residual = None if agents.cap is None else 1
+    answer = design_agents(alone, agents, [3], v0=[1], max_input=3, residual=residual)
+    assert answer.verdict == verdict and says in answer.binding
+    if answer.certificate is not None:
+        assert answer.certificate.verdict == "certified" and answer.peak <= 3
+    if agents.cascade is not None and verdict == "met":  # u(0) = -alpha eta(0) v(0), eta(0) = (0.001 + 1)/T
+        assert abs(answer.deadline * 3 - 2 * Fraction("1.001")) < Fraction("0.01")

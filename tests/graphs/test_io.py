@@ -1171,7 +1171,7 @@ def test_odd_labels_in_a_start(put):
         ("a=1", ["2 of 3 nodes have no value: b, c"]),
         ("a=1,b=2,c=3,d=4", ['node "d" is not in the graph', "a, b, c"]),
         ("a=1,b=2,c=3,a=1", ["node a has two values"]),
-        ("a=1,b=2,3", ['node "" is not in the graph']),
+        ("a=1,b=2,3", ['"3" is not label=value']),
         ("a=1,b=,c=3", ["node b"]),
         ('a=1,"b=2,c=3', ["quote"]),
     ],
@@ -1183,6 +1183,12 @@ def test_a_wrong_initial_state_is_refused(content, words):
     assert message.startswith("initial state")
     for word in words:
         assert word in message
+
+
+def test_an_initial_state_of_labels_with_commas_is_sent_to_a_file():
+    cars = SignedDigraph.from_edges([("my car", "your, car", 1)])
+    with pytest.raises(ParameterError, match='"your" is not label=value; for labels with a comma give a CSV file'):
+        read_state("my car=1,your, car=2", cars)
 
 
 @pytest.mark.parametrize(

@@ -302,3 +302,30 @@ def test_undecided_for_want_of_time_names_the_search():
     assert set(NO_SEARCHES) <= set(STEPS)
     text = ptcc.certify(PAIR, NOMINAL, [5, 1], time_limit=1e-9).assessment.text
     assert text == "undecided: no rate is proved, the search took its share of 1e-09 s; raise --time-limit"
+
+
+def test_no_claim_hypothesis_or_parameter_is_cut_short():
+    fine = ptcc.SlidingModeProtocol(T_r="0.123456789", T_s="0.987654321", mu1="0.2234567891", delta="0.123456789012")
+    text = " ".join(" ".join(assert_screen(ptcc.certify(PAIR, fine, [3, 5], simulation=False))).split())
+    assert "any |d_k| <= 0.123456789012 (Theorem 4.1)" in text and "sigma(0) 0" in text and "..." not in text
+    apart = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("c", "d", -1), ("d", "c", -1)])
+    assert "           any |d_k| <= 1" in assert_screen(ptcc.certify(apart, SLIDING, [1, 2, 3, 4], simulation=False))
+    capped = ptcc.Agents(order=1, offsets=[1, 2], gain_cap=4)
+    lines = summary_lines(ptcc.certify(PAIR, NOMINAL, [3, 5], agents=capped, simulation=False), "pair")
+    text = " ".join(" ".join(lines).split())
+    assert "consensus of x - offsets but for what the cap leaves at T = 0.6 (Theorem 1.1)" in text
+
+
+def test_a_protocol_is_broken_between_terms_only():
+    cascade = ptcc.certify(PAIR, STRONG, [3, 5], agents=ptcc.Agents(order=2, cascade=3), simulation=False)
+    for lines in (summary_lines(cascade, "pair"), wrap_lines(certificate_lines(cascade, "pair"))):
+        first = next(k for k, line in enumerate(lines) if line.startswith("agents "))
+        assert lines[first + 1].startswith("           - 3 g x'") and lines[first].endswith("g e'")
+        assert all(line.isprintable() for line in lines)
+
+
+def test_of_many_agents_of_order_n_it_is_told_that_no_final_state_is_proved():
+    star = SignedDigraph.from_edges([(0, k, 1) for k in range(1, 121)])
+    made = ptcc.certify(star, STRONG, [1] * 121, agents=ptcc.Agents(order=2), simulation=False, method="perron")
+    assert made.agents is not None and made.agents.final_state is None
+    assert "x(T)       not proved of more than 120 agents of order n" in summary_lines(made, "star")

@@ -179,6 +179,10 @@ def read_state(
         mend = "separate the values by commas, without brackets, such as 5,2,-4 or a=5,b=2,c=-4"
         raise ParameterError(f"{place}: no such file; {mend}")
     if labelled:
+        if (other := next((item for item in items if "=" not in item), None)) is not None:
+            comma = "; for labels with a comma give a CSV file with rows node,value"
+            commas = comma * any("," in label for label in graph.labels)
+            raise ParameterError(f'{place}: "{shorten(other)}" is not label=value{commas}')
         pairs = [item.rpartition("=")[::2] for item in items]
         pairs = [(label if label in graph.index else label.strip(), value) for label, value in pairs]
     elif len(items) == graph.n_nodes:
