@@ -96,7 +96,6 @@ def plot(
     runs under many signals are drawn within what is proved for every signal.
     """
     from ptcc_certify.certificate.certificate import RejectedCertificate
-    from ptcc_certify.report.plots.style import save_figure
 
     certified = kind_of(graph[0]) in ("a certificate", "JSON")
     if certified and len(graph) > 1:
@@ -120,7 +119,11 @@ def plot(
     if output is None:
         output = f"{PurePath(graph[0]).stem.lstrip('-') or 'graph'}-{what}.png"
         refuse_output(output)
-    save_figure(_draw(what, subject, wide, time_unit), output)
+    with progress(("figure",)) as begin:
+        begin("figure")
+        from ptcc_certify.report.plots.style import save_figure
+
+        save_figure(_draw(what, subject, wide, time_unit), output)
     print_lines(f"written    {output}")
     return ExitCode.OK
 
@@ -215,7 +218,9 @@ def _of_graph(
         search = {name: options[name] for name in ("method", "time_limit")}
         with progress(STEPS) as begin:
             return certify(signed, protocol, x0, simulation=True, progress=begin, **more, **search)
-    return simulate(signed, protocol, x0, **shared.run_keywords(protocol, options, signed))
+    with progress(("simulation",)) as begin:
+        begin("simulation")
+        return simulate(signed, protocol, x0, **shared.run_keywords(protocol, options, signed))
 
 
 def _of_agents(signed: SignedDigraph, protocol: Protocol, what: str, options: shared.Options) -> Certificate:
