@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ptcc_certify.cli.completion import PAPER, THEOREMS, complete
-from ptcc_certify.cli.terminal import progress
+from ptcc_certify.cli.terminal import print_lines, progress
 from ptcc_certify.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 @click.option("-o", "--output", type=click.Path(file_okay=False), help="Write certificates and figures to this folder.")
 @click.option("--format", "suffix", type=click.Choice(["png", "pdf", "svg"]), default="png", help="Of figures.")
 def examples(name: str, output: str | None, suffix: str) -> int:
-    """Run the paper's examples (all, a number 1 to 6, or a graph such as fig1a) and print one row each.
+    """Run the paper's examples (all, a number 1 to 6, or a graph such as fig1a) and print two lines each.
 
     worst and reached are of the simulated run, all else is proved. With -o also every certificate, the figures of the
     paper's Section 4 (and decay and input besides), and the table in full as examples.csv.
@@ -38,14 +38,14 @@ def examples(name: str, output: str | None, suffix: str) -> int:
     with progress([*steps, *["figures"] * bool(output)]) as begin:
         begin(steps[0])
         from ptcc_certify.certificate.verdict import worst_code
-        from ptcc_certify.report.example_results import RESULTS_HEAD, certify_example, result_line
+        from ptcc_certify.report.example_results import RESULTS_HEAD, certify_example, result_lines
 
-        click.echo(RESULTS_HEAD)
+        print_lines(*RESULTS_HEAD)
         runs = []
         for step, entry in zip(steps, selection, strict=True):
             begin(step)
             runs.append(certify_example(entry))
-            click.echo(result_line(runs[-1]))
+            print_lines(*result_lines(runs[-1]))
             if output:
                 _save(runs[-1], Path(output))
         if output:

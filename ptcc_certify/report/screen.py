@@ -221,7 +221,7 @@ def _claim_texts(structure: Structure, claims: Sequence[Claim], when: str = "", 
         nodes = components[k].nodes
         names = [printable(labels[v]) for v in nodes[:TEXT]]
         lines.append(f"{shorten_list(names, TEXT - len(text) - 2, len(nodes))}: {text}")
-    return lines + [f"... {len(claims)} components in all"] * (len(claims) > 4)
+    return lines + [f"... {len(claims):,} components in all"] * (len(claims) > 4)
 
 
 def _short_final_state(certificate: Certificate) -> Lines:
@@ -245,7 +245,9 @@ def _short_final_state(certificate: Certificate) -> Lines:
             f"{len(names):,} agent{'s'[: len(names) > 1]} at {short_number(state)}" for state, names in groups.items()
         )
     elif cut:
-        most, least = (value_list([labels[k]], [result.states[k]]) for (k,) in extremes(result.states, 1, result.radius))
+        most, least = (
+            value_list([labels[k]], [result.states[k]]) for (k,) in extremes(result.states, 1, result.radius)
+        )
         text = f"least {least}, largest {most}, of {len(labels):,} agents"
     yield "x(T)", f"{text} {kind}"
 
