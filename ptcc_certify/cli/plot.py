@@ -61,9 +61,10 @@ class _Figure(click.Choice):  # type: ignore[type-arg]  # no generic class befor
 @click.option(
     "--what",
     type=_Figure([*OF_A_RUN, "graph", "spectrum", *OF_AGENTS, *OF_A_CERTIFICATE]),
-    help="States, input, or error under its proved bounds over time; the graph; its eigenvalues; of agents of order n "
-    "positions and velocities, their inputs, or their ways in the plane; of a certificate with late messages, or "
-    "moving leaders, what is proved then.  [default: of a certificate what it claims, else graph]",
+    help="States, input, or error under its proved bounds over time (these three of families too); the graph, or the "
+    "modes of a family; eigenvalues of one graph. Agents of order n: motion, input, and in the plane formation. "
+    "Certificates with late messages: late; with moving leaders: tracking.  [default: of a certificate what it claims, "
+    "else graph]",
 )
 @click.option(
     "-o",

@@ -235,7 +235,8 @@ def _endings(saved: Certificate) -> list[tuple[Markup, str]]:
         return []
     agents = sorted(range(len(intervals)), key=lambda k: intervals[k], reverse=True)
     if len(agents) > FEW:
-        agents = sum(extremes(saved.final_state.states, 1, saved.final_state.radius), [])
+        highest, lowest = extremes(saved.final_state.states, 1, saved.final_state.radius)
+        agents = highest + lowest
     same = groupby(agents, key=intervals.__getitem__)
     return [(texts.labels(list(nodes), saved.graph.labels, FEW), enclosed(value)) for value, nodes in same]
 
