@@ -108,8 +108,8 @@ def plot_decay(
     ax.set_ylim(bottom / scale, 3 * top / scale)
     ax.set_xscale("log" if axis == "left" else "linear")
     ax.set_xlim(place[0], place[max(last, 1)])
-    if (proved if run is None else run).protocol.reaching is not None:
-        p = (proved if run is None else run).protocol
+    p = subject.protocol
+    if p.reaching is not None:
         (at,) = _places(p.gain, None, np.array([float(p.span / p.T)]))[axis]
         ax.axvline(at, color="black", linewidth=0.8, linestyle=(0, (5, 2, 1, 2)), label="$T_r$")
     name = r"\varepsilon" if proved is not None and proved.envelope.coordinates == "eps" else "E"

@@ -150,8 +150,7 @@ def draw_ground(ax: Axes, graph: SignedDigraph, place: np.ndarray, nodes: Sequen
     along = np.linspace(0, 1, 41)[:, None, None]
     for part in parts:
         rim = (1 - along) * part + along * np.roll(part, 1, axis=0)
-        gaps = np.linalg.norm(rim.reshape(-1, 1, 2) - foreign, axis=-1)
-        if gaps.min(initial=np.inf) < (REACH + 1) * radius and (part != part[0]).any():
-            continue  # it would reach under a node that is not of the group
-        width = 2 * REACH * radius
-        ax.add_patch(Polygon(part, linewidth=width, joinstyle="round", capstyle="round", **style))  # type: ignore[arg-type]
+        gap = np.linalg.norm(rim.reshape(-1, 1, 2) - foreign, axis=-1).min(initial=np.inf)
+        width = 2 * min(REACH * radius, gap - radius)  # under no node that is not of the group
+        if width > 0:
+            ax.add_patch(Polygon(part, linewidth=width, joinstyle="round", capstyle="round", **style))  # type: ignore[arg-type]
