@@ -16,6 +16,7 @@ the certificate forms them exactly.
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -29,6 +30,7 @@ from lmi.sparse_h_matrix import SparseHMatrix, solve
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.io import as_state
 from ptcc_certify.graphs.other_names import Hinted
+from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.structure import ClosedComponent, Structure, analyse
 from ptcc_certify.graphs.tables import import_pandas, position, series
 from ptcc_certify.theorems.lemmas import (
@@ -380,6 +382,28 @@ class FinalState(Mapping[str, Number], Hinted):
     def __repr__(self) -> str:
         entries = ", ".join(f"{k}={float(x):.6g}" for k, x in list(zip(self.labels, self.states, strict=True))[:8])
         return f"FinalState({entries}{', ...' if len(self.labels) > 8 else ''})"
+
+
+def extremes(
+    states: Sequence[Number], number: int, radius: Sequence[Fraction] | None = None
+) -> tuple[list[int], list[int]]:
+    """Return the agents with the highest states and those with the lowest, from the highest on, no agent twice.
+
+    Of states whose nearest floats are equal, exact ones come before enclosed ones, then nodes in their order.
+
+    Examples
+    --------
+    >>> from ptcc_certify.bounds.final_state import extremes
+    >>> extremes([5, 2, 9, 9, 2, 2], 1), extremes([9.5, Fraction(19, 2)], 1, [Fraction(1, 99), Fraction(0)])
+    (([2], [1]), ([1], [0]))
+    """
+    floats = [nearest_float(Fraction(x)) for x in states]
+    wide = [bool(r) for r in radius or (0,) * len(floats)]
+    highest = heapq.nsmallest(number, range(len(floats)), key=lambda k: (-floats[k], wide[k], k))
+    chosen = set(highest)
+    others = (k for k in range(len(floats)) if k not in chosen)
+    lowest = heapq.nsmallest(number, others, key=lambda k: (floats[k], wide[k], k))
+    return highest, lowest[::-1]
 
 
 def final_state(

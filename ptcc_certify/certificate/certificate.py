@@ -280,7 +280,7 @@ class Certificate(Content, FromFile, Shown):
         rate = "none" if self.rate is None else down(self.rate)
         behaviour = f"{len(self.structure.components)} components"
         if self.claim:
-            behaviour = (self.claim.behaviour, *self.claim.special)[-1]
+            behaviour = self.claim.sharpest
         return f"Certificate({behaviour}, Theorem {self.theorem.number}, rate {rate}, {self.verdict})"
 
 

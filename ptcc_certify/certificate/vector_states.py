@@ -133,7 +133,7 @@ class VectorCertificate:
 
     def __repr__(self) -> str:
         rate = "none" if self.rate is None else down(self.rate)
-        behaviour = self.claim.behaviour if self.claim else "disconnected"
+        behaviour = self.claim.sharpest if self.claim else "disconnected"
         return f"VectorCertificate({len(self)} components, {behaviour}, rate {rate}, {self.verdict})"
 
 

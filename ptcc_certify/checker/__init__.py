@@ -16,6 +16,7 @@ from __future__ import annotations
 import io
 import math
 import sys
+import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -240,7 +241,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except UnreadableError as error:
         print(f"checker: {error}", file=sys.stderr)
         return 2
-    if report.sha256:
-        print(f"graph      SHA-256 {report.sha256}; compare it with that of the graph you mean")
-    print("\n".join(report.lines()))
+    whose = [f"graph      SHA-256 {report.sha256}; compare it with that of the graph you mean"] * bool(report.sha256)
+    *lines, last = whose + report.lines()
+    for line in lines:
+        print(textwrap.fill(line, 80, subsequent_indent=" " * 11, break_on_hyphens=False, break_long_words=False))
+    print(last)  # a refusal is one line
     return 1 if not report.accepted else 0 if report.verdict == "certified" else 4

@@ -159,10 +159,12 @@ def report(certificate: str, output: str, simulation: bool | None, memory: float
     certificate the page tells the reason and no claim.
     """
     from ptcc_certify.certificate.certificate import RejectedCertificate
-    from ptcc_certify.report.report_file import write_report
 
     try:
         with progress(("independent check", "simulation", "report")) as begin:
+            begin("independent check")
+            from ptcc_certify.report.report_file import write_report  # takes seconds: figures
+
             verdict = write_report(certificate, output, simulation=simulation, progress=begin, memory=memory)
     except RejectedCertificate as error:
         print_lines(f"rejected: {error}", err=True)

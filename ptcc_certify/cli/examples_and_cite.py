@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from ptcc_certify.cli.completion import PAPER, THEOREMS, complete
+from ptcc_certify.cli.terminal import print_lines, progress
 from ptcc_certify.errors import ParameterError
+
+if TYPE_CHECKING:
+    from ptcc_certify.report.example_results import Run
 
 
 @click.command()
@@ -15,37 +21,55 @@ from ptcc_certify.errors import ParameterError
 @click.option("-o", "--output", type=click.Path(file_okay=False), help="Write certificates and figures to this folder.")
 @click.option("--format", "suffix", type=click.Choice(["png", "pdf", "svg"]), default="png", help="Of figures.")
 def examples(name: str, output: str | None, suffix: str) -> int:
-    """Run the paper's examples (all, a number 1 to 6, or a graph such as fig1a) and print one row each.
+    """Run the paper's examples (all, a number 1 to 6, or a graph such as fig1a) and print two lines each.
 
     worst and reached are of the simulated run, all else is proved. With -o also every certificate, the figures of the
     paper's Section 4 (and decay and input besides), and the table in full as examples.csv.
     """
-    from ptcc_certify.certificate.verdict import worst_code
     from ptcc_certify.examples import select
-    from ptcc_certify.report.example_results import RESULTS_HEAD, certify_example, result_line, results_csv
 
-    selection, runs = select(name), []
+    selection = select(name)
     if output:
         try:
             Path(output).mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise ParameterError(f"{output}: cannot make this folder ({error.strerror})") from None
-    click.echo(RESULTS_HEAD)
-    for run in map(certify_example, selection):
-        click.echo(result_line(run))
-        runs.append(run)
-        if output:
-            stem = run.graph if run.example.sigma0 is None else f"{run.graph}_sliding"
-            run.certificate.save(Path(output) / f"{stem}.json")
-    if output:
-        from ptcc_certify.graphs.io import write_atomically
-        from ptcc_certify.report.example_figures import paper_figures
-        from ptcc_certify.report.plots.style import save_figure
+    steps = [f"example {example.number} on {graph}" for example, graph, _ in selection]
+    with progress([*steps, *["figures"] * bool(output)]) as begin:
+        begin(steps[0])
+        from ptcc_certify.certificate.verdict import worst_code
+        from ptcc_certify.report.example_results import RESULTS_HEAD, certify_example, result_lines
 
-        for title, figure in paper_figures(runs).items():
-            save_figure(figure, Path(output) / f"{title}.{suffix}")
-        write_atomically(Path(output) / "examples.csv", results_csv(runs))
+        print_lines(*RESULTS_HEAD)
+        runs = []
+        for step, entry in zip(steps, selection, strict=True):
+            begin(step)
+            runs.append(certify_example(entry))
+            print_lines(*result_lines(runs[-1]))
+            if output:
+                _save(runs[-1], Path(output))
+        if output:
+            begin("figures")
+            _draw(runs, Path(output), suffix)
     return worst_code([run.certificate.assessment.exit_code for run in runs])
+
+
+def _save(run: Run, folder: Path) -> None:
+    """Write the certificate of an example to a folder."""
+    stem = run.graph if run.example.sigma0 is None else f"{run.graph}_sliding"
+    run.certificate.save(folder / f"{stem}.json")
+
+
+def _draw(runs: Sequence[Run], folder: Path, suffix: str) -> None:
+    """Write the figures of some examples, and their table, to a folder."""
+    from ptcc_certify.graphs.io import write_atomically
+    from ptcc_certify.report.example_figures import paper_figures
+    from ptcc_certify.report.example_results import results_csv
+    from ptcc_certify.report.plots.style import save_figure
+
+    for title, figure in paper_figures(runs).items():
+        save_figure(figure, folder / f"{title}.{suffix}")
+    write_atomically(folder / "examples.csv", results_csv(runs))
 
 
 @click.command()

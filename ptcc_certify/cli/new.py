@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -17,7 +18,8 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.kinds_of_file import kind_of, shell_word
 from ptcc_certify.graphs.rationals import shorten
 
-#: What is written as it is; the rest are comments.
+#: Columns of the file, where values leave room, and what is written in it as it is; the rest are comments.
+_WIDTH = 100
 _WRITTEN = ("graph", "kind", "T", "rho1", "rho2", "kappa", "x0", "seed")
 
 
@@ -75,17 +77,23 @@ def template(options: Mapping[str, click.Parameter], files: Sequence[str] = (), 
     lines = ["# A scenario: ptcc certify, simulate, design and plot take this file in place of a graph."]
     lines += ["# Lines that begin with # are left out; remove the # to give the key a value. Flags override it."]
     for section, (title, keys) in SECTIONS.items():
-        lines += ["", f"[{section}]  # {title}"]
+        lines += ["", *_commented(f"[{section}]", title)]
         for key, (option, example) in keys.items():
             if key == "file" and files:
                 quoted = [_quoted(file) for file in files]
                 example = quoted[0] if len(files) == 1 else f"[{', '.join(quoted)}]"
             line = f"{'' if option in _WRITTEN else '# '}{key} = {example}"
-            lines.append(f"{line:<32}  # {_meaning(options.get(option))}")
+            lines += _commented(f"{line:<32}", _meaning(options.get(option)))
             if key == "x0" and 0 < len(labels) <= 12:
                 values = ", ".join(f"{_quoted(label)} = 1" for label in labels)
                 lines.append(f"# x0 = {{ {values} }}")
     return "\n".join(lines) + "\n"
+
+
+def _commented(line: str, comment: str) -> list[str]:
+    """Return a line with a comment beside it, which goes on in the lines below."""
+    first, *others = textwrap.wrap(comment, _WIDTH - len(line) - 4)
+    return [f"{line}  # {first}", *(f"{' ' * len(line)}  # {more}" for more in others)]
 
 
 def _quoted(text: str) -> str:

@@ -61,9 +61,10 @@ class _Figure(click.Choice):  # type: ignore[type-arg]  # no generic class befor
 @click.option(
     "--what",
     type=_Figure([*OF_A_RUN, "graph", "spectrum", *OF_AGENTS, *OF_A_CERTIFICATE]),
-    help="States, input, or error under its proved bounds over time; the graph; its eigenvalues; of agents of order n "
-    "positions and velocities, their inputs, or their ways in the plane; of a certificate with late messages, or "
-    "moving leaders, what is proved then.  [default: of a certificate what it claims, else graph]",
+    help="States, input, or error under its proved bounds over time (these three of families too); the graph, or the "
+    "modes of a family; eigenvalues of one graph. Agents of order n: motion, input, and in the plane formation. "
+    "Certificates with late messages: late; with moving leaders: tracking.  [default: of a certificate what it claims, "
+    "else graph]",
 )
 @click.option(
     "-o",
@@ -96,7 +97,6 @@ def plot(
     runs under many signals are drawn within what is proved for every signal.
     """
     from ptcc_certify.certificate.certificate import RejectedCertificate
-    from ptcc_certify.report.plots.style import save_figure
 
     certified = kind_of(graph[0]) in ("a certificate", "JSON")
     if certified and len(graph) > 1:
@@ -120,7 +120,11 @@ def plot(
     if output is None:
         output = f"{PurePath(graph[0]).stem.lstrip('-') or 'graph'}-{what}.png"
         refuse_output(output)
-    save_figure(_draw(what, subject, wide, time_unit), output)
+    with progress(("figure",)) as begin:
+        begin("figure")
+        from ptcc_certify.report.plots.style import save_figure
+
+        save_figure(_draw(what, subject, wide, time_unit), output)
     print_lines(f"written    {output}")
     return ExitCode.OK
 
@@ -216,7 +220,9 @@ def _of_graph(
         search = {name: options[name] for name in ("method", "time_limit")}
         with progress(STEPS) as begin:
             return certify(signed, protocol, x0, simulation=True, progress=begin, **more, **search)
-    return simulate(signed, protocol, x0, **shared.run_keywords(protocol, options, signed))
+    with progress(("simulation",)) as begin:
+        begin("simulation")
+        return simulate(signed, protocol, x0, **shared.run_keywords(protocol, options, signed))
 
 
 def _of_agents(signed: SignedDigraph, protocol: Protocol, what: str, options: shared.Options) -> Certificate:

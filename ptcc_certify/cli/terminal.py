@@ -25,6 +25,8 @@ from ptcc_certify.errors import ParameterError, PTCCError, one_line
 FIGURES = (".png", ".pdf", ".svg")
 #: Options that name a file to write, and where the path of the scenario of a call is kept.
 WRITTEN, SCENARIO = ("output", "log", "curve"), "ptcc_certify.scenario_file"
+#: Where a call keeps when its work began.
+CLOCK = "ptcc_certify.clock"
 #: Seconds after which a command that writes to no terminal tells where it is, and between two such lines.
 FIRST_WORD, NEXT_WORD = 10, 30
 
@@ -208,23 +210,23 @@ def _bar(*columns: str, quiet: bool = False) -> Iterator[Callable[..., Callable[
     from rich.console import Console
 
     layout = (rich.BarColumn(), *(getattr(rich, name)() for name in columns), rich.TextColumn("{task.description}"))
-    with rich.Progress(*layout, console=Console(stderr=True), transient=True) as bar:
+    to_terminal = _on_terminal(sys.stdout)  # else rich would send to standard error what is printed to a file
+    with rich.Progress(*layout, console=Console(stderr=True), transient=True, redirect_stdout=to_terminal) as bar:
         yield lambda description, **task: partial(bar.update, bar.add_task(description, **task))
 
 
 @contextmanager
 def _plain_lines() -> Iterator[Callable[..., Callable[..., None]]]:
-    """Write where the work is to standard error, after 10 s and then every 30 s."""
+    """Write where the work is to standard error, 10 s after it began and then every 30 s."""
     state: dict[str, Any] = {}
-    done, began = threading.Event(), time.monotonic()
+    done, clock = threading.Event(), _clock()
 
     def tell() -> None:
-        pause = FIRST_WORD
-        while not done.wait(pause):
-            pause = NEXT_WORD
+        while not done.wait(max(clock["word"] - time.monotonic(), 0)):
+            clock["word"] = time.monotonic() + NEXT_WORD
             if state:
                 where = f"{state.get('completed', 0)} of {state['total']} done, {state['description']}"
-                click.echo(f"ptcc: after {time.monotonic() - began:.0f} s: {where}", err=True)
+                click.echo(f"ptcc: after {time.monotonic() - clock['began']:.0f} s: {where}", err=True)
 
     def add(description: str, **task: Any) -> Callable[..., None]:
         state.update(description=description, **task)
@@ -237,3 +239,10 @@ def _plain_lines() -> Iterator[Callable[..., Callable[..., None]]]:
     finally:
         done.set()
         teller.join()
+
+
+def _clock() -> dict[str, float]:
+    """Return when the work of this command began, and when it next tells where it is; parts of a command share it."""
+    now, context = time.monotonic(), click.get_current_context(silent=True)
+    clock = {"began": now, "word": now + FIRST_WORD}
+    return clock if context is None else context.meta.setdefault(CLOCK, clock)

@@ -294,7 +294,7 @@ class Structure(ReadOnly, Shown):
         closed, balanced = len(self.closed_components), sum(c.balanced for c in self.closed_components)
         claim = f"{len(self.components)} components"
         if self.claim:
-            claim = f"Theorem {self.claim.theorem}: {self.claim.behaviour}"
+            claim = f"{self.claim.reference}: {self.claim.sharpest}"
         return (
             f"Structure({self.graph.n_nodes} nodes, {self.connectivity}, {closed} closed "
             f"component{'s' * (closed > 1)}, {balanced} balanced, {self.leaders.size} leaders; {claim})"
@@ -323,7 +323,7 @@ def analyse(graph: Any, orientation: str | None = None) -> Structure:
     --------
     >>> g = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("b", "c", -1)])
     >>> analyse(g)
-    Structure(3 nodes, quasi-strong, 1 closed component, 1 balanced, 2 leaders; Theorem 2.1: interval bipartite \
+    Structure(3 nodes, quasi-strong, 1 closed component, 1 balanced, 2 leaders; Theorem 2.1, Corollary 3: bipartite \
 consensus)
     """
     if isinstance(graph, Structure) and orientation is None:

@@ -14,10 +14,10 @@ from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.examples import Example, load_graph
 
-#: The head of the table that ``ptcc examples`` prints; its rows are of :func:`result_line`.
+#: The head of the table that ``ptcc examples`` prints; its rows are of :func:`result_lines`.
 RESULTS_HEAD = (
-    f"{'example':<9}{'theorem':<9}{'behaviour':<30}{'rate':>9}{'optimality':>12}{'worst':>8}"
-    f"{'reached':>10}{'proved by':>11}{'T_r':>5}  {'final state':<14}verdict"
+    f"{'example':<9}{'theorem':<9}{'behaviour':<30}verdict",
+    f"{'rate':>18}{'optimality':>12}{'worst':>8}{'reached':>10}{'proved by':>11}{'T_r':>5}  final state",
 )
 
 
@@ -78,8 +78,8 @@ def results_csv(runs: Sequence[Run]) -> str:
     return text.getvalue()
 
 
-def result_line(run: Run) -> str:
-    """Return the row of an example under :data:`RESULTS_HEAD`; what was proved is rounded to the safe side."""
+def result_lines(run: Run) -> tuple[str, str]:
+    """Return the two lines of an example under :data:`RESULTS_HEAD`; what was proved is rounded to the safe side."""
     certificate = run.certificate
     claim, rate, comparison = certificate.claim, certificate.rate, certificate.comparison
     assert claim is not None
@@ -89,9 +89,9 @@ def result_line(run: Run) -> str:
     if last is not None and proved is not None:
         times = f"{last:>10.5f}{up(proved, 5):>11}{deadline:>5.2g}"
     return (
-        f"{run.example.number} {run.graph:<7}{claim.theorem:<9}{claim.behaviour:<30}"
-        f"{down(rate or Fraction(0)):>9}{down(certificate.optimality_ratio or 0.0, 4):>12}"
-        f"{ratio:>8.3f}{times}  {_ends(certificate):<14}{certificate.assessment.word}"
+        f"{run.example.number} {run.graph:<7}{claim.theorem:<9}{claim.behaviour:<30}{certificate.assessment.word}",
+        f"{down(rate or Fraction(0)):>18}{down(certificate.optimality_ratio or 0.0, 4):>12}"
+        f"{ratio:>8.3f}{times}  {_ends(certificate)}",
     )
 
 

@@ -14,8 +14,8 @@ from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.certificate.restricted_states import constant_states, last_states, states_of_signal
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.size_limits import EXACT_NODES
-from ptcc_certify.graphs.structure import STABILITY
-from ptcc_certify.report.restricted_screen import RESTS, agreement_text, restricted_entries, rests
+from ptcc_certify.graphs.structure import BIPARTITE_CONTAINMENT, STABILITY
+from ptcc_certify.report.restricted_screen import RESTS, agreement_text, of_mode, restricted_entries, rests
 from ptcc_certify.report.sliding_lines import sliding_lines
 from ptcc_certify.report.structure_text import Lines, structure_text
 from ptcc_certify.report.text_layout import (
@@ -34,7 +34,7 @@ from ptcc_certify.report.text_layout import (
 )
 from ptcc_certify.report.told_instants import SHORT, told_instants
 from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_name
-from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent, decide
+from ptcc_certify.theorems.family_behaviour import CHAIN, DEPENDS, FamilyComponent, decide
 from ptcc_certify.theorems.family_claims import camps, special_behaviours
 from ptcc_certify.theorems.family_groups import AgreeingGroup, FamilyGroups
 from ptcc_certify.theorems.family_rate import explicit_rate
@@ -292,8 +292,12 @@ def _alone(mode: Mode, direct: bool) -> str:
     if not mode.n_edges:
         return RESTS if direct else f"every agent {DRIVEN}"
     components = decide(Family((mode,)))
-    text = ", ".join(dict.fromkeys(map(sharpest, components)))
-    return text if len(components) == 1 else f"{len(components):,} separate parts, each by itself: {text}"
+    if len(components) == 1:
+        return sharpest(components[0])
+    parts, behaviours = f"{len(components):,} separate parts", {part.behaviour for part in components}
+    if behaviours <= {*CHAIN}:
+        return f"{of_mode(BIPARTITE_CONTAINMENT, mode)}, in {parts}"
+    return f"{parts}, each by itself: {', '.join(dict.fromkeys(map(sharpest, components)))}"
 
 
 def groups_text(component: FamilyComponent, direct: bool = True) -> str:

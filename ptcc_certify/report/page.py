@@ -20,6 +20,7 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
+from ptcc_certify.bounds.final_state import extremes
 from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.checker import CheckReport
@@ -221,9 +222,11 @@ def _tabled(saved: Certificate) -> list[int]:
     """Return the agents that have a row: all, or those that end highest and lowest, from the highest on."""
     if saved.graph.n_nodes <= ROWS:
         return list(range(saved.graph.n_nodes))
-    states = saved.initial_state if saved.final_state is None else saved.final_state.states
-    order = sorted(range(saved.graph.n_nodes), key=lambda k: (states or ())[k], reverse=True)
-    return order[:EXTREMES] + order[-EXTREMES:]
+    if (end := saved.final_state) is None:
+        highest, lowest = extremes(saved.initial_state or (), EXTREMES)
+    else:
+        highest, lowest = extremes(end.states, EXTREMES, end.radius)
+    return highest + lowest
 
 
 def _endings(saved: Certificate) -> list[tuple[Markup, str]]:
@@ -232,7 +235,8 @@ def _endings(saved: Certificate) -> list[tuple[Markup, str]]:
         return []
     agents = sorted(range(len(intervals)), key=lambda k: intervals[k], reverse=True)
     if len(agents) > FEW:
-        agents = [agents[0], agents[-1]]
+        highest, lowest = extremes(saved.final_state.states, 1, saved.final_state.radius)
+        agents = highest + lowest
     same = groupby(agents, key=intervals.__getitem__)
     return [(texts.labels(list(nodes), saved.graph.labels, FEW), enclosed(value)) for value, nodes in same]
 

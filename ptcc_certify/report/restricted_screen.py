@@ -97,7 +97,7 @@ def _last_mode_text(certificate: FamilyContent, claim: LastModeClaim | FinalValu
         unknown = "nothing is claimed"
     modes = certificate.parts[claim.component].component.family.modes
     pairs = zip(own, modes, strict=True)
-    behaviours = [_of_mode(behaviour, mode, unknown) for behaviour, mode in pairs]
+    behaviours = [of_mode(behaviour, mode, unknown) for behaviour, mode in pairs]
     late = "; how near by when depends on the last switch" if begin else "; how near by when is not proved"
     if len(set(behaviours)) == 1:
         camps = ", camps of that mode" if begin and own[0] == BIPARTITE_CONSENSUS else ""
@@ -107,7 +107,7 @@ def _last_mode_text(certificate: FamilyContent, claim: LastModeClaim | FinalValu
     return f"{begin}: {each}{late}".removeprefix(": ")
 
 
-def _of_mode(behaviour: str | None, mode: Mode, unknown: str) -> str:
+def of_mode(behaviour: str | None, mode: Mode, unknown: str = "") -> str:
     """Name what the last mode does; no average of ``x(0)``, which is not where it begins."""
     if not mode.n_edges:
         return RESTS

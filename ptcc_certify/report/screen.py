@@ -14,6 +14,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from lmi.exact.decimal_rounding import down, near, up
+from ptcc_certify.bounds.final_state import extremes
 from ptcc_certify.errors import PTCCError
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.report.agents_lines import answers, claimed_of, long_lines
@@ -102,9 +103,13 @@ def summary_lines(certificate: Certificate, name: str, origins: Mapping[str, str
         whatever = ", nothing late"
     if certificate.tracking is not None:
         whatever = ", leaders at rest"
+    if certificate.limits:
+        whatever = ", without limits"
     claims = _claim_texts(
         certificate.structure, certificate.claims, _when(certificate, f"at T = {near(p.T)}"), whatever
     )
+    if len(certificate.claims) > 1 and (certificate.late or certificate.tracking or certificate.limits):
+        claims.append(whatever.removeprefix(", "))
     drawn = _is_set_asked(certificate)
     entries = [
         *graph_entries(certificate.structure, name),
@@ -207,17 +212,15 @@ def _claim_texts(structure: Structure, claims: Sequence[Claim], when: str = "", 
     sharpest = [claim.sharpest for claim in claims]
     if len(claims) == 1:
         (claim,) = claims
-        corollary = f", Corollary {claim.corollaries[-1]}" if claim.special else ""
-        texts = [f"{sharpest[0]}{when}{also} (Theorem {claim.theorem}{more})" for more in (corollary, "")]
-        return [texts[0] if len(texts[0]) <= TEXT else texts[1]]
+        texts = [f"{sharpest[0]}{when}{also} ({which})" for which in (claim.reference, f"Theorem {claim.theorem}")]
+        return [texts[0] if len(texts[0]) <= TEXT else shorten_text(texts[1], TEXT)]
     components, labels, lines = structure.components, structure.graph.labels, []
     for k in sorted(range(len(claims)), key=lambda k: -len(components[k].nodes))[:4]:
         text = f"{sharpest[k]}{when} (Theorem {claims[k].theorem})"
         nodes = components[k].nodes
         names = [printable(labels[v]) for v in nodes[:TEXT]]
-        lines.append(f"{shorten_list(names, max(TEXT - len(text) - 2, 14), len(nodes))}: {text}")
-    lines += [f"... {len(claims)} components in all"] * (len(claims) > 4)
-    return lines + [also.removeprefix(", ")] * bool(also)
+        lines.append(f"{shorten_list(names, TEXT - len(text) - 2, len(nodes))}: {text}")
+    return lines + [f"... {len(claims):,} components in all"] * (len(claims) > 4)
 
 
 def _short_final_state(certificate: Certificate) -> Lines:
@@ -225,8 +228,8 @@ def _short_final_state(certificate: Certificate) -> Lines:
     result, labels = certificate.final_state, certificate.graph.labels
     if result is None:
         return
-    degenerate, limits = "; degenerate x(0)" * bool(result.degenerate), "; without limits" * bool(certificate.limits)
-    kind = f"({_accuracy(result, 'rounded')}{degenerate}{limits})"
+    degenerate = "; balanced leaders happen to meet at 0" * bool(result.degenerate)
+    kind = f"({_accuracy(result, 'rounded')}{degenerate}{'; without limits' * bool(certificate.limits)})"
     groups: dict[Fraction | float, list[str]] = {}
     for label, state in zip(labels, result.states, strict=True):
         groups.setdefault(state, []).append(printable(label))
@@ -241,8 +244,9 @@ def _short_final_state(certificate: Certificate) -> Lines:
             f"{len(names):,} agent{'s'[: len(names) > 1]} at {short_number(state)}" for state, names in groups.items()
         )
     elif cut:
-        order = sorted(range(len(labels)), key=result.states.__getitem__)
-        least, most = (value_list([labels[k]], [result.states[k]]) for k in (order[0], order[-1]))
+        most, least = (
+            value_list([labels[k]], [result.states[k]]) for (k,) in extremes(result.states, 1, result.radius)
+        )
         text = f"least {least}, largest {most}, of {len(labels):,} agents"
     yield "x(T)", f"{text} {kind}"
 
@@ -353,11 +357,11 @@ def _short_verdict(certificate: Certificate) -> str:
 
 
 def _cut_off_text(certificate: Certificate) -> str:
-    """Tell which searches took longer than their shares of the time limit; nothing if none did."""
+    """Tell what was cut off because it took longer than its share of the time limit; nothing if nothing was."""
     if not certificate.cut_off:
         return ""
     shares = "its share" if len(certificate.cut_off) == 1 else "their shares"
-    return f"{', '.join(certificate.cut_off)} took {shares} of --time-limit {certificate.time_limit:g} s"
+    return f"{', '.join(certificate.cut_off)} cut off after {shares} of --time-limit {certificate.time_limit:g} s"
 
 
 def structure_lines(structure: Structure, name: str) -> list[str]:
@@ -405,7 +409,7 @@ def certificate_lines(
                 yield from part(certificate)
         yield from _headed("simulated", _simulated(certificate))
         if certificate.cut_off:
-            yield "cut off", f"{_cut_off_text(certificate)}; what was proved by then stands"
+            yield "time limit", f"{_cut_off_text(certificate)}; what was proved by then stands"
         yield from (("note", note) for note in certificate.notes[:3])
         yield "verdict", certificate.assessment.text
 
@@ -426,7 +430,7 @@ def _final_state_lines(certificate: Certificate) -> Lines:
     yield "x(T)", f"{value_list(certificate.graph.labels, result.states)} ({_accuracy(result)})"
     if result.degenerate:
         groups = ", ".join(map(str, result.degenerate))
-        yield "", f"degenerate initial state: leader group {groups} meets at 0, although it is balanced"
+        yield "", f"of this x(0) leader group {groups} happens to meet at 0, although it is balanced"
 
 
 def _accuracy(result: FinalState, rounded: str = "here to 5 digits") -> str:

@@ -39,6 +39,8 @@ def _graph_text(structure: Structure, name: str) -> str:
     rest = f": {size}, {_connectivity(structure)}"
     if len(rest) + columns(name) > TEXT:
         rest, name = rest.replace("ly connected", "").replace("disconnected, ", ""), PurePath(name).name
+    if len(rest) + min(columns(name), 8) > TEXT:  # the claims tell how many components there are
+        rest = rest.rpartition(", ")[0]
     return shorten_text(printable(name), max(TEXT - len(rest), 8)) + rest
 
 
@@ -66,9 +68,11 @@ def leader_lines(structure: Structure, most: int, width: int = 40) -> Lines:
     if many:
         single, balanced = sum(len(c.nodes) == 1 for c in closed), sum(c.balanced for c in closed)
         larger, size = len(closed) - single, len(largest[0][1].nodes)
-        whole = f"{single:,} of one node, {larger:,} larger, up to {size:,}" if larger else "all of one node"
+        whole = [f"{single:,} of one node, {larger:,} larger, up to {size:,}", f"{larger:,} of 2 to {size:,} nodes"]
         these = ", such as" * (larger > len(told))
-        yield "leaders", f"{len(closed):,} groups, {balanced:,} balanced; {whole}{these}"
+        texts = [f"{whole[0]}{these}", *whole] if larger else ["all of one node"]
+        groups = f"{len(closed):,} groups, {balanced:,} balanced"
+        yield "leaders", next((f"{groups}; {text}" for text in texts if columns(groups + text) + 2 <= TEXT), groups)
     for number, component in told:
         text = leaders_text(component, labels, width)
         head = "leaders" if len(closed) == 1 else f"leaders {number}"

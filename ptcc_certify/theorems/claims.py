@@ -86,6 +86,18 @@ class Claim:
         """
         return (self.behaviour, *self.special)[-1]
 
+    @property
+    def reference(self) -> str:
+        """The theorem, and the corollary that makes the behaviour sharper.
+
+        Examples
+        --------
+        >>> Claim("2.1", "interval bipartite consensus", ("3",), ("bipartite consensus",)).reference
+        'Theorem 2.1, Corollary 3'
+        """
+        corollary = f", Corollary {self.corollaries[-1]}" if self.special else ""
+        return f"Theorem {self.theorem}{corollary}"
+
     def holds(self, behaviour: str) -> bool:
         """Tell whether ``behaviour`` (words joined by blanks or hyphens) follows from this claim.
 

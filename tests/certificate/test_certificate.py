@@ -552,7 +552,7 @@ def test_a_degenerate_start_is_named_in_json_and_on_screen(tmp_path: Path):
     assert data["final_state"] == {"a": "0", "b": "0", "c": "1", "d": "1", "e": "1/2"}
     Recheck(data).everything()
     screen = " ".join(ptcc("certify", str(path), "--x0", special, "-v").out.split())
-    assert "degenerate initial state: leader group 1 meets at 0, although it is balanced" in screen
+    assert "of this x(0) leader group 1 happens to meet at 0, although it is balanced" in screen
     unbalanced = certify(SignedDigraph.from_edges([(1, 2, 1), (2, 1, -1)]), PROTOCOL, [1, 1], simulation=False)
     assert unbalanced.to_dict()["influence"]["degenerate"] == []  # 0 is what an unbalanced group is for
 

@@ -48,7 +48,7 @@ STANDARD = {
         "operator",
         "pathlib",
     ),
-    *("re", "sys", "typing"),
+    *("re", "sys", "textwrap", "typing"),
 }
 #: Functions of ``math`` that give integers.
 EXACT_MATH = {"ceil", "comb", "factorial", "floor", "gcd", "isqrt", "lcm", "prod"}

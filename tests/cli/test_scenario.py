@@ -206,6 +206,7 @@ def test_what_new_writes_certifies(folder: Path):
     assert ptcc("new", "-o", "a.toml").out == "written    a.toml; now: ptcc certify a.toml\n"
     assert ptcc("certify", "a.toml").code == 0
     assert ptcc("new").out == Path("a.toml").read_text()
+    assert max(map(len, ptcc("new").out.splitlines())) <= 100
     assert ptcc("new", "my data/team.csv", "-o", "my data/new one.toml").code == 0
     assert read_scenario("my data/new one.toml").sections["graph"] == {"file": "team.csv"}
     assert ptcc("certify", "my data/new one.toml", "--no-simulation").code == 0
@@ -228,7 +229,8 @@ def test_every_key_is_an_option_with_a_meaning_and_an_example_that_is_read():
         for key, (option, example) in keys.items():
             assert option in PARAMETERS
             (line,) = (line for line in text.splitlines() if line.removeprefix("# ").startswith(f"{key} = {example} "))
-            assert "[default: " in line or key == "file"
+            explained = line + text.partition(line)[2].partition("=")[0]
+            assert "[default:" in explained or key == "file"
             if key == "file":
                 continue
             graph = "" if section == "graph" else 'graph.file = "fig1a"\n'

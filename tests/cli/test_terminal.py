@@ -7,6 +7,7 @@ import re
 import threading
 from pathlib import Path
 
+import click
 import pytest
 from bad_inputs import ptcc
 from rich.cells import cell_len
@@ -121,6 +122,37 @@ def test_work_that_lasts_says_where_it_is_without_a_terminal(
         begin("one step")
         threading.Event().wait(0.05)
     assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    ("words", "steps"),
+    [
+        (("examples", "fig1a"), {"example 1 on fig1a", "example 4 on fig1a"}),
+        (("plot", "fig1a"), {"figure"}),
+        (("plot", "fig1a", "--what", "states"), {"simulation", "figure"}),
+        (("report", "c.json", "-o", "c.html", "--no-simulation"), {"independent check", "report"}),
+    ],
+)
+def test_every_command_that_lasts_says_where_it_is(
+    monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], steps: set[str]
+):
+    assert ptcc("certify", "fig1a", "--no-simulation", "-q", "-o", "c.json").code == 0
+    monkeypatch.setattr(terminal, "FIRST_WORD", 0.001)
+    monkeypatch.setattr(terminal, "NEXT_WORD", 0.001)
+    assert steps <= set(re.findall(r"^ptcc: after \d+ s: \d of \d done, (.*)$", ptcc(*words).err, re.M))
+
+
+def test_the_parts_of_a_command_count_its_seconds_together(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+):
+    monkeypatch.setattr(terminal, "FIRST_WORD", 0.3)
+    monkeypatch.setattr(terminal, "NEXT_WORD", 60)
+    with click.Context(click.Command("plot")):
+        for step in ("one step", "another step"):
+            with terminal.progress((step,)) as begin:
+                begin(step)
+                threading.Event().wait(0.2)
+    assert re.fullmatch(r"ptcc: after 0 s: 0 of 1 done, another step\n", capsys.readouterr().err)
 
 
 @pytest.mark.parametrize(

@@ -149,7 +149,7 @@ def test_every_packaged_graph_is_there(explorer: Explorer, panel: Panel):
     for name in GRAPHS:
         claim, view = ptcc.analyse(load_graph(name)).claim, explorer.view(Settings(name, method="paper"))
         assert claim is not None
-        assert claim.behaviour in view.facts["claim"], name
+        assert claim.sharpest in view.facts["claim"], name
         assert f"Theorem {claim.theorem}" in view.facts["claim"], name
         assert view.verdict.startswith("certified"), name
 

@@ -41,6 +41,11 @@ def test_every_run_lies_within_what_is_shaded(drawn):
             assert any(tube.contains_points(points, radius=1e-3).all() for tube in tubes)
 
 
+def test_the_bars_of_final_states_are_named(drawn):
+    names = [text.get_text() for text in plot_family(drawn[0], runs=drawn[1]).get_legend().get_texts()]
+    assert names[-3:] == ["proved for every signal", "final states, proved", "deadline $T$"]
+
+
 def test_the_decay_of_every_run_lies_below_the_bound(drawn):
     certificate, runs = drawn
     ax = plot_family_decay(certificate, runs=runs, axis="clock")

@@ -16,6 +16,7 @@ import ptcc_certify as ptcc
 from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
 from ptcc_certify.certificate.family_verdict import first_input
 from ptcc_certify.certificate.request import Expectations
+from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.report.family_screen import (
     decision_lines,
@@ -327,3 +328,13 @@ def test_more_functions_than_the_check_takes_are_left_out_and_nothing_rests_on_t
     assert fewer.verdict == "certified" and not any(part.functions for part in fewer.parts)
     assert any("more than 2 Lyapunov functions" in note for note in fewer.notes)
     assert set(fewer.behaviours) == {"bipartite consensus"}
+
+
+def test_a_mode_of_several_parts_is_called_by_one_word():
+    graphs = {"first": [("ann", "bob", 1)], "second": [("bob", "eve", -1)]}
+    nodes = ["ann", "bob", "eve"]
+    family = Family.switching({name: SignedDigraph.from_edges(edges, nodes) for name, edges in graphs.items()})
+    protocol = ptcc.NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
+    text = " ".join(" ".join(family_summary(ptcc.certify(family, protocol, signal=DwellTime("0.5")), "two")).split())
+    assert "first: containment, in 2 separate parts; second: bipartite containment, in 2 separate parts" in text
+    assert "decides: first: containment; second: bipartite containment; how near" in text

@@ -461,6 +461,45 @@ def test_the_ground_of_a_leader_group_has_no_hole() -> None:
     assert not grounds("fig1a") and grounds("apart")
 
 
+def test_the_ground_of_a_leader_group_reaches_under_no_follower() -> None:
+    leaders = [(k, k % 37 + 1, 1) for k in range(1, 38)] + [(k, (k + 12) % 37 + 1, 1) for k in range(1, 38)]
+    ax = drawn(plot_graph(SignedDigraph.from_edges([*leaders, (1, 38, 1), (20, 39, 1), (30, 40, 1)])))
+    places, radius = np.array([text.xy for text in ax.texts]), 6.3  # type: ignore[attr-defined]
+    followers = [place for place, text in zip(places, ax.texts, strict=True) if int(text.get_text()) > 37]
+    grounds = [patch for patch in ax.patches if isinstance(patch, Polygon) and len(patch.get_xy()) > 2]
+    assert grounds and len(followers) == 3
+    for patch in grounds:
+        for place in followers:
+            assert not patch.get_path().contains_point(place, radius=patch.get_linewidth() / 2 + radius)
+
+
+def test_short_labels_of_40_agents_stand_in_their_nodes() -> None:
+    ax = drawn(plot_graph(ring(LABELLED_NODES)))
+    for text in ax.texts:
+        box, place = text.get_window_extent(), ax.transData.transform(text.xy)  # type: ignore[attr-defined]
+        assert abs((box.x0 + box.x1) / 2 - place[0]) < 1 and box.width * 72 / ax.figure.dpi < 12.6
+
+
+def test_the_axis_of_an_input_that_is_large_for_a_short_time_alone_is_logarithmic() -> None:
+    for name, scale in (("fig1a", "log"), ("fig3a", "linear")):
+        example, _, _ = select(name)[name == "fig1a"]
+        sigma0 = example.sigma0 and example.sigma0.split(",")
+        cert = certify(load_graph(name), example.protocol(), example.x0.split(","), sigma0=sigma0, method="paper")
+        ax = drawn(plot_input(cert))
+        assert ax.get_yscale() == scale and ax.spines["bottom"].get_bounds()[0] == 0
+        end = plot_decay(cert, axis="time")
+        assert ("$T_r$" in labelled(end)) == (example.sigma0 is not None)
+        if example.sigma0 is not None:
+            assert labelled(end)["$T_r$"].get_xdata()[0] == pytest.approx(float(example.protocol().reaching.T_r))  # type: ignore[attr-defined,union-attr]
+
+
+def test_states_of_a_certificate_with_late_messages_say_that_they_are_without() -> None:
+    graph = SignedDigraph.from_edges([(1, 2, 1), (2, 3, -1)])
+    cert = certify(graph, PROTOCOL, [1, 0, 2], messages=LateMessages(delay="0.05"), method="paper")
+    (ax,) = plot_run(cert).axes
+    assert ax.get_legend().get_title().get_text() == "without late messages"  # type: ignore[union-attr]
+
+
 # ---------------------------------------------------------------------- spectra and frontiers
 
 
@@ -892,7 +931,9 @@ def test_coordinates_of_agents_stand_below_each_other_and_side_by_side_in_a_wide
         assert axes[0].get_subplotspec().get_gridspec().get_geometry() == shape
         assert {ax.get_ylabel() for ax in axes} == {"position 1", "position 2", "velocity 1", "velocity 2"}
         assert len({(ax.get_xlim(), tuple(ax.get_xticks())) for ax in axes}) == 1
-        assert sorted(text.get_text() for ax in axes for text in ax.texts) == ["a", "a", "b", "b"]
+        for ax in axes:  # velocities begin at 0, and are named where they are largest
+            assert sorted(text.get_text() for text in ax.texts) == ["a", "b"]
+            assert ax.spines["bottom"].get_bounds()[0] == 0
 
 
 def test_a_motion_names_its_agents_and_all_panels_have_the_same_times():

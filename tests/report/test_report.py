@@ -264,8 +264,10 @@ def test_final_states_are_the_proved_ones(tmp_path: Path):
     saved = read_certificate(tmp_path / "c.json")
     said = rows((tmp_path / "c.html").read_text(), "Where the agents end, proved in intervals: the 10 highest")
     assert saved.final_state is not None and saved.final_state.intervals is not None and len(said) == 2 * EXTREMES
-    order = sorted(range(150), key=lambda k: saved.final_state.states[k], reverse=True)
-    assert [row[0] for row in said] == [graph.labels[k] for k in order[:EXTREMES] + order[-EXTREMES:]]
+    ends = [(float(x), radius > 0, k) for k, (x, radius) in enumerate(saved.final_state.intervals)]
+    highest = sorted(ends, key=lambda end: (-end[0], *end[1:]))[:EXTREMES]  # of the same states exact ones come first
+    lowest = sorted(set(ends).difference(highest))[:EXTREMES]
+    assert [row[0] for row in said] == [graph.labels[k] for *_, k in [*highest, *reversed(lowest)]]
     for row in said:
         middle, radius = saved.final_state.intervals[graph.labels.index(row[0])]
         shown, _, wide = row[3].partition(" \u00b1 ")

@@ -15,6 +15,7 @@ from rich.cells import cell_len
 from selection import thinned
 
 import ptcc_certify as ptcc
+from ptcc_certify.bounds.final_state import extremes
 from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.procedure import STEPS
 from ptcc_certify.certificate.request import Expectations
@@ -181,6 +182,21 @@ def test_final_states_are_exact_or_called_rounded_and_of_many_there_are_the_ends
     labels = [f"n{k}" for k in range(40)]
     loose = SignedDigraph.from_edges([("n0", "n1", 1)], labels)
     assert "least n0=0, largest n39=39," in line([*range(40)], loose).replace("every agent", "")
+
+
+def test_of_agents_that_end_highest_an_exact_one_comes_first_then_the_first_in_order():
+    tied = [1.5, Fraction(3, 2), Fraction(0), Fraction(3, 2), Fraction(0)]
+    assert extremes(tied, 1, [Fraction(1, 10**9), *[Fraction(0)] * 4]) == ([1], [2])
+    assert extremes([0, 0, 1], 2) == ([2, 0], [1])  # no agent twice
+
+
+def test_the_claim_says_that_it_is_without_limits_of_the_gain():
+    several = SignedDigraph.from_edges([("a", "b", 1), ("c", "d", 1)])
+    for limits in (GainLimits(gain_cap=50), GainLimits(stop_before="0.1"), GainLimits(1000, sample_period="0.001")):
+        more: dict[str, Any] = {"simulation": False, "method": "paper", "limits": limits}
+        (claim,) = (line for line in assert_screen(ptcc.certify(PAIR, NOMINAL, [1, 2], **more)) if "claim " in line)
+        assert ", without limits (Theorem" in claim
+        assert " " * 11 + "without limits" in summary_lines(ptcc.certify(several, NOMINAL, **more), "several")
 
 
 def test_agents_that_end_at_the_same_state_are_told_together_where_one_line_is_enough():

@@ -62,9 +62,10 @@ def without_flags(verdict: str) -> str:
 
 
 def _claim(certificate: Certificate) -> str:
-    p, behaviours = certificate.protocol, dict.fromkeys(claim.behaviour for claim in certificate.claims)
+    p, behaviours = certificate.protocol, dict.fromkeys(claim.sharpest for claim in certificate.claims)
     when = f"T = {near(p.T)}" if p.reaching is None else f"T_r + T_s = {near(p.T)} whatever the disturbance"
-    return f"{', '.join(behaviours)} at {when} (Theorem {certificate.theorem.number})"
+    which = f"Theorem {certificate.theorem.number}" if certificate.claim is None else certificate.claim.reference
+    return f"{', '.join(behaviours)} at {when} ({which})"
 
 
 def _final_state(certificate: Certificate) -> str:

@@ -157,6 +157,7 @@ def name_agents(
     )
     ax.set_xticks([x for x in ticks if first <= x <= last])
     ax.set_xlim(first - left, last)
+    ax.spines["bottom"].set_bounds(first, last)  # names have their room before time begins
 
 
 def _spread(

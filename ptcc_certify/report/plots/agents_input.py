@@ -54,7 +54,7 @@ def plot_agents_input(subject: Any, *, ax: Axes | None = None, time_unit: str = 
     part = subject.agents if isinstance(subject, Certificate) else None
     largest = None if part is None or part.input is None else max(part.input)
     text = "" if largest is None else f"certified peak {up(largest, 4)}{', sliding terms included' * sliding}"
-    draw_peaks(ax, size, [] if largest is None else [Peak(float(largest), text)])
+    draw_peaks(ax, run.t, size, [] if largest is None else [Peak(float(largest), text)])
     ax.axvline(float(run.protocol.gain.T), color="black", linewidth=0.8, linestyle=":", label="deadline $T$")
     name_agents(ax, run, size, named)
     norm = "$|u_k|$" if run.input.shape[1] == 1 else r"$\|u_k\|$"

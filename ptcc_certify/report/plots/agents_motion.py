@@ -90,9 +90,9 @@ def plot_motion(subject: Any, *, wide: bool = False, time_unit: str = "") -> Fig
                 name = _NAMES[i] if i < len(_NAMES) else f"derivative {i}"
                 label = f"{name} {q + 1}" if d > 1 else name
                 finished(ax, time_label("time $t$", time_unit) if place // columns == rows - 1 else "", label)
-                if i == 0 and len(groups) <= NAMED_AGENTS:
+                if len(groups) <= NAMED_AGENTS:
                     colours = {k: CAMP_STYLES[group][0] for k, group in enumerate(groups)}
-                    name_agents(ax, run, run.states[:, q, i], colours)
+                    (_name_peaks if i else name_agents)(ax, run, run.states[:, q, i], colours)
                 if (legend := ax.get_legend()) is not None and (i or q):
                     legend.remove()
         _align(figure.axes[:d], figure.axes)  # positions are drawn first
@@ -106,6 +106,17 @@ def _align(named: list[Axes], every: list[Axes]) -> None:
     for ax in every:
         ax.set_xticks(ticks)
         ax.set_xlim(limits)
+        ax.spines["bottom"].set_bounds(0, limits[1])
+
+
+def _name_peaks(ax: Axes, run: AgentsTrajectory, values: np.ndarray, colours: dict[int, str]) -> None:
+    """Write the names of agents where their values are largest: many velocities begin and end at 0."""
+    ax.margins(y=0.12)
+    for k, color in colours.items():
+        at = int(np.abs(values[k]).argmax())
+        name, up = shorten_text(printable(run.labels[k]), 12), 1 if values[k, at] >= 0 else -1
+        how: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "va": "center", "fontsize": NAME_SIZE}
+        ax.annotate(name, (run.t[at], values[k, at]), (0, 5 * up), color=color, path_effects=HALO, zorder=6, **how)
 
 
 def _lines(ax: Axes, run: AgentsTrajectory, values: np.ndarray, groups: np.ndarray) -> None:
@@ -159,24 +170,24 @@ def plot_formation(subject: Any, *, ax: Axes | None = None) -> Axes:
         ax.plot(x[-1], y[-1], "o", markersize=4.5, color=color, zorder=5)
     ax.set_aspect("equal", adjustable="datalim")
     if run.graph.n_nodes <= 2 * NAMED_AGENTS:
-        _name_ends(ax, run)
+        _name_starts(ax, run)
     for face, name in (("white", "at $t = 0$"), ("#7F7F7F", "at $t = T$")):
         ax.plot([], [], "o", markersize=4, markerfacecolor=face, markeredgecolor="#7F7F7F", label=name)
     return finished(ax, "$x$", "$y$")
 
 
-def _name_ends(ax: Axes, run: AgentsTrajectory) -> None:
-    """Write every agent's name beside the end of its way, on the side where other marks and names are farthest."""
+def _name_starts(ax: Axes, run: AgentsTrajectory) -> None:
+    """Write every agent's name beside the start of its way, on the side where ways, marks and names are farthest."""
     ends, begins = run.positions[:, :, -1], run.positions[:, :, 0]
     points = 72 * min(SINGLE_COLUMN) * 0.8
     unit = float(np.ptp(np.vstack([ends, begins]), axis=0).max() or 1) * 1.1 / points  # of data, for one point of print
     sides = [np.array([math.cos(a), math.sin(a)]) * _AWAY for a in np.arange(16) * math.pi / 8]
-    taken: list[np.ndarray] = [*ends, *begins]
-    for k, end in enumerate(ends):
-        others = np.array([*taken[:k], *taken[k + 1 :]])
-        free = [float(np.hypot(*(others - end - unit * side).T).min()) for side in sides]
+    taken: list[np.ndarray] = [*np.moveaxis(run.positions, 1, -1).reshape(-1, 2)]
+    for k, begin in enumerate(begins):
+        others = np.array(taken)
+        free = [float(np.hypot(*(others - begin - unit * side).T).min()) for side in sides]
         side = sides[int(np.argmax(np.round(free, 9)))]
-        taken.append(end + unit * side)
+        taken.append(begin + unit * side)
         name = shorten_text(printable(run.graph.labels[k]), 12)
         how: dict[str, Any] = {"textcoords": "offset points", "fontsize": NAME_SIZE, "ha": "center", "va": "center"}
-        ax.annotate(name, (end[0], end[1]), (side[0], side[1]), zorder=6, **how).set_path_effects([*HALO])
+        ax.annotate(name, (begin[0], begin[1]), (side[0], side[1]), zorder=6, **how).set_path_effects([*HALO])

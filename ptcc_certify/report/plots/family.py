@@ -24,6 +24,8 @@ from ptcc_certify.theorems.restricted_signals import DwellTime
 _RANDOM = 8
 #: Samples of runs that begin off the sliding manifold: half as many, since there are as many again before ``T_r``.
 _SAMPLES = 101
+#: The bar of a final interval.
+BAR: dict[str, Any] = {"linewidth": 2.5, "marker": "_", "markersize": 5}
 _AXES = {"left": "remaining time, $1 - t/T$", "time": "time $t$", "clock": "stretched clock $s(t)$"}
 
 
@@ -118,8 +120,8 @@ def plot_family(
     >>> from ptcc_certify.certificate.family_certificate import certify_family
     >>> unsure = Family.from_intervals([("a", "b", "0.8", "1.2"), ("b", "a", "0.5", "1.5")])
     >>> ax = plot_family(certify_family(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2]), time_unit="s")
-    >>> ax.get_xlabel(), [text.get_text() for text in ax.get_legend().get_texts()][-2:]
-    ('time $t$ (s)', ['proved for every signal', 'deadline $T$'])
+    >>> ax.get_xlabel(), [text.get_text() for text in ax.get_legend().get_texts()][-3:]
+    ('time $t$ (s)', ['proved for every signal', 'final states, proved', 'deadline $T$'])
     """
     runs, ax = runs_of(subject, runs), axes_of(ax)
     first = runs[0]
@@ -285,7 +287,7 @@ def _draw_tubes(
         largest[nodes] = np.abs(run.states[nodes, 0]).max()
         if run.sliding is not None:
             largest[nodes] += np.abs(run.sliding.sigma0[nodes]).sum()
-    T, label = float(certificate.protocol.T), bound_label(certificate)
+    T = float(certificate.protocol.T)
     places: dict[tuple[float, float, str], None] = {}
     for name in dict.fromkeys(groups[agents]):
         tubes = []
@@ -297,10 +299,14 @@ def _draw_tubes(
         if name != "single leaders" and tubes:
             tubes = [(np.min([low for low, _ in tubes], axis=0), np.max([high for _, high in tubes], axis=0))]
         for least, most in tubes:
-            style: dict[str, Any] = {"color": CAMP_STYLES[name][0], "alpha": 0.12, "linewidth": 0}
-            ax.fill_between(run.t[before], least, most, **style, label=label)
-            label = ""
+            colour = CAMP_STYLES[name][0]
+            ax.fill_between(run.t[before], least, most, color=colour, alpha=0.07, linewidth=0)
+            for rim in (least, most):  # told apart where two overlap
+                ax.plot(run.t[before], rim, color=colour, alpha=0.6, linewidth=0.6)
     for number, (low, high, colour) in enumerate(places, 1):
         place = T + number * (float(run.t[-1]) - T) / (len(places) + 1)
-        ax.plot([place, place], [low, high], color=colour, linewidth=2.5, zorder=4, marker="_", markersize=5)
+        ax.plot([place, place], [low, high], color=colour, zorder=4, **BAR)
+    if places:
+        ax.fill([], [], facecolor=BEHIND, alpha=0.3, edgecolor=BEHIND, label=bound_label(certificate))
+        ax.plot([], [], color=BEHIND, **BAR, label="final states, proved")
     return [end for low, high, _ in places for end in (low, high)]

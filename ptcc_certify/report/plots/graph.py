@@ -67,8 +67,9 @@ def plot_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
     if graph.n_nodes > LABELLED_NODES:
         return draw_adjacency(ax, structure)
     width, height = np.array(ax.get_window_extent().size) / ax.figure.dpi * 72 * [1.05, 0.95]  # points, of own axes
-    inside = max(map(columns, graph.labels)) <= INSIDE and graph.n_nodes <= FREE_NODES
-    radius = float(np.clip(32 / np.sqrt(graph.n_nodes), 7.5, 10)) if inside else 4.5
+    inside = max(map(columns, graph.labels)) <= INSIDE
+    radius = float(np.clip(32 / np.sqrt(graph.n_nodes), 7.5 if graph.n_nodes <= FREE_NODES else 6.3, 10))
+    radius = radius if inside else 4.5
     part = np.full(graph.n_nodes, -1)
     for number, component in enumerate(structure.closed_components):
         part[list(component.nodes)] = number
@@ -138,7 +139,7 @@ def _draw_arrows(ax: Axes, arrows: Sequence[Arrow], place: np.ndarray, bends: np
 
 
 def draw_ground(ax: Axes, graph: SignedDigraph, place: np.ndarray, nodes: Sequence[int], radius: float) -> None:
-    """Draw a ground under a leader group: under its nodes, along its edges, and between them where no other node is."""
+    """Draw a ground under a leader group: its nodes, its edges and what is between them, but under no other node."""
     inside, style = np.zeros(graph.n_nodes, dtype=bool), {"color": GROUND, "zorder": 0}
     inside[list(nodes)] = True
     own, foreign = inside[graph.source] & inside[graph.target], place[~inside]
@@ -146,6 +147,10 @@ def draw_ground(ax: Axes, graph: SignedDigraph, place: np.ndarray, nodes: Sequen
     if (triangles := triangles_of(place[list(nodes)])) is not None:
         free = np.setdiff1d(np.arange(len(triangles.simplices)), triangles.find_simplex(foreign))
         parts += list(triangles.points[triangles.simplices[free]])
+    along = np.linspace(0, 1, 41)[:, None, None]
     for part in parts:
-        width = 2 * REACH * radius
-        ax.add_patch(Polygon(part, linewidth=width, joinstyle="round", capstyle="round", **style))  # type: ignore[arg-type]
+        rim = (1 - along) * part + along * np.roll(part, 1, axis=0)
+        gap = np.linalg.norm(rim.reshape(-1, 1, 2) - foreign, axis=-1).min(initial=np.inf)
+        width = 2 * min(REACH * radius, gap - radius)  # under no node that is not of the group
+        if width > 0:
+            ax.add_patch(Polygon(part, linewidth=width, joinstyle="round", capstyle="round", **style))  # type: ignore[arg-type]

@@ -21,6 +21,8 @@ WEIGHED_ARROWS = 24
 WEIGHT_SHARES = np.array([0.5, 0.45, 0.55, 0.4, 0.6, 0.35, 0.65, 0.3, 0.7, 0.25, 0.75])
 #: Boxes along an arrow of three points each; its own weight keeps off so many at either end.
 BOX, NEAR_ENDS = 3, 5
+#: Points between two weights.
+APART = 6
 
 
 def draw_labels(
@@ -31,7 +33,8 @@ def draw_labels(
     nodes = [np.array([*(p - radius), *(p + radius)]) for p in place]
     if lines is None:
         for label, p in zip(labels, place, strict=True):
-            ax.annotate(printable(label), p, color="white", va="center_baseline", **style)
+            small = {"fontsize": min(NAME_SIZE, 0.9 * radius)}
+            ax.annotate(printable(label), p, color="white", va="center_baseline", **style | small)
         return nodes
     taken = nodes + lines
     for label, p in zip(labels, place, strict=True):
@@ -41,7 +44,7 @@ def draw_labels(
         ways = np.stack([np.cos(turns), np.sin(turns)], axis=1)
         spots = [p + way * (far * radius + 1) + half * way for far in (1, 2, 3, 4, 5, 6, 7) for way in ways]
         taken.append(box := least_covered(spots, half, taken))
-        if (np.maximum(box[:2] - p, p - box[2:]) > 3 * radius).any():  # far from its node
+        if (np.maximum(box[:2] - p, p - box[2:]) > 1.6 * radius).any():  # not beside its node
             ax.plot(*np.stack([p, np.clip(p, box[:2], box[2:])], axis=1), color="0.6", linewidth=0.5, zorder=1)
         ax.annotate(text, p, (box[:2] + box[2:]) / 2, va="center", color="black", path_effects=HALO, **style)
     return nodes + taken[len(nodes) + len(lines) :]
@@ -78,7 +81,7 @@ def draw_sizes(
         spots += [spots[0] + beside, spots[0] - beside]
         others = [*lines[:k], lines[k][:NEAR_ENDS], lines[k][-NEAR_ENDS:], *lines[k + 1 :]]
         box = least_covered(spots, half, [*taken, *(box for line in others for box in line)])
-        taken.append(box)
+        taken.append(box + APART * np.array([-1, -1, 1, 1]))
         (x, y), colour = (box[:2] + box[2:]) / 2, EDGE_STYLES[arrow.sign][0]
         ax.text(x, y, text, fontsize=NAME_SIZE, color=colour, ha="center", va="center", bbox=ground, zorder=4)
 

@@ -36,13 +36,13 @@ def plot_input(
 
     Lines and names are those of :func:`plot_trajectory`; of more than eight agents the largest input in each part of
     the graph is drawn, with a line for the agent whose input is the largest at first. The axis is linear; logarithmic
-    for an input that grows to three times its initial size. Behind an actuator it is the input that acts. Nothing is
-    drawn where the integrator no longer resolves what the gain multiplies. No peak is drawn where none holds: for runs
-    that begin later than 0, sampled inputs, disturbance or noise of the nominal protocol, boundary layers. Of a
-    certificate with one set of limits of the gain the run under these is drawn, and their peak; the legend names them.
-    A held input is drawn in steps if every period is sampled. With late messages their bound is drawn besides, as far
-    as there is one. Of a family the largest input under each of many signals is drawn, below its bound for every
-    signal; of agents of order n the size of each agent's input.
+    for an input that grows to three times its initial size, or is large for a short time alone. Behind an actuator it
+    is the input that acts. Nothing is drawn where the integrator no longer resolves what the gain multiplies. No peak
+    is drawn where none holds: for runs that begin later than 0, sampled inputs, disturbance or noise of the nominal
+    protocol, boundary layers. Of a certificate with one set of limits of the gain the run under these is drawn, and
+    their peak; the legend names them. A held input is drawn in steps if every period is sampled. With late messages
+    their bound is drawn besides, as far as there is one. Of a family the largest input under each of many signals is
+    drawn, below its bound for every signal; of agents of order n the size of each agent's input.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def plot_input(
     ax, size = axes_of(ax), np.abs(_resolved_input(run))
     steps = "steps-post" if _every_period_sampled(run) else "default"
     named = draw_agents(ax, run, size, structure, size=True, drawstyle=steps)
-    draw_peaks(ax, size, [] if certificate is None else _peaks(run, certificate))
+    draw_peaks(ax, run.t, size, [] if certificate is None else _peaks(run, certificate))
     draw_deadlines(ax, run)
     name_agents(ax, run, size, named)
     return finished(ax, time_label("time $t$", time_unit), "input $|u_k|$", limits_text(run, certificate))

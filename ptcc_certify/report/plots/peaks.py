@@ -10,12 +10,14 @@ from matplotlib.axes import Axes
 
 from ptcc_certify.report.plots.agents import NAME_SIZE
 
-#: An input that grows to so many times its initial size is drawn on a logarithmic axis,
-LARGE_GROWTH = 3
+#: An input that grows to so many times its initial size, or is above such a share of its largest for less than such a
+#: share of the time, is drawn on a logarithmic axis,
+LARGE_GROWTH, LARGE, BRIEF = 3, 1 / 5, 1 / 8
 #: from so many decades below its initial size on; changes of sign go further down.
 INPUT_DECADES = 3
-#: A bound is drawn as a line up to so many times the largest input of the run, else named at the top.
-HIGH_PEAK = 2.5
+#: A bound is drawn as a line up to so many times the largest input of the run, else named at the top; on a linear axis,
+#: and on a logarithmic one.
+HIGH_PEAK, HIGH_PEAK_OF_LOGARITHM = 1.6, 30
 
 
 class Peak(NamedTuple):
@@ -26,16 +28,21 @@ class Peak(NamedTuple):
     color: str = "black"
 
 
-def draw_peaks(ax: Axes, size: np.ndarray, peaks: Sequence[Peak]) -> None:
+def draw_peaks(ax: Axes, t: np.ndarray, size: np.ndarray, peaks: Sequence[Peak]) -> None:
     """Set the axis of inputs of these sizes, (N, M), and draw what bounds them, with names; those far above at the top.
 
-    Of two lines the higher one has its name above it, the lower one below.
+    The axis is logarithmic where a linear one would leave most of the time, ``t`` (M,), flat. Of two lines the higher
+    one has its name above it, the lower one below.
     """
     largest = np.nan_to_num(size)
     first, top = float(largest[:, :1].max(initial=0)), float(largest.max(initial=0))
-    shown = [peak for peak in peaks if peak.value <= HIGH_PEAK * top or top == 0]
+    even = np.interp(np.linspace(t[0], t[-1], 401), t, largest.max(axis=0))
+    brief = (even > LARGE * top).mean() < BRIEF
+    logarithmic = bool(first and (brief or top > LARGE_GROWTH * first))
+    most = HIGH_PEAK_OF_LOGARITHM if logarithmic else HIGH_PEAK
+    shown = [peak for peak in peaks if peak.value <= most * top or top == 0]
     height = max([top, *(peak.value for peak in shown)])
-    if first and top > LARGE_GROWTH * first:
+    if logarithmic:
         ax.set_yscale("log", nonpositive="clip")
         ax.set_ylim(first * 10.0**-INPUT_DECADES, height * 2)
     else:
@@ -49,7 +56,7 @@ def draw_peaks(ax: Axes, size: np.ndarray, peaks: Sequence[Peak]) -> None:
             ax.annotate(f"{peak.name}, above", (1, 1), place, xycoords=at, va="top", color=peak.color, **style)
             above += 1
             continue
-        ax.axhline(peak.value, color=peak.color, linewidth=0.9, linestyle="--")
+        ax.plot(t[[0, -1]], [peak.value] * 2, color=peak.color, linewidth=0.9, linestyle="--")  # not over names
         low = any(other.value > peak.value for other in shown)
         ends: dict[str, Any] = {"va": "top" if low else "bottom", "color": peak.color}
         sides = ("axes fraction", "data")

@@ -126,10 +126,17 @@ def structure_of(subject: Any) -> Structure:
 
 
 def limits_text(run: Trajectory, certificate: Certificate | None) -> str:
-    """Name what limits the gain of a run, or say that a certificate's limits do not."""
+    """Name what limits the gain of a run, or say what of a certificate is not in it: limits, late messages, motion."""
     limits = run.actuator
+    if limits is None and certificate is not None:
+        absent = {
+            "without the limits of the gain": certificate.limits,
+            "without late messages": certificate.late,
+            "leaders at rest": certificate.tracking,
+        }
+        return ", ".join(text for text, there in absent.items() if there)
     if limits is None:
-        return "without the limits of the gain" if certificate is not None and certificate.limits else ""
+        return ""
     numbers = (limits.gain_cap, limits.stop_before, limits.sample_period)
     named = zip(("gain at most", "off from $T$ -", "held over"), numbers, strict=True)
     return ", ".join(f"{name} {near(number)}" for name, number in named if number is not None)
