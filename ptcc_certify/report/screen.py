@@ -108,8 +108,6 @@ def summary_lines(certificate: Certificate, name: str, origins: Mapping[str, str
     claims = _claim_texts(
         certificate.structure, certificate.claims, _when(certificate, f"at T = {near(p.T)}"), whatever
     )
-    if len(certificate.claims) > 1 and (certificate.late or certificate.tracking or certificate.limits):
-        claims.append(whatever.removeprefix(", "))
     drawn = _is_set_asked(certificate)
     entries = [
         *graph_entries(certificate.structure, name),
@@ -213,14 +211,15 @@ def _claim_texts(structure: Structure, claims: Sequence[Claim], when: str = "", 
     if len(claims) == 1:
         (claim,) = claims
         texts = [f"{sharpest[0]}{when}{also} ({which})" for which in (claim.reference, f"Theorem {claim.theorem}")]
-        return [texts[0] if len(texts[0]) <= TEXT else shorten_text(texts[1], TEXT)]
+        return [texts[0] if len(texts[0]) <= TEXT else texts[1]]
     components, labels, lines = structure.components, structure.graph.labels, []
     for k in sorted(range(len(claims)), key=lambda k: -len(components[k].nodes))[:4]:
         text = f"{sharpest[k]}{when} (Theorem {claims[k].theorem})"
         nodes = components[k].nodes
         names = [printable(labels[v]) for v in nodes[:TEXT]]
-        lines.append(f"{shorten_list(names, TEXT - len(text) - 2, len(nodes))}: {text}")
-    return lines + [f"... {len(claims):,} components in all"] * (len(claims) > 4)
+        lines.append(f"{shorten_list(names, max(TEXT - len(text) - 2, 14), len(nodes))}: {text}")
+    lines += [f"... {len(claims):,} components in all"] * (len(claims) > 4)
+    return lines + [also.removeprefix(", ")] * bool(also)
 
 
 def _short_final_state(certificate: Certificate) -> Lines:
