@@ -100,7 +100,8 @@ class LateBounds:
     input : (N,) array or None
         What bounds ``|x_k'|`` up to ``T``, the sliding term left out, in floats from above; None where nothing does.
     enough : Fraction or None
-        A delay with which no more is left than was asked, near to the longest one that is proved.
+        The age up to which no more is left than was asked, near to the longest one that is proved; all times of
+        ``messages`` in proportion.
     """
 
     messages: LateMessages

@@ -16,6 +16,7 @@ from late_certificates import led_graph
 from ptcc_certify.bounds import late_messages
 from ptcc_certify.bounds.final_state import final_state
 from ptcc_certify.bounds.late_messages import LateBounds, bound_late
+from ptcc_certify.bounds.longest_delay import LateCase
 from ptcc_certify.bounds.small_delays import delay_threshold
 from ptcc_certify.bounds.staged_deadlines import levels
 from ptcc_certify.bounds.tracking import bound_tracking
@@ -128,6 +129,28 @@ def test_messages_of_leaders_at_rest_may_be_as_old_as_they_like() -> None:
     cert = certify(graph, protocol, messages=LateMessages(delay=each), simulation=False, method="paper")
     assert cert.checked is not None and cert.checked.accepted, cert.checked
     assert cert.late is not None and cert.late.largest <= among.largest * 1.05
+
+
+@pytest.mark.parametrize("seed", [11, 12])
+def test_the_longest_delay_leaves_as_little_as_was_asked_and_a_longer_one_does_not(seed: int) -> None:
+    rng, structure, protocol, x0, ends = _case(seed)
+    messages = _messages(rng, protocol, exact=True)
+    messages = _apart(rng, structure, messages) if seed % 2 else messages
+    case = LateCase(structure, protocol, x0, ends.intervals)
+    first = case.bound(messages)
+    for share in ("0.3", "3"):
+        asked = Fraction(first.largest) * Fraction(share)
+        longest = case.longest(first, asked)
+        if longest is None:
+            assert case._bound_at(messages, protocol.T / 10**5).largest > asked
+            continue
+        assert longest.largest <= asked
+        age, times = longest.messages.age, messages.latencies(structure.graph)
+        assert (age < messages.age) == (share == "0.3") or longest is first
+        if isinstance(times, tuple):  # all times in proportion
+            assert [x * age / messages.age for x in times] == list(longest.messages.latencies(structure.graph))
+        longer = case._bound_at(messages, age * Fraction(11, 10))
+        assert longer.largest > asked or age == protocol.T
 
 
 def test_initial_deviations_of_many_followers_are_bounded_from_above_and_nearly_exact(

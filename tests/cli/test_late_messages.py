@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import re
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -27,6 +28,7 @@ from ptcc_certify import (
     read_graph,
     simulate,
 )
+from ptcc_certify.bounds.longest_delay import LateCase
 from ptcc_certify.certificate import format_vectors
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.simulation.late_messages import simulate_late
@@ -84,6 +86,39 @@ def test_a_behaviour_asked_for_at_T_is_refuted_where_an_agent_is_proved_to_miss_
     left = ptcc("certify", "team.csv", "--delay", "0.02", *START, *QUICK, "--max-residual", "0.001")
     assert left.code == 4, left
     assert "this certificate's limit is" in " ".join(left.out.split())
+
+
+@pytest.mark.parametrize(
+    ("graph", "delay", "more", "status"),
+    [
+        ("team.csv", "0.02", ("--max-residual", "0.1"), "met"),
+        ("team.csv", "0.02", ("--max-residual", "0.001"), "left open"),
+        ("ring.csv", "0.01", ("--max-residual", "1", "--gain-cap", "5"), "left open"),
+        ("ring.csv", "0.5", ("--max-residual", "1.5", "--gain-cap", "5"), "left open"),
+        ("ring.csv", "0.0001", ("--max-residual", "2", "--gain-cap", "5", "--own-delay"), "met"),
+    ],
+)
+def test_the_delay_up_to_which_a_wanted_residual_is_told_to_be_certified_is_certified(
+    graph: str, delay: str, more: tuple[str, ...], status: str
+) -> None:
+    Path("ring.csv").write_text("a,b,1\nb,a,1\nb,c,-2\nc,d,1.5\nd,c,0.7\na,d,-1\n")
+    gains = QUICK if graph == "team.csv" else QUICK[4:]
+    run = ptcc("certify", graph, "--delay", delay, *more, *START, *gains)
+    text = " ".join(run.out.partition("verdict")[2].split())
+    told = re.search(r"certified where nothing is older than ([\d.]+\d)", text)
+    assert text.startswith(status) and told is not None, run
+    again = ptcc("certify", graph, "--delay", told[1], *more, *START, *gains)
+    assert "verdict    met: within" in again.out, again
+
+
+def test_no_delay_is_told_that_the_check_does_not_accept(monkeypatch: pytest.MonkeyPatch) -> None:
+    words = ("team.csv", "--delay", "0.02", "--max-residual", "0.001", *START, *QUICK)
+    monkeypatch.setattr(
+        LateCase,
+        "longest",
+        lambda self, late, asked: replace(late, residual=np.zeros(4), messages=LateMessages("0.01")),
+    )
+    assert "older" not in ptcc("certify", *words).out
 
 
 @pytest.mark.parametrize(
