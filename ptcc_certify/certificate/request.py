@@ -204,9 +204,9 @@ def refuse_beside(structure: Structure, protocol: Protocol, request: Request) ->
         refuse_leader_groups(structure, "leaders that move as they like: a bound")
     if messages is not None:
         _refuse_messages(structure, messages, [limit.gain_cap for limit in request.limits])
-    alone = structure.followers.size == 0 if leaders is not None else structure.graph.n_edges == 0
-    if alone:
-        raise ParameterError("nobody listens to a leader, so nothing is late and nobody tracks; leave it out")
+    if structure.graph.n_edges == 0:
+        name, why = ("leaders", "nobody tracks") if messages is None else ("messages", "nothing is late")
+        raise ParameterError(f"{name}: nobody listens to anybody, so {why}; leave it out")
 
 
 def _refuse_more(refused: Mapping[str, str], request: Request) -> None:

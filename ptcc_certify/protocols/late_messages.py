@@ -64,7 +64,8 @@ class LateMessages:
     >>> LateMessages(delay=1, own_delay=True)
     Traceback (most recent call last):
     ptcc_certify.errors.ParameterError: an own state that is late makes the protocol diverge, for its gain grows \
-without limit before T; add a gain cap, or measure the own state without delay
+without limit before T; add a gain_cap, below (pi/2 - |arg lambda|)/(delay |lambda|) for all nonzero eigenvalues \
+lambda of L, or measure the own state without delay
     """
 
     delay: Exact | Mapping[tuple[str, str], Exact] = 0
@@ -99,11 +100,12 @@ without limit before T; add a gain cap, or measure the own state without delay
         if self.own_delay and self.gain_cap is None:
             raise ParameterError(
                 "an own state that is late makes the protocol diverge, for its gain grows without limit before T; "
-                "add a gain cap, or measure the own state without delay"
+                "add a gain_cap, below (pi/2 - |arg lambda|)/(delay |lambda|) for all nonzero eigenvalues lambda of L, "
+                "or measure the own state without delay"
             )
         if not self.age and not self.value_error:
             raise ParameterError(
-                "messages that are neither late, nor lost, nor rounded; give a delay, a period or a value error above 0"
+                "messages that are neither late, nor lost, nor rounded; give delay, period or value_error above 0"
             )
 
     @property

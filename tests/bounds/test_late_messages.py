@@ -291,7 +291,7 @@ BAD = [
     ({"delay": 1, "losses": 3}, "losses without a period: tell how long it is from one message to the next"),
     ({"delay": 1, "period": 0}, "period = 0 is outside its domain"),
     ({"delay": 1, "period": 1, "losses": -1}, "losses = -1 is not a number of messages, 0 to 1,000,000"),
-    ({"delay": 0}, "messages that are neither late, nor lost, nor rounded; give a delay, a period or a value error"),
+    ({"delay": 0}, "messages that are neither late, nor lost, nor rounded; give delay, period or value_error above 0"),
     ({"delay": {"a": 1}}, "a delay of 'a', which is no edge; name it as (source, target)"),
 ]
 

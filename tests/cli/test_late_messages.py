@@ -55,6 +55,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     Path("team.csv").write_text(TEAM)
     Path("chain.csv").write_text(CHAIN)
+    Path("none.csv").write_text("a\nb\n")
     Path("group.csv").write_text("a,b,1\nb,a,1\nb,c,1\n")
     return tmp_path
 
@@ -197,7 +198,12 @@ def test_followers_track_leaders_that_move_and_the_file_says_so() -> None:
     [
         (("team.csv", "--delay=-1"), "delay = -1 is outside its domain; delay must be >= 0"),
         (("team.csv", "--delay", "nan"), '--delay: "nan" is not a finite number'),
-        (("team.csv", "--delay", "0"), "neither late, nor lost, nor rounded"),
+        (("team.csv", "--delay", "0"), "nor rounded; give --delay, --period or --quantisation above 0"),
+        (("team.csv", "--quantisation", "0"), "nor rounded; give --delay, --period or --quantisation above 0"),
+        (("team.csv", "--delay", "0.1", "--period", "0"), "period = 0 is outside its domain"),
+        (("none.csv", "--delay", "0.1"), "--delay: nobody listens to anybody; leave it out, or add edges"),
+        (("none.csv", "--quantisation", "1"), "--quantisation: nobody listens to anybody; leave it out"),
+        (("none.csv", "--leader-speed", "1"), "--leader-speed: nobody listens to anybody; leave it out"),
         (("team.csv", "--delay", "0.1", "--packet-loss", "3"), "--packet-loss says nothing by itself; give --period"),
         (("team.csv", "--max-residual", "1"), "--max-residual: is asked of late messages"),
         (("team.csv", "--delay", "0.1", "--initial-bound", "1"), "--initial-bound) is not taken up"),
@@ -216,7 +222,11 @@ def test_followers_track_leaders_that_move_and_the_file_says_so() -> None:
         (("team.csv", "--delay", "latency"), 'team.csv, line 1: no column "latency"; begin with a header'),
         (("team.csv", "--packet-loss", "3"), "--packet-loss says nothing by itself; give --period"),
         (("team.csv", "--own-delay"), "--own-delay says nothing by itself; give --delay"),
-        (("team.csv", "--delay", "0.1", "--own-delay"), "makes the protocol diverge"),
+        (  # the pair of allies has the eigenvalue 2: pi/2 / (2 * 0.1)
+            ("group.csv", "--delay", "0.1", "--own-delay"),
+            "add --gain-cap (with this delay a constant gain diverges above 7.85, numerical; what is",
+        ),
+        (("group.csv", "--quantisation", "0.1", "--own-delay"), "add --gain-cap, or measure the own state without"),
         (("group.csv", "--delay", "0.1"), "needs leaders that listen to nobody; a and b are leaders of one group"),
         (("group.csv", "--leader-speed", "1"), "needs leaders that listen to nobody; a and b are leaders of one group"),
         (("team.csv", "--sign-gain", "1"), "--sign-gain belongs to leaders that move; give --leader-speed"),
@@ -497,6 +507,10 @@ def test_a_column_of_a_file_without_columns_is_refused() -> None:
 def test_families_and_other_limits_are_refused_in_python_too() -> None:
     pair, protocol = SignedDigraph.from_edges([(1, 2, 1)]), NominalProtocol(1, 1, 2, 1)
     each, same = LateMessages(delay={(1, 2): "0.1"}), GainLimits(gain_cap=20)
+    alone = SignedDigraph.from_matrix([[0, 0], [0, 0]], orientation="listens")
+    for asked, said in (({"messages": LateMessages("0.1")}, "messages"), ({"leaders": MovingLeaders(1)}, "leaders")):
+        with pytest.raises(ParameterError, match=f"{said}: nobody listens to anybody, so .*; leave it out"):
+            certify(alone, protocol, **asked)
     with pytest.raises(ParameterError, match="messages is not for families of graphs yet"):
         certify(pair, protocol, uncertainty="10%", messages=each)
     with pytest.raises(ParameterError, match="max_residual: is asked of late messages, which families"):
