@@ -11,6 +11,7 @@ import numpy as np
 
 from ptcc_certify.bounds.final_state import Influence
 from ptcc_certify.bounds.late_messages import LateBounds, bound_late
+from ptcc_certify.bounds.settling_leaders import SettlingBounds
 from ptcc_certify.bounds.small_delays import DecayingForm, SmallDelayBounds
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.protocols.base import Protocol
@@ -36,7 +37,7 @@ class LateCase:
     influence : Influence, optional
         Exact; it belongs to ``forms``.
     forms : sequence of DecayingForm
-        Lyapunov functions of the whole graph, which forgive small delays under a capped gain.
+        Lyapunov functions of the whole graph: they forgive small delays under a cap, or tell how leaders settle.
 
     Examples
     --------
@@ -56,7 +57,7 @@ class LateCase:
 
     def bound(self, messages: LateMessages) -> LateBounds:
         """Return what is proved with such messages, by rows and by Lyapunov functions."""
-        return self.with_form(bound_late(self.structure, self.protocol, messages, self.initial_state, self.ends))
+        return self.with_forms(bound_late(self.structure, self.protocol, messages, self.initial_state, self.ends))
 
     def small_delays(self, messages: LateMessages) -> SmallDelayBounds | None:
         """Return what bounds small delays of the whole graph; None where nothing does."""
@@ -65,14 +66,27 @@ class LateCase:
             return None
         return SmallDelayBounds(self.structure, self.protocol.gain, messages, exact, state)
 
-    def with_form(self, late: LateBounds) -> LateBounds:
-        """Add what the best Lyapunov function of the whole graph proves."""
-        bounds = self.small_delays(late.messages)
+    def with_forms(self, late: LateBounds) -> LateBounds:
+        """Add what the best Lyapunov functions of the whole graph prove."""
+        late, bounds = self._with_settling(late), self.small_delays(late.messages)
         form = None if bounds is None else bounds.best(self.forms)
         if bounds is None or form is None:
             return late
         inputs = bounds.inputs(next(one for one in self.forms if one.function == form.function), form)
         return replace(late, form=form, input=inputs if late.input is None else np.minimum(inputs, late.input))
+
+    def _with_settling(self, late: LateBounds) -> LateBounds:
+        """Add what holds of followers that hear late of leaders in groups, unless these hear late, too."""
+        state, ends, structure = self.initial_state, self.ends, self.structure
+        groups = any(len(c.nodes) > 1 for c in structure.closed_components)
+        if state is None or ends is None or not groups or not structure.followers.size or not late.messages.age:
+            return late
+        if not self.forms or not late.messages.leaders_hear_at_once(structure):
+            return late
+        bounds = SettlingBounds(structure, late.gain, late.messages, state, ends)
+        best = bounds.best(self.forms)
+        inputs = None if best is None or late.messages.gain_cap is None else bounds.inputs(best)
+        return replace(late, settling=best, input=inputs)
 
     def longest(self, late: LateBounds, residual: Fraction) -> LateBounds | None:
         """Return the bounds for nearly the longest delay that leaves no more than a residual.

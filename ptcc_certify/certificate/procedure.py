@@ -334,7 +334,7 @@ def _with_small_delays(certificate: Certificate) -> Certificate:
         certificate.influence,
         certificate.decaying_forms,
     )
-    late, small = case.with_form(late), case.small_delays(late.messages)
+    late, small = case.with_forms(late), case.small_delays(late.messages)
     late = late if small is None else replace(late, longest_delay=small.longest_delay(case.forms))
     certificate, asked = certificate.changed(late=late), certificate.expectations.max_residual
     if asked is not None and late.messages.age and certificate.graph.n_nodes <= EXACT_NODES:

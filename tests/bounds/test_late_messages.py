@@ -11,7 +11,7 @@ from typing import Any
 import networkx as nx
 import numpy as np
 import pytest
-from late_certificates import led_graph
+from late_certificates import grouped_graph, led_graph
 
 from ptcc_certify.bounds import late_messages
 from ptcc_certify.bounds.final_state import final_state
@@ -129,6 +129,42 @@ def test_messages_of_leaders_at_rest_may_be_as_old_as_they_like() -> None:
     cert = certify(graph, protocol, messages=LateMessages(delay=each), simulation=False, method="paper")
     assert cert.checked is not None and cert.checked.accepted, cert.checked
     assert cert.late is not None and cert.late.largest <= among.largest * 1.05
+
+
+def _judge_settling(seed: int, patterns: tuple[str, ...] = PATTERNS) -> float:
+    """The largest deviation, or input under a cap, over its bound, of runs behind leaders that settle."""
+    rng = np.random.default_rng(seed)
+    graph, delays = grouped_graph(rng, int(rng.integers(1, 5)))
+    protocol = NominalProtocol(
+        T=Fraction(int(rng.integers(5, 30)), 10),
+        rho1=Fraction(int(rng.integers(1, 20)), 10),
+        rho2=Fraction(int(rng.integers(2, 60)), 10),
+        kappa=1,
+    )
+    x0 = [Fraction(int(x), 10) for x in rng.integers(-100, 100, graph.n_nodes)]
+    messages = LateMessages(delays, gain_cap=int(rng.integers(5, 80)) if seed % 3 == 0 else None)
+    cert = certify(graph, protocol, x0, messages=messages, simulation=False, method="paper")
+    assert cert.verdict == "certified" and cert.late is not None and cert.late.settling is not None, (seed, cert.notes)
+    end, worst = np.asarray(cert.final_state, dtype=float), 0.0
+    for pattern in patterns:
+        run = simulate_late(graph, protocol, messages, [float(x) for x in x0], pattern=pattern, seed=seed, steps=300)  # type: ignore[arg-type]
+        away = np.maximum(np.abs(run.states - end[:, None]) - FLOOR * 10 * float(max(map(abs, x0))), 0)
+        ratios = [away / np.maximum(cert.late.settling.deviation_bound(cert.late.gain, run.t), 1e-300)]
+        ratios.append(away[:, -1] / np.maximum(cert.late.settling.residual, 1e-300))
+        ratios += [] if cert.late.input is None else [np.abs(run.input) / cert.late.input[:, None]]
+        worst = max(worst, *(float(ratio.max()) for ratio in ratios))
+    return worst
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_run_behind_leaders_that_settle_exceeds_what_is_proved(seed: int) -> None:
+    assert _judge_settling(seed, PATTERNS[seed : seed + 1]) <= 1 + ROUNDING
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("block", range(5))
+def test_100_graphs_with_leaders_that_settle_keep_their_bounds(block: int) -> None:
+    assert max(_judge_settling(100 + 20 * block + k) for k in range(20)) <= 1 + ROUNDING
 
 
 @pytest.mark.parametrize("seed", [11, 12])

@@ -271,6 +271,23 @@ def test_small_delays_of_a_leader_group_are_certified_under_a_cap_up_to_a_limit_
     assert "this certificate's limit is a delay of" in long.assessment.text
 
 
+def test_followers_of_a_leader_group_are_certified_without_a_cap_where_the_leaders_hear_each_other_at_once() -> None:
+    Path("led.csv").write_text("source,target,weight,delay\np,q,1,0\nq,p,2,0\np,f,-1,0.01\nf,g,1,0.02\ng,f,0.5,0.02\n")
+    words = ("certify", "led.csv", "--delay", "delay", "--rho2", "12", "--x0", "1,3,4,-4")
+    run = ptcc(*words, "--max-residual", "1", "--at", "0.9", "-v", "-o", "c.json")
+    text = " ".join(run.out.split())
+    assert run.code == 0 and "leaders hear each other at once, and settle by themselves" in text, run
+    assert re.search(r"met: within 1 at T \(certified where nothing is older than 0.\d+, all delays in prop", text)
+    assert "at t = 0.9 every agent within" in text and ptcc("check", "c.json").code == 0
+    saved = read_certificate("c.json").late
+    assert saved is not None and saved.settling is not None and saved.largest <= 1
+    assert ptcc("report", "c.json", "-o", "c.html").code == ptcc("plot", "c.json", "--what", "late").code == 0
+    capped = ptcc(*words, "--gain-cap", "30")
+    assert capped.code == 0 and "input      bounded up to T" in capped.out, capped
+    for more in (("--quantisation", "0.1"), ("--period", "0.01")):
+        assert "let leaders hear each other at once (delays of 0)" in ptcc(*words, *more).err
+
+
 def test_messages_that_take_longer_than_the_deadline_are_certified_to_leave_what_was_there_at_first() -> None:
     run = ptcc("certify", "chain.csv", "--delay", "5", "--x0", "1,0,2", *QUICK)
     assert run.code == 0, run
