@@ -175,7 +175,8 @@ def certify(
         under each of ``limits`` but sampling. Noise times an infinite gain is bounded by nothing.
     messages : LateMessages, optional
         How late, how often lost and how inexact is what agents hear; what is left at the deadline then is bounded. With
-        single leaders, and ``sigma(0) = 0`` under the sliding-mode protocol.
+        single leaders, leader groups that hear each other at once, or a cap; ``sigma(0) = 0`` under the sliding-mode
+        protocol.
     leaders : MovingLeaders, optional
         Nominal protocol, single leaders: how fast these move; how followers track them is bounded. Not with
         ``messages``.
