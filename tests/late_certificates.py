@@ -7,7 +7,7 @@ import json
 import math
 from collections.abc import Sequence
 from fractions import Fraction
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -20,6 +20,7 @@ from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import OBLIGATIONS
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.protocols.late_messages import LateMessages
 
 ROOM = Fraction(1, 10**6)
 
@@ -46,6 +47,30 @@ def led_graph(
             sign = {"mixed": rng.choice([-1, 1]), "positive": 1, "gauge": camp[k] * camp[v]}[signs]
             edges.append((order[v], order[k], Fraction(int(sign) * int(rng.integers(10, 300)), 100)))
     return SignedDigraph.from_edges(edges, sorted(order))
+
+
+def grouped_graph(rng: np.random.Generator, followers: int) -> tuple[SignedDigraph, dict[tuple[str, str], Fraction]]:
+    """A leader group with any signs, a single leader, and followers of them; delays, which are 0 within the group."""
+    size = int(rng.integers(2, 4))
+    pairs = [(v, (v + 1) % size) for v in range(size)] + [(1, 0)]
+    for k in range(size + 1, size + 1 + followers):
+        before = int(rng.integers(0, min(k, size + 1))) if k > size + 1 else 0
+        others = [v for v in range(k - 1, size + 1 + followers) if v not in (k, size)]
+        pairs += [(before, k), *((v, k) for v in others[:2])]
+    weights = {pair: Fraction(int(rng.choice([-1, 1]) * rng.integers(10, 300)), 100) for pair in pairs}
+    edges = [(f"a{s}", f"a{t}", w) for (s, t), w in weights.items()]
+    delays = {(f"a{s}", f"a{t}"): Fraction(int(t >= size) * int(rng.integers(5, 40)), 500) for s, t in weights}
+    graph = SignedDigraph.from_edges(edges, [f"a{v}" for v in range(size + 1 + followers)])
+    return graph, delays
+
+
+@cache
+def settling(seed: int, gain_cap: Any = None) -> Json:
+    """A certificate of followers that hear late of a leader group, as it is made."""
+    rng = np.random.default_rng(seed)
+    graph, delays = grouped_graph(rng, int(rng.integers(1, 4)))
+    x0 = [Fraction(int(v), 10) for v in rng.integers(-50, 50, graph.n_nodes)]
+    return plain(graph, nominal(), x0, messages=LateMessages(delays, gain_cap=gain_cap))
 
 
 def plain(graph: SignedDigraph, protocol: Any, x0: Any, **options: Any) -> Json:
@@ -387,6 +412,7 @@ def with_messages(
         "residual": None,
         "missed": None,
         "staged": None,
+        "settling": None,
         "form": None,
         "input": None,
     }

@@ -81,6 +81,8 @@ class LateMotion:
         From 0 on, by steps of the least ``taubar`` at most.
     own_late : bool
         The own state is heard late too, as old as each message.
+    at_once : tuple of int
+        Agents that listen to each other alone, at once: they move exactly so.
     """
 
     W: Matrix
@@ -88,6 +90,7 @@ class LateMotion:
     taubar: float | Matrix
     times: Vector
     own_late: bool = False
+    at_once: tuple[int, ...] = ()
 
     def run(self, history: Vector, ages: Ages, errors: Callable[[Vector], Vector] | None = None) -> Matrix:
         """Return the states at all instants, (N, times).
@@ -105,6 +108,9 @@ class LateMotion:
         N, D = len(self.W), np.abs(self.W).sum(axis=1)
         X, own = np.empty((N, len(self.times))), np.arange(N)[None, :]
         X[:, 0] = history
+        leading = list(self.at_once)
+        A = (np.diag(D) - self.W)[np.ix_(leading, leading)]
+        slowest = min((x.real for x in np.linalg.eigvals(A) if abs(x) > 1e-9), default=1.0) if leading else 1.0
         moved = [[g.between(a, b) for g in self.gains] for a, b in pairwise(self.times)]
         for j, ds in enumerate(np.array(moved)):
             # the first instant that is not older than taubar at the end of the step
@@ -121,6 +127,8 @@ class LateMotion:
             decay = np.exp(-D[moves] * ds[moves])
             X[:, j + 1] = X[:, j]
             X[moves, j + 1] = end[moves] + (X[moves, j] - end[moves]) * decay
+            if self.at_once:
+                X[leading, j + 1] = expm(-A * min(ds[0], 50 / slowest)) @ X[leading, j]
         return X
 
 

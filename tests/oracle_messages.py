@@ -19,6 +19,7 @@ import late_motion
 import numpy as np
 from late_motion import Gain, LateMotion, Moving
 from oracle import Oracle, ball, number
+from scipy.linalg import expm
 
 Json = dict[str, Any]
 #: A bound may lie below what floats find by this share, and by this much for states of size 1.
@@ -45,7 +46,15 @@ class Runs:
 
 @lru_cache(maxsize=400)
 def late_runs(
-    W: bytes, x0: bytes, target: bytes, gains: tuple[Gain, ...], oldest: bytes, error: float, late: bool, end: float
+    W: bytes,
+    x0: bytes,
+    target: bytes,
+    gains: tuple[Gain, ...],
+    oldest: bytes,
+    error: float,
+    late: bool,
+    end: float,
+    at_once: tuple[int, ...] = (),
 ) -> Runs:
     """Motions for delays up to the ages of ``oldest``, by listener and source, and errors up to ``error``."""
     start, aim = np.frombuffer(x0), np.frombuffer(target)
@@ -57,7 +66,7 @@ def late_runs(
     times = np.arange(0, T, min(delay, T) / 3) if capped else late_motion.instants(T, delay)
     times = np.unique(np.concatenate([times, [g.T for g in gains], np.arange(T, end, min(delay, T) / 3)]))
     rng = np.random.default_rng(0)
-    motion = LateMotion(weights, list(gains), taubar, times, late)
+    motion = LateMotion(weights, list(gains), taubar, times, late, at_once)
     patterns = [
         late_motion.oldest_of_all,
         late_motion.by_chance(rng),
@@ -188,6 +197,8 @@ class LateOracle(Oracle):
             self.away_at_the_deadline()
         if self.said["staged"] is not None:
             self.deadlines()
+        if self.said["settling"] is not None:
+            self.behind_settling_leaders()
         if self.said["form"] is not None:
             self.small_delays()
         if self.said["input"] is not None:
@@ -221,7 +232,8 @@ class LateOracle(Oracle):
         # what leaders at rest said is never old
         ages = np.full((self.n, self.n), float(self.delay))
         for (s, t), age in self.ages.items():
-            ages[t, s] = float(age) if self.L[s][s] or not self.single else float(self.delay)
+            at_rest = not self.L[s][s] and self.single
+            ages[t, s] = float(self.delay) if at_rest or t in self.at_once else float(age)
         if ages.min() < T / 400:
             return  # what is held for so short a time takes too many steps
         for x0, target in self.starts():
@@ -235,9 +247,19 @@ class LateOracle(Oracle):
                     float(self.error) if error else 0.0,
                     self.said["own"] == "late",
                     runs_to or T,
+                    self.at_once,
                 ),
                 target,
             )
+
+    @cached_property
+    def at_once(self) -> tuple[int, ...]:
+        """Leaders in groups all of whom hear each other at once and exactly; none if one does not."""
+        leading = tuple(v for part in self.closed if len(part) > 1 for v in part)
+        late = (
+            self.error != 0 or self.said["own"] == "late" or any(self.ages[s, t] for s, t in self.pairs if t in leading)
+        )
+        return () if late else leading
 
     def power(self, q: Fraction, s: int, v: int) -> Any:
         """``q`` to the power of the age of what ``v`` hears of ``s`` over the largest age."""
@@ -416,6 +438,45 @@ class LateOracle(Oracle):
                 self.require(not np.any(off > moved[:, None] * (1 + 1e-6) + FLOOR), "form: moved")
                 end = np.abs(X[:, runs.times == T] - target[:, None])
                 self.require(not np.any(end > residual[:, None] * (1 + 1e-6) + FLOOR), "form: residual")
+
+    def behind_settling_leaders(self) -> None:
+        said, step = self.said["settling"], self.witness("messages.settling")
+        q, b = (number(step["numbers"][key]) for key in ("q", "b"))
+        cap, clock, left = (number(said[key]) for key in ("cap", "clock", "left"))
+        u, leading = self.vector(step["witness"]["u"]), {v for part in self.closed for v in part}
+        follow = [v for v in range(self.n) if v not in leading]
+        self.require(all(self.ages[s, t] == 0 for s, t in self.pairs if t in leading), "settling: leaders hear late")
+        self.require(self.error == 0 and self.said["own"] == "fresh" and self.target is not None, "settling: needs")
+        self.require(self.delay > 0 and b > 0 and cap > 0 and follow, "settling: signs")
+        if self.false or self.start is None or self.target is None:
+            return
+        self.require(not ball(b * cap * self.delay) > ball(q).log(), "settling: b cap delay")
+        limit = cap if self.cap is None else min(cap, self.cap)
+        self.require(clock >= 0 and not ball(clock) > self.clock(limit), "settling: clock")
+        self.require(not ball(left) < (-ball(b * clock)).exp(), "settling: left")
+        for v in follow:
+            parts = (self.power(q, s, v) * ball(abs(w) * u[s]) for (s, t), w in self.weights.items() if t == v)
+            heard, D = sum(parts, ball(Fraction(0))), self.L[v][v]
+            self.require(not ball(D * u[v] - b * u[v]) < heard, f"settling: row {v}")
+            self.require(u[v] >= self.far(v) and u[v] > 0, f"settling: start of {v}")
+        self.leaders_settle(b, u, sorted(leading))
+        T, rho1, k = map(float, self.gain)
+        slow = Gain(T, rho1, k, float(limit))
+        for runs, target in self.loop():
+            z = np.array([math.exp(-float(b) * min(slow.clock(t), 1e4)) for t in runs.times])
+            z[-1] = float(left) if runs.times[-1] == T else z[-1]
+            seen, bound = runs.away(target), np.array(list(map(float, u)))[:, None] * z
+            self.require(not np.any(seen > bound * (1 + SLACK) + FLOOR), "settling: a motion")
+
+    def leaders_settle(self, b: Fraction, u: list[Fraction], leading: list[int]) -> None:
+        """The exact motion of the leaders on the clock, beside ``u_l e^(-b s)``."""
+        A = np.array([[float(self.L[i][j]) for j in leading] for i in leading])
+        x0, end = (np.array([float((x or [])[v]) for v in leading]) for x in (self.start, self.target))
+        rate = max(float(np.abs(np.diag(A)).max(initial=0.0)), 1e-9)
+        for s in np.concatenate([np.linspace(0, 3 / rate, 40), np.geomspace(3, 12, 40) / rate]):
+            away = np.abs(expm(-A * s) @ x0 - end)
+            most = np.array([float(u[v]) for v in leading]) * math.exp(-float(b) * s)
+            self.require(not np.any(away > most * (1 + SLACK) + FLOOR), f"settling: leaders at {s}")
 
     # ------------------------------------------------------------------ leaders that move
 

@@ -25,6 +25,7 @@ from lmi.exact.decimal_rounding import float_up, up
 from lmi.exact.elementary_enclosures import log, rounded
 from ptcc_certify.bounds.late_steps import Steps, search_steps
 from ptcc_certify.bounds.missed_deadline import Missed, find_missed
+from ptcc_certify.bounds.settling_leaders import Settling
 from ptcc_certify.bounds.small_delays import SmallDelays
 from ptcc_certify.bounds.staged_deadlines import stage_deadlines
 from ptcc_certify.checker.input_formulas import BITS, Limits, decay_above
@@ -93,6 +94,8 @@ class LateBounds:
         What bounds ``|x_k(T) - x_k*|`` row by row, in floats from above; None where nothing does.
     form : SmallDelays or None
         What a Lyapunov function of the whole graph proves under a capped gain.
+    settling : Settling or None
+        What holds of followers that hear late of leaders in groups.
     longest_delay : float or None
         About the longest delay that such functions forgive: this certificate's limit. None if it was not asked.
     unarrived : bool
@@ -100,7 +103,8 @@ class LateBounds:
     input : (N,) array or None
         What bounds ``|x_k'|`` up to ``T``, the sliding term left out, in floats from above; None where nothing does.
     enough : Fraction or None
-        A delay with which no more is left than was asked, near to the longest one that is proved.
+        The age up to which no more is left than was asked, near to the longest one that is proved; all times of
+        ``messages`` in proportion.
     """
 
     messages: LateMessages
@@ -117,16 +121,18 @@ class LateBounds:
     unarrived: bool = False
     input: np.ndarray | None = None
     enough: Fraction | None = None
+    settling: Settling | None = None
 
     @property
     def says_something(self) -> bool:
         """Whether anything is proved."""
-        return bool(self.rows or self.steps or self.missed or self.staged or self.form)
+        return bool(self.rows or self.steps or self.missed or self.staged or self.settling or self.form)
 
     @property
     def largest(self) -> float:
         """The largest of the bounds of ``|x_k(T) - x_k*|``; infinite where nothing is bounded."""
         largest = math.inf if self.residual is None else float(self.residual.max())
+        largest = largest if self.settling is None else min(largest, float(self.settling.residual.max()))
         return largest if self.form is None else min(largest, float_up(max(self.form.residual)))
 
     def __repr__(self) -> str:
@@ -150,7 +156,15 @@ class LateBounds:
         if self.steps is not None:
             at = np.searchsorted([float(x) for x in self.steps.instants], t * (1 - 1e-15), side="right") - 1
             whole = np.minimum(whole, self.steps.bounds[np.maximum(at, 0)].T)
+        if self.settling is not None:
+            whole = np.minimum(whole, self.settling.deviation_bound(self.gain, t)[self.structure.followers])
         return whole
+
+    def largest_bound(self, t: Sequence[float] | np.ndarray) -> np.ndarray:
+        """Return what bounds the largest ``|x_k - x_k*|`` of all agents at instants, ``(M,)`` floats."""
+        if self.settling is None:
+            return np.asarray(self.deviation_bound(t).max(axis=0))
+        return np.asarray(self.settling.deviation_bound(self.gain, np.asarray(t, dtype=float)).max(axis=0))
 
 
 def bound_late(

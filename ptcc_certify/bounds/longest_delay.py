@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
-from ptcc_certify.bounds.late_messages import bound_late
+import numpy as np
+
+from ptcc_certify.bounds.final_state import Influence
+from ptcc_certify.bounds.late_messages import LateBounds, bound_late
+from ptcc_certify.bounds.settling_leaders import SettlingBounds
+from ptcc_certify.bounds.small_delays import DecayingForm, SmallDelayBounds
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.protocols.base import Protocol
 from ptcc_certify.protocols.late_messages import LateMessages
@@ -17,54 +23,109 @@ _HALVINGS, _DIGITS = 9, 3
 _SHORTEST = 1e-5
 
 
-def longest_delay(
-    structure: Structure,
-    protocol: Protocol,
-    residual: Fraction,
-    messages: LateMessages,
-    initial_state: Sequence[Fraction] | None = None,
-    ends: Sequence[tuple[Fraction, Fraction]] | None = None,
-) -> Fraction | None:
-    """Return a delay of few digits, near to the longest one, that is proved to leave no more than a residual.
+@dataclass(frozen=True, eq=False)
+class LateCase:
+    """A graph, a protocol and an initial state, of which many delays are asked.
 
     Parameters
     ----------
     structure : Structure
     protocol : Protocol
-    residual : Fraction
-        What may be left of ``|x_k(T) - x_k*|``.
-    messages : LateMessages
-        Whose delay is too long; its value error and cap of the gain are kept, and nothing gets lost.
     initial_state : sequence of N Fraction, optional
     ends : sequence of N (middle, radius), optional
         Of ``Q X(0)``.
-
-    Returns
-    -------
-    Fraction or None
-        Proved by the bound that a certificate with this delay states; None if no delay is.
+    influence : Influence, optional
+        Exact; it belongs to ``forms``.
+    forms : sequence of DecayingForm
+        Lyapunov functions of the whole graph: they forgive small delays under a cap, or tell how leaders settle.
 
     Examples
     --------
     >>> structure = analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 3, 1), (3, 2, 1)]))
-    >>> p = NominalProtocol(T=1, rho1=1, rho2=4, kappa=1)
-    >>> 0.005 < longest_delay(structure, p, Fraction(1, 20), LateMessages(delay=1)) < 0.5
-    True
+    >>> case = LateCase(structure, NominalProtocol(T=1, rho1=1, rho2=4, kappa=1))
+    >>> longest = case.longest(case.bound(LateMessages(delay=1)), Fraction(1, 20))
+    >>> 0.005 < longest.messages.age < 0.5, longest.largest <= 0.05
+    (True, True)
     """
 
-    def holds(delay: Fraction) -> bool:
-        late = LateMessages(delay=delay, value_error=messages.value_error, gain_cap=messages.gain_cap)
-        return bound_late(structure, protocol, late, initial_state, ends).largest <= residual
+    structure: Structure
+    protocol: Protocol
+    initial_state: Sequence[Fraction] | None = None
+    ends: Sequence[tuple[Fraction, Fraction]] | None = None
+    influence: Influence | None = None
+    forms: Sequence[DecayingForm] = ()
 
-    T = float(protocol.T)
-    high = math.log(float(messages.age) or T)
-    low = math.log(_SHORTEST * T)
-    best = None
-    for _ in range(_HALVINGS):
-        middle = (low + high) / 2
-        delay = Fraction(f"{math.exp(middle):.{_DIGITS - 1}e}")
-        if holds(delay):
-            best, low = delay, middle
-        else:
-            high = middle
-    return best
+    def bound(self, messages: LateMessages) -> LateBounds:
+        """Return what is proved with such messages, by rows and by Lyapunov functions."""
+        return self.with_forms(bound_late(self.structure, self.protocol, messages, self.initial_state, self.ends))
+
+    def small_delays(self, messages: LateMessages) -> SmallDelayBounds | None:
+        """Return what bounds small delays of the whole graph; None where nothing does."""
+        state, exact = self.initial_state, self.influence
+        if messages.gain_cap is None or messages.value_error or state is None or exact is None or not self.forms:
+            return None
+        return SmallDelayBounds(self.structure, self.protocol.gain, messages, exact, state)
+
+    def with_forms(self, late: LateBounds) -> LateBounds:
+        """Add what the best Lyapunov functions of the whole graph prove."""
+        late, bounds = self._with_settling(late), self.small_delays(late.messages)
+        form = None if bounds is None else bounds.best(self.forms)
+        if bounds is None or form is None:
+            return late
+        inputs = bounds.inputs(next(one for one in self.forms if one.function == form.function), form)
+        return replace(late, form=form, input=inputs if late.input is None else np.minimum(inputs, late.input))
+
+    def _with_settling(self, late: LateBounds) -> LateBounds:
+        """Add what holds of followers that hear late of leaders in groups, unless these hear late, too."""
+        state, ends, structure = self.initial_state, self.ends, self.structure
+        groups = any(len(c.nodes) > 1 for c in structure.closed_components)
+        if state is None or ends is None or not groups or not structure.followers.size or not late.messages.age:
+            return late
+        if not self.forms or not late.messages.leaders_hear_at_once(structure):
+            return late
+        bounds = SettlingBounds(structure, late.gain, late.messages, state, ends)
+        best = bounds.best(self.forms)
+        inputs = None if best is None or late.messages.gain_cap is None else bounds.inputs(best)
+        return replace(late, settling=best, input=inputs)
+
+    def longest(self, late: LateBounds, residual: Fraction) -> LateBounds | None:
+        """Return the bounds for nearly the longest delay that leaves no more than a residual.
+
+        Parameters
+        ----------
+        late : LateBounds
+            With some delay; its value error, losses and cap of the gain are kept, and so are the proportions of all
+            times.
+        residual : Fraction
+            What may be left of ``|x_k(T) - x_k*|``.
+
+        Returns
+        -------
+        LateBounds or None
+            None if no delay is found. One of ``T`` is as good as any longer one, and none longer is tried.
+        """
+        T, age = self.protocol.T, late.messages.age
+        best, shortest, high = None, T * Fraction(_SHORTEST), min(age, T)
+        if late.largest <= residual:
+            best, shortest, high = late, age, max(age, T)
+            whole = late if age >= T else self._bound_at(late.messages, T)
+            if whole.largest <= residual:
+                return whole
+        low, top = math.log(float(shortest)), math.log(float(high))
+        for _ in range(_HALVINGS):
+            middle = (low + top) / 2
+            tried = self._bound_at(late.messages, Fraction(f"{math.exp(middle):.{_DIGITS - 1}e}"))
+            if tried.largest <= residual:
+                best, low = tried, middle
+            else:
+                top = middle
+        return best
+
+    def _bound_at(self, messages: LateMessages, age: Fraction) -> LateBounds:
+        """Bound what is left where what is heard is so old, all times in proportion."""
+        factor, given = age / messages.age, messages.delay
+        delay: Fraction | dict[tuple[str, str], Fraction] = messages.largest_delay * factor
+        if isinstance(given, Mapping):
+            delay = {edge: Fraction(x) * factor for edge, x in given.items()}
+        period = None if messages.period is None else messages.period * factor
+        return self.bound(replace(messages, delay=delay, period=period))

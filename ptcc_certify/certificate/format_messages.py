@@ -12,6 +12,7 @@ from lmi.exact.decimal_rounding import float_up
 from ptcc_certify.bounds.late_messages import LateBounds, RowBound, late_rows
 from ptcc_certify.bounds.late_steps import bound_steps
 from ptcc_certify.bounds.missed_deadline import Missed
+from ptcc_certify.bounds.settling_leaders import Settling
 from ptcc_certify.bounds.small_delays import SmallDelays
 from ptcc_certify.certificate.format_vectors import Reader, Writer, number, text
 from ptcc_certify.checker.reading import exact
@@ -53,6 +54,10 @@ def late_obligations(late: LateBounds | None) -> Iterator[Obligation]:
         yield Obligation("late-missed", "messages.missed", witness=Vectors({"gauge": late.missed.gauge}))
     if late.staged is not None:
         yield Obligation("late-staged", "messages.staged")
+    if (settling := late.settling) is not None:
+        u = dict(zip(late.structure.graph.labels, map(format_exact, settling.u), strict=True))
+        numbers = {"q": settling.q, "b": settling.b}
+        yield Obligation("late-settling", "messages.settling", numbers, {"function": settling.function, "u": u})
     if (form := late.form) is not None:
         phi = dict(zip(late.structure.graph.labels, map(format_exact, form.phi), strict=True))
         numbers = {"q": form.q, "b": form.b, "kap": form.kap}
@@ -88,6 +93,7 @@ def messages_section(late: LateBounds, out: Writer) -> dict[str, Any]:
         "residual": None if late.residual is None else agents_section(graph.labels, "late", late.residual, out),
         "missed": missed and {"agent": graph.labels[missed.agent], "bound": format_exact(missed.bound)},
         "staged": staged and dict(zip(followers, map(format_exact, staged), strict=True)),
+        "settling": late.settling and {name: text(getattr(late.settling, name)) for name in ("cap", "clock", "left")},
         "form": None if late.form is None else _form_section(late.form, graph.labels),
         "input": None if late.input is None else agents_section(graph.labels, "late-input", late.input, out),
     }
@@ -114,6 +120,14 @@ def _read_form(section: Mapping[str, Any] | None, step: Obligation | None, data:
         data.agents(section["moved"]),
         data.agents(section["residual"]),
     )
+
+
+def _read_settling(section: Mapping[str, Any] | None, step: Obligation | None, data: Reader) -> Settling | None:
+    if section is None or step is None:
+        return None
+    cap, clock, left = (exact(section[name]) for name in ("cap", "clock", "left"))
+    u = tuple(data.agents(step.witness["u"]))
+    return Settling(step.witness["function"], step.numbers["q"], step.numbers["b"], cap, clock, left, u)
 
 
 def agents_section(labels: tuple[str, ...], name: str, values: np.ndarray, out: Writer) -> Any:
@@ -164,6 +178,7 @@ def read_late(
         staged and tuple(map(exact, staged.values())),
         None if residual is None else np.array([float_up(x) for x in data.agents(residual)]),
         _read_form(section["form"], steps.get(("late-form", "messages.form")), data),
+        settling=_read_settling(section["settling"], steps.get(("late-settling", "messages.settling")), data),
         input=None if section["input"] is None else np.array([float_up(x) for x in data.agents(section["input"])]),
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from fractions import Fraction
 
 from lmi.exact.decimal_rounding import down, near, up
@@ -47,19 +48,27 @@ def judge_messages(certificate: Content) -> list[Answer]:
         return answers
     if not late.says_something:
         limit = f"; this certificate's limit is a delay of {late.longest_delay:.3g}" if late.longest_delay else ""
-        return [Answer(OPEN, "late messages", f"nothing is proved of what is left at T{limit}")]
+        wish = "" if most is None else _longest(late, f"within {near(most, 12)} at T is ")
+        return [Answer(OPEN, "late messages", f"nothing is proved of what is left at T{limit}{wish}")]
     return [] if most is None else [_judge_residual(certificate, late, most)]
 
 
 def _judge_residual(certificate: Content, late: LateBounds, most: Fraction) -> Answer:
-    """Tell whether no more than ``most`` is left at ``T``."""
+    """Tell whether no more than ``most`` is left at ``T``, and up to which delay that is proved."""
     what, missed = f"within {near(most, 12)} at T" + " from within 1 of it" * late.relative, late.missed
     if late.largest <= most:
-        return Answer(MET, what)
+        return Answer(MET, what, _longest(late).removeprefix("; "))
     if missed is not None and missed.bound > most:
-        return Answer(REFUTED, what, _misses(certificate, missed))
-    shorter = "" if late.enough is None else f"; certified where nothing is older than {down(late.enough, 4)}"
-    return Answer(OPEN, what, f"this certificate's limit is {up(late.largest, 3)}{shorter}")
+        return Answer(REFUTED, what, f"{_misses(certificate, missed)}{_longest(late)}")
+    return Answer(OPEN, what, f"this certificate's limit is {up(late.largest, 3)}{_longest(late)}")
+
+
+def _longest(late: LateBounds, what: str = "") -> str:
+    """Tell how old what is heard may be so that what was asked is certified; empty if that is not known."""
+    if late.enough is None:
+        return ""
+    alike = ", all delays in proportion" * isinstance(late.messages.delay, Mapping)
+    return f"; {what}certified where nothing is older than {down(late.enough, 4)}{alike}"
 
 
 def _misses(certificate: Content, missed: Missed) -> str:

@@ -31,8 +31,7 @@ from ptcc_certify.bounds.final_state import (
     influence,
 )
 from ptcc_certify.bounds.late_messages import LateBounds, bound_late
-from ptcc_certify.bounds.longest_delay import longest_delay
-from ptcc_certify.bounds.small_delays import SmallDelayBounds
+from ptcc_certify.bounds.longest_delay import LateCase
 from ptcc_certify.bounds.tracking import Tracking, bound_tracking
 from ptcc_certify.certificate.agents_part import prove_agents
 from ptcc_certify.certificate.agents_request import Chains, read_chains, refuse_agents, single_integrators
@@ -176,7 +175,8 @@ def certify(
         under each of ``limits`` but sampling. Noise times an infinite gain is bounded by nothing.
     messages : LateMessages, optional
         How late, how often lost and how inexact is what agents hear; what is left at the deadline then is bounded. With
-        single leaders, and ``sigma(0) = 0`` under the sliding-mode protocol.
+        single leaders, leader groups that hear each other at once, or a cap; ``sigma(0) = 0`` under the sliding-mode
+        protocol.
     leaders : MovingLeaders, optional
         Nominal protocol, single leaders: how fast these move; how followers track them is bounded. Not with
         ``messages``.
@@ -322,27 +322,33 @@ def _with_agents(certificate: Certificate, agents: Agents, chains: Chains, run: 
 
 
 def _with_small_delays(certificate: Certificate) -> Certificate:
-    """Add what Lyapunov functions of the whole graph prove with late messages under a capped gain."""
-    late, x0 = certificate.late, certificate.initial_state
+    """Add what Lyapunov functions of the whole graph prove with late messages, and the longest delay that was asked."""
+    late, final = certificate.late, certificate.final_state
     if late is None:
         return certificate
-    forms = certificate.decaying_forms
-    if late.messages.gain_cap is not None and not late.messages.value_error and x0 is not None and forms:
-        bounds = SmallDelayBounds(
-            certificate.structure, certificate.protocol.gain, late.messages, certificate.influence, x0
-        )
-        form, inputs = bounds.best(forms), late.input
-        if form is not None:
-            own = bounds.inputs(next(one for one in forms if one.function == form.function), form)
-            inputs = own if inputs is None else np.minimum(inputs, own)
-        late = replace(late, form=form, input=inputs, longest_delay=bounds.longest_delay(forms))
-    asked, final = certificate.expectations.max_residual, certificate.final_state
-    if asked is not None and late.rows and late.largest > asked and late.messages.age:
-        ends = None if final is None else final.intervals
-        case = certificate.structure, certificate.protocol, asked, late.messages, x0, ends
-        if certificate.graph.n_nodes <= EXACT_NODES:
-            late = replace(late, enough=longest_delay(*case))
-    return certificate.changed(late=late)
+    case = LateCase(
+        certificate.structure,
+        certificate.protocol,
+        certificate.initial_state,
+        None if final is None else final.intervals,
+        certificate.influence,
+        certificate.decaying_forms,
+    )
+    late, small = case.with_forms(late), case.small_delays(late.messages)
+    late = late if small is None else replace(late, longest_delay=small.longest_delay(case.forms))
+    certificate, asked = certificate.changed(late=late), certificate.expectations.max_residual
+    if asked is not None and late.messages.age and certificate.graph.n_nodes <= EXACT_NODES:
+        certificate = certificate.changed(late=replace(late, enough=_longest_delay(certificate, case, late, asked)))
+    return certificate
+
+
+def _longest_delay(certificate: Certificate, case: LateCase, late: LateBounds, asked: Fraction) -> Fraction | None:
+    """Return nearly the longest delay that leaves so little, if the check accepts what a certificate states of it."""
+    longest = case.longest(late, asked)
+    if longest is None or longest is late:
+        return None if longest is None else late.messages.age
+    report = certificate.changed(late=longest).checked
+    return longest.messages.age if report is not None and report.accepted else None
 
 
 def _check_disturbance(disturbance: Any, protocol: ReachingProtocol, graph: SignedDigraph) -> None:

@@ -204,9 +204,9 @@ def refuse_beside(structure: Structure, protocol: Protocol, request: Request) ->
         refuse_leader_groups(structure, "leaders that move as they like: a bound")
     if messages is not None:
         _refuse_messages(structure, messages, [limit.gain_cap for limit in request.limits])
-    alone = structure.followers.size == 0 if leaders is not None else structure.graph.n_edges == 0
-    if alone:
-        raise ParameterError("nobody listens to a leader, so nothing is late and nobody tracks; leave it out")
+    if structure.graph.n_edges == 0:
+        name, why = ("leaders", "nobody tracks") if messages is None else ("messages", "nothing is late")
+        raise ParameterError(f"{name}: nobody listens to anybody, so {why}; leave it out")
 
 
 def _refuse_more(refused: Mapping[str, str], request: Request) -> None:
@@ -221,8 +221,9 @@ def _refuse_messages(structure: Structure, messages: LateMessages, caps: Sequenc
     messages.latencies(structure.graph)
     if any(cap != messages.gain_cap for cap in caps):
         raise ParameterError("gain_cap: limits and late messages have two; give both the same, or messages alone")
-    if messages.gain_cap is None:
-        refuse_leader_groups(structure, "late messages: add a gain cap; without one a bound")
+    if messages.gain_cap is None and not messages.leaders_hear_at_once(structure):
+        mend = "add a gain cap, or let leaders hear each other at once (delays of 0)"
+        refuse_leader_groups(structure, f"late messages: {mend}; otherwise a bound")
     if messages.value_error and messages.own_delay:
         raise ParameterError("values that are off are not certified where the own state is late; leave one of them out")
     if messages.value_error:

@@ -15,6 +15,7 @@ from typing import Any
 from lmi.exact.elementary_enclosures import exp, log, rounded
 from lmi.exact.numbers import longest, shorten, sized
 from lmi.exact.work import spend
+from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.final_state import state_intervals
 from ptcc_certify.checker.input_formulas import BITS
 from ptcc_certify.checker.late_messages import PARTS
@@ -131,11 +132,7 @@ class Rows:
         """Bound ``sum_l q^(part_kl/64) |w_kl| u_l`` from above, over a common denominator and the unit of the graph."""
         if len(parts) == 1:
             return [q.numerator * x for x in self.heard], q.denominator
-        log_q = log(q)[1]
-        power = {part: rounded(exp(log_q * Fraction(part, PARTS))[1], BITS, up=True) for part in set(parts)}
-        power |= {0: Fraction(1), PARTS: q}
-        common = math.lcm(*(x.denominator for x in power.values()))
-        factors = {part: x.numerator * (common // x.denominator) for part, x in power.items()}
+        factors, common = powers(q, parts)
         return self.followers.heard(self.u, parts, factors), common
 
     def above_initial(self, initial: Fraction) -> None:
@@ -157,9 +154,31 @@ class Rows:
         return [D * u + h for u, D, h in zip(self.u, self.followers.degrees, self.heard, strict=True)]
 
 
+def powers(q: Fraction, parts: Sequence[int]) -> tuple[dict[int, int], int]:
+    """Bound ``q^(part/64)`` from above for every part, over a common denominator."""
+    log_q = log(q)[1]
+    power = {part: rounded(exp(log_q * Fraction(part, PARTS))[1], BITS, up=True) for part in set(parts)}
+    power |= {0: Fraction(1), PARTS: q}
+    common = math.lcm(*(x.denominator for x in power.values()))
+    return {part: x.numerator * (common // x.denominator) for part, x in power.items()}, common
+
+
+def heard_later(graph: Digraph, values: Sequence[int], q: Fraction, parts: Sequence[int]) -> tuple[list[int], int]:
+    """Bound ``sum_l q^(part_kl/64) |w_kl| u_l`` from above for every agent, over a common denominator and the unit."""
+    if len(parts) == 1:
+        return [q.numerator * x for x in graph.sums_in(values)], q.denominator
+    factors, common = powers(q, parts)
+    return graph.sums_by_part(values, parts, factors), common
+
+
 def followers_of(doc: Document, structure: Structure, begin: Begin) -> Followers:
     """Return the followers of leaders that are single nodes, with bounds of ``|x_k(0) - x*_k|``; 1 without a state."""
     need(all(len(group) == 1 for group in structure.closed), "leaders in a group of two or more, which do not rest")
+    return away_of(doc, structure, begin)
+
+
+def away_of(doc: Document, structure: Structure, begin: Begin) -> Followers:
+    """Return the followers, with bounds of ``|x_k(0) - x*_k|``; 1 without a state."""
     nodes, final = structure.followers, doc.data["final_state"]
     need(bool(nodes), "no follower")
     if final is None or begin.state is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import chain
@@ -50,7 +50,7 @@ def check_form(
     obligation = doc.open("late-form", "messages.form", ["q", "b", "kap"], witness=True)
     witness = fields(obligation["witness"], ("function", "phi"), "the witness")
     q, b, kap = (obligation[key] for key in ("q", "b", "kap"))
-    known = _function(doc, verified, witness["function"])
+    known = function_of(doc, verified, witness["function"])
     phi, left = by_agent(doc, graph, witness["phi"], "phi", files=False), exact(section["left"])
     need(all(x >= 0 for x in phi), "phi is negative")
     lag = cap * messages.delay * q
@@ -65,7 +65,7 @@ def check_form(
     need(kap >= 0 and kap**2 >= _value_of_sizes(doc, graph, known.form, pushed), "kap is too small")
     need(b + lag * kap <= known.form.rate / 2, "the delay takes more than the rate")
     need(left >= formulas.decay_above(b * formulas.Limits(cap).clock_below(messages.gain)), "left is not proved")
-    root = formulas.root_above(_initial_value(verified, known.form))
+    root = formulas.root_above(initial_value(verified, known.form))
     moved = [lag / b * root * x for x in _moved(verified, pushed)]
     claimed = _above(doc, graph, section["moved"], "moved", moved)
     rest = [x + formulas.root_above(c) * root * left for x, c in zip(claimed, known.deviations, strict=True)]
@@ -75,7 +75,7 @@ def check_form(
     doc.done(f"b = {down(b)}, gain at most {down(cap)}")
 
 
-def _function(doc: Document, verified: Verified, k: Any) -> Constants:
+def function_of(doc: Document, verified: Verified, k: Any) -> Constants:
     """Return the Lyapunov function of this number, with its constants."""
     need(type(k) is int and 0 <= k < len(verified.functions), "no such Lyapunov function")
     function, graph = verified.functions[k], verified.structure.graph
@@ -119,15 +119,16 @@ def _value_of_sizes(doc: Document, graph: Digraph, form: Form, sizes: Sequence[F
     return total / (scale * common**2)
 
 
-def _initial_value(verified: Verified, form: Form) -> Fraction:
-    """Return ``V(0)``."""
+def initial_value(verified: Verified, form: Form, among: Container[int] | None = None) -> Fraction:
+    """Return ``V(0)``, with errors of other agents than ``among`` set to 0."""
     graph, state = verified.structure.graph, verified.begin.state
     if state is None:
         raise RejectedError("form without an initial state")
     values, scale = state.over(range(graph.n))
     errors = graph.laplacian_product(values)
     spend(len(form.nodes) ** 2, longest(errors), longest(chain.from_iterable(form.entries[0])), "V(0)")
-    return form.value([Fraction(errors[v], scale * graph.unit) for v in form.nodes])
+    counted = [errors[v] if among is None or v in among else 0 for v in form.nodes]
+    return form.value([Fraction(x, scale * graph.unit) for x in counted])
 
 
 def _moved(verified: Verified, pushed: Sequence[Fraction]) -> list[Fraction]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -17,6 +17,7 @@ from ptcc_certify.checker.late_messages import Messages
 from ptcc_certify.checker.late_steps import clock_below
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError, need
+from ptcc_certify.checker.side_files import Numbers
 
 
 def gain_above(gain: PrescribedGain, gain_cap: Fraction, b: Fraction, cap: Fraction | None = None) -> Fraction:
@@ -87,6 +88,17 @@ class Inputs:
                 self.met[v] = 1
         for group in rows.followers.structure.closed:  # leaders that rest
             for v in group:
+                self.met[v] = 1
+
+    def by_settling(self, followers: Container[int], u: Numbers, b: Fraction, cap: Fraction) -> None:
+        """Mark what is at least ``(2 D_k - b) u_k y`` of followers, ``(D_l u_l + heard_l) y`` of leaders."""
+        graph, y = self.graph, gain_above(self.messages.gain, self.gain_cap, b, cap)
+        values, scale = u.over(range(graph.n))
+        heard, bits = graph.sums_in(values), longest(n for x in (y, b) for n in x.as_integer_ratio())
+        spend(8 * graph.n, 4 * bits, longest(values) + graph.bits + longest(self.values), "inputs of agents")
+        for v, (x, D, h) in enumerate(zip(values, graph.diagonal, heard, strict=True)):
+            most = (2 * D - b * graph.unit) * x if v in followers else Fraction(D * x + h)
+            if Fraction(self.values[v], self.scale) >= most * y / (scale * graph.unit):
                 self.met[v] = 1
 
     def by_form(self, phi: Sequence[Fraction], b: Fraction, root: Fraction) -> None:

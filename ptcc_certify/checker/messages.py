@@ -22,11 +22,12 @@ from ptcc_certify.checker.late_steps import FIXED, Steps, clock_below
 from ptcc_certify.checker.missed_deadline import check_missed, check_staged
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import entries, exact, fields, length, need
+from ptcc_certify.checker.settling_leaders import check_settling
 from ptcc_certify.checker.side_files import Numbers
 
 KEYS = (
     *("latency", "packets", "delay", "own", "value_error", "gain_cap"),
-    *("rows", "steps", "residual", "missed", "staged", "form", "input"),
+    *("rows", "steps", "residual", "missed", "staged", "settling", "form", "input"),
 )
 #: Witnesses of rows, and instants of steps, that are read.
 MANY_ROWS, MANY_INSTANTS = 100, 2001
@@ -66,7 +67,8 @@ def check_messages(doc: Document, verified: Verified) -> None:
     messages = read_messages(doc, graph, verified.gain, section)
     need(len(entries(section["rows"], "rows")) <= MANY_ROWS, f"more than {MANY_ROWS} witnesses of rows")
     by_rows = bool(section["rows"]) or any(section[key] is not None for key in ("steps", "missed", "staged"))
-    need(by_rows or section["form"] is not None, "nothing is stated of late messages")
+    stated = by_rows or section["form"] is not None or section["settling"] is not None
+    need(stated, "nothing is stated of late messages")
     bounded = bool(section["rows"]) or section["steps"] is not None
     need(bounded == (section["residual"] is not None), "a residual is stated iff rows or steps bound it")
     inputs = None if section["input"] is None else Inputs(doc, graph, messages, section["input"])
@@ -74,6 +76,8 @@ def check_messages(doc: Document, verified: Verified) -> None:
         need(not messages.late, "rows, steps, missed or staged of a late own state")
         followers = followers_of(doc, verified.structure, verified.begin)
         _check_followers(doc, messages, verified, followers, section, inputs)
+    if section["settling"] is not None:
+        check_settling(doc, messages, verified, section["settling"], inputs)
     if section["form"] is not None:
         check_form(doc, messages, verified, section["form"], inputs)
     if inputs is not None:

@@ -17,7 +17,7 @@ from ptcc_certify.cli.families import (
     refuse_restricted,
     restricted_options,
 )
-from ptcc_certify.cli.messages import leader_options, leaders_of, message_options, messages_of
+from ptcc_certify.cli.messages import leader_options, leaders_of, message_options, messages_of, refuse_unheard
 from ptcc_certify.cli.scenario import scenario_record
 from ptcc_certify.cli.terminal import LOG, Screen, print_json, progress, refuse_output, screen_options
 from ptcc_certify.errors import ParameterError, one_line
@@ -104,6 +104,7 @@ def _certify_graph(
     x0 = of_agents.pop("x0", None) or shared.read_initial_state(options["x0"], options["seed"], signed)
     if of_agents:
         more = {name: value for name, value in more.items() if name not in ("limits", "disturbance")} | of_agents
+    refuse_unheard(signed, options)
     more |= {"messages": messages_of(graph, signed, options), "leaders": leaders_of(options)}
     origins = _origins(options)
     with progress(STEPS, screen.quiet) as begin:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
 import click
 
-from ptcc_certify.cli.options import Options, graph_file, number_option, options_of
+from ptcc_certify.cli.options import Options, flag_of, graph_file, number_option, options_of
 from ptcc_certify.errors import NumberError, ParameterError
 
 if TYPE_CHECKING:
@@ -60,14 +61,46 @@ def messages_of(graph: str, signed: SignedDigraph, options: Options) -> LateMess
     step = options["quantisation"]
     if step is not None and step < 0:
         raise ParameterError("--quantisation is outside its domain; a step must be >= 0")
-    return LateMessages(
-        delay=0 if options["delay"] is None else _delay(graph, signed, options["delay"]),
+    delay = Fraction(0) if options["delay"] is None else _delay(graph, signed, options["delay"])
+    if not (any(delay.values()) if isinstance(delay, dict) else delay) and options["period"] is None and not step:
+        raise ParameterError(
+            "messages are neither late, nor lost, nor rounded; give --delay, --period or --quantisation above 0"
+        )
+    messages = LateMessages(
+        delay=delay,
         period=options["period"],
         losses=options["packet_loss"] or 0,
         value_error=0 if step is None else step / 2,
-        own_delay=options["own_delay"],
         gain_cap=options["gain_cap"],
     )
+    if not options["own_delay"]:
+        return messages
+    if messages.gain_cap is None:
+        raise ParameterError(_needs_cap(signed, messages))
+    return replace(messages, own_delay=True)
+
+
+def _needs_cap(signed: SignedDigraph, messages: LateMessages) -> str:
+    """Tell that an own state that is late asks for a cap, and what gain agents bear with this delay."""
+    from ptcc_certify.bounds.small_delays import delay_threshold
+    from ptcc_certify.graphs.size_limits import EXACT_NODES
+    from ptcc_certify.graphs.structure import analyse
+
+    cap = ""
+    if signed.n_nodes <= EXACT_NODES and signed.n_edges and messages.age:
+        most = delay_threshold(analyse(signed), 1.0) / float(messages.age)
+        cap = f" (with this delay a constant gain diverges above {most:.3g}, numerical; what is certified is less)"
+    return (
+        "--own-delay: an own state that is late makes the protocol diverge, for its gain grows without limit before T; "
+        f"add --gain-cap{cap}, or measure the own state without delay"
+    )
+
+
+def refuse_unheard(signed: SignedDigraph, options: Options) -> None:
+    """Refuse messages and leaders of a graph in which nobody listens to anybody, by the flag that asks for them."""
+    given = next((name for name in (*_ASKING, "leader_speed") if options[name] is not None), None)
+    if given is not None and not signed.n_edges:
+        raise ParameterError(f"{flag_of(given)}: nobody listens to anybody; leave it out, or add edges")
 
 
 def _delay(graph: str, signed: SignedDigraph, text: str) -> Fraction | dict[tuple[str, str], Fraction]:

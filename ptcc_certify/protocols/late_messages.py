@@ -17,6 +17,7 @@ from typing import Any
 from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.graphs.digraph import Exact, SignedDigraph
 from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.protocols.parameters import Given, NotNegative, parameter, readable
 
 #: Most losses in a row.
@@ -64,7 +65,8 @@ class LateMessages:
     >>> LateMessages(delay=1, own_delay=True)
     Traceback (most recent call last):
     ptcc_certify.errors.ParameterError: an own state that is late makes the protocol diverge, for its gain grows \
-without limit before T; add a gain cap, or measure the own state without delay
+without limit before T; add a gain_cap, below (pi/2 - |arg lambda|)/(delay |lambda|) for all nonzero eigenvalues \
+lambda of L, or measure the own state without delay
     """
 
     delay: Exact | Mapping[tuple[str, str], Exact] = 0
@@ -99,11 +101,12 @@ without limit before T; add a gain cap, or measure the own state without delay
         if self.own_delay and self.gain_cap is None:
             raise ParameterError(
                 "an own state that is late makes the protocol diverge, for its gain grows without limit before T; "
-                "add a gain cap, or measure the own state without delay"
+                "add a gain_cap, below (pi/2 - |arg lambda|)/(delay |lambda|) for all nonzero eigenvalues lambda of L, "
+                "or measure the own state without delay"
             )
         if not self.age and not self.value_error:
             raise ParameterError(
-                "messages that are neither late, nor lost, nor rounded; give a delay, a period or a value error above 0"
+                "messages that are neither late, nor lost, nor rounded; give delay, period or value_error above 0"
             )
 
     @property
@@ -139,6 +142,25 @@ without limit before T; add a gain cap, or measure the own state without delay
         if self._of_graph is None or self._of_graph[0] is not graph:
             object.__setattr__(self, "_of_graph", (graph, self._by_edge(graph)))
         return self._of_graph[1]  # type: ignore[index]
+
+    def leaders_hear_at_once(self, structure: Structure) -> bool:
+        """Tell whether what leaders hear of each other is neither late, nor held, nor off, and no own state is late.
+
+        Parameters
+        ----------
+        structure : Structure
+
+        Examples
+        --------
+        >>> pair = analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1), (2, 3, 1)]))
+        >>> LateMessages("0.1").leaders_hear_at_once(pair), LateMessages({(2, 3): "0.1"}).leaders_hear_at_once(pair)
+        (False, True)
+        """
+        if self.own_delay or self.value_error or self.held:
+            return False
+        latencies, followers = self.latencies(structure.graph), set(structure.followers.tolist())
+        each = latencies if isinstance(latencies, tuple) else (latencies,) * structure.graph.n_edges
+        return not any(x for x, v in zip(each, structure.graph.target.tolist(), strict=True) if v not in followers)
 
     def _by_edge(self, graph: SignedDigraph) -> tuple[Fraction, ...]:
         assert isinstance(self.delay, Mapping)

@@ -29,8 +29,8 @@ def late_lines(certificate: Certificate) -> Lines:
         return
     yield "messages", messages_text(late.messages, certificate.protocol)
     texts = [*_impossible(late), *([] if late.direct else _left(late)), *_stages(late)]
-    if (at := certificate.at) is not None and (late.rows or late.steps is not None):
-        texts.append(f"at t = {near(at)} every agent within {up(float(late.deviation_bound([float(at)]).max()), 2)}")
+    if (at := certificate.at) is not None and (late.rows or late.steps or late.settling):
+        texts.append(f"at t = {near(at)} every agent within {up(float(late.largest_bound([float(at)])[0]), 2)}")
     yield "late" if late.says_something else "LATE", texts[0]
     yield from (("", text) for text in texts[1:])
     from ptcc_certify.certificate.late_answers import largest_late_input  # ``classify`` has no use for solvers
@@ -98,6 +98,8 @@ def residual_text(certificate: Certificate) -> str:
     if late is None or math.isinf(late.largest):
         return ""
     bounds = late.residual if late.residual is not None else np.full(certificate.graph.n_nodes, np.inf)
+    if late.settling is not None:
+        bounds = np.minimum(bounds, late.settling.residual)
     if late.form is not None:
         bounds = np.minimum(bounds, [float_up(x) for x in late.form.residual])
     names = certificate.graph.labels
@@ -132,7 +134,9 @@ def _left(late: LateBounds) -> list[str]:
         return [f"{cap}nothing is proved of what is left at T{_limits(late)}"]
     whole = ", from within 1 of it at first" * late.relative
     formed = late.form is not None and float(max(late.form.residual)) <= late.largest
-    return [f"{cap}every agent within {up(late.largest, 2)} of its final state at T{whole}{_limits(late) * formed}"]
+    settling = "; leaders hear each other at once, and settle by themselves" * (late.settling is not None)
+    within = f"every agent within {up(late.largest, 2)} of its final state at T"
+    return [f"{cap}{within}{whole}{settling}{_limits(late) * formed}"]
 
 
 def _limits(late: LateBounds) -> str:

@@ -17,11 +17,13 @@ from fractions import Fraction
 from typing import Any, Literal
 
 import numpy as np
+from scipy.linalg import expm
 
 from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import as_graph, as_state
 from ptcc_certify.graphs.rationals import shorten, whole_number
+from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.protocols.base import Protocol, refuse_no_protocol
 from ptcc_certify.protocols.gain import Gain
 from ptcc_certify.protocols.gain_limits import GainLimits, LimitedGain
@@ -32,6 +34,8 @@ Pattern = Literal["oldest", "fresh", "varying", "square"]
 PATTERNS = ("oldest", "fresh", "varying", "square")
 #: Instants of a run, and at most; the share of ``T`` down to which they come nearer to it.
 STEPS, MOST_STEPS, NEAREST = 1500, 20_000, 1e-9
+#: How many times leaders in groups fall by a factor e until they are settled.
+_SETTLED = 40
 #: States of a run at most.
 MOST_STATES = 50_000_000
 #: What a step loses, relatively.
@@ -76,7 +80,8 @@ def simulate_late(
     protocol : Protocol
     messages : LateMessages
         Values are off by the whole ``value_error``, to either side. What is heard over an edge is as old as a step
-        where its own delay is less than that, as a delay of 0 is.
+        where its own delay is less than that, as a delay of 0 is; but leaders of a group that hear each other at once
+        move exactly so.
     x0 : state-like
         The state up to 0, whatever :func:`ptcc_certify.as_state` takes.
     pattern : {"oldest", "fresh", "varying", "square"}
@@ -134,7 +139,7 @@ def simulate_late(
     hearing = _Hearing(graph, messages, t, pattern, np.random.default_rng(seed))
     states, errors = np.empty((2, t.size, graph.n_nodes))
     states[0] = first
-    D = graph.in_weight()
+    D, leading = graph.in_weight(), _Leading(graph, messages)
     for i in range(t.size - 1):
         heard, own = hearing.sums(i, states)
         step, errors[i] = steps_of_clock[i], heard - (own if messages.own_delay else D * states[i])
@@ -145,6 +150,7 @@ def simulate_late(
             goal = np.where(D > 0, heard / D, states[i])
             left = np.where(np.isfinite(step), np.exp(-D * step), D <= 0)
         states[i + 1] = goal + (states[i] - goal) * left
+        leading.move(states[i], states[i + 1], step)
     errors[-1] = heard - (own if messages.own_delay else D * states[-1])
     return _run(graph, protocol, messages, pattern, t, states.T, errors.T, time.perf_counter() - begin)
 
@@ -240,6 +246,24 @@ def _clocks(
         column[t >= float(end) * (1 - 1e-14)] = np.inf
         whole[:, [k for k, x in enumerate(deadlines) if x == end]] = column[:, None]
     return whole
+
+
+class _Leading:
+    """Leaders of groups that hear each other at once: they move as ``X' = -gain L X`` does, exactly."""
+
+    def __init__(self, graph: SignedDigraph, messages: LateMessages):
+        structure = analyse(graph)
+        at_once = messages.leaders_hear_at_once(structure)
+        groups = [np.array(c.nodes) for c in structure.closed_components if at_once and len(c.nodes) > 1]
+        L: Any = graph.laplacian().tocsr() if groups else None
+        self.groups = [(nodes, L[nodes][:, nodes].toarray()) for nodes in groups]
+
+    def move(self, before: np.ndarray, after: np.ndarray, step: np.ndarray) -> None:
+        """Write the states of leaders after a step of the clock; after an infinite one they are settled."""
+        for nodes, L in self.groups:
+            values = np.linalg.eigvals(L)
+            slowest = min((x.real for x in values if abs(x) > 1e-9 * abs(L).max()), default=1.0)
+            after[nodes] = expm(-L * min(float(step.min()), _SETTLED / slowest)) @ before[nodes]
 
 
 class _Hearing:

@@ -11,11 +11,12 @@ from typing import Any
 import networkx as nx
 import numpy as np
 import pytest
-from late_certificates import led_graph
+from late_certificates import grouped_graph, led_graph
 
 from ptcc_certify.bounds import late_messages
 from ptcc_certify.bounds.final_state import final_state
 from ptcc_certify.bounds.late_messages import LateBounds, bound_late
+from ptcc_certify.bounds.longest_delay import LateCase
 from ptcc_certify.bounds.small_delays import delay_threshold
 from ptcc_certify.bounds.staged_deadlines import levels
 from ptcc_certify.bounds.tracking import bound_tracking
@@ -128,6 +129,64 @@ def test_messages_of_leaders_at_rest_may_be_as_old_as_they_like() -> None:
     cert = certify(graph, protocol, messages=LateMessages(delay=each), simulation=False, method="paper")
     assert cert.checked is not None and cert.checked.accepted, cert.checked
     assert cert.late is not None and cert.late.largest <= among.largest * 1.05
+
+
+def _judge_settling(seed: int, patterns: tuple[str, ...] = PATTERNS) -> float:
+    """The largest deviation, or input under a cap, over its bound, of runs behind leaders that settle."""
+    rng = np.random.default_rng(seed)
+    graph, delays = grouped_graph(rng, int(rng.integers(1, 5)))
+    protocol = NominalProtocol(
+        T=Fraction(int(rng.integers(5, 30)), 10),
+        rho1=Fraction(int(rng.integers(1, 20)), 10),
+        rho2=Fraction(int(rng.integers(2, 60)), 10),
+        kappa=1,
+    )
+    x0 = [Fraction(int(x), 10) for x in rng.integers(-100, 100, graph.n_nodes)]
+    messages = LateMessages(delays, gain_cap=int(rng.integers(5, 80)) if seed % 3 == 0 else None)
+    cert = certify(graph, protocol, x0, messages=messages, simulation=False, method="paper")
+    assert cert.verdict == "certified" and cert.late is not None and cert.late.settling is not None, (seed, cert.notes)
+    end, worst = np.asarray(cert.final_state, dtype=float), 0.0
+    for pattern in patterns:
+        run = simulate_late(graph, protocol, messages, [float(x) for x in x0], pattern=pattern, seed=seed, steps=300)  # type: ignore[arg-type]
+        away = np.maximum(np.abs(run.states - end[:, None]) - FLOOR * 10 * float(max(map(abs, x0))), 0)
+        ratios = [away / np.maximum(cert.late.settling.deviation_bound(cert.late.gain, run.t), 1e-300)]
+        ratios.append(away[:, -1] / np.maximum(cert.late.settling.residual, 1e-300))
+        ratios += [] if cert.late.input is None else [np.abs(run.input) / cert.late.input[:, None]]
+        worst = max(worst, *(float(ratio.max()) for ratio in ratios))
+    return worst
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_run_behind_leaders_that_settle_exceeds_what_is_proved(seed: int) -> None:
+    assert _judge_settling(seed, PATTERNS[seed : seed + 1]) <= 1 + ROUNDING
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("block", range(5))
+def test_100_graphs_with_leaders_that_settle_keep_their_bounds(block: int) -> None:
+    assert max(_judge_settling(100 + 20 * block + k) for k in range(20)) <= 1 + ROUNDING
+
+
+@pytest.mark.parametrize("seed", [11, 12])
+def test_the_longest_delay_leaves_as_little_as_was_asked_and_a_longer_one_does_not(seed: int) -> None:
+    rng, structure, protocol, x0, ends = _case(seed)
+    messages = _messages(rng, protocol, exact=True)
+    messages = _apart(rng, structure, messages) if seed % 2 else messages
+    case = LateCase(structure, protocol, x0, ends.intervals)
+    first = case.bound(messages)
+    for share in ("0.3", "3"):
+        asked = Fraction(first.largest) * Fraction(share)
+        longest = case.longest(first, asked)
+        if longest is None:
+            assert case._bound_at(messages, protocol.T / 10**5).largest > asked
+            continue
+        assert longest.largest <= asked
+        age, times = longest.messages.age, messages.latencies(structure.graph)
+        assert (age < messages.age) == (share == "0.3") or longest is first
+        if isinstance(times, tuple):  # all times in proportion
+            assert [x * age / messages.age for x in times] == list(longest.messages.latencies(structure.graph))
+        longer = case._bound_at(messages, age * Fraction(11, 10))
+        assert longer.largest > asked or age == protocol.T
 
 
 def test_initial_deviations_of_many_followers_are_bounded_from_above_and_nearly_exact(
@@ -268,7 +327,7 @@ BAD = [
     ({"delay": 1, "losses": 3}, "losses without a period: tell how long it is from one message to the next"),
     ({"delay": 1, "period": 0}, "period = 0 is outside its domain"),
     ({"delay": 1, "period": 1, "losses": -1}, "losses = -1 is not a number of messages, 0 to 1,000,000"),
-    ({"delay": 0}, "messages that are neither late, nor lost, nor rounded; give a delay, a period or a value error"),
+    ({"delay": 0}, "messages that are neither late, nor lost, nor rounded; give delay, period or value_error above 0"),
     ({"delay": {"a": 1}}, "a delay of 'a', which is no edge; name it as (source, target)"),
 ]
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from late_certificates import led_graph, nominal, plain, with_leaders, with_messages
+from late_certificates import led_graph, nominal, plain, settling, with_leaders, with_messages
 from mutations import Json, at, changed, containers, leaves, of_container, of_leaf, resealed, same_claim
 from oracle_messages import late_claims
 from random_mutants import WAYS, Rng, fraction, mutant, nudged, pick
@@ -35,6 +35,8 @@ SINGLY = (
     "leaders of 1",
     "sign of 4",
     "form False of 1",
+    "settling of 1",
+    "settling of 2",
 )
 #: Obligations and parts of section 22.
 OWN = ("messages", "leaders", "late-", "tracking")
@@ -68,6 +70,7 @@ def cases() -> list[tuple[str, Json]]:
             if small["messages"]["form"] is not None:
                 some[f"form {late}"] = small
         found += [(f"{name} of {seed}", data) for name, data in some.items()]
+    found += [(f"settling of {seed}", settling(seed, cap)) for seed, cap in ((1, None), (2, 12))]
     for name, data in found:
         assert check(data).accepted, (name, check(data).reason)
     return found

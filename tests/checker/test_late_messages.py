@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 import pytest
 from jsonschema import Draft202012Validator  # type: ignore[import-untyped]
-from late_certificates import Late, led_graph, nominal, obligation, plain, with_leaders, with_messages
+from late_certificates import Late, led_graph, nominal, obligation, plain, settling, with_leaders, with_messages
 from mutations import Json, at, changed, resealed
+from oracle import number
 from oracle_messages import late_claims
 from selection import thinned
 from side_files import Side
@@ -96,13 +97,15 @@ def samples() -> dict[str, Json]:
         "leaders": led(),
         "sign": led("1/2"),
         "any state, leaders": with_leaders(base(state=False), disturbance="1/3", bounded=False),
+        "settling": settling(1),
+        "settling, capped": settling(2, 12),
     }
 
 
 NAMES = (
     *("everything", "capped", "late own state", "small delays", "values off", "each edge", "ages apart", "any state"),
     "sliding",
-    *("leaders", "sign", "any state, leaders"),
+    *("leaders", "sign", "any state, leaders", "settling", "settling, capped"),
 )
 
 
@@ -153,6 +156,9 @@ def test_motions_keep_to_what_is_accepted(name: str):
         ("everything", ("messages", "rows", 0, "initial"), F(9, 10), "initial"),
         ("capped", ("messages", "rows", 0, "floor"), F(9, 10), "floor"),
         ("late own state", ("messages", "form", "left"), F(9, 10), "left"),
+        ("settling", ("messages", "settling", "left"), F(9, 10), "settling: left"),
+        ("settling", ("messages", "settling", "cap"), F(11, 10), "settling: b cap delay"),
+        ("settling, capped", ("messages", "settling", "clock"), F(11, 10), "settling: clock"),
         ("leaders", ("leaders", "after"), F(9, 10), "after"),
         ("leaders", ("leaders", "initial"), F(9, 10), "initial"),
     ],
@@ -161,6 +167,15 @@ def test_the_oracle_finds_what_is_false(name: str, path: tuple[Any, ...], factor
     data = samples()[name]
     false = late_claims(changed(data, path, str(F(at(data, path)) * factor)))
     assert any(claim in told for told in false), false
+
+
+def test_the_oracle_finds_leaders_that_do_not_settle_so_fast_and_rows_that_do_not_hold():
+    data, told = settling(1), step(settling(1), "messages.settling")
+    u = data["proof"][told[1]]["witness"]["u"]
+    for label, x in u.items():
+        if F(x):
+            false = late_claims(changed(data, (*told, "witness", "u", label), str(F(x) / 4)))
+            assert any("settling: leaders at" in one or "settling: row" in one for one in false), label
 
 
 def test_motions_alone_find_bounds_that_are_far_too_small():
@@ -530,6 +545,76 @@ def test_deadlines_of_their_own_on_a_cycle_or_before_anything_arrives_are_refuse
     assert late["messages"]["staged"] == {"1": "0", "2": "1/3", "3": "2/3", "4": "1"}
     assert "has not arrived by the deadline" in reason(late)
     assert check(with_messages(chain, "33/100", qs=("11/10",), staged=True)).accepted
+
+
+# ---------------------------------------------------------------------- leaders in groups that settle
+
+
+@pytest.mark.parametrize(("seed", "cap"), [(3, None), (4, 12)])
+def test_followers_behind_leaders_that_settle_are_accepted_and_no_motion_exceeds_it(seed: int, cap: Any):
+    data = settling(seed, cap)
+    assert data["messages"]["settling"] is not None and (data["messages"]["input"] is None) == (cap is None)
+    VALIDATOR.validate(data)
+    for stdlib in (False, True):
+        assert check(data, stdlib=stdlib).accepted, check(data).reason
+    assert late_claims(data) == []
+
+
+def test_bounds_behind_leaders_that_settle_are_refused_where_they_do_not_follow():
+    data = settling(1)
+    told = step(data, "messages.settling")
+    numbers, u = data["proof"][told[1]]["numbers"], data["proof"][told[1]]["witness"]["u"]
+    q = F(numbers["q"])
+    assert "q is not above 1" in reason(data, (*told, "numbers", "q"), "1")
+    assert "above half the rate" in reason(data, (*told, "numbers", "b"), "-1")
+    assert "above half the rate" in reason(data, (*told, "numbers", "b"), "100")
+    assert "b cap delay is above ln q" in reason(data, (*told, "numbers", "q"), str(1 + (q - 1) * F(99, 100)))
+    assert "b cap delay is above ln q" in reason(
+        data, (*TOP, "settling", "cap"), str(3 * F(data["messages"]["settling"]["cap"]))
+    )
+    assert "does not come so far" in reason(data, (*TOP, "settling", "clock"), "1000")
+    assert "left is not proved" in reason(data, (*TOP, "settling", "left"), "0")
+    assert "no such Lyapunov function" in reason(data, (*told, "witness", "function"), 99)
+    leaders = next(part["nodes"] for part in data["structure"]["closed_components"] if len(part["nodes"]) > 1)
+    for label, x in u.items():
+        if F(x) == 0:  # a leader that rests
+            assert f"u of agent {label} is too small" in reason(data, (*told, "witness", "u", label), "-1")
+            continue
+        less = reason(data, (*told, "witness", "u", label), str(F(x) * F(999, 1000)))
+        if label in leaders:
+            assert f"u of agent {label} is too small" in less
+        else:
+            assert "starts farther" in less or "does not decay" in less
+            assert "not positive" in reason(data, (*told, "witness", "u", label), "0")
+            far = {**data["initial_state"], label: str(F(data["initial_state"][label]) + 10**9)}
+            assert reason(data, ("initial_state",), far)
+
+
+def test_leaders_that_hear_each_other_late_or_inexactly_do_not_settle_by_themselves():
+    data = settling(1)
+    edges, latency = data["graph"]["edges"], data["messages"]["latency"]
+    followers = set(data["structure"]["followers"])
+    for k, (_, target, _) in enumerate(edges):
+        if target not in followers:
+            assert f"agent {target} leads, and hears late" in reason(data, (*TOP, "latency", k), "1/1000")
+    assert "hears late" in reason(data, (*TOP, "latency"), max(latency, key=F))
+    assert "or values are off" in reason(data, (*TOP, "value_error"), "1/10")
+    held = with_all(
+        data,
+        ((*TOP, "packets"), {"period": "1/100", "losses": "0"}),
+        ((*TOP, "delay"), str(F(data["messages"]["delay"]) + F(1, 100))),
+    )
+    assert "values that are held" in reason(held)
+    capped = settling(2, 12)
+    assert "late own state" in reason(capped, (*TOP, "own"), "late")
+
+
+def test_inputs_behind_leaders_that_settle_are_refused_where_too_small():
+    data = settling(2, 12)
+    for label, said in data["messages"]["input"].items():
+        if (x := number(said)) > F(1, 10**6):
+            found = reason(data, (*TOP, "input", label), str(x * F(99, 100)))
+            assert f"the input of agent {label} is not proved" in found
 
 
 # ---------------------------------------------------------------------- small delays of the whole graph

@@ -218,8 +218,20 @@ def of_messages() -> list[str]:
     late = LateMessages(delay="0.02"), LateMessages(delay="0.001", gain_cap=4, own_delay=True)
     made = [certify(chain, protocol, x0, simulation=False, method="paper", messages=messages) for messages in late]
     made.append(certify(chain, protocol, x0, simulation=False, method="paper", leaders=MovingLeaders(speed=1)))
+    group = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", -1), ("b", "c", 2), ("c", "d", 1), ("d", "c", 1)])
+    apart = LateMessages({("b", "c"): "0.01", ("c", "d"): "0.02", ("d", "c"): "0.02"})
+    made.append(certify(group, protocol, [1, 3, 4, 2], simulation=False, method="paper", messages=apart))
     kinds = {step["kind"] for one in made for step in json.loads(one.to_json())["proof"]}
-    assert {"late-rows", "late-steps", "late-residual", "late-staged", "late-form", "late-input", "tracking"} <= kinds
+    assert {
+        "late-rows",
+        "late-steps",
+        "late-residual",
+        "late-staged",
+        "late-form",
+        "late-input",
+        "late-settling",
+        "tracking",
+    } <= kinds
     return [one.to_json() for one in made]
 
 

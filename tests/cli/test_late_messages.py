@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import re
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -27,6 +28,7 @@ from ptcc_certify import (
     read_graph,
     simulate,
 )
+from ptcc_certify.bounds.longest_delay import LateCase
 from ptcc_certify.certificate import format_vectors
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.simulation.late_messages import simulate_late
@@ -53,6 +55,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     Path("team.csv").write_text(TEAM)
     Path("chain.csv").write_text(CHAIN)
+    Path("none.csv").write_text("a\nb\n")
     Path("group.csv").write_text("a,b,1\nb,a,1\nb,c,1\n")
     return tmp_path
 
@@ -84,6 +87,39 @@ def test_a_behaviour_asked_for_at_T_is_refuted_where_an_agent_is_proved_to_miss_
     left = ptcc("certify", "team.csv", "--delay", "0.02", *START, *QUICK, "--max-residual", "0.001")
     assert left.code == 4, left
     assert "this certificate's limit is" in " ".join(left.out.split())
+
+
+@pytest.mark.parametrize(
+    ("graph", "delay", "more", "status"),
+    [
+        ("team.csv", "0.02", ("--max-residual", "0.1"), "met"),
+        ("team.csv", "0.02", ("--max-residual", "0.001"), "left open"),
+        ("ring.csv", "0.01", ("--max-residual", "1", "--gain-cap", "5"), "left open"),
+        ("ring.csv", "0.5", ("--max-residual", "1.5", "--gain-cap", "5"), "left open"),
+        ("ring.csv", "0.0001", ("--max-residual", "2", "--gain-cap", "5", "--own-delay"), "met"),
+    ],
+)
+def test_the_delay_up_to_which_a_wanted_residual_is_told_to_be_certified_is_certified(
+    graph: str, delay: str, more: tuple[str, ...], status: str
+) -> None:
+    Path("ring.csv").write_text("a,b,1\nb,a,1\nb,c,-2\nc,d,1.5\nd,c,0.7\na,d,-1\n")
+    gains = QUICK if graph == "team.csv" else QUICK[4:]
+    run = ptcc("certify", graph, "--delay", delay, *more, *START, *gains)
+    text = " ".join(run.out.partition("verdict")[2].split())
+    told = re.search(r"certified where nothing is older than ([\d.]+\d)", text)
+    assert text.startswith(status) and told is not None, run
+    again = ptcc("certify", graph, "--delay", told[1], *more, *START, *gains)
+    assert "verdict    met: within" in again.out, again
+
+
+def test_no_delay_is_told_that_the_check_does_not_accept(monkeypatch: pytest.MonkeyPatch) -> None:
+    words = ("team.csv", "--delay", "0.02", "--max-residual", "0.001", *START, *QUICK)
+    monkeypatch.setattr(
+        LateCase,
+        "longest",
+        lambda self, late, asked: replace(late, residual=np.zeros(4), messages=LateMessages("0.01")),
+    )
+    assert "older" not in ptcc("certify", *words).out
 
 
 @pytest.mark.parametrize(
@@ -162,7 +198,12 @@ def test_followers_track_leaders_that_move_and_the_file_says_so() -> None:
     [
         (("team.csv", "--delay=-1"), "delay = -1 is outside its domain; delay must be >= 0"),
         (("team.csv", "--delay", "nan"), '--delay: "nan" is not a finite number'),
-        (("team.csv", "--delay", "0"), "neither late, nor lost, nor rounded"),
+        (("team.csv", "--delay", "0"), "nor rounded; give --delay, --period or --quantisation above 0"),
+        (("team.csv", "--quantisation", "0"), "nor rounded; give --delay, --period or --quantisation above 0"),
+        (("team.csv", "--delay", "0.1", "--period", "0"), "period = 0 is outside its domain"),
+        (("none.csv", "--delay", "0.1"), "--delay: nobody listens to anybody; leave it out, or add edges"),
+        (("none.csv", "--quantisation", "1"), "--quantisation: nobody listens to anybody; leave it out"),
+        (("none.csv", "--leader-speed", "1"), "--leader-speed: nobody listens to anybody; leave it out"),
         (("team.csv", "--delay", "0.1", "--packet-loss", "3"), "--packet-loss says nothing by itself; give --period"),
         (("team.csv", "--max-residual", "1"), "--max-residual: is asked of late messages"),
         (("team.csv", "--delay", "0.1", "--initial-bound", "1"), "--initial-bound) is not taken up"),
@@ -181,7 +222,11 @@ def test_followers_track_leaders_that_move_and_the_file_says_so() -> None:
         (("team.csv", "--delay", "latency"), 'team.csv, line 1: no column "latency"; begin with a header'),
         (("team.csv", "--packet-loss", "3"), "--packet-loss says nothing by itself; give --period"),
         (("team.csv", "--own-delay"), "--own-delay says nothing by itself; give --delay"),
-        (("team.csv", "--delay", "0.1", "--own-delay"), "makes the protocol diverge"),
+        (  # the pair of allies has the eigenvalue 2: pi/2 / (2 * 0.1)
+            ("group.csv", "--delay", "0.1", "--own-delay"),
+            "add --gain-cap (with this delay a constant gain diverges above 7.85, numerical; what is",
+        ),
+        (("group.csv", "--quantisation", "0.1", "--own-delay"), "add --gain-cap, or measure the own state without"),
         (("group.csv", "--delay", "0.1"), "needs leaders that listen to nobody; a and b are leaders of one group"),
         (("group.csv", "--leader-speed", "1"), "needs leaders that listen to nobody; a and b are leaders of one group"),
         (("team.csv", "--sign-gain", "1"), "--sign-gain belongs to leaders that move; give --leader-speed"),
@@ -224,6 +269,23 @@ def test_small_delays_of_a_leader_group_are_certified_under_a_cap_up_to_a_limit_
     long = certify(group, protocol, [3, 1, 2], messages=LateMessages(delay="0.5", gain_cap=20), simulation=False)
     assert int(long.assessment.exit_code) == 4
     assert "this certificate's limit is a delay of" in long.assessment.text
+
+
+def test_followers_of_a_leader_group_are_certified_without_a_cap_where_the_leaders_hear_each_other_at_once() -> None:
+    Path("led.csv").write_text("source,target,weight,delay\np,q,1,0\nq,p,2,0\np,f,-1,0.01\nf,g,1,0.02\ng,f,0.5,0.02\n")
+    words = ("certify", "led.csv", "--delay", "delay", "--rho2", "12", "--x0", "1,3,4,-4")
+    run = ptcc(*words, "--max-residual", "1", "--at", "0.9", "-v", "-o", "c.json")
+    text = " ".join(run.out.split())
+    assert run.code == 0 and "leaders hear each other at once, and settle by themselves" in text, run
+    assert re.search(r"met: within 1 at T \(certified where nothing is older than 0.\d+, all delays in prop", text)
+    assert "at t = 0.9 every agent within" in text and ptcc("check", "c.json").code == 0
+    saved = read_certificate("c.json").late
+    assert saved is not None and saved.settling is not None and saved.largest <= 1
+    assert ptcc("report", "c.json", "-o", "c.html").code == ptcc("plot", "c.json", "--what", "late").code == 0
+    capped = ptcc(*words, "--gain-cap", "30")
+    assert capped.code == 0 and "input      bounded up to T" in capped.out, capped
+    for more in (("--quantisation", "0.1"), ("--period", "0.01")):
+        assert "let leaders hear each other at once (delays of 0)" in ptcc(*words, *more).err
 
 
 def test_messages_that_take_longer_than_the_deadline_are_certified_to_leave_what_was_there_at_first() -> None:
@@ -463,6 +525,10 @@ def test_a_column_of_a_file_without_columns_is_refused() -> None:
 def test_families_and_other_limits_are_refused_in_python_too() -> None:
     pair, protocol = SignedDigraph.from_edges([(1, 2, 1)]), NominalProtocol(1, 1, 2, 1)
     each, same = LateMessages(delay={(1, 2): "0.1"}), GainLimits(gain_cap=20)
+    alone = SignedDigraph.from_matrix([[0, 0], [0, 0]], orientation="listens")
+    for asked, said in (({"messages": LateMessages("0.1")}, "messages"), ({"leaders": MovingLeaders(1)}, "leaders")):
+        with pytest.raises(ParameterError, match=f"{said}: nobody listens to anybody, so .*; leave it out"):
+            certify(alone, protocol, **asked)
     with pytest.raises(ParameterError, match="messages is not for families of graphs yet"):
         certify(pair, protocol, uncertainty="10%", messages=each)
     with pytest.raises(ParameterError, match="max_residual: is asked of late messages, which families"):

@@ -63,7 +63,7 @@ def plot_late(subject: Any, *, ax: Axes | None = None, time_unit: str = "") -> A
     if x0 is None or ends is None:
         raise ParameterError("the certificate has no initial state to run from; certify with x0")
     ax, F = axes_of(ax), certificate.structure.followers
-    nodes = F if F.size else np.arange(certificate.graph.n_nodes)
+    nodes = F if F.size and late.settling is None else np.arange(certificate.graph.n_nodes)
     start, goal = [float(x) for x in x0], np.asarray(ends, dtype=float)
     t = np.linspace(0, float(certificate.protocol.T), 401)
     for pattern, style in _RUNS.items() if can_run(certificate.protocol, late.messages) else ():
@@ -80,8 +80,8 @@ def plot_late(subject: Any, *, ax: Axes | None = None, time_unit: str = "") -> A
 
 
 def _draw_bound(ax: Axes, late: LateBounds, t: np.ndarray) -> None:
-    if late.rows or late.steps is not None:
-        ax.plot(t, late.deviation_bound(t).max(axis=0), color=BOUND, linewidth=1.8, label="proved bound")
+    if late.rows or late.steps is not None or late.settling is not None:
+        ax.plot(t, late.largest_bound(t), color=BOUND, linewidth=1.8, label="proved bound")
     elif late.form is not None:
         level = float(max(late.form.residual))
         ax.plot(t[-1:], [level], marker="_", color=BOUND, markersize=12, label="proved at $T$", linestyle="none")

@@ -1,0 +1,97 @@
+"""Verifies followers that hear late of leaders in groups, which hear each other at once and settle by themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any
+
+from lmi.exact.decimal_rounding import down
+from lmi.exact.elementary_enclosures import log
+from lmi.exact.numbers import longest, shorten
+from lmi.exact.work import spend
+from ptcc_certify.checker import input_formulas as formulas
+from ptcc_certify.checker.digraph import edges_of
+from ptcc_certify.checker.follower_rows import Followers, away_of, heard_later
+from ptcc_certify.checker.graph import by_agent
+from ptcc_certify.checker.input import Verified
+from ptcc_certify.checker.late_form import Constants, function_of, initial_value
+from ptcc_certify.checker.late_input import Inputs
+from ptcc_certify.checker.late_messages import Messages
+from ptcc_certify.checker.proof_cursor import Document
+from ptcc_certify.checker.reading import exact, fields, length, need
+from ptcc_certify.checker.side_files import Numbers
+from ptcc_certify.checker.structure import Structure
+
+
+def check_settling(
+    doc: Document, messages: Messages, verified: Verified, section: Any, inputs: Inputs | None = None
+) -> None:
+    """Verify ``|x_k - x*_k| <= u_k e^(-b s_c)`` for every agent, leaders by a Lyapunov function of theirs."""
+    doc.at = "messages.settling"
+    fields(section, ("cap", "clock", "left"), "settling")
+    structure, gain = verified.structure, messages.gain
+    need(messages.delay > 0 and messages.value_error == 0, "settling leaders where nothing is late, or values are off")
+    need(not messages.late, "settling leaders of a late own state")
+    need(verified.begin.state is not None and doc.data["final_state"] is not None, "settling leaders without a state")
+    need(bool(structure.followers), "no follower")
+    _hear_at_once(messages, structure)
+    cap, clock, left = (exact(section[key]) for key in ("cap", "clock", "left"))
+    obligation = doc.open("late-settling", "messages.settling", ["q", "b"], witness=True)
+    witness = fields(obligation["witness"], ("function", "u"), "the witness")
+    q, b = obligation["q"], obligation["b"]
+    known = function_of(doc, verified, witness["function"])
+    u = by_agent(doc, structure.graph, witness["u"], "u", files=False)
+    need(q > 1 and cap > 0, "q is not above 1, or cap not positive")
+    need(0 < b <= known.form.rate / 2, "b is not positive, or above half the rate of the leaders")
+    bits = length((q, b, left, clock, cap, messages.delay, gain.T, gain.rho1, *u, *known.deviations))
+    spend(50 + 20 * structure.graph.n, bits, bits, "settling leaders")
+    need(b * cap * messages.delay <= log(q)[0], "b cap delay is above ln q")
+    limit = cap if messages.gain_cap is None else min(cap, messages.gain_cap)
+    need(0 <= clock <= formulas.Limits(limit).clock_below(gain), "the clock does not come so far")
+    need(left >= formulas.decay_above(b * clock), "left is not proved")
+    _above_leaders(verified, known, u)
+    _decays(structure, u, away_of(doc, structure, verified.begin), q, b, messages.parts())
+    if inputs is not None:
+        inputs.by_settling(set(structure.followers), u, b, cap)
+    doc.done(f"b = {down(b)}, q = {down(q)}")
+
+
+def _hear_at_once(messages: Messages, structure: Structure) -> None:
+    """Verify that what leaders hear of each other is never old."""
+    graph = structure.graph
+    need(messages.delay == messages.latency.largest(), "leaders of a group hear values that are held")
+    spend(graph.n_edges, what="what leaders hear")
+    for group in structure.closed:
+        for v in group:
+            first = graph.into[0][v]
+            for e in range(first, first + len(edges_of(graph.into, v)[0])):
+                need(messages.latency_of(e) == 0, f"agent {shorten(graph.labels[v])} leads, and hears late")
+
+
+def _above_leaders(verified: Verified, known: Constants, u: Numbers) -> None:
+    """Verify ``u_l >= sqrt(c_l V(0))`` for leaders in groups, followers where their errors are 0; others rest."""
+    structure = verified.structure
+    leaders = {v for group in structure.closed for v in group}
+    root = formulas.root_above(initial_value(verified, known.form, leaders))
+    for group in structure.closed:
+        for v in group:
+            least = formulas.root_above(known.deviations[v]) * root if len(group) > 1 else Fraction(0)
+            need(u[v] >= least, f"u of agent {shorten(structure.graph.labels[v])} is too small")
+
+
+def _decays(
+    structure: Structure, u: Numbers, followers: Followers, q: Fraction, b: Fraction, parts: Sequence[int]
+) -> None:
+    """Verify ``u_k >= |x_k(0) - x*_k|``, and ``D_k u_k - sum_l q^(part_kl/64) |w_kl| u_l >= b u_k``, for followers."""
+    graph = structure.graph
+    values, scale = u.over(range(graph.n))
+    own = [values[v] for v in followers.nodes]
+    need(min(own) > 0, "u of a follower is not positive")
+    followers.starts_within(own, scale)
+    heard, common = heard_later(graph, values, q, parts)
+    spend(6 * len(own), graph.bits + longest(b.as_integer_ratio()), longest(heard), "rows of followers")
+    first, third = common * b.denominator, b.numerator * common * graph.unit
+    rows = zip(own, followers.degrees, (heard[v] for v in followers.nodes), strict=True)
+    low = next((k for k, (x, D, h) in enumerate(rows) if (first * D - third) * x < b.denominator * h), None)
+    need(low is None, f"the row of agent {followers.label(low or 0)} does not decay so fast")
