@@ -340,6 +340,7 @@ ELSEWHERE = {
     "g[0]": "... a SignedDigraph has no [0]; its edges are graph.edges",
     "cert['verdict']": "... a Certificate has no ['verdict']; its parts are attributes, or to_dict() as JSON",
     "ptcc.analyse(g)['leaders']": "... a Structure has no ['leaders']; its parts are attributes",
+    "cert.envelope(0.5)": "... an Envelope is no function: norm_bound(q, x0) bounds ||E(t)||",
     "cert.behaviour": "... UnknownName: Certificate has no attribute 'behaviour'; see its claim.behaviour",
     "cert.deadline": "... see its protocol.T",
     "cert.x0": "... see its initial_state",

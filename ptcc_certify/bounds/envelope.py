@@ -193,6 +193,10 @@ class Envelope:
     def _laplacian(self) -> object:
         return self.structure.graph.laplacian()
 
+    def __call__(self, *_: object, **__: object) -> object:
+        """Refuse the call: there are several bounds."""
+        raise ParameterError("an Envelope is no function: norm_bound(q, x0) bounds ||E(t)|| at q = 1 - t/T")
+
     @property
     def coordinates(self) -> str:
         """The coordinates ``z`` of the bounds in norm: ``E`` if some function is in ``E``, otherwise ``eps``."""
