@@ -31,6 +31,12 @@ class CheckReport(Hinted, checker.CheckReport):
     ptcc_certify.errors.ParameterError: a CheckReport is no function; for a page or LaTeX: write_report(certificate, ...
     """
 
+    def __eq__(self, other: object) -> bool:
+        """Tell whether another report, of this class or of the check's own, says the same."""
+        return isinstance(other, checker.CheckReport) and vars(self) == vars(other)
+
+    __hash__ = checker.CheckReport.__hash__
+
     def __call__(self, *_: Any, **__: Any) -> Any:
         """Refuse to be called, as ``certificate.report("page.html")``."""
         raise ParameterError("a CheckReport is no function; for a page or LaTeX: write_report(certificate, path)")

@@ -41,7 +41,7 @@ class VectorCertificate:
     --------
     >>> certs = certify_vectors([("a", "b", -1), ("b", "a", -1)], NominalProtocol(), [[3, 1], [1, 5]])
     >>> certs
-    VectorCertificate(2 components, bipartite consensus, rate 3.99999, certified)
+    VectorCertificate(2 components, signed-average consensus, rate 3.99999, certified)
     >>> certs.final_state
     array([[ 1., -2.],
            [-1.,  2.]])

@@ -17,7 +17,6 @@ from fractions import Fraction
 from typing import Any, Literal
 
 import numpy as np
-from scipy.linalg import expm
 
 from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.graphs.digraph import SignedDigraph
@@ -260,6 +259,8 @@ class _Leading:
 
     def move(self, before: np.ndarray, after: np.ndarray, step: np.ndarray) -> None:
         """Write the states of leaders after a step of the clock; after an infinite one they are settled."""
+        from scipy.linalg import expm
+
         for nodes, L in self.groups:
             values = np.linalg.eigvals(L)
             slowest = min((x.real for x in values if abs(x) > 1e-9 * abs(L).max()), default=1.0)

@@ -553,5 +553,5 @@ def test_behaviours_are_named_with_blanks_or_hyphens():
         assert behaviour_name(name) == behaviour_name(name.replace(" ", "-")) == name
     with pytest.raises(ValueError, match="interval-bipartite-consensus"):
         behaviour_name("chaos")
-    assert "; Theorem 2.1, Corollary 3: consensus)" in repr(build(2, {(0, 1): Fraction(1)}))
+    assert "; Theorem 2.1, Corollary 4: consensus)" in repr(build(2, {(0, 1): Fraction(1)}))
     assert "2 components" in repr(build(2, {}))

@@ -144,9 +144,11 @@ def alarm_interrupts():
     """Let an alarm act like Ctrl-C."""
     callbacks = gc.callbacks[:]
     gc.callbacks.clear()  # Python loses what is raised in one, and hypothesis has one
+    gc.disable()  # and what is raised in a callback of a weak reference, as other tests leave some behind
     before = signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(signal.SIGINT))
     yield
     signal.signal(signal.SIGALRM, before)
+    gc.enable()
     gc.callbacks.extend(callbacks)
 
 

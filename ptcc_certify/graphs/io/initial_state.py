@@ -340,7 +340,7 @@ def _node_and_value(row: Sequence[str], place: str) -> tuple[int | None, int | N
             parse_exact(row[1 - node])
             return node, None  # a row of a node that is called so
         return node, 1 - node
-    if value is not None and value == column(row, ("x",), place) and column(row, ("y",), place) is not None:
+    if node is not None and value is not None and None not in (column(row, (t,), place) for t in "xy"):
         raise FormatError(f"{place}: x and y are coordinates of a vector; keep one column, called value")
     return node, value
 
