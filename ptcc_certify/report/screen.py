@@ -228,7 +228,8 @@ def _short_final_state(certificate: Certificate) -> Lines:
     if result is None:
         return
     degenerate = "; balanced leaders happen to meet at 0" * bool(result.degenerate)
-    kind = f"({_accuracy(result, 'rounded')}{degenerate}{'; without limits' * bool(certificate.limits)})"
+    unproved = "; not certified that they get there" * (certificate.verdict == "undecided")
+    kind = f"({_accuracy(result, 'rounded')}{degenerate}{'; without limits' * bool(certificate.limits)}{unproved})"
     groups: dict[Fraction | float, list[str]] = {}
     for label, state in zip(labels, result.states, strict=True):
         groups.setdefault(state, []).append(printable(label))
