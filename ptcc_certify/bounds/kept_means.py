@@ -115,7 +115,7 @@ def mean_of_shares(component: FamilyComponent, shares: Sequence[Fraction]) -> Le
     >>> outage = SignedDigraph.from_edges([], nodes="ab")
     >>> group = mean_of_shares(decide(Family.switching([pair, outage]))[0], [Fraction(3, 4), Fraction(1, 4)])
     >>> group.vector, group.camps, group.final_value([Fraction(8), Fraction(0)])
-    ((3, 1), (1, -1), Fraction(6, 1))
+    ((1, 3), (1, -1), Fraction(2, 1))
     """
     assert component.gauge is not None, "agents come together by camps"
     family, nodes = component.family, np.arange(component.nodes.size)
