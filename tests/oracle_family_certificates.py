@@ -735,3 +735,33 @@ class FamilyOracle:
                 PA = times(P, times(to_zero, [[row[nodes.index(v)] for v in free] for row in own]))
                 S = [[PA[i][j] + PA[j][i] - b * P[i][j] for j in range(len(P))] for i in range(len(P))]
                 self.require(semidefinite(S), "a rate by shares")
+        if "final_state" in said:
+            self.ends_by_shares(nodes, said, every, basis)
+
+    def ends_by_shares(self, nodes: list[int], said: Json, every: list[Matrix], basis: Matrix) -> None:
+        """Where agents end by shares: the value of what all members keep, in rationals, and modes played in turn."""
+        known = self.start is not None and said["behaviour"] is not None and not any(self.sigma0)
+        self.require(known and list(said["final_state"]) == [self.labels[v] for v in nodes], "ends by shares")
+        if not known or self.start is None:
+            return
+        kept = kernel([row for L in every for row in transposed(L)])
+        if basis and kept:
+            first, camps = [self.start[v] for v in nodes], basis[0]
+            values = [sum((p * y for p, y in zip(kept[0], ys, strict=True)), Fraction(0)) for ys in (first, camps)]
+            ends = zip(said["final_state"].values(), camps, strict=True)
+            self.require(len(kept) == 1, "several means that are kept where all agents agree")
+            self.require(all(Oracle.holds(x, g * values[0] / values[1]) for x, g in ends), "an end by a kept mean")
+        largest = max(float(L[i][i]) for L in every for i in range(len(nodes)))
+        pace = 8 / float(number(said["rate"]))
+        shares = [float(number(x)) for x in said["signals"]["shares"]]
+        for _ in range(SIGNALS):
+            x = np.array([float(self.start[v]) for v in nodes])
+            for step in [1 / largest] * 20 + [pace] * 8:
+                for k in self.draw.sample(range(len(shares)), len(shares)):
+                    L = np.array(self.part(self.draw.choice(self.members[k]), nodes), dtype=float)
+                    x = expm(-L * shares[k] * step) @ x
+            for entry, y in zip(said["final_state"].values(), x, strict=True):
+                mid = number(entry["mid"]) if isinstance(entry, dict) else number(entry)
+                radius = number(entry["radius"]) if isinstance(entry, dict) else Fraction(0)
+                size = max(1.0, *(abs(float(z)) for z in self.start))
+                self.require(abs(y - float(mid)) <= float(radius) + 1e-6 * size, "an end by shares, played")

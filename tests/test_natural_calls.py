@@ -94,6 +94,11 @@ NETWORK_SCIENTIST = {
     "ptcc.as_graph({'ann': {'bob': 1}})": "GraphError: {'ann': {'bob': 1}} is not read as a graph; give",
     "g.to_networkx().edges['ann', 'bob']['weight']": "-2.0",
     "g.to_pandas()": "source target  weight",
+    "g.edges() == g.edges and set(g.edges()) == set(edges)": "True",
+    "[label for label in g.labels()]": "['ann', 'bob', 'eve']",
+    "g.labels": "('ann', 'bob', 'eve')",
+    "ptcc.analyse(G).graph.edges()[0]": "('bob', 'ann', Fraction(-1, 1))",
+    "day.labels()": "('ann', 'bob')",
     "list(g)": "['ann', 'bob', 'eve']",
     "len(g)": "3",
     "'ann' in g": "True",
@@ -334,6 +339,17 @@ ELSEWHERE = {
     "ptcc.SignedDigraph.from_pandas(df)": "... the class SignedDigraph has no attribute 'from_pandas'; make one with",
     "ptcc.SignedDigraph.from_file('g.csv')": "... as_graph(data), read_graph(path) or SignedDigraph.from_edges(edges)",
     "ptcc.Certificate.load('c.json')": "... make one with certify(graph, protocol, x0) or read_certificate(path)",
+    "ptcc.NominalProtocol.from_file('p.toml')": "... 'from_file'; make one with NominalProtocol(T, rho1, rho2, kappa)",
+    "ptcc.Ensemble.from_csv('g.csv')": "... make one with Ensemble(count, nodes, seed",
+    "ptcc.Expectations.load('e.toml')": "... make one with Expectations(behaviour, min_rate, max_input, max_residual)",
+    "ptcc.LateMessages.from_dict({})": "... make one with LateMessages(delay, period,",
+    "ptcc.GainLimits.load('l.toml')": "... make one with GainLimits(gain_cap, stop_before, sample_period)",
+    "ptcc.Agents.load('a.toml')": "... make one with Agents(order, plant,",
+    "ptcc.MovingLeaders.load('m.toml')": "... make one with MovingLeaders(speed, disturbance, sign_gain)",
+    "ptcc.SampledDisturbance.from_csv('d.csv')": "... make one with SampledDisturbance(times, samples, hold, text)",
+    "p.deadline": "... UnknownName: NominalProtocol has no attribute 'deadline'; see its T",
+    "p['T']": "... a NominalProtocol has no ['T']; its parts are attributes",
+    "p.kapa": "... did you mean kappa?",
     "ptcc.Structure.from_graph(g)": "... make one with analyse(graph)",
     "cert.final_state.to_dict()": "... FinalState has no attribute 'to_dict'; see its items(): dict(final_state)",
     "g['ann']": "... a SignedDigraph has no ['ann']; its edges are graph.edges, and graph.to_networkx()[label] tells",
@@ -408,7 +424,7 @@ def test_a_natural_call_gives_a_result_or_one_line_that_names_the_mend(call, nam
 def test_where_an_object_is_said_to_have_something_it_is(names):
     cert = names["cert"]
     objects = [cert, cert.structure, cert.graph, cert.trajectory, cert.final_state, cert.checked]
-    objects += [ptcc.certify(names["day"], names["p"])]
+    objects += [ptcc.certify(names["day"], names["p"]), names["p"], names["robust"]]
     assert {type(one).__name__ for one in objects} == ITS.keys()
     for one in objects:
         for name, place in ITS[type(one).__name__].items():

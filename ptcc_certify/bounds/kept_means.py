@@ -22,8 +22,10 @@ import numpy as np
 
 from ptcc_certify.bounds.family_final_state import middle_left_vector
 from ptcc_certify.checker.family_limits import agents_heard
+from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.size_limits import EXACT_NODES
+from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.lyapunov.family_function import MARGIN, FamilyFunction, mean_constant, rounded_up
 from ptcc_certify.lyapunov.interval_rows import IntervalRows
 from ptcc_certify.lyapunov.quotient import Quotient
@@ -93,6 +95,47 @@ def leading_groups(component: FamilyComponent) -> tuple[LeadingGroup, ...]:
     return tuple(result)
 
 
+def mean_of_shares(component: FamilyComponent, shares: Sequence[Fraction]) -> LeadingGroup | None:
+    """Return all agents as a group with a mean that every signal keeps, if shares of the clock bring them together.
+
+    Where they do, the mean of the modes over the shares brings them together, too; only its left null vector can be
+    kept. For components of up to 120 agents.
+
+    Parameters
+    ----------
+    component : FamilyComponent
+        All edges of all modes keep its camps.
+    shares : sequence of Fraction
+        One of each mode.
+
+    Examples
+    --------
+    >>> from ptcc_certify.theorems.family_behaviour import decide
+    >>> pair = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -3)])
+    >>> outage = SignedDigraph.from_edges([], nodes="ab")
+    >>> group = mean_of_shares(decide(Family.switching([pair, outage]))[0], [Fraction(3, 4), Fraction(1, 4)])
+    >>> group.vector, group.camps, group.final_value([Fraction(8), Fraction(0)])
+    ((1, 3), (1, -1), Fraction(2, 1))
+    """
+    assert component.gauge is not None, "agents come together by camps"
+    family, nodes = component.family, np.arange(component.nodes.size)
+    weights: dict[tuple[int, int], Fraction] = {}
+    for mode, share in zip(family.modes, shares, strict=True):
+        for e, ends in enumerate(zip(mode.source.tolist(), mode.target.tolist(), strict=True)):
+            weights[ends] = weights.get(ends, Fraction(0)) + share * mode.lower.fraction(e)
+    edges = [(s, t, w) for (s, t), w in weights.items() if w]
+    mean = SignedDigraph.from_edges(edges, nodes=nodes.tolist())
+    closed = analyse(mean).closed_components
+    if len(closed) != 1 or nodes.size > EXACT_NODES:
+        return None
+    leaders = np.array(closed[0].nodes)
+    whole = _whole_vector(nodes, leaders, exact_left_vector(mean.subgraph(leaders)))
+    rows = IntervalRows.of(family.modes, nodes)
+    if not _is_kept(rows, _tied(family, rows), whole):
+        return None
+    return LeadingGroup(tuple(nodes.tolist()), tuple(component.gauge.tolist()), tuple(whole.tolist()))
+
+
 def with_means(function: FamilyFunction, quotient: Quotient, groups: Sequence[LeadingGroup]) -> FamilyFunction:
     """Add to a function of positive rate a weighted mean of each leading group that keeps none exactly.
 
@@ -124,17 +167,27 @@ def with_means(function: FamilyFunction, quotient: Quotient, groups: Sequence[Le
 def _kept_vector(family: Family, nodes: np.ndarray, leaders: np.ndarray) -> tuple[int, ...] | None:
     """Return ``p`` of a group by its nodes, in integers; ``leaders`` are those of the first mode, ascending."""
     rows = IntervalRows.of(family.modes, nodes)
-    tied = np.array([mode.tied for mode in family.modes])[rows.mode]
+    tied = _tied(family, rows)
     ones = np.ones(nodes.size, dtype=np.int64).astype(object)
     if _is_kept(rows, tied, ones):
         return tuple(ones.tolist())
     if leaders.size > EXACT_NODES:
         return None
-    p = exact_left_vector(family.modes[0].restricted(leaders).mandatory)
+    whole = _whole_vector(nodes, leaders, exact_left_vector(family.modes[0].restricted(leaders).mandatory))
+    return tuple(whole.tolist()) if _is_kept(rows, tied, whole) else None
+
+
+def _whole_vector(nodes: np.ndarray, leaders: np.ndarray, p: Sequence[Fraction]) -> np.ndarray:
+    """Return ``p`` of the leaders in integers, by nodes, both ascending; 0 of the others."""
     scale = math.lcm(*(y.denominator for y in p))
     whole = np.zeros(nodes.size, dtype=object)
     whole[np.searchsorted(nodes, leaders)] = [y.numerator * (scale // y.denominator) for y in p]
-    return tuple(whole.tolist()) if _is_kept(rows, tied, whole) else None
+    return whole
+
+
+def _tied(family: Family, rows: IntervalRows) -> np.ndarray:
+    """Tell of every edge of the rows whether its mode is undirected."""
+    return np.array([mode.tied for mode in family.modes])[rows.mode]
 
 
 def _is_kept(rows: IntervalRows, tied: np.ndarray, p: np.ndarray) -> bool:

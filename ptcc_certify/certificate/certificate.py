@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import json
+import sys
 from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass
 from functools import cached_property
+from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
@@ -295,8 +298,9 @@ def read_certificate(
     Parameters
     ----------
     path : str, Path, mapping, Certificate or FamilyCertificate
-        A file of schema ``ptcc-certificate/2``; its side files are in the same folder. Or its parsed JSON, without side
-        files; or a certificate, which is written down and read back.
+        A file of schema ``ptcc-certificate/2``; its side files are in the same folder. ``"-"`` is standard input, with
+        side files in the current folder. Or its parsed JSON, without side files; or a certificate, which is written
+        down and read back.
     stdlib : bool
         Let the check use the standard library alone.
     memory : float
@@ -343,15 +347,50 @@ def read_certificate(
         if not report.accepted:
             raise RejectedCertificate(file, report)
         return accepted_certificate(file, document, sha256, report, files or {})
+    if path == "-":
+        document, report, sha256 = _read_standard_input(stdlib, memory)
+        return _accepted(Path("certificate.json" if report.accepted else "standard input"), document, sha256, report)
     refuse_no_path(path)
     path = Path(path)  # type: ignore[arg-type]
     sha256 = _file_hash(path)
     document, report = read_and_check(path, stdlib=stdlib, memory=memory)
     if _file_hash(path) != sha256:
         raise FormatError(f"{shorten(str(path), 200)}: was changed while it was read; try again")
+    return _accepted(path, document, sha256, report)
+
+
+def _accepted(
+    path: Path, document: dict[str, Any], sha256: str, report: CheckReport
+) -> Certificate | FamilyCertificate:
+    """Return the certificate of a file, with the side files in its folder, or refuse what the check rejects."""
     if not report.accepted:
         raise RejectedCertificate(path, report)
     return accepted_certificate(path, document, sha256, report, read_side_files(document, path.parent))
+
+
+class _Hashed:
+    """A binary file, whose bytes are hashed as they are read."""
+
+    def __init__(self, file: BinaryIO):
+        self.file, self.sha256 = file, hashlib.sha256()
+
+    def read(self, size: int) -> bytes:
+        """Return the next bytes, at most so many."""
+        content = self.file.read(size)
+        self.sha256.update(content)
+        return content
+
+
+def _read_standard_input(stdlib: bool, memory: float) -> tuple[dict[str, Any], CheckReport, str]:
+    """Check what stands on standard input, which can be read once, and hash it as the check reads it."""
+    usual = sys.stdin
+    hashed = _Hashed(getattr(usual, "buffer", BytesIO()))
+    sys.stdin = SimpleNamespace(buffer=hashed) if usual else usual  # type: ignore[assignment]
+    try:
+        document, report = read_and_check("-", stdlib=stdlib, memory=memory)
+    finally:
+        sys.stdin = usual
+    return document, report, hashed.sha256.hexdigest()
 
 
 def accepted_certificate(

@@ -132,7 +132,7 @@ def _proof(
     steps += [_step("family-input", "input")] * (certificate.bounded is not None)
     steps += [_step("attracting-box", f"boxes[{k}]") for k in range(len(certificate.boxes))]
     for k, claim in enumerate(certificate.restricted):
-        own = claim_steps(f"restricted[{k}]", claim)
+        own = claim_steps(f"restricted[{k}]", claim, _labels(certificate, claim))
         steps += [_step(kind, of, witness, **numbers) for kind, of, witness, numbers in own]
     return steps
 

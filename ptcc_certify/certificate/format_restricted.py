@@ -17,7 +17,7 @@ from ptcc_certify.certificate.restricted_claims import (
     ShareClaim,
     WindowClaim,
 )
-from ptcc_certify.checker.reading import exact, interval, triangle
+from ptcc_certify.checker.reading import Interval, exact, interval, triangle
 from ptcc_certify.graphs.family import Mode
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY, find_camps
@@ -82,6 +82,7 @@ def claim_entry(claim: Claim, labels: Sequence[str]) -> dict[str, Any]:
             "form": _lower_triangle(claim.form.function.matrix),
             "rate": format_exact(claim.rate),
             "behaviour": claim.behaviour,
+            **({} if claim.final_states is None else {"final_state": _ends_entry(claim.final_states, labels)}),
         }
     if isinstance(claim, FinalValueClaim):
         modes = [None if ends is None else _value_entry(ends, labels) for ends in claim.values]
@@ -90,7 +91,7 @@ def claim_entry(claim: Claim, labels: Sequence[str]) -> dict[str, Any]:
     if not isinstance(claim, RateClaim):
         ends = claim.final_states
         about = {"signals": signal_entry(claim.signal), "component": claim.component}
-        final = None if ends is None else {v: enclosed(*pair) for v, pair in zip(labels, ends, strict=True)}
+        final = None if ends is None else _ends_entry(ends, labels)
         if isinstance(claim, LastModeClaim):
             return {"claim": "last mode", **about, "modes": list(claim.behaviours), "final_state": final}
         more = {"behaviour": claim.behaviour, "eta": format_exact(claim.rate.eta)}
@@ -107,6 +108,10 @@ def claim_entry(claim: Claim, labels: Sequence[str]) -> dict[str, Any]:
     }
 
 
+def _ends_entry(ends: Sequence[Interval], labels: Sequence[str]) -> dict[str, Any]:
+    return {label: enclosed(*pair) for label, pair in zip(labels, ends, strict=True)}
+
+
 def _value_entry(ends: ValueEnds, labels: Sequence[str]) -> dict[str, Any]:
     names = [labels[v] for v in ends.nodes]
     entry: dict[str, Any] = {key: format_exact(getattr(ends, key)) for key in ("lower", "upper", "within")}
@@ -119,14 +124,15 @@ def _lower_triangle(P: Sequence[Sequence[Any]]) -> list[list[str]]:
     return [[format_exact(x) for x in row[: i + 1]] for i, row in enumerate(P)]
 
 
-def claim_steps(of: str, claim: Claim) -> Iterator[Step]:
-    """Yield kind, place, witness and numbers of the obligations of a claim."""
+def claim_steps(of: str, claim: Claim, labels: Sequence[str]) -> Iterator[Step]:
+    """Yield kind, place, witness and numbers of the obligations of a claim about the agents ``labels``."""
     if isinstance(claim, ShareClaim):
         V = claim.form.function
         for mode, (rate, tau, rests) in enumerate(zip(V.rates, V.multipliers, claim.form.at_rest, strict=True)):
             witness = None if rests else {"multipliers": [format_exact(x) for x in tau]}
             yield "family-rate", f"{of}.modes[{mode}]", witness, {"b": format_exact(rate)}
-        yield "clock-shares", of, None, {}
+        q = None if claim.mean is None else {v: format_exact(x) for v, x in zip(labels, claim.mean, strict=True) if x}
+        yield "clock-shares", of, None if q is None else {"mean": q}, {}
         return
     if isinstance(claim, FinalValueClaim):
         yield "final-value", of, None, {}
@@ -160,14 +166,18 @@ def read_claim(
     steps = [x for x in proof if x["kind"] == "family-rate" and x["of"].startswith(f"{of}.modes[")]
     if entry["claim"] == "shares":
         assert isinstance(signal, ClockShares), "the check has verified what a claim is about"
-        return ShareClaim(number, signal, _read_share_form(entry, steps, components[number]), exact(entry["rate"]))
+        form, labels = _read_share_form(entry, steps, components[number]), components[number].family.labels
+        ends = None if "final_state" not in entry else _read_ends(entry["final_state"])
+        last = next(step for step in proof if step["kind"] == "clock-shares" and step["of"] == of)
+        mean = last["witness"] and tuple(exact(last["witness"]["mean"].get(label, "0")) for label in labels)
+        return ShareClaim(number, signal, form, exact(entry["rate"]), ends, mean)
     if entry["claim"] == "final value":
         pairs = zip(entry["modes"], components[number].family.modes, strict=True)
         return FinalValueClaim(
             number, tuple(None if value is None else _read_value(value, mode) for value, mode in pairs)
         )
     if entry["claim"] != "rate":
-        ends = entry["final_state"] and tuple((m - r, m + r) for m, r in map(interval, entry["final_state"].values()))
+        ends = entry["final_state"] and _read_ends(entry["final_state"])
         if entry["claim"] == "last mode":
             return LastModeClaim(number, signal, tuple(entry["modes"]), ends)
         assert isinstance(signal, JointWindows), "the check has verified what a claim is about"
@@ -181,6 +191,10 @@ def read_claim(
             exact(entry["ratio"]),
         )
     return RateClaim(entry["component"], signal, forms, exact(entry["rate"]), bool(entry["bounded"]))
+
+
+def _read_ends(section: Mapping[str, Any]) -> tuple[Interval, ...]:
+    return tuple((m - r, m + r) for m, r in map(interval, section.values()))
 
 
 def _read_value(entry: Mapping[str, Any], mode: Mode) -> ValueEnds:

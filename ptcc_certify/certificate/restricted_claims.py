@@ -112,13 +112,19 @@ class ShareClaim:
     form : ShareForm
     rate : Fraction
         The mean of the rates over the shares, per unit of the stretched clock.
+    final_states : tuple of (Fraction, Fraction), or None
+        Of each node of the component; None without an initial state, where nothing decays, and where every signal has
+        final states.
+    mean : tuple of Fraction, or None
+        ``q`` of each node of the component, if every signal keeps ``q' X`` and the final states follow from that.
     """
 
     component: int
     signal: ClockShares
     form: ShareForm
     rate: Fraction
-    final_states = None
+    final_states: tuple[Interval, ...] | None = None
+    mean: tuple[Fraction, ...] | None = None
 
     @property
     def behaviours(self) -> tuple[str | None, ...]:

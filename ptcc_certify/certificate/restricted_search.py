@@ -7,12 +7,14 @@ common, an end where they differ.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from fractions import Fraction
 
 from lmi.exact.elementary_enclosures import log, rounded
 from lmi.search_time import share_of_time
 from ptcc_certify.bounds.attracting_box import have_common_denominator
 from ptcc_certify.bounds.family_final_state import ValueEnds, value_ends
+from ptcc_certify.bounds.kept_means import mean_of_shares
 from ptcc_certify.certificate.family_content import ComponentProof
 from ptcc_certify.certificate.restricted_claims import (
     Claim,
@@ -25,6 +27,7 @@ from ptcc_certify.certificate.restricted_claims import (
 from ptcc_certify.checker.restricted_signals import MANY_CLAIMS, agreed_bounds, reachable_bounds
 from ptcc_certify.errors import HypothesisError, ParameterError
 from ptcc_certify.graphs.family import Mode
+from ptcc_certify.graphs.rationals import writable
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
 from ptcc_certify.lyapunov.clock_shares import search_share_form
@@ -32,7 +35,7 @@ from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.mode_forms import ModeForms, search_mode_forms, search_single_forms, within_reach
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.protocols import Protocol
-from ptcc_certify.theorems.family_behaviour import DEPENDS
+from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
 from ptcc_certify.theorems.joint_windows import joint_behaviour, window_rate
 from ptcc_certify.theorems.last_mode import last_mode_behaviours
 from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows, SignalClass
@@ -91,7 +94,7 @@ def claims_for(
         if part.component.nodes.size == 1 or part.component.behaviour is None:
             continue
         if isinstance(signal, ClockShares):
-            claims += filter(None, [_share_claim(number, signal, part, notes)])
+            claims += filter(None, [_share_claim(number, signal, part, state, notes)])
         elif part.component.behaviour == DEPENDS:
             if isinstance(signal, JointWindows):
                 claims += filter(None, [_window_claim(number, signal, part, state)])
@@ -151,12 +154,32 @@ def _rate_claim(
     return None if rate is None else RateClaim(number, signal, forms, rate, rate * protocol.gain.pole >= 2)
 
 
-def _share_claim(number: int, signal: ClockShares, part: ComponentProof, notes: list[str]) -> ShareClaim | None:
+def _share_claim(
+    number: int, signal: ClockShares, part: ComponentProof, state: Sequence[Fraction] | None, notes: list[str]
+) -> ShareClaim | None:
     with share_of_time(1.0, STEP, notes):
         known = [V for V in part.functions if isinstance(V, FamilyFunction) and V.kind != "undirected"]
         form = search_share_form(part.component, signal.shares, known)
-        return None if form is None else ShareClaim(number, signal, form, form.mean(signal.shares))
+        if form is None:
+            return None
+        claim = ShareClaim(number, signal, form, form.mean(signal.shares))
+        if state is None or claim.behaviour is None or part.component.behaviour != DEPENDS:
+            return claim
+        return _with_ends(claim, part.component, [state[v] for v in part.component.nodes.tolist()])
     return None
+
+
+def _with_ends(claim: ShareClaim, component: FamilyComponent, x: Sequence[Fraction]) -> ShareClaim:
+    """Add where the agents end: at one value that a kept mean tells, or within all their bounds; or at 0."""
+    camps = None if claim.behaviour == STABILITY else component.gauge
+    if camps is not None and (group := mean_of_shares(component, claim.signal.shares)) is not None:
+        q = tuple(Fraction(p * g) for p, g in zip(group.vector or (), group.camps, strict=True))
+        c = group.final_value(x)
+        if c is not None and all(map(writable, (c, *q))):
+            return replace(claim, final_states=tuple((g * c, g * c) for g in group.camps), mean=q)
+    edges = zip(*(end.tolist() for end in component.family.union), strict=True)
+    signs = None if camps is None else dict(enumerate(camps.tolist()))
+    return replace(claim, final_states=tuple(agreed_bounds(range(len(x)), edges, x, signs).values()))
 
 
 def _window_claim(

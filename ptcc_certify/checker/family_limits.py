@@ -147,13 +147,14 @@ def check_means(
         pairs = ((s, t) for edges in component.part.edges for s, t, _, _, _ in edges)
         groups = agents_heard(pairs, component.pivots) if component.kernel else {}
         need(entry is None or (isinstance(entry, dict) and set(entry) <= set(map(str, groups))), "means of a component")
-        means = {int(j): _mean(doc, family, component, groups[int(j)], int(j), q, x) for j, q in (entry or {}).items()}
+        numbered = ((int(j), q) for j, q in (entry or {}).items())
+        means = {j: check_mean(doc, family, component, groups[j], j, q, x) for j, q in numbered}
         result.append((groups, means))
     return result
 
 
-def _mean(
-    doc: Document, family: Family, component: Component, group: list[int], j: int, entry: Any, x: Sequence[Fraction]
+def check_mean(
+    doc: Document, family: Family, component: Component, group: Sequence[int], j: int, entry: Any, x: Sequence[Fraction]
 ) -> Fraction:
     """Verify that every member keeps ``q' X``, and return ``c_j``."""
     camps = {v: int(component.kernel[v][j]) for v in group}

@@ -18,6 +18,7 @@ from lmi.exact.work import spend
 from ptcc_certify.checker.constant_weights import check_final_value, fitting_camps
 from ptcc_certify.checker.family import CONSENSUS, CONTAINMENT, INTERVAL, STABILITY, Component, Family
 from ptcc_certify.checker.family_function import decreases, quotient_of
+from ptcc_certify.checker.family_limits import check_mean
 from ptcc_certify.checker.family_rows import Function
 from ptcc_certify.checker.graph import ordered, positions
 from ptcc_certify.checker.matrix_products import Matrix, combined, need_rows
@@ -31,6 +32,7 @@ RATE = ("claim", "signals", "component", "forms", "ratio", "rate", "bounded")
 LAST_MODE = ("claim", "signals", "component", "modes", "final_state")
 WINDOWS = ("claim", "signals", "component", "behaviour", "eta", "final_state")
 SHARES = ("claim", "signals", "component", "nodes", "form", "rate", "behaviour")
+SHARES_WITH_ENDS = (*SHARES, "final_state")
 #: Products of short integers that an edge of a claim costs, about.
 EACH_EDGE = 100
 #: Longest ratio, in bits, of which the logarithm is enclosed.
@@ -70,7 +72,7 @@ def check_restricted(
             _check_windows(doc, family, x, entry, of)
         else:
             need(kind == "shares", "an unknown claim")
-            _check_shares(doc, family, entry, of)
+            _check_shares(doc, family, x, entry, of)
 
 
 def _component(family: Family, number: Any) -> Component:
@@ -348,9 +350,10 @@ def _check_intervals(family: Family, component: Component, section: Any, bounds:
 # ---------------------------------------------------------------------- shares of the clock
 
 
-def _check_shares(doc: Document, family: Family, entry: Any, of: str) -> None:
+def _check_shares(doc: Document, family: Family, x: Sequence[Fraction] | None, entry: Any, of: str) -> None:
     """Verify one form for all modes, of which each has a rate of its own, and the mean of these rates."""
-    fields(entry, SHARES, "a claim")
+    told = isinstance(entry, dict) and "final_state" in entry
+    fields(entry, SHARES_WITH_ENDS if told else SHARES, "a claim")
     part = _component(family, entry["component"]).part
     shares = [exact(x) for x in entries(fields(entry["signals"], ("shares",), "signals")["shares"], "shares")]
     need(len(shares) == len(family.modes) and min(shares) >= 0 and sum(shares) == 1, "shares of the modes")
@@ -375,8 +378,28 @@ def _check_shares(doc: Document, family: Family, entry: Any, of: str) -> None:
         )
         mean += share * numbers["b"]
         doc.done(f"b = {down(numbers['b'])}" if numbers["b"] > 0 else "nothing decays")
-    doc.open("clock-shares", of)
+    witness = doc.open("clock-shares", of, witness=told)["witness"]
     rate = exact(entry["rate"])
     need(rate <= mean, "the rate is not proved")
     need(entry["behaviour"] == (common.behaviour if rate > 0 else None), "another behaviour")
+    if told:
+        need(x is not None and rate > 0, "a final state where none is known")
+        _check_share_ends(doc, family, common, x or [], entry["final_state"], witness)
     doc.done(f"rate {down(rate)}" if rate > 0 else "nothing decays")
+
+
+def _check_share_ends(
+    doc: Document, family: Family, common: Component, x: Sequence[Fraction], section: Any, witness: Any
+) -> None:
+    """Verify where agents end: at 0, at one value up to camps that a kept mean tells, or within all their bounds."""
+    part = common.part
+    spend(EACH_EDGE * sum(1 + len(edges) for edges in part.edges), what="restricted signals")
+    if witness is None:
+        every = {edge[:3] for edges in part.edges for edge in edges}
+        bounds = agreed_bounds(part.nodes, every, x, part.camps if common.behaviour == CONSENSUS else None)
+    else:
+        need(common.behaviour == CONSENSUS, "a mean of agents that end at 0")
+        mean = fields(witness, ("mean",), "a witness")["mean"]
+        value = check_mean(doc, family, common, part.nodes, 1, mean, x)
+        bounds = {v: (row[1] * value, row[1] * value) for v, row in common.kernel.items()}
+    _check_intervals(family, common, section, bounds)

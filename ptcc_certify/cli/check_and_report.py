@@ -155,8 +155,9 @@ def _same_graph(
 def report(certificate: str, output: str, simulation: bool | None, memory: float) -> int:
     """Check CERTIFICATE and write a report to send to somebody: a page of HTML, or a statement in LaTeX.
 
-    The page is one file that loads nothing and runs no script. Exit codes are those of `check`; of a rejected
-    certificate the page tells the reason and no claim.
+    CERTIFICATE is a file, or - for standard input (side files are then those in this folder), which the report calls
+    certificate.json. The page is one file that loads nothing and runs no script. Exit codes are those of `check`; of a
+    rejected certificate the page tells the reason and no claim.
     """
     from ptcc_certify.certificate.certificate import RejectedCertificate
 

@@ -5,7 +5,9 @@ One table for each way of asking: ``object.name``, ``object[key]`` and ``Class.n
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from abc import ABCMeta
+from dataclasses import fields, is_dataclass
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 from ptcc_certify.errors import ParameterError, UnknownName, did_you_mean
 
@@ -64,6 +66,8 @@ ITS = {
         "to_dict": "items(): dict(final_state) makes a dict",
         "to_numpy": "states: numpy.asarray(final_state) rounds them",
     },
+    "NominalProtocol": {"deadline": "T"},
+    "SlidingModeProtocol": {"deadline": "T"},
     "CheckReport": dict.fromkeys(("save", "write"), "to_dict()"),
 }
 #: By name: what is not a part of the object.
@@ -101,6 +105,26 @@ _MADE_BY = {
 }
 
 
+_T = TypeVar("_T")
+
+
+class Row(tuple[_T, ...]):
+    """A tuple that may be called, too, as in networkx: ``graph.edges()`` is ``graph.edges``.
+
+    Examples
+    --------
+    >>> graph = SignedDigraph.from_edges([("a", "b", -1)])
+    >>> graph.labels(), graph.edges() == graph.edges == (("a", "b", -1),)
+    (('a', 'b'), True)
+    """
+
+    __slots__ = ()
+
+    def __call__(self) -> Self:
+        """Return the tuple itself."""
+        return self
+
+
 class Hinted:
     """An object that says where something is that it does not have.
 
@@ -133,11 +157,14 @@ class Hinted:
             )
 
 
-class HintedClass(type):
+class HintedClass(ABCMeta):
     """A class that names what makes its objects, where it is asked for a constructor that it does not have.
 
     Examples
     --------
+    >>> NominalProtocol.from_file
+    Traceback (most recent call last):
+    ptcc_certify.errors.UnknownName: the class NominalProtocol has no attribute 'from_file'; make one with ...
     >>> ptcc.SignedDigraph.from_pandas
     Traceback (most recent call last):
     ptcc_certify.errors.UnknownName: the class SignedDigraph has no attribute 'from_pandas'; make one with ...
@@ -147,9 +174,15 @@ class HintedClass(type):
 
         def __getattr__(cls, name: str) -> Any:
             """Refuse a name, with what makes an object."""
-            made = "" if name.startswith("_") else _of_class(_MADE_BY, cls, "")
+            made = "" if name.startswith("_") else _of_class(_MADE_BY, cls, "") or _call_of(cls)
             hint = f"; make one with {made}" if made else ""
             raise UnknownName(f"the class {cls.__name__} has no attribute {name!r}{hint}")
+
+
+def _call_of(cls: type) -> str:
+    """Write the call of a dataclass with the names of its parameters; "" of other classes."""
+    names = [field.name for field in fields(cls) if field.init and field.name[0] != "_"] if is_dataclass(cls) else []
+    return f"{cls.__name__}({', '.join(names)})" if names else ""
 
 
 def _of_class(table: dict[str, Any], of: type, otherwise: Any) -> Any:

@@ -45,7 +45,7 @@ def write_report(
     Parameters
     ----------
     certificate : path, mapping, Certificate or FamilyCertificate
-        A file of schema ``ptcc-certificate/2``, its parsed JSON, or a certificate.
+        A file of schema ``ptcc-certificate/2`` (``"-"``: standard input), its parsed JSON, or a certificate.
     output : path
         The suffix decides what is written.
     simulation : bool, optional
@@ -88,7 +88,7 @@ def write_report(
         raise ParameterError(f"{output}: a report is written to .html or .tex; choose one of these")
     refuse_no_certificate(certificate)
     in_memory = isinstance(certificate, Certificate | FamilyCertificate | Mapping)
-    file = None if in_memory else Path(certificate)  # type: ignore[arg-type]
+    file = None if in_memory or certificate == "-" else Path(certificate)  # type: ignore[arg-type]
     if file is not None and path.is_file() and file.is_file() and path.samefile(file):
         raise ParameterError(f"{output}: is the certificate itself; name another file")
     if not path.parent.is_dir():

@@ -543,6 +543,104 @@ def test_what_shares_prove_is_judged_and_read_back(tmp_path: Path):
         assert not check(resealed(forged)).accepted, (key, new)
 
 
+def played_by_shares(family: Family, shares: list[Fraction], x: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Where agents are after modes were played in turn, in another order each time, by their shares of the clock."""
+    for step in [0.3] * 20 + [4.0] * 30:
+        for k in rng.permutation(len(family.modes)).tolist():
+            mode = family.modes[k]
+            L = np.zeros((x.size, x.size))
+            for e, (s, t) in enumerate(zip(mode.source, mode.target, strict=True)):
+                weight = rng.uniform(float(mode.lower.fraction(e)), float(mode.upper.fraction(e)))
+                L[t, t] += weight
+                L[t, s] -= weight * mode.sign[e]
+            x = expm(-L * float(shares[k]) * step) @ x
+    return x
+
+
+def test_shares_tell_where_agents_end_exactly_where_a_mean_is_kept():
+    day = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 3), ("b", "c", -2)])
+    outage = SignedDigraph.from_edges([], nodes="abc")
+    shares, x0 = [Fraction(3, 10), Fraction(7, 10)], [Fraction(8), Fraction(0), Fraction(5)]
+    family = Family.switching({"outage": outage, "day": day})
+    made = certify_family(family, PROTOCOL, x0, signal=ClockShares(shares))
+    (claim,) = made.restricted
+    (only,) = certify_family(Family.switching([day]), PROTOCOL, x0).parts
+    assert only.leading_groups[0].final_value(x0) == 2  # p = (1, 3)/4
+    assert claim.final_states == ((2, 2), (2, 2), (-2, -2)) and claim.mean == (1, 3, 0)
+    for seed in range(5):
+        end = played_by_shares(family, shares, np.array(x0, dtype=float), np.random.default_rng(seed))
+        assert np.allclose(end, [2, 2, -2], atol=1e-9)
+    assert "a, b at 2, c at -2 (these signals)" in " ".join(made.summary().split())
+    assert check(made.to_dict(), stdlib=True).accepted
+
+
+def test_shares_tell_between_which_values_agents_end_where_no_mean_is_kept():
+    first = Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 1), ("b", "c", -1, -1)])
+    outage = Family.from_intervals([], nodes="abc")
+    shares, x0 = [Fraction(1, 2), Fraction(1, 2)], [Fraction(8), Fraction(0), Fraction(-5)]
+    family = Family.switching({"on": first, "outage": outage})
+    (claim,) = certify_family(family, PROTOCOL, x0, signal=ClockShares(shares)).restricted
+    assert claim.mean is None and claim.final_states == ((0, 8), (0, 8), (-8, 0))
+    ends = np.array(
+        [played_by_shares(family, shares, np.array(x0, dtype=float), np.random.default_rng(k)) for k in range(5)]
+    )
+    assert np.allclose(ends[:, 0], ends[:, 1]) and np.allclose(ends[:, 0], -ends[:, 2])
+    assert (ends[:, 0] > 4).all() and (ends[:, 0] < 16 / 3).all() and np.ptp(ends[:, 0]) > 1e-3
+
+
+def test_shares_that_bring_agents_to_0_say_so(tmp_path: Path):
+    shares = ClockShares(["0.5", "0.3", "0.2"])
+    made = certify_family(with_outage("stability"), PROTOCOL, [1, 2, 3, 4], signal=shares)
+    assert made.restricted[0].final_states == ((0, 0),) * 4 and made.restricted[0].mean is None
+    made.save(tmp_path / "c.json")
+    assert read_certificate(tmp_path / "c.json").restricted[0].final_states == ((0, 0),) * 4
+
+
+def test_no_end_that_shares_do_not_prove_is_accepted(tmp_path: Path):
+    day, outage = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", -3)]), SignedDigraph.from_edges([], nodes="ab")
+    balanced = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 3)])
+    made = certify_family(Family.switching([balanced, outage]), PROTOCOL, [8, 0], signal=ClockShares(["0.5", "0.5"]))
+    made.save(tmp_path / "c.json")
+    again = read_certificate(tmp_path / "c.json")
+    (one,), (other,) = made.restricted, again.restricted
+    assert one.final_states == other.final_states == ((2, 2), (2, 2)) and one.mean == other.mean == (1, 3)
+    assert again.to_dict() == made.to_dict()
+    data = made.to_dict()
+    (step,) = [k for k, step in enumerate(data["proof"]) if step["kind"] == "clock-shares"]
+    wider = {"mid": "4", "radius": "4"}
+    for ends, witness, accepted in (
+        ({"a": "2", "b": "2"}, {"mean": {"a": "1", "b": "3"}}, True),
+        ({"a": wider, "b": wider}, None, True),
+        ({"a": {"mid": "4", "radius": "3"}, "b": wider}, None, False),
+        ({"a": "2", "b": "2"}, None, False),
+        ({"a": "4", "b": "4"}, {"mean": "equal"}, False),
+        ({"a": "4", "b": "4"}, {"mean": {"a": "1", "b": "1"}}, False),
+        ({"a": "0", "b": "0"}, {"mean": {}}, False),
+        ({"a": "2", "b": "201/100"}, {"mean": {"a": "1", "b": "3"}}, False),
+        ({"a": "2"}, {"mean": {"a": "1", "b": "3"}}, False),
+        (None, {"mean": {"a": "1", "b": "3"}}, False),
+        ({"a": "2", "b": "2"}, {"mean": {"a": "1", "b": "3"}, "more": 1}, False),
+    ):
+        forged = copy.deepcopy(data)
+        forged["restricted"][0]["final_state"], forged["proof"][step]["witness"] = ends, witness
+        assert check(resealed(forged)).accepted is accepted, (ends, witness)
+    older = copy.deepcopy(data)  # files that were made before say nothing of ends
+    del older["restricted"][0]["final_state"]
+    assert not check(resealed(older)).accepted
+    older["proof"][step]["witness"] = None
+    assert check(resealed(older)).accepted
+    stable = certify_family(
+        Family.switching([day, outage]), PROTOCOL, [8, 0], signal=ClockShares(["0.5", "0.5"])
+    ).to_dict()
+    assert stable["restricted"][0]["final_state"] == {"a": "0", "b": "0"}
+    stateless = certify_family(
+        Family.switching([balanced, outage]), PROTOCOL, signal=ClockShares(["0.5", "0.5"])
+    ).to_dict()
+    assert "final_state" not in stateless["restricted"][0]
+    stateless["restricted"][0]["final_state"] = {"a": "2", "b": "2"}
+    assert not check(resealed(stateless)).accepted
+
+
 def test_shares_that_are_none_are_refused():
     for wrong in (["0.5"], ["0.5", "0.6"], ["1.5", "-0.5"], ["x", "1"]):
         with pytest.raises(ParameterError):

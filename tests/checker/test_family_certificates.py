@@ -185,9 +185,18 @@ def restricted_cases(count: int) -> list[tuple[str, Json]]:
         pair = Family.from_intervals([("a", "b", 1, 2), ("b", "c", -1, -1), *[("c", "a", 1, 1)] * -back], nodes="abc")
         other = Family.from_intervals([("a", "b", 1, 1), *[("b", "a", -1, 0)] * -back], nodes="abc")
         modes = Family.switching({"pair": pair, "outage": outage, "other": other})
-        made = certify_family(modes, PROTOCOL, None, signal=ClockShares(["0.8", "0.1", "0.1"]))
+        state = None if k else [3, -1, Fraction(1, 7)]
+        made = certify_family(modes, PROTOCOL, state, signal=ClockShares(["0.8", "0.1", "0.1"]))
         assert made.restricted
         found.append((f"shares {k}", {**made.to_dict(), "unverified": {}}))
+    kept = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -3), ("b", "c", 1)], nodes="abc")
+    moved = Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 1), ("b", "c", 1, 1)])
+    stable = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", -3), ("b", "c", 1)])
+    for k, on in enumerate((kept, moved, stable)):
+        modes = Family.switching([on, outage])
+        made = certify_family(modes, PROTOCOL, [3, -1, Fraction(1, 7)], signal=ClockShares(["0.7", "0.3"]))
+        assert (made.restricted[0].mean is None) == (k > 0) and made.restricted[0].final_states is not None
+        found.append((f"ends by shares {k}", {**made.to_dict(), "unverified": {}}))
     return found + final_value_cases()
 
 
@@ -423,12 +432,13 @@ def test_no_mutant_is_accepted_that_is_false():
 NEW = ("sliding_variable", "reaching_time", "protocol", "drives", "input", "final_state")
 
 
-def of_sliding(count: int) -> Counter[str]:
-    """Change what families have under the sliding-mode protocol alone, in one place."""
+def changed_numbers(begin: str, keys: tuple[str, ...], count: int) -> Counter[str]:
+    """Change one number below some keys of the certificates whose name begins so."""
     rng, seen = np.random.default_rng([SEED, 5]), Counter[str]()
+    among = [case for case in cases() if case[0].startswith(begin)]
     for _ in range(count):
-        name, data = pick(rng, [case for case in cases() if case[0].startswith("sliding")])
-        paths = [(path, x) for path, x in leaves(data) if set(path[:2]) & set(NEW) and fraction(x) is not None]
+        name, data = pick(rng, among)
+        paths = [(path, x) for path, x in leaves(data) if set(path) & set(keys) and fraction(x) is not None]
         path, text = pick(rng, paths)
         made = resealed(changed(data, path, nudged(rng, text)))
         if not same_claim(made, data):
@@ -436,6 +446,26 @@ def of_sliding(count: int) -> Counter[str]:
             seen[f"{path[0]} {'accepted' if accepted else 'rejected'}"] += 1
             assert not accepted or false_family_claims(made) == [], (name, path, at(made, path))
     return seen
+
+
+def of_sliding(count: int) -> Counter[str]:
+    """Change what families have under the sliding-mode protocol alone, in one place."""
+    return changed_numbers("sliding", NEW, count)
+
+
+def of_shares(count: int) -> Counter[str]:
+    """Change where agents end by shares of the clock, and the mean from which that follows, in one place."""
+    return changed_numbers("ends by shares", ("restricted", "witness", "initial_state"), count)
+
+
+def test_no_mutant_of_where_agents_end_by_shares_is_accepted_that_is_false():
+    seen = of_shares(40)
+    assert {key.split()[1] for key in seen} == {"accepted", "rejected"}
+
+
+@pytest.mark.campaign
+def test_no_mutant_of_thousands_of_where_agents_end_by_shares_is_accepted_that_is_false():
+    assert sum(of_shares(2000).values()) > 1000
 
 
 def test_no_mutant_of_what_slides_is_accepted_that_is_false():

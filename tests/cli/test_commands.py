@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import subprocess
@@ -210,6 +211,26 @@ def test_a_certificate_is_checked_from_standard_input(certificate: str):
         assert ptcc("check", "-", stdin=stdin).code == 2
     tight = ptcc("check", "-", "--memory", "0.00001", stdin=content)
     assert tight.code == 2 and "--memory" in tight.err
+
+
+def test_a_report_is_written_of_a_certificate_from_standard_input(certificate: str):
+    content = Path(certificate).read_bytes()
+    Path("certificate.json").write_bytes(content)
+    for name in ("c.html", "c.tex"):
+        assert ptcc("report", "certificate.json", "-o", name, "--no-simulation").code == 0
+        expected = Path(name).read_text(encoding="utf-8")
+        Path(name).unlink()
+        assert ptcc("report", "-", "-o", name, "--no-simulation", stdin=content).code == 0
+        assert Path(name).read_text(encoding="utf-8") == expected
+    spaced = json.dumps(json.loads(content), indent=3).encode()  # another file, of the same content
+    run = process("-m", "ptcc_certify", "report", "-", "-o", "d.html", "--no-simulation", stdin=spaced)
+    assert run.code == 0 and hashlib.sha256(spaced).hexdigest() in Path("d.html").read_text(encoding="utf-8")
+    for wrong in (b"", b"a,b,1", b"{}"):
+        run = ptcc("report", "-", "-o", "e.html", stdin=wrong)
+        assert run.code == 2 and run.err.startswith("ptcc: standard input: ") and not Path("e.html").exists()
+    false = content.replace(b'"T": "', b'"T": "1', 1)
+    run = ptcc("report", "-", "-o", "e.html", stdin=false)
+    assert run.code == 1 and "standard input" in Path("e.html").read_text(encoding="utf-8")
 
 
 def test_a_side_file_that_is_missing_is_no_rejection():

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import hashlib
 import json
+import pickle
 from decimal import Decimal
 from fractions import Fraction
 from functools import partial
@@ -18,6 +20,7 @@ from scipy import sparse
 
 from ptcc_certify.errors import GraphError, PTCCError
 from ptcc_certify.graphs.digraph import SignedDigraph, Weights, ordered_labels
+from ptcc_certify.graphs.family import Family
 
 weight = st.one_of(
     st.integers(-(10**20), 10**20),
@@ -426,3 +429,15 @@ def test_a_character_in_two_surrogates_is_refused():
     """Written to JSON and read again it would be another label."""
     with pytest.raises(GraphError, match="two surrogates"):
         SignedDigraph.from_edges([("\ud83d\ude00", "b", 1)])
+
+
+def test_labels_and_edges_are_tuples_that_may_be_called():
+    g = SignedDigraph.from_edges([("a", "b", -1), ("b", "c", 2)])
+    for row in (g.labels, g.edges, Family.from_graph(g).labels):
+        assert row() is row and isinstance(row, tuple)
+        assert row == tuple(row) and hash(row) == hash(tuple(row)) and repr(row) == repr(tuple(row))
+        for again in (pickle.loads(pickle.dumps(row)), copy.copy(row), copy.deepcopy(row)):  # noqa: S301
+            assert again == row and again() == row
+        with pytest.raises(AttributeError):
+            row.label = 1
+    assert json.loads(json.dumps(g.labels)) == ["a", "b", "c"]
