@@ -407,6 +407,7 @@ def with_messages(
         "own": "late" if late else "fresh",
         "value_error": text(error),
         "gain_cap": text(cap),
+        "leaders": None,
         "rows": [],
         "steps": None,
         "residual": None,
