@@ -165,6 +165,9 @@ class Late:
     def inputs(self, step: Json, entry: Json, error: Fraction, gain_cap: Fraction) -> list[Fraction]:
         """What an entry of ``rows`` proves of the inputs of all agents."""
         u, b, floor, found = step["bound"][0], number(step["numbers"]["b"]), number(entry["floor"]), []
+        if "after" in entry:
+            first = min(self.rho1 + self.k / self.T, gain_cap)
+            floor += number(entry["after"]) * min(self.rho1, gain_cap) / first
         y = self.largest_gain(b, gain_cap, None if entry["cap"] is None else number(entry["cap"]))
         for v in range(len(self.labels)):
             if v not in u:
@@ -177,7 +180,26 @@ class Late:
 
     # ------------------------------------------------------------------ parts
 
-    def row(self, q: Fraction, delay: Fraction, error: Fraction, gain_cap: Fraction | None) -> tuple[Json, Json] | None:
+    def integral(self, b: Fraction, cap: Fraction | None) -> Fraction:
+        """``int_0^T e^(-b (s_c(T) - s_c(r))) dr``, a little above, by quadrature."""
+        if cap is None:
+            return Fraction(0)
+        first, T, k = float(self.rho1 + self.k / self.T), float(self.T), float(self.k)
+        r = T if cap <= first else k / float(cap - self.rho1)
+        end = math.exp(-float(b * cap) * r)
+        x = T - r * np.exp(np.linspace(0, math.log(T / r), 4001))  # instants before the turn
+        grown = float(b) * k * np.log((T - x) / r)  # without rho1, as the format has it
+        whole = float(abs(np.trapezoid(np.exp(-grown), x)))
+        return Fraction(end * whole * (1 + 1e-5) + (1 - end) / float(b * cap)) * (1 + ROOM)
+
+    def row(
+        self,
+        q: Fraction,
+        delay: Fraction,
+        error: Fraction,
+        gain_cap: Fraction | None,
+        push: Fraction | None = None,
+    ) -> tuple[Json, Json] | None:
         """An entry of ``rows``, and its obligation without ``of``."""
         if (found := self.witness(q)) is None:
             return None
@@ -196,15 +218,21 @@ class Late:
             "initial": text(initial),
             "floor": text(floor),
         }
+        drift = Fraction(0)
+        if push is not None:
+            drift = push / min(u.values()) * self.integral(b, limit)
+            slowest = min(x for x in (self.rho1, gain_cap) if x is not None)
+            after = max(push / slowest / x for x in slack.values())
+            entry |= {"drift": text(drift), "after": text(after)}
         told = {"q": text(q), "b": text(b)}
         return entry, {
             "numbers": told,
             "witness": {"u": [text(u[v]) for v in self.followers]},
-            "bound": (u, initial * left + floor),
+            "bound": (u, initial * left + floor + drift),
         }
 
     def steps(
-        self, delay: Fraction, error: Fraction, gain_cap: Fraction | None, count: int
+        self, delay: Fraction, error: Fraction, gain_cap: Fraction | None, count: int, push: float = 0.0
     ) -> tuple[Json, Json, dict[int, Fraction]]:
         """The part ``steps``, its witness, and bounds at ``T`` in floats with some room."""
         A = np.zeros((len(self.followers),) * 2)
@@ -215,6 +243,7 @@ class Late:
                 A[place[v], place[s]] -= float(w)
         base = np.linalg.solve(A, np.array([float(self.D[v]) for v in self.followers]))
         share = max(max(float(self.away(v)) / base[place[v]] for v in self.followers), float(error)) + 1e-9
+        share += push / self.gain_at(0.0, gain_cap) / min(float(self.D[v]) for v in self.followers)
         y0 = {
             v: Fraction(math.ceil(base[place[v]] * share * (1 + 1e-6) * 2**30) + 2**10, 2**30) for v in self.followers
         }
@@ -235,6 +264,7 @@ class Late:
             for v in self.followers:
                 told = sum(float(w) * y[at[self.parts[s, v]]][s] for s, w in self.heard[v])
                 h = told / float(self.D[v]) + float(error)
+                h += push / (float(self.D[v]) * self.gain_at(float(a), gain_cap)) if math.isfinite(way) else 0.0
                 x = float(self.D[v]) * way
                 decay = 1 / (1 + x + x**2 / 2 + x**3 / 6 + x**4 / 24)
                 new[v] = min(y[i][v], h + max(y[i][v] - h, 0) * decay)
@@ -242,6 +272,10 @@ class Late:
         top = max(y[0].values())
         bounds = {v: Fraction(x + len(instants) * top / 2**20) for v, x in y[-1].items()}
         return {"instants": [text(t) for t in instants]}, {"start": [text(y0[v]) for v in self.followers]}, bounds
+
+    def gain_at(self, t: float, cap: Fraction | None) -> float:
+        gain = float(self.rho1) + float(self.k) / (float(self.T) - t)
+        return gain if cap is None else min(gain, float(cap))
 
     def way(self, a: float, b: float, cap: Fraction | None) -> float:
         T, rho1, k = map(float, (self.T, self.rho1, self.k))
@@ -391,8 +425,9 @@ def with_messages(
     staged: bool = False,
     form: Fraction | None = None,
     bounded: bool = True,
+    moving: tuple[Any, Any] | None = None,
 ) -> Json:
-    """The certificate with late messages: as many of the parts as there are."""
+    """The certificate with late messages: as many of the parts as there are; ``moving``: speed and disturbance."""
     data = copy.deepcopy(data)
     each = latency if isinstance(latency, list) else [latency]
     delay = max(map(Fraction, each))
@@ -407,6 +442,7 @@ def with_messages(
         "own": "late" if late else "fresh",
         "value_error": text(error),
         "gain_cap": text(cap),
+        "leaders": moving and {"speed": text(moving[0]), "disturbance": text(moving[1])},
         "rows": [],
         "steps": None,
         "residual": None,
@@ -416,9 +452,12 @@ def with_messages(
         "form": None,
         "input": None,
     }
-    proof, bounds, inputs = [], [], []
+    proof, bounds, inputs, push = [], [], [], None
+    if moving is not None:
+        push = Fraction(moving[0]) + Fraction(moving[1])
+        error += Fraction(moving[0]) * delay
     for q in () if late else qs:
-        if (found := case.row(Fraction(q), delay, error, cap)) is not None:
+        if (found := case.row(Fraction(q), delay, error, cap, push)) is not None:
             entry, step = found
             bounds.append({v: step["bound"][0][v] * step["bound"][1] for v in case.followers})
             inputs += [] if cap is None else [case.inputs(step, entry, error, cap)]
@@ -427,7 +466,7 @@ def with_messages(
             )
             said["rows"].append(entry)
     if steps:
-        said["steps"], witness, above = case.steps(delay, error, cap, steps)
+        said["steps"], witness, above = case.steps(delay, error, cap, steps, float(push or 0))
         bounds.append(above)
         proof.append(obligation("late-steps", "messages.steps", witness=witness))
     if bounds:

@@ -63,6 +63,43 @@ def instants(T: float, taubar: float, nearest: float = 1e-7, count: int = 60) ->
 
 
 Ages = Callable[[Matrix, Matrix, int], Matrix]
+#: Where agents are to be, in a state: the same for all, or as leaders are there.
+Target = Vector | Callable[[Vector], Vector]
+
+
+@dataclass(frozen=True)
+class Flight:
+    """Leaders that move, by the worst row, and disturbances that push followers from their targets.
+
+    Leaders move evenly over a step, for nobody hears of it before the next; a disturbance is a constant times the gain
+    within a step.
+    """
+
+    W: Matrix
+    speed: float
+    delta: float
+
+    def parts(self) -> tuple[list[int], list[int], Matrix]:
+        """Return leaders, followers, and ``-L_F^-1 L_FL``."""
+        D = np.abs(self.W).sum(axis=1)
+        F, A = np.flatnonzero(D > 0).tolist(), np.flatnonzero(D == 0).tolist()
+        L = np.diag(D) - self.W
+        return A, F, -np.linalg.solve(L[np.ix_(F, F)], L[np.ix_(F, A)])
+
+    def targets(self, X: Matrix) -> Matrix:
+        """Where agents are to be, for one state or many; leaders are where they are."""
+        A, F, targets = self.parts()
+        aims = X.copy()
+        aims[F] = targets @ X[A]
+        return aims
+
+    def move(self, x: Vector, new: Vector, dt: float, top: float, decay: Vector) -> None:
+        """Add to the states after a step how leaders move, and what pushes followers under a gain up to ``top``."""
+        A, F, targets = self.parts()
+        off = x[F] - targets @ x[A]
+        row, D = int(np.argmax(np.abs(off))), np.abs(self.W).sum(axis=1)[F]
+        new[A] += -np.sign(off[row]) * self.speed * np.where(targets[row] >= 0, 1.0, -1.0) * dt
+        new[F] += self.delta * np.where(off >= 0, 1.0, -1.0) * (1 - decay) / (D * top)
 
 
 @dataclass(frozen=True)
@@ -83,6 +120,8 @@ class LateMotion:
         The own state is heard late too, as old as each message.
     at_once : tuple of int
         Agents that listen to each other alone, at once: they move exactly so.
+    flight : Flight, optional
+        Leaders move, and disturbances act; all gains are the same.
     """
 
     W: Matrix
@@ -91,6 +130,7 @@ class LateMotion:
     times: Vector
     own_late: bool = False
     at_once: tuple[int, ...] = ()
+    flight: Flight | None = None
 
     def run(self, history: Vector, ages: Ages, errors: Callable[[Vector], Vector] | None = None) -> Matrix:
         """Return the states at all instants, (N, times).
@@ -127,6 +167,10 @@ class LateMotion:
             decay = np.exp(-D[moves] * ds[moves])
             X[:, j + 1] = X[:, j]
             X[moves, j + 1] = end[moves] + (X[moves, j] - end[moves]) * decay
+            if self.flight is not None:
+                a, b, gain = self.times[j], self.times[j + 1], self.gains[0]
+                top = gain.rho1 if a >= gain.T else min(gain.cap, math.inf if b >= gain.T else gain.value(b))
+                self.flight.move(X[:, j], X[:, j + 1], b - a, top, decay)
             if self.at_once:
                 X[leading, j + 1] = expm(-A * min(ds[0], 50 / slowest)) @ X[leading, j]
         return X
@@ -147,11 +191,12 @@ def square_wave(period: int, phases: Matrix) -> Ages:
     return lambda X, oldest, j: np.where((j + phases) // period % 2 == 0, j, oldest)
 
 
-def worst(W: Matrix, target: Vector) -> Ages:
+def worst(W: Matrix, target: Target) -> Ages:
     """The message of each neighbour that drives the listener farthest from its target, on the side where it is."""
 
     def ages(X: Matrix, oldest: Matrix, j: int) -> Matrix:
-        side, which = np.sign(W) * np.where(X[:, j] >= target, 1.0, -1.0)[:, None], oldest.copy()
+        aim = target(X[:, j]) if callable(target) else target
+        side, which = np.sign(W) * np.where(X[:, j] >= aim, 1.0, -1.0)[:, None], oldest.copy()
         for first in np.unique(oldest):
             window = X[:, first:]
             far = np.where(side > 0, window.argmax(axis=1)[None, :], window.argmin(axis=1)[None, :])
@@ -161,9 +206,9 @@ def worst(W: Matrix, target: Vector) -> Ages:
     return ages
 
 
-def worst_errors(nu: float, target: Vector) -> Callable[[Vector], Vector]:
+def worst_errors(nu: float, target: Target) -> Callable[[Vector], Vector]:
     """Errors of received values that drive every listener away from its target."""
-    return lambda x: np.where(x >= target, nu, -nu)
+    return lambda x: np.where(x >= (target(x) if callable(target) else target), nu, -nu)
 
 
 # ---------------------------------------------------------------------- moving leaders

@@ -17,7 +17,7 @@ from typing import Any
 import flint
 import late_motion
 import numpy as np
-from late_motion import Gain, LateMotion, Moving
+from late_motion import Flight, Gain, LateMotion, Moving
 from oracle import Oracle, ball, number
 from scipy.linalg import expm
 
@@ -31,8 +31,8 @@ YOUNGER = 0.05
 class Runs:
     """Motions of one closed loop: states at all instants, for each pattern of delays."""
 
-    def __init__(self, times: np.ndarray, states: list[np.ndarray], gain: Gain):
-        self.times, self.states, self.gain = times, states, gain
+    def __init__(self, times: np.ndarray, states: list[np.ndarray], gain: Gain, flight: Flight | None = None):
+        self.times, self.states, self.gain, self.flight = times, states, gain, flight
 
     @cached_property
     def largest(self) -> np.ndarray:
@@ -40,7 +40,9 @@ class Runs:
         return np.array([np.max(self.states, axis=0), np.min(self.states, axis=0)])
 
     def away(self, target: np.ndarray) -> np.ndarray:
-        """The largest distance from a target over all patterns, (N, times)."""
+        """The largest distance from a target over all patterns, (N, times); from where leaders are if they move."""
+        if self.flight is not None:
+            return np.max([np.abs(X - self.flight.targets(X)) for X in self.states], axis=0)
         return np.abs(self.largest - target[None, :, None]).max(axis=0)
 
 
@@ -55,8 +57,12 @@ def late_runs(
     late: bool,
     end: float,
     at_once: tuple[int, ...] = (),
+    moving: tuple[float, float] | None = None,
 ) -> Runs:
-    """Motions for delays up to the ages of ``oldest``, by listener and source, and errors up to ``error``."""
+    """Motions for delays up to the ages of ``oldest``, by listener and source, and errors up to ``error``.
+
+    ``moving``: how fast leaders move, and what disturbs followers.
+    """
     start, aim = np.frombuffer(x0), np.frombuffer(target)
     N = len(start)
     weights, taubar = np.frombuffer(W).reshape(N, N), np.frombuffer(oldest).reshape(N, N)
@@ -66,15 +72,17 @@ def late_runs(
     times = np.arange(0, T, min(delay, T) / 3) if capped else late_motion.instants(T, delay)
     times = np.unique(np.concatenate([times, [g.T for g in gains], np.arange(T, end, min(delay, T) / 3)]))
     rng = np.random.default_rng(0)
-    motion = LateMotion(weights, list(gains), taubar, times, late, at_once)
+    flight = None if moving is None else Flight(weights, *moving)
+    aims: late_motion.Target = aim if flight is None else flight.targets
+    motion = LateMotion(weights, list(gains), taubar, times, late, at_once, flight)
     patterns = [
         late_motion.oldest_of_all,
         late_motion.by_chance(rng),
         late_motion.square_wave(5, rng.integers(0, 9, (N, N))),
-        late_motion.worst(weights, aim),
+        late_motion.worst(weights, aims),
     ]
-    off = late_motion.worst_errors(error, aim) if error else None
-    return Runs(times, [motion.run(start, ages, off) for ages in patterns], gains[0])
+    off = late_motion.worst_errors(error, aims) if error else None
+    return Runs(times, [motion.run(start, ages, off) for ages in patterns], gains[0], flight)
 
 
 class LateOracle(Oracle):
@@ -174,6 +182,17 @@ class LateOracle(Oracle):
         return number(self.said["value_error"])
 
     @cached_property
+    def fled(self) -> tuple[Fraction, Fraction] | None:
+        """How fast leaders move, and what disturbs followers; None if they rest."""
+        said = self.said["leaders"]
+        return None if said is None else (number(said["speed"]), number(said["disturbance"]))
+
+    @property
+    def wrong(self) -> Fraction:
+        """How far what is heard of a target is off."""
+        return self.error + (self.fled[0] * self.delay if self.fled else 0)
+
+    @cached_property
     def cap(self) -> Fraction | None:
         return None if self.said["gain_cap"] is None else number(self.said["gain_cap"])
 
@@ -190,7 +209,12 @@ class LateOracle(Oracle):
         self.require(not any(self.sigma0), "sliding variables that move")
         for key in ("rows", "steps", "missed", "staged"):
             self.require(not self.said[key] or (self.single and not late and self.follow), key)
+        if self.fled is not None:
+            self.require(min(self.fled) >= 0 and "mu1" not in self.gains, "leaders: what they need")
+            self.require(not any(self.said[key] for key in ("missed", "staged", "settling", "form")), "leaders move")
         self.above_rows()
+        if self.fled is not None:
+            self.kept_after()
         if self.said["residual"] is not None:
             self.above_residual()
         if self.said["missed"] is not None:
@@ -210,7 +234,11 @@ class LateOracle(Oracle):
         self.require(self.cap is not None and (most >= 0).all(), "input: what it needs")
         for runs, _ in self.loop():
             way = np.abs(np.diff(runs.states))
-            allowed = most[:, None] * np.diff(runs.times) * (1 + SLACK) + FLOOR
+            add = np.zeros(self.n)
+            if self.fled is not None:
+                add[:] = float(self.fled[0])
+                add[self.follow] = float(self.fled[1])
+            allowed = (most + add)[:, None] * np.diff(runs.times) * (1 + SLACK) + FLOOR
             self.require(not np.any(way > allowed), "input: a motion")
 
     def clock(self, cap: Fraction | None, t: Fraction | None = None) -> Any:
@@ -232,7 +260,7 @@ class LateOracle(Oracle):
         # what leaders at rest said is never old
         ages = np.full((self.n, self.n), float(self.delay))
         for (s, t), age in self.ages.items():
-            at_rest = not self.L[s][s] and self.single
+            at_rest = not self.L[s][s] and self.single and self.fled is None
             ages[t, s] = float(self.delay) if at_rest or t in self.at_once else float(age)
         if ages.min() < T / 400:
             return  # what is held for so short a time takes too many steps
@@ -248,6 +276,7 @@ class LateOracle(Oracle):
                     self.said["own"] == "late",
                     runs_to or T,
                     self.at_once,
+                    None if self.fled is None else (float(self.fled[0]), float(self.fled[1])),
                 ),
                 target,
             )
@@ -281,7 +310,11 @@ class LateOracle(Oracle):
                 later = sum((self.power(q, s, v) * ball(w * u[s]) for s, w in self.among[v]), ball(Fraction(0)))
                 self.require(not ball(D * x - b * x) < later, f"{at}: row {v}")
                 self.require(initial * x >= self.far(v), f"{at}: initial of {v}")
-                self.require(floor * (D * x - heard) >= self.error * D, f"{at}: floor of {v}")
+                self.require(floor * (D * x - heard) >= self.wrong * D, f"{at}: floor of {v}")
+                if self.fled is not None:
+                    slowest = min(x for x in (self.gain[1], self.cap) if x is not None)
+                    enough = number(entry["after"]) * (D * x - heard) >= sum(self.fled) / slowest
+                    self.require(enough, f"{at}: after of {v}")
             self.require(initial >= 0 and floor >= 0, f"{at}: negative")
             if self.delay:
                 self.require(cap is not None and cap > 0, f"{at}: cap")
@@ -300,16 +333,46 @@ class LateOracle(Oracle):
                 if limit is not None:
                     z[-1] = float(left) if runs.times[-1] == T else z[-1]
                 bound = float(initial) * z + float(floor)
+                if self.fled is not None:
+                    bound = bound + self.drifted(b, slow, runs.times) * float(sum(self.fled) / min(u.values()))
+                    whole = float(number(entry["drift"]) + floor + initial * left)
+                    self.require(bound[-1] <= whole * (1 + SLACK), f"{at}: drift")
                 for v, x in u.items():
                     seen = runs.away(target)[v]
                     self.require(not np.any(seen > float(x) * bound * (1 + SLACK) + FLOOR), f"{at}: motion of {v}")
+
+    def drifted(self, b: Fraction, gain: Gain, times: np.ndarray) -> np.ndarray:
+        """``int_0^t e^(-b (s(t) - s(r))) dr`` at instants, by quadrature on the pieces between them."""
+        nodes, weights = np.polynomial.legendre.leggauss(12)
+        found, clocks = np.zeros(len(times)), [gain.clock(t) for t in times]
+        for j in range(len(times) - 1):
+            r = times[j] + (times[j + 1] - times[j]) * (1 + nodes) / 2
+            if math.isinf(clocks[j + 1]):
+                continue
+            parts = np.exp(-float(b) * np.array([clocks[j + 1] - gain.clock(x) for x in r]))
+            found[j + 1] = found[j] * math.exp(-float(b) * (clocks[j + 1] - clocks[j]))
+            found[j + 1] += (times[j + 1] - times[j]) / 2 * float(weights @ parts)
+        return found
+
+    def kept_after(self) -> None:
+        """Motions beyond ``T`` of leaders that go on, beside every entry of ``rows``."""
+        T = float(self.gain[0])
+        for runs, target in self.loop(1.4 * T):
+            seen = runs.away(target)[:, runs.times >= T].max(axis=1)
+            for i, entry in enumerate(self.said["rows"]):
+                u = self.by_follower(self.witness(f"messages.rows[{i}]")["witness"]["u"])
+                factor = number(entry["initial"]) * number(entry["left"])
+                factor += number(entry["floor"]) + number(entry["after"])
+                for v, x in u.items():
+                    most = float(x * factor) * (1 + SLACK) + FLOOR
+                    self.require(seen[v] <= most, f"messages.rows[{i}]: after, a motion of {v}")
 
     def above_residual(self) -> None:
         bound = np.array(list(map(float, self.vector(self.said["residual"]))))
         self.require(not any(bound[v] for v in range(self.n) if v not in self.follow), "a residual of a leader")
         for runs, target in self.loop():
             self.require(not np.any(runs.away(target)[:, -1] > bound * (1 + SLACK) + FLOOR), "residual")
-        if self.delay and self.error == 0 and self.cap is None and self.camps(self.follow) is not None:
+        if self.delay and self.wrong == 0 and self.cap is None and not self.fled and self.camps(self.follow) is not None:
             self.require(not np.any(self.attained() > bound * (1 + 1e-6) + FLOOR), "residual that is attained")
 
     def attained(self) -> np.ndarray:

@@ -6,7 +6,10 @@ Agents obey :mod:`ptcc_certify.protocols.late_messages`, leaders listen to nobod
     |x_k(t) - x_k*| <= u_k (initial e^(-b s_c(t)) + floor)
 
 for every gain that acts and all delays up to ``age``; ``initial`` is the largest ``|x_k(0) - x_k*| / u_k``, and
-``floor`` what errors of values add.
+``floor`` what errors of values add. Where leaders move, the target ``x_k*(t)`` does, too, and what is heard of it is
+off by ``speed age`` more; and there is added, inside the bracket,
+
+    (speed + disturbance) / min u  int_0^t e^(-b (s_c(t) - s_c(r))) dr.
 """
 
 from __future__ import annotations
@@ -28,7 +31,9 @@ from ptcc_certify.bounds.missed_deadline import Missed, find_missed
 from ptcc_certify.bounds.settling_leaders import Settling
 from ptcc_certify.bounds.small_delays import SmallDelays
 from ptcc_certify.bounds.staged_deadlines import stage_deadlines
+from ptcc_certify.bounds.tracking import drift_integral
 from ptcc_certify.checker.input_formulas import BITS, Limits, decay_above
+from ptcc_certify.checker.late_drift import drift_above
 from ptcc_certify.checker.late_input import gain_above
 from ptcc_certify.checker.late_messages import PARTS
 from ptcc_certify.graphs.structure import Structure
@@ -36,11 +41,14 @@ from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness
 from ptcc_certify.protocols.base import Protocol
 from ptcc_certify.protocols.gain_limits import GainLimits, LimitedGain
 from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.protocols.moving_leaders import MovingLeaders
 
 #: Up to so many followers many ``q`` are tried; beyond, the best of those that one vector proves.
 SEARCHED_FOLLOWERS = 3000
 #: Values of ``q`` that are tried, and the largest one; losses of ``b`` for a more even vector.
 _TRIED, _LARGEST_Q, _LOSSES = 10, 1e9, (0.01, 0.2, 0.6)
+#: Iterations for what no gain takes away.
+_ITERATIONS = 200
 #: What is added to a bound in floats, relatively, so that it holds.
 _MORE = 1 + 1e-9
 
@@ -59,6 +67,8 @@ class RowBound:
         ``s_c(T)`` from below; None where it is infinite.
     left, initial, floor : Fraction
         From above.
+    drift, after : Fraction or None
+        What leaders that move, and disturbances, add to ``floor`` at ``T``, and at all times; None where leaders rest.
     """
 
     witness: RowWitness
@@ -67,10 +77,13 @@ class RowBound:
     left: Fraction
     initial: Fraction
     floor: Fraction
+    drift: Fraction | None = None
+    after: Fraction | None = None
 
-    def residual(self) -> np.ndarray:
-        """Return what bounds ``|x_k(T) - x_k*|`` for every follower, in floats from above."""
-        return self.witness.u * float(self.initial * self.left + self.floor) * _MORE + 1e-300
+    def residual(self, after: bool = False) -> np.ndarray:
+        """Return what bounds ``|x_k - x_k*|`` at ``T``, or from there on, for every follower, in floats from above."""
+        drift = (self.after if after else self.drift) or 0
+        return self.witness.u * float(self.initial * self.left + self.floor + drift) * _MORE + 1e-300
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -105,6 +118,8 @@ class LateBounds:
     enough : Fraction or None
         The age up to which no more is left than was asked, near to the longest one that is proved; all times of
         ``messages`` in proportion.
+    leaders : MovingLeaders or None
+        How leaders move, and what disturbs the followers; None if they rest, and nothing does.
     """
 
     messages: LateMessages
@@ -122,6 +137,7 @@ class LateBounds:
     input: np.ndarray | None = None
     enough: Fraction | None = None
     settling: Settling | None = None
+    leaders: MovingLeaders | None = None
 
     @property
     def says_something(self) -> bool:
@@ -140,6 +156,32 @@ class LateBounds:
         return f"LateBounds({self.messages!r}: {within} at T)"
 
     @property
+    def after(self) -> float | None:
+        """What bounds ``|x_k - x_k*|`` from ``T`` on where leaders move; None where they rest."""
+        found = [float(row.residual(after=True).max()) for row in self.rows]
+        return min(found) if found and self.leaders is not None else None
+
+    @property
+    def never_below(self) -> float | None:
+        """What stays at least of the largest bound however large the gain, where leaders move while messages come.
+
+        From instant to instant that is ``y = D^-1 |W_F| y + speed age`` from below. By rows it is more by the drift, for
+        ``s_c`` grows no faster than its cap.
+        """
+        if self.leaders is None or not self.messages.age:
+            return None
+        if self.steps is None:
+            each = (row.witness.u.max() * float(row.floor) for row in self.rows)
+            more = (self.leaders.total / (row.witness.b * row.cap) for row in self.rows if row.cap is not None)
+            found = (x + float(drift) for x, drift in zip(each, more, strict=True))
+            return min(found, default=0.0) / _MORE
+        rows, error = late_rows(self.structure, self.messages), float(self.leaders.speed * self.messages.age)
+        y = np.zeros(rows.D.size)
+        for _ in range(_ITERATIONS):
+            y = (rows.W @ y) / rows.D + error
+        return float(y.max()) / _MORE
+
+    @property
     def direct(self) -> bool:
         """Whether all followers hear of leaders alone, so that they settle at ``T`` exactly."""
         return self.staged is not None and len(set(self.staged)) == 1
@@ -152,6 +194,9 @@ class LateBounds:
             cap = [x for x in (row.cap, self.gain.limits.gain_cap) if x is not None]
             clock = GainLimits(gain_cap=min(cap, default=None)).limit(self.gain.gain).clock(t)
             b, M, c = map(float, (row.witness.b, row.initial, row.floor))
+            if self.leaders is not None:
+                push = float(self.leaders.total) / float(row.witness.u.min())
+                c = c + push * drift_integral(self.gain.gain, b, min(cap, default=None), t)
             whole = np.minimum(whole, row.witness.u[:, None] * (M * np.exp(-b * clock) + c) * _MORE)
         if self.steps is not None:
             at = np.searchsorted([float(x) for x in self.steps.instants], t * (1 - 1e-15), side="right") - 1
@@ -173,6 +218,7 @@ def bound_late(
     messages: LateMessages,
     initial_state: Sequence[Fraction] | None = None,
     ends: Sequence[tuple[Fraction, Fraction]] | None = None,
+    leaders: MovingLeaders | None = None,
 ) -> LateBounds:
     """Bound what late messages leave at the deadline.
 
@@ -186,6 +232,8 @@ def bound_late(
     initial_state : sequence of N Fraction, optional
     ends : sequence of N (middle, radius), optional
         Of ``Q X(0)``; without it bounds are for every initial state within 1 of its final one.
+    leaders : MovingLeaders, optional
+        Without a sign term: leaders move, and followers are disturbed; ``x*`` moves with the leaders.
 
     Returns
     -------
@@ -207,24 +255,23 @@ def bound_late(
     latencies = messages.latencies(structure.graph)
     gain = GainLimits(gain_cap=messages.gain_cap).limit(protocol.gain)
     if messages.own_delay or any(len(c.nodes) > 1 for c in structure.closed_components):
-        return LateBounds(messages, structure, gain, initial_state is None or ends is None)
+        return LateBounds(messages, structure, gain, initial_state is None or ends is None, leaders=leaders)
     rows = late_rows(structure, messages)
     first = np.ones(rows.D.size)
     if initial_state is not None and ends is not None:
         first = _away(rows, initial_state, ends)
-    bounds = LateBounds(messages, structure, gain, initial_state is None or ends is None)
-    found = search_rows(rows, gain, messages, first)
+    bounds = LateBounds(messages, structure, gain, initial_state is None or ends is None, leaders=leaders)
+    found = search_rows(rows, gain, messages, first, leaders)
     steps = None
     if messages.age:
         with suppress(LMIError):
-            steps = search_steps(rows, gain, messages.age, float(messages.value_error) * _MORE, first)
+            error, push = float(heard_wrong(messages, leaders)) * _MORE, float(leaders.total if leaders else 0)
+            steps = search_steps(rows, gain, messages.age, error, first, push * _MORE)
     each = [row.residual() for row in found]
     each += [] if steps is None else [steps.bounds[-1] * _MORE + 1e-300]
-    inputs = _least(
-        structure, [] if messages.gain_cap is None else [_inputs(rows, gain, messages, row) for row in found]
-    )
+    inputs = _least(structure, [] if messages.gain_cap is None else [_inputs(rows, bounds, row) for row in found])
     bounds = replace(bounds, rows=found, steps=steps, residual=_least(structure, each), input=inputs)
-    if messages.value_error or messages.gain_cap is not None:
+    if messages.value_error or messages.gain_cap is not None or leaders is not None:
         return bounds
     if initial_state is not None and ends is not None:
         bounds = replace(bounds, missed=find_missed(rows, protocol, latencies, initial_state, ends))
@@ -233,12 +280,20 @@ def bound_late(
     return replace(bounds, staged=staged, unarrived=unarrived)
 
 
-def _inputs(rows: FollowerRows, gain: LimitedGain, messages: LateMessages, row: RowBound) -> np.ndarray:
-    """Bound ``gain (D_k |eps_k| + sum_l |w_kl| |eps_l(t - tau_kl)| + value_error D_k)`` of every follower."""
-    cap, u, b = messages.gain_cap, row.witness.u, float_up(row.witness.b)
+def heard_wrong(messages: LateMessages, leaders: MovingLeaders | None) -> Fraction:
+    """Return what a target that is heard late is off by: the error of values, and how far it moved on."""
+    return messages.value_error + (0 if leaders is None else leaders.speed * messages.age)
+
+
+def _inputs(rows: FollowerRows, bounds: LateBounds, row: RowBound) -> np.ndarray:
+    """Bound ``gain (D_k |eps_k| + sum_l |w_kl| |eps_l(t - tau_kl)| + error D_k)`` of every follower."""
+    cap, u, b, gain = bounds.messages.gain_cap, row.witness.u, float_up(row.witness.b), bounds.gain.gain.exact
     assert cap is not None
-    y = float_up(row.initial * gain_above(gain.gain.exact, cap, row.witness.b, row.cap))
-    wrong = float_up(cap * row.floor) * (rows.D * u + rows.W @ u) + float_up(cap * messages.value_error) * rows.D
+    y, floor = float_up(row.initial * gain_above(gain, cap, row.witness.b, row.cap)), row.floor
+    if row.after is not None:
+        floor += row.after * min(gain.rho1, cap) / min(gain.value(Fraction(1)), cap)
+    error = heard_wrong(bounds.messages, bounds.leaders)
+    wrong = float_up(cap * floor) * (rows.D * u + rows.W @ u) + float_up(cap * error) * rows.D
     return ((2 * rows.D - b * (1 - 1e-15)) * u * y + wrong) * _MORE + 1e-300
 
 
@@ -283,15 +338,22 @@ def _least(structure: Structure, bounds: Sequence[np.ndarray]) -> np.ndarray | N
 
 
 def search_rows(
-    rows: FollowerRows, gain: LimitedGain, messages: LateMessages, first: np.ndarray
+    rows: FollowerRows,
+    gain: LimitedGain,
+    messages: LateMessages,
+    first: np.ndarray,
+    leaders: MovingLeaders | None = None,
 ) -> tuple[RowBound, ...]:
-    """Return the row bound that leaves least at ``T`` of those found, and under a cap that of the least input."""
+    """Return the row bound that leaves least at ``T`` of those found, under a cap that of the least input, too.
+
+    Where leaders move that which leaves least after ``T``, too.
+    """
     candidates: list[RowBound] = []
 
     def offer(q: float, loss: float) -> None:
         with suppress(LMIError):
             witness = rows.witness(Fraction(round_to_bits(q, 24)), loss)
-            candidates.append(row_bound(rows, gain, messages, first, witness))
+            candidates.append(row_bound(rows, gain, messages, first, witness, leaders))
 
     small = rows.D.size <= SEARCHED_FOLLOWERS
     if not messages.age:
@@ -313,11 +375,13 @@ def search_rows(
                 offer(best_q, loss)
     if not candidates:
         return ()
-    least, cap = min(candidates, key=_largest), messages.gain_cap
-    if cap is None:
-        return (least,)
-    lowest = min(candidates, key=lambda row: float(_inputs(rows, gain, messages, row).max()))
-    return (least,) if lowest is least else (least, lowest)
+    chosen = [min(candidates, key=_largest)]
+    if messages.gain_cap is not None:
+        whole = LateBounds(messages, rows.structure, gain, False, leaders=leaders)
+        chosen.append(min(candidates, key=lambda row: float(_inputs(rows, whole, row).max())))
+    if leaders is not None:
+        chosen.append(min(candidates, key=lambda row: float(row.residual(after=True).max())))
+    return tuple(dict.fromkeys(chosen))
 
 
 def _largest(bound: RowBound) -> float:
@@ -341,7 +405,12 @@ def _best_q(rows: FollowerRows, gain: LimitedGain, messages: LateMessages, most:
 
 
 def row_bound(
-    rows: FollowerRows, gain: LimitedGain, messages: LateMessages, first: np.ndarray, witness: RowWitness
+    rows: FollowerRows,
+    gain: LimitedGain,
+    messages: LateMessages,
+    first: np.ndarray,
+    witness: RowWitness,
+    leaders: MovingLeaders | None = None,
 ) -> RowBound:
     """Return what a witness proves under a delay.
 
@@ -361,9 +430,15 @@ def row_bound(
     if caps:
         clock = Limits(min(caps)).clock_below(gain.gain.exact)
         left = rounded(decay_above(witness.b * clock), BITS, up=True)
-    floor = 0.0
-    if messages.value_error:
-        slack = rows.D * witness.u - rows.W @ witness.u
-        floor = float((rows.D / slack).max()) * float(messages.value_error)
+    floor, error, slack = 0.0, heard_wrong(messages, leaders), rows.D * witness.u - rows.W @ witness.u
+    if error:
+        floor = float((rows.D / slack).max()) * float(error)
     initial = float((first / witness.u).max())
-    return RowBound(witness, cap, clock, left, Fraction(initial * _MORE), Fraction(floor * _MORE))
+    row = RowBound(witness, cap, clock, left, Fraction(initial * _MORE), Fraction(floor * _MORE))
+    if leaders is None:
+        return row
+    push, limit = leaders.total / Fraction(float(witness.u.min())), min(caps, default=None)
+    drift = push * drift_above(gain.gain.exact, witness.b, limit)
+    slowest = gain.gain.rho1 if messages.gain_cap is None else min(gain.gain.rho1, messages.gain_cap)
+    after = Fraction(float((1 / slack).max()) * _MORE) * leaders.total / slowest
+    return replace(row, drift=rounded(drift, BITS, up=True), after=rounded(after, BITS, up=True))

@@ -11,6 +11,8 @@ the age of the edge, hence
     y_i = h + (y_(i-1) - h)_+ e^(-D (s(t_i) - s(t_(i-1)))),    h = D^-1 |W_F| y_j + nu.
 
 Where delays are constant and weights positive the solution is attained: what is lost is the distance of instants.
+Where leaders move, and followers are disturbed, ``nu`` has ``push/(D gain)`` besides: the gain never falls, so that
+``push <= gain D (push/(D gain(t_(i-1))))`` in a step.
 """
 
 from __future__ import annotations
@@ -80,7 +82,7 @@ def instants_of(T: Fraction, delay: Fraction, most: int) -> tuple[Fraction, ...]
 
 
 def search_steps(
-    rows: FollowerRows, gain: LimitedGain, delay: Fraction, error: float, first: np.ndarray
+    rows: FollowerRows, gain: LimitedGain, delay: Fraction, error: float, first: np.ndarray, push: float = 0.0
 ) -> Steps | None:
     """Choose instants and start, and bound followers from instant to instant; None where the graph is too large.
 
@@ -95,6 +97,8 @@ def search_steps(
         Of a value that is heard, from above.
     first : (F,) array
         ``|eps(0)|`` from above.
+    push : float
+        How fast a follower and its target may part, from above.
 
     Raises
     ------
@@ -104,10 +108,11 @@ def search_steps(
     most = min(MOST_INSTANTS, MOST_PRODUCTS // (rows.W.nnz + 4 * rows.D.size))
     if most < _FEWEST:
         return None
-    start = _start(rows, error, first)
+    start = _start(rows, error + _lag(rows, gain, push, 0.0), first)
     if not 0 < float(start.max()) < np.inf:
         return None
-    return bound_steps(rows, gain, delay, error, instants_of(gain.gain.T, delay * rows.least_share, most), start)
+    instants = instants_of(gain.gain.T, delay * rows.least_share, most)
+    return bound_steps(rows, gain, delay, error, instants, start, push)
 
 
 def bound_steps(
@@ -117,17 +122,25 @@ def bound_steps(
     error: float,
     instants: tuple[Fraction, ...],
     start: np.ndarray,
+    push: float = 0.0,
 ) -> Steps:
     """Bound followers from instant to instant, in floats that leave room for the integers of the check."""
     parts = [(W, _hearing(instants, delay * Fraction(share))) for share, W in rows.by_age().items()]
     clock, size = _clock(gain, instants), float(start.max())
-    room, bounds = _UNIT * size * (np.diff(rows.W.indptr) + 4.0), [start + _UNIT * size]
+    room, bounds = _UNIT * size * (np.diff(rows.W.indptr) + 6.0), [start + _UNIT * size]
     for i in range(1, len(instants)):
         before, heard = bounds[-1], sum(W @ bounds[at[i - 1]] for W, at in parts) / rows.D + error + room
+        if push and np.isfinite(clock[i]):
+            heard = heard + _lag(rows, gain, push, float(instants[i - 1]))
         step = clock[i] - clock[i - 1] if np.isfinite(clock[i]) else np.inf
         left = _decay_above(rows.D * max(step, 0.0) * (1 - 1e-9))
         bounds.append(np.minimum(before, heard + np.maximum(before - heard, 0) * left + 4 * _UNIT * size))
     return Steps(instants, start, np.array(bounds))
+
+
+def _lag(rows: FollowerRows, gain: LimitedGain, push: float, t: float) -> np.ndarray:
+    """Return ``push/(D gain(t))`` by follower, a little above."""
+    return np.asarray(push / (rows.D * float(gain.value([t])[0])) * (1 + _MORE))
 
 
 def _hearing(instants: Sequence[Fraction], delay: Fraction) -> list[int]:
@@ -146,7 +159,7 @@ def _decay_above(x: np.ndarray) -> np.ndarray:
         return 1 / (1 + x * (1 + x / 2 * (1 + x / 3 * (1 + x / 4))))
 
 
-def _start(rows: FollowerRows, error: float, first: np.ndarray) -> np.ndarray:
+def _start(rows: FollowerRows, error: np.ndarray, first: np.ndarray) -> np.ndarray:
     """Return a small ``y_0 >= first`` with ``D y_0 >= |W_F| y_0 + error D``, by iteration from below."""
     y = first * (1 + _MORE)
     for _ in range(_ITERATIONS):

@@ -16,6 +16,7 @@ from ptcc_certify.bounds.small_delays import DecayingForm, SmallDelayBounds
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.protocols.base import Protocol
 from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.protocols.moving_leaders import MovingLeaders
 
 #: Halvings of the interval, in powers of two, and digits of the delay that is returned.
 _HALVINGS, _DIGITS = 9, 3
@@ -38,6 +39,8 @@ class LateCase:
         Exact; it belongs to ``forms``.
     forms : sequence of DecayingForm
         Lyapunov functions of the whole graph: they forgive small delays under a cap, or tell how leaders settle.
+    leaders : MovingLeaders, optional
+        Leaders move; nothing is then asked of these functions.
 
     Examples
     --------
@@ -54,15 +57,24 @@ class LateCase:
     ends: Sequence[tuple[Fraction, Fraction]] | None = None
     influence: Influence | None = None
     forms: Sequence[DecayingForm] = ()
+    leaders: MovingLeaders | None = None
 
     def bound(self, messages: LateMessages) -> LateBounds:
         """Return what is proved with such messages, by rows and by Lyapunov functions."""
-        return self.with_forms(bound_late(self.structure, self.protocol, messages, self.initial_state, self.ends))
+        late = bound_late(self.structure, self.protocol, messages, self.initial_state, self.ends, self.leaders)
+        return self.with_forms(late)
 
     def small_delays(self, messages: LateMessages) -> SmallDelayBounds | None:
         """Return what bounds small delays of the whole graph; None where nothing does."""
         state, exact = self.initial_state, self.influence
-        if messages.gain_cap is None or messages.value_error or state is None or exact is None or not self.forms:
+        if (
+            self.leaders is not None
+            or messages.gain_cap is None
+            or messages.value_error
+            or state is None
+            or exact is None
+            or not self.forms
+        ):
             return None
         return SmallDelayBounds(self.structure, self.protocol.gain, messages, exact, state)
 

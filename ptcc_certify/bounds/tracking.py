@@ -22,6 +22,7 @@ from lmi.exact.decimal_rounding import float_up, up
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness, refuse_leader_groups
 from ptcc_certify.protocols.base import Protocol
+from ptcc_certify.protocols.gain import Gain
 from ptcc_certify.protocols.moving_leaders import MovingLeaders
 
 #: Losses of ``a`` that are tried for a more even ``u``; the share of the time that is left where they are compared.
@@ -85,12 +86,52 @@ class Tracking:
 
     def distance_bound(self, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
         """Return what bounds ``|x_k - x_k*|`` of followers where ``1 - t/T`` is ``remaining``, ``(F, M)`` floats."""
-        q, T, p = np.asarray(remaining, dtype=float), float(self.protocol.T), self.pole
+        q, T = np.asarray(remaining, dtype=float), float(self.protocol.T)
         with np.errstate(divide="ignore", invalid="ignore"):
-            share = np.where(q > 0, (1 - q ** (p - 1)) / (p - 1) if p != 1 else -np.log(q), 0.0)
             clock = self.protocol.gain.clock_at_remaining(q)
-        m = np.exp(-float(self.witness.b) * clock) * float(self.initial) + self.drift * T * q * np.maximum(share, 0)
+        m = np.exp(-float(self.witness.b) * clock) * float(self.initial) + self.drift * T * _decayed(q, self.pole)
         return self.witness.u[:, None] * np.where(q > 0, m, 0.0) * _MORE
+
+
+def _decayed(remaining: np.ndarray, p: float) -> np.ndarray:
+    """Return ``int ((T - t)/(T - r))^p dr/T`` from 0 to ``t``, where ``1 - t/T`` is ``remaining``; 0 at ``T``."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(remaining > 0, (1 - remaining ** (p - 1)) / (p - 1) if p != 1 else -np.log(remaining), 0.0)
+    return np.asarray(remaining * np.maximum(share, 0))
+
+
+def drift_integral(gain: Gain, b: float, cap: Fraction | None, t: np.ndarray) -> np.ndarray:
+    """Bound ``int_0^t e^(-b (s_c(t) - s_c(r))) dr`` at instants up to ``T``, in floats.
+
+    Parameters
+    ----------
+    gain : Gain
+    b : float
+    cap : Fraction or None
+        ``s_c`` is the integral of ``min(gain, cap)``; None: of the gain.
+    t : (M,) array
+        In units of time, up to ``T``.
+
+    Returns
+    -------
+    (M,) array
+        In units of time.
+
+    Examples
+    --------
+    >>> gain = Gain(T=1, rho1=1, rho2=2, kappa=1)
+    >>> drift_integral(gain, 1.0, Fraction(2), np.array([0, 1])).round(4)  # (1 - e^-2)/2
+    array([0.    , 0.4323])
+    """
+    T, p, turn = float(gain.T), b * float(gain.pole), 0.0
+    if cap is not None:
+        turn = 1.0 if cap <= gain.first else float(gain.pole / (cap - gain.rho1) / gain.T)
+    q = np.maximum(1 - t / T, 0)
+    before = T * _decayed(np.maximum(q, turn), p)
+    if cap is None:
+        return before
+    left = np.exp(-b * float(cap) * T * np.maximum(turn - q, 0))
+    return np.asarray(before * left + (1 - left) / (b * float(cap)))
 
 
 def bound_tracking(

@@ -400,6 +400,11 @@ class Content:
             return None
         return float(np.abs(np.array([float(x) for x in self.initial_state]) - np.asarray(self.final_state)).max())
 
+    @property
+    def leaders_move(self) -> bool:
+        """Whether leaders move where it is told what is proved beside the claim."""
+        return self.tracking is not None or (self.late is not None and self.late.leaders is not None)
+
     @cached_property
     def envelope(self) -> Envelope:
         """The proved bounds over time; without Lyapunov functions if nothing was proved."""

@@ -125,7 +125,7 @@ def read_document(
         "final_state": read_final_state(document, structure, data),
         "matrix": None,
         "late": read_late(document, structure, protocol, data, steps)
-        or nothing_proved(request.messages, structure, protocol, initial_state is None),
+        or nothing_proved(request, structure, protocol, initial_state is None),
         "tracking": read_tracking(document, structure, protocol, data, steps),
         "request": request,
         "observed": _read_observations(document["unverified"]),

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 
 from lmi.exact.decimal_rounding import float_up
-from ptcc_certify.bounds.late_messages import LateBounds, RowBound, late_rows
+from ptcc_certify.bounds.late_messages import LateBounds, RowBound, heard_wrong, late_rows
 from ptcc_certify.bounds.late_steps import bound_steps
 from ptcc_certify.bounds.missed_deadline import Missed
 from ptcc_certify.bounds.settling_leaders import Settling
 from ptcc_certify.bounds.small_delays import SmallDelays
 from ptcc_certify.certificate.format_vectors import Reader, Writer, number, text
+from ptcc_certify.checker.messages import MOVING, ROW
 from ptcc_certify.checker.reading import exact
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.rationals import format_exact
@@ -23,6 +24,7 @@ from ptcc_certify.lyapunov.follower_rows import RowWitness
 from ptcc_certify.protocols.base import Protocol
 from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.protocols.moving_leaders import MovingLeaders
 from ptcc_certify.theorems.theorem import Obligation
 
 
@@ -79,16 +81,20 @@ def asked_messages(messages: LateMessages, graph: SignedDigraph, out: Writer) ->
     }
 
 
+def _asked_leaders(leaders: MovingLeaders | None) -> dict[str, str] | None:
+    """Return how leaders move while messages are late, as files have it."""
+    return leaders and {"speed": format_exact(leaders.speed), "disturbance": format_exact(leaders.disturbance)}
+
+
 def messages_section(late: LateBounds, out: Writer) -> dict[str, Any]:
     """Return what is proved with late messages, as files have it."""
     graph, missed, staged = late.structure.graph, late.missed, late.staged
     followers = [graph.labels[v] for v in late.structure.followers]
+    names = ROW if late.leaders is None else (*ROW, *MOVING)
     return {
         **asked_messages(late.messages, graph, out),
-        "rows": [
-            {name: text(getattr(row, name)) for name in ("cap", "clock", "left", "initial", "floor")}
-            for row in late.rows
-        ],
+        "leaders": _asked_leaders(late.leaders),
+        "rows": [{name: text(getattr(row, name)) for name in names} for row in late.rows],
         "steps": None if late.steps is None else {"instants": [format_exact(t) for t in late.steps.instants]},
         "residual": None if late.residual is None else agents_section(graph.labels, "late", late.residual, out),
         "missed": missed and {"agent": graph.labels[missed.agent], "bound": format_exact(missed.bound)},
@@ -148,13 +154,15 @@ def read_late(
     section = document.get("messages")
     if section is None:
         return None
-    messages, F = read_messages(section, structure, data), structure.followers.size
+    messages, F, moving = read_messages(section, structure, data), structure.followers.size, section["leaders"]
+    leaders = moving and MovingLeaders(exact(moving["speed"]), exact(moving["disturbance"]))
     rows = []
     for i, row in enumerate(section["rows"]):
         step = steps["late-rows", f"messages.rows[{i}]"]
         witness = RowWitness(step.numbers["q"], step.numbers["b"], data.floats(step.witness["u"], F))
         cap, clock = number(row["cap"]), number(row["clock"])
-        rows.append(RowBound(witness, cap, clock, *(exact(row[name]) for name in ("left", "initial", "floor"))))
+        rest = (exact(row[name]) for name in (*ROW[2:], *MOVING) if name in row)
+        rows.append(RowBound(witness, cap, clock, *rest))
     gain, missed = GainLimits(gain_cap=messages.gain_cap).limit(protocol.gain), section["missed"]
     if missed is not None:
         signs = steps["late-missed", "messages.missed"].witness["gauge"]
@@ -165,8 +173,8 @@ def read_late(
     if section["steps"] is not None:
         start = data.floats(steps["late-steps", "messages.steps"].witness["start"], F)
         times = tuple(map(exact, section["steps"]["instants"]))
-        error = float_up(messages.value_error)
-        instants = bound_steps(late_rows(structure, messages), gain, messages.age, error, times, start)
+        error, push = float_up(heard_wrong(messages, leaders)), float_up(leaders.total if leaders else 0)
+        instants = bound_steps(late_rows(structure, messages), gain, messages.age, error, times, start, push)
     return LateBounds(
         messages,
         structure,
@@ -180,6 +188,7 @@ def read_late(
         _read_form(section["form"], steps.get(("late-form", "messages.form")), data),
         settling=_read_settling(section["settling"], steps.get(("late-settling", "messages.settling")), data),
         input=None if section["input"] is None else np.array([float_up(x) for x in data.agents(section["input"])]),
+        leaders=leaders,
     )
 
 

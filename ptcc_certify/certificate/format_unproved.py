@@ -14,20 +14,21 @@ from ptcc_certify.certificate.certificate_data import Content
 from ptcc_certify.certificate.format_leaders import asked_leaders, read_leaders
 from ptcc_certify.certificate.format_messages import asked_messages, read_messages
 from ptcc_certify.certificate.format_vectors import Reader, Writer, readable
+from ptcc_certify.certificate.request import Request
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.protocols.base import Protocol
 from ptcc_certify.protocols.gain_limits import GainLimits
-from ptcc_certify.protocols.late_messages import LateMessages
 
 
 def write_unproved(content: Content) -> dict[str, Any]:
     """Return the late messages or moving leaders that were asked for where nothing is proved of them."""
     messages, leaders, late = content.request.messages, content.request.leaders, content.late
-    if messages is not None and not (late is not None and late.says_something):
-        return {"messages": asked_messages(messages, content.graph, Writer(content.graph.labels))}
-    if leaders is not None and content.tracking is None:
-        return {"leaders": asked_leaders(leaders)}
-    return {}
+    if (late is not None and late.says_something) or content.tracking is not None:
+        return {}
+    asked: dict[str, Any] = {}
+    if messages is not None:
+        asked["messages"] = asked_messages(messages, content.graph, Writer(content.graph.labels))
+    return asked if leaders is None else {**asked, "leaders": asked_leaders(leaders)}
 
 
 def read_unproved(document: Mapping[str, Any], structure: Structure) -> dict[str, Any]:
@@ -35,23 +36,25 @@ def read_unproved(document: Mapping[str, Any], structure: Structure) -> dict[str
     asked, data = document["unverified"].get("asked"), Reader(structure.graph.labels, {})
     if not isinstance(asked, dict) or "messages" in document or "leaders" in document:
         return {}
-    messages = readable(lambda: read_messages(asked["messages"], structure, data))
-    return {"messages": messages} if messages else {"leaders": readable(lambda: read_leaders(asked["leaders"]))}
+    return {
+        "messages": readable(lambda: read_messages(asked["messages"], structure, data)),
+        "leaders": readable(lambda: read_leaders(asked["leaders"])),
+    }
 
 
-def nothing_proved(
-    messages: LateMessages | None, structure: Structure, protocol: Protocol, relative: bool
-) -> LateBounds | None:
+def nothing_proved(request: Request, structure: Structure, protocol: Protocol, relative: bool) -> LateBounds | None:
     """Return that nothing is proved of late messages that were asked for; None if none were.
 
     Parameters
     ----------
-    messages : LateMessages or None
+    request : Request
     structure : Structure
     protocol : Protocol
     relative : bool
         Whether no initial state was given.
     """
+    messages = request.messages
     if messages is None:
         return None
-    return LateBounds(messages, structure, GainLimits(gain_cap=messages.gain_cap).limit(protocol.gain), relative)
+    gain = GainLimits(gain_cap=messages.gain_cap).limit(protocol.gain)
+    return LateBounds(messages, structure, gain, relative, leaders=request.leaders)

@@ -31,6 +31,8 @@ def at_deadline(certificate: Content, answer: Answer) -> Answer:
         return Answer(REFUTED, what, _misses(certificate, late.missed))
     if late.staged is not None:
         return Answer(OPEN, what, "with deadlines of stages it holds, with one for all none is proved to hold it")
+    if late.leaders is not None:
+        return Answer(OPEN, what, "leaders move, so that nobody is proved to settle")
     if late.messages.gain_cap is not None:
         return Answer(OPEN, what, "nothing settles under a cap")
     return Answer(OPEN, what, "nobody is proved to settle at T")
@@ -103,7 +105,7 @@ def _judge_late_input(certificate: Content, late: LateBounds, most: Fraction, wh
         why = "no bound is proved with late messages"
         why += "; a gain without a cap makes ever more of what is left at T" * (late.messages.gain_cap is None)
         return Answer(OPEN, what, why)
-    what += " from within 1 of the final states" * late.relative
+    what += f" from within 1 of the {'final states' if late.leaders is None else 'targets'}" * late.relative
     return Answer(MET, what) if largest <= most else Answer(OPEN, what, f"proved: {up(largest)}")
 
 
@@ -142,7 +144,8 @@ def use_of_late(late: LateBounds, longest_way: float | None) -> tuple[bool | Non
     if math.isinf(late.largest):
         return None, "", caveat
     way = 1.0 if late.relative else longest_way
-    remark = f"every agent within {up(late.largest, 2)} of its final state at T{' from within 1 of it' * late.relative}"
+    where = "agent within {} of its final state" if late.leaders is None else "follower within {} of its target"
+    remark = f"every {where.format(up(late.largest, 2))} at T{' from within 1 of it' * late.relative}"
     return way is not None and late.largest <= USEFUL * way, remark, caveat
 
 

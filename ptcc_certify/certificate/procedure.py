@@ -178,8 +178,8 @@ def certify(
         single leaders, leader groups that hear each other at once, or a cap; ``sigma(0) = 0`` under the sliding-mode
         protocol.
     leaders : MovingLeaders, optional
-        Nominal protocol, single leaders: how fast these move; how followers track them is bounded. Not with
-        ``messages``.
+        Nominal protocol, single leaders: how fast these move; how followers track them is bounded. With ``messages``
+        without a sign term; what is left at the deadline is then bounded.
     signal : {"any", "constant"}, DwellTime, JointWindows or ClockShares
         Of a family: restricted signals of which more is claimed, beside what holds for every signal; the three classes
         are in :mod:`ptcc_certify.theorems.restricted_signals`.
@@ -333,6 +333,7 @@ def _with_small_delays(certificate: Certificate) -> Certificate:
         None if final is None else final.intervals,
         certificate.influence,
         certificate.decaying_forms,
+        late.leaders,
     )
     late, small = case.with_forms(late), case.small_delays(late.messages)
     late = late if small is None else replace(late, longest_delay=small.longest_delay(case.forms))
@@ -539,12 +540,12 @@ class Case:
                 "late messages ask for sigma(0) = 0, so that no sliding variable moves; leave sigma0 out"
             )
         ends = None if result is None else result.intervals
-        return bound_late(self.structure, self.protocol, messages, self.initial_state, ends)
+        return bound_late(self.structure, self.protocol, messages, self.initial_state, ends, self.request.leaders)
 
     def tracking(self, result: FinalState | None) -> Tracking | None:
-        """Bound how followers track leaders that move; None if nothing is asked of that."""
+        """Bound how followers track leaders that move; None if nothing is asked of that, or messages are late."""
         leaders, ends = self.request.leaders, None if result is None else result.intervals
-        if leaders is None:
+        if leaders is None or self.request.messages is not None:
             return None
         try:
             return bound_tracking(self.structure, self.protocol, leaders, self.initial_state, ends)

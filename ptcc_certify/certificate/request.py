@@ -28,7 +28,7 @@ from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.base import refuse_no_protocol
 from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.protocols.late_messages import LateMessages
-from ptcc_certify.protocols.moving_leaders import MovingLeaders
+from ptcc_certify.protocols.moving_leaders import MovingLeaders, refuse_together
 from ptcc_certify.protocols.parameters import parameter
 from ptcc_certify.protocols.reaching_time import ReachingTime, certified_reaching_times
 
@@ -185,6 +185,7 @@ _NOT_TRACKING = {
     "noise": "is not proved while leaders move; leave it out",
     "delta": "of leaders that move MovingLeaders(disturbance=..) tells what disturbs the followers; give that instead",
 }
+_NOT_TOGETHER = _NOT_LATE | {"delta": _NOT_TRACKING["delta"]}
 
 
 def refuse_beside(structure: Structure, protocol: Protocol, request: Request) -> None:
@@ -194,9 +195,9 @@ def refuse_beside(structure: Structure, protocol: Protocol, request: Request) ->
         raise ParameterError("max_residual: is asked of late messages; tell how late they are, or leave it out")
     if messages is None and leaders is None:
         return
-    if messages is not None and leaders is not None:
-        raise ParameterError("messages and leaders together are not certified yet; ask for one of them")
-    _refuse_more(_NOT_TRACKING if messages is None else _NOT_LATE, request)
+    refuse_together(messages, leaders)
+    together = messages is not None and leaders is not None
+    _refuse_more(_NOT_TOGETHER if together else _NOT_TRACKING if messages is None else _NOT_LATE, request)
     if leaders is not None:
         if protocol.reaching:
             raise ParameterError(

@@ -36,6 +36,9 @@ class ArraySteps(Steps):
         before = np.concatenate([[np.uint64(0)], np.cumsum(products.view(np.uint64))])[np.asarray(self.offsets)]
         return -(-np.diff(before).view(np.int64) >> FIXED) + self.error
 
+    def _pushed(self, heard: Any, share: int) -> Any:
+        return heard - (-np.asarray(self.lags) * share >> FIXED)
+
     def _step(self, y: Sequence[int], heard: Any, way: tuple[int, int] | None) -> Sequence[int]:
         states = np.asarray(y)
         if way is None:

@@ -77,12 +77,13 @@ class Followers:
         low = next((k for k, (u, x) in enumerate(zip(values, away, strict=True)) if p * u < q * x), None)
         need(low is None, f"agent {self.label(low or 0)} starts farther from its final state")
 
-    def never_grows(self, values: Sequence[int], value_error: Fraction) -> None:
-        """Verify ``D_k y_k >= sum_l |w_kl| y_l + value_error D_k``; all over one scale."""
-        p, q = value_error.as_integer_ratio()
-        spend(3 * len(values), self.structure.graph.bits + longest((p, q)), longest(values), "rows of followers")
+    def never_grows(self, values: Sequence[int], value_error: Fraction, push: Fraction = Fraction(0)) -> None:
+        """Verify ``D_k y_k >= sum_l |w_kl| y_l + value_error D_k + push``; all over one scale."""
+        graph, q = self.structure.graph, math.lcm(value_error.denominator, push.denominator)
+        p, more = int(value_error * q), int(push * q) * graph.unit
+        spend(3 * len(values), graph.bits + longest((p, q, more)), longest(values), "rows of followers")
         rows = zip(values, self.degrees, self.heard(values), strict=True)
-        low = next((k for k, (y, D, h) in enumerate(rows) if q * (D * y - h) < p * D), None)
+        low = next((k for k, (y, D, h) in enumerate(rows) if q * (D * y - h) < p * D + more), None)
         need(low is None, f"the start of agent {self.label(low or 0)} may grow")
 
 
@@ -148,6 +149,15 @@ class Rows:
         rows = zip(self.u, self.followers.degrees, self.heard, strict=True)
         low = next((k for k, (u, D, h) in enumerate(rows) if p * (D * u - h) < q * D), None)
         need(low is None, f"what is heard wrong drives agent {self.followers.label(low or 0)} farther")
+
+    def above_push(self, floor: Fraction, push: Fraction) -> None:
+        """Verify ``floor (D_k u_k - sum_l |w_kl| u_l) >= push``."""
+        need(floor >= 0, "what pushes followers is negative")
+        self._spent(floor, push)
+        p, q = floor.numerator * push.denominator, floor.denominator * push.numerator * self.scale * self.graph.unit
+        rows = zip(self.u, self.followers.degrees, self.heard, strict=True)
+        low = next((k for k, (u, D, h) in enumerate(rows) if p * (D * u - h) < q), None)
+        need(low is None, f"agent {self.followers.label(low or 0)} is pushed farther")
 
     def inputs(self) -> list[int]:
         """Return ``D_k u_k + sum_l |w_kl| u_l`` by follower, times the scale of ``u`` and the unit of the graph."""

@@ -71,7 +71,7 @@ class Inputs:
 
     def by_rows(self, rows: Rows, b: Fraction, cap: Fraction | None, initial: Fraction, floor: Fraction) -> None:
         """Mark what is at least ``(2 D_k - b) u_k initial y + gain_cap (floor (D_k u_k + heard_k) + error D_k)``."""
-        graph, error = self.graph, self.messages.value_error
+        graph, error = self.graph, self.messages.wrong
         y = initial * gain_above(self.messages.gain, self.gain_cap, b, cap)
         each = self.gain_cap * floor
         factors = [2 * y + each, y * b * graph.unit, each, self.gain_cap * error * rows.scale]

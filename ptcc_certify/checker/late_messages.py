@@ -20,6 +20,25 @@ from ptcc_certify.checker.side_files import Numbers, beside
 PARTS = 64
 
 
+@dataclass(frozen=True)
+class Moving:
+    """Leaders that move.
+
+    Attributes
+    ----------
+    speed, disturbance : Fraction
+        Of every leader, and of every follower, at most.
+    """
+
+    speed: Fraction
+    disturbance: Fraction
+
+    @property
+    def push(self) -> Fraction:
+        """How fast a follower and its target may part."""
+        return self.speed + self.disturbance
+
+
 @dataclass(frozen=True, eq=False)
 class Messages:
     """What is heard, and when.
@@ -38,6 +57,8 @@ class Messages:
         No value is off by more.
     gain_cap : Fraction or None
         What the gain is capped at.
+    leaders : Moving or None
+        How fast leaders move, and what disturbs the followers; None if they rest, and nothing does.
     """
 
     gain: PrescribedGain
@@ -46,6 +67,17 @@ class Messages:
     late: bool
     value_error: Fraction
     gain_cap: Fraction | None
+    leaders: Moving | None = None
+
+    def least_gain(self, always: bool = False) -> Fraction:
+        """Return the least gain up to ``T``, or of all times: ``rho1``, or the first one, or its cap."""
+        least = self.gain.rho1 if always else self.gain.value(Fraction(1))
+        return least if self.gain_cap is None else min(least, self.gain_cap)
+
+    @property
+    def wrong(self) -> Fraction:
+        """What is heard differs from what is so by no more, deviations left out: targets move on while it is late."""
+        return self.value_error + (self.leaders.speed * self.delay if self.leaders else 0)
 
     def latency_of(self, edge: int) -> Fraction:
         """Return the latency of an edge, by its place among all."""
@@ -94,7 +126,17 @@ def read_messages(doc: Document, graph: Digraph, gain: PrescribedGain, section: 
     late, cap = section["own"] == "late", None if section["gain_cap"] is None else exact(section["gain_cap"])
     need(cap is None or cap > 0, "gain_cap is not positive")
     need(cap is not None or not late, "the own state is late, and the gain has no cap: the protocol diverges")
-    return Messages(gain, latency, delay, late, error, cap)
+    return Messages(gain, latency, delay, late, error, cap, _moving(section["leaders"]))
+
+
+def _moving(entry: Any) -> Moving | None:
+    """Read how leaders move; None if they rest."""
+    if entry is None:
+        return None
+    fields(entry, ("speed", "disturbance"), "leaders")
+    speed, disturbance = exact(entry["speed"]), exact(entry["disturbance"])
+    need(speed >= 0 and disturbance >= 0, "a speed or a disturbance is negative")
+    return Moving(speed, disturbance)
 
 
 def _latency(doc: Document, graph: Digraph, entry: Any) -> Numbers:

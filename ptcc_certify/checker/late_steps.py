@@ -3,7 +3,8 @@
 ``y' = -g (D y - |W_F| y(t - delay) - value_error D)`` from a constant history ``y_0`` with ``D y_0 >= |W_F| y_0 +
 value_error D`` never grows, and bounds ``|x - x*|`` for all delays up to ``delay``. Between two instants of the grid
 what is heard is at most what was said at an instant before, so that each row has a solution in closed form. Entries are
-multiples of ``2^-30`` of the largest one at first; everything is rounded up.
+multiples of ``2^-30`` of the largest one at first; everything is rounded up. Where leaders move, and followers are
+disturbed, by ``push`` together, ``value_error + push/(D_k g)`` stands for ``value_error``: ``g`` never falls.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from itertools import pairwise
+from math import ceil
 
 from lmi.exact.elementary_enclosures import log, rounded
 from lmi.exact.numbers import longest, sized
@@ -81,6 +83,8 @@ class Steps:
         Times the same scale.
     parts : ints
         Ages of what is heard over the edges of the graph, in 64ths of the largest one; or one for all.
+    push : Fraction
+        Over the first gain, times the same scale.
     """
 
     def __init__(
@@ -91,11 +95,14 @@ class Steps:
         start: Sequence[int],
         value_error: Fraction,
         parts: Sequence[int] = (PARTS,),
+        push: Fraction = Fraction(0),
     ):
         self.graph, self.nodes, self.largest = graph, nodes, max(max(start), 1)
         spend(graph.n_edges + 2 * graph.n, graph.bits + FIXED, longest(start), "bounds from instant to instant")
         self.start = array("q", (-(-(x << FIXED) // self.largest) for x in start))
         self.error = -(-(value_error.numerator << FIXED) // (value_error.denominator * self.largest))
+        p, q = (push * graph.unit).as_integer_ratio()
+        self.lags = array("q", (-(-(p << FIXED) // (q * self.largest * D)) for D in degrees))
         self.top = max(degrees)
         self.shares = array("q", ((D << SHARE) // self.top for D in degrees))
         place = dict(zip(nodes, range(len(nodes)), strict=True))
@@ -110,7 +117,13 @@ class Steps:
                     self.parts.append(parts[e if len(parts) > 1 else 0])
             self.offsets.append(len(self.sources))
 
-    def run(self, instants: Sequence[Fraction], delay: Fraction, ways: Sequence[Fraction | None]) -> Sequence[int]:
+    def run(
+        self,
+        instants: Sequence[Fraction],
+        delay: Fraction,
+        ways: Sequence[Fraction | None],
+        gains: Sequence[Fraction] = (),
+    ) -> Sequence[int]:
         """Return the bounds at the last instant, multiples of ``largest 2^-30``.
 
         Parameters
@@ -120,6 +133,8 @@ class Steps:
         delay : Fraction
         ways : Fractions
             How far the clock goes between two of them, from below; None: infinitely far.
+        gains : Fractions
+            The gain at every instant but the last, from below, ascending; where nothing pushes they may be left out.
         """
         ages = {part: delay * part / PARTS for part in sorted(set(self.parts) or {PARTS}, reverse=True)}
         said = [[max(bisect_right(instants, t - age) - 1, 0) for age in ages.values()] for t in instants[:-1]]
@@ -131,6 +146,8 @@ class Steps:
             for old in [m for m in known if m < places[0]]:
                 del known[old]
             heard = self._heard({part: known[j] for part, j in zip(ages, places, strict=True)})
+            if gains and way is not None:
+                heard = self._pushed(heard, ceil(ONE * gains[0] / gains[i]))
             known[i + 1] = self._step(known[i], heard, None if way is None else self._fixed(way))
         return known[len(ways)]
 
@@ -145,6 +162,10 @@ class Steps:
         """Bound ``sum_l |w_kl| y_l / D_k + value_error`` from above, each ``y`` that of the age of its edge."""
         products = [a * told[part][s] for a, s, part in zip(self.weights, self.sources, self.parts, strict=True)]
         return [-(-sum(products[a:b]) >> FIXED) + self.error for a, b in pairwise(self.offsets)]
+
+    def _pushed(self, heard: Sequence[int], share: int) -> Sequence[int]:
+        """Add what pushes followers under a gain that is the first one over a share."""
+        return [h - (-x * share >> FIXED) for h, x in zip(heard, self.lags, strict=True)]
 
     def _step(self, y: Sequence[int], heard: Sequence[int], way: tuple[int, int] | None) -> Sequence[int]:
         """Bound the next state."""

@@ -15,9 +15,10 @@ from ptcc_certify.checker import input_formulas as formulas
 from ptcc_certify.checker.follower_rows import Followers, Rows, followers_of
 from ptcc_certify.checker.graph import MANY_EDGES, by_agent
 from ptcc_certify.checker.input import Verified
+from ptcc_certify.checker.late_drift import drift_above
 from ptcc_certify.checker.late_form import check_form
 from ptcc_certify.checker.late_input import Inputs
-from ptcc_certify.checker.late_messages import Messages, read_messages
+from ptcc_certify.checker.late_messages import Messages, Moving, read_messages
 from ptcc_certify.checker.late_steps import FIXED, Steps, clock_below
 from ptcc_certify.checker.missed_deadline import check_missed, check_staged
 from ptcc_certify.checker.proof_cursor import Document
@@ -26,11 +27,14 @@ from ptcc_certify.checker.settling_leaders import check_settling
 from ptcc_certify.checker.side_files import Numbers
 
 KEYS = (
-    *("latency", "packets", "delay", "own", "value_error", "gain_cap"),
+    *("latency", "packets", "delay", "own", "value_error", "gain_cap", "leaders"),
     *("rows", "steps", "residual", "missed", "staged", "settling", "form", "input"),
 )
 #: Witnesses of rows, and instants of steps, that are read.
 MANY_ROWS, MANY_INSTANTS = 100, 2001
+#: Of an entry of rows, and what it has besides where leaders move; what is not proved there.
+ROW, MOVING = ("cap", "clock", "left", "initial", "floor"), ("drift", "after")
+AT_REST = ("missed", "staged", "settling", "form")
 
 
 class Residual:
@@ -61,10 +65,13 @@ def check_messages(doc: Document, verified: Verified) -> None:
     if "messages" not in doc.data:
         return
     section, graph = fields(doc.section("messages"), KEYS, "messages"), verified.structure.graph
-    need("leaders" not in doc.data, "late messages and leaders that move")
+    need("leaders" not in doc.data, "leaders that move beside late messages stand under messages")
     sigma = verified.begin.sigma
     need(sigma is None or not any(sigma.values), "late messages while sliding variables move")
     messages = read_messages(doc, graph, verified.gain, section)
+    if messages.leaders is not None:
+        need(not verified.protocol.sliding, "leaders that move under the sliding-mode protocol")
+        need(all(section[key] is None for key in AT_REST), f"one of {', '.join(AT_REST)} though leaders move")
     need(len(entries(section["rows"], "rows")) <= MANY_ROWS, f"more than {MANY_ROWS} witnesses of rows")
     by_rows = bool(section["rows"]) or any(section[key] is not None for key in ("steps", "missed", "staged"))
     stated = by_rows or section["form"] is not None or section["settling"] is not None
@@ -131,7 +138,7 @@ def _check_rows(
 ) -> None:
     """Verify ``|x_k - x*_k| <= u_k (initial e^(-b s) + floor)`` by one witness of rows."""
     doc.at = of
-    fields(entry, ("cap", "clock", "left", "initial", "floor"), of)
+    fields(entry, ROW if messages.leaders is None else (*ROW, *MOVING), of)
     cap, clock = (None if entry[key] is None else exact(entry[key]) for key in ("cap", "clock"))
     left, initial, floor = (exact(entry[key]) for key in ("left", "initial", "floor"))
     obligation = doc.open("late-rows", of, ["q", "b"], witness=True)
@@ -153,12 +160,28 @@ def _check_rows(
         need(0 <= clock <= formulas.Limits(limit).clock_below(messages.gain), "the clock does not come so far")
         need(left >= formulas.decay_above(b * clock), "left is not proved")
     rows.above_initial(initial)
-    rows.above_floor(floor, messages.value_error)
+    rows.above_floor(floor, messages.wrong)
+    drift, floor_up_to_T = Fraction(0), floor
+    if messages.leaders is not None:
+        drift, after = _drift(messages, messages.leaders, rows, b, limit, entry)
+        floor_up_to_T += after * messages.least_gain(always=True) / messages.least_gain()
     if residual is not None:
-        residual.meet(rows.u, (initial * left + floor) / rows.scale)
+        residual.meet(rows.u, (initial * left + floor + drift) / rows.scale)
     if inputs is not None:
-        inputs.by_rows(rows, b, cap, initial, floor)
+        inputs.by_rows(rows, b, cap, initial, floor_up_to_T)
     doc.done(f"b = {down(b)}, q = {down(q)}")
+
+
+def _drift(
+    messages: Messages, leaders: Moving, rows: Rows, b: Fraction, limit: Fraction | None, entry: Any
+) -> tuple[Fraction, Fraction]:
+    """Verify what leaders that move, and disturbances, add at ``T``, and at all times."""
+    drift, after, gain = exact(entry["drift"]), exact(entry["after"]), messages.gain
+    bits = length((leaders.push, rows.least, drift, after, b, limit or b, gain.T, gain.rho1, gain.k))
+    spend(100, bits, bits, "drift of followers")
+    need(drift >= leaders.push / rows.least * drift_above(gain, b, limit), "drift is not proved")
+    rows.above_push(after, leaders.push / messages.least_gain(always=True))
+    return drift, after
 
 
 def _check_steps(
@@ -181,17 +204,19 @@ def _check_steps(
     start = followers.vector(doc, witness["start"], "start")
     need(all(x >= 0 for x in start.values), "start is negative")
     values, scale = start.over(range(len(start)))
-    error = messages.value_error * scale
-    followers.starts_within(values, scale)
-    followers.never_grows(values, error)
+    error, limits = messages.wrong * scale, formulas.Limits(messages.gain_cap)
     bits = length((gain.T, gain.rho1, gain.k, messages.delay, messages.gain_cap or gain.T, *instants))
     spend(60 * len(instants), bits, bits, "instants of steps")
+    gains = [limits.gain_at(gain, t) for t in instants[:-1]] if messages.leaders is not None else []
+    push = messages.leaders.push * scale / gains[0] if messages.leaders is not None else Fraction(0)
+    followers.starts_within(values, scale)
+    followers.never_grows(values, error, push)
     ways = [clock_below(gain, messages.gain_cap, a, b) for a, b in pairwise(instants)]
     kind, graph = Steps, followers.structure.graph
     if doc.exact.numpy and graph.n_edges >= MANY_EDGES:
         from ptcc_certify.checker.array_steps import ArraySteps as kind  # noqa: N813
-    steps = kind(graph, followers.nodes, followers.degrees, values, error, parts)
-    bounds = steps.run(instants, messages.delay, ways)
+    steps = kind(graph, followers.nodes, followers.degrees, values, error, parts, push)
+    bounds = steps.run(instants, messages.delay, ways, gains)
     if residual is not None:
         residual.meet(bounds, Fraction(steps.largest, scale << FIXED))
     doc.done(f"{len(ways)} steps")

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate
     from ptcc_certify.protocols.base import Protocol
     from ptcc_certify.protocols.late_messages import LateMessages
+    from ptcc_certify.protocols.moving_leaders import MovingLeaders
 
 
 def late_lines(certificate: Certificate) -> Lines:
@@ -28,7 +29,9 @@ def late_lines(certificate: Certificate) -> Lines:
     if late is None:
         return
     yield "messages", messages_text(late.messages, certificate.protocol)
-    texts = [*_impossible(late), *([] if late.direct else _left(late)), *_stages(late)]
+    if late.leaders is not None:
+        yield "leaders", leaders_text(late.leaders)
+    texts = [*_impossible(late), *([] if late.direct else _left(late)), *_stages(late), *_kept_off(late)]
     if (at := certificate.at) is not None and (late.rows or late.steps or late.settling):
         texts.append(f"at t = {near(at)} every agent within {up(float(late.largest_bound([float(at)])[0]), 2)}")
     yield "late" if late.says_something else "LATE", texts[0]
@@ -49,10 +52,8 @@ def tracking_lines(certificate: Certificate) -> Lines:
     tracking = certificate.tracking
     if tracking is None:
         return
-    leaders, T = tracking.leaders, near(certificate.protocol.T)
-    sign = "" if leaders.sign_gain is None else f"; followers add {near(leaders.sign_gain)} sign(e_k)"
-    pushed = f"; any |d_k| <= {near(leaders.disturbance)}" * (leaders.disturbance > 0)
-    yield "leaders", f"speed |x_j'| <= {near(leaders.speed)}{pushed}{sign}"
+    T = near(certificate.protocol.T)
+    yield "leaders", leaders_text(tracking.leaders)
     instants = {"0.9 T": Fraction(1, 10), "0.99 T": Fraction(1, 100)}
     if (at := certificate.at) is not None:
         instants = {f"t = {near(at)}": 1 - at / certificate.protocol.T}
@@ -65,6 +66,19 @@ def tracking_lines(certificate: Certificate) -> Lines:
         yield "input", f"bounded up to T; |u_k| <= {up(float(tracking.input.max()), 4)}{whole}"
     else:
         yield "INPUT", f"not proved bounded while leaders move; rho2 = {tracking.bounding_rho2} bounds it"
+
+
+def leaders_text(leaders: MovingLeaders) -> str:
+    """Tell how fast leaders move, and what disturbs the followers.
+
+    Examples
+    --------
+    >>> leaders_text(MovingLeaders(speed="0.5", disturbance=1))
+    "speed |x_j'| <= 0.5; any |d_k| <= 1"
+    """
+    sign = "" if leaders.sign_gain is None else f"; followers add {near(leaders.sign_gain)} sign(e_k)"
+    pushed = f"; any |d_k| <= {near(leaders.disturbance)}" * (leaders.disturbance > 0)
+    return f"speed |x_j'| <= {near(leaders.speed)}{pushed}{sign}"
 
 
 def messages_text(messages: LateMessages, protocol: Protocol | None = None) -> str:
@@ -129,14 +143,24 @@ def _threshold(late: LateBounds) -> float:
 
 def _left(late: LateBounds) -> list[str]:
     """Tell what is left at T at most, and which delays are certified."""
-    cap = "under a cap nothing settles: " * (late.messages.gain_cap is not None)
+    cap = "under a cap nothing settles: " * (late.messages.gain_cap is not None and late.leaders is None)
     if math.isinf(late.largest):
         return [f"{cap}nothing is proved of what is left at T{_limits(late)}"]
     whole = ", from within 1 of it at first" * late.relative
     formed = late.form is not None and float(max(late.form.residual)) <= late.largest
     settling = "; leaders hear each other at once, and settle by themselves" * (late.settling is not None)
     within = f"every agent within {up(late.largest, 2)} of its final state at T"
+    if late.leaders is not None:
+        within = f"every follower within {up(late.largest, 2)} of its target at T"
+        within += f", within {up(late.after, 2)} from then on" * (late.after is not None)
     return [f"{cap}{within}{whole}{settling}{_limits(late) * formed}"]
+
+
+def _kept_off(late: LateBounds) -> list[str]:
+    """Tell what of this bound no gain takes away, since leaders move on while messages come."""
+    if not late.never_below:
+        return []
+    return [f"{down(late.never_below, 2)} of that no gain takes away: leaders move on while messages come"]
 
 
 def _limits(late: LateBounds) -> str:

@@ -203,7 +203,7 @@ def _title(saved: Certificate, invariant: str) -> Markup:
     text = Markup("{} at {} = {}").format(behaviour, deadline, rational(saved.protocol.T)).replace("= \u2248", "\u2248")
     if saved.constant:
         text = Markup("every agent keeps {}").format(invariant)
-    text += ", nothing late" * (saved.late is not None) + ", leaders at rest" * (saved.tracking is not None)
+    text += ", nothing late" * (saved.late is not None) + ", leaders at rest" * saved.leaders_move
     return text[:1].upper() + text[1:] if saved.verdict == "certified" else "Undecided: " + text
 
 

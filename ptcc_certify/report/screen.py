@@ -101,8 +101,8 @@ def summary_lines(certificate: Certificate, name: str, origins: Mapping[str, str
         whatever = ", without disturbances"
     if certificate.late is not None:
         whatever = ", nothing late"
-    if certificate.tracking is not None:
-        whatever = ", leaders at rest"
+    if certificate.leaders_move:
+        whatever = ", nothing late, leaders at rest" if certificate.late else ", leaders at rest"
     if certificate.limits:
         whatever = ", without limits"
     claims = _claim_texts(
@@ -261,7 +261,7 @@ def _answers(certificate: Certificate, drawn: bool) -> Lines:
     if certificate.agents is not None:
         yield from answers(certificate.agents)
         return
-    if certificate.tracking is None and not drawn:
+    if not certificate.leaders_move and not drawn:
         yield from _short_final_state(certificate)
     if certificate.late is None and certificate.tracking is None:
         yield from _bounds(certificate, drawn)
@@ -391,7 +391,9 @@ def certificate_lines(
             yield "", f"left at T by agent: {by_agent}"
         yield from tracking_lines(certificate)
         if certificate.late is not None or certificate.tracking is not None:
-            yield "", f"the lines below are of {'messages at once' if certificate.late else 'leaders at rest'}"
+            without = ["messages at once"] * (certificate.late is not None)
+            without += ["leaders at rest"] * certificate.leaders_move
+            yield "", f"the lines below are of {' and '.join(without)}"
         yield from _claim_lines(structure, certificate.claims, _when(certificate, when))
         yield "protocol", _gains_text(p)
         if certificate.limits or certificate.noise is not None or certificate.delta is not None:

@@ -5,14 +5,15 @@ age`` and ``t_i``: the delay ``t - t_j`` is one of those that are allowed, and t
 
     x_k(t_(i+1)) = h_k + (x_k(t_i) - h_k) e^(-D_k (s(t_(i+1)) - s(t_i))),    h_k = sum_l w_kl y_kl / D_k,
 
-exact where the gain has its pole. With an own state that is late the whole right side is held.
+exact where the gain has its pole. With an own state that is late the whole right side is held. Leaders may move over a
+step, for nobody hears of it before the next; disturbances are a constant times the gain within a step, at most ``d``.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, Literal
 
@@ -27,6 +28,7 @@ from ptcc_certify.protocols.base import Protocol, refuse_no_protocol
 from ptcc_certify.protocols.gain import Gain
 from ptcc_certify.protocols.gain_limits import GainLimits, LimitedGain
 from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.protocols.moving_leaders import MovingLeaders, refuse_together
 from ptcc_certify.simulation.trajectory import Trajectory
 
 Pattern = Literal["oldest", "fresh", "varying", "square"]
@@ -52,10 +54,19 @@ class LateRun(Trajectory):
     messages : LateMessages
     pattern : str
         How old is what agents hear.
+    leaders : MovingLeaders or None
+        How leaders move.
+    targets : (N, M) array or None
+        ``-L_F^-1 L_FL X_L`` of followers, of leaders their states; None where leaders rest.
     """
 
     messages: LateMessages
     pattern: str
+    leaders: MovingLeaders | None = None
+    targets: np.ndarray | None = None
+
+    def _more_columns(self) -> list[tuple[str, np.ndarray]]:
+        return [] if self.targets is None else target_columns(self.labels, self.targets)
 
 
 @gated
@@ -69,6 +80,7 @@ def simulate_late(
     seed: int = 0,
     steps: int = STEPS,
     deadlines: Sequence[Fraction] | None = None,
+    leaders: MovingLeaders | None = None,
 ) -> LateRun:
     """Run a protocol with late messages up to its deadline.
 
@@ -92,6 +104,9 @@ def simulate_late(
         Instants, about.
     deadlines : sequence of N Fraction, optional
         Of every agent by itself, in place of ``T``; in units of time.
+    leaders : MovingLeaders, optional
+        Without a sign term, under the nominal protocol: leaders move away from the follower that is farthest from its
+        target, as fast as they may, and disturbances drive all followers off.
 
     Returns
     -------
@@ -99,6 +114,8 @@ def simulate_late(
 
     Raises
     ------
+    HypothesisError
+        Leaders are to move, and one belongs to a group.
     ParameterError
         The pattern is unknown, a number is outside its domain, the state does not fit the graph, the delay is so short
         that the run would take more than 20,000 steps, or steps and agents are so many that it would not fit memory.
@@ -139,6 +156,7 @@ def simulate_late(
     states, errors = np.empty((2, t.size, graph.n_nodes))
     states[0] = first
     D, leading = graph.in_weight(), _Leading(graph, messages)
+    fleeing = None if leaders is None else _Fleeing(graph, protocol, messages, leaders, t)
     for i in range(t.size - 1):
         heard, own = hearing.sums(i, states)
         step, errors[i] = steps_of_clock[i], heard - (own if messages.own_delay else D * states[i])
@@ -149,9 +167,12 @@ def simulate_late(
             goal = np.where(D > 0, heard / D, states[i])
             left = np.where(np.isfinite(step), np.exp(-D * step), D <= 0)
         states[i + 1] = goal + (states[i] - goal) * left
+        if fleeing is not None:
+            fleeing.move(i, states, left)
         leading.move(states[i], states[i + 1], step)
     errors[-1] = heard - (own if messages.own_delay else D * states[-1])
-    return _run(graph, protocol, messages, pattern, t, states.T, errors.T, time.perf_counter() - begin)
+    run = _run(graph, protocol, messages, pattern, t, states.T, errors.T, time.perf_counter() - begin)
+    return run if fleeing is None else fleeing.added(run)
 
 
 def _run(
@@ -245,6 +266,45 @@ def _clocks(
         column[t >= float(end) * (1 - 1e-14)] = np.inf
         whole[:, [k for k, x in enumerate(deadlines) if x == end]] = column[:, None]
     return whole
+
+
+class _Fleeing:
+    """Leaders that move away from the farthest follower over steps, and disturbances that push followers off."""
+
+    def __init__(
+        self, graph: SignedDigraph, protocol: Protocol, messages: LateMessages, leaders: MovingLeaders, t: np.ndarray
+    ):
+        from ptcc_certify.simulation.worst_leaders import WorstLeaders  # it loads SciPy
+
+        if not isinstance(leaders, MovingLeaders) or protocol.reaching:
+            mend = "give it, and MovingLeaders(speed=1), say"
+            raise ParameterError(f"leaders that move run under the nominal protocol; {mend}")
+        refuse_together(messages, leaders)
+        self.leaders, self.worst, self.t = leaders, WorstLeaders(analyse(graph), leaders), t
+        gain = GainLimits(gain_cap=messages.gain_cap).limit(protocol.gain).value(t, np.maximum(1 - t / t[-1], 0))
+        gain[-1] = np.inf if messages.gain_cap is None else float(messages.gain_cap)
+        self.pull = graph.in_weight()[self.worst.followers] * gain[:, None]
+        self.inputs = np.zeros((t.size, self.worst.heads.size))
+
+    def move(self, i: int, states: np.ndarray, left: np.ndarray) -> None:
+        """Add to the states after step ``i`` how leaders move, and what pushes followers."""
+        worst, F = self.worst, self.worst.followers
+        eps = states[i, F] - worst.Q @ states[i, worst.heads]
+        self.inputs[i:] = velocity = worst.velocities(eps)
+        states[i + 1, worst.heads] += velocity * (self.t[i + 1] - self.t[i])
+        states[i + 1, F] += worst.pushes(eps) * (1 - left[F]) / self.pull[i + 1]
+
+    def added(self, run: LateRun) -> LateRun:
+        """Return a run with leaders, whose inputs are their velocities, and with targets."""
+        assert run.held_input is not None
+        inputs = run.held_input.copy()
+        inputs[self.worst.heads] = self.inputs.T
+        return replace(run, held_input=inputs, leaders=self.leaders, targets=self.worst.targets(run.states))
+
+
+def target_columns(labels: Sequence[str], targets: np.ndarray) -> list[tuple[str, np.ndarray]]:
+    """Return the columns of a table that tell the targets, ``(N, M)``, by label."""
+    return [(f"target({label})", row) for label, row in zip(labels, targets, strict=True)]
 
 
 class _Leading:

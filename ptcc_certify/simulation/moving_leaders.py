@@ -20,13 +20,12 @@ import numpy as np
 from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.graphs.io import as_graph, as_state
 from ptcc_certify.graphs.rationals import whole_number
-from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.lyapunov.follower_rows import refuse_leader_groups
 from ptcc_certify.protocols.base import Protocol, refuse_no_protocol
 from ptcc_certify.protocols.moving_leaders import MovingLeaders
-from ptcc_certify.simulation.late_messages import residual_at_end
+from ptcc_certify.simulation.late_messages import residual_at_end, target_columns
 from ptcc_certify.simulation.trajectory import Trajectory
+from ptcc_certify.simulation.worst_leaders import WorstLeaders
 
 #: Steps up to T; the share of what is left of T that a step takes; how near they come; where a run with sign term ends.
 STEPS, SHARE, NEAREST, PAST = 800, 0.02, 1e-7, 0.5
@@ -49,7 +48,7 @@ class TrackingRun(Trajectory):
     targets: np.ndarray
 
     def _more_columns(self) -> list[tuple[str, np.ndarray]]:
-        return [(f"target({label})", row) for label, row in zip(self.labels, self.targets, strict=True)]
+        return target_columns(self.labels, self.targets)
 
 
 @gated
@@ -109,22 +108,12 @@ def simulate_tracking(
             "leaders that move run under the nominal protocol; give it, and MovingLeaders(speed=1), say"
         )
     structure, steps = analyse(as_graph(graph)), whole_number(steps, "steps", 2, MOST_STEPS)
-    refuse_leader_groups(structure, "leaders that move as they like: a run")
-    n, F = structure.graph.n_nodes, structure.followers
-    if n > EXACT_NODES:
-        raise ParameterError(f"runs with moving leaders are of up to {EXACT_NODES} agents; the graph has {n}")
-    if not F.size:
-        raise ParameterError("nobody listens to a leader, so nobody tracks; add edges")
+    worst = WorstLeaders(structure, leaders, u)
+    F, heads, L_F, Q = worst.followers, worst.heads, worst.L_F, worst.Q
     x = np.array([float(value) for value in as_state(x0, structure.graph, "x0")])
-    heads = np.setdiff1d(np.arange(n), F)
-    L = structure.graph.dense_laplacian()
-    L_F, Q = L[np.ix_(F, F)], -np.linalg.solve(L[np.ix_(F, F)], L[np.ix_(F, heads)])
-    weights = np.ones(F.size) if u is None else np.asarray(u, dtype=float)
-    if weights.shape != (F.size,) or not (weights > 0).all():
-        raise ParameterError(f"u is not {F.size} positive numbers, one for each follower; leave it out")
     t, clock, last = _grid(protocol, steps)
-    step_of = _Step(L_F, leaders, Q)
-    states, targets, inputs = np.zeros((3, t.size, n))
+    step_of = _Step(worst, leaders)
+    states, targets, inputs = np.zeros((3, t.size, structure.graph.n_nodes))
     lead, eps, begin = x[heads], x[F] - Q @ x[heads], time.perf_counter()
     remaining = np.maximum(1 - t / float(protocol.T), 0)
     gain = protocol.gain.value_at_remaining(remaining)
@@ -135,7 +124,7 @@ def simulate_tracking(
         j = min(i, t.size - 2)
         inputs[i, F] = -gain[i] * (L_F @ eps) + step_of.sign_term(eps, t[j + 1] - t[j])
         if i + 1 < t.size:
-            moved, eps = step_of(eps, weights, clock[i], last[i], t[i + 1] - t[i])
+            moved, eps = step_of(eps, clock[i], last[i], t[i + 1] - t[i])
             lead, inputs[i, heads] = lead + moved, moved / (t[i + 1] - t[i])
     end = int(np.argmax(remaining == 0))
     return TrackingRun(
@@ -177,22 +166,16 @@ def _grid(protocol: Protocol, steps: int) -> tuple[np.ndarray, np.ndarray, np.nd
 class _Step:
     """One step of the deviations, at the worst velocities and disturbances."""
 
-    def __init__(self, L_F: np.ndarray, leaders: MovingLeaders, Q: np.ndarray):
-        self.L_F, self.Q, self.inverse = L_F, Q, np.linalg.inv(L_F)
-        self.speed, self.delta = float(leaders.speed), float(leaders.disturbance)
+    def __init__(self, worst: WorstLeaders, leaders: MovingLeaders):
+        self.worst, self.L_F, self.inverse = worst, worst.L_F, np.linalg.inv(worst.L_F)
         self.sign = None if leaders.sign_gain is None else float(leaders.sign_gain)
 
-    def __call__(
-        self, eps: np.ndarray, weights: np.ndarray, ds: float, gain: float, dt: float
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def __call__(self, eps: np.ndarray, ds: float, gain: float, dt: float) -> tuple[np.ndarray, np.ndarray]:
         """Return by how much leaders move, and the deviations after the step."""
         if np.isinf(gain):
-            return np.zeros(self.Q.shape[1]), np.zeros_like(eps)
-        k = int(np.argmax(np.abs(eps) / weights))
-        side = 1.0 if eps[k] >= 0 else -1.0
-        v = -side * np.sign(self.Q[k]) * self.speed
-        push = self.delta * np.where(eps >= 0, 1.0, -1.0) - self.Q @ v
-        push = push + self.sign_term(eps, dt)
+            return np.zeros(self.worst.heads.size), np.zeros_like(eps)
+        v = self.worst.velocities(eps)
+        push = self.worst.pushes(eps) - self.worst.Q @ v + self.sign_term(eps, dt)
         E = _decay(self.L_F * ds)
         new = E @ eps + (np.eye(eps.size) - E) @ (self.inverse @ push) / gain
         return v * ds / gain, new

@@ -25,7 +25,7 @@ from ptcc_certify.protocols.base import refuse_no_protocol
 from ptcc_certify.protocols.disturbance import as_disturbance
 from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.protocols.late_messages import LateMessages
-from ptcc_certify.protocols.moving_leaders import MovingLeaders
+from ptcc_certify.protocols.moving_leaders import MovingLeaders, refuse_together
 from ptcc_certify.simulation.cvodes import Tolerances
 from ptcc_certify.simulation.filippov import simulate_sliding
 from ptcc_certify.simulation.instants import PAST, default_instants, wanted_instants
@@ -104,7 +104,8 @@ def simulate(
         The run of :func:`ptcc_certify.simulate_late`, with ``pattern`` and ``seed``, at instants of its own up to
         ``T``; nothing else acts on it, and sliding variables are 0.
     leaders : MovingLeaders, optional
-        The run of :func:`ptcc_certify.simulate_tracking`, at instants of its own; nothing else acts on it.
+        The run of :func:`ptcc_certify.simulate_tracking`, at instants of its own; nothing else acts on it. With
+        ``messages`` that of :func:`ptcc_certify.simulate_late`.
     pattern : {"oldest", "fresh", "varying", "square"}
         Of ``messages``: how old is what agents hear.
     seed : int
@@ -161,7 +162,7 @@ def simulate(
         beside |= {"disturbance": disturbance, "actuator": actuator, "times": times}
         _refuse_beside(graph, messages, leaders, sigma0, beside)
         if messages is not None:
-            return simulate_late(graph, protocol, messages, x0, pattern=pattern, seed=seed)
+            return simulate_late(graph, protocol, messages, x0, pattern=pattern, seed=seed, leaders=leaders)
         assert leaders is not None
         from ptcc_certify.simulation.moving_leaders import simulate_tracking  # it loads SciPy
 
@@ -211,12 +212,13 @@ def _refuse_beside(
     beside: Mapping[str, Any],
 ) -> None:
     """Refuse what is not simulated beside late messages or moving leaders."""
-    if messages is not None and leaders is not None:
-        raise ParameterError("messages and leaders together are not simulated yet; ask for one of them")
-    name = "late messages" if leaders is None else "leaders that move"
+    refuse_together(messages, leaders)
+    name = "late messages" if messages is not None else "leaders that move"
     for what, value in beside.items():
         if value is not None:
-            mend = "; give LateMessages(gain_cap=..)" if what == "actuator" and leaders is None else "; leave it out"
+            mend = (
+                "; give LateMessages(gain_cap=..)" if what == "actuator" and messages is not None else "; leave it out"
+            )
             raise ParameterError(f"{what}: is not simulated with {name}{mend}")
     if sigma0 is not None and _floats(sigma0, graph, "sigma0").any():
         raise ParameterError(f"sigma0: {name} ask for sigma(0) = 0, so that no sliding variable moves; leave it out")

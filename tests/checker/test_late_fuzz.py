@@ -34,6 +34,10 @@ SINGLY = (
     "capped of 4",
     "leaders of 1",
     "sign of 4",
+    "moving of 1",
+    "moving of 4",
+    "moving, capped of 2",
+    "any moving of 2",
     "form False of 1",
     "settling of 1",
     "settling of 2",
@@ -64,6 +68,9 @@ def cases() -> list[tuple[str, Json]]:
             "leaders": with_leaders(known, disturbance="1/10"),
             "sign": with_leaders(known, sign_gain="1/2"),
             "any leaders": with_leaders(any_state, speed="1/3"),
+            "moving": with_messages(known, "1/20", qs=("21/20", "6/5"), steps=12, moving=("1/2", "1/5")),
+            "moving, capped": with_messages(known, gain_cap=20, value_error="1/100", steps=8, moving=("1", "0")),
+            "any moving": with_messages(any_state, apart, steps=8, moving=("1/3", "1/3")),
         }
         for late in (False, True):
             small = with_messages(known, "1/300", gain_cap=4, form=Fraction(1, 2), late=late)
@@ -180,6 +187,8 @@ def test_motions_keep_to_what_is_accepted_on_many_graphs(part: int):
             with_messages(data, delay, value_error="1/20", qs=("11/10",), gain_cap=15, steps=10),
             with_leaders(data, disturbance="1/10"),
             with_leaders(data, sign_gain="1/2"),
+            with_messages(data, delay, qs=("21/20", "5/4"), steps=20, moving=("1/2", "1/5")),
+            with_messages(data, delay, value_error="1/20", gain_cap=15, steps=10, moving=("1", "0")),
         ]
         for made in more:
             said = made.get("messages")

@@ -80,6 +80,12 @@ def led(sign: Any = None) -> Json:
 
 
 @cache
+def fled(**options: Any) -> Json:
+    """Late messages and leaders that move."""
+    return with_messages(base(), qs=("21/20", "11/10"), steps=30, moving=("1/2", "1/5"), **options)
+
+
+@cache
 def samples() -> dict[str, Json]:
     """Certificates of every kind."""
     ages = [F(1, 50) + F(k, 1000) for k in range(len(base(2, "gauge")["graph"]["edges"]))]
@@ -99,6 +105,11 @@ def samples() -> dict[str, Json]:
         "any state, leaders": with_leaders(base(state=False), disturbance="1/3", bounded=False),
         "settling": settling(1),
         "settling, capped": settling(2, 12),
+        "moving": fled(),
+        "moving, capped": fled(gain_cap=20, value_error="1/100"),
+        "moving, ages apart": with_messages(base(2, "gauge"), apart, qs=("21/20", "2"), steps=30, moving=("1", "0")),
+        "moving, any state": with_messages(base(state=False), qs=("21/20",), moving=("0", "1/3")),
+        "moving, values off": with_messages(base(), "0", value_error="1/10", qs=("1", "3/2"), moving=("1/2", "1/2")),
     }
 
 
@@ -106,6 +117,7 @@ NAMES = (
     *("everything", "capped", "late own state", "small delays", "values off", "each edge", "ages apart", "any state"),
     "sliding",
     *("leaders", "sign", "any state, leaders", "settling", "settling, capped"),
+    *("moving", "moving, capped", "moving, ages apart", "moving, any state", "moving, values off"),
 )
 
 

@@ -29,7 +29,8 @@ _SEEN = 1e-3
 def plot_late(subject: Any, *, ax: Axes | None = None, time_unit: str = "") -> Axes:
     """Draw how far the farthest agent is from its final state while messages are late, under the proved bound.
 
-    Where delays are too short for runs, the bound alone.
+    Where delays are too short for runs, the bound alone. Where leaders move, in the runs away from the farthest
+    follower as fast as they may, how far that is from its target.
 
     Parameters
     ----------
@@ -64,19 +65,23 @@ def plot_late(subject: Any, *, ax: Axes | None = None, time_unit: str = "") -> A
         raise ParameterError("the certificate has no initial state to run from; certify with x0")
     ax, F = axes_of(ax), certificate.structure.followers
     nodes = F if F.size and late.settling is None else np.arange(certificate.graph.n_nodes)
-    start, goal = [float(x) for x in x0], np.asarray(ends, dtype=float)
+    start, goal = [float(x) for x in x0], np.asarray(ends, dtype=float)[:, None]
+    options: dict[str, Any] = {"leaders": late.leaders}
     t = np.linspace(0, float(certificate.protocol.T), 401)
     for pattern, style in _RUNS.items() if can_run(certificate.protocol, late.messages) else ():
-        run = simulate_late(certificate.graph, certificate.protocol, late.messages, start, pattern=pattern)  # type: ignore[arg-type]
+        options["pattern"] = pattern
+        run = simulate_late(certificate.graph, certificate.protocol, late.messages, start, **options)
         t = run.t
-        ax.plot(t, np.abs(run.states - goal[:, None])[nodes].max(axis=0), **style)
+        aims = goal if run.targets is None else run.targets
+        ax.plot(t, np.abs(run.states - aims)[nodes].max(axis=0), **style)
     _draw_bound(ax, late, t)
     if late.missed is not None and late.missed.bound >= _SEEN * late.largest:
         marks: dict[str, Any] = {"marker": "v", "color": BOUND, "linestyle": "none", "markersize": 4, "clip_on": False}
         ax.plot(t[-1:], [float(late.missed.bound)], label="at least, if as late as allowed", **marks)
     ax.set_yscale("log")
     ax.set_xlim(0, t[-1])
-    return finished(ax, time_label("time $t$", time_unit), r"$\max_k |x_k(t) - x_k^*|$")
+    moving = "(t)" * (late.leaders is not None)
+    return finished(ax, time_label("time $t$", time_unit), rf"$\max_k |x_k(t) - x_k^*{moving}|$")
 
 
 def _draw_bound(ax: Axes, late: LateBounds, t: np.ndarray) -> None:

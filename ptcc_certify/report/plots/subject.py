@@ -132,7 +132,7 @@ def limits_text(run: Trajectory, certificate: Certificate | None) -> str:
         absent = {
             "without the limits of the gain": certificate.limits,
             "without late messages": certificate.late,
-            "leaders at rest": certificate.tracking,
+            "leaders at rest": certificate.leaders_move,
         }
         return ", ".join(text for text, there in absent.items() if there)
     if limits is None:
