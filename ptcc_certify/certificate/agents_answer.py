@@ -115,11 +115,11 @@ class AgentsAnswer(ABC):
     def longest_way(self) -> float:
         """The longest way of an agent from its initial to its final position (numerical); 0 without a final state."""
         begin, end = self.initial_state or (), self.final_state or ()
-        squares = [
-            sum(float(x[0] - m[0][0]) ** 2 for x, m in zip(agent, place, strict=True))
+        ways = (
+            math.hypot(*(float(x[0] - m[0][0]) for x, m in zip(agent, place, strict=True)))
             for agent, place in zip(begin, end, strict=False)
-        ]
-        return math.sqrt(max(squares, default=0.0))
+        )
+        return max(ways, default=0.0)
 
     # ------------------------------------------------------------------ input
 
