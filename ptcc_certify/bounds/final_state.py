@@ -54,7 +54,9 @@ _ROUNDING, _NARROW = 1e-12, 4e-7
 _LOOSE = 0.05
 #: Room for the rounding of a radius, and of texts and floats of a middle.
 _MORE, _ULP = 1 + 1e-6, 2.0**-52
-#: Starts below this size leave no room for radii in float64, and are taken in another unit.
+#: Above what floats below the smallest normal one are off by.
+_TINY = 1e-320
+#: States below this size, or above its reciprocal, leave no room for radii in float64, and are taken in another unit.
 _SMALLEST = Fraction(1, 10**290)
 
 
@@ -503,40 +505,91 @@ def enclosed_final_state(influence: Influence, initial_state: Sequence[Fraction]
     NotEnclosedError
         The followers' equations are too ill-conditioned for floats, or a consensus value may be 0.
     """
-    structure, n, unit, enclosure = influence.structure, len(initial_state), Fraction(1), influence.enclosure
+    final, spreads = _enclosed(influence, initial_state)
+    numbers = [k for k, c in enumerate(influence.structure.closed_components, start=1) if c.balanced]
+    values, degenerate = list[Number](), []
+    for number, component in zip(numbers, influence.balanced, strict=True):
+        first = component.nodes[0]
+        value, spread = final[first] * (component.gauge or (1,))[0], spreads[first]
+        if spread and abs(value) <= 2 * spread:
+            raise NotEnclosedError(f"the consensus value of leader group {number} may or may not be 0")
+        degenerate += [number] * (not value)
+        values.append(value)
+    labels = influence.structure.graph.labels
+    return FinalState(labels, tuple(final), tuple(values), tuple(degenerate), tuple(spreads))
+
+
+def enclosed_ends(influence: Influence, begin: Sequence[tuple[Fraction, Fraction]]) -> list[tuple[Fraction, Fraction]]:
+    """Enclose ``Q x`` for all ``x`` within intervals, middle and radius of each agent.
+
+    Raises
+    ------
+    NotEnclosedError
+        The followers' equations are too ill-conditioned for floats.
+
+    Examples
+    --------
+    >>> st = analyse(SignedDigraph.from_edges([("a", "c", 1), ("b", "c", -2)]))
+    >>> begin = [(Fraction(1), Fraction(1, 8)), (Fraction(0), Fraction(0)), (Fraction(1), Fraction(0))]
+    >>> ends = enclosed_ends(enclose(influence(st, exact=False)), begin)
+    >>> ends[0] == begin[0], bool(ends[1][1] >= Fraction(1, 24))  # c ends at (x_a - 2 x_b)/3
+    (True, True)
+    """
+    state, spread = zip(*begin, strict=True)
+    final, spreads = _enclosed(influence, state, spread if any(spread) else None)
+    return [(Fraction(x), r) for x, r in zip(final, spreads, strict=True)]
+
+
+def _enclosed(
+    influence: Influence, state: Sequence[Fraction], spread: Sequence[Fraction] | None = None
+) -> tuple[list[Number], list[Fraction]]:
+    """Return middles and radii of ``Q x`` for all ``x`` within ``spread`` of a state; in floats where not exact."""
+    structure, n, unit, enclosure = influence.structure, len(state), Fraction(1), influence.enclosure
+    zero = Fraction(0)
     assert enclosure is not None
-    size = max((abs(initial_state[v]) for c in influence.balanced for v in c.nodes), default=Fraction(0))
-    if 0 < size < _SMALLEST:
-        unit = Fraction(1, 2 ** (size.denominator.bit_length() - size.numerator.bit_length()))
-        initial_state = [x / unit for x in initial_state]
-    middle, radius, exact = np.zeros(n), np.zeros(n), dict[int, Fraction]()
-    numbers = [k for k, c in enumerate(structure.closed_components, start=1) if c.balanced]
-    degenerate = []
-    for k, (number, (component, null_vector)) in enumerate(zip(numbers, influence.groups, strict=True)):
-        signs, nodes = np.array(component.gauge or ()), np.array(component.nodes)
-        if k in enclosure.left_null_vectors and any(initial_state[v] for v in component.nodes):
-            own, (weights, radii) = np.array([float(initial_state[v]) for v in nodes]), enclosure.left_null_vectors[k]
-            value, total = float(weights @ own), float(np.abs(weights) @ np.abs(own))
-            spread = (float(radii @ np.abs(own)) + _ROUNDING * total) * _MORE
-            if abs(value) <= 2 * spread:
-                raise NotEnclosedError(f"the consensus value of leader group {number} may or may not be 0")
-            middle[nodes], radius[nodes] = signs * value, spread
+    size = max((abs(state[v]) for c in influence.balanced for v in c.nodes), default=zero)
+    size += max(spread or (zero,))
+    if size and not _SMALLEST <= size <= 1 / _SMALLEST:
+        unit = Fraction(2) ** (size.numerator.bit_length() - size.denominator.bit_length())
+        state, spread = [x / unit for x in state], spread and [r / unit for r in spread]
+    middle, radius, exact = np.zeros(n), np.zeros(n), dict[int, tuple[Fraction, Fraction]]()
+    for k, (component, null_vector) in enumerate(influence.groups):
+        signs, nodes = np.array(component.gauge or ()), component.nodes
+        own, wide = (
+            [state[v] for v in nodes],
+            [Fraction(0)] * len(nodes) if spread is None else [spread[v] for v in nodes],
+        )
+        if k in enclosure.left_null_vectors and (any(own) or any(wide)):
+            value, width = _enclosed_value(enclosure.left_null_vectors[k], own, wide)
+            middle[list(nodes)], radius[list(nodes)] = signs * value, width
             continue
-        shares = zip(component.nodes, null_vector, strict=True)
-        consensus = sum((Fraction(w) * initial_state[v] for v, w in shares if initial_state[v]), Fraction(0))
-        degenerate += [number] if consensus == 0 else []
-        exact.update((v, sign * consensus) for v, sign in zip(component.nodes, component.gauge or (), strict=True))
-        middle[nodes], radius[nodes] = signs * float(consensus), rounding_radius(consensus)
-    exact.update((v, Fraction(0)) for c in structure.closed_components if not c.balanced for v in c.nodes)
+        consensus = sum((Fraction(w) * x for w, x in zip(null_vector, own, strict=True) if x), zero)
+        blur = sum((abs(Fraction(w)) * r for w, r in zip(null_vector, wide, strict=True) if r), zero)
+        exact.update((v, (sign * consensus, blur)) for v, sign in zip(nodes, component.gauge or (), strict=True))
+        middle[list(nodes)] = signs * float(consensus)
+        radius[list(nodes)] = rounding_radius(consensus) + float(blur) * _MORE + bool(blur) * _TINY
+    exact.update(
+        (v, (Fraction(0), Fraction(0))) for c in structure.closed_components if not c.balanced for v in c.nodes
+    )
     F = structure.followers
-    if F.size and middle.any():
-        middle[F], radius[F] = _enclose_followers(structure, exact, middle, radius, enclosure.witness)
-    final: list[Fraction | float] = [x if unit == 1 else Fraction(x) * unit for x in middle.tolist()]
+    if F.size and (middle.any() or radius.any()):
+        leaders = {v: x for v, (x, _) in exact.items()}
+        middle[F], radius[F] = _enclose_followers(structure, leaders, middle, radius, enclosure.witness)
+    final: list[Number] = [x if unit == 1 else Fraction(x) * unit for x in middle.tolist()]
     spreads = [Fraction(r) * unit for r in radius.tolist()]
-    for v, x in exact.items():
-        final[v], spreads[v] = x * unit, Fraction(0)
-    values = [final[c.nodes[0]] * (c.gauge or (1,))[0] for c in influence.balanced]
-    return FinalState(structure.graph.labels, tuple(final), tuple(values), tuple(degenerate), tuple(spreads))
+    for v, (x, r) in exact.items():
+        final[v], spreads[v] = x * unit, r * unit
+    return final, spreads
+
+
+def _enclosed_value(
+    null_vector: tuple[np.ndarray, np.ndarray], own: Sequence[Fraction], wide: Sequence[Fraction]
+) -> tuple[float, float]:
+    """Return middle and radius of the consensus value of a group whose left null vector is enclosed, in floats."""
+    (weights, radii), states, spread = null_vector, np.array(own, dtype=float), np.array(wide, dtype=float)
+    value, total = float(weights @ states), float(np.abs(weights) @ np.abs(states))
+    more = float(radii @ (np.abs(states) + spread)) + float(np.abs(weights) @ spread)
+    return value, (more + _ROUNDING * total) * _MORE + _TINY
 
 
 def rounding_radius(value: Fraction) -> float:
@@ -607,7 +660,7 @@ def _enclose_followers(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return middles and radii of the followers, in a unit near to the largest leader."""
     F = structure.followers
-    unit = float(np.exp2(np.floor(np.log2(np.abs(middle).max()))))
+    unit = float(np.exp2(np.floor(np.log2(np.maximum(np.abs(middle), radius).max()))))
     rows = structure.graph.laplacian().tocsr()[F]
     state, blur = middle / unit, abs(rows) @ (radius / unit)
     block = rows[:, F].tocsr()

@@ -16,7 +16,7 @@ from lmi.exact.elementary_enclosures import sqrt
 from ptcc_certify.bounds.agent_motion import Interval
 from ptcc_certify.bounds.agents import States, first_inputs
 from ptcc_certify.bounds.agents_comparison import AgentsComparison
-from ptcc_certify.bounds.final_state import Influence
+from ptcc_certify.bounds.final_state import Influence, NotEnclosedError
 from ptcc_certify.certificate.answer import MET, OPEN, REFUTED, Answer
 from ptcc_certify.certificate.format_vectors import agents_ends, weighted_sum
 from ptcc_certify.errors import ParameterError
@@ -115,11 +115,11 @@ class AgentsAnswer(ABC):
     def longest_way(self) -> float:
         """The longest way of an agent from its initial to its final position (numerical); 0 without a final state."""
         begin, end = self.initial_state or (), self.final_state or ()
-        squares = [
-            sum(float(x[0] - m[0][0]) ** 2 for x, m in zip(agent, place, strict=True))
+        ways = (
+            math.hypot(*(float(x[0] - m[0][0]) for x, m in zip(agent, place, strict=True)))
             for agent, place in zip(begin, end, strict=False)
-        ]
-        return math.sqrt(max(squares, default=0.0))
+        )
+        return max(ways, default=0.0)
 
     # ------------------------------------------------------------------ input
 
@@ -276,8 +276,10 @@ def _root(square: Fraction) -> Interval:
     return (root, root) if root**2 == square else sqrt(square)
 
 
-def final_states(part: AgentsAnswer, influence: Influence) -> Intervals:
-    """Return where the agents end, with their velocities and so on."""
+def final_states(part: AgentsAnswer, influence: Influence) -> Intervals | None:
+    """Return where the agents end, with their velocities and so on; None if it is not enclosed in a large graph."""
+    if not influence.exact and influence.enclosure is None:
+        return None
     offsets, zero = part.protocol.offsets, Fraction(0)
     coordinates = []
     for q in range(part.dimension):
@@ -285,7 +287,10 @@ def final_states(part: AgentsAnswer, influence: Influence) -> Intervals:
             [(x - (h[q] if i == 0 else 0), zero) for i, x in enumerate(agent[q])]
             for agent, h in zip(part.initial_state or (), offsets, strict=True)
         ]
-        columns = [agents_ends(influence, [weighted_sum(row, chain) for chain in begin]) for row in part.motion]
+        try:
+            columns = [agents_ends(influence, [weighted_sum(row, chain) for chain in begin]) for row in part.motion]
+        except NotEnclosedError:
+            return None
         coordinates.append(list(zip(*columns, strict=True)))
     return tuple(
         tuple(

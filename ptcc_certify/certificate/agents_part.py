@@ -266,7 +266,7 @@ def prove_agents(
         common_motion(agents.coefficients, agents.own, gain),
     )
     decided = initial_state is not None and bool(used or not structure.graph.n_edges)
-    final = final_states(part, influence) if influence.exact and decided else None
+    final = final_states(part, influence) if decided else None
     return replace(part, final_state=final, residual=_residual(part), input=_input(part, influence))
 
 

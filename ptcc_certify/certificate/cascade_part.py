@@ -284,9 +284,9 @@ def prove_cascade(
         common_motion(agents.coefficients, agents.own, base.gain),
     )
     final = None
-    if influence.exact and initial_state is not None and part.settles:
+    if initial_state is not None and part.settles:
         final = final_states(part, influence)
-        if not part.derivatives_agree:
+        if final is not None and not part.derivatives_agree:
             final = tuple(tuple(chain[:1] for chain in agent) for agent in final)
     return replace(part, final_state=final, input=_input(part))
 

@@ -10,7 +10,7 @@ from ptcc_certify.bounds.cascade import Roots
 from ptcc_certify.certificate.agents_answer import AgentsAnswer, Residual, UsedFunction
 from ptcc_certify.certificate.agents_part import AgentsPart
 from ptcc_certify.certificate.cascade_part import CascadePart
-from ptcc_certify.certificate.format_vectors import Writer, interval_text, number, text
+from ptcc_certify.certificate.format_vectors import Interval, Writer, interval_text, number, text
 from ptcc_certify.checker.reading import exact, interval, triangle
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import Structure
@@ -21,6 +21,8 @@ from ptcc_certify.protocols.cascade import CascadeProtocol
 from ptcc_certify.theorems.agent_decrease import AgentMatrix
 
 Section = Mapping[str, Any]
+#: Bits of numerator and denominator up to which an enclosed final state is written as it is.
+_SHORT_BITS = 256
 
 
 def agents_section(part: AgentsAnswer, out: Writer) -> dict[str, Any]:
@@ -51,7 +53,7 @@ def _section_of_matrix(part: AgentsPart, out: Writer) -> dict[str, Any]:
         and _by_agent(out, [[_texts(chain) for chain in agent] for agent in part.initial_state]),
         "motion": [list(map(interval_text, row)) for row in part.motion],
         "final_state": part.final_state
-        and _by_agent(out, [[list(map(interval_text, chain)) for chain in agent] for agent in part.final_state]),
+        and _by_agent(out, [[list(map(_end_text, chain)) for chain in agent] for agent in part.final_state]),
         "residual": residual
         and {"clock": format_exact(residual.clock), "agents": _by_agent(out, list(map(_texts, residual.agents)))},
         "input": part.input
@@ -72,10 +74,17 @@ def _section_of_cascade(part: CascadePart, out: Writer) -> dict[str, Any]:
         "offsets": _by_agent(out, [_texts(row) for row in part.protocol.offsets]),
         "initial_state": begin and _by_agent(out, [[_texts(chain) for chain in agent] for agent in begin]),
         "motion": [list(map(interval_text, row)) for row in part.motion],
-        "final_state": final
-        and _by_agent(out, [[list(map(interval_text, chain)) for chain in agent] for agent in final]),
+        "final_state": final and _by_agent(out, [[list(map(_end_text, chain)) for chain in agent] for agent in final]),
         "input": bounds and {"agents": _by_agent(out, _texts(bounds)), "largest": format_exact(max(bounds))},
     }
+
+
+def _end_text(end: Interval) -> str | dict[str, str]:
+    """Write an interval: as it is where its numbers are short, as in large graphs; else as a ball around it."""
+    short = all(max(x.numerator.bit_length(), x.denominator.bit_length()) <= _SHORT_BITS for x in end)
+    if end[1] and short:
+        return {"mid": format_exact(end[0]), "radius": format_exact(end[1])}
+    return interval_text(end)
 
 
 def _texts(values: Sequence[Fraction]) -> list[str]:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from lmi.exact.definite import SparseFactor
-from ptcc_certify.bounds.final_state import Influence
+from ptcc_certify.bounds.final_state import Influence, enclosed_ends
 from ptcc_certify.checker.reading import RejectedError, exact
 from ptcc_certify.checker.side_files import SideFiles, beside
 from ptcc_certify.errors import FormatError
@@ -265,7 +265,15 @@ def influence_balls(matrix: Influence) -> tuple[list[list[Interval]], list[list[
 
 
 def agents_ends(matrix: Influence, begin: Sequence[Interval]) -> list[Interval]:
-    """Return ``Q x`` for intervals ``x`` of the agents."""
+    """Return ``Q x`` for intervals ``x`` of the agents.
+
+    Raises
+    ------
+    NotEnclosedError
+        Of a large graph, whose ``Q`` is enclosed: its equations are too ill-conditioned for floats.
+    """
+    if not matrix.exact:
+        return enclosed_ends(matrix, begin)
     left_null_vectors, containment_weights = influence_balls(matrix)
     groups = list(zip(matrix.balanced, left_null_vectors, strict=True))
     values = [weighted_sum(null_vector, [begin[v] for v in c.nodes]) for c, null_vector in groups]

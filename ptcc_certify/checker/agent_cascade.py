@@ -90,8 +90,7 @@ def check_cascade(doc: Document, verified: Verified) -> bool:
     moves = bool(graph.listening)
     proved = doc.data["influence"] is not None and (bool(used) or not moves)
     if section["final_state"] is not None:
-        told = proved and verified.final.weights is not None
-        need(told and states is not None, "a final state without initial states, weights, or a proof")
+        need(proved and states is not None, "a final state without initial states or a proof")
         rests = not moves or any(one.use.function.rate * gain.k > 2 for one in used)
         check_final_states(doc, agents, verified.final, M[: 1 + rests], states or (), offsets)
     doc.at = "agents.input"

@@ -103,7 +103,7 @@ def check_final_states(
 ) -> None:
     """Verify the interval of every agent, coordinate and derivative: ``h_k + sum_l Q_kl sum_j M_ij g_lj``.
 
-    Of as many derivatives as ``M`` has rows.
+    Of as many derivatives as ``M`` has rows. In the large form from the leaders' intervals and what followers leave.
     """
     doc.open("agent-final-state", "agents")
     labels, n = final.structure.graph.labels, agents.n
@@ -118,18 +118,28 @@ def check_final_states(
     ]
     for axis in range(agents.d):
         G = [[row[axis][j] - (offsets[v][axis] if j == 0 else 0) for v, row in enumerate(states)] for j in range(n)]
-        each = [final.enclosures(final.values(Numbers(g))) for g in G] if rounded else []
+        before = [final.values(Numbers(g)) for g in G] if rounded else []
+        each = list(map(final.enclosures, before))
         for i, row in enumerate(M):
-            ends = final.enclosures(final.values(Numbers(_combined([mid for mid, _ in row], G))))
-            for v, label in enumerate(labels):
-                x, r = ends[v]
-                r += sum(
-                    (wide * (abs(Q[v][0]) + Q[v][1]) for (_, wide), Q in zip(row, each, strict=False)), Fraction(0)
-                )
-                mid, radius = claimed[v][axis][i]
-                x += offsets[v][axis] if i == 0 else 0
-                need(abs(x - mid) + r <= radius, f"agent {shorten(label)} ends elsewhere")
+            values = final.values(Numbers(_combined([mid for mid, _ in row], G)))
+            own = [claimed[v][axis][i] for v in range(len(labels))]
+            mids = [mid - (offsets[v][axis] if i == 0 else 0) for v, (mid, _) in enumerate(own)]
+            for v, end in final.enclosures(values).items():
+                x, r = _wider(end, row, [ends[v] for ends in each])
+                need(abs(x - mids[v]) + r <= own[v][1], f"agent {shorten(labels[v])} ends elsewhere")
+            if final.weights is None:
+                wide = {k: _wider(value, row, [one[k] for one in before]) for k, value in values.items()}
+                final.check_followers(wide, (Numbers(mids), Numbers([radius for _, radius in own])))
     doc.done("exact" if final.exact and not rounded else "enclosed")
+
+
+def _wider(end: Interval, row: Sequence[Interval], before: Sequence[Interval]) -> Interval:
+    """Return an interval wider by what a rounded row of ``M`` makes of what is there ``before``, at time 0.
+
+    That is of positions, velocities and so on; empty if ``M`` is exact.
+    """
+    x, r = end
+    return x, r + sum((wide * (abs(y) + s) for (_, wide), (y, s) in zip(row, before, strict=False)), Fraction(0))
 
 
 def _combined(row: Sequence[Fraction], G: Sequence[Sequence[Fraction]]) -> list[Fraction]:

@@ -46,8 +46,10 @@ def check_agents(doc: Document, verified: Verified) -> bool:
     doc.at = "agents.final_state"
     final = verified.final
     proved = doc.data["influence"] is not None and (bool(used) or not graph.listening)
-    known = begin is not None and proved and final.weights is not None
-    need(known or section["final_state"] is None, "a final state without initial states, weights, or a proof")
+    need(
+        (begin is not None and proved) or section["final_state"] is None,
+        "a final state without initial states or a proof",
+    )
     if begin is not None and section["final_state"] is not None:
         check_final_states(doc, agents, final, M, begin.states, offsets)
     _bounds(doc, verified, agents, begin, used)

@@ -99,6 +99,50 @@ class FinalState:
             result |= {v: combined(row, list(values.values())) for v, row in rows}
         return result
 
+    def check_followers(
+        self, values: Mapping[int, Interval], intervals: tuple[Numbers, Numbers], spare: Fraction | None = None
+    ) -> Fraction:
+        """Verify intervals of the followers in the large form: ``|x_F - mid| <= max_i (|r_i| / (M(L_F) u)_i) u``.
+
+        All in integers: states over ``grid``, to which values of components are rounded where they do not fit, and
+        ``u`` over another scale. Returns the largest radius that is proved.
+
+        Parameters
+        ----------
+        values : mapping of int to Interval
+            Of every balanced closed component.
+        intervals : (Numbers, Numbers)
+            Middles and radii, by agent.
+        spare : Fraction, optional
+            How much wider than twice what is proved they may be; None: as wide as they like.
+        """
+        structure, graph, F = self.structure, self.structure.graph, self.structure.followers
+        (mids, scale), (radii, fine) = (numbers.over(F) for numbers in intervals)
+        wide = {k for k, (_, r) in values.items() if r or k in self.left_null_vectors}
+        single = {group[0]: values[k][0] for k, group, _ in structure.balanced if k not in wide}
+        (own,), other = integers([list(single.values())])
+        grid = math.lcm(scale, other)
+        if any(r or grid % x.denominator for x, r in map(values.__getitem__, wide)):
+            grid <<= GRID_BITS
+        middles = {v: x * (grid // scale) for v, x in zip(F, mids, strict=True)}
+        middles |= {v: x * (grid // other) for v, x in zip(single, own, strict=True)}
+        blurs: dict[int, int] = {}
+        for k, group, gauge in structure.balanced:
+            if k in wide:
+                value, r = values[k]
+                middle = math.floor(value * grid)
+                middles |= {v: g * middle for v, g in zip(group, gauge, strict=True)}
+                blurs |= dict.fromkeys(group, math.ceil(r * grid) + (middle != value * grid))
+        X, R = ([states.get(v, 0) for v in range(graph.n)] for states in (middles, blurs))
+        blur = graph.sums_in(R) if any(R) else R
+        worst, least = self.error([abs(x) + y for x, y in zip(graph.laplacian_product(X), blur, strict=True)])
+        # The radius that is proved is worst scaled_u / (least grid); all over least grid fine
+        share = least * grid
+        room = None if spare is None else math.floor(spare * (share * fine))
+        for v, radius, weight in zip(F, radii, self.scaled_u, strict=True):
+            _narrow(graph.labels[v], 0, worst * fine * weight, share * radius, room)
+        return Fraction(worst * max(self.scaled_u, default=0), share)
+
     @cached_property
     def projection(self) -> list[dict[int, Fraction]]:
         """The rows of ``Q``, which are exact."""
@@ -256,14 +300,14 @@ def _final(doc: Document, final: FinalState, section: Any, degenerate: Any, begi
         if x != mid or r != radius:
             _narrow(structure.graph.labels[v], abs(x - mid), r, radius, spare)
     widest = max(r for _, r in enclosures.values())
-    return widest if final.weights is not None else max(widest, _followers(final, shifted, values, intervals, spare))
+    return widest if final.weights is not None else max(widest, final.check_followers(values, intervals, spare))
 
 
 def _narrow(label: str, off: Any, error: Any, radius: Any, spare: Any) -> None:
-    """Verify that a radius takes in what is proved, off the middle, and is not much wider; all over one scale."""
+    """Verify that a radius takes in what is proved, off the middle, and unless it may be wider, not much more."""
     if off + error > radius:
         raise RejectedError(f"agent {shorten(label)} ends elsewhere")
-    if radius > 2 * error + spare:
+    if spare is not None and radius > 2 * error + spare:
         raise RejectedError(f"the interval of agent {shorten(label)} is wider than what is proved")
 
 
@@ -277,45 +321,6 @@ def state_intervals(doc: Document, graph: Digraph, section: Any) -> tuple[Number
         return mid, radius
     intervals = [interval(x) for x in ordered(graph.labels, section, "final_state").values()]
     return Numbers([x for x, _ in intervals]), Numbers([r for _, r in intervals])
-
-
-def _followers(
-    final: FinalState,
-    shifted: Numbers,
-    values: Mapping[int, Interval],
-    intervals: tuple[Numbers, Numbers],
-    spare: Fraction,
-) -> Fraction:
-    """Verify the followers' part of one final state: ``|x_F - mid| <= max_i (|r_i| / (M(L_F) u)_i) u``.
-
-    All in integers: states over ``grid``, to which values of leaders are rounded where they do not fit, and ``u``
-    over another scale. Returns the largest radius that is proved.
-    """
-    structure, graph, F = final.structure, final.structure.graph, final.structure.followers
-    (mids, scale), (radii, fine) = (numbers.over(F) for numbers in intervals)
-    single = [group[0] for k, group, _ in structure.balanced if k not in final.left_null_vectors]
-    own, other = shifted.over(single)
-    grid = math.lcm(scale, other)
-    if any(r or grid % x.denominator for x, r in map(values.__getitem__, final.left_null_vectors)):
-        grid <<= GRID_BITS
-    middles = {v: x * (grid // scale) for v, x in zip(F, mids, strict=True)}
-    middles |= {v: x * (grid // other) for v, x in zip(single, own, strict=True)}
-    wide: dict[int, int] = {}
-    for k, group, gauge in structure.balanced:
-        if k in final.left_null_vectors:
-            value, r = values[k]
-            middle = math.floor(value * grid)
-            middles |= {v: g * middle for v, g in zip(group, gauge, strict=True)}
-            wide |= dict.fromkeys(group, math.ceil(r * grid) + (middle != value * grid))
-    X, R = ([states.get(v, 0) for v in range(graph.n)] for states in (middles, wide))
-    blur = graph.sums_in(R) if any(R) else R
-    worst, least = final.error([abs(x) + y for x, y in zip(graph.laplacian_product(X), blur, strict=True)])
-    # The radius that is proved is worst scaled_u / (least grid); all over least grid fine
-    share = least * grid
-    room = math.floor(spare * (share * fine))
-    for v, radius, weight in zip(F, radii, final.scaled_u, strict=True):
-        _narrow(graph.labels[v], 0, worst * fine * weight, share * radius, room)
-    return Fraction(worst * max(final.scaled_u, default=0), share)
 
 
 def combined(weights: Sequence[Interval], values: Sequence[Interval]) -> Interval:

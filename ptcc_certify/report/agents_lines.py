@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lmi.exact.decimal_rounding import near, up
+from ptcc_certify.bounds.final_state import extremes
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.protocols.agents import DERIVATIVES, PLURALS, plant_text
 from ptcc_certify.report.text_layout import TEXT, columns, short_number, shorten_label, shorten_list, unbroken
@@ -58,8 +59,8 @@ def answers(part: AgentsAnswer) -> Iterator[tuple[str, str]]:
 def _final_lines(part: AgentsAnswer, width: int) -> Iterator[tuple[str, str]]:
     """Tell positions at ``T``, and velocities and so on unless all are 0."""
     if part.final_state is None:
-        if part.initial_state is not None and part.structure.graph.n_nodes > EXACT_NODES:
-            yield _ENDS[0], f"not proved of more than {EXACT_NODES} agents of order n"
+        if part.initial_state is not None and part.functions:
+            yield _ENDS[0], "not proved: the equations of followers or leaders are too ill-conditioned for floats"
         return
     labels = part.structure.graph.labels
     rest = not part.moving and part.settled > 1
@@ -74,6 +75,9 @@ def _final_lines(part: AgentsAnswer, width: int) -> Iterator[tuple[str, str]]:
         text = shorten_list(words, width - columns(kind) - 1)
         if len(set(places)) == 1 < len(places):
             text = f"{places[0]}, of every agent"
+        elif len(words) > EXACT_NODES and part.dimension == 1:
+            (m,), (least,) = extremes([row[0][0] for row in ends], 1, [row[0][1] for row in ends])
+            text = f"least {words[least]}, largest {words[m]}, of {len(words):,} agents"
         if i == 0 and part.protocol.gain_cap is not None:
             kind = f"{kind[:-1]}; without the cap)"
         yield _ENDS[i] if i < len(_ENDS) else f"x^({i})(T)", f"{text} {kind}"

@@ -340,8 +340,10 @@ def test_a_protocol_is_broken_between_terms_only():
         assert all(line.isprintable() for line in lines)
 
 
-def test_of_many_agents_of_order_n_it_is_told_that_no_final_state_is_proved():
-    star = SignedDigraph.from_edges([(0, k, 1) for k in range(1, 121)])
-    made = ptcc.certify(star, STRONG, [1] * 121, agents=ptcc.Agents(order=2), simulation=False, method="perron")
-    assert made.agents is not None and made.agents.final_state is None
-    assert "x(T)       not proved of more than 120 agents of order n" in summary_lines(made, "star")
+def test_of_many_agents_of_order_n_the_least_and_the_largest_final_state_are_told():
+    star = SignedDigraph.from_edges([(0, k, 1 if k % 2 else -1) for k in range(1, 121)])
+    options = {"agents": ptcc.Agents(order=2), "simulation": False, "method": "perron"}
+    made = ptcc.certify(star, STRONG, [3] * 121, v0=[1] * 121, **options)
+    lines = summary_lines(made, "star")
+    assert any(line.startswith("x(T)       least 2=-4, largest 0=4, of 121 agents (") for line in lines), lines
+    assert any(line.startswith("v(T)       least 2=-1, largest 0=1, of 121 agents (") for line in lines), lines
