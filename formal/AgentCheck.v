@@ -12,11 +12,11 @@ Definition table (n : nat) (f : nat -> nat -> list Q) : list (list (list Q)) :=
   map (fun i => map (f i) (seq 0 n)) (seq 0 n).
 Definition choose (b : bool) (p : list Q) : list Q := if b then p else [].
 
-(** an entry of [A_z], and of [b b' - r W - A_z W - W A_z'], as polynomials of [zeta] *)
+(** an entry of [A_z], and of [b b' - r W - A_z W - W A_z'], as polynomials of [zeta]; at the cap of the gain [theta] is 0 *)
 Definition pull_in (a : agents) : Q := rho2 (graph a) * kappa (graph a).
-Definition chain (a : agents) (i l : nat) : list Q :=
+Definition chain (a : agents) (grows : bool) (i l : nat) : list Q :=
   padd (choose (S i =? l)%nat [1])
-    (padd (choose (i =? l)%nat (pscale (- (index i / pull_in a)) [1; - (2 * slope a); slope a * slope a]))
+    (padd (choose (grows && (i =? l)%nat) (pscale (- (index i / pull_in a)) [1; - (2 * slope a); slope a * slope a]))
       (choose (S i =? degree a)%nat
         (padd [- nth l (damping a) 0] (repeat 0 (degree a - l) ++ [- nth l (plant a) 0])))).
 Definition fall_entry (a : agents) (A : nat -> nat -> list Q) (i j : nat) : list Q :=
@@ -24,23 +24,30 @@ Definition fall_entry (a : agents) (A : nat -> nat -> list Q) (i j : nat) : list
     (pscale (-1) (fold_right (fun l p => padd (padd (pscale (cell (W a) l j) (A i l)) (pscale (cell (W a) i l) (A j l))) p)
       [] (seq 0 (degree a)))).
 Definition look (T : list (list (list Q))) (i j : nat) : list Q := nth j (nth i T []) [].
-Definition fall_table (a : agents) : list (list (list Q)) :=
-  let A := table (degree a) (chain a) in table (degree a) (fun i j => map reduced (fall_entry a (look A) i j)).
+Definition fall_table (a : agents) (grows : bool) : list (list (list Q)) :=
+  let A := table (degree a) (chain a grows) in table (degree a) (fun i j => map reduced (fall_entry a (look A) i j)).
 (** nonnegative for all [zeta] from [low] to [high]: its Bernstein matrices are *)
 Definition check_interval (split : splitting) (n m : nat) (T : list (list (list Q))) (low high : Q) : bool :=
   let B := map (map (fun p => map reduced (bernstein m (moved low (high - low) p)))) T in
   forallb (fun i => psd split n (map (map (fun p => nth i p 0)) B)) (seq 0 (S m)).
 Fixpoint check_points (check : Q -> Q -> bool) (low : Q) (points : list Q) (last : Q) : bool :=
   match points with [] => Qeq_bool low last | p :: l => check low p && check_points check p l last end.
+(** the gain at the begin, without a cap and with one *)
+Definition begin_gain (a : agents) : Q := slope a + pull_in a / span (graph a).
+Definition first_gain (a : agents) : Q := match cap a with None => begin_gain a | Some G => lesser (begin_gain a) G end.
+Definition check_cap (split : splitting) (a : agents) : bool := match cap a with None => true | Some G =>
+  psd split (degree a) (map (map (fun p => reduced (evaluate p (/ G)))) (fall_table a false)) end.
 Definition check_decrease (split : splitting) (a : agents) (points : list Q) : bool :=
-  let n := degree a in let m := Nat.max n 2 in let T := fall_table a in
-  forallb (forallb (fun p : list Q => (length p <=? S m)%nat)) T &&
+  let n := degree a in let m := Nat.max n 2 in let T := fall_table a true in
+  forallb (forallb (fun p : list Q => (length p <=? S m)%nat)) T && check_cap split a &&
   match points with
-  | low :: p :: l => Qle_bool low 0 && check_points (check_interval split n m T) low (p :: l) (/ (slope a + pull_in a / span (graph a)))
-  | _ => false end.
+  | low :: p :: l => Qle_bool low (match cap a with None => 0 | Some G => / G end) &&
+      check_points (check_interval split n m T) low (p :: l) (/ begin_gain a)
+  | _ => match cap a with None => false | Some G => Qle_bool G (begin_gain a) end end.
 Definition row_times (n : nat) (r c : nat -> Q) : Q := qsum (map (fun l => r l * c l) (seq 0 n)).
 Definition check_matrices (split : splitting) (a : agents) : bool :=
-  let n := degree a in psd split n (W a) && forallb pos [coupling a; falls a] && notneg (slope a) && (0 <? n)%nat &&
+  let n := degree a in psd split n (W a) && forallb pos [coupling a; falls a] &&
+  (notneg (slope a) && match cap a with None => true | Some G => pos G end) && (0 <? n)%nat &&
   square n (fun i j => Qeq_bool (cell (P a) i j) (cell (P a) j i) &&
     Qeq_bool (row_times n (cell (W a) i) (fun l => cell (P a) l j)) (if (i =? j)%nat then 1 else 0)) &&
   forallb (fun i => Qeq_bool (row_times n (cell (W a) i) (fun l => nth l (gains a) 0))
@@ -50,7 +57,7 @@ Definition check_coupling (a : agents) : bool := forallb (fun k => match nth_err
 
 (** where they end *)
 Definition check_agree (a : agents) : bool := negb (agree a) ||
-  (negb (Qle_bool (falls a * pull_in a) (2 * index (pred (degree a)))) && existsb (fun k => match nth_error (funcs (graph a)) k with
+  (negb (Qle_bool (falls a * pull_in a) (2 * index (pred (degree a)))) && match cap a with None => true | Some _ => false end && existsb (fun k => match nth_error (funcs (graph a)) k with
     | Some f => match deviation f with Some _ => true | None => false end | None => false end) (used a)).
 (** [q^m / m!] *)
 Fixpoint part (q : Q) (m : nat) : Q := match m with O => 1 | S m' => q / index (S m') * part q m' end.
@@ -75,7 +82,7 @@ Definition check_ends_of (a : agents) : bool := match drift a with None => true 
 (** the input: by each function the square of what relative states take at most, over its value at the begin; that *)
 Fixpoint powq (q : Q) (m : nat) : Q := match m with O => 1 | S m' => q * powq q m' end.
 Definition begin_rows (a : agents) (x : axis) : list (list Q) :=
-  let g := / (slope a + pull_in a / span (graph a)) in
+  let g := / first_gain a in
   map (fun i => map (fun q => reduced (q * powq g i)) (placed_q x i)) (seq 0 (degree a)).
 Definition worth_q (a : agents) (F : Vec.mat) (m : Z) (rows : list (list Q)) : Q :=
   let n := degree a in let e := common (concat rows) in let zs := map (map (scaled e)) rows in
@@ -84,17 +91,35 @@ Definition worth_q (a : agents) (F : Vec.mat) (m : Z) (rows : list (list Q)) : Q
     (inject_Z (nth j (nth i G []) 0%Z + nth i (nth j G []) 0%Z) / inject_Z (2 * m * (e * e))))) (seq 0 n))) (seq 0 n)).
 Definition check_rows (N : nat) (rows : list (list Q)) : bool :=
   forallb (fun r : list Q => (length r =? N)%nat && good (common (concat rows)) r) rows.
-Definition check_tops (a : agents) : bool := match tops a with [] => true | l =>
-  let c := graph a in let n := degree a in let d := prepare c in let rows := map (begin_rows a) (axes a) in
-  let g := slope a + pull_in a / span c in
+Definition check_begins (a : agents) : bool := let N := order (graph a) in
+  forallb (fun x => (length (offsets x) =? N)%nat && (length (nth 0 (begins x) []) =? N)%nat) (axes a) &&
+  forallb (check_rows N) (map (begin_rows a) (axes a)).
+(** over all coordinates of space *)
+Definition worth_all (a : agents) (F : Vec.mat) (m : Z) : Q := qsum (map (worth_q a F m) (map (begin_rows a) (axes a))).
+(** a bound of the gain, of which the power is never above what the decay leaves *)
+Definition pace (a : agents) : option Q :=
+  if Qle_bool (2 * index (degree a)) (falls a * pull_in a) then Some (first_gain a) else cap a.
+Definition check_tops (a : agents) : bool := match tops a, pace a with [], _ => true | _, None => false | l, Some g =>
+  let c := graph a in let n := degree a in let d := prepare c in
   let added := match kind c with Nominal _ => 0 | SlidingMode _ _ mu1 _ _ _ => mu1 * index (length (axes a)) end in
   let known := flat_map (fun k => match nth_error (funcs c) k with None => [] | Some f =>
     match bounds_of c d f, form (order c) (dls d) (dL d) (ly f) with
-    | Some (_, cs, _), Some (F, m) => [(cs, reduced (powq g (2 * n) * (coupling a * nth (pred n) (gains a) 0) *
-        qsum (map (worth_q a F m) rows)))]
+    | Some (_, cs, _), Some (F, m) =>
+        [(cs, reduced (powq g (2 * n) * (coupling a * nth (pred n) (gains a) 0) * worth_all a F m))]
     | _, _ => [] end end) (used a) in
-  forallb (Qeq_bool 0) (damping a) && Qle_bool (2 * index n) (falls a * pull_in a) && fits (order c) (dL d) && good (common (start c)) (start c) &&
-  forallb (fun x => (length (offsets x) =? order c)%nat && (length (nth 0 (begins x) []) =? order c)%nat) (axes a) &&
-  forallb (check_rows (order c)) rows &&
+  forallb (Qeq_bool 0) (damping a) && fits (order c) (dL d) && good (common (start c)) (start c) && check_begins a &&
   forallb (fun j => let rest := nth j l 0 - added - qsum (map (fun x => Qabs (nth 0 (plant a) 0 * nth j (offsets x) 0)) (axes a)) in
     Qle_bool 0 rest && existsb (fun p : list Q * Q => Qle_bool (nth j (fst p) 0 * snd p) (rest * rest)) known) (seq 0 (order c)) end.
+
+(** what is left at the deadline under a cap, which the gain reaches [w] before it: [e^y <= T/w] if the clock goes that far *)
+Definition check_left (a : agents) : bool := match left_over a, cap a with None, _ => true | _, None => false | Some (q, rows), Some G =>
+  let c := graph a in let n := degree a in let d := prepare c in
+  let w := if Qle_bool G (begin_gain a) then span c else pull_in a / (G - slope a) in
+  let y := reduced ((q - slope a * (span c - w) - G * w) / pull_in a) in let y := if notneg y then y else 0 in
+  let b := twice_4 (floor (horner (reduced (falls a * q / 16)) 0 100)) in
+  let known := flat_map (fun k => match nth_error (funcs c) k with None => [] | Some f =>
+    match deviation f, form (order c) (dls d) (dL d) (ly f) with
+    | Some (_, cs), Some (F, m) => [(cs, worth_all a F m)] | _, _ => [] end end) (used a) in
+  notneg q && negb (Qle_bool 1 (term (y / 16) 0 101)) && Qle_bool (twice_4 (ceil (above (y / 16)))) (span c / w) && check_begins a &&
+  forallb (fun j => forallb (fun i => let x := nth i (nth j rows []) 0 in notneg x && existsb (fun p : list Q * Q =>
+    Qle_bool (powq G (2 * i) * (nth j (fst p) 0 * cell (W a) i i * snd p)) (x * x * b)) known) (seq 0 n)) (seq 0 (order c)) end.

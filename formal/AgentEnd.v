@@ -63,7 +63,6 @@ Let d := prepare c.
 Hypothesis Hedges : check_edges c (dls d) = true.
 Hypothesis Hend : check_end c d = true.
 Hypothesis Hprot : check_protocol c = true.
-Hypothesis Hslope : 0 <= Q2R (slope a).
 Hypothesis Hn : (0 < n)%nat.
 Hypothesis HX : flies a h X Sl.
 
@@ -166,54 +165,88 @@ Proof.
 Qed.
 End End.
 
-(** * What a power of the gain leaves of the decay *)
+(** * What a power of the gain leaves of the decay, and how far the clock goes *)
 Section Powers.
 Variable a : agents.
 Let c := graph a.
 Let T := deadline c.
 Hypothesis Hprot : check_protocol c = true.
-Hypothesis Hslope : 0 <= Q2R (slope a).
-Lemma eta_derive t : t < T -> is_derive (eta a) t (k c / sq (T - t)).
-Proof.
-  intros Ht. unfold eta, gain, sq. fold c T. auto_derive; [lra|]. replace (T + - t) with (T - t) by ring. field. lra.
-Qed.
+Hypothesis Hgain : positive_gain a.
 Lemma powers m q : INR m <= q * k c -> forall t, 0 <= t < T -> exp (- (q * turns a t)) * eta a t ^ m <= eta a 0 ^ m.
 Proof.
   intros Hq t Ht. destruct (T_k a Hprot) as [A B]. fold c T in A, B.
+  assert (q0 : 0 <= q) by (pose proof (pos_INR m); nra).
   assert (D : exp (- (q * turns a t)) * eta a t ^ m <= exp (- (q * turns a 0)) * eta a 0 ^ m).
-  { apply (decreasing T 0 (fun t => exp (- (q * turns a t)) * eta a t ^ m) (fun t => - (q * eta a t) * exp (- (q * turns a t)) * eta a t ^ m
-      + exp (- (q * turns a t)) * (INR m * (k c / sq (T - t)) * eta a t ^ pred m))); [| | |exact Ht]; clear t Ht.
-    - intros t Ht. apply (is_derive_mult (fun t => exp (- (q * turns a t))) (fun t => eta a t ^ m)); [| |intros; apply Rmult_comm].
-      + evar_last. { apply is_derive_comp; [apply is_derive_exp|]. apply @is_derive_opp. apply is_derive_scal. apply (turns_derive a Hprot). apply Ht. }
-        unfold scal, opp; simpl; unfold mult; simpl. ring.
-      + apply (is_derive_pow (eta a) m). apply eta_derive. apply Ht.
-    - intros t Ht. apply (continuous_mult (fun t => exp (- (q * turns a t))) (fun t => eta a t ^ m)); apply @ex_derive_continuous.
-      + eexists. apply is_derive_comp; [apply is_derive_exp|]. apply @is_derive_opp. apply is_derive_scal. apply (turns_derive a Hprot). apply Ht.
-      + apply ex_derive_pow. eexists. apply eta_derive. apply Ht.
-    - intros t Ht. pose proof (exp_pos (- (q * turns a t))) as E. pose proof (eta_pos a Hprot Hslope t (proj2 Ht)) as P.
-      destruct m as [|m].
-      + rewrite pow_O. simpl INR in *. assert (q0 : 0 <= q) by nra. set (x := exp (- (q * turns a t))) in *. set (e := eta a t) in *.
-        assert (0 <= q * e) by nra. assert (0 <= q * e * x) by nra. simpl pow. lra.
-      + simpl pred. rewrite <- tech_pow_Rmult. pose proof (pow_lt (eta a t) m P) as P'.
-        assert (K : k c * (k c / sq (T - t)) <= sq (eta a t)).
-        { unfold eta, gain. fold c T. replace (k c * (k c / sq (T - t))) with (sq (k c / (T - t))) by (unfold sq; field; lra).
-          assert (0 < k c / (T - t)) by (apply Rdiv_lt_0_compat; lra). unfold sq. apply Rmult_le_compat; lra. }
-        assert (K2 : INR (S m) * (k c / sq (T - t)) <= q * sq (eta a t)).
-        { assert (0 <= INR (S m)) by apply pos_INR. assert (0 < k c / sq (T - t)) by (apply Rdiv_lt_0_compat; [lra|unfold sq; nra]).
-          assert (q0 : 0 <= q) by nra. apply (Rle_trans _ (q * k c * (k c / sq (T - t)))); [nra|].
-          replace (q * k c * (k c / sq (T - t))) with (q * (k c * (k c / sq (T - t)))) by ring. apply Rmult_le_compat_l; assumption. }
-        unfold sq in K2 at 2. set (g := k c / sq (T - t)) in *. set (e := eta a t) in *. set (x := exp (- (q * turns a t))) in *.
-        replace (- (q * e) * x * (e * e ^ m) + x * (INR (S m) * g * e ^ m)) with (x * e ^ m * (INR (S m) * g - q * (e * e))) by ring.
-        assert (0 <= x * e ^ m) by nra. nra. }
-  assert (T0 : turns a 0 = 0).
-  { unfold turns, clock. fold c T. rewrite Rminus_0_r. replace (T / T) with 1 by (field; lra). rewrite ln_1. ring. }
-  rewrite T0, Rmult_0_r, Ropp_0, exp_0, Rmult_1_l in D. exact D.
+  { assert (DE : forall t, t < T -> is_derive (fun t => exp (- (q * turns a t))) t (- (q * eta a t) * exp (- (q * turns a t)))).
+    { clear t Ht. intros t Ht. evar_last. { apply is_derive_comp; [apply is_derive_exp|]. apply @is_derive_opp. apply is_derive_scal.
+      apply (turns_derive a Hprot). exact Ht. } unfold scal, opp; simpl; unfold mult; simpl. ring. }
+    apply (FamilyFlow.falls (fun t => exp (- (q * turns a t)) * eta a t ^ m) 0 T (fun _ => corner a)); [| |exact Ht]; clear t Ht; intros t Ht.
+    - apply (continuous_mult (fun t => exp (- (q * turns a t))) (fun t => eta a t ^ m)).
+      + apply @ex_derive_continuous. eexists. apply DE. apply Ht.
+      + apply continuous_power, (eta_continuous a). apply Ht.
+    - intros Hc. destruct (eta_derive a Hprot Hgain t (proj2 Ht) (Hc O)) as [d [Dd [d0 dk]]]. fold c in dk.
+      exists (- (q * eta a t) * exp (- (q * turns a t)) * eta a t ^ m + exp (- (q * turns a t)) * (INR m * d * eta a t ^ pred m)). split.
+      + apply (is_derive_mult (fun t => exp (- (q * turns a t))) (fun t => eta a t ^ m)); [apply DE, Ht|apply (is_derive_pow (eta a) m); exact Dd|].
+        intros; apply Rmult_comm.
+      + pose proof (exp_pos (- (q * turns a t))) as E. pose proof (eta_pos a Hprot Hgain t (proj2 Ht)) as P.
+        destruct m as [|m].
+        * simpl. set (x := exp (- (q * turns a t))) in *. set (e := eta a t) in *. assert (0 <= q * e) by nra. assert (0 <= q * e * x) by nra. lra.
+        * simpl pred. rewrite <- tech_pow_Rmult. pose proof (pow_lt (eta a t) m P) as P'.
+          assert (K : INR (S m) * d <= q * sq (eta a t)).
+          { apply (Rle_trans _ (q * (k c * d))); [|apply Rmult_le_compat_l; assumption]. rewrite <- Rmult_assoc. apply Rmult_le_compat_r; assumption. }
+          unfold sq in K. set (e := eta a t) in *. set (x := exp (- (q * turns a t))) in *.
+          replace (- (q * e) * x * (e * e ^ m) + x * (INR (S m) * d * e ^ m)) with (x * e ^ m * (INR (S m) * d - q * (e * e))) by ring.
+          assert (0 <= x * e ^ m) by nra. nra. }
+  rewrite (turns_0 a), Rmult_0_r, Ropp_0, exp_0, Rmult_1_l in D. exact D.
+Qed.
+Lemma eta_integrable u v : u < T -> v < T -> ex_RInt (eta a) u v.
+Proof.
+  intros Hu Hv. apply (ex_RInt_continuous (eta a)). intros z [_ Hz]. apply eta_continuous.
+  eapply Rle_lt_trans; [exact Hz|]. apply Rmax_lub_lt; assumption.
+Qed.
+Lemma turns_pos t : 0 <= t < T -> 0 <= turns a t.
+Proof.
+  intros Ht. apply RInt_ge_0; [lra|apply eta_integrable; lra|]. intros u Hu. left. apply (eta_pos a Hprot Hgain). fold c T. lra.
+Qed.
+(** the gain is at most its cap, and so is what a decay leaves of its powers *)
+Lemma capped G m q : cap a = Some G -> 0 <= q -> forall t, 0 <= t < T -> exp (- (q * turns a t)) * eta a t ^ m <= Q2R G ^ m.
+Proof.
+  intros EG q0 t Ht. pose proof (turns_pos t Ht) as P. pose proof (eta_pos a Hprot Hgain t (proj2 Ht)) as E.
+  assert (B : eta a t <= Q2R G) by (unfold eta; rewrite EG; apply Rmin_r).
+  assert (X : exp (- (q * turns a t)) <= 1).
+  { rewrite <- exp_0. destruct (Req_dec (q * turns a t) 0) as [Z|Z]; [rewrite Z, Ropp_0; lra|]. left. apply exp_increasing.
+    assert (0 <= q * turns a t) by (apply Rmult_le_pos; assumption). lra. }
+  rewrite <- (Rmult_1_l (Q2R G ^ m)). apply Rmult_le_compat; [left; apply exp_pos|apply pow_le; lra|exact X|apply pow_incr; lra].
+Qed.
+Lemma uncapped_clock t : 0 <= t < T -> RInt (uncapped a) 0 t = clock T (Q2R (slope a)) (k c) t.
+Proof.
+  intros Ht. destruct (T_k a Hprot) as [A B]. fold c T in A, B. apply is_RInt_unique.
+  replace (clock T (Q2R (slope a)) (k c) t) with (minus (clock T (Q2R (slope a)) (k c) t) (clock T (Q2R (slope a)) (k c) 0)).
+  - apply (is_RInt_derive (clock T (Q2R (slope a)) (k c)) (uncapped a)); rewrite Rmin_left, Rmax_right by lra; intros u Hu.
+    + unfold clock, uncapped, gain. fold c T. auto_derive.
+      * split; [lra|]. split; [|exact I]. apply Rdiv_lt_0_compat; lra.
+      * field. lra.
+    + apply (uncapped_continuous a). fold c T. lra.
+  - unfold minus, plus, opp, clock; simpl. rewrite Rminus_0_r. replace (T / T) with 1 by (field; lra). rewrite ln_1. ring.
+Qed.
+Lemma turns_clock t : cap a = None -> 0 <= t < T -> turns a t = clock T (Q2R (slope a)) (k c) t.
+Proof. intros E Ht. rewrite <- uncapped_clock by exact Ht. unfold turns, eta, uncapped. rewrite E. reflexivity. Qed.
+(** where the gain reaches its cap at [t1] *)
+Lemma turns_late G t1 t : cap a = Some G -> 0 <= t1 <= t -> t < T -> (forall u, 0 <= u < t1 -> uncapped a u <= Q2R G) ->
+  (forall u, t1 < u < T -> Q2R G <= uncapped a u) -> turns a t = clock T (Q2R (slope a)) (k c) t1 + Q2R G * (t - t1).
+Proof.
+  intros EG H1 Ht Below Above. unfold turns. rewrite <- (RInt_Chasles (eta a) 0 t1 t) by (apply eta_integrable; lra).
+  rewrite <- uncapped_clock by lra. change (plus ?u ?v) with (u + v). f_equal.
+  - apply RInt_ext. rewrite Rmin_left, Rmax_right by lra. intros u Hu. unfold eta. rewrite EG. apply Rmin_left. apply Below. lra.
+  - rewrite (RInt_ext (eta a) (fun _ => Q2R G)).
+    + rewrite RInt_const. unfold scal; simpl; unfold mult; simpl. ring.
+    + rewrite Rmin_left, Rmax_right by lra. intros u Hu. unfold eta. rewrite EG. apply Rmin_right. apply Above. lra.
 Qed.
 (** what falls as the derivative [i] of a deviation does vanishes at the deadline *)
-Lemma vanishes (z : R -> R) i r C : 0 <= C -> 2 * INR i < r * k c ->
+Lemma vanishes (z : R -> R) i r C : cap a = None -> 0 <= C -> 2 * INR i < r * k c ->
   (forall t, 0 <= t < T -> sq (z t) <= sq (eta a t ^ i) * (C * exp (- (r * turns a t)))) -> filterlim z (at_left T) (locally 0).
 Proof.
-  intros HC Hr Hz. destruct (T_k a Hprot) as [A B]. fold c T in A, B. set (q := 2 * INR i / k c). set (b := r - q).
+  intros EC HC Hr Hz. destruct (T_k a Hprot) as [A B]. pose proof (proj1 Hgain) as R0. fold c T in A, B. set (q := 2 * INR i / k c). set (b := r - q).
   assert (Eq : q * k c = 2 * INR i) by (unfold q; field; lra). assert (Hb : 0 < b) by (unfold b; nra).
   assert (K : quiet 1 T (fun _ _ => 0) 0) by (split; [lra|]; intros; reflexivity).
   apply (reaches 1 T (Q2R (slope a) + 1) (k c) A ltac:(lra) B (fun t _ => z t) (fun _ _ => 0) 0 K 0%nat 0
@@ -225,7 +258,7 @@ Proof.
     rewrite !P in K'.
     assert (E : exp (- (r * turns a t)) = exp (- (q * turns a t)) * exp (- (b * turns a t))) by (rewrite <- exp_plus; f_equal; unfold b; ring).
     rewrite E. assert (E2 : exp (- (b * turns a t)) <= exp (b * T) * exp (- (b * clock T (Q2R (slope a) + 1) (k c) t))).
-    { rewrite <- exp_plus. assert (M : forall u v, u <= v -> exp u <= exp v) by (intros u v [L| ->]; [left; apply exp_increasing; exact L|right; reflexivity]). apply M. unfold turns, clock. fold c T. nra. }
+    { rewrite <- exp_plus. assert (M : forall u v, u <= v -> exp u <= exp v) by (intros u v [L| ->]; [left; apply exp_increasing; exact L|right; reflexivity]). apply M. rewrite (turns_clock t EC Ht). unfold clock. fold c T. nra. }
     pose proof (exp_pos (- (b * turns a t))). pose proof (Rle_0_sqr (eta a 0 ^ i)) as S0. fold (sq (eta a 0 ^ i)) in S0.
     apply Rle_trans with (sq (eta a 0 ^ i) * C * exp (- (b * turns a t))).
     + replace (sq (eta a t ^ i) * (C * (exp (- (q * turns a t)) * exp (- (b * turns a t)))))

@@ -42,10 +42,10 @@ Let n := degree a.
 Let N := order c.
 Let T := deadline c.
 Hypothesis Hprot : check_protocol c = true.
-Hypothesis Hslope : 0 <= Q2R (slope a).
+Hypothesis Hgain : positive_gain a.
 Hypothesis Hn : (0 < n)%nat.
 Let HT : 0 < T := proj1 (T_pos c Hprot).
-Let eta_positive t : t < T -> 0 < eta a t := eta_pos a Hprot Hslope t.
+Let eta_positive t : t < T -> 0 < eta a t := eta_pos a Hprot Hgain t.
 Definition by_agent (x : nat * nat -> R) (i j : nat) := x (i, j).
 Definition moved_ t (x : nat * nat -> R) (p : nat * nat) : R := let (i, j) := p in if (S i =? n)%nat
   then control a h (by_agent x) t j - sum n (fun l => at_ (plant a) l * x (l, j)) else x (S i, j).
@@ -53,11 +53,6 @@ Definition moved_ t (x : nat * nat -> R) (p : nat * nat) : R := let (i, j) := p 
 Let still_ (p : nat * nat) : R := let (i, j) := p in if (i =? 0)%nat then h j else 0.
 Let first (p : nat * nat) : R := let (i, j) := p in if (i <? n)%nat && (j <? N)%nat then begin i j else still_ p.
 
-Lemma eta_grows t u : t <= u < T -> eta a t <= eta a u.
-Proof.
-  intros H. pose proof (proj2 (proj2 (T_pos c Hprot))) as K. unfold eta, gain. fold c T. apply Rplus_le_compat_l. unfold Rdiv.
-  apply Rmult_le_compat_l; [lra|]. apply Rinv_le_contravar; lra.
-Qed.
 Lemma moved_bounded v : 0 <= v < T -> exists M, 0 <= M /\ forall t p, 0 <= t <= v -> bounded_by M (fun x => moved_ t x p).
 Proof.
   intros Hv. destruct (lap_lipschitz (edges c)) as [K [HK [_ L]]]. pose proof (eta_positive 0 HT) as E0. pose proof (eta_positive v ltac:(lra)) as Ev.
@@ -76,7 +71,7 @@ Proof.
       with (/ eta a t ^ l * (x (l, q) - z (l, q))) by (field; apply pow_nonzero; lra).
     rewrite Rabs_mult. apply Rmult_le_compat; try apply Rabs_pos; [|apply H].
     rewrite Rabs_right by (apply Rle_ge; left; apply Rinv_0_lt_compat; apply pow_lt; exact Et). unfold r. rewrite pow_inv.
-    apply Rinv_le_contravar; [apply pow_lt; exact E0|]. apply pow_incr. split; [lra|]. apply eta_grows. lra. }
+    apply Rinv_le_contravar; [apply pow_lt; exact E0|]. apply pow_incr. split; [lra|]. apply (eta_grows a Hprot). fold c T. lra. }
   assert (YL : forall l, bounded_by (K * r l) (fun x => lap (edges c) (y a h (by_agent x) t l) j)).
   { intros l x z d H. rewrite Rmult_assoc. apply L. intros q. apply Y. exact H. }
   unfold control. fold n c. apply (bounded_le (0 + (eta a v ^ n * sum n row) + sum n (fun l => Rabs (at_ (plant a) l) * 1))).
@@ -84,7 +79,7 @@ Proof.
   unfold Rminus. apply bounded_plus; [apply bounded_plus; [apply bounded_const|]|].
   - apply (bounded_ext _ (fun x => - eta a t ^ n * sum n (fun i => at_ (gains a) i * lap (edges c) (y a h (by_agent x) t i) j +
       at_ (damping a) i * y a h (by_agent x) t i j))); [intros; ring|]. apply bounded_times.
-    + rewrite Rabs_Ropp, Rabs_right by (apply Rle_ge, pow_le; lra). apply pow_incr. split; [lra|]. apply eta_grows. lra.
+    + rewrite Rabs_Ropp, Rabs_right by (apply Rle_ge, pow_le; lra). apply pow_incr. split; [lra|]. apply (eta_grows a Hprot). fold c T. lra.
     + apply bounded_sum. intros l. apply bounded_plus; apply bounded_times; auto using Rle_refl.
   - apply (bounded_ext _ (fun x => sum n (fun l => - at_ (plant a) l * x (l, j)))).
     { intros x. rewrite (sum_ext n _ (fun l => -1 * (at_ (plant a) l * x (l, j)))) by (intros; ring). rewrite sum_scal. ring. }
@@ -105,9 +100,8 @@ Qed.
 Lemma moved_continuous x p t : t < T -> continuous (fun u => moved_ u x p) t.
 Proof.
   intros Ht. destruct p as [i j]. cbn [moved_]. destruct (S i =? n)%nat; [|apply continuous_const].
-  assert (E : continuous (eta a) t) by (apply gain_continuous; exact Ht).
-  assert (P : forall m, continuous (fun u => eta a u ^ m) t).
-  { induction m as [|m IH]; simpl; [apply continuous_const|]. apply continuous_times; assumption. }
+  assert (E : continuous (eta a) t) by (apply eta_continuous; exact Ht).
+  assert (P : forall m, continuous (fun u => eta a u ^ m) t) by (intros m; apply continuous_power; exact E).
   assert (I : forall m, continuous (fun u => / eta a u ^ m) t).
   { intros m. apply (continuous_comp (fun u => eta a u ^ m) Rinv); [apply P|]. apply continuous_Rinv. apply pow_nonzero.
     apply Rgt_not_eq, eta_positive. exact Ht. }

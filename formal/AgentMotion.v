@@ -2,6 +2,7 @@
 Require Import ZArith QArith Qreals List Bool Reals Lra Lia Psatz FunctionalExtensionality.
 From Coquelicot Require Import Coquelicot.
 Import ListNotations.
+Require FamilyFlow.
 Require Import Vec Definite Graph Flow Certificate Checker Sound Input Slide Main Weighted AgentCertificate AgentForms AgentFall.
 Open Scope R_scope.
 
@@ -100,6 +101,112 @@ Proof.
   apply IH. intros; apply K. right. assumption.
 Qed.
 
+(** * The gain, and its clock *)
+(** numbers that make the gain positive; the instant at which it reaches its cap; [theta] of the paper, [1/eta]' less *)
+Definition positive_gain (a : agents) : Prop := 0 <= Q2R (slope a) /\ forall G, cap a = Some G -> 0 < Q2R G.
+Definition uncapped (a : agents) t : R := gain (deadline (graph a)) (Q2R (slope a)) (k (graph a)) t.
+Definition corner (a : agents) : R :=
+  match cap a with Some G => deadline (graph a) - k (graph a) / (Q2R G - Q2R (slope a)) | None => 0 end.
+Definition theta (a : agents) t : R := let free := sq (1 - Q2R (slope a) * / eta a t) / k (graph a) in
+  match cap a with Some G => if Rlt_dec (Q2R G) (uncapped a t) then 0 else free | None => free end.
+Section Gain.
+Variable a : agents.
+Let c := graph a.
+Let T := deadline c.
+Let rho := Q2R (slope a).
+Hypothesis Hprot : check_protocol c = true.
+Hypothesis Hgain : positive_gain a.
+Lemma T_k : 0 < T /\ 0 < k c.
+Proof. destruct (T_pos c Hprot) as [A [_ B]]. split; assumption. Qed.
+Lemma uncapped_pos t : t < T -> rho < uncapped a t.
+Proof.
+  intros Ht. destruct T_k as [A B]. unfold uncapped, gain. fold c T rho. assert (0 < k c / (T - t)) by (apply Rdiv_lt_0_compat; lra). lra.
+Qed.
+Lemma uncapped_continuous t : t < T -> continuous (uncapped a) t.
+Proof. apply Exist.gain_continuous. Qed.
+Lemma eta_pos t : t < T -> 0 < eta a t.
+Proof.
+  intros Ht. destruct Hgain as [R0 R1]. fold rho in R0. pose proof (uncapped_pos t Ht) as P. unfold eta. change (gain _ _ _ t) with (uncapped a t).
+  destruct (cap a) as [G|]; [|lra]. specialize (R1 G eq_refl). apply Rmin_pos; lra.
+Qed.
+Lemma eta_continuous t : t < T -> continuous (eta a) t.
+Proof.
+  intros Ht. pose proof (uncapped_continuous t Ht) as C. unfold eta. change (fun t => _) with (fun t => match cap a with None => uncapped a t | Some G => Rmin (uncapped a t) (Q2R G) end).
+  destruct (cap a) as [G|]; [|exact C].
+  apply (continuous_ext (fun u => / 2 * (uncapped a u + Q2R G - Rabs (uncapped a u - Q2R G)))).
+  { intros u. unfold Rmin, Rabs. destruct (Rle_dec _ _), (Rcase_abs _); lra. }
+  apply (continuous_mult (fun _ => / 2)); [apply continuous_const|]. apply (continuous_minus (fun u => uncapped a u + Q2R G)).
+  - apply (continuous_plus (uncapped a) (fun _ => Q2R G)); [exact C|apply continuous_const].
+  - apply (continuous_comp (fun u => uncapped a u - Q2R G) Rabs); [|apply continuous_Rabs].
+    apply (continuous_minus (uncapped a) (fun _ => Q2R G)); [exact C|apply continuous_const].
+Qed.
+Lemma turns_derive t : t < T -> is_derive (turns a) t (eta a t).
+Proof.
+  intros Ht. destruct T_k as [A B]. apply (is_derive_RInt (eta a) (turns a) 0 t); [|apply eta_continuous; exact Ht].
+  assert (He : 0 < T - t) by lra. exists (mkposreal _ He). intros u Hu. unfold ball in Hu; simpl in Hu;
+    unfold AbsRing_ball, abs, minus, plus, opp in Hu; simpl in Hu. apply Rabs_def2 in Hu.
+  apply (RInt_correct (eta a)). apply (ex_RInt_continuous (eta a)). intros z [_ Hz]. apply eta_continuous.
+  eapply Rle_lt_trans; [exact Hz|]. apply Rmax_lub_lt; lra.
+Qed.
+Lemma turns_0 : turns a 0 = 0.
+Proof. unfold turns. apply (RInt_point 0 (eta a)). Qed.
+Lemma uncapped_derive t : t < T -> is_derive (uncapped a) t (k c / sq (T - t)).
+Proof.
+  intros Ht. unfold uncapped, gain, sq. fold c T. auto_derive; [lra|]. replace (T + - t) with (T - t) by ring. field. lra.
+Qed.
+Lemma inverse_derive t : t < T -> is_derive (fun u => / uncapped a u) t (- (sq (1 - rho * / uncapped a t) / k c)).
+Proof.
+  intros Ht. destruct T_k as [A B], Hgain as [R0 _]. fold rho in R0. pose proof (uncapped_pos t Ht) as E. unfold sq. unfold uncapped, gain in E |- *. fold c T rho in E |- *.
+  auto_derive.
+  - split; [lra|]. split; [|exact I]. apply Rgt_not_eq. replace (T + - t) with (T - t) by ring. lra.
+  - replace (T + - t) with (T - t) by ring. assert (0 <= rho * (T - t)) by (apply Rmult_le_pos; lra).
+    field. repeat split; lra.
+Qed.
+(** near an instant that is not the corner the gain is what it is there: free, or at its cap *)
+Lemma locally_eta t : t < T -> t <> corner a -> theta a t = sq (1 - rho * / eta a t) / k c /\ locally t (fun u => uncapped a u = eta a u) \/
+  theta a t = 0 /\ exists G, cap a = Some G /\ locally t (fun u => Q2R G = eta a u).
+Proof.
+  intros Ht Hc. destruct T_k as [A B]. unfold theta, corner, eta in *. change (gain (deadline (graph a)) (Q2R (slope a)) (k (graph a))) with (uncapped a) in *.
+  destruct (cap a) as [G|]; [|left; split; [reflexivity|]; apply filter_forall; reflexivity].
+  destruct (Rlt_dec (Q2R G) (uncapped a t)) as [L|L].
+  - right. split; [reflexivity|]. exists G. split; [reflexivity|].
+    pose proof (uncapped_continuous t Ht _ (open_gt (Q2R G) _ L)) as C. unfold filtermap in C. revert C. apply filter_imp. intros u Hu. rewrite Rmin_right; lra.
+  - left. split; [reflexivity|]. assert (L' : uncapped a t < Q2R G).
+    { destruct (Req_dec (uncapped a t) (Q2R G)) as [E|]; [|lra]. exfalso. apply Hc. unfold uncapped, gain in E. fold c T rho in E |- *.
+      assert (P : 0 < k c / (T - t)) by (apply Rdiv_lt_0_compat; lra). rewrite <- E.
+      replace (rho + k c / (T - t) - rho) with (k c / (T - t)) by ring. field. split; lra. }
+    pose proof (uncapped_continuous t Ht _ (open_lt (Q2R G) _ L')) as C. unfold filtermap in C. revert C. apply filter_imp. intros u Hu. rewrite Rmin_left; lra.
+Qed.
+Lemma zeta_derive t : t < T -> t <> corner a -> is_derive (fun u => / eta a u) t (- theta a t).
+Proof.
+  intros Ht Hc. destruct (locally_eta t Ht Hc) as [[E L]|[E [G [_ L]]]]; rewrite E.
+  - apply (is_derive_ext_loc (fun u => / uncapped a u)); [generalize L; apply filter_imp; intros u Hu; rewrite Hu; reflexivity|].
+    rewrite <- (locally_singleton _ _ L). apply inverse_derive. exact Ht.
+  - apply (is_derive_ext_loc (fun _ => / Q2R G)); [generalize L; apply filter_imp; intros u Hu; rewrite Hu; reflexivity|].
+    rewrite Ropp_0. apply @is_derive_const.
+Qed.
+Lemma eta_derive t : t < T -> t <> corner a -> exists d, is_derive (eta a) t d /\ 0 <= d /\ k c * d <= sq (eta a t).
+Proof.
+  intros Ht Hc. destruct T_k as [A B], Hgain as [R0 _]. fold rho in R0. destruct (locally_eta t Ht Hc) as [[_ L]|[_ [G [_ L]]]].
+  - exists (k c / sq (T - t)). split; [apply (is_derive_ext_loc (uncapped a)); [exact L|apply uncapped_derive; exact Ht]|].
+    split; [left; apply Rdiv_lt_0_compat; [exact B|unfold sq; nra]|]. rewrite <- (locally_singleton _ _ L).
+    unfold uncapped, gain. fold c T rho. replace (k c * (k c / sq (T - t))) with (sq (k c / (T - t))) by (unfold sq; field; lra).
+    assert (0 < k c / (T - t)) by (apply Rdiv_lt_0_compat; lra). unfold sq. apply Rmult_le_compat; lra.
+  - exists 0. split; [apply (is_derive_ext_loc (fun _ => Q2R G)); [exact L|apply @is_derive_const]|]. rewrite Rmult_0_r.
+    split; [lra|apply Rle_0_sqr].
+Qed.
+(** it never falls *)
+Lemma eta_grows t u : t <= u < T -> eta a t <= eta a u.
+Proof.
+  intros H. destruct T_k as [A B]. assert (U : uncapped a t <= uncapped a u).
+  { unfold uncapped, gain. fold c T. apply Rplus_le_compat_l. unfold Rdiv. apply Rmult_le_compat_l; [lra|]. apply Rinv_le_contravar; lra. }
+  unfold eta. change (gain (deadline (graph a)) (Q2R (slope a)) (k (graph a))) with (uncapped a). destruct (cap a) as [G|]; [|exact U].
+  unfold Rmin. destruct (Rle_dec _ _), (Rle_dec _ _); lra.
+Qed.
+End Gain.
+Lemma continuous_power (f : R -> R) m t : continuous f t -> continuous (fun u => f u ^ m) t.
+Proof. intros C. induction m as [|m IH]; simpl; [apply continuous_const|apply (continuous_mult f (fun u => f u ^ m)); assumption]. Qed.
+
 (** * The curve *)
 Section Curve.
 Variables (a : agents) (h : nat -> R) (X : R -> nat -> nat -> R) (Sl : R -> nat -> R).
@@ -110,16 +217,12 @@ Let T := deadline c.
 Let rho := Q2R (slope a).
 Let es := edges c.
 Hypothesis Hprot : check_protocol c = true.
-Hypothesis Hslope : 0 <= rho.
+Hypothesis Hgain : positive_gain a.
 Hypothesis Hn : (0 < n)%nat.
 Hypothesis HX : flies a h X Sl.
 
-Lemma T_k : 0 < T /\ 0 < k c.
-Proof. destruct (T_pos c Hprot) as [A [_ B]]. split; assumption. Qed.
-Lemma eta_pos t : t < T -> 0 < eta a t.
-Proof.
-  intros Ht. destruct T_k as [A B]. unfold eta, gain. fold c T rho. assert (0 < k c / (T - t)) by (apply Rdiv_lt_0_compat; lra). lra.
-Qed.
+Let T_k := T_k a Hprot.
+Let eta_pos t : t < T -> 0 < eta a t := eta_pos a Hprot Hgain t.
 (** no sliding variable moves: those that begin at 0 stay there, whatever the disturbance *)
 Lemma resting t j : 0 <= t < T -> (j < N)%nat -> Sl t j = 0.
 Proof.
@@ -143,15 +246,6 @@ Proof.
 Qed.
 
 Let zeta t := / eta a t.
-Let theta t := sq (1 - rho * zeta t) / k c.
-Lemma zeta_derive t : t < T -> is_derive zeta t (- theta t).
-Proof.
-  intros Ht. destruct T_k as [A B]. pose proof (eta_pos t Ht) as E. unfold theta, zeta, sq. unfold eta, gain in E |- *. fold c T rho in E |- *.
-  auto_derive.
-  - split; [lra|]. split; [|exact I]. apply Rgt_not_eq. replace (T + - t) with (T - t) by ring. lra.
-  - replace (T + - t) with (T - t) by ring. assert (0 <= rho * (T - t)) by (apply Rmult_le_pos; lra).
-    field. repeat split; lra.
-Qed.
 (** entries of [A_z] *)
 Definition entry_at (z th : R) (i l : nat) : R := (if (S i =? l)%nat then 1 else 0) + (if (i =? l)%nat then - (INR i * th) else 0)
   + if (S i =? degree a)%nat then - (at_ (damping a) l + at_ (plant a) l * z ^ (degree a - l)) else 0.
@@ -167,11 +261,8 @@ Proof.
   apply (continuous_mult (fun u => placed h (X (Rmax 0 u)) i j) (fun u => / eta a u ^ i)).
   - unfold placed. apply (continuous_minus (fun u => X (Rmax 0 u) i j) (fun _ => if (i =? 0)%nat then h j else 0)); [|apply continuous_const].
     apply HX; assumption.
-  - apply @ex_derive_continuous. apply (ex_derive_ext_loc (fun u => zeta u ^ i)).
-    + assert (He : 0 < T - t) by lra. exists (mkposreal _ He). intros u Hu. unfold ball in Hu; simpl in Hu;
-        unfold AbsRing_ball, abs, minus, plus, opp in Hu; simpl in Hu. apply Rabs_def2 in Hu.
-      unfold zeta. apply pow_inv.
-    + apply ex_derive_pow. exists (- theta t). apply zeta_derive. exact Ht.
+  - apply (continuous_comp (fun u => eta a u ^ i) Rinv); [apply continuous_power, (eta_continuous a); exact Ht|].
+    apply continuous_Rinv. apply pow_nonzero. apply Rgt_not_eq, eta_pos. exact Ht.
 Qed.
 (** the derivative of a state, however high *)
 Let dX t i j := if (S i =? n)%nat then control a h (X t) t j - sum n (fun l => at_ (plant a) l * X t l j) else X t (S i) j.
@@ -189,17 +280,17 @@ Proof.
     intros u Hu. rewrite Rmax_right by lra. rewrite (resting u j) by (try assumption; lra). replace (pred n) with i by lia. ring.
   - apply (near (fun u => X u i j)); [exact Ht| |apply D; fold n; lia]. intros u Hu. rewrite Rmax_right by lra. reflexivity.
 Qed.
-Lemma Y_derive t i j : 0 < t < T -> (i < n)%nat -> (j < N)%nat ->
-  is_derive (fun u => Y u i j) t (eta a t * moving (lap es) n (entry_at (zeta t) (theta t)) K (Y t) i j).
+Lemma Y_derive t i j : 0 < t < T -> t <> corner a -> (i < n)%nat -> (j < N)%nat ->
+  is_derive (fun u => Y u i j) t (eta a t * moving (lap es) n (entry_at (zeta t) (theta a t)) K (Y t) i j).
 Proof.
-  intros Ht Hi Hj. pose proof (eta_pos t ltac:(lra)) as E0.
+  intros Ht Hcorner Hi Hj. pose proof (eta_pos t ltac:(lra)) as E0.
   assert (D : is_derive (fun u => placed h (X (Rmax 0 u)) i j * zeta u ^ i) t
-    (dX t i j * zeta t ^ i + placed h (X (Rmax 0 t)) i j * (INR i * - theta t * zeta t ^ pred i))).
+    (dX t i j * zeta t ^ i + placed h (X (Rmax 0 t)) i j * (INR i * - theta a t * zeta t ^ pred i))).
   { apply (is_derive_mult (fun u => placed h (X (Rmax 0 u)) i j) (fun u => zeta u ^ i)).
     - unfold placed. evar_last. { apply (is_derive_minus (fun u => X (Rmax 0 u) i j) (fun _ => if (i =? 0)%nat then h j else 0));
         [apply X_derive; assumption|apply @is_derive_const]. }
       unfold minus, plus, opp, zero; simpl. ring.
-    - apply (is_derive_pow zeta i). apply zeta_derive. lra.
+    - apply (is_derive_pow zeta i). apply (zeta_derive a Hprot Hgain); [exact (proj2 Ht)|exact Hcorner].
     - intros; apply Rmult_comm. }
   apply (near (fun u => placed h (X (Rmax 0 u)) i j * zeta u ^ i)); [exact Ht| |].
   { intros u Hu. unfold Y, y, Rdiv, zeta. rewrite pow_inv. reflexivity. }
@@ -209,7 +300,7 @@ Proof.
   assert (Z2 : zeta t * eta a t = 1) by (unfold zeta; apply Rinv_l; lra).
   assert (Z3 : INR i * zeta t ^ pred i = INR i * (eta a t * zeta t ^ i)).
   { destruct i as [|i]; [simpl; ring|]. simpl pred. f_equal. rewrite <- tech_pow_Rmult. rewrite <- Rmult_assoc, (Rmult_comm (eta a t)), Z2. ring. }
-  set (e := eta a t) in *. set (z := zeta t) in *. set (th := theta t) in *. set (v := y a h (X t) t) in *.
+  set (e := eta a t) in *. set (z := zeta t) in *. set (th := theta a t) in *. set (v := y a h (X t) t) in *.
   replace (e ^ i * v i j * (INR i * - th * z ^ pred i)) with (- th * v i j * (e ^ i * (INR i * z ^ pred i))) by ring. rewrite Z3.
   replace (- th * v i j * (e ^ i * (INR i * (e * z ^ i)))) with (- th * v i j * INR i * e * (z ^ i * e ^ i)) by ring. rewrite Z1.
   rewrite (sum_ext n _ (fun l => (if (S i =? l)%nat then v l j else 0) + ((if (i =? l)%nat then - (INR i * th) * v l j else 0)
@@ -258,14 +349,14 @@ Hypothesis Hcont : forall (X Z : R -> nat -> R) (t : R), (forall j, (j < N)%nat 
   (forall j, (j < N)%nat -> continuous (fun u : R => Z u j) t) -> continuous (fun u => pair es (ly f) (X u) (Z u)) t.
 Hypothesis Hpos : positive (pair es (ly f)).
 Let p i j := at_ (nth i (P a) []) j.
-Hypothesis Hfall : forall t (v : nat -> nat -> R), 0 <= t < T ->
-  let m := moving (lap es) n (entry_at (zeta t) (theta t)) K v in
+Hypothesis Hfall : forall t (v : nat -> nat -> R), 0 < t < T ->
+  let m := moving (lap es) n (entry_at (zeta t) (theta a t)) K v in
   sum n (fun i => sum n (fun j => p i j * (pair es (ly f) (m i) (v j) + pair es (ly f) (v i) (m j))))
     <= - r * sum n (fun i => sum n (fun j => p i j * pair es (ly f) (v i) (v j))).
-Lemma value_derive t : 0 < t < T -> is_derive (fun u => value a f (Y u)) t (eta a t * let m := moving (lap es) n (entry_at (zeta t) (theta t)) K (Y t) in
+Lemma value_derive t : 0 < t < T -> t <> corner a -> is_derive (fun u => value a f (Y u)) t (eta a t * let m := moving (lap es) n (entry_at (zeta t) (theta a t)) K (Y t) in
   sum n (fun i => sum n (fun j => p i j * (pair es (ly f) (m i) (Y t j) + pair es (ly f) (Y t i) (m j))))).
 Proof.
-  intros Ht. cbv zeta. set (m := moving (lap es) n (entry_at (zeta t) (theta t)) K (Y t)). unfold value, double. fold n es. rewrite <- sum_scal.
+  intros Ht Hcorner. cbv zeta. set (m := moving (lap es) n (entry_at (zeta t) (theta a t)) K (Y t)). unfold value, double. fold n es. rewrite <- sum_scal.
   apply (is_derive_sum n (fun u i => sum n (fun j => at_ (nth i (P a) []) j * pair es (ly f) (Y u i) (Y u j)))). intros i Hi. rewrite <- sum_scal.
   apply (is_derive_sum n (fun u j => at_ (nth i (P a) []) j * pair es (ly f) (Y u i) (Y u j))). intros j Hj.
   evar_last.
@@ -273,37 +364,29 @@ Proof.
   - fold m. change (at_ (nth i (P a) []) j) with (p i j).
     rewrite (scales _ Hpos (eta a t) (m i)), (swaps _ Hpos (Y t i) (fun l => eta a t * _)), (scales _ Hpos (eta a t) (m j)), (swaps _ Hpos (m j)). ring.
 Qed.
-Lemma turns_derive t : t < T -> is_derive (turns a) t (eta a t).
-Proof.
-  intros Ht. destruct T_k as [A B]. unfold turns, eta. fold c T rho. unfold clock, gain. auto_derive.
-  - split; [lra|]. split; [|exact I]. apply Rdiv_lt_0_compat; lra.
-  - field. lra.
-Qed.
 Theorem value_falls t : 0 <= t < T -> value a f (y a h (X t) t) <= exp (- (r * turns a t)) * value a f (y a h (X 0) 0).
 Proof.
   intros Ht. rewrite <- !Y_eq by lra.
   assert (D : exp (r * turns a t) * value a f (Y t) <= exp (r * turns a 0) * value a f (Y 0)).
-  { set (dv t := eta a t * let m := moving (lap es) n (entry_at (zeta t) (theta t)) K (Y t) in
+  { set (dv t := eta a t * let m := moving (lap es) n (entry_at (zeta t) (theta a t)) K (Y t) in
       sum n (fun i => sum n (fun j => p i j * (pair es (ly f) (m i) (Y t j) + pair es (ly f) (Y t i) (m j))))).
-    apply (decreasing T 0 (fun t => exp (r * turns a t) * value a f (Y t))
-      (fun t => r * eta a t * exp (r * turns a t) * value a f (Y t) + exp (r * turns a t) * dv t)); [| | |exact Ht]; clear t Ht; intros t Ht.
-    - apply (is_derive_mult (fun t => exp (r * turns a t)) (fun t => value a f (Y t))).
-      + evar_last. { apply is_derive_comp; [apply is_derive_exp|]. apply is_derive_scal. apply turns_derive. lra. }
-        unfold scal; simpl; unfold mult; simpl. ring.
-      + apply value_derive. exact Ht.
-      + intros; apply Rmult_comm.
+    apply (FamilyFlow.falls (fun t => exp (r * turns a t) * value a f (Y t)) 0 T (fun _ => corner a)); [| |exact Ht]; clear t Ht; intros t Ht;
+      [|intros Hc; exists (r * eta a t * exp (r * turns a t) * value a f (Y t) + exp (r * turns a t) * dv t); split].
     - apply (continuous_mult (fun t => exp (r * turns a t)) (fun t => value a f (Y t))).
-      + apply @ex_derive_continuous. eexists. apply is_derive_comp; [apply is_derive_exp|]. apply is_derive_scal. apply turns_derive. lra.
+      + apply @ex_derive_continuous. eexists. apply is_derive_comp; [apply is_derive_exp|]. apply is_derive_scal. apply (turns_derive a Hprot). apply Ht.
       + unfold value, double. apply (continuous_sum n (fun u i => sum n (fun j => at_ (nth i (P a) []) j * pair es (ly f) (Y u i) (Y u j)))). intros i Hi.
         apply (continuous_sum n (fun u j => at_ (nth i (P a) []) j * pair es (ly f) (Y u i) (Y u j))). intros j Hj.
         apply (continuous_mult (fun _ => at_ (nth i (P a) []) j)); [apply continuous_const|].
         apply (Hcont (fun u => Y u i) (fun u => Y u j)); intros l Hl; apply Y_continuous; first [assumption|lra].
-    - pose proof (Hfall t (Y t) Ht) as B. cbv zeta in B. fold K in B. pose proof (eta_pos t ltac:(lra)) as E. pose proof (exp_pos (r * turns a t)) as X0.
+    - apply (is_derive_mult (fun t => exp (r * turns a t)) (fun t => value a f (Y t))).
+      + evar_last. { apply is_derive_comp; [apply is_derive_exp|]. apply is_derive_scal. apply (turns_derive a Hprot). apply Ht. }
+        unfold scal; simpl; unfold mult; simpl. ring.
+      + apply value_derive; [exact Ht|exact (Hc O)].
+      + intros; apply Rmult_comm.
+    - pose proof (Hfall t (Y t) ltac:(lra)) as B. cbv zeta in B. fold K in B. pose proof (eta_pos t ltac:(lra)) as E. pose proof (exp_pos (r * turns a t)) as X0.
       unfold dv. cbv zeta. match type of B with ?q <= _ => change (q <= - r * value a f (Y t)) in B; set (q' := q) in * end.
       assert (0 <= exp (r * turns a t) * eta a t) by nra. nra. }
-  assert (T0 : turns a 0 = 0).
-  { destruct T_k as [A B]. unfold turns, clock. fold c T. rewrite Rminus_0_r. replace (T / T) with 1 by (field; lra). rewrite ln_1. ring. }
-  rewrite T0, Rmult_0_r, exp_0, Rmult_1_l in D.
+  rewrite (turns_0 a), Rmult_0_r, exp_0, Rmult_1_l in D.
   apply (Rmult_le_reg_l (exp (r * turns a t))); [apply exp_pos|]. rewrite <- Rmult_assoc, <- exp_plus.
   replace (r * turns a t + - (r * turns a t)) with 0 by ring. rewrite exp_0. lra.
 Qed.

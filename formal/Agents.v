@@ -34,14 +34,14 @@ Let d := prepare c.
 Let es := edges c.
 Let rho := Q2R (slope a).
 
-Lemma chain_ok i l z : Q2R (pull_in a) <> 0 ->
-  peval (chain a i l) z = entry_at a z (sq (1 - rho * z) / Q2R (pull_in a)) i l.
+Lemma chain_ok g i l z : Q2R (pull_in a) <> 0 ->
+  peval (chain a g i l) z = entry_at a z (if g then sq (1 - rho * z) / Q2R (pull_in a) else 0) i l.
 Proof.
   intros Hk. unfold chain, entry_at. rewrite !peval_padd, !peval_choose, peval_pscale, peval_padd, peval_shifted.
   assert (K : ~ (pull_in a == 0)%Q) by (intros E; apply Hk; rewrite (Qeq_eqR _ _ E); apply Q2R_0).
   simpl peval. rewrite Q2R_opp, Q2R_div, index_ok by exact K. rewrite !Q2R_opp, !Q2R_mult, Q2R_1.
   assert (Q2 : Q2R 2 = 2) by (unfold Q2R; simpl; field). rewrite Q2. fold rho. unfold at_, sq.
-  destruct (S i =? l)%nat, (i =? l)%nat, (S i =? degree a)%nat; field; exact Hk.
+  destruct g, (S i =? l)%nat, (i =? l)%nat, (S i =? degree a)%nat; cbn [andb]; field; exact Hk.
 Qed.
 Lemma fall_ok A z i j : peval (fall_entry a A i j) z
   = (if (S i =? n)%nat && (S j =? n)%nat then 1 else 0) - Q2R (falls a) * at_ (nth i (W a) []) j
@@ -105,7 +105,7 @@ Qed.
 End Agents.
 
 Definition check_agents_only (split : splitting) (points : list Q) (a : agents) : bool :=
-  check_matrices split a && check_decrease split a points && check_coupling a && check_agree a && check_common a && check_ends_of a && check_tops a.
+  check_matrices split a && check_decrease split a points && check_coupling a && check_agree a && check_common a && check_ends_of a && check_tops a && check_left a.
 Definition accepts_agents (h : hints) (split : splitting) (points : list Q) (a : agents) : bool :=
   accepts h (graph a) && negb (enclosed (graph a)) && check_agents_only split points a.
 
@@ -126,7 +126,7 @@ Lemma pull_ok : Q2R (pull_in a) = k c.
 Proof. unfold pull_in, k. rewrite Q2R_mult. reflexivity. Qed.
 Lemma span_ok : Q2R (span c) = deadline c.
 Proof. unfold span, deadline. destruct (kind c); [reflexivity|]. apply Q2R_plus. Qed.
-Lemma matrices : psd split n (W a) = true /\ 0 < Q2R (coupling a) /\ 0 < Q2R (falls a) /\ 0 <= Q2R (slope a) /\ (0 < n)%nat /\
+Lemma matrices : psd split n (W a) = true /\ 0 < Q2R (coupling a) /\ 0 < Q2R (falls a) /\ positive_gain a /\ (0 < n)%nat /\
   (forall i j, (i < n)%nat -> (j < n)%nat -> at_ (nth i (P a) []) j = at_ (nth j (P a) []) i) /\
   (forall i j, (i < n)%nat -> (j < n)%nat -> sum n (fun l => at_ (nth i (W a) []) l * at_ (nth l (P a) []) j) = if (i =? j)%nat then 1 else 0) /\
   forall i, (i < n)%nat -> sum n (fun l => at_ (nth i (W a) []) l * at_ (gains a) l) = if (S i =? n)%nat then Q2R (coupling a) else 0.
@@ -135,7 +135,8 @@ Proof.
   apply andb_prop in Hmatrices as [H H6]. apply andb_prop in H as [H H5]. apply andb_prop in H as [H H4].
   apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2]. simpl in H2. apply andb_prop in H2 as [P1 P2].
   apply andb_prop in P2 as [P2 _]. split; [exact H1|]. split; [apply Qpos; exact P1|]. split; [apply Qpos; exact P2|].
-  split; [apply notneg_ok; exact H3|]. split; [apply Nat.ltb_lt; exact H4|]. split; [|split].
+  split; [apply andb_prop in H3 as [H3 HG]; split; [apply notneg_ok; exact H3|intros G EG; rewrite EG in HG; apply Qpos; exact HG]|].
+  split; [apply Nat.ltb_lt; exact H4|]. split; [|split].
   - intros i j Hi Hj. pose proof (square_ok _ _ H5 i j Hi Hj) as K. cbv beta in K. apply andb_prop in K as [K _].
     apply Qeq_bool_eq, Qeq_eqR in K. exact K.
   - intros i j Hi Hj. pose proof (square_ok _ _ H5 i j Hi Hj) as K. cbv beta in K. apply andb_prop in K as [_ K].
@@ -155,39 +156,89 @@ Proof.
     apply (psd_ok split n (W a) _ (fun i _ => x i) PF M1).
   - intros i Hi. split; [apply M8; exact Hi|]. intros j Hj. apply M7; assumption.
 Qed.
+Lemma index_2 m : Q2R (2 * index m) = 2 * INR m.
+Proof. rewrite Q2R_mult, index_ok. f_equal. unfold Q2R. simpl. field. Qed.
 Lemma gain_slope t : 0 <= t < deadline c -> 0 < eta a t /\ eta a 0 <= eta a t.
 Proof.
-  intros Ht. destruct matrices as [_ [_ [_ [M4 _]]]]. destruct (T_k a Hprot) as [A B]. fold c in A, B.
-  unfold eta, gain. fold c. set (T := deadline c) in *. rewrite Rminus_0_r.
-  assert (0 < k c / (T - t)) by (apply Rdiv_lt_0_compat; lra). split; [lra|]. apply Rplus_le_compat_l.
-  apply Rmult_le_compat_l; [lra|]. apply Rinv_le_contravar; lra.
+  intros Ht. destruct matrices as [_ [_ [_ [M4 _]]]]. split; [apply (eta_pos a Hprot M4); apply Ht|apply (eta_grows a Hprot); exact Ht].
 Qed.
-(** the matrix of the decrease, at every instant *)
-Lemma falls_ok F Y t : positive F -> 0 <= t < deadline c -> let z := / eta a t in let th := sq (1 - Q2R (slope a) * z) / k c in
-  0 <= sum n (fun i => sum n (fun j => ((if (S i =? n)%nat && (S j =? n)%nat then 1 else 0) - Q2R (falls a) * at_ (nth i (W a) []) j
-    - sum n (fun l => entry_at a z th i l * at_ (nth l (W a) []) j + entry_at a z th j l * at_ (nth i (W a) []) l)) * F (Y i) (Y j))).
+Lemma span_pos : ~ (span (graph a) == 0)%Q.
 Proof.
-  intros HF Ht z th. destruct (gain_slope t Ht) as [E0 E1]. destruct (T_k a Hprot) as [A B]. fold c in A, B.
-  unfold check_decrease in Hdecrease. cbv zeta in Hdecrease. apply andb_prop in Hdecrease as [HL H].
-  destruct points as [|low [|p l]]; try discriminate. apply andb_prop in H as [H0 H]. fold n in HL, H.
-  assert (E2 : 0 < eta a 0) by (apply gain_slope; lra).
-  assert (Last : Q2R (/ (slope a + pull_in a / span (graph a))) = / eta a 0).
-  { assert (Es : ~ (span (graph a) == 0)%Q) by (intros E; apply Qeq_eqR in E; rewrite Q2R_0 in E; pose proof span_ok as SO; unfold c in *; lra).
-    assert (Ev : Q2R (slope a + pull_in a / span (graph a)) = eta a 0).
-    { rewrite Q2R_plus, Q2R_div, pull_ok by exact Es. fold c. rewrite span_ok. unfold eta, gain. fold c. rewrite Rminus_0_r. reflexivity. }
-    rewrite Q2R_inv, Ev; [reflexivity|]. intros E. apply Qeq_eqR in E. rewrite Ev, Q2R_0 in E. lra. }
-  apply Qle_bool_iff, Qle_Rle in H0. rewrite Q2R_0 in H0.
-  assert (Hz : Q2R low <= z <= / eta a 0).
-  { split; [|apply Rinv_le_contravar; assumption]. assert (0 < z) by (apply Rinv_0_lt_compat; exact E0). lra. }
-  rewrite <- Last in Hz. destruct (points_ok _ _ z (p :: l) low H Hz ltac:(discriminate)) as [lo [hi [HC Hz']]].
-  assert (L1 : length (fall_table a) = n) by (unfold fall_table, table; rewrite map_length, seq_length; reflexivity).
-  assert (L2 : forall i, (i < n)%nat -> length (nth i (fall_table a) []) = n).
-  { intros i Hi. apply (table_row n _ i Hi). }
-  pose proof (interval_ok split a (fall_table a) lo hi z F Y HF HC HL L1 L2 Hz') as K. fold n in K.
-  eapply Rle_trans; [exact K|]. apply Req_le. apply sum_ext. intros i Hi. apply sum_ext. intros j Hj. f_equal.
+  intros E. destruct (T_k a Hprot) as [A _]. apply Qeq_eqR in E. rewrite Q2R_0 in E. pose proof span_ok as SO. unfold c in *. lra.
+Qed.
+Lemma begin_ok : Q2R (begin_gain a) = uncapped a 0.
+Proof.
+  unfold begin_gain. rewrite Q2R_plus, Q2R_div, pull_ok by exact span_pos. fold c. rewrite span_ok.
+  unfold uncapped, gain. fold c. rewrite Rminus_0_r. reflexivity.
+Qed.
+Lemma first_ok : Q2R (first_gain a) = eta a 0.
+Proof.
+  unfold first_gain, eta. change (gain (deadline (graph a)) (Q2R (slope a)) (k (graph a)) 0) with (uncapped a 0). rewrite <- begin_ok.
+  destruct (cap a) as [G|]; [|reflexivity]. unfold lesser. destruct (Qle_bool (begin_gain a) G) eqn:E.
+  - apply Qle_bool_iff, Qle_Rle in E. rewrite Rmin_left by exact E. reflexivity.
+  - destruct (Qlt_le_dec G (begin_gain a)) as [L|L]; [|apply Qle_bool_iff in L; congruence].
+    apply Qlt_Rlt in L. rewrite Rmin_right by lra. reflexivity.
+Qed.
+Lemma inverse_ok q : 0 < Q2R q -> Q2R (/ q) = / Q2R q.
+Proof. intros H. apply Q2R_inv. intros E. apply Qeq_eqR in E. rewrite E, Q2R_0 in H. lra. Qed.
+Lemma peval_at p q : Q2R (evaluate p q) = peval p (Q2R q).
+Proof. induction p as [|b p IH]; cbn [evaluate peval]; [apply Q2R_0|]. rewrite Q2R_plus, Q2R_mult, IH. reflexivity. Qed.
+(** the matrix of the decrease, at every instant *)
+Lemma entries_ok g z F (Y : nat -> nat -> R) :
+  sum n (fun i => sum n (fun j => peval (look (fall_table a g) i j) z * F (Y i) (Y j))) =
+  sum n (fun i => sum n (fun j => ((if (S i =? n)%nat && (S j =? n)%nat then 1 else 0) - Q2R (falls a) * at_ (nth i (W a) []) j
+    - sum n (fun l => entry_at a z (if g then sq (1 - Q2R (slope a) * z) / k c else 0) i l * at_ (nth l (W a) []) j
+      + entry_at a z (if g then sq (1 - Q2R (slope a) * z) / k c else 0) j l * at_ (nth i (W a) []) l)) * F (Y i) (Y j))).
+Proof.
+  destruct (T_k a Hprot) as [A B]. fold c in A, B. apply sum_ext. intros i Hi. apply sum_ext. intros j Hj. f_equal.
   unfold fall_table. cbv zeta. rewrite table_ok by assumption. rewrite peval_reduced, fall_ok. f_equal.
   apply sum_ext. intros l' Hl. rewrite !table_ok by assumption.
   assert (Nk : Q2R (pull_in a) <> 0) by (rewrite pull_ok; lra). rewrite !chain_ok by exact Nk. rewrite pull_ok. reflexivity.
+Qed.
+Lemma falls_ok F Y t : positive F -> 0 < t < deadline c -> let z := / eta a t in let th := theta a t in
+  0 <= sum n (fun i => sum n (fun j => ((if (S i =? n)%nat && (S j =? n)%nat then 1 else 0) - Q2R (falls a) * at_ (nth i (W a) []) j
+    - sum n (fun l => entry_at a z th i l * at_ (nth l (W a) []) j + entry_at a z th j l * at_ (nth i (W a) []) l)) * F (Y i) (Y j))).
+Proof.
+  intros HF Ht z th. destruct (gain_slope t ltac:(lra)) as [E0 E1]. destruct (T_k a Hprot) as [A B]. fold c in A, B.
+  destruct matrices as [_ [_ [_ [M4 _]]]].
+  unfold check_decrease in Hdecrease. cbv zeta in Hdecrease. apply andb_prop in Hdecrease as [H H1]. apply andb_prop in H as [HL HC].
+  fold n in HL, H1. pose proof begin_ok as BO.
+  assert (L1 : forall g, length (fall_table a g) = n) by (intros; unfold fall_table, table; rewrite map_length, seq_length; reflexivity).
+  assert (L2 : forall g i, (i < n)%nat -> length (nth i (fall_table a g) []) = n) by (intros g i Hi; apply (table_row n _ i Hi)).
+  assert (U0 : uncapped a 0 < uncapped a t).
+  { unfold uncapped, gain. fold c. apply Rplus_lt_compat_l. unfold Rdiv. apply Rmult_lt_compat_l; [exact B|]. apply Rinv_lt_contravar; [|lra].
+    apply Rmult_lt_0_compat; lra. }
+  pose proof (uncapped_pos a Hprot 0 A) as U1. destruct M4 as [R0 R1].
+  (* where the gain is free *)
+  assert (Free : th = sq (1 - Q2R (slope a) * z) / k c -> eta a t = uncapped a t -> (forall G, cap a = Some G -> uncapped a t <= Q2R G) ->
+    0 <= sum n (fun i => sum n (fun j => ((if (S i =? n)%nat && (S j =? n)%nat then 1 else 0) - Q2R (falls a) * at_ (nth i (W a) []) j
+    - sum n (fun l => entry_at a z th i l * at_ (nth l (W a) []) j + entry_at a z th j l * at_ (nth i (W a) []) l)) * F (Y i) (Y j)))).
+  { intros Eth Eeta Hcap. rewrite Eth. pose proof (entries_ok true z F Y) as EN. cbv beta iota in EN. rewrite <- EN.
+    assert (Hup : z <= Q2R (/ begin_gain a)).
+    { rewrite inverse_ok, BO by (rewrite BO; lra). unfold z. rewrite Eeta. apply Rinv_le_contravar; lra. }
+    assert (Hlow : Q2R match cap a with None => 0 | Some G => / G end <= z).
+    { destruct (cap a) as [G|] eqn:EG; [|rewrite Q2R_0; left; apply Rinv_0_lt_compat; exact E0].
+      rewrite inverse_ok by (apply R1; reflexivity). unfold z. rewrite Eeta. apply Rinv_le_contravar; [lra|apply Hcap; reflexivity]. }
+    destruct points as [|low [|p l]].
+    1, 2: destruct (cap a) as [G|] eqn:EG; [|discriminate]; apply Qle_bool_iff, Qle_Rle in H1; rewrite BO in H1; specialize (Hcap G eq_refl); lra.
+    apply andb_prop in H1 as [H0 H]. apply Qle_bool_iff, Qle_Rle in H0.
+    destruct (points_ok _ _ z (p :: l) low H ltac:(lra) ltac:(discriminate)) as [lo [hi [HI Hz']]].
+    apply (interval_ok split a (fall_table a true) lo hi z F Y HF HI HL (L1 true) (L2 true) Hz'). }
+  unfold theta in th. change (gain (deadline (graph a)) (Q2R (slope a)) (k (graph a))) with (uncapped a) in *.
+  unfold eta in Free at 1. change (gain (deadline (graph a)) (Q2R (slope a)) (k (graph a)) t) with (uncapped a t) in Free.
+  destruct (cap a) as [G|] eqn:EG.
+  - destruct (Rlt_dec (Q2R G) (uncapped a t)) as [L|L].
+    + unfold check_cap in HC. rewrite EG in HC. fold n in HC. pose proof (psd_ok _ _ _ F Y HF HC) as K. unfold double in K.
+      assert (Ez : z = Q2R (/ G)).
+      { rewrite inverse_ok by (apply R1; reflexivity). unfold z, eta. rewrite EG. f_equal.
+        change (gain (deadline (graph a)) (Q2R (slope a)) (k (graph a)) t) with (uncapped a t). apply Rmin_right. lra. }
+      pose proof (entries_ok false z F Y) as EN. cbv beta iota in EN. unfold th. rewrite <- EN.
+      eapply Rle_trans; [exact K|]. apply Req_le. apply sum_ext. intros i Hi. apply sum_ext. intros j Hj. f_equal. rewrite Ez.
+      rewrite <- peval_at. unfold at_. set (f := fun p => reduced (evaluate p (/ G))).
+      rewrite nth_indep with (d' := map f []) by (rewrite map_length, L1; exact Hi). rewrite (map_nth (map f)).
+      rewrite nth_indep with (d' := f []) by (rewrite map_length, L2 by exact Hi; exact Hj). rewrite (map_nth f). unfold f. apply reduced_ok.
+    + apply Free; [reflexivity|apply Rmin_left; lra|]. intros G' E'. injection E' as <-. lra.
+  - apply Free; [reflexivity|reflexivity|discriminate].
 Qed.
 Theorem claim_ok j f : In j (used a) -> nth_error (funcs c) j = Some f -> agent_claim a f.
 Proof.
@@ -210,13 +261,13 @@ Proof.
     - apply (pair_continuous c f HL F m EF).
     - exact PS.
     - intros u Y Hu m'. apply (falling S (lap (edges c)) n (fun i j => at_ (nth i (W a) []) j) (fun i j => at_ (nth i (P a) []) j)
-        (entry_at a (/ eta a u) (sq (1 - Q2R (slope a) * / eta a u) / k c)) (at_ (gains a)) (Q2R (coupling a)) (Q2R (falls a)) (Q2R (rate f)) Y PS);
+        (entry_at a (/ eta a u) (theta a u)) (at_ (gains a)) (Q2R (coupling a)) (Q2R (falls a)) (Q2R (rate f)) Y PS);
         try assumption.
       + intros. apply lap_comb.
       + apply (pair_rate c f HL F m EF H1).
       + split; assumption.
       + apply (falls_ok S (fun i => comb n (fun l => at_ (nth i (P a) []) l) Y) u PS Hu). }
-  split; [exact D|]. intros b cs i jj Edev Hi Hjj x. rewrite Edev in H4.
+  split; [exact D|]. intros b cs i jj Edev Hi Hjj. rewrite Edev in H4. unfold away. set (x := placed off (X t) i).
   set (dev := fun z : nat -> R => z jj - end_state c z jj).
   assert (DV : forall z, 0 <= at_ cs jj /\ sq (dev z) <= at_ cs jj * S z z).
   { intros z. destruct (deviation_ok c Hedges Hend f F m EF b cs H4 z) as [_ K]. specialize (K jj Hjj).
@@ -269,26 +320,25 @@ Proof.
 Qed.
 Theorem agreement_ok : agreement a.
 Proof.
-  intros HA off X Sl i j HX Hi Hj tends.
-  destruct matrices as [M1 [M2 [M3 [M4 [M5 [M6 [M7 M8]]]]]]].
-  assert (D : tends (fun t => placed off (X t) i j - end_state (graph a) (placed off (X t) i) j) 0).
-  { unfold check_agree in Hagree. rewrite HA in Hagree. simpl in Hagree. apply andb_prop in Hagree as [G1 G2].
+  intros off X Sl i j HX Hi Hj tends.
+  destruct matrices as [M1 [M2 [M3 [M4 [M5 [M6 [M7 M8]]]]]]]. split.
+  { intros HA. unfold check_agree in Hagree. rewrite HA in Hagree. simpl in Hagree. apply andb_prop in Hagree as [G1 G2].
+    apply andb_prop in G1 as [G1 G3]. assert (EC : cap a = None) by (destruct (cap a); [discriminate|reflexivity]).
     apply existsb_exists in G2 as [kf [Hk G2]]. destruct (nth_error (funcs (graph a)) kf) as [f|] eqn:Ef; [|discriminate].
     destruct (deviation f) as [[b cs]|] eqn:Ed; [|discriminate].
     pose proof (claim_ok kf f Hk Ef off X Sl) as CL.
     apply negb_true_iff in G1. destruct (Qlt_le_dec (2 * index (pred n)) (falls a * pull_in a)) as [L|L]; [|apply Qle_bool_iff in L; unfold n in L; congruence].
-    apply Qlt_Rlt in L. rewrite !Q2R_mult, index_ok, pull_ok in L. assert (Q2 : Q2R 2 = 2) by (unfold Q2R; simpl; field). rewrite Q2 in L.
+    apply Qlt_Rlt in L. rewrite index_2, Q2R_mult, pull_ok in L.
     set (C := at_ cs j * at_ (nth i (W a) []) i * value a f (y a off (X 0) 0)).
-    assert (B : forall t, 0 <= t < deadline (graph a) -> sq (placed off (X t) i j - end_state (graph a) (placed off (X t) i) j)
-      <= sq (eta a t ^ i) * (C * exp (- (Q2R (falls a) * turns a t)))).
+    assert (B : forall t, 0 <= t < deadline (graph a) -> sq (away a off (X t) i j) <= sq (eta a t ^ i) * (C * exp (- (Q2R (falls a) * turns a t)))).
     { intros t Ht. destruct (CL t HX Ht) as [_ K]. specialize (K b cs i j Ed Hi Hj). cbv zeta in K. eapply Rle_trans; [exact K|].
       apply Req_le. unfold C. ring. }
-    apply (vanishes a Hprot M4 _ i (Q2R (falls a)) (Rmax 0 C)).
+    apply (vanishes a Hprot M4 _ i (Q2R (falls a)) (Rmax 0 C) EC).
     - apply Rmax_l.
     - eapply Rle_lt_trans; [|exact L]. apply Rmult_le_compat_l; [lra|]. apply le_INR. unfold n in *. lia.
     - intros t Ht. eapply Rle_trans; [apply (B t Ht)|]. apply Rmult_le_compat_l; [apply Rle_0_sqr|].
       apply Rmult_le_compat_r; [left; apply exp_pos|apply Rmax_r]. }
-  split; [exact D|]. intros M EM. unfold check_common in Hcommon. rewrite EM in Hcommon. apply andb_prop in Hcommon as [Z HM].
+  intros M EM. unfold check_common in Hcommon. rewrite EM in Hcommon. apply andb_prop in Hcommon as [Z HM].
   rewrite forallb_app in Z. apply andb_prop in Z as [Z1 Z2].
   destruct (T_k a Hprot) as [T0 K0]. fold c in T0, K0. set (T := deadline c) in *.
   set (wj := fun t => taylor (n - i) (fun l => end_state c (placed off (X (Rmax 0 0)) (i + l)) j) t).
@@ -301,21 +351,16 @@ Proof.
     apply sum_ext. intros l Hl. pose proof (square_ok _ _ HM i l Hi Hl) as K. cbv beta in K. apply Qeq_bool_eq, Qeq_eqR in K.
     change (at_ (nth i M []) l) with (Q2R (cell M i l)). rewrite K. destruct (i <=? l)%nat; [|rewrite Q2R_0; ring].
     rewrite part_ok. fold c. rewrite span_ok. reflexivity. }
-  rewrite EO. unfold tends in *. fold c T in D |- *.
+  rewrite EO. unfold tends. fold c T.
   assert (CW : filterlim (fun t => (if (i =? 0)%nat then off j else 0) + wj t) (at_left T) (locally ((if (i =? 0)%nat then off j else 0) + wj T))).
   { apply (filterlim_filter_le_1 (G := at_left T) (F := at_left T) (fun t => (if (i =? 0)%nat then off j else 0) + wj t) (fun P HP => HP)).
     eapply filterlim_filter_le_1; [|apply (continuous_plus (fun _ => if (i =? 0)%nat then off j else 0) wj);
       [apply continuous_const|apply @ex_derive_continuous]].
     - intros P [e He]. exists e. intros u Hu _. apply He. exact Hu.
     - destruct (n - i)%nat as [|u] eqn:Eu; [unfold n in *; lia|]. unfold wj. eexists. apply taylor_derive. }
-  apply (filterlim_ext_loc (fun t => (placed off (X t) i j - end_state c (placed off (X t) i) j) + ((if (i =? 0)%nat then off j else 0) + wj t))).
-  - exists (mkposreal T T0). intros t Bt Lt. unfold ball in Bt; simpl in Bt; unfold AbsRing_ball, abs, minus, plus, opp in Bt; simpl in Bt.
-    apply Rabs_def2 in Bt. rewrite EW by lra. unfold placed. ring.
-  - evar_last.
-    + apply (filterlim_comp_2 (F := at_left T) (G := locally 0) (H := locally ((if (i =? 0)%nat then off j else 0) + wj T))
-        (fun t => placed off (X t) i j - end_state c (placed off (X t) i) j) (fun t => (if (i =? 0)%nat then off j else 0) + wj t) Rplus D CW).
-      apply (filterlim_plus 0 ((if (i =? 0)%nat then off j else 0) + wj T)).
-    + unfold plus; simpl. f_equal. ring.
+  apply (filterlim_ext_loc (fun t => (if (i =? 0)%nat then off j else 0) + wj t)); [|exact CW].
+  exists (mkposreal T T0). intros t Bt Lt. unfold ball in Bt; simpl in Bt; unfold AbsRing_ball, abs, minus, plus, opp in Bt; simpl in Bt.
+  apply Rabs_def2 in Bt. rewrite <- EW by lra. unfold away, placed. fold c. ring.
 Qed.
 Lemma dotq_ok l : forall x, Q2R (dotq l x) = qdot l (at_ x).
 Proof.
@@ -353,12 +398,6 @@ Qed.
 
 (** * The input *)
 Hypothesis Htops : check_tops a = true.
-Lemma eta_0_ok : Q2R (slope a + pull_in a / span (graph a)) = eta a 0.
-Proof.
-  destruct (T_k a Hprot) as [A B]. fold c in A, B.
-  assert (Es : ~ (span (graph a) == 0)%Q) by (intros E; apply Qeq_eqR in E; rewrite Q2R_0 in E; pose proof span_ok as SO; unfold c in *; lra).
-  rewrite Q2R_plus, Q2R_div, pull_ok by exact Es. fold c. rewrite span_ok. unfold eta, gain. fold c. rewrite Rminus_0_r. reflexivity.
-Qed.
 Lemma powq_ok q m : Q2R (powq q m) = Q2R q ^ m.
 Proof. induction m as [|m IH]; simpl; [apply Q2R_1|]. rewrite Q2R_mult, IH. reflexivity. Qed.
 Lemma rows_ok x i j : length (offsets x) = order c -> length (nth 0 (begins x) []) = order c -> (i < n)%nat ->
@@ -370,8 +409,8 @@ Proof.
     - rewrite nth_indep with (d' := g 0%Q) by (rewrite map_length; exact L). rewrite map_nth. reflexivity.
     - rewrite !nth_overflow by (try rewrite map_length; exact L). rewrite G. apply Q2R_0. }
   rewrite E by (rewrite reduced_ok, Q2R_mult, Q2R_0; ring). rewrite reduced_ok, Q2R_mult, powq_ok. unfold y.
-  pose proof eta_0_ok as E0. assert (P0 : 0 < eta a 0) by (apply gain_slope; split; [lra|apply (T_k a Hprot)]).
-  rewrite Q2R_inv by (intros Z; apply Qeq_eqR in Z; rewrite E0, Q2R_0 in Z; lra). rewrite E0. unfold Rdiv. rewrite <- pow_inv. f_equal.
+  pose proof first_ok as E0. assert (P0 : 0 < eta a 0) by (apply gain_slope; split; [lra|apply (T_k a Hprot)]).
+  rewrite inverse_ok by (rewrite E0; exact P0). rewrite E0. unfold Rdiv. rewrite <- pow_inv. f_equal.
   unfold placed_q, placed. cbv zeta. change (Q2R (nth j ?u 0%Q)) with (at_ u j).
   destruct (Nat.eqb_spec i 0) as [->|]; [apply less_ok; congruence|unfold at_; ring].
 Qed.
@@ -407,15 +446,45 @@ Proof.
   rewrite Q2R_div by exact NZ.
   rewrite !IZ, plus_IZR, !EG, !mult_IZR by assumption. field. split; lra.
 Qed.
+Lemma value_ext f F m x z : Checker.form (order c) (dls d) (dL d) (ly f) = Some (F, m) ->
+  (forall i j, (i < n)%nat -> (j < order c)%nat -> x i j = z i j) -> value a f x = value a f z.
+Proof.
+  intros EF H. pose proof (Main.Hls c Hedges) as Hl. fold d in Hl. destruct (form_ok _ _ _ _ _ _ _ Hl eq_refl EF) as [_ [Hfit _]].
+  destruct (fits_ok _ _ Hfit) as [F1 F2]. unfold value. apply double_ext. intros i j Hi Hj. fold c. rewrite !(pair_bil c f Hl F m EF).
+  assert (E : forall u v, (u < n)%nat -> (v < n)%nat -> bil F (x u) (x v) = bil F (z u) (z v)).
+  { intros u v Hu Hv. rewrite (bil_ext_l F (x u) (z u)) by (intros; apply H; [assumption|lia]).
+    apply (bil_ext_r F (order c)); [exact F2|]. intros; apply H; assumption. }
+  rewrite !E by assumption. reflexivity.
+Qed.
+Lemma qsum_list {A} (g : A -> Q) l x0 : Q2R (qsum (map g l)) = sum (length l) (fun i => Q2R (g (nth i l x0))).
+Proof.
+  induction l as [|x l IH]; [apply Q2R_0|]. cbn [map length]. rewrite sum_front. cbn [nth]. rewrite <- IH. unfold qsum. cbn [fold_right].
+  apply Q2R_plus.
+Qed.
+(** over space, from the states of the file on *)
+Lemma begins_ok f F m X Sl : Checker.form (order c) (dls d) (dL d) (ly f) = Some (F, m) -> check_begins a = true -> begun a X Sl ->
+  Q2R (worth_all a F m) = sum (length (axes a)) (fun i => value a f (y a (spot a i) (X i 0) 0)).
+Proof.
+  intros EF HB HX. unfold check_begins in HB. cbv zeta in HB. apply andb_prop in HB as [H5 H6]. rewrite forallb_forall in H5, H6.
+  unfold worth_all. rewrite map_map. set (dflt := Axis [] [] []). rewrite (qsum_list _ _ dflt). apply sum_ext. intros i Hi.
+  assert (HXi : nth_error (axes a) i = Some (nth i (axes a) dflt)) by (apply nth_error_nth'; exact Hi).
+  destruct (HX _ i HXi) as [_ HB0]. assert (Ai : In (nth i (axes a) dflt) (axes a)) by (apply nth_In; exact Hi).
+  specialize (H5 _ Ai). apply andb_prop in H5 as [L1 L2]. apply Nat.eqb_eq in L1, L2.
+  rewrite (worth_ok f F m (begin_rows a (nth i (axes a) dflt)) (y a (spot a i) (fun u => at_ (nth u (begins (nth i (axes a) dflt)) [])) 0) EF).
+  - apply (value_ext f F m _ _ EF). intros u w Hu Hw. unfold y, placed. rewrite (HB0 u w Hu Hw). reflexivity.
+  - apply H6. apply in_map. exact Ai.
+  - unfold begin_rows. cbv zeta. rewrite map_length, seq_length. reflexivity.
+  - intros u Hu. apply functional_extensionality. intros w. apply rows_ok; assumption.
+Qed.
 (** the relative part of the input *)
 Lemma relative_ok kf f F m v cs cn off X Sl t j : In kf (used a) -> nth_error (funcs c) kf = Some f ->
   bounds_of c d f = Some (v, cs, cn) -> Checker.form (order c) (dls d) (dL d) (ly f) = Some (F, m) ->
   fits (order c) (dL d) = true -> good (common (start c)) (start c) = true ->
-  flies a off X Sl -> 0 <= t < deadline c -> (j < order c)%nat -> 2 * INR n <= Q2R (falls a) * k c ->
-  sq (eta a t ^ n * sum n (fun i => at_ (gains a) i * lap (edges c) (y a off (X t) t i) j))
-    <= eta a 0 ^ (2 * n) * (Q2R (coupling a) * at_ (gains a) (pred n)) * value a f (y a off (X 0) 0) * at_ cs j.
+  flies a off X Sl -> 0 <= t < deadline c -> (j < order c)%nat -> forall g,
+  exp (- (Q2R (falls a) * turns a t)) * eta a t ^ (2 * n) <= g ^ (2 * n) -> sq (eta a t ^ n * sum n (fun i => at_ (gains a) i * lap (edges c) (y a off (X t) t i) j))
+    <= g ^ (2 * n) * (Q2R (coupling a) * at_ (gains a) (pred n)) * value a f (y a off (X 0) 0) * at_ cs j.
 Proof.
-  intros Hu Ef EB EF Hfit Gs HX Ht Hj Hr. destruct matrices as [M1 [M2 [M3 [M4 [M5 [M6 [M7 M8]]]]]]].
+  intros Hu Ef EB EF Hfit Gs HX Ht Hj g PW. destruct matrices as [M1 [M2 [M3 [M4 [M5 [M6 [M7 M8]]]]]]].
   pose proof (nth_error_In _ _ Ef) as Hf. pose proof Hfuncs as HC. rewrite forallb_forall in HC. specialize (HC f Hf). unfold check_function in HC.
   fold c d in HC. rewrite EF in HC. apply andb_prop in HC as [HC _]. apply andb_prop in HC as [HC H3]. apply andb_prop in HC as [_ H2].
   pose proof (Main.Hls c Hedges) as Hl. fold d in Hl.
@@ -454,7 +523,6 @@ Proof.
   rewrite EK in A.
   assert (Erel : sum n (fun i => K i * lap (edges c) (Y i) j) = ell (comb n K Y)) by (unfold ell; rewrite lap_comb; reflexivity).
   fold K Y. rewrite Erel. assert (CK : 0 <= Q2R (coupling a) * K (pred n)) by (rewrite <- EK; apply WP).
-  pose proof (powers a Hprot M4 (2 * n) (Q2R (falls a)) ltac:(rewrite mult_INR; exact Hr) t Ht) as PW.
   set (V0 := value a f (y a off (X 0) 0)) in *. set (x := exp (- (Q2R (falls a) * turns a t))) in *. set (e := eta a t) in *.
   assert (Sq : sq (e ^ n * ell (comb n K Y)) = e ^ (2 * n) * sq (ell (comb n K Y))).
   { unfold sq. replace (2 * n)%nat with (n + n)%nat by lia. rewrite pow_add. ring. }
@@ -477,19 +545,9 @@ Proof.
       pose proof (exp_pos (- (Q2R (falls a) * turns a t))) as X0. fold x in X0. nra. }
     replace (e ^ (2 * n) * (Q2R (coupling a) * K (pred n) * (at_ cs j * (x * V0))))
       with (x * e ^ (2 * n) * (Q2R (coupling a) * K (pred n) * (at_ cs j * V0))) by ring.
-    replace (eta a 0 ^ (2 * n) * (Q2R (coupling a) * K (pred n)) * V0 * at_ cs j)
-      with (eta a 0 ^ (2 * n) * (Q2R (coupling a) * K (pred n) * (at_ cs j * V0))) by ring.
+    replace (g ^ (2 * n) * (Q2R (coupling a) * K (pred n)) * V0 * at_ cs j)
+      with (g ^ (2 * n) * (Q2R (coupling a) * K (pred n) * (at_ cs j * V0))) by ring.
     apply Rmult_le_compat_r; [apply Rmult_le_pos; [exact CK|exact CV0]|exact PW].
-Qed.
-Lemma value_ext f F m x z : Checker.form (order c) (dls d) (dL d) (ly f) = Some (F, m) ->
-  (forall i j, (i < n)%nat -> (j < order c)%nat -> x i j = z i j) -> value a f x = value a f z.
-Proof.
-  intros EF H. pose proof (Main.Hls c Hedges) as Hl. fold d in Hl. destruct (form_ok _ _ _ _ _ _ _ Hl eq_refl EF) as [_ [Hfit _]].
-  destruct (fits_ok _ _ Hfit) as [F1 F2]. unfold value. apply double_ext. intros i j Hi Hj. fold c. rewrite !(pair_bil c f Hl F m EF).
-  assert (E : forall u v, (u < n)%nat -> (v < n)%nat -> bil F (x u) (x v) = bil F (z u) (z v)).
-  { intros u v Hu Hv. rewrite (bil_ext_l F (x u) (z u)) by (intros; apply H; [assumption|lia]).
-    apply (bil_ext_r F (order c)); [exact F2|]. intros; apply H; assumption. }
-  rewrite !E by assumption. reflexivity.
 Qed.
 Lemma minkowski m (u p r : nat -> R) R : (forall i, (i < m)%nat -> Rabs (u i) <= p i + r i /\ 0 <= p i /\ 0 <= r i) ->
   sum m (fun i => sq (r i)) <= R * R -> 0 <= R -> sqrt (sum m (fun i => sq (u i))) <= sum m p + R.
@@ -513,20 +571,25 @@ Proof.
       assert (p i * r i <= p i * R) by (apply Rmult_le_compat_l; assumption). lra.
   - rewrite sum_plus, sum_scal. fold T. lra.
 Qed.
-Lemma qsum_list {A} (g : A -> Q) l x0 : Q2R (qsum (map g l)) = sum (length l) (fun i => Q2R (g (nth i l x0))).
+Lemma abs_ok q : Q2R (Qabs q) = Rabs (Q2R q).
 Proof.
-  induction l as [|x l IH]; [apply Q2R_0|]. cbn [map length]. rewrite sum_front. cbn [nth]. rewrite <- IH. unfold qsum. cbn [fold_right].
-  apply Q2R_plus.
+  destruct q as [u w]. unfold Q2R. simpl. rewrite abs_IZR, Rabs_mult. f_equal. symmetry. apply Rabs_right. apply Rle_ge. left.
+  apply Rinv_0_lt_compat. apply IZR_lt. reflexivity.
+Qed.
+Lemma pace_ok g t : pace a = Some g -> 0 <= t < deadline c -> exp (- (Q2R (falls a) * turns a t)) * eta a t ^ (2 * n) <= Q2R g ^ (2 * n).
+Proof.
+  intros Hg Ht. destruct matrices as [_ [_ [M3 [M4 _]]]]. unfold pace in Hg. destruct (Qle_bool _ _) eqn:E.
+  - injection Hg as <-. rewrite first_ok. apply (powers a Hprot M4); [|exact Ht]. apply Qle_bool_iff, Qle_Rle in E.
+    rewrite index_2, Q2R_mult, pull_ok in E. rewrite mult_INR. exact E.
+  - apply (capped a Hprot M4 g (2 * n) _ Hg); [lra|exact Ht].
 Qed.
 Theorem tops_ok : tops_claim a.
 Proof.
-  intros Ne X Sl t j Hj HX Ht m hh. fold c in Hj, Ht. unfold check_tops in Htops. destruct (tops a) as [|q0 l0] eqn:Et; [contradiction|].
+  intros Ne X Sl t j Hj HX Ht. set (m := length (axes a)). fold c in Hj, Ht. unfold check_tops in Htops. destruct (tops a) as [|q0 l0] eqn:Et; [contradiction|].
+  destruct (pace a) as [g|] eqn:Eg; [|discriminate].
   set (l := q0 :: l0) in *. cbv zeta in Htops. fold c n d in Htops.
-  apply andb_prop in Htops as [H H7]. apply andb_prop in H as [H H6]. apply andb_prop in H as [H H5]. apply andb_prop in H as [H H4].
-  apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2].
-  apply Qle_bool_iff, Qle_Rle in H2. rewrite !Q2R_mult, index_ok, pull_ok in H2.
-  assert (Q2 : Q2R 2 = 2) by (unfold Q2R; simpl; field). rewrite Q2 in H2.
-  rewrite forallb_forall in H5, H6, H7. specialize (H7 j ltac:(apply in_seq; lia)). apply andb_prop in H7 as [R0 H7].
+  apply andb_prop in Htops as [H H7]. apply andb_prop in H as [H H5]. apply andb_prop in H as [H H4]. apply andb_prop in H as [H1 H3].
+  rewrite forallb_forall in H7. specialize (H7 j ltac:(apply in_seq; lia)). apply andb_prop in H7 as [R0 H7].
   set (added := match kind c with Nominal _ => 0%Q | SlidingMode _ _ mu1 _ _ _ => (mu1 * index (length (axes a)))%Q end) in *.
   assert (EA : Q2R added = match kind c with Nominal _ => 0 | SlidingMode _ _ mu1 _ _ _ => Q2R mu1 * INR m end).
   { unfold added. destruct (kind c); [apply Q2R_0|]. rewrite Q2R_mult, index_ok. reflexivity. }
@@ -536,37 +599,162 @@ Proof.
   destruct (bounds_of c d f) as [[[v cs'] cn]|] eqn:EB; [|destruct Hk].
   destruct (Checker.form (order c) (dls d) (dL d) (ly f)) as [[F mm]|] eqn:EF; [|destruct Hk].
   destruct Hk as [Hk|[]]. injection Hk as <- EBq. apply Qle_bool_iff, Qle_Rle in HB. rewrite <- EBq in HB. clear EBq.
-  pose proof eta_0_ok as E0. fold c in E0. rewrite !Q2R_mult, reduced_ok, !Q2R_mult, powq_ok, E0 in HB. rewrite map_map in HB.
-  set (dflt := Axis [] [] []). rewrite (qsum_list _ _ dflt) in HB. fold m in HB.
+  rewrite !Q2R_mult, reduced_ok, !Q2R_mult, powq_ok, (begins_ok f F mm X Sl EF H5 HX) in HB. fold m in HB.
   apply Qle_bool_iff, Qle_Rle in R0. rewrite Q2R_0 in R0.
-  assert (Er : Q2R rest = at_ l j - Q2R added - sum m (fun i => Rabs (at_ (plant a) 0 * hh i j))).
-  { unfold rest. rewrite !Q2R_minus. f_equal. rewrite (qsum_list _ _ dflt). apply sum_ext. intros i _.
-    assert (AB : forall q, Q2R (Qabs q) = Rabs (Q2R q)).
-    { intros [u w]. unfold Q2R. simpl. rewrite abs_IZR, Rabs_mult. f_equal. symmetry. apply Rabs_right. apply Rle_ge. left.
-      apply Rinv_0_lt_compat. apply IZR_lt. reflexivity. }
-    rewrite AB, Q2R_mult. reflexivity. }
-  assert (HXi : forall i, (i < m)%nat -> nth_error (axes a) i = Some (nth i (axes a) dflt)) by (intros i Hi; apply nth_error_nth'; exact Hi).
-  set (rel := fun i => eta a t ^ n * sum n (fun u => at_ (gains a) u * lap (edges c) (y a (hh i) (X i t) t u) j)).
-  assert (MK : sqrt (sum m (fun i => sq (control a (hh i) (X i t) t j))) <= sum m (fun i => Rabs (at_ (plant a) 0 * hh i j)) + Q2R rest).
+  assert (Er : Q2R rest = at_ l j - Q2R added - sum m (fun i => Rabs (at_ (plant a) 0 * spot a i j))).
+  { unfold rest. rewrite !Q2R_minus. f_equal. rewrite (qsum_list _ _ (Axis [] [] [])). apply sum_ext. intros i _.
+    rewrite abs_ok, Q2R_mult. reflexivity. }
+  set (rel := fun i => eta a t ^ n * sum n (fun u => at_ (gains a) u * lap (edges c) (y a (spot a i) (X i t) t u) j)).
+  assert (MK : over_space a (fun i => control a (spot a i) (X i t) t j) <= sum m (fun i => Rabs (at_ (plant a) 0 * spot a i j)) + Q2R rest).
   { apply (minkowski m _ _ (fun i => Rabs (rel i))); [| |exact R0].
     - intros i Hi. split; [|split; apply Rabs_pos]. unfold control. fold n c.
-      rewrite (sum_ext n _ (fun u => at_ (gains a) u * lap (edges c) (y a (hh i) (X i t) t u) j)) by (intros u _; rewrite (zeros _ u H1); ring).
+      rewrite (sum_ext n _ (fun u => at_ (gains a) u * lap (edges c) (y a (spot a i) (X i t) t u) j)) by (intros u _; rewrite (zeros _ u H1); ring).
       fold (rel i). unfold Rminus. eapply Rle_trans; [apply Rabs_triang|]. rewrite Rabs_Ropp. apply Rle_refl.
-    - eapply Rle_trans; [|exact HB]. set (g := eta a 0 ^ (2 * n)). set (CK := Q2R (coupling a) * _).
-      apply Rle_trans with (sum m (fun i => at_ cs' j * (g * CK) * Q2R (worth_q a F mm (begin_rows a (nth i (axes a) dflt))))); [|rewrite sum_scal; apply Req_le; unfold at_; change (eta a 0 ^ (n + (n + 0))) with g; ring].
-      apply sum_le. intros i Hi. destruct (HX _ i (HXi i Hi)) as [HF HB0].
-      assert (Ai : In (nth i (axes a) dflt) (axes a)) by (apply nth_In; exact Hi).
-      specialize (H5 _ Ai). apply andb_prop in H5 as [L1 L2]. apply Nat.eqb_eq in L1, L2.
-      assert (Ri : check_rows (order c) (begin_rows a (nth i (axes a) dflt)) = true) by (apply H6; apply in_map; exact Ai).
-      rewrite (worth_ok f F mm (begin_rows a (nth i (axes a) dflt)) (y a (hh i) (fun u => at_ (nth u (begins (nth i (axes a) dflt)) [])) 0) EF Ri).
-      + rewrite (value_ext f F mm _ (y a (hh i) (X i 0) 0) EF).
-        * replace (sq (Rabs (rel i))) with (sq (rel i)) by (unfold sq; rewrite <- Rabs_mult; symmetry; apply Rabs_right; apply Rle_ge; apply Rle_0_sqr).
-          eapply Rle_trans; [apply (relative_ok kf f F mm v cs' cn (hh i) (X i) (Sl i) t j Hu Ef EB EF H3 H4 HF Ht Hj H2)|].
-          apply Req_le. unfold g, CK, at_. ring.
-        * intros u w Hu' Hw. unfold y, placed. rewrite (HB0 u w Hu' Hw). reflexivity.
-      + unfold begin_rows. cbv zeta. rewrite map_length, seq_length. reflexivity.
-      + intros u Hu'. apply functional_extensionality. intros w. apply rows_ok; assumption. }
+    - eapply Rle_trans; [|exact HB]. set (CK := Q2R (coupling a) * _).
+      apply Rle_trans with (sum m (fun i => at_ cs' j * (Q2R g ^ (2 * n) * CK) * value a f (y a (spot a i) (X i 0) 0)));
+        [|rewrite sum_scal; change (Q2R (nth j cs' 0%Q)) with (at_ cs' j); apply Req_le; change (n + (n + 0))%nat with (2 * n)%nat; generalize (Q2R g ^ (2 * n)); intros; ring].
+      apply sum_le. intros i Hi. destruct (HX _ i (nth_error_nth' (axes a) (Axis [] [] []) Hi)) as [HF _].
+      replace (sq (Rabs (rel i))) with (sq (rel i)) by (unfold sq; rewrite <- Rabs_mult; symmetry; apply Rabs_right; apply Rle_ge; apply Rle_0_sqr).
+      eapply Rle_trans; [apply (relative_ok kf f F mm v cs' cn (spot a i) (X i) (Sl i) t j Hu Ef EB EF H3 H4 HF Ht Hj (Q2R g) (pace_ok g t Eg Ht))|].
+      apply Req_le. change (Q2R (coupling a) * at_ (gains a) (pred n)) with CK. generalize (Q2R g ^ (2 * n)). intros. ring. }
   rewrite Er in MK. lra.
+Qed.
+
+(** * What is left under a cap *)
+Lemma power_below q z : 0 <= Q2R q <= exp (z / 16) -> Q2R (twice_4 (floor q)) <= exp z.
+Proof.
+  intros [H0 H1]. assert (F0 : 0 <= Q2R (floor q)).
+  { assert (N : (0 <= Qnum q)%Z).
+    { apply le_IZR. unfold Q2R in H0. assert (D : 0 < IZR (Zpos (Qden q))) by (apply IZR_lt; reflexivity).
+      apply (Rmult_le_reg_r (/ IZR (Zpos (Qden q)))); [apply Rinv_0_lt_compat; exact D|lra]. }
+    unfold floor. cbv zeta. rewrite Q2R_div by (intros Z; discriminate Z). unfold Rdiv. apply Rmult_le_pos.
+    - unfold Q2R, inject_Z. simpl Qden. simpl Qnum. apply Rmult_le_pos; [apply IZR_le; apply Z.div_pos; [apply Z.mul_nonneg_nonneg; [exact N|discriminate]|reflexivity]|].
+      left. apply Rinv_0_lt_compat. lra.
+    - left. apply Rinv_0_lt_compat. unfold Q2R, inject_Z. simpl Qden. simpl Qnum. apply Rmult_lt_0_compat; [apply IZR_lt; reflexivity|]. apply Rinv_0_lt_compat. lra. }
+  pose proof (floor_ok q) as F1. set (g := floor q) in *. clearbody g. unfold twice_4. cbv zeta. rewrite !Q2R_mult. set (x := exp (z / 16)) in *.
+  assert (EX : exp z = x * x * (x * x) * (x * x * (x * x)) * (x * x * (x * x) * (x * x * (x * x)))).
+  { unfold x. rewrite <- !exp_plus. f_equal. field. }
+  rewrite EX. assert (S1 : forall u v, 0 <= u -> u <= v -> 0 <= u * u /\ u * u <= v * v).
+  { intros u v Hu Huv. split; [apply Rmult_le_pos; lra|apply Rmult_le_compat; lra]. }
+  destruct (S1 (Q2R g) x ltac:(lra) ltac:(lra)) as [Q1 Q2]. destruct (S1 _ _ Q1 Q2) as [Q3 Q4]. destruct (S1 _ _ Q3 Q4) as [Q5 Q6].
+  destruct (S1 _ _ Q5 Q6) as [_ Q8]. exact Q8.
+Qed.
+Hypothesis Hleft : check_left a = true.
+Lemma cap_reached G : cap a = Some G -> let w := if Qle_bool G (begin_gain a) then span c else (pull_in a / (G - slope a))%Q in
+  0 < Q2R w <= deadline c /\ forall t, deadline c - Q2R w <= t < deadline c ->
+    turns a t = clock (deadline c) (Q2R (slope a)) (k c) (deadline c - Q2R w) + Q2R G * (t - (deadline c - Q2R w)).
+Proof.
+  intros EG w. destruct (T_k a Hprot) as [A B]. fold c in A, B. destruct matrices as [_ [_ [_ [M4 _]]]]. pose proof (proj1 M4) as R0.
+  set (T := deadline c) in *. pose proof begin_ok as BO. assert (U0 : uncapped a 0 = Q2R (slope a) + k c / T) by (unfold uncapped, gain; fold c T; rewrite Rminus_0_r; reflexivity).
+  assert (KT : 0 < k c / T) by (apply Rdiv_lt_0_compat; lra).
+  assert (Up : forall t u, t <= u < T -> uncapped a t <= uncapped a u).
+  { intros t u H. unfold uncapped, gain. fold c T. apply Rplus_le_compat_l. unfold Rdiv. apply Rmult_le_compat_l; [lra|]. apply Rinv_le_contravar; lra. }
+  destruct (Qle_bool G (begin_gain a)) eqn:E.
+  - apply Qle_bool_iff, Qle_Rle in E. assert (Ew : Q2R w = T) by apply span_ok. rewrite Ew. split; [lra|]. intros t Ht.
+    apply (turns_late a Hprot G (T - T) t EG ltac:(lra) ltac:(apply Ht)).
+    + intros u Hu. lra.
+    + intros u Hu. specialize (Up 0 u ltac:(fold c T in Hu; lra)). lra.
+  - assert (L : Q2R (begin_gain a) < Q2R G).
+    { destruct (Qlt_le_dec (begin_gain a) G) as [L|L]; [apply Qlt_Rlt; exact L|apply Qle_bool_iff in L; congruence]. }
+    rewrite BO, U0 in L. assert (P : 0 < Q2R (G - slope a)) by (rewrite Q2R_minus; lra).
+    assert (Ew : Q2R w = k c / (Q2R G - Q2R (slope a))).
+    { unfold w. rewrite Q2R_div, pull_ok, Q2R_minus; [reflexivity|]. intros Z. apply Qeq_eqR in Z. rewrite Z, Q2R_0 in P. lra. }
+    rewrite Q2R_minus in P. assert (W0 : 0 < Q2R w) by (rewrite Ew; apply Rdiv_lt_0_compat; lra).
+    assert (W1 : Q2R w * (Q2R G - Q2R (slope a)) = k c) by (rewrite Ew; field; lra).
+    assert (W2 : Q2R w <= T).
+    { apply (Rmult_le_reg_r (Q2R G - Q2R (slope a))); [exact P|]. rewrite W1. apply Rle_trans with (T * (k c / T)); [right; field; lra|].
+      apply Rmult_le_compat_l; lra. }
+    assert (AtG : uncapped a (T - Q2R w) = Q2R G).
+    { unfold uncapped, gain. fold c T. replace (T - (T - Q2R w)) with (Q2R w) by ring. rewrite <- W1. field. lra. }
+    split; [lra|]. intros t Ht. apply (turns_late a Hprot G _ t EG); [lra|apply Ht| |].
+    + intros u Hu. rewrite <- AtG. apply Up. lra.
+    + intros u Hu. rewrite <- AtG. apply Up. fold c T in Hu. lra.
+Qed.
+Lemma near_end w (Q : R -> Prop) : 0 < w -> (forall t, deadline c - w < t < deadline c -> Q t) -> at_left (deadline c) Q.
+Proof.
+  intros W0 H. exists (mkposreal _ W0). intros t Bt Lt. unfold ball in Bt; simpl in Bt; unfold AbsRing_ball, abs, minus, plus, opp in Bt; simpl in Bt.
+  apply Rabs_def2 in Bt. apply H. lra.
+Qed.
+Theorem left_ok : left_claim a.
+Proof.
+  intros q rows e EL He nearly. unfold check_left in Hleft. rewrite EL in Hleft. destruct (cap a) as [G|] eqn:EG; [|discriminate].
+  cbv zeta in Hleft. fold c n d in Hleft. set (w := if Qle_bool G (begin_gain a) then span c else (pull_in a / (G - slope a))%Q) in *.
+  set (y0 := reduced ((q - slope a * (span c - w) - G * w) / pull_in a)) in *. set (y1 := if notneg y0 then y0 else 0%Q) in *.
+  set (b := twice_4 (floor _)) in *.
+  apply andb_prop in Hleft as [H H5]. apply andb_prop in H as [H H4]. apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2].
+  destruct (T_k a Hprot) as [A B]. fold c in A, B. destruct matrices as [M1 [_ [M3 [M4 _]]]]. pose proof (proj2 M4 G EG) as G0.
+  set (T := deadline c) in *. destruct (cap_reached G EG) as [W0 TL]. fold w T in W0, TL. apply notneg_ok in H1.
+  assert (Far : Q2R q <= clock T (Q2R (slope a)) (k c) (T - Q2R w) + Q2R G * Q2R w).
+  { assert (Y0 : 0 <= Q2R y1) by (unfold y1; destruct (notneg y0) eqn:N; [apply notneg_ok; exact N|rewrite Q2R_0; lra]).
+    assert (Y1 : Q2R y0 <= Q2R y1).
+    { unfold y1. destruct (notneg y0) eqn:N; [lra|]. rewrite Q2R_0. unfold notneg in N. apply Z.leb_gt in N. unfold Q2R.
+      apply IZR_lt in N. assert (0 < / IZR (Zpos (Qden y0))) by (apply Rinv_0_lt_compat; apply IZR_lt; reflexivity). nra. }
+    apply negb_true_iff in H2. pose proof (Moving.power_ok y1 Y0 H2) as PO. apply Qle_bool_iff, Qle_Rle in H3.
+    assert (Nw : ~ (w == 0)%Q) by (intros Z; apply Qeq_eqR in Z; rewrite Z, Q2R_0 in W0; lra).
+    rewrite Q2R_div, span_ok in H3 by exact Nw. fold T in H3.
+    assert (LN : Q2R y1 <= ln (T / Q2R w)).
+    { rewrite <- (ln_exp (Q2R y1)). destruct (Req_dec (exp (Q2R y1)) (T / Q2R w)) as [Z|Z]; [rewrite Z; lra|]. left.
+      apply ln_increasing; [apply exp_pos|lra]. }
+    assert (Np : ~ (pull_in a == 0)%Q) by (intros Z; apply Qeq_eqR in Z; rewrite pull_ok, Q2R_0 in Z; lra).
+    unfold y0 in Y1. rewrite reduced_ok, Q2R_div, !Q2R_minus, !Q2R_mult, Q2R_minus, span_ok, pull_ok in Y1 by exact Np. fold T in Y1.
+    unfold clock. replace (T - (T - Q2R w)) with (Q2R w) by ring. set (ll := ln (T / Q2R w)) in *.
+    assert (E : (Q2R q - Q2R (slope a) * (T - Q2R w) - Q2R G * Q2R w) / k c * k c = Q2R q - Q2R (slope a) * (T - Q2R w) - Q2R G * Q2R w) by (field; lra).
+    set (z := (Q2R q - _ - _) / k c) in *. assert (z * k c <= ll * k c) by (apply Rmult_le_compat_r; lra). lra. }
+  assert (Clock : forall r, 0 < r -> at_left T (fun t => Q2R q - r <= turns a t)).
+  { intros r Hr. assert (M : 0 < Rmin (r / Q2R G) (Q2R w)) by (apply Rmin_pos; [apply Rdiv_lt_0_compat; assumption|lra]).
+    apply (near_end _ _ M). fold T. intros t Ht. pose proof (Rmin_l (r / Q2R G) (Q2R w)). pose proof (Rmin_r (r / Q2R G) (Q2R w)).
+    rewrite TL by lra. assert (X : Q2R G * (T - t) <= Q2R G * (r / Q2R G)) by (apply Rmult_le_compat_l; lra).
+    replace (Q2R G * (r / Q2R G)) with r in X by (field; lra). lra. }
+  split; [apply Clock; exact He|]. intros X Sl i j Hi Hj HX. unfold nearly. fold c T in Hj |- *. fold n in Hi.
+  rewrite forallb_forall in H5. specialize (H5 j ltac:(apply in_seq; lia)). rewrite forallb_forall in H5.
+  specialize (H5 i ltac:(apply in_seq; lia)). set (x := nth i (nth j rows []) 0%Q) in *. apply andb_prop in H5 as [X0 H5]. apply notneg_ok in X0.
+  apply existsb_exists in H5 as [[cs V0] [Hk HB]]. cbn [fst snd] in HB. apply in_flat_map in Hk as [kf [Hu Hk]].
+  destruct (nth_error (funcs c) kf) as [f|] eqn:Ef; [|destruct Hk].
+  destruct (deviation f) as [[bb cs']|] eqn:Ed; [|destruct Hk].
+  destruct (Checker.form (order c) (dls d) (dL d) (ly f)) as [[F mm]|] eqn:EF; [|destruct Hk].
+  destruct Hk as [Hk|[]]. injection Hk as <- <-. apply Qle_bool_iff, Qle_Rle in HB.
+  rewrite !Q2R_mult, powq_ok, (begins_ok f F mm X Sl EF H4 HX) in HB. set (m := length (axes a)) in *.
+  set (V := sum m (fun i => value a f (y a (spot a i) (X i 0) 0))) in *. set (K := at_ cs' j * at_ (nth i (W a) []) i * V).
+  assert (EK : Q2R (nth j cs' 0%Q) * Q2R (cell (W a) i i) * V = K) by reflexivity. rewrite EK in HB. clear EK.
+  set (r := Q2R (falls a)) in *.
+  assert (Hb : Q2R b <= exp (r * Q2R q)).
+  { set (p := reduced (falls a * q / 16)) in *. assert (Ep : Q2R p = r * Q2R q / 16).
+    { unfold p. rewrite reduced_ok, Q2R_div by (intros Z; discriminate Z). rewrite Q2R_mult. f_equal. unfold Q2R. simpl. field. }
+    assert (P0 : 0 <= Q2R p) by (rewrite Ep; unfold Rdiv; apply Rmult_le_pos; [apply Rmult_le_pos; lra|lra]).
+    apply power_below. rewrite <- Ep. pose proof (Effort.horner_ok p 100 P0). lra. }
+  assert (Small : forall t, 0 <= t < T -> sum m (fun i0 => sq (away a (spot a i0) (X i0 t) i j)) <= Q2R x * Q2R x * exp (r * (Q2R q - turns a t))).
+  { intros t Ht. set (u := exp (- (r * turns a t))).
+    assert (S1 : sum m (fun i0 => sq (away a (spot a i0) (X i0 t) i j)) <= sq (eta a t ^ i) * u * K).
+    { apply Rle_trans with (sum m (fun i0 => sq (eta a t ^ i) * u * (at_ cs' j * at_ (nth i (W a) []) i) * value a f (y a (spot a i0) (X i0 0) 0)));
+        [|rewrite sum_scal; fold V; apply Req_le; unfold K; ring].
+      apply sum_le. intros i0 Hi0. destruct (HX _ i0 (nth_error_nth' (axes a) (Axis [] [] []) Hi0)) as [HF _].
+      destruct (claim_ok kf f Hu Ef _ _ _ t HF Ht) as [_ C]. specialize (C bb cs' i j Ed Hi Hj). cbv zeta in C. change (at_ (offsets (nth i0 (axes a) (Axis [] [] [])))) with (spot a i0) in C.
+      eapply Rle_trans; [exact C|]. apply Req_le. unfold u, r. ring. }
+    assert (U0 : 0 < u) by apply exp_pos. eapply Rle_trans; [exact S1|].
+    assert (EX : exp (r * (Q2R q - turns a t)) = exp (r * Q2R q) * u) by (unfold u; rewrite <- exp_plus; f_equal; ring).
+    assert (PG : sq (eta a t ^ i) <= Q2R G ^ (2 * i)).
+    { replace (2 * i)%nat with (i + i)%nat by lia. rewrite pow_add. pose proof (eta_pos a Hprot M4 t (proj2 Ht)).
+      assert (eta a t <= Q2R G) by (unfold eta; rewrite EG; apply Rmin_r).
+      assert (0 <= eta a t ^ i <= Q2R G ^ i) by (split; [apply pow_le; lra|apply pow_incr; lra]). unfold sq. apply Rmult_le_compat; lra. }
+    pose proof (Rle_0_sqr (eta a t ^ i)) as E0. fold (sq (eta a t ^ i)) in E0. change (Rsqr (eta a t ^ i)) with (sq (eta a t ^ i)) in E0.
+    rewrite EX. destruct (Rle_lt_dec 0 K) as [K0|K0].
+    - apply Rle_trans with (Q2R G ^ (2 * i) * K * u); [|].
+      + replace (sq (eta a t ^ i) * u * K) with (sq (eta a t ^ i) * K * u) by ring. apply Rmult_le_compat_r; [lra|]. apply Rmult_le_compat_r; assumption.
+      + rewrite <- Rmult_assoc. apply Rmult_le_compat_r; [lra|]. eapply Rle_trans; [exact HB|]. apply Rmult_le_compat_l; [apply Rmult_le_pos; exact X0|exact Hb].
+    - apply Rle_trans with 0; [|apply Rmult_le_pos; [apply Rmult_le_pos; exact X0|apply Rmult_le_pos; left; [apply exp_pos|exact U0]]].
+      assert (0 <= sq (eta a t ^ i) * u) by (apply Rmult_le_pos; lra). nra. }
+  assert (Fin : exists dd, 0 < dd /\ Q2R x * Q2R x * exp (r * dd) <= (Q2R x + e) * (Q2R x + e)).
+  { destruct (Req_dec (Q2R x) 0) as [Z|Z]; [exists 1; split; [lra|]; rewrite Z, !Rmult_0_l; nra|].
+    set (v := (Q2R x + e) / Q2R x). assert (V1 : 1 < v) by (unfold v; apply (Rmult_lt_reg_r (Q2R x)); [lra|]; unfold Rdiv; rewrite Rmult_assoc, Rinv_l by lra; lra).
+    exists (ln v / r). split; [apply Rdiv_lt_0_compat; [rewrite <- ln_1; apply ln_increasing; lra|exact M3]|].
+    replace (r * (ln v / r)) with (ln v) by (field; change (0 < r) in M3; lra). rewrite exp_ln by lra.
+    replace (Q2R x * Q2R x * v) with (Q2R x * (Q2R x + e)) by (unfold v; field; lra). nra. }
+  destruct Fin as [dd [D0 D1]]. generalize (filter_and (F := at_left T) _ _ (Clock dd D0) (near_end T _ A (fun t H => H))).
+  apply (filter_imp (F := at_left T)). intros t [C1 C2]. fold T in C2. change (at_ (nth j rows []) i) with (Q2R x).
+  unfold over_space. fold m. rewrite <- (sqrt_square (Q2R x + e)) by lra. apply sqrt_le_1_alt. eapply Rle_trans; [apply Small; lra|].
+  eapply Rle_trans; [|exact D1]. apply Rmult_le_compat_l; [apply Rmult_le_pos; exact X0|].
+  destruct (Req_dec (r * (Q2R q - turns a t)) (r * dd)) as [Z|Z]; [rewrite Z; lra|]. left. apply exp_increasing.
+  assert (r * (Q2R q - turns a t) <= r * dd) by (apply Rmult_le_compat_l; [left; exact M3|lra]). lra.
 Qed.
 End Sound.
 
@@ -576,11 +764,12 @@ Proof.
   apply negb_true_iff in HE. split; [apply (accepts_sound h); exact HG|]. unfold accepts in HG. rewrite HE in HG.
   unfold check in HG. set (d := prepare (graph a)) in *.
   repeat match type of HG with (_ && _ = true) => let K := fresh "G" in apply andb_prop in HG as [HG K] end.
-  unfold check_agents_only in HA. apply andb_prop in HA as [HA A7]. apply andb_prop in HA as [HA A6].
+  unfold check_agents_only in HA. apply andb_prop in HA as [HA A8]. apply andb_prop in HA as [HA A7]. apply andb_prop in HA as [HA A6].
   apply andb_prop in HA as [HA A5].
   apply andb_prop in HA as [HA A4]. apply andb_prop in HA as [HA A3]. apply andb_prop in HA as [A1 A2].
   split; [apply (definite_ok split); assumption|]. split; [apply (agreement_ok split points a); assumption|].
-  split; [apply (ends_ok a); assumption|]. split; [apply (tops_ok split points a); assumption|]. split.
+  split; [apply (ends_ok a); assumption|]. split; [apply (tops_ok split points a); assumption|].
+  split; [apply (left_ok split points a); assumption|]. split.
   { intros h0 x0. destruct (matrices split a A1) as [_ [_ [_ [Hs [Hn _]]]]]. apply flight; assumption. }
   intros j Hj.
   assert (E : exists f, nth_error (funcs (graph a)) j = Some f).

@@ -51,8 +51,10 @@ Definition switches_from F X S t0 := switches F X S /\ quiet (order (frame F)) (
 
 (** * What it claims *)
 (** a signal is a mode and its weights at every instant, so that members change continuously off a sequence of instants:
-    from every state, and all sliding variables, a motion starts under each of them, so nothing that follows is void *)
-Definition existence_claim (F : family) : Prop := let c := frame F in forall m w (D : nat -> R) x0 s0,
+    there are some, for there is a member; from every state, and all sliding variables, a motion starts under each of
+    them, so nothing that follows is void *)
+Definition existence_claim (F : family) : Prop := let c := frame F in
+  (exists m w, In m (modes F) /\ admits (ties m) w) /\ forall m w (D : nat -> R) x0 s0,
   (forall t, In (m t) (modes F) /\ admits (ties (m t)) (w t)) ->
   (forall t x i, 0 < t < deadline c -> (forall j, t <> D j) -> continuous (fun u => member (ties (m u)) (w u) x i) t) ->
   (forall T i, kind c = Nominal T -> s0 i = 0) ->

@@ -152,7 +152,8 @@ Definition check_part (F : family) (P : part) : bool :=
   | Interval => negb (length (still P) =? 0)%nat && forallb (fun m => match owned m P with [_] => true | _ => false end) (modes F)
   | Containment => negb (length (still P) =? 0)%nat && existsb (fun m => match owned m P with _ :: _ :: _ => true | _ => false end) (modes F) end.
 Definition check_frame (F : family) : bool :=
-  let c := frame F in check_protocol c && check_sliding_input c && check_reaching c && (match edges c with [] => true | _ => false end) &&
+  let c := frame F in negb (length (modes F) =? 0)%nat && check_protocol c && check_sliding_input c && check_reaching c &&
+  (match edges c with [] => true | _ => false end) &&
   forallb (fun i => existsb (fun P => mem i (its_agents P)) (parts F)) (seq 0 (order c)).
 
 (** * From the initial state *)

@@ -29,9 +29,19 @@ Proof.
   - apply (lipschitz_le L); [lra|]. apply H. exact Hw.
   - apply (lipschitz_le K); [lra|]. apply IH; assumption.
 Qed.
-Theorem family_motions_exist F : check_protocol (frame F) = true -> existence_claim F.
+Lemma member_exists F : modes F <> [] -> forallb (check_mode F) (modes F) = true -> exists m w, In m (modes F) /\ admits (ties m) w.
 Proof.
-  intros HP. unfold existence_claim. cbv zeta. set (c := frame F) in *. intros m w D x0 s0 Hmw HD H0. destruct (slides_exist c s0 HP H0) as [S [HS [S0 CS]]].
+  destruct (modes F) as [|m l]; [contradiction|]. intros _ H. exists m. simpl in H. apply andb_prop in H as [H _]. unfold check_mode in H.
+  cbv zeta in H. repeat apply andb_prop in H as [H _]. rewrite forallb_forall in H.
+  set (w := fun j => match nth_error (ties m) j with Some e => Q2R (bottom e) | None => 0 end).
+  exists w. split; [left; reflexivity|]. intros j e Hj. unfold w. rewrite Hj. split; [lra|].
+  specialize (H e (nth_error_In _ _ Hj)). unfold check_tie, lo, hi in H. apply andb_prop in H as [_ H]. apply Qle_bool_iff in H.
+  apply Qle_Rle. destruct (positive e); [exact H|]. rewrite <- (Qopp_involutive (bottom e)), <- (Qopp_involutive (top e)).
+  apply Qopp_le_compat. exact H.
+Qed.
+Theorem family_motions_exist F : check_protocol (frame F) = true -> modes F <> [] -> forallb (check_mode F) (modes F) = true -> existence_claim F.
+Proof.
+  intros HP HM HC. unfold existence_claim. cbv zeta. set (c := frame F) in *. split; [apply member_exists; assumption|]. intros m w D x0 s0 Hmw HD H0. destruct (slides_exist c s0 HP H0) as [S [HS [S0 CS]]].
   destruct (modes_lipschitz (modes F)) as [K [HK L]].
   destruct (driven (order c) (fun t => member (ties (m t)) (w t)) (deadline c) (Q2R (rho1 c)) (k c) S x0 K) as [X [X0 [CX DX]]];
     [apply (T_pos c HP)|exact HK|intros t _; apply L; apply Hmw|intros; apply CS|].
@@ -305,6 +315,7 @@ Proof.
   intros H. unfold accepts_family, check_family in H. apply andb_prop in H as [H H7]. apply andb_prop in H as [H H6].
   apply andb_prop in H as [H H5]. apply andb_prop in H as [H H4]. apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2].
   destruct (frame_parts F H1) as [A1 [A2 [A3 A4]]].
+  assert (A0 : modes F <> []) by (intros E; unfold check_frame in H1; rewrite E in H1; discriminate H1).
   split; [intros m Hm; apply (modes_claim F H2 m Hm)|].
   split; [intros P HP; rewrite forallb_forall in H3; apply (parts_claim F H2); auto|].
   split; [exact A4|]. split; [split; [exact A3|apply (sliding_ok _ A1 A2)]|].
@@ -312,5 +323,5 @@ Proof.
   split.
   - apply (ends_ok F H1 H2 hs H4 H5).
   - split; [split; [apply (stays_ok F H1 H2 hs H4 H6)|apply (peaks_ok F H1 H2 hs H4 H7)]|].
-    apply (family_motions_exist F A1).
+    apply (family_motions_exist F A1 A0 H2).
 Qed.

@@ -69,7 +69,7 @@ Lemma frame_parts : check_protocol c = true /\ check_sliding c = true /\ edges c
   forall i, (i < n)%nat -> exists P, In P (parts F) /\ In i (its_agents P).
 Proof.
   unfold check_frame in Hframe. cbv zeta in Hframe. fold c in Hframe. apply andb_prop in Hframe as [H H5].
-  apply andb_prop in H as [H H4]. apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2].
+  apply andb_prop in H as [H H4]. apply andb_prop in H as [H H3]. apply andb_prop in H as [H H2]. apply andb_prop in H as [_ H1].
   split; [exact H1|]. split; [unfold check_sliding; rewrite H2, H3; reflexivity|]. split; [destruct (edges c); [reflexivity|discriminate]|].
   intros i Hi. rewrite forallb_forall in H5. specialize (H5 i ltac:(apply in_seq; unfold n in Hi; lia)).
   apply existsb_exists in H5 as [P [A B]]. exists P. split; [exact A|apply mem_In; exact B].

@@ -105,7 +105,6 @@ let certificate json : t =
   List.iter (fun key -> need (null_in json key) (key ^ " beside that of the agents")) [ "initial_state"; "final_state"; "input" ];
   List.iter (fun x -> need (Number.equal x Number.zero) "agents of order n begin with sliding variables that are 0") r.cert.sliding;
   if r.cert.enclosed then unsupported "agents of order n on a large form";
-  if get "gain_cap" <> Null then unsupported "agents of order n with a gain that is capped";
   let n = count "order" (get "order") in
   let dimension = count "dimension" (get "dimension") in
   let row key = shorts key n (get key) in
@@ -115,7 +114,7 @@ let certificate json : t =
   need (List.length points <= many_points) (Printf.sprintf "more than %d points" many_points);
   let points = List.map (fun x -> short "points" (number "points" x)) points in
   let rec ascending = function a :: (b :: _ as l) -> Number.compare a b < 0 && ascending l | _ -> true in
-  need (ascending points && points <> [] && Number.equal (List.hd points) Number.zero) "points do not ascend from 0";
+  need (ascending points) "points do not ascend";
   let proof = { rest = r.rest; checked = []; unchecked = [] } in
   let listed = match json with
     | Obj l -> (match List.assoc_opt "lyapunov" l with Some (Obj l) -> entries "functions" (List.assoc "functions" l) | _ -> []) | _ -> [] in
@@ -129,31 +128,56 @@ let certificate json : t =
   let left = ref [] in
   let skip kind key = if get key <> Null then (skipped proof kind "agents"; left := ("agents." ^ key) :: !left) in
   let plant = row "plant" and damping = row "own" in
+  let cap = match get "gain_cap" with Null -> None | _ -> Some (single "gain_cap") in
   let of_int i = Number.of_z (Z.of_int i) and largest = List.fold_left (fun m (x : q) -> Number.max m { x with qnum = Z.abs x.qnum }) Number.zero in
   let pace = Number.mul r.cert.rho2 r.cert.kappa and most = largest plant in
   let span = match r.cert.kind with Nominal t -> t | SlidingMode (a, b, _, _, _, _) -> Number.add a b in
   need (Number.equal most Number.zero || Number.compare (Number.mul span (Number.add Number.one most)) (of_int 100) <= 0)
     "agents that move too far before T";
-  need (Number.compare (Number.mul rate pace) (of_int (2 * (n - 1))) > 0) "r k is not above 2 (n - 1): derivatives need not agree at T";
+  let gain_0 = Number.add r.cert.rho1 (Number.div pace span) in
+  (match cap with
+   | None ->
+       need (Number.compare (Number.mul rate pace) (of_int (2 * (n - 1))) > 0) "r k is not above 2 (n - 1): derivatives need not agree at T";
+       need (points <> [] && Number.equal (List.hd points) Number.zero) "points do not begin at 0"
+   | Some g ->
+       need (Z.sign g.qnum > 0) "the cap of the gain is not positive";
+       need (if Number.compare g gain_0 <= 0 then points = []
+         else points <> [] && Number.equal (List.hd points) (Number.div Number.one g)) "points do not begin at the cap of the gain");
   need (Number.equal (largest damping) Number.zero || (n = 2 && Z.sign (List.hd damping).qnum = 0 && Z.sign (List.nth damping 1).qnum > 0
-    && Z.sign (List.hd plant).qnum = 0)) "feedback of the own state that is not that of meeting at rest";
-  let agree = List.exists (fun k -> (List.nth funcs k).deviation <> None) used in
-  if not agree && used <> [] then left := [ "claim, that all agree at the deadline" ];
+    && Z.sign (List.hd plant).qnum = 0 && cap = None)) "feedback of the own state that is not that of meeting at rest";
+  let deviates = List.exists (fun k -> (List.nth funcs k).deviation <> None) used in
+  let agree = cap = None && deviates in
+  if cap = None && not agree && used <> [] then left := [ "claim, that all agree at the deadline" ];
   let chains = List.for_all (fun x -> Number.equal x Number.zero) (plant @ damping) in
   let motion = List.map (fun row -> let l = entries "motion" row in
     need (List.length l = n) "motion: another number of columns"; List.map (Reader.interval "motion") l) (entries "motion" (get "motion")) in
   need (List.length motion = n) "motion: another number of rows";
   let common = if not chains then None else Some (List.map (List.map (fun (x, radius) ->
     need (Number.equal radius Number.zero) "motion: a radius where the common motion is known exactly"; x)) motion) in
-  let known = agree && chains in
+  let known = chains && (agree || cap <> None) in
   if known then bare_of proof "agent-motion" "agents" else skip "agent-motion" "motion";
   if known && get "final_state" <> Null then bare_of proof "agent-final-state" "agents" else skip "agent-final-state" "final_state";
-  need (get "residual" = Null) "what is left at the deadline of a gain that is not capped";
+  need ((get "residual" <> Null) = (cap <> None && get "initial_state" <> Null && deviates))
+    "what is left at the deadline is told iff there are a cap, initial states and deviations";
+  let left_over = match get "residual" with
+    | Null -> None
+    | v ->
+        let get = fields "residual" [ "clock"; "agents" ] v in
+        let clock = number "clock" (get "clock") in
+        let rows = by_agent r.nodes (fun what v ->
+          let l = entries what v in
+          need (List.length l = n) (Printf.sprintf "%s: %d derivatives are due" what n); List.map (number what) l) "residual" (get "agents") in
+        (* [e^(r clock)] and the logarithm of the capped gain are known well enough *)
+        let far = Number.compare (Number.mul rate clock) (of_int 400) > 0
+          || Number.compare (Number.div (Number.mul span (Option.get cap)) pace) (Number.of_z (Z.shift_left Z.one 800)) > 0 in
+        if far then (skip "agent-residual" "residual"; None)
+        else (bare_of proof "agent-residual" "agents"; Some (clock, rows)) in
   let tops = match get "input" with
     | Null -> []
     | _ when not (Number.equal (largest damping) Number.zero) -> skip "agent-input" "input"; []
     | v ->
         need (get "initial_state" <> Null && used <> []) "a bound of the input without initial states or Lyapunov functions";
+        need (cap <> None || Number.compare (Number.mul rate pace) (of_int (2 * n)) >= 0) "a bound of the input though r k is below 2 n";
         bare_of proof "agent-input" "agents";
         let get = fields "input" [ "agents"; "largest" ] v in
         let tops = by_agent r.nodes number "input" (get "agents") in
@@ -161,8 +185,8 @@ let certificate json : t =
   need (proof.rest = []) "an obligation that nothing asks for";
   let slope = r.cert.rho1 in
   let cert = { r.cert with funcs; rho1 = if Z.sign slope.qnum = 0 then Number.one else slope } in
-  let record = { graph = cert; degree = n; slope; plant; damping; gains = row "gains"; w; p = inverse w;
-    coupling; falls = rate; used; agree; drift = common; axes = axes r n dimension get known; tops } in
+  let record = { graph = cert; degree = n; slope; cap; plant; damping; gains = row "gains"; w; p = inverse w;
+    coupling; falls = rate; used; agree; drift = common; axes = axes r n dimension get known; tops; left_over } in
   { base = { r with cert; rest = []; checked = r.checked @ List.rev proof.checked; unchecked = r.unchecked @ List.rev proof.unchecked;
       sections = r.sections @ List.rev !left };
     record; points }
@@ -174,4 +198,5 @@ let parts a = [ "agent-positive of agents", (fun () -> check_matrices split a.re
   "agent-decrease of agents: derivatives need not agree at T", (fun () -> check_agree a.record);
   "agent-motion of agents", (fun () -> check_common a.record);
   "agent-final-state of agents", (fun () -> check_ends_of a.record);
+  "agent-residual of agents", (fun () -> check_left a.record);
   "agent-input of agents", (fun () -> check_tops a.record) ]

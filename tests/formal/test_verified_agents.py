@@ -36,11 +36,19 @@ SETTINGS = {
     "sliding variables": Setting(slides=True, dimension=2),
     "every Lyapunov function": Setting(order=3, method="best"),
     "order 4 without states": Setting(order=4, start=False),
+    "capped gain": Setting(cap=F(7), R=F(5)),
+    "capped gain, slow decay": Setting(cap=F(5), R=F(3)),
+    "capped from the beginning": Setting(cap=F(1, 2)),
+    "capped at its first value": Setting(order=3, cap=F(5, 4)),
+    "capped gain, sliding variables": Setting(order=3, cap=F(20), slides=True, dimension=2),
+    "capped gain, drag": Setting(cap=F(9), plant=(F(0), F(1, 3)), pieces=2),
+    "capped gain, every Lyapunov function": Setting(cap=F(100), method="best"),
+    "capped gain without states": Setting(cap=F(7), start=False),
 }
 #: What is not checked of them: the common motion of agents that are no chains of integrators, the input at rest.
 SKIPPED = {"agent-input", "agent-motion", "agent-final-state"}
 #: What the executable says of a form that it does not read.
-UNREAD = ("large form", "undecided", "radius", "capped", "cascade", "dominance", "weak components")
+UNREAD = ("large form", "undecided", "radius", "cascade", "dominance", "weak components")
 
 
 @pytest.mark.parametrize("name", SETTINGS)
@@ -78,13 +86,10 @@ def test_forms_of_agents_that_are_not_read_are_told_in_one_line(tmp_path: Path) 
     program()
     options: dict[str, Any] = {"simulation": False, "derivatives": [[0, 0, 0, 0]]}
     cascade = certify(CAMPS, NominalProtocol(1, 1, 1, 4), [1, 2, 3, 4], agents=Agents(order=2, cascade=1), **options)
-    for document, what in (
-        (made(CAMPS, Setting(cap=F(7), R=F(5))), "capped"),
-        (json.loads(cascade.to_json()), "cascade"),
-    ):
-        assert check(document).accepted
-        code, text = said(document, tmp_path)
-        assert code == 2 and what in text and "use ptcc check" in text and text.count("\n") == 1
+    document = json.loads(cascade.to_json())
+    assert check(document).accepted
+    code, text = said(document, tmp_path)
+    assert code == 2 and "cascade" in text and "use ptcc check" in text and text.count("\n") == 1
 
 
 def told(document: Json, path: tuple[str | int, ...], new: Any) -> Json:
@@ -126,6 +131,65 @@ def test_what_is_forged_is_rejected_by_both_checkers(tmp_path: Path) -> None:
         assert code == 1 and where in text, (path, text)
 
 
+def refused(document: Json, path: tuple[str | int, ...], new: Any, where: str, folder: Path) -> None:
+    """Both checkers reject a change that the proof tells as well."""
+    forged = told(document, path, new)
+    assert not check(forged).accepted, path
+    code, text = said(forged, folder)
+    assert code == 1 and where in text, (path, text)
+
+
+@pytest.mark.parametrize("name", ["capped gain", "capped gain, slow decay", "capped from the beginning"])
+def test_what_is_forged_under_a_cap_is_rejected_by_both_checkers(name: str, tmp_path: Path) -> None:
+    program()
+    document = made(CAMPS, SETTINGS[name])
+    own = document["agents"]
+    late = own["points"] == []
+    times = lambda text, q: str(F(text) * F(q))  # noqa: E731
+    rows, entry = own["residual"]["agents"], own["input"]["agents"]
+    for path, new, where in (
+        (("agents", "residual", "clock"), times(own["residual"]["clock"], "1.000001"), "agent-residual"),
+        (("agents", "residual", "agents", "b", 0), times(rows["b"][0], "0.99999"), "agent-residual"),
+        (("agents", "residual", "agents", "f", 1), times(rows["f"][1], "0.99999"), "agent-residual"),
+        (("agents", "residual", "agents", "a", 0), "-1", "agent-residual"),
+        (("agents", "residual"), None, "iff"),
+        (("agents", "input", "agents", "b"), times(entry["b"], "0.99999"), "input"),
+        (("agents", "gain_cap"), times(own["gain_cap"], "2"), "points" if not late else "agent-"),
+        (("agents", "gain_cap"), "0", "not positive"),
+        (("agents", "points"), ["0", "4/5"] if late else ["0", *own["points"]], "points"),
+        (("agents", "rate"), times(own["rate"], "1.01"), "agent-decrease"),
+        (("agents", "own", 1), "1", "feedback"),
+    ):
+        refused(document, path, new, where, tmp_path)
+    # less is claimed
+    for path, new in (
+        (("agents", "residual", "agents", "b", 0), times(rows["b"][0], 2)),
+        (("agents", "input", "agents", "b"), entry["b"]),
+    ):
+        weaker = told(document, path, new)
+        assert check(weaker).accepted and said(weaker, tmp_path).code == 0
+
+
+def test_a_decrease_that_holds_but_at_the_cap_is_rejected(tmp_path: Path) -> None:
+    program()
+    free, capped = Setting(R=F(5)), Setting(cap=F(7), R=F(5))
+    document = made(CAMPS, capped)
+    for key in ("lower_triangle", "gains"):
+        document = changed(document, ("agents", key), made(CAMPS, free)["agents"][key])
+    document = resealed(document)
+    assert not check(document).accepted
+    code, text = said(document, tmp_path)
+    assert code == 1 and "agent-decrease" in text
+
+
+def test_what_is_left_is_named_where_the_decay_is_too_long_to_be_enclosed(tmp_path: Path) -> None:
+    program()
+    document = made(CAMPS, Setting(order=1, cap=F(10) ** 120, R=F(2)))
+    assert check(document).accepted
+    code, text = said(document, tmp_path)
+    assert code == 0 and {"agent-residual of agents", "agents.residual"} <= named(text)
+
+
 def test_where_no_function_used_has_a_deviation_it_is_named_that_all_agree(tmp_path: Path) -> None:
     program()
     document = made(CAMPS, Setting(order=3, method="best", start=False))
@@ -161,7 +225,7 @@ def own_mutants(document: Json, every: int, start: int, nudges: int) -> list[tup
     return [(path, x) for path, x in mutants(document, every, start) if path[0] in parts] + list(small)
 
 
-@pytest.mark.parametrize("name", ["double integrators", "drag in the plane"])
+@pytest.mark.parametrize("name", ["double integrators", "drag in the plane", "capped gain"])
 def test_of_some_mutants_of_agents_none_is_accepted_unless_true_or_not_checked(name: str, tmp_path: Path) -> None:
     program()
     document = {**made(CAMPS, SETTINGS[name]), "unverified": {}}
@@ -184,13 +248,15 @@ def test_of_hundreds_of_mutants_of_agents_none_is_accepted_unless_true_or_not_ch
 
 
 def random_setting(seed: int) -> Setting:
-    """Orders 1 to 4, chains and others, with and without ``rho1``, sliding variables, and slow decay."""
+    """Orders 1 to 4, chains and others, with and without ``rho1``, sliding variables, a cap, and slow decay."""
     rng = np.random.default_rng([7, seed])
     n = 1 + seed % 4
     plant = tuple(F(int(x), 10) for x in rng.integers(-10, 11, n)) if seed % 3 == 0 else ()
     rate = F(2 * n - 1) if seed % 7 == 0 else None
+    first = F(seed % 5, 8) + F(3, 4)
+    cap = [None, None, None, first / 2, first, first * 3 / 2, F(7), F(50), F(10**6)][seed % 9]
     return Setting(
-        order=n, dimension=1 + seed % 2, plant=plant, R=rate, rho1=F(seed % 5, 8), slides=seed % 4 == 1,
+        order=n, dimension=1 + seed % 2, plant=plant, R=rate, rho1=F(seed % 5, 8), slides=seed % 4 == 1, cap=cap,
         method=("paper", "best")[seed % 11 == 0],
     )  # fmt: skip
 
