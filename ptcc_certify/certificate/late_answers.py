@@ -51,7 +51,8 @@ def judge_messages(certificate: Content) -> list[Answer]:
     if not late.says_something:
         limit = f"; this certificate's limit is a delay of {late.longest_delay:.3g}" if late.longest_delay else ""
         wish = "" if most is None else _longest(late, f"within {near(most, 12)} at T is ")
-        return [Answer(OPEN, "late messages", f"nothing is proved of what is left at T{limit}{wish}")]
+        mend = "; give an initial state" * (certificate.initial_state is None)
+        return [Answer(OPEN, "late messages", f"nothing is proved of what is left at T{mend}{limit}{wish}")]
     return [] if most is None else [_judge_residual(certificate, late, most)]
 
 

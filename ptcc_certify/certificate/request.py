@@ -223,13 +223,14 @@ def _refuse_messages(structure: Structure, messages: LateMessages, caps: Sequenc
     messages.latencies(structure.graph)
     if any(cap != messages.gain_cap for cap in caps):
         raise ParameterError("gain_cap: limits and late messages have two; give both the same, or messages alone")
-    if messages.gain_cap is None and not messages.leaders_hear_at_once(structure):
-        mend = "add a gain cap, or let leaders hear each other at once (delays of 0)"
-        refuse_leader_groups(structure, f"late messages: {mend}; otherwise a bound")
     if messages.value_error and messages.own_delay:
         raise ParameterError("values that are off are not certified where the own state is late; leave one of them out")
     if messages.value_error:
         refuse_leader_groups(structure, "what values that are off add: a bound")
+    if messages.gain_cap is None and not messages.leaders_hear_at_once(structure):
+        at_once = f"delays of 0 within their group{', and no period' * bool(messages.held)}"
+        mend = f"add a gain cap, or let leaders hear each other at once ({at_once})"
+        refuse_leader_groups(structure, f"late messages: {mend}; otherwise a bound")
 
 
 def read_request(structure: Structure, protocol: Protocol, arguments: Mapping[str, Any]) -> Request:

@@ -1,61 +1,31 @@
-"""What is asked of the input of agents of order n, and the answer."""
+"""The answer to what is asked of the input of agents of order n: a deadline, and what is proved of it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
 from lmi.exact.decimal_rounding import down, float_up, up
-from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.graphs.display_hook import Shown
-from ptcc_certify.graphs.rationals import format_exact, short_exact
-from ptcc_certify.protocols import Protocol
+from ptcc_certify.gain_design.answer import DesignAnswer, texts
+from ptcc_certify.graphs.rationals import short_exact
 from ptcc_certify.protocols.agents import Agents
 
 
-@dataclass(frozen=True)
-class AgentsRequest:
-    """What is asked.
-
-    Attributes
-    ----------
-    max_input : Fraction
-        ``U`` of the Euclidean norm of every agent's input.
-    deadline, residual : Fraction or None
-        In units of time; how far a position may be from its place at the deadline, under a gain cap.
-    """
-
-    max_input: Fraction
-    deadline: Fraction | None
-    residual: Fraction | None
-
-
 @dataclass(frozen=True, repr=False)
-class AgentsDesign(Shown):
+class AgentsDesign(DesignAnswer):
     """What was asked of agents of order n, and a deadline that is proved to meet it; made by :func:`design_agents`.
 
     Attributes
     ----------
-    verdict : {"met", "infeasible", "not with this certificate"}
-        ``infeasible``: no gains of the protocol can, proved. The third says that these bounds do not suffice.
-    binding : str
-        What binds, or what is missing.
-    asked : AgentsRequest
-    agents : Agents
-    deadline : Fraction or None
-        ``T``, in units of time: the one that is asked for, else the one that is found.
-    certificate : Certificate or None
-        What proves it; None unless the verdict is ``met``.
     peak, residual : Fraction or None
         Proved at ``deadline``: the largest input of an agent, and what is left of a position under a gain cap.
-    too_short : Fraction or None
-        The longest deadline below ``deadline`` that was tried, and whose bounds do not keep the limit.
     shortest_possible : Fraction or None
         No input within the limit brings the agents where the protocol does by a shorter deadline, proved; None if
         nothing is known: under a gain cap, of agents that move by themselves, and of the cascade.
-    repeatable : bool
-        Whether :func:`ptcc_certify.certify` proves the same by the functions that it finds itself.
+    agents : Agents
+    too_short : Fraction or None
+        The longest deadline below ``deadline`` that was tried, and whose bounds do not keep the limit.
 
     Examples
     --------
@@ -67,22 +37,8 @@ class AgentsDesign(Shown):
     True
     """
 
-    verdict: str
-    binding: str
-    asked: AgentsRequest
-    agents: Agents
-    deadline: Fraction | None = None
-    certificate: Certificate | None = None
-    peak: Fraction | None = None
-    residual: Fraction | None = None
+    agents: Agents = field(kw_only=True)
     too_short: Fraction | None = None
-    shortest_possible: Fraction | None = None
-    repeatable: bool = False
-
-    @property
-    def protocol(self) -> Protocol | None:
-        """The protocol with this deadline; None unless the verdict is ``met``."""
-        return None if self.certificate is None else self.certificate.protocol
 
     @property
     def gain_cap(self) -> Fraction | None:
@@ -140,22 +96,8 @@ class AgentsDesign(Shown):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the design as JSON-ready data, exact numbers as texts, without the certificate."""
-
-        def text(x: Fraction | None) -> str | None:
-            return None if x is None else format_exact(x)
-
-        asked = self.asked
-        numbers = ("gain_cap", "deadline", "peak", "residual", "too_short", "shortest_possible")
-        return {
-            "verdict": self.verdict,
-            "binding": self.binding,
-            "agents": self.agents.text(),
-            "max_input": text(asked.max_input),
-            "asked": {"deadline": text(asked.deadline), "residual": text(asked.residual)},
-            "protocol": None if self.protocol is None else self.protocol.to_dict(),
-            **{name: text(getattr(self, name)) for name in numbers},
-            "ratio": self.ratio,
-        }
+        own = {"agents": self.agents.text(), "ratio": self.ratio}
+        return self._summary() | texts(self, "too_short") | own
 
     def __repr__(self) -> str:
         if self.deadline is None or self.certificate is None or self.peak is None:

@@ -21,7 +21,7 @@ from ptcc_certify.certificate.agents_answer import AgentsAnswer
 from ptcc_certify.certificate.agents_part import prove_agents
 from ptcc_certify.certificate.cascade_part import prove_cascade
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.gain_design.agents_answer import AgentsRequest
+from ptcc_certify.gain_design.request import Request
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.agents import MOST_MOTION, Agents
 
@@ -55,14 +55,14 @@ class Candidate:
             return Fraction(0)
         return None if self.part.residual is None else max(row[0] for row in self.part.residual.agents)
 
-    def excess(self, request: AgentsRequest) -> Fraction | None:
+    def excess(self, request: Request) -> Fraction | None:
         """Return what is proved over what is asked, the larger of two; at most 1 if it is met, None if it is open."""
         if self.peak is None or self.residual is None:
             return None
         beyond = self.residual / request.residual if request.residual else Fraction(0)
         return max(self.peak / request.max_input, beyond)
 
-    def meets(self, request: AgentsRequest) -> bool:
+    def meets(self, request: Request) -> bool:
         """Tell whether what is proved suffices."""
         excess = self.excess(request)
         return excess is not None and excess <= 1
@@ -99,7 +99,7 @@ class Search:
     base: Certificate
     agents: Agents
     template: Protocol
-    request: AgentsRequest
+    request: Request
     tried: dict[Fraction, Candidate | None] = field(default_factory=dict)
 
     def at(self, T: Fraction) -> Candidate | None:

@@ -17,7 +17,7 @@ from dataclasses import replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
-from lmi.exact.decimal_rounding import down, up
+from lmi.exact.decimal_rounding import up
 from ptcc_certify.bounds.shortest_time import shortest_time
 from ptcc_certify.certificate.agents_answer import AgentsAnswer
 from ptcc_certify.certificate.certificate import Certificate
@@ -25,9 +25,10 @@ from ptcc_certify.certificate.format_vectors import agents_ends
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.errors import ParameterError, gated
-from ptcc_certify.gain_design.agents_answer import AgentsDesign, AgentsRequest
+from ptcc_certify.gain_design.agents_answer import AgentsDesign
 from ptcc_certify.gain_design.agents_deadlines import Candidate, Search, at_deadline, longest
-from ptcc_certify.gain_design.answer import INFEASIBLE, MET, UNPROVED
+from ptcc_certify.gain_design.answer import INFEASIBLE, MET, UNPROVED, refusal
+from ptcc_certify.gain_design.request import Request
 from ptcc_certify.graphs.rationals import short_exact, shorten
 from ptcc_certify.protocols import NominalProtocol, Protocol
 from ptcc_certify.protocols.agents import Agents
@@ -103,7 +104,7 @@ def design_agents(
     >>> design_agents(trio, square, start, max_input=5, deadline=1).verdict
     'infeasible'
     """
-    request = AgentsRequest(
+    request = Request(
         parameter("max_input", max_input),
         None if deadline is None else parameter("deadline", deadline),
         None if residual is None else parameter("residual", residual),
@@ -120,7 +121,8 @@ def design_agents(
     part = base.agents
     if part is None or part.initial_state is None:
         raise ParameterError("design of agents of order n starts from an initial state; give x0")
-    blank = AgentsDesign(UNPROVED, "", request, agents, request.deadline, shortest_possible=_least_time(base, request))
+    least = _least_time(base, request)
+    blank = AgentsDesign(UNPROVED, "", request, request.deadline, shortest_possible=least, agents=agents)
     if (reason := _unusable(base, part, request)) is not None:
         return replace(blank, binding=reason)
     search = Search(base, agents, template, request)
@@ -138,7 +140,7 @@ def design_agents(
     return _with(replace(blank, too_short=search.too_short), candidate, base, again)
 
 
-def _refuse(agents: Any, request: AgentsRequest) -> None:
+def _refuse(agents: Any, request: Request) -> None:
     """Refuse what is not searched."""
     if not isinstance(agents, Agents):
         raise ParameterError(f"agents = {shorten(repr(agents))}: give Agents(order=2) for double integrators")
@@ -157,7 +159,7 @@ def _refuse(agents: Any, request: AgentsRequest) -> None:
         raise ParameterError("gain_cap: leaves something at every deadline; give residual, how far a position may be")
 
 
-def _least_time(base: Certificate, request: AgentsRequest) -> Fraction | None:
+def _least_time(base: Certificate, request: Request) -> Fraction | None:
     """Return a deadline below which no input within the limit suffices; None if nothing is known."""
     part = base.agents
     if part is None or part.initial_state is None or any(part.protocol.plant) or part.protocol.gain_cap is not None:
@@ -179,7 +181,7 @@ def _least_time(base: Certificate, request: AgentsRequest) -> Fraction | None:
     return max(shortest_time(rows, request.max_input) for rows in deviations) or None
 
 
-def _unusable(base: Certificate, part: AgentsAnswer, request: AgentsRequest) -> str | None:
+def _unusable(base: Certificate, part: AgentsAnswer, request: Request) -> str | None:
     """Tell what is missing, whatever the deadline; None if nothing is."""
     if part.grows:
         least = up(1 / part.protocol.gain.pole, 4)
@@ -211,10 +213,8 @@ def _with(blank: AgentsDesign, candidate: Candidate, base: Certificate, again: C
     if own is None or not repeatable:
         own, changes = candidate, {"protocol": candidate.protocol, "agents": candidate.part}
         again = base.changed(**changes, expectations=Expectations(max_input=asked.max_input))
-        report = again.checked
-        if report is None or not report.accepted:
-            why = "" if report is None else f" {report.rejected}: {report.reason}"
-            return replace(blank, binding=f"the independent check does not accept{why}")
+        if refused := refusal(again):
+            return replace(blank, binding=refused)
     peak, residual, inputs = own.peak, own.residual, own.part.inputs
     assert peak is not None and residual is not None and inputs is not None
     label = again.graph.labels[inputs.index(peak)]
@@ -238,11 +238,9 @@ def _with(blank: AgentsDesign, candidate: Candidate, base: Certificate, again: C
 
 def _without(answer: AgentsDesign, search: Search, nearest: Candidate | None) -> AgentsDesign:
     """Return the answer without a certificate: what is not met, by how much, and which deadline would be."""
-    asked, least = answer.asked, answer.shortest_possible
-    if asked.deadline is not None and least is not None and least > asked.deadline:
-        times = down(least / asked.deadline)
-        text = f"no gains meet a deadline below {down(least)}, {times} times the one asked for"
-        return replace(answer, verdict=INFEASIBLE, binding=text)
+    asked = answer.asked
+    if answer.excluded:
+        return replace(answer, verdict=INFEASIBLE, binding=answer.excluded)
     if nearest is None or nearest.peak is None:
         return replace(answer, binding="no matrix for these agents was proved")
     text = f"at T = {short_exact(nearest.deadline)} the certified peak is {up(nearest.peak)}"

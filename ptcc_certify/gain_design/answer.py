@@ -15,7 +15,7 @@ from lmi.exact.decimal_rounding import down, float_up, up
 from ptcc_certify.bounds.input.worst_initial_state import WorstInitialState, worst_initial_state
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.checker.input_formulas import Limits
-from ptcc_certify.gain_design.request import DesignRequest, fit_of
+from ptcc_certify.gain_design.request import DesignRequest, Request, fit_of
 from ptcc_certify.graphs.display_hook import Shown
 from ptcc_certify.graphs.rationals import format_exact, nearest_float, short_exact
 from ptcc_certify.protocols import Protocol
@@ -34,19 +34,33 @@ class TradeOff(NamedTuple):
     lower: np.ndarray
 
 
+def refusal(certificate: Certificate) -> str:
+    """Tell that the independent check does not accept a certificate, and why; empty if it does."""
+    report = certificate.checked
+    if report is not None and report.accepted:
+        return ""
+    return "the independent check does not accept" + ("" if report is None else f" {report.rejected}: {report.reason}")
+
+
+def texts(source: Any, *names: str) -> dict[str, str | None]:
+    """Return exact numbers of an object as texts, by name."""
+    values = ((name, getattr(source, name)) for name in names)
+    return {name: None if x is None else format_exact(x) for name, x in values}
+
+
 @dataclass(frozen=True, repr=False)
-class Design(Shown):
-    """What was asked of an input, and the gains that are proved to meet it; made by :func:`design`.
+class DesignAnswer(Shown):
+    """What was asked of an input, and what is proved of it, whatever the agents.
 
     Attributes
     ----------
     verdict : {"met", "infeasible", "not with this certificate"}
-        ``infeasible``: no gains of the nominal protocol can, proved. The third says that the bounds of this
-        certificate do not suffice, and nothing about other gains.
+        ``infeasible``: no gains of the protocol can, proved. The third says that the bounds of this certificate do not
+        suffice, and nothing about other gains.
     binding : str
-        The limit that binds, and how far off it is.
-    asked : DesignRequest
-        The limit, the initial states, deadline and residual.
+        What binds, and how far off it is, or what is missing.
+    asked : Request
+        The limit, deadline and residual, and what else is asked.
     deadline : Fraction or None
         ``T``, in units of time; None if none was asked for and none is certified.
     certificate : Certificate or None
@@ -54,15 +68,61 @@ class Design(Shown):
     peak : Fraction or None
         The certified peak of the input at ``deadline``, also if it is too large.
     residual : Fraction or None
-        How far from its final state an agent is at the deadline, at most; 0 without a cap.
-    product : Fraction or None
-        ``phi``, peak times deadline: what the gains found certify at any deadline.
-    lower_product : Fraction or None
-        Below which ``U T`` is too small for all gains of the protocol, proved.
-    lower_by : str
-        Why.
+        How far an agent is from its final state, or from its place, at the deadline, at most; 0 without a cap.
+    shortest_possible : Fraction or None
+        No gains of the protocol meet a shorter deadline within the limit, proved; None if nothing is known.
     repeatable : bool
         Whether :func:`ptcc_certify.certify` proves the same of these gains by the functions that it finds itself.
+    """
+
+    verdict: str
+    binding: str
+    asked: Request
+    deadline: Fraction | None = None
+    certificate: Certificate | None = None
+    peak: Fraction | None = None
+    residual: Fraction | None = None
+    shortest_possible: Fraction | None = None
+    repeatable: bool = False
+
+    @property
+    def protocol(self) -> Protocol | None:
+        """The gains; None unless the verdict is ``met``."""
+        return None if self.certificate is None else self.certificate.protocol
+
+    @property
+    def excluded(self) -> str:
+        """That no gains meet the deadline that was asked for, in one line; empty where that is not proved."""
+        T, least = self.asked.deadline, self.shortest_possible
+        if T is None or least is None or least <= T:
+            return ""
+        return f"no gains meet a deadline below {down(least)}, {down(least / T)} times the one asked for"
+
+    def _summary(self) -> dict[str, Any]:
+        """Return what all answers tell as JSON-ready data."""
+        return {
+            **{"verdict": self.verdict, "binding": self.binding},
+            **texts(self.asked, "max_input"),
+            "asked": texts(self.asked, "deadline", "residual"),
+            "protocol": None if self.protocol is None else self.protocol.to_dict(),
+            **texts(self, "gain_cap", "deadline", "peak", "residual", "shortest_possible"),
+        }
+
+
+@dataclass(frozen=True, repr=False)
+class Design(DesignAnswer):
+    """What was asked of an input, and the gains that are proved to meet it; made by :func:`design`.
+
+    All gains are those of the nominal protocol.
+
+    Attributes
+    ----------
+    asked : DesignRequest
+        The limit, the initial states, deadline and residual.
+    product : Fraction or None
+        ``phi``, peak times deadline: what the gains found certify at any deadline.
+    lower_by : str
+        Why no gains meet a shorter deadline than ``shortest_possible``.
 
     References
     ----------
@@ -76,22 +136,9 @@ class Design(Shown):
     ('met', True)
     """
 
-    verdict: str
-    binding: str
     asked: DesignRequest
-    deadline: Fraction | None = None
-    certificate: Certificate | None = None
-    peak: Fraction | None = None
-    residual: Fraction | None = None
     product: Fraction | None = None
-    lower_product: Fraction | None = None
     lower_by: str = ""
-    repeatable: bool = False
-
-    @property
-    def protocol(self) -> Protocol | None:
-        """The gains; None unless the verdict is ``met``."""
-        return None if self.certificate is None else self.certificate.protocol
 
     @property
     def limits(self) -> Limits | None:
@@ -125,9 +172,9 @@ class Design(Shown):
         return [text for name, value in options.items() for text in (f"--{name}", short_exact(value))]
 
     @property
-    def shortest_possible(self) -> Fraction | None:
-        """No gains of the protocol meet a shorter deadline within ``max_input``; None if nothing is known."""
-        return None if self.lower_product is None else self.lower_product / self.asked.max_input
+    def lower_product(self) -> Fraction | None:
+        """Below which ``U T`` is too small for all gains of the protocol, proved; None if nothing is known."""
+        return None if self.shortest_possible is None else self.shortest_possible * self.asked.max_input
 
     @property
     def shortest_certified(self) -> Fraction | None:
@@ -254,21 +301,8 @@ class Design(Shown):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the design as JSON-ready data, exact numbers as texts, without the certificate."""
-
-        def texts(source: Any, *names: str) -> dict[str, str | None]:
-            values = ((name, getattr(source, name)) for name in names)
-            return {name: None if x is None else format_exact(x) for name, x in values}
-
-        return {
-            "verdict": self.verdict,
-            "binding": self.binding,
-            **texts(self.asked, "max_input"),
-            "input_norm": self.asked.input_norm,
-            "asked": texts(self.asked, "deadline", "residual"),
-            "protocol": None if self.protocol is None else self.protocol.to_dict(),
-            **texts(self, "gain_cap", "deadline", "peak", "residual", "shortest_certified", "shortest_possible"),
-            "ratio": self.ratio,
-        }
+        own = {"input_norm": self.asked.input_norm, "ratio": self.ratio}
+        return self._summary() | texts(self, "shortest_certified") | own
 
     def __repr__(self) -> str:
         if self.protocol is None or self.peak is None:

@@ -11,26 +11,37 @@ from ptcc_certify.checker.input_formulas import InitialSet, InputBounds
 
 
 @dataclass(frozen=True)
-class DesignRequest:
-    """What is asked of an input.
+class Request:
+    """What is asked of an input from a given initial state.
 
     Attributes
     ----------
     max_input : Fraction
-        ``U``, of ``max_k |u_k|``, or of ``||u||_2``; in units of the input.
-    input_norm : {2, None}
-        None: of every agent's input.
-    initial_set : InitialSet
-        For all of which it is to hold.
+        ``U``, of the Euclidean norm of every agent's input; in units of the input.
     deadline, residual : Fraction or None
-        In units of time and of the states; None where nothing is asked.
+        In units of time and of the states; None where nothing is asked. The residual is that of every agent at the
+        deadline, of agents of order n that of positions.
     """
 
     max_input: Fraction
-    input_norm: int | None
-    initial_set: InitialSet
     deadline: Fraction | None
     residual: Fraction | None
+
+
+@dataclass(frozen=True)
+class DesignRequest(Request):
+    """What is asked of an input from all initial states of a set.
+
+    Attributes
+    ----------
+    input_norm : {2, None}
+        2: ``max_input`` is of ``||u||_2``. None: of every agent's input.
+    initial_set : InitialSet
+        For all of which it is to hold.
+    """
+
+    input_norm: int | None
+    initial_set: InitialSet
 
     def met_by(self, fit: Fit) -> bool:
         """Tell whether what is proved of some gains suffices."""

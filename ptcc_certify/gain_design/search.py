@@ -43,7 +43,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lmi.exact.decimal_rounding import down, up
+from lmi.exact.decimal_rounding import up
 from ptcc_certify.bounds.input.initial_set import initial_set_within
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
@@ -51,7 +51,7 @@ from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.checker import INPUT_NODES
 from ptcc_certify.checker.input_formulas import InitialSet
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.gain_design.answer import INFEASIBLE, MET, UNPROVED, Design
+from ptcc_certify.gain_design.answer import INFEASIBLE, MET, UNPROVED, Design, refusal
 from ptcc_certify.gain_design.gains import Option, decimal, options
 from ptcc_certify.gain_design.request import DesignRequest, Fit, fit_of
 from ptcc_certify.gain_design.shortest_possible import lower_product
@@ -142,11 +142,11 @@ one asked for)
     initial_set = (
         initial_bound if isinstance(initial_bound, InitialSet) else initial_set_within(structure, initial_bound)
     )
-    request = DesignRequest(U, input_norm, initial_set, T, r)
+    request = DesignRequest(U, T, r, input_norm, initial_set)
     begin: dict[str, Any] = {"x0": initial_set.center} if initial_set.point else {"initial_set": initial_set}
     base = certify(graph, _first_protocol(structure), **begin, simulation=False)
     lower, why = lower_product(base, request)
-    blank = Design(UNPROVED, "", request, T, lower_product=lower, lower_by=why)
+    blank = Design(UNPROVED, "", request, T, shortest_possible=None if lower is None else lower / U, lower_by=why)
     first: list[Fit] = []
     candidate = None
     for _ in range(_ROUNDS):
@@ -161,24 +161,16 @@ one asked for)
         base = certify(graph, own.protocol, **begin, limits=own.limits, simulation=False)
         again = fit_of(base, request)
         if request.met_by(again) and base.verdict == "certified":
-            if again.deadline > candidate.deadline * _LONGER and _accepted(candidate):
+            if again.deadline > candidate.deadline * _LONGER and not refusal(candidate.certificate):
                 break  # a deadline that is shorter is worth more than a command that proves it again
             return _answer_with_gains(replace(blank, verdict=MET, repeatable=True), again)
     if candidate is not None:
-        report = candidate.certificate.checked
-        if report is None or not report.accepted:
-            why = "" if report is None else f" {report.rejected}: {report.reason}"
-            return replace(blank, binding=f"the independent check does not accept{why}")
+        if refused := refusal(candidate.certificate):
+            return replace(blank, binding=refused)
         return _answer_with_gains(replace(blank, verdict=MET), candidate)
     if reason is None and first and (peak := first[0].peak) is not None:
         return _answer_without_gains(replace(blank, peak=peak, product=peak * first[0].deadline))
     return _answer_without_gains(replace(blank, binding=reason or "this certificate bounds no input"))
-
-
-def _accepted(fit: Fit) -> bool:
-    """Tell whether the independent check accepts what proves these gains."""
-    report = fit.certificate.checked
-    return report is not None and report.accepted
 
 
 def _search(base: Certificate, request: DesignRequest) -> list[Fit]:
@@ -259,11 +251,9 @@ def _answer_with_gains(blank: Design, fit: Fit) -> Design:
 
 def _answer_without_gains(answer: Design) -> Design:
     """Return the answer without gains; ``binding`` tells why if nothing is certified."""
-    U, T, shortest = answer.asked.max_input, answer.asked.deadline, answer.shortest_possible
-    if T is not None and shortest is not None and shortest > T:
-        least, times = map(down, (shortest, shortest / T))
-        text = f"no gains meet a deadline below {least}, {times} times the one asked for"
-        return replace(answer, verdict=INFEASIBLE, binding=f"{answer.lower_by}: {text}")
+    U = answer.asked.max_input
+    if answer.excluded:
+        return replace(answer, verdict=INFEASIBLE, binding=f"{answer.lower_by}: {answer.excluded}")
     if answer.peak is None or answer.product is None:
         return answer
     if answer.peak <= U:

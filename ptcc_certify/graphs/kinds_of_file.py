@@ -74,8 +74,10 @@ def kind_of_content(first: bytes, ending: str) -> str:
     >>> kind_of_content(b'{"schema": "ptcc-certificate/2"}', ""), kind_of_content(b"a,b,1", "csv")
     ('a certificate', '')
     """
+    if ending in ("toml", "") and re.search(rb"^\s*\[graph\]\s*(#.*)?$", first, re.MULTILINE):
+        return TOML[0]
     if ending == "toml":
-        return TOML[0] if re.search(rb"^\s*\[graph\]", first, re.MULTILINE) else TOML[1]
+        return TOML[1]
     start = first.removeprefix(b"\xef\xbb\xbf").lstrip()
     for signature, kind in _SIGNATURES.items():
         if start[: len(signature)].lower() == signature.lower() and not (kind == "a zip archive" and ending in _PACKED):
@@ -132,7 +134,9 @@ def _refuse_kind_as_graph(kind: str, name: str, path: object) -> None:
         "a folder": f"name a file in it, or all: ptcc batch {shell_word(str(Path(text, '*.csv')))}",
         "a certificate": f"ptcc check {word} checks it, ptcc report {word} -o page.html shows it; in Python "
         "read_certificate(path)",
-        "a scenario": f"ptcc certify {word} runs it",
+        "a scenario": f"ptcc certify {word} runs it"
+        if text.endswith(".toml")
+        else "save it as .toml: ptcc certify FILE.toml runs it",
         "a zip archive": "unpack it, or save a spreadsheet as CSV",
     }
     if kind not in ("", PIPE):

@@ -12,6 +12,7 @@ import networkx as nx
 import numpy as np
 import pytest
 from late_certificates import grouped_graph, led_graph
+from scipy.linalg import expm
 
 from ptcc_certify.bounds import late_messages
 from ptcc_certify.bounds.final_state import final_state
@@ -159,6 +160,23 @@ def _judge_settling(seed: int, patterns: tuple[str, ...] = PATTERNS) -> float:
 @pytest.mark.parametrize("seed", range(3))
 def test_no_run_behind_leaders_that_settle_exceeds_what_is_proved(seed: int) -> None:
     assert _judge_settling(seed, PATTERNS[seed : seed + 1]) <= 1 + ROUNDING
+
+
+def test_leaders_in_a_group_run_as_the_exponential_of_their_laplacian_whose_spectrum_is_taken_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Spectra and exponentials at every step took minutes for a group of 120."""
+    taken: list[int] = []
+    monkeypatch.setattr(np.linalg, "eigvals", lambda A, own=np.linalg.eigvals: (taken.append(len(A)), own(A))[1])
+    rng = np.random.default_rng(0)
+    ring = [(str(v), str((v + 1) % 12), int(rng.choice([-1, 1]) * rng.integers(1, 9))) for v in range(12)]
+    graph = SignedDigraph.from_edges([*ring, ("3", "0", 2), ("0", "f", 1)], [*map(str, range(12)), "f"])
+    protocol = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
+    run = simulate_late(graph, protocol, LateMessages({("0", "f"): "0.1"}), [*range(12), 0], steps=300)
+    L = graph.laplacian().toarray()[:12, :12]
+    for i in (1, 50, 200, -2):
+        np.testing.assert_allclose(run.states[:12, i], expm(-L * run.clock[i]) @ np.arange(12), atol=1e-10)
+    assert taken == [12]
 
 
 @pytest.mark.campaign

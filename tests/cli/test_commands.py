@@ -183,6 +183,8 @@ def test_standard_input_of_the_wrong_kind_is_named_as_a_file_is(certificate: str
     for stdin, says in ((Path("team.csv").read_bytes(), "if it is a graph, ptcc certify - -o"), (b"", "is empty")):
         run = ptcc("check", "-", stdin=stdin)
         assert run.code == 2 and run.err.startswith("ptcc: standard input: ") and says in run.err
+    scenario = KINDS["x.toml"][0]  # rows of one field would be nodes
+    assert "is a scenario, not a graph; save it as .toml" in ptcc("classify", "-", stdin=scenario).err
     assert process("-m", "ptcc_certify", "check", "/dev/stdin", stdin=content).code == 0
 
 

@@ -284,8 +284,18 @@ def test_followers_of_a_leader_group_are_certified_without_a_cap_where_the_leade
     assert ptcc("report", "c.json", "-o", "c.html").code == ptcc("plot", "c.json", "--what", "late").code == 0
     capped = ptcc(*words, "--gain-cap", "30")
     assert capped.code == 0 and "input      bounded up to T" in capped.out, capped
-    for more in (("--quantisation", "0.1"), ("--period", "0.01")):
-        assert "let leaders hear each other at once (delays of 0)" in ptcc(*words, *more).err
+    held = ptcc(*words, "--period", "0.01").err
+    assert "let leaders hear each other at once (delays of 0 within their group, and no period)" in held
+    for more in ((), ("--gain-cap", "30")):  # which no cap and no delay mends
+        off = ptcc(*words, "--quantisation", "0.1", *more).err
+        assert "what values that are off add: a bound needs leaders that listen to nobody" in off
+
+
+def test_a_leader_group_without_an_initial_state_is_told_that_it_needs_one() -> None:
+    group = [("p", "q", 1), ("q", "p", 2), ("p", "f", -1)]
+    late = LateMessages({("p", "f"): "0.01"})
+    open_ = certify(group, NominalProtocol(T=1, rho1=1, rho2=4, kappa=1), messages=late, simulation=False).assessment
+    assert "nothing is proved of what is left at T; give an initial state" in open_.text
 
 
 def test_messages_that_take_longer_than_the_deadline_are_certified_to_leave_what_was_there_at_first() -> None:
