@@ -235,6 +235,20 @@ def of_messages() -> list[str]:
     return [one.to_json() for one in made]
 
 
+#: The checker's command, for one file after the other: exit code and output of each.
+CHECKS = """
+import contextlib, io, json, runpy
+
+for name in sys.argv[1:]:
+    sys.argv, said = ["checker", *filter(None, [name])], io.StringIO()
+    try:
+        with contextlib.redirect_stdout(said):
+            runpy.run_module("ptcc_certify.checker", run_name="__main__")
+    except SystemExit as stop:
+        print(json.dumps([stop.code, said.getvalue()]))
+"""
+
+
 @pytest.mark.parametrize("watched", thinned([True, False]))
 def test_the_examples_are_accepted_by_these_files_alone(watched: bool, tmp_path: Path):
     """Copied into an empty folder, isolated from all that is installed: no NumPy, no flint, no solver.
@@ -267,16 +281,17 @@ def test_the_examples_are_accepted_by_these_files_alone(watched: bool, tmp_path:
         "lmi.definiteness_proofs",
     ):
         assert "ModuleNotFoundError" in run(f"import {name}").stderr
-    check = "import runpy; sys.argv[0] = 'checker'; runpy.run_module('ptcc_certify.checker', run_name='__main__')"
-    for text in (*families(), *agents(), *of_messages(), *paper_examples()):
-        (tmp_path / "c.json").write_text(text, encoding="utf-8")
-        done = run(check, "c.json")
-        assert done.returncode == 0, done.stdout + done.stderr
-        assert done.stdout.splitlines()[-1].startswith("accepted   certified;")
-        assert done.stdout.splitlines()[-1].endswith("by standard library")
-    assert len(paper_examples()) == 12
-    false = json.loads((tmp_path / "c.json").read_text(encoding="utf-8")) | {"verdict": "undecided"}
-    (tmp_path / "c.json").write_text(json.dumps(false), encoding="utf-8")
-    done = run(check, "c.json")
-    assert done.returncode == 1 and done.stdout.splitlines()[-1].startswith("rejected   verdict")
-    assert run(check).returncode == 2
+    texts = (*families(), *agents(), *of_messages(), *paper_examples())
+    false = json.dumps(json.loads(texts[-1]) | {"verdict": "undecided"})
+    files = [f"{k}.json" for k in range(len(texts) + 1)]
+    for name, text in zip(files, (*texts, false), strict=True):
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    done = run(CHECKS, *files, "")
+    *accepted, rejected, unnamed = map(json.loads, done.stdout.splitlines())
+    assert len(accepted) == len(texts) and len(paper_examples()) == 12, done.stderr
+    for code, said in accepted:
+        assert code == 0, said
+        assert said.splitlines()[-1].startswith("accepted   certified;")
+        assert said.splitlines()[-1].endswith("by standard library")
+    assert rejected[0] == 1 and rejected[1].splitlines()[-1].startswith("rejected   verdict")
+    assert unnamed[0] == 2
