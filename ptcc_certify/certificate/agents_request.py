@@ -54,7 +54,8 @@ def single_integrators(agents: Any, protocol: Any, limits: Any) -> tuple[Any, An
         return None, limits
     if getattr(protocol, "reaching", None) is not None:
         return agents, limits
-    return None, (GainLimits(gain_cap=agents.cap), *limits)
+    own = GainLimits(gain_cap=agents.cap)
+    return None, limits if own in limits else (own, *limits)
 
 
 def refuse_agents(agents: Any, protocol: Protocol, asked: dict[str, Any]) -> None:

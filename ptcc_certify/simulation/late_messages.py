@@ -1,12 +1,15 @@
-"""Runs with late messages, without an ODE solver: every run is a solution, up to rounding.
+"""Runs with late messages, without an ODE solver.
 
 Over a step from ``t_i`` to ``t_(i+1)`` what an agent hears is held, as it was at an instant ``t_j`` between ``t_(i+1) -
 age`` and ``t_i``: the delay ``t - t_j`` is one of those that are allowed, and the step has a closed form,
 
     x_k(t_(i+1)) = h_k + (x_k(t_i) - h_k) e^(-D_k (s(t_(i+1)) - s(t_i))),    h_k = sum_l w_kl y_kl / D_k,
 
-exact where the gain has its pole. With an own state that is late the whole right side is held. Leaders may move over a
-step, for nobody hears of it before the next; disturbances are a constant times the gain within a step, at most ``d``.
+exact where the gain has its pole: the run is a solution, up to rounding. With an own state that is late the whole right
+side is held. What is heard at once is no solution if it is held: it is taken to change evenly with the clock over a
+step, which is of second order in the step, and leaders of a group that hear each other at once move exactly. Leaders
+that move as they like may do so over a step, for who hears them late hears of it in the next; disturbances are a constant
+times the gain within a step, at most ``d``.
 """
 
 from __future__ import annotations
@@ -33,8 +36,12 @@ from ptcc_certify.simulation.trajectory import Trajectory
 
 Pattern = Literal["oldest", "fresh", "varying", "square"]
 PATTERNS = ("oldest", "fresh", "varying", "square")
+#: Corrections of what is heard at once, in a step, at most.
+_CORRECTIONS = 100
 #: Instants of a run, and at most; the share of ``T`` down to which they come nearer to it.
 STEPS, MOST_STEPS, NEAREST = 1500, 20_000, 1e-9
+#: A step as a share of what is left until ``T``, at most; a fifth of that where followers hear at once.
+_SHARE = 0.02
 #: How many times leaders in groups fall by a factor e until they are settled.
 _SETTLED = 40
 #: Terms of the exponential series of a matrix whose 1-norm is 1 at most; what is left out is below ``2^-53``.
@@ -93,8 +100,7 @@ def simulate_late(
     protocol : Protocol
     messages : LateMessages
         Values are off by the whole ``value_error``, to either side. What is heard over an edge is as old as a step
-        where its own delay is less than that, as a delay of 0 is; but leaders of a group that hear each other at once
-        move exactly so.
+        where its own delay is less than that, but not 0.
     x0 : state-like
         The state up to 0, whatever :func:`ptcc_certify.as_state` takes.
     pattern : {"oldest", "fresh", "varying", "square"}
@@ -145,7 +151,8 @@ def simulate_late(
     if deadlines is not None and len(deadlines) != graph.n_nodes:
         raise ParameterError(f"deadlines are {len(deadlines)} for {graph.n_nodes} agents; give one for each")
     first = [float(x) for x in as_state(x0, graph, "x0")]
-    t = _grid(float(protocol.T), float(messages.age), _least_age(graph, messages), steps)
+    share = _SHARE / 5 if _heard_at_once(graph, messages).size else _SHARE
+    t = _grid(float(protocol.T), float(messages.age), _least_age(graph, messages), steps, share)
     if t.size * graph.n_nodes > MOST_STATES:
         raise ParameterError(
             f"{t.size:,} instants of {graph.n_nodes:,} agents are more than {MOST_STATES:,} states; "
@@ -172,6 +179,7 @@ def simulate_late(
         if fleeing is not None:
             fleeing.move(i, states, left)
         leading.move(states[i], states[i + 1], step)
+        hearing.correct(states[i], states[i + 1], step, left)
     errors[-1] = heard - (own if messages.own_delay else D * states[-1])
     run = _run(graph, protocol, messages, pattern, t, states.T, errors.T, time.perf_counter() - begin)
     return run if fleeing is None else fleeing.added(run)
@@ -233,14 +241,24 @@ def _least_age(graph: SignedDigraph, messages: LateMessages) -> float:
     return float(min((x + messages.held for x in each if x + messages.held > 0), default=messages.age))
 
 
-def _grid(T: float, age: float, least: float, steps: int) -> np.ndarray:
-    """Return instants that come near to ``T``: some in the largest delay, one in the least unless that is too short."""
+def _heard_at_once(graph: SignedDigraph, messages: LateMessages) -> np.ndarray:
+    """Return the edges over which followers hear at once."""
+    latencies = messages.latencies(graph)
+    if not isinstance(latencies, tuple) or messages.held or messages.own_delay:
+        return np.arange(0)
+    return np.flatnonzero(np.isin(graph.target, analyse(graph).followers) & (np.array(latencies, dtype=float) == 0))
+
+
+def _grid(T: float, age: float, least: float, steps: int, share: float) -> np.ndarray:
+    """Return instants that come near to ``T``: some in the largest delay, one in the least unless that is too short.
+
+    Steps are at most such a share of what is left until ``T``.
+    """
     longest = min(T / steps, age / IN_DELAY, max(least, T / _MOST_FOR_LEAST)) if age else T / steps
     if T / longest > MOST_STEPS:
         raise ParameterError(
             f"a delay of {age:.3g} in a run of {T:.6g} takes more than {MOST_STEPS:,} steps; the bound needs no run"
         )
-    share = 0.02
     left, each = [0.0, NEAREST * T], NEAREST * T
     while left[-1] < T:
         each = min(longest, left[-1] * share)
@@ -360,6 +378,27 @@ class _Hearing:
         self.phase = random.uniform(0, 2 * np.pi, graph.n_edges)
         self.old = random.random(graph.n_edges) < 0.5
         self.signs = np.where(random.random(graph.n_edges) < 0.5, 1.0, -1.0)
+        self.at_once = _heard_at_once(graph, messages)
+        self.degree = graph.in_weight()
+
+    def correct(self, before: np.ndarray, after: np.ndarray, step: np.ndarray, left: np.ndarray) -> None:
+        """Let what followers hear at once change evenly over a step of the clock, in place of being held.
+
+        With ``w/D`` times its change ``c``, ``way = D step`` and ``left = e^-way``, the state gains
+        ``c (1 - (1 - left)/way)``; the change is that of the states that are sought, which are found one from another.
+        """
+        if not self.at_once.size:
+            return
+        source, target = self.source[self.at_once], self.target[self.at_once]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            way = np.where(self.degree > 0, self.degree * step, 0.0)
+            share = np.where(np.isinf(way), 1.0, np.where(way > 1e-5, 1 - (1 - left) / way, way / 2))
+        factor, held = self.weights[self.at_once] * share[target] / self.degree[target], after.copy()
+        for _ in range(_CORRECTIONS):
+            change = np.bincount(target, factor * (after - before)[source], minlength=self.n)
+            last, after[:] = after.copy(), held + change
+            if np.abs(after - last).max() <= _ROUNDING * np.abs(after).max():
+                break
 
     def sums(self, i: int, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the sums of ``w y`` and, for an own state that is late, of ``|w| x_k`` as it was."""

@@ -162,6 +162,18 @@ def test_no_run_behind_leaders_that_settle_exceeds_what_is_proved(seed: int) -> 
     assert _judge_settling(seed, PATTERNS[seed : seed + 1]) <= 1 + ROUNDING
 
 
+def test_what_followers_hear_at_once_is_not_held_over_a_step() -> None:
+    """A run whose bound is attained at all times was up to 6.5 % above it, whatever the number of steps."""
+    edges = [("a", "b", 1), ("b", "a", 1), ("a", "f", 5), ("a", "g", 50)]
+    messages = LateMessages({("a", "g"): "0.01"})  # a settles like e^(-2 s), and f follows at 5/(5 - 2) times that
+    protocol = NominalProtocol(T=1, rho1=1, rho2=3, kappa=1)
+    run = simulate_late(SignedDigraph.from_edges(edges), protocol, messages, [1, -1, 5 / 3, 0], steps=300)
+    size = np.exp(-2 * run.clock[:-1])
+    known = size > 1e-12
+    np.testing.assert_allclose(run.states[2, :-1][known] / size[known], 5 / 3, rtol=1e-4)
+    assert abs(run.states[2, -1]) < 1e-12
+
+
 def test_leaders_in_a_group_run_as_the_exponential_of_their_laplacian_whose_spectrum_is_taken_once(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -135,6 +135,8 @@ def test_one_integrator_under_a_gain_cap_is_the_plain_certificate_under_this_lim
     assert same == plain and same.agents is None and same.to_dict()["digest"] == plain.to_dict()["digest"]
     both = certify(TEAM, NOMINAL, [5, 2, 4, -1], simulation=False, agents=Agents(1, gain_cap=4), limits=GainLimits(9))
     assert [limit.gain_cap for limit in both.limits] == [4, 9]
+    twice = certify(TEAM, NOMINAL, [5, 2, 4, -1], simulation=False, agents=Agents(1, gain_cap=9), limits=GainLimits(9))
+    assert [limit.gain_cap for limit in twice.limits] == [9]
     with pytest.raises(ParameterError, match="no velocity"):
         certify(TEAM, NOMINAL, [5, 2, 4, -1], agents=Agents(1, gain_cap=4), v0=[1, 0, 0, 0])
 
