@@ -165,8 +165,8 @@ class LateBounds:
     def never_below(self) -> float | None:
         """What stays at least of the largest bound however large the gain, where leaders move while messages come.
 
-        From instant to instant that is ``y = D^-1 |W_F| y + speed age`` from below. By rows it is more by the drift, for
-        ``s_c`` grows no faster than its cap.
+        From instant to instant that is ``y = D^-1 |W_F| y + speed age`` from below. By rows it is more by the drift,
+        for ``s_c`` grows no faster than its cap.
         """
         if self.leaders is None or not self.messages.age:
             return None
