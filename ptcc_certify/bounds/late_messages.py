@@ -193,7 +193,8 @@ class LateBounds:
         for row in self.rows:
             cap = [x for x in (row.cap, self.gain.limits.gain_cap) if x is not None]
             clock = GainLimits(gain_cap=min(cap, default=None)).limit(self.gain.gain).clock(t)
-            b, M, c = map(float, (row.witness.b, row.initial, row.floor))
+            b, M = float(row.witness.b), float(row.initial)
+            c = np.full(t.shape, float(row.floor))
             if self.leaders is not None:
                 push = float(self.leaders.total) / float(row.witness.u.min())
                 c = c + push * drift_integral(self.gain.gain, b, min(cap, default=None), t)
