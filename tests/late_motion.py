@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -79,6 +80,7 @@ class Flight:
     speed: float
     delta: float
 
+    @cached_property
     def parts(self) -> tuple[list[int], list[int], Matrix]:
         """Return leaders, followers, and ``-L_F^-1 L_FL``."""
         D = np.abs(self.W).sum(axis=1)
@@ -88,14 +90,14 @@ class Flight:
 
     def targets(self, X: Matrix) -> Matrix:
         """Where agents are to be, for one state or many; leaders are where they are."""
-        A, F, targets = self.parts()
+        A, F, targets = self.parts
         aims = X.copy()
         aims[F] = targets @ X[A]
         return aims
 
     def move(self, x: Vector, new: Vector, dt: float, top: float, decay: Vector) -> None:
         """Add to the states after a step how leaders move, and what pushes followers under a gain up to ``top``."""
-        A, F, targets = self.parts()
+        A, F, targets = self.parts
         off = x[F] - targets @ x[A]
         row, D = int(np.argmax(np.abs(off))), np.abs(self.W).sum(axis=1)[F]
         new[A] += -np.sign(off[row]) * self.speed * np.where(targets[row] >= 0, 1.0, -1.0) * dt

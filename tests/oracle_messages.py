@@ -372,7 +372,13 @@ class LateOracle(Oracle):
         self.require(not any(bound[v] for v in range(self.n) if v not in self.follow), "a residual of a leader")
         for runs, target in self.loop():
             self.require(not np.any(runs.away(target)[:, -1] > bound * (1 + SLACK) + FLOOR), "residual")
-        if self.delay and self.wrong == 0 and self.cap is None and not self.fled and self.camps(self.follow) is not None:
+        if (
+            self.delay
+            and self.wrong == 0
+            and self.cap is None
+            and not self.fled
+            and self.camps(self.follow) is not None
+        ):
             self.require(not np.any(self.attained() > bound * (1 + 1e-6) + FLOOR), "residual that is attained")
 
     def attained(self) -> np.ndarray:

@@ -165,8 +165,8 @@ class LateBounds:
     def never_below(self) -> float | None:
         """What stays at least of the largest bound however large the gain, where leaders move while messages come.
 
-        From instant to instant that is ``y = D^-1 |W_F| y + speed age`` from below. By rows it is more by the drift, for
-        ``s_c`` grows no faster than its cap.
+        From instant to instant that is ``y = D^-1 |W_F| y + speed age`` from below. By rows it is more by the drift,
+        for ``s_c`` grows no faster than its cap.
         """
         if self.leaders is None or not self.messages.age:
             return None
@@ -193,7 +193,8 @@ class LateBounds:
         for row in self.rows:
             cap = [x for x in (row.cap, self.gain.limits.gain_cap) if x is not None]
             clock = GainLimits(gain_cap=min(cap, default=None)).limit(self.gain.gain).clock(t)
-            b, M, c = map(float, (row.witness.b, row.initial, row.floor))
+            b, M = float(row.witness.b), float(row.initial)
+            c = np.full(t.shape, float(row.floor))
             if self.leaders is not None:
                 push = float(self.leaders.total) / float(row.witness.u.min())
                 c = c + push * drift_integral(self.gain.gain, b, min(cap, default=None), t)

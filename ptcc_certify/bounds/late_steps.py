@@ -108,7 +108,7 @@ def search_steps(
     most = min(MOST_INSTANTS, MOST_PRODUCTS // (rows.W.nnz + 4 * rows.D.size))
     if most < _FEWEST:
         return None
-    start = _start(rows, error + _lag(rows, gain, push, 0.0), first)
+    start = _start(rows, error + _lags(rows, gain, push, (Fraction(0),))[0], first)
     if not 0 < float(start.max()) < np.inf:
         return None
     instants = instants_of(gain.gain.T, delay * rows.least_share, most)
@@ -126,21 +126,23 @@ def bound_steps(
 ) -> Steps:
     """Bound followers from instant to instant, in floats that leave room for the integers of the check."""
     parts = [(W, _hearing(instants, delay * Fraction(share))) for share, W in rows.by_age().items()]
-    clock, size = _clock(gain, instants), float(start.max())
+    clock, size, lags = _clock(gain, instants), float(start.max()), _lags(rows, gain, push, instants[:-1])
     room, bounds = _UNIT * size * (np.diff(rows.W.indptr) + 6.0), [start + _UNIT * size]
     for i in range(1, len(instants)):
         before, heard = bounds[-1], sum(W @ bounds[at[i - 1]] for W, at in parts) / rows.D + error + room
         if push and np.isfinite(clock[i]):
-            heard = heard + _lag(rows, gain, push, float(instants[i - 1]))
+            heard = heard + lags[i - 1]
         step = clock[i] - clock[i - 1] if np.isfinite(clock[i]) else np.inf
         left = _decay_above(rows.D * max(step, 0.0) * (1 - 1e-9))
         bounds.append(np.minimum(before, heard + np.maximum(before - heard, 0) * left + 4 * _UNIT * size))
     return Steps(instants, start, np.array(bounds))
 
 
-def _lag(rows: FollowerRows, gain: LimitedGain, push: float, t: float) -> np.ndarray:
-    """Return ``push/(D gain(t))`` by follower, a little above."""
-    return np.asarray(push / (rows.D * float(gain.value([t])[0])) * (1 + _MORE))
+def _lags(rows: FollowerRows, gain: LimitedGain, push: float, instants: Sequence[Fraction]) -> np.ndarray:
+    """Return ``push/(D gain(t))`` at instants by follower, ``(m, F)``, a little above."""
+    T = gain.gain.T
+    left = np.array([float((T - t) / T) for t in instants])
+    return np.asarray(push / np.outer(gain.value(_floats(instants), remaining=left), rows.D) * (1 + _MORE))
 
 
 def _hearing(instants: Sequence[Fraction], delay: Fraction) -> list[int]:

@@ -83,7 +83,9 @@ def asked_messages(messages: LateMessages, graph: SignedDigraph, out: Writer) ->
 
 def _asked_leaders(leaders: MovingLeaders | None) -> dict[str, str] | None:
     """Return how leaders move while messages are late, as files have it."""
-    return leaders and {"speed": format_exact(leaders.speed), "disturbance": format_exact(leaders.disturbance)}
+    if leaders is None:
+        return None
+    return {"speed": format_exact(leaders.speed), "disturbance": format_exact(leaders.disturbance)}
 
 
 def messages_section(late: LateBounds, out: Writer) -> dict[str, Any]:
@@ -173,7 +175,7 @@ def read_late(
     if section["steps"] is not None:
         start = data.floats(steps["late-steps", "messages.steps"].witness["start"], F)
         times = tuple(map(exact, section["steps"]["instants"]))
-        error, push = float_up(heard_wrong(messages, leaders)), float_up(leaders.total if leaders else 0)
+        error, push = float_up(heard_wrong(messages, leaders)), float_up(leaders.total) if leaders else 0.0
         instants = bound_steps(late_rows(structure, messages), gain, messages.age, error, times, start, push)
     return LateBounds(
         messages,

@@ -173,8 +173,8 @@ _NOT_LATE = {
     "sample_period": "of late messages a period tells how often they are sent; give that instead",
     "noise": "of late messages an error of values tells it: noise within NU is one of 2 NU, a quantisation of 4 NU; "
     "give that instead",
-    "delta": "is not proved of late messages under the nominal protocol; take the sliding-mode protocol, under which "
-    "disturbances within delta move nothing",
+    "delta": "is not proved of late messages under the nominal protocol by itself; give leaders with it, of speed 0 if "
+    "they rest, or take the sliding-mode protocol, under which disturbances within delta move nothing",
 }
 #: What is not certified beside leaders that move.
 _NOT_TRACKING = {

@@ -192,7 +192,10 @@ def _run_beside(graph: str, signed: SignedDigraph, protocol: Protocol, options: 
     messages, leaders = messages_of(graph, signed, options), leaders_of(options)
     if messages is None and leaders is None:
         return None
-    source, name = click.get_current_context().get_parameter_source, "late messages" if messages else "leaders that move"
+    source, name = (
+        click.get_current_context().get_parameter_source,
+        "late messages" if messages else "leaders that move",
+    )
     refused = ["steps", "boundary_layer", "noise", "stop_before", "sample_period"]
     refused += ["gain_cap"] * (messages is None) + ["delta"] * (leaders is None and protocol.reaching is None)
     refused += ["disturbance"] * (protocol.reaching is None)

@@ -82,7 +82,8 @@ def refuse_together(messages: LateMessages | None, leaders: MovingLeaders | None
     --------
     >>> refuse_together(LateMessages(delay=1), MovingLeaders(speed=1, sign_gain=1))
     Traceback (most recent call last):
-    ptcc_certify.errors.ParameterError: sign_gain: nothing is proved of a sign term where messages are late; leave it out
+    ptcc_certify.errors.ParameterError: sign_gain: nothing is proved of a sign term where messages are late; leave it \
+out
     """
     if messages is None or leaders is None:
         return

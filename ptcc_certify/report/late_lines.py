@@ -152,7 +152,7 @@ def _left(late: LateBounds) -> list[str]:
     within = f"every agent within {up(late.largest, 2)} of its final state at T"
     if late.leaders is not None:
         within = f"every follower within {up(late.largest, 2)} of its target at T"
-        within += f", within {up(late.after, 2)} from then on" * (late.after is not None)
+        within += "" if late.after is None else f", within {up(late.after, 2)} from then on"
     return [f"{cap}{within}{whole}{settling}{_limits(late) * formed}"]
 
 

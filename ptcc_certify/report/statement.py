@@ -303,11 +303,12 @@ def _late(saved: Certificate) -> dict[str, Fraction | float | str | None]:
     """Return what is left at ``T`` with late messages, the input, who misses it, and followers' drift after ``T``."""
     late, tracking = saved.late, saved.tracking
     missed = None if late is None else late.missed
+    where = "targets" if saved.leaders_move else "final states"
     return {
         "late_largest": None if late is None or math.isinf(late.largest) else late.largest,
         "late_after": None if late is None else late.after,
         "late_input": None if late is None else largest_late_input(late, saved.protocol),
-        "whole_late": f", from within 1 of the {'targets' if late.leaders else 'final states'}" if late is not None and late.relative else "",
+        "whole_late": f", from within 1 of the {where}" if late is not None and late.relative else "",
         "late_missed": None if missed is None else _cut(saved.graph.labels[missed.agent]),
         "tracking_after": None if tracking is None else tracking.distance_after,
     }

@@ -6,12 +6,15 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 from fractions import Fraction
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import networkx as nx
 import numpy as np
 import pytest
 from late_certificates import grouped_graph, led_graph
+from late_motion import Flight, Gain, LateMotion, by_chance, instants, oldest_of_all, square_wave, worst, worst_errors
 from scipy.linalg import expm
 
 from ptcc_certify.bounds import late_messages
@@ -20,9 +23,12 @@ from ptcc_certify.bounds.late_messages import LateBounds, bound_late
 from ptcc_certify.bounds.longest_delay import LateCase
 from ptcc_certify.bounds.small_delays import delay_threshold
 from ptcc_certify.bounds.staged_deadlines import levels
-from ptcc_certify.bounds.tracking import bound_tracking
+from ptcc_certify.bounds.tracking import bound_tracking, drift_integral
+from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.checker.input_formulas import PrescribedGain
+from ptcc_certify.checker.late_drift import drift_above
 from ptcc_certify.checker.late_input import gain_above
 from ptcc_certify.errors import HypothesisError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
@@ -549,3 +555,196 @@ def test_without_a_cap_no_input_is_bounded() -> None:
     for messages in (LateMessages(delay="0.01"), LateMessages(value_error="0.1")):
         late = certify(structure, protocol, x0, messages=messages, simulation=False, method="paper").late
         assert late is not None and late.rows and late.input is None
+
+
+# ---------------------------------------------------------------------- late messages behind leaders that move
+
+
+def _both(seed: int, apart: bool = False) -> tuple[Structure, NominalProtocol, LateMessages, MovingLeaders, Any, Any]:
+    rng, structure, protocol, x0, ends = _case(seed)
+    delay = protocol.T * Fraction(int(10 ** rng.uniform(1, 2.4)), 1000)
+    error, capped = Fraction(int(rng.integers(0, 5)), 20), Fraction(int(rng.integers(3, 60)))
+    messages = LateMessages(delay, value_error=error, gain_cap=capped if rng.random() < 0.3 else None)
+    speed, push = (Fraction(int(x), 10) for x in rng.integers(0, 40, 2))
+    messages = _apart(rng, structure, messages) if apart else messages
+    return structure, protocol, messages, MovingLeaders(speed, push), x0, ends
+
+
+def _flight_ratio(seed: int, pattern: int, apart: bool = False) -> tuple[float, float]:
+    """The largest share of what is proved that a motion takes, at any time and at ``T``.
+
+    The motion is that of the tests, which knows nothing of the package.
+    """
+    structure, protocol, messages, leaders, x0, ends = _both(seed, apart)
+    bounds = bound_late(structure, protocol, messages, x0, ends.intervals, leaders)
+    graph, T, rng = structure.graph, float(protocol.T), np.random.default_rng(seed)
+    W, ages = np.zeros((graph.n_nodes,) * 2), np.full((graph.n_nodes,) * 2, float(messages.age))
+    W[graph.target, graph.source] = graph.weights
+    latencies = messages.latencies(graph)
+    ages[graph.target, graph.source] = (
+        [float(x) for x in latencies] if isinstance(latencies, tuple) else float(latencies)
+    )  # type: ignore[arg-type]
+    cap = math.inf if messages.gain_cap is None else float(messages.gain_cap)
+    gain = Gain(T, float(protocol.rho1), float(protocol.gain.pole), cap)
+    flight = Flight(W, float(leaders.speed), float(leaders.disturbance))
+    phases = rng.integers(0, 9, W.shape)
+    drawn = (oldest_of_all, worst(W, flight.targets), square_wave(5, phases), by_chance(rng))[pattern]
+    motion = LateMotion(W, [gain] * graph.n_nodes, ages, instants(T, float(ages.min())), flight=flight)
+    X = motion.run(np.array([float(x) for x in x0]), drawn, worst_errors(float(messages.value_error), flight.targets))
+    away = np.abs(X - flight.targets(X))[structure.followers]
+    away = np.maximum(away - FLOOR * max(float(np.abs(X).max()), 1.0), 0)
+    assert bounds.residual is not None
+    last = float((away[:, -1] / bounds.residual[structure.followers]).max())
+    return max(float((away / bounds.deviation_bound(motion.times)).max()), last), last
+
+
+@pytest.mark.parametrize("pattern", range(4))
+def test_64_graphs_whose_leaders_flee_while_messages_are_late_keep_their_bounds(
+    pattern: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(late_messages, "_TRIED", 3)
+    monkeypatch.setattr("ptcc_certify.bounds.late_steps.MOST_INSTANTS", 300)
+    ratios, last = zip(*(_flight_ratio(3000 + 16 * pattern + k, pattern, k % 4 == 0) for k in range(16)), strict=True)
+    assert max(ratios) <= 1 + ROUNDING, ratios
+    assert max(last) > 0.3, last
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("block", range(12))
+def test_240_graphs_whose_leaders_flee_while_messages_are_late_keep_their_bounds(
+    block: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = [_flight_ratio(5000 + 20 * block + k, pattern, k % 3 == 0) for k in range(20) for pattern in range(4)]
+    ratios, last = np.array(found).T
+    with capsys.disabled():
+        print(f"\nblock {block}: largest {ratios.max():.9f}, at T {last.max():.6f}, median {np.median(last):.2f}")
+    assert ratios.max() <= 1 + ROUNDING
+
+
+@pytest.mark.parametrize("seed", range(3000, 3012))
+def test_runs_of_the_package_behind_fleeing_leaders_keep_the_bounds(seed: int) -> None:
+    structure, protocol, messages, leaders, x0, ends = _both(seed)
+    bounds = bound_late(structure, protocol, messages, x0, ends.intervals, leaders)
+    pattern: Any = PATTERNS[seed % 4]
+    run = simulate_late(structure.graph, protocol, messages, x0, pattern=pattern, steps=300, leaders=leaders)
+    assert run.targets is not None
+    assert (
+        _worst(bounds, replace(run, states=run.states - run.targets), np.zeros(structure.graph.n_nodes)) <= 1 + ROUNDING
+    )
+    D = structure.graph.in_weight()
+    moved = np.abs(np.diff(run.states))[D == 0] - float(leaders.speed) * np.diff(run.t)
+    assert moved.max() <= 1e-12 and ("target(" in run.to_csv().split("\n")[0])
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_without_speed_and_disturbance_nothing_changes(seed: int) -> None:
+    structure, protocol, messages, _, x0, ends = _both(4000 + seed, apart=seed % 2 == 0)
+    still = bound_late(structure, protocol, messages, x0, ends.intervals)
+    moving = bound_late(structure, protocol, messages, x0, ends.intervals, MovingLeaders(speed=0))
+    assert still.residual is not None and moving.residual is not None
+    np.testing.assert_array_equal(still.residual, moving.residual)
+    for one, other in zip(still.rows, moving.rows, strict=False):
+        assert (one.left, one.initial, one.floor) == (other.left, other.initial, other.floor)
+        assert other.drift == 0 == other.after
+    assert still.input is None or moving.input is not None
+    if still.input is not None:
+        np.testing.assert_array_equal(still.input, moving.input)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_with_ever_shorter_delays_the_bound_comes_to_that_of_tracking(seed: int) -> None:
+    """At ``T`` nothing is left in the limit, and before it no more than by rows at once."""
+    structure, protocol, _, leaders, x0, ends = _both(4100 + seed)
+    tracking = bound_tracking(structure, protocol, leaders, x0, ends.intervals)
+    t = np.array([0.3, 0.7, 0.9, 0.99]) * float(protocol.T)
+    allowed = tracking.distance_bound(1 - t / float(protocol.T)).max(axis=0)
+    left, before = [], []
+    for age in ("1e-3", "1e-5", "1e-7"):
+        late = bound_late(structure, protocol, LateMessages(protocol.T * Fraction(age)), x0, ends.intervals, leaders)
+        left.append(late.largest)
+        before.append((late.deviation_bound(t).max(axis=0) / allowed).max())
+    assert left[1] <= 0.6 * left[0] + 1e-9 and left[2] <= 0.6 * left[1] + 1e-9, left
+    assert before[-1] <= 1.1, before
+
+
+def test_the_drift_of_rows_is_that_of_an_equation_with_a_capped_gain() -> None:
+    """``C' = 1 - b min(gain, cap) C`` by small steps of Heun's method, and the bounds of the check and in floats."""
+    for T, rho1, k, b, cap in (
+        (1, 1, 4, 0.5, 20),
+        (2, 0.1, 1, 0.7, 9),
+        (1, 3, 2, 0.5, 40),
+        (1, 1, 2, 2, 3),
+        (1, 1, 2, 1, 2),
+    ):
+        gain, t = NominalProtocol(T=T, rho1=rho1, rho2=k, kappa=1).gain, np.linspace(0, T, 40001)[:-1]
+        g, C, h = np.minimum(rho1 + k / (T - t), cap), 0.0, T / 40000
+        for i in range(t.size):
+            end = g[i + 1] if i + 1 < t.size else float(min(np.inf, cap))
+            slope = 1 - b * g[i] * C
+            C += h / 2 * (slope + 1 - b * end * (C + h * slope))
+        exact = float(
+            drift_above(PrescribedGain(*map(Fraction, map(str, (T, rho1, k)))), Fraction(str(b)), Fraction(cap))
+        )
+        floats = float(drift_integral(gain, b, Fraction(cap), np.array([float(T)]))[0])
+        assert C * (1 - 1e-6) <= exact <= 1.5 * C, (C, exact)
+        assert math.isclose(floats, exact, rel_tol=1e-9)
+
+
+def test_what_no_gain_takes_away_stays_below_the_bound_and_above_nothing() -> None:
+    structure = analyse(SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 1), ("c", "d", -1)]))
+    strong = NominalProtocol(T=1, rho1=1, rho2=60, kappa=1)
+    late = bound_late(structure, strong, LateMessages(Fraction(1, 50)), leaders=MovingLeaders("1/2"))
+    assert late.never_below is not None and math.isclose(late.never_below, 0.03, rel_tol=1e-6)  # 3 links of 0.01
+    assert late.never_below <= late.largest <= 1.1 * late.never_below
+    by_rows = replace(late, steps=None)
+    assert by_rows.never_below is not None and by_rows.never_below > late.never_below
+    assert bound_late(structure, strong, LateMessages(Fraction(1, 50))).never_below is None
+
+
+def test_late_messages_and_leaders_that_move_are_saved_and_read() -> None:
+    graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 2), ("c", "b", -1)])
+    protocol, leaders = NominalProtocol(T=1, rho1=1, rho2=3, kappa=1), MovingLeaders("1/2", "1/5")
+    for x0, cap in (([1, 2, 3], None), (None, 9)):
+        messages = LateMessages("0.03", value_error="0.01", gain_cap=cap)
+        made = certify(graph, protocol, x0, messages=messages, leaders=leaders, simulation=False, method="paper")
+        with TemporaryDirectory() as folder:
+            made.save(Path(folder) / "c.json")
+            saved = read_certificate(Path(folder) / "c.json")
+        assert saved.late is not None and made.late is not None and saved.tracking is None
+        assert saved.late.leaders == leaders and saved.late.messages == messages
+        np.testing.assert_array_equal(saved.late.residual, made.late.residual)
+        assert saved.late.after == made.late.after and saved.late.never_below == made.late.never_below
+        t = np.linspace(0, 1, 7)
+        np.testing.assert_allclose(saved.late.largest_bound(t), made.late.largest_bound(t), rtol=1e-8)
+        assert made.checked is not None and made.checked.accepted
+
+
+def test_late_messages_and_leaders_of_which_nothing_is_proved_are_read_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("ptcc_certify.certificate.procedure.bound_late", _nothing)
+    graph, leaders = SignedDigraph.from_edges([("a", "b", 1)]), MovingLeaders("1/2")
+    protocol, messages = NominalProtocol(T=1, rho1=1, rho2=3, kappa=1), LateMessages("0.03")
+    made = certify(graph, protocol, [1, 2], messages=messages, leaders=leaders, simulation=False, method="paper")
+    with TemporaryDirectory() as folder:
+        made.save(Path(folder) / "c.json")
+        saved = read_certificate(Path(folder) / "c.json")
+    assert saved.late is not None and not saved.late.says_something
+    assert (saved.late.messages, saved.late.leaders) == (messages, leaders)
+
+
+def _nothing(
+    structure: Structure, protocol: Any, messages: LateMessages, x0: Any, ends: Any, leaders: Any
+) -> LateBounds:
+    return LateBounds(messages, structure, protocol.gain, x0 is None, leaders=leaders)
+
+
+def test_the_longest_delay_behind_leaders_that_move_is_certified() -> None:
+    graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 1)])
+    protocol, leaders = NominalProtocol(T=1, rho1=1, rho2=5, kappa=1), MovingLeaders("1/2")
+    asked = Expectations(max_residual=Fraction(1, 20))
+    messages = LateMessages("0.2")
+    options: dict[str, Any] = {"leaders": leaders, "expectations": asked, "simulation": False, "method": "paper"}
+    made = certify(graph, protocol, [1, 2, 3], messages=messages, **options)
+    assert made.late is not None and made.late.enough is not None and 0 < made.late.enough < Fraction(1, 5)
+    structure, x0, again = made.structure, [Fraction(x) for x in (1, 2, 3)], replace(messages, delay=made.late.enough)
+    ends = final_state(structure, x0).intervals
+    assert bound_late(structure, protocol, again, x0, ends, leaders).largest <= 0.05

@@ -172,6 +172,9 @@ def test_motions_keep_to_what_is_accepted(name: str):
         ("settling", ("messages", "settling", "cap"), F(11, 10), "settling: b cap delay"),
         ("settling, capped", ("messages", "settling", "clock"), F(11, 10), "settling: clock"),
         ("leaders", ("leaders", "after"), F(9, 10), "after"),
+        ("moving", ("messages", "rows", 0, "floor"), F(9, 10), "floor"),
+        ("moving", ("messages", "rows", 0, "after"), F(9, 10), "after"),
+        ("moving", ("messages", "rows", 0, "drift"), F(1, 2), "drift"),
         ("leaders", ("leaders", "initial"), F(9, 10), "initial"),
     ],
 )
@@ -756,6 +759,72 @@ def test_an_input_that_may_grow_is_refused():
     assert "too small for a bounded input" in reason(data, ("leaders", "input"), {"a": "0", "b": "999999"})
     sliding = base(sigma=0)
     assert "under the sliding-mode protocol" in reason({**sliding, "leaders": data["leaders"]})
+
+
+# ---------------------------------------------------------------------- late messages behind leaders that move
+
+
+def test_what_leaders_that_move_add_is_refused_where_it_is_told_too_small():
+    data, top, row = fled(), (*TOP, "leaders"), (*TOP, "rows", 1)
+    for key, said in (("drift", "drift is not proved"), ("after", "is pushed farther"), ("floor", "heard wrong")):
+        value = F(data["messages"]["rows"][1][key])
+        assert said in reason(data, (*row, key), str(value * F(999, 1000)))
+    assert "floor is negative" in reason(data, (*row, "floor"), "-1")
+    assert "what pushes followers is negative" in reason(data, (*row, "after"), "-1")
+    assert "drift is not proved" in reason(data, (*row, "drift"), "-1")
+    assert "heard wrong" in reason(data, (*top, "speed"), "51/100")
+    assert "drift is not proved" in reason(data, (*top, "disturbance"), "21/100")
+    assert "is negative" in reason(data, (*top, "speed"), "-1/2")
+    assert "is negative" in reason(data, (*top, "disturbance"), "-1/5")
+    for label, x in data["messages"]["residual"].items():
+        if x != "0":
+            assert "is not proved" in reason(data, (*TOP, "residual", label), str(F(x) * F(99, 100)))
+    still = with_messages(base(), qs=(), steps=30)
+    for moving in (("40", "0"), ("0", "40")):
+        fast = with_messages(base(), qs=(), steps=30, moving=moving)
+        start = (*step(fast, "messages.steps"), "witness", "start")
+        assert check(fast).accepted
+        assert "may grow" in reason(fast, start, at(still, (*step(still, "messages.steps"), "witness", "start")))
+
+
+def test_leaders_that_move_are_refused_beside_what_is_of_leaders_at_rest():
+    data, top = fled(), (*TOP, "leaders")
+    still = with_messages(base(), qs=("21/20", "11/10"), steps=30)
+    assert '"drift" is not known' in reason(data, top, None)
+    assert '"drift" is missing' in reason(still, top, {"speed": "1/2", "disturbance": "1/5"})
+    assert '"sign_gain" is not known' in reason(data, top, {**data["messages"]["leaders"], "sign_gain": None})
+    assert '"speed" is missing' in reason(data, top, {"disturbance": "0"})
+    assert "leaders is not an object" in reason(data, top, [])
+    assert '"leaders" is missing' in reason(
+        data, TOP, {key: value for key, value in data["messages"].items() if key != "leaders"}
+    )
+    assert "stand under messages" in reason({**data, "leaders": led()["leaders"]})
+    moving = data["messages"]["leaders"]
+    for key, whole in (("missed", full()), ("staged", full()), ("form", form(False)), ("settling", settling(1))):
+        assert whole["messages"][key] and "though leaders move" in reason(whole, top, moving)
+    assert "under the sliding-mode protocol" in reason(samples()["sliding"], top, moving)
+    assert "of a late own state" in reason(fled(gain_cap=20), (*TOP, "own"), "late")
+
+
+def test_an_input_behind_leaders_that_move_counts_them_in():
+    data = fled(gain_cap=20, value_error="1/100")
+    assert check(data).accepted and data["messages"]["input"]
+    still = with_messages(base(), qs=("21/20", "11/10"), steps=30, gain_cap=20, value_error="1/100")
+    for label, x in data["messages"]["input"].items():
+        if x != "0":
+            assert F(still["messages"]["input"][label]) < F(x)
+            assert "is not proved" in reason(data, (*TOP, "input", label), str(F(x) * F(999, 1000)))
+            assert "is not proved" in reason(data, (*TOP, "input", label), still["messages"]["input"][label])
+
+
+def test_many_leaders_that_are_told_of_in_long_numbers_take_no_long_time():
+    begin, long = time.process_time(), "1/" + "7" * 3990
+    for key in ("speed", "disturbance"):
+        check(resealed(changed(fled(), (*TOP, "leaders", key), long)))
+    for key in ("drift", "after"):
+        for new in (long, "9" * 4000):
+            check(resealed(changed(fled(), (*TOP, "rows", 0, key), new)))
+    assert time.process_time() - begin < 20
 
 
 # ---------------------------------------------------------------------- side files, sizes, work

@@ -232,7 +232,18 @@ def test_followers_track_leaders_that_move_and_the_file_says_so() -> None:
         (("team.csv", "--sign-gain", "1"), "--sign-gain belongs to leaders that move; give --leader-speed"),
         (("team.csv", "--leader-speed", "1", "--sign-gain", "0.5"), "is below speed + disturbance = 1"),
         (("team.csv", "--leader-speed=-1"), "speed = -1 is outside its domain"),
-        (("team.csv", "--leader-speed", "1", "--delay", "1"), "messages and leaders together are not certified yet"),
+        (
+            ("team.csv", "--leader-speed", "1", "--delay", "1", "--sign-gain", "2"),
+            "--sign-gain: nothing is proved of a sign term where messages are late; leave it out",
+        ),
+        (
+            ("team.csv", "--leader-speed", "1", "--delay", "1", "--own-delay", "--gain-cap", "9"),
+            "--own-delay: an own state that is late is certified of leaders at rest alone; leave one of the two out",
+        ),
+        (("group.csv", "--leader-speed", "1", "--delay", "1"), "leaders that move as they like: a bound needs leaders"),
+        (("group.csv", "--leader-speed", "1", "--delay", "1", "--gain-cap", "9"), "a and b are leaders of one group"),
+        (("team.csv", "--leader-speed", "1", "--delay", "1", "--stop-before", "0.1"), "--stop-before: late messages"),
+        (("team.csv", "--leader-speed", "1", "--delay", "1", "--noise", "1", "--gain-cap", "9"), "of 4 NU"),
         (
             ("team.csv", "--delay", "1", "--agents", "double-integrator"),
             "--delay: is not proved of agents of order n; late messages are proved of",
@@ -461,7 +472,8 @@ def test_simulate_draws_such_runs_and_takes_them_from_a_scenario(words: tuple[st
         (("--delay", "0.1", "--stop-before", "0.1"), "--stop-before: is not simulated with late messages"),
         (("--delay", "0.1", "--steps", "9"), "--steps: is not simulated with late messages"),
         (("--delay", "0.1", "--samples", "9"), "--samples: is not simulated with late messages"),
-        (("--delay", "0.1", "--leader-speed", "1"), "messages and leaders together are not simulated yet"),
+        (("--delay", "0.1", "--leader-speed", "1", "--sign-gain", "2"), "--sign-gain: nothing is proved of a sign"),
+        (("--delay", "0.1", "--delta", "1"), "--delta: is not simulated with late messages"),
         (("--leader-speed", "1", "--gain-cap", "9"), "--gain-cap: is not simulated with leaders that move"),
         (("--delay", "0.1", "--agents", "double-integrator"), "--delay: is not simulated of agents of order n"),
         (("--delay", "0.1", "--uncertainty", "10%"), "--delay: is not simulated of families of graphs"),
@@ -473,14 +485,38 @@ def test_what_is_not_simulated_beside_late_messages_is_refused(words: tuple[str,
     assert run.code == 2 and said in run.err and run.err.count("\n") == 1, run
 
 
+def test_late_messages_and_leaders_that_move_from_certify_to_page() -> None:
+    words = ("--delay", "0.02", "--leader-speed", "0.5", "--delta", "0.2", *START)
+    run = ptcc("certify", "team.csv", *words, "--max-residual", "9", "-o", "both.json")
+    text = " ".join(run.out.split())
+    assert run.code == 0 and "leaders speed |x_j'| <= 0.5; any |d_k| <= 0.2" in text, run
+    assert "of its target at T, within" in text and "of that no gain takes away" in text
+    assert "nothing late, leaders at rest" in text and "x(T)" not in text and "met: within 9 at T" in text
+    assert ptcc("check", "both.json").code == 0
+    verbose = " ".join(ptcc("certify", "team.csv", *words, "-v").out.split())
+    assert "the lines below are of messages at once and leaders at rest" in verbose
+    assert "|u_k| <=" in " ".join(ptcc("certify", "team.csv", *words, "--gain-cap", "9").out.split())
+    for name, said in (("both.html", "leaders that rest. If messages are late"), ("both.tex", "leaders at rest. If")):
+        assert ptcc("report", "both.json", "-o", name).code == 0
+        assert said in Path(name).read_text(encoding="utf-8")
+    assert ptcc("plot", "both.json", "--what", "late", "-o", "both.svg").code == 0
+    assert ptcc("simulate", "team.csv", *words, "-o", "both.csv").code == 0
+    assert "target(" in Path("both.csv").read_text(encoding="utf-8").splitlines()[0]
+    strict = ptcc("certify", "team.csv", *words, "--expect", "containment")
+    assert strict.code in (3, 4), strict
+
+
 def test_what_is_not_simulated_beside_is_refused_in_python() -> None:
     graph, p = SignedDigraph.from_edges([(1, 2, 1)]), NominalProtocol(T=1, rho1=1, rho2=1, kappa=1)
     late = LateMessages(delay="0.1")
     for more, said in (({"actuator": GainLimits(gain_cap=9)}, "gain_cap="), ({"times": [1]}, "times: is not")):
         with pytest.raises(ParameterError, match=said):
             simulate(graph, p, [1, 0], messages=late, **more)
-    with pytest.raises(ParameterError, match="messages and leaders together"):
-        simulate(graph, p, [1, 0], messages=late, leaders=MovingLeaders(speed=1))
+    with pytest.raises(ParameterError, match="sign_gain: nothing is proved"):
+        simulate(graph, p, [1, 0], messages=late, leaders=MovingLeaders(speed=1, sign_gain=1))
+    with pytest.raises(ParameterError, match="own_delay: an own state that is late"):
+        own = LateMessages(delay="0.1", own_delay=True, gain_cap=3)
+        simulate(graph, p, [1, 0], messages=own, leaders=MovingLeaders(speed=1))
     with pytest.raises(ParameterError, match="sigma0: leaders that move ask"):
         simulate(graph, p, [1, 0], leaders=MovingLeaders(speed=1), sigma0=[1, 0])
     many = SignedDigraph.from_edges([(0, k, 1) for k in range(1, 60_000)])
