@@ -517,7 +517,10 @@ class FamilyOracle:
         for said in self.data.get("boxes", ()):
             nodes = self.pieces[said["component"]]
             self.require(self.depends(nodes) and self.start is not None and not any(self.sigma0), "a box")
-            if self.start is None or not isinstance(said["vector"], list):
+            if self.start is None or not isinstance(said.get("vector", []), list):
+                continue
+            if "vector" not in said:
+                self.stays(nodes, said)
                 continue
             own = [self.index[label] for label in said["nodes"]]
             self.require(own == sorted(set(own)) and set(own) <= set(nodes), "followers of a box")
@@ -547,6 +550,25 @@ class FamilyOracle:
                     x, s = expm(-L * h) @ x, s + h
                     bound = first * np.exp(-rate * s / 2) * (1 + SLACK) + 1e-9 * size / d.min()
                     self.require(rho(x) <= bound, "an agent outside of a box")
+
+    def stays(self, nodes: list[int], said: Json) -> None:
+        """Ends between which agents stay: no signal that is played leaves them, the greedy ones push one agent out."""
+        low, high = (np.array([float(number(x)) for x in said[key]]) for key in ("lower", "upper"))
+        self.require(len(low) == len(high) == len(nodes), "an interval for each agent")
+        members = [np.array(self.part(L, nodes), dtype=float) for some in self.members for L in some]
+        largest = max(float(np.abs(L).max()) for L in members) or 1.0
+        flows = [[expm(-L * h / largest) for L in members] for h in (0.1, 1.0, 10.0)]
+        begin = np.array([float(self.start[v]) for v in nodes])  # type: ignore[index]
+        slack = 1e-9 * max(1.0, float(np.abs(begin).max()))
+        for run in range(4 * SIGNALS):
+            x, target, side = begin, self.draw.randrange(len(nodes)), self.draw.choice((-1, 1))
+            for _ in range(40):
+                self.require(bool((x >= low - slack).all() and (x <= high + slack).all()), "an agent out of its ends")
+                flow = self.draw.choice(flows)
+                if run % 2:
+                    x = self.draw.choice(flow) @ x
+                else:
+                    x = max((F @ x for F in flow), key=lambda y: side * float(y[target]))
 
     # ------------------------------------------------------------------ restricted signals
 

@@ -348,23 +348,22 @@ def read_certificate(
             raise RejectedCertificate(file, report)
         return accepted_certificate(file, document, sha256, report, files or {})
     if path == "-":
-        document, report, sha256 = _read_standard_input(stdlib, memory)
-        return _accepted(Path("certificate.json" if report.accepted else "standard input"), document, sha256, report)
+        return _accepted(Path("certificate.json"), *_read_standard_input(stdlib, memory), name="standard input")
     refuse_no_path(path)
     path = Path(path)  # type: ignore[arg-type]
     sha256 = _file_hash(path)
     document, report = read_and_check(path, stdlib=stdlib, memory=memory)
     if _file_hash(path) != sha256:
         raise FormatError(f"{shorten(str(path), 200)}: was changed while it was read; try again")
-    return _accepted(path, document, sha256, report)
+    return _accepted(path, document, report, sha256)
 
 
 def _accepted(
-    path: Path, document: dict[str, Any], sha256: str, report: CheckReport
+    path: Path, document: dict[str, Any], report: CheckReport, sha256: str, name: str | None = None
 ) -> Certificate | FamilyCertificate:
     """Return the certificate of a file, with the side files in its folder, or refuse what the check rejects."""
     if not report.accepted:
-        raise RejectedCertificate(path, report)
+        raise RejectedCertificate(Path(name or path), report)
     return accepted_certificate(path, document, sha256, report, read_side_files(document, path.parent))
 
 

@@ -42,6 +42,8 @@ from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.family import MANY_MODES
 from ptcc_certify.checker.family_rows import MANY_FUNCTIONS
 from ptcc_certify.checker.matrix_products import LARGEST_ROWS
+from ptcc_certify.checker.reading import Interval
+from ptcc_certify.checker.restricted_signals import reachable_bounds
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.display_hook import Shown, family_summary, plot_of_family
 from ptcc_certify.graphs.family import Family
@@ -68,6 +70,8 @@ BOXES = "boxes of followers"
 LARGE_MEMORY = 16
 #: Share of the upper bound that ends the search, and share of the time that the bound may take at first.
 _ENOUGH, _BOUND_SHARE = Fraction(99, 100), 0.3
+#: Agents and edges of a component up to which ends are told between which each agent stays.
+_MANY = 200_000
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -101,6 +105,8 @@ class FamilyCertificate(FamilyContent, FromFile, Shown):
         What holds for these beside what holds for every signal.
     boxes : mapping of int to AttractingBox
         Where every signal brings the followers of components that depend on it, by the numbers of these.
+    ranges : mapping of int to tuple of (Fraction, Fraction)
+        Between which ends every signal keeps each agent of these components, at all times.
 
     References
     ----------
@@ -219,6 +225,8 @@ class FamilyCertificate(FamilyContent, FromFile, Shown):
           comes to rest.
         - ``box_least``, ``box_largest``: the interval into which every signal draws a follower whose end depends on the
           signal. It may move there for ever: these are no ends at the deadline.
+        - ``stays_least``, ``stays_largest``: the interval in which every signal keeps an agent at all times whose end
+          depends on the signal.
         - ``keeps``: whether no edge of any mode leads to the agent and no sliding variable moves, so that it stays at
           ``x(0)`` under every signal. Edges alone decide this, and it is no part of the claim that is checked.
 
@@ -344,6 +352,7 @@ def certify_family(
         begin = initial_state if still else None
         kept: dict[str, Any] = {
             "boxes": _boxes(parts, begin, notes),
+            "ranges": _ranges(parts, begin),
             "signal": signal,
             "restricted": claims_for(signal, parts, protocol, begin, notes, asked.min_rate),
         }
@@ -390,6 +399,18 @@ def _boxes(
                 if (box := box_of_family(part.component.family, x)) is not None:
                     boxes[number] = box
     return boxes
+
+
+def _ranges(parts: Sequence[ComponentProof], state: Sequence[Fraction] | None) -> dict[int, tuple[Interval, ...]]:
+    """Return of components that depend on the signal between which ends each agent stays at all times."""
+    ranges: dict[int, tuple[Interval, ...]] = {}
+    for number, part in enumerate(parts if state is not None else ()):
+        component = part.component
+        if component.behaviour == DEPENDS and component.family.n_nodes + component.family.union[0].size <= _MANY:
+            edges = zip(*(end.tolist() for end in component.family.union), strict=True)
+            x = [state[v] for v in component.nodes.tolist()]  # type: ignore[index]
+            ranges[number] = tuple(reachable_bounds(range(len(x)), edges, x).values())
+    return ranges
 
 
 def _with_means(part: ComponentProof) -> ComponentProof:

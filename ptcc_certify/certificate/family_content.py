@@ -173,6 +173,7 @@ class FamilyContent:
     signal: SignalClass = "any"
     restricted: tuple[Claim, ...] = ()
     boxes: Mapping[int, AttractingBox] = field(default_factory=dict)
+    ranges: Mapping[int, tuple[Interval, ...]] = field(default_factory=dict)
 
     @property
     def common(self) -> bool:

@@ -43,6 +43,7 @@ def family_table(certificate: FamilyContent, certified: bool) -> pd.DataFrame:
         **_pair("restricted_least", "restricted_largest", own),
         "restricted_to": ["" if ends is None else signal for ends in own],
         **_pair("box_least", "box_largest", _boxes(certificate) if certified else unknown),
+        **_pair("stays_least", "stays_largest", _ranges(certificate) if certified else unknown),
         "keeps": _keeps(certificate),
     }
     return pandas.DataFrame(columns, index=pandas.Index(certificate.family.labels, name="node"))
@@ -63,6 +64,15 @@ def _boxes(certificate: FamilyContent) -> list[Interval | None]:
         nodes = certificate.parts[number].component.nodes[box.decay.nodes].tolist()
         for v, low, high in zip(nodes, box.lower, box.upper, strict=True):
             result[v] = low, high
+    return result
+
+
+def _ranges(certificate: FamilyContent) -> list[Interval | None]:
+    """Return the interval in which every signal keeps an agent whose end depends on it."""
+    result: list[Interval | None] = [None] * certificate.family.n_nodes
+    for number, ends in certificate.ranges.items():
+        for v, own in zip(certificate.parts[number].component.nodes.tolist(), ends, strict=True):
+            result[v] = own
     return result
 
 

@@ -17,6 +17,7 @@ from ptcc_certify.certificate.format_family_rows import (
     box_entry,
     form_entry,
     form_steps,
+    range_entry,
     rows_entry,
     rows_steps,
     squares_entry,
@@ -70,9 +71,10 @@ def family_document(certificate: FamilyContent, files: bool = False) -> tuple[di
         "proof": _proof(certificate, components, functions, out),
         "verdict": "certified",
     }
-    if certificate.boxes:
+    if certificate.boxes or certificate.ranges:
         labelled = ((k, box, list(components[k].family.labels)) for k, box in sorted(certificate.boxes.items()))
         document["boxes"] = [box_entry(own, k, box, out) for k, box, own in labelled]
+        document["boxes"] += [range_entry(k, ends) for k, ends in sorted(certificate.ranges.items())]
     if certificate.restricted:
         document["restricted"] = [claim_entry(claim, _labels(certificate, claim)) for claim in certificate.restricted]
     return document | {"digest": digest(document), "unverified": _unverified(certificate)}, out
@@ -130,7 +132,8 @@ def _proof(
         steps.append(_step("family-final-state", "final_state", _means(certificate)))
     steps += [_step("input-sliding", "input")] * (certificate.sliding_peaks is not None)
     steps += [_step("family-input", "input")] * (certificate.bounded is not None)
-    steps += [_step("attracting-box", f"boxes[{k}]") for k in range(len(certificate.boxes))]
+    kinds = ["attracting-box"] * len(certificate.boxes) + ["kept-box"] * len(certificate.ranges)
+    steps += [_step(kind, f"boxes[{k}]") for k, kind in enumerate(kinds)]
     for k, claim in enumerate(certificate.restricted):
         own = claim_steps(f"restricted[{k}]", claim, _labels(certificate, claim))
         steps += [_step(kind, of, witness, **numbers) for kind, of, witness, numbers in own]

@@ -9,7 +9,7 @@ import numpy as np
 
 from ptcc_certify.bounds.attracting_box import AttractingBox
 from ptcc_certify.certificate.format_vectors import Writer, factor_entry
-from ptcc_certify.checker.reading import exact
+from ptcc_certify.checker.reading import Interval, exact
 from ptcc_certify.checker.side_files import SideFiles
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.lyapunov.family_function import FamilyFunction
@@ -70,6 +70,17 @@ def box_entry(labels: list[str], number: int, box: AttractingBox, out: Writer) -
         "upper": list(map(format_exact, box.upper)),
         "rate": format_exact(2 * box.decay.rate),
     }
+
+
+def range_entry(number: int, ends: Sequence[Interval]) -> dict[str, Any]:
+    """Return a box in which all agents of a component stay."""
+    lower, upper = zip(*ends, strict=True)
+    return {"component": number, "lower": list(map(format_exact, lower)), "upper": list(map(format_exact, upper))}
+
+
+def read_range(entry: Mapping[str, Any]) -> tuple[Interval, ...]:
+    """Return what :func:`range_entry` has written."""
+    return tuple(zip(*(map(exact, entry[key]) for key in ("lower", "upper")), strict=True))
 
 
 def read_box(entry: Mapping[str, Any], labels: Sequence[str], files: SideFiles) -> AttractingBox:

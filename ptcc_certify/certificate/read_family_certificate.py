@@ -15,7 +15,7 @@ from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCe
 from ptcc_certify.certificate.family_content import ProvedFunction
 from ptcc_certify.certificate.format import read_protocol, read_reaching
 from ptcc_certify.certificate.format_family import certificate_family
-from ptcc_certify.certificate.format_family_rows import read_box
+from ptcc_certify.certificate.format_family_rows import read_box, read_range
 from ptcc_certify.certificate.format_restricted import read_claim
 from ptcc_certify.certificate.format_upper_bound import read_upper_bound
 from ptcc_certify.certificate.format_vectors import Reader
@@ -62,6 +62,10 @@ def read_family_certificate(source: Source) -> FamilyCertificate:
     kept["boxes"] = {
         entry["component"]: read_box(entry, components[entry["component"]].family.labels, files)
         for entry in document.get("boxes", ())
+        if "vector" in entry
+    }
+    kept["ranges"] = {
+        entry["component"]: read_range(entry) for entry in document.get("boxes", ()) if "vector" not in entry
     }
     kept |= {"expectations": _read_expectations(document["unverified"].get("asked")), "source": source}
     return FamilyCertificate(

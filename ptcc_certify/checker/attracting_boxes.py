@@ -1,6 +1,9 @@
-"""Verifies boxes to which followers come under every signal, where what they follow need not come to rest.
+"""Verifies boxes in which agents stay, or to which followers come, under every signal, where they need not rest.
 
-Section 19 of the format. Agents that are no followers hear none of these, and stay within what reaches them of
+Section 19 of the format. Of ``+-x_l(0)`` that reach an agent along edges of any modes none is left behind: within the
+least and the largest it stays at all times.
+
+Agents that are no followers hear none of these, and stay within what reaches them of
 ``+-x_l(0)`` at all times. With these ends, ``u`` and ``l`` of the followers, ``y_l = u_l`` for positive and ``-l_l``
 for negative edges, let for every follower ``k`` in every mode
 
@@ -28,6 +31,7 @@ from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, 
 from ptcc_certify.checker.restricted_signals import reachable_bounds
 
 KEYS = ("component", "nodes", "vector", "lower", "upper", "rate")
+KEPT = ("component", "lower", "upper")
 
 
 def check_boxes(doc: Document, family: Family, begin: Begin) -> None:
@@ -39,15 +43,28 @@ def check_boxes(doc: Document, family: Family, begin: Begin) -> None:
     need(not (begin.sigma and any(begin.sigma)), "a box while sliding variables move")
     if begin.state is None:
         raise RejectedError("a box without an initial state")
-    x, last = list(begin.state), -1
+    x, last = list(begin.state), (False, -1)
     for k, entry in enumerate(items):
         doc.at = of = f"boxes[{k}]"
-        number = fields(entry, KEYS, "a box")["component"]
-        need(type(number) is int and last < number < len(family.components), "an unknown component, or out of order")
+        kept = isinstance(entry, dict) and entry.keys() == set(KEPT)
+        number = fields(entry, KEPT if kept else KEYS, "a box")["component"]
+        known = type(number) is int and 0 <= number < len(family.components)
+        need(known and last < (kept, number), "an unknown component, or out of order")
         need(family.components[number].depends, "a box where all agents come to rest")
-        doc.open("attracting-box", of)
-        _check_box(doc, family, family.components[number], x, entry)
-        last = number
+        doc.open("kept-box" if kept else "attracting-box", of)
+        (_check_kept if kept else _check_box)(doc, family, family.components[number], x, entry)
+        last = kept, number
+
+
+def _check_kept(doc: Document, family: Family, component: Component, x: Sequence[Fraction], entry: Any) -> None:
+    """Verify a box in which all agents of a component stay at all times."""
+    edges, n = component.part.edges, len(component.nodes)
+    spend(100 * sum(1 + len(some) for some in edges), what="boxes")
+    reach = reachable_bounds(component.nodes, {edge[:3] for some in edges for edge in some}, x)
+    lower, upper = ([exact(value) for value in entries(entry[key], key, n)] for key in ("lower", "upper"))
+    for v, low, high in zip(component.nodes, lower, upper, strict=True):
+        need(low <= reach[v][0] and reach[v][1] <= high, "an agent may leave the box")
+    doc.done(f"{n} agents")
 
 
 def _check_box(doc: Document, family: Family, component: Component, x: Sequence[Fraction], entry: Any) -> None:

@@ -24,7 +24,15 @@ from ptcc_certify.graphs.family import Mode
 from ptcc_certify.graphs.size_limits import DRAWN_NODES, INPUT_NODES
 from ptcc_certify.protocols.reaching_time import ReachingTime
 from ptcc_certify.report import notation as texts
-from ptcc_certify.report.family_screen import BOUND_KINDS, box_text, constant_text, groups_text, sharpest
+from ptcc_certify.report.family_screen import (
+    BOUND_KINDS,
+    box_text,
+    constant_text,
+    groups_text,
+    range_text,
+    sharpest,
+    told_ranges,
+)
 from ptcc_certify.report.notation import above, rational
 from ptcc_certify.report.plots.counterexample import plot_counterexample
 from ptcc_certify.report.plots.family import keeps_dwell, plot_family, plot_family_decay
@@ -67,6 +75,7 @@ def family_facts(saved: FamilyCertificate) -> dict[str, Any]:
         "constant": all(component.nodes.size == 1 for component in components),
         "restricted": _restricted(saved) if certified else [],
         "boxes": [box_text(components[k], box) for k, box in sorted(saved.boxes.items())] if certified else [],
+        "ranges": [range_text(components[k], ends) for k, ends in told_ranges(saved).items()] if certified else [],
         "promise": "" if saved.signal == "any" else signal_text(saved.signal)[1],
         "these": states_of_signal(saved) != list(saved.final_states or ()),
         "explicit_power": _explicit_power(saved),

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lmi.exact.decimal_rounding import down, near, up
+from ptcc_certify.certificate.restricted_claims import LastModeClaim
 from ptcc_certify.certificate.restricted_states import constant_states, last_states, states_of_signal
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.size_limits import EXACT_NODES
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     from ptcc_certify.bounds.attracting_box import AttractingBox
     from ptcc_certify.certificate.family_certificate import FamilyCertificate
     from ptcc_certify.certificate.family_content import FamilyContent
+    from ptcc_certify.checker.reading import Interval
 
 #: Components of which a screen tells, and lines of a text on the short one.
 _COMPONENTS, _LINES = 4, 3
@@ -358,6 +360,36 @@ def _agreeing(component: FamilyComponent, groups: Sequence[AgreeingGroup]) -> li
     ]
 
 
+def told_ranges(certificate: FamilyContent) -> dict[int, tuple[Interval, ...]]:
+    """Return between which ends every signal keeps agents, of components of which no last mode tells the same."""
+    last = certificate.ends_of_signal
+    same = {k for k, claim in last.items() if isinstance(claim, LastModeClaim) and claim.final_states is not None}
+    return {k: ends for k, ends in certificate.ranges.items() if k not in same}
+
+
+def range_text(component: FamilyComponent, ends: Sequence[Interval], width: int = 12 * TEXT) -> str:
+    """Tell in which intervals every signal keeps all agents of a component at all times.
+
+    Where that takes more columns than ``width``, the interval is told that holds them all.
+
+    Examples
+    --------
+    >>> foes = Family.from_intervals([("a", "b", -1, 1), ("b", "a", 1, 2)])
+    >>> cert = certify(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, -2])
+    >>> range_text(cert.parts[0].component, cert.ranges[0])
+    'every signal keeps a, b in [-2, 2] at all times'
+    """
+    groups: dict[str, list[int]] = {}
+    for v, own in enumerate(ends):
+        groups.setdefault(_interval(own), []).append(v)
+    told = ", ".join(f"{_names(component, nodes, _NAMES)} {text}" for text, nodes in groups.items())
+    text = f"every signal keeps {told} at all times"
+    if columns(text) <= width:
+        return text
+    whole = _interval((min(low for low, _ in ends), max(high for _, high in ends)))
+    return f"every signal keeps {counted(len(ends), 'agent')} {whole} at all times"
+
+
 def box_text(component: FamilyComponent, box: AttractingBox, width: int = 12 * TEXT) -> str:
     """Tell into which intervals every signal draws followers, whether or not they come to rest, and at what rate.
 
@@ -483,6 +515,9 @@ def _final_entries(certificate: FamilyCertificate, long: bool = False) -> Lines:
         yield from ((name and what, f"{text}{agree} (these signals)") for name, text in ends)
     if text := constant_text(certificate, 12 * TEXT if long else 2 * TEXT - 20):
         yield "" if certificate.common else "x(T)", f"{text} (constant weights)"
+    ranges = [*told_ranges(certificate).items()]
+    for k, kept in ranges if long else ranges[:1]:
+        yield "x(t)", range_text(certificate.parts[k].component, kept, 12 * TEXT if long else TEXT)
 
 
 def constant_text(certificate: FamilyContent, width: int = 12 * TEXT) -> str:
