@@ -621,23 +621,11 @@ Proof.
 Qed.
 
 (** * What is left under a cap *)
-Lemma power_below q z : 0 <= Q2R q <= exp (z / 16) -> Q2R (twice_4 (floor q)) <= exp z.
+Lemma floor_pos q : 0 <= Q2R q -> 0 <= Q2R (floor q).
 Proof.
-  intros [H0 H1]. assert (F0 : 0 <= Q2R (floor q)).
-  { assert (N : (0 <= Qnum q)%Z).
-    { apply le_IZR. unfold Q2R in H0. assert (D : 0 < IZR (Zpos (Qden q))) by (apply IZR_lt; reflexivity).
-      apply (Rmult_le_reg_r (/ IZR (Zpos (Qden q)))); [apply Rinv_0_lt_compat; exact D|lra]. }
-    unfold floor. cbv zeta. rewrite Q2R_div by (intros Z; discriminate Z). unfold Rdiv. apply Rmult_le_pos.
-    - unfold Q2R, inject_Z. simpl Qden. simpl Qnum. apply Rmult_le_pos; [apply IZR_le; apply Z.div_pos; [apply Z.mul_nonneg_nonneg; [exact N|discriminate]|reflexivity]|].
-      left. apply Rinv_0_lt_compat. lra.
-    - left. apply Rinv_0_lt_compat. unfold Q2R, inject_Z. simpl Qden. simpl Qnum. apply Rmult_lt_0_compat; [apply IZR_lt; reflexivity|]. apply Rinv_0_lt_compat. lra. }
-  pose proof (floor_ok q) as F1. set (g := floor q) in *. clearbody g. unfold twice_4. cbv zeta. rewrite !Q2R_mult. set (x := exp (z / 16)) in *.
-  assert (EX : exp z = x * x * (x * x) * (x * x * (x * x)) * (x * x * (x * x) * (x * x * (x * x)))).
-  { unfold x. rewrite <- !exp_plus. f_equal. field. }
-  rewrite EX. assert (S1 : forall u v, 0 <= u -> u <= v -> 0 <= u * u /\ u * u <= v * v).
-  { intros u v Hu Huv. split; [apply Rmult_le_pos; lra|apply Rmult_le_compat; lra]. }
-  destruct (S1 (Q2R g) x ltac:(lra) ltac:(lra)) as [Q1 Q2]. destruct (S1 _ _ Q1 Q2) as [Q3 Q4]. destruct (S1 _ _ Q3 Q4) as [Q5 Q6].
-  destruct (S1 _ _ Q5 Q6) as [_ Q8]. exact Q8.
+  intros H. rewrite <- Q2R_0 in H. apply Rle_Qle in H. unfold Qle in H. simpl in H. rewrite Z.mul_1_r in H. rewrite <- Q2R_0. apply Qle_Rle.
+  unfold floor. cbv zeta. apply Qle_shift_div_l; [reflexivity|]. rewrite Qmult_0_l. change 0%Q with (inject_Z 0). rewrite <- Zle_Qle.
+  apply Z.div_pos; [apply Z.mul_nonneg_nonneg; [exact H|discriminate]|reflexivity].
 Qed.
 Hypothesis Hleft : check_left a = true.
 Lemma cap_reached G : cap a = Some G -> let w := if Qle_bool G (begin_gain a) then span c else (pull_in a / (G - slope a))%Q in
@@ -721,7 +709,7 @@ Proof.
   { set (p := reduced (falls a * q / 16)) in *. assert (Ep : Q2R p = r * Q2R q / 16).
     { unfold p. rewrite reduced_ok, Q2R_div by (intros Z; discriminate Z). rewrite Q2R_mult. f_equal. unfold Q2R. simpl. field. }
     assert (P0 : 0 <= Q2R p) by (rewrite Ep; unfold Rdiv; apply Rmult_le_pos; [apply Rmult_le_pos; lra|lra]).
-    apply power_below. rewrite <- Ep. pose proof (Effort.horner_ok p 100 P0). lra. }
+    destruct (Effort.horner_ok p 100 P0) as [N1 N2]. apply Moving.power_below; [apply floor_pos; lra|rewrite <- Ep; exact N2]. }
   assert (Small : forall t, 0 <= t < T -> sum m (fun i0 => sq (away a (spot a i0) (X i0 t) i j)) <= Q2R x * Q2R x * exp (r * (Q2R q - turns a t))).
   { intros t Ht. set (u := exp (- (r * turns a t))).
     assert (S1 : sum m (fun i0 => sq (away a (spot a i0) (X i0 t) i j)) <= sq (eta a t ^ i) * u * K).

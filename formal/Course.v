@@ -186,6 +186,13 @@ Proof.
     change 0%Z with ((fun q => Z.sgn (Qnum q)) 0%Q). rewrite map_nth. reflexivity.
   - fold w. unfold sq in R1. rewrite Eq in R1. exact R1.
 Qed.
+Lemma root_falls t0 t : moves_from c X S t0 -> t0 <= t < T -> U (X t) <= exp (- (Q2R (rate f) / 2 * (s c t - s c t0))) * U (X t0).
+Proof.
+  intros HQ Ht. pose proof (Hrest t0 t HQ Ht) as D. unfold U. set (x := exp (- (Q2R (rate f) / 2 * (s c t - s c t0)))).
+  assert (Px : 0 < x) by apply exp_pos.
+  assert (EE : exp (- (Q2R (rate f) * (s c t - s c t0))) = x * x) by (unfold x; rewrite <- exp_plus; f_equal; field).
+  rewrite EE in D. rewrite <- (sqrt_square x) by lra. rewrite <- sqrt_mult_alt by (apply Rle_0_sqr). apply sqrt_le_1_alt. exact D.
+Qed.
 Lemma root_driven a t : 0 <= a <= t -> t < T -> U (X t) <= exp (- (Q2R (rate f) / 2 * (s c t - s c a))) * U (X a)
   + Q2R ww * (left_of c T_r mu2 mu3 a - left_of c T_r mu2 mu3 t) + Q2R ff * (t - a).
 Proof.
@@ -197,10 +204,7 @@ Proof.
   - intros x. apply sqrt_pos.
   - intros x y. apply (measure_plus es (ly f) F (IZR m) Hm HV' V0).
   - intros x. apply (measure_falls es (ly f) F (IZR m) (Q2R (rate f)) Hm Hr HV' V0 Hdecay).
-  - intros t0 u HQ Hu. unfold U. pose proof (Hrest t0 u HQ Hu) as D. set (x := exp (- (Q2R (rate f) / 2 * (s c u - s c t0)))).
-    assert (Px : 0 < x) by apply exp_pos.
-    assert (EE : exp (- (Q2R (rate f) * (s c u - s c t0))) = x * x) by (unfold x; rewrite <- exp_plus; f_equal; field).
-    rewrite EE in D. rewrite <- (sqrt_square x) by lra. rewrite <- sqrt_mult_alt by (apply Rle_0_sqr). apply sqrt_le_1_alt. exact D.
+  - exact root_falls.
 Qed.
 
 (** * What is known of a function *)
@@ -258,10 +262,7 @@ Proof.
   split; [reflexivity|]. split; [exact HL|]. split; [exact C1|]. split; [exact C2|]. split; [|split].
   - intros t Ht. assert (MF : moves_from c X S (Q2R (time (List.last (a :: l) o0)))).
     { split; [exact HM|]. split; [exact HT0|]. intros u i Hu Hi. apply (rested_ok _ u i E3); [lra|exact Hu|exact Hi]. }
-    pose proof (Hrest _ t MF Ht) as D. unfold Ut, U. set (te := Q2R (time (List.last (a :: l) o0))) in *.
-    set (x := exp (- (Q2R (rate f) / 2 * (s c t - s c te)))). assert (Px : 0 < x) by apply exp_pos.
-    assert (EE : exp (- (Q2R (rate f) * (s c t - s c te))) = x * x) by (unfold x; rewrite <- exp_plus; f_equal; field).
-    rewrite EE in D. rewrite <- (sqrt_square x) by lra. rewrite <- sqrt_mult_alt by (apply Rle_0_sqr). apply sqrt_le_1_alt. exact D.
+    exact (root_falls _ t MF Ht).
   - destruct (root_ok cn K3) as [N0 N1]. split; [exact N0|]. intros x. unfold U.
     rewrite <- (sqrt_square _ N0), <- sqrt_mult_alt by (apply Rle_0_sqr). apply sqrt_le_1_alt.
     eapply Rle_trans; [apply Hn|]. apply Rmult_le_compat_r; [apply V0|exact N1].

@@ -88,27 +88,25 @@ Proof.
   - apply (continuous_comp (fun u => t0 + u) (fun v => Y v i)); [|apply (Y_cont n (lap es) T _ _ X S t0 HM HQ); [lra|exact Hi]].
     apply (continuous_plus (fun _ => t0) (fun u => u)); [apply continuous_const|apply continuous_id].
 Qed.
-Lemma states_stay M t i : 0 <= M -> (forall j, (j < n)%nat -> Rabs (X t0 j) <= M) -> t0 <= t < T -> (i < n)%nat -> Rabs (X t i) <= M.
+Lemma never_above_begin (g : (nat -> R) -> nat -> R) M t i :
+  (forall u j, 0 < u < T - t0 -> (j < n)%nat -> is_derive (fun u => g (f u) j) u (- (gain (T - t0) (Q2R (rho1 c)) (k c) u * lap es (g (f u)) j))) ->
+  (forall u j, 0 <= u < T - t0 -> (j < n)%nat -> continuous (fun u => g (f u) j) u) -> 0 <= M ->
+  (forall j, (j < n)%nat -> Rabs (g (X t0) j) <= M) -> t0 <= t < T -> (i < n)%nat -> Rabs (g (X t) i) <= M.
 Proof.
-  intros HM H Ht Hi. destruct shifted as [A [D C]].
-  pose proof (contained es n (T - t0) (Q2R (rho1 c)) (k c) ltac:(lra) H1 Hk Hsrc f D C M HM) as K.
+  intros D C HM H Ht Hi. destruct shifted as [A _].
+  pose proof (contained es n (T - t0) (Q2R (rho1 c)) (k c) ltac:(lra) H1 Hk Hsrc (fun u => g (f u)) D C M HM) as K.
   assert (E : forall u, 0 <= u -> f u = X (t0 + u)) by (intros u Hu; unfold f, Y; rewrite Rmax_right by lra; reflexivity).
   replace t with (t0 + (t - t0)) by ring. rewrite <- E by lra. apply K; [|lra|exact Hi].
   intros j Hj. rewrite E by lra. rewrite Rplus_0_r. apply H. exact Hj.
 Qed.
+Lemma states_stay M t i : 0 <= M -> (forall j, (j < n)%nat -> Rabs (X t0 j) <= M) -> t0 <= t < T -> (i < n)%nat -> Rabs (X t i) <= M.
+Proof. destruct shifted as [_ [D C]]. exact (never_above_begin (fun x => x) M t i D C). Qed.
 Lemma errors_stay M t i : 0 <= M -> (forall j, (j < n)%nat -> Rabs (lap es (X t0) j) <= M) -> t0 <= t < T -> (i < n)%nat ->
   Rabs (lap es (X t) i) <= M.
 Proof.
-  intros HM H Ht Hi. destruct shifted as [A [D C]].
-  assert (D' : forall u j, 0 < u < T - t0 -> (j < n)%nat -> is_derive (fun u => lap es (f u) j) u
-    (- (gain (T - t0) (Q2R (rho1 c)) (k c) u * lap es (lap es (f u)) j))).
-  { intros u j Hu Hj. rewrite <- lap_scal. apply (is_derive_lap es n f); auto. }
-  assert (C' : forall u j, 0 <= u < T - t0 -> (j < n)%nat -> continuous (fun u => lap es (f u) j) u).
-  { intros u j Hu Hj. apply (continuous_lap es n f); auto. }
-  pose proof (contained es n (T - t0) (Q2R (rho1 c)) (k c) ltac:(lra) H1 Hk Hsrc (fun u => lap es (f u)) D' C' M HM) as K.
-  assert (E : forall u, 0 <= u -> f u = X (t0 + u)) by (intros u Hu; unfold f, Y; rewrite Rmax_right by lra; reflexivity).
-  replace t with (t0 + (t - t0)) by ring. rewrite <- E by lra. apply K; [|lra|exact Hi].
-  intros j Hj. rewrite E by lra. rewrite Rplus_0_r. apply H. exact Hj.
+  destruct shifted as [_ [D C]]. apply (never_above_begin (lap es)); intros u j Hu Hj.
+  - rewrite <- lap_scal. apply (is_derive_lap es n f); auto.
+  - apply (continuous_lap es n f); auto.
 Qed.
 End Rests.
 

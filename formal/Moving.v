@@ -58,20 +58,19 @@ Proof.
   destruct H as [H| ->]; [left; apply exp_increasing; exact H|lra].
 Qed.
 
+Lemma twice_4_ok q : Q2R (twice_4 q) = Q2R q ^ 16.
+Proof. unfold twice_4. cbv zeta. rewrite !Q2R_mult. ring. Qed.
+Lemma exp_16 x : exp x = exp (x / 16) ^ 16.
+Proof. simpl. rewrite Rmult_1_r, <- !exp_plus. f_equal. field. Qed.
+Lemma sixteenth p : Q2R (p / 16) = Q2R p / 16.
+Proof. rewrite Q2R_div by (apply nonzero; unfold Q2R; simpl; lra). f_equal. unfold Q2R; simpl; lra. Qed.
 Lemma power_ok p : 0 <= Q2R p -> Qle_bool 1 (term (p / 16) 0 101) = false -> exp (Q2R p) <= Q2R (twice_4 (ceil (above (p / 16)))).
 Proof.
-  intros Hp HT. assert (E : Q2R (p / 16) = Q2R p / 16).
-  { rewrite Q2R_div by (apply nonzero; unfold Q2R; simpl; lra). f_equal. unfold Q2R; simpl; lra. }
-  assert (P0 : 0 <= Q2R (p / 16)) by (rewrite E; lra). pose proof (above_ok _ P0 HT) as A. rewrite E in A. pose proof (ceil_ok (above (p / 16))) as B.
-  set (g := ceil (above (p / 16))) in *. pose proof (exp_pos (Q2R p / 16)) as X. unfold twice_4. cbv zeta. rewrite !Q2R_mult.
-  set (a := Q2R g) in *. set (x := exp (Q2R p / 16)) in *.
-  assert (EX : exp (Q2R p) = x * x * (x * x) * (x * x * (x * x)) * (x * x * (x * x) * (x * x * (x * x)))).
-  { unfold x. rewrite <- !exp_plus. f_equal. field. }
-  rewrite EX. assert (S1 : forall u v, 0 <= u -> u <= v -> 0 <= u * u /\ u * u <= v * v).
-  { intros u v Hu Huv. split; [apply Rmult_le_pos; lra|apply Rmult_le_compat; lra]. }
-  destruct (S1 x a ltac:(lra) ltac:(lra)) as [Q1 Q2]. destruct (S1 _ _ Q1 Q2) as [Q3 Q4]. destruct (S1 _ _ Q3 Q4) as [Q5 Q6].
-  destruct (S1 _ _ Q5 Q6) as [_ Q8]. exact Q8.
+  intros Hp HT. rewrite twice_4_ok, exp_16. apply pow_incr. split; [left; apply exp_pos|]. rewrite <- sixteenth.
+  eapply Rle_trans; [apply above_ok; [rewrite sixteenth; lra|exact HT]|apply ceil_ok].
 Qed.
+Lemma power_below q x : 0 <= Q2R (floor q) -> Q2R q <= exp (x / 16) -> Q2R (twice_4 (floor q)) <= exp x.
+Proof. intros F0 H. rewrite twice_4_ok, exp_16. apply pow_incr. split; [exact F0|]. eapply Rle_trans; [apply floor_ok|exact H]. Qed.
 
 Section Instants.
 Variables (c : cert) (T_r T_s mu1 mu2 mu3 delta : Q).

@@ -182,23 +182,13 @@ Proof.
     - apply is_derive_times; [apply w_derive; exact Hu|]. apply @is_derive_minus; [apply @is_derive_const|].
       apply is_derive_scal. apply spent_derive. exact Hu.
     - unfold minus, plus, opp, zero; simpl. unfold f. field. lra. }
-  assert (K : 0 <= f b - Rabs (S (Rmax 0 b) i)).
-  { apply (stays 0 b (fun u => f u - Rabs (S (Rmax 0 u) i))); [lra| | |].
-    - intros t Ht. apply (continuous_minus f (fun u => Rabs (S (Rmax 0 u) i))).
-      + apply @ex_derive_continuous. exists (df t). apply D. lra.
-      + apply (size_cont c X S i HM Hi). lra.
-    - rewrite Rmax_left by lra. unfold f, spent, Exist.spent. rewrite RInt_point. unfold w.
-      rewrite (psi_0 c T_r T_s mu1 mu2 mu3 delta Hprot Hkind). unfold zero; simpl. lra.
-    - intros t Ht Z. rewrite Rmax_right in Z by lra. set (e := (Q2R mu1 - Q2R delta - r) / 2).
-      destruct (Slide.law c T_r T_s mu1 mu2 mu3 delta Hkind X S i HM Hi t e ltac:(lra) (NZ t ltac:(lra)) ltac:(unfold e; lra)) as [e1 [E1 L1]].
-      pose proof (D t ltac:(lra)) as Dt. apply is_derive_Reals in Dt. destruct (Dt e ltac:(unfold e; lra)) as [e2 L2].
-      exists (Rmin e1 e2). split; [apply Rmin_pos; [exact E1|apply cond_pos]|]. intros h Hh.
-      pose proof (Rmin_l e1 e2). pose proof (Rmin_r e1 e2). specialize (L1 h ltac:(lra)).
-      specialize (L2 h ltac:(lra) ltac:(rewrite Rabs_right; lra)). apply Rabs_def2 in L2 as [_ L2].
-      rewrite Rmax_right by lra. apply (Rmult_lt_compat_l h) in L2; [|lra].
-      replace (h * ((f (t + h) - f t) / h - df t)) with (f (t + h) - f t - h * df t) in L2 by (field; lra).
-      assert (Q : Rabs (S t i) = f t) by lra. fold p in L1. rewrite Q in L1. unfold df, e in *. nra. }
-  rewrite Rmax_right in K by lra. unfold f in K. rewrite R1 in K. pose proof (Rabs_pos_lt _ N). lra.
+  assert (K : Rabs (S b i) <= f b).
+  { apply (Slide.slower c T_r T_s mu1 mu2 mu3 delta Hkind X S i HM Hi ((Q2R mu1 - Q2R delta - r) / 2) 0 b f df); [lra|lra|lra| | |].
+    - intros t Ht. apply D. lra.
+    - intros t Ht _. split; [apply NZ; lra|unfold df, p; lra].
+    - unfold f, spent, Exist.spent. rewrite RInt_point. unfold w.
+      rewrite (psi_0 c T_r T_s mu1 mu2 mu3 delta Hprot Hkind). unfold zero; simpl. lra. }
+  unfold f in K. rewrite R1 in K. pose proof (Rabs_pos_lt _ N). lra.
 Qed.
 Lemma reaching_part z t : arrives c T_r mu1 mu2 mu3 delta (nth i (sliding c) 0%Q) z = true ->
   S 0 i = Q2R (nth i (sliding c) 0%Q) -> Tr * (1 - exp (- Q2R z)) <= t < deadline c -> S t i = 0.

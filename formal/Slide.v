@@ -124,31 +124,34 @@ Proof.
   intros Ht. destruct HM as [[_ C] _]. apply (continuous_comp (fun u => S (Rmax 0 u) i) Rabs); [|apply continuous_Rabs].
   apply C; assumption.
 Qed.
+(** below what falls slower than the law wherever both are equal, by a margin *)
+Lemma slower e a b (f df : R -> R) : 0 <= a <= b -> b < deadline c -> 0 < e -> (forall t, a <= t <= b -> is_derive f t (df t)) ->
+  (forall t, a <= t < b -> Rabs (S t i) = f t -> S t i <> 0 /\ 2 * e <= df t + (Q2R mu1 - Q2R delta) + p t * f t) ->
+  Rabs (S a i) <= f a -> Rabs (S b i) <= f b.
+Proof.
+  intros [A0 Ab] Bd He D H Ha.
+  assert (K : 0 <= f b - Rabs (S (Rmax 0 b) i)); [|rewrite Rmax_right in K by lra; lra].
+  apply (stays a b (fun u => f u - Rabs (S (Rmax 0 u) i)) Ab).
+  - intros t Ht. apply (continuous_minus f (fun u => Rabs (S (Rmax 0 u) i))); [|apply size_cont; lra].
+    apply @ex_derive_continuous. exists (df t). apply D. exact Ht.
+  - rewrite Rmax_right by lra. lra.
+  - intros t Ht Z. rewrite Rmax_right in Z by lra. assert (Q : Rabs (S t i) = f t) by lra. destruct (H t Ht Q) as [N M].
+    destruct (law t e ltac:(lra) N He) as [e1 [E1 L1]]. rewrite Q in L1.
+    pose proof (D t ltac:(lra)) as Dt. apply is_derive_Reals in Dt. destruct (Dt e He) as [e2 L2].
+    exists (Rmin e1 e2). split; [apply Rmin_pos; [exact E1|apply cond_pos]|]. intros h Hh.
+    pose proof (Rmin_l e1 e2). pose proof (Rmin_r e1 e2). specialize (L1 h ltac:(lra)).
+    specialize (L2 h ltac:(lra) ltac:(rewrite Rabs_right; lra)). apply Rabs_def2 in L2 as [_ L2].
+    rewrite Rmax_right by lra. apply (Rmult_lt_compat_l h) in L2; [|lra].
+    replace (h * ((f (t + h) - f t) / h - df t)) with (f (t + h) - f t - h * df t) in L2 by (field; lra).
+    apply (Rmult_le_compat_l h) in M; lra.
+Qed.
 (** below what falls no faster than the pull *)
 Lemma held a b (f df : R -> R) : 0 <= a <= b -> b < deadline c ->
   (forall t, a <= t <= b -> is_derive f t (df t) /\ 0 < f t /\ - (p t * f t) <= df t) ->
   Rabs (S a i) <= f a -> Rabs (S b i) <= f b.
 Proof.
-  intros [A0 Ab] Bd H Ha. destruct parts as [_ [M _]]. set (e := (Q2R mu1 - Q2R delta) / 2).
-  assert (K : 0 <= f b - Rabs (S (Rmax 0 b) i)); [|rewrite Rmax_right in K by lra; lra].
-  apply (stays a b (fun u => f u - Rabs (S (Rmax 0 u) i)) Ab).
-  - intros t Ht. apply (continuous_minus f (fun u => Rabs (S (Rmax 0 u) i))).
-    + apply @ex_derive_continuous. exists (df t). apply H. exact Ht.
-    + apply size_cont. lra.
-  - rewrite Rmax_right by lra. lra.
-  - intros t Ht Z. rewrite Rmax_right in Z by lra. destruct (H t ltac:(lra)) as [D [P G]].
-    assert (N : S t i <> 0) by (intros E; rewrite E, Rabs_R0 in Z; lra).
-    destruct (law t e ltac:(lra) N ltac:(unfold e; lra)) as [e1 [E1 L1]].
-    apply is_derive_Reals in D. destruct (D e ltac:(unfold e; lra)) as [e2 L2].
-    exists (Rmin e1 e2). split; [apply Rmin_pos; [exact E1|apply cond_pos]|]. intros h Hh.
-    pose proof (Rmin_l e1 e2). pose proof (Rmin_r e1 e2). specialize (L1 h ltac:(lra)).
-    specialize (L2 h ltac:(lra) ltac:(rewrite Rabs_right; lra)). apply Rabs_def2 in L2 as [_ L2].
-    rewrite Rmax_right by lra.
-    assert (L3 : h * (df t - e) < f (t + h) - f t).
-    { apply (Rmult_lt_compat_l h) in L2; [|lra].
-      replace (h * ((f (t + h) - f t) / h - df t)) with (f (t + h) - f t - h * df t) in L2 by (field; lra). lra. }
-    assert (Q : Rabs (S t i) = f t) by lra. rewrite Q in L1.
-    assert (h * (- (p t * f t)) <= h * df t) by (apply Rmult_le_compat_l; lra). unfold e in *. lra.
+  intros Hab Bd H. destruct parts as [_ [M _]]. apply (slower ((Q2R mu1 - Q2R delta) / 2) a b f df Hab Bd); [lra|intros t Ht; apply H; exact Ht|].
+  intros t Ht Q. destruct (H t ltac:(lra)) as [_ [P G]]. split; [intros E; rewrite E, Rabs_R0 in Q; lra|lra].
 Qed.
 Lemma shrinks t : 0 <= t < Tr -> Rabs (S t i) <= w t * Rabs (S 0 i).
 Proof.
