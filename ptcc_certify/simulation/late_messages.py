@@ -8,8 +8,8 @@ age`` and ``t_i``: the delay ``t - t_j`` is one of those that are allowed, and t
 exact where the gain has its pole: the run is a solution, up to rounding. With an own state that is late the whole right
 side is held. What is heard at once is no solution if it is held: it is taken to change evenly with the clock over a
 step, which is of second order in the step, and leaders of a group that hear each other at once move exactly. Leaders
-that move as they like may do so over a step, for who hears them late hears of it in the next; disturbances are a constant
-times the gain within a step, at most ``d``.
+that move as they like may do so over a step, for who hears them late hears of it in the next; disturbances are a
+constant times the gain within a step, at most ``d``.
 """
 
 from __future__ import annotations
