@@ -22,9 +22,10 @@ from typing import Any
 import numpy as np
 
 from lmi import child_process
+from lmi.diagonal import run_solver
 from lmi.errors import MatrixError, NoCertificate, OutOfTime
 from lmi.matrix_classes import square
-from lmi.semidefinite_program import Affine, Program, Value, bordered, diagonal
+from lmi.search_time import checkpoint, seconds_left, uncounted
 
 #: Steps at most, and the relative gain that is worth another one.
 _STEPS, _GAIN = 12, 1e-4
@@ -279,54 +280,54 @@ class _Search:
     def _solve(
         self, modes: Sequence[UncertainMatrix], rates: Sequence[float], least: float
     ) -> tuple[np.ndarray, list[np.ndarray]]:
+        with uncounted():
+            import cvxpy as cp
+        checkpoint()
         n = len(modes[0].A)
         unit = max(float(np.abs(mode.A).max(initial=0.0)) for mode in modes) or 1.0
-        program = Program()
-        P = form_between(program, n, self.diagonal, least, 1.0)
-        rises = [program.column(1) for _ in range(1 if self.shares is None else len(modes))]
-        taus = [program.column(len(mode.radii)) for mode in modes]
+        p = cp.Variable(n) if self.diagonal else cp.Variable((n, n), symmetric=True)
+        P = cp.diag(p) if self.diagonal else p
+        t = cp.Variable(1 if self.shares is None else len(modes))
+        constraints = [p >= least, p <= 1] if self.diagonal else [P >> least * np.eye(n), P << np.eye(n)]
+        taus = []
         for i, mode in enumerate(modes):
-            own, rise = (min(rates), rises[0]) if self.shares is None else (rates[i], rises[i])
-            program.positive(inequality(P, mode, taus[i], own, rise, unit))
-        goal = rises[0] if self.shares is None else sum(rise * w for rise, w in zip(rises, self.shares, strict=True))
-        value = solution(program, goal, self.tolerance, self.diagonal)
-        return value(P), [value(tau)[:, 0] for tau in taus]
+            tau = cp.Variable(len(mode.radii)) if mode.radii.size else None
+            own, rise = (min(rates), t[0]) if self.shares is None else (rates[i], t[i])
+            constraints.append(inequality(P, mode, tau, own, rise, unit) >> 0)
+            taus.append(tau)
+        problem = cp.Problem(cp.Maximize(t[0] if self.shares is None else self.shares @ t), constraints)
+        run_program(problem, n + max(mode.radii.size for mode in modes), self.tolerance, self.diagonal)
+        if p.value is None or not np.isfinite(p.value).all():
+            raise NoCertificate(f"the solver answered {problem.status}")
+        value = np.diag(p.value) if self.diagonal else (p.value + p.value.T) / 2
+        return value, [np.zeros(0) if tau is None else tau.value for tau in taus]
 
 
-def form_between(program: Program, n: int, diagonal_only: bool, low: float, high: Any) -> Affine:
-    """Return an unknown ``P`` with ``low I <= P <= high I``, symmetric or diagonal; ``high`` may be a variable."""
-    if diagonal_only:
-        p = program.column(n)
-        program.not_negative(p - low)
-        program.not_negative(high * np.ones((n, 1)) - p)
-        return diagonal(p)
-    P = program.symmetric(n)
-    program.positive(P - low * np.eye(n))
-    program.positive(high * np.eye(n) - P)
-    return P
-
-
-def inequality(P: Any, mode: UncertainMatrix, tau: Affine, b: float, t: Any, unit: float) -> Affine:
+def inequality(P: Any, mode: UncertainMatrix, tau: Any, b: Any, t: Any, unit: float) -> Any:
     """Return the matrix of the module's inequality over ``unit``, in coordinates of radii 1, minus ``t I``."""
-    product = P @ (mode.A / unit)
-    form = product + product.T - (b / unit) * P - t * np.eye(len(mode.A))
-    if not mode.radii.size:
+    import cvxpy as cp
+    from scipy import sparse
+
+    n = len(mode.A)
+    product = P @ sparse.csr_array(mode.A / unit)  # keeps the zeros, of which chordal decomposition makes use
+    form = product + product.T - (b / unit) * P - t * np.eye(n)
+    if tau is None:
         return form
-    H, F = (x / math.sqrt(unit) for x in (mode.H, mode.F))
-    return bordered(form - H @ diagonal(tau) @ H.T, P @ F, diagonal(tau))
+    H, F = (sparse.csr_array(x / math.sqrt(unit)) for x in (mode.H, mode.F))
+    coupling = P @ F
+    return cp.bmat([[form - H @ cp.diag(tau) @ H.T, coupling], [coupling.T, cp.diag(tau)]])
 
 
-def solution(program: Program, goal: Affine, tolerance: float, diagonal_only: bool = False) -> Value:
-    """Maximise ``goal``, and return the function that evaluates matrices; large sparse matrices are split."""
-    rows = max(len(matrix.constant) for matrix in program.matrices)
-    return program.maximise(
-        goal,
-        tol_gap_abs=tolerance * 1e-2,
-        tol_gap_rel=tolerance,
-        tol_feas=tolerance * 1e-2,
-        chordal_decomposition_enable=rows > _WHOLE_ROWS[diagonal_only],
-        chordal_decomposition_merge_method="parent_child",
-    )
+def run_program(problem: Any, rows: int, tolerance: float, diagonal: bool = False) -> None:
+    """Solve a program of blocks of so many rows at most; whether it was solved is asked by the caller."""
+    options: dict[str, Any] = {"tol_gap_abs": tolerance * 1e-2, "tol_gap_rel": tolerance, "tol_feas": tolerance * 1e-2}
+    options["chordal_decomposition_enable"] = rows > _WHOLE_ROWS[diagonal]
+    options["chordal_decomposition_merge_method"] = "parent_child"
+    options["time_limit"] = seconds_left()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # "solution may be inaccurate": every result is recomputed by the caller
+        run_solver(problem, "clarabel", options)
+    checkpoint()
 
 
 def least_condition(
@@ -365,20 +366,29 @@ def least_condition(
     """
     if child_process.forked:
         raise NoCertificate("Clarabel is not run in a forked process")
-    n, program = len(modes[0].A), Program()
+    with uncounted():
+        import cvxpy as cp
+    n = len(modes[0].A)
     pairs = [mode.transformed(np.eye(n)) for mode in modes]
-    c = program.column(1)
-    P = form_between(program, n, shape == "diagonal", 1.0, c)
-    taus = [program.column(len(mode.radii)) for mode in modes]
-    for (mode, _), tau, rate in zip(pairs, taus, rates, strict=True):
+    p = cp.Variable(n) if shape == "diagonal" else cp.Variable((n, n), symmetric=True)
+    P, c = cp.diag(p) if shape == "diagonal" else p, cp.Variable()
+    constraints = [p >= 1, p <= c] if shape == "diagonal" else [P >> np.eye(n), P << c * np.eye(n)]
+    taus = []
+    for (mode, _), rate in zip(pairs, rates, strict=True):
+        taus.append(cp.Variable(len(mode.radii)) if mode.radii.size else None)
         unit = float(np.abs(mode.A).max(initial=0.0)) or 1.0
-        program.positive(inequality(P, mode, tau, rate, 0.0, unit))
-    value = solution(program, -c, tolerance, shape == "diagonal")
-    top = float(np.linalg.eigvalsh(value(P))[-1])
+        constraints.append(inequality(P, mode, taus[-1], rate, 0.0, unit) >> 0)
+    problem = cp.Problem(cp.Minimize(c), constraints)
+    run_program(problem, n + max(mode.radii.size for mode in modes), tolerance, shape == "diagonal")
+    if p.value is None or not np.isfinite(p.value).all():
+        raise NoCertificate(f"the solver answered {problem.status}")
+    value = np.diag(p.value) if shape == "diagonal" else (p.value + p.value.T) / 2
+    top = float(np.linalg.eigvalsh(value)[-1])
     multipliers = [
-        np.maximum(value(tau)[:, 0], 1e-12) / scale / top for tau, (_, scale) in zip(taus, pairs, strict=True)
+        np.zeros(0) if tau is None else np.maximum(tau.value, 1e-12) / scale / top
+        for tau, (_, scale) in zip(taus, pairs, strict=True)
     ]
-    return evaluate(value(P) / top, modes, multipliers)
+    return evaluate(value / top, modes, multipliers)
 
 
 def evaluate(P: np.ndarray, modes: Sequence[UncertainMatrix], multipliers: Sequence[np.ndarray]) -> CommonCertificate:
@@ -446,7 +456,13 @@ def best_multipliers(certificate: CommonCertificate, modes: Sequence[UncertainMa
 
 
 def _multipliers(mode: UncertainMatrix) -> np.ndarray:
-    unit, program = float(np.abs(mode.A).max(initial=0.0)) or 1.0, Program()
-    tau, t = program.column(len(mode.radii)), program.column(1)
-    program.positive(inequality(np.eye(len(mode.A)), mode, tau, 0.0, t, unit))
-    return solution(program, t, 1e-7)(tau)[:, 0]
+    with uncounted():
+        import cvxpy as cp
+    checkpoint()
+    unit = float(np.abs(mode.A).max(initial=0.0)) or 1.0
+    tau, t = cp.Variable(len(mode.radii)), cp.Variable()
+    problem = cp.Problem(cp.Maximize(t), [inequality(np.eye(len(mode.A)), mode, tau, 0.0, t, unit) >> 0])
+    run_program(problem, len(mode.A) + len(mode.radii), 1e-7)
+    if tau.value is None or not np.isfinite(tau.value).all():
+        raise NoCertificate(f"the solver answered {problem.status}")
+    return tau.value

@@ -16,10 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from lmi import child_process
-from lmi.common import CommonCertificate, UncertainMatrix, common_lyapunov, evaluate, form_between, inequality, solution
+from lmi.common import CommonCertificate, UncertainMatrix, common_lyapunov, evaluate, inequality, run_program
 from lmi.errors import MatrixError, NoCertificate, OutOfTime
-from lmi.search_time import checkpoint
-from lmi.semidefinite_program import Program
+from lmi.search_time import checkpoint, uncounted
 
 #: Steps at most for one ``m``, the relative gain that is worth another one, and values of ``ln m`` that are tried.
 _STEPS, _GAIN, _TRIALS = 8, 1e-3, 6
@@ -160,17 +159,23 @@ class _Program:
 
     def solve(self) -> tuple[list[np.ndarray], list[np.ndarray]]:
         """Return matrices and multipliers."""
-        n, program = len(self.modes[0].A), Program()
+        with uncounted():
+            import cvxpy as cp
+        n = len(self.modes[0].A)
         unit = max(float(np.abs(mode.A).max(initial=0.0)) for mode in self.modes) or 1.0
-        t, forms, taus = program.column(1), [], []
+        t, constraints, forms, taus = cp.Variable(), [], [], []
         for mode in self.modes:
-            forms.append(form_between(program, n, False, _LEAST, 1.0))
-            taus.append(program.column(len(mode.radii)))
-            program.positive(inequality(forms[-1], mode, taus[-1], self.rate, t, unit))
+            P = cp.Variable((n, n), symmetric=True)
+            tau = cp.Variable(len(mode.radii)) if mode.radii.size else None
+            constraints += [P >> _LEAST * np.eye(n), P << np.eye(n)]
+            constraints.append(inequality(P, mode, tau, self.rate, t, unit) >> 0)
+            forms.append(P)
+            taus.append(tau)
         common = [S.T @ P @ S for S, P in zip(self.factors, forms, strict=True)]
-        for P in common:
-            for Q in common:
-                if P is not Q:
-                    program.positive(self.ratio * P - Q)
-        value = solution(program, t, 1e-7)
-        return [value(P) + _LEAST * np.eye(n) for P in forms], [value(tau)[:, 0] for tau in taus]
+        constraints += [self.ratio * P - Q >> 0 for P in common for Q in common if P is not Q]
+        problem = cp.Problem(cp.Maximize(t), constraints)
+        run_program(problem, n + max(mode.radii.size for mode in self.modes), 1e-7)
+        if t.value is None or any(P.value is None or not np.isfinite(P.value).all() for P in forms):
+            raise NoCertificate(f"the solver answered {problem.status}")
+        matrices = [(P.value + P.value.T) / 2 + _LEAST * np.eye(n) for P in forms]
+        return matrices, [np.zeros(0) if tau is None else tau.value for tau in taus]
