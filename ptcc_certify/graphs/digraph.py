@@ -23,7 +23,7 @@ import numpy as np
 from ptcc_certify.errors import GraphError, NumberError, gated
 from ptcc_certify.graphs.display_hook import Shown
 from ptcc_certify.graphs.equality import ReadOnly
-from ptcc_certify.graphs.other_names import Row
+from ptcc_certify.graphs.other_names import CallableTuple
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, nearest_float, shorten, writable
 from ptcc_certify.graphs.tables import first_five, import_pandas
 
@@ -165,7 +165,7 @@ class SignedDigraph(ReadOnly, Shown):
         weights: Weights,
         read: Mapping[str, Any] | None = None,
     ):
-        self.labels = Row(labels)
+        self.labels = CallableTuple(labels)
         n = len(self.labels)
         if n == 0:
             raise GraphError("the graph has no nodes; give at least one edge, or a row with one label")
@@ -461,10 +461,10 @@ class SignedDigraph(ReadOnly, Shown):
         return np.asarray(self._weights.table == self._weights.table[other], dtype=bool)
 
     @property
-    def edges(self) -> Row[tuple[str, str, Fraction]]:
+    def edges(self) -> CallableTuple[tuple[str, str, Fraction]]:
         """All edges as ``(source label, target label, exact weight)``, sorted by (target, source) index."""
         pairs = enumerate(zip(self.source.tolist(), self.target.tolist(), strict=True))
-        return Row((self.labels[s], self.labels[t], self._weights.fraction(i)) for i, (s, t) in pairs)
+        return CallableTuple((self.labels[s], self.labels[t], self._weights.fraction(i)) for i, (s, t) in pairs)
 
     def adjacency(self) -> sparse.csr_array:
         """(N, N) sparse float64 matrix ``W``; rows are listeners."""

@@ -22,7 +22,7 @@ import numpy as np
 from ptcc_certify.errors import GraphError, NumberError, did_you_mean, gated
 from ptcc_certify.graphs.digraph import Exact, SignedDigraph, Weights, ordered_labels, refuse_unknown_orientation
 from ptcc_certify.graphs.display_hook import Shown
-from ptcc_certify.graphs.other_names import Row
+from ptcc_certify.graphs.other_names import CallableTuple
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, shorten
 from ptcc_certify.graphs.tables import import_pandas
 
@@ -76,7 +76,7 @@ class Mode:
     tied: bool = False
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "labels", Row(self.labels))
+        object.__setattr__(self, "labels", CallableTuple(self.labels))
         for array in (self.source, self.target, self.sign, self.lower.table, self.upper.table):
             array.flags.writeable = False
 

@@ -108,7 +108,7 @@ _MADE_BY = {
 _T = TypeVar("_T")
 
 
-class Row(tuple[_T, ...]):
+class CallableTuple(tuple[_T, ...]):
     """A tuple that may be called, too, as in networkx: ``graph.edges()`` is ``graph.edges``.
 
     Examples
