@@ -511,7 +511,7 @@ def enclosed_final_state(influence: Influence, initial_state: Sequence[Fraction]
     for number, component in zip(numbers, influence.balanced, strict=True):
         first = component.nodes[0]
         value, spread = final[first] * (component.gauge or (1,))[0], spreads[first]
-        if spread and abs(value) <= 2 * spread:
+        if spread and abs(Fraction(value)) <= 2 * spread:
             raise NotEnclosedError(f"the consensus value of leader group {number} may or may not be 0")
         degenerate += [number] * (not value)
         values.append(value)
