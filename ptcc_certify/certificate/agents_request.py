@@ -58,19 +58,6 @@ def single_integrators(agents: Any, protocol: Any, limits: Any) -> tuple[Any, An
     return None, limits if own in limits else (own, *limits)
 
 
-def one_path(agents: Agents, chains: Chains, protocol: Protocol) -> bool:
-    """Tell whether these are single integrators on a line, in places, under a cap: then ``x - h`` is certified."""
-    return agents.of_paper and agents.cap is not None and chains.dimension == 1 and protocol.reaching is None
-
-
-def less_places(chains: Chains) -> tuple[list[Fraction] | None, tuple[Fraction, ...]]:
-    """Return the initial state less the places ``h``, and these, of single integrators on a line."""
-    places = tuple(h for (h,) in chains.offsets)
-    if chains.states is None:
-        return None, places
-    return [x - h for ((x,),), h in zip(chains.states, places, strict=True)], places
-
-
 def refuse_agents(agents: Any, protocol: Protocol, asked: dict[str, Any]) -> None:
     """Refuse what is not asked of agents of order n, or not proved of them.
 

@@ -83,8 +83,6 @@ def certificate_document(content: Content, verdict: str, files: bool = False) ->
     }
     if content.agents is not None:
         document["agents"] = agents_section(content.agents, out)
-    if content.offsets is not None:
-        document["offsets"] = out.state("offsets", content.offsets)
     if content.late is not None and content.late.says_something:
         document["messages"] = messages_section(content.late, out)
     if content.tracking is not None:
@@ -133,7 +131,6 @@ def read_document(
         "observed": _read_observations(document["unverified"]),
         "source": Source(path, sha256, document, report, effort, proof, files),
         "agents": read_agents(document.get("agents"), structure, protocol, functions),
-        "offsets": data.state(document.get("offsets")),
     }
 
 

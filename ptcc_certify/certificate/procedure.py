@@ -34,14 +34,7 @@ from ptcc_certify.bounds.late_messages import LateBounds, bound_late
 from ptcc_certify.bounds.longest_delay import LateCase
 from ptcc_certify.bounds.tracking import Tracking, bound_tracking
 from ptcc_certify.certificate.agents_part import prove_agents
-from ptcc_certify.certificate.agents_request import (
-    Chains,
-    less_places,
-    one_path,
-    read_chains,
-    refuse_agents,
-    single_integrators,
-)
+from ptcc_certify.certificate.agents_request import Chains, read_chains, refuse_agents, single_integrators
 from ptcc_certify.certificate.cascade_part import prove_cascade
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.certificate_data import Observations
@@ -75,7 +68,6 @@ from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.agents import Agents
 from ptcc_certify.protocols.base import ReachingProtocol
 from ptcc_certify.protocols.disturbance import as_disturbance
-from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.protocols.late_messages import LateMessages
 from ptcc_certify.protocols.moving_leaders import MovingLeaders
 from ptcc_certify.protocols.reaching_time import ReachingTime
@@ -274,13 +266,10 @@ def certify(
         raise ParameterError("signal is for families of graphs, which change; this is one graph: leave it out")
     progress, graph = listener(progress), as_graph(graph, orientation)
     refuse(graph, protocol, method, {"sigma0": sigma0, "disturbance": disturbance}, [*options["limits"], delta, noise])
-    structure, offsets = analyse(graph), None
-    chains = None if of_agents is None else read_chains(of_agents, graph, protocol.gain, x0, v0, derivatives)
-    if of_agents is not None and chains is not None and one_path(of_agents, chains, protocol):
-        x0, offsets = less_places(chains)
-        options["limits"], of_agents, chains = (GainLimits(gain_cap=of_agents.cap),), None, None
+    structure = analyse(graph)
     request = read_request(structure, protocol, options)
     refuse_beside(structure, protocol, request)
+    chains = None if of_agents is None else read_chains(of_agents, graph, protocol.gain, x0, v0, derivatives)
     initial_state = None if x0 is None or chains else read_initial_state(structure, x0, "x0")
     manifold, reaching = read_sliding_variable(structure, protocol, sigma0)
     case = Case(structure, protocol, request, initial_state, manifold, progress)
@@ -289,26 +278,11 @@ def certify(
     if not runs and disturbance is not None and protocol.reaching is not None:
         _check_disturbance(disturbance, protocol.reaching, graph)
     certificate = case.certificate(disturbance, runs, reaching)
-    if offsets is not None:
-        certificate = certificate.changed(offsets=offsets)
     if of_agents is not None and chains is not None:
         certificate = _with_agents(certificate, of_agents, chains, wanted)
     certificate = _with_small_delays(certificate)
     progress(STEPS[5])
     return _with_word_of_check(certificate)
-
-
-def motion_of(certificate: Certificate, agents: Agents) -> Certificate:
-    """Return a certificate of agents of order n, with ``agents`` also of single integrators in places under a cap.
-
-    :func:`certify` has one certificate of these, that of ``x - h``; their motion, and how bounds depend on the
-    deadline, are taken from that of agents of order n.
-    """
-    if certificate.offsets is None:
-        return certificate
-    begin, places = certificate.initial_positions, tuple((h,) for h in certificate.offsets)
-    chains = Chains(None if begin is None else tuple(((x,),) for x in begin), 1, places)
-    return _with_agents(certificate.changed(offsets=None, initial_state=None, limits=()), agents, chains, False)
 
 
 def _agents_options(agents: Any, protocol: Protocol, asked: dict[str, Any], v0: Any, derivatives: Any) -> Agents | None:

@@ -43,7 +43,6 @@ from ptcc_certify.checker.protocol import (
     SLIDING_CLOCK,
     Protocol,
     check_begin,
-    check_offsets,
     check_protocol,
     check_sliding,
 )
@@ -60,10 +59,10 @@ GRAPH = "a graph file is not read: compare the SHA-256 that is printed, or use p
 KEYS = (
     *("schema", "producer", "graph", "structure", "claim", "components", "protocol", "paper", "lyapunov", "rates"),
     *("overshoot", "initial_state", "sliding_variable", "influence", "final_state", "reaching_time", "input", "proof"),
-    *("verdict", "digest", "unverified", "boxes", "restricted", "agents", "messages", "leaders", "offsets"),
+    *("verdict", "digest", "unverified", "boxes", "restricted", "agents", "messages", "leaders"),
 )
 #: Parts that need not be there.
-OPTIONAL = ("components", "boxes", "restricted", "agents", "messages", "leaders", "offsets")
+OPTIONAL = ("components", "boxes", "restricted", "agents", "messages", "leaders")
 
 #: Parts that are null in a certificate of a family.
 NOT_OF_FAMILIES = ("paper", "rates", "overshoot", "influence")
@@ -173,7 +172,6 @@ def _verdict(doc: Document) -> str:
     structure = check_structure(doc, graph, data["structure"])
     claim = check_claim(doc, structure, protocol.sliding)
     begin = check_begin(doc, graph, protocol)
-    check_offsets(doc, graph, protocol)
     final = check_final_state(doc, structure, claim, begin)
     paper = check_paper(doc, structure, claim)
     functions = check_functions(doc, structure, final, paper)
@@ -205,7 +203,6 @@ def _family_verdict(doc: Document, protocol: Protocol) -> str:
     need("agents" not in doc.data, "agents of order n on a family")
     need("messages" not in doc.data, "late messages of a family")
     need("leaders" not in doc.data, "leaders of a family that move")
-    need("offsets" not in doc.data, "a formation of a family")
     family = check_family(doc)
     begin = check_begin(doc, family.modes[0].structure.graph, protocol)
     functions = check_family_functions(doc, family)

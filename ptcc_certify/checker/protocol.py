@@ -70,14 +70,6 @@ def check_begin(doc: Document, graph: Digraph, protocol: Protocol) -> Begin:
     return Begin(state, sigma)
 
 
-def check_offsets(doc: Document, graph: Digraph, protocol: Protocol) -> None:
-    """Read the places ``h`` of a formation, of which everything else is less; any numbers are true of themselves."""
-    if "offsets" in doc.data:
-        beside = {"agents", "messages", "leaders"} & doc.data.keys()
-        need(not protocol.sliding and not beside, "a formation beside what is not said of one")
-        by_agent(doc, graph, doc.section("offsets"), "offsets")
-
-
 def check_sliding(doc: Document, graph: Digraph, protocol: Protocol, begin: Begin) -> None:
     """Verify Proposition 1 and every reaching time."""
     section, sigma0, g = doc.section("reaching_time"), begin.sigma, protocol.gains

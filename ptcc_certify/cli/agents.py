@@ -147,9 +147,9 @@ def refuse_dimension(options: Options, command: str) -> None:
 
 def run_of_agents(graph: SignedDigraph, protocol: Protocol, keywords: dict[str, Any], samples: int) -> AgentsTrajectory:
     """Run agents of order n with the gains that ``ptcc certify`` proves, from their initial states to the deadline."""
-    from ptcc_certify.certificate.procedure import certify, motion_of
+    from ptcc_certify.certificate.procedure import certify
 
-    part = motion_of(certify(graph, protocol, simulation=False, **keywords), keywords["agents"]).agents
+    part = certify(graph, protocol, simulation=False, **keywords).agents
     if part is None or (graph.n_edges and not part.functions):
         raise ParameterError("no gains of these agents are proved; ptcc certify tells why")
     return part.simulate(samples=samples)

@@ -15,7 +15,7 @@ from scipy.linalg import expm
 
 from ptcc_certify.certificate.answer import MET, OPEN, REFUTED
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
-from ptcc_certify.certificate.procedure import certify, motion_of
+from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.checker import check
 from ptcc_certify.errors import ParameterError
@@ -145,89 +145,6 @@ def test_one_integrator_under_a_gain_cap_and_disturbances_is_still_one_of_order_
     robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
     part = certify(TEAM, robust, [5, 2, 4, -1], simulation=False, agents=Agents(1, gain_cap=40)).agents
     assert part is not None and part.protocol.gain_cap == 40
-
-
-@pytest.mark.parametrize("graph", [TEAM, ENEMIES, CAMPS], ids=["team", "enemies", "camps"])
-@pytest.mark.parametrize("cap", [4, "0.5"])
-def test_single_integrators_in_a_formation_under_a_cap_have_the_plain_certificate_of_their_places(
-    graph: SignedDigraph, cap: Any, tmp_path: Path
-):
-    """Every part of the file but the places is that of ``x0 - h`` under the same limit; positions are shifted."""
-    N = graph.n_nodes
-    x0, h = [5, 2, 4, -1][:N], [1, -3, "2/3", 2][:N]
-    ours = certify(graph, NOMINAL, x0, simulation=False, agents=Agents(order=1, offsets=h, gain_cap=cap))
-    less = [x - Fraction(y) for x, y in zip(x0, h, strict=True)]
-    plain = certify(graph, NOMINAL, less, simulation=False, limits=GainLimits(gain_cap=cap))
-    assert ours.verdict == "certified" and ours.agents is None and ours.offsets == tuple(map(Fraction, h))
-    own, other = (
-        {key: part for key, part in one.to_dict().items() if key not in ("digest", "unverified", "offsets")}
-        for one in (ours, plain)
-    )
-    assert own == other and own["input"]["residual"] and ours != plain
-    assert ours.initial_positions == tuple(map(Fraction, x0))
-    assert ours.final_positions is not None and plain.final_state is not None
-    shifted = [x - y for x, y in zip(ours.final_positions.states, ours.offsets, strict=True)]
-    assert shifted == list(plain.final_state.states)
-    ours.save(tmp_path / "places.json")
-    again = read_certificate(tmp_path / "places.json")
-    assert again == ours and again.offsets == ours.offsets
-    assert ours.to_pandas()["x(T)"].to_list() == [float(x) for x in ours.final_positions.states]
-    assert any("of x - offsets" in line for line in summary_lines(again, "team"))
-
-
-def test_bounds_of_a_formation_under_a_cap_hold_on_the_motion_that_agents_of_order_1_make():
-    """The motion is that of agents in their places; the bound of the input is no weaker than theirs."""
-    agents = Agents(order=1, offsets=[1, -3, 2, 2], gain_cap=4)
-    ours = certify(TEAM, NOMINAL, [5, 2, 4, -1], simulation=False, agents=agents)
-    part = motion_of(ours, agents).agents
-    assert part is not None and part.input is not None and ours.effort is not None
-    (left,) = ours.effort.residual
-    run = part.simulate()
-    ends = np.array([float(x) for x in ours.final_positions.states])
-    off = np.abs(run.states[:, 0, 0, -1] - ends)
-    assert left.agents is not None and left.largest is not None
-    assert all(0 <= x <= float(y) * (1 + 1e-7) for x, y in zip(off, left.agents, strict=True))
-    assert left.largest <= max(part.input) * (1 + Fraction(1, 10**9))
-
-
-@pytest.mark.parametrize("expected", ["bipartite-containment", "consensus"])
-def test_a_behaviour_under_a_cap_is_not_told_to_be_met_in_a_formation(expected: str):
-    agents = Agents(order=1, offsets=[1, -3, 2, 2], gain_cap=4)
-    asked = Expectations(behaviour=expected)
-    found = certify(TEAM, NOMINAL, [5, 2, 4, -1], simulation=False, agents=agents, expectations=asked)
-    assert found.assessment.answers[0].status == OPEN
-
-
-def test_biases_under_a_cap_make_the_same_certificate_as_the_places_that_they_make():
-    biases = [0, 0, 0, 1]
-    ours = certify(TEAM, NOMINAL, [5, 2, 4, -1], simulation=False, agents=Agents(order=1, biases=[0] * 4, gain_cap=4))
-    assert ours.offsets == (0, 0, 0, 0)
-    with pytest.raises(ParameterError, match="biases fit no formation"):
-        certify(TEAM, NOMINAL, [5, 2, 4, -1], agents=Agents(order=1, biases=biases, gain_cap=4))
-
-
-def test_in_the_plane_single_integrators_under_a_cap_keep_the_proof_of_agents_of_order_n():
-    agents = Agents(order=1, offsets=[[1, 0], [0, 0], [2, 1], [0, 3]], gain_cap=4)
-    part = certify(TEAM, NOMINAL, [[5, 1], [2, 0], [4, 1], [-1, 2]], simulation=False, agents=agents).agents
-    assert part is not None and part.residual is not None and part.dimension == 2
-
-
-@pytest.mark.parametrize(
-    ("change", "reason"),
-    [
-        ({"offsets": None}, "offsets"),
-        ({"offsets": {"a": "1"}}, "missing"),
-        ({"offsets": {"a": "1", "b": "-3", "c": "2", "d": "nan"}}, ""),
-        ({"messages": {}}, "a formation beside what is not said of one"),
-        ({"agents": {}}, "a formation beside what is not said of one"),
-    ],
-)
-def test_places_that_are_no_numbers_or_beside_other_claims_are_rejected(change: Any, reason: str):
-    agents = Agents(order=1, offsets=[1, -3, 2, 2], gain_cap=4)
-    data = certify(TEAM, NOMINAL, [5, 2, 4, -1], simulation=False, agents=agents).to_dict()
-    assert check(data).accepted
-    report = check({**data, **change})
-    assert not report.accepted and reason in (report.reason or "")
 
 
 @pytest.mark.parametrize("graph", [TEAM, ENEMIES, CAMPS], ids=["team", "enemies", "camps"])
