@@ -8,11 +8,12 @@ Import ListNotations. Open Scope R_scope.
 Record axis := Axis { offsets : list Q; begins : list (list Q); arrivals : list (list (Q * Q)) }.
 (** [x^(n) + a_n x^(n-1) + .. + a_1 x = u] of every node of [graph], under the protocol of it but for [slope], which
     takes the place of [rho1], and [cap], which the gain does not exceed; which functions of [graph] are used, and whether
-    all agree at the deadline; [drift] takes the common motion there from time 0; [tops] bounds the inputs by agent;
-    [left_over] is how far the clock goes at least, and by agent and derivative what is left at the deadline under a cap *)
+    all agree at the deadline; [drift] takes the common motion there from time 0, by middles and radii; [tops] bounds the
+    inputs by agent; [left_over] is how far the clock goes at least, and by agent and derivative what is left at the
+    deadline under a cap *)
 Record agents := Agents { graph : cert; degree : nat; slope : Q; cap : option Q; plant : list Q; damping : list Q;
   gains : list Q; W : list (list Q); P : list (list Q); coupling : Q; falls : Q; used : list nat; agree : bool;
-  drift : option (list (list Q)); axes : list axis; tops : list Q; left_over : option (Q * list (list Q)) }.
+  drift : option (list (list (Q * Q))); axes : list axis; tops : list Q; left_over : option (Q * list (list Q)) }.
 
 Definition at_ (l : list Q) (i : nat) : R := Q2R (nth i l 0%Q).
 Definition sum (n : nat) (f : nat -> R) : R := fold_right (fun i a => f i + a) 0 (seq 0 n).
@@ -57,17 +58,21 @@ Definition agent_claim (a : agents) (f : func) : Prop := forall h X S t, flies a
   0 <= t < deadline (graph a) -> let v := exp (- (Q2R (falls a) * turns a t)) * value a f (y a h (X 0) 0) in
   value a f (y a h (X t) t) <= v /\ forall b cs i j, deviation f = Some (b, cs) -> (i < degree a)%nat ->
     (j < order (graph a))%nat -> sq (away a h (X t) i j) <= sq (eta a t ^ i) * (at_ cs j * at_ (nth i (W a) []) i * v).
-(** at the deadline, if there is no cap, all derivatives of all agents are those of the common motion; where that is *)
-Definition outcome a M h x i j : R := (if (i =? 0)%nat then h j else 0) +
-  sum (degree a) (fun l => at_ (nth i M []) l * end_state (graph a) (placed h x l) j).
-Definition agreement (a : agents) : Prop := forall h X S i j, flies a h X S -> (i < degree a)%nat ->
-  (j < order (graph a))%nat -> let tends f y := filterlim f (at_left (deadline (graph a))) (locally y) in
+(** at the deadline, if there is no cap, all derivatives of all agents are those of the common motion; where that is, by
+    a matrix that [drift] encloses *)
+Definition outcome a r h x i j : R := (if (i =? 0)%nat then h j else 0) +
+  sum (degree a) (fun l => r i l * end_state (graph a) (placed h x l) j).
+Definition inside a (r : nat -> nat -> R) : Prop := forall M i l, drift a = Some M -> (i < degree a)%nat ->
+  (l < degree a)%nat -> let p := nth l (nth i M []) (0%Q, 0%Q) in Rabs (Q2R (fst p) - r i l) <= Q2R (snd p).
+Definition agreement (a : agents) : Prop := exists r, inside a r /\ forall h X S i j, flies a h X S ->
+  (i < degree a)%nat -> (j < order (graph a))%nat ->
+  let tends f y := filterlim f (at_left (deadline (graph a))) (locally y) in
   (agree a = true -> tends (fun t => away a h (X t) i j) 0) /\
-  forall M, drift a = Some M -> tends (fun t => X t i j - away a h (X t) i j) (outcome a M h (X 0) i j).
+  (drift a <> None -> tends (fun t => X t i j - away a h (X t) i j) (outcome a r h (X 0) i j)).
 (** the intervals of the final states hold these *)
-Definition ends_claim (a : agents) : Prop := forall M x i j, drift a = Some M -> In x (axes a) ->
+Definition ends_claim (a : agents) : Prop := forall r x i j, drift a <> None -> inside a r -> In x (axes a) ->
   (i < length (arrivals x))%nat -> (j < order (graph a))%nat -> let p := nth j (nth i (arrivals x) []) (0%Q, 0%Q) in
-  Rabs (Q2R (fst p) - outcome a M (at_ (offsets x)) (fun l => at_ (nth l (begins x) [])) i j) <= Q2R (snd p).
+  Rabs (Q2R (fst p) - outcome a r (at_ (offsets x)) (fun l => at_ (nth l (begins x) [])) i j) <= Q2R (snd p).
 (** by coordinate of space, motions from the states of the file on; the Euclidean norm over space *)
 Definition begun a (X : nat -> R -> nat -> nat -> R) (S : nat -> R -> nat -> R) : Prop := forall x c,
   nth_error (axes a) c = Some x -> flies a (at_ (offsets x)) (X c) (S c) /\

@@ -61,21 +61,37 @@ Definition check_agree (a : agents) : bool := negb (agree a) ||
     | Some f => match deviation f with Some _ => true | None => false end | None => false end) (used a)).
 (** [q^m / m!] *)
 Fixpoint part (q : Q) (m : nat) : Q := match m with O => 1 | S m' => q / index (S m') * part q m' end.
+(** coefficients, from number [j] on, of a series of [v] in which [(p + 1 + w v) P + v P' = 1], and the last of them *)
+Fixpoint powers_of (p w b : Q) (j n : nat) : list Q := b :: match n with O => []
+  | S n' => powers_of p w (reduced (- (w * b) / (p + 1 + index (S j)))) (S j) n' end.
+Fixpoint last_of (p w b : Q) (j n : nat) : Q := match n with O => b
+  | S n' => last_of p w (reduced (- (w * b) / (p + 1 + index (S j)))) (S j) n' end.
+Fixpoint total_of (l : list Q) : Q := match l with [] => 0 | b :: l' => reduced (b + total_of l') end.
+Definition terms : nat := 200.
+Definition close_to (p : Q * Q) (q r : Q) : bool := Qle_bool (Qabs (fst p - q) + r) (snd p).
+Definition entry_of (M : list (list (Q * Q))) (i l : nat) : Q * Q := nth l (nth i M []) (0, 0).
+Definition check_rest (a : agents) (M : list (list (Q * Q))) : bool :=
+  let f2 := nth 1 (damping a) 0 in let p := f2 * pull_in a in let w := (nth 1 (plant a) 0 + f2 * slope a) * span (graph a) in
+  let b := / (p + 1) in let m := span (graph a) * total_of (powers_of p w b 0 terms) in let e := Qabs (w * last_of p w b 0 terms) in
+  (degree a =? 2)%nat && match cap a with None => true | Some _ => false end && Qeq_bool 0 (nth 0 (plant a) 0) &&
+  Qeq_bool 0 (nth 0 (damping a) 0) && pos f2 && negb (Qle_bool 1 e) && close_to (entry_of M 0 0) 1 0 &&
+  close_to (entry_of M 0 1) m (e / (1 - e) * Qabs m) && close_to (entry_of M 1 0) 0 0 && close_to (entry_of M 1 1) 0 0.
 Definition check_common (a : agents) : bool := match drift a with None => true | Some M =>
-  forallb (Qeq_bool 0) (plant a ++ damping a) && square (degree a) (fun i l =>
-    Qeq_bool (cell M i l) (if (i <=? l)%nat then part (span (graph a)) (l - i) else 0)) end.
+  if forallb (Qeq_bool 0) (plant a ++ damping a) then square (degree a) (fun i l =>
+    close_to (entry_of M i l) (if (i <=? l)%nat then part (span (graph a)) (l - i) else 0) 0) else check_rest a M end.
 Fixpoint dotq (l x : list Q) : Q := match l, x with q :: l', v :: x' => reduced (q * v + dotq l' x') | _, _ => 0 end.
 Definition ends_q (c : cert) (x : list Q) : list Q :=
   let vs := map (fun b : nat * (list Q * list Q) => (fst (snd b), dotq (snd (snd b)) x)) (balanced_comps (comps c)) in
   map (fun j => reduced (fold_right (fun (p : list Q * Q) s => nth j (fst p) 0 * snd p + s) 0 vs)) (seq 0 (order c)).
 Definition less (x h : list Q) : list Q := map (fun p : Q * Q => fst p - snd p) (combine x h).
 Definition placed_q (x : axis) (l : nat) : list Q := let y := nth l (begins x) [] in if (l =? 0)%nat then less y (offsets x) else y.
-Definition check_axis (a : agents) (M : list (list Q)) (x : axis) : bool :=
+Definition check_axis (a : agents) (M : list (list (Q * Q))) (x : axis) : bool :=
   let n := degree a in let N := order (graph a) in
   let E := map (fun l => ends_q (graph a) (placed_q x l)) (seq 0 n) in
   (length (arrivals x) <=? n)%nat && (length (nth 0 (begins x) []) =? N)%nat && (length (offsets x) =? N)%nat &&
   forallb (fun i => forallb (fun j => let p := nth j (nth i (arrivals x) []) (0, 0) in
-    Qle_bool (Qabs (fst p - ((if (i =? 0)%nat then nth j (offsets x) 0 else 0) + row_times n (cell M i) (fun l => cell E l j)))) (snd p))
+    close_to p ((if (i =? 0)%nat then nth j (offsets x) 0 else 0) + row_times n (fun l => fst (entry_of M i l)) (fun l => cell E l j))
+      (row_times n (fun l => snd (entry_of M i l)) (fun l => Qabs (cell E l j))))
     (seq 0 N)) (seq 0 (length (arrivals x))).
 Definition check_ends_of (a : agents) : bool := match drift a with None => true | Some M => forallb (check_axis a M) (axes a) end.
 

@@ -2,14 +2,10 @@
 Require Import ZArith QArith Qabs Qreals List Bool Reals Lra Lia Psatz FunctionalExtensionality.
 From Coquelicot Require Import Coquelicot.
 Import ListNotations.
-Require Import Vec Definite Graph Flow Certificate Checker Sound Input Slide Main Mean Peak Weighted Large AgentCertificate AgentForms AgentCheck AgentFall AgentMotion AgentExist AgentEnd.
+Require Import Vec Definite Graph Flow Certificate Checker Sound Input Slide Main Mean Peak Weighted Large AgentCertificate AgentForms AgentCheck AgentFall AgentMotion AgentExist AgentEnd AgentRest.
 Open Scope R_scope.
 
 (** * Rationals and polynomials of the check *)
-Lemma reduced_ok q : Q2R (reduced q) = Q2R q.
-Proof. unfold reduced. cbv zeta. destruct (Qeq_bool _ q) eqn:E; [|reflexivity]. apply Qeq_bool_eq, Qeq_eqR in E. exact E. Qed.
-Lemma index_ok i : Q2R (index i) = INR i.
-Proof. unfold index, Q2R. simpl. rewrite INR_IZR_INZ. field. Qed.
 Lemma peval_reduced p x : peval (map reduced p) x = peval p x.
 Proof. induction p as [|q p IH]; simpl; [reflexivity|]. rewrite reduced_ok, IH. reflexivity. Qed.
 Lemma hom_reduced p x z : hom (map reduced p) x z = hom p x z.
@@ -318,11 +314,24 @@ Proof.
   intros H. unfold at_. destruct (nth_in_or_default i l 0%Q) as [I|E]; [|rewrite E; apply Q2R_0].
   rewrite forallb_forall in H. specialize (H _ I). apply Qeq_bool_eq, Qeq_eqR in H. rewrite <- H. apply Q2R_0.
 Qed.
-Theorem agreement_ok : agreement a.
+Lemma abs_ok q : Q2R (Qabs q) = Rabs (Q2R q).
 Proof.
-  intros off X Sl i j HX Hi Hj tends.
-  destruct matrices as [M1 [M2 [M3 [M4 [M5 [M6 [M7 M8]]]]]]]. split.
-  { intros HA. unfold check_agree in Hagree. rewrite HA in Hagree. simpl in Hagree. apply andb_prop in Hagree as [G1 G2].
+  destruct q as [u w]. unfold Q2R. simpl. rewrite abs_IZR, Rabs_mult. f_equal. symmetry. apply Rabs_right. apply Rle_ge. left.
+  apply Rinv_0_lt_compat. apply IZR_lt. reflexivity.
+Qed.
+Lemma near_ok p q r x : close_to p q r = true -> Rabs (Q2R q - x) <= Q2R r -> Rabs (Q2R (fst p) - x) <= Q2R (snd p).
+Proof.
+  intros H B. unfold close_to in H. apply Qle_bool_iff, Qle_Rle in H. rewrite Q2R_plus, abs_ok, Q2R_minus in H.
+  replace (Q2R (fst p) - x) with ((Q2R (fst p) - Q2R q) + (Q2R q - x)) by ring. eapply Rle_trans; [apply Rabs_triang|]. lra.
+Qed.
+Lemma near_at p q x : close_to p q 0 = true -> Q2R q = x -> Rabs (Q2R (fst p) - x) <= Q2R (snd p).
+Proof. intros H E. apply (near_ok p q 0 x H). rewrite E, Rminus_eq_0, Rabs_R0, Q2R_0. lra. Qed.
+(** at the deadline what is known to tend to something *)
+Lemma agrees off X Sl i j : flies a off X Sl -> (i < n)%nat -> (j < order c)%nat -> agree a = true ->
+  filterlim (fun t => away a off (X t) i j) (at_left (deadline c)) (locally 0).
+Proof.
+  intros HX Hi Hj HA. destruct matrices as [M1 [M2 [M3 [M4 [M5 [M6 [M7 M8]]]]]]].
+  unfold check_agree in Hagree. rewrite HA in Hagree. simpl in Hagree. apply andb_prop in Hagree as [G1 G2].
     apply andb_prop in G1 as [G1 G3]. assert (EC : cap a = None) by (destruct (cap a); [discriminate|reflexivity]).
     apply existsb_exists in G2 as [kf [Hk G2]]. destruct (nth_error (funcs (graph a)) kf) as [f|] eqn:Ef; [|discriminate].
     destruct (deviation f) as [[b cs]|] eqn:Ed; [|discriminate].
@@ -337,30 +346,90 @@ Proof.
     - apply Rmax_l.
     - eapply Rle_lt_trans; [|exact L]. apply Rmult_le_compat_l; [lra|]. apply le_INR. unfold n in *. lia.
     - intros t Ht. eapply Rle_trans; [apply (B t Ht)|]. apply Rmult_le_compat_l; [apply Rle_0_sqr|].
-      apply Rmult_le_compat_r; [left; apply exp_pos|apply Rmax_r]. }
-  intros M EM. unfold check_common in Hcommon. rewrite EM in Hcommon. apply andb_prop in Hcommon as [Z HM].
-  rewrite forallb_app in Z. apply andb_prop in Z as [Z1 Z2].
+      apply Rmult_le_compat_r; [left; apply exp_pos|apply Rmax_r].
+Qed.
+Lemma common_ends off X i j v (f : R -> R) : (forall t, 0 <= t < deadline c -> end_state c (placed off (X t) i) j = f t) ->
+  filterlim f (at_left (deadline c)) (locally v) ->
+  filterlim (fun t => X t i j - away a off (X t) i j) (at_left (deadline c)) (locally ((if (i =? 0)%nat then off j else 0) + v)).
+Proof.
+  intros E L. destruct (T_k a Hprot) as [T0 _]. fold c in T0. set (q := if (i =? 0)%nat then off j else 0).
+  apply (filterlim_ext_loc (fun t => q + f t)).
+  - exists (mkposreal _ T0). intros t Bt Lt. unfold ball in Bt; simpl in Bt; unfold AbsRing_ball, abs, minus, plus, opp in Bt; simpl in Bt.
+    apply Rabs_def2 in Bt. rewrite <- E by lra. unfold away, placed, q. fold c. ring.
+  - apply (filterlim_comp_2 (F := at_left (deadline c)) (G := locally q) (H := locally v) (fun _ => q) f Rplus); [apply filterlim_const|exact L|].
+    apply (filterlim_plus q v).
+Qed.
+Definition chain_drift (i l : nat) : R := if (i <=? l)%nat then deadline c ^ (l - i) / INR (fact (l - i)) else 0.
+Lemma chains_end off X Sl i j : forallb (Qeq_bool 0) (plant a ++ damping a) = true -> flies a off X Sl -> (i < n)%nat -> (j < order c)%nat ->
+  filterlim (fun t => X t i j - away a off (X t) i j) (at_left (deadline c)) (locally (outcome a chain_drift off (X 0) i j)).
+Proof.
+  intros Z HX Hi Hj. destruct matrices as [_ [_ [_ [_ [M5 _]]]]]. rewrite forallb_app in Z. apply andb_prop in Z as [Z1 Z2].
   destruct (T_k a Hprot) as [T0 K0]. fold c in T0, K0. set (T := deadline c) in *.
   set (wj := fun t => taylor (n - i) (fun l => end_state c (placed off (X (Rmax 0 0)) (i + l)) j) t).
-  assert (EW : forall t, 0 <= t < T -> end_state c (placed off (X t) i) j = wj t).
-  { intros t Ht. pose proof (drifts a off X Sl Hedges Hend Hprot M5 HX (fun l => zeros _ l Z1) (fun l => zeros _ l Z2) j (n - i) i
-      ltac:(unfold n in *; lia) ltac:(unfold n in *; lia) t Ht) as K. cbv beta zeta in K. rewrite (Rmax_right 0 t) in K by lra. exact K. }
-  assert (EO : outcome a M off (X 0) i j = (if (i =? 0)%nat then off j else 0) + wj T).
+  assert (EO : outcome a chain_drift off (X 0) i j = (if (i =? 0)%nat then off j else 0) + wj T).
   { unfold outcome. f_equal. fold n c. unfold wj, taylor. rewrite Rmax_left by lra.
     rewrite <- (sum_from i n (fun u v => T ^ u / INR (fact u) * end_state c (placed off (X 0) v) j)) by (unfold n in *; lia).
-    apply sum_ext. intros l Hl. pose proof (square_ok _ _ HM i l Hi Hl) as K. cbv beta in K. apply Qeq_bool_eq, Qeq_eqR in K.
-    change (at_ (nth i M []) l) with (Q2R (cell M i l)). rewrite K. destruct (i <=? l)%nat; [|rewrite Q2R_0; ring].
-    rewrite part_ok. fold c. rewrite span_ok. reflexivity. }
-  rewrite EO. unfold tends. fold c T.
-  assert (CW : filterlim (fun t => (if (i =? 0)%nat then off j else 0) + wj t) (at_left T) (locally ((if (i =? 0)%nat then off j else 0) + wj T))).
-  { apply (filterlim_filter_le_1 (G := at_left T) (F := at_left T) (fun t => (if (i =? 0)%nat then off j else 0) + wj t) (fun P HP => HP)).
-    eapply filterlim_filter_le_1; [|apply (continuous_plus (fun _ => if (i =? 0)%nat then off j else 0) wj);
-      [apply continuous_const|apply @ex_derive_continuous]].
-    - intros P [e He]. exists e. intros u Hu _. apply He. exact Hu.
-    - destruct (n - i)%nat as [|u] eqn:Eu; [unfold n in *; lia|]. unfold wj. eexists. apply taylor_derive. }
-  apply (filterlim_ext_loc (fun t => (if (i =? 0)%nat then off j else 0) + wj t)); [|exact CW].
-  exists (mkposreal T T0). intros t Bt Lt. unfold ball in Bt; simpl in Bt; unfold AbsRing_ball, abs, minus, plus, opp in Bt; simpl in Bt.
-  apply Rabs_def2 in Bt. rewrite <- EW by lra. unfold away, placed. fold c. ring.
+    apply sum_ext. intros l Hl. unfold chain_drift. fold T. destruct (i <=? l)%nat; ring. }
+  rewrite EO. apply (common_ends off X i j (wj T) wj).
+  - intros t Ht. pose proof (drifts a off X Sl Hedges Hend Hprot M5 HX (fun l => zeros _ l Z1) (fun l => zeros _ l Z2) j (n - i) i
+      ltac:(unfold n in *; lia) ltac:(unfold n in *; lia) t Ht) as K. cbv beta zeta in K. rewrite (Rmax_right 0 t) in K by lra. exact K.
+  - eapply filterlim_filter_le_1; [|apply (@ex_derive_continuous _ _ wj T)].
+    + intros P [e He]. exists e. intros u Hu _. apply He. exact Hu.
+    + destruct (n - i)%nat as [|u] eqn:Eu; [unfold n in *; lia|]. unfold wj. eexists. apply taylor_derive.
+Qed.
+Definition rest_drift (m : R) (i l : nat) : R := match i, l with O, O => 1 | O, 1%nat => m | _, _ => 0 end.
+Theorem agreement_ok : agreement a.
+Proof.
+  destruct (drift a) as [M|] eqn:EM; [|exists (fun _ _ => 0); split; [intros M i l E; rewrite EM in E; discriminate|]; intros off X Sl i j HX Hi Hj tends;
+    split; [apply (agrees off X Sl); assumption|intros E; contradiction]].
+  pose proof Hcommon as HC. unfold check_common in HC. rewrite EM in HC. destruct (forallb (Qeq_bool 0) (plant a ++ damping a)) eqn:Z.
+  - exists chain_drift. split.
+    + intros M' i l E Hi Hl. rewrite EM in E. injection E as <-. pose proof (square_ok _ _ HC i l Hi Hl) as K. cbv beta in K.
+      apply (near_at _ _ _ K). unfold chain_drift. destruct (i <=? l)%nat; [|apply Q2R_0]. rewrite part_ok. fold c. rewrite span_ok. reflexivity.
+    + intros off X Sl i j HX Hi Hj tends. split; [apply (agrees off X Sl); assumption|]. intros _. apply (chains_end off X Sl); assumption.
+  - unfold check_rest in HC. cbv zeta in HC.
+    set (p := (nth 1 (damping a) 0 * pull_in a)%Q) in *. set (w := ((nth 1 (plant a) 0 + nth 1 (damping a) 0 * slope a) * span (graph a))%Q) in *.
+    set (b := (/ (p + 1))%Q) in *. set (S := total_of _) in *. set (e := Qabs _) in *.
+    apply andb_prop in HC as [H N4]. apply andb_prop in H as [H N3]. apply andb_prop in H as [H N2]. apply andb_prop in H as [H N1].
+    apply andb_prop in H as [H C6]. apply andb_prop in H as [H C5]. apply andb_prop in H as [H C4]. apply andb_prop in H as [H C3]. apply andb_prop in H as [C1 C2].
+    apply Nat.eqb_eq in C1. assert (EC : cap a = None) by (destruct (cap a); [discriminate|reflexivity]).
+    apply Qeq_bool_eq, Qeq_eqR in C3, C4. rewrite Q2R_0 in C3, C4. apply Qpos in C5. apply negb_true_iff in C6.
+    destruct matrices as [_ [_ [_ [M4 _]]]].
+    assert (Ep : Q2R p = at_ (damping a) 1 * k c) by (unfold p; rewrite Q2R_mult, pull_ok; reflexivity).
+    assert (Ew : Q2R w = (at_ (plant a) 1 + at_ (damping a) 1 * Q2R (slope a)) * deadline c) by (unfold w; rewrite !Q2R_mult, Q2R_plus, Q2R_mult; fold c; rewrite span_ok; reflexivity).
+    destruct (glides a p w terms (at_ (plant a) 1) (at_ (damping a) 1) Hprot M4 EC C5 Ep Ew) as [m [L [m0 B]]]. fold c in L, B.
+    exists (rest_drift m). split.
+    + intros M' i l E Hi Hl. rewrite EM in E. injection E as <-. rewrite C1 in Hi, Hl.
+      destruct i as [|[|i]]; [| |lia]; (destruct l as [|[|l]]; [| |lia]); cbn [rest_drift].
+      * apply (near_at _ _ _ N1). apply Q2R_1.
+      * apply (near_ok _ _ _ _ N2). rewrite Q2R_mult. fold c. rewrite span_ok. fold (terms). unfold S. rewrite total_ok. fold b in B.
+        set (x := deadline c * peval (powers_of p w b 0 terms) 1) in *.
+        assert (E1 : Q2R e = Rabs (Q2R w * Q2R (last_of p w b 0 terms))) by (unfold e; rewrite abs_ok, Q2R_mult; reflexivity). rewrite <- E1 in B.
+        assert (E2 : Q2R e < 1) by (destruct (Qlt_le_dec e 1) as [Q|Q]; [apply Qlt_Rlt in Q; rewrite Q2R_1 in Q; exact Q|apply Qle_bool_iff in Q; congruence]).
+        assert (E3 : 0 <= Q2R e) by (rewrite E1; apply Rabs_pos).
+        assert (ED : Q2R (1 - e) = 1 - Q2R e) by (rewrite Q2R_minus, Q2R_1; reflexivity).
+        rewrite Q2R_mult, Q2R_div, ED by (intros Q; apply Qeq_eqR in Q; rewrite ED, Q2R_0 in Q; lra). rewrite abs_ok, Q2R_mult. fold c. rewrite span_ok, total_ok. fold x.
+        rewrite Rabs_minus_sym. eapply Rle_trans; [exact B|]. pose proof (Rle_abs x) as X1. pose proof (Rle_abs (m - x)) as X2.
+        assert (X3 : m * (1 - Q2R e) <= Rabs x) by lra. unfold Rdiv. rewrite Rmult_assoc. apply Rmult_le_compat_l; [exact E3|].
+        apply (Rmult_le_reg_r (1 - Q2R e)); [lra|]. rewrite (Rmult_comm (/ _)), Rmult_assoc, Rinv_l by lra. lra.
+      * apply (near_at _ _ _ N3). apply Q2R_0.
+      * apply (near_at _ _ _ N4). apply Q2R_0.
+    + intros off X Sl i j HX Hi Hj tends. split; [apply (agrees off X Sl); assumption|]. intros _. fold n in Hi. unfold n in Hi. rewrite C1 in Hi.
+      assert (W : forall t, 0 <= t < deadline c -> (fun u => X (Rmax 0 u)) t = X t) by (intros t Ht; cbv beta; rewrite Rmax_right by lra; reflexivity).
+      unfold outcome. rewrite C1. unfold sum. cbn [seq fold_right rest_drift]. fold c.
+      set (v0 := end_state c (placed off (X 0) 0) j). set (v1 := end_state c (placed off (X 0) 1) j).
+      destruct i as [|[|i]]; [| |lia].
+      * cbn [rest_drift]. replace (1 * v0 + (m * v1 + 0)) with (v0 + m * v1) by ring.
+        apply (common_ends off X 0 j (v0 + m * v1) (fun t => v0 + glide a (at_ (plant a) 1) (at_ (damping a) 1) t * v1)).
+        -- intros t Ht. pose proof (position a off X Sl Hedges Hend Hprot M4 HX C1 (eq_sym C3) (eq_sym C4) j t Ht) as K. cbv beta zeta in K.
+           rewrite (Rmax_right 0 t), (Rmax_right 0 0) in K by lra. exact K.
+        -- apply (filterlim_comp _ _ _ (glide a (at_ (plant a) 1) (at_ (damping a) 1)) (fun y => v0 + y * v1) (at_left (deadline c)) (locally m)); [exact L|].
+           apply (continuous_plus (fun _ => v0) (fun y => y * v1)); [apply continuous_const|].
+           apply (continuous_mult (fun y => y) (fun _ => v1)); [apply continuous_id|apply continuous_const].
+      * cbn [rest_drift]. replace (0 * v0 + (0 * v1 + 0)) with 0 by ring.
+        apply (common_ends off X 1 j 0 (fun t => fades a (at_ (plant a) 1) (at_ (damping a) 1) t * v1)); [|apply (fades_vanish a _ _ Hprot M4 EC C5)].
+        intros t Ht. pose proof (velocity a off X Sl Hedges Hend Hprot M4 HX C1 (eq_sym C3) (eq_sym C4) j t Ht) as K. cbv beta zeta in K.
+        rewrite (Rmax_right 0 t), (Rmax_right 0 0) in K by lra. exact K.
 Qed.
 Lemma dotq_ok l : forall x, Q2R (dotq l x) = qdot l (at_ x).
 Proof.
@@ -380,20 +449,32 @@ Proof.
   - destruct j; rewrite Q2R_0; ring.
   - destruct j as [|j]; simpl; [apply Q2R_minus|]. apply IH. lia.
 Qed.
+Lemma sum_abs m f : Rabs (sum m f) <= sum m (fun i => Rabs (f i)).
+Proof.
+  unfold sum. induction (seq 0 m) as [|i l IH]; cbn [fold_right]; [rewrite Rabs_R0; lra|]. eapply Rle_trans; [apply Rabs_triang|]. lra.
+Qed.
 Theorem ends_ok : ends_claim a.
 Proof.
-  intros M x i j EM Hx Hi Hj p. unfold check_ends_of in Hends. rewrite EM in Hends. rewrite forallb_forall in Hends.
+  intros r x i j ED Hr Hx Hi Hj p. unfold check_ends_of in Hends. destruct (drift a) as [M|] eqn:EM; [|contradiction]. rewrite forallb_forall in Hends.
   specialize (Hends x Hx). unfold check_axis in Hends. cbv zeta in Hends. apply andb_prop in Hends as [H H4].
   apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2]. apply Nat.leb_le in H1. apply Nat.eqb_eq in H2, H3.
   rewrite forallb_forall in H4. specialize (H4 i ltac:(apply in_seq; lia)). rewrite forallb_forall in H4.
-  specialize (H4 j ltac:(apply in_seq; lia)). fold p in H4. apply Qle_bool_iff, Qle_Rle in H4. eapply Rle_trans; [|exact H4].
-  assert (AB : forall q, Q2R (Qabs q) = Rabs (Q2R q)).
-  { intros [u v]. unfold Q2R. simpl. rewrite abs_IZR, Rabs_mult. f_equal. symmetry. apply Rabs_right. apply Rle_ge. left.
-    apply Rinv_0_lt_compat. apply IZR_lt. reflexivity. }
-  rewrite AB, Q2R_minus, Q2R_plus. apply Req_le. f_equal. f_equal. unfold outcome. f_equal; [destruct (i =? 0)%nat; [reflexivity|symmetry; apply Q2R_0]|].
-  unfold row_times. rewrite qsum_ok. apply sum_ext. intros l Hl. rewrite Q2R_mult. f_equal. unfold cell. rewrite nth_map_seq by exact Hl.
-  fold c. rewrite ends_q_ok by exact Hj. f_equal. apply functional_extensionality. intros v. unfold placed, placed_q. cbv zeta.
-  destruct (Nat.eqb_spec l 0) as [->|]; [symmetry; apply less_ok; congruence|ring].
+  specialize (H4 j ltac:(apply in_seq; lia)). fold p in H4. apply (near_ok _ _ _ _ H4).
+  assert (EE : forall l, (l < n)%nat -> Q2R (cell (map (fun l => ends_q (graph a) (placed_q x l)) (seq 0 (degree a))) l j)
+    = end_state c (placed (at_ (offsets x)) (fun l => at_ (nth l (begins x) [])) l) j).
+  { intros l Hl. unfold cell. rewrite nth_map_seq by exact Hl. fold c. rewrite ends_q_ok by exact Hj. f_equal. apply functional_extensionality. intros v.
+    unfold placed, placed_q. cbv zeta. destruct (Nat.eqb_spec l 0) as [->|]; [apply less_ok; congruence|ring]. }
+  unfold row_times. rewrite Q2R_plus, !qsum_ok. unfold outcome. fold n c.
+  rewrite (sum_ext n (fun l => Q2R (_ * Qabs _)) (fun l => Q2R (snd (entry_of M i l)) * Rabs (end_state c (placed (at_ (offsets x)) (fun l => at_ (nth l (begins x) [])) l) j)))
+    by (intros l Hl; rewrite Q2R_mult, abs_ok; f_equal; f_equal; apply EE; exact Hl).
+  rewrite (sum_ext n (fun l => Q2R (fst _ * _)) (fun l => Q2R (fst (entry_of M i l)) * end_state c (placed (at_ (offsets x)) (fun l => at_ (nth l (begins x) [])) l) j))
+    by (intros l Hl; rewrite Q2R_mult; f_equal; apply EE; exact Hl).
+  set (E := fun l => end_state c (placed (at_ (offsets x)) (fun l => at_ (nth l (begins x) [])) l) j).
+  assert (E0 : Q2R (if (i =? 0)%nat then nth j (offsets x) 0%Q else 0%Q) = if (i =? 0)%nat then at_ (offsets x) j else 0) by (destruct (i =? 0)%nat; [reflexivity|apply Q2R_0]).
+  rewrite E0. match goal with |- Rabs ?u <= _ => replace u with (sum n (fun l => (Q2R (fst (entry_of M i l)) - r i l) * E l)) end.
+  - eapply Rle_trans; [apply sum_abs|]. apply sum_le. intros l Hl. rewrite Rabs_mult. apply Rmult_le_compat_r; [apply Rabs_pos|].
+    apply (Hr M i l EM); [unfold n in *; lia|exact Hl].
+  - rewrite (sum_ext n _ (fun l => Q2R (fst (entry_of M i l)) * E l + -1 * (r i l * E l))) by (intros; ring). rewrite sum_plus, sum_scal. unfold E. ring.
 Qed.
 
 (** * The input *)
@@ -570,11 +651,6 @@ Proof.
     + unfold sq. assert (p i * p i <= T * p i) by (apply Rmult_le_compat_r; assumption).
       assert (p i * r i <= p i * R) by (apply Rmult_le_compat_l; assumption). lra.
   - rewrite sum_plus, sum_scal. fold T. lra.
-Qed.
-Lemma abs_ok q : Q2R (Qabs q) = Rabs (Q2R q).
-Proof.
-  destruct q as [u w]. unfold Q2R. simpl. rewrite abs_IZR, Rabs_mult. f_equal. symmetry. apply Rabs_right. apply Rle_ge. left.
-  apply Rinv_0_lt_compat. apply IZR_lt. reflexivity.
 Qed.
 Lemma pace_ok g t : pace a = Some g -> 0 <= t < deadline c -> exp (- (Q2R (falls a) * turns a t)) * eta a t ^ (2 * n) <= Q2R g ^ (2 * n).
 Proof.

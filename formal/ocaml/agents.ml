@@ -152,9 +152,14 @@ let certificate json : t =
   let motion = List.map (fun row -> let l = entries "motion" row in
     need (List.length l = n) "motion: another number of columns"; List.map (Reader.interval "motion") l) (entries "motion" (get "motion")) in
   need (List.length motion = n) "motion: another number of rows";
-  let common = if not chains then None else Some (List.map (List.map (fun (x, radius) ->
-    need (Number.equal radius Number.zero) "motion: a radius where the common motion is known exactly"; x)) motion) in
-  let known = chains && (agree || cap <> None) in
+  (* of agents that meet at rest it is a series of [w], as long as that is short *)
+  let rests = not (Number.equal (largest damping) Number.zero) && (let f2 = List.nth damping 1 in
+    let w = Number.mul span (Number.add (List.nth plant 1) (Number.mul f2 r.cert.rho1)) in
+    Number.compare { w with qnum = Z.abs w.qnum } (of_int 20) <= 0) in
+  let common = if not (chains || rests) then None else Some motion in
+  if common <> None then List.iteri (fun i -> List.iteri (fun l (_, radius) ->
+    need (rests && i = 0 && l = 1 || Number.equal radius Number.zero) "motion: a radius where the common motion is known exactly")) motion;
+  let known = common <> None && (agree || cap <> None) in
   if known then bare_of proof "agent-motion" "agents" else skip "agent-motion" "motion";
   if known && get "final_state" <> Null then bare_of proof "agent-final-state" "agents" else skip "agent-final-state" "final_state";
   need ((get "residual" <> Null) = (cap <> None && get "initial_state" <> Null && deviates))

@@ -45,7 +45,7 @@ SETTINGS = {
     "capped gain, every Lyapunov function": Setting(cap=F(100), method="best"),
     "capped gain without states": Setting(cap=F(7), start=False),
 }
-#: What is not checked of them: the common motion of agents that are no chains of integrators, the input at rest.
+#: What is not checked of them: the common motion of agents with another force than damping, the input at rest.
 SKIPPED = {"agent-input", "agent-motion", "agent-final-state"}
 #: What the executable says of a form that it does not read.
 UNREAD = ("large form", "undecided", "radius", "cascade", "dominance", "weak components")
@@ -65,7 +65,7 @@ def test_certificates_of_agents_are_accepted_and_every_obligation_is_verified_or
     verified = re.findall(r"^verified    (.*)$", text, re.MULTILINE)
     left = [line for line in named(text) if line in listed]
     assert sorted(verified + left) == sorted(listed)
-    skipped = SKIPPED if setting.damping else SKIPPED - {"agent-input"} if any(setting.a) else set()
+    skipped = {"agent-input"} if setting.damping else SKIPPED - {"agent-input"} if any(setting.a) else set()
     assert {line.split(" ")[0] for line in left} <= skipped
 
 
@@ -168,6 +168,36 @@ def test_what_is_forged_under_a_cap_is_rejected_by_both_checkers(name: str, tmp_
     ):
         weaker = told(document, path, new)
         assert check(weaker).accepted and said(weaker, tmp_path).code == 0
+
+
+def test_where_agents_that_meet_at_rest_end_is_verified_and_what_is_forged_of_it_is_rejected(tmp_path: Path) -> None:
+    program()
+    for setting in (
+        SETTINGS["at rest"],
+        Setting(damping=F(1, 3), rho1=F(0)),
+        Setting(damping=F(5), plant=(F(0), F(-2))),
+        Setting(damping=F(9, 2), rho1=F(2), dimension=2),
+    ):
+        document = made(CAMPS, setting)
+        code, text = said(document, tmp_path)
+        assert code == 0 and {"agent-motion", "agent-final-state"} <= set(
+            re.findall(r"verified +(\S+) of agents", text)
+        )
+        entry = document["agents"]["motion"][0][1]
+        mid, radius = (F(entry["mid"]), F(entry["radius"])) if isinstance(entry, dict) else (F(entry), F(0))
+        away = {"mid": str(mid + 2 * radius + F(1, 10**30)), "radius": str(radius or F(1, 10**40))}
+        refused(document, ("agents", "motion", 0, 1), away, "agent-motion", tmp_path)
+        refused(document, ("agents", "motion", 1, 1), "1/1000000", "agent-motion", tmp_path)
+        ends = document["agents"]["final_state"]["f"][0]
+        middle = F(ends[0]["mid"] if isinstance(ends[0], dict) else ends[0])
+        refused(
+            document, ("agents", "final_state", "f", 0, 0), str(middle + F(1, 10**6)), "agent-final-state", tmp_path
+        )
+        refused(document, ("agents", "final_state", "f", 0, 1), "1/10", "agent-final-state", tmp_path)
+    far = made(CAMPS, Setting(damping=F(25), rho1=F(1, 2)))
+    assert check(far).accepted
+    code, text = said(far, tmp_path)
+    assert code == 0 and {"agent-motion of agents", "agents.final_state"} <= named(text)
 
 
 def test_a_decrease_that_holds_but_at_the_cap_is_rejected(tmp_path: Path) -> None:

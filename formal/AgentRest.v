@@ -1,0 +1,300 @@
+(** Agents that meet at rest: how far the common velocity takes them until it is 0. *)
+Require Import ZArith QArith Qreals List Bool Reals Lra Lia Psatz FunctionalExtensionality.
+From Coquelicot Require Import Coquelicot.
+Import ListNotations.
+Require Import Vec Definite Graph Flow Certificate Checker Sound Input Main AgentCertificate AgentForms AgentCheck AgentFall AgentMotion AgentEnd.
+Open Scope R_scope.
+
+(** * What never falls and is bounded has a limit *)
+Lemma rises T f B : 0 < T -> (forall t u, 0 <= t <= u -> u < T -> f t <= f u) -> (forall t, 0 <= t < T -> f t <= B) ->
+  exists l, filterlim f (at_left T) (locally l) /\ forall t, 0 <= t < T -> f t <= l.
+Proof.
+  intros HT Up HB. destruct (completeness (fun v => exists t, 0 <= t < T /\ v = f t)) as [l [U L]].
+  - exists B. intros v [t [Ht ->]]. apply HB. exact Ht.
+  - exists (f 0), 0. split; [lra|reflexivity].
+  - exists l. split; [|intros t Ht; apply U; exists t; split; [exact Ht|reflexivity]].
+    apply filterlim_locally. intros e. pose proof (cond_pos e) as He.
+    destruct (Classical_Prop.classic (exists t, 0 <= t < T /\ l - e < f t)) as [[t0 [Ht0 H0]]|No].
+    + assert (D : 0 < T - t0) by lra. exists (mkposreal _ D). intros t Bt Lt. unfold ball in Bt; simpl in Bt;
+        unfold AbsRing_ball, abs, minus, plus, opp in Bt; simpl in Bt. apply Rabs_def2 in Bt.
+      pose proof (Up t0 t ltac:(lra) Lt). assert (f t <= l) by (apply U; exists t; split; [lra|reflexivity]).
+      apply Rabs_def1; unfold minus, plus, opp; simpl; lra.
+    + exfalso. assert (l <= l - e); [|lra]. apply L. intros v [t [Ht ->]]. apply Rnot_lt_le. intros N. apply No. exists t. split; assumption.
+Qed.
+
+(** * A series: [(p + 1 + w v) P + v P' = 1 + w a v^(n + 1)], [a] the last coefficient *)
+Fixpoint slope_of (l : list Q) (v : R) : R := match l with [] => 0 | _ :: l' => peval l' v + v * slope_of l' v end.
+Lemma peval_derive l v : is_derive (peval l) v (slope_of l v).
+Proof.
+  induction l as [|q l IH]; [apply (is_derive_const 0)|]. cbn [peval slope_of].
+  evar_last; [apply (is_derive_plus (fun _ => Q2R q) (fun v => v * peval l v) v 0 (1 * peval l v + v * slope_of l v))|].
+  - apply @is_derive_const.
+  - apply (is_derive_mult (fun v => v) (peval l) v 1 (slope_of l v)); [apply @is_derive_id|exact IH|intros; apply Rmult_comm].
+  - unfold plus; simpl. ring.
+Qed.
+Lemma index_ok i : Q2R (index i) = INR i.
+Proof. unfold index, Q2R. simpl. rewrite INR_IZR_INZ. field. Qed.
+Lemma reduced_ok q : Q2R (reduced q) = Q2R q.
+Proof. unfold reduced. cbv zeta. destruct (Qeq_bool _ q) eqn:E; [|reflexivity]. apply Qeq_bool_eq, Qeq_eqR in E. exact E. Qed.
+Lemma total_ok l : Q2R (total_of l) = peval l 1.
+Proof. induction l as [|q l IH]; cbn [total_of peval]; [apply Q2R_0|]. rewrite reduced_ok, Q2R_plus, IH. ring. Qed.
+Lemma series p w v n : 0 < Q2R p -> forall a j, (Q2R p + 1 + INR j + Q2R w * v) * peval (powers_of p w a j n) v + v * slope_of (powers_of p w a j n) v
+  = (Q2R p + 1 + INR j) * Q2R a + Q2R w * Q2R (last_of p w a j n) * v ^ S n.
+Proof.
+  intros Hp. induction n as [|n IH]; intros a j; [cbn [powers_of peval slope_of last_of pow]; ring|].
+  cbn [powers_of last_of]. set (b := reduced (- (w * a) / (p + 1 + index (S j)))). specialize (IH b (S j)). cbn [peval slope_of].
+  set (P := peval (powers_of p w b (S j) n) v) in *. set (D := slope_of (powers_of p w b (S j) n) v) in *.
+  set (L := Q2R (last_of p w b (S j) n)) in *. pose proof (pos_INR j) as J.
+  assert (E : Q2R (p + 1 + index (S j)) = Q2R p + 1 + INR (S j)) by (rewrite !Q2R_plus, index_ok, Q2R_1; reflexivity).
+  assert (Eb : (Q2R p + 1 + INR (S j)) * Q2R b = - (Q2R w * Q2R a)).
+  { unfold b. rewrite reduced_ok, Q2R_div by (intros Z; apply Qeq_eqR in Z; rewrite E, Q2R_0, S_INR in Z; lra).
+    rewrite E, Q2R_opp, Q2R_mult. field. rewrite S_INR. lra. }
+  rewrite S_INR in *. rewrite <- (tech_pow_Rmult v (S n)).
+  assert (V : v * ((Q2R p + 1 + (INR j + 1) + Q2R w * v) * P + v * D) = v * (- (Q2R w * Q2R a) + Q2R w * L * v ^ S n)) by (rewrite IH, Eb; ring).
+  lra.
+Qed.
+
+Section Glide.
+Variables (a : agents) (p w : Q) (n : nat) (a2 f2 : R).
+Let c := graph a.
+Let T := deadline c.
+Hypothesis Hprot : check_protocol c = true.
+Hypothesis Hgain : positive_gain a.
+Hypothesis Hcap : cap a = None.
+Hypothesis Hf : 0 < f2.
+Hypothesis Hp : Q2R p = f2 * k c.
+Hypothesis Hw : Q2R w = (a2 + f2 * Q2R (slope a)) * T.
+Definition fades t : R := exp (- (a2 * t + f2 * turns a t)).
+Definition glide t : R := RInt fades 0 t.
+Let P := powers_of p w (/ (p + 1)) 0 n.
+Let last := Rabs (Q2R w * Q2R (last_of p w (/ (p + 1)) 0 n)).
+Let T_k := T_k a Hprot.
+Lemma fades_derive t : t < T -> is_derive fades t (- (a2 + f2 * eta a t) * fades t).
+Proof.
+  intros Ht. evar_last.
+  - apply (is_derive_comp exp (fun t => - (a2 * t + f2 * turns a t))); [apply is_derive_exp|]. apply @is_derive_opp. apply (is_derive_plus (fun t => a2 * t) (fun t => f2 * turns a t)).
+    + apply is_derive_scal. apply @is_derive_id.
+    + apply is_derive_scal. apply (turns_derive a Hprot). exact Ht.
+  - unfold scal, opp, plus, one; simpl; unfold mult; simpl. fold (fades t). ring.
+Qed.
+Lemma fades_continuous t : t < T -> continuous fades t.
+Proof. intros Ht. apply @ex_derive_continuous. eexists. apply fades_derive. exact Ht. Qed.
+Lemma exp_le u v : u <= v -> exp u <= exp v.
+Proof. intros [H| ->]; [left; apply exp_increasing; exact H|right; reflexivity]. Qed.
+Lemma fades_below t : 0 <= t < T -> fades t <= exp (Rabs a2 * T) * exp (- (f2 * turns a t)).
+Proof.
+  intros Ht. unfold fades. rewrite <- exp_plus. apply exp_le. pose proof (Rle_abs (- a2)) as A. rewrite Rabs_Ropp in A.
+  pose proof (Rabs_pos a2). assert (- (a2 * t) <= Rabs a2 * t) by nra. assert (Rabs a2 * t <= Rabs a2 * T) by (apply Rmult_le_compat_l; lra). lra.
+Qed.
+Lemma fades_at_most t : 0 <= t < T -> fades t <= exp (Rabs a2 * T).
+Proof.
+  intros Ht. eapply Rle_trans; [apply fades_below; exact Ht|]. rewrite <- (Rmult_1_r (exp (Rabs a2 * T))) at 2.
+  apply Rmult_le_compat_l; [left; apply exp_pos|]. rewrite <- exp_0. apply exp_le. pose proof (turns_pos a Hprot Hgain t Ht).
+  assert (0 <= f2 * turns a t) by (apply Rmult_le_pos; lra). lra.
+Qed.
+Lemma fades_vanish C : filterlim (fun t => fades t * C) (at_left T) (locally 0).
+Proof.
+  pose proof (exp_pos (Rabs a2 * T)) as E. apply (vanishes a Hprot Hgain _ 0%nat (2 * f2) (sq (exp (Rabs a2 * T) * C)) Hcap).
+  - apply Rle_0_sqr.
+  - simpl. pose proof (Rmult_lt_0_compat _ _ Hf (proj2 T_k)). lra.
+  - intros t Ht. simpl pow. unfold sq at 2. rewrite !Rmult_1_l. pose proof (fades_below t Ht) as B. pose proof (exp_pos (- (a2 * t + f2 * turns a t))) as F0.
+    fold (fades t) in F0. set (x := exp (- (f2 * turns a t))) in *.
+    assert (X2 : exp (- (2 * f2 * turns a t)) = x * x) by (unfold x; rewrite <- exp_plus; f_equal; ring). rewrite X2.
+    assert (S1 : fades t * fades t <= (exp (Rabs a2 * T) * x) * (exp (Rabs a2 * T) * x)) by (apply Rmult_le_compat; lra).
+    unfold sq. apply Rle_trans with (fades t * fades t * (C * C)); [right; ring|].
+    apply Rle_trans with ((exp (Rabs a2 * T) * x) * (exp (Rabs a2 * T) * x) * (C * C)); [|right; ring].
+    apply Rmult_le_compat_r; [apply Rle_0_sqr|exact S1].
+Qed.
+Lemma glide_derive t : t < T -> is_derive glide t (fades t).
+Proof.
+  intros Ht. apply (is_derive_RInt fades glide 0 t); [|apply fades_continuous; exact Ht].
+  assert (He : 0 < T - t) by lra. exists (mkposreal _ He). intros u Hu. unfold ball in Hu; simpl in Hu;
+    unfold AbsRing_ball, abs, minus, plus, opp in Hu; simpl in Hu. apply Rabs_def2 in Hu.
+  apply (RInt_correct fades). apply (ex_RInt_continuous fades). intros z [_ Hz]. apply fades_continuous.
+  eapply Rle_lt_trans; [exact Hz|]. pose proof (proj1 T_k). apply Rmax_lub_lt; [assumption|lra].
+Qed.
+Lemma glide_0 : glide 0 = 0.
+Proof. apply (RInt_point 0 fades). Qed.
+Lemma glide_continuous t : t < T -> continuous glide t.
+Proof. intros Ht. apply @ex_derive_continuous. eexists. apply glide_derive. exact Ht. Qed.
+Let rest t := fades t * ((T - t) * peval P ((T - t) / T)).
+Lemma rest_derive t : t < T -> is_derive rest t (- fades t * (1 + Q2R w * Q2R (last_of p w (/ (p + 1)) 0 n) * ((T - t) / T) ^ S n)).
+Proof.
+  intros Ht. destruct T_k as [A B]. fold c T in A, B.
+  assert (Pp : 0 < Q2R p) by (rewrite Hp; apply Rmult_lt_0_compat; assumption).
+  pose proof (series p w ((T - t) / T) n Pp (/ (p + 1))%Q 0) as S. fold P in S. set (v := (T - t) / T) in *.
+  assert (E1 : Q2R (/ (p + 1)) * (Q2R p + 1) = 1).
+  { assert (E : Q2R (p + 1) = Q2R p + 1) by (rewrite Q2R_plus, Q2R_1; reflexivity).
+    rewrite Q2R_inv by (intros Z; apply Qeq_eqR in Z; rewrite E, Q2R_0 in Z; lra). rewrite E. field. lra. }
+  simpl INR in S. rewrite Rplus_0_r, (Rmult_comm (Q2R p + 1) (Q2R (/ (p + 1)))), E1 in S.
+  assert (DP : is_derive (fun t => peval P ((T - t) / T)) t (- / T * slope_of P v)).
+  { apply (is_derive_comp (peval P) (fun t => (T - t) / T)); [apply peval_derive|]. auto_derive; [exact I|field; lra]. }
+  evar_last.
+  - apply (is_derive_mult fades (fun t => (T - t) * peval P ((T - t) / T))); [apply fades_derive; exact Ht| |intros; apply Rmult_comm].
+    apply (is_derive_mult (fun t => T - t) (fun t => peval P ((T - t) / T)) t (-1) (- / T * slope_of P v)); [auto_derive; [exact I|ring]|exact DP|intros; apply Rmult_comm].
+  - fold v. rewrite <- S. unfold mult, plus; simpl. unfold eta. rewrite Hcap. unfold gain. fold c T. rewrite Hp, Hw.
+    assert (Ev : T - t = v * T) by (unfold v; field; lra). rewrite Ev. assert (v <> 0) by (intros Z; rewrite Z in Ev; lra). field. split; lra.
+Qed.
+Lemma rest_vanishes : filterlim rest (at_left T) (locally 0).
+Proof.
+  destruct T_k as [A B]. fold c T in A, B.
+  assert (C : exists C, forall t, 0 <= t < T -> Rabs (peval P ((T - t) / T)) <= C).
+  { generalize P as l. induction l as [|q l [C IH]]; [exists 0; intros; simpl; rewrite Rabs_R0; lra|].
+    exists (Rabs (Q2R q) + C). intros t Ht. cbn [peval]. eapply Rle_trans; [apply Rabs_triang|]. apply Rplus_le_compat_l. rewrite Rabs_mult.
+    specialize (IH t Ht). rewrite <- (Rmult_1_l C). apply Rmult_le_compat; try apply Rabs_pos; [|exact IH].
+    assert (0 < (T - t) / T) by (apply Rdiv_lt_0_compat; lra). rewrite Rabs_right by lra. apply (Rmult_le_reg_r T); [exact A|].
+    unfold Rdiv. rewrite Rmult_assoc, Rinv_l by lra. lra. }
+  destruct C as [C HC]. apply (filterlim_locally (F := at_left T)). intros e.
+  pose proof (proj1 (filterlim_locally (F := at_left T) _ 0) (fades_vanish (T * C)) e) as K.
+  assert (N : at_left T (fun t => 0 <= t < T)).
+  { exists (mkposreal _ A). intros t Bt Lt. unfold ball in Bt; simpl in Bt; unfold AbsRing_ball, abs, minus, plus, opp in Bt; simpl in Bt.
+    apply Rabs_def2 in Bt. lra. }
+  generalize (filter_and (F := at_left T) _ _ K N). apply (filter_imp (F := at_left T)). intros t [Bt Ht].
+  unfold ball in *; simpl in *; unfold AbsRing_ball, abs, minus, plus, opp in *; simpl in *. rewrite Ropp_0, Rplus_0_r in *.
+  eapply Rle_lt_trans; [|exact Bt]. unfold rest. rewrite !Rabs_mult. pose proof (Rabs_pos (fades t)). specialize (HC t Ht).
+  apply Rmult_le_compat_l; [assumption|]. apply Rmult_le_compat; try apply Rabs_pos.
+  - rewrite !Rabs_right; lra.
+  - eapply Rle_trans; [exact HC|apply Rle_abs].
+Qed.
+(** the distance is [T P(1)], but for what the series leaves *)
+Theorem glides : exists m, filterlim glide (at_left T) (locally m) /\ 0 <= m /\ Rabs (m - T * peval P 1) <= last * m.
+Proof.
+  destruct T_k as [A B]. fold c T in A, B.
+  assert (F0 : forall t, 0 < fades t) by (intros; apply exp_pos).
+  destruct (rises T glide (exp (Rabs a2 * T) * T) A) as [m [L U]].
+  - intros t u H1 H2. apply Ropp_le_cancel. apply (decreasing T t (fun t => - glide t) (fun t => - fades t)); [| | |lra]; intros s Hs.
+    + apply @is_derive_opp. apply glide_derive. lra.
+    + apply @continuous_opp. apply glide_continuous. lra.
+    + specialize (F0 s). lra.
+  - intros t Ht. assert (D : glide t - exp (Rabs a2 * T) * t <= glide 0 - exp (Rabs a2 * T) * 0).
+    { apply (decreasing T 0 (fun t => glide t - exp (Rabs a2 * T) * t) (fun t => fades t - exp (Rabs a2 * T))); [| | |exact Ht]; intros s Hs.
+      - evar_last; [apply (is_derive_minus glide (fun t => exp (Rabs a2 * T) * t)); [apply glide_derive; lra|apply is_derive_scal; apply @is_derive_id]|].
+        unfold minus, plus, opp, one; simpl. ring.
+      - apply (continuous_minus glide (fun t => exp (Rabs a2 * T) * t)); [apply glide_continuous; lra|].
+        apply (continuous_mult (fun _ => exp (Rabs a2 * T)) (fun t => t)); [apply continuous_const|apply continuous_id].
+      - pose proof (fades_at_most s ltac:(lra)). lra. }
+    rewrite glide_0 in D. assert (exp (Rabs a2 * T) * t <= exp (Rabs a2 * T) * T) by (apply Rmult_le_compat_l; [left; apply exp_pos|lra]). lra.
+  - exists m. split; [exact L|]. split; [rewrite <- glide_0; apply U; lra|].
+    assert (R0 : rest 0 = T * peval P 1).
+    { unfold rest, fades. rewrite (turns_0 a), !Rmult_0_r, Rplus_0_r, Ropp_0, exp_0, Rminus_0_r. unfold Rdiv. rewrite Rinv_r by lra. ring. }
+    rewrite <- R0. assert (K : forall s, s = 1 \/ s = -1 -> s * (m - rest 0) <= last * m).
+    { intros s Hs. set (f := fun t => s * (glide t + rest t - rest 0)). set (g := fun t => last * glide t).
+      assert (I : forall t, 0 <= t < T -> f t - g t <= f 0 - g 0).
+      { apply (decreasing T 0 (fun t => f t - g t) (fun t => s * (fades t + - fades t * (1 + Q2R w * Q2R (last_of p w (/ (p + 1)) 0 n) * ((T - t) / T) ^ S n) - 0) - last * fades t));
+          intros t Ht.
+        - apply (is_derive_minus f g); [apply is_derive_scal|apply is_derive_scal; apply glide_derive; lra].
+          apply (is_derive_minus (fun t => glide t + rest t) (fun _ => rest 0)); [|apply @is_derive_const].
+          apply (is_derive_plus glide rest); [apply glide_derive; lra|apply rest_derive; lra].
+        - apply (continuous_minus f g).
+          + apply (continuous_mult (fun _ => s)); [apply continuous_const|]. apply (continuous_minus (fun t => glide t + rest t) (fun _ => rest 0)); [|apply continuous_const].
+            apply (continuous_plus glide rest); [apply glide_continuous; lra|]. apply @ex_derive_continuous. eexists. apply rest_derive. lra.
+          + apply (continuous_mult (fun _ => last)); [apply continuous_const|apply glide_continuous; lra].
+        - set (q := Q2R w * Q2R (last_of p w (/ (p + 1)) 0 n)) in *. set (v := ((T - t) / T) ^ S n).
+          assert (V : 0 <= v <= 1).
+          { assert (V0 : 0 <= (T - t) / T <= 1).
+            { split; [left; apply Rdiv_lt_0_compat; lra|]. apply (Rmult_le_reg_r T); [exact A|]. unfold Rdiv. rewrite Rmult_assoc, Rinv_l by lra. lra. }
+            split; [apply pow_le; lra|]. rewrite <- (pow1 (S n)). apply pow_incr. lra. }
+          specialize (F0 t). assert (Q : Rabs (s * (q * v)) <= last).
+          { rewrite !Rabs_mult. fold last. change (Rabs q) with last. pose proof (Rabs_pos q) as Q0. change (Rabs q) with last in Q0.
+            assert (S1 : Rabs s = 1) by (destruct Hs as [-> | ->]; unfold Rabs; destruct Rcase_abs; lra). rewrite S1, (Rabs_right v) by lra. nra. }
+          pose proof (Rle_abs (- (s * (q * v)))) as Q1. rewrite Rabs_Ropp in Q1. nra. }
+      assert (I0 : f 0 - g 0 = 0) by (unfold f, g; rewrite glide_0; ring). rewrite I0 in I.
+      assert (N : at_left T (fun t => f t <= g t)).
+      { exists (mkposreal _ A). intros t Bt Lt. unfold ball in Bt; simpl in Bt; unfold AbsRing_ball, abs, minus, plus, opp in Bt; simpl in Bt.
+        apply Rabs_def2 in Bt. specialize (I t ltac:(lra)). lra. }
+      assert (Lf : filterlim f (at_left T) (locally (s * (m - rest 0)))).
+      { evar_last.
+        - apply (filterlim_comp _ _ _ (fun t => glide t + rest t - rest 0) (fun y => s * y) (at_left T) (locally (m + 0 - rest 0))); [|apply (continuous_mult (fun _ => s) (fun y => y)); [apply continuous_const|apply continuous_id]].
+          apply (filterlim_comp_2 (F := at_left T) (G := locally (m + 0)) (H := locally (- rest 0)) (fun t => glide t + rest t) (fun _ => - rest 0) Rplus);
+            [|apply filterlim_const|apply (filterlim_plus (m + 0) (- rest 0))].
+          apply (filterlim_comp_2 (F := at_left T) (G := locally m) (H := locally 0) glide rest Rplus L rest_vanishes). apply (filterlim_plus m 0).
+        - replace (s * (m - rest 0)) with (s * (m + 0 - rest 0)) by ring. reflexivity. }
+      assert (Lg : filterlim g (at_left T) (locally (last * m))).
+      { apply (filterlim_comp _ _ _ glide (fun y => last * y) (at_left T) (locally m)); [exact L|].
+        apply (continuous_mult (fun _ => last) (fun y => y)); [apply continuous_const|apply continuous_id]. }
+      exact (filterlim_le (F := at_left T) f g (s * (m - rest 0)) (last * m) N Lf Lg). }
+    pose proof (K 1 ltac:(left; reflexivity)). pose proof (K (-1) ltac:(right; reflexivity)). apply Rabs_le. lra.
+Qed.
+End Glide.
+
+(** * The common motion *)
+Section Common.
+Variables (a : agents) (h : nat -> R) (X : R -> nat -> nat -> R) (Sl : R -> nat -> R).
+Let c := graph a.
+Let T := deadline c.
+Let d := prepare c.
+Hypothesis Hedges : check_edges c (dls d) = true.
+Hypothesis Hend : check_end c d = true.
+Hypothesis Hprot : check_protocol c = true.
+Hypothesis Hgain : positive_gain a.
+Hypothesis Hcap : cap a = None.
+Hypothesis HX : flies a h X Sl.
+Hypothesis Hn : degree a = 2%nat.
+Hypothesis Hp0 : at_ (plant a) 0 = 0.
+Hypothesis Hd0 : at_ (damping a) 0 = 0.
+Let a2 := at_ (plant a) 1.
+Let f2 := at_ (damping a) 1.
+Hypothesis Hf : 0 < f2.
+Let w (j i : nat) (t : R) := end_state c (placed h (X (Rmax 0 t)) i) j.
+Let fade := fades a a2 f2.
+Let far := glide a a2 f2.
+Let some : (0 < degree a)%nat.
+Proof. rewrite Hn. lia. Qed.
+Let two i : (i < 2)%nat -> (i < degree a)%nat.
+Proof. rewrite Hn. exact (fun H => H). Qed.
+Lemma position_moves j t : 0 < t < T -> is_derive (w j 0) t (w j 1 t).
+Proof.
+  intros Ht. evar_last.
+  - apply (end_derive a Hend some (fun u => placed h (X (Rmax 0 u)) 0) (fun l => X t 1%nat l)). intros l Hl. unfold placed. evar_last.
+    + apply (is_derive_minus (fun u => X (Rmax 0 u) 0%nat l) (fun _ => h l)); [|apply @is_derive_const].
+      apply (X_derive a h X Sl Hprot some HX t 0%nat l Ht (two 0 ltac:(lia)) Hl).
+    + rewrite Hn. exact (Rminus_0_r _).
+  - unfold w. rewrite Rmax_right by lra. f_equal. apply functional_extensionality. intros l. unfold placed. simpl. ring.
+Qed.
+Lemma velocity_moves j t : 0 < t < T -> is_derive (w j 1) t (- (a2 + f2 * eta a t) * w j 1 t).
+Proof.
+  intros Ht. pose proof (eta_pos a Hprot Hgain t (proj2 Ht)) as E0. evar_last.
+  - apply (end_derive a Hend some (fun u => placed h (X (Rmax 0 u)) 1)
+      (fun l => control a h (X t) t l - sum (degree a) (fun v => at_ (plant a) v * X t v l))). intros l Hl. unfold placed. evar_last.
+    + apply (is_derive_minus (fun u => X (Rmax 0 u) 1%nat l) (fun _ => 0)); [|apply @is_derive_const].
+      apply (X_derive a h X Sl Hprot some HX t 1%nat l Ht (two 1 ltac:(lia)) Hl).
+    + rewrite Hn. exact (Rminus_0_r _).
+  - unfold w. rewrite Rmax_right by lra.
+    transitivity (end_state c (fun l => comb 2 (fun i => - (eta a t ^ 2 * at_ (gains a) i)) (fun i => lap (edges c) (y a h (X t) t i)) l
+      + - (a2 + f2 * eta a t) * placed h (X t) 1 l) j).
+    + f_equal. apply functional_extensionality. intros l. unfold control, comb, sum. rewrite Hn. cbn [seq fold_right]. rewrite Hp0, Hd0.
+      fold a2 f2 c.
+      assert (P1 : placed h (X t) 1 l = X t 1%nat l) by (unfold placed; simpl; ring).
+      assert (Y1 : y a h (X t) t 1 l = X t 1%nat l / eta a t) by (unfold y; rewrite P1; simpl; field; lra). rewrite Y1, P1. field. lra.
+    + rewrite (end_plus a), (end_scal a (- (a2 + f2 * eta a t)) (placed h (X t) 1)), (end_comb a), (sum_zero 2); [fold c; ring|].
+      intros i _. rewrite (end_lap a Hedges Hend). ring.
+Qed.
+Lemma velocity j t : 0 <= t < T -> w j 1 t = fade t * w j 1 0.
+Proof.
+  intros Ht. assert (E : w j 1 t * exp (a2 * t + f2 * turns a t) = w j 1 0 * exp (a2 * 0 + f2 * turns a 0)).
+  { assert (DE : forall u, u < T -> is_derive (fun u => exp (a2 * u + f2 * turns a u)) u ((a2 + f2 * eta a u) * exp (a2 * u + f2 * turns a u))).
+    { intros u Hu. evar_last; [apply (is_derive_comp exp (fun u => a2 * u + f2 * turns a u)); [apply is_derive_exp|];
+        apply (is_derive_plus (fun t => a2 * t) (fun t => f2 * turns a t)); apply is_derive_scal; [apply @is_derive_id|apply (turns_derive a Hprot); exact Hu]|].
+      unfold scal, plus, one; simpl; unfold mult; simpl. ring. }
+    apply (still T (fun u => w j 1 u * exp (a2 * u + f2 * turns a u))); [| |exact Ht]; intros u Hu.
+    - evar_last; [apply (is_derive_mult (w j 1) (fun u => exp (a2 * u + f2 * turns a u))); [apply velocity_moves; exact Hu|apply DE; lra|intros; apply Rmult_comm]|].
+      unfold plus, mult; simpl. ring.
+    - apply (continuous_mult (w j 1) (fun u => exp (a2 * u + f2 * turns a u))).
+      + apply (w_continuous a h X Sl Hend some HX j 1 u Hu (two 1 ltac:(lia))).
+      + apply @ex_derive_continuous. eexists. apply DE. apply Hu. }
+  rewrite (turns_0 a), !Rmult_0_r, Rplus_0_r, exp_0, Rmult_1_r in E. rewrite <- E. unfold fade, fades. rewrite exp_Ropp. field.
+  apply Rgt_not_eq, exp_pos.
+Qed.
+Lemma position j t : 0 <= t < T -> w j 0 t = w j 0 0 + far t * w j 1 0.
+Proof.
+  intros Ht. assert (E : w j 0 t - far t * w j 1 0 = w j 0 0 - far 0 * w j 1 0).
+  { apply (still T (fun u => w j 0 u - far u * w j 1 0)); [| |exact Ht]; intros u Hu.
+    - evar_last; [apply (is_derive_minus (w j 0) (fun u => far u * w j 1 0)); [apply position_moves; exact Hu|]|].
+      + apply (is_derive_mult far (fun _ => w j 1 0)); [apply (glide_derive a a2 f2 Hprot); apply Hu|apply @is_derive_const|intros; apply Rmult_comm].
+      + rewrite (velocity j u) by lra. unfold minus, plus, opp, mult, zero; simpl. fold (fade u). ring.
+    - apply (continuous_minus (w j 0) (fun u => far u * w j 1 0)).
+      + apply (w_continuous a h X Sl Hend some HX j 0 u Hu (two 0 ltac:(lia))).
+      + apply (continuous_mult far (fun _ => w j 1 0)); [apply (glide_continuous a a2 f2 Hprot); apply Hu|apply continuous_const]. }
+  unfold far in E at 2. rewrite (glide_0 a a2 f2) in E. lra.
+Qed.
+End Common.
