@@ -29,10 +29,10 @@ from lmi.exact.elementary_enclosures import log, rounded
 from ptcc_certify.bounds.late_steps import Steps, search_steps
 from ptcc_certify.bounds.missed_deadline import Missed, find_missed
 from ptcc_certify.bounds.settling_leaders import Settling
-from ptcc_certify.bounds.small_delays import SmallDelays
+from ptcc_certify.bounds.small_delays import SmallDelays, left_above
 from ptcc_certify.bounds.staged_deadlines import stage_deadlines
 from ptcc_certify.bounds.tracking import drift_integral
-from ptcc_certify.checker.input_formulas import BITS, Limits, decay_above
+from ptcc_certify.checker.input_formulas import BITS, Limits
 from ptcc_certify.checker.late_drift import drift_above
 from ptcc_certify.checker.late_input import gain_above
 from ptcc_certify.checker.late_messages import PARTS
@@ -430,7 +430,7 @@ def row_bound(
     clock, left = None, Fraction(0)
     if caps:
         clock = Limits(min(caps)).clock_below(gain.gain.exact)
-        left = rounded(decay_above(witness.b * clock), BITS, up=True)
+        left = left_above(witness.b * clock)
     floor, error, slack = 0.0, heard_wrong(messages, leaders), rows.D * witness.u - rows.W @ witness.u
     if error:
         floor = float((rows.D / slack).max()) * float(error)

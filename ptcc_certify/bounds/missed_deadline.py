@@ -17,6 +17,7 @@ import numpy as np
 
 from lmi.exact.elementary_enclosures import exp, log, rounded
 from ptcc_certify.checker.input_formulas import BITS
+from ptcc_certify.graphs.rationals import writable
 from ptcc_certify.lyapunov.follower_rows import FollowerRows
 from ptcc_certify.protocols.base import Protocol
 
@@ -77,7 +78,7 @@ def find_missed(
             size = max(abs(initial_state[j] - ends[j][0]) - ends[j][1], Fraction(0))
             bound += abs(exact[k][j]) / exact[k][k] * _kept(protocol, exact[j][j], of[j, k]) * size
         bound = rounded(bound, BITS) if bound > 0 else bound
-        if bound > 0 and (best is None or bound > best.bound):
+        if bound > 0 and writable(bound) and (best is None or bound > best.bound):
             best = Missed(k, bound, np.array([signs.get(v, 0) for v in followers]))
     return best
 

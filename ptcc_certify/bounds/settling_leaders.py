@@ -20,8 +20,8 @@ import numpy as np
 from lmi.dyadic import round_to_bits
 from lmi.exact.decimal_rounding import float_up
 from lmi.exact.elementary_enclosures import log, rounded
-from ptcc_certify.bounds.small_delays import DecayingForm
-from ptcc_certify.checker.input_formulas import BITS, Limits, decay_above, root_above
+from ptcc_certify.bounds.small_delays import DecayingForm, left_above
+from ptcc_certify.checker.input_formulas import BITS, Limits, root_above
 from ptcc_certify.checker.late_input import gain_above
 from ptcc_certify.checker.late_messages import PARTS
 from ptcc_certify.graphs.structure import Structure
@@ -147,7 +147,7 @@ class SettlingBounds:
         u = [Fraction(0)] * self.D.size
         for v, x in (*leaders.items(), *zip(self.structure.followers.tolist(), own, strict=True)):
             u[v] = x if isinstance(x, Fraction) else rounded(Fraction(float(x)), BITS, up=True)
-        left = rounded(decay_above(rate * clock), BITS, up=True)
+        left = left_above(rate * clock)
         return Settling(function, q, rate, cap, clock, left, tuple(u))
 
     def _root(self, one: DecayingForm) -> Fraction:

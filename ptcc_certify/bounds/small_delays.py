@@ -31,6 +31,19 @@ from ptcc_certify.protocols.late_messages import LateMessages
 _HALVINGS = 40
 #: Room for rounding, relatively.
 _MORE = 1e-9
+#: What is left is told to be at least this: less would take too many digits to write.
+LEAST_LEFT = Fraction(1, 2**1000)
+
+
+def left_above(x: Fraction) -> Fraction:
+    """Bound ``e^-x`` from above by a number that is short enough for a file.
+
+    Examples
+    --------
+    >>> float(left_above(Fraction(1))), left_above(Fraction(90_000)) == LEAST_LEFT
+    (0.36787944117144233, True)
+    """
+    return max(rounded(decay_above(x), BITS, up=True), LEAST_LEFT)
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +156,7 @@ class SmallDelayBounds:
         exact = [rounded(Fraction(x), BITS, up=True) for x in phi]
         pushed = [sum((x * exact[v] for v, x in row.items()), Fraction(0)) for row in self.B]
         kap = Fraction(self._kap(self._weights(one), np.array([float(x) for x in pushed])) * (1 + _MORE))
-        left = rounded(decay_above(b * self.clock), BITS, up=True)
+        left = left_above(b * self.clock)
         root, moved, residual = self._root(one), list[Fraction](), list[Fraction]()
         for k, c in enumerate(one.deviations):
             share = sum((abs(Fraction(x)) * pushed[v] for v, x in self.influence.row(k).items()), Fraction(0))

@@ -47,6 +47,7 @@ from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_
 from ptcc_certify.theorems.family_behaviour import DEPENDS, Counterexample, FamilyComponent
 from ptcc_certify.theorems.family_claims import camps, component_holds, component_refutation
 from ptcc_certify.theorems.family_rate import explicit_rate
+from ptcc_certify.theorems.restricted_signals import DwellTime
 
 #: Modes, uncertain weights and parts of a proof that are listed.
 MODES, WEIGHTS = 12, 8
@@ -77,6 +78,7 @@ def family_facts(saved: FamilyCertificate) -> dict[str, Any]:
         "boxes": [box_text(components[k], box) for k, box in sorted(saved.boxes.items())] if certified else [],
         "ranges": [range_text(components[k], ends) for k, ends in told_ranges(saved).items()] if certified else [],
         "promise": "" if saved.signal == "any" else signal_text(saved.signal)[1],
+        "stays": isinstance(saved.signal, DwellTime) or not rests(saved),
         "these": states_of_signal(saved) != list(saved.final_states or ()),
         "explicit_power": _explicit_power(saved),
         **{"sliding": saved.protocol.reaching is not None, "arithmetic": arithmetic(saved.direct)},

@@ -748,3 +748,18 @@ def test_the_longest_delay_behind_leaders_that_move_is_certified() -> None:
     structure, x0, again = made.structure, [Fraction(x) for x in (1, 2, 3)], replace(messages, delay=made.late.enough)
     ends = final_state(structure, x0).intervals
     assert bound_late(structure, protocol, again, x0, ends, leaders).largest <= 0.05
+
+
+@pytest.mark.parametrize("cap", [None, 100])
+@pytest.mark.parametrize("speed", [None, "1/2"])
+def test_a_clock_that_goes_very_far_leaves_what_can_be_written(speed: str | None, cap: int | None) -> None:
+    graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 1), ("c", "b", 2)])
+    protocol, leaders = (
+        NominalProtocol(T=1000, rho1=100, rho2=1, kappa=1),
+        None if speed is None else MovingLeaders(speed),
+    )
+    messages = LateMessages("1e-6", gain_cap=cap)
+    made = certify(graph, protocol, [1, 2, 3], messages=messages, leaders=leaders, simulation=False, method="paper")
+    assert made.verdict == "certified" and made.late is not None
+    assert 0 < min(row.left for row in made.late.rows) <= Fraction(1, 2**1000)
+    assert made.late.largest < (1e-6 if leaders is None else 0.05)

@@ -158,7 +158,7 @@ def test_where_modes_have_camps_of_their_own_each_ends_within_the_ends_of_all():
         family_summary(saved, "pair")
     )
     assert "constant weights" not in "\n".join(family_summary(saved, "pair"))
-    assert "each stays within: a [\N{MINUS SIGN}3,\N{NO-BREAK SPACE}3]; b" in re.sub(
+    assert "each ends within: a [\N{MINUS SIGN}3,\N{NO-BREAK SPACE}3]; b" in re.sub(
         " +", " ", re.sub("<[^>]*>", " ", report_html(saved))
     )
 

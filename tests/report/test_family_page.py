@@ -30,7 +30,7 @@ from ptcc_certify.report.statement import family_latex
 from ptcc_certify.simulation.family_run import simulate_family
 from ptcc_certify.simulation.signals import RandomSignal
 from ptcc_certify.theorems.family_behaviour import decide
-from ptcc_certify.theorems.restricted_signals import DwellTime, JointWindows
+from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
 SLIDING = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=3, mu1=2, mu2=1, mu3=1, delta=1)
@@ -77,6 +77,18 @@ def test_what_is_proved_of_restricted_signals_is_told_too():
     assert f"If signals are restricted A{told}: rate " in page and f"is for those that keep a promise: a{told}." in page
     assert "holds for signals that keep the promise alone" in page
     assert f"Of signals that are restricted (a{told}) more is proved: rate " in family_latex(saved)
+
+
+@pytest.mark.parametrize("signal", [ClockShares(["0.7", "0.3"]), JointWindows(2, on=1, clock="s")], ids=repr)
+def test_agents_that_leave_where_they_begin_are_not_told_to_stay_where_they_end(signal):
+    family = Family.switching(
+        [SignedDigraph.from_edges(edges, nodes="ab") for edges in ([("a", "b", 1), ("b", "a", 2)], [])]
+    )
+    saved = read_certificate(certify(family, PROTOCOL, [1, 5], signal=signal).to_dict())
+    page = words(report_html(saved)).replace("\N{NO-BREAK SPACE}", " ")
+    ends = "11/3" if isinstance(signal, ClockShares) else "[1, 5]"
+    assert f"each ends within: a , b {ends}." in page and "stays within" not in page
+    assert "every signal keeps a, b in [1, 5] at all times" in page
 
 
 def test_ends_under_the_last_mode_stand_on_page_and_statement():

@@ -33,7 +33,17 @@ from selection import thinned
 
 import ptcc_certify
 from lmi.exact.decimal_rounding import up
-from ptcc_certify import Agents, Certificate, GainLimits, LateMessages, NominalProtocol, SignedDigraph, certify, design
+from ptcc_certify import (
+    Agents,
+    Certificate,
+    GainLimits,
+    LateMessages,
+    MovingLeaders,
+    NominalProtocol,
+    SignedDigraph,
+    certify,
+    design,
+)
 from ptcc_certify.certificate.certificate import RejectedCertificate, read_certificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import load_graph
@@ -580,6 +590,15 @@ def test_a_statement_tells_the_input_with_late_messages(x0: Any):
     largest = up(Fraction(float(certificate.late.input.max())), 4)
     told = f"The input then satisfies $|u_{{k}}| \\le {largest}$ up to $T$"
     assert told + (", from within 1 of the final states" if x0 is None else "") + "." in text
+
+
+def test_the_answer_of_late_messages_tells_whose_speed_it_names():
+    graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1)])
+    leaders = MovingLeaders(speed="0.5", disturbance="0.2")
+    for messages in (LateMessages(delay="0.01"), None):
+        made = certify(graph, NOMINAL, [1, 2, 3], messages=messages, leaders=leaders, method="perron", simulation=False)
+        page = " ".join(re.sub("<[^>]*>", "", report_html(read_certificate(made.to_dict()))).split())
+        assert re.search(r"Leaders: speed \|xj&#39;\| ≤ 0.5; any \|dk\| ≤ 0.2\.", page) and "Speed |x" not in page
 
 
 def test_a_matrix_too_wide_for_a_column_of_two_is_a_list_of_weights(tmp_path: Path):
