@@ -301,7 +301,7 @@ FAMILIES = {
     "ptcc.certify(day, p, [1, 2]).plot('graph')": "Axes",
     "ptcc.certify(day, p, [1, 2]).plot('spectrum')": "ParameterError: eigenvalues of single graphs do not tell what",
     "ptcc.certify(day, p, [1, 2]).plot('picture')": "ParameterError: what = 'picture' is unknown; one of decay, input",
-    "ptcc.certify(day, p, [1, 2]).to_pandas().shape": "(2, 8)",
+    "ptcc.certify(day, p, [1, 2]).to_pandas().shape": "(2, 10)",
     "ptcc.certify(day, p).to_pandas()[['least', 'largest']].isna().all(axis=None)": "True",
     "cert.to_pandas().loc['eve', ['role', 'x(0)']].tolist()": "-4.0",
     "ptcc.certify(day, p).report": "... for a page or LaTeX: write_report(certificate, path)",
