@@ -228,7 +228,7 @@ def test_without_the_witness_or_with_another_initial_state_no_end_is_accepted():
         assert not check(resealed(forged)).accepted
 
 
-def again(mutant: Json, path: Any, new: str) -> Json:
+def unchanged(mutant: Json, path: Any, new: str) -> Json:
     return mutant
 
 
@@ -243,9 +243,9 @@ LONG = [
 def test_mutants_of_final_states_that_are_accepted_are_true(kind: str):
     data = document(kind, 13, 2)
     judge = false_claims_of_cascade if kind == "cascade" else false_claims_of_agents
-    only = [(path, mutant) for path, mutant in nudged(data, ("agents",), 3, 400, again) if path[1] == "final_state"]
+    only = [(path, mutant) for path, mutant in nudged(data, ("agents",), 3, 400, unchanged) if path[1] == "final_state"]
     parts = ("initial_state", "offsets", "motion")
-    other = [(path, m) for path, m in nudged(data, ("agents",), 4, 60, again) if path[1] in parts]
+    other = [(path, m) for path, m in nudged(data, ("agents",), 4, 60, unchanged) if path[1] in parts]
     count, passed = judged_mutants(data, iter(only[:50]), judge)
     assert count > 30 and passed  # a wider interval is true
     assert judged_mutants(data, iter(other), judge)[0] > 5
