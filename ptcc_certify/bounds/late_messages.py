@@ -51,6 +51,8 @@ _TRIED, _LARGEST_Q, _LOSSES = 10, 1e9, (0.01, 0.2, 0.6)
 _ITERATIONS = 200
 #: What is added to a bound in floats, relatively, so that it holds.
 _MORE = 1 + 1e-9
+#: What errors of values add, at least: less is lost in floats.
+_LEAST = 1e-300
 
 
 @dataclass(frozen=True, eq=False)
@@ -433,7 +435,7 @@ def row_bound(
         left = left_above(witness.b * clock)
     floor, error, slack = 0.0, heard_wrong(messages, leaders), rows.D * witness.u - rows.W @ witness.u
     if error:
-        floor = float((rows.D / slack).max()) * float(error)
+        floor = max(float((rows.D / slack).max()) * float(error), _LEAST)
     initial = float((first / witness.u).max())
     row = RowBound(witness, cap, clock, left, Fraction(initial * _MORE), Fraction(floor * _MORE))
     if leaders is None:

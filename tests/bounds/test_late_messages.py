@@ -763,3 +763,11 @@ def test_a_clock_that_goes_very_far_leaves_what_can_be_written(speed: str | None
     assert made.verdict == "certified" and made.late is not None
     assert 0 < min(row.left for row in made.late.rows) <= Fraction(1, 2**1000)
     assert made.late.largest < (1e-6 if leaders is None else 0.05)
+
+
+def test_values_that_are_off_by_less_than_floats_hold_are_certified() -> None:
+    """Targets move by ``1e-600`` while messages come, which floats call 0, and the check does not."""
+    graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 1), ("c", "b", 2)])
+    messages, leaders = LateMessages("1e-300"), MovingLeaders("1e-300")
+    made = certify(graph, NominalProtocol(), [1, 2, 3], messages=messages, leaders=leaders, simulation=False)
+    assert made.verdict == "certified" and made.late is not None and made.late.largest < 1e-6
