@@ -90,10 +90,10 @@ def _place(row: Sequence[Interval]) -> str:
 
 def _accuracy(ends: Sequence[Sequence[Interval]]) -> str:
     widest = max(r for row in ends for _, r in row)
+    cut = any(Fraction(short_number(float(m) if r else m)) != m for row in ends for m, r in row)
     if widest > Fraction(1, 10**12):
-        return f"to within {up(widest, 2)}, proved"
-    cut = widest > 0 or any(Fraction(short_number(m)) != m for row in ends for m, _ in row)
-    return "rounded" if cut else "exact"
+        return f"to within {up(widest, 2)}, proved" + "; rounded" * cut
+    return "rounded" if cut or widest else "exact"
 
 
 def _named(bounds: Sequence[float]) -> str:

@@ -347,3 +347,5 @@ def test_of_many_agents_of_order_n_the_least_and_the_largest_final_state_are_tol
     lines = summary_lines(made, "star")
     assert any(line.startswith("x(T)       least 2=-4, largest 0=4, of 121 agents (") for line in lines), lines
     assert any(line.startswith("v(T)       least 2=-1, largest 0=1, of 121 agents (") for line in lines), lines
+    made = ptcc.certify(star, STRONG, [Fraction(1, 3)] * 121, v0=[1] * 121, **options)
+    assert "proved; rounded)" in " ".join(" ".join(summary_lines(made, "star")).split())
