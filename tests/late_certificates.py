@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from mutations import Json, resealed
 from oracle import number
+from scipy.integrate import trapezoid
 
 from lmi.exact.elementary_enclosures import exp, log, sqrt
 from ptcc_certify.certificate.procedure import certify
@@ -189,7 +190,7 @@ class Late:
         end = math.exp(-float(b * cap) * r)
         x = T - r * np.exp(np.linspace(0, math.log(T / r), 4001))  # instants before the turn
         grown = float(b) * k * np.log((T - x) / r)  # without rho1, as the format has it
-        whole = float(abs(np.trapezoid(np.exp(-grown), x)))
+        whole = float(abs(trapezoid(np.exp(-grown), x)))
         return Fraction(end * whole * (1 + 1e-5) + (1 - end) / float(b * cap)) * (1 + ROOM)
 
     def row(
