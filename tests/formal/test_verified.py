@@ -26,6 +26,8 @@ from ptcc_certify.cli.verified import VARIABLE, executable, verified_check
 from ptcc_certify.errors import FormatError, ParameterError
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.gain_limits import GainLimits
+from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.protocols.moving_leaders import MovingLeaders
 
 SOURCES = Path(__file__).resolve().parents[2] / "formal"
 
@@ -140,6 +142,21 @@ def test_claims_besides_those_of_the_graph_are_named_and_not_believed(tmp_path: 
         assert code == 1 and "unknown" in text
         code, text = said(resealed({**document, "proof": more["proof"]}), tmp_path)
         assert code == 1 and "nothing asks for" in text
+
+
+def test_late_messages_of_leaders_that_move_are_named_with_all_their_obligations(tmp_path: Path) -> None:
+    program()
+    edges, late = [("l", "a", 1), ("a", "b", 1), ("b", "a", 1), ("m", "b", 2)], LateMessages(delay="0.02")
+    for more in ({"messages": late}, {"messages": late, "leaders": MovingLeaders("0.5")}):
+        cert = certify(edges, NominalProtocol(1, 1, 1, 2), [1, 2, 3, 4], simulation=False, **more)
+        document = json.loads(cert.to_json())
+        assert check(document).accepted and (document["messages"]["leaders"] is None) == (len(more) == 1)
+        code, text = said(document, tmp_path)
+        assert code == 0 and "not checked messages, all that is said of" in text and "leaders that move" in text
+        listed = {f"{o['kind']} of {o['of']}" for o in document["proof"]}
+        verified = set(re.findall(r"^verified    (.*)$", text, re.MULTILINE))
+        assert verified | named(text) >= listed and not verified & named(text)
+        assert {what for what in listed if what.startswith("late-")} <= named(text)
 
 
 def test_the_claim_of_every_weak_component_is_verified(tmp_path: Path) -> None:

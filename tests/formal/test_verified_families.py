@@ -18,19 +18,22 @@ from common_kernel_families import random_family as with_common_kernel
 from families import KINDS, random_family
 from mutations import changed, mutants, resealed
 from row_families import random_followers
-from verified import compare, program, said
+from verified import compare, named, program, said
 
 from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate, certify_family
 from ptcc_certify.checker import check
+from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.follower_function import follower_functions
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.theorems.family_behaviour import decide
+from ptcc_certify.theorems.restricted_signals import ClockShares, JointWindows
 
 Json = dict[str, Any]
 NOMINAL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
 SLIDING = SlidingModeProtocol(T_r="0.5", T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
 SIGNED = Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 1), ("b", "c", -2, -1)])
+SIGNALS = ("any", "constant", ClockShares(["1/2", "1/2"]), JointWindows(1, on="1/5", clock="s"))
 #: What the executable says of a form of a family that it does not read.
 UNREAD = ("function of rows", "function of squares", "side files", "more than 400 nodes", "entries")
 
@@ -91,6 +94,27 @@ def test_a_family_is_accepted_and_every_obligation_is_verified_or_named(tmp_path
         assert "family-rate of lyapunov.functions[0].modes[0]" in {
             w for mark, w in lines if mark.startswith("verified")
         }
+
+
+@pytest.mark.parametrize("signal", SIGNALS, ids=str)
+def test_what_is_said_of_restricted_signals_and_of_boxes_is_named(signal: Any, tmp_path: Path) -> None:
+    program()
+    pairs = [("a", "b", 1), ("b", "a", 1), ("b", "c", 2), ("c", "b", 2)], [("a", "c", 1), ("c", "a", 1)]
+    several = [("l", "a", 1), ("m", "b", 1), ("a", "b", 1)], [("m", "a", 1), ("l", "b", 1), ("b", "a", 2)]
+    for one, other in (pairs, several):
+        nodes = sorted({v for edge in (*one, *other) for v in edge[:2]})
+        modes = [SignedDigraph.from_edges(edges, nodes=nodes) for edges in (one, other)]
+        found = document(Family.switching(modes), signal=signal)
+        assert check(found).accepted
+        code, text = said(found, tmp_path)
+        assert code == 0, text
+        listed = {f"{o['kind']} of {o['of']}" for o in found["proof"]}
+        verified = set(re.findall(r"^verified    (.*)$", text, re.MULTILINE))
+        assert verified | named(text) >= listed and not verified & named(text)
+        assert "kept-box of boxes" in " ".join(named(text)) and "boxes" in named(text)
+        assert ("restricted" in named(text)) == ("restricted" in found)
+        apart = ("kept-box", "attracting-box", "last-mode", "clock-shares", "joint-windows")
+        assert not any(what.startswith(apart) or "restricted" in what or "boxes" in what for what in verified)
 
 
 def test_higher_rates_and_smaller_constants_than_are_proved_are_rejected(tmp_path: Path) -> None:
