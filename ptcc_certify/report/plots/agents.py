@@ -87,6 +87,7 @@ def draw_agents(
     """
     group = family_groups(run.family) if isinstance(run, FamilyTrajectory) else camp_groups(structure)
     single: dict[int, str] = {}
+    ranges = False
     step: Any = "post" if style.get("drawstyle") == "steps-post" else None
     for name, (colour, line) in CAMP_STYLES.items():
         own = np.flatnonzero(group == name)
@@ -95,16 +96,16 @@ def draw_agents(
             rows = np.nan_to_num(values[own])
             high, low = rows.max(axis=0), 0 if size else rows.min(axis=0)
             ax.fill_between(run.t, low, high, color=colour, alpha=0.2, linewidth=0, step=step)
-            middle, label = (
-                (high, f"{name} (largest)") if size else (np.median(rows, axis=0), f"{name} (median, range)")
-            )
-            ax.plot(run.t, middle, color=colour, linestyle=line, linewidth=2, label=label, **style)
+            middle = high if size else np.median(rows, axis=0)
+            ax.plot(run.t, middle, color=colour, linestyle=line, linewidth=2, label=name, **style)
             ends = {int(rows[:, 0].argmax())} | (set() if size else {int(rows[:, 0].argmin())})
-            own, width, label = own[sorted(ends)], 0.7, ""
+            own, width, label, ranges = own[sorted(ends)], 0.7, "", True
         for v in own:
             drawn = {"color": colour, "linestyle": line, "linewidth": width}
             ax.plot(run.t, values[v], label=label or None, **drawn, **style)
             label, single[int(v)] = "", colour
+    if ranges:
+        ax.fill_between([], [], color=BEHIND, alpha=0.3, label="largest" if size else "median and range")
     return single
 
 

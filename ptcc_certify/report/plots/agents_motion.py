@@ -13,7 +13,15 @@ from ptcc_certify.certificate.agents_answer import AgentsAnswer
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.report.plots.agents import CAMP_STYLES, HALO, NAME_SIZE, NAMED_AGENTS, camp_groups, name_agents
+from ptcc_certify.report.plots.agents import (
+    CAMP_STYLES,
+    HALO,
+    NAME_SIZE,
+    NAMED_AGENTS,
+    camp_groups,
+    draw_agents,
+    name_agents,
+)
 from ptcc_certify.report.plots.style import SINGLE_COLUMN, axes_of, finished, new_axes, shown, styled, time_label
 from ptcc_certify.report.plots.subject import read_back
 from ptcc_certify.report.text_layout import printable, shorten_text
@@ -45,6 +53,8 @@ def agents_run(subject: Any) -> AgentsTrajectory:
 
 def plot_motion(subject: Any, *, wide: bool = False, time_unit: str = "") -> Figure:
     """Draw positions, velocities and so on over time, of each coordinate below each other.
+
+    Of more than eight agents, parts of the graph with more than three are drawn as their range and median.
 
     Parameters
     ----------
@@ -81,18 +91,21 @@ def plot_motion(subject: Any, *, wide: bool = False, time_unit: str = "") -> Fig
     with style.context(STYLE):
         rows, columns = (n, d) if wide else (n * d, 1)
         figure = Figure((2 * width if wide else width, 0.75 * height * rows), layout="constrained")
-        groups = camp_groups(analyse(run.graph))
+        structure = analyse(run.graph)
         for i in range(n):
             for q in range(d):
                 place = i * d + q if wide else q * n + i
                 ax = new_axes(figure, (rows, columns, 1 + place))
-                _lines(ax, run, run.states[:, q, i], groups)
+                lines = draw_agents(ax, run, run.states[:, q, i], structure)
+                deadline = float(run.protocol.gain.T)
+                ax.axvline(deadline, color="black", linewidth=0.8, linestyle=":", label="deadline $T$")
                 name = _NAMES[i] if i < len(_NAMES) else f"derivative {i}"
                 label = f"{name} {q + 1}" if d > 1 else name
                 finished(ax, time_label("time $t$", time_unit) if place // columns == rows - 1 else "", label)
-                if len(groups) <= NAMED_AGENTS:
-                    colours = {k: CAMP_STYLES[group][0] for k, group in enumerate(groups)}
-                    (_name_peaks if i else name_agents)(ax, run, run.states[:, q, i], colours)
+                if not i:
+                    name_agents(ax, run, run.states[:, q, i], lines)
+                elif run.graph.n_nodes <= NAMED_AGENTS:
+                    _name_peaks(ax, run, run.states[:, q, i], lines)
                 if (legend := ax.get_legend()) is not None and (i or q):
                     legend.remove()
         _align(figure.axes[:d], figure.axes)  # positions are drawn first
@@ -117,15 +130,6 @@ def _name_peaks(ax: Axes, run: AgentsTrajectory, values: np.ndarray, colours: di
         name, up = shorten_text(printable(run.labels[k]), 12), 1 if values[k, at] >= 0 else -1
         how: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "va": "center", "fontsize": NAME_SIZE}
         ax.annotate(name, (run.t[at], values[k, at]), (0, 5 * up), color=color, path_effects=HALO, zorder=6, **how)
-
-
-def _lines(ax: Axes, run: AgentsTrajectory, values: np.ndarray, groups: np.ndarray) -> None:
-    """Draw a line for each agent in the colour of its camp."""
-    for k, row in enumerate(values):
-        color, line = CAMP_STYLES[groups[k]]
-        first = k == int(np.flatnonzero(groups == groups[k])[0])
-        ax.plot(run.t, row, color=color, linestyle=line, linewidth=1, label=groups[k] if first else None)
-    ax.axvline(float(run.protocol.gain.T), color="black", linewidth=0.8, linestyle=":", label="deadline $T$")
 
 
 @styled

@@ -5,11 +5,13 @@ from __future__ import annotations
 import functools
 import io
 import math
+import re
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from matplotlib import rcParams, style
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
@@ -187,13 +189,31 @@ def finished(ax: Axes, x: str, y: str, title: str = "") -> Axes:
     for axis, label in ((ax.xaxis, x), (ax.yaxis, y)):
         place_ticks(axis)
         axis.set_label_text(factor_out(axis, label) if label else "")
-    if ax.get_legend_handles_labels()[0]:
+    if labels := ax.get_legend_handles_labels()[1]:
         width = ax.get_window_extent().width / ax.figure.dpi
-        columns = 1 if width < 2.2 else 2 if width < 4 else 3
+        columns = legend_columns(labels, 1.1 * width, 1 if width < 2.2 else 2 if width < 4 else 3)
         ax.legend(
             loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns, frameon=False, borderaxespad=0.2, title=title
         )
     return ax
+
+
+def legend_columns(labels: Iterable[str], width: float, most: int) -> int:
+    """Return in how many columns a legend fits into a width in inches, at most ``most``; labels go down, then right.
+
+    Examples
+    --------
+    >>> from ptcc_certify.report.plots.style import legend_columns
+    >>> legend_columns(["first camp", "followers"], 3, 2), legend_columns(["unbalanced leaders, to be sure"] * 2, 3, 2)
+    (2, 1)
+    """
+    sizes = [3.6 * len(re.sub(r"[$_{}]|\\\w", "", label)) for label in labels]  # points in the size of the style
+
+    def fits(columns: int) -> bool:
+        parts = np.array_split(sizes, columns)
+        return sum(24 + max(part, default=0) for part in parts) <= 72 * width
+
+    return next((columns for columns in range(most, 1, -1) if fits(columns)), 1)
 
 
 def share_legend(figure: Figure, columns: int) -> Figure:
@@ -204,6 +224,7 @@ def share_legend(figure: Figure, columns: int) -> Figure:
             shared.setdefault(label, handle)
         if (own := ax.get_legend()) is not None:
             own.remove()
+    columns = legend_columns(shared, float(figure.get_figwidth()), columns)
     narrow = {"handlelength": 1.6, "columnspacing": 1.2, "handletextpad": 0.6}  # not from border to border
     figure.legend(shared.values(), shared.keys(), loc="outside upper center", ncols=columns, frameon=False, **narrow)
     return figure
