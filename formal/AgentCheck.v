@@ -115,6 +115,24 @@ Definition worth_all (a : agents) (F : Vec.mat) (m : Z) : Q := qsum (map (worth_
 (** a bound of the gain, of which the power is never above what the decay leaves *)
 Definition pace (a : agents) : option Q :=
   if Qle_bool (2 * index (degree a)) (falls a * pull_in a) then Some (first_gain a) else cap a.
+(** what each function used proves of deviations: constants by agent, and its value at the begin *)
+Definition deviating (a : agents) : list (list Q * Q) := flat_map (fun k => match nth_error (funcs (graph a)) k with None => [] | Some f =>
+  match deviation f, form (order (graph a)) (dls (prepare (graph a))) (dL (prepare (graph a))) (ly f) with
+  | Some (_, cs), Some (F, m) => [(cs, worth_all a F m)] | _, _ => [] end end) (used a).
+(** a root that is as near for small numbers *)
+Definition near_root (q : Q) : Q := let s := inject_Z (2 ^ Z.log2 (Zpos (Qden q) / Z.max 1 (Qnum q))) in root (q * (s * s)) / s.
+(** agents that meet at rest, whose [eta e^(-f_2 s - a_2 t)] does not grow *)
+Definition slows (a : agents) : bool := let f2 := nth 1 (damping a) 0 in
+  (degree a =? 2)%nat && match cap a with None => true | Some _ => false end && Qeq_bool 0 (nth 0 (plant a) 0) &&
+  Qeq_bool 0 (nth 0 (damping a) 0) && pos f2 && Qle_bool 1 (f2 * pull_in a) &&
+  notneg (nth 1 (plant a) 0 + (f2 - / pull_in a) * begin_gain a) && Qle_bool (2 * index (degree a)) (falls a * pull_in a).
+(** what feedback of the own state adds to the input of an agent, by each function that proves it *)
+Definition own_parts (a : agents) (known : list (list Q * Q)) (j : nat) : list Q :=
+  if forallb (Qeq_bool 0) (damping a) then [0] else if slows a then
+    let f2 := nth 1 (damping a) 0 in let g := begin_gain a in
+    let v := near_root (qsum (map (fun x => let q := nth j (ends_q (graph a) (placed_q x 1)) 0 in q * q) (axes a))) in
+    map (fun p : list Q * Q => f2 * g * (g * near_root (nth j (fst p) 0 * cell (W a) 1 1 * snd p) + v)) known
+  else [].
 Definition check_tops (a : agents) : bool := match tops a, pace a with [], _ => true | _, None => false | l, Some g =>
   let c := graph a in let n := degree a in let d := prepare c in
   let added := match kind c with Nominal _ => 0 | SlidingMode _ _ mu1 _ _ _ => mu1 * index (length (axes a)) end in
@@ -123,19 +141,20 @@ Definition check_tops (a : agents) : bool := match tops a, pace a with [], _ => 
     | Some (_, cs, _), Some (F, m) =>
         [(cs, reduced (powq g (2 * n) * (coupling a * nth (pred n) (gains a) 0) * worth_all a F m))]
     | _, _ => [] end end) (used a) in
-  forallb (Qeq_bool 0) (damping a) && fits (order c) (dL d) && good (common (start c)) (start c) && check_begins a &&
-  forallb (fun j => let rest := nth j l 0 - added - qsum (map (fun x => Qabs (nth 0 (plant a) 0 * nth j (offsets x) 0)) (axes a)) in
-    Qle_bool 0 rest && existsb (fun p : list Q * Q => Qle_bool (nth j (fst p) 0 * snd p) (rest * rest)) known) (seq 0 (order c)) end.
+  let away := if forallb (Qeq_bool 0) (damping a) then [] else deviating a in
+  fits (order c) (dL d) && good (common (start c)) (start c) && check_begins a &&
+  forallb (fun j => let most := nth j l 0 - added - qsum (map (fun x => Qabs (nth 0 (plant a) 0 * nth j (offsets x) 0)) (axes a)) in
+    existsb (fun own => let rest := most - own in
+      Qle_bool 0 rest && existsb (fun p : list Q * Q => Qle_bool (nth j (fst p) 0 * snd p) (rest * rest)) known) (own_parts a away j))
+    (seq 0 (order c)) end.
 
 (** what is left at the deadline under a cap, which the gain reaches [w] before it: [e^y <= T/w] if the clock goes that far *)
 Definition check_left (a : agents) : bool := match left_over a, cap a with None, _ => true | _, None => false | Some (q, rows), Some G =>
-  let c := graph a in let n := degree a in let d := prepare c in
+  let c := graph a in let n := degree a in
   let w := if Qle_bool G (begin_gain a) then span c else pull_in a / (G - slope a) in
   let y := reduced ((q - slope a * (span c - w) - G * w) / pull_in a) in let y := if notneg y then y else 0 in
   let b := twice_4 (floor (horner (reduced (falls a * q / 16)) 0 100)) in
-  let known := flat_map (fun k => match nth_error (funcs c) k with None => [] | Some f =>
-    match deviation f, form (order c) (dls d) (dL d) (ly f) with
-    | Some (_, cs), Some (F, m) => [(cs, worth_all a F m)] | _, _ => [] end end) (used a) in
+  let known := deviating a in
   notneg q && negb (Qle_bool 1 (term (y / 16) 0 101)) && Qle_bool (twice_4 (ceil (above (y / 16)))) (span c / w) && check_begins a &&
   forallb (fun j => forallb (fun i => let x := nth i (nth j rows []) 0 in notneg x && existsb (fun p : list Q * Q =>
     Qle_bool (powq G (2 * i) * (nth j (fst p) 0 * cell (W a) i i * snd p)) (x * x * b)) known) (seq 0 n)) (seq 0 (order c)) end.

@@ -97,6 +97,12 @@ Proof.
   - apply (continuous_mult (fun _ => Q2R q)); [apply continuous_const|]. apply H. simpl. lia.
   - apply (IH (fun u => shift (Z u))). intros i Hi. apply (H (S i)). simpl. lia.
 Qed.
+Lemma end_ext x z j : (forall i, (i < N)%nat -> x i = z i) -> end_state c x j = end_state c z j.
+Proof.
+  intros H. destruct (end_parts c Hend) as [_ [_ [_ [L _]]]]. fold c N in L. unfold end_state.
+  induction (balanced_comps (comps c)) as [|b l IH]; simpl; [reflexivity|]. rewrite IH by (intros; apply L; right; assumption). f_equal. f_equal.
+  apply qdot_ext. intros i Hi. apply H. destruct (L b ltac:(left; reflexivity)) as [_ [_ K]]. unfold N. lia.
+Qed.
 Lemma end_derive (Z : R -> nat -> R) (dZ : nat -> R) t j : (forall i, (i < N)%nat -> is_derive (fun u => Z u i) t (dZ i)) ->
   is_derive (fun u => end_state c (Z u) j) t (end_state c dZ j).
 Proof.

@@ -105,6 +105,28 @@ Proof.
     apply Rle_trans with ((exp (Rabs a2 * T) * x) * (exp (Rabs a2 * T) * x) * (C * C)); [|right; ring].
     apply Rmult_le_compat_r; [apply Rle_0_sqr|exact S1].
 Qed.
+(** times the gain it never grows, if it fades fast enough *)
+Lemma fades_0 : fades 0 = 1.
+Proof. unfold fades. rewrite (turns_0 a), !Rmult_0_r, Rplus_0_r, Ropp_0. apply exp_0. Qed.
+Lemma fades_fast t : 1 <= f2 * k c -> 0 <= a2 + (f2 - / k c) * eta a 0 -> 0 <= t < T -> eta a t * fades t <= eta a 0.
+Proof.
+  intros H1 H2 Ht. destruct T_k as [A B]. fold c T in A, B. pose proof (eta_grows a Hprot) as Up. fold c T in Up.
+  set (g := fun u => eta a u * fades u). assert (G0 : g 0 = eta a 0) by (unfold g; rewrite fades_0; ring). rewrite <- G0.
+  apply (FamilyFlow.falls g 0 T (fun _ => corner a)); [| |exact Ht]; clear t Ht; intros t Ht.
+  - apply (continuous_mult (eta a) fades); [apply eta_continuous; apply Ht|apply fades_continuous; apply Ht].
+  - intros Hc. destruct (eta_derive a Hprot Hgain t (proj2 Ht) (Hc O)) as [d [Dd [d0 dk]]]. fold c in dk.
+    exists (d * fades t + eta a t * (- (a2 + f2 * eta a t) * fades t)). split.
+    + apply (is_derive_mult (eta a) fades); [exact Dd|apply fades_derive; apply Ht|intros; apply Rmult_comm].
+    + pose proof (eta_pos a Hprot Hgain t (proj2 Ht)) as E0. specialize (Up 0 t ltac:(lra)). pose proof (exp_pos (- (a2 * t + f2 * turns a t))) as F0.
+      fold (fades t) in F0. set (e := eta a t) in *. assert (K : d <= / k c * (e * e)).
+      { apply (Rmult_le_reg_l (k c)); [exact B|]. rewrite <- Rmult_assoc, Rinv_r, Rmult_1_l by lra. exact dk. }
+      assert (P0 : 0 <= f2 - / k c).
+      { apply (Rmult_le_reg_l (k c)); [exact B|]. rewrite Rmult_minus_distr_l, Rinv_r by lra. lra. }
+      assert (Q0 : (f2 - / k c) * eta a 0 <= (f2 - / k c) * e) by (apply Rmult_le_compat_l; assumption).
+      assert (R0 : 0 <= e * (a2 + (f2 - / k c) * e)) by (apply Rmult_le_pos; lra).
+      replace (d * fades t + e * (- (a2 + f2 * e) * fades t)) with (fades t * ((d - / k c * (e * e)) - e * (a2 + (f2 - / k c) * e))) by ring.
+      assert (0 <= fades t * (e * (a2 + (f2 - / k c) * e) - (d - / k c * (e * e)))) by (apply Rmult_le_pos; lra). lra.
+Qed.
 Lemma glide_derive t : t < T -> is_derive glide t (fades t).
 Proof.
   intros Ht. apply (is_derive_RInt fades glide 0 t); [|apply fades_continuous; exact Ht].

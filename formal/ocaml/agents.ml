@@ -179,7 +179,6 @@ let certificate json : t =
         else (bare_of proof "agent-residual" "agents"; Some (clock, rows)) in
   let tops = match get "input" with
     | Null -> []
-    | _ when not (Number.equal (largest damping) Number.zero) -> skip "agent-input" "input"; []
     | v ->
         need (get "initial_state" <> Null && used <> []) "a bound of the input without initial states or Lyapunov functions";
         need (cap <> None || Number.compare (Number.mul rate pace) (of_int (2 * n)) >= 0) "a bound of the input though r k is below 2 n";

@@ -45,8 +45,8 @@ SETTINGS = {
     "capped gain, every Lyapunov function": Setting(cap=F(100), method="best"),
     "capped gain without states": Setting(cap=F(7), start=False),
 }
-#: What is not checked of them: the common motion of agents with another force than damping, the input at rest.
-SKIPPED = {"agent-input", "agent-motion", "agent-final-state"}
+#: What is not checked of them: the common motion of agents with another force than damping.
+SKIPPED = {"agent-motion", "agent-final-state"}
 #: What the executable says of a form that it does not read.
 UNREAD = ("large form", "undecided", "radius", "cascade", "dominance", "weak components")
 
@@ -65,7 +65,7 @@ def test_certificates_of_agents_are_accepted_and_every_obligation_is_verified_or
     verified = re.findall(r"^verified    (.*)$", text, re.MULTILINE)
     left = [line for line in named(text) if line in listed]
     assert sorted(verified + left) == sorted(listed)
-    skipped = {"agent-input"} if setting.damping else SKIPPED - {"agent-input"} if any(setting.a) else set()
+    skipped = SKIPPED if any(setting.a) and not setting.damping else set()
     assert {line.split(" ")[0] for line in left} <= skipped
 
 
@@ -198,6 +198,34 @@ def test_where_agents_that_meet_at_rest_end_is_verified_and_what_is_forged_of_it
     assert check(far).accepted
     code, text = said(far, tmp_path)
     assert code == 0 and {"agent-motion of agents", "agents.final_state"} <= named(text)
+
+
+def test_the_input_of_agents_that_meet_at_rest_is_verified_and_what_is_forged_of_it_is_rejected(tmp_path: Path) -> None:
+    program()
+    tight = {
+        "at rest": SETTINGS["at rest"],
+        "thrust": Setting(damping=F(5), plant=(F(0), F(-2))),
+        "plane": Setting(damping=F(9, 2), rho1=F(2), dimension=2),
+        "slides": Setting(damping=F(2), slides=True, dimension=3),
+    }
+    for name, setting in tight.items():
+        document = made(CAMPS, setting)
+        code, text = said(document, tmp_path)
+        assert code == 0 and "verified    agent-input of agents" in text, name
+        own = document["agents"]["input"]["agents"]
+        for label in own:
+            lower = changed(document, ("agents", "input", "agents", label), str(F(own[label]) * (1 - F(1, 10**9))))
+            rest = max(map(F, lower["agents"]["input"]["agents"].values()))
+            refused(lower, ("agents", "input", "largest"), str(rest), "agent-input", tmp_path)
+        refused(document, ("agents", "input", "largest"), "7", "largest input", tmp_path)
+    # a bound that is true at the begin where the own velocity grows faster than the gain fades
+    for setting in (Setting(damping=F(1, 3)), Setting(damping=F(2), plant=(F(0), F(-3)))):
+        document, known = made(CAMPS, setting), made(CAMPS, SETTINGS["at rest"])
+        assert document["agents"]["input"] is None
+        steps = [o for o in known["proof"] if o["kind"] == "agent-input"]
+        forged = {**document, "proof": document["proof"] + steps}
+        vast = {"agents": dict.fromkeys(known["agents"]["input"]["agents"], "1000000"), "largest": "1000000"}
+        refused(forged, ("agents", "input"), vast, "agent-input", tmp_path)
 
 
 def test_a_decrease_that_holds_but_at_the_cap_is_rejected(tmp_path: Path) -> None:
