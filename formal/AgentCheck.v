@@ -76,9 +76,32 @@ Definition check_rest (a : agents) (M : list (list (Q * Q))) : bool :=
   (degree a =? 2)%nat && match cap a with None => true | Some _ => false end && Qeq_bool 0 (nth 0 (plant a) 0) &&
   Qeq_bool 0 (nth 0 (damping a) 0) && pos f2 && negb (Qle_bool 1 e) && close_to (entry_of M 0 0) 1 0 &&
   close_to (entry_of M 0 1) m (e / (1 - e) * Qabs m) && close_to (entry_of M 1 0) 0 0 && close_to (entry_of M 1 1) 0 0.
+(** [e^(A T)] of agents that move by themselves: polynomials with integer vectors over [2^p] as coefficients, and how far
+    they are from the equation; [D T A u], with [b = D T] and [g_l = - D T a_l] *)
+Definition pushes (n : nat) (b : Z) (g u : list Z) : list Z := map (fun i => if (S i =? n)%nat
+  then fold_right (fun l s => nth l g 0 * nth l u 0 + s)%Z 0%Z (seq 0 n) else (b * nth (S i) u 0)%Z) (seq 0 n).
+Definition total_size (n : nat) (f : nat -> Z) : Z := fold_right (fun i s => Z.abs (f i) + s)%Z 0%Z (seq 0 n).
+Fixpoint strays (n : nat) (b D : Z) (g : list Z) (j : Z) (u : list Z) (l : list (list Z)) : Z :=
+  let w := pushes n b g u in match l with [] => total_size n (fun i => nth i w 0%Z)
+  | v :: l' => (total_size n (fun i => D * j * nth i v 0 - nth i w 0) + strays n b D g (j + 1) v l')%Z end.
+(** Taylor's, rounded *)
+Fixpoint vectors (n : nat) (b D : Z) (g : list Z) (j : Z) (u : list Z) (steps : nat) : list (list Z) :=
+  match steps with O => [] | S s => if forallb (Z.eqb 0) u then [] else
+    let v := map (fun w => (2 * w + D * j) / (2 * (D * j)))%Z (pushes n b g u) in v :: vectors n b D g (j + 1) v s end.
+Definition check_drag (a : agents) (M : list (list (Q * Q))) : bool :=
+  let n := degree a in let T := span (graph a) in let own := map (fun l => - (T * nth l (plant a) 0)) (seq 0 n) in
+  let D := common (T :: own) in let b := scaled D T in let g := map (scaled D) own in
+  let y := T * (1 + qsum (map (fun l => Qabs (nth l (plant a) 0)) (seq 0 n))) + (1 # 2) in
+  let K := Z.to_nat (Qnum y / Zpos (Qden y) + 1) in let p := (2 ^ (256 + 2 * Z.of_nat K))%Z in
+  good D (T :: own) && forallb (Qeq_bool 0) (damping a) && Qle_bool y (index K) && forallb (fun l =>
+    let u := map (fun i => if (l =? i)%nat then p else 0%Z) (seq 0 n) in let us := vectors n b D g 1 u (20 * K + 400) in
+    let e := inject_Z (strays n b D g 1 u us * 3 ^ Z.of_nat K) / inject_Z (D * p) in
+    forallb (fun i => close_to (entry_of M i l) (inject_Z (fold_right (fun v s => nth i v 0 + s)%Z 0%Z (u :: us)) / inject_Z p) e) (seq 0 n))
+    (seq 0 n).
 Definition check_common (a : agents) : bool := match drift a with None => true | Some M =>
   if forallb (Qeq_bool 0) (plant a ++ damping a) then square (degree a) (fun i l =>
-    close_to (entry_of M i l) (if (i <=? l)%nat then part (span (graph a)) (l - i) else 0) 0) else check_rest a M end.
+    close_to (entry_of M i l) (if (i <=? l)%nat then part (span (graph a)) (l - i) else 0) 0)
+  else if forallb (Qeq_bool 0) (damping a) then check_drag a M else check_rest a M end.
 Fixpoint dotq (l x : list Q) : Q := match l, x with q :: l', v :: x' => reduced (q * v + dotq l' x') | _, _ => 0 end.
 Definition ends_q (c : cert) (x : list Q) : list Q :=
   let vs := map (fun b : nat * (list Q * list Q) => (fst (snd b), dotq (snd (snd b)) x)) (balanced_comps (comps c)) in

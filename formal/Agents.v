@@ -2,7 +2,7 @@
 Require Import ZArith QArith Qabs Qreals List Bool Reals Lra Lia Psatz FunctionalExtensionality.
 From Coquelicot Require Import Coquelicot.
 Import ListNotations.
-Require Import Vec Definite Graph Flow Certificate Checker Sound Input Slide Main Mean Peak Weighted Large AgentCertificate AgentForms AgentCheck AgentFall AgentMotion AgentExist AgentEnd AgentRest.
+Require Import Vec Definite Graph Flow Certificate Checker Sound Input Slide Main Mean Peak Weighted Large AgentCertificate AgentForms AgentCheck AgentFall AgentMotion AgentExist AgentEnd AgentRest AgentDrag.
 Open Scope R_scope.
 
 (** * Rationals and polynomials of the check *)
@@ -371,11 +371,68 @@ Proof.
     rewrite <- (sum_from i n (fun u v => T ^ u / INR (fact u) * end_state c (placed off (X 0) v) j)) by (unfold n in *; lia).
     apply sum_ext. intros l Hl. unfold chain_drift. fold T. destruct (i <=? l)%nat; ring. }
   rewrite EO. apply (common_ends off X i j (wj T) wj).
-  - intros t Ht. pose proof (drifts a off X Sl Hedges Hend Hprot M5 HX (fun l => zeros _ l Z1) (fun l => zeros _ l Z2) j (n - i) i
+  - intros t Ht. pose proof (drifts a off X Sl Hedges Hend Hprot M5 HX (fun l => zeros _ l Z2) (fun l => zeros _ l Z1) j (n - i) i
       ltac:(unfold n in *; lia) ltac:(unfold n in *; lia) t Ht) as K. cbv beta zeta in K. rewrite (Rmax_right 0 t) in K by lra. exact K.
   - eapply filterlim_filter_le_1; [|apply (@ex_derive_continuous _ _ wj T)].
     + intros P [e He]. exists e. intros u Hu _. apply He. exact Hu.
     + destruct (n - i)%nat as [|u] eqn:Eu; [unfold n in *; lia|]. unfold wj. eexists. apply taylor_derive.
+Qed.
+(** agents that move by themselves *)
+Definition solves (X : R -> nat -> R) (l : nat) : Prop := (forall i, X 0 i = unit_at l i) /\
+  (forall t i, 0 <= t <= deadline c -> continuous (fun u => X u i) t) /\
+  forall t i, 0 < t <= deadline c -> is_derive (fun u => X u i) t (own n (at_ (plant a)) (X t) i).
+Lemma solutions : exists X, forall l, (l < n)%nat -> solves (X l) l.
+Proof.
+  destruct (T_k a Hprot) as [T0 _]. fold c in T0.
+  assert (One : forall l, exists x, solves x l).
+  { intros l. destruct (runs n (at_ (plant a)) (2 * deadline c) l ltac:(lra)) as [x [X0 [CX DX]]]. exists (fun t => x (Rmax 0 t)). split; [|split].
+    - intros i. rewrite Rmax_left by lra. apply X0.
+    - intros t i Ht. apply CX. lra.
+    - intros t i Ht. rewrite Rmax_right by lra. apply (is_derive_ext_loc (fun u => x u i)); [|apply DX; lra].
+      assert (He : 0 < t) by lra. exists (mkposreal _ He). intros u Hu. unfold ball in Hu; simpl in Hu; unfold AbsRing_ball, abs, minus, plus, opp in Hu; simpl in Hu.
+      apply Rabs_def2 in Hu. rewrite Rmax_right by lra. reflexivity. }
+  apply (Rest.finite_choice (fun _ _ => 0) n (fun l X => solves X l)). intros l _. apply One.
+Qed.
+Lemma drag_ends X off Z Sl i j : (forall l, (l < n)%nat -> solves (X l) l) -> forallb (Qeq_bool 0) (damping a) = true -> flies a off Z Sl -> (i < n)%nat -> (j < order c)%nat ->
+  filterlim (fun t => Z t i j - away a off (Z t) i j) (at_left (deadline c)) (locally (outcome a (fun i l => X l (deadline c) i) off (Z 0) i j)).
+Proof.
+  intros HX HD HZ Hi Hj. destruct matrices as [_ [_ [_ [_ [M5 _]]]]]. destruct (T_k a Hprot) as [T0 _]. fold c in T0.
+  set (w := fun t i => end_state c (placed off (Z (Rmax 0 t)) i) j). set (f := fun t => sum n (fun l => w 0 l * X l t i)).
+  assert (EO : outcome a (fun i l => X l (deadline c) i) off (Z 0) i j = (if (i =? 0)%nat then off j else 0) + f (deadline c)).
+  { unfold outcome, f. f_equal. fold n. apply sum_ext. intros l _. unfold w. rewrite Rmax_left by lra. fold c. ring. }
+  rewrite EO. apply (common_ends off Z i j _ f).
+  - intros t Ht. pose proof (combined n (at_ (plant a)) M5 (deadline c) X w) as K. unfold f. rewrite <- K; [unfold w; rewrite Rmax_right by lra; reflexivity| | | |exact Ht|exact Hi].
+    + intros l Hl. destruct (HX l Hl) as [K0 [K1 K2]]. split; [exact K0|]. split; [intros; apply K1; lra|intros; apply K2; lra].
+    + intros u v Hu Hv. exact (w_derive a off Z Sl Hedges Hend Hprot M5 HZ (fun l => zeros _ l HD) j v u Hu Hv).
+    + intros u v Hu Hv. exact (w_continuous a off Z Sl Hend M5 HZ j v u Hu Hv).
+  - eapply filterlim_filter_le_1; [|apply (continuous_sum n (fun t l => w 0 l * X l t i) (deadline c))].
+    + intros P [e He]. exists e. intros u Hu _. apply He. exact Hu.
+    + intros l Hl. apply (continuous_mult (fun _ => w 0 l)); [apply continuous_const|]. apply (HX l Hl). lra.
+Qed.
+Lemma drag_inside M X : check_drag a M = true -> (forall l, (l < n)%nat -> solves (X l) l) -> forall i l, (i < n)%nat -> (l < n)%nat ->
+  Rabs (Q2R (fst (entry_of M i l)) - X l (deadline c) i) <= Q2R (snd (entry_of M i l)).
+Proof.
+  intros HM HX i l Hi Hl. unfold check_drag in HM. cbv zeta in HM. fold n c in HM. set (T := span c) in *.
+  set (g0 := map (fun l => - (T * nth l (plant a) 0))%Q (seq 0 n)) in *. set (D := common (T :: g0)) in *. set (y := (_ + (1 # 2))%Q) in *.
+  set (K := Z.to_nat _) in *. set (p := (2 ^ (256 + 2 * Z.of_nat K))%Z) in *. apply andb_prop in HM as [H H4]. apply andb_prop in H as [H H3].
+  apply andb_prop in H as [H1 H2]. rewrite forallb_forall in H4. specialize (H4 l ltac:(apply in_seq; lia)).
+  set (u := map _ _) in H4. set (us := vectors _ _ _ _ _ _ _) in *.
+  rewrite forallb_forall in H4. specialize (H4 i ltac:(apply in_seq; lia)). destruct (good_ok _ _ H1) as [D0 _].
+  assert (ET : Q2R T = deadline c) by apply span_ok. destruct (T_k a Hprot) as [T0 _]. fold c in T0. destruct matrices as [_ [_ [_ [_ [M5 _]]]]].
+  assert (Hp : (0 < p)%Z) by (apply Z.pow_pos_nonneg; lia).
+  assert (Hb : IZR (scaled D T) = IZR D * deadline c).
+  { rewrite <- ET. apply (scaled_ok D T D0). apply (good_ok _ _ H1). left. reflexivity. }
+  assert (Hg : forall v, (v < n)%nat -> IZR (nth v (map (scaled D) g0) 0%Z) = - (IZR D * (deadline c * at_ (plant a) v))).
+  { intros v Hv. rewrite nth_scaled by (apply andb_prop in H1 as [G1 G2]; simpl in G2; apply andb_prop in G2 as [_ G2]; apply andb_true_intro; split; assumption).
+    unfold g0. rewrite nth_map_seq by exact Hv. rewrite Q2R_opp, Q2R_mult, ET. unfold at_. ring. }
+  assert (HK : deadline c * pull_size n (at_ (plant a)) + / 2 <= INR K).
+  { apply Qle_bool_iff, Qle_Rle in H3. rewrite index_ok in H3. eapply Rle_trans; [|exact H3]. unfold y. rewrite Q2R_plus, Q2R_mult, Q2R_plus, ET, Q2R_1, qsum_ok.
+    assert (E2 : Q2R (1 # 2) = / 2) by (unfold Q2R; simpl; lra). rewrite E2. unfold pull_size.
+    rewrite (sum_ext n (fun v => Q2R (Qabs _)) (fun v => Rabs (at_ (plant a) v))) by (intros; apply abs_ok). lra. }
+  assert (NP : forall z, (0 < z)%Z -> ~ (inject_Z z == 0)%Q) by (intros z Hz Z0; unfold Qeq in Z0; simpl in Z0; lia).
+  apply (near_ok _ _ _ _ H4). rewrite !Q2R_div, !Effort.Q2R_inject by (apply NP; try apply Z.mul_pos_pos; assumption). rewrite poly_1.
+  destruct (HX l Hl) as [K0 [K1 K2]].
+  apply (encloses n (at_ (plant a)) M5 (scaled D T) D (map (scaled D) g0) (deadline c) D0 T0 Hb Hg p l us K (X l) Hp HK K0 K1 ltac:(intros; apply K2; lra) i Hi).
 Qed.
 Definition rest_drift (m : R) (i l : nat) : R := match i, l with O, O => 1 | O, 1%nat => m | _, _ => 0 end.
 Theorem agreement_ok : agreement a.
@@ -387,7 +444,11 @@ Proof.
     + intros M' i l E Hi Hl. rewrite EM in E. injection E as <-. pose proof (square_ok _ _ HC i l Hi Hl) as K. cbv beta in K.
       apply (near_at _ _ _ K). unfold chain_drift. destruct (i <=? l)%nat; [|apply Q2R_0]. rewrite part_ok. fold c. rewrite span_ok. reflexivity.
     + intros off X Sl i j HX Hi Hj tends. split; [apply (agrees off X Sl); assumption|]. intros _. apply (chains_end off X Sl); assumption.
-  - unfold check_rest in HC. cbv zeta in HC.
+  - destruct (forallb (Qeq_bool 0) (damping a)) eqn:ZD.
+  { destruct solutions as [X HX]. exists (fun i l => X l (deadline c) i). split.
+    - intros M' i l E Hi Hl. rewrite EM in E. injection E as <-. apply (drag_inside M X HC HX i l Hi Hl).
+    - intros off Z' Sl i j HZ Hi Hj tends. split; [apply (agrees off Z' Sl); assumption|]. intros _. apply (drag_ends X off Z' Sl); assumption. }
+  unfold check_rest in HC. cbv zeta in HC.
     set (p := (nth 1 (damping a) 0 * pull_in a)%Q) in *. set (w := ((nth 1 (plant a) 0 + nth 1 (damping a) 0 * slope a) * span (graph a))%Q) in *.
     set (b := (/ (p + 1))%Q) in *. set (S := total_of _) in *. set (e := Qabs _) in *.
     apply andb_prop in HC as [H N4]. apply andb_prop in H as [H N3]. apply andb_prop in H as [H N2]. apply andb_prop in H as [H N1].

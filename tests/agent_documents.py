@@ -152,11 +152,17 @@ def motion(s: Setting) -> list[list[Any]]:
         return [["1", damped(s, w, p)], ["0", "0"]]
     if not any(s.a):
         return [[str(T ** (j - i) / math.factorial(j - i)) if j >= i else "0" for j in range(n)] for i in range(n)]
-    companion = [[Fraction(int(j == i + 1)) for j in range(n)] for i in range(n - 1)] + [[-a for a in s.a]]
+    return exponential(s, interval)
+
+
+def exponential(s: Setting, read: Any) -> list[list[Any]]:
+    """What is read from the entries of ``e^(A T)``, balls of 1,000 bits."""
+    companion = [[Fraction(int(j == i + 1)) for j in range(s.order)] for i in range(s.order - 1)]
+    companion.append([-a for a in s.a])
     before, flint.ctx.prec = flint.ctx.prec, 1000
     try:
-        found = flint.arb_mat([[ball(x * T) for x in row] for row in companion]).exp()
-        return [[interval(found[i, j]) for j in range(n)] for i in range(n)]
+        found = flint.arb_mat([[ball(x * s.T) for x in row] for row in companion]).exp()
+        return [[read(found[i, j]) for j in range(s.order)] for i in range(s.order)]
     finally:
         flint.ctx.prec = before
 

@@ -156,9 +156,10 @@ let certificate json : t =
   let rests = not (Number.equal (largest damping) Number.zero) && (let f2 = List.nth damping 1 in
     let w = Number.mul span (Number.add (List.nth plant 1) (Number.mul f2 r.cert.rho1)) in
     Number.compare { w with qnum = Z.abs w.qnum } (of_int 20) <= 0) in
-  let common = if not (chains || rests) then None else Some motion in
+  let drags = Number.equal (largest damping) Number.zero && not chains in
+  let common = if not (chains || rests || drags) then None else Some motion in
   if common <> None then List.iteri (fun i -> List.iteri (fun l (_, radius) ->
-    need (rests && i = 0 && l = 1 || Number.equal radius Number.zero) "motion: a radius where the common motion is known exactly")) motion;
+    need (drags || rests && i = 0 && l = 1 || Number.equal radius Number.zero) "motion: a radius where the common motion is known exactly")) motion;
   let known = common <> None && (agree || cap <> None) in
   if known then bare_of proof "agent-motion" "agents" else skip "agent-motion" "motion";
   if known && get "final_state" <> Null then bare_of proof "agent-final-state" "agents" else skip "agent-final-state" "final_state";
