@@ -61,18 +61,24 @@ Definition check_agree (a : agents) : bool := negb (agree a) ||
     | Some f => match deviation f with Some _ => true | None => false end | None => false end) (used a)).
 (** [q^m / m!] *)
 Fixpoint part (q : Q) (m : nat) : Q := match m with O => 1 | S m' => q / index (S m') * part q m' end.
-(** coefficients, from number [j] on, of a series of [v] in which [(p + 1 + w v) P + v P' = 1], and the last of them *)
-Fixpoint powers_of (p w b : Q) (j n : nat) : list Q := b :: match n with O => []
-  | S n' => powers_of p w (reduced (- (w * b) / (p + 1 + index (S j)))) (S j) n' end.
-Fixpoint last_of (p w b : Q) (j n : nat) : Q := match n with O => b
-  | S n' => last_of p w (reduced (- (w * b) / (p + 1 + index (S j)))) (S j) n' end.
-Fixpoint total_of (l : list Q) : Q := match l with [] => 0 | b :: l' => reduced (b + total_of l') end.
-Definition terms : nat := 200.
+(** coefficients of a polynomial of [v], over [q], in which [(p + 1 + w v) P + v P'] is nearly 1: those of a series, rounded
+    however, after number [j - 1], which is [b]; and how far from it. [D (p + 1)] and [D w] are the integers [P] and [W]. *)
+Fixpoint powers_of (P W D j b : Z) (steps : nat) : list Z := match steps with O => [] | S s => if (b =? 0)%Z then [] else
+  let v := ((P + D * j - 2 * (W * b)) / (2 * (P + D * j)))%Z in v :: powers_of P W D (j + 1) v s end.
+Fixpoint misses (P W D j b : Z) (l : list Z) : Z := match l with [] => Z.abs (W * b)
+  | v :: l' => (Z.abs ((P + D * j) * v + W * b) + misses P W D (j + 1) v l')%Z end.
+(** [P] at 1, and how far from 1 it is *)
+Definition far_q (p w : Q) : Q * Q :=
+  let x := reduced (p + 1) in let y := reduced w in let P := (Qnum x * Zpos (Qden y))%Z in let W := (Qnum y * Zpos (Qden x))%Z in
+  let D := (Zpos (Qden x) * Zpos (Qden y))%Z in let K := Z.to_nat (Z.abs (Qnum y) / Zpos (Qden y) + 1) in
+  let b := (D * 2 ^ (256 + 2 * Z.of_nat K))%Z in let q := (P * 2 ^ (256 + 2 * Z.of_nat K))%Z in
+  let l := powers_of P W D 1 b (20 * K + 400) in
+  (inject_Z (fold_right Z.add 0%Z (b :: l)) / inject_Z q, inject_Z (misses P W D 1 b l) / inject_Z (D * q)).
 Definition close_to (p : Q * Q) (q r : Q) : bool := Qle_bool (Qabs (fst p - q) + r) (snd p).
 Definition entry_of (M : list (list (Q * Q))) (i l : nat) : Q * Q := nth l (nth i M []) (0, 0).
 Definition check_rest (a : agents) (M : list (list (Q * Q))) : bool :=
   let f2 := nth 1 (damping a) 0 in let p := f2 * pull_in a in let w := (nth 1 (plant a) 0 + f2 * slope a) * span (graph a) in
-  let b := / (p + 1) in let m := span (graph a) * total_of (powers_of p w b 0 terms) in let e := Qabs (w * last_of p w b 0 terms) in
+  let m := span (graph a) * fst (far_q p w) in let e := snd (far_q p w) in
   (degree a =? 2)%nat && match cap a with None => true | Some _ => false end && Qeq_bool 0 (nth 0 (plant a) 0) &&
   Qeq_bool 0 (nth 0 (damping a) 0) && pos f2 && negb (Qle_bool 1 e) && close_to (entry_of M 0 0) 1 0 &&
   close_to (entry_of M 0 1) m (e / (1 - e) * Qabs m) && close_to (entry_of M 1 0) 0 0 && close_to (entry_of M 1 1) 0 0.

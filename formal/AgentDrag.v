@@ -170,17 +170,17 @@ Qed.
 
 (** * A polynomial of time whose coefficients are integers over a power of 2, however found *)
 (** row [i] of a list of vectors as a polynomial, and its slope *)
-Fixpoint poly (l : list (list Z)) (i : nat) (s : R) : R := match l with [] => 0 | u :: l' => vec_of u i + s * poly l' i s end.
-Fixpoint rise (l : list (list Z)) (i : nat) (s : R) : R := match l with [] => 0 | _ :: l' => poly l' i s + s * rise l' i s end.
+Definition row (l : list (list Z)) (i : nat) : list Z := map (fun u => nth i u 0%Z) l.
+Definition poly l i (s : R) : R := zeval (row l i) s.
+Definition rise l i (s : R) : R := zslope (row l i) s.
+Lemma poly_cons u l i s : poly (u :: l) i s = vec_of u i + s * poly l i s.
+Proof. reflexivity. Qed.
+Lemma rise_cons u l i s : rise (u :: l) i s = poly l i s + s * rise l i s.
+Proof. reflexivity. Qed.
 Lemma poly_derive l i s : is_derive (poly l i) s (rise l i s).
-Proof.
-  induction l as [|u l IH]; [apply (is_derive_const 0)|]. cbn [poly rise].
-  evar_last; [apply (is_derive_plus (fun _ => vec_of u i) (fun s => s * poly l i s)); [apply @is_derive_const|]|].
-  - apply (is_derive_mult (fun s => s) (poly l i)); [apply @is_derive_id|exact IH|intros; apply Rmult_comm].
-  - unfold plus, mult, zero, one; simpl. ring.
-Qed.
+Proof. apply zeval_derive. Qed.
 Lemma poly_1 l i : IZR (fold_right (fun v s => nth i v 0 + s)%Z 0%Z l) = poly l i 1.
-Proof. induction l as [|u l IH]; cbn [fold_right poly]; [reflexivity|]. rewrite plus_IZR, IH. unfold vec_of. ring. Qed.
+Proof. unfold poly. rewrite <- zeval_1. induction l as [|u l IH]; cbn [fold_right row map]; [reflexivity|]. rewrite !plus_IZR, IH. reflexivity. Qed.
 Variables (b D : Z) (g : list Z) (T : R).
 Hypothesis HD : (0 < D)%Z.
 Hypothesis HT : 0 < T.
@@ -200,8 +200,9 @@ Lemma strays_ok s : 0 <= s <= 1 -> forall l j u,
   sum n (fun i => Rabs (IZR D * (IZR j * poly l i s + s * rise l i s) - IZR D * T * own (fun q => poly (u :: l) q s) i)) <= IZR (strays n b D g j u l).
 Proof.
   intros Hs. induction l as [|v l IH]; intros j u; cbn [strays]; cbv zeta.
-  - rewrite total_size_ok. apply sum_le. intros i Hi. rewrite pushes_ok by exact Hi. cbn [poly rise].
-    replace (own (fun q => vec_of u q + s * 0) i) with (own (vec_of u) i) by (f_equal; apply functional_extensionality; intros; ring).
+  - rewrite total_size_ok. apply sum_le. intros i Hi. rewrite pushes_ok by exact Hi. change (poly [] i s) with 0. change (rise [] i s) with 0.
+    replace (own (fun q => poly [u] q s) i) with (own (vec_of u) i)
+      by (f_equal; apply functional_extensionality; intros; rewrite poly_cons; change (poly [] x s) with 0; ring).
     rewrite <- Rabs_Ropp. apply Req_le. f_equal. ring.
   - rewrite plus_IZR, total_size_ok.
     set (w := fun i => IZR D * (IZR (j + 1) * poly l i s + s * rise l i s) - IZR D * T * own (fun q => poly (v :: l) q s) i).
@@ -209,7 +210,7 @@ Proof.
     + apply sum_le. intros i Hi. rewrite minus_IZR, !mult_IZR, pushes_ok by exact Hi.
       assert (E : own (fun q => poly (u :: v :: l) q s) i = own (vec_of u) i + s * own (fun q => poly (v :: l) q s) i).
       { rewrite <- own_linear. reflexivity. }
-      rewrite E. set (o := own (fun q => poly (v :: l) q s) i) in *. cbn [poly rise].
+      rewrite E. set (o := own (fun q => poly (v :: l) q s) i) in *. rewrite poly_cons, rise_cons.
       replace (IZR D * (IZR j * (vec_of v i + s * poly l i s) + s * (poly l i s + s * rise l i s)) - IZR D * T * (own (vec_of u) i + s * o))
         with ((IZR D * IZR j * vec_of v i - IZR D * T * own (vec_of u) i) + s * w i) by (unfold w; fold o; rewrite plus_IZR; ring).
       eapply Rle_trans; [apply Rabs_triang|]. unfold vec_of at 1. apply Rplus_le_compat_l. rewrite Rabs_mult, (Rabs_right s) by lra.
@@ -276,9 +277,9 @@ Proof.
         assert (OP : own (P v) j = / IZR p * own (fun q => poly (u0 :: us) q (v / T)) j).
         { transitivity (own (fun k => 0 + / IZR p * poly (u0 :: us) k (v / T)) j); [f_equal; apply functional_extensionality; intros k; unfold P, Rdiv; ring|].
           rewrite (own_linear (/ IZR p) (fun _ => 0)), own_zero. ring. }
-        rewrite OP. set (o := own (fun q => poly (u0 :: us) q (v / T)) j). unfold dP, q. cbn [rise]. field. lra. }
+        rewrite OP. set (o := own (fun q => poly (u0 :: us) q (v / T)) j). unfold dP, q. rewrite rise_cons. field. lra. }
     assert (E0 : energy (e 0) = 0).
-    { unfold energy. apply sum_zero. intros j Hj. unfold e, P. rewrite X0. replace (0 / T) with 0 by (unfold Rdiv; ring). cbn [poly]. unfold vec_of, u0.
+    { unfold energy. apply sum_zero. intros j Hj. unfold e, P. rewrite X0. replace (0 / T) with 0 by (unfold Rdiv; ring). rewrite poly_cons. unfold vec_of, u0.
       rewrite nth_map_seq by exact Hj. unfold unit_at. destruct (l =? j)%nat; unfold sq; field; lra. }
     rewrite E0, Rplus_0_l in E. pose proof (energy_above (e t) i Hi) as B. pose proof (Rle_0_sqr De) as Q0. change (Rsqr De) with (sq De) in Q0.
     assert (X1 : exp ((2 * pull_size + / T) * t) <= 3 ^ K * 3 ^ K).

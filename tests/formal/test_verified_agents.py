@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from agent_documents import Setting, ball, ends, exponential
+from agent_documents import Setting, ball, damped, ends, exponential
 from agent_documents import document as made
 from generators import all_classes, random_graph
 from mutations import Json, at, changed, mutants, nudged, resealed
@@ -169,27 +169,34 @@ def test_where_agents_that_meet_at_rest_end_is_verified_and_what_is_forged_of_it
         Setting(damping=F(1, 3), rho1=F(0)),
         Setting(damping=F(5), plant=(F(0), F(-2))),
         Setting(damping=F(9, 2), rho1=F(2), dimension=2),
+        Setting(damping=F(25), plant=(F(0), F(-1))),
+        Setting(damping=F(2), plant=(F(0), F(-40))),
+        Setting(damping=F(2), rho1=F(1), T=F(500)),
     ):
         document = made(CAMPS, setting)
+        assert check(document).accepted
         code, text = said(document, tmp_path)
         assert code == 0 and {"agent-motion", "agent-final-state"} <= set(
             re.findall(r"verified +(\S+) of agents", text)
         )
-        entry = document["agents"]["motion"][0][1]
-        mid, radius = (F(entry["mid"]), F(entry["radius"])) if isinstance(entry, dict) else (F(entry), F(0))
-        away = {"mid": str(mid + 2 * radius + F(1, 10**30)), "radius": str(radius or F(1, 10**40))}
+        mid, radius = ends(document["agents"]["motion"][0][1])
+        far = mid + 2 * radius + F(1, 10**30)
+        away = {"mid": str(far), "radius": str(radius)} if radius else str(far)
         refused(document, ("agents", "motion", 0, 1), away, "agent-motion", tmp_path)
         refused(document, ("agents", "motion", 1, 1), "1/1000000", "agent-motion", tmp_path)
-        ends = document["agents"]["final_state"]["f"][0]
-        middle = F(ends[0]["mid"] if isinstance(ends[0], dict) else ends[0])
-        refused(
-            document, ("agents", "final_state", "f", 0, 0), str(middle + F(1, 10**6)), "agent-final-state", tmp_path
-        )
+        middle, _ = ends(document["agents"]["final_state"]["f"][0][0])
+        moved = str(middle + F(1, 10**6) * max(1, abs(middle)))
+        refused(document, ("agents", "final_state", "f", 0, 0), moved, "agent-final-state", tmp_path)
         refused(document, ("agents", "final_state", "f", 0, 1), "1/10", "agent-final-state", tmp_path)
-    far = made(CAMPS, Setting(damping=F(25), rho1=F(1, 2)))
-    assert check(far).accepted
+    # where a_2 + f_2 rho1 is 0 the common motion is known exactly
+    document = made(CAMPS, Setting(damping=F(2), plant=(F(0), F(-1))))
+    wide = {"mid": document["agents"]["motion"][0][1], "radius": "1/1000"}
+    refused(document, ("agents", "motion", 0, 1), wide, "known exactly", tmp_path)
+    assert said(document, tmp_path).code == 0
+    far = told(document, ("protocol", "rho1"), "300")
+    assert not check(far).accepted
     code, text = said(far, tmp_path)
-    assert code == 0 and {"agent-motion of agents", "agents.final_state"} <= named(text)
+    assert code == 1
 
 
 @pytest.mark.parametrize(
@@ -212,18 +219,17 @@ def test_where_agents_that_move_by_themselves_end_is_verified_and_what_is_forged
     assert code == 0 and {"agent-motion", "agent-final-state"} <= set(re.findall(r"verified +(\S+) of agents", text))
     for i in range(setting.order):
         for j in range(setting.order):
-            entry = document["agents"]["motion"][i][j]
-            middle, radius = F(entry["mid"]), F(entry["radius"])
+            middle, radius = ends(document["agents"]["motion"][i][j])
             for mid in (middle + 2 * radius, middle - 2 * radius):
                 away = {"mid": str(mid), "radius": str(radius)}
                 refused(document, ("agents", "motion", i, j), away, "agent-motion", tmp_path)
             if middle not in (0, 1):  # which are exact where drag alone moves them
                 refused(document, ("agents", "motion", i, j), str(middle), "agent-motion", tmp_path)
-    ends = document["agents"]["final_state"]["f"][0]
-    for i, end in enumerate(ends):
-        away = {"mid": str(F(end["mid"]) + 3 * F(end["radius"]) + F(1, 10**40)), "radius": end["radius"]}
+    for i, end in enumerate(document["agents"]["final_state"]["f"][0]):
+        middle, radius = ends(end)
+        away = {"mid": str(middle + 3 * radius), "radius": str(radius)}
         refused(document, ("agents", "final_state", "f", 0, i), away, "agent-final-state", tmp_path)
-        refused(document, ("agents", "final_state", "f", 0, i), end["mid"], "agent-final-state", tmp_path)
+        refused(document, ("agents", "final_state", "f", 0, i), str(middle), "agent-final-state", tmp_path)
 
 
 def test_the_input_of_agents_that_meet_at_rest_is_verified_and_what_is_forged_of_it_is_rejected(tmp_path: Path) -> None:
@@ -318,8 +324,10 @@ def sharper(setting: Setting) -> Any:
     """What knows that a common motion holds that is told within less than ``ptcc check`` encloses it."""
 
     def known(document: Json, path: tuple[str | int, ...], place: str, left: set[str]) -> bool:
-        if path[:2] != ("agents", "motion") or setting.damping:
+        if path[:2] != ("agents", "motion"):
             return False
+        if setting.damping:
+            return path[2:4] == (0, 1) and damped(setting, lambda x: holds(*ends(at(document, path[:4])), x))
         stated = iter([ends(x) for row in document["agents"]["motion"] for x in row])
         inside = exponential(setting, lambda x: holds(*next(stated), x))
         return all(map(all, inside))
