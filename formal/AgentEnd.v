@@ -97,6 +97,12 @@ Proof.
   - apply (continuous_mult (fun _ => Q2R q)); [apply continuous_const|]. apply H. simpl. lia.
   - apply (IH (fun u => shift (Z u))). intros i Hi. apply (H (S i)). simpl. lia.
 Qed.
+Lemma end_ext x z j : (forall i, (i < N)%nat -> x i = z i) -> end_state c x j = end_state c z j.
+Proof.
+  intros H. destruct (end_parts c Hend) as [_ [_ [_ [L _]]]]. fold c N in L. unfold end_state.
+  induction (balanced_comps (comps c)) as [|b l IH]; simpl; [reflexivity|]. rewrite IH by (intros; apply L; right; assumption). f_equal. f_equal.
+  apply qdot_ext. intros i Hi. apply H. destruct (L b ltac:(left; reflexivity)) as [_ [_ K]]. unfold N. lia.
+Qed.
 Lemma end_derive (Z : R -> nat -> R) (dZ : nat -> R) t j : (forall i, (i < N)%nat -> is_derive (fun u => Z u i) t (dZ i)) ->
   is_derive (fun u => end_state c (Z u) j) t (end_state c dZ j).
 Proof.
@@ -118,8 +124,7 @@ Proof.
   - apply IH. intros p Hp. apply L. right. exact Hp.
 Qed.
 
-(** * The common motion of chains of integrators *)
-Hypothesis Hplant : forall l, at_ (plant a) l = 0.
+(** * The common motion of agents without feedback of their own, that of one agent without neighbours *)
 Hypothesis Hdamp : forall l, at_ (damping a) l = 0.
 Let w (j i : nat) (t : R) := end_state c (placed h (X (Rmax 0 t)) i) j.
 Lemma w_continuous j i t : 0 <= t < T -> (i < n)%nat -> continuous (w j i) t.
@@ -128,7 +133,7 @@ Proof.
   apply (continuous_minus (fun u => X (Rmax 0 u) i l) (fun _ => if (i =? 0)%nat then h l else 0)); [|apply continuous_const].
   apply HX; [exact Hl|apply Ht|exact Hi].
 Qed.
-Lemma w_derive j i t : 0 < t < T -> (i < n)%nat -> is_derive (w j i) t (if (S i =? n)%nat then 0 else w j (S i) t).
+Lemma w_derive j i t : 0 < t < T -> (i < n)%nat -> is_derive (w j i) t (if (S i =? n)%nat then - sum n (fun l => at_ (plant a) l * w j l t) else w j (S i) t).
 Proof.
   intros Ht Hi. evar_last.
   - apply (end_derive (fun u => placed h (X (Rmax 0 u)) i)
@@ -138,14 +143,19 @@ Proof.
       apply (X_derive a h X Sl Hprot Hn HX t i l Ht Hi Hl).
     + exact (Rminus_0_r _).
   - unfold w. rewrite Rmax_right by lra. destruct (Nat.eqb_spec (S i) n) as [E|E].
-    + transitivity (end_state c (comb n (fun l => - (eta a t ^ n * at_ (gains a) l)) (fun l => lap (edges c) (y a h (X t) t l))) j).
-      * f_equal. apply functional_extensionality. intros l. unfold control, comb. rewrite Hplant.
-        rewrite (sum_zero n (fun v => at_ (plant a) v * X t v l)) by (intros; rewrite Hplant; ring). fold n.
-        transitivity (- eta a t ^ n * sum n (fun i0 => at_ (gains a) i0 * lap (edges (graph a)) (y a h (X t) t i0) l + at_ (damping a) i0 * y a h (X t) t i0 l)); [ring|].
-        rewrite <- sum_scal. apply sum_ext. intros v _. rewrite Hdamp. fold c. ring.
-      * rewrite end_comb. apply sum_zero. intros l _. rewrite end_lap. ring.
+    + set (x := comb n (fun l => eta a t ^ n * at_ (gains a) l) (fun l => lap (edges c) (y a h (X t) t l))).
+      set (z := comb n (at_ (plant a)) (placed h (X t))). transitivity (end_state c (fun l => -1 * x l + -1 * z l) j).
+      * f_equal. apply functional_extensionality. intros l. unfold n, c. rewrite (placed_sum a h Hn (X t)). unfold control, x, z, comb. fold n c.
+        rewrite (sum_ext n (fun v => eta a t ^ n * at_ (gains a) v * _) (fun v => eta a t ^ n * (at_ (gains a) v * lap (edges c) (y a h (X t) t v) l)))
+          by (intros; ring). rewrite sum_scal.
+        rewrite (sum_ext n (fun v => _ + at_ (damping a) v * _) (fun v => at_ (gains a) v * lap (edges c) (y a h (X t) t v) l))
+          by (intros; rewrite Hdamp; ring). ring.
+      * rewrite (end_plus (fun l => -1 * x l)), !end_scal. unfold x, z. rewrite !end_comb, (sum_zero n (fun l => _ * end_state c (lap _ _) j)); [ring|].
+        intros l _. rewrite end_lap. ring.
     + f_equal. apply functional_extensionality. intros l. unfold placed. simpl. ring.
 Qed.
+(** chains of integrators *)
+Hypothesis Hplant : forall l, at_ (plant a) l = 0.
 Theorem drifts j : forall m i, (i + m = n)%nat -> (0 < m)%nat -> forall t, 0 <= t < T -> w j i t = taylor m (fun l => w j (i + l) 0) t.
 Proof.
   induction m as [|m IH]; intros i Hi Hm t Ht; [lia|].
@@ -153,9 +163,9 @@ Proof.
   { apply (still T (fun t => w j i t - taylor (S m) (fun l => w j (i + l) 0) t)); [| |exact Ht].
     - intros u Hu. evar_last.
       + apply (is_derive_minus (w j i) (taylor (S m) (fun l => w j (i + l) 0))); [apply w_derive; [exact Hu|lia]|apply taylor_derive].
-      + change ((if (S i =? n)%nat then 0 else w j (S i) u) - taylor m (fun l => w j (i + S l) 0) u = 0).
+      + change ((if (S i =? n)%nat then - sum n (fun l => at_ (plant a) l * w j l u) else w j (S i) u) - taylor m (fun l => w j (i + S l) 0) u = 0).
         destruct (Nat.eqb_spec (S i) n) as [E|E].
-        * replace m with 0%nat by lia. unfold taylor, sum. simpl. ring.
+        * replace m with 0%nat by lia. rewrite (sum_zero n) by (intros; rewrite Hplant; ring). unfold taylor, sum. simpl. ring.
         * rewrite (IH (S i)) by (try lia; lra). unfold taylor.
           rewrite (sum_ext m (fun l => u ^ l / INR (fact l) * w j (i + S l) 0) (fun l => u ^ l / INR (fact l) * w j (S i + l) 0))
             by (intros l _; replace (i + S l)%nat with (S i + l)%nat by lia; reflexivity). ring.

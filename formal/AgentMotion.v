@@ -280,6 +280,12 @@ Proof.
     intros u Hu. rewrite Rmax_right by lra. rewrite (resting u j) by (try assumption; lra). replace (pred n) with i by lia. ring.
   - apply (near (fun u => X u i j)); [exact Ht| |apply D; fold n; lia]. intros u Hu. rewrite Rmax_right by lra. reflexivity.
 Qed.
+Lemma placed_sum x j : sum n (fun l => at_ (plant a) l * x l j) = at_ (plant a) 0 * h j + sum n (fun l => at_ (plant a) l * placed h x l j).
+Proof.
+  rewrite (sum_ext n (fun l => at_ (plant a) l * x l j) (fun l => (if (0 =? l)%nat then at_ (plant a) l * h j else 0) + at_ (plant a) l * placed h x l j)).
+  - rewrite sum_plus, (sum_at n 0 (fun l => at_ (plant a) l * h j)) by exact Hn. reflexivity.
+  - intros l _. unfold placed. destruct l as [|l]; simpl; ring.
+Qed.
 Lemma Y_derive t i j : 0 < t < T -> t <> corner a -> (i < n)%nat -> (j < N)%nat ->
   is_derive (fun u => Y u i j) t (eta a t * moving (lap es) n (entry_at (zeta t) (theta a t)) K (Y t) i j).
 Proof.
@@ -312,11 +318,7 @@ Proof.
     assert (C : (control a h (X t) t j - sum n (fun l => at_ (plant a) l * X t l j)) * z ^ i =
       - e * (sum n (fun l => K l * lap es (v l) j) + sum n (fun l => at_ (damping a) l * v l j)
         + sum n (fun l => at_ (plant a) l * z ^ (n - l) * v l j))).
-    { assert (P1 : sum n (fun l => at_ (plant a) l * X t l j) = at_ (plant a) 0 * h j + sum n (fun l => at_ (plant a) l * placed h (X t) l j)).
-      { rewrite (sum_ext n (fun l => at_ (plant a) l * X t l j) (fun l => (if (0 =? l)%nat then at_ (plant a) l * h j else 0) + at_ (plant a) l * placed h (X t) l j)).
-        - rewrite sum_plus, (sum_at n 0 (fun l => at_ (plant a) l * h j)) by exact Hn. reflexivity.
-        - intros l _. unfold placed. destruct l as [|l]; simpl; ring. }
-      rewrite P1. assert (Ctl : control a h (X t) t j = at_ (plant a) 0 * h j -
+    { rewrite (placed_sum (X t)). assert (Ctl : control a h (X t) t j = at_ (plant a) 0 * h j -
         e ^ n * sum n (fun l => K l * lap es (v l) j + at_ (damping a) l * v l j)) by reflexivity.
       rewrite Ctl, sum_plus.
       assert (P2 : z ^ i * sum n (fun l => at_ (plant a) l * placed h (X t) l j) = e * sum n (fun l => at_ (plant a) l * z ^ (n - l) * v l j)).

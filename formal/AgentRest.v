@@ -1,4 +1,4 @@
-(** Agents that meet at rest: how far the common velocity takes them until it is 0. *)
+(** Agents that meet at rest: how far the common velocity takes them until it is 0, by a polynomial that is near the equation. *)
 Require Import ZArith QArith Qreals List Bool Reals Lra Lia Psatz FunctionalExtensionality.
 From Coquelicot Require Import Coquelicot.
 Import ListNotations.
@@ -22,52 +22,82 @@ Proof.
     + exfalso. assert (l <= l - e); [|lra]. apply L. intros v [t [Ht ->]]. apply Rnot_lt_le. intros N. apply No. exists t. split; assumption.
 Qed.
 
-(** * A series: [(p + 1 + w v) P + v P' = 1 + w a v^(n + 1)], [a] the last coefficient *)
-Fixpoint slope_of (l : list Q) (v : R) : R := match l with [] => 0 | _ :: l' => peval l' v + v * slope_of l' v end.
-Lemma peval_derive l v : is_derive (peval l) v (slope_of l v).
+(** * Polynomials with integer coefficients *)
+Fixpoint zeval (l : list Z) (v : R) : R := match l with [] => 0 | b :: l' => IZR b + v * zeval l' v end.
+Fixpoint zslope (l : list Z) (v : R) : R := match l with [] => 0 | _ :: l' => zeval l' v + v * zslope l' v end.
+Lemma zeval_derive l v : is_derive (zeval l) v (zslope l v).
 Proof.
-  induction l as [|q l IH]; [apply (is_derive_const 0)|]. cbn [peval slope_of].
-  evar_last; [apply (is_derive_plus (fun _ => Q2R q) (fun v => v * peval l v) v 0 (1 * peval l v + v * slope_of l v))|].
+  induction l as [|b l IH]; [apply (is_derive_const 0)|]. cbn [zeval zslope].
+  evar_last; [apply (is_derive_plus (fun _ => IZR b) (fun v => v * zeval l v) v 0 (1 * zeval l v + v * zslope l v))|].
   - apply @is_derive_const.
-  - apply (is_derive_mult (fun v => v) (peval l) v 1 (slope_of l v)); [apply @is_derive_id|exact IH|intros; apply Rmult_comm].
+  - apply (is_derive_mult (fun v => v) (zeval l) v 1 (zslope l v)); [apply @is_derive_id|exact IH|intros; apply Rmult_comm].
   - unfold plus; simpl. ring.
 Qed.
+Lemma zeval_1 l : IZR (fold_right Z.add 0%Z l) = zeval l 1.
+Proof. induction l as [|b l IH]; cbn [fold_right zeval]; [reflexivity|]. rewrite plus_IZR, IH. ring. Qed.
 Lemma index_ok i : Q2R (index i) = INR i.
 Proof. unfold index, Q2R. simpl. rewrite INR_IZR_INZ. field. Qed.
 Lemma reduced_ok q : Q2R (reduced q) = Q2R q.
 Proof. unfold reduced. cbv zeta. destruct (Qeq_bool _ q) eqn:E; [|reflexivity]. apply Qeq_bool_eq, Qeq_eqR in E. exact E. Qed.
-Lemma total_ok l : Q2R (total_of l) = peval l 1.
-Proof. induction l as [|q l IH]; cbn [total_of peval]; [apply Q2R_0|]. rewrite reduced_ok, Q2R_plus, IH. ring. Qed.
-Lemma series p w v n : 0 < Q2R p -> forall a j, (Q2R p + 1 + INR j + Q2R w * v) * peval (powers_of p w a j n) v + v * slope_of (powers_of p w a j n) v
-  = (Q2R p + 1 + INR j) * Q2R a + Q2R w * Q2R (last_of p w a j n) * v ^ S n.
+(** how far such a polynomial is from a series *)
+Lemma misses_ok P W D v : 0 <= v <= 1 -> forall l j b,
+  Rabs ((IZR P + IZR D * IZR j) * zeval l v + IZR D * v * zslope l v + IZR W * zeval (b :: l) v) <= IZR (misses P W D j b l).
 Proof.
-  intros Hp. induction n as [|n IH]; intros a j; [cbn [powers_of peval slope_of last_of pow]; ring|].
-  cbn [powers_of last_of]. set (b := reduced (- (w * a) / (p + 1 + index (S j)))). specialize (IH b (S j)). cbn [peval slope_of].
-  set (P := peval (powers_of p w b (S j) n) v) in *. set (D := slope_of (powers_of p w b (S j) n) v) in *.
-  set (L := Q2R (last_of p w b (S j) n)) in *. pose proof (pos_INR j) as J.
-  assert (E : Q2R (p + 1 + index (S j)) = Q2R p + 1 + INR (S j)) by (rewrite !Q2R_plus, index_ok, Q2R_1; reflexivity).
-  assert (Eb : (Q2R p + 1 + INR (S j)) * Q2R b = - (Q2R w * Q2R a)).
-  { unfold b. rewrite reduced_ok, Q2R_div by (intros Z; apply Qeq_eqR in Z; rewrite E, Q2R_0, S_INR in Z; lra).
-    rewrite E, Q2R_opp, Q2R_mult. field. rewrite S_INR. lra. }
-  rewrite S_INR in *. rewrite <- (tech_pow_Rmult v (S n)).
-  assert (V : v * ((Q2R p + 1 + (INR j + 1) + Q2R w * v) * P + v * D) = v * (- (Q2R w * Q2R a) + Q2R w * L * v ^ S n)) by (rewrite IH, Eb; ring).
-  lra.
+  intros Hv. induction l as [|u l IH]; intros j b; cbn [misses]; [rewrite abs_IZR, mult_IZR; cbn [zeval zslope]; apply Req_le; f_equal; ring|].
+  specialize (IH (j + 1)%Z u). set (A := (IZR P + IZR D * IZR (j + 1)) * zeval l v + IZR D * v * zslope l v + IZR W * zeval (u :: l) v) in *.
+  rewrite plus_IZR, abs_IZR, plus_IZR, !mult_IZR, plus_IZR, mult_IZR.
+  replace ((IZR P + IZR D * IZR j) * zeval (u :: l) v + IZR D * v * zslope (u :: l) v + IZR W * zeval (b :: u :: l) v)
+    with (((IZR P + IZR D * IZR j) * IZR u + IZR W * IZR b) + v * A) by (unfold A; cbn [zeval zslope]; rewrite plus_IZR; ring).
+  eapply Rle_trans; [apply Rabs_triang|]. apply Rplus_le_compat_l. rewrite Rabs_mult, (Rabs_right v) by lra. pose proof (Rabs_pos A). nra.
+Qed.
+Lemma parts_of x : IZR (Qnum x) = IZR (Zpos (Qden x)) * Q2R x.
+Proof. unfold Q2R. field. apply not_0_IZR. discriminate. Qed.
+Theorem far_ok p w : 0 < Q2R p -> exists P dP : R -> R, (forall v, is_derive P v (dP v)) /\ Q2R (fst (far_q p w)) = P 1 /\
+  forall v, 0 <= v <= 1 -> Rabs ((Q2R p + 1 + Q2R w * v) * P v + v * dP v - 1) <= Q2R (snd (far_q p w)).
+Proof.
+  intros Hp. unfold far_q. cbv zeta. set (x := reduced (p + 1)). set (y := reduced w). set (K := Z.to_nat _).
+  set (P := (Qnum x * Zpos (Qden y))%Z). set (W := (Qnum y * Zpos (Qden x))%Z). set (D := (Zpos (Qden x) * Zpos (Qden y))%Z).
+  set (u := (2 ^ (256 + 2 * Z.of_nat K))%Z). set (b := (D * u)%Z). set (q := (P * u)%Z). set (l := powers_of _ _ _ _ _ _). cbn [fst snd].
+  assert (Ex : Q2R x = Q2R p + 1) by (unfold x; rewrite reduced_ok, Q2R_plus, Q2R_1; reflexivity).
+  assert (Ey : Q2R y = Q2R w) by apply reduced_ok.
+  assert (D0 : 0 < IZR D) by (apply IZR_lt; reflexivity). assert (U0 : 0 < IZR u) by (apply IZR_lt, Z.pow_pos_nonneg; lia).
+  assert (EP : IZR P = IZR D * (Q2R p + 1)) by (unfold P, D; rewrite !mult_IZR, parts_of, Ex; ring).
+  assert (EW : IZR W = IZR D * Q2R w) by (unfold W, D; rewrite !mult_IZR, parts_of, Ey; ring).
+  assert (P0 : 0 < IZR P) by (rewrite EP; apply Rmult_lt_0_compat; lra).
+  assert (Eq : IZR q = IZR P * IZR u) by (unfold q; apply mult_IZR). assert (Q0 : 0 < IZR q) by (rewrite Eq; apply Rmult_lt_0_compat; assumption).
+  assert (NP : forall z, (0 < z)%Z -> ~ (inject_Z z == 0)%Q) by (intros z Hz Z0; unfold Qeq in Z0; simpl in Z0; lia).
+  assert (Dz : (0 < D)%Z) by reflexivity. assert (Qz : (0 < q)%Z) by (apply lt_IZR; exact Q0).
+  pose proof (NP q Qz) as NQ. pose proof (NP (D * q)%Z ltac:(apply Z.mul_pos_pos; assumption)) as ND.
+  exists (fun v => zeval (b :: l) v / IZR q), (fun v => zslope (b :: l) v / IZR q). split; [|split].
+  - intros v. apply (is_derive_ext (fun v => / IZR q * zeval (b :: l) v)); [intros z; apply Rmult_comm|].
+    evar_last; [apply is_derive_scal; apply zeval_derive|]. unfold scal; simpl; unfold mult; simpl. unfold Rdiv. ring.
+  - rewrite Q2R_div, !Effort.Q2R_inject, zeval_1 by exact NQ. reflexivity.
+  - intros v Hv. rewrite Q2R_div, !Effort.Q2R_inject, mult_IZR by exact ND. pose proof (misses_ok P W D v Hv l 1%Z b) as M.
+    set (e := IZR (misses P W D 1 b l)) in *.
+    replace ((Q2R p + 1 + Q2R w * v) * (zeval (b :: l) v / IZR q) + v * (zslope (b :: l) v / IZR q) - 1)
+      with (/ (IZR D * IZR q) * (v * ((IZR P + IZR D * 1) * zeval l v + IZR D * v * zslope l v + IZR W * zeval (b :: l) v))).
+    + assert (I0 : 0 < / (IZR D * IZR q)) by (apply Rinv_0_lt_compat, Rmult_lt_0_compat; assumption).
+      rewrite Rabs_mult, (Rabs_right (/ _)), Rabs_mult, (Rabs_right v) by lra. unfold Rdiv. rewrite Rmult_comm. apply Rmult_le_compat_r; [lra|].
+      eapply Rle_trans; [|exact M]. set (A := Rabs _). pose proof (Rabs_pos ((IZR P + IZR D * 1) * zeval l v + IZR D * v * zslope l v + IZR W * zeval (b :: l) v)) as A0.
+      fold A in A0. nra.
+    + cbn [zeval zslope]. unfold b. rewrite EP, EW, Eq, EP, mult_IZR. field. repeat split; lra.
 Qed.
 
 Section Glide.
-Variables (a : agents) (p w : Q) (n : nat) (a2 f2 : R).
+Variables (a : agents) (p w a2 f2 e : R) (P dP : R -> R).
 Let c := graph a.
 Let T := deadline c.
 Hypothesis Hprot : check_protocol c = true.
 Hypothesis Hgain : positive_gain a.
 Hypothesis Hcap : cap a = None.
 Hypothesis Hf : 0 < f2.
-Hypothesis Hp : Q2R p = f2 * k c.
-Hypothesis Hw : Q2R w = (a2 + f2 * Q2R (slope a)) * T.
+Hypothesis Hp : p = f2 * k c.
+Hypothesis Hw : w = (a2 + f2 * Q2R (slope a)) * T.
+Hypothesis HP : forall v, is_derive P v (dP v).
+Let miss v := (p + 1 + w * v) * P v + v * dP v - 1.
+Hypothesis Hmiss : forall v, 0 <= v <= 1 -> Rabs (miss v) <= e.
 Definition fades t : R := exp (- (a2 * t + f2 * turns a t)).
 Definition glide t : R := RInt fades 0 t.
-Let P := powers_of p w (/ (p + 1)) 0 n.
-Let last := Rabs (Q2R w * Q2R (last_of p w (/ (p + 1)) 0 n)).
 Let T_k := T_k a Hprot.
 Lemma fades_derive t : t < T -> is_derive fades t (- (a2 + f2 * eta a t) * fades t).
 Proof.
@@ -105,6 +135,28 @@ Proof.
     apply Rle_trans with ((exp (Rabs a2 * T) * x) * (exp (Rabs a2 * T) * x) * (C * C)); [|right; ring].
     apply Rmult_le_compat_r; [apply Rle_0_sqr|exact S1].
 Qed.
+(** times the gain it never grows, if it fades fast enough *)
+Lemma fades_0 : fades 0 = 1.
+Proof. unfold fades. rewrite (turns_0 a), !Rmult_0_r, Rplus_0_r, Ropp_0. apply exp_0. Qed.
+Lemma fades_fast t : 1 <= f2 * k c -> 0 <= a2 + (f2 - / k c) * eta a 0 -> 0 <= t < T -> eta a t * fades t <= eta a 0.
+Proof.
+  intros H1 H2 Ht. destruct T_k as [A B]. fold c T in A, B. pose proof (eta_grows a Hprot) as Up. fold c T in Up.
+  set (g := fun u => eta a u * fades u). assert (G0 : g 0 = eta a 0) by (unfold g; rewrite fades_0; ring). rewrite <- G0.
+  apply (FamilyFlow.falls g 0 T (fun _ => corner a)); [| |exact Ht]; clear t Ht; intros t Ht.
+  - apply (continuous_mult (eta a) fades); [apply eta_continuous; apply Ht|apply fades_continuous; apply Ht].
+  - intros Hc. destruct (eta_derive a Hprot Hgain t (proj2 Ht) (Hc O)) as [d [Dd [d0 dk]]]. fold c in dk.
+    exists (d * fades t + eta a t * (- (a2 + f2 * eta a t) * fades t)). split.
+    + apply (is_derive_mult (eta a) fades); [exact Dd|apply fades_derive; apply Ht|intros; apply Rmult_comm].
+    + pose proof (eta_pos a Hprot Hgain t (proj2 Ht)) as E0. specialize (Up 0 t ltac:(lra)). pose proof (exp_pos (- (a2 * t + f2 * turns a t))) as F0.
+      fold (fades t) in F0. set (g0 := eta a t) in *. assert (K : d <= / k c * (g0 * g0)).
+      { apply (Rmult_le_reg_l (k c)); [exact B|]. rewrite <- Rmult_assoc, Rinv_r, Rmult_1_l by lra. exact dk. }
+      assert (P0 : 0 <= f2 - / k c).
+      { apply (Rmult_le_reg_l (k c)); [exact B|]. rewrite Rmult_minus_distr_l, Rinv_r by lra. lra. }
+      assert (Q0 : (f2 - / k c) * eta a 0 <= (f2 - / k c) * g0) by (apply Rmult_le_compat_l; assumption).
+      assert (R0 : 0 <= g0 * (a2 + (f2 - / k c) * g0)) by (apply Rmult_le_pos; lra).
+      replace (d * fades t + g0 * (- (a2 + f2 * g0) * fades t)) with (fades t * ((d - / k c * (g0 * g0)) - g0 * (a2 + (f2 - / k c) * g0))) by ring.
+      assert (0 <= fades t * (g0 * (a2 + (f2 - / k c) * g0) - (d - / k c * (g0 * g0)))) by (apply Rmult_le_pos; lra). lra.
+Qed.
 Lemma glide_derive t : t < T -> is_derive glide t (fades t).
 Proof.
   intros Ht. apply (is_derive_RInt fades glide 0 t); [|apply fades_continuous; exact Ht].
@@ -117,47 +169,44 @@ Lemma glide_0 : glide 0 = 0.
 Proof. apply (RInt_point 0 fades). Qed.
 Lemma glide_continuous t : t < T -> continuous glide t.
 Proof. intros Ht. apply @ex_derive_continuous. eexists. apply glide_derive. exact Ht. Qed.
-Let rest t := fades t * ((T - t) * peval P ((T - t) / T)).
-Lemma rest_derive t : t < T -> is_derive rest t (- fades t * (1 + Q2R w * Q2R (last_of p w (/ (p + 1)) 0 n) * ((T - t) / T) ^ S n)).
+Let share t : 0 <= t < T -> 0 <= (T - t) / T <= 1.
 Proof.
-  intros Ht. destruct T_k as [A B]. fold c T in A, B.
-  assert (Pp : 0 < Q2R p) by (rewrite Hp; apply Rmult_lt_0_compat; assumption).
-  pose proof (series p w ((T - t) / T) n Pp (/ (p + 1))%Q 0) as S. fold P in S. set (v := (T - t) / T) in *.
-  assert (E1 : Q2R (/ (p + 1)) * (Q2R p + 1) = 1).
-  { assert (E : Q2R (p + 1) = Q2R p + 1) by (rewrite Q2R_plus, Q2R_1; reflexivity).
-    rewrite Q2R_inv by (intros Z; apply Qeq_eqR in Z; rewrite E, Q2R_0 in Z; lra). rewrite E. field. lra. }
-  simpl INR in S. rewrite Rplus_0_r, (Rmult_comm (Q2R p + 1) (Q2R (/ (p + 1)))), E1 in S.
-  assert (DP : is_derive (fun t => peval P ((T - t) / T)) t (- / T * slope_of P v)).
-  { apply (is_derive_comp (peval P) (fun t => (T - t) / T)); [apply peval_derive|]. auto_derive; [exact I|field; lra]. }
+  intros Ht. pose proof (proj1 T_k) as A. fold c T in A. split; [left; apply Rdiv_lt_0_compat; lra|]. apply (Rmult_le_reg_r T); [exact A|].
+  unfold Rdiv. rewrite Rmult_assoc, Rinv_l by lra. lra.
+Qed.
+Let rest t := fades t * ((T - t) * P ((T - t) / T)).
+Lemma rest_derive t : t < T -> is_derive rest t (- fades t * (1 + miss ((T - t) / T))).
+Proof.
+  intros Ht. destruct T_k as [A B]. fold c T in A, B. set (v := (T - t) / T) in *.
+  assert (DP : is_derive (fun t => P ((T - t) / T)) t (- / T * dP v)).
+  { apply (is_derive_comp P (fun t => (T - t) / T)); [apply HP|]. auto_derive; [exact I|field; lra]. }
   evar_last.
-  - apply (is_derive_mult fades (fun t => (T - t) * peval P ((T - t) / T))); [apply fades_derive; exact Ht| |intros; apply Rmult_comm].
-    apply (is_derive_mult (fun t => T - t) (fun t => peval P ((T - t) / T)) t (-1) (- / T * slope_of P v)); [auto_derive; [exact I|ring]|exact DP|intros; apply Rmult_comm].
-  - fold v. rewrite <- S. unfold mult, plus; simpl. unfold eta. rewrite Hcap. unfold gain. fold c T. rewrite Hp, Hw.
+  - apply (is_derive_mult fades (fun t => (T - t) * P ((T - t) / T))); [apply fades_derive; exact Ht| |intros; apply Rmult_comm].
+    apply (is_derive_mult (fun t => T - t) (fun t => P ((T - t) / T)) t (-1) (- / T * dP v)); [auto_derive; [exact I|ring]|exact DP|intros; apply Rmult_comm].
+  - fold v. unfold mult, plus; simpl. unfold eta, miss. rewrite Hcap. unfold gain. fold c T. rewrite Hp, Hw.
     assert (Ev : T - t = v * T) by (unfold v; field; lra). rewrite Ev. assert (v <> 0) by (intros Z; rewrite Z in Ev; lra). field. split; lra.
 Qed.
 Lemma rest_vanishes : filterlim rest (at_left T) (locally 0).
 Proof.
   destruct T_k as [A B]. fold c T in A, B.
-  assert (C : exists C, forall t, 0 <= t < T -> Rabs (peval P ((T - t) / T)) <= C).
-  { generalize P as l. induction l as [|q l [C IH]]; [exists 0; intros; simpl; rewrite Rabs_R0; lra|].
-    exists (Rabs (Q2R q) + C). intros t Ht. cbn [peval]. eapply Rle_trans; [apply Rabs_triang|]. apply Rplus_le_compat_l. rewrite Rabs_mult.
-    specialize (IH t Ht). rewrite <- (Rmult_1_l C). apply Rmult_le_compat; try apply Rabs_pos; [|exact IH].
-    assert (0 < (T - t) / T) by (apply Rdiv_lt_0_compat; lra). rewrite Rabs_right by lra. apply (Rmult_le_reg_r T); [exact A|].
-    unfold Rdiv. rewrite Rmult_assoc, Rinv_l by lra. lra. }
-  destruct C as [C HC]. apply (filterlim_locally (F := at_left T)). intros e.
-  pose proof (proj1 (filterlim_locally (F := at_left T) _ 0) (fades_vanish (T * C)) e) as K.
-  assert (N : at_left T (fun t => 0 <= t < T)).
-  { exists (mkposreal _ A). intros t Bt Lt. unfold ball in Bt; simpl in Bt; unfold AbsRing_ball, abs, minus, plus, opp in Bt; simpl in Bt.
-    apply Rabs_def2 in Bt. lra. }
-  generalize (filter_and (F := at_left T) _ _ K N). apply (filter_imp (F := at_left T)). intros t [Bt Ht].
-  unfold ball in *; simpl in *; unfold AbsRing_ball, abs, minus, plus, opp in *; simpl in *. rewrite Ropp_0, Rplus_0_r in *.
-  eapply Rle_lt_trans; [|exact Bt]. unfold rest. rewrite !Rabs_mult. pose proof (Rabs_pos (fades t)). specialize (HC t Ht).
-  apply Rmult_le_compat_l; [assumption|]. apply Rmult_le_compat; try apply Rabs_pos.
-  - rewrite !Rabs_right; lra.
-  - eapply Rle_trans; [exact HC|apply Rle_abs].
+  replace 0 with (0 * P 0) by ring. apply (filterlim_ext (fun t => (fades t * (T - t)) * P ((T - t) / T))); [intros; unfold rest; ring|].
+  apply (filterlim_comp_2 (F := at_left T) (G := locally 0) (H := locally (P 0)) (fun t => fades t * (T - t)) (fun t => P ((T - t) / T)) Rmult);
+    [| |apply (filterlim_mult 0 (P 0))].
+  - apply (filterlim_locally (F := at_left T)). intros d. pose proof (proj1 (filterlim_locally (F := at_left T) _ 0) (fades_vanish T) d) as K.
+    assert (N : at_left T (fun t => 0 <= t < T)).
+    { exists (mkposreal _ A). intros t Bt Lt. unfold ball in Bt; simpl in Bt; unfold AbsRing_ball, abs, minus, plus, opp in Bt; simpl in Bt.
+      apply Rabs_def2 in Bt. lra. }
+    generalize (filter_and (F := at_left T) _ _ K N). apply (filter_imp (F := at_left T)). intros t [Bt Ht].
+    unfold ball in *; simpl in *; unfold AbsRing_ball, abs, minus, plus, opp in *; simpl in *. rewrite Ropp_0, Rplus_0_r in *.
+    eapply Rle_lt_trans; [|exact Bt]. rewrite !Rabs_mult. apply Rmult_le_compat_l; [apply Rabs_pos|]. rewrite !Rabs_right; lra.
+  - assert (C : continuous (fun t => P ((T - t) / T)) T).
+    { apply (continuous_comp (fun t => (T - t) / T) P); [|apply @ex_derive_continuous; eexists; apply HP].
+      apply @ex_derive_continuous. auto_derive. exact I. }
+    replace (P 0) with (P ((T - T) / T)) by (f_equal; field; lra). eapply filterlim_filter_le_1; [|exact C].
+    intros Q [d Hd]. exists d. intros u Hu _. apply Hd. exact Hu.
 Qed.
 (** the distance is [T P(1)], but for what the series leaves *)
-Theorem glides : exists m, filterlim glide (at_left T) (locally m) /\ 0 <= m /\ Rabs (m - T * peval P 1) <= last * m.
+Theorem glides : exists m, filterlim glide (at_left T) (locally m) /\ 0 <= m /\ Rabs (m - T * P 1) <= e * m.
 Proof.
   destruct T_k as [A B]. fold c T in A, B.
   assert (F0 : forall t, 0 < fades t) by (intros; apply exp_pos).
@@ -175,12 +224,12 @@ Proof.
       - pose proof (fades_at_most s ltac:(lra)). lra. }
     rewrite glide_0 in D. assert (exp (Rabs a2 * T) * t <= exp (Rabs a2 * T) * T) by (apply Rmult_le_compat_l; [left; apply exp_pos|lra]). lra.
   - exists m. split; [exact L|]. split; [rewrite <- glide_0; apply U; lra|].
-    assert (R0 : rest 0 = T * peval P 1).
+    assert (R0 : rest 0 = T * P 1).
     { unfold rest, fades. rewrite (turns_0 a), !Rmult_0_r, Rplus_0_r, Ropp_0, exp_0, Rminus_0_r. unfold Rdiv. rewrite Rinv_r by lra. ring. }
-    rewrite <- R0. assert (K : forall s, s = 1 \/ s = -1 -> s * (m - rest 0) <= last * m).
-    { intros s Hs. set (f := fun t => s * (glide t + rest t - rest 0)). set (g := fun t => last * glide t).
+    rewrite <- R0. assert (K : forall s, s = 1 \/ s = -1 -> s * (m - rest 0) <= e * m).
+    { intros s Hs. set (f := fun t => s * (glide t + rest t - rest 0)). set (g := fun t => e * glide t).
       assert (I : forall t, 0 <= t < T -> f t - g t <= f 0 - g 0).
-      { apply (decreasing T 0 (fun t => f t - g t) (fun t => s * (fades t + - fades t * (1 + Q2R w * Q2R (last_of p w (/ (p + 1)) 0 n) * ((T - t) / T) ^ S n) - 0) - last * fades t));
+      { apply (decreasing T 0 (fun t => f t - g t) (fun t => s * (fades t + - fades t * (1 + miss ((T - t) / T)) - 0) - e * fades t));
           intros t Ht.
         - apply (is_derive_minus f g); [apply is_derive_scal|apply is_derive_scal; apply glide_derive; lra].
           apply (is_derive_minus (fun t => glide t + rest t) (fun _ => rest 0)); [|apply @is_derive_const].
@@ -188,16 +237,9 @@ Proof.
         - apply (continuous_minus f g).
           + apply (continuous_mult (fun _ => s)); [apply continuous_const|]. apply (continuous_minus (fun t => glide t + rest t) (fun _ => rest 0)); [|apply continuous_const].
             apply (continuous_plus glide rest); [apply glide_continuous; lra|]. apply @ex_derive_continuous. eexists. apply rest_derive. lra.
-          + apply (continuous_mult (fun _ => last)); [apply continuous_const|apply glide_continuous; lra].
-        - set (q := Q2R w * Q2R (last_of p w (/ (p + 1)) 0 n)) in *. set (v := ((T - t) / T) ^ S n).
-          assert (V : 0 <= v <= 1).
-          { assert (V0 : 0 <= (T - t) / T <= 1).
-            { split; [left; apply Rdiv_lt_0_compat; lra|]. apply (Rmult_le_reg_r T); [exact A|]. unfold Rdiv. rewrite Rmult_assoc, Rinv_l by lra. lra. }
-            split; [apply pow_le; lra|]. rewrite <- (pow1 (S n)). apply pow_incr. lra. }
-          specialize (F0 t). assert (Q : Rabs (s * (q * v)) <= last).
-          { rewrite !Rabs_mult. fold last. change (Rabs q) with last. pose proof (Rabs_pos q) as Q0. change (Rabs q) with last in Q0.
-            assert (S1 : Rabs s = 1) by (destruct Hs as [-> | ->]; unfold Rabs; destruct Rcase_abs; lra). rewrite S1, (Rabs_right v) by lra. nra. }
-          pose proof (Rle_abs (- (s * (q * v)))) as Q1. rewrite Rabs_Ropp in Q1. nra. }
+          + apply (continuous_mult (fun _ => e)); [apply continuous_const|apply glide_continuous; lra].
+        - specialize (F0 t). pose proof (Hmiss _ (share t Ht)) as M. set (v := miss ((T - t) / T)) in *.
+          pose proof (Rle_abs (- v)) as Q1. rewrite Rabs_Ropp in Q1. pose proof (Rle_abs v) as Q2. destruct Hs as [-> | ->]; nra. }
       assert (I0 : f 0 - g 0 = 0) by (unfold f, g; rewrite glide_0; ring). rewrite I0 in I.
       assert (N : at_left T (fun t => f t <= g t)).
       { exists (mkposreal _ A). intros t Bt Lt. unfold ball in Bt; simpl in Bt; unfold AbsRing_ball, abs, minus, plus, opp in Bt; simpl in Bt.
@@ -209,10 +251,10 @@ Proof.
             [|apply filterlim_const|apply (filterlim_plus (m + 0) (- rest 0))].
           apply (filterlim_comp_2 (F := at_left T) (G := locally m) (H := locally 0) glide rest Rplus L rest_vanishes). apply (filterlim_plus m 0).
         - replace (s * (m - rest 0)) with (s * (m + 0 - rest 0)) by ring. reflexivity. }
-      assert (Lg : filterlim g (at_left T) (locally (last * m))).
-      { apply (filterlim_comp _ _ _ glide (fun y => last * y) (at_left T) (locally m)); [exact L|].
-        apply (continuous_mult (fun _ => last) (fun y => y)); [apply continuous_const|apply continuous_id]. }
-      exact (filterlim_le (F := at_left T) f g (s * (m - rest 0)) (last * m) N Lf Lg). }
+      assert (Lg : filterlim g (at_left T) (locally (e * m))).
+      { apply (filterlim_comp _ _ _ glide (fun y => e * y) (at_left T) (locally m)); [exact L|].
+        apply (continuous_mult (fun _ => e) (fun y => y)); [apply continuous_const|apply continuous_id]. }
+      exact (filterlim_le (F := at_left T) f g (s * (m - rest 0)) (e * m) N Lf Lg). }
     pose proof (K 1 ltac:(left; reflexivity)). pose proof (K (-1) ltac:(right; reflexivity)). apply Rabs_le. lra.
 Qed.
 End Glide.

@@ -2,7 +2,7 @@
 Require Import ZArith QArith Qabs Qreals List Bool Reals Lra Lia Psatz FunctionalExtensionality.
 From Coquelicot Require Import Coquelicot.
 Import ListNotations.
-Require Import Vec Definite Graph Flow Certificate Checker Sound Input Slide Main Mean Peak Weighted Large AgentCertificate AgentForms AgentCheck AgentFall AgentMotion AgentExist AgentEnd AgentRest.
+Require Import Vec Definite Graph Flow Certificate Checker Sound Input Slide Main Mean Peak Weighted Large AgentCertificate AgentForms AgentCheck AgentFall AgentMotion AgentExist AgentEnd AgentRest AgentDrag.
 Open Scope R_scope.
 
 (** * Rationals and polynomials of the check *)
@@ -371,11 +371,68 @@ Proof.
     rewrite <- (sum_from i n (fun u v => T ^ u / INR (fact u) * end_state c (placed off (X 0) v) j)) by (unfold n in *; lia).
     apply sum_ext. intros l Hl. unfold chain_drift. fold T. destruct (i <=? l)%nat; ring. }
   rewrite EO. apply (common_ends off X i j (wj T) wj).
-  - intros t Ht. pose proof (drifts a off X Sl Hedges Hend Hprot M5 HX (fun l => zeros _ l Z1) (fun l => zeros _ l Z2) j (n - i) i
+  - intros t Ht. pose proof (drifts a off X Sl Hedges Hend Hprot M5 HX (fun l => zeros _ l Z2) (fun l => zeros _ l Z1) j (n - i) i
       ltac:(unfold n in *; lia) ltac:(unfold n in *; lia) t Ht) as K. cbv beta zeta in K. rewrite (Rmax_right 0 t) in K by lra. exact K.
   - eapply filterlim_filter_le_1; [|apply (@ex_derive_continuous _ _ wj T)].
     + intros P [e He]. exists e. intros u Hu _. apply He. exact Hu.
     + destruct (n - i)%nat as [|u] eqn:Eu; [unfold n in *; lia|]. unfold wj. eexists. apply taylor_derive.
+Qed.
+(** agents that move by themselves *)
+Definition solves (X : R -> nat -> R) (l : nat) : Prop := (forall i, X 0 i = unit_at l i) /\
+  (forall t i, 0 <= t <= deadline c -> continuous (fun u => X u i) t) /\
+  forall t i, 0 < t <= deadline c -> is_derive (fun u => X u i) t (own n (at_ (plant a)) (X t) i).
+Lemma solutions : exists X, forall l, (l < n)%nat -> solves (X l) l.
+Proof.
+  destruct (T_k a Hprot) as [T0 _]. fold c in T0.
+  assert (One : forall l, exists x, solves x l).
+  { intros l. destruct (runs n (at_ (plant a)) (2 * deadline c) l ltac:(lra)) as [x [X0 [CX DX]]]. exists (fun t => x (Rmax 0 t)). split; [|split].
+    - intros i. rewrite Rmax_left by lra. apply X0.
+    - intros t i Ht. apply CX. lra.
+    - intros t i Ht. rewrite Rmax_right by lra. apply (is_derive_ext_loc (fun u => x u i)); [|apply DX; lra].
+      assert (He : 0 < t) by lra. exists (mkposreal _ He). intros u Hu. unfold ball in Hu; simpl in Hu; unfold AbsRing_ball, abs, minus, plus, opp in Hu; simpl in Hu.
+      apply Rabs_def2 in Hu. rewrite Rmax_right by lra. reflexivity. }
+  apply (Rest.finite_choice (fun _ _ => 0) n (fun l X => solves X l)). intros l _. apply One.
+Qed.
+Lemma drag_ends X off Z Sl i j : (forall l, (l < n)%nat -> solves (X l) l) -> forallb (Qeq_bool 0) (damping a) = true -> flies a off Z Sl -> (i < n)%nat -> (j < order c)%nat ->
+  filterlim (fun t => Z t i j - away a off (Z t) i j) (at_left (deadline c)) (locally (outcome a (fun i l => X l (deadline c) i) off (Z 0) i j)).
+Proof.
+  intros HX HD HZ Hi Hj. destruct matrices as [_ [_ [_ [_ [M5 _]]]]]. destruct (T_k a Hprot) as [T0 _]. fold c in T0.
+  set (w := fun t i => end_state c (placed off (Z (Rmax 0 t)) i) j). set (f := fun t => sum n (fun l => w 0 l * X l t i)).
+  assert (EO : outcome a (fun i l => X l (deadline c) i) off (Z 0) i j = (if (i =? 0)%nat then off j else 0) + f (deadline c)).
+  { unfold outcome, f. f_equal. fold n. apply sum_ext. intros l _. unfold w. rewrite Rmax_left by lra. fold c. ring. }
+  rewrite EO. apply (common_ends off Z i j _ f).
+  - intros t Ht. pose proof (combined n (at_ (plant a)) M5 (deadline c) X w) as K. unfold f. rewrite <- K; [unfold w; rewrite Rmax_right by lra; reflexivity| | | |exact Ht|exact Hi].
+    + intros l Hl. destruct (HX l Hl) as [K0 [K1 K2]]. split; [exact K0|]. split; [intros; apply K1; lra|intros; apply K2; lra].
+    + intros u v Hu Hv. exact (w_derive a off Z Sl Hedges Hend Hprot M5 HZ (fun l => zeros _ l HD) j v u Hu Hv).
+    + intros u v Hu Hv. exact (w_continuous a off Z Sl Hend M5 HZ j v u Hu Hv).
+  - eapply filterlim_filter_le_1; [|apply (continuous_sum n (fun t l => w 0 l * X l t i) (deadline c))].
+    + intros P [e He]. exists e. intros u Hu _. apply He. exact Hu.
+    + intros l Hl. apply (continuous_mult (fun _ => w 0 l)); [apply continuous_const|]. apply (HX l Hl). lra.
+Qed.
+Lemma drag_inside M X : check_drag a M = true -> (forall l, (l < n)%nat -> solves (X l) l) -> forall i l, (i < n)%nat -> (l < n)%nat ->
+  Rabs (Q2R (fst (entry_of M i l)) - X l (deadline c) i) <= Q2R (snd (entry_of M i l)).
+Proof.
+  intros HM HX i l Hi Hl. unfold check_drag in HM. cbv zeta in HM. fold n c in HM. set (T := span c) in *.
+  set (g0 := map (fun l => - (T * nth l (plant a) 0))%Q (seq 0 n)) in *. set (D := common (T :: g0)) in *. set (y := (_ + (1 # 2))%Q) in *.
+  set (K := Z.to_nat _) in *. set (p := (2 ^ (256 + 2 * Z.of_nat K))%Z) in *. apply andb_prop in HM as [H H4]. apply andb_prop in H as [H H3].
+  apply andb_prop in H as [H1 H2]. rewrite forallb_forall in H4. specialize (H4 l ltac:(apply in_seq; lia)).
+  set (u := map _ _) in H4. set (us := vectors _ _ _ _ _ _ _) in *.
+  rewrite forallb_forall in H4. specialize (H4 i ltac:(apply in_seq; lia)). destruct (good_ok _ _ H1) as [D0 _].
+  assert (ET : Q2R T = deadline c) by apply span_ok. destruct (T_k a Hprot) as [T0 _]. fold c in T0. destruct matrices as [_ [_ [_ [_ [M5 _]]]]].
+  assert (Hp : (0 < p)%Z) by (apply Z.pow_pos_nonneg; lia).
+  assert (Hb : IZR (scaled D T) = IZR D * deadline c).
+  { rewrite <- ET. apply (scaled_ok D T D0). apply (good_ok _ _ H1). left. reflexivity. }
+  assert (Hg : forall v, (v < n)%nat -> IZR (nth v (map (scaled D) g0) 0%Z) = - (IZR D * (deadline c * at_ (plant a) v))).
+  { intros v Hv. rewrite nth_scaled by (apply andb_prop in H1 as [G1 G2]; simpl in G2; apply andb_prop in G2 as [_ G2]; apply andb_true_intro; split; assumption).
+    unfold g0. rewrite nth_map_seq by exact Hv. rewrite Q2R_opp, Q2R_mult, ET. unfold at_. ring. }
+  assert (HK : deadline c * pull_size n (at_ (plant a)) + / 2 <= INR K).
+  { apply Qle_bool_iff, Qle_Rle in H3. rewrite index_ok in H3. eapply Rle_trans; [|exact H3]. unfold y. rewrite Q2R_plus, Q2R_mult, Q2R_plus, ET, Q2R_1, qsum_ok.
+    assert (E2 : Q2R (1 # 2) = / 2) by (unfold Q2R; simpl; lra). rewrite E2. unfold pull_size.
+    rewrite (sum_ext n (fun v => Q2R (Qabs _)) (fun v => Rabs (at_ (plant a) v))) by (intros; apply abs_ok). lra. }
+  assert (NP : forall z, (0 < z)%Z -> ~ (inject_Z z == 0)%Q) by (intros z Hz Z0; unfold Qeq in Z0; simpl in Z0; lia).
+  apply (near_ok _ _ _ _ H4). rewrite !Q2R_div, !Effort.Q2R_inject by (apply NP; try apply Z.mul_pos_pos; assumption). rewrite poly_1.
+  destruct (HX l Hl) as [K0 [K1 K2]].
+  apply (encloses n (at_ (plant a)) M5 (scaled D T) D (map (scaled D) g0) (deadline c) D0 T0 Hb Hg p l us K (X l) Hp HK K0 K1 ltac:(intros; apply K2; lra) i Hi).
 Qed.
 Definition rest_drift (m : R) (i l : nat) : R := match i, l with O, O => 1 | O, 1%nat => m | _, _ => 0 end.
 Theorem agreement_ok : agreement a.
@@ -387,9 +444,13 @@ Proof.
     + intros M' i l E Hi Hl. rewrite EM in E. injection E as <-. pose proof (square_ok _ _ HC i l Hi Hl) as K. cbv beta in K.
       apply (near_at _ _ _ K). unfold chain_drift. destruct (i <=? l)%nat; [|apply Q2R_0]. rewrite part_ok. fold c. rewrite span_ok. reflexivity.
     + intros off X Sl i j HX Hi Hj tends. split; [apply (agrees off X Sl); assumption|]. intros _. apply (chains_end off X Sl); assumption.
-  - unfold check_rest in HC. cbv zeta in HC.
+  - destruct (forallb (Qeq_bool 0) (damping a)) eqn:ZD.
+  { destruct solutions as [X HX]. exists (fun i l => X l (deadline c) i). split.
+    - intros M' i l E Hi Hl. rewrite EM in E. injection E as <-. apply (drag_inside M X HC HX i l Hi Hl).
+    - intros off Z' Sl i j HZ Hi Hj tends. split; [apply (agrees off Z' Sl); assumption|]. intros _. apply (drag_ends X off Z' Sl); assumption. }
+  unfold check_rest in HC. cbv zeta in HC.
     set (p := (nth 1 (damping a) 0 * pull_in a)%Q) in *. set (w := ((nth 1 (plant a) 0 + nth 1 (damping a) 0 * slope a) * span (graph a))%Q) in *.
-    set (b := (/ (p + 1))%Q) in *. set (S := total_of _) in *. set (e := Qabs _) in *.
+    set (x := fst (far_q p w)) in *. set (e := snd (far_q p w)) in *.
     apply andb_prop in HC as [H N4]. apply andb_prop in H as [H N3]. apply andb_prop in H as [H N2]. apply andb_prop in H as [H N1].
     apply andb_prop in H as [H C6]. apply andb_prop in H as [H C5]. apply andb_prop in H as [H C4]. apply andb_prop in H as [H C3]. apply andb_prop in H as [C1 C2].
     apply Nat.eqb_eq in C1. assert (EC : cap a = None) by (destruct (cap a); [discriminate|reflexivity]).
@@ -397,20 +458,21 @@ Proof.
     destruct matrices as [_ [_ [_ [M4 _]]]].
     assert (Ep : Q2R p = at_ (damping a) 1 * k c) by (unfold p; rewrite Q2R_mult, pull_ok; reflexivity).
     assert (Ew : Q2R w = (at_ (plant a) 1 + at_ (damping a) 1 * Q2R (slope a)) * deadline c) by (unfold w; rewrite !Q2R_mult, Q2R_plus, Q2R_mult; fold c; rewrite span_ok; reflexivity).
-    destruct (glides a p w terms (at_ (plant a) 1) (at_ (damping a) 1) Hprot M4 EC C5 Ep Ew) as [m [L [m0 B]]]. fold c in L, B.
+    assert (P0 : 0 < Q2R p) by (rewrite Ep; apply Rmult_lt_0_compat; [exact C5|apply (T_k a Hprot)]).
+    destruct (far_ok p w P0) as [Po [dP [DP [Ex He]]]]. fold x in Ex. fold e in He.
+    destruct (glides a (Q2R p) (Q2R w) (at_ (plant a) 1) (at_ (damping a) 1) (Q2R e) Po dP Hprot M4 EC C5 Ep Ew DP He) as [m [L [m0 B]]]. fold c in L, B.
+    rewrite <- Ex in B.
     exists (rest_drift m). split.
     + intros M' i l E Hi Hl. rewrite EM in E. injection E as <-. rewrite C1 in Hi, Hl.
       destruct i as [|[|i]]; [| |lia]; (destruct l as [|[|l]]; [| |lia]); cbn [rest_drift].
       * apply (near_at _ _ _ N1). apply Q2R_1.
-      * apply (near_ok _ _ _ _ N2). rewrite Q2R_mult. fold c. rewrite span_ok. fold (terms). unfold S. rewrite total_ok. fold b in B.
-        set (x := deadline c * peval (powers_of p w b 0 terms) 1) in *.
-        assert (E1 : Q2R e = Rabs (Q2R w * Q2R (last_of p w b 0 terms))) by (unfold e; rewrite abs_ok, Q2R_mult; reflexivity). rewrite <- E1 in B.
-        assert (E2 : Q2R e < 1) by (destruct (Qlt_le_dec e 1) as [Q|Q]; [apply Qlt_Rlt in Q; rewrite Q2R_1 in Q; exact Q|apply Qle_bool_iff in Q; congruence]).
-        assert (E3 : 0 <= Q2R e) by (rewrite E1; apply Rabs_pos).
+      * apply (near_ok _ _ _ _ N2). assert (E2 : Q2R e < 1) by (destruct (Qlt_le_dec e 1) as [Q|Q]; [apply Qlt_Rlt in Q; rewrite Q2R_1 in Q; exact Q|apply Qle_bool_iff in Q; congruence]).
+        assert (E3 : 0 <= Q2R e) by (eapply Rle_trans; [apply Rabs_pos|apply (He 0); lra]).
         assert (ED : Q2R (1 - e) = 1 - Q2R e) by (rewrite Q2R_minus, Q2R_1; reflexivity).
-        rewrite Q2R_mult, Q2R_div, ED by (intros Q; apply Qeq_eqR in Q; rewrite ED, Q2R_0 in Q; lra). rewrite abs_ok, Q2R_mult. fold c. rewrite span_ok, total_ok. fold x.
-        rewrite Rabs_minus_sym. eapply Rle_trans; [exact B|]. pose proof (Rle_abs x) as X1. pose proof (Rle_abs (m - x)) as X2.
-        assert (X3 : m * (1 - Q2R e) <= Rabs x) by lra. unfold Rdiv. rewrite Rmult_assoc. apply Rmult_le_compat_l; [exact E3|].
+        rewrite !Q2R_mult, Q2R_div, ED by (intros Q; apply Qeq_eqR in Q; rewrite ED, Q2R_0 in Q; lra). rewrite abs_ok, Q2R_mult. fold c. rewrite span_ok.
+        set (z := deadline c * Q2R x) in *.
+        rewrite Rabs_minus_sym. eapply Rle_trans; [exact B|]. pose proof (Rle_abs z) as X1. pose proof (Rle_abs (m - z)) as X2.
+        assert (X3 : m * (1 - Q2R e) <= Rabs z) by lra. unfold Rdiv. rewrite Rmult_assoc. apply Rmult_le_compat_l; [exact E3|].
         apply (Rmult_le_reg_r (1 - Q2R e)); [lra|]. rewrite (Rmult_comm (/ _)), Rmult_assoc, Rinv_l by lra. lra.
       * apply (near_at _ _ _ N3). apply Q2R_0.
       * apply (near_at _ _ _ N4). apply Q2R_0.
@@ -652,6 +714,23 @@ Proof.
       assert (p i * r i <= p i * R) by (apply Rmult_le_compat_l; assumption). lra.
   - rewrite sum_plus, sum_scal. fold T. lra.
 Qed.
+Lemma sizes_plus m (u v : nat -> R) p q : sum m (fun i => sq (u i)) <= p * p -> sum m (fun i => sq (v i)) <= q * q -> 0 <= p -> 0 <= q ->
+  sum m (fun i => sq (u i + v i)) <= (p + q) * (p + q).
+Proof.
+  intros Hp Hq p0 q0. set (F := fun x z : nat -> R => sum m (fun i => x i * z i)).
+  assert (PF : positive F).
+  { constructor; intros; unfold F.
+    - apply sum_ext. intros. ring.
+    - rewrite <- sum_plus. apply sum_ext. intros. ring.
+    - rewrite <- sum_scal. apply sum_ext. intros. ring.
+    - rewrite <- (sum_zero m (fun _ => 0)) by reflexivity. apply sum_le. intros. apply Rle_0_sqr. }
+  pose proof (cauchy F PF u v) as C. change (sum m (fun i => sq (u i))) with (F u u) in Hp. change (sum m (fun i => sq (v i))) with (F v v) in Hq.
+  assert (D : F u v <= p * q).
+  { apply Rsqr_incr_0_var; [|apply Rmult_le_pos; assumption]. unfold Rsqr. eapply Rle_trans; [exact C|].
+    replace (p * q * (p * q)) with (p * p * (q * q)) by ring. apply Rmult_le_compat; [apply (above0 F PF)|apply (above0 F PF)|assumption|assumption]. }
+  rewrite (sum_ext m _ (fun i => u i * u i + (2 * (u i * v i) + v i * v i))) by (intros; unfold sq; ring). rewrite !sum_plus, sum_scal.
+  change (F u u + (2 * F u v + F v v) <= (p + q) * (p + q)). lra.
+Qed.
 Lemma pace_ok g t : pace a = Some g -> 0 <= t < deadline c -> exp (- (Q2R (falls a) * turns a t)) * eta a t ^ (2 * n) <= Q2R g ^ (2 * n).
 Proof.
   intros Hg Ht. destruct matrices as [_ [_ [M3 [M4 _]]]]. unfold pace in Hg. destruct (Qle_bool _ _) eqn:E.
@@ -659,38 +738,142 @@ Proof.
     rewrite index_2, Q2R_mult, pull_ok in E. rewrite mult_INR. exact E.
   - apply (capped a Hprot M4 g (2 * n) _ Hg); [lra|exact Ht].
 Qed.
+Lemma near_root_ok q : 0 <= Q2R q -> 0 <= Q2R (near_root q) /\ Q2R q <= Q2R (near_root q) * Q2R (near_root q).
+Proof.
+  intros H. unfold near_root. cbv zeta. set (s := inject_Z _).
+  assert (S0 : 0 < Q2R s).
+  { unfold s, Q2R. simpl. rewrite Rinv_1, Rmult_1_r. apply IZR_lt. apply Z.pow_pos_nonneg; [reflexivity|apply Z.log2_nonneg]. }
+  destruct (Moving.root_ok (q * (s * s))) as [A B]; [rewrite !Q2R_mult; apply Rmult_le_pos; [exact H|apply Rmult_le_pos; lra]|].
+  rewrite Q2R_div by (intros Z; apply Qeq_eqR in Z; rewrite Q2R_0 in Z; lra). set (r := Q2R (root _)) in *. split.
+  - apply Rmult_le_pos; [exact A|left; apply Rinv_0_lt_compat; exact S0].
+  - unfold sq in B. rewrite !Q2R_mult in B. apply (Rmult_le_reg_r (Q2R s * Q2R s)); [apply Rmult_lt_0_compat; exact S0|].
+    replace (r / Q2R s * (r / Q2R s) * (Q2R s * Q2R s)) with (r * r) by (field; lra). exact B.
+Qed.
+Lemma deviating_ok cs v : In (cs, v) (deviating a) -> exists kf f b F m, In kf (used a) /\ nth_error (funcs c) kf = Some f /\
+  deviation f = Some (b, cs) /\ Checker.form (order c) (dls d) (dL d) (ly f) = Some (F, m) /\ v = worth_all a F m.
+Proof.
+  intros H. unfold deviating in H. fold c d in H. apply in_flat_map in H as [kf [Hu Hk]].
+  destruct (nth_error (funcs c) kf) as [f|] eqn:Ef; [|destruct Hk].
+  destruct (deviation f) as [[b cs']|] eqn:Ed; [|destruct Hk].
+  destruct (Checker.form (order c) (dls d) (dL d) (ly f)) as [[F m]|] eqn:EF; [|destruct Hk].
+  destruct Hk as [Hk|[]]. injection Hk as <- <-. exists kf, f, b, F, m. repeat split; assumption.
+Qed.
+(** what feedback of the own state adds *)
+Let own_force X t j i := eta a t ^ n * sum n (fun u => at_ (damping a) u * y a (spot a i) (X i t) t u j).
+Lemma own_ok own j X Sl t : In own (own_parts a (if forallb (Qeq_bool 0) (damping a) then [] else deviating a) j) ->
+  check_begins a = true -> (j < order c)%nat -> begun a X Sl -> 0 <= t < deadline c ->
+  0 <= Q2R own /\ sum (length (axes a)) (fun i => sq (own_force X t j i)) <= Q2R own * Q2R own.
+Proof.
+  intros Hin HB Hj HX Ht. set (m := length (axes a)). unfold own_parts in Hin. destruct (forallb (Qeq_bool 0) (damping a)) eqn:Z.
+  { destruct Hin as [<-|[]]. rewrite Q2R_0. split; [lra|]. rewrite sum_zero; [lra|]. intros i _. unfold own_force.
+    rewrite sum_zero; [unfold sq; ring|]. intros u _. rewrite (zeros _ u Z). ring. }
+  destruct (slows a) eqn:ES; [|destruct Hin]. cbv zeta in Hin. apply in_map_iff in Hin as [[cs V0] [Eown Hin]]. cbn [fst snd] in Eown.
+  destruct (deviating_ok cs V0 Hin) as [kf [f [b [F [mm [Hu [Ef [Ed [EF ->]]]]]]]]]. clear Hin.
+  destruct matrices as [M1 [M2 [M3 [M4 [M5 [M6 [M7 M8]]]]]]]. destruct (T_k a Hprot) as [T0 K0]. fold c in T0, K0.
+  unfold slows in ES. cbv zeta in ES. apply andb_prop in ES as [H H8]. apply andb_prop in H as [H H7]. apply andb_prop in H as [H H6].
+  apply andb_prop in H as [H H5]. apply andb_prop in H as [H H4]. apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2].
+  apply Nat.eqb_eq in H1. fold n in H1, H8. assert (EC : cap a = None) by (destruct (cap a); [discriminate|reflexivity]).
+  apply Qeq_bool_eq, Qeq_eqR in H3, H4. rewrite Q2R_0 in H3, H4. apply Qpos in H5. apply Qle_bool_iff, Qle_Rle in H6, H8. apply notneg_ok in H7.
+  set (f2 := nth 1 (damping a) 0%Q) in *. set (a2 := nth 1 (plant a) 0%Q) in *.
+  assert (Eg : Q2R (begin_gain a) = eta a 0) by (rewrite <- first_ok; unfold first_gain; rewrite EC; reflexivity).
+  rewrite Q2R_1, Q2R_mult, pull_ok in H6. rewrite Q2R_plus, Q2R_mult, Q2R_minus, inverse_ok, pull_ok, Eg in H7 by (rewrite pull_ok; exact K0).
+  rewrite index_2, Q2R_mult, pull_ok in H8. set (g := begin_gain a) in *.
+  pose proof (begins_ok f F mm X Sl EF HB HX) as EV. fold m in EV. set (V := sum m (fun i => value a f (y a (spot a i) (X i 0) 0))) in *.
+  set (K := at_ cs j * at_ (nth 1 (W a) []) 1 * V). set (r := Q2R (falls a)) in *. set (x := exp (- (r * turns a t))).
+  assert (X0 : 0 < x) by apply exp_pos. destruct (gain_slope t Ht) as [E0 E1].
+  assert (G0 : 0 < eta a 0) by (apply gain_slope; lra).
+  (* deviations *)
+  assert (Dev : sum m (fun i => sq (away a (spot a i) (X i t) 1 j)) <= sq (eta a t) * x * K).
+  { apply Rle_trans with (sum m (fun i => sq (eta a t) * x * (at_ cs j * at_ (nth 1 (W a) []) 1) * value a f (y a (spot a i) (X i 0) 0)));
+      [|rewrite sum_scal; fold V; apply Req_le; unfold K; ring].
+    apply sum_le. intros i Hi. destruct (HX _ i (nth_error_nth' (axes a) (Axis [] [] []) Hi)) as [HF _].
+    destruct (claim_ok kf f Hu Ef _ _ _ t HF Ht) as [_ C]. specialize (C b cs 1%nat j Ed ltac:(fold n; lia) Hj). cbv zeta in C.
+    change (at_ (offsets (nth i (axes a) (Axis [] [] [])))) with (spot a i) in C. eapply Rle_trans; [exact C|].
+    apply Req_le. unfold x, r. rewrite pow_1. ring. }
+  assert (K1 : 0 <= K).
+  { apply Rnot_lt_le. intros N. assert (S0 : 0 <= sum m (fun i => sq (away a (spot a i) (X i t) 1 j))).
+    { rewrite <- (sum_zero m (fun _ => 0)) by reflexivity. apply sum_le. intros; apply Rle_0_sqr. }
+    assert (0 < sq (eta a t) * x) by (apply Rmult_lt_0_compat; [unfold sq; apply Rmult_lt_0_compat; exact E0|exact X0]). nra. }
+  set (kq := (nth j cs 0 * cell (W a) 1 1 * worth_all a F mm)%Q) in *.
+  assert (EK : Q2R kq = K) by (unfold kq; rewrite !Q2R_mult, EV; reflexivity).
+  destruct (near_root_ok kq) as [R0 R1]; [rewrite EK; exact K1|]. rewrite EK in R1. set (rk := near_root kq) in *.
+  (* the common velocity *)
+  set (e := fun i => end_state c (placed (spot a i) (X i 0) 1) j). set (vq := qsum _) in Eown.
+  assert (Ev : Q2R vq = sum m (fun i => sq (e i))).
+  { unfold vq. rewrite (qsum_list _ _ (Axis [] [] [])). apply sum_ext. intros i Hi. rewrite Q2R_mult. fold c. rewrite ends_q_ok by exact Hj.
+    unfold sq, e. destruct (HX _ i (nth_error_nth' (axes a) (Axis [] [] []) Hi)) as [_ B0].
+    assert (EE : end_state c (at_ (placed_q (nth i (axes a) (Axis [] [] [])) 1)) j = end_state c (placed (spot a i) (X i 0) 1) j).
+    { apply (end_ext a Hend M5). intros l Hl. unfold placed, placed_q. cbn [Nat.eqb]. rewrite (B0 1%nat l ltac:(fold n; lia) Hl). ring. }
+    rewrite EE. reflexivity. }
+  destruct (near_root_ok vq) as [S0 S1].
+  { rewrite Ev, <- (sum_zero m (fun _ => 0)) by reflexivity. apply sum_le. intros; apply Rle_0_sqr. }
+  set (rv := near_root vq) in *. rewrite Ev in S1.
+  assert (Eo : Q2R own = Q2R f2 * eta a 0 * (eta a 0 * Q2R rk) + Q2R f2 * eta a 0 * Q2R rv).
+  { rewrite <- Eown, !Q2R_mult, Q2R_plus, Q2R_mult, Eg. ring. }
+  assert (P1 : 0 <= Q2R f2 * eta a 0 * (eta a 0 * Q2R rk)) by (apply Rmult_le_pos; apply Rmult_le_pos; lra).
+  assert (P2 : 0 <= Q2R f2 * eta a 0 * Q2R rv) by (apply Rmult_le_pos; [apply Rmult_le_pos; lra|exact S0]).
+  rewrite Eo. split; [lra|]. set (fd := fades a (Q2R a2) (Q2R f2) t).
+  assert (F0 : 0 <= eta a t * fd <= eta a 0).
+  { split; [apply Rmult_le_pos; [lra|left; apply exp_pos]|]. apply (fades_fast a (Q2R a2) (Q2R f2) Hprot M4 t); fold c; assumption. }
+  apply Rle_trans with (sum m (fun i => sq (Q2R f2 * eta a t * away a (spot a i) (X i t) 1 j + Q2R f2 * (eta a t * fd) * e i))).
+  - apply Req_le. apply sum_ext. intros i Hi. f_equal. unfold own_force. rewrite H1. unfold sum. cbn [seq fold_right].
+    change (at_ (damping a) 0) with (Q2R (nth 0 (damping a) 0%Q)). rewrite <- H4. change (at_ (damping a) 1) with (Q2R f2).
+    destruct (HX _ i (nth_error_nth' (axes a) (Axis [] [] []) Hi)) as [HF _].
+    pose proof (velocity a (spot a i) (X i) (Sl i) Hedges Hend Hprot M4 HF ltac:(exact H1) (eq_sym H3) (eq_sym H4) j t Ht) as VE. cbv beta zeta in VE.
+    rewrite (Rmax_right 0 t), (Rmax_right 0 0) in VE by lra. change (fades a (at_ (plant a) 1) (at_ (damping a) 1) t) with fd in VE.
+    assert (AE : away a (spot a i) (X i t) 1 j = placed (spot a i) (X i t) 1 j - fd * e i) by (unfold away; rewrite VE; reflexivity).
+    rewrite AE. unfold y. field. lra.
+  - apply sizes_plus; [| |exact P1|exact P2].
+    + rewrite (sum_ext m _ (fun i => sq (Q2R f2 * eta a t) * sq (away a (spot a i) (X i t) 1 j))) by (intros; unfold sq; ring). rewrite sum_scal.
+      pose proof (powers a Hprot M4 4 r ltac:(rewrite H1 in H8; simpl INR in *; fold c; lra) t Ht) as PW. fold x in PW.
+      apply Rle_trans with (sq (Q2R f2 * eta a t) * (sq (eta a t) * x * K)); [apply Rmult_le_compat_l; [apply Rle_0_sqr|exact Dev]|].
+      replace (sq (Q2R f2 * eta a t) * (sq (eta a t) * x * K)) with (sq (Q2R f2) * (x * eta a t ^ 4) * K) by (unfold sq; ring).
+      replace (Q2R f2 * eta a 0 * (eta a 0 * Q2R rk) * (Q2R f2 * eta a 0 * (eta a 0 * Q2R rk))) with (sq (Q2R f2) * eta a 0 ^ 4 * (Q2R rk * Q2R rk)) by (unfold sq; ring).
+      assert (Q0 : 0 <= sq (Q2R f2)) by apply Rle_0_sqr. assert (PE : 0 <= eta a 0 ^ 4) by (apply pow_le; lra).
+      apply Rmult_le_compat; [apply Rmult_le_pos; [exact Q0|apply Rmult_le_pos; [lra|apply pow_le; lra]]|exact K1| |exact R1].
+      apply Rmult_le_compat_l; assumption.
+    + rewrite (sum_ext m _ (fun i => sq (Q2R f2 * (eta a t * fd)) * sq (e i))) by (intros; unfold sq; ring). rewrite sum_scal.
+      assert (Le : sq (Q2R f2 * (eta a t * fd)) <= sq (Q2R f2 * eta a 0)).
+      { assert (0 <= Q2R f2 * (eta a t * fd) <= Q2R f2 * eta a 0) by (split; [apply Rmult_le_pos; lra|apply Rmult_le_compat_l; lra]).
+        unfold sq. apply Rmult_le_compat; lra. }
+      replace (Q2R f2 * eta a 0 * Q2R rv * (Q2R f2 * eta a 0 * Q2R rv)) with (sq (Q2R f2 * eta a 0) * (Q2R rv * Q2R rv)) by (unfold sq; ring).
+      apply Rmult_le_compat; [apply Rle_0_sqr| |exact Le|exact S1]. rewrite <- Ev. rewrite Ev, <- (sum_zero m (fun _ => 0)) by reflexivity.
+      apply sum_le. intros; apply Rle_0_sqr.
+Qed.
 Theorem tops_ok : tops_claim a.
 Proof.
   intros Ne X Sl t j Hj HX Ht. set (m := length (axes a)). fold c in Hj, Ht. unfold check_tops in Htops. destruct (tops a) as [|q0 l0] eqn:Et; [contradiction|].
   destruct (pace a) as [g|] eqn:Eg; [|discriminate].
   set (l := q0 :: l0) in *. cbv zeta in Htops. fold c n d in Htops.
-  apply andb_prop in Htops as [H H7]. apply andb_prop in H as [H H5]. apply andb_prop in H as [H H4]. apply andb_prop in H as [H1 H3].
-  rewrite forallb_forall in H7. specialize (H7 j ltac:(apply in_seq; lia)). apply andb_prop in H7 as [R0 H7].
+  apply andb_prop in Htops as [H H7]. apply andb_prop in H as [H H5]. apply andb_prop in H as [H3 H4].
+  rewrite forallb_forall in H7. specialize (H7 j ltac:(apply in_seq; lia)). apply existsb_exists in H7 as [own [Ho H7]].
+  apply andb_prop in H7 as [R0 H7].
   set (added := match kind c with Nominal _ => 0%Q | SlidingMode _ _ mu1 _ _ _ => (mu1 * index (length (axes a)))%Q end) in *.
   assert (EA : Q2R added = match kind c with Nominal _ => 0 | SlidingMode _ _ mu1 _ _ _ => Q2R mu1 * INR m end).
   { unfold added. destruct (kind c); [apply Q2R_0|]. rewrite Q2R_mult, index_ok. reflexivity. }
-  fold c. rewrite <- EA. set (rest := (nth j l 0 - added - _)%Q) in *.
+  fold c. rewrite <- EA. set (rest := (nth j l 0 - added - _ - own)%Q) in *.
   apply existsb_exists in H7 as [[cs B] [Hk HB]]. cbn [fst snd] in HB. apply in_flat_map in Hk as [kf [Hu Hk]].
   destruct (nth_error (funcs c) kf) as [f|] eqn:Ef; [|destruct Hk].
   destruct (bounds_of c d f) as [[[v cs'] cn]|] eqn:EB; [|destruct Hk].
   destruct (Checker.form (order c) (dls d) (dL d) (ly f)) as [[F mm]|] eqn:EF; [|destruct Hk].
   destruct Hk as [Hk|[]]. injection Hk as <- EBq. apply Qle_bool_iff, Qle_Rle in HB. rewrite <- EBq in HB. clear EBq.
   rewrite !Q2R_mult, reduced_ok, !Q2R_mult, powq_ok, (begins_ok f F mm X Sl EF H5 HX) in HB. fold m in HB.
-  apply Qle_bool_iff, Qle_Rle in R0. rewrite Q2R_0 in R0.
-  assert (Er : Q2R rest = at_ l j - Q2R added - sum m (fun i => Rabs (at_ (plant a) 0 * spot a i j))).
-  { unfold rest. rewrite !Q2R_minus. f_equal. rewrite (qsum_list _ _ (Axis [] [] [])). apply sum_ext. intros i _.
+  apply Qle_bool_iff, Qle_Rle in R0. rewrite Q2R_0 in R0. destruct (own_ok own j X Sl t Ho H5 Hj HX Ht) as [O0 O1]. fold m in O1.
+  assert (Er : Q2R rest = at_ l j - Q2R added - sum m (fun i => Rabs (at_ (plant a) 0 * spot a i j)) - Q2R own).
+  { unfold rest. rewrite !Q2R_minus. f_equal. f_equal. rewrite (qsum_list _ _ (Axis [] [] [])). apply sum_ext. intros i _.
     rewrite abs_ok, Q2R_mult. reflexivity. }
   set (rel := fun i => eta a t ^ n * sum n (fun u => at_ (gains a) u * lap (edges c) (y a (spot a i) (X i t) t u) j)).
-  assert (MK : over_space a (fun i => control a (spot a i) (X i t) t j) <= sum m (fun i => Rabs (at_ (plant a) 0 * spot a i j)) + Q2R rest).
-  { apply (minkowski m _ _ (fun i => Rabs (rel i))); [| |exact R0].
-    - intros i Hi. split; [|split; apply Rabs_pos]. unfold control. fold n c.
-      rewrite (sum_ext n _ (fun u => at_ (gains a) u * lap (edges c) (y a (spot a i) (X i t) t u) j)) by (intros u _; rewrite (zeros _ u H1); ring).
-      fold (rel i). unfold Rminus. eapply Rle_trans; [apply Rabs_triang|]. rewrite Rabs_Ropp. apply Rle_refl.
-    - eapply Rle_trans; [|exact HB]. set (CK := Q2R (coupling a) * _).
+  assert (Abs : forall v : R, sq (Rabs v) = sq v) by (intros u; unfold sq; rewrite <- Rabs_mult; apply Rabs_right; apply Rle_ge; apply Rle_0_sqr).
+  assert (MK : over_space a (fun i => control a (spot a i) (X i t) t j) <= sum m (fun i => Rabs (at_ (plant a) 0 * spot a i j)) + (Q2R rest + Q2R own)).
+  { apply (minkowski m _ _ (fun i => Rabs (rel i) + Rabs (own_force X t j i))); [| |lra].
+    - intros i Hi. split; [|split; [apply Rabs_pos|apply Rplus_le_le_0_compat; apply Rabs_pos]]. unfold control. fold n c. rewrite sum_plus.
+      replace (_ - _) with (at_ (plant a) 0 * spot a i j + - (rel i + own_force X t j i)) by (unfold rel, own_force; ring).
+      eapply Rle_trans; [apply Rabs_triang|]. rewrite Rabs_Ropp. apply Rplus_le_compat_l. apply Rabs_triang.
+    - apply sizes_plus; [|rewrite (sum_ext m _ (fun i => sq (own_force X t j i))) by (intros; apply Abs); exact O1|exact R0|exact O0].
+      eapply Rle_trans; [|exact HB]. set (CK := Q2R (coupling a) * _).
       apply Rle_trans with (sum m (fun i => at_ cs' j * (Q2R g ^ (2 * n) * CK) * value a f (y a (spot a i) (X i 0) 0)));
         [|rewrite sum_scal; change (Q2R (nth j cs' 0%Q)) with (at_ cs' j); apply Req_le; change (n + (n + 0))%nat with (2 * n)%nat; generalize (Q2R g ^ (2 * n)); intros; ring].
-      apply sum_le. intros i Hi. destruct (HX _ i (nth_error_nth' (axes a) (Axis [] [] []) Hi)) as [HF _].
-      replace (sq (Rabs (rel i))) with (sq (rel i)) by (unfold sq; rewrite <- Rabs_mult; symmetry; apply Rabs_right; apply Rle_ge; apply Rle_0_sqr).
+      apply sum_le. intros i Hi. destruct (HX _ i (nth_error_nth' (axes a) (Axis [] [] []) Hi)) as [HF _]. rewrite Abs.
       eapply Rle_trans; [apply (relative_ok kf f F mm v cs' cn (spot a i) (X i) (Sl i) t j Hu Ef EB EF H3 H4 HF Ht Hj (Q2R g) (pace_ok g t Eg Ht))|].
       apply Req_le. change (Q2R (coupling a) * at_ (gains a) (pred n)) with CK. generalize (Q2R g ^ (2 * n)). intros. ring. }
   rewrite Er in MK. lra.
@@ -772,11 +955,8 @@ Proof.
   split; [apply Clock; exact He|]. intros X Sl i j Hi Hj HX. unfold nearly. fold c T in Hj |- *. fold n in Hi.
   rewrite forallb_forall in H5. specialize (H5 j ltac:(apply in_seq; lia)). rewrite forallb_forall in H5.
   specialize (H5 i ltac:(apply in_seq; lia)). set (x := nth i (nth j rows []) 0%Q) in *. apply andb_prop in H5 as [X0 H5]. apply notneg_ok in X0.
-  apply existsb_exists in H5 as [[cs V0] [Hk HB]]. cbn [fst snd] in HB. apply in_flat_map in Hk as [kf [Hu Hk]].
-  destruct (nth_error (funcs c) kf) as [f|] eqn:Ef; [|destruct Hk].
-  destruct (deviation f) as [[bb cs']|] eqn:Ed; [|destruct Hk].
-  destruct (Checker.form (order c) (dls d) (dL d) (ly f)) as [[F mm]|] eqn:EF; [|destruct Hk].
-  destruct Hk as [Hk|[]]. injection Hk as <- <-. apply Qle_bool_iff, Qle_Rle in HB.
+  apply existsb_exists in H5 as [[cs' V0] [Hk HB]]. cbn [fst snd] in HB.
+  destruct (deviating_ok cs' V0 Hk) as [kf [f [bb [F [mm [Hu [Ef [Ed [EF ->]]]]]]]]]. apply Qle_bool_iff, Qle_Rle in HB.
   rewrite !Q2R_mult, powq_ok, (begins_ok f F mm X Sl EF H4 HX) in HB. set (m := length (axes a)) in *.
   set (V := sum m (fun i => value a f (y a (spot a i) (X i 0) 0))) in *. set (K := at_ cs' j * at_ (nth i (W a) []) i * V).
   assert (EK : Q2R (nth j cs' 0%Q) * Q2R (cell (W a) i i) * V = K) by reflexivity. rewrite EK in HB. clear EK.

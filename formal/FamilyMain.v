@@ -192,7 +192,7 @@ Proof.
       destruct (bound_parts b h Hh) as [_ [_ [_ [_ [_ HV]]]]]. destruct (HV (X t0)) as [a [Ha H0]].
       exists (sq (rho + k c / T) * (Q2R (nth i (inputs b) 0%Q) * a * exp (Q2R (decay b) * s c t0))). intros t m w Ht Hm Hw.
       apply (inputs_fall b h i X Sl t0 a t m w); assumption. }
-  destruct (finite_choice n (fun i K => forall t m w, t0 <= t < T -> In m (modes F) -> admits (ties m) w ->
+  destruct (finite_choice 0 n (fun i K => forall t m w, t0 <= t < T -> In m (modes F) -> admits (ties m) w ->
     sq (gain T rho (k c) t * member (ties m) w (X t) i) <= K) E) as [K HK].
   exists (fold_right (fun i a => Rabs (K i) + a) 0 (seq 0 n) + 1). intros t i m w Ht Hi Hm Hw. specialize (HK i Hi t m w Ht Hm Hw).
   set (u := _ * _) in *.

@@ -216,7 +216,7 @@ Theorem comes_to_rest_family : 0 < Q2R (decay b) -> forall X Sl, switches F X Sl
   filterlim (fun t => X t i) (at_left T) (locally (y i)) /\ xi P y i = 0.
 Proof.
   intros Hr X Sl HM. destruct (settles_family X Sl HM) as [t0 HM0]. destruct (HV (X t0)) as [a [Ha H0]]. pose proof HM0 as [_ HQ].
-  destruct (finite_choice n (fun i v => In i (its_agents P) -> filterlim (fun t => X t i) (at_left T) (locally v))) as [y Hy].
+  destruct (finite_choice 0 n (fun i v => In i (its_agents P) -> filterlim (fun t => X t i) (at_left T) (locally v))) as [y Hy].
   { intros i Hi. destruct (in_dec Nat.eq_dec i (its_agents P)) as [I|I]; [|exists 0; intros; contradiction].
     destruct (nears X Sl t0 a i Hr HM0 Ha H0 I) as [v Hv]. exists v. intros _. apply (near_limit X Sl t0 i v _ _ Hr HM0 Hv). }
   exists y. intros i Hi. split; [apply Hy; auto|].

@@ -6,9 +6,9 @@ Import ListNotations.
 Require Import Vec Definite Graph Flow Certificate Checker Sound Input Mean Table Dominance Weighted.
 Open Scope R_scope.
 
-Lemma finite_choice n (P : nat -> R -> Prop) : (forall i, (i < n)%nat -> exists v, P i v) -> exists y, forall i, (i < n)%nat -> P i (y i).
+Lemma finite_choice {A} (a : A) n (P : nat -> A -> Prop) : (forall i, (i < n)%nat -> exists v, P i v) -> exists y, forall i, (i < n)%nat -> P i (y i).
 Proof.
-  induction n as [|n IH]; intros H; [exists (fun _ => 0); intros; lia|].
+  induction n as [|n IH]; intros H; [exists (fun _ => a); intros; lia|].
   destruct (IH ltac:(intros; apply H; lia)) as [y Hy]. destruct (H n ltac:(lia)) as [v Hv].
   exists (fun i => if (i =? n)%nat then v else y i). intros i Hi. destruct (Nat.eqb_spec i n) as [->|N]; [exact Hv|apply Hy; lia].
 Qed.
@@ -96,7 +96,7 @@ Qed.
 Theorem comes_to_rest : exists y, (forall i, (i < n)%nat -> filterlim (fun t => X t i) (at_left T) (locally (y i))) /\
   (forall i, (i < n)%nat -> lap es y i = 0) /\ forall t i, t0 <= t < T -> (i < n)%nat -> Rabs (X t i - y i) <= m * a t.
 Proof.
-  destruct (finite_choice n (fun i v => forall t, t0 <= t < T -> Rabs (X t i - v) <= m * a t) limit_at) as [y Hy].
+  destruct (finite_choice 0 n (fun i v => forall t, t0 <= t < T -> Rabs (X t i - v) <= m * a t) limit_at) as [y Hy].
   pose proof m_pos as M0.
   assert (Q : forall t i, t0 <= t < T -> (i < n)%nat -> sq (X t i - y i) <= sq m * exp (- (r * clock t))).
   { intros t i Ht Hi. rewrite <- a_sq. specialize (Hy i Hi t Ht). pose proof (a_pos t). apply Rabs_le_between in Hy.

@@ -148,26 +148,31 @@ def motion(s: Setting) -> list[list[Any]]:
     """``M``, as texts or intervals."""
     n, T = s.order, s.T
     if s.damping:
-        w, p = (s.a[1] + s.damping * s.rho1) * T, s.damping * s.k
-        return [["1", damped(s, w, p)], ["0", "0"]]
+        exact = s.a[1] + s.damping * s.rho1 == 0
+        return [["1", str(T / (s.damping * s.k + 1)) if exact else damped(s, interval)], ["0", "0"]]
     if not any(s.a):
         return [[str(T ** (j - i) / math.factorial(j - i)) if j >= i else "0" for j in range(n)] for i in range(n)]
-    companion = [[Fraction(int(j == i + 1)) for j in range(n)] for i in range(n - 1)] + [[-a for a in s.a]]
+    return exponential(s, interval)
+
+
+def exponential(s: Setting, read: Any) -> list[list[Any]]:
+    """What is read from the entries of ``e^(A T)``, balls of 1,000 bits."""
+    companion = [[Fraction(int(j == i + 1)) for j in range(s.order)] for i in range(s.order - 1)]
+    companion.append([-a for a in s.a])
     before, flint.ctx.prec = flint.ctx.prec, 1000
     try:
-        found = flint.arb_mat([[ball(x * T) for x in row] for row in companion]).exp()
-        return [[interval(found[i, j]) for j in range(n)] for i in range(n)]
+        found = flint.arb_mat([[ball(x * s.T) for x in row] for row in companion]).exp()
+        return [[read(found[i, j]) for j in range(s.order)] for i in range(s.order)]
     finally:
         flint.ctx.prec = before
 
 
-def damped(s: Setting, w: Fraction, p: Fraction) -> Any:
-    """``int_0^T e^(-a_2 t - f_2 s(t)) dt``; exact for ``w = 0``."""
-    if w == 0:
-        return str(s.T / (p + 1))
+def damped(s: Setting, read: Any) -> Any:
+    """What is read from ``int_0^T e^(-a_2 t - f_2 s(t)) dt``, a ball of 1,000 bits."""
+    w, p = (s.a[1] + s.damping * s.rho1) * s.T, s.damping * s.k
     before, flint.ctx.prec = flint.ctx.prec, 1000
     try:
-        return interval(ball(s.T / (p + 1)) * ball(-w).hypgeom_1f1(1, ball(p + 2)))
+        return read(ball(s.T / (p + 1)) * ball(-w).hypgeom_1f1(1, ball(p + 2)))
     finally:
         flint.ctx.prec = before
 

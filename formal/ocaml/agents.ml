@@ -148,18 +148,17 @@ let certificate json : t =
   let deviates = List.exists (fun k -> (List.nth funcs k).deviation <> None) used in
   let agree = cap = None && deviates in
   if cap = None && not agree && used <> [] then left := [ "claim, that all agree at the deadline" ];
-  let chains = List.for_all (fun x -> Number.equal x Number.zero) (plant @ damping) in
   let motion = List.map (fun row -> let l = entries "motion" row in
     need (List.length l = n) "motion: another number of columns"; List.map (Reader.interval "motion") l) (entries "motion" (get "motion")) in
   need (List.length motion = n) "motion: another number of rows";
-  (* of agents that meet at rest it is a series of [w], as long as that is short *)
-  let rests = not (Number.equal (largest damping) Number.zero) && (let f2 = List.nth damping 1 in
-    let w = Number.mul span (Number.add (List.nth plant 1) (Number.mul f2 r.cert.rho1)) in
-    Number.compare { w with qnum = Z.abs w.qnum } (of_int 20) <= 0) in
-  let common = if not (chains || rests) then None else Some motion in
-  if common <> None then List.iteri (fun i -> List.iteri (fun l (_, radius) ->
-    need (rests && i = 0 && l = 1 || Number.equal radius Number.zero) "motion: a radius where the common motion is known exactly")) motion;
-  let known = common <> None && (agree || cap <> None) in
+  let force = if Number.equal (largest damping) Number.zero then Number.zero
+    else Number.mul span (Number.add (List.nth plant 1) (Number.mul (List.nth damping 1) r.cert.rho1)) in
+  need (Number.compare { force with qnum = Z.abs force.qnum } (of_int 1000) <= 0) "agents at rest: (a_2 + f_2 rho1) T is above 1000";
+  let rounded i l = if Number.equal (largest damping) Number.zero then not (Number.equal most Number.zero)
+    else i = 0 && l = 1 && not (Number.equal force Number.zero) in
+  List.iteri (fun i -> List.iteri (fun l (_, radius) ->
+    need (rounded i l || Number.equal radius Number.zero) "motion: a radius where the common motion is known exactly")) motion;
+  let known = agree || cap <> None in
   if known then bare_of proof "agent-motion" "agents" else skip "agent-motion" "motion";
   if known && get "final_state" <> Null then bare_of proof "agent-final-state" "agents" else skip "agent-final-state" "final_state";
   need ((get "residual" <> Null) = (cap <> None && get "initial_state" <> Null && deviates))
@@ -179,7 +178,6 @@ let certificate json : t =
         else (bare_of proof "agent-residual" "agents"; Some (clock, rows)) in
   let tops = match get "input" with
     | Null -> []
-    | _ when not (Number.equal (largest damping) Number.zero) -> skip "agent-input" "input"; []
     | v ->
         need (get "initial_state" <> Null && used <> []) "a bound of the input without initial states or Lyapunov functions";
         need (cap <> None || Number.compare (Number.mul rate pace) (of_int (2 * n)) >= 0) "a bound of the input though r k is below 2 n";
@@ -191,7 +189,7 @@ let certificate json : t =
   let slope = r.cert.rho1 in
   let cert = { r.cert with funcs; rho1 = if Z.sign slope.qnum = 0 then Number.one else slope } in
   let record = { graph = cert; degree = n; slope; cap; plant; damping; gains = row "gains"; w; p = inverse w;
-    coupling; falls = rate; used; agree; drift = common; axes = axes r n dimension get known; tops; left_over } in
+    coupling; falls = rate; used; agree; drift = Some motion; axes = axes r n dimension get known; tops; left_over } in
   { base = { r with cert; rest = []; checked = r.checked @ List.rev proof.checked; unchecked = r.unchecked @ List.rev proof.unchecked;
       sections = r.sections @ List.rev !left };
     record; points }
