@@ -78,6 +78,13 @@ Definition part_claim (F : family) (P : part) : Prop :=
   | Consensus => exists p v, still P = [(p, v)] /\ forall i, In i (its_agents P) -> sq (Q2R (nth i v 0%Q)) = 1
   | Interval => still P <> [] /\ forall m, In m (modes F) -> exists C, owned m P = [C]
   | Containment => still P <> [] /\ exists m C C' l, In m (modes F) /\ owned m P = C :: C' :: l end.
+(** the common kernel theorem: every motion has a limit, which is at rest in every member; with constants of the family
+    alone it nears it exponentially by the clock, however the signal switches *)
+Definition kernel_claim (F : family) (P : part) : Prop := let c := frame F in becomes P <> Depends -> exists K r, 0 < r /\
+  forall X S, switches F X S -> exists y, (forall i, In i (its_agents P) -> xi P y i = 0 /\
+    filterlim (fun t => X t i) (at_left (deadline c)) (locally (y i))) /\ forall t0 t M i, switches_from F X S t0 ->
+    t0 <= t < deadline c -> In i (its_agents P) -> (forall j, In j (its_agents P) -> Rabs (xi P (X t0) j) <= M) ->
+    Rabs (X t i - y i) <= K * exp (- (r * (s c t - s c t0))) * M.
 (** the function is at most [a] *)
 Definition below (b : lyapunov) (a : R) (x : nat -> R) : Prop := let z := xi (about b) x in match by_ b with
   | Form P => qbil P z z <= a | Squares p => qdot p (fun i => sq (x i)) <= a
@@ -107,7 +114,7 @@ Definition inputs_claim (F : family) : Prop := let c := frame F in
     In m (modes F) -> admits (ties m) w -> Rabs (u m w X t i) <= Q2R (nth i (peaks F) 0%Q).
 (** sliding variables do not hear the graph: what is said of them is what holds without edges, of [X = S] *)
 Definition true_family (F : family) : Prop := (forall m, In m (modes F) -> mode_claim F m) /\
-  (forall P, In P (parts F) -> part_claim F P) /\
+  (forall P, In P (parts F) -> part_claim F P /\ kernel_claim F P) /\
   (forall i, (i < order (frame F))%nat -> exists P, In P (parts F) /\ In i (its_agents P)) /\
   (edges (frame F) = [] /\ sliding_claim (frame F)) /\ (forall b, In b (bounds F) -> bound_claim F b) /\
   ends_claim F /\ inputs_claim F /\ existence_claim F.

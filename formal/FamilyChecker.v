@@ -151,6 +151,11 @@ Definition check_part (F : family) (P : part) : bool :=
   | Consensus => match still P with [(_, v)] => forallb (fun i => Qeq_bool (nth i v 0%Q * nth i v 0%Q) 1) C | _ => false end
   | Interval => negb (length (still P) =? 0)%nat && forallb (fun m => match owned m P with [_] => true | _ => false end) (modes F)
   | Containment => negb (length (still P) =? 0)%nat && existsb (fun m => match owned m P with _ :: _ :: _ => true | _ => false end) (modes F) end.
+(** columns of the basis are 1 at their own pivots, 0 at the others *)
+Fixpoint distinct (l : list nat) : bool := match l with [] => true | i :: l' => negb (mem i l') && distinct l' end.
+Definition check_pivots (F : family) (P : part) : bool := let C := its_agents P in match becomes P with Depends => true | _ =>
+  forallb (fun i => (i <? order (frame F))%nat) C && distinct (map fst (still P)) && forallb (fun b => mem (fst b) C &&
+    forallb (fun b' => Qeq_bool (nth (fst b') (snd b) 0%Q) (if (fst b =? fst b')%nat then 1%Q else 0%Q)) (still P)) (still P) end.
 Definition check_frame (F : family) : bool :=
   let c := frame F in negb (length (modes F) =? 0)%nat && check_protocol c && check_sliding_input c && check_reaching c &&
   (match edges c with [] => true | _ => false end) &&
@@ -181,12 +186,12 @@ Definition check_peak (F : family) (i : nat) (peak : Q) : bool := let c := frame
     | None => false end) (bounds F)).
 Definition check_peaks (F : family) : bool := forallb (fun p => check_peak F (fst p) (snd p)) (combine (seq 0 (length (peaks F))) (peaks F)).
 
-(** agents that a function draws to 0 *)
+(** agents that end at 0 *)
 Definition check_end_of (F : family) (i : nat) (e : Q * Q) : bool := Qle_bool (Qabs (fst e)) (snd e) &&
-  existsb (fun b => pos (decay b) && mem i (its_agents (about b)) && match still (about b) with [] => true | _ => false end) (bounds F).
+  existsb (fun P => mem i (its_agents P) && match becomes P with Stability => true | _ => false end) (parts F).
 Definition check_family_ends (F : family) : bool := forallb (fun ie => match snd ie with None => true | Some e => check_end_of F (fst ie) e end)
   (combine (seq 0 (length (ends F))) (ends F)).
 Definition check_family (F : family) (hs : list hint) : bool :=
-  check_frame F && forallb (check_mode F) (modes F) && forallb (check_part F) (parts F) &&
+  check_frame F && forallb (check_mode F) (modes F) && forallb (check_part F) (parts F) && forallb (check_pivots F) (parts F) &&
   ((length (bounds F) =? length hs)%nat && forallb (fun bh => check_bound F (fst bh) (snd bh)) (combine (bounds F) hs)) &&
   check_family_ends F && check_stays F && check_peaks F.

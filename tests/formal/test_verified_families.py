@@ -6,6 +6,7 @@ import json
 import os
 import random
 import re
+from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
@@ -72,6 +73,13 @@ def random_families(count: int) -> list[tuple[str, Family]]:
 def signed(protocol: Any = NOMINAL) -> str:
     """The certificate of one uncertain mode with camps, as a text."""
     return json.dumps(document(SIGNED, protocol=protocol))
+
+
+def decided(family: Family, protocol: Any = NOMINAL) -> Json:
+    """The certificate of a family by the decision alone, without functions."""
+    parts = tuple(ComponentProof(c, ()) for c in decide(family))
+    made = certify_family(family, protocol, range(1, family.n_nodes + 1), time_limit=0.001)
+    return {**json.loads(replace(made, parts=parts).to_json()), "unverified": {}}
 
 
 def rows(seed: int) -> Json:
@@ -153,6 +161,43 @@ def test_rows_are_verified_and_a_higher_rate_of_theirs_is_rejected(tmp_path: Pat
     faster = changed(found, ("lyapunov", "functions", 0, "rate"), rate)
     code, text = said(resealed(changed(faster, ("proof", place, "numbers", "b"), rate)), tmp_path)
     assert code == 1 and "lyapunov.functions[0]" in text, text
+
+
+def test_without_functions_it_is_verified_that_components_come_to_rest(tmp_path: Path) -> None:
+    program()
+    seen = set()
+    for seed, (name, family) in enumerate(random_families(9)):
+        found = decided(family, SLIDING if seed % 3 == 2 else NOMINAL)
+        assert check(found).accepted and found["lyapunov"]["functions"] == []
+        code, text = said(found, tmp_path)
+        assert code == 0, (name, text)
+        behaviours = {c.behaviour for c in decide(family)}
+        if "depends on the signal" not in behaviours:
+            assert "verified    family-claim of graph\n" in text and "claim" not in named(text), (name, text)
+        if behaviours == {"stability"}:
+            assert "verified    family-final-state of final_state" in text, (name, text)
+        seen |= behaviours
+    assert seen > {"stability", "bipartite consensus", "interval bipartite consensus", "bipartite containment"}
+
+
+def test_without_functions_a_common_kernel_that_is_none_is_rejected(tmp_path: Path) -> None:
+    program()
+    leaders = [("l", "a", 1), ("m", "a", 1)], [("l", "a", 1), ("m", "a", 2)]
+    depends = decided(Family.switching([SignedDigraph.from_edges(edges) for edges in leaders]))
+    shares = {"a": {"1": "1/2", "2": "1/2"}}
+    assert depends["claim"]["behaviour"] == "depends on the signal"
+    bent = decided(Family.switching([SignedDigraph.from_edges(leaders[0])]))
+    more = decided(Family.switching([SignedDigraph.from_edges([("a", "b", 1)], nodes=["a", "b"])]))
+    fewer = decided(Family.switching([SignedDigraph.from_edges([("a", "b", -1), ("b", "a", 1)])]))
+    for forged in (
+        with_witness(depends, "bipartite containment", [{"rows": shares}]),
+        with_witness(bent, "bipartite containment", [{"rows": {"a": {"1": "1/2", "2": "1/4"}}}]),
+        with_witness(more, "stability", None),
+        with_witness(fewer, "bipartite consensus", None),
+    ):
+        assert not check(forged).accepted
+        code, text = said(forged, tmp_path)
+        assert code == 1 and "claim" in text, text
 
 
 def with_witness(found: Json, behaviour: str, witness: Any) -> Json:
