@@ -356,7 +356,7 @@ Proof.
       + assert (X t i - 2 * Ea t <= v); [|lra]. apply U. exists t. split; [exact Ht|reflexivity]. }
   destruct (finite_choice (order c) (fun i v => In i C -> forall t, ta <= t < T -> Rabs (X t i - v) <= 2 * Ea t)) as [y Hy].
   { intros i _. destruct (in_dec Nat.eq_dec i C) as [I|I]; [|exists 0; intros; contradiction]. destruct (Lim i I) as [v Hv]. exists v. auto. }
-  destruct (basis_parts F P Hbasis Hdepends) as [HC [_ [HP _]]]. fold C in HC, HP. fold c in HC.
+  pose proof (agents_in F P Hbasis) as HC. destruct (basis_parts F P Hbasis Hdepends) as [_ [HP _]]. fold C in HC, HP. fold c in HC.
   exists y. split.
   - intros i Hi. split.
     + destruct (comb_small P i) as [B [B0 HB]]. set (K := (1 + B) * (3 * (exp d * exp (r * s ta) * Ma))).

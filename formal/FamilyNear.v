@@ -165,8 +165,8 @@ Hypothesis Hpart : check_part F P = true.
 Hypothesis Hbasis : check_pivots F P = true.
 Hypothesis Hdepends : becomes P <> Depends.
 Local Notation s := (s c).
-Lemma agents_in i : In i C -> (i < n)%nat.
-Proof. apply (basis_parts F P Hbasis Hdepends). Qed.
+Lemma in_n i : In i C -> (i < n)%nat.
+Proof. apply (agents_in F P Hbasis). Qed.
 Lemma later X Sl t0 t1 : switches_from F X Sl t0 -> t0 <= t1 < T -> switches_from F X Sl t1.
 Proof. intros [HM [A B]] Ht. split; [exact HM|]. split; [fold c T in A |- *; lra|]. intros t i H Hi. apply B; [fold c T in H |- *; lra|exact Hi]. Qed.
 
@@ -212,7 +212,7 @@ Proof.
       + intros Mx. unfold q. destruct (in_dec Nat.eq_dec v C) as [A|_]; [|lra].
         assert (Fj : f j u = g j * x u v) by (unfold f, q; fold v; destruct (in_dec Nat.eq_dec v C); [ring|contradiction]).
         assert (All : forall i, In i C -> Rabs (x u i) <= g j * x u v).
-        { intros i' Hi. pose proof (agents_in i' Hi) as Hin. pose proof (Mx i' ltac:(lia)) as M1. pose proof (Mx (i' + n)%nat ltac:(lia)) as M2.
+        { intros i' Hi. pose proof (in_n i' Hi) as Hin. pose proof (Mx i' ltac:(lia)) as M1. pose proof (Mx (i' + n)%nat ltac:(lia)) as M2.
           rewrite Fj in M1, M2. unfold f, g, ix, q in M1, M2. destruct (Nat.ltb_spec i' n); [|lia]. destruct (Nat.ltb_spec (i' + n) n); [lia|].
           replace (i' + n - n)%nat with i' in M2 by lia. destruct (in_dec Nat.eq_dec i' C); [|contradiction].
           change (if (j <? n)%nat then 1 else -1) with (g j) in M1, M2. apply Rabs_le. lra. }
@@ -224,7 +224,7 @@ Proof.
         assert (0 <= g j * L) by lra. assert (0 <= gain T rho (k c) u * (g j * L)) by (apply Rmult_le_pos; lra). lra.
     - intros j Hj. unfold f, q. destruct (in_dec Nat.eq_dec (ix j) C) as [A|_]; [|rewrite Rmult_0_l, Rmult_0_r; exact M0].
       rewrite Rmult_1_l. apply sign_at_most; [apply Hg|apply H0; exact A]. }
-  pose proof (agents_in i Hi0) as Hin. pose proof (G i t Ht ltac:(lia)) as G1. pose proof (G (i + n)%nat t Ht ltac:(lia)) as G2.
+  pose proof (in_n i Hi0) as Hin. pose proof (G i t Ht ltac:(lia)) as G1. pose proof (G (i + n)%nat t Ht ltac:(lia)) as G2.
   unfold f, g, ix, q in G1, G2. destruct (Nat.ltb_spec i n); [|lia]. destruct (Nat.ltb_spec (i + n) n); [lia|].
   replace (i + n - n)%nat with i in G2 by lia. destruct (in_dec Nat.eq_dec i C); [|contradiction]. apply Rabs_le. lra.
 Qed.
@@ -254,7 +254,7 @@ Proof.
       + apply (continuous_mult (fun _ => kap * e t0)); [apply continuous_const|]. apply @ex_derive_continuous. eexists. apply Es. lra.
       + apply (continuous_mult e y); [apply @ex_derive_continuous; eexists; apply Ee; lra|]. apply (asum_cont A u). intros a Ha.
         apply (continuous_minus (fun _ => M) (fun t => sg (snd a) * x t (fst a))); [apply continuous_const|].
-        apply (continuous_mult (fun _ => sg (snd a))); [apply continuous_const|]. apply x_cont; [exact Ht|apply agents_in; apply HA; exact Ha].
+        apply (continuous_mult (fun _ => sg (snd a))); [apply continuous_const|]. apply x_cont; [exact Ht|apply in_n; apply HA; exact Ha].
     - intros t Ht Hj. destruct (HDx t Ht Hj) as [m [w [Hm [Hw E]]]]. set (g := gain T rho (k c) t) in *. set (L := member (ties m) w (x t)) in *.
       set (dy := asum A (fun a => g * (sg (snd a) * L (fst a)))).
       exists (kap * e t0 * g - (D * g * e t * y t + e t * dy)). split.
@@ -262,7 +262,7 @@ Proof.
         apply (is_derive_mult e y); [apply Ee; lra| |intros; apply Rmult_comm]. unfold y, dy. apply (asum_derive A u). intros a Ha. unfold u.
         replace (g * (sg (snd a) * L (fst a))) with (0 - sg (snd a) * - (g * L (fst a))) by ring.
         apply (is_derive_minus (fun _ => M) (fun t => sg (snd a) * x t (fst a))); [apply (is_derive_const M)|].
-        apply is_derive_scal. apply E. apply agents_in. apply HA. exact Ha.
+        apply is_derive_scal. apply E. apply in_n. apply HA. exact Ha.
       + specialize (HS t m ltac:(lra) Hm). rewrite Eq in HS. pose proof (gain_pos T rho (k c) P2 P3 t ltac:(lra)) as Gp. fold g in Gp.
         assert (Z : asum A (fun a => spare (edges (mandatory m)) M (sg (snd a)) (x t) (fst a)) <=
           asum A (fun a => 1 * (sg (snd a) * L (fst a)) + D * u a t)).

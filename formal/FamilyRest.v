@@ -25,6 +25,25 @@ Lemma tot_zero bs l c : (forall b, In b bs -> c (fst b) = 0) -> tot bs l c = 0.
 Proof.
   intros H. rewrite (tot_ext bs l l c (fun _ => 0 * 0)) by (intros b Hb; rewrite (H b Hb); split; ring). rewrite (tot_scal bs l 0 (fun _ => 0)). ring.
 Qed.
+Lemma tot_null bs l c : (forall b, In b bs -> l b = 0) -> tot bs l c = 0.
+Proof.
+  induction bs as [|b bs IH]; intros H; simpl; [reflexivity|]. rewrite IH by (intros; apply H; right; assumption).
+  rewrite (H b) by (left; reflexivity). ring.
+Qed.
+Lemma tot_single bs l c b : NoDup (map fst bs) -> In b bs -> (forall b', In b' bs -> fst b' <> fst b -> l b' = 0) ->
+  tot bs l c = l b * c (fst b).
+Proof.
+  induction bs as [|b0 bs IH]; intros N Hb H; [destruct Hb|]. simpl in N. apply NoDup_cons_iff in N as [N1 N2]. simpl.
+  destruct Hb as [->|Hb].
+  - rewrite tot_null; [ring|]. intros b' Hb'. apply H; [right; exact Hb'|]. intros E. apply N1. rewrite <- E. apply in_map. exact Hb'.
+  - rewrite (IH N2 Hb) by (intros; apply H; [right|]; assumption).
+    rewrite (H b0); [ring|left; reflexivity|]. intros E. apply N1. rewrite E. apply in_map. exact Hb.
+Qed.
+Lemma distinct_ok l : distinct l = true -> NoDup l.
+Proof.
+  induction l as [|i l IH]; intros H; constructor; simpl in H; apply andb_prop in H as [A B]; [|apply IH; exact B].
+  intros I. apply mem_In in I. rewrite I in A. discriminate.
+Qed.
 Lemma fewer bs : NoDup (map fst bs) -> forall Ls, (length Ls < length bs)%nat ->
   exists c, (exists b, In b bs /\ c (fst b) <> 0) /\ forall l, In l Ls -> tot bs l c = 0.
 Proof.
@@ -143,34 +162,28 @@ Hypothesis Hpart : check_part F P = true.
 Hypothesis Hbasis : check_pivots F P = true.
 Hypothesis Hdepends : becomes P <> Depends.
 
-Lemma basis_parts : (forall i, In i C -> (i < n)%nat) /\ NoDup (map fst (still P)) /\ (forall b, In b (still P) -> In (fst b) C) /\
+Lemma agents_in i : In i C -> (i < n)%nat.
+Proof.
+  unfold check_pivots in Hbasis. cbv zeta in Hbasis. apply andb_prop in Hbasis as [H _]. rewrite forallb_forall in H.
+  intros Hi. apply Nat.ltb_lt. apply H. exact Hi.
+Qed.
+Lemma basis_parts : NoDup (map fst (still P)) /\ (forall b, In b (still P) -> In (fst b) C) /\
   forall b b', In b (still P) -> In b' (still P) -> Q2R (nth (fst b') (snd b) 0%Q) = if (fst b =? fst b')%nat then 1 else 0.
 Proof.
-  unfold check_pivots in Hbasis. cbv zeta in Hbasis. fold C n in Hbasis.
-  assert (H : forallb (fun i => (i <? n)%nat) C && distinct (map fst (still P)) && forallb (fun b => mem (fst b) C && forallb (fun b' =>
+  unfold check_pivots in Hbasis. cbv zeta in Hbasis. fold C in Hbasis. apply andb_prop in Hbasis as [_ B].
+  assert (H : distinct (map fst (still P)) && forallb (fun b => mem (fst b) C && forallb (fun b' =>
     Qeq_bool (nth (fst b') (snd b) 0%Q) (if (fst b =? fst b')%nat then 1%Q else 0%Q)) (still P)) (still P) = true)
-    by (destruct (becomes P); try exact Hbasis; contradiction Hdepends; reflexivity).
-  apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2]. rewrite forallb_forall in H1, H3.
-  split; [intros i Hi; apply Nat.ltb_lt; auto|]. split.
-  - clear - H2. induction (map fst (still P)) as [|i l IH]; constructor; simpl in H2; apply andb_prop in H2 as [A B]; [|apply IH; exact B].
-    intros I. apply mem_In in I. rewrite I in A. discriminate.
-  - split; intros b.
-    + intros Hb. specialize (H3 b Hb). apply andb_prop in H3 as [A _]. apply mem_In. exact A.
-    + intros b' Hb Hb'. specialize (H3 b Hb). apply andb_prop in H3 as [_ A]. rewrite forallb_forall in A. specialize (A b' Hb').
-      apply Qeq_R in A. rewrite A. destruct (fst b =? fst b')%nat; unfold Q2R; simpl; lra.
+    by (destruct (becomes P); try exact B; contradiction Hdepends; reflexivity).
+  apply andb_prop in H as [H2 H3]. rewrite forallb_forall in H3. split; [apply distinct_ok; exact H2|]. split; intros b.
+  - intros Hb. specialize (H3 b Hb). apply andb_prop in H3 as [A _]. apply mem_In. exact A.
+  - intros b' Hb Hb'. specialize (H3 b Hb). apply andb_prop in H3 as [_ A]. rewrite forallb_forall in A. specialize (A b' Hb').
+    apply Qeq_R in A. rewrite A. destruct (fst b =? fst b')%nat; unfold Q2R; simpl; lra.
 Qed.
 Lemma comb_pivot z b : In b (still P) -> comb P z (fst b) = z (fst b).
 Proof.
-  intros Hb. destruct basis_parts as [_ [N [_ I]]]. unfold comb.
-  assert (G : forall l, incl l (still P) -> NoDup (map fst l) ->
-    tot l (fun b' => Q2R (nth (fst b) (snd b') 0%Q)) z = if in_dec Nat.eq_dec (fst b) (map fst l) then z (fst b) else 0).
-  { induction l as [|b' l IH]; intros HI HN; simpl; [reflexivity|]. simpl in HN. apply NoDup_cons_iff in HN as [N1 N2].
-    rewrite IH by (try exact N2; intros x Hx; apply HI; right; exact Hx). rewrite (I b' b (HI b' ltac:(left; reflexivity)) Hb).
-    destruct (Nat.eqb_spec (fst b') (fst b)) as [E|E], (Nat.eq_dec (fst b') (fst b)) as [E'|E']; try contradiction.
-    - destruct (in_dec Nat.eq_dec (fst b) (map fst l)) as [I1|_]; [rewrite E in N1; contradiction|]. rewrite E. ring.
-    - destruct (in_dec Nat.eq_dec (fst b) (map fst l)); ring. }
-  rewrite (G (still P)) by (try exact N; apply incl_refl). destruct (in_dec Nat.eq_dec (fst b) (map fst (still P))) as [_|K]; [reflexivity|].
-  exfalso. apply K. apply in_map. exact Hb.
+  intros Hb. destruct basis_parts as [N [_ I]]. unfold comb. rewrite (tot_single _ _ _ b N Hb).
+  - rewrite (I b b Hb Hb), Nat.eqb_refl. ring.
+  - intros b' Hb' Ne. rewrite (I b' b Hb' Hb). destruct (Nat.eqb_spec (fst b') (fst b)); [contradiction|reflexivity].
 Qed.
 Lemma comb_comb z i : comb P (comb P z) i = comb P z i.
 Proof. unfold comb at 1 3. apply tot_ext. intros b Hb. split; [reflexivity|apply comb_pivot; exact Hb]. Qed.
@@ -236,9 +249,8 @@ Lemma kernel_bound y M : 0 <= M -> (forall i, (i < n)%nat -> lap es y i = 0) ->
   (forall D, In D (owned m P) -> is_balanced D = true -> Rabs (y (hd O (nodes D))) <= M) -> forall i, In i C -> Rabs (y i) <= M.
 Proof.
   intros HM Hy HB i Hi. destruct mode_parts as [En W]. destruct (wide_parts c W) as [_ [W1 [_ W3]]]. rewrite En in W1, W3.
-  destruct basis_parts as [HC _].
   destruct (largest_of (fun i => Rabs (y i)) C) as [b [Hb MB]]; [intros E; rewrite E in Hi; destruct Hi|].
-  specialize (MB i Hi) as Li. eapply Rle_trans; [exact Li|]. destruct (W3 b (HC b Hb)) as [D [HD [_ HP]]].
+  specialize (MB i Hi) as Li. eapply Rle_trans; [exact Li|]. destruct (W3 b (agents_in b Hb)) as [D [HD [_ HP]]].
   assert (Cl : forall e, In e es -> In (tgt e) C -> In (src e) C) by (intros e He Ht; apply (part_inside m e Hm He); exact Ht).
   rewrite <- (path_same n es y Hr Hnz (fun j => In j C) (Rabs (y b)) (fun j Hj _ => Hy j Hj) Cl MB _ b HP Hb eq_refl).
   assert (Ho : In D (owned m P)).
@@ -251,7 +263,7 @@ Proof.
 Qed.
 Lemma heads_solve tau : exists z, forall D, In D (owned m P) -> is_balanced D = true -> comb P z (hd O (nodes D)) = tau (hd O (nodes D)).
 Proof.
-  destruct basis_parts as [HC [N [HP _]]].
+  destruct basis_parts as [N [HP _]].
   destruct (solvable (still P) (fun j b => Q2R (nth j (snd b) 0%Q)) (map (fun D => hd O (nodes D)) (filter is_balanced (owned m P))) N) with (tau := tau) as [z Hz].
   - rewrite map_length, (basis_size m Hm). lia.
   - intros z Hz b Hb. rewrite <- (comb_pivot z b Hb).
@@ -284,7 +296,7 @@ Proof.
   { intros i _ [b Hb]. unfold y. rewrite lap_minus, comb_lap. rewrite lap_esum.
     rewrite (esum_ext _ _ (fun e => 0 * lap_edge i tau e)); [rewrite esum_scal; ring|]. intros e He. rewrite Rmult_0_l. unfold lap_edge.
     destruct (Nat.eqb_spec (tgt e) i) as [E|_]; [|reflexivity]. rewrite (T i b Hb), (T _ _ (Hclosed i b e Hb He E)), turn_ok. ring. }
-  destruct mode_parts as [En W]. destruct (wide_parts c W) as [_ [_ [W2 W3]]]. rewrite En in W3. destruct basis_parts as [HC _].
+  destruct mode_parts as [En W]. destruct (wide_parts c W) as [_ [_ [W2 W3]]]. rewrite En in W3.
   assert (Z : forall k, S k -> y k = 0).
   { intros k Hk. destruct (largest_of (fun i => Rabs (y i)) (map fst A)) as [a [Ha MA]].
     { destruct Hk as [b Hb]. intros E. apply (in_map fst) in Hb. rewrite E in Hb. destruct Hb. }
@@ -293,7 +305,7 @@ Proof.
     assert (Sa : S a) by (apply HS; exact Ha).
     assert (Ba : forall i, S i -> Rabs (y i) <= Rabs (y a)) by (intros i Hi; apply MA; apply HS; exact Hi).
     assert (Sn : forall i, S i -> In i C) by (intros i [b Hb]; apply (HA i b Hb)).
-    destruct (W3 a (HC a (Sn a Sa))) as [D [HD [_ HP]]]. destruct (hd_in D HD) as [Hh _]. set (h := hd O (nodes D)) in *.
+    destruct (W3 a (agents_in a (Sn a Sa))) as [D [HD [_ HP]]]. destruct (hd_in D HD) as [Hh _]. set (h := hd O (nodes D)) in *.
     assert (Sh : S h) by (apply (closed_path es S h a Cl HP Sa)).
     assert (Eh : Rabs (y h) = Rabs (y a)) by (apply (path_same n es y Hr Hnz S (Rabs (y a)) Hy Cl Ba h a HP Sa eq_refl)).
     assert (Ho : In D (owned m P)) by (unfold owned; apply filter_In; split; [exact HD|apply mem_In; apply Sn; exact Sh]).
