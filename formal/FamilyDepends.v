@@ -87,7 +87,7 @@ Proof.
     - intros D HD _. rewrite Hx; [rewrite Rabs_R0; apply Rle_refl|]. intros I. apply followers_ok in I as [_ L].
       unfold owned in HD. apply filter_In in HD as [HD _]. destruct (hd_in F Hmodes m Hm D HD) as [Hh _].
       assert (Y : leads m (hd O (nodes D)) = true) by (apply leads_ok; exists D; auto). congruence. }
-  pose proof (Rabs_pos (x i)). destruct (Req_dec (x i) 0) as [Z|Z]; [exact Z|]. apply Rabs_pos_lt in Z. lra.
+  apply no_size. exact K.
 Qed.
 (** leaders at rest determine followers *)
 Lemma dirichlet tau : (forall i, ~ In i C -> tau i = 0) -> (forall i, In i C -> leads m i = true -> lap es tau i = 0) ->
@@ -215,7 +215,6 @@ Proof.
       { apply (Hc (fun b => phi m (fst b) (hd O (nodes D)))). apply in_app_iff. right. apply in_map_iff. exists D. split; [reflexivity|].
         unfold heads. apply filter_In. auto. }
       rewrite E, Rabs_R0. apply Rle_refl. }
-  pose proof (Rabs_pos (q (fst b))). assert (E : q (fst b) = 0) by (destruct (Req_dec (q (fst b)) 0) as [E|E]; [exact E|apply Rabs_pos_lt in E; lra]).
-  rewrite Q2 in E. apply Rmult_integral in E as [E|E]; contradiction.
+  apply no_size in Z. rename Z into E. rewrite Q2 in E. apply Rmult_integral in E as [E|E]; contradiction.
 Qed.
 End Counter.

@@ -371,7 +371,7 @@ Proof.
         specialize (HB (fun j => y j + -1 * comb P z j) (3 * Ea t)).
         specialize (HB ltac:(intros b Hb; cbv beta; replace (y (fst b) + -1 * comb P z (fst b)) with (y (fst b) - comb P z (fst b)) by ring; apply A; apply HP; exact Hb)).
         specialize (A i Hi). assert (EK : K * exp (- (r * s t)) = (1 + B) * (3 * Ea t)) by (unfold K, Ea; rewrite Em; ring). rewrite EK. lra. }
-      pose proof (Rabs_pos (xi P y i)). destruct (Req_dec (xi P y i) 0) as [Z|Z]; [exact Z|]. apply Rabs_pos_lt in Z. lra.
+      apply no_size. exact V.
     + apply (near_limit F Hframe X Sl ta i (y i) (2 * (exp d * exp (r * s ta) * Ma)) (2 * r) ltac:(lra) Ha). intros t Ht.
       eapply Rle_trans; [apply (Hy i (HC i Hi) Hi t Ht)|]. unfold Ea. rewrite Em. fold c. replace (2 * r / 2 * s t) with (r * s t) by field. right. ring.
   - intros t0 t M i H0 Ht Hi HX. fold C in Hi, HX. assert (M0 : 0 <= M) by (eapply Rle_trans; [apply Rabs_pos|apply (HX i Hi)]).

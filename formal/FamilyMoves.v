@@ -95,7 +95,7 @@ Proof.
   destruct (dirichlet F P Hmodes Hpart Hbasis m Hm tau T0) as [q [Q1 Q2]].
   { intros i Hi L. change (lap es tau i = 0). rewrite (lap_same es tau x i) by (intros e He Et; subst i; split; apply Tx; [exact Hi|apply inside_; assumption]).
     destruct (state_parts i Hi) as [_ B]. rewrite into_null in B.
-    - pose proof (Rabs_pos (lap es x i)). destruct (Req_dec (lap es x i) 0) as [Z|Z]; [exact Z|apply Rabs_pos_lt in Z; lra].
+    - apply no_size. exact B.
     - intros e He Et. subst i. pose proof (inside_ e He Hi) as Hs. rewrite (proj1 (state_parts _ Hi) L), (proj1 (state_parts _ Hs) (Lead e He Hi L)). ring. }
   change (forall i, lap es q i = 0) in Q2. exists q. split; [|split; [exact Q2|]].
   { intros i Hi. rewrite (Q1 i); [apply T0; exact Hi|]. intros I. apply (followers_ok F P Hbasis m) in I as [I _]. contradiction. }

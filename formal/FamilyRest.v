@@ -7,6 +7,8 @@ Require Import Vec Definite Graph Flow Certificate Checker Sound Claims Mean Tab
   FamilySound FamilyMotion FamilyRows.
 Open Scope R_scope.
 
+Lemma no_size x : Rabs x <= 0 -> x = 0.
+Proof. intros H. pose proof (Rabs_pos x). destruct (Req_dec x 0) as [Z|Z]; [exact Z|]. apply Rabs_pos_lt in Z. lra. Qed.
 (** * Fewer equations than unknowns *)
 (** unknowns are numbers at the first entries of the list *)
 Definition tot (bs : list (nat * list Q)) (l : nat * list Q -> R) (c : nat -> R) : R := fold_right (fun b a => l b * c (fst b) + a) 0 bs.
@@ -272,7 +274,7 @@ Proof.
       assert (Z : comb P z (hd O (nodes D)) = 0).
       { apply Hz. apply in_map_iff. exists D. split; [reflexivity|]. apply filter_In. auto. }
       rewrite Z, Rabs_R0. apply Rle_refl. }
-    pose proof (Rabs_pos (comb P z (fst b))). destruct (Req_dec (comb P z (fst b)) 0) as [Z|Z]; [exact Z|]. apply Rabs_pos_lt in Z. lra.
+    apply no_size. exact A.
   - exists z. intros D HD HB. apply Hz. apply in_map_iff. exists D. split; [reflexivity|]. apply filter_In. auto.
 Qed.
 Variable A : list (nat * bool).
@@ -321,8 +323,7 @@ Proof.
           - destruct b'; [contradiction|reflexivity]. }
         rewrite (G _ _ Hb), (G _ _ Hs). apply Rlt_Qlt. rewrite Q2R_mult, Q2R_0. pose proof (Hnz e He) as Z. unfold turn.
         set (w := Q2R (wt e)) in *. destruct (Rlt_dec 0 w), b; unfold Q2R, inject_Z; simpl; lra. }
-    pose proof (Ba k Hk) as L. rewrite <- Eh, Y0, Rabs_R0 in L. pose proof (Rabs_pos (y k)). destruct (Req_dec (y k) 0) as [Q|Q]; [exact Q|].
-    apply Rabs_pos_lt in Q. lra. }
+    pose proof (Ba k Hk) as L. rewrite <- Eh, Y0, Rabs_R0 in L. apply no_size. exact L. }
   intros k b Hk. rewrite <- (T k b Hk). specialize (Z k (ex_intro _ b Hk)). unfold y in Z. lra.
 Qed.
 End Mandatory.
