@@ -67,17 +67,27 @@ Definition mode_claim (F : family) (m : mode) : Prop := edges (mandatory m) = sm
 Definition xi (P : part) (x : nat -> R) (i : nat) : R :=
   x i - fold_right (fun b a => Q2R (nth i (snd b) 0%Q) * x (fst b) + a) 0 (still P).
 Definition owned (m : mode) (P : part) := filter (fun C => mem (hd O (nodes C)) (its_agents P)) (comps (mandatory m)).
-(** the basis is at rest in every member, and has as many columns as each mandatory graph balanced closed components *)
+(** the basis is at rest in every member, and has as many columns as each mandatory graph balanced closed components; of a
+    part that depends on the signal some motion stays where another member moves it: no states at rest in all are reached *)
 Definition part_claim (F : family) (P : part) : Prop :=
   (forall i j, In i (its_agents P) ->
     (In j (its_agents P) <-> linked (flat_map (fun e => there e 1%Q) (flat_map ties (modes F))) i j)) /\
   (becomes P <> Depends -> forall m, In m (modes F) -> length (filter is_balanced (owned m P)) = length (still P) /\
      forall w p v i, admits (ties m) w -> In (p, v) (still P) -> In i (its_agents P) ->
        member (ties m) w (fun j => Q2R (nth j v 0%Q)) i = 0) /\
-  match becomes P with Stability => still P = [] | Depends => True
+  match becomes P with Stability => still P = []
   | Consensus => exists p v, still P = [(p, v)] /\ forall i, In i (its_agents P) -> sq (Q2R (nth i v 0%Q)) = 1
   | Interval => still P <> [] /\ forall m, In m (modes F) -> exists C, owned m P = [C]
-  | Containment => still P <> [] /\ exists m C C' l, In m (modes F) /\ owned m P = C :: C' :: l end.
+  | Containment => still P <> [] /\ exists m C C' l, In m (modes F) /\ owned m P = C :: C' :: l
+  | Depends => exists q m w i, switches F (fun _ => q) (fun _ _ => 0) /\ In m (modes F) /\ admits (ties m) w /\
+      In i (its_agents P) /\ member (ties m) w q i <> 0 end.
+(** the common kernel theorem: every motion has a limit, which is at rest in every member; with constants of the family
+    alone it nears it exponentially by the clock, however the signal switches *)
+Definition kernel_claim (F : family) (P : part) : Prop := let c := frame F in becomes P <> Depends -> exists K r, 0 < r /\
+  forall X S, switches F X S -> exists y, (forall i, In i (its_agents P) -> xi P y i = 0 /\
+    filterlim (fun t => X t i) (at_left (deadline c)) (locally (y i))) /\ forall t0 t M i, switches_from F X S t0 ->
+    t0 <= t < deadline c -> In i (its_agents P) -> (forall j, In j (its_agents P) -> Rabs (xi P (X t0) j) <= M) ->
+    Rabs (X t i - y i) <= K * exp (- (r * (s c t - s c t0))) * M.
 (** the function is at most [a] *)
 Definition below (b : lyapunov) (a : R) (x : nat -> R) : Prop := let z := xi (about b) x in match by_ b with
   | Form P => qbil P z z <= a | Squares p => qdot p (fun i => sq (x i)) <= a
@@ -107,7 +117,7 @@ Definition inputs_claim (F : family) : Prop := let c := frame F in
     In m (modes F) -> admits (ties m) w -> Rabs (u m w X t i) <= Q2R (nth i (peaks F) 0%Q).
 (** sliding variables do not hear the graph: what is said of them is what holds without edges, of [X = S] *)
 Definition true_family (F : family) : Prop := (forall m, In m (modes F) -> mode_claim F m) /\
-  (forall P, In P (parts F) -> part_claim F P) /\
+  (forall P, In P (parts F) -> part_claim F P /\ kernel_claim F P) /\
   (forall i, (i < order (frame F))%nat -> exists P, In P (parts F) /\ In i (its_agents P)) /\
   (edges (frame F) = [] /\ sliding_claim (frame F)) /\ (forall b, In b (bounds F) -> bound_claim F b) /\
   ends_claim F /\ inputs_claim F /\ existence_claim F.

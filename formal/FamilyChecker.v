@@ -151,6 +151,43 @@ Definition check_part (F : family) (P : part) : bool :=
   | Consensus => match still P with [(_, v)] => forallb (fun i => Qeq_bool (nth i v 0%Q * nth i v 0%Q) 1) C | _ => false end
   | Interval => negb (length (still P) =? 0)%nat && forallb (fun m => match owned m P with [_] => true | _ => false end) (modes F)
   | Containment => negb (length (still P) =? 0)%nat && existsb (fun m => match owned m P with _ :: _ :: _ => true | _ => false end) (modes F) end.
+(** columns of the basis are 1 at their own pivots, 0 at the others *)
+Fixpoint distinct (l : list nat) : bool := match l with [] => true | i :: l' => negb (mem i l') && distinct l' end.
+Definition check_pivots (F : family) (P : part) : bool := let C := its_agents P in
+  forallb (fun i => (i <? order (frame F))%nat) C && match becomes P with Depends => true | _ =>
+  distinct (map fst (still P)) && forallb (fun b => mem (fst b) C &&
+    forallb (fun b' => Qeq_bool (nth (fst b') (snd b) 0%Q) (if (fst b =? fst b')%nat then 1%Q else 0%Q)) (still P)) (still P) end.
+
+(** * A state at rest in one member that moves in another *)
+(** what is believed to prove it, by numbers of modes: one has more balanced closed components than the other; or a state
+    near [middle], within [off], moves, in a mandatory graph or by a weight that may change *)
+Inductive why := Counts (one other : nat) | Moves (one other : nat) (by_weight : option nat) (middle_ off : list Q).
+Definition heads (m : mode) (P : part) : list comp := filter is_balanced (owned m P).
+Definition check_counts (P : part) (m m' : mode) : bool := let B := heads m P in let top D := hd O (nodes D) in
+  (length (heads m' P) <? length B)%nat && distinct (map top B) &&
+  forallb (fun D => forallb (fun D' => (top D =? top D')%nat || negb (mem (top D') (nodes D))) B) B.
+Definition row_of (es : list edge) (g : edge -> Q) (i : nat) : Q :=
+  fold_right (fun e a => if (tgt e =? i)%nat then Qred (g e + a) else a)%Q 0%Q es.
+Definition moved (x : list Q) (e : edge) : Q := (Qabs (wt e) * entry x (tgt e) - wt e * entry x (src e))%Q.
+Definition drawn_in (r : list Q) (e : edge) : Q := (Qabs (wt e) * (entry r (tgt e) - entry r (src e)))%Q.
+Definition blurred (r : list Q) (e : edge) : Q := (Qabs (wt e) * (entry r (tgt e) + entry r (src e)))%Q.
+Definition leads (m : mode) (i : nat) : bool := existsb (fun D => mem i (nodes D)) (comps (mandatory m)).
+Definition less (a b : Q) : bool := negb (Qle_bool b a).
+Definition check_state (P : part) (m : mode) (x r : list Q) : bool := let es := edges (mandatory m) in
+  forallb (fun i => (negb (leads m i) || Qeq_bool (entry r i) 0) &&
+    Qle_bool (Qabs (row_of es (moved x) i)) (row_of es (drawn_in r) i)) (its_agents P).
+Definition check_moved (P : part) (m : mode) (by_weight : option nat) (x r : list Q) : bool := match by_weight with
+  | None => let es := edges (mandatory m) in
+      existsb (fun i => less (row_of es (blurred r) i) (Qabs (row_of es (moved x) i))) (its_agents P)
+  | Some j => match nth_error (ties m) j with None => false | Some e =>
+      negb (head e =? tail e)%nat && mem (head e) (its_agents P) && less (lo e) (hi e) &&
+      less (entry r (head e) + entry r (tail e)) (Qabs (entry x (head e) - inject_Z (sign_of e) * entry x (tail e))) end end.
+Definition check_depends (F : family) (P : part) (w : option why) : bool := match becomes P, w with
+  | Depends, Some (Counts a b) => match nth_error (modes F) a, nth_error (modes F) b with
+      | Some m, Some m' => check_counts P m m' | _, _ => false end
+  | Depends, Some (Moves a b j x r) => match nth_error (modes F) a, nth_error (modes F) b with
+      | Some m, Some m' => check_state P m x r && check_moved P m' j x r | _, _ => false end
+  | Depends, None => false | _, _ => true end.
 Definition check_frame (F : family) : bool :=
   let c := frame F in negb (length (modes F) =? 0)%nat && check_protocol c && check_sliding_input c && check_reaching c &&
   (match edges c with [] => true | _ => false end) &&
@@ -181,12 +218,13 @@ Definition check_peak (F : family) (i : nat) (peak : Q) : bool := let c := frame
     | None => false end) (bounds F)).
 Definition check_peaks (F : family) : bool := forallb (fun p => check_peak F (fst p) (snd p)) (combine (seq 0 (length (peaks F))) (peaks F)).
 
-(** agents that a function draws to 0 *)
+(** agents that end at 0 *)
 Definition check_end_of (F : family) (i : nat) (e : Q * Q) : bool := Qle_bool (Qabs (fst e)) (snd e) &&
-  existsb (fun b => pos (decay b) && mem i (its_agents (about b)) && match still (about b) with [] => true | _ => false end) (bounds F).
+  existsb (fun P => mem i (its_agents P) && match becomes P with Stability => true | _ => false end) (parts F).
 Definition check_family_ends (F : family) : bool := forallb (fun ie => match snd ie with None => true | Some e => check_end_of F (fst ie) e end)
   (combine (seq 0 (length (ends F))) (ends F)).
-Definition check_family (F : family) (hs : list hint) : bool :=
-  check_frame F && forallb (check_mode F) (modes F) && forallb (check_part F) (parts F) &&
+Definition check_family (F : family) (hs : list hint) (ws : list (option why)) : bool :=
+  check_frame F && forallb (check_mode F) (modes F) && forallb (check_part F) (parts F) && forallb (check_pivots F) (parts F) &&
+  (length (parts F) =? length ws)%nat && forallb (fun pw => check_depends F (fst pw) (snd pw)) (combine (parts F) ws) &&
   ((length (bounds F) =? length hs)%nat && forallb (fun bh => check_bound F (fst bh) (snd bh)) (combine (bounds F) hs)) &&
   check_family_ends F && check_stays F && check_peaks F.

@@ -3,7 +3,7 @@ Require Import ZArith QArith Qabs Qreals List Bool Reals Lra Lia Psatz.
 From Coquelicot Require Import Coquelicot.
 Import ListNotations.
 Require Import Vec Definite Graph Flow Certificate Checker Sound Claims Input Slide Exist Peak Reach Main Rest Table Wide FamilyCertificate FamilyFlow
-  FamilyChecker FamilySound FamilyMotion FamilyRows.
+  FamilyChecker FamilySound FamilyMotion FamilyRows FamilyKernel FamilyMoves.
 Open Scope R_scope.
 
 (** * Motions exist *)
@@ -122,9 +122,9 @@ Proof.
 Qed.
 
 (** * Parts *)
-Theorem parts_claim P : check_part F P = true -> part_claim F P.
+Theorem parts_claim P u : check_pivots F P = true -> check_depends F P u = true -> check_part F P = true -> part_claim F P.
 Proof.
-  unfold check_part. cbv zeta. set (C := its_agents P). set (es := every_edge F). intros H.
+  intros HV HW HPart. pose proof HPart as H. revert H. unfold check_part. cbv zeta. set (C := its_agents P). set (es := every_edge F). intros H.
   apply andb_prop in H as [H H5]. apply andb_prop in H as [H H4]. apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2].
   split; [|split].
   - assert (K : forall j, In j C -> linked es (hd O C) j).
@@ -135,14 +135,14 @@ Proof.
   - intros ND m Hm. destruct (becomes P); try (exfalso; apply ND; reflexivity); rewrite forallb_forall in H4; specialize (H4 m Hm);
       apply andb_prop in H4 as [L R]; apply Nat.eqb_eq in L; (split; [exact L|]); intros w p v i Hw Hv Hi; rewrite forallb_forall in R;
       apply (rest_ok F Hmodes (common_of (still P)) m v Hm (R _ Hv) w i Hw).
-  - destruct (becomes P).
+  - destruct (becomes P) eqn:EB.
     + destruct (still P); [reflexivity|discriminate].
     + destruct (still P) as [|[p v] [|]]; try discriminate. exists p, v. split; [reflexivity|]. intros i Hi.
       rewrite forallb_forall in H5. specialize (H5 i Hi). apply Qeq_R in H5. rewrite Q2R_mult in H5. unfold sq. rewrite H5. unfold Q2R. simpl. lra.
     + apply andb_prop in H5 as [HN H5]. split; [intros E; rewrite E in HN; discriminate|]. intros m Hm.
       rewrite forallb_forall in H5. specialize (H5 m Hm). destruct (owned m P) as [|C0 [|]]; try discriminate. exists C0. reflexivity.
     + apply andb_prop in H5 as [HN H5]. split; [intros E; rewrite E in HN; discriminate|]. apply existsb_exists in H5 as [m [Hm H5]]. destruct (owned m P) as [|C0 [|C1 l]] eqn:E; try discriminate. exists m, C0, C1, l. auto.
-    + exact I.
+    + apply (depends_ok F P u Hmodes HPart HV HW EB).
 Qed.
 
 (** * The input *)
@@ -290,38 +290,40 @@ Proof.
     rewrite ES in H3. change (Q2R (rho2 c) * Q2R (kappa c)) with (k c) in H3. change (k c * / T) with (k c / T) in H3. change (Q2R (rho1 c)) with rho in H3.
     set (u := _ * member _ _ _ _) in *. unfold sq in B. apply Rabs_le. split; nra.
 Qed.
-Theorem ends_ok : check_family_ends F = true -> ends_claim F.
+Theorem ends_ok : (forall P, In P (parts F) -> part_claim F P /\ kernel_claim F P) -> check_family_ends F = true -> ends_claim F.
 Proof.
-  intros H X S i m r [HM _] E. unfold check_family_ends in H. rewrite forallb_forall in H.
+  intros HP H X S i m r [HM _] E. unfold check_family_ends in H. rewrite forallb_forall in H.
   assert (L : (i < length (ends F))%nat).
   { destruct (Nat.lt_ge_cases i (length (ends F))) as [L|L]; [exact L|]. rewrite nth_overflow in E by exact L. discriminate. }
   assert (K : In (i, nth i (ends F) None) (combine (seq 0 (length (ends F))) (ends F))).
   { apply (in_numbered _ (ends F) 0%nat); [apply nth_error_nth'|]; exact L. }
   specialize (H _ K). cbn [fst snd] in H. rewrite E in H. unfold check_end_of in H. cbn [fst snd] in H. apply andb_prop in H as [A H].
-  apply existsb_exists in H as [b [Hb H]]. apply andb_prop in H as [H B3]. apply andb_prop in H as [B1 B2]. apply Qpos in B1. apply mem_In in B2.
-  destruct (bound_of b Hb) as [h Hh]. destruct (bounds_claim b h Hh) as [_ [_ [_ G]]]. destruct (G B1 X S HM) as [y Hy].
-  destruct (Hy i B2) as [Y1 Y2]. exists (y i). split; [exact Y1|]. unfold xi in Y2. destruct (still (about b)); [|discriminate]. simpl in Y2.
+  apply existsb_exists in H as [P [HP' H]]. apply andb_prop in H as [B1 B2]. apply mem_In in B1. destruct (HP P HP') as [[_ [_ B3]] G].
+  destruct (becomes P) eqn:EP; try discriminate. destruct (G ltac:(rewrite EP; discriminate)) as [q1 [q2 [_ G']]].
+  destruct (G' X S HM) as [y [Hy _]]. destruct (Hy i B1) as [Y2 Y1]. exists (y i). split; [exact Y1|]. unfold xi in Y2. rewrite B3 in Y2. simpl in Y2.
   replace (y i) with 0 by lra. unfold Rminus. rewrite Rplus_0_l, Rabs_Ropp. apply Qle_R in A.
-  assert (N : Q2R (Qabs m) = Rabs (Q2R m)).
-  { unfold Q2R. destruct m as [nm dm]. simpl. rewrite Rabs_mult, abs_IZR. f_equal. symmetry. apply Rabs_right. apply Rle_ge. left.
-    apply Rinv_0_lt_compat. apply IZR_lt. reflexivity. }
-  rewrite N in A. exact A.
+  rewrite Qabs_R in A. exact A.
 Qed.
 End Main.
 
-Definition accepts_family (F : family) (hs : list hint) : bool := check_family F hs.
-Theorem accepts_family_sound F hs : accepts_family F hs = true -> true_family F.
+Definition accepts_family (F : family) (hs : list hint) (ws : list (option why)) : bool := check_family F hs ws.
+Theorem accepts_family_sound F hs ws : accepts_family F hs ws = true -> true_family F.
 Proof.
   intros H. unfold accepts_family, check_family in H. apply andb_prop in H as [H H7]. apply andb_prop in H as [H H6].
-  apply andb_prop in H as [H H5]. apply andb_prop in H as [H H4]. apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2].
+  apply andb_prop in H as [H H5]. apply andb_prop in H as [H H4]. apply andb_prop in H as [H H10]. apply andb_prop in H as [H H9].
+  apply andb_prop in H as [H H8]. apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2].
   destruct (frame_parts F H1) as [A1 [A2 [A3 A4]]].
   assert (A0 : modes F <> []) by (intros E; unfold check_frame in H1; rewrite E in H1; discriminate H1).
   split; [intros m Hm; apply (modes_claim F H2 m Hm)|].
-  split; [intros P HP; rewrite forallb_forall in H3; apply (parts_claim F H2); auto|].
+  assert (AP : forall P, In P (parts F) -> part_claim F P /\ kernel_claim F P).
+  { intros P HP. rewrite forallb_forall in H3, H8, H10. apply Nat.eqb_eq in H9. destruct (in_combine _ ws P H9 HP) as [w Hw].
+    split; [apply (parts_claim F H2 P w (H8 P HP) (H10 _ Hw) (H3 P HP))|].
+    intros ND. apply (common_kernel F P H1 H2 (H3 P HP) (H8 P HP) ND ND). }
+  split; [exact AP|].
   split; [exact A4|]. split; [split; [exact A3|apply (sliding_ok _ A1 A2)]|].
   split; [intros b Hb; destruct (bound_of F hs H4 b Hb) as [h Hh]; apply (bounds_claim F H1 H2 b h Hh)|].
   split.
-  - apply (ends_ok F H1 H2 hs H4 H5).
+  - apply (ends_ok F AP H5).
   - split; [split; [apply (stays_ok F H1 H2 hs H4 H6)|apply (peaks_ok F H1 H2 hs H4 H7)]|].
     apply (family_motions_exist F A1 A0 H2).
 Qed.

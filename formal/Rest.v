@@ -150,8 +150,8 @@ Section Still.
 Variables (n : nat) (es : list edge) (y : nat -> R).
 Hypothesis Hr : forall e, In e es -> (tgt e < n)%nat /\ (src e < n)%nat.
 Hypothesis Hnz : forall e, In e es -> Q2R (wt e) <> 0.
-Hypothesis Hy : forall i, (i < n)%nat -> lap es y i = 0.
 Variables (S : nat -> Prop) (m : R).
+Hypothesis Hy : forall i, (i < n)%nat -> S i -> lap es y i = 0.
 Hypothesis HS : forall e, In e es -> S (tgt e) -> S (src e).
 Hypothesis Hm : forall i, S i -> Rabs (y i) <= m.
 Lemma edge_rule e : In e es -> S (tgt e) -> Rabs (y (tgt e)) = m -> Q2R (wt e) * y (src e) = Rabs (Q2R (wt e)) * y (tgt e).
@@ -167,7 +167,7 @@ Proof.
       { rewrite <- Rabs_mult. set (v := Q2R (wt f) * y (src f)). pose proof (Rle_abs v). pose proof (Rle_abs (- v)) as V.
         rewrite Rabs_Ropp in V. destruct G1 as [-> | ->]; lra. }
       pose proof (Rabs_pos (Q2R (wt f))). nra.
-    - rewrite esum_scal, <- lap_esum, Hy by exact Rt. ring. }
+    - rewrite esum_scal, <- lap_esum, Hy by assumption. ring. }
   unfold lap_edge in Z. fold t in Z. rewrite Nat.eqb_refl in Z. destruct G1 as [-> | ->]; lra.
 Qed.
 Lemma edge_same e : In e es -> S (tgt e) -> Rabs (y (tgt e)) = m -> Rabs (y (src e)) = m.
@@ -205,13 +205,13 @@ Proof.
   intros HC. destruct Hs as [A _]. destruct (A C HC) as [[i0 H0] [Cl St]].
   destruct (largest_of (fun i => Rabs (y i)) (nodes C)) as [b [Hb M]]; [intros E; rewrite E in H0; destruct H0|].
   exists (Rabs (y b)). intros i Hi.
-  apply (path_same n es y Hr Hnz Hy (fun i => In i (nodes C)) (Rabs (y b)) Cl M i b); auto.
+  apply (path_same n es y Hr Hnz (fun i => In i (nodes C)) (Rabs (y b)) (fun i Hi _ => Hy i Hi) Cl M i b); auto.
 Qed.
 Lemma comp_edge C e : In C (comps c) -> In e es -> In (tgt e) (nodes C) ->
   Q2R (wt e) * y (src e) = Rabs (Q2R (wt e)) * y (tgt e).
 Proof.
   intros HC He Ht. destruct (comp_same C HC) as [m M]. destruct Hs as [A _]. destruct (A C HC) as [_ [Cl _]].
-  apply (edge_rule n es y Hr Hy (fun i => In i (nodes C)) m Cl); auto. intros i Hi. rewrite (M i Hi). lra.
+  apply (edge_rule n es y Hr (fun i => In i (nodes C)) m (fun i Hi _ => Hy i Hi) Cl); auto. intros i Hi. rewrite (M i Hi). lra.
 Qed.
 Lemma sign_product q a b : (0 < q * inject_Z (a * b))%Q -> 0 < Q2R q * (IZR a * IZR b).
 Proof.
@@ -279,7 +279,7 @@ Proof.
       apply (path_step _ _ (swap e)); [apply in_app_iff; right; apply in_map; exact He|]. constructor. }
     assert (Bd : forall j, In j (members P) /\ (j < n)%nat -> Rabs (y j) <= Rabs (y b)).
     { intros j [Hj Hjn]. apply MB. apply filter_In. split; [exact Hj|apply Nat.ltb_lt; exact Hjn]. }
-    pose proof (path_same n es y Hr Hnz Hy (fun j => In j (members P) /\ (j < n)%nat) (Rabs (y b)) Back Bd _ b HP2 (Logic.conj Hb Hbn) eq_refl) as Eh.
+    pose proof (path_same n es y Hr Hnz (fun j => In j (members P) /\ (j < n)%nat) (Rabs (y b)) (fun j Hj _ => Hy j Hj) Back Bd _ b HP2 (Logic.conj Hb Hbn) eq_refl) as Eh.
     assert (Hh : In (hd O (nodes C)) (members P)).
     { pose proof (closed_path es (fun j => In j (members P) /\ (j < n)%nat) (hd O (nodes C)) b Back HP2 (Logic.conj Hb Hbn)) as K. apply K. }
     assert (Ho : In C (own c P)) by (unfold own; apply filter_In; split; [exact HC|apply mem_In; exact Hh]).

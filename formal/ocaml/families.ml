@@ -4,7 +4,7 @@ open Json
 open Document
 module Z = Number.Z
 
-type t = { nodes : nodes; family : family; hints : hint list; sha256 : string; checked : (string * string) list;
+type t = { nodes : nodes; family : family; hints : hint list; whys : why option list; sha256 : string; checked : (string * string) list;
   unchecked : (string * string) list; sections : string list }
 
 let most_nodes = 400
@@ -126,6 +126,41 @@ let columns nodes (first : cert) own camps outcome witness =
           if inside i then Number.of_z g.(i) else if leader.(i) then Number.zero
           else match List.assoc_opt i rows with
             | Some row -> Option.value (List.assoc_opt (string_of_int k) row) ~default:Number.zero | None -> Number.zero)) mine
+
+let index_of f l =
+  let rec go k = function [] -> None | x :: l' -> if f x then Some k else go (k + 1) l' in go 0 l
+(* why what becomes of a component depends on the signal: numbers of balanced closed components that differ, or a state *)
+let why_of nodes modes part witness =
+  let n = Array.length nodes.labels in
+  let counts = List.map (fun m -> List.length (heads m part)) modes in
+  let most = List.fold_left max 0 counts and least = List.fold_left min max_int counts in
+  let place x = Option.get (index_of (fun y -> y = x) counts) in
+  if part.becomes <> Depends then None
+  else if most > least then begin
+    need (witness = Null) "family-claim: a witness that nothing asks for";
+    Some (Counts (place most, place least)) end
+  else begin
+    let get = fields "the witness" [ "mode"; "other"; "edge"; "state" ] witness in
+    let mode key = let k = integer key (get key) in
+      need (Z.sign k >= 0 && Z.compare k (Z.of_int (List.length modes)) < 0) "family-claim: an unknown mode"; Z.to_int k in
+    let one = mode "mode" and other = mode "other" in
+    let here = Pieces.inside n part.its_agents in
+    let state = match get "state" with
+      | Obj l -> List.map (fun (label, v) -> let i = node nodes "state" (Str label) in
+          need (here i) "family-claim: a state outside the component"; i, Reader.interval "state" v) l
+      | _ -> bad "state: an object is due" in
+    let all f = List.init n (fun i -> match List.assoc_opt i state with Some x -> f x | None -> Number.zero) in
+    let by_weight = match get "edge" with
+      | Null -> None
+      | v -> (match entries "edge" v with
+          | [ s; t; sg ] ->
+              let s = node nodes "edge" s and t = node nodes "edge" t and sg = integer "edge" sg in
+              let fits e = not (known e) && Z.equal sg (Z.of_int (sign e))
+                && ((e.tail = s && e.head = t) || (e.mutual && e.tail = t && e.head = s)) in
+              (match index_of fits (List.nth modes other).ties with
+               | Some j -> Some j | None -> bad "family-claim: an unknown edge, or a known weight")
+          | _ -> bad "edge: three entries are due") in
+    Some (Moves (one, other, by_weight, all fst, all snd)) end
 
 (* * Functions *)
 (* an upper bound of [(d'x)^2 / V], and of its root *)
@@ -299,16 +334,13 @@ let certificate (j : Json.t) : t =
         List.map2 (fun v (own, _) ->
           let get = fields "a component" [ "nodes"; "claim" ] v in
           need (positions nodes "a component" (get "nodes") = own) "components: other nodes"; claim (get "claim")) l found in
-  let unknown_end = List.exists (fun o -> o = Depends) claims in
-  let _, witness = (if unknown_end then take proof "family-claim" "graph" None else proved proof "family-claim" "graph" []) in
-  if unknown_end then begin
-    proof.unchecked <- ("family-claim", "graph") :: proof.unchecked;
-    not_checked "claim, that what becomes of a component depends on the signal" end;
+  let _, witness = proved proof "family-claim" "graph" [] in
   let witnesses = entries "family-claim" witness in
   need (List.length witnesses = List.length found) "family-claim: one for each component";
   let first = (List.hd modes).mandatory in
   let parts = List.map2 (fun ((own, camps), becomes) w ->
     { its_agents = own; becomes; still = columns nodes first own camps becomes w }) (List.combine found claims) witnesses in
+  let whys = List.map2 (why_of nodes modes) parts witnesses in
   let sliding = match get "sliding_variable" with Null -> [] | v -> by_agent nodes number "sliding_variable" v in
   let drives = List.exists (fun x -> not (Number.equal x Number.zero)) sliding in
   let lyapunov = fields "lyapunov" ("functions" :: if drives then [ "drives" ] else []) (get "lyapunov") in
@@ -316,14 +348,6 @@ let certificate (j : Json.t) : t =
   need (List.length functions <= most_functions) "lyapunov.functions: more than 1,000";
   let work = ref 0 in
   let bounds = List.mapi (lyapunov_of nodes parts modes proof work) functions in
-  (* the theorem says that a component comes to rest where a function has a positive rate *)
-  let at_rest p = p.becomes = Depends || (match p.its_agents with [ _ ] -> true
-    | _ -> List.exists (fun (b, _) -> b.about == p && Z.sign b.decay.qnum > 0) bounds) in
-  let unproved = List.filter (fun (_, p) -> not (at_rest p)) (List.mapi (fun i p -> i, p) parts) in
-  List.iter (fun (i, _) -> not_checked (Printf.sprintf "claim, that component %d comes to rest under every signal" i)) unproved;
-  if unproved <> [] && not unknown_end then begin
-    proof.checked <- List.filter (fun o -> o <> ("family-claim", "graph")) proof.checked;
-    proof.unchecked <- proof.unchecked @ [ "family-claim", "graph" ] end;
   let start = match get "initial_state" with Null -> None | v -> Some (by_agent nodes number "initial_state" v) in
   need (is_sliding = (get "sliding_variable" <> Null)) "sigma(0) belongs to the sliding-mode protocol, and is part of it";
   let reaching = if is_sliding then begin
@@ -338,7 +362,7 @@ let certificate (j : Json.t) : t =
     List.iteri (fun k _ -> skipped proof "family-drive" (Printf.sprintf "lyapunov.functions[%d]" k)) functions end;
   need ((start = None) = (get "final_state" = Null)) "a final state without an initial state, or none";
   (* ends of agents that are drawn to 0; others are not read *)
-  let stable = List.for_all (fun p -> p.becomes = Stability) parts && unproved = [] in
+  let stable = List.for_all (fun p -> p.becomes = Stability) parts in
   let ends = match start with
     | None -> []
     | Some _ when stable ->
@@ -370,14 +394,15 @@ let certificate (j : Json.t) : t =
   let frame = { first with edges = []; comps = []; pieces = []; kind; rho1; rho2; kappa; start = Option.value start ~default:[]; sliding;
     reaching; sliding_input } in
   { nodes; sha256; checked = List.rev proof.checked; unchecked = List.rev proof.unchecked; sections = List.rev !left;
-    hints = List.map snd bounds;
+    hints = List.map snd bounds; whys;
     family = { frame; modes; parts; bounds = List.map fst bounds; ends; stays; peaks } }
 
 (* the parts of the check one by one, to name the first that fails *)
-let of_family (f : family) hs : (string * (unit -> bool)) list =
+let of_family (f : family) hs ws : (string * (unit -> bool)) list =
   [ "protocol, or what is said of sliding variables", (fun () -> check_frame f) ]
   @ List.mapi (fun i m -> Printf.sprintf "structure of graph.modes[%d]" i, (fun () -> check_mode f m)) f.modes
-  @ List.mapi (fun i p -> Printf.sprintf "family-claim of graph, component %d" i, (fun () -> check_part f p)) f.parts
+  @ List.mapi (fun i (p, w) -> Printf.sprintf "family-claim of graph, component %d" i,
+      (fun () -> check_part f p && check_pivots f p && check_depends f p w)) (List.combine f.parts ws)
   @ List.mapi (fun i (b, h) -> Printf.sprintf "lyapunov.functions[%d]" i, (fun () -> check_bound f b h)) (List.combine f.bounds hs)
   @ [ "family-final-state of final_state", (fun () -> check_family_ends f);
       "family-input of input", (fun () -> check_stays f && check_peaks f) ]

@@ -6,6 +6,7 @@ import json
 import os
 import random
 import re
+from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
@@ -34,6 +35,22 @@ NOMINAL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
 SLIDING = SlidingModeProtocol(T_r="0.5", T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
 SIGNED = Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 1), ("b", "c", -2, -1)])
 SIGNALS = ("any", "constant", ClockShares(["1/2", "1/2"]), JointWindows(1, on="1/5", clock="s"))
+#: Families of which what becomes depends on the signal, by the kind of the witness.
+DEPENDING = {
+    "moves in another mode": Family.switching(
+        [SignedDigraph.from_edges([("l", "a", 1), ("m", "a", w), ("a", "b", -1)]) for w in (1, 2)]
+    ),
+    "moves by a weight": Family.from_intervals([("l", "a", 1, 2), ("m", "a", 1, 1), ("a", "b", -1, -1)]),
+    "moves by an undirected weight": Family.from_intervals(
+        [("a", "b", 1, 1), ("b", "c", -1, -1), ("a", "c", 0, 1)], undirected=True
+    ),
+    "other numbers": Family.switching(
+        [
+            SignedDigraph.from_edges(edges, nodes=["a", "b", "c"])
+            for edges in ([("a", "b", 1)], [("a", "b", 1), ("c", "b", -1), ("b", "c", 2), ("b", "a", -1)])
+        ]
+    ),
+}
 #: What the executable says of a form of a family that it does not read.
 UNREAD = ("function of rows", "function of squares", "side files", "more than 400 nodes", "entries")
 
@@ -72,6 +89,13 @@ def random_families(count: int) -> list[tuple[str, Family]]:
 def signed(protocol: Any = NOMINAL) -> str:
     """The certificate of one uncertain mode with camps, as a text."""
     return json.dumps(document(SIGNED, protocol=protocol))
+
+
+def decided(family: Family, protocol: Any = NOMINAL) -> Json:
+    """The certificate of a family by the decision alone, without functions."""
+    parts = tuple(ComponentProof(c, ()) for c in decide(family))
+    made = certify_family(family, protocol, range(1, family.n_nodes + 1), time_limit=0.001)
+    return {**json.loads(replace(made, parts=parts).to_json()), "unverified": {}}
 
 
 def rows(seed: int) -> Json:
@@ -153,6 +177,83 @@ def test_rows_are_verified_and_a_higher_rate_of_theirs_is_rejected(tmp_path: Pat
     faster = changed(found, ("lyapunov", "functions", 0, "rate"), rate)
     code, text = said(resealed(changed(faster, ("proof", place, "numbers", "b"), rate)), tmp_path)
     assert code == 1 and "lyapunov.functions[0]" in text, text
+
+
+def test_without_functions_it_is_verified_that_components_come_to_rest(tmp_path: Path) -> None:
+    program()
+    seen = set()
+    for seed, (name, family) in enumerate(random_families(9)):
+        found = decided(family, SLIDING if seed % 3 == 2 else NOMINAL)
+        assert check(found).accepted and found["lyapunov"]["functions"] == []
+        code, text = said(found, tmp_path)
+        assert code == 0, (name, text)
+        behaviours = {c.behaviour for c in decide(family)}
+        assert "verified    family-claim of graph\n" in text and "claim" not in named(text), (name, text)
+        if behaviours == {"stability"}:
+            assert "verified    family-final-state of final_state" in text, (name, text)
+        seen |= behaviours
+    assert seen > {"stability", "bipartite consensus", "interval bipartite consensus", "bipartite containment"}
+
+
+def test_without_functions_a_common_kernel_that_is_none_is_rejected(tmp_path: Path) -> None:
+    program()
+    shares = {"a": {"1": "1/2", "2": "1/2"}}
+    depends = decided(DEPENDING["moves in another mode"])
+    bent = decided(Family.switching([SignedDigraph.from_edges([("l", "a", 1), ("m", "a", 1)])]))
+    more = decided(Family.switching([SignedDigraph.from_edges([("a", "b", 1)], nodes=["a", "b"])]))
+    fewer = decided(Family.switching([SignedDigraph.from_edges([("a", "b", -1), ("b", "a", 1)])]))
+    for forged in (
+        with_witness(depends, "bipartite containment", [{"rows": shares}]),
+        with_witness(bent, "bipartite containment", [{"rows": {"a": {"1": "1/2", "2": "1/4"}}}]),
+        with_witness(more, "stability", None),
+        with_witness(fewer, "bipartite consensus", None),
+    ):
+        assert not check(forged).accepted
+        code, text = said(forged, tmp_path)
+        assert code == 1 and "claim" in text, text
+
+
+@pytest.mark.parametrize("kind", DEPENDING)
+def test_that_a_component_depends_on_the_signal_is_verified_by_its_witness(kind: str, tmp_path: Path) -> None:
+    program()
+    found = decided(DEPENDING[kind])
+    (claim,) = (o for o in found["proof"] if o["kind"] == "family-claim")
+    (witness,) = claim["witness"]
+    assert found["claim"]["behaviour"] == "depends on the signal" and check(found).accepted
+    assert (witness is None) == (kind == "other numbers")
+    assert witness is None or (witness["edge"] is None) == (kind == "moves in another mode")
+    code, text = said(found, tmp_path)
+    assert code == 0 and "verified    family-claim of graph\n" in text, text
+    for path, mutant in mutants(found, every=3):
+        compare(mutant, path, tmp_path, UNREAD, same_claim)
+    other = {"mode": 0, "other": 0, "edge": None, "state": {}} if witness is None else None
+    code, text = said(with_witness(found, "depends on the signal", [other]), tmp_path)
+    assert code == 1 and "witness" in text, text
+
+
+def test_a_state_that_does_not_rest_or_does_not_move_proves_nothing(tmp_path: Path) -> None:
+    program()
+    found = decided(DEPENDING["moves in another mode"])
+    (witness,) = next(o["witness"] for o in found["proof"] if o["kind"] == "family-claim")
+    state = witness["state"]
+    near = {"mid": state["a"], "radius": "1/100"}
+    cases: list[tuple[bool, Json]] = [
+        (True, {"state": {**state, "a": near, "b": {**near, "mid": state["b"]}}}),
+        (False, {"state": {**state, "a": near}}),  # what hears it has no radius
+        (False, {"state": {**state, "a": str(Fraction(state["a"]) + Fraction(1, 1000))}}),
+        (False, {"state": {**state, "a": {**near, "radius": "1"}, "b": {"mid": state["b"], "radius": "1"}}}),
+        (False, {"state": {k: {"mid": x, "radius": "1/1000"} for k, x in state.items()}}),  # leaders are exact
+        (False, {"state": {}}),
+        (False, {"other": witness["mode"]}),
+        (False, {"mode": witness["other"]}),
+        (False, {"edge": ["l", "a", 1]}),
+        (False, {"mode": 2}),
+    ]
+    for accepted, change in cases:
+        changed_ = with_witness(found, "depends on the signal", [{**witness, **change}])
+        assert check(changed_).accepted == accepted, change
+        code, text = said(changed_, tmp_path)
+        assert (code == 0) == accepted and code in (0, 1), (change, text)
 
 
 def with_witness(found: Json, behaviour: str, witness: Any) -> Json:
