@@ -32,9 +32,11 @@ Record part := Part { its_agents : list nat; becomes : outcome; still : list (na
 Inductive shape := Form (P : list (list Q)) | Rows (d : list Q) | Squares (p : list Q).
 Record lyapunov := Lyapunov { about : part; by_ : shape; decay : Q; inputs : list Q; offs : list Q;
   means : list (list Q * Q) }.
+(** the agents [whom] stay between these ends, or are drawn there where they may be off by multiples of [extent] *)
+Record box := Box { whom : list nat; extent : list Q; lower_end : list Q; upper_end : list Q; speed : Q }.
 (** order, protocol, initial state and sliding variables are those of [frame] *)
 Record family := Family { frame : cert; modes : list mode; parts : list part; bounds : list lyapunov;
-  ends : list (option (Q * Q)); stays : bool; peaks : list Q }.
+  ends : list (option (Q * Q)); stays : bool; peaks : list Q; boxes : list box }.
 
 (** * Motions *)
 (** at [t] the state moves as the member of the mode [m] that has the weights [w] *)
@@ -104,20 +106,26 @@ Definition bound_claim (F : family) (b : lyapunov) : Prop := let c := frame F in
      sq (qdot (fst q) (member (ties m) w x)) <= Q2R (snd q) * a) /\
   (0 < Q2R (decay b) -> forall X S, switches F X S -> exists y, forall i, In i (its_agents (about b)) ->
      filterlim (fun t => X t i) (at_left (deadline c)) (locally (y i)) /\ xi (about b) y i = 0).
-(** from the initial state on: where agents end; if no sliding variable moves, the nominal part of their input *)
-Definition starts (F : family) X S := switches F X S /\
-  forall i, (i < order (frame F))%nat -> X 0 i = Q2R (nth i (start (frame F)) 0%Q).
+(** from the initial state and the sliding variables of the file on: where agents end, the boxes, the whole input *)
+Definition starts (F : family) X S := switches F X S /\ forall i, (i < order (frame F))%nat ->
+  X 0 i = Q2R (nth i (start (frame F)) 0%Q) /\ S 0 i = Q2R (nth i (sliding (frame F)) 0%Q).
 Definition ends_claim (F : family) : Prop := forall X S i m r, starts F X S -> nth i (ends F) None = Some (m, r) ->
   exists y, filterlim (fun t => X t i) (at_left (deadline (frame F))) (locally y) /\ Rabs (y - Q2R m) <= Q2R r.
 Definition inputs_claim (F : family) : Prop := let c := frame F in
   let u m w X t i := gain (deadline c) (Q2R (rho1 c)) (k c) t * member (ties m) w (X t) i in
   (stays F = true -> forall X S t0, switches_from F X S t0 -> exists K, forall t i m w, t0 <= t < deadline c ->
      (i < order c)%nat -> In m (modes F) -> admits (ties m) w -> Rabs (u m w X t i) <= K) /\
-  forall X S t i m w, switches_from F X S 0 -> starts F X S -> 0 <= t < deadline c -> (i < length (peaks F))%nat ->
-    In m (modes F) -> admits (ties m) w -> Rabs (u m w X t i) <= Q2R (nth i (peaks F) 0%Q).
+  forall X S t i m w, starts F X S -> 0 <= t < deadline c -> (i < length (peaks F))%nat ->
+    In m (modes F) -> admits (ties m) w -> Rabs (u m w X t i) + added c S t i <= Q2R (nth i (peaks F) 0%Q).
+(** at the deadline agents are in their box, since [s] grows beyond all bounds *)
+Definition box_claim (F : family) (b : box) : Prop := forall X S t a, let at_ l i := Q2R (nth i l 0%Q) in
+  let at_most a x i := at_ (lower_end b) i - a * at_ (extent b) i <= x <= at_ (upper_end b) i + a * at_ (extent b) i in
+  starts F X S -> 0 <= t < deadline (frame F) -> 0 <= a ->
+  (forall i, In i (whom b) -> 0 < at_ (extent b) i -> at_most a (X 0 i) i) ->
+  forall i, In i (whom b) -> at_most (exp (- (Q2R (speed b) / 2 * s (frame F) t)) * a) (X t i) i.
 (** sliding variables do not hear the graph: what is said of them is what holds without edges, of [X = S] *)
 Definition true_family (F : family) : Prop := (forall m, In m (modes F) -> mode_claim F m) /\
   (forall P, In P (parts F) -> part_claim F P /\ kernel_claim F P) /\
   (forall i, (i < order (frame F))%nat -> exists P, In P (parts F) /\ In i (its_agents P)) /\
   (edges (frame F) = [] /\ sliding_claim (frame F)) /\ (forall b, In b (bounds F) -> bound_claim F b) /\
-  ends_claim F /\ inputs_claim F /\ existence_claim F.
+  ends_claim F /\ inputs_claim F /\ (forall b, In b (boxes F) -> box_claim F b) /\ existence_claim F.

@@ -194,6 +194,8 @@ Definition check_frame (F : family) : bool :=
   forallb (fun i => existsb (fun P => mem i (its_agents P)) (parts F)) (seq 0 (order c)).
 
 (** * From the initial state *)
+(** no sliding variable moves *)
+Definition at_first (F : family) : bool := forallb (fun q => Qeq_bool q 0) (sliding (frame F)).
 Definition start_at (F : family) (i : nat) : Q := nth i (start (frame F)) 0%Q.
 Definition left_at (F : family) (P : part) (i : nat) : Q :=
   Qred (start_at F i - fold_right (fun b a => nth i (snd b) 0 * start_at F (fst b) + a) 0 (still P))%Q.
@@ -212,19 +214,17 @@ Definition value_at (F : family) (b : lyapunov) : option Q := let P := about b i
 Definition fast (F : family) (b : lyapunov) : bool := let c := frame F in Qle_bool 2 (rho2 c * kappa c * decay b).
 Definition check_stays (F : family) : bool := negb (stays F) || forallb (fun i => unmoved F i ||
   existsb (fun b => fast F b && mem i (its_agents (about b))) (bounds F)) (seq 0 (order (frame F))).
-Definition check_peak (F : family) (i : nat) (peak : Q) : bool := let c := frame F in notneg peak && (unmoved F i ||
+Definition check_peak (F : family) (i : nat) (peak : Q) : bool := let c := frame F in (i <? order c)%nat && (notneg peak && (unmoved F i ||
   existsb (fun b => fast F b && mem i (its_agents (about b)) && match value_at F b with
     | Some v => let g := (rho1 c + rho2 c * kappa c * / span c)%Q in Qle_bool (g * g * (nth i (inputs b) 0%Q * v)) (peak * peak)
-    | None => false end) (bounds F)).
-Definition check_peaks (F : family) : bool := forallb (fun p => check_peak F (fst p) (snd p)) (combine (seq 0 (length (peaks F))) (peaks F)).
+    | None => false end) (bounds F))).
+(** without what the sliding mode adds to an input at rest *)
+Definition nominal_peak (F : family) (peak : Q) : Q := match kind (frame F) with Nominal _ => peak | SlidingMode _ _ mu1 _ _ _ => (peak - mu1)%Q end.
+Definition check_peaks (F : family) : bool := match peaks F with [] => true | l => at_first F &&
+  forallb (fun p => check_peak F (fst p) (nominal_peak F (snd p))) (combine (seq 0 (length l)) l) end.
 
-(** agents that end at 0 *)
-Definition check_end_of (F : family) (i : nat) (e : Q * Q) : bool := Qle_bool (Qabs (fst e)) (snd e) &&
-  existsb (fun P => mem i (its_agents P) && match becomes P with Stability => true | _ => false end) (parts F).
-Definition check_family_ends (F : family) : bool := forallb (fun ie => match snd ie with None => true | Some e => check_end_of F (fst ie) e end)
-  (combine (seq 0 (length (ends F))) (ends F)).
 Definition check_family (F : family) (hs : list hint) (ws : list (option why)) : bool :=
   check_frame F && forallb (check_mode F) (modes F) && forallb (check_part F) (parts F) && forallb (check_pivots F) (parts F) &&
   (length (parts F) =? length ws)%nat && forallb (fun pw => check_depends F (fst pw) (snd pw)) (combine (parts F) ws) &&
   ((length (bounds F) =? length hs)%nat && forallb (fun bh => check_bound F (fst bh) (snd bh)) (combine (bounds F) hs)) &&
-  check_family_ends F && check_stays F && check_peaks F.
+  check_stays F && check_peaks F.

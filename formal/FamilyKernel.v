@@ -354,7 +354,7 @@ Proof.
     - exists v. intros t Ht. apply Rabs_le. split.
       + assert (v <= X t i + 2 * Ea t); [|lra]. apply L. intros u [t' [Ht' ->]]. apply K; assumption.
       + assert (X t i - 2 * Ea t <= v); [|lra]. apply U. exists t. split; [exact Ht|reflexivity]. }
-  destruct (finite_choice (order c) (fun i v => In i C -> forall t, ta <= t < T -> Rabs (X t i - v) <= 2 * Ea t)) as [y Hy].
+  destruct (finite_choice 0 (order c) (fun i v => In i C -> forall t, ta <= t < T -> Rabs (X t i - v) <= 2 * Ea t)) as [y Hy].
   { intros i _. destruct (in_dec Nat.eq_dec i C) as [I|I]; [|exists 0; intros; contradiction]. destruct (Lim i I) as [v Hv]. exists v. auto. }
   pose proof (agents_in F P Hbasis) as HC. destruct (basis_parts F P Hbasis Hdepends) as [_ [HP _]]. fold C in HC, HP. fold c in HC.
   exists y. split.
@@ -372,7 +372,7 @@ Proof.
         specialize (HB ltac:(intros b Hb; cbv beta; replace (y (fst b) + -1 * comb P z (fst b)) with (y (fst b) - comb P z (fst b)) by ring; apply A; apply HP; exact Hb)).
         specialize (A i Hi). assert (EK : K * exp (- (r * s t)) = (1 + B) * (3 * Ea t)) by (unfold K, Ea; rewrite Em; ring). rewrite EK. lra. }
       apply no_size. exact V.
-    + apply (near_limit F Hframe X Sl ta i (y i) (2 * (exp d * exp (r * s ta) * Ma)) (2 * r) ltac:(lra) Ha). intros t Ht.
+    + apply (near_limit F Hframe (fun t => X t i) X Sl ta (y i) (2 * (exp d * exp (r * s ta) * Ma)) (2 * r) ltac:(lra) Ha). intros t Ht.
       eapply Rle_trans; [apply (Hy i (HC i Hi) Hi t Ht)|]. unfold Ea. rewrite Em. fold c. replace (2 * r / 2 * s t) with (r * s t) by field. right. ring.
   - intros t0 t M i H0 Ht Hi HX. fold C in Hi, HX. assert (M0 : 0 <= M) by (eapply Rle_trans; [apply Rabs_pos|apply (HX i Hi)]).
     assert (V : Rabs (X t i - y i) - 2 * E t0 M t <= 0).

@@ -3,7 +3,7 @@ Require Import ZArith QArith Qabs Qreals List Bool Reals Lra Lia Psatz.
 From Coquelicot Require Import Coquelicot.
 Import ListNotations.
 Require Import Vec Definite Graph Flow Certificate Checker Sound Claims Input Slide Exist Peak Reach Main Rest Table Wide FamilyCertificate FamilyFlow
-  FamilyChecker FamilySound FamilyMotion FamilyRows FamilyKernel FamilyMoves.
+  FamilyChecker FamilySound FamilyMotion FamilyRows FamilyKernel FamilyMoves FamilyBox FamilyEnds.
 Open Scope R_scope.
 
 (** * Motions exist *)
@@ -270,14 +270,21 @@ Proof.
   unfold check_family_form in Hb. cbv zeta in Hb. apply andb_prop in Hb as [Hb H5]. do 3 apply andb_prop in Hb as [Hb _].
   destruct (factor_mod _ _ _ _) as [r|] eqn:Er in H5; [|discriminate]. apply (value_pos n P A Hb r Er).
 Qed.
-Theorem peaks_ok : check_peaks F = true -> forall X S t i m w, switches_from F X S 0 -> starts F X S -> 0 <= t < T -> (i < length (peaks F))%nat ->
-  In m (modes F) -> admits (ties m) w -> Rabs (gain T rho (k c) t * member (ties m) w (X t) i) <= Q2R (nth i (peaks F) 0%Q).
+Theorem peaks_ok : check_peaks F = true -> forall X S t i m w, starts F X S -> 0 <= t < T -> (i < length (peaks F))%nat ->
+  In m (modes F) -> admits (ties m) w -> Rabs (gain T rho (k c) t * member (ties m) w (X t) i) + added c S t i <= Q2R (nth i (peaks F) 0%Q).
 Proof.
-  intros H X Sl t i m w HM [_ H0] Ht Hi Hm Hw. fold c n in H0. unfold check_peaks in H. rewrite forallb_forall in H.
+  intros H X Sl t i m w HS Ht Hi Hm Hw.
+  assert (HP : at_first F && forallb (fun p => check_peak F (fst p) (nominal_peak F (snd p))) (combine (seq 0 (length (peaks F))) (peaks F)) = true)
+    by (unfold check_peaks in H; destruct (peaks F); [simpl in Hi; lia|exact H]).
+  clear H. apply andb_prop in HP as [HA H]. pose proof (starts_quiet F Hframe X Sl HA HS) as HM. rewrite forallb_forall in H.
+  assert (H0 : forall j, (j < n)%nat -> X 0 j = Q2R (start_at F j)) by (intros j Hj; apply HS; exact Hj).
   assert (K : In (i, nth i (peaks F) 0%Q) (combine (seq 0 (length (peaks F))) (peaks F))).
   { apply (in_numbered _ (peaks F) 0%nat); [apply nth_error_nth'|]; exact Hi. }
-  specialize (H _ K). cbn [fst snd] in H. unfold check_peak in H. cbv zeta in H. fold c in H. apply andb_prop in H as [N H].
-  apply notneg_R in N. set (q := nth i (peaks F) 0%Q) in *. apply orb_prop in H as [H|H].
+  specialize (H _ K). cbn [fst snd] in H. clear K. set (q := nominal_peak F (nth i (peaks F) 0%Q)) in *.
+  assert (EA : (i < n)%nat -> Q2R (nth i (peaks F) 0%Q) = Q2R q + added c Sl t i).
+  { intros Hn. unfold q, nominal_peak, added. fold c. destruct (kind c); [ring|]. destruct HM as [_ [_ Z]]. rewrite (Z t i Ht Hn), Rabs_R0, Q2R_minus. ring. }
+  unfold check_peak in H. cbv zeta in H. fold c in H. apply andb_prop in H as [Hn H]. apply andb_prop in H as [N H].
+  apply Nat.ltb_lt in Hn. rewrite (EA Hn). apply Rplus_le_compat_r. apply notneg_R in N. apply orb_prop in H as [H|H].
   - rewrite (unmoved_ok F i m w (X t) H Hm), Rmult_0_r, Rabs_R0. exact N.
   - apply existsb_exists in H as [b [Hb H]]. apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2]. apply mem_In in H2.
     destruct (bound_of b Hb) as [h Hh]. destruct (value_at F b) as [v|] eqn:Ev; [|discriminate].
@@ -290,27 +297,29 @@ Proof.
     rewrite ES in H3. change (Q2R (rho2 c) * Q2R (kappa c)) with (k c) in H3. change (k c * / T) with (k c / T) in H3. change (Q2R (rho1 c)) with rho in H3.
     set (u := _ * member _ _ _ _) in *. unfold sq in B. apply Rabs_le. split; nra.
 Qed.
-Theorem ends_ok : (forall P, In P (parts F) -> part_claim F P /\ kernel_claim F P) -> check_family_ends F = true -> ends_claim F.
+Theorem ends_hold hull es : forallb (check_pivots F) (parts F) = true -> (forall P, In P (parts F) -> kernel_claim F P) ->
+  check_family_ends F hull es = true -> ends_claim F.
 Proof.
-  intros HP H X S i m r [HM _] E. unfold check_family_ends in H. rewrite forallb_forall in H.
-  assert (L : (i < length (ends F))%nat).
-  { destruct (Nat.lt_ge_cases i (length (ends F))) as [L|L]; [exact L|]. rewrite nth_overflow in E by exact L. discriminate. }
-  assert (K : In (i, nth i (ends F) None) (combine (seq 0 (length (ends F))) (ends F))).
-  { apply (in_numbered _ (ends F) 0%nat); [apply nth_error_nth'|]; exact L. }
-  specialize (H _ K). cbn [fst snd] in H. rewrite E in H. unfold check_end_of in H. cbn [fst snd] in H. apply andb_prop in H as [A H].
-  apply existsb_exists in H as [P [HP' H]]. apply andb_prop in H as [B1 B2]. apply mem_In in B1. destruct (HP P HP') as [[_ [_ B3]] G].
-  destruct (becomes P) eqn:EP; try discriminate. destruct (G ltac:(rewrite EP; discriminate)) as [q1 [q2 [_ G']]].
-  destruct (G' X S HM) as [y [Hy _]]. destruct (Hy i B1) as [Y2 Y1]. exists (y i). split; [exact Y1|]. unfold xi in Y2. rewrite B3 in Y2. simpl in Y2.
-  replace (y i) with 0 by lra. unfold Rminus. rewrite Rplus_0_l, Rabs_Ropp. apply Qle_R in A.
-  rewrite Qabs_R in A. exact A.
+  intros HV HK. apply (ends_ok F hull es Hframe Hmodes); intros b.
+  - intros Hb. destruct (bound_of b Hb) as [h Hh]. destruct (bound_parts b h Hh) as [B1 [_ [B2 [B3 [B4 _]]]]]. auto.
+  - intros HP. split.
+    + rewrite forallb_forall in HV. specialize (HV b HP). unfold check_pivots in HV. cbv zeta in HV. apply andb_prop in HV as [HV _].
+      rewrite forallb_forall in HV. intros i Hi. apply Nat.ltb_lt, HV, Hi.
+    + intros ND X Sl HM. destruct (HK b HP ND) as [q1 [q2 [_ G]]]. destruct (G X Sl HM) as [y [Hy _]]. exists y.
+      intros i Hi. destruct (Hy i Hi). auto.
+  - intros v X Hb. destruct (bound_of b Hb) as [h Hh]. apply (value_ok b h v X Hh).
 Qed.
 End Main.
 
-Definition accepts_family (F : family) (hs : list hint) (ws : list (option why)) : bool := check_family F hs ws.
-Theorem accepts_family_sound F hs ws : accepts_family F hs ws = true -> true_family F.
+(** what is known of limits, and a box that holds all agents *)
+Record limits := Limits { hull : list Q * list Q; told : list (nat * list fact) }.
+Definition accepts_family (F : family) (hs : list hint) (ws : list (option why)) (l : limits) : bool :=
+  check_family F hs ws && check_family_ends F (hull l) (told l) && check_boxes F (hull l).
+Theorem accepts_family_sound F hs ws l : accepts_family F hs ws l = true -> true_family F.
 Proof.
-  intros H. unfold accepts_family, check_family in H. apply andb_prop in H as [H H7]. apply andb_prop in H as [H H6].
-  apply andb_prop in H as [H H5]. apply andb_prop in H as [H H4]. apply andb_prop in H as [H H10]. apply andb_prop in H as [H H9].
+  intros H. unfold accepts_family in H. apply andb_prop in H as [H H11]. apply andb_prop in H as [H H5]. unfold check_family in H.
+  apply andb_prop in H as [H H7]. apply andb_prop in H as [H H6].
+  apply andb_prop in H as [H H4]. apply andb_prop in H as [H H10]. apply andb_prop in H as [H H9].
   apply andb_prop in H as [H H8]. apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2].
   destruct (frame_parts F H1) as [A1 [A2 [A3 A4]]].
   assert (A0 : modes F <> []) by (intros E; unfold check_frame in H1; rewrite E in H1; discriminate H1).
@@ -322,8 +331,7 @@ Proof.
   split; [exact AP|].
   split; [exact A4|]. split; [split; [exact A3|apply (sliding_ok _ A1 A2)]|].
   split; [intros b Hb; destruct (bound_of F hs H4 b Hb) as [h Hh]; apply (bounds_claim F H1 H2 b h Hh)|].
-  split.
-  - apply (ends_ok F AP H5).
-  - split; [split; [apply (stays_ok F H1 H2 hs H4 H6)|apply (peaks_ok F H1 H2 hs H4 H7)]|].
-    apply (family_motions_exist F A1 A0 H2).
+  split; [apply (ends_hold F H1 H2 hs H4 _ _ H8 (fun P HP => proj2 (AP P HP)) H5)|].
+  split; [split; [apply (stays_ok F H1 H2 hs H4 H6)|apply (peaks_ok F H1 H2 hs H4 H7)]|].
+  split; [apply (boxes_ok F H1 H2 (hull l) H11)|]. apply (family_motions_exist F A1 A0 H2).
 Qed.

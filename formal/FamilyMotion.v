@@ -56,6 +56,40 @@ Proof.
 Qed.
 End Settles.
 
+(** * Sums of a few agents *)
+Definition sdot (u : list (nat * Q)) (x : nat -> R) : R := fold_right (fun p a => Q2R (snd p) * x (fst p) + a) 0 u.
+Definition row (P : part) (i : nat) : list (nat * Q) := map (fun v => (fst v, nth i (snd v) 0%Q)) (still P).
+Lemma sdot_one i x : sdot [(i, 1%Q)] x = x i.
+Proof. unfold sdot. simpl. replace (Q2R 1) with 1 by (unfold Q2R; simpl; lra). ring. Qed.
+Lemma xi_row P x i : xi P x i = x i - sdot (row P i) x.
+Proof. unfold xi, row, sdot. f_equal. induction (still P) as [|v l IH]; simpl; [reflexivity|]. rewrite IH. reflexivity. Qed.
+Lemma sdot_continuous u (f : R -> nat -> R) t : (forall p, In p u -> continuous (fun v => f v (fst p)) t) -> continuous (fun v => sdot u (f v)) t.
+Proof.
+  induction u as [|p l IH]; intros H; simpl; [apply continuous_const|].
+  apply (continuous_plus (fun v => Q2R (snd p) * f v (fst p))); [|apply IH; intros; apply H; right; assumption].
+  apply (continuous_mult (fun _ => Q2R (snd p))); [apply continuous_const|]. apply H. left. reflexivity.
+Qed.
+Lemma sdot_derive u (f : R -> nat -> R) t g L : (forall p, In p u -> is_derive (fun v => f v (fst p)) t (- (g * L (fst p)))) ->
+  is_derive (fun v => sdot u (f v)) t (- (g * sdot u L)).
+Proof.
+  induction u as [|p l IH]; intros H; simpl; [rewrite Rmult_0_r, Ropp_0; apply (is_derive_const 0)|].
+  replace (- (g * (Q2R (snd p) * L (fst p) + sdot l L))) with (Q2R (snd p) * - (g * L (fst p)) + - (g * sdot l L)) by ring.
+  apply (is_derive_plus (fun v => Q2R (snd p) * f v (fst p))); [|apply IH; intros; apply H; right; assumption].
+  apply (is_derive_scal (fun v => f v (fst p))). apply H. left. reflexivity.
+Qed.
+Lemma sdot_limit u (f : R -> nat -> R) T y : (forall p, In p u -> filterlim (fun t => f t (fst p)) (at_left T) (locally (y (fst p)))) ->
+  filterlim (fun t => sdot u (f t)) (at_left T) (locally (sdot u y)).
+Proof.
+  induction u as [|p l IH]; intros H; simpl; [apply filterlim_const|].
+  apply (filterlim_comp_2 (F := at_left T) (G := locally (Q2R (snd p) * y (fst p))) (H := locally (sdot l y))
+    (fun t => Q2R (snd p) * f t (fst p)) (fun t => sdot l (f t)) (fun u v => plus u v)).
+  - apply (filterlim_comp _ _ _ (fun t => f t (fst p)) (fun z => scal (Q2R (snd p)) z) _ (locally (y (fst p)))).
+    + apply H. left. reflexivity.
+    + apply (filterlim_scal_r (Q2R (snd p)) (y (fst p))).
+  - apply IH. intros; apply H; right; assumption.
+  - apply (filterlim_plus (Q2R (snd p) * y (fst p))).
+Qed.
+
 Section Main.
 Variable F : family.
 Let c := frame F.
@@ -177,23 +211,25 @@ Definition means_too : Prop := forall x a q, 0 <= a -> below b a x -> In q (mean
 Hypotheses (HD : decays) (HS : sizes) (HV : forall x, exists a, 0 <= a /\ below b a x).
 Hypothesis Hagents : forall i, In i (its_agents P) -> (i < n)%nat.
 Hypothesis Hpivots : forall v, In v (still P) -> In (fst v) (its_agents P).
-(** how near to its end an agent is *)
-Lemma nears X Sl t0 a i : 0 < Q2R (decay b) -> switches_from F X Sl t0 -> 0 <= a -> below b a (X t0) -> In i (its_agents P) ->
-  exists v, forall t, t0 <= t < T -> Rabs (X t i - v) <=
-    2 * sqrt (Q2R (nth i (inputs b) 0%Q) * a * exp (Q2R (decay b) * s c t0)) / Q2R (decay b) * exp (- (Q2R (decay b) / 2 * s c t)).
+(** how near to its end a sum of agents is of which the members move as little as the function *)
+Lemma near_of u q X Sl t0 a : (forall v, In v u -> (fst v < n)%nat) ->
+  (forall x a, 0 <= a -> below b a x -> forall m w, In m (modes F) -> admits (ties m) w -> sq (sdot u (member (ties m) w x)) <= q * a) ->
+  0 < Q2R (decay b) -> switches_from F X Sl t0 -> 0 <= a -> below b a (X t0) ->
+  exists v, forall t, t0 <= t < T -> Rabs (sdot u (X t) - v) <=
+    2 * sqrt (q * a * exp (Q2R (decay b) * s c t0)) / Q2R (decay b) * exp (- (Q2R (decay b) / 2 * s c t)).
 Proof.
-  intros Hr HM Ha H0 Hi. set (r := Q2R (decay b)) in *. destruct positive_ as [P1 [P2 P3]]. pose proof HM as [_ [Ht0 _]]. fold c T in Ht0.
+  intros Hu HU Hr HM Ha H0. set (r := Q2R (decay b)) in *. destruct positive_ as [P1 [P2 P3]]. pose proof HM as [_ [Ht0 _]]. fold c T in Ht0.
   destruct (Y_moves X Sl t0 HM) as [D HDm]. set (C := sqrt _).
-  destruct (settles_at T rho (k c) P1 P2 P3 (fun u => X (Rmax t0 u) i) t0 D r C Ht0 Hr (sqrt_pos _)) as [v Hv].
-  - intros t Ht. apply (Y_cont X Sl t0 HM t i Ht). apply Hagents. exact Hi.
-  - intros t Ht Hj. destruct (HDm t Ht Hj) as [m [w [Hm [Hw E]]]]. exists (member (ties m) w (X (Rmax t0 t)) i).
-    split; [apply E; apply Hagents; exact Hi|]. rewrite Rmax_right by lra.
+  destruct (settles_at T rho (k c) P1 P2 P3 (fun t => sdot u (X (Rmax t0 t))) t0 D r C Ht0 Hr (sqrt_pos _)) as [v Hv].
+  - intros t Ht. apply sdot_continuous. intros p Hp. apply (Y_cont X Sl t0 HM t (fst p) Ht). apply Hu. exact Hp.
+  - intros t Ht Hj. destruct (HDm t Ht Hj) as [m [w [Hm [Hw E]]]]. exists (sdot u (member (ties m) w (X (Rmax t0 t)))).
+    split; [apply sdot_derive; intros p Hp; apply E, Hu, Hp|]. rewrite Rmax_right by lra.
     specialize (HD X Sl t0 t a HM ltac:(lra) Ha H0). fold r in HD. set (e := exp (- (r * (s c t - s c t0)))) in *.
-    assert (Pe : 0 < e) by apply exp_pos. destruct (HS (X t) (e * a) i ltac:(apply Rmult_le_pos; lra) HD Hi) as [_ K].
-    specialize (K m w Hm Hw). apply abs_sq; [apply Rmult_le_pos; [apply sqrt_pos|left; apply exp_pos]|].
-    eapply Rle_trans; [exact K|]. set (q := Q2R (nth i (inputs b) 0%Q)) in *.
+    assert (Pe : 0 < e) by apply exp_pos. pose proof (HU (X t) (e * a) ltac:(apply Rmult_le_pos; lra) HD m w Hm Hw) as K.
+    apply abs_sq; [apply Rmult_le_pos; [apply sqrt_pos|left; apply exp_pos]|].
+    eapply Rle_trans; [exact K|].
     assert (Q0 : 0 <= q * a).
-    { pose proof (sq_pos (member (ties m) w (X t) i)) as Z. assert (0 <= e * (q * a)) by lra.
+    { pose proof (sq_pos (sdot u (member (ties m) w (X t)))) as Z. assert (0 <= e * (q * a)) by lra.
       apply (Rmult_le_reg_l e); [exact Pe|]. lra. }
     assert (Ee : e = exp (r * s c t0) * sq (exp (- (r / 2 * s c t)))).
     { unfold e, sq. rewrite <- !exp_plus. f_equal. lra. }
@@ -203,11 +239,20 @@ Proof.
     rewrite sqrt_sqrt by (apply Rmult_le_pos; [exact Q0|left; apply exp_pos]). rewrite Ee. unfold sq. right. ring.
   - exists v. intros t Ht. specialize (Hv t Ht). rewrite Rmax_right in Hv by lra. exact Hv.
 Qed.
-Lemma near_limit X Sl t0 i v C r : 0 < r -> switches_from F X Sl t0 ->
-  (forall t, t0 <= t < T -> Rabs (X t i - v) <= C * exp (- (r / 2 * s c t))) -> filterlim (fun t => X t i) (at_left T) (locally v).
+Lemma nears X Sl t0 a i : 0 < Q2R (decay b) -> switches_from F X Sl t0 -> 0 <= a -> below b a (X t0) -> In i (its_agents P) ->
+  exists v, forall t, t0 <= t < T -> Rabs (X t i - v) <=
+    2 * sqrt (Q2R (nth i (inputs b) 0%Q) * a * exp (Q2R (decay b) * s c t0)) / Q2R (decay b) * exp (- (Q2R (decay b) / 2 * s c t)).
+Proof.
+  intros Hr HM Ha H0 Hi.
+  destruct (near_of [(i, 1%Q)] (Q2R (nth i (inputs b) 0%Q)) X Sl t0 a ltac:(intros v [<-|[]]; apply Hagents; exact Hi)) as [v Hv]; try assumption.
+  - intros x a0 A0 B0 m w Hm Hw. rewrite sdot_one. apply (HS x a0 i A0 B0 Hi); assumption.
+  - exists v. intros t Ht. specialize (Hv t Ht). rewrite sdot_one in Hv. exact Hv.
+Qed.
+Lemma near_limit (f : R -> R) X Sl t0 v C r : 0 < r -> switches_from F X Sl t0 ->
+  (forall t, t0 <= t < T -> Rabs (f t - v) <= C * exp (- (r / 2 * s c t))) -> filterlim f (at_left T) (locally v).
 Proof.
   intros Hr HM Hv. destruct positive_ as [P1 [P2 P3]]. pose proof HM as [_ HQ].
-  apply (reaches n T rho (k c) P1 P2 P3 X Sl t0 HQ i v (sq C) r Hr (sq_pos C)). intros t Ht. specialize (Hv t Ht).
+  apply (reaches n T rho (k c) P1 P2 P3 (fun t _ => f t) Sl t0 HQ 0%nat v (sq C) r Hr (sq_pos C)). intros t Ht. specialize (Hv t Ht).
   assert (E : exp (- (r * clock T rho (k c) t)) = sq (exp (- (r / 2 * s c t)))) by (unfold sq; rewrite <- exp_plus; f_equal; unfold s; fold T rho; lra).
   rewrite E. set (e := exp _) in *. assert (0 < e) by apply exp_pos. apply Rabs_le_between in Hv. unfold sq.
   replace (C * C * (e * e)) with (C * e * (C * e)) by ring. nra.
@@ -218,27 +263,15 @@ Proof.
   intros Hr X Sl HM. destruct (settles_family X Sl HM) as [t0 HM0]. destruct (HV (X t0)) as [a [Ha H0]]. pose proof HM0 as [_ HQ].
   destruct (finite_choice 0 n (fun i v => In i (its_agents P) -> filterlim (fun t => X t i) (at_left T) (locally v))) as [y Hy].
   { intros i Hi. destruct (in_dec Nat.eq_dec i (its_agents P)) as [I|I]; [|exists 0; intros; contradiction].
-    destruct (nears X Sl t0 a i Hr HM0 Ha H0 I) as [v Hv]. exists v. intros _. apply (near_limit X Sl t0 i v _ _ Hr HM0 Hv). }
+    destruct (nears X Sl t0 a i Hr HM0 Ha H0 I) as [v Hv]. exists v. intros _. apply (near_limit (fun t => X t i) X Sl t0 v _ _ Hr HM0 Hv). }
   exists y. intros i Hi. split; [apply Hy; auto|].
   assert (L : filterlim (fun t => xi P (X t) i) (at_left T) (locally (xi P y i))).
-  { unfold xi. apply (filterlim_comp_2 (F := at_left T) (G := locally (y i))
-      (H := locally (fold_right (fun v a => Q2R (nth i (snd v) 0%Q) * y (fst v) + a) 0 (still P)))
-      (fun t => X t i) (fun t => fold_right (fun v a => Q2R (nth i (snd v) 0%Q) * X t (fst v) + a) 0 (still P)) (fun u v => minus u v)).
+  { rewrite xi_row. apply (filterlim_ext (fun t => plus (X t i) (opp (sdot (row P i) (X t))))); [intros t; rewrite xi_row; reflexivity|].
+    apply (filterlim_comp_2 (F := at_left T) (G := locally (y i)) (H := locally (opp (sdot (row P i) y))) (fun t => X t i) (fun t => opp (sdot (row P i) (X t))) plus).
     - apply Hy; auto.
-    - clear - Hy Hpivots Hagents. induction (still P) as [|v l IH]; simpl; [apply filterlim_const|].
-      apply (filterlim_comp_2 (F := at_left T) (G := locally (Q2R (nth i (snd v) 0%Q) * y (fst v)))
-        (H := locally (fold_right (fun v a => Q2R (nth i (snd v) 0%Q) * y (fst v) + a) 0 l))
-        (fun t => Q2R (nth i (snd v) 0%Q) * X t (fst v)) (fun t => fold_right (fun v a => Q2R (nth i (snd v) 0%Q) * X t (fst v) + a) 0 l) (fun u v => plus u v)).
-      + apply (filterlim_comp _ _ _ (fun t => X t (fst v)) (fun z => scal (Q2R (nth i (snd v) 0%Q)) z) _ (locally (y (fst v)))).
-        * apply Hy; [apply Hagents|]; apply Hpivots; left; reflexivity.
-        * apply (filterlim_scal_r (Q2R (nth i (snd v) 0%Q)) (y (fst v))).
-      + apply IH. intros; apply Hpivots; right; assumption.
-      + apply (filterlim_plus (Q2R (nth i (snd v) 0%Q) * y (fst v))).
-    - apply (filterlim_comp_2 (F := filter_prod (locally (y i)) (locally (fold_right (fun v a => Q2R (nth i (snd v) 0%Q) * y (fst v) + a) 0 (still P))))
-        (G := locally (y i)) (H := locally (opp (fold_right (fun v a => Q2R (nth i (snd v) 0%Q) * y (fst v) + a) 0 (still P)))) fst (fun p => opp (snd p)) plus).
-      + apply filterlim_fst.
-      + apply (filterlim_comp _ _ _ snd opp _ (locally (fold_right (fun v a => Q2R (nth i (snd v) 0%Q) * y (fst v) + a) 0 (still P)))); [apply filterlim_snd|apply (@filterlim_opp R_AbsRing R_NormedModule)].
-      + apply (filterlim_plus (y i)). }
+    - apply (filterlim_comp _ _ _ (fun t => sdot (row P i) (X t)) opp _ (locally (sdot (row P i) y))); [|apply (@filterlim_opp R_AbsRing R_NormedModule)].
+      apply sdot_limit. intros v Hv. apply in_map_iff in Hv as [p [<- Hp]]. apply Hy; [apply Hagents|]; apply Hpivots; exact Hp.
+    - apply (filterlim_plus (y i)). }
   assert (Z : filterlim (fun t => xi P (X t) i) (at_left T) (locally 0)).
   { destruct positive_ as [P1 [P2 P3]]. set (r := Q2R (decay b)) in *.
     set (q := Q2R (nth i (offs b) 0%Q)). set (e0 := exp (r * s c t0)).

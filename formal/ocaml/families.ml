@@ -4,7 +4,8 @@ open Json
 open Document
 module Z = Number.Z
 
-type t = { nodes : nodes; family : family; hints : hint list; whys : why option list; sha256 : string; checked : (string * string) list;
+type t = { nodes : nodes; family : family; hints : hint list; whys : why option list; limits : limits; sha256 : string;
+  checked : (string * string) list;
   unchecked : (string * string) list; sections : string list }
 
 let most_nodes = 400
@@ -173,19 +174,13 @@ let square r (q : quotient) fs d =
   let m = List.fold_left Z.min (List.hd f.fe) f.fe in
   let two = Z.of_int 2 in
   Number.make (Z.mul two (Z.mul q.qm (Z.add (Z.mul m (size2 y)) (size2 rest)))) (Z.mul m (Z.mul f.fs f.fs))
-(* above the root, and near it *)
-let root (v : q) =
-  if Z.sign v.qnum <= 0 then Number.zero else begin
-    let bits = 80 + max 0 ((Z.numbits v.qden - Z.numbits v.qnum) / 2) in
-    let scaled = Z.add (Z.div (Z.shift_left v.qnum (2 * bits)) v.qden) Z.one in
-    Number.make (Z.add (Z.sqrt scaled) Z.one) (Z.shift_left Z.one bits) end
 let middle_common ties = List.fold_left (fun a e -> Z.lcm a (middle e).qden) Z.one ties
 let roots_of n part (q : quotient) means modes = match factor_mod n q.qsw q.qfw q.qF with
   | None -> bad "P is not definite"
   | Some r ->
       let fs = List.map fst q.qfw in
       let here = Pieces.inside n part.its_agents in
-      let above d scale = root (Number.div (square r q fs d) (Number.of_z (Z.mul scale scale))) in
+      let above d scale = Number.root (Number.div (square r q fs d) (Number.of_z (Z.mul scale scale))) in
       List.map (fun m ->
         let dq = middle_common m.ties in
         List.map (fun e -> if known e || not (here e.head) then Number.zero else above (hvec e) Z.one) m.ties,
@@ -293,11 +288,11 @@ let lyapunov_of nodes parts modes proof work k v =
   | _ -> form_of nodes parts modes proof work k v
 
 (* * The document *)
-let keys = [ "boxes", "boxes in which agents stay, or come to"; "restricted", "signals that are restricted" ]
+let keys = [ "restricted", "signals that are restricted" ]
 let certificate (j : Json.t) : t =
   let there key = match j with Obj l -> List.mem_assoc key l | _ -> false in
   let more = List.filter (fun (key, _) -> there key) keys in
-  let get = fields "the certificate" (Reader.keys @ List.map fst more @ (if there "components" then [ "components" ] else [])) j in
+  let get = fields "the certificate" (Reader.keys @ List.map fst more @ List.filter there [ "boxes"; "components" ]) j in
   let left = ref [] in
   let not_checked s = left := s :: !left in
   List.iter (fun (key, what) -> not_checked (Printf.sprintf "%s, all that is said of %s" key what)) more;
@@ -361,15 +356,29 @@ let certificate (j : Json.t) : t =
     not_checked "lyapunov.drives";
     List.iteri (fun k _ -> skipped proof "family-drive" (Printf.sprintf "lyapunov.functions[%d]" k)) functions end;
   need ((start = None) = (get "final_state" = Null)) "a final state without an initial state, or none";
-  (* ends of agents that are drawn to 0; others are not read *)
-  let stable = List.for_all (fun p -> p.becomes = Stability) parts in
-  let ends = match start with
-    | None -> []
-    | Some _ when stable ->
-        let _, witness = proved proof "family-final-state" "final_state" [] in
-        need (witness = Null || List.for_all (fun w -> w = Null) (entries "family-final-state" witness)) "kept means of a component that is stable";
-        List.map (fun e -> Some e) (by_agent nodes Reader.interval "final_state" (get "final_state"))
-    | Some _ -> skipped proof "family-final-state" "final_state"; not_checked "final_state"; [] in
+  let moving = drives in
+  (* of every part what is known of its ends; none if they are not proved *)
+  let base = { frame = { first with start = Option.value start ~default:[] }; modes; parts; bounds = List.map fst bounds; ends = []; stays = false; peaks = []; boxes = [] } in
+  let ends, facts = match start with
+    | None -> [], []
+    | Some _ ->
+        let all_kept p k = p.still = [] || List.length k = List.length p.still in
+        let told = match following_witness proof with
+          | Null -> List.map (fun p -> p, []) parts
+          | w ->
+              let l = entries "family-final-state" w in
+              need (List.length l = List.length parts) "family-final-state: one for each component";
+              List.map2 (fun p w -> need (p.becomes <> Depends || w = Null) "kept means of a component without a common kernel";
+                p, Limits.kept nodes modes p w) parts l in
+        let proved_ (p, k) = p.becomes = Depends || (match p.its_agents with [ _ ] -> true | _ -> not moving || all_kept p k) in
+        let read = by_agent nodes (optional Reader.interval) "final_state" (get "final_state") in
+        let depends = Pieces.inside n (List.concat_map (fun p -> if p.becomes = Depends then p.its_agents else []) parts) in
+        List.iteri (fun i e -> need ((e = None) = depends i) "a final state that is not claimed, or one that is") read;
+        if List.for_all proved_ told then ignore (proved proof "family-final-state" "final_state" [])
+        else (skipped proof "family-final-state" "final_state"; not_checked "final_state");
+        let ok = Pieces.inside n (List.concat_map (fun t -> if proved_ t then (fst t).its_agents else []) told) in
+        List.mapi (fun i e -> if ok i then e else None) read,
+        List.mapi (fun i (p, k) -> i, k @ (if moving then [] else Limits.near base p)) told in
   let input = fields "input" ([ "bounded"; "peaks" ] @ if is_sliding then [ "sliding" ] else []) (get "input") in
   let sliding_input = if not is_sliding then [] else begin
     let part = fields "input.sliding" [ "bounded"; "agents" ] (input "sliding") in
@@ -382,8 +391,12 @@ let certificate (j : Json.t) : t =
         let slow = match kind with
           | SlidingMode (_, _, _, _, mu3, _) -> drives && Number.compare (Number.mul mu3 kappa) Number.one < 0 | Nominal _ -> false in
         if input "peaks" = Null then (need (start = None || slow) "input.peaks are due"; bare_of proof "family-input" "input"; true, [])
-        else if is_sliding then (skipped proof "family-input" "input"; not_checked "input.peaks"; true, [])
+        else if moving then (skipped proof "family-input" "input"; not_checked "input.peaks"; true, [])
         else (need (start <> None) "peaks without an initial state"; bare_of proof "family-input" "input"; true, by_agent nodes number "input.peaks" (input "peaks")) in
+  let boxes = if not (there "boxes") then [] else begin
+    need (start <> None && not moving) "boxes without an initial state, or while sliding variables move";
+    Limits.boxes nodes modes parts proof (get "boxes") end in
+  let hull = match start with Some x when not moving && (boxes <> [] || facts <> []) -> Limits.hull_of modes x | _ -> [], [] in
   let rest o = match o with
     | Obj l -> (match List.assoc_opt "kind" l, List.assoc_opt "of" l with
         | Some (Str k), Some (Str o) when more <> [] && Reader.named k && Reader.named o -> unknown proof k o
@@ -394,15 +407,16 @@ let certificate (j : Json.t) : t =
   let frame = { first with edges = []; comps = []; pieces = []; kind; rho1; rho2; kappa; start = Option.value start ~default:[]; sliding;
     reaching; sliding_input } in
   { nodes; sha256; checked = List.rev proof.checked; unchecked = List.rev proof.unchecked; sections = List.rev !left;
-    hints = List.map snd bounds; whys;
-    family = { frame; modes; parts; bounds = List.map fst bounds; ends; stays; peaks } }
+    hints = List.map snd bounds; whys; limits = { hull; told = facts };
+    family = { frame; modes; parts; bounds = List.map fst bounds; ends; stays; peaks; boxes } }
 
 (* the parts of the check one by one, to name the first that fails *)
-let of_family (f : family) hs ws : (string * (unit -> bool)) list =
+let of_family (f : family) hs ws l : (string * (unit -> bool)) list =
   [ "protocol, or what is said of sliding variables", (fun () -> check_frame f) ]
   @ List.mapi (fun i m -> Printf.sprintf "structure of graph.modes[%d]" i, (fun () -> check_mode f m)) f.modes
   @ List.mapi (fun i (p, w) -> Printf.sprintf "family-claim of graph, component %d" i,
       (fun () -> check_part f p && check_pivots f p && check_depends f p w)) (List.combine f.parts ws)
   @ List.mapi (fun i (b, h) -> Printf.sprintf "lyapunov.functions[%d]" i, (fun () -> check_bound f b h)) (List.combine f.bounds hs)
-  @ [ "family-final-state of final_state", (fun () -> check_family_ends f);
-      "family-input of input", (fun () -> check_stays f && check_peaks f) ]
+  @ [ "family-final-state of final_state", (fun () -> check_family_ends f l.hull l.told);
+      "family-input of input", (fun () -> check_stays f && check_peaks f);
+      "boxes", (fun () -> check_boxes f l.hull) ]

@@ -59,3 +59,9 @@ let rational (s : string) : q =
         let m, e = cut 'e' (String.lowercase_ascii t) in
         let e = match e with None -> 0 | Some e -> exponent 400 e in
         pointed (fun s -> s = "" || digits s) 10 m 10 e
+(* above the root, and near it *)
+let root (v : q) : q =
+  if Z.sign v.qnum <= 0 then zero else begin
+    let bits = 80 + Stdlib.max 0 ((Z.numbits v.qden - Z.numbits v.qnum) / 2) in
+    let scaled = Z.add (Z.div (Z.shift_left v.qnum (2 * bits)) v.qden) Z.one in
+    make (Z.add (Z.sqrt scaled) Z.one) (Z.shift_left Z.one bits) end

@@ -64,6 +64,10 @@ let obligations = [
     "kept means, integral of the input");
   "family-input", ("for every signal the input is bounded, by these peaks",
     "integral of the input");
+  "attracting-box", ("every row of the followers decays at this rate, and none leaves the box, at the worst weights",
+    "an attracting box");
+  "kept-box", ("for every signal each agent stays between these ends at all times",
+    "extremes of what reaches an agent");
   "agent-positive", ("W > 0",
     "Lyapunov matrix of one agent");
   "agent-decrease", ("A W + W A' - b b' + rate W <= 0 at all values of zeta, by Bernstein matrices",
