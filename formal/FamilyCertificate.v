@@ -67,8 +67,9 @@ Definition mode_claim (F : family) (m : mode) : Prop := edges (mandatory m) = sm
 Definition xi (P : part) (x : nat -> R) (i : nat) : R :=
   x i - fold_right (fun b a => Q2R (nth i (snd b) 0%Q) * x (fst b) + a) 0 (still P).
 Definition owned (m : mode) (P : part) := filter (fun C => mem (hd O (nodes C)) (its_agents P)) (comps (mandatory m)).
-(** the basis is at rest in every member, and has as many columns as each mandatory graph balanced closed components; of a
-    part that depends on the signal some motion stays where another member moves it: no states at rest in all are reached *)
+(** the basis is at rest in every member, and has as many columns as each mandatory graph balanced closed components; of
+    a part that depends on the signal some motion stays where another member moves it: no states at rest in all members
+    are reached by all motions *)
 Definition part_claim (F : family) (P : part) : Prop :=
   (forall i j, In i (its_agents P) ->
     (In j (its_agents P) <-> linked (flat_map (fun e => there e 1%Q) (flat_map ties (modes F))) i j)) /\
