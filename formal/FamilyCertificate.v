@@ -69,8 +69,9 @@ Definition mode_claim (F : family) (m : mode) : Prop := edges (mandatory m) = sm
 Definition xi (P : part) (x : nat -> R) (i : nat) : R :=
   x i - fold_right (fun b a => Q2R (nth i (snd b) 0%Q) * x (fst b) + a) 0 (still P).
 Definition owned (m : mode) (P : part) := filter (fun C => mem (hd O (nodes C)) (its_agents P)) (comps (mandatory m)).
-(** the basis is at rest in every member, and has as many columns as each mandatory graph balanced closed components; of a
-    part that depends on the signal some motion stays where another member moves it: no states at rest in all are reached *)
+(** the basis is at rest in every member, and has as many columns as each mandatory graph balanced closed components; of
+    a part that depends on the signal some motion stays where another member moves it: no states at rest in all members
+    are reached by all motions *)
 Definition part_claim (F : family) (P : part) : Prop :=
   (forall i j, In i (its_agents P) ->
     (In j (its_agents P) <-> linked (flat_map (fun e => there e 1%Q) (flat_map ties (modes F))) i j)) /\
@@ -85,8 +86,8 @@ Definition part_claim (F : family) (P : part) : Prop :=
       In i (its_agents P) /\ member (ties m) w q i <> 0 end.
 (** the common kernel theorem: every motion has a limit, which is at rest in every member; with constants of the family
     alone it nears it exponentially by the clock, however the signal switches *)
-Definition kernel_claim (F : family) (P : part) : Prop := let c := frame F in becomes P <> Depends -> exists K r, 0 < r /\
-  forall X S, switches F X S -> exists y, (forall i, In i (its_agents P) -> xi P y i = 0 /\
+Definition kernel_claim (F : family) (P : part) : Prop := let c := frame F in becomes P <> Depends ->
+  exists K r, 0 < r /\ forall X S, switches F X S -> exists y, (forall i, In i (its_agents P) -> xi P y i = 0 /\
     filterlim (fun t => X t i) (at_left (deadline c)) (locally (y i))) /\ forall t0 t M i, switches_from F X S t0 ->
     t0 <= t < deadline c -> In i (its_agents P) -> (forall j, In j (its_agents P) -> Rabs (xi P (X t0) j) <= M) ->
     Rabs (X t i - y i) <= K * exp (- (r * (s c t - s c t0))) * M.
