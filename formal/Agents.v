@@ -331,8 +331,11 @@ Lemma agrees off X Sl i j : flies a off X Sl -> (i < n)%nat -> (j < order c)%nat
   filterlim (fun t => away a off (X t) i j) (at_left (deadline c)) (locally 0).
 Proof.
   intros HX Hi Hj HA. destruct matrices as [M1 [M2 [M3 [M4 [M5 [M6 [M7 M8]]]]]]].
-  unfold check_agree in Hagree. rewrite HA in Hagree. simpl in Hagree. apply andb_prop in Hagree as [G1 G2].
-    apply andb_prop in G1 as [G1 G3]. assert (EC : cap a = None) by (destruct (cap a); [discriminate|reflexivity]).
+  unfold check_agree in Hagree. rewrite HA in Hagree. cbn [negb orb] in Hagree. apply andb_prop in Hagree as [G3 G].
+    assert (EC : cap a = None) by (destruct (cap a); [discriminate|reflexivity]). apply orb_prop in G as [G|G].
+    { apply (filterlim_ext (fun _ => 0)); [|apply filterlim_const]. intros t. unfold away. pose proof (nothing_left c Hend G (placed off (X t) i) j Hj) as K.
+      fold c. lra. }
+    apply andb_prop in G as [G1 G2].
     apply existsb_exists in G2 as [kf [Hk G2]]. destruct (nth_error (funcs (graph a)) kf) as [f|] eqn:Ef; [|discriminate].
     destruct (deviation f) as [[b cs]|] eqn:Ed; [|discriminate].
     pose proof (claim_ok kf f Hk Ef off X Sl) as CL.
