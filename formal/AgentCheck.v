@@ -56,9 +56,10 @@ Definition check_coupling (a : agents) : bool := forallb (fun k => match nth_err
   | Some f => Qle_bool 1 (coupling a * rate f) | None => false end) (used a).
 
 (** where they end *)
-Definition check_agree (a : agents) : bool := negb (agree a) ||
-  (negb (Qle_bool (falls a * pull_in a) (2 * index (pred (degree a)))) && match cap a with None => true | Some _ => false end && existsb (fun k => match nth_error (funcs (graph a)) k with
-    | Some f => match deviation f with Some _ => true | None => false end | None => false end) (used a)).
+Definition check_agree (a : agents) : bool := negb (agree a) || match cap a with None => true | Some _ => false end &&
+  (forallb zero_vec (dD (prepare (graph a))) || negb (Qle_bool (falls a * pull_in a) (2 * index (pred (degree a)))) &&
+    existsb (fun k => match nth_error (funcs (graph a)) k with
+      | Some f => match deviation f with Some _ => true | None => false end | None => false end) (used a)).
 (** [q^m / m!] *)
 Fixpoint part (q : Q) (m : nat) : Q := match m with O => 1 | S m' => q / index (S m') * part q m' end.
 (** coefficients of a polynomial of [v], over [q], in which [(p + 1 + w v) P + v P'] is nearly 1: those of a series, rounded

@@ -302,3 +302,84 @@ Proof.
   rewrite <- Rabs_Ropp. apply Req_le. f_equal. unfold e, P. replace (T / T) with 1 by (field; lra). ring.
 Qed.
 End Equation.
+
+(** * From the check to it *)
+Section Drag.
+Variable a : agents.
+Let c := graph a.
+Let n := degree a.
+Let d := prepare c.
+Hypothesis Hedges : check_edges c (dls d) = true.
+Hypothesis Hprot : check_protocol c = true.
+Hypothesis Hend : check_end c d = true.
+Hypothesis Hn : (0 < n)%nat.
+(** where the common motion tends to, of whatever agents *)
+Lemma common_ends off X i j v (f : R -> R) : (forall t, 0 <= t < deadline c -> end_state c (placed off (X t) i) j = f t) ->
+  filterlim f (at_left (deadline c)) (locally v) ->
+  filterlim (fun t => X t i j - away a off (X t) i j) (at_left (deadline c)) (locally ((if (i =? 0)%nat then off j else 0) + v)).
+Proof.
+  intros E L. destruct (T_k a Hprot) as [T0 _]. fold c in T0. set (q := if (i =? 0)%nat then off j else 0).
+  apply (filterlim_ext_loc (fun t => q + f t)).
+  - exists (mkposreal _ T0). intros t Bt Lt. unfold ball in Bt; simpl in Bt; unfold AbsRing_ball, abs, minus, plus, opp in Bt; simpl in Bt.
+    apply Rabs_def2 in Bt. rewrite <- E by lra. unfold away, placed, q. fold c. ring.
+  - apply (filterlim_comp_2 (F := at_left (deadline c)) (G := locally q) (H := locally v) (fun _ => q) f Rplus); [apply filterlim_const|exact L|].
+    apply (filterlim_plus q v).
+Qed.
+(** solutions from the unit vectors *)
+Definition solves (X : R -> nat -> R) (l : nat) : Prop := (forall i, X 0 i = unit_at l i) /\
+  (forall t i, 0 <= t <= deadline c -> continuous (fun u => X u i) t) /\
+  forall t i, 0 < t <= deadline c -> is_derive (fun u => X u i) t (own n (at_ (plant a)) (X t) i).
+Lemma solutions : exists X, forall l, (l < n)%nat -> solves (X l) l.
+Proof.
+  destruct (T_k a Hprot) as [T0 _]. fold c in T0.
+  assert (One : forall l, exists x, solves x l).
+  { intros l. destruct (runs n (at_ (plant a)) (2 * deadline c) l ltac:(lra)) as [x [X0 [CX DX]]]. exists (fun t => x (Rmax 0 t)). split; [|split].
+    - intros i. rewrite Rmax_left by lra. apply X0.
+    - intros t i Ht. apply CX. lra.
+    - intros t i Ht. rewrite Rmax_right by lra. apply (is_derive_ext_loc (fun u => x u i)); [|apply DX; lra].
+      assert (He : 0 < t) by lra. exists (mkposreal _ He). intros u Hu. unfold ball in Hu; simpl in Hu; unfold AbsRing_ball, abs, minus, plus, opp in Hu; simpl in Hu.
+      apply Rabs_def2 in Hu. rewrite Rmax_right by lra. reflexivity. }
+  apply (Rest.finite_choice (fun _ _ => 0) n (fun l X => solves X l)). intros l _. apply One.
+Qed.
+Lemma drag_ends X off Z Sl i j : (forall l, (l < n)%nat -> solves (X l) l) -> forallb (Qeq_bool 0) (damping a) = true -> flies a off Z Sl -> (i < n)%nat -> (j < order c)%nat ->
+  filterlim (fun t => Z t i j - away a off (Z t) i j) (at_left (deadline c)) (locally (outcome a (fun i l => X l (deadline c) i) off (Z 0) i j)).
+Proof.
+  intros HX HD HZ Hi Hj. destruct (T_k a Hprot) as [T0 _]. fold c in T0.
+  set (w := fun t i => end_state c (placed off (Z (Rmax 0 t)) i) j). set (f := fun t => sum n (fun l => w 0 l * X l t i)).
+  assert (EO : outcome a (fun i l => X l (deadline c) i) off (Z 0) i j = (if (i =? 0)%nat then off j else 0) + f (deadline c)).
+  { unfold outcome, f. f_equal. fold n. apply sum_ext. intros l _. unfold w. rewrite Rmax_left by lra. fold c. ring. }
+  rewrite EO. apply (common_ends off Z i j _ f).
+  - intros t Ht. pose proof (combined n (at_ (plant a)) Hn (deadline c) X w) as K. unfold f. rewrite <- K; [unfold w; rewrite Rmax_right by lra; reflexivity| | | |exact Ht|exact Hi].
+    + intros l Hl. destruct (HX l Hl) as [K0 [K1 K2]]. split; [exact K0|]. split; [intros; apply K1; lra|intros; apply K2; lra].
+    + intros u v Hu Hv. exact (w_derive a off Z Sl Hedges Hend Hprot Hn HZ (fun l => zeros _ l HD) j v u Hu Hv).
+    + intros u v Hu Hv. exact (w_continuous a off Z Sl Hend Hn HZ j v u Hu Hv).
+  - eapply filterlim_filter_le_1; [|apply (continuous_sum n (fun t l => w 0 l * X l t i) (deadline c))].
+    + intros P [e He]. exists e. intros u Hu _. apply He. exact Hu.
+    + intros l Hl. apply (continuous_mult (fun _ => w 0 l)); [apply continuous_const|]. apply (HX l Hl). lra.
+Qed.
+Lemma drag_inside M X : check_drag a M = true -> (forall l, (l < n)%nat -> solves (X l) l) -> forall i l, (i < n)%nat -> (l < n)%nat ->
+  Rabs (Q2R (fst (entry_of M i l)) - X l (deadline c) i) <= Q2R (snd (entry_of M i l)).
+Proof.
+  intros HM HX i l Hi Hl. unfold check_drag in HM. cbv zeta in HM. fold n c in HM. set (T := span c) in *.
+  set (g0 := map (fun l => - (T * nth l (plant a) 0))%Q (seq 0 n)) in *. set (D := common (T :: g0)) in *. set (y := (_ + (1 # 2))%Q) in *.
+  set (K := Z.to_nat _) in *. set (p := (2 ^ (256 + 2 * Z.of_nat K))%Z) in *. apply andb_prop in HM as [H H4]. apply andb_prop in H as [H H3].
+  apply andb_prop in H as [H1 H2]. rewrite forallb_forall in H4. specialize (H4 l ltac:(apply in_seq; lia)).
+  set (u := map _ _) in H4. set (us := vectors _ _ _ _ _ _ _) in *.
+  rewrite forallb_forall in H4. specialize (H4 i ltac:(apply in_seq; lia)). destruct (good_ok _ _ H1) as [D0 _].
+  assert (ET : Q2R T = deadline c) by apply span_ok. destruct (T_k a Hprot) as [T0 _]. fold c in T0.
+  assert (Hp : (0 < p)%Z) by (apply Z.pow_pos_nonneg; lia).
+  assert (Hb : IZR (scaled D T) = IZR D * deadline c).
+  { rewrite <- ET. apply (scaled_ok D T D0). apply (good_ok _ _ H1). left. reflexivity. }
+  assert (Hg : forall v, (v < n)%nat -> IZR (nth v (map (scaled D) g0) 0%Z) = - (IZR D * (deadline c * at_ (plant a) v))).
+  { intros v Hv. rewrite nth_scaled by (apply andb_prop in H1 as [G1 G2]; simpl in G2; apply andb_prop in G2 as [_ G2]; apply andb_true_intro; split; assumption).
+    unfold g0. rewrite nth_map_seq by exact Hv. rewrite Q2R_opp, Q2R_mult, ET. unfold at_. ring. }
+  assert (HK : deadline c * pull_size n (at_ (plant a)) + / 2 <= INR K).
+  { apply Qle_bool_iff, Qle_Rle in H3. rewrite index_ok in H3. eapply Rle_trans; [|exact H3]. unfold y. rewrite Q2R_plus, Q2R_mult, Q2R_plus, ET, Q2R_1, qsum_ok.
+    assert (E2 : Q2R (1 # 2) = / 2) by (unfold Q2R; simpl; lra). rewrite E2. unfold pull_size.
+    rewrite (sum_ext n (fun v => Q2R (Qabs _)) (fun v => Rabs (at_ (plant a) v))) by (intros; apply abs_ok). lra. }
+  assert (NP : forall z, (0 < z)%Z -> ~ (inject_Z z == 0)%Q) by (intros z Hz Z0; unfold Qeq in Z0; simpl in Z0; lia).
+  apply (near_ok _ _ _ _ H4). rewrite !Q2R_div, !Effort.Q2R_inject by (apply NP; try apply Z.mul_pos_pos; assumption). rewrite poly_1.
+  destruct (HX l Hl) as [K0 [K1 K2]].
+  apply (encloses n (at_ (plant a)) Hn (scaled D T) D (map (scaled D) g0) (deadline c) D0 T0 Hb Hg p l us K (X l) Hp HK K0 K1 ltac:(intros; apply K2; lra) i Hi).
+Qed.
+End Drag.

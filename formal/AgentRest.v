@@ -1,5 +1,5 @@
 (** Agents that meet at rest: how far the common velocity takes them until it is 0, by a polynomial that is near the equation. *)
-Require Import ZArith QArith Qreals List Bool Reals Lra Lia Psatz FunctionalExtensionality.
+Require Import ZArith QArith Qabs Qreals List Bool Reals Lra Lia Psatz FunctionalExtensionality.
 From Coquelicot Require Import Coquelicot.
 Import ListNotations.
 Require Import Vec Definite Graph Flow Certificate Checker Sound Input Main AgentCertificate AgentForms AgentCheck AgentFall AgentMotion AgentEnd.
@@ -39,6 +39,27 @@ Lemma index_ok i : Q2R (index i) = INR i.
 Proof. unfold index, Q2R. simpl. rewrite INR_IZR_INZ. field. Qed.
 Lemma reduced_ok q : Q2R (reduced q) = Q2R q.
 Proof. unfold reduced. cbv zeta. destruct (Qeq_bool _ q) eqn:E; [|reflexivity]. apply Qeq_bool_eq, Qeq_eqR in E. exact E. Qed.
+Lemma qsum_ok n (g : nat -> Q) : Q2R (qsum (map g (seq 0 n))) = sum n (fun l => Q2R (g l)).
+Proof. unfold sum. induction (seq 0 n) as [|i s IH]; simpl; [apply Q2R_0|]. rewrite Q2R_plus, IH. reflexivity. Qed.
+Lemma span_ok c : Q2R (span c) = deadline c.
+Proof. unfold span, deadline. destruct (kind c); [reflexivity|]. apply Q2R_plus. Qed.
+Lemma abs_ok q : Q2R (Qabs q) = Rabs (Q2R q).
+Proof.
+  destruct q as [u w]. unfold Q2R. simpl. rewrite abs_IZR, Rabs_mult. f_equal. symmetry. apply Rabs_right. apply Rle_ge. left.
+  apply Rinv_0_lt_compat. apply IZR_lt. reflexivity.
+Qed.
+Lemma near_ok p q r x : close_to p q r = true -> Rabs (Q2R q - x) <= Q2R r -> Rabs (Q2R (fst p) - x) <= Q2R (snd p).
+Proof.
+  intros H B. unfold close_to in H. apply Qle_bool_iff, Qle_Rle in H. rewrite Q2R_plus, abs_ok, Q2R_minus in H.
+  replace (Q2R (fst p) - x) with ((Q2R (fst p) - Q2R q) + (Q2R q - x)) by ring. eapply Rle_trans; [apply Rabs_triang|]. lra.
+Qed.
+Lemma near_at p q x : close_to p q 0 = true -> Q2R q = x -> Rabs (Q2R (fst p) - x) <= Q2R (snd p).
+Proof. intros H E. apply (near_ok p q 0 x H). rewrite E, Rminus_eq_0, Rabs_R0, Q2R_0. lra. Qed.
+Lemma zeros l i : forallb (Qeq_bool 0) l = true -> at_ l i = 0.
+Proof.
+  intros H. unfold at_. destruct (nth_in_or_default i l 0%Q) as [I|E]; [|rewrite E; apply Q2R_0].
+  rewrite forallb_forall in H. specialize (H _ I). apply Qeq_bool_eq, Qeq_eqR in H. rewrite <- H. apply Q2R_0.
+Qed.
 (** how far such a polynomial is from a series *)
 Lemma misses_ok P W D v : 0 <= v <= 1 -> forall l j b,
   Rabs ((IZR P + IZR D * IZR j) * zeval l v + IZR D * v * zslope l v + IZR W * zeval (b :: l) v) <= IZR (misses P W D j b l).

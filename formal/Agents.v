@@ -14,8 +14,6 @@ Lemma peval_shifted m q x : peval (repeat 0%Q m ++ [q]) x = x ^ m * Q2R q.
 Proof. induction m as [|m IH]; simpl; [ring|]. rewrite IH, Q2R_0. ring. Qed.
 Lemma peval_choose b p x : peval (choose b p) x = if b then peval p x else 0.
 Proof. destruct b; reflexivity. Qed.
-Lemma qsum_ok n (g : nat -> Q) : Q2R (qsum (map g (seq 0 n))) = sum n (fun l => Q2R (g l)).
-Proof. unfold sum. induction (seq 0 n) as [|i s IH]; simpl; [apply Q2R_0|]. rewrite Q2R_plus, IH. reflexivity. Qed.
 Lemma table_ok n g i j : (i < n)%nat -> (j < n)%nat -> look (table n g) i j = g i j.
 Proof. intros Hi Hj. unfold look, table. rewrite nth_map_seq by exact Hi. apply nth_map_seq. exact Hj. Qed.
 Lemma table_row n g i : (i < n)%nat -> length (nth i (table n g) []) = n.
@@ -120,8 +118,6 @@ Hypothesis Hcoupling : check_coupling a = true.
 
 Lemma pull_ok : Q2R (pull_in a) = k c.
 Proof. unfold pull_in, k. rewrite Q2R_mult. reflexivity. Qed.
-Lemma span_ok : Q2R (span c) = deadline c.
-Proof. unfold span, deadline. destruct (kind c); [reflexivity|]. apply Q2R_plus. Qed.
 Lemma matrices : psd split n (W a) = true /\ 0 < Q2R (coupling a) /\ 0 < Q2R (falls a) /\ positive_gain a /\ (0 < n)%nat /\
   (forall i j, (i < n)%nat -> (j < n)%nat -> at_ (nth i (P a) []) j = at_ (nth j (P a) []) i) /\
   (forall i j, (i < n)%nat -> (j < n)%nat -> sum n (fun l => at_ (nth i (W a) []) l * at_ (nth l (P a) []) j) = if (i =? j)%nat then 1 else 0) /\
@@ -160,7 +156,7 @@ Proof.
 Qed.
 Lemma span_pos : ~ (span (graph a) == 0)%Q.
 Proof.
-  intros E. destruct (T_k a Hprot) as [A _]. apply Qeq_eqR in E. rewrite Q2R_0 in E. pose proof span_ok as SO. unfold c in *. lra.
+  intros E. destruct (T_k a Hprot) as [A _]. apply Qeq_eqR in E. rewrite Q2R_0 in E. pose proof (span_ok c) as SO. unfold c in *. lra.
 Qed.
 Lemma begin_ok : Q2R (begin_gain a) = uncapped a 0.
 Proof.
@@ -309,30 +305,16 @@ Proof.
   rewrite Q2R_mult, Q2R_div, IH, index_ok by exact N. change (fact (S m)) with (S m * fact m)%nat. rewrite mult_INR, <- tech_pow_Rmult.
   pose proof (INR_fact_neq_0 m). assert (INR (S m) <> 0) by (apply not_0_INR; lia). field. split; assumption.
 Qed.
-Lemma zeros l i : forallb (Qeq_bool 0) l = true -> at_ l i = 0.
-Proof.
-  intros H. unfold at_. destruct (nth_in_or_default i l 0%Q) as [I|E]; [|rewrite E; apply Q2R_0].
-  rewrite forallb_forall in H. specialize (H _ I). apply Qeq_bool_eq, Qeq_eqR in H. rewrite <- H. apply Q2R_0.
-Qed.
-Lemma abs_ok q : Q2R (Qabs q) = Rabs (Q2R q).
-Proof.
-  destruct q as [u w]. unfold Q2R. simpl. rewrite abs_IZR, Rabs_mult. f_equal. symmetry. apply Rabs_right. apply Rle_ge. left.
-  apply Rinv_0_lt_compat. apply IZR_lt. reflexivity.
-Qed.
-Lemma near_ok p q r x : close_to p q r = true -> Rabs (Q2R q - x) <= Q2R r -> Rabs (Q2R (fst p) - x) <= Q2R (snd p).
-Proof.
-  intros H B. unfold close_to in H. apply Qle_bool_iff, Qle_Rle in H. rewrite Q2R_plus, abs_ok, Q2R_minus in H.
-  replace (Q2R (fst p) - x) with ((Q2R (fst p) - Q2R q) + (Q2R q - x)) by ring. eapply Rle_trans; [apply Rabs_triang|]. lra.
-Qed.
-Lemma near_at p q x : close_to p q 0 = true -> Q2R q = x -> Rabs (Q2R (fst p) - x) <= Q2R (snd p).
-Proof. intros H E. apply (near_ok p q 0 x H). rewrite E, Rminus_eq_0, Rabs_R0, Q2R_0. lra. Qed.
 (** at the deadline what is known to tend to something *)
 Lemma agrees off X Sl i j : flies a off X Sl -> (i < n)%nat -> (j < order c)%nat -> agree a = true ->
   filterlim (fun t => away a off (X t) i j) (at_left (deadline c)) (locally 0).
 Proof.
   intros HX Hi Hj HA. destruct matrices as [M1 [M2 [M3 [M4 [M5 [M6 [M7 M8]]]]]]].
-  unfold check_agree in Hagree. rewrite HA in Hagree. simpl in Hagree. apply andb_prop in Hagree as [G1 G2].
-    apply andb_prop in G1 as [G1 G3]. assert (EC : cap a = None) by (destruct (cap a); [discriminate|reflexivity]).
+  unfold check_agree in Hagree. rewrite HA in Hagree. cbn [negb orb] in Hagree. apply andb_prop in Hagree as [G3 G].
+    assert (EC : cap a = None) by (destruct (cap a); [discriminate|reflexivity]). apply orb_prop in G as [G|G].
+    { apply (filterlim_ext (fun _ => 0)); [|apply filterlim_const]. intros t. unfold away. pose proof (nothing_left c Hend G (placed off (X t) i) j Hj) as K.
+      fold c. lra. }
+    apply andb_prop in G as [G1 G2].
     apply existsb_exists in G2 as [kf [Hk G2]]. destruct (nth_error (funcs (graph a)) kf) as [f|] eqn:Ef; [|discriminate].
     destruct (deviation f) as [[b cs]|] eqn:Ed; [|discriminate].
     pose proof (claim_ok kf f Hk Ef off X Sl) as CL.
@@ -348,17 +330,6 @@ Proof.
     - intros t Ht. eapply Rle_trans; [apply (B t Ht)|]. apply Rmult_le_compat_l; [apply Rle_0_sqr|].
       apply Rmult_le_compat_r; [left; apply exp_pos|apply Rmax_r].
 Qed.
-Lemma common_ends off X i j v (f : R -> R) : (forall t, 0 <= t < deadline c -> end_state c (placed off (X t) i) j = f t) ->
-  filterlim f (at_left (deadline c)) (locally v) ->
-  filterlim (fun t => X t i j - away a off (X t) i j) (at_left (deadline c)) (locally ((if (i =? 0)%nat then off j else 0) + v)).
-Proof.
-  intros E L. destruct (T_k a Hprot) as [T0 _]. fold c in T0. set (q := if (i =? 0)%nat then off j else 0).
-  apply (filterlim_ext_loc (fun t => q + f t)).
-  - exists (mkposreal _ T0). intros t Bt Lt. unfold ball in Bt; simpl in Bt; unfold AbsRing_ball, abs, minus, plus, opp in Bt; simpl in Bt.
-    apply Rabs_def2 in Bt. rewrite <- E by lra. unfold away, placed, q. fold c. ring.
-  - apply (filterlim_comp_2 (F := at_left (deadline c)) (G := locally q) (H := locally v) (fun _ => q) f Rplus); [apply filterlim_const|exact L|].
-    apply (filterlim_plus q v).
-Qed.
 Definition chain_drift (i l : nat) : R := if (i <=? l)%nat then deadline c ^ (l - i) / INR (fact (l - i)) else 0.
 Lemma chains_end off X Sl i j : forallb (Qeq_bool 0) (plant a ++ damping a) = true -> flies a off X Sl -> (i < n)%nat -> (j < order c)%nat ->
   filterlim (fun t => X t i j - away a off (X t) i j) (at_left (deadline c)) (locally (outcome a chain_drift off (X 0) i j)).
@@ -370,69 +341,12 @@ Proof.
   { unfold outcome. f_equal. fold n c. unfold wj, taylor. rewrite Rmax_left by lra.
     rewrite <- (sum_from i n (fun u v => T ^ u / INR (fact u) * end_state c (placed off (X 0) v) j)) by (unfold n in *; lia).
     apply sum_ext. intros l Hl. unfold chain_drift. fold T. destruct (i <=? l)%nat; ring. }
-  rewrite EO. apply (common_ends off X i j (wj T) wj).
+  rewrite EO. apply (common_ends a Hprot off X i j (wj T) wj).
   - intros t Ht. pose proof (drifts a off X Sl Hedges Hend Hprot M5 HX (fun l => zeros _ l Z2) (fun l => zeros _ l Z1) j (n - i) i
       ltac:(unfold n in *; lia) ltac:(unfold n in *; lia) t Ht) as K. cbv beta zeta in K. rewrite (Rmax_right 0 t) in K by lra. exact K.
   - eapply filterlim_filter_le_1; [|apply (@ex_derive_continuous _ _ wj T)].
     + intros P [e He]. exists e. intros u Hu _. apply He. exact Hu.
     + destruct (n - i)%nat as [|u] eqn:Eu; [unfold n in *; lia|]. unfold wj. eexists. apply taylor_derive.
-Qed.
-(** agents that move by themselves *)
-Definition solves (X : R -> nat -> R) (l : nat) : Prop := (forall i, X 0 i = unit_at l i) /\
-  (forall t i, 0 <= t <= deadline c -> continuous (fun u => X u i) t) /\
-  forall t i, 0 < t <= deadline c -> is_derive (fun u => X u i) t (own n (at_ (plant a)) (X t) i).
-Lemma solutions : exists X, forall l, (l < n)%nat -> solves (X l) l.
-Proof.
-  destruct (T_k a Hprot) as [T0 _]. fold c in T0.
-  assert (One : forall l, exists x, solves x l).
-  { intros l. destruct (runs n (at_ (plant a)) (2 * deadline c) l ltac:(lra)) as [x [X0 [CX DX]]]. exists (fun t => x (Rmax 0 t)). split; [|split].
-    - intros i. rewrite Rmax_left by lra. apply X0.
-    - intros t i Ht. apply CX. lra.
-    - intros t i Ht. rewrite Rmax_right by lra. apply (is_derive_ext_loc (fun u => x u i)); [|apply DX; lra].
-      assert (He : 0 < t) by lra. exists (mkposreal _ He). intros u Hu. unfold ball in Hu; simpl in Hu; unfold AbsRing_ball, abs, minus, plus, opp in Hu; simpl in Hu.
-      apply Rabs_def2 in Hu. rewrite Rmax_right by lra. reflexivity. }
-  apply (Rest.finite_choice (fun _ _ => 0) n (fun l X => solves X l)). intros l _. apply One.
-Qed.
-Lemma drag_ends X off Z Sl i j : (forall l, (l < n)%nat -> solves (X l) l) -> forallb (Qeq_bool 0) (damping a) = true -> flies a off Z Sl -> (i < n)%nat -> (j < order c)%nat ->
-  filterlim (fun t => Z t i j - away a off (Z t) i j) (at_left (deadline c)) (locally (outcome a (fun i l => X l (deadline c) i) off (Z 0) i j)).
-Proof.
-  intros HX HD HZ Hi Hj. destruct matrices as [_ [_ [_ [_ [M5 _]]]]]. destruct (T_k a Hprot) as [T0 _]. fold c in T0.
-  set (w := fun t i => end_state c (placed off (Z (Rmax 0 t)) i) j). set (f := fun t => sum n (fun l => w 0 l * X l t i)).
-  assert (EO : outcome a (fun i l => X l (deadline c) i) off (Z 0) i j = (if (i =? 0)%nat then off j else 0) + f (deadline c)).
-  { unfold outcome, f. f_equal. fold n. apply sum_ext. intros l _. unfold w. rewrite Rmax_left by lra. fold c. ring. }
-  rewrite EO. apply (common_ends off Z i j _ f).
-  - intros t Ht. pose proof (combined n (at_ (plant a)) M5 (deadline c) X w) as K. unfold f. rewrite <- K; [unfold w; rewrite Rmax_right by lra; reflexivity| | | |exact Ht|exact Hi].
-    + intros l Hl. destruct (HX l Hl) as [K0 [K1 K2]]. split; [exact K0|]. split; [intros; apply K1; lra|intros; apply K2; lra].
-    + intros u v Hu Hv. exact (w_derive a off Z Sl Hedges Hend Hprot M5 HZ (fun l => zeros _ l HD) j v u Hu Hv).
-    + intros u v Hu Hv. exact (w_continuous a off Z Sl Hend M5 HZ j v u Hu Hv).
-  - eapply filterlim_filter_le_1; [|apply (continuous_sum n (fun t l => w 0 l * X l t i) (deadline c))].
-    + intros P [e He]. exists e. intros u Hu _. apply He. exact Hu.
-    + intros l Hl. apply (continuous_mult (fun _ => w 0 l)); [apply continuous_const|]. apply (HX l Hl). lra.
-Qed.
-Lemma drag_inside M X : check_drag a M = true -> (forall l, (l < n)%nat -> solves (X l) l) -> forall i l, (i < n)%nat -> (l < n)%nat ->
-  Rabs (Q2R (fst (entry_of M i l)) - X l (deadline c) i) <= Q2R (snd (entry_of M i l)).
-Proof.
-  intros HM HX i l Hi Hl. unfold check_drag in HM. cbv zeta in HM. fold n c in HM. set (T := span c) in *.
-  set (g0 := map (fun l => - (T * nth l (plant a) 0))%Q (seq 0 n)) in *. set (D := common (T :: g0)) in *. set (y := (_ + (1 # 2))%Q) in *.
-  set (K := Z.to_nat _) in *. set (p := (2 ^ (256 + 2 * Z.of_nat K))%Z) in *. apply andb_prop in HM as [H H4]. apply andb_prop in H as [H H3].
-  apply andb_prop in H as [H1 H2]. rewrite forallb_forall in H4. specialize (H4 l ltac:(apply in_seq; lia)).
-  set (u := map _ _) in H4. set (us := vectors _ _ _ _ _ _ _) in *.
-  rewrite forallb_forall in H4. specialize (H4 i ltac:(apply in_seq; lia)). destruct (good_ok _ _ H1) as [D0 _].
-  assert (ET : Q2R T = deadline c) by apply span_ok. destruct (T_k a Hprot) as [T0 _]. fold c in T0. destruct matrices as [_ [_ [_ [_ [M5 _]]]]].
-  assert (Hp : (0 < p)%Z) by (apply Z.pow_pos_nonneg; lia).
-  assert (Hb : IZR (scaled D T) = IZR D * deadline c).
-  { rewrite <- ET. apply (scaled_ok D T D0). apply (good_ok _ _ H1). left. reflexivity. }
-  assert (Hg : forall v, (v < n)%nat -> IZR (nth v (map (scaled D) g0) 0%Z) = - (IZR D * (deadline c * at_ (plant a) v))).
-  { intros v Hv. rewrite nth_scaled by (apply andb_prop in H1 as [G1 G2]; simpl in G2; apply andb_prop in G2 as [_ G2]; apply andb_true_intro; split; assumption).
-    unfold g0. rewrite nth_map_seq by exact Hv. rewrite Q2R_opp, Q2R_mult, ET. unfold at_. ring. }
-  assert (HK : deadline c * pull_size n (at_ (plant a)) + / 2 <= INR K).
-  { apply Qle_bool_iff, Qle_Rle in H3. rewrite index_ok in H3. eapply Rle_trans; [|exact H3]. unfold y. rewrite Q2R_plus, Q2R_mult, Q2R_plus, ET, Q2R_1, qsum_ok.
-    assert (E2 : Q2R (1 # 2) = / 2) by (unfold Q2R; simpl; lra). rewrite E2. unfold pull_size.
-    rewrite (sum_ext n (fun v => Q2R (Qabs _)) (fun v => Rabs (at_ (plant a) v))) by (intros; apply abs_ok). lra. }
-  assert (NP : forall z, (0 < z)%Z -> ~ (inject_Z z == 0)%Q) by (intros z Hz Z0; unfold Qeq in Z0; simpl in Z0; lia).
-  apply (near_ok _ _ _ _ H4). rewrite !Q2R_div, !Effort.Q2R_inject by (apply NP; try apply Z.mul_pos_pos; assumption). rewrite poly_1.
-  destruct (HX l Hl) as [K0 [K1 K2]].
-  apply (encloses n (at_ (plant a)) M5 (scaled D T) D (map (scaled D) g0) (deadline c) D0 T0 Hb Hg p l us K (X l) Hp HK K0 K1 ltac:(intros; apply K2; lra) i Hi).
 Qed.
 Definition rest_drift (m : R) (i l : nat) : R := match i, l with O, O => 1 | O, 1%nat => m | _, _ => 0 end.
 Theorem agreement_ok : agreement a.
@@ -445,9 +359,9 @@ Proof.
       apply (near_at _ _ _ K). unfold chain_drift. destruct (i <=? l)%nat; [|apply Q2R_0]. rewrite part_ok. fold c. rewrite span_ok. reflexivity.
     + intros off X Sl i j HX Hi Hj tends. split; [apply (agrees off X Sl); assumption|]. intros _. apply (chains_end off X Sl); assumption.
   - destruct (forallb (Qeq_bool 0) (damping a)) eqn:ZD.
-  { destruct solutions as [X HX]. exists (fun i l => X l (deadline c) i). split.
-    - intros M' i l E Hi Hl. rewrite EM in E. injection E as <-. apply (drag_inside M X HC HX i l Hi Hl).
-    - intros off Z' Sl i j HZ Hi Hj tends. split; [apply (agrees off Z' Sl); assumption|]. intros _. apply (drag_ends X off Z' Sl); assumption. }
+  { destruct matrices as [_ [_ [_ [_ [M5 _]]]]]. destruct (solutions a Hprot) as [X HX]. exists (fun i l => X l (deadline c) i). split.
+    - intros M' i l E Hi Hl. rewrite EM in E. injection E as <-. apply (drag_inside a Hprot M5 M X HC HX i l Hi Hl).
+    - intros off Z' Sl i j HZ Hi Hj tends. split; [apply (agrees off Z' Sl); assumption|]. intros _. apply (drag_ends a Hedges Hprot Hend M5 X off Z' Sl); assumption. }
   unfold check_rest in HC. cbv zeta in HC.
     set (p := (nth 1 (damping a) 0 * pull_in a)%Q) in *. set (w := ((nth 1 (plant a) 0 + nth 1 (damping a) 0 * slope a) * span (graph a))%Q) in *.
     set (x := fst (far_q p w)) in *. set (e := snd (far_q p w)) in *.
@@ -482,14 +396,14 @@ Proof.
       set (v0 := end_state c (placed off (X 0) 0) j). set (v1 := end_state c (placed off (X 0) 1) j).
       destruct i as [|[|i]]; [| |lia].
       * cbn [rest_drift]. replace (1 * v0 + (m * v1 + 0)) with (v0 + m * v1) by ring.
-        apply (common_ends off X 0 j (v0 + m * v1) (fun t => v0 + glide a (at_ (plant a) 1) (at_ (damping a) 1) t * v1)).
+        apply (common_ends a Hprot off X 0 j (v0 + m * v1) (fun t => v0 + glide a (at_ (plant a) 1) (at_ (damping a) 1) t * v1)).
         -- intros t Ht. pose proof (position a off X Sl Hedges Hend Hprot M4 HX C1 (eq_sym C3) (eq_sym C4) j t Ht) as K. cbv beta zeta in K.
            rewrite (Rmax_right 0 t), (Rmax_right 0 0) in K by lra. exact K.
         -- apply (filterlim_comp _ _ _ (glide a (at_ (plant a) 1) (at_ (damping a) 1)) (fun y => v0 + y * v1) (at_left (deadline c)) (locally m)); [exact L|].
            apply (continuous_plus (fun _ => v0) (fun y => y * v1)); [apply continuous_const|].
            apply (continuous_mult (fun y => y) (fun _ => v1)); [apply continuous_id|apply continuous_const].
       * cbn [rest_drift]. replace (0 * v0 + (0 * v1 + 0)) with 0 by ring.
-        apply (common_ends off X 1 j 0 (fun t => fades a (at_ (plant a) 1) (at_ (damping a) 1) t * v1)); [|apply (fades_vanish a _ _ Hprot M4 EC C5)].
+        apply (common_ends a Hprot off X 1 j 0 (fun t => fades a (at_ (plant a) 1) (at_ (damping a) 1) t * v1)); [|apply (fades_vanish a _ _ Hprot M4 EC C5)].
         intros t Ht. pose proof (velocity a off X Sl Hedges Hend Hprot M4 HX C1 (eq_sym C3) (eq_sym C4) j t Ht) as K. cbv beta zeta in K.
         rewrite (Rmax_right 0 t), (Rmax_right 0 0) in K by lra. exact K.
 Qed.

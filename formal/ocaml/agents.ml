@@ -146,7 +146,7 @@ let certificate json : t =
   need (Number.equal (largest damping) Number.zero || (n = 2 && Z.sign (List.hd damping).qnum = 0 && Z.sign (List.nth damping 1).qnum > 0
     && Z.sign (List.hd plant).qnum = 0 && cap = None)) "feedback of the own state that is not that of meeting at rest";
   let deviates = List.exists (fun k -> (List.nth funcs k).deviation <> None) used in
-  let agree = cap = None && deviates in
+  let agree = cap = None && (deviates || r.cert.edges = []) in
   if cap = None && not agree && used <> [] then left := [ "claim, that all agree at the deadline" ];
   let motion = List.map (fun row -> let l = entries "motion" row in
     need (List.length l = n) "motion: another number of columns"; List.map (Reader.interval "motion") l) (entries "motion" (get "motion")) in

@@ -295,6 +295,21 @@ def test_where_no_function_used_has_a_deviation_it_is_named_that_all_agree(tmp_p
     assert {"agent-motion of agents", "agents.motion"} <= named(text)
 
 
+@pytest.mark.parametrize("labels", [["a"], ["a", "b", "c"]])
+def test_where_agents_end_of_whom_none_listens_is_verified(labels: list[str], tmp_path: Path) -> None:
+    program()
+    graph = SignedDigraph.from_edges([], nodes=labels)
+    for setting in (Setting(order=3, dimension=2), SETTINGS["drag in the plane"], SETTINGS["at rest"]):
+        document = made(graph, setting)
+        assert check(document).accepted and document["agents"]["functions"] == []
+        code, text = said(document, tmp_path)
+        assert code == 0 and not named(text)
+        row = document["agents"]["final_state"][labels[0]][0]
+        middle, radius = ends(row[0])
+        away = {"mid": str(middle + 3 * radius), "radius": str(radius)} if radius else str(middle + F(1, 10**30))
+        refused(document, ("agents", "final_state", labels[0], 0, 0), away, "agent-final-state", tmp_path)
+
+
 def test_late_messages_and_moving_leaders_beside_agents_are_rejected(tmp_path: Path) -> None:
     program()
     for key in ("messages", "leaders"):
