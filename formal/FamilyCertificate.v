@@ -95,8 +95,7 @@ Definition kernel_claim (F : family) (P : part) : Prop := let c := frame F in be
 Definition below (b : lyapunov) (a : R) (x : nat -> R) : Prop := let z := xi (about b) x in match by_ b with
   | Form P => qbil P z z <= a | Squares p => qdot p (fun i => sq (x i)) <= a
   | Rows d => forall i, In i (its_agents (about b)) -> sq (z i) <= a * sq (Q2R (nth i d 0%Q)) end.
-(** it decays along every motion, bounds what agents and means are moved and what is left to the states at rest; with a
-    positive rate, the part comes to rest, at a state that is at rest in every member *)
+(** it decays along every motion, bounds what agents and means are moved and what is left to the states at rest *)
 Definition bound_claim (F : family) (b : lyapunov) : Prop := let c := frame F in
   (forall X S t0 t a, switches_from F X S t0 -> t0 <= t < deadline c -> 0 <= a -> below b a (X t0) ->
      below b (exp (- (Q2R (decay b) * (s c t - s c t0))) * a) (X t)) /\
@@ -104,9 +103,7 @@ Definition bound_claim (F : family) (b : lyapunov) : Prop := let c := frame F in
      sq (xi (about b) x i) <= Q2R (nth i (offs b) 0%Q) * a /\
      forall m w, In m (modes F) -> admits (ties m) w -> sq (member (ties m) w x i) <= Q2R (nth i (inputs b) 0%Q) * a) /\
   (forall x a q, 0 <= a -> below b a x -> In q (means b) -> forall m w, In m (modes F) -> admits (ties m) w ->
-     sq (qdot (fst q) (member (ties m) w x)) <= Q2R (snd q) * a) /\
-  (0 < Q2R (decay b) -> forall X S, switches F X S -> exists y, forall i, In i (its_agents (about b)) ->
-     filterlim (fun t => X t i) (at_left (deadline c)) (locally (y i)) /\ xi (about b) y i = 0).
+     sq (qdot (fst q) (member (ties m) w x)) <= Q2R (snd q) * a).
 (** from the initial state and the sliding variables of the file on: where agents end, the boxes, the whole input *)
 Definition starts (F : family) X S := switches F X S /\ forall i, (i < order (frame F))%nat ->
   X 0 i = Q2R (nth i (start (frame F)) 0%Q) /\ S 0 i = Q2R (nth i (sliding (frame F)) 0%Q).

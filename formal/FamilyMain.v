@@ -117,8 +117,7 @@ Proof.
 Qed.
 Theorem bounds_claim b h : check_bound F b h = true -> bound_claim F b.
 Proof.
-  intros H. destruct (bound_parts b h H) as [H1 [H2 [H3 [H4 [H5 H6]]]]]. split; [exact H3|]. split; [exact H4|]. split; [exact H5|].
-  intros Hr X Sl HM. apply (comes_to_rest_family F Hframe b H3 H4 H6 H1 H2 Hr X Sl HM).
+  intros H. destruct (bound_parts b h H) as [_ [_ [H3 [H4 [H5 _]]]]]. split; [exact H3|]. split; [exact H4|exact H5].
 Qed.
 
 (** * Parts *)

@@ -208,9 +208,8 @@ Definition sizes : Prop := forall x a i, 0 <= a -> below b a x -> In i (its_agen
   forall m w, In m (modes F) -> admits (ties m) w -> sq (member (ties m) w x i) <= Q2R (nth i (inputs b) 0%Q) * a.
 Definition means_too : Prop := forall x a q, 0 <= a -> below b a x -> In q (means b) -> forall m w, In m (modes F) ->
   admits (ties m) w -> sq (qdot (fst q) (member (ties m) w x)) <= Q2R (snd q) * a.
-Hypotheses (HD : decays) (HS : sizes) (HV : forall x, exists a, 0 <= a /\ below b a x).
+Hypotheses (HD : decays) (HS : sizes).
 Hypothesis Hagents : forall i, In i (its_agents P) -> (i < n)%nat.
-Hypothesis Hpivots : forall v, In v (still P) -> In (fst v) (its_agents P).
 (** how near to its end a sum of agents is of which the members move as little as the function *)
 Lemma near_of u q X Sl t0 a : (forall v, In v u -> (fst v < n)%nat) ->
   (forall x a, 0 <= a -> below b a x -> forall m w, In m (modes F) -> admits (ties m) w -> sq (sdot u (member (ties m) w x)) <= q * a) ->
@@ -239,15 +238,6 @@ Proof.
     rewrite sqrt_sqrt by (apply Rmult_le_pos; [exact Q0|left; apply exp_pos]). rewrite Ee. unfold sq. right. ring.
   - exists v. intros t Ht. specialize (Hv t Ht). rewrite Rmax_right in Hv by lra. exact Hv.
 Qed.
-Lemma nears X Sl t0 a i : 0 < Q2R (decay b) -> switches_from F X Sl t0 -> 0 <= a -> below b a (X t0) -> In i (its_agents P) ->
-  exists v, forall t, t0 <= t < T -> Rabs (X t i - v) <=
-    2 * sqrt (Q2R (nth i (inputs b) 0%Q) * a * exp (Q2R (decay b) * s c t0)) / Q2R (decay b) * exp (- (Q2R (decay b) / 2 * s c t)).
-Proof.
-  intros Hr HM Ha H0 Hi.
-  destruct (near_of [(i, 1%Q)] (Q2R (nth i (inputs b) 0%Q)) X Sl t0 a ltac:(intros v [<-|[]]; apply Hagents; exact Hi)) as [v Hv]; try assumption.
-  - intros x a0 A0 B0 m w Hm Hw. rewrite sdot_one. apply (HS x a0 i A0 B0 Hi); assumption.
-  - exists v. intros t Ht. specialize (Hv t Ht). rewrite sdot_one in Hv. exact Hv.
-Qed.
 Lemma near_limit (f : R -> R) X Sl t0 v C r : 0 < r -> switches_from F X Sl t0 ->
   (forall t, t0 <= t < T -> Rabs (f t - v) <= C * exp (- (r / 2 * s c t))) -> filterlim f (at_left T) (locally v).
 Proof.
@@ -256,35 +246,6 @@ Proof.
   assert (E : exp (- (r * clock T rho (k c) t)) = sq (exp (- (r / 2 * s c t)))) by (unfold sq; rewrite <- exp_plus; f_equal; unfold s; fold T rho; lra).
   rewrite E. set (e := exp _) in *. assert (0 < e) by apply exp_pos. apply Rabs_le_between in Hv. unfold sq.
   replace (C * C * (e * e)) with (C * e * (C * e)) by ring. nra.
-Qed.
-Theorem comes_to_rest_family : 0 < Q2R (decay b) -> forall X Sl, switches F X Sl -> exists y, forall i, In i (its_agents P) ->
-  filterlim (fun t => X t i) (at_left T) (locally (y i)) /\ xi P y i = 0.
-Proof.
-  intros Hr X Sl HM. destruct (settles_family X Sl HM) as [t0 HM0]. destruct (HV (X t0)) as [a [Ha H0]]. pose proof HM0 as [_ HQ].
-  destruct (finite_choice 0 n (fun i v => In i (its_agents P) -> filterlim (fun t => X t i) (at_left T) (locally v))) as [y Hy].
-  { intros i Hi. destruct (in_dec Nat.eq_dec i (its_agents P)) as [I|I]; [|exists 0; intros; contradiction].
-    destruct (nears X Sl t0 a i Hr HM0 Ha H0 I) as [v Hv]. exists v. intros _. apply (near_limit (fun t => X t i) X Sl t0 v _ _ Hr HM0 Hv). }
-  exists y. intros i Hi. split; [apply Hy; auto|].
-  assert (L : filterlim (fun t => xi P (X t) i) (at_left T) (locally (xi P y i))).
-  { rewrite xi_row. apply (filterlim_ext (fun t => plus (X t i) (opp (sdot (row P i) (X t))))); [intros t; rewrite xi_row; reflexivity|].
-    apply (filterlim_comp_2 (F := at_left T) (G := locally (y i)) (H := locally (opp (sdot (row P i) y))) (fun t => X t i) (fun t => opp (sdot (row P i) (X t))) plus).
-    - apply Hy; auto.
-    - apply (filterlim_comp _ _ _ (fun t => sdot (row P i) (X t)) opp _ (locally (sdot (row P i) y))); [|apply (@filterlim_opp R_AbsRing R_NormedModule)].
-      apply sdot_limit. intros v Hv. apply in_map_iff in Hv as [p [<- Hp]]. apply Hy; [apply Hagents|]; apply Hpivots; exact Hp.
-    - apply (filterlim_plus (y i)). }
-  assert (Z : filterlim (fun t => xi P (X t) i) (at_left T) (locally 0)).
-  { destruct positive_ as [P1 [P2 P3]]. set (r := Q2R (decay b)) in *.
-    set (q := Q2R (nth i (offs b) 0%Q)). set (e0 := exp (r * s c t0)).
-    assert (Q0 : 0 <= q * a). { destruct (HS (X t0) a i Ha H0 Hi) as [K _]. pose proof (sq_pos (xi P (X t0) i)). fold q in K. lra. }
-    apply (reaches n T rho (k c) P1 P2 P3 (fun t j => xi P (X t) j) Sl t0 HQ i 0 (q * a * e0) r Hr
-      ltac:(apply Rmult_le_pos; [exact Q0|left; apply exp_pos])).
-    intros t Ht. rewrite Rminus_0_r. specialize (HD X Sl t0 t a HM0 Ht Ha H0). fold r in HD.
-    set (e := exp (- (r * (s c t - s c t0)))) in *. assert (Pe : 0 < e) by apply exp_pos.
-    destruct (HS (X t) (e * a) i ltac:(apply Rmult_le_pos; lra) HD Hi) as [K _]. fold q in K. unfold sq in K.
-    eapply Rle_trans; [exact K|]. right.
-    assert (Ee : e = e0 * exp (- (r * clock T rho (k c) t))) by (unfold e, e0; rewrite <- exp_plus; f_equal; unfold s; fold T rho; lra).
-    rewrite Ee. ring. }
-  apply (filterlim_locally_unique (F := at_left T) (fun t => xi P (X t) i)); assumption.
 Qed.
 End Bound.
 

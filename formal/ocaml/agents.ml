@@ -74,30 +74,28 @@ let functions (r : Reader.t) proof is_full v =
     ([], -1, r.cert.funcs) (entries "functions" v) in
   List.rev used, funcs
 
-(* by coordinate: offsets by agent, and states by derivative and agent *)
-let axes (r : Reader.t) n dimension get ends_known =
+(* by coordinate: offsets by agent, and states by derivative and agent; of the final ones [told] derivatives *)
+let axes ?told (r : Reader.t) n dimension get ends_known =
   let boxes key read v = by_agent r.nodes (fun what v ->
     let l = entries what v in
     need (List.length l = dimension) (Printf.sprintf "%s: %d coordinates are due" what dimension); List.map (read what) l) key v in
-  let row read what v =
+  let told = Option.value told ~default:n in
+  let row n read what v =
     let l = entries what v in
     need (List.length l = n) (Printf.sprintf "%s: %d derivatives are due" what n); List.map (read what) l in
   let offsets = boxes "offsets" number (get "offsets") in
-  let states = match get "initial_state" with Null -> None | v -> Some (boxes "initial_state" (row number) v) in
+  let states = match get "initial_state" with Null -> None | v -> Some (boxes "initial_state" (row n number) v) in
   let finals = match get "final_state" with
     | Null -> None
-    | v -> need (states <> None) "a final state without initial states"; Some (boxes "final_state" (row Reader.interval) v) in
-  let turned axis rows = List.init n (fun i -> List.map (fun row -> List.nth (List.nth row axis) i) rows) in
+    | v -> need (states <> None) "a final state without initial states"; Some (boxes "final_state" (row told Reader.interval) v) in
+  let turned n axis rows = List.init n (fun i -> List.map (fun row -> List.nth (List.nth row axis) i) rows) in
   match states with
   | None -> []
-  | Some states -> List.init dimension (fun axis -> { offsets = List.map (fun row -> List.nth row axis) offsets; begins = turned axis states;
-      arrivals = match finals with Some l when ends_known -> turned axis l | _ -> [] })
+  | Some states -> List.init dimension (fun axis -> { offsets = List.map (fun row -> List.nth row axis) offsets; begins = turned n axis states;
+      arrivals = match finals with Some l when ends_known -> turned told axis l | _ -> [] })
 
-let certificate json : t =
-  let get = match section json with
-    | Some (Obj l) when List.mem_assoc "cascade" l -> unsupported "agents that track a velocity, section agents.cascade"
-    | Some v -> fields "agents" keys v
-    | None -> bad "no agents of order n" in
+(* the certificate of the graph of agents of order n *)
+let graph_of json : Reader.t =
   (match json with
    | Obj l -> List.iter (fun (key, _) -> need (not (List.mem_assoc key l)) (key ^ " beside agents of order n")) Reader.besides
    | _ -> ());
@@ -105,6 +103,11 @@ let certificate json : t =
   List.iter (fun key -> need (null_in json key) (key ^ " beside that of the agents")) [ "initial_state"; "final_state"; "input" ];
   List.iter (fun x -> need (Number.equal x Number.zero) "agents of order n begin with sliding variables that are 0") r.cert.sliding;
   if r.cert.enclosed then unsupported "agents of order n on a large form";
+  r
+
+let certificate json : t =
+  let get = match section json with Some v -> fields "agents" keys v | None -> bad "no agents of order n" in
+  let r = graph_of json in
   let n = count "order" (get "order") in
   let dimension = count "dimension" (get "dimension") in
   let row key = shorts key n (get key) in

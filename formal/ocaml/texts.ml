@@ -74,6 +74,8 @@ let obligations = [
     "one matrix for all agents");
   "agent-coupling", ("K = c b'W^-1, and c times the rate of every function used is at least 1",
     "Lyapunov decrease of a Kronecker product");
+  "agent-cascade", ("q = x' - eta e decays like e^(-alpha s); initial and drive are not below sqrt(V) of positions and of q(0)",
+    "variation of constants");
   "agent-motion", ("the common motion is M times its initial value at the deadline",
     "one agent without neighbours");
   "agent-final-state", ("Q and M take the initial states to these final states",
