@@ -349,6 +349,38 @@ Proof.
     + destruct (n - i)%nat as [|u] eqn:Eu; [unfold n in *; lia|]. unfold wj. eexists. apply taylor_derive.
 Qed.
 Definition rest_drift (m : R) (i l : nat) : R := match i, l with O, O => 1 | O, 1%nat => m | _, _ => 0 end.
+(** the common motion of agents that meet at rest: how far they glide, and that [drift] holds it *)
+Lemma rest_inside M : positive_gain a -> drift a = Some M -> check_rest a M = true -> degree a = 2%nat /\ cap a = None /\
+  0 = at_ (plant a) 0 /\ 0 = at_ (damping a) 0 /\ 0 < at_ (damping a) 1 /\
+  exists m, filterlim (glide a (at_ (plant a) 1) (at_ (damping a) 1)) (at_left (deadline c)) (locally m) /\ inside a (rest_drift m).
+Proof.
+  intros M4 EM HC. unfold check_rest in HC. cbv zeta in HC.
+    set (p := (nth 1 (damping a) 0 * pull_in a)%Q) in *. set (w := ((nth 1 (plant a) 0 + nth 1 (damping a) 0 * slope a) * span (graph a))%Q) in *.
+    set (x := fst (far_q p w)) in *. set (e := snd (far_q p w)) in *.
+    apply andb_prop in HC as [H N4]. apply andb_prop in H as [H N3]. apply andb_prop in H as [H N2]. apply andb_prop in H as [H N1].
+    apply andb_prop in H as [H C6]. apply andb_prop in H as [H C5]. apply andb_prop in H as [H C4]. apply andb_prop in H as [H C3]. apply andb_prop in H as [C1 C2].
+    apply Nat.eqb_eq in C1. assert (EC : cap a = None) by (destruct (cap a); [discriminate|reflexivity]).
+    apply Qeq_bool_eq, Qeq_eqR in C3, C4. rewrite Q2R_0 in C3, C4. apply Qpos in C5. apply negb_true_iff in C6.
+    assert (Ep : Q2R p = at_ (damping a) 1 * k c) by (unfold p; rewrite Q2R_mult, pull_ok; reflexivity).
+    assert (Ew : Q2R w = (at_ (plant a) 1 + at_ (damping a) 1 * Q2R (slope a)) * deadline c) by (unfold w; rewrite !Q2R_mult, Q2R_plus, Q2R_mult; fold c; rewrite span_ok; reflexivity).
+    assert (P0 : 0 < Q2R p) by (rewrite Ep; apply Rmult_lt_0_compat; [exact C5|apply (T_k a Hprot)]).
+    destruct (far_ok p w P0) as [Po [dP [DP [Ex He]]]]. fold x in Ex. fold e in He.
+    destruct (glides a (Q2R p) (Q2R w) (at_ (plant a) 1) (at_ (damping a) 1) (Q2R e) Po dP Hprot M4 EC C5 Ep Ew DP He) as [m [L [m0 B]]]. fold c in L, B.
+    rewrite <- Ex in B.
+    do 5 (split; [assumption|]). exists m. split; [exact L|]. intros M' i l E Hi Hl. rewrite EM in E. injection E as <-. rewrite C1 in Hi, Hl.
+      destruct i as [|[|i]]; [| |lia]; (destruct l as [|[|l]]; [| |lia]); cbn [rest_drift].
+      * apply (near_at _ _ _ N1). apply Q2R_1.
+      * apply (near_ok _ _ _ _ N2). assert (E2 : Q2R e < 1) by (destruct (Qlt_le_dec e 1) as [Q|Q]; [apply Qlt_Rlt in Q; rewrite Q2R_1 in Q; exact Q|apply Qle_bool_iff in Q; congruence]).
+        assert (E3 : 0 <= Q2R e) by (eapply Rle_trans; [apply Rabs_pos|apply (He 0); lra]).
+        assert (ED : Q2R (1 - e) = 1 - Q2R e) by (rewrite Q2R_minus, Q2R_1; reflexivity).
+        rewrite !Q2R_mult, Q2R_div, ED by (intros Q; apply Qeq_eqR in Q; rewrite ED, Q2R_0 in Q; lra). rewrite abs_ok, Q2R_mult. fold c. rewrite span_ok.
+        set (z := deadline c * Q2R x) in *.
+        rewrite Rabs_minus_sym. eapply Rle_trans; [exact B|]. pose proof (Rle_abs z) as X1. pose proof (Rle_abs (m - z)) as X2.
+        assert (X3 : m * (1 - Q2R e) <= Rabs z) by lra. unfold Rdiv. rewrite Rmult_assoc. apply Rmult_le_compat_l; [exact E3|].
+        apply (Rmult_le_reg_r (1 - Q2R e)); [lra|]. rewrite (Rmult_comm (/ _)), Rmult_assoc, Rinv_l by lra. lra.
+      * apply (near_at _ _ _ N3). apply Q2R_0.
+      * apply (near_at _ _ _ N4). apply Q2R_0.
+Qed.
 Theorem agreement_ok : agreement a.
 Proof.
   destruct (drift a) as [M|] eqn:EM; [|exists (fun _ _ => 0); split; [intros M i l E; rewrite EM in E; discriminate|]; intros off X Sl i j HX Hi Hj tends;
@@ -362,34 +394,8 @@ Proof.
   { destruct matrices as [_ [_ [_ [_ [M5 _]]]]]. destruct (solutions a Hprot) as [X HX]. exists (fun i l => X l (deadline c) i). split.
     - intros M' i l E Hi Hl. rewrite EM in E. injection E as <-. apply (drag_inside a Hprot M5 M X HC HX i l Hi Hl).
     - intros off Z' Sl i j HZ Hi Hj tends. split; [apply (agrees off Z' Sl); assumption|]. intros _. apply (drag_ends a Hedges Hprot Hend M5 X off Z' Sl); assumption. }
-  unfold check_rest in HC. cbv zeta in HC.
-    set (p := (nth 1 (damping a) 0 * pull_in a)%Q) in *. set (w := ((nth 1 (plant a) 0 + nth 1 (damping a) 0 * slope a) * span (graph a))%Q) in *.
-    set (x := fst (far_q p w)) in *. set (e := snd (far_q p w)) in *.
-    apply andb_prop in HC as [H N4]. apply andb_prop in H as [H N3]. apply andb_prop in H as [H N2]. apply andb_prop in H as [H N1].
-    apply andb_prop in H as [H C6]. apply andb_prop in H as [H C5]. apply andb_prop in H as [H C4]. apply andb_prop in H as [H C3]. apply andb_prop in H as [C1 C2].
-    apply Nat.eqb_eq in C1. assert (EC : cap a = None) by (destruct (cap a); [discriminate|reflexivity]).
-    apply Qeq_bool_eq, Qeq_eqR in C3, C4. rewrite Q2R_0 in C3, C4. apply Qpos in C5. apply negb_true_iff in C6.
-    destruct matrices as [_ [_ [_ [M4 _]]]].
-    assert (Ep : Q2R p = at_ (damping a) 1 * k c) by (unfold p; rewrite Q2R_mult, pull_ok; reflexivity).
-    assert (Ew : Q2R w = (at_ (plant a) 1 + at_ (damping a) 1 * Q2R (slope a)) * deadline c) by (unfold w; rewrite !Q2R_mult, Q2R_plus, Q2R_mult; fold c; rewrite span_ok; reflexivity).
-    assert (P0 : 0 < Q2R p) by (rewrite Ep; apply Rmult_lt_0_compat; [exact C5|apply (T_k a Hprot)]).
-    destruct (far_ok p w P0) as [Po [dP [DP [Ex He]]]]. fold x in Ex. fold e in He.
-    destruct (glides a (Q2R p) (Q2R w) (at_ (plant a) 1) (at_ (damping a) 1) (Q2R e) Po dP Hprot M4 EC C5 Ep Ew DP He) as [m [L [m0 B]]]. fold c in L, B.
-    rewrite <- Ex in B.
-    exists (rest_drift m). split.
-    + intros M' i l E Hi Hl. rewrite EM in E. injection E as <-. rewrite C1 in Hi, Hl.
-      destruct i as [|[|i]]; [| |lia]; (destruct l as [|[|l]]; [| |lia]); cbn [rest_drift].
-      * apply (near_at _ _ _ N1). apply Q2R_1.
-      * apply (near_ok _ _ _ _ N2). assert (E2 : Q2R e < 1) by (destruct (Qlt_le_dec e 1) as [Q|Q]; [apply Qlt_Rlt in Q; rewrite Q2R_1 in Q; exact Q|apply Qle_bool_iff in Q; congruence]).
-        assert (E3 : 0 <= Q2R e) by (eapply Rle_trans; [apply Rabs_pos|apply (He 0); lra]).
-        assert (ED : Q2R (1 - e) = 1 - Q2R e) by (rewrite Q2R_minus, Q2R_1; reflexivity).
-        rewrite !Q2R_mult, Q2R_div, ED by (intros Q; apply Qeq_eqR in Q; rewrite ED, Q2R_0 in Q; lra). rewrite abs_ok, Q2R_mult. fold c. rewrite span_ok.
-        set (z := deadline c * Q2R x) in *.
-        rewrite Rabs_minus_sym. eapply Rle_trans; [exact B|]. pose proof (Rle_abs z) as X1. pose proof (Rle_abs (m - z)) as X2.
-        assert (X3 : m * (1 - Q2R e) <= Rabs z) by lra. unfold Rdiv. rewrite Rmult_assoc. apply Rmult_le_compat_l; [exact E3|].
-        apply (Rmult_le_reg_r (1 - Q2R e)); [lra|]. rewrite (Rmult_comm (/ _)), Rmult_assoc, Rinv_l by lra. lra.
-      * apply (near_at _ _ _ N3). apply Q2R_0.
-      * apply (near_at _ _ _ N4). apply Q2R_0.
+  destruct matrices as [_ [_ [_ [M4 _]]]].
+  destruct (rest_inside M M4 EM HC) as [C1 [EC [C3 [C4 [C5 [m [L I]]]]]]]. exists (rest_drift m). split; [exact I|].
     + intros off X Sl i j HX Hi Hj tends. split; [apply (agrees off X Sl); assumption|]. intros _. fold n in Hi. unfold n in Hi. rewrite C1 in Hi.
       assert (W : forall t, 0 <= t < deadline c -> (fun u => X (Rmax 0 u)) t = X t) by (intros t Ht; cbv beta; rewrite Rmax_right by lra; reflexivity).
       unfold outcome. rewrite C1. unfold sum. cbn [seq fold_right rest_drift]. fold c.

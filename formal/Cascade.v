@@ -73,30 +73,10 @@ Proof.
 Qed.
 Lemma rest_inside M : drift a = Some M -> exists m, filterlim (glide a 0 (alpha c)) (at_left T) (locally m) /\ inside a (rest_drift m).
 Proof.
-  intros EM. pose proof (proj1 law_ok) as C1. pose proof Hlaw as HC. unfold check_law in HC. cbv zeta in HC. fold a G in HC. apply andb_prop in HC as [_ HC].
-  rewrite EM in HC. apply andb_prop in HC as [HC HP]. apply Qeq_bool_eq, Qeq_eqR in HP. rewrite Q2R_0 in HP. unfold check_rest in HC. cbv zeta in HC. fold a G in HC.
-  set (p := (nth 1 (damping a) 0 * pull_in a)%Q) in *. set (w := ((nth 1 (plant a) 0 + nth 1 (damping a) 0 * slope a) * span G)%Q) in *.
-  set (b := (/ (p + 1))%Q) in *. set (S := total_of _) in *. set (e := Qabs _) in *.
-  apply andb_prop in HC as [H N4]. apply andb_prop in H as [H N3]. apply andb_prop in H as [H N2]. apply andb_prop in H as [H N1].
-  apply andb_prop in H as [_ C6]. apply negb_true_iff in C6.
-  assert (Ep : Q2R p = alpha c * k G) by (unfold p; rewrite Q2R_mult, pull_ok; reflexivity).
-  assert (Ew : Q2R w = (0 + alpha c * Q2R (slope a)) * T) by (unfold w; rewrite !Q2R_mult, Q2R_plus, Q2R_mult, <- HP; unfold G; rewrite span_ok; reflexivity).
-  destruct (glides a p w terms 0 (alpha c) Hprot Hgain Hcap Ha Ep Ew) as [m [L [m0 B]]]. fold G T b in L, B. exists m. split; [exact L|].
-  intros M' i l E Hi Hl. rewrite EM in E. injection E as <-. rewrite C1 in Hi, Hl.
-  destruct i as [|[|i]]; [| |lia]; (destruct l as [|[|l]]; [| |lia]); cbn [rest_drift].
-  - apply (near_at _ _ _ N1). apply Q2R_1.
-  - apply (near_ok _ _ _ _ N2). rewrite Q2R_mult. unfold G. rewrite span_ok. fold G T. unfold S. rewrite total_ok.
-    set (x := T * peval (powers_of p w b 0 terms) 1) in *.
-    assert (E1 : Q2R e = Rabs (Q2R w * Q2R (last_of p w b 0 terms))) by (unfold e; rewrite abs_ok, Q2R_mult; reflexivity). rewrite <- E1 in B.
-    assert (E2 : Q2R e < 1) by (destruct (Qlt_le_dec e 1) as [Q|Q]; [apply Qlt_Rlt in Q; rewrite Q2R_1 in Q; exact Q|apply Qle_bool_iff in Q; congruence]).
-    assert (E3 : 0 <= Q2R e) by (rewrite E1; apply Rabs_pos).
-    assert (ED : Q2R (1 - e) = 1 - Q2R e) by (rewrite Q2R_minus, Q2R_1; reflexivity).
-    rewrite Q2R_mult, Q2R_div, ED by (intros Q; apply Qeq_eqR in Q; rewrite ED, Q2R_0 in Q; lra). rewrite abs_ok, Q2R_mult. unfold G. rewrite span_ok, total_ok. fold G T x.
-    rewrite Rabs_minus_sym. eapply Rle_trans; [exact B|]. pose proof (Rle_abs x) as X1. pose proof (Rle_abs (m - x)) as X2.
-    assert (X3 : m * (1 - Q2R e) <= Rabs x) by lra. unfold Rdiv. rewrite Rmult_assoc. apply Rmult_le_compat_l; [exact E3|].
-    apply (Rmult_le_reg_r (1 - Q2R e)); [lra|]. rewrite (Rmult_comm (/ _)), Rmult_assoc, Rinv_l by lra. lra.
-  - apply (near_at _ _ _ N3). apply Q2R_0.
-  - apply (near_at _ _ _ N4). apply Q2R_0.
+  intros EM. pose proof Hlaw as HC. unfold check_law in HC. cbv zeta in HC. fold a G in HC. apply andb_prop in HC as [_ HC].
+  rewrite EM in HC. apply andb_prop in HC as [HC HP]. apply Qeq_bool_eq, Qeq_eqR in HP. rewrite Q2R_0 in HP.
+  destruct (Agents.rest_inside a Hprot M Hgain EM HC) as [_ [_ [_ [_ [_ [m [L I]]]]]]]. exists m. split; [|exact I].
+  change (at_ (plant a) 1) with (Q2R (nth 1 (plant a) 0%Q)) in L. rewrite <- HP in L. exact L.
 Qed.
 Lemma agree_ok h X Sl j : tracks c h X Sl -> (j < N)%nat -> agree a = true -> filterlim (fun t => away a h (X t) 0 j) (at_left T) (locally 0).
 Proof.
