@@ -324,7 +324,7 @@ def balanced_parts(n: int, edges: Iterable[tuple[int, int, int]]) -> list[bool]:
     return [find(v) not in torn for v in range(n)]
 
 
-@pytest.mark.parametrize("negative", [0.0, 0.001, 0.3])
+@pytest.mark.parametrize("negative", thinned([0.3, 0.001, 0.0], 3))
 @pytest.mark.parametrize(
     ("mean_in_degree", "block"), thinned([(0.5, None), (1.0, None), (3.0, None), (1.5, 4), (2.0, 10)])
 )
