@@ -15,6 +15,7 @@ from agent_documents import Setting, ball, damped, ends, exponential
 from agent_documents import document as made
 from generators import all_classes, random_graph
 from mutations import Json, at, changed, mutants, nudged, resealed
+from selection import every
 from verified import compare, named, program, said
 
 from ptcc_certify.certificate.procedure import certify
@@ -162,9 +163,12 @@ def test_what_is_forged_under_a_cap_is_rejected_by_both_checkers(name: str, tmp_
         assert check(weaker).accepted and said(weaker, tmp_path).code == 0
 
 
-def test_where_agents_that_meet_at_rest_end_is_verified_and_what_is_forged_of_it_is_rejected(tmp_path: Path) -> None:
+@every(3)
+def test_where_agents_that_meet_at_rest_end_is_verified_and_what_is_forged_of_it_is_rejected(
+    every: int, tmp_path: Path
+) -> None:
     program()
-    for setting in (
+    settings = (
         SETTINGS["at rest"],
         Setting(damping=F(1, 3), rho1=F(0)),
         Setting(damping=F(5), plant=(F(0), F(-2))),
@@ -172,7 +176,8 @@ def test_where_agents_that_meet_at_rest_end_is_verified_and_what_is_forged_of_it
         Setting(damping=F(25), plant=(F(0), F(-1))),
         Setting(damping=F(2), plant=(F(0), F(-40))),
         Setting(damping=F(2), rho1=F(1), T=F(500)),
-    ):
+    )
+    for setting in settings[::every]:
         document = made(CAMPS, setting)
         assert check(document).accepted
         code, text = said(document, tmp_path)

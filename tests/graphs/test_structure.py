@@ -282,7 +282,7 @@ def test_the_constructed_graphs_cover_every_class_and_size():
     assert len([m for m in mixtures if len(m) > 1]) >= 12
 
 
-@pytest.mark.parametrize("negative", [0.0, 0.15, 0.5, 1.0])
+@pytest.mark.parametrize("negative", thinned([0.15, 0.0, 0.5, 1.0], 2))
 def test_random_sign_matrices_agree_with_the_definitions(negative):
     rng = np.random.default_rng(int(100 * negative))
     for i in range(150):
