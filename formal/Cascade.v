@@ -3,12 +3,11 @@ Require Import ZArith QArith Qabs Qreals List Bool Reals Lra Lia Psatz Functiona
 From Coquelicot Require Import Coquelicot.
 Import ListNotations.
 Require Import Vec Definite Graph Flow Certificate Checker Sound Input Slide Main Weighted Large AgentCertificate AgentForms AgentCheck
-  AgentMotion AgentEnd AgentRest Agents CascadeCertificate CascadeCheck CascadeMotion CascadeExist CascadeEnd.
+  AgentMotion AgentEnd AgentRest Agents CascadeCertificate CascadeCheck CascadeMotion CascadeExist CascadeEnd CascadeInput.
 Open Scope R_scope.
 
-Definition check_push (c : cascade) : bool := match tops (team c) with [] => true | _ => false end.
-Definition accepts_cascade (h : hints) (c : cascade) : bool := accepts h (graph (team c)) && negb (enclosed (graph (team c))) &&
-  check_law c && check_agreed c && check_stops c && check_roots c && check_ends_of (team c) && check_push c.
+Definition accepts_cascade (h : hints) (p : thrusts) (c : cascade) : bool := accepts h (graph (team c)) && negb (enclosed (graph (team c))) &&
+  check_law c && check_agreed c && check_stops c && check_roots c && check_ends_of (team c) && check_push c p.
 
 Section Sound.
 Variable c : cascade.
@@ -211,9 +210,131 @@ Proof.
   - rewrite nth_indep with (d' := place_row (Axis [] [] [])) by (rewrite map_length; exact Hj). rewrite map_nth. apply P. exact Hq.
   - rewrite nth_indep with (d' := lag_row a (Axis [] [] [])) by (rewrite map_length; exact Hj). rewrite map_nth. apply L. exact Hq.
 Qed.
+
+(** * The input *)
+Variable hp : thrusts.
+Hypothesis Hpush : check_push c hp = true.
+Lemma begin_free : Q2R (begin_gain a) = eta a 0.
+Proof. rewrite (begin_ok a Hprot). symmetry. apply (free c Hcap). Qed.
+Lemma theta_begin : Q2R (theta_q a) = theta c 0.
+Proof.
+  destruct (T_k a Hprot) as [T0 K0]. pose proof (eta_pos a Hprot Hgain 0 T0) as E. unfold theta_q, theta. cbv zeta. fold a G.
+  assert (N1 : ~ (begin_gain a == 0)%Q) by (intros W; apply Qeq_eqR in W; rewrite begin_free, Q2R_0 in W; exact (Rlt_not_eq _ _ E (eq_sym W))).
+  assert (N2 : ~ (pull_in a == 0)%Q) by (intros W; apply Qeq_eqR in W; rewrite pull_ok, Q2R_0 in W; exact (Rlt_not_eq _ _ K0 (eq_sym W))).
+  rewrite Q2R_div, Q2R_mult, !Q2R_minus, Q2R_div, Q2R_1, begin_free, pull_ok by assumption. reflexivity.
+Qed.
+Lemma larger_ok p q : Q2R (larger p q) = Rmax (Q2R p) (Q2R q).
+Proof.
+  unfold larger. destruct (Qle_bool p q) eqn:E.
+  - apply Qle_bool_iff, Qle_Rle in E. rewrite Rmax_right by exact E. reflexivity.
+  - destruct (Qlt_le_dec q p) as [L|L]; [|apply Qle_bool_iff in L; congruence]. apply Qlt_Rlt in L. rewrite Rmax_left by lra. reflexivity.
+Qed.
+Lemma scaled_at (g : Q -> Q) l j : Q2R (g 0%Q) = 0 -> at_ (map g l) j = Q2R (g (nth j l 0%Q)).
+Proof.
+  intros G0. unfold at_. destruct (Nat.lt_ge_cases j (length l)) as [L|L].
+  - rewrite nth_indep with (d' := g 0%Q) by (rewrite map_length; exact L). rewrite map_nth. reflexivity.
+  - rewrite !nth_overflow by (try rewrite map_length; exact L). rewrite G0. apply Q2R_0.
+Qed.
+Lemma mixed_ok X Sl i j : released c X Sl -> check_shape a = true -> (i < length (axes a))%nat -> (j < N)%nat ->
+  mixed c (spot a i) (X i) 0 j = at_ (nth i (map (mixed_row a) (axes a)) []) j.
+Proof.
+  intros HX HS Hi Hj. destruct (starts_ok X Sl i HX HS Hi) as [P [W _]].
+  rewrite nth_indep with (d' := mixed_row a (Axis [] [] [])) by (rewrite map_length; exact Hi). rewrite map_nth. set (x := nth i (axes a) _) in *.
+  assert (LE : length (nth 1 (begins x) []) = length (place_row x)).
+  { pose proof HS as H. unfold check_shape in H. cbv zeta in H. rewrite forallb_forall in H. specialize (H x (nth_In _ _ Hi)).
+    apply andb_prop in H as [H S4]. apply andb_prop in H as [_ S3]. apply Nat.eqb_eq in S3. destruct (rows_good _ S4) as [L4 _]. rewrite S3, L4. reflexivity. }
+  destruct (T_k a Hprot) as [T0 _]. pose proof (eta_pos a Hprot Hgain 0 T0) as E.
+  unfold mixed_row. cbv zeta. rewrite scaled_at by (rewrite reduced_ok, Q2R_mult, Q2R_0; ring). rewrite reduced_ok, Q2R_mult.
+  change (Q2R (nth j ?u 0%Q)) with (at_ u j). rewrite added_ok by exact LE. rewrite <- W, <- P by exact Hj.
+  rewrite Q2R_mult, Q2R_plus, theta_begin, (inverse_ok (begin_gain a)) by (rewrite begin_free; exact E). rewrite begin_free.
+  change (Q2R (alpha_q a)) with (alpha c). unfold mixed. rewrite place_at, speed_at by lra. fold a. field. lra.
+Qed.
+Lemma push_ok : push_claim c.
+Proof.
+  unfold push_claim. cbv zeta. fold a G N T. intros Ne X Sl t j Hj HX Ht. pose proof Hpush as H. unfold check_push in H. cbv zeta in H. fold a G d N in H.
+  destruct (tops a) as [|q0 l0] eqn:Et; [contradiction|]. set (l := q0 :: l0) in *. clear Ne Et.
+  apply andb_prop in H as [H H5]. apply andb_prop in H as [H H4]. apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 H2].
+  rewrite forallb_forall in H5. specialize (H5 j ltac:(apply in_seq; lia)). apply andb_prop in H5 as [H5 H8]. apply andb_prop in H5 as [H6 H7].
+  set (m := length (axes a)) in *. set (w := nth j (speeds hp) 0%Q) in *. apply notneg_ok in H6.
+  set (added := match kind G with Nominal _ => 0%Q | SlidingMode _ _ mu1 _ _ _ => (mu1 * index m)%Q end) in *.
+  assert (EA : Q2R added = match kind G with Nominal _ => 0 | SlidingMode _ _ mu1 _ _ _ => Q2R mu1 * INR m end).
+  { unfold added. destruct (kind G); [apply Q2R_0|]. rewrite Q2R_mult, index_ok. reflexivity. }
+  rewrite <- EA. apply existsb_exists in H8 as [cs [Hk HB]]. apply in_flat_map in Hk as [[[kf p] [r qs]] [Hc Hk]].
+  apply in_combine_l in Hc. unfold share_of in Hk. cbn [fst snd] in Hk. fold G d N in Hk.
+  destruct (nth_error (funcs G) kf) as [f|] eqn:Ef; [|destruct Hk].
+  destruct (Checker.form N (dls d) (dL d) (ly f)) as [[F mm]|] eqn:EF; [|destruct Hk].
+  destruct (bounds_of G d f) as [[[vv es] cn]|] eqn:EB; [|destruct Hk].
+  destruct (_ && _) eqn:EC in Hk; [|destruct Hk]. destruct Hk as [<-|[]].
+  apply andb_prop in EC as [EC C4]. apply andb_prop in EC as [EC C3]. apply andb_prop in EC as [C1 C2].
+  destruct (function_ok f (nth_error_In _ _ Ef)) as [F' [mm' [EF' [R1 [R2 [R3 _]]]]]]. rewrite EF in EF'. injection EF' as <- <-.
+  rewrite forallb_forall in C4. specialize (C4 j ltac:(apply in_seq; lia)). apply andb_prop in C4 as [C4 C5]. apply notneg_ok in C4.
+  set (C := nth j qs 0%Q) in *. apply Qle_bool_iff, Qle_Rle in C5. rewrite Q2R_mult in C5.
+  destruct (T_k a Hprot) as [T0 K0]. fold G in K0. pose proof (eta_pos a Hprot Hgain 0 T0) as E. set (g := eta a 0) in *.
+  assert (Np : Q2R (/ pull_in a) = / k G) by (rewrite inverse_ok; rewrite pull_ok; [reflexivity|exact K0]).
+  (* numbers *)
+  apply Qle_bool_iff, Qle_Rle in H4. rewrite Q2R_1, Q2R_mult, pull_ok in H4. change (Q2R (alpha_q a)) with (alpha c) in H4. fold G in H4.
+  apply Qle_bool_iff, Qle_Rle in C1. rewrite Q2R_mult, pull_ok in C1. fold G in C1. replace (Q2R 4) with 4 in C1 by (unfold Q2R; simpl; lra).
+  apply negb_true_iff in C2. destruct (Qlt_le_dec 5 (alpha_q a * pull_in a + rate f * pull_in a)) as [L|L]; [|apply Qle_bool_iff in L; congruence].
+  apply Qlt_Rlt in L. rewrite Q2R_plus, !Q2R_mult, pull_ok in L. change (Q2R (alpha_q a)) with (alpha c) in L. fold G in L.
+  replace (Q2R 5) with 5 in L by (unfold Q2R; simpl; lra). clear C2.
+  set (kap := / k G) in *. assert (EK : kap * k G = 1) by (unfold kap; apply Rinv_l; lra).
+  assert (A1 : 0 <= alpha c - kap) by (apply (Rmult_le_reg_r (k G)); [exact K0|]; rewrite Rmult_0_l, Rmult_minus_distr_r, EK; lra).
+  assert (A2 : 0 <= Q2R (rate f) / 2 - 2 * kap) by (apply (Rmult_le_reg_r (k G)); [exact K0|]; rewrite Rmult_0_l, Rmult_minus_distr_r, Rmult_assoc, EK; lra).
+  assert (A3 : 0 < alpha c - kap + (Q2R (rate f) / 2 - 2 * kap)).
+  { apply (Rmult_lt_reg_r (k G)); [exact K0|]. rewrite Rmult_0_l, Rmult_plus_distr_r, !Rmult_minus_distr_r, Rmult_assoc, EK. lra. }
+  set (M := Rmax 1 ((alpha c - kap + alpha c) / (alpha c - kap + (Q2R (rate f) / 2 - 2 * kap)))).
+  assert (EM : Q2R (factor_q a f) = M).
+  { unfold factor_q. cbv zeta. rewrite larger_ok, Q2R_1. assert (Z : Q2R (alpha_q a - / pull_in a + (rate f / 2 - 2 * / pull_in a)) = alpha c - kap + (Q2R (rate f) / 2 - 2 * kap)).
+    { rewrite Q2R_plus, !Q2R_minus, Q2R_mult, Q2R_div, Np by (intros W; discriminate W). replace (Q2R 2) with 2 by (unfold Q2R; simpl; lra). reflexivity. }
+    rewrite Q2R_div by (intros W; apply Qeq_eqR in W; rewrite Z, Q2R_0 in W; lra). rewrite Z, Q2R_plus, Q2R_minus, Np. reflexivity. }
+  assert (M0 : 0 <= M) by (pose proof (Rmax_l 1 ((alpha c - kap + alpha c) / (alpha c - kap + (Q2R (rate f) / 2 - 2 * kap)))) as W; fold M in W; lra).
+  destruct (theta_ok c Hprot Hgain Hcap 0 T0) as [_ K1]. fold a G kap in K1.
+  destruct (Peak.bounds_ok G Hls (fun e He => proj2 (inside_graph e He)) H1 H2 (at_ (start G)) (fun _ _ => eq_refl) f vv es cn R3 R2 EB) as [_ [BK _]].
+  assert (HC : forall y, Rabs (lap (edges G) y j) <= Q2R C * sqrt (V (edges G) (ly f) y)).
+  { intros y. pose proof (V_pos c f F mm Hls EF R2 y) as VP. fold a G in VP. rewrite <- (sqrt_square (Q2R C)) by exact C4.
+    rewrite <- sqrt_mult by (try exact VP; apply Rle_0_sqr). rewrite <- sqrt_Rsqr_abs. apply sqrt_le_1_alt. eapply Rle_trans; [exact (BK y j Hj)|].
+    apply Rmult_le_compat_r; [exact VP|exact C5]. }
+  set (A := Q2R C * M * sq g). assert (A0 : 0 <= A) by (unfold A; apply Rmult_le_pos; [apply Rmult_le_pos; assumption|apply Rle_0_sqr]).
+  set (B := A * (kap - theta c 0)). assert (B0 : 0 <= B) by (unfold B; apply Rmult_le_pos; lra).
+  assert (D0 : 0 <= alpha c * g) by (apply Rmult_le_pos; lra).
+  set (u1 := fun i => sqrt (V (edges G) (ly f) (mixed c (spot a i) (X i) 0))). set (u2 := fun i => sqrt (V (edges G) (ly f) (placed (spot a i) (X i 0) 0))).
+  set (u3 := fun i => Rabs (X i 0 1%nat j)).
+  assert (One : forall i, (i < m)%nat -> Rabs (steer c (spot a i) (X i t) t j) <= A * u1 i + (B * u2 i + alpha c * g * u3 i)).
+  { intros i Hi. destruct (HX _ i (nth_error_nth' (axes a) (Axis [] [] []) Hi)) as [HF _].
+    pose proof (input_below c f F mm Hprot Hgain Hcap Hls EF R2 R1 Ha A1 A2 A3 _ (X i) (Sl i) HF j (Q2R C) t Hj C4 HC Ht) as I.
+    rewrite place_at, speed_at in I by lra. change (at_ (offsets (nth i (axes a) (Axis [] [] [])))) with (spot a i) in I. fold a G kap g M in I.
+    eapply Rle_trans; [exact I|]. apply Req_le. unfold A, B, A, u1, u2, u3. ring. }
+  assert (S1 : over_space a (fun i => steer c (spot a i) (X i t) t j) <= A * size m u1 + (B * size m u2 + alpha c * g * size m u3)).
+  { change (over_space a (fun i => steer c (spot a i) (X i t) t j)) with (size m (fun i => steer c (spot a i) (X i t) t j)).
+    eapply Rle_trans; [apply size_le; exact One|]. eapply Rle_trans; [apply (size_plus m (fun i => A * u1 i) (fun i => B * u2 i + alpha c * g * u3 i))|].
+    rewrite size_scal by exact A0. apply Rplus_le_compat_l. eapply Rle_trans; [apply (size_plus m (fun i => B * u2 i) (fun i => alpha c * g * u3 i))|].
+    rewrite !size_scal by assumption. apply Rle_refl. }
+  assert (Sq : forall (y : nat -> nat -> R), size m (fun i => sqrt (V (edges G) (ly f) (y i))) = root c f m y).
+  { intros y. unfold size, root. fold a G. f_equal. apply sum_ext. intros i _. apply sqrt_sqrt, (V_pos c f F mm Hls EF R2). }
+  assert (U1 : size m u1 <= Q2R r).
+  { unfold u1. rewrite (Sq (fun i => mixed c (spot a i) (X i) 0)). unfold m. rewrite <- (map_length (mixed_row a)).
+    apply (root_ok f F mm _ _ _ EF C3). intros i q Hi Hq. rewrite map_length in Hi. apply (mixed_ok X Sl i q HX H3 Hi Hq). }
+  assert (U2 : size m u2 <= Q2R (fst p)).
+  { unfold u2. rewrite (Sq (fun i => placed (spot a i) (X i 0) 0)). apply (In_nth_error) in Hc as [i Hi].
+    assert (HH : nth_error (used a) i = Some kf /\ nth_error (firsts c) i = Some p).
+    { clear - Hi. revert Hi. generalize (used a) as us, (firsts c) as fs. induction i as [|i IH]; intros [|x us] [|y fs] W; simpl in *; try discriminate.
+      - injection W as -> ->. split; reflexivity.
+      - apply IH. exact W. }
+    destruct (roots_ok i kf f p (proj1 HH) Ef (proj2 HH) X Sl HX) as [W _]. exact W. }
+  assert (U3 : size m u3 <= Q2R w).
+  { unfold size, u3. rewrite <- (sqrt_square (Q2R w)) by exact H6. apply sqrt_le_1_alt. apply Qle_bool_iff, Qle_Rle in H7.
+    rewrite Q2R_mult, (qsum_list _ _ (Axis [] [] [])) in H7. fold m in H7. eapply Rle_trans; [|exact H7]. apply Req_le. apply sum_ext. intros i Hi.
+    destruct (starts_ok X Sl i HX H3 Hi) as [_ [W _]]. rewrite (W j Hj). rewrite Q2R_mult. unfold sq, at_. rewrite <- Rabs_mult. apply Rabs_right, Rle_ge, Rle_0_sqr. }
+  apply Qle_bool_iff, Qle_Rle in HB. rewrite !Q2R_plus, !Q2R_mult, begin_free in HB. change (Q2R (alpha_q a)) with (alpha c) in HB. fold g in HB.
+  change (Q2R (nth j ?z 0%Q)) with (at_ z j) in HB. rewrite scaled_at in HB by (rewrite Q2R_mult, Q2R_0; ring). fold C in HB.
+  rewrite !Q2R_mult, Q2R_plus, Q2R_mult, Q2R_minus, EM, begin_free, theta_begin, Np in HB. fold g in HB.
+  apply (Rmult_le_compat_l A) in U1; [|exact A0]. apply (Rmult_le_compat_l B) in U2; [|exact B0]. apply (Rmult_le_compat_l (alpha c * g)) in U3; [|exact D0].
+  replace (Q2R C * (M * g * g * (Q2R r + (kap - theta c 0) * Q2R (fst p)))) with (A * Q2R r + B * Q2R (fst p)) in HB by (unfold B, A, sq; ring).
+  change (at_ l j) with (Q2R (nth j l 0%Q)) in *. lra.
+Qed.
 End Sound.
 
-Theorem accepts_cascade_sound h c : accepts_cascade h c = true -> true_cascade c.
+Theorem accepts_cascade_sound h p c : accepts_cascade h p c = true -> true_cascade c.
 Proof.
   intros H. unfold accepts_cascade in H. apply andb_prop in H as [H P8]. apply andb_prop in H as [H P7]. apply andb_prop in H as [H P6].
   apply andb_prop in H as [H P5]. apply andb_prop in H as [H P4]. apply andb_prop in H as [H P3]. apply andb_prop in H as [HG HE].
@@ -223,7 +344,7 @@ Proof.
   destruct (law_ok c P3) as [L1 [L2 [L3 L4]]]. split; [exact L1|]. split; [exact L2|]. split; [exact L4|]. split.
   { intros h0 x0. apply (launch c h0 x0); try assumption. intros e He. apply (inside_graph c); assumption. }
   split; [apply landing_ok; assumption|]. split; [apply (ends_ok (team c)); exact P7|]. split.
-  { intros Ne. exfalso. unfold check_push in P8. destruct (tops (team c)); [contradiction|discriminate]. }
+  { apply (push_ok c) with (hp := p); assumption. }
   intros i k Hu. destruct (used_ok c P3 k (nth_error_In _ _ Hu)) as [f [Ef _]]. exists f. split; [exact Ef|].
-  split; [apply course_ok; try assumption; apply (nth_error_In _ _ Ef)|]. intros p Hp. apply (roots_ok c) with (i := i) (k := k); assumption.
+  split; [apply course_ok; try assumption; apply (nth_error_In _ _ Ef)|]. intros q Hq. apply (roots_ok c) with (i := i) (k := k); assumption.
 Qed.

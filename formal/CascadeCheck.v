@@ -40,3 +40,30 @@ Definition check_roots (c : cascade) : bool := let a := team c in let G := graph
       | None => false
       | Some (F, m) => check_root a F m (map place_row (axes a)) (fst (snd p)) &&
           check_root a F m (map (lag_row a) (axes a)) (snd (snd p)) end end) (combine (used a) (firsts c)) end.
+
+(** the input: of each function used a root of the value of [X' + (alpha + theta) X] at the begin, and roots of the
+    constants of the agents' inputs; of each agent its speed at the begin *)
+Record thrusts := Thrusts { of_functions : list (Q * list Q); speeds : list Q }.
+Definition alpha_q (a : agents) : Q := nth 1 (damping a) 0.
+Definition theta_q (a : agents) : Q := let z := 1 - slope a / begin_gain a in z * z / pull_in a.
+Definition mixed_row (a : agents) (x : axis) : list Q := let g := begin_gain a in
+  map (fun q => reduced (/ g * q)) (added_rows ((alpha_q a + theta_q a) * g) (nth 1 (begins x) []) (place_row x)).
+Definition larger (p q : Q) : Q := if Qle_bool p q then q else p.
+Definition factor_q (a : agents) (f : func) : Q := let i := / pull_in a in
+  larger 1 ((alpha_q a - i + alpha_q a) / (alpha_q a - i + (rate f / 2 - 2 * i))).
+Definition share_of (a : agents) (p : (nat * (Q * Q)) * (Q * list Q)) : list (list Q) := let G := graph a in let d := prepare G in
+  let (r, cs) := snd p in match nth_error (funcs G) (fst (fst p)) with None => [] | Some f =>
+    match form (order G) (dls d) (dL d) (ly f), bounds_of G d f with Some (F, m), Some (_, es, _) =>
+      let K := factor_q a f * begin_gain a * begin_gain a * (r + (/ pull_in a - theta_q a) * fst (snd (fst p))) in
+      if Qle_bool 4 (rate f * pull_in a) && negb (Qle_bool (alpha_q a * pull_in a + rate f * pull_in a) 5) &&
+         check_root a F m (map (mixed_row a) (axes a)) r &&
+         forallb (fun j => let q := nth j cs 0 in notneg q && Qle_bool (nth j es 0) (q * q)) (seq 0 (order G))
+      then [map (fun q => q * K) cs] else [] | _, _ => [] end end.
+Definition check_push (c : cascade) (h : thrusts) : bool := let a := team c in let G := graph a in let d := prepare G in
+  match tops a with [] => true | l =>
+  let known := flat_map (share_of a) (combine (combine (used a) (firsts c)) (of_functions h)) in
+  let added := match kind G with Nominal _ => 0 | SlidingMode _ _ mu1 _ _ _ => mu1 * index (length (axes a)) end in
+  fits (order G) (dL d) && good (common (start G)) (start G) && check_shape a && Qle_bool 1 (alpha_q a * pull_in a) &&
+  forallb (fun j => let v := nth j (speeds h) 0 in notneg v &&
+    Qle_bool (qsum (map (fun x => let y := nth j (nth 1 (begins x) []) 0 in y * y) (axes a))) (v * v) &&
+    existsb (fun cs => Qle_bool (nth j cs 0 + alpha_q a * begin_gain a * v + added) (nth j l 0)) known) (seq 0 (order G)) end.

@@ -4,7 +4,7 @@ open Json
 open Document
 module Z = Number.Z
 
-type t = { base : Reader.t; record : Checker.cascade }
+type t = { base : Reader.t; record : Checker.cascade; hint : Checker.thrusts }
 
 let keys = [ "cascade"; "dimension"; "functions"; "offsets"; "initial_state"; "motion"; "final_state"; "input" ]
 let is_cascade = function Obj l -> List.mem_assoc "cascade" l | _ -> false
@@ -17,6 +17,29 @@ let roots_of v =
   let roots = match one "initial", one "drive" with
     | Some x, Some y -> Some (x, y) | None, None -> None | _ -> bad "initial and drive are told both, or none" in
   roots, Obj [ "function", get "function"; "inputs", get "inputs" ]
+
+(* not below the root, to many bits; the check verifies it *)
+let root (q : q) =
+  if Z.sign q.qnum <= 0 then Number.zero
+  else begin
+    let e = max 0 (260 + (Z.numbits q.qden - Z.numbits q.qnum) / 2) in
+    let v = Z.shift_left q.qnum (2 * e) in
+    let s = Z.sqrt (Z.div v q.qden) in
+    let s = if Z.equal (Z.mul (Z.mul s s) q.qden) v then s else Z.succ s in
+    Number.div (Number.of_z s) (Number.of_z (Z.shift_left Z.one e)) end
+let sum = List.fold_left Number.add Number.zero
+
+(* what the bound of the input is formed of: roots of values at the begin, of constants and of speeds *)
+let thrust_of team : thrusts =
+  let d = prepare team.graph in
+  let of_function k =
+    let f = List.nth team.graph.funcs k in
+    match form team.graph.order d.dls d.dL f.ly, bounds_of team.graph d f with
+    | Some (m, scale), Some ((_, constants), _) ->
+        root (sum (List.map (fun x -> value_q team m scale (mixed_row team x)) team.axes)), List.map root constants
+    | _ -> Number.zero, [] in
+  let speeds j = root (sum (List.map (fun x -> let v = List.nth (List.nth x.begins 1) j in Number.mul v v) team.axes)) in
+  { of_functions = List.map of_function team.used; speeds = List.init team.graph.order speeds }
 
 let certificate section json : t =
   let get = fields "agents" keys section in
@@ -59,20 +82,29 @@ let certificate section json : t =
   let ends = known && (stops || not velocities) in
   if ends && get "final_state" <> Null then bare_of proof "agent-final-state" "agents" else skip "agent-final-state" "final_state";
   let axes = Agents.axes ~told:(if velocities then 2 else 1) r 2 dimension get ends in
-  skip "agent-input" "input";
+  let largest = List.fold_left Number.max Number.zero in
+  let tops = match get "input" with
+    | Null -> []
+    | v ->
+        need (begins && used <> []) "a bound of the input without initial states or Lyapunov functions";
+        bare_of proof "agent-input" "agents";
+        let get = fields "input" [ "agents"; "largest" ] v in
+        let tops = by_agent r.nodes number "input" (get "agents") in
+        need (Number.equal (number "largest" (get "largest")) (largest tops)) "the largest input is another"; tops in
   need (proof.rest = []) "an obligation that nothing asks for";
   let slope = r.cert.rho1 in
   let cert = { r.cert with funcs; rho1 = if Z.sign slope.qnum = 0 then Number.one else slope } in
   let team = { graph = cert; degree = 2; slope; cap = None; plant = []; damping = [ Number.zero; alpha ]; gains = []; w = []; p = [];
-    coupling = Number.zero; falls = Number.zero; used; agree; drift = common; axes; tops = []; left_over = None } in
+    coupling = Number.zero; falls = Number.zero; used; agree; drift = common; axes; tops; left_over = None } in
   { base = { r with cert; rest = []; checked = r.checked @ List.rev proof.checked; unchecked = r.unchecked @ List.rev proof.unchecked;
       sections = r.sections @ List.rev !left };
-    record = { team; firsts = List.filter_map Fun.id told; stops } }
-let accepts c = accepts_cascade c.base.hints c.record
+    record = { team; firsts = List.filter_map Fun.id told; stops };
+    hint = if tops = [] then { of_functions = []; speeds = [] } else thrust_of team }
+let accepts c = accepts_cascade c.base.hints c.hint c.record
 (* the parts of the check one by one *)
 let parts c = [ "agent-motion of agents", (fun () -> check_law c.record);
   "agent-cascade of agents: a function whose deviation is known", (fun () -> check_agreed c.record);
   "agent-cascade of agents: velocities need not vanish at T", (fun () -> check_stops c.record);
   "agent-cascade of agents", (fun () -> check_roots c.record);
   "agent-final-state of agents", (fun () -> check_ends_of c.record.team);
-  "agent-input of agents", (fun () -> check_push c.record) ]
+  "agent-input of agents", (fun () -> check_push c.record c.hint) ]
