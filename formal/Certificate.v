@@ -56,14 +56,15 @@ Inductive effort := PathLength (most : Q) (way : nat * Q) | EnergyBy (most : Q) 
 Inductive protocol := Nominal (T : Q) | SlidingMode (T_r T_s mu1 mu2 mu3 delta : Q).
 (** final states are middle and radius; of many nodes they are [enclosed], and no weights tell them; a leader group is its
     weights, 0 elsewhere, and its rate; [sliding_input] bounds what the sliding mode adds to the input, by agent;
-    [reaching] are instants [z = ln(T_r/(T_r - t))]; [degenerate], if stated, are the numbers, from 1 on, of the balanced
+    [reaching] are instants [z = ln(T_r/(T_r - t))]; efforts may be of a box of initial states, a center and radii;
+    [degenerate], if stated, are the numbers, from 1 on, of the balanced
     closed components that end at 0 *)
 Record cert := Cert { order : nat; edges : list edge; kind : protocol; rho1 : Q; rho2 : Q; kappa : Q;
   comps : list comp; pieces : list piece; all_balanced : balance; sign_symmetric : bool; funcs : list func;
   start : list Q; sliding : list Q; final : list (Q * Q); enclosed : bool; margins : list margin;
   leaders : list (list Q * Q); upper_bound : option upper; proved : option Q; best_diagonal : option Q;
   best_overshoot : option Q; bounded_input : bool; reaching : list (option Q); sliding_input : list Q;
-  efforts : list effort; degenerate : option (list nat) }.
+  efforts : list effort; degenerate : option (list nat); start_box : option (list Q * list Q) }.
 
 (** * Words *)
 Definition shift (x : nat -> R) : nat -> R := fun i => x (S i).
@@ -182,8 +183,10 @@ Definition input c (X : R -> nat -> R) t i : R := - (gain (deadline c) (Q2R (rho
 Definition input_claim (c : cert) : Prop := bounded_input c = true -> forall X S t0, moves_from c X S t0 ->
   exists K, forall t i, t0 <= t < deadline c -> (i < order c)%nat -> Rabs (input c X t i) <= K.
 (** the length of its path, its energy, and how large the whole input gets, from the initial values of the file *)
+Definition begins c i x := match start_box c with None => x = Q2R (nth i (start c) 0%Q)
+  | Some (a, r) => Rabs (x - Q2R (nth i a 0%Q)) <= Q2R (nth i r 0%Q) end.
 Definition effort_claim (c : cert) (e : effort) : Prop := forall X S t, moves c X S -> 0 <= t < deadline c ->
-  (forall i, (i < order c)%nat -> X 0 i = Q2R (nth i (start c) 0%Q) /\ S 0 i = Q2R (nth i (sliding c) 0%Q)) ->
+  (forall i, (i < order c)%nat -> begins c i (X 0 i) /\ S 0 i = Q2R (nth i (sliding c) 0%Q)) ->
   let I f q := ex_RInt f 0 t /\ RInt f 0 t <= Q2R q in let N u := norm2 (order c) (input c X u) in
   let whole i := Rabs (input c X t i) + added c S t i in match e with PathLength q _ => I (fun u => sqrt (N u)) q
   | EnergyBy q _ | Energy q _ _ _ _ _ => I N q | Peak qs q _ _ => sqrt (norm2 (order c) whole) <= Q2R q /\
