@@ -229,7 +229,7 @@ Proof.
   intros Ht Hj. destruct HX as [HS [H0 HM]]. change (graph a) with c in HS, H0, HM. unfold slides in HS. destruct (kind c) as [T0|T_r T_s mu1 mu2 mu3 delta] eqn:K; [apply HS|].
   set (c' := Cert (order c) [] (kind c) (rho1 c) (rho2 c) (kappa c) (comps c) (pieces c) (all_balanced c) (sign_symmetric c) (funcs c)
     (start c) (sliding c) (final c) (enclosed c) (margins c) (leaders c) (upper_bound c) (proved c) (best_diagonal c)
-    (best_overshoot c) (bounded_input c) (reaching c) (sliding_input c) (efforts c) (degenerate c)).
+    (best_overshoot c) (bounded_input c) (reaching c) (sliding_input c) (efforts c) (degenerate c) (start_box c)).
   assert (M : moves c' Sl Sl).
   { split.
     - split.

@@ -56,14 +56,14 @@ Inductive effort := PathLength (most : Q) (way : nat * Q) | EnergyBy (most : Q) 
 Inductive protocol := Nominal (T : Q) | SlidingMode (T_r T_s mu1 mu2 mu3 delta : Q).
 (** final states are middle and radius; of many nodes they are [enclosed], and no weights tell them; a leader group is its
     weights, 0 elsewhere, and its rate; [sliding_input] bounds what the sliding mode adds to the input, by agent;
-    [reaching] are instants [z = ln(T_r/(T_r - t))]; [degenerate], if stated, are the numbers, from 1 on, of the balanced
-    closed components that end at 0 *)
+    [reaching] are instants [z = ln(T_r/(T_r - t))]; efforts may be of a box of initial states, a center and radii;
+    [degenerate], if stated, are the numbers, from 1 on, of the balanced closed components that end at 0 *)
 Record cert := Cert { order : nat; edges : list edge; kind : protocol; rho1 : Q; rho2 : Q; kappa : Q;
   comps : list comp; pieces : list piece; all_balanced : balance; sign_symmetric : bool; funcs : list func;
   start : list Q; sliding : list Q; final : list (Q * Q); enclosed : bool; margins : list margin;
   leaders : list (list Q * Q); upper_bound : option upper; proved : option Q; best_diagonal : option Q;
   best_overshoot : option Q; bounded_input : bool; reaching : list (option Q); sliding_input : list Q;
-  efforts : list effort; degenerate : option (list nat) }.
+  efforts : list effort; degenerate : option (list nat); start_box : option (list Q * list Q) }.
 
 (** * Words *)
 Definition shift (x : nat -> R) : nat -> R := fun i => x (S i).
@@ -107,9 +107,8 @@ Definition existence (c : cert) : Prop := forall x0 s0, (forall T i, kind c = No
 Definition balance_claim (es : list edge) (C : list nat) (b : balance) : Prop :=
   match b with Gauge g => balanced es C (fun i => nth i g 0%Z) | Cycle _ => forall g, ~ balanced es C g end.
 (** closed components are these, and there are no others; camps and negative cycles are those of the edges *)
-Definition structure (c : cert) : Prop :=
-  (forall C, In C (comps c) -> closed_component (edges c) (fun i => In i (nodes C))) /\
-  (forall D, closed_component (edges c) D -> (forall i, D i -> (i < order c)%nat) ->
+Definition structure (c : cert) : Prop := (forall C, In C (comps c) -> closed_component (edges c)
+     (fun i => In i (nodes C))) /\ (forall D, closed_component (edges c) D -> (forall i, D i -> (i < order c)%nat) ->
      exists C, In C (comps c) /\ forall i, D i <-> In i (nodes C)) /\
   (forall C, In C (comps c) -> balance_claim (edges c) (nodes C) (camps C)).
 (** balanced components end at [c_k] or [-c_k] by camps, unbalanced ones at 0; where final states are [enclosed] there are
@@ -119,9 +118,8 @@ Definition behaviour (c : cert) : Prop := forall x C i, In C (comps c) -> In i (
 (** the hypotheses of the theorem and of the corollaries, by weak component; nobody ends beyond the largest [|c_k|] of its
     own: all at 0 where no closed component is balanced *)
 Definition own (c : cert) (P : piece) : list comp := filter (fun C => mem (hd O (nodes C)) (members P)) (comps c).
-Definition piece_claim (c : cert) (P : piece) : Prop :=
-  (forall i j, In i (members P) -> (In j (members P) <-> linked (edges c) i j)) /\
-  own c P <> [] /\ row P = match own c P with
+Definition piece_claim (c : cert) (P : piece) : Prop := (forall i j, In i (members P) ->
+     (In j (members P) <-> linked (edges c) i j)) /\ own c P <> [] /\ row P = match own c P with
     | [C] => if forallb (fun i => mem i (nodes C)) (members P) then 1%nat else 2%nat | _ => 3%nat end /\
   some_balanced P = existsb is_balanced (own c P) /\ (undirected P = true <-> forall e, In e (edges c) ->
      In (tgt e) (members P) -> exists f, In f (edges c) /\ src f = tgt e /\ tgt f = src e /\ (wt f == wt e)%Q) /\
@@ -182,8 +180,10 @@ Definition input c (X : R -> nat -> R) t i : R := - (gain (deadline c) (Q2R (rho
 Definition input_claim (c : cert) : Prop := bounded_input c = true -> forall X S t0, moves_from c X S t0 ->
   exists K, forall t i, t0 <= t < deadline c -> (i < order c)%nat -> Rabs (input c X t i) <= K.
 (** the length of its path, its energy, and how large the whole input gets, from the initial values of the file *)
+Definition begins c i x := match start_box c with None => x = Q2R (nth i (start c) 0%Q)
+  | Some (a, r) => Rabs (x - Q2R (nth i a 0%Q)) <= Q2R (nth i r 0%Q) end.
 Definition effort_claim (c : cert) (e : effort) : Prop := forall X S t, moves c X S -> 0 <= t < deadline c ->
-  (forall i, (i < order c)%nat -> X 0 i = Q2R (nth i (start c) 0%Q) /\ S 0 i = Q2R (nth i (sliding c) 0%Q)) ->
+  (forall i, (i < order c)%nat -> begins c i (X 0 i) /\ S 0 i = Q2R (nth i (sliding c) 0%Q)) ->
   let I f q := ex_RInt f 0 t /\ RInt f 0 t <= Q2R q in let N u := norm2 (order c) (input c X u) in
   let whole i := Rabs (input c X t i) + added c S t i in match e with PathLength q _ => I (fun u => sqrt (N u)) q
   | EnergyBy q _ | Energy q _ _ _ _ _ => I N q | Peak qs q _ _ => sqrt (norm2 (order c) whole) <= Q2R q /\

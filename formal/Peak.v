@@ -565,14 +565,12 @@ Hypothesis Hls : good (dls d) (map wt es) = true.
 Hypothesis Hfit : fits n (dL d) = true.
 Hypothesis Hsrc : forall e, In e es -> (src e < n)%nat.
 Hypothesis HX : moves_from c X S 0.
-Hypothesis G : good (common (start c)) (start c) = true.
-Hypothesis H0 : forall i, (i < n)%nat -> X 0 i = Q2R (nth i (start c) 0%Q).
+Variables me mx : R.
+Hypotheses (HE : forall j, (j < n)%nat -> Rabs (lap es (X 0) j) <= me) (HX0 : forall j, (j < n)%nat -> Rabs (X 0 j) <= mx).
 Lemma held t i : 0 <= t < T -> (i < n)%nat ->
-  Rabs (lap es (X t) i) <= Q2R (greatest (map (fun r => inject_Z (zdot r (map (scaled (common (start c))) (start c)))
-    / inject_Z (dls d * common (start c)))%Q (dL d))) /\
-  Rabs (lap es (X t) i) <= Q2R (inject_Z (size (nth i (dL d) [])) / inject_Z (dls d) * greatest (start c)).
+  Rabs (lap es (X t) i) <= me /\ Rabs (lap es (X t) i) <= IZR (size (nth i (dL d) [])) / IZR (dls d) * mx.
 Proof.
-  intros Ht Hi. destruct (good_ok _ _ Hls) as [Hl _]. destruct (good_ok _ _ G) as [Hb _].
+  intros Ht Hi. destruct (good_ok _ _ Hls) as [Hl _].
   pose proof HX as [[HM _] HQ]. set (Y := fun u => X (Rmax 0 u)).
   assert (DY : forall t i, 0 < t < T -> (i < n)%nat -> is_derive (fun u => Y u i) t (- (gain T (Q2R (rho1 c)) (k c) t * lap es (Y t) i))).
   { intros u j Hu Hj. exact (Y_derive n (lap es) T _ _ X S 0 HM HQ u j Hu Hj). }
@@ -580,24 +578,16 @@ Proof.
   { intros u j Hu Hj. exact (Y_cont n (lap es) T _ _ X S 0 HM HQ u j Hu Hj). }
   assert (EY : forall u, 0 <= u -> Y u = X u) by (intros u Hu; unfold Y; rewrite Rmax_right by exact Hu; reflexivity).
   split.
-  - set (me := greatest _). rewrite <- EY by apply Ht.
+  - rewrite <- EY by apply Ht.
     apply (contained es n T (Q2R (rho1 c)) (k c) HT H1 Hk Hsrc (fun u j => lap es (Y u) j)); auto.
     + intros u j Hu Hj. rewrite <- lap_scal. apply (is_derive_lap es n Y); auto.
     + intros u j Hu Hj. apply (continuous_lap es n Y); auto.
-    + pose proof (greatest_ok (map (fun r => inject_Z (zdot r (map (scaled (common (start c))) (start c)))
-        / inject_Z (dls d * common (start c)))%Q (dL d)) 0) as P. eapply Rle_trans; [apply Rabs_pos|exact P].
-    + intros j Hj. rewrite EY by lra. eapply Rle_trans; [|apply (greatest_ok _ j)]. apply Req_le. f_equal.
-      rewrite nth_indep with (d' := (fun r => (inject_Z (zdot r (map (scaled (common (start c))) (start c)))
-        / inject_Z (dls d * common (start c)))%Q) []) by (rewrite map_length; unfold d; rewrite len_dL; exact Hj).
-      rewrite (map_nth (fun r => (inject_Z (zdot r (map (scaled (common (start c))) (start c))) / inject_Z (dls d * common (start c)))%Q)).
-      rewrite Q2R_div, !Q2R_inject by (unfold Qeq; cbn [Qnum Qden inject_Z]; nia).
-      unfold d. rewrite (begin_ok c Hls Hsrc G (X 0) H0 j Hj), mult_IZR. apply IZR_lt in Hl, Hb. fold es d. field. lra.
-  - assert (M0 : 0 <= Q2R (greatest (start c))) by (eapply Rle_trans; [apply Rabs_pos|apply (greatest_ok (start c) 0)]).
-    assert (K : forall j, (j < n)%nat -> Rabs (X t j) <= Q2R (greatest (start c))).
-    { intros j Hj. rewrite <- EY by apply Ht.
-      apply (contained es n T (Q2R (rho1 c)) (k c) HT H1 Hk Hsrc Y); auto.
-      intros m Hm. rewrite EY by lra. rewrite H0 by exact Hm. apply greatest_ok. }
-    rewrite Q2R_mult, Q2R_div, !Q2R_inject by (unfold Qeq; cbn [Qnum Qden inject_Z]; lia).
+    + eapply Rle_trans; [apply Rabs_pos|apply (HE i Hi)].
+    + intros j Hj. rewrite EY by lra. apply HE. exact Hj.
+  - assert (M0 : 0 <= mx) by (eapply Rle_trans; [apply Rabs_pos|apply (HX0 i Hi)]).
+    assert (K : forall j, (j < n)%nat -> Rabs (X t j) <= mx).
+    { intros j Hj. rewrite <- EY by apply Ht. apply (contained es n T (Q2R (rho1 c)) (k c) HT H1 Hk Hsrc Y); auto.
+      intros m Hm. rewrite EY by lra. apply HX0. exact Hm. }
     destruct (fits_ok _ _ Hfit) as [_ F2]. assert (Hin : In (nth i (dL d) []) (dL d)) by (apply nth_In; unfold d; rewrite len_dL; exact Hi).
     unfold rows_le in F2. rewrite Forall_forall in F2. specialize (F2 _ Hin).
     pose proof (size_dot (nth i (dL d) []) (X t) _ (fun j Hj => K j (Nat.lt_le_trans _ _ _ Hj F2)) M0) as B.

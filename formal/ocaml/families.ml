@@ -83,7 +83,7 @@ let mandatory nodes ties structure =
   { order = n; edges; kind = Nominal Number.one; rho1 = Number.one; rho2 = Number.one; kappa = Number.one; comps; pieces;
     all_balanced = found.balance; sign_symmetric = Pieces.sign_symmetric all; funcs = []; start = []; sliding = []; final = [];
     enclosed = true; margins = []; leaders = []; upper_bound = None; proved = None; best_diagonal = None; best_overshoot = None;
-    bounded_input = false; reaching = []; sliding_input = []; efforts = []; degenerate = None }
+    bounded_input = false; reaching = []; sliding_input = []; efforts = []; degenerate = None; start_box = None }
 
 (* * Components, and what becomes of them *)
 let outcomes = [ "stability", Stability; "bipartite consensus", Consensus; "interval bipartite consensus", Interval;

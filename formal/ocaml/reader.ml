@@ -442,10 +442,10 @@ let certificate (j : Json.t) : t =
     bare_of proof "sliding-bound" "protocol";
     reaching_times proof kind kappa sliding (by_agent nodes (optional number) "reaching_time.z" (times "z")) not_checked end
   else (need (get "reaching_time" = Null) "reaching times without sliding variables"; []) in
-  let bounded_input, sliding_input, functions, efforts = match get "input" with
+  let bounded_input, sliding_input, functions, efforts, start_box = match get "input" with
     | Null ->
         need (of_agents || rate "proved" = None && edges <> []) "input is null, though a decay was proved, or nothing moves";
-        false, [], functions, []
+        false, [], functions, [], None
     | v ->
         let input = fields "input" [ "bounded"; "threshold"; "initial_set"; "constants"; "peak"; "energy"; "path_length";
           "sliding"; "residual"; "disturbed" ] v in
@@ -484,8 +484,18 @@ let certificate (j : Json.t) : t =
               if not (there (part "agents")) then []
               else (bare_of proof "input-sliding" "input"; by_agent nodes number "input.sliding.agents" (part "agents"))
           | _ -> bad "input.sliding of the nominal protocol" in
+        let start_box = match input "initial_set" with
+          | Obj l as v when List.mem_assoc "radius" l ->
+              let set = fields "initial_set" [ "center"; "radius" ] v in
+              let radii = by_agent nodes number "radius" (set "radius") in
+              need (List.for_all (fun r -> Z.sign r.qnum >= 0) radii) "radius: a number is negative";
+              Some (by_agent nodes number "center" (set "center"), radii)
+          | _ -> None in
+        let read_set = match start_box with
+          | Some _ -> List.for_all (Number.equal Number.zero) sliding
+          | None -> not (there (input "initial_set")) && start <> None in
         let begins =
-          if enclosed || start = None || there (input "initial_set") then Effort.Unread
+          if enclosed || not read_set then Effort.Unread
           else match kind with
             | Nominal t -> Effort.At_rest (Number.add (Number.mul rho1 t) (Number.mul rho2 kappa))
             | SlidingMode (t_r, t_s, _, _, _, _) when List.for_all (Number.equal Number.zero) sliding ->
@@ -497,11 +507,11 @@ let certificate (j : Json.t) : t =
         List.iteri (fun i _ -> skipped proof "limited-gain" (Printf.sprintf "input.residual[%d]" i))
           (entries "residual" (input "residual"));
         if there (input "disturbed") then skipped proof "nominal-disturbed" "input";
-        let left = List.filter (fun key -> there (input key)) [ "initial_set" ] @ left
+        let left = List.filter (fun key -> (match begins with Effort.Unread -> true | _ -> false) && there (input key)) [ "initial_set" ] @ left
           @ (if is_sliding then [ "sliding.bounded" ] else []) @ (if input "residual" <> Arr [] then [ "residual" ] else [])
           @ List.filter (fun key -> there (input key)) [ "disturbed" ] in
         List.iter (fun key -> not_checked ("input." ^ key)) left;
-        bounded, sliding_input, functions, efforts in
+        bounded, sliding_input, functions, efforts, (if efforts = [] then None else start_box) in
   let and_besides o = match o with
     | Obj l -> (match List.assoc_opt "kind" l, List.assoc_opt "of" l with
         | Some (Str k), Some (Str o) when more <> [] && of_besides k && named k && named o -> unknown proof k o
@@ -521,4 +531,4 @@ let certificate (j : Json.t) : t =
       margins = (match paper with Some p -> p.inequalities | None -> []);
       leaders = (match paper with Some p -> p.groups | None -> []);
       upper_bound;
-      proved = rate "proved"; best_diagonal = rate "diagonal"; best_overshoot; bounded_input; degenerate } }
+      proved = rate "proved"; best_diagonal = rate "diagonal"; best_overshoot; bounded_input; degenerate; start_box } }
