@@ -74,8 +74,9 @@ let certificate section json : t =
   need (List.length motion = 2) "motion: another number of rows";
   List.iteri (fun i -> List.iteri (fun l (_, radius) ->
     need (i = 0 && l = 1 || Number.equal radius Number.zero) "motion: a radius where the common motion is known exactly")) motion;
-  (* a series of [alpha rho1 T], as long as that is short *)
-  let common = if Number.compare force (of_int 20) <= 0 then Some motion else None in
+  (* a series of [alpha rho1 T] and [alpha k], as long as it and these are short *)
+  let few (x : q) = Z.numbits x.qnum + Z.numbits x.qden <= 500 in
+  let common = if Number.compare force (of_int 20) <= 0 && few force && few (Number.mul alpha pace) then Some motion else None in
   let known = common <> None && agree in
   if known then bare_of proof "agent-motion" "agents" else skip "agent-motion" "motion";
   let velocities = fast || r.cert.edges = [] in
