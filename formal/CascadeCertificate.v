@@ -17,17 +17,20 @@ Definition steer c h (x : nat -> nat -> R) t j : R := let g := eta (team c) t in
 (** as agents that fly, with this input *)
 Definition tracks c h (X : R -> nat -> nat -> R) (S : R -> nat -> R) : Prop := let G := graph (team c) in slides G S /\
   (forall j, (j < order G)%nat -> S 0 j = 0) /\ forall t j, (j < order G)%nat -> t < deadline G -> (0 < t ->
-   is_derive (fun u => X u 1%nat j - S u j) t (steer c h (X t) t j) /\ is_derive (fun u => X u 0%nat j) t (X t 1%nat j)) /\
-  continuous (fun u => S (Rmax 0 u) j) t /\ forall i, (i < 2)%nat -> continuous (fun u => X (Rmax 0 u) i j) t.
+   is_derive (fun u => X u 1%nat j - S u j) t (steer c h (X t) t j) /\
+   is_derive (fun u => X u 0%nat j) t (X t 1%nat j)) /\ continuous (fun u => S (Rmax 0 u) j) t /\
+  forall i, (i < 2)%nat -> continuous (fun u => X (Rmax 0 u) i j) t.
 Definition launch_claim c : Prop := forall h x0, exists X S, tracks c h X S /\
   forall i j, (i < 2)%nat -> (j < order (graph (team c)))%nat -> X 0 i j = x0 i j.
 (** how far velocities are from those that the protocol commands; how far that carries what falls at the rate [b] *)
 Definition lag c h x t j : R := x 1%nat j + eta (team c) t * lp c (placed h x 0) j.
-Definition carried c b t : R := let s := turns (team c) in RInt (fun r => exp (- (b * (s t - s r) + alpha c * s r))) 0 t.
+Definition carried c b t : R := let s := turns (team c) in
+  RInt (fun r => exp (- (b * (s t - s r) + alpha c * s r))) 0 t.
 (** the root of a function over coordinates of space; along all motions, and with the numbers of the file *)
 Definition root c f m (x : nat -> nat -> R) : R := sqrt (sum m (fun i => V (edges (graph (team c))) (ly f) (x i))).
-Definition course_claim c (f : func) : Prop := forall m h X S t, (forall i, (i < m)%nat -> tracks c (h i) (X i) (S i)) ->
-  0 <= t < deadline (graph (team c)) -> let b := Q2R (rate f) / 2 in let s := turns (team c) t in
+Definition course_claim c (f : func) : Prop := forall m h X S t,
+  (forall i, (i < m)%nat -> tracks c (h i) (X i) (S i)) -> 0 <= t < deadline (graph (team c)) ->
+  let b := Q2R (rate f) / 2 in let s := turns (team c) t in
   (forall i j, (i < m)%nat -> (j < order (graph (team c)))%nat ->
      lag c (h i) (X i t) t j = exp (- (alpha c * s)) * lag c (h i) (X i 0) 0 j) /\
   root c f m (fun i => placed (h i) (X i t) 0) <= exp (- (b * s)) * root c f m (fun i => placed (h i) (X i 0) 0) +
@@ -53,6 +56,6 @@ Definition push_claim c : Prop := let a := team c in tops a <> [] -> forall X S 
     <= at_ (tops a) j.
 
 Definition true_cascade c : Prop := let a := team c in true_certificate (graph a) /\ degree a = 2%nat /\ cap a = None /\
-  0 < alpha c /\ launch_claim c /\ landing c /\ ends_claim a /\ push_claim c /\ forall i j, nth_error (used a) i = Some j ->
-  exists f, nth_error (funcs (graph a)) j = Some f /\ course_claim c f /\
+  0 < alpha c /\ launch_claim c /\ landing c /\ ends_claim a /\ push_claim c /\ forall i j,
+  nth_error (used a) i = Some j -> exists f, nth_error (funcs (graph a)) j = Some f /\ course_claim c f /\
     forall p, nth_error (firsts c) i = Some p -> roots_claim c f p.

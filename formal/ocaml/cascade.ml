@@ -74,12 +74,9 @@ let certificate section json : t =
   need (List.length motion = 2) "motion: another number of rows";
   List.iteri (fun i -> List.iteri (fun l (_, radius) ->
     need (i = 0 && l = 1 || Number.equal radius Number.zero) "motion: a radius where the common motion is known exactly")) motion;
-  (* a series of [alpha rho1 T], as long as that is short *)
-  let common = if Number.compare force (of_int 20) <= 0 then Some motion else None in
-  let known = common <> None && agree in
-  if known then bare_of proof "agent-motion" "agents" else skip "agent-motion" "motion";
+  if agree then bare_of proof "agent-motion" "agents" else skip "agent-motion" "motion";
   let velocities = fast || r.cert.edges = [] in
-  let ends = known && (stops || not velocities) in
+  let ends = agree && (stops || not velocities) in
   if ends && get "final_state" <> Null then bare_of proof "agent-final-state" "agents" else skip "agent-final-state" "final_state";
   let axes = Agents.axes ~told:(if velocities then 2 else 1) r 2 dimension get ends in
   let largest = List.fold_left Number.max Number.zero in
@@ -95,7 +92,7 @@ let certificate section json : t =
   let slope = r.cert.rho1 in
   let cert = { r.cert with funcs; rho1 = if Z.sign slope.qnum = 0 then Number.one else slope } in
   let team = { graph = cert; degree = 2; slope; cap = None; plant = []; damping = [ Number.zero; alpha ]; gains = []; w = []; p = [];
-    coupling = Number.zero; falls = Number.zero; used; agree; drift = common; axes; tops; left_over = None } in
+    coupling = Number.zero; falls = Number.zero; used; agree; drift = Some motion; axes; tops; left_over = None } in
   { base = { r with cert; rest = []; checked = r.checked @ List.rev proof.checked; unchecked = r.unchecked @ List.rev proof.unchecked;
       sections = r.sections @ List.rev !left };
     record = { team; firsts = List.filter_map Fun.id told; stops };

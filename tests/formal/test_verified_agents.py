@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 from fractions import Fraction
@@ -18,11 +17,8 @@ from mutations import Json, at, changed, mutants, nudged, resealed
 from selection import every
 from verified import compare, named, program, said
 
-from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.protocols import NominalProtocol
-from ptcc_certify.protocols.agents import Agents
 
 F = Fraction
 SOURCES = Path(__file__).resolve().parents[2] / "formal"
@@ -47,7 +43,7 @@ SETTINGS = {
     "capped gain without states": Setting(cap=F(7), start=False),
 }
 #: What the executable says of a form that it does not read.
-UNREAD = ("large form", "undecided", "radius", "cascade", "dominance", "weak components")
+UNREAD = ("large form", "undecided", "radius", "dominance", "weak components")
 
 
 @pytest.mark.parametrize("name", SETTINGS)
@@ -73,16 +69,6 @@ def test_the_statement_is_one_more_file_of_as_many_lines_as_is_said() -> None:
     ]
     for page in (SOURCES / "README.md", SOURCES.parent / "docs" / "theory" / "verified-checker.md"):
         assert f"{len(lines)} more" in page.read_text("utf-8")
-
-
-def test_forms_of_agents_that_are_not_read_are_told_in_one_line(tmp_path: Path) -> None:
-    program()
-    options: dict[str, Any] = {"simulation": False, "derivatives": [[0, 0, 0, 0]]}
-    cascade = certify(CAMPS, NominalProtocol(1, 1, 1, 4), [1, 2, 3, 4], agents=Agents(order=2, cascade=1), **options)
-    document = json.loads(cascade.to_json())
-    assert check(document).accepted
-    code, text = said(document, tmp_path)
-    assert code == 2 and "cascade" in text and "use ptcc check" in text and text.count("\n") == 1
 
 
 def told(document: Json, path: tuple[str | int, ...], new: Any) -> Json:
