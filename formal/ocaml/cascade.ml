@@ -75,7 +75,7 @@ let certificate section json : t =
   List.iteri (fun i -> List.iteri (fun l (_, radius) ->
     need (i = 0 && l = 1 || Number.equal radius Number.zero) "motion: a radius where the common motion is known exactly")) motion;
   (* a series of [alpha rho1 T] and [alpha k], as long as it and these are short *)
-  let few (x : q) = Z.numbits x.qnum + Z.numbits x.qden <= 500 in
+  let few (x : q) = Z.numbits x.qnum + Z.numbits x.qden <= 64 in
   let common = if Number.compare force (of_int 20) <= 0 && few force && few (Number.mul alpha pace) then Some motion else None in
   let known = common <> None && agree in
   if known then bare_of proof "agent-motion" "agents" else skip "agent-motion" "motion";

@@ -16,6 +16,8 @@ from generators import all_classes, random_graph
 from mutations import Json, at, changed, mutants, nudged, resealed
 from verified import compare, named, program, said
 
+from ptcc_certify.bounds import final_state as final_states
+from ptcc_certify.certificate import procedure
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
 from ptcc_certify.graphs.digraph import SignedDigraph
@@ -196,6 +198,17 @@ def own_mutants(data: Json, every: int, start: int, nudges: int) -> list[tuple[t
     parts = ("agents", "protocol", "proof", "verdict")
     small = nudged(data, ("agents", "protocol", "graph", "lyapunov"), start, nudges, told)
     return [(path, x) for path, x in mutants(data, every, start) if path[0] in parts] + list(small)
+
+
+def test_a_cascade_on_a_large_form_is_told_in_one_line(tmp_path: Path) -> None:
+    program()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(procedure, "EXACT_NODES", 0)
+        patch.setattr(final_states, "EXACT_NODES", 0)
+        data = document(SignedDigraph.from_edges(GRAPHS["singles"]), STRONG, {"method": "perron"}, 1)
+    assert check(data).accepted
+    code, text = said(data, tmp_path)
+    assert code == 2 and "large form" in text and "use ptcc check" in text and text.count("\n") == 1
 
 
 @pytest.mark.parametrize("name", ["plain", "formation in the plane", "sliding variables"])
