@@ -16,6 +16,8 @@ from generators import all_classes, random_graph
 from mutations import Json, at, changed, mutants, nudged, resealed
 from verified import compare, named, program, said
 
+from ptcc_certify.bounds import final_state as final_states
+from ptcc_certify.certificate import procedure
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
 from ptcc_certify.graphs.digraph import SignedDigraph
@@ -164,12 +166,13 @@ def test_velocities_that_need_not_vanish_and_inputs_without_a_bound_are_rejected
         assert code == 1 and "agent-input" in text
 
 
-def test_a_common_motion_that_is_far_from_a_short_series_is_named(tmp_path: Path) -> None:
+def test_the_common_motion_is_verified_however_strong_the_damping(tmp_path: Path) -> None:
     program()
-    data = document(SignedDigraph.from_edges(GRAPHS["camps"]), STRONG, {"cascade": 25}, 1)
-    assert check(data).accepted
-    code, text = said(data, tmp_path)
-    assert code == 0 and {"agent-motion of agents", "agents.motion", "agents.final_state"} <= named(text)
+    for alpha in (25, "12345678901234567/1000000000000000"):
+        data = document(SignedDigraph.from_edges(GRAPHS["camps"]), STRONG, {"cascade": alpha}, 1)
+        assert check(data).accepted
+        code, text = said(data, tmp_path)
+        assert code == 0 and not {"agent-motion of agents", "agents.motion", "agents.final_state"} & named(text)
 
 
 def test_where_no_function_used_has_a_deviation_it_is_named_that_all_agree(tmp_path: Path) -> None:
@@ -196,6 +199,17 @@ def own_mutants(data: Json, every: int, start: int, nudges: int) -> list[tuple[t
     parts = ("agents", "protocol", "proof", "verdict")
     small = nudged(data, ("agents", "protocol", "graph", "lyapunov"), start, nudges, told)
     return [(path, x) for path, x in mutants(data, every, start) if path[0] in parts] + list(small)
+
+
+def test_a_cascade_on_a_large_form_is_told_in_one_line(tmp_path: Path) -> None:
+    program()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(procedure, "EXACT_NODES", 0)
+        patch.setattr(final_states, "EXACT_NODES", 0)
+        data = document(SignedDigraph.from_edges(GRAPHS["singles"]), STRONG, {"method": "perron"}, 1)
+    assert check(data).accepted
+    code, text = said(data, tmp_path)
+    assert code == 2 and "large form" in text and "use ptcc check" in text and text.count("\n") == 1
 
 
 @pytest.mark.parametrize("name", ["plain", "formation in the plane", "sliding variables"])
