@@ -54,7 +54,7 @@ def document(graph: SignedDigraph, protocol: Any, of_agents: Json, dimension: in
     rng, labels, options = np.random.default_rng(seed), graph.labels, {"cascade": 2, **of_agents}
     rows = lambda: {v: [str(F(int(x), 4)) for x in rng.integers(-20, 21, dimension)] for v in labels}  # noqa: E731
     asked: Json = {"method": options.pop("method", "paper"), "simulation": False}
-    if options.pop("offsets", False):
+    if options.pop("offsets", False) and dimension:
         options["offsets"] = rows()
     if dimension:
         asked |= {"x0": rows(), "v0": rows()}
