@@ -35,7 +35,7 @@ Interval = tuple[arb, arb]
 _OPERATORS = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**", ast.USub: "neg", ast.UAdd: ""}
 _BINARY = frozenset(("+", "-", "*", "/", "**", "min", "max"))
 _FOREIGN = re.compile(r"[^A-Za-z0-9_+\-*/(),. \t\r\n]")
-_NUMBER_BEFORE_NAME = re.compile(r"(?<![\w.])[0-9.]++(?:[eE][+-]?[0-9]++)?+(?=[A-Za-z_])")
+_NUMBER_BEFORE_NAME = re.compile(r"(?<![\w.])[0-9.]+(?:[eE][+-]?[0-9]+)?(?![eE][+-]?[0-9])(?=[A-Za-z_])")
 _NAMES = f"{', '.join(ATOMS)} and the functions {', '.join(FUNCTIONS)}"
 _ALLOWED = f"write numbers, + - * / ** ( ) , {_NAMES}"
 

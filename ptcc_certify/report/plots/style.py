@@ -191,7 +191,7 @@ def finished(ax: Axes, x: str, y: str, title: str = "") -> Axes:
         axis.set_label_text(factor_out(axis, label) if label else "")
     if labels := ax.get_legend_handles_labels()[1]:
         width = ax.get_window_extent().width / ax.figure.dpi
-        columns = legend_columns(labels, 1.1 * width, 1 if width < 2.2 else 2 if width < 4 else 3)
+        columns = legend_columns(labels, 1.2 * width, 1 if width < 2.2 else 2 if width < 4 else 3)
         ax.legend(
             loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns, frameon=False, borderaxespad=0.2, title=title
         )
