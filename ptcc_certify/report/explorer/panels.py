@@ -28,7 +28,7 @@ PANELS = {
 _LEAST, _LAST = 1e-8, 1e-4
 #: Decades that are named on the axes of the decay.
 _TICKS = {4: "10⁴", 2: "100", 0: "1", -2: "0.01", -4: "10⁻⁴", -6: "10⁻⁶", -8: "10⁻⁸"}
-#: A panel in inches, and its margins: left, bottom, right, and top with room for the longest legend, of one line, or four.
+#: A panel in inches, and its margins: left, bottom, right, and top: the longest legend has one line, or four.
 _SIZE, _MARGINS = (SINGLE_COLUMN[0], 3.0), (0.62, 0.45, 0.56)
 _TOP = {"decay": 0.26, "states": 0.74, "input": 0.74, "graph": 0.74, "sliding": 0.74}
 
