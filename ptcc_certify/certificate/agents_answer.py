@@ -250,7 +250,7 @@ class AgentsAnswer(ABC):
     @property
     @abstractmethod
     def obligations(self) -> list[Obligation]:
-        """What the independent check verifies, in its order."""
+        """What proves the decay: obligations with numbers or a witness."""
 
     @property
     def first_ones(self) -> str:

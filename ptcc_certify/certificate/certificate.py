@@ -19,25 +19,21 @@ import numpy as np
 from lmi.exact.decimal_rounding import down
 from ptcc_certify.certificate.certificate_data import Content, Source
 from ptcc_certify.certificate.certificate_file import FromFile, bytes_of, text_of, write_certificate
-from ptcc_certify.certificate.checking import check, read_and_check, refuse_no_certificate
+from ptcc_certify.certificate.checking import read_and_check, refuse_no_certificate
 from ptcc_certify.certificate.format import certificate_document, read_document
-from ptcc_certify.certificate.format_vectors import Writer, read_side_files
-from ptcc_certify.certificate.verdict import CERTIFIED, Assessment, assess, verdict_of
-from ptcc_certify.checker import CheckReport
+from ptcc_certify.certificate.format_vectors import read_side_files
+from ptcc_certify.certificate.verdict import Assessment, assess, verdict_of
+from ptcc_certify.checker import CheckReport, VerifiedObligation
 from ptcc_certify.errors import FormatError, PTCCError, gated
 from ptcc_certify.graphs.display_hook import Shown, plot, summary
 from ptcc_certify.graphs.io.files import refuse_no_path
 from ptcc_certify.graphs.kinds_of_file import refuse_as_certificate
 from ptcc_certify.graphs.rationals import shorten
-from ptcc_certify.graphs.size_limits import EXACT_NODES
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from ptcc_certify.certificate.family_certificate import FamilyCertificate
-
-#: GB that the check of a large graph may take while it is certified.
-LARGE_MEMORY = 16
 
 
 class RejectedCertificate(PTCCError, ValueError):
@@ -132,8 +128,8 @@ class Certificate(Content, FromFile, Shown):
         """The JSON. What stands under ``unverified`` is its own word."""
         if self.source is not None:
             return self.source.document
-        document, out = self._document(self.verdict)
-        return document if not out.files else certificate_document(self, self.verdict)[0]
+        document, files, _ = self._recorded
+        return document if not files else certificate_document(self, files=False)[0]
 
     @cached_property
     def checked(self) -> CheckReport | None:
@@ -143,8 +139,12 @@ class Certificate(Content, FromFile, Shown):
         proved = self.constant or self.rate is not None
         if not proved or not (self.influence.exact or self.influence.enclosure is not None):
             return None
-        document, out = self._document(CERTIFIED)
-        return check(document, files=out.files, memory=1 if self.graph.n_nodes <= EXACT_NODES else LARGE_MEMORY)
+        return self._recorded[2]
+
+    @property
+    def obligations(self) -> tuple[VerifiedObligation, ...]:
+        """What the independent check verified, in its order."""
+        return () if self.checked is None else self.checked.obligations
 
     @property
     def verdict(self) -> str:
@@ -156,12 +156,10 @@ class Certificate(Content, FromFile, Shown):
         """The graded verdict: whether the bound says something by the deadline, and what became of expectations."""
         return assess(self, self.checked)
 
-    def _document(self, verdict: str) -> tuple[dict[str, Any], Writer]:
-        """Return the JSON of a verdict and its side files, made once."""
-        documents = self.__dict__.setdefault("_documents", {})
-        if verdict not in documents:
-            documents[verdict] = certificate_document(self, verdict, files=True)
-        return documents[verdict]
+    @cached_property
+    def _recorded(self) -> tuple[dict[str, Any], Mapping[str, bytes], CheckReport]:
+        """The JSON, its side files, and what the check says, which laid down the proof."""
+        return certificate_document(self)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the certificate as JSON-ready data of schema ``ptcc-certificate/2``, without side files: a copy.
@@ -198,8 +196,7 @@ class Certificate(Content, FromFile, Shown):
         """Return the JSON and the contents of its side files, as the independent check takes them."""
         if self.source is not None:
             return self.source.document, self.source.files
-        document, out = self._document(self.verdict)
-        return document, out.files
+        return self._recorded[:2]
 
     def to_pandas(self) -> pd.DataFrame:
         """Return one row per agent: its place in the graph, where it begins and ends, how near its end it is proved.
@@ -276,7 +273,7 @@ class Certificate(Content, FromFile, Shown):
 
     @property
     def _digest(self) -> str:
-        document = self._document(self.verdict)[0] if self.source is None else self.source.document
+        document = self._recorded[0] if self.source is None else self.source.document
         return str(document["digest"])
 
     def __repr__(self) -> str:
@@ -399,7 +396,7 @@ def accepted_certificate(
     if "modes" in document["graph"]:
         from ptcc_certify.certificate.read_family_certificate import read_family_certificate
 
-        return read_family_certificate(Source(path, sha256, document, report, None, (), files))
+        return read_family_certificate(Source(path, sha256, document, report, None, files))
     return Certificate(**read_document(path, document, sha256, report, files))
 
 

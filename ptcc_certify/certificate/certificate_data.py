@@ -108,8 +108,6 @@ class Source:
         Of the independent check.
     effort : Effort or None
         What is proved about the input.
-    obligations : tuple of Obligation
-        What was proved, with witnesses as the JSON has them.
     files : mapping of str to bytes
         The side files that stood beside it, by name.
     """
@@ -119,7 +117,6 @@ class Source:
     document: Mapping[str, Any]
     report: CheckReport
     effort: Effort | None
-    obligations: tuple[Obligation, ...]
     files: Mapping[str, bytes] = field(repr=False)
 
 
@@ -532,11 +529,9 @@ class Content:
     # ------------------------------------------------------------------ proof
 
     @cached_property
-    def obligations(self) -> tuple[Obligation, ...]:
-        """Everything that was proved, in the order of the JSON."""
-        if self.source is not None:
-            return self.source.obligations
-        obligations = [Obligation("structure", "graph"), Obligation("claim", "graph")]
+    def witnesses(self) -> tuple[Obligation, ...]:
+        """What the proof needs besides the claims: obligations with numbers or a witness, in any order."""
+        obligations = []
         if self.influence.exact:
             obligations.append(
                 Obligation("final-state", "graph", witness=final_state_witness(self.structure, self.influence))
@@ -550,15 +545,9 @@ class Content:
                 obligations.append(Obligation(kind, V.name, {"b": V.proved_rate}, V.dominance))
             if V.matrix is not None:
                 obligations.append(Obligation("overshoot", V.name, {"lowest": V.lowest, "highest": V.highest}))
-            if V.deviation is not None:
-                obligations.append(Obligation("deviation", V.name))
         if self.limit is not None:
             witness = self.limit.witness(self.graph.labels)
             obligations.append(Obligation(self.limit.kind, "rates", {"upper_bound": self.limit.value}, witness))
-        if self.reaching is not None:
-            obligations.append(Obligation("sliding-bound", "protocol"))
-            if any(s and r.z is not None for s, r in zip(self.sigma0 or (), self.reaching, strict=True)):
-                obligations.append(Obligation("reaching-time", "reaching_time"))
         if self.effort is not None:
             obligations += self.effort.obligations
         if self.agents is not None:

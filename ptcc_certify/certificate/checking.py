@@ -18,7 +18,11 @@ from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.kinds_of_file import refuse_as_certificate
 from ptcc_certify.graphs.other_names import Hinted
 from ptcc_certify.graphs.rationals import number_within, shorten
+from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure
+
+#: GB that the check of a large graph may take while it is certified.
+LARGE_MEMORY = 16
 
 
 class CheckReport(Hinted, checker.CheckReport):
@@ -107,6 +111,18 @@ def read_and_check(source: Any, **options: Any) -> tuple[dict[str, Any], CheckRe
     if not isinstance(source, Mapping) and re.fullmatch(r"side file \S+ cannot be read", report.reason or ""):
         mend = "ask the sender for all files beside it"
         raise FormatError(f"{shorten(os.fspath(source), 200)}: incomplete: {report.reason}; {mend}")
+    return document, CheckReport(**vars(report))
+
+
+def record(
+    sections: Mapping[str, Any],
+    given: Mapping[tuple[str, str], Mapping[str, Any]],
+    files: Mapping[str, bytes],
+    n_nodes: int,
+) -> tuple[dict[str, Any], CheckReport]:
+    """Lay down the proof of a certificate while it is checked; see :func:`ptcc_certify.checker.record`."""
+    memory = 1 if n_nodes <= EXACT_NODES else LARGE_MEMORY
+    document, report = checker.record(sections, given, files=files, memory=memory)
     return document, CheckReport(**vars(report))
 
 

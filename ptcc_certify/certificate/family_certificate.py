@@ -21,7 +21,6 @@ from lmi.search_time import share_of_time
 from ptcc_certify.bounds.attracting_box import AttractingBox, box_of_family
 from ptcc_certify.bounds.kept_means import with_means
 from ptcc_certify.certificate.certificate_file import FromFile, write_certificate
-from ptcc_certify.certificate.checking import check
 from ptcc_certify.certificate.family_content import ComponentProof, FamilyContent, ProvedFunction
 from ptcc_certify.certificate.family_table import family_table
 from ptcc_certify.certificate.family_verdict import assess_family
@@ -66,8 +65,6 @@ if TYPE_CHECKING:
 
 STEPS = ("the decision", "upper bound on the decay rate", "Lyapunov functions", STEP, "independent check")
 BOXES = "boxes of followers"
-#: GB that the check may take for families whose members have more nodes than are solved for exactly.
-LARGE_MEMORY = 16
 #: Share of the upper bound that ends the search, and share of the time that the bound may take at first.
 _ENOUGH, _BOUND_SHARE = Fraction(99, 100), 0.3
 #: Agents and edges of a component up to which ends are told between which each agent stays.
@@ -163,26 +160,20 @@ class FamilyCertificate(FamilyContent, FromFile, Shown):
     # ------------------------------------------------------------------ the file
 
     @cached_property
-    def _document(self) -> tuple[dict[str, Any], Mapping[str, bytes]]:
-        """The JSON, and its side files by name."""
+    def _recorded(self) -> tuple[dict[str, Any], Mapping[str, bytes], CheckReport]:
+        """The JSON, its side files by name, and what the check says, which laid down the proof."""
         if self.source is not None:
-            return dict(self.source.document), self.source.files
-        document, out = family_document(self, files=True)
-        return document, out.files
+            return dict(self.source.document), self.source.files, self.source.report
+        return family_document(self)
 
     @cached_property
     def checked(self) -> CheckReport | None:
         """What the independent check says; None where a behaviour is not decided, or takes too many rows."""
-        if self.source is not None:
-            return self.source.report
-        if not all(part.certifiable for part in self.parts):
-            return None
-        document, files = self._document
-        return check(document, files=files, memory=1 if self.family.n_nodes <= EXACT_NODES else LARGE_MEMORY)
+        return self._recorded[2] if all(part.certifiable for part in self.parts) else None
 
     def for_check(self) -> tuple[Mapping[str, Any], Mapping[str, bytes]]:
         """Return the JSON and the contents of its side files, as the independent check takes them."""
-        return self._document
+        return self._recorded[:2]
 
     @property
     def verdict(self) -> str:
@@ -191,9 +182,9 @@ class FamilyCertificate(FamilyContent, FromFile, Shown):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the certificate as JSON-ready data, without side files: a copy."""
-        document, files = self._document
-        whole = family_document(self)[0] if files and self.source is None else document
-        return json.loads(json.dumps(whole | {"verdict": self.verdict}))
+        document, files = self.for_check()
+        whole = family_document(self, files=False)[0] if files and self.source is None else document
+        return json.loads(json.dumps({**whole, "verdict": self.verdict}))
 
     def save(self, path: str | Path) -> None:
         """Write the certificate; the file appears whole or not at all.
@@ -209,7 +200,7 @@ class FamilyCertificate(FamilyContent, FromFile, Shown):
         """
         if self.verdict != "certified":
             raise ParameterError("nothing is certified of this family, so that no certificate is written")
-        write_certificate(path, *self._document)
+        write_certificate(path, *self.for_check())
 
     def to_json(self) -> str:
         """Return the certificate as one JSON object, without NaN or infinity."""
@@ -255,7 +246,7 @@ class FamilyCertificate(FamilyContent, FromFile, Shown):
 
     @property
     def _digest(self) -> str:
-        return str(self._document[0]["digest"])
+        return str(self._recorded[0]["digest"])
 
     def __repr__(self) -> str:
         behaviour = self.parts[0].component.behaviour or "not decided"

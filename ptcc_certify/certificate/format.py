@@ -15,9 +15,11 @@ from typing import Any
 
 import numpy as np
 
+from ptcc_certify import checker
 from ptcc_certify.bounds.envelope import FRACTIONS, LAST_INSTANTS
 from ptcc_certify.bounds.input.effort import EnergyIntegral, Peak
 from ptcc_certify.certificate.certificate_data import Content, Observations, Source
+from ptcc_certify.certificate.checking import CheckReport, record
 from ptcc_certify.certificate.format_agents import agents_section, read_agents
 from ptcc_certify.certificate.format_effort import LIMITS, effort_section, energy_witness, peak_witness, read_effort
 from ptcc_certify.certificate.format_final_state import final_state_sections, read_final_state
@@ -34,7 +36,7 @@ from ptcc_certify.certificate.format_vectors import (
     text,
 )
 from ptcc_certify.certificate.request import Expectations, Request
-from ptcc_certify.checker import SCHEMA, SLIDING_BOUND, SLIDING_CLOCK, CheckReport, digest
+from ptcc_certify.checker import SCHEMA, SLIDING_BOUND, SLIDING_CLOCK
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
 from ptcc_certify.checker.reading import RejectedError, exact, triangle
 from ptcc_certify.errors import one_line
@@ -48,8 +50,10 @@ from ptcc_certify.protocols.reaching_time import ReachingTime
 from ptcc_certify.theorems.theorem import ExactInterval, Obligation, RateProof
 
 
-def certificate_document(content: Content, verdict: str, files: bool = False) -> tuple[dict[str, Any], Writer]:
-    """Return a certificate as JSON-ready data, and what holds its side files."""
+def certificate_document(
+    content: Content, files: bool = True
+) -> tuple[dict[str, Any], Mapping[str, bytes], CheckReport]:
+    """Return a certificate as JSON-ready data, its side files, and what the check says, which lays down the proof."""
     graph, structure = content.graph, content.structure
     out = Writer(graph.labels, files)
     influence, final = final_state_sections(content, out)
@@ -78,8 +82,8 @@ def certificate_document(content: Content, verdict: str, files: bool = False) ->
         "final_state": final,
         "reaching_time": reaching_section(graph.labels, content.reaching),
         "input": effort_section(content.effort, out),
-        "proof": [_write_obligation(o, out) for o in content.obligations],
-        "verdict": verdict,
+        "proof": [],
+        "verdict": "",
     }
     if content.agents is not None:
         document["agents"] = agents_section(content.agents, out)
@@ -87,11 +91,14 @@ def certificate_document(content: Content, verdict: str, files: bool = False) ->
         document["messages"] = messages_section(content.late, out)
     if content.tracking is not None:
         document["leaders"] = leaders_section(content.tracking, out)
-    return document | {"digest": digest(document), "unverified": _write_unverified(content)}, out
+    document |= {"digest": "", "unverified": _write_unverified(content)}
+    given = {(o.kind, o.of): _write_obligation(o, out) for o in content.witnesses}
+    document, report = record(document, given, out.files, graph.n_nodes)
+    return document, out.files, report
 
 
 def read_document(
-    path: Path, document: Mapping[str, Any], sha256: str, report: CheckReport, files: Mapping[str, bytes]
+    path: Path, document: Mapping[str, Any], sha256: str, report: checker.CheckReport, files: Mapping[str, bytes]
 ) -> dict[str, Any]:
     """Return the fields of a certificate that was accepted; the structure is computed anew from the edges."""
     graph = certificate_graph(document, files)
@@ -129,7 +136,7 @@ def read_document(
         "tracking": read_tracking(document, structure, protocol, data, steps),
         "request": request,
         "observed": _read_observations(document["unverified"]),
-        "source": Source(path, sha256, document, report, effort, proof, files),
+        "source": Source(path, sha256, document, report, effort, files),
         "agents": read_agents(document.get("agents"), structure, protocol, functions),
     }
 
@@ -274,7 +281,7 @@ def _read_limit(steps: Mapping[tuple[str, str], Obligation], data: Reader) -> Ra
 
 
 def _write_obligation(obligation: Obligation, out: Writer) -> dict[str, Any]:
-    """Return one step of the proof."""
+    """Return numbers and witness of one step of the proof."""
     witness = obligation.witness
     if isinstance(witness, Dominance):
         witness = _dominance_witness(witness, out)
@@ -289,14 +296,7 @@ def _write_obligation(obligation: Obligation, out: Writer) -> dict[str, Any]:
     elif isinstance(witness, np.ndarray):
         by_label = zip(out.labels, map(repr, witness.tolist()), strict=True)
         witness = {"u": out.vector("u", witness) if out.aside(witness.size) else dict(by_label)}
-    return {
-        "kind": obligation.kind,
-        "of": obligation.of,
-        "proves": obligation.statement,
-        "lemma": obligation.lemma,
-        "numbers": {name: format_exact(value) for name, value in obligation.numbers.items()},
-        "witness": witness,
-    }
+    return {"numbers": {name: format_exact(value) for name, value in obligation.numbers.items()}, "witness": witness}
 
 
 def _read_obligation(section: Mapping[str, Any]) -> Obligation:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from lmi.exact.elementary_enclosures import rounded
+from ptcc_certify.certificate.checking import CheckReport, record
 from ptcc_certify.certificate.family_content import FamilyContent
 from ptcc_certify.certificate.format import producer, protocol_section, reaching_section
 from ptcc_certify.certificate.format_family_rows import (
@@ -28,7 +29,7 @@ from ptcc_certify.certificate.format_restricted import claim_entry, claim_steps,
 from ptcc_certify.certificate.format_upper_bound import upper_bound_entry
 from ptcc_certify.certificate.format_vectors import Writer
 from ptcc_certify.certificate.restricted_claims import Claim
-from ptcc_certify.checker import NOT_OF_FAMILIES, OBLIGATIONS, SCHEMA, digest
+from ptcc_certify.checker import NOT_OF_FAMILIES, SCHEMA
 from ptcc_certify.checker.family import THEOREM
 from ptcc_certify.checker.family_limits import EQUAL
 from ptcc_certify.checker.reading import exact
@@ -41,8 +42,10 @@ from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
 
 
-def family_document(certificate: FamilyContent, files: bool = False) -> tuple[dict[str, Any], Writer]:
-    """Return a certificate of a family as JSON-ready data, and what holds its side files."""
+def family_document(
+    certificate: FamilyContent, files: bool = True
+) -> tuple[dict[str, Any], Mapping[str, bytes], CheckReport]:
+    """Return a certificate of a family as JSON-ready data, its side files, and what the check says of it."""
     out = Writer(certificate.family.labels, files)
     family, parts = certificate.family, certificate.parts
     components = [part.component for part in parts]
@@ -68,8 +71,8 @@ def family_document(certificate: FamilyContent, files: bool = False) -> tuple[di
             "peaks": None if peaks is None else dict(zip(labels, map(_up, peaks), strict=True)),
             **_sliding_part(certificate),
         },
-        "proof": _proof(certificate, components, functions, out),
-        "verdict": "certified",
+        "proof": [],
+        "verdict": "",
     }
     if certificate.boxes or certificate.ranges:
         labelled = ((k, box, list(components[k].family.labels)) for k, box in sorted(certificate.boxes.items()))
@@ -77,7 +80,11 @@ def family_document(certificate: FamilyContent, files: bool = False) -> tuple[di
         document["boxes"] += [range_entry(k, ends) for k, ends in sorted(certificate.ranges.items())]
     if certificate.restricted:
         document["restricted"] = [claim_entry(claim, _labels(certificate, claim)) for claim in certificate.restricted]
-    return document | {"digest": digest(document), "unverified": _unverified(certificate)}, out
+    document |= {"digest": "", "unverified": _unverified(certificate)}
+    steps = _steps(certificate, out)
+    given = {(kind, of): {"numbers": numbers, "witness": witness} for kind, of, witness, numbers in steps}
+    document, report = record(document, given, out.files, family.n_nodes)
+    return document, out.files, report
 
 
 def _function(family: Family, component: FamilyComponent, number: int, V: Any, out: Writer) -> dict[str, Any]:
@@ -85,12 +92,6 @@ def _function(family: Family, component: FamilyComponent, number: int, V: Any, o
     if V.kind == "squares":
         return squares_entry(number, V, out)
     return rows_entry(labels, number, V, out) if V.kind == "rows" else form_entry(labels, number, V)
-
-
-def _steps(of: str, V: Any, out: Writer) -> Iterator[Step]:
-    if V.kind == "squares":
-        return squares_steps(of, V, out)
-    return (rows_steps if V.kind == "rows" else form_steps)(of, V)
 
 
 def _labels(certificate: FamilyContent, claim: Claim) -> Sequence[str]:
@@ -111,33 +112,21 @@ def _up(x: Fraction) -> str:
     return format_exact(rounded(x, 60, up=True))
 
 
-def _proof(
-    certificate: FamilyContent,
-    components: Sequence[FamilyComponent],
-    functions: Sequence[tuple[int, Any]],
-    out: Writer,
-) -> list[dict[str, Any]]:
-    family = certificate.family
-    steps = [_step("structure", f"graph.modes[{k}]") for k in range(len(family.modes))]
-    steps.append(_step("family-claim", "graph", claim_witnesses(family, components)))
-    for k, (_, V) in enumerate(functions):
-        own = _steps(f"lyapunov.functions[{k}]", V, out)
-        steps += [_step(kind, of, witness, **numbers) for kind, of, witness, numbers in own]
-    steps += [_step("sliding-bound", "protocol")] * (certificate.sigma0 is not None)
-    if certificate.drives is not None:
-        times = zip(certificate.reaching or (), certificate.sigma0 or (), strict=True)
-        steps += [_step("reaching-time", "reaching_time")] * any(s and r.z is not None for r, s in times)
-        steps += [_step("family-drive", f"lyapunov.functions[{k}]") for k in range(len(functions))]
+def _steps(certificate: FamilyContent, out: Writer) -> Iterator[Step]:
+    """Yield kind, place, witness and numbers of the obligations that have some, in any order."""
+    components = [part.component for part in certificate.parts]
+    functions: list[Any] = [V for part in certificate.parts for V in part.functions]
+    yield "family-claim", "graph", claim_witnesses(certificate.family, components), {}
+    for k, V in enumerate(functions):
+        of = f"lyapunov.functions[{k}]"
+        if V.kind == "squares":
+            yield from squares_steps(of, V, out)
+        else:
+            yield from (rows_steps if V.kind == "rows" else form_steps)(of, V)
     if certificate.final_states is not None:
-        steps.append(_step("family-final-state", "final_state", _means(certificate)))
-    steps += [_step("input-sliding", "input")] * (certificate.sliding_peaks is not None)
-    steps += [_step("family-input", "input")] * (certificate.bounded is not None)
-    kinds = ["attracting-box"] * len(certificate.boxes) + ["kept-box"] * len(certificate.ranges)
-    steps += [_step(kind, f"boxes[{k}]") for k, kind in enumerate(kinds)]
+        yield "family-final-state", "final_state", _means(certificate), {}
     for k, claim in enumerate(certificate.restricted):
-        own = claim_steps(f"restricted[{k}]", claim, _labels(certificate, claim))
-        steps += [_step(kind, of, witness, **numbers) for kind, of, witness, numbers in own]
-    return steps
+        yield from claim_steps(f"restricted[{k}]", claim, _labels(certificate, claim))
 
 
 def _means(certificate: FamilyContent) -> list[Any] | None:
@@ -157,11 +146,6 @@ def _means(certificate: FamilyContent) -> list[Any] | None:
                 means[number[int(nodes[pivot])]] = EQUAL if set(group.vector) == {1} else q
         result.append(means or None)
     return result if any(result) else None
-
-
-def _step(kind: str, of: str, witness: Any = None, **numbers: str) -> dict[str, Any]:
-    proves, lemma = OBLIGATIONS[kind]
-    return {"kind": kind, "of": of, "proves": proves, "lemma": lemma, "numbers": numbers, "witness": witness}
 
 
 def _unverified(certificate: FamilyContent) -> dict[str, Any]:

@@ -119,7 +119,6 @@ def form_steps(of: str, V: FamilyFunction) -> Iterator[Step]:
         multipliers = V.multipliers[mode] if V.multipliers else ()
         witness = {"multipliers": [format_exact(x) for x in multipliers]} if V.kind != "undirected" else None
         yield "family-rate", f"{of}.modes[{mode}]", witness, {"b": format_exact(rate)}
-    yield "family-constants", of, None, {}
 
 
 def rows_steps(of: str, V: FollowerFunction) -> Iterator[Step]:

@@ -42,7 +42,7 @@ class Vectors:
 
 
 def late_obligations(late: LateBounds | None) -> Iterator[Obligation]:
-    """Yield what was proved of late messages, in the order of the file."""
+    """Yield what proves bounds with late messages."""
     if late is None:
         return
     for i, row in enumerate(late.rows):
@@ -50,12 +50,8 @@ def late_obligations(late: LateBounds | None) -> Iterator[Obligation]:
         yield Obligation("late-rows", f"messages.rows[{i}]", numbers, Vectors({"u": row.witness.u}))
     if late.steps is not None:
         yield Obligation("late-steps", "messages.steps", witness=Vectors({"start": late.steps.start}))
-    if late.residual is not None:
-        yield Obligation("late-residual", "messages.residual")
     if late.missed is not None:
         yield Obligation("late-missed", "messages.missed", witness=Vectors({"gauge": late.missed.gauge}))
-    if late.staged is not None:
-        yield Obligation("late-staged", "messages.staged")
     if (settling := late.settling) is not None:
         u = dict(zip(late.structure.graph.labels, map(format_exact, settling.u), strict=True))
         numbers = {"q": settling.q, "b": settling.b}
@@ -64,8 +60,6 @@ def late_obligations(late: LateBounds | None) -> Iterator[Obligation]:
         phi = dict(zip(late.structure.graph.labels, map(format_exact, form.phi), strict=True))
         numbers = {"q": form.q, "b": form.b, "kap": form.kap}
         yield Obligation("late-form", "messages.form", numbers, {"function": form.function, "phi": phi})
-    if late.input is not None:
-        yield Obligation("late-input", "messages.input")
 
 
 def asked_messages(messages: LateMessages, graph: SignedDigraph, out: Writer) -> dict[str, Any]:

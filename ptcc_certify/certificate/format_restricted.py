@@ -133,18 +133,10 @@ def claim_steps(of: str, claim: Claim, labels: Sequence[str]) -> Iterator[Step]:
             yield "family-rate", f"{of}.modes[{mode}]", witness, {"b": format_exact(rate)}
         q = None if claim.mean is None else {v: format_exact(x) for v, x in zip(labels, claim.mean, strict=True) if x}
         yield "clock-shares", of, None if q is None else {"mean": q}, {}
-        return
-    if isinstance(claim, FinalValueClaim):
-        yield "final-value", of, None, {}
-        return
-    if not isinstance(claim, RateClaim):
-        yield "last-mode" if isinstance(claim, LastModeClaim) else "joint-windows", of, None, {}
-        return
-    if claim.forms is not None:
+    elif isinstance(claim, RateClaim) and claim.forms is not None:
         for mode, (rate, tau) in enumerate(zip(claim.forms.rates, claim.forms.multipliers, strict=True)):
             witness = {"multipliers": [format_exact(x) for x in tau]}
             yield "family-rate", f"{of}.modes[{mode}]", witness, {"b": format_exact(rate)}
-    yield "restricted-rate", of, None, {}
 
 
 def _read_signal(entry: Any) -> SignalClass:

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from lmi.exact import arithmetic
-from lmi.exact.work import WorkError, limited
+from lmi.exact.work import Account, WorkError, limited
 from ptcc_certify.checker.agents import check_agents
 from ptcc_certify.checker.attracting_boxes import check_boxes
 from ptcc_certify.checker.family import check_family
@@ -36,7 +36,7 @@ from ptcc_certify.checker.leaders import check_leaders
 from ptcc_certify.checker.lyapunov import check_functions
 from ptcc_certify.checker.messages import check_messages
 from ptcc_certify.checker.obligations import OBLIGATIONS, CheckReport, ProofObligation, VerifiedObligation
-from ptcc_certify.checker.proof_cursor import Document
+from ptcc_certify.checker.proof_cursor import Document, Recorder
 from ptcc_certify.checker.protocol import (
     REACHING_BITS,
     SLIDING_BOUND,
@@ -86,6 +86,7 @@ __all__ = [
     "check",
     "digest",
     "read",
+    "record",
 ]
 
 
@@ -138,15 +139,53 @@ def read_and_check(
     """
     with limited(memory) as account:
         data, folder = (dict(source), Path()) if isinstance(source, Mapping) else (read(source), Path(source).parent)
-        doc, verdict, reason = Document(data, SideFiles(folder, files), arithmetic(stdlib)), "", None
-        try:
-            verdict = _verdict(doc)
-        except (RejectedError, WorkError) as error:
-            reason = str(error)
-        except MALFORMED as error:
-            reason = f"malformed ({type(error).__name__})"
-        at, obligations, needed = None if reason is None else doc.at, tuple(doc.obligations), float(account.needed)
-        return data, CheckReport(reason is None, verdict, obligations, at, reason, doc.exact.name, doc.sha256, needed)
+        return data, _report(Document(data, SideFiles(folder, files), arithmetic(stdlib)), account)
+
+
+def record(
+    sections: Mapping[str, Any],
+    given: Mapping[tuple[str, str], Mapping[str, Any]],
+    *,
+    files: Mapping[str, bytes] | None = None,
+    memory: float = 1,
+) -> tuple[dict[str, Any], CheckReport]:
+    """Lay down the proof, the verdict and the digest of a certificate while it is checked.
+
+    Parameters
+    ----------
+    sections : mapping
+        The JSON object; what stands under ``proof``, ``verdict`` and ``digest`` is put there anew.
+    given : mapping of (str, str) to mapping
+        By kind and place, in any order, the obligations that have ``numbers`` or a ``witness``.
+    files, memory
+        As in :func:`read_and_check`.
+
+    Returns
+    -------
+    dict, CheckReport
+        The certificate, and the report of its check. If it is rejected, the proof ends at what was rejected.
+
+    Examples
+    --------
+    >>> record({"schema": SCHEMA}, {})[1].reason
+    'the key "producer" is missing'
+    """
+    data = dict(sections)
+    with limited(memory) as account:
+        return data, _report(Recorder(data, SideFiles(Path(), files), arithmetic(False), given), account)
+
+
+def _report(doc: Document, account: Account) -> CheckReport:
+    """Verify a whole certificate; return what came of it."""
+    verdict, reason = "", None
+    try:
+        verdict = _verdict(doc)
+    except (RejectedError, WorkError) as error:
+        reason = str(error)
+    except MALFORMED as error:
+        reason = f"malformed ({type(error).__name__})"
+    at, obligations, needed = None if reason is None else doc.at, tuple(doc.obligations), float(account.needed)
+    return CheckReport(reason is None, verdict, obligations, at, reason, doc.exact.name, doc.sha256, needed)
 
 
 def _verdict(doc: Document) -> str:
@@ -181,21 +220,11 @@ def _verdict(doc: Document) -> str:
     verified = Verified(structure, protocol, begin, final, functions, rate, bound)
     if "agents" in data:
         need("messages" not in data and "leaders" not in data, "agents of order n with late messages or moving leaders")
-        return _close(doc, check_agents(doc, verified))
+        return doc.close(check_agents(doc, verified))
     check_input(doc, verified)
     check_messages(doc, verified)
     check_leaders(doc, verified)
-    return _close(doc, data["influence"] is not None and (rate is not None or not graph.listening))
-
-
-def _close(doc: Document, proved: bool) -> str:
-    """Verify that nothing is left of the proof, the verdict, and the digest."""
-    data, doc.at = doc.data, "proof"
-    need(len(doc.obligations) == len(data["proof"]), "an obligation that nothing asks for")
-    verdict = "certified" if proved else "undecided"
-    need(doc.section("verdict") == verdict, f"what was proved makes it {verdict}")
-    need(doc.section("digest") == digest(data), "the certificate was changed after it was made")
-    return verdict
+    return doc.close(data["influence"] is not None and (rate is not None or not graph.listening))
 
 
 def _family_verdict(doc: Document, protocol: Protocol) -> str:
@@ -212,7 +241,7 @@ def _family_verdict(doc: Document, protocol: Protocol) -> str:
     check_restricted(doc, family, functions, protocol, begin)
     for key in NOT_OF_FAMILIES:
         need(doc.section(key) is None, "a part that certificates of families do not have")
-    return _close(doc, True)
+    return doc.close(True)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -239,7 +239,7 @@ def _peak(doc: Document, verified: Verified, section: Any, bounds: formulas.Inpu
 
 def _energy(doc: Document, verified: Verified, section: Any, bounds: formulas.InputBounds) -> None:
     """Verify the energy, by one function or by two matrices."""
-    if not isinstance(doc.following.get("witness"), dict):
+    if not isinstance(doc.following("input-energy", "input").get("witness"), dict):
         _by_function(doc, section["energy"], "input-energy", formulas.energy_above, bounds)
         return
     obligation = doc.open("input-energy", "input", ["p", "m0", "m1"], witness=True)

@@ -67,7 +67,7 @@ def check_functions(doc: Document, structure: Structure, final: FinalState, pape
         fields(entry, ("class", *KEYS, "deviation"), "a Lyapunov function")
         if k == 0 and paper is not None and of_paper:
             function, form = _of_paper(doc, paper, entry)
-        elif entry["class"] in ("perron", "lmi") and doc.following.get("kind") == "dominance":
+        elif entry["class"] in ("perron", "lmi") and doc.following("dominance", of):
             function, form = _by_rows(doc, structure, entry, of, proofs), None
         else:
             function, form = _searched(doc, structure, entry, of)

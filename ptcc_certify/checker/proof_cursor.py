@@ -1,13 +1,17 @@
-"""A certificate while it is checked: what it says, the obligations of its proof one after the other, its side files."""
+"""A certificate while it is checked: what it says, the obligations of its proof one after the other, its side files.
+
+The check also lays a proof down: :class:`Recorder` takes each obligation when it is asked for, so that the order of a
+proof stands in the functions that verify it, and nowhere else.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from lmi.exact.definite import Arithmetic
 from ptcc_certify.checker.obligations import OBLIGATIONS, VerifiedObligation
-from ptcc_certify.checker.reading import exact, fields, need
+from ptcc_certify.checker.reading import digest, exact, fields, need
 from ptcc_certify.checker.side_files import SideFiles
 
 
@@ -39,11 +43,11 @@ class Document:
         self.at = key
         return self.data[key]
 
-    @property
-    def following(self) -> dict[str, Any]:
-        """The next obligation, not verified yet; empty if there is none."""
+    def following(self, kind: str, of: str) -> Mapping[str, Any]:
+        """Return the next obligation, not verified yet, if it is this one, else nothing."""
         proof, k = self.data["proof"], len(self.obligations)
-        return proof[k] if k < len(proof) and isinstance(proof[k], dict) else {}
+        obligation = proof[k] if k < len(proof) and isinstance(proof[k], dict) else {}
+        return obligation if (obligation.get("kind"), obligation.get("of")) == (kind, of) else {}
 
     def open(self, kind: str, of: str, numbers: Sequence[str] = (), witness: bool = False) -> dict[str, Any]:
         """Take the next obligation of the proof, which must be this one; return its numbers and its witness."""
@@ -62,3 +66,59 @@ class Document:
         kind, _, of = self.at.partition(" of ")
         self.obligations.append(VerifiedObligation(kind, of, detail))
         self.at = "format"
+
+    def close(self, proved: bool) -> str:
+        """Verify that nothing is left of the proof, the verdict, and the digest; return the verdict."""
+        self.at = "proof"
+        need(len(self.obligations) == len(self.data["proof"]), "an obligation that nothing asks for")
+        verdict = "certified" if proved else "undecided"
+        need(self.section("verdict") == verdict, f"what was proved makes it {verdict}")
+        need(self.section("digest") == digest(self.data), "the certificate was changed after it was made")
+        return verdict
+
+
+class Recorder(Document):
+    """A certificate whose proof, verdict and digest are laid down while it is checked.
+
+    Attributes
+    ----------
+    given : dict
+        By kind and place, in any order, the obligations that have numbers or a witness, and have not been asked for.
+    """
+
+    def __init__(
+        self,
+        data: dict[str, Any],
+        files: SideFiles,
+        arithmetic: Arithmetic,
+        given: Mapping[tuple[str, str], Mapping[str, Any]],
+    ):
+        super().__init__(data, files, arithmetic)
+        self.given = dict(given)
+        data |= {"proof": [], "verdict": "undecided", "digest": ""}
+
+    def following(self, kind: str, of: str) -> Mapping[str, Any]:
+        """Return an obligation if it is given, else nothing."""
+        return self.given.get((kind, of), {})
+
+    def open(self, kind: str, of: str, numbers: Sequence[str] = (), witness: bool = False) -> dict[str, Any]:
+        """Lay down an obligation, and take it as any other."""
+        proves, lemma = OBLIGATIONS[kind]
+        obligation: dict[str, Any] = {
+            "kind": kind,
+            "of": of,
+            "proves": proves,
+            "lemma": lemma,
+            "numbers": {},
+            "witness": None,
+        }
+        self.data["proof"].append({**obligation, **self.given.pop((kind, of), {})})
+        return super().open(kind, of, numbers, witness)
+
+    def close(self, proved: bool) -> str:
+        """Verify that nothing was given in vain; lay down the verdict, and the digest of the whole."""
+        self.at = "proof"
+        need(not self.given, "an obligation that nothing asks for")
+        self.data["verdict"] = "certified" if proved else "undecided"
+        self.data["digest"] = digest(self.data)
+        return super().close(proved)

@@ -44,7 +44,7 @@ def check_rate_bound(doc: Document, structure: Structure) -> Fraction | None:
     entry = doc.data["rates"]["upper_bound"]
     if entry is None:
         return None
-    mean = doc.following.get("kind") == "rate-mean"
+    mean = bool(doc.following("rate-mean", "rates"))
     obligation = doc.open("rate-mean" if mean else "rate-upper-bound", "rates", ["upper_bound"], witness=True)
     need(exact(entry) == obligation["upper_bound"], "the upper bound is another")
     (_mean if mean else _inertia)(doc, structure, obligation["upper_bound"], obligation["witness"])

@@ -40,7 +40,7 @@ from ptcc_certify.bounds.input.initial_set import box, ellipsoid
 from ptcc_certify.certificate import format_vectors as vectors
 from ptcc_certify.certificate import procedure
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.format import certificate_document
+from ptcc_certify.certificate.checking import record
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import UnreadableError, check
 from ptcc_certify.checker import graph as checked_graph
@@ -174,14 +174,12 @@ def judged(graph: SignedDigraph, rng: np.random.Generator, slides: bool) -> Cert
 
 def test_what_the_checker_rejects_is_never_called_certified(monkeypatch: pytest.MonkeyPatch):
     """A wrong claim that slips in anywhere before the JSON ends as undecided, with a note."""
-    honest = certificate_document
 
-    def lying(certificate: Any, verdict: str, files: bool = False) -> tuple[Json, Any]:
-        data, written = honest(certificate, verdict, files)
-        rate = Fraction(data["rates"]["upper_bound"]) * 2
-        return resealed({**data, "rates": {**data["rates"], "proved": str(rate)}}), written
+    def lying(sections: Json, *others: Any) -> Any:
+        rate = Fraction(sections["rates"]["upper_bound"]) * 2
+        return record({**sections, "rates": {**sections["rates"], "proved": str(rate)}}, *others)
 
-    monkeypatch.setattr("ptcc_certify.certificate.certificate.certificate_document", lying)
+    monkeypatch.setattr("ptcc_certify.certificate.format.record", lying)
     cert = certify(load_graph("fig1a"), NOMINAL, simulation=False)
     assert cert.verdict == "undecided"
     assert "does not accept" in cert.notes[0] and "rates" in cert.notes[0]

@@ -57,7 +57,7 @@ FLOATS = {
     ("lmi/exact/decimal_rounding.py", "float_up"): "the float next to a number",
     ("lmi/exact/decimal_rounding.py", "_write"): "prints a number; the digits come from a Decimal",
     ("ptcc_certify/checker/__init__.py", "main"): "GB that are allowed",
-    ("ptcc_certify/checker/__init__.py", "read_and_check"): "tells the GB that were needed",
+    ("ptcc_certify/checker/__init__.py", "_report"): "tells the GB that were needed",
     ("ptcc_certify/checker/obligations.py", ""): "tells the GB that were needed",
     ("ptcc_certify/checker/reading.py", "number"): "JSON numbers of `unverified`, which nothing reads",
     ("ptcc_certify/checker/side_files.py", "column"): "side files of floats: finite",

@@ -22,7 +22,6 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from selection import thinned
 
 import ptcc_certify as ptcc
-from ptcc_certify.certificate import certificate as certificates
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.examples import load_graph
@@ -327,7 +326,7 @@ def test_nothing_is_called_certified_before_the_check(panel: Panel):
 
 def test_what_the_check_rejects_is_not_certified(explorer: Explorer, monkeypatch: pytest.MonkeyPatch):
     rejection = CheckReport(False, "undecided", (), "rate", "because this test says so", "none", "")
-    monkeypatch.setattr(certificates, "check", lambda *args, **options: rejection)
+    monkeypatch.setattr("ptcc_certify.certificate.format.record", lambda sections, *others: (sections, rejection))
     view = explorer.view(Settings(T=0.9))
     assert view.text.endswith("verdict    undecided: the independent check rejects rate; please report this graph")
     assert view.grade == "doubt"

@@ -167,15 +167,8 @@ class Effort:
 
     @property
     def obligations(self) -> list[Obligation]:
-        """What the independent check verifies, in its order."""
+        """What proves the bounds: obligations with numbers or a witness."""
         result = [Obligation("input-threshold", "input", witness=self.by)] if self.bounded is not None else []
-        result += [
-            Obligation("input-constants", f"lyapunov.functions[{k}]")
-            for k, c in enumerate(self.constants)
-            if c is not None
-        ]
-        if self.sliding is not None and self.sliding.agents is not None:
-            result.append(Obligation("input-sliding", "input"))
         if self.peak is not None:
             result.append(Obligation("input-peak", "input", {"z": self.peak.norm_how.z}, self.peak))
         for kind, bound in (("input-energy", self.energy), ("input-length", self.path_length)):
