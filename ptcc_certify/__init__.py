@@ -10,12 +10,13 @@ cert.save("certificate.json")
 The names at the top, by topic:
 
 - Graphs: ``SignedDigraph``, ``as_graph``, ``as_state``, ``read_graph``, ``write_graph``, ``analyse``, ``Structure``
-- Families of graphs: ``Family``, ``as_family``, ``read_family``, ``decide``
+- Families of graphs: ``Family``, ``as_family``, ``read_family``, ``decide``, ``DwellTime``, ``JointWindows``,
+  ``ClockShares``
 - Protocols, disturbances, actuators: ``Agents``, ``companion_form``, ``NominalProtocol``, ``SlidingModeProtocol``,
   ``ExpressionDisturbance``, ``SampledDisturbance``, ``StateDependent``, ``telegraph_noise``, ``GainLimits``,
   ``LateMessages``, ``MovingLeaders``
 - Runs: ``simulate``, ``simulate_family``, ``simulate_late``, ``simulate_tracking``, ``Trajectory``
-- Certificates: ``certify``, ``certify_vectors``, ``Certificate``, ``Expectations``, ``read_certificate``, ``check``
+- Certificates: ``certify``, ``Certificate``, ``Expectations``, ``read_certificate``, ``check``
 - Bounds and design: ``final_state``, ``influence``, ``formation_of_biases``, ``box``, ``ellipsoid``,
   ``worst_initial_state``, ``design``, ``design_agents``
 - Many graphs: ``Ensemble``, ``certify_many``
@@ -27,7 +28,7 @@ The names at the top, by topic:
 - Errors: ``PTCCError``
 
 Everything else is in the rooms of the package, which are loaded when they are named: ``ptcc.errors.GraphError``,
-``ptcc.theorems.lemmas.gauge``, ``ptcc.bounds.behaviours.is_stability``.
+``ptcc.theorems.lemmas.gauge``.
 
 .. [Zhu] Z.-H. Zhu, H. Wu, Z.-H. Guan, Z.-W. Liu, Y. Chen, X. Zheng: Robust prescribed-time coordination control of
    cooperative-antagonistic networks with disturbances, manuscript; ``ptcc cite`` prints the BibTeX entry.
@@ -39,7 +40,7 @@ from functools import cache
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
-from types import FunctionType, ModuleType
+from types import FunctionType
 from typing import Any
 
 _EXPORTS = {
@@ -56,6 +57,9 @@ _EXPORTS = {
     "as_family": "graphs.io",
     "read_family": "graphs.io",
     "decide": "theorems.family_behaviour",
+    "DwellTime": "theorems.restricted_signals",
+    "JointWindows": "theorems.restricted_signals",
+    "ClockShares": "theorems.restricted_signals",
     # Protocols, disturbances, actuators
     "Agents": "protocols.agents",
     "companion_form": "protocols.companion",
@@ -76,7 +80,6 @@ _EXPORTS = {
     "Trajectory": "simulation.trajectory",
     # Certificates
     "certify": "certificate.procedure",
-    "certify_vectors": "certificate.vector_states",
     "Certificate": "certificate.certificate",
     "Expectations": "certificate.request",
     "read_certificate": "certificate.certificate",
@@ -121,49 +124,6 @@ _EXPORTS = {
     "PTCCError": "errors",
 }
 __all__ = [*_EXPORTS, "__version__"]
-#: What others call a public name.
-_ALSO_CALLED = {
-    "analyze": "analyse",
-    "classify": "analyse",
-    "load_certificate": "read_certificate",
-    "plot_states": "plot_trajectory",
-    "load_graph": "as_graph",
-    "load": "read_certificate",
-    "verify": "check",
-    "plot": "plot_trajectory",
-    "compare": "certify_many",
-    "DiGraph": "SignedDigraph",
-    "Graph": "SignedDigraph",
-    "Protocol": "NominalProtocol",
-    # Rooms that are called like functions
-    "batch": "certify_many",
-    "certificate": "certify",
-    "checker": "check",
-    "examples": 'examples.EXAMPLES, or as_graph("fig1a")',
-    "gain_design": "design",
-    "graphs": "as_graph",
-    "protocols": "NominalProtocol",
-    "report": "write_report",
-    "simulation": "simulate",
-    "theorems": "analyse",
-}
-_ALSO_CALLED |= {name: f"theorems.restricted_signals.{name}" for name in ("DwellTime", "JointWindows", "ClockShares")}
-
-
-class Room(ModuleType):
-    """The package, or a module in it, which becomes one when it is loaded; called, it names what is meant."""
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        if type(value) is ModuleType and value.__name__ == f"{self.__name__}.{name}":
-            value.__class__ = Room
-        super().__setattr__(name, value)
-
-    def __call__(self, *_: Any, **__: Any) -> Any:
-        from ptcc_certify.errors import ParameterError
-
-        meant = _ALSO_CALLED.get(self.__name__.removeprefix(f"{__name__}."))
-        hint = f"; did you mean {meant}?" if meant else ""
-        raise ParameterError(f"{self.__name__} is a module, not a function{hint}")
 
 
 def modules_of(package: str) -> Callable[[str], Any]:
@@ -178,15 +138,8 @@ def modules_of(package: str) -> Callable[[str], Any]:
     def load(name: str) -> Any:
         if name.isidentifier() and not name.startswith("_") and find_spec(f"{package}.{name}") is not None:
             return import_module(f"{package}.{name}")
-        from ptcc_certify.errors import UnknownName, did_you_mean
+        raise AttributeError(f"module {package!r} has no attribute {name!r}", name=name, obj=sys.modules[package])
 
-        hint = ""
-        if package == __name__:
-            meant = _ALSO_CALLED.get(name)
-            hint = f"; did you mean {meant}?" if meant else did_you_mean(name, _EXPORTS)
-        raise UnknownName(f"module {package!r} has no attribute {name!r}{hint}")
-
-    sys.modules[package].__class__ = Room
     return load
 
 

@@ -124,10 +124,6 @@ class HypothesisError(PTCCError, ValueError):
     """
 
 
-class UnknownName(PTCCError, AttributeError):
-    """A room has no module, the package no public name, or an object no attribute, that is called so."""
-
-
 class SimulationError(PTCCError, RuntimeError):
     """The integrator failed; the message names the cause.
 
@@ -184,29 +180,9 @@ _PLACES = dict.fromkeys(("T", "rho1", "rho2", "kappa"), "NominalProtocol")
 _PLACES |= dict.fromkeys(("T_r", "T_s", "mu1", "mu2", "mu3"), "SlidingModeProtocol")
 _PLACES |= dict.fromkeys(("gain_cap", "stop_before", "sample_period"), "GainLimits")
 _PLACES |= dict.fromkeys(("behaviour", "min_rate", "max_input"), "Expectations")
-#: What a parameter is called elsewhere, on the command line for one.
-_ALSO_CALLED = {"edges": "orientation", "direction": "orientation", "initial_state": "x0", "t": "times"}
-_ALSO_CALLED |= {"expect": "expectations", "initial_bound": "initial_set"}
-
-#: How else an object of a class is made, from what one has at hand.
-_MAKERS = {"SignedDigraph": ", or SignedDigraph.from_edges([(source, target, weight), ...])"}
-_MAKERS |= dict.fromkeys(("certify", "certify_vectors"), ", such as ptcc.NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)")
-#: What is given at once, where one gives more.
-_AT_ONCE = {"switching": "give one list or dict of graphs"}
-#: What a check is asked for besides: the graph that a certificate should be about.
-_COMPARE = "it reads no graph: compare report.sha256 with as_graph(...).sha256, or use ptcc check CERT GRAPH"
-_AT_ONCE |= {"check": _COMPARE, "to_csv": "it returns the text: Path(path).write_text(run.to_csv())"}
-#: Restricted signals, by what may be taken for keywords of certify.
-_SIGNALS = dict.fromkeys(("dwell", "dwell_time", "clock_dwell"), "DwellTime(...)")
-_SIGNALS |= dict.fromkeys(("window", "windows", "clock_window", "window_on"), "JointWindows(...)")
-_SIGNALS |= dict.fromkeys(("share", "shares"), "ClockShares(...)")
-#: How to ask a function for what it has no parameter for.
-_INSTEAD = {("design", "shortest_deadline"): "leave deadline out, and the shortest is sought"}
-_INSTEAD |= {("certify", "seed"): "give x0=ptcc_certify.graphs.io.random_states(seed, n)"}
+_PLACES |= dict.fromkeys(("delay", "own_delay", "period", "losses", "value_error"), "LateMessages")
 #: How many parameters are listed.
 _FEW = 12
-#: What is said of messages.
-_MESSAGES = ("delay", "own_delay", "period", "losses", "value_error")
 
 
 def gated(called: Called) -> Called:
@@ -249,12 +225,9 @@ def _misfit(called: Any, signature: inspect.Signature, args: tuple[Any, ...], ke
     required = [key for key, one in parameters.items() if one.default is one.empty and one.kind is not one.VAR_KEYWORD]
     if missing := [key for key in required if key not in given and key not in keywords]:
         call = [f"{key}=..." if parameters[key].kind is inspect.Parameter.KEYWORD_ONLY else key for key in required]
-        also = _MAKERS.get(name, "") if name == "SignedDigraph" or "protocol" in missing else ""
-        return f"{name} asks for {', '.join(missing)}; write {name}({', '.join(call)}){also}"
-    certify = f"write {name}(certify(graph, protocol, x0)), and " if name.startswith("plot_") else "write "
-    mend = _AT_ONCE.get(name, f"{certify}any other as name=value")
-    once = ", each once" * bool(keywords.keys() & set(given))
-    return f"{name} takes {', '.join(places) or 'nothing'} without a name{once}; {mend}"
+        return f"{name} asks for {', '.join(missing)}; write {name}({', '.join(call)})"
+    once = ", each once" if keywords.keys() & set(given) else ""
+    return f"{name} takes {', '.join(places) or 'nothing'} without a name{once}; write any other as name=value"
 
 
 def unknown_parameter(name: str, unknown: str, parameters: Iterable[str]) -> str:
@@ -262,25 +235,13 @@ def unknown_parameter(name: str, unknown: str, parameters: Iterable[str]) -> str
 
     Examples
     --------
-    >>> unknown_parameter("certify", "dwell", ["graph", "delta", "signal"])
-    'certify has no parameter dwell; say signal=DwellTime(...) of ptcc_certify.theorems.restricted_signals'
+    >>> unknown_parameter("certify", "rho1", ["graph", "protocol", "x0"])
+    'certify has no parameter rho1; give it to NominalProtocol(rho1=...)'
     """
     parameters = list(parameters)
     listed = f"it has {', '.join(parameters)}" if len(parameters) <= _FEW else f"help({name}) lists what it has"
     hint = did_you_mean(unknown, parameters) or f"; {listed}"
-    if (meant := _ALSO_CALLED.get(unknown)) in parameters:
-        hint = f"; did you mean {meant}?"
-    elif "signal" in parameters and (signal := _SIGNALS.get(unknown)):
-        hint = f"; say signal={signal} of ptcc_certify.theorems.restricted_signals"
-    elif "messages" in parameters and unknown in _MESSAGES:
-        hint = f"; say messages=LateMessages({unknown}=...)"
-    elif (name, unknown) in _INSTEAD:
-        hint = f"; {_INSTEAD[name, unknown]}"
-    elif unknown == "optional" and "uncertainty" in parameters:
-        hint = "; an edge that may fail has 0 at one end: Family.from_intervals([(source, target, 0, weight), ...])"
-    elif name == "check" and unknown in ("graph", "family"):
-        hint = f"; {_COMPARE}"
-    elif (place := _PLACES.get(unknown)) and name not in _PLACES.values():
+    if (place := _PLACES.get(unknown)) and name not in _PLACES.values():
         hint = f"; give it to {place}({unknown}=...)"
     return f"{name} has no parameter {unknown}{hint}"
 

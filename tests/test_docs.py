@@ -51,13 +51,6 @@ IN_ROOMS = {
     "protocols.reaching_time": ("ReachingTime", "certified_reaching_times"),
     "simulation.trajectory": ("SlidingTrajectory",),
     "bounds.final_state": ("FinalState", "Influence"),
-    "bounds.behaviours": (
-        "is_prescribed_time_stable",
-        "is_stability",
-        "is_bipartite_consensus",
-        "is_interval_bipartite_consensus",
-        "is_bipartite_containment",
-    ),
     "bounds.envelope": ("Envelope", "Comparison"),
     "bounds.sliding_envelope": ("SlidingEnvelope",),
     "bounds.input.effort": ("Effort",),

@@ -5,11 +5,9 @@ with limits of actuators, a student, and a reviewer.
 """
 
 import copy
-import re
 from contextlib import nullcontext
 from fractions import Fraction
 from io import StringIO
-from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +17,6 @@ from scipy import sparse
 
 import ptcc_certify as ptcc
 from ptcc_certify.errors import PTCCError
-from ptcc_certify.graphs.other_names import ITS
 
 #: What is typed, and a part of what is shown: of a refusal, its class and beginning, or "... " and a part.
 CONTROL_RESEARCHER = {
@@ -44,8 +41,7 @@ CONTROL_RESEARCHER = {
     "ptcc.simulate(g, p, None)": "ParameterError: the initial state x0 is missing; give one number for each of ann",
     "ptcc.simulate(g, 0.6, x0)": "ParameterError: protocol = 0.6 is none; give NominalProtocol(",
     "ptcc.simulate(g, p, x0, sigma0=[1, 1, 1])": "ParameterError: sigma0 belongs to the sliding-mode protocol",
-    "ptcc.certify_vectors(g, p, [[5, 1], [2, 0], [-4, 2]], **fast)": "VectorCertificate(2 components",
-    "ptcc.certify(g, p, [[5, 1], [2, 0], [-4, 2]])": "... certify vectors by certify_vectors(graph, protocol, x0)",
+    "ptcc.certify(g, p, [[5, 1], [2, 0], [-4, 2]])": "... each coordinate has a certificate of its own",
     "ptcc.NominalProtocol(T='1e500')": 'ParameterError: T: the exponent of "1e500" is beyond 400',
     "cert.rate > 0": "True",
     "cert.norm_bound([0.1]) < cert.norm_bound([1.0])": "True",
@@ -53,7 +49,6 @@ CONTROL_RESEARCHER = {
     "p.gain(0.5)": "5.0",
     "ptcc.as_graph([['0', '-0.3'], ['1/3', '0']], 'listens').edges[0][2]": "-3/10",
     "ptcc.as_graph(np.array([['0', 'x'], ['1', '0']]), 'listens')": 'GraphError: row 1, column 2 of the matrix: "x" is',
-    "ptcc.report(cert, 'r.tex')": "ParameterError: ptcc_certify.report is a module, not a function; did you mean wri",
     "cert.report()": "... for a page or LaTeX: write_report(certificate, path)",
     "repr(cert.theorem)": "Theorem(2.1: Quasi-strongly connected",
     "repr(cert.effort)": "Effort(bounded, |u_k| <= 43.98",
@@ -68,8 +63,6 @@ CONTROL_RESEARCHER = {
 NETWORK_SCIENTIST = {
     "ptcc.certify(G, p, **fast)": "Certificate(bipartite consensus",
     "ptcc.analyse(G)": "Structure(3 nodes, quasi-strong, 1 closed component,",
-    "ptcc.analyze(G)": "... UnknownName: module 'ptcc_certify' has no attribute 'analyze'; did you mean analyse?",
-    "ptcc.classify(G)": "... did you mean analyse?",
     "ptcc.analyse(G).to_pandas().loc['bob'].astype(str).tolist()": "['leader', '1', '-1', '1']",
     "ptcc.analyse(G).to_pandas().loc['eve', 'role']": "follower",
     "ptcc.influence(G).to_pandas().loc['eve', 'ann']": "-0.666",
@@ -195,50 +188,37 @@ MISTAKES = {
     "ptcc.certify(G, p, x0, gain_cap=50)": "ParameterError: certify has no parameter gain_cap; give it to GainLimits(",
     "ptcc.certify(G, p, x0, min_rate=1)": "... give it to Expectations(min_rate=...)",
     "ptcc.certify(G, p, x_0=x0)": "ParameterError: certify has no parameter x_0; did you mean x0?",
-    "ptcc.certify(G, p, initial_state=x0)": "ParameterError: certify has no parameter initial_state; did you mean x0?",
     "ptcc.certify(G, p, x0, 'listens')": "ParameterError: certify takes graph, protocol, x0 without a name; write any",
     "ptcc.certify(G, p, x0, x0=x0)": "ParameterError: certify takes graph, protocol, x0 without a name, each once",
-    "ptcc.certify(G)": "ParameterError: certify asks for protocol; write certify(graph, protocol), such as ptcc.Nom",
+    "ptcc.certify(G)": "ParameterError: certify asks for protocol; write certify(graph, protocol)",
     "ptcc.certify(G, p, progress=None, **fast)": "Certificate(bipartite consensus",
     "ptcc.certify(G, p, progress=True, **fast)": "ParameterError: progress = True is no function; give print, say",
     "ptcc.certify(G, p, scenario='s.toml')": "ParameterError: scenario = 's.toml' is none; give the mapping that",
-    "ptcc.certify_vectors(G, p, [[5, 1], [2, 0], [-4, 2]], columns=2)": "... certify has no parameter columns; help(",
     "ptcc.certify_many(G, p, methd='perron')": "ParameterError: certify_many has no parameter methd; did you mean meth",
     "ptcc.certify_many(G, p, uncertainty='20%')": "ParameterError: certify_many has no parameter uncertainty, which ma",
-    "ptcc.certify(G, p, dwell=0.5)": "ParameterError: certify has no parameter dwell; say signal=DwellTime(...) of ptc",
     "ptcc.certify(pd.DataFrame({'from': list('aa'), 'to': list('aa'), 'w': 1}), p)": '... df[df["from"] != df["to"]]',
     "ptcc.certify([('a', 'a', 1), ('b', 'b', 1)], p)": "GraphError: self-loop at node a (2 in all); remove them",
-    "ptcc.SignedDigraph([('a', 'b', 1)])": "... weights), or SignedDigraph.from_edges([(source, target, weight), ...])",
     "ptcc.certify(p, G)": "ParameterError: graph and protocol are exchanged; write certify(graph, protocol)",
     "ptcc.theorems.restricted_signals.DwellTime(0.5)": "DwellTime(0.5, clock='t')",
     "ptcc.theorems.restricted_signals.JointWindows(2, on=0.5)": "JointWindows(2, on=0.5, clock='s')",
-    "ptcc.DwellTime(0.5)": "... no attribute 'DwellTime'; did you mean theorems.restricted_signals.DwellTime?",
-    "ptcc.JointWindows": "... did you mean theorems.restricted_signals.JointWindows?",
-    "ptcc.ClockShares": "... did you mean theorems.restricted_signals.ClockShares?",
-    "ptcc.certify(G, p, optional=[('ann', 'bob')])": "... 0 at one end: Family.from_intervals([(source, target, 0, wei",
+    "ptcc.DwellTime(0.5)": "DwellTime(0.5, clock='t')",
     "ptcc.certify({'ann': ['bob'], 'bob': ['eve']}, p)": "... a dict is a family of graphs by name; give the edges",
     "ptcc.certify({'ann': {'bob': 1}}, p)": "... a dict is a family of graphs by name; give the edges",
-    "ptcc.certify(G, p, shares=[1])": "ParameterError: certify has no parameter shares; say signal=ClockShares(...) of",
-    "ptcc.certify(G, p, clock_window=1)": "ParameterError: certify has no parameter clock_window; say signal=JointWin",
     "ptcc.certify_many(G, p, output=5)": "FormatError: 5 names no file; give a path",
     "ptcc.certify_many(G, p, progress=None, method='perron')[0]['nodes']": "3",
-    "ptcc.read_graph('x.csv', edges='listens')": "ParameterError: read_graph has no parameter edges; did you mean orie",
+    "ptcc.read_graph('x.csv', edges='listens')": "ParameterError: read_graph has no parameter edges; ",
     "ptcc.read_graph('x.csv', sep=';')": "ParameterError: read_graph has no parameter sep; it has path, orientation, ",
     "ptcc.read_graph()": "ParameterError: read_graph asks for path; write read_graph(path)",
     "ptcc.read_graph(G)": "... a DiGraph is no file; ptcc_certify.as_graph takes other data",
     "ptcc.read_graph('fig1a')": "FormatError: fig1a: no such file; ptcc_certify.as_graph takes the packaged graph",
     "ptcc.SignedDigraph.from_edges(df)": "... is not a triple (source, target, weight); as_graph takes tables",
-    "ptcc.certify(G, p, 'random', seed=3)": "... no parameter seed; give x0=ptcc_certify.graphs.io.random_states(seed",
     "ptcc.certify(G, p, ptcc.graphs.io.random_states(3, 3), **fast)": "Certificate(bipartite consensus",
     "ptcc.certify(G, p, colour='red')": "ParameterError: certify has no parameter colour; help(certify) lists what",
-    "ptcc.design(G, max_input=9, initial_bound=1, shortest_deadline=True)": "... leave deadline out, and the shortest",
-    "ptcc.plot_decay(G, p, x0)": "... without a name; write plot_decay(certify(graph, protocol, x0)), and any other",
+    "ptcc.plot_decay(G, p, x0)": "... without a name; write any other as name=value",
     "ptcc.plot_decay(G)": "... not from DiGraph; give certify(graph, protocol, x0)",
     "ptcc.write_report(g, 'c.html')": "... is a graph, no certificate; give certify(graph, protocol, x0)",
     "ptcc.read_certificate(G)": "... is a graph, no certificate; give certify(graph, protocol, x0)",
-    "ptcc.plot_states": "... did you mean plot_trajectory?",
     "ptcc.simulate(G, p)": "ParameterError: simulate asks for x0; write simulate(graph, protocol, x0)",
-    "ptcc.simulate(G, p, x0, t=[0, 1])": "ParameterError: simulate has no parameter t; did you mean times?",
     "ptcc.simulate(G, p, x0, samples='many')": "ParameterError: samples = many is outside its domain; it must be an",
     "ptcc.simulate(G, p, x0, past=None)": "ParameterError: past = None is outside its domain; it must be a number from",
     "cert.simulate(sample=5)": "ParameterError: simulate has no parameter sample; did you mean samples?",
@@ -260,8 +240,7 @@ MISTAKES = {
     "ptcc.final_state(G, x0, matrix=ptcc.influence('fig1a'))": "ParameterError: matrix is not the influence of this",
     "ptcc.explore(G, p)": "ParameterError: settings = NominalProtocol(T=1, rho1=1, rho2=2, kap... is none; give",
     "ptcc.check(cert, memory='1 GB')": "ParameterError: memory in GB = 1 GB is outside its domain",
-    "ptcc.check(cert, 'team.csv')": "... compare report.sha256 with as_graph(...).sha256, or use ptcc check CERT GRAPH",
-    "ptcc.check(cert, graph='team.csv')": "ParameterError: check has no parameter graph; it reads no graph: compare",
+    "ptcc.check(cert, 'team.csv')": "ParameterError: check takes source without a name",
     "ptcc.write_report(cert, 'c.html', title='Team')": "ParameterError: write_report has no parameter title; it has",
     "ptcc.analyse(G).holds('peace')": 'ParameterError: unknown behaviour "peace"; one of stability',
     "ptcc.SignedDigraph([('ann', 'bob', 1)])": "ParameterError: SignedDigraph asks for source, target, weights; write",
@@ -283,7 +262,7 @@ FAMILIES = {
     "ptcc.Family.switching([day, day]), ptcc.Family.switching({'on': g, 'off': g})": "Family(3 nodes, 2 modes)",
     "ptcc.Family.switching({'day': edges, 'night': edges})": "GraphError: mode day: [('ann', 'bob', -2), ('bob', 'ann'",
     "ptcc.Family.switching([edges, edges])": '... SignedDigraph; ptcc_certify.as_family({"day": edges, "night": edg',
-    "ptcc.Family.switching(g, g)": "... switching takes modes without a name; give one list or dict of graphs",
+    "ptcc.Family.switching(g, g)": "... switching takes modes without a name; write any other as name=value",
     "ptcc.Family.switching(modes=[day])": "Family(2 nodes",
     "ptcc.certify([edges, edges], p)": '... a dict, {"day": edges, "night": edges2}',
     "ptcc.certify([edges, edges, edges], p)": '... a dict, {"day": edges, "night": edges2}',
@@ -315,61 +294,7 @@ FAMILIES = {
     "ptcc.decide(day)[0].plot()": "ParameterError: the component has no counterexample",
     "ptcc.analyse(day)": "GraphError: Family(2 nodes, 1 of 2 weights uncertain) is several graphs",
 }
-#: Not there; the refusal says where it is.
-ELSEWHERE = {
-    "g.plot()": "... UnknownName: SignedDigraph has no attribute 'plot'; draw it with ptcc_certify.plot_graph",
-    "g.nodes": "... UnknownName: SignedDigraph has no attribute 'nodes'; see its labels",
-    "g.add_edge('ann', 'eve', 1)": "... UnknownName: SignedDigraph has no attribute 'add_edge'; it stays as it is",
-    "g.lables": "... did you mean labels",
-    "ptcc.analyse(g).camps": "... UnknownName: Structure has no attribute 'camps'; gauge holds the camp",
-    "cert.T": "... UnknownName: Certificate has no attribute 'T'; see its protocol",
-    "cert.error(1)": "... UnknownName: Certificate has no attribute 'error'; norm_bound(q) bounds ||E(t)||",
-    "cert.check()": "... UnknownName: Certificate has no attribute 'check'; write ptcc_certify.check(certificate)",
-    "cert.trajectory.animate()": "... UnknownName: Trajectory has no attribute 'animate'; there are no animations",
-    "hasattr(g, 'nodes'), hasattr(g, '_ipython_display_'), copy.copy(g) == g": "(False, False, True)",
-    "ptcc.load('c.json')": "... did you mean read_certificate?",
-    "ptcc.batch('e.toml')": "... is a module, not a function; did you mean certify_many?",
-    "ptcc.examples.EXAMPLES and ptcc.examples()": '... did you mean examples.EXAMPLES, or as_graph("fig1a")?',
-    "ptcc.simulation(g, p, x0)": "... did you mean simulate?",
-    "ptcc.protocols()": "... did you mean NominalProtocol?",
-    "ptcc.checker('c.json')": "... did you mean check?",
-    "ptcc.errors()": "ParameterError: ptcc_certify.errors is a module, not a function",
-    "ptcc.read_certificate('c.json').report('x.html')": "... a CheckReport is no function; for a page or LaTeX: write_",
-    "cert.checked.save('x.json')": "... CheckReport has no attribute 'save'; see its to_dict()",
-    "ptcc.SignedDigraph.from_pandas(df)": "... the class SignedDigraph has no attribute 'from_pandas'; make one with",
-    "ptcc.SignedDigraph.from_file('g.csv')": "... as_graph(data), read_graph(path) or SignedDigraph.from_edges(edges)",
-    "ptcc.Certificate.load('c.json')": "... make one with certify(graph, protocol, x0) or read_certificate(path)",
-    "ptcc.NominalProtocol.from_file('p.toml')": "... 'from_file'; make one with NominalProtocol(T, rho1, rho2, kappa)",
-    "ptcc.Ensemble.from_csv('g.csv')": "... make one with Ensemble(count, nodes, seed",
-    "ptcc.Expectations.load('e.toml')": "... make one with Expectations(behaviour, min_rate, max_input, max_residual)",
-    "ptcc.LateMessages.from_dict({})": "... make one with LateMessages(delay, period,",
-    "ptcc.GainLimits.load('l.toml')": "... make one with GainLimits(gain_cap, stop_before, sample_period)",
-    "ptcc.Agents.load('a.toml')": "... make one with Agents(order, plant,",
-    "ptcc.MovingLeaders.load('m.toml')": "... make one with MovingLeaders(speed, disturbance, sign_gain)",
-    "ptcc.SampledDisturbance.from_csv('d.csv')": "... make one with SampledDisturbance(times, samples, hold, text)",
-    "p.deadline": "... UnknownName: NominalProtocol has no attribute 'deadline'; see its T",
-    "p['T']": "... a NominalProtocol has no ['T']; its parts are attributes",
-    "p.kapa": "... did you mean kappa?",
-    "ptcc.Structure.from_graph(g)": "... make one with analyse(graph)",
-    "cert.final_state.to_dict()": "... FinalState has no attribute 'to_dict'; see its items(): dict(final_state)",
-    "g['ann']": "... a SignedDigraph has no ['ann']; its edges are graph.edges, and graph.to_networkx()[label] tells",
-    "g[0]": "... a SignedDigraph has no [0]; its edges are graph.edges",
-    "cert['verdict']": "... a Certificate has no ['verdict']; its parts are attributes, or to_dict() as JSON",
-    "ptcc.analyse(g)['leaders']": "... a Structure has no ['leaders']; its parts are attributes",
-    "cert.envelope(0.5)": "... an Envelope is no function: norm_bound(q, x0) bounds ||E(t)||",
-    "cert.behaviour": "... UnknownName: Certificate has no attribute 'behaviour'; see its claim.behaviour",
-    "cert.deadline": "... see its protocol.T",
-    "cert.x0": "... see its initial_state",
-    "cert.certified": "... see its verdict",
-    "cert.peak_input": "... see its effort.peak.agents",
-    "cert.input": "... see its effort",
-    "cert.bound": "... see its norm_bound(q) of ||E(t)|| at q = 1 - t/T",
-    "cert.to_networkx()": "... see its graph.to_networkx()",
-    "ptcc.analyse(g).to_networkx()": "... see its graph.to_networkx()",
-    "cert.trajectory.to_csv('x.csv')": "... it returns the text: Path(path).write_text(run.to_csv())",
-    "ptcc.certify(day, p).deadline": "... FamilyCertificate has no attribute 'deadline'; see its protocol.T",
-}
-CALLS = CONTROL_RESEARCHER | NETWORK_SCIENTIST | ENGINEER | STUDENT | REVIEWER | MISTAKES | FAMILIES | ELSEWHERE
+CALLS = CONTROL_RESEARCHER | NETWORK_SCIENTIST | ENGINEER | STUDENT | REVIEWER | MISTAKES | FAMILIES
 
 
 @pytest.fixture(scope="module")
@@ -419,14 +344,3 @@ def test_a_natural_call_gives_a_result_or_one_line_that_names_the_mend(call, nam
         shown = f"{caught.type.__name__}: {caught.value}"
         assert "\n" not in shown
     assert CALLS[call].removeprefix("... ") in shown
-
-
-def test_where_an_object_is_said_to_have_something_it_is(names):
-    cert = names["cert"]
-    objects = [cert, cert.structure, cert.graph, cert.trajectory, cert.final_state, cert.checked]
-    objects += [ptcc.certify(names["day"], names["p"]), names["p"], names["robust"]]
-    assert {type(one).__name__ for one in objects} == ITS.keys()
-    for one in objects:
-        for name, place in ITS[type(one).__name__].items():
-            assert name not in dir(one)
-            attrgetter(re.match(r"[\w.]+", place)[0])(one)

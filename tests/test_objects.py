@@ -229,50 +229,6 @@ def test_a_protocol_has_the_defaults_of_the_command_line():
         assert protocol_of(context.params | {"kind": kind}) == protocol
 
 
-def test_vector_valued_states_have_one_certificate_for_each_component(tmp_path):
-    x0 = [[5, 1], [2, 0], [-4, 2]]
-    protocol = PROTOCOL.replace(rho2=2)
-    certs = ptcc.certify_vectors(TEAM, protocol, x0, method="perron", simulation=False)
-    run = ptcc.simulate(TEAM, protocol, x0)
-    assert len(certs) == 2 and certs.verdict == "certified"
-    assert np.abs(run.final_state - certs.final_state).max() < 1e-6
-    assert not certs.compare(run).violated
-    for name in ("c.json", "c"):
-        paths = certs.save(tmp_path / name)
-        assert [path.name for path in paths] == ["c.1.json", "c.2.json"] and all(ptcc.check(p).accepted for p in paths)
-    for none in (5, "", "/"):
-        with pytest.raises(FormatError, match="names no file"):
-            certs.save(none)
-    before = run.remaining > 0
-    norm = np.linalg.norm(run.error, axis=(0, 1))[before]
-    assert (norm <= certs.norm_bound(run.remaining[before]) + 1e-9).all()
-    gap = np.linalg.norm(run.states - run.final_state[..., None], axis=1)[:, before]
-    assert (gap <= certs.deviation_bound(run.remaining[before]) + 1e-6).all()
-    assert (np.linalg.norm(run.input, axis=1)[:, before] <= certs.peak_input[:, None] + 1e-6).all()
-
-
-def test_the_peak_input_of_vectors_counts_disturbances_and_is_never_rounded_down():
-    fast = {"method": "perron", "simulation": False}
-    protocol = PROTOCOL.replace(rho2=2)
-    calm = ptcc.certify_vectors(TEAM, protocol, [[5, 1], [2, 0], [-4, 2]], **fast).peak_input
-    assert (ptcc.certify_vectors(TEAM, protocol, [[5, 1], [2, 0], [-4, 2]], delta=1, **fast).peak_input > calm).all()
-    tiny = ptcc.certify_vectors(TEAM, protocol, [["1e-399", 0], [0, 0], [0, 0]], **fast).peak_input
-    assert tiny.max() > 0
-    limits = ptcc.GainLimits(gain_cap=50)
-    assert ptcc.certify_vectors(TEAM, protocol, [[5, 1], [2, 0], [-4, 2]], limits=limits, **fast).peak_input is None
-
-
-def test_a_certificate_of_vector_valued_states_is_refused_with_the_mend():
-    with pytest.raises(ParameterError, match="certify_vectors"):
+def test_vector_valued_states_are_refused_with_the_mend():
+    with pytest.raises(ParameterError, match="each coordinate has a certificate of its own"):
         ptcc.certify(TEAM, PROTOCOL, [[5, 1], [2, 0], [-4, 2]])
-    with pytest.raises(ParameterError, match="as many of each"):
-        ptcc.certify_vectors(TEAM, ROBUST, [[5, 1], [2, 0], [-4, 2]], sigma0=[1, 0, 1])
-
-
-def test_a_norm_of_tiny_or_huge_bounds_is_not_below_them():
-    from ptcc_certify.certificate.vector_states import _norm
-
-    assert _norm([np.array([5e-324]), np.array([5e-324])]) > 5e-324
-    for size in (1e-300, 1.0, 1e200):
-        assert (_norm([np.array([3 * size]), np.array([4 * size])]) >= 5 * size).all()
-    assert _norm([np.array([np.inf]), np.array([1.0])]) == np.inf and _norm([np.zeros(1), np.zeros(1)]) == 0

@@ -20,12 +20,12 @@ ROOMS = {
     ),
     "certificate": (
         "Certificates",
-        "certificate.certificate certificate.request certificate.verdict certificate.vector_states",
+        "certificate.certificate certificate.request certificate.verdict",
     ),
     "checker": ("The independent check", "certificate.checking checker"),
     "bounds": (
         "Bounds: error, final state, input",
-        "bounds.envelope bounds.sliding_envelope bounds.final_state bounds.behaviours bounds.input.effort "
+        "bounds.envelope bounds.sliding_envelope bounds.final_state bounds.input.effort "
         "bounds.input.initial_set bounds.input.worst_initial_state",
     ),
     "simulation": ("Simulation", "simulation.trajectory"),

@@ -29,7 +29,6 @@ from lmi.errors import LMIError
 from lmi.sparse_h_matrix import SparseHMatrix, solve
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.io import as_state
-from ptcc_certify.graphs.other_names import Hinted
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.structure import ClosedComponent, Structure, analyse
 from ptcc_certify.graphs.tables import import_pandas, position, series
@@ -295,7 +294,7 @@ def influence(graph: Any, *, exact: bool | None = None, orientation: str | None 
 
 
 @dataclass(frozen=True)
-class FinalState(Mapping[str, Number], Hinted):
+class FinalState(Mapping[str, Number]):
     """The state at the deadline and after: a mapping from labels to states; ``numpy.asarray`` rounds it to floats.
 
     Attributes

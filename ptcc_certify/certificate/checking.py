@@ -12,38 +12,17 @@ from collections.abc import Mapping
 from typing import Any
 
 from ptcc_certify import checker
-from ptcc_certify.errors import FormatError, ParameterError
+from ptcc_certify.checker import CheckReport
+from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.kinds_of_file import refuse_as_certificate
-from ptcc_certify.graphs.other_names import Hinted
 from ptcc_certify.graphs.rationals import number_within, shorten
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure
 
 #: GB that the check of a large graph may take while it is certified.
 LARGE_MEMORY = 16
-
-
-class CheckReport(Hinted, checker.CheckReport):
-    """The report of the independent check, which says where something is that it does not have.
-
-    Examples
-    --------
-    >>> certify("fig1a", NominalProtocol()).checked("page.html")
-    Traceback (most recent call last):
-    ptcc_certify.errors.ParameterError: a CheckReport is no function; for a page or LaTeX: write_report(certificate, ...
-    """
-
-    def __eq__(self, other: object) -> bool:
-        """Tell whether another report, of this class or of the check's own, says the same."""
-        return isinstance(other, checker.CheckReport) and vars(self) == vars(other)
-
-    __hash__ = checker.CheckReport.__hash__
-
-    def __call__(self, *_: Any, **__: Any) -> Any:
-        """Refuse to be called, as ``certificate.report("page.html")``."""
-        raise ParameterError("a CheckReport is no function; for a page or LaTeX: write_report(certificate, path)")
 
 
 def check(
@@ -111,7 +90,7 @@ def read_and_check(source: Any, **options: Any) -> tuple[dict[str, Any], CheckRe
     if not isinstance(source, Mapping) and re.fullmatch(r"side file \S+ cannot be read", report.reason or ""):
         mend = "ask the sender for all files beside it"
         raise FormatError(f"{shorten(os.fspath(source), 200)}: incomplete: {report.reason}; {mend}")
-    return document, CheckReport(**vars(report))
+    return document, report
 
 
 def record(
@@ -123,7 +102,7 @@ def record(
     """Lay down the proof of a certificate while it is checked; see :func:`ptcc_certify.checker.record`."""
     memory = 1 if n_nodes <= EXACT_NODES else LARGE_MEMORY
     document, report = checker.record(sections, given, files=files, memory=memory)
-    return document, CheckReport(**vars(report))
+    return document, report
 
 
 def refuse_no_certificate(source: Any) -> None:

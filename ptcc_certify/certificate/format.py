@@ -15,11 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from ptcc_certify import checker
 from ptcc_certify.bounds.envelope import FRACTIONS, LAST_INSTANTS
 from ptcc_certify.bounds.input.effort import EnergyIntegral, Peak
 from ptcc_certify.certificate.certificate_data import Content, Observations, Source
-from ptcc_certify.certificate.checking import CheckReport, record
+from ptcc_certify.certificate.checking import record
 from ptcc_certify.certificate.format_agents import agents_section, read_agents
 from ptcc_certify.certificate.format_effort import LIMITS, effort_section, energy_witness, peak_witness, read_effort
 from ptcc_certify.certificate.format_final_state import final_state_sections, read_final_state
@@ -36,7 +35,7 @@ from ptcc_certify.certificate.format_vectors import (
     text,
 )
 from ptcc_certify.certificate.request import Expectations, Request
-from ptcc_certify.checker import SCHEMA, SLIDING_BOUND, SLIDING_CLOCK
+from ptcc_certify.checker import SCHEMA, SLIDING_BOUND, SLIDING_CLOCK, CheckReport
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
 from ptcc_certify.checker.reading import RejectedError, exact, triangle
 from ptcc_certify.errors import one_line
@@ -98,7 +97,7 @@ def certificate_document(
 
 
 def read_document(
-    path: Path, document: Mapping[str, Any], sha256: str, report: checker.CheckReport, files: Mapping[str, bytes]
+    path: Path, document: Mapping[str, Any], sha256: str, report: CheckReport, files: Mapping[str, bytes]
 ) -> dict[str, Any]:
     """Return the fields of a certificate that was accepted; the structure is computed anew from the edges."""
     graph = certificate_graph(document, files)

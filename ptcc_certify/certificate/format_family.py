@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from lmi.exact.elementary_enclosures import rounded
-from ptcc_certify.certificate.checking import CheckReport, record
+from ptcc_certify.certificate.checking import record
 from ptcc_certify.certificate.family_content import FamilyContent
 from ptcc_certify.certificate.format import producer, protocol_section, reaching_section
 from ptcc_certify.certificate.format_family_rows import (
@@ -29,7 +29,7 @@ from ptcc_certify.certificate.format_restricted import claim_entry, claim_steps,
 from ptcc_certify.certificate.format_upper_bound import upper_bound_entry
 from ptcc_certify.certificate.format_vectors import Writer
 from ptcc_certify.certificate.restricted_claims import Claim
-from ptcc_certify.checker import NOT_OF_FAMILIES, SCHEMA
+from ptcc_certify.checker import NOT_OF_FAMILIES, SCHEMA, CheckReport
 from ptcc_certify.checker.family import THEOREM
 from ptcc_certify.checker.family_limits import EQUAL
 from ptcc_certify.checker.reading import exact

@@ -18,7 +18,6 @@ from ptcc_certify.checker.input_formulas import InitialSet, Limits
 from ptcc_certify.errors import NumberError, ParameterError, gated
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import as_state
-from ptcc_certify.graphs.other_names import Hinted, HintedClass
 from ptcc_certify.graphs.rationals import as_fraction, shorten, writable
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure, behaviour_name
@@ -38,7 +37,7 @@ LONGEST_BITS = 470_000
 
 @gated
 @dataclass(frozen=True)
-class Expectations(Hinted, metaclass=HintedClass):
+class Expectations:
     """What is asked of a certificate besides.
 
     Attributes

@@ -22,7 +22,6 @@ from ptcc_certify.cli import (
     certify,
     check_and_report,
     classify,
-    completion,
     design,
     examples_and_cite,
     explore,
@@ -65,7 +64,6 @@ GROUPS = {
         examples_and_cite.examples: "Run the paper's examples, figures included.",
         explore.explore: "Try graph, deadline and gains in a browser.",
         examples_and_cite.cite: "Print BibTeX of the theorem used.",
-        completion.completion: "Complete names with TAB in bash, zsh or fish.",
     },
 }
 

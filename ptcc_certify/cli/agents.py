@@ -139,9 +139,7 @@ def refuse_dimension(options: Options, command: str) -> None:
     """Refuse vectors where there are no agents of order n."""
     if options["dimension"] not in (None, 1) and agents_of(options) is None:
         why = f"ptcc {command} takes single integrators of one component"
-        mend = (
-            "what is proved of one holds for each: leave it out, or use certify_vectors(graph, protocol, x0) in Python"
-        )
+        mend = "what is proved of one holds for each: leave it out, and give one coordinate"
         raise ParameterError(f"--dimension: {why}; {mend}")
 
 

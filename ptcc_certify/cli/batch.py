@@ -11,7 +11,6 @@ from typing import Any
 import click
 
 from ptcc_certify.cli import options as shared
-from ptcc_certify.cli.completion import GRAPHS, PACKAGED, complete
 from ptcc_certify.cli.options import READING
 from ptcc_certify.cli.terminal import counting, print_lines
 from ptcc_certify.errors import ExitCode, ParameterError
@@ -30,9 +29,7 @@ def _refuse_scenarios(context: click.Context, parameter: click.Parameter, patter
 
 
 @click.command()
-@click.argument(
-    "pattern", nargs=-1, required=True, callback=_refuse_scenarios, shell_complete=complete(GRAPHS, PACKAGED)
-)
+@click.argument("pattern", nargs=-1, required=True, callback=_refuse_scenarios, type=click.Path())
 @shared.reading_options
 @shared.protocol_options
 @shared.expect_option("E.g. stability; exit code 3 if it does not follow for some graph.")

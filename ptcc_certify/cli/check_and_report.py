@@ -11,7 +11,6 @@ import click
 from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
-from ptcc_certify.cli.completion import GRAPHS, PACKAGED, complete
 from ptcc_certify.cli.families import family_of_files, mode_options, same_family
 from ptcc_certify.cli.terminal import Screen, print_json, print_lines, progress, screen_options
 from ptcc_certify.errors import ExitCode, ParameterError
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @shared.certificate_argument
-@click.argument("graph", nargs=-1, shell_complete=complete(GRAPHS, PACKAGED))
+@click.argument("graph", nargs=-1, type=click.Path())
 @shared.reading_options
 @mode_options
 @click.option("--stdlib", is_flag=True, help="Use the standard library alone, even where python-flint is installed.")

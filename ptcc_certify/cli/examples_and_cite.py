@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ptcc_certify.cli.completion import PAPER, THEOREMS, complete
 from ptcc_certify.cli.terminal import print_lines, progress
 from ptcc_certify.errors import ParameterError
 
@@ -17,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("name", default="all", shell_complete=complete((), ("all", *"123456", *PAPER)))
+@click.argument("name", default="all")
 @click.option("-o", "--output", type=click.Path(file_okay=False), help="Write certificates and figures to this folder.")
 @click.option("--format", "suffix", type=click.Choice(["png", "pdf", "svg"]), default="png", help="Of figures.")
 def examples(name: str, output: str | None, suffix: str) -> int:
@@ -73,7 +72,7 @@ def _draw(runs: Sequence[Run], folder: Path, suffix: str) -> None:
 
 
 @click.command()
-@click.argument("theorem", required=False, shell_complete=complete((), THEOREMS))
+@click.argument("theorem", required=False)
 def cite(theorem: str | None) -> int:
     """Print BibTeX of the source, with the THEOREM used (such as 2.1) in the note."""
     from ptcc_certify.theorems.table import cite as bibtex

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import click
 
-from ptcc_certify.cli.completion import GRAPHS, PACKAGED, complete
 from ptcc_certify.cli.options import graph_file
 from ptcc_certify.cli.scenario import SECTIONS, is_scenario
 from ptcc_certify.cli.terminal import print_lines
@@ -24,7 +23,7 @@ _WRITTEN = ("graph", "kind", "T", "rho1", "rho2", "kappa", "x0", "seed")
 
 
 @click.command()
-@click.argument("graph", nargs=-1, shell_complete=complete(GRAPHS, PACKAGED))
+@click.argument("graph", nargs=-1, type=click.Path())
 @click.option("-o", "--output", type=click.Path(dir_okay=False), help="Write it to this file, such as scenario.toml.")
 @click.option("--force", is_flag=True, help="Replace an existing file.")
 @click.pass_context

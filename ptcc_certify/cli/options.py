@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ptcc_certify.cli.completion import CERTIFICATES, GRAPHS, PACKAGED, complete, complete_behaviours
 from ptcc_certify.cli.scenario import (
     FOREIGN,
     IN_LIBRARY,
@@ -146,9 +145,7 @@ _switch = partial(click.option, default=False, show_default=False)
 
 def expect_option(text: str) -> Callable[[Any], Any]:
     """Return the option that names the behaviour that is asked for."""
-    return click.option(
-        "--expect", metavar="BEHAVIOUR", callback=_behaviour, shell_complete=complete_behaviours, help=text
-    )
+    return click.option("--expect", metavar="BEHAVIOUR", callback=_behaviour, help=text)
 
 
 reading_options = options_of(
@@ -168,7 +165,7 @@ reading_options = options_of(
 )
 #: GRAPH, or SCENARIO.toml, whose other keys become defaults of the options; hence it is read before these.
 graph_argument = click.argument(
-    "graph", metavar="GRAPH|SCENARIO.toml", is_eager=True, callback=graph_of, shell_complete=complete(GRAPHS, PACKAGED)
+    "graph", metavar="GRAPH|SCENARIO.toml", is_eager=True, callback=graph_of, type=click.Path()
 )
 #: The same where several graphs are the modes of a family.
 graphs_argument = click.argument(
@@ -178,9 +175,9 @@ graphs_argument = click.argument(
     metavar="GRAPH..|SCENARIO.toml",
     is_eager=True,
     callback=graph_of,
-    shell_complete=complete(GRAPHS, PACKAGED),
+    type=click.Path(),
 )
-certificate_argument = click.argument("certificate", callback=_certificate, shell_complete=complete(CERTIFICATES))
+certificate_argument = click.argument("certificate", callback=_certificate, type=click.Path())
 
 
 def kind_option(text: str) -> Callable[[Any], Any]:

@@ -11,7 +11,6 @@ from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
 from ptcc_certify.cli.agents import agents_keywords, agents_of, agents_options, dimension_option, refuse_dimension
-from ptcc_certify.cli.completion import CERTIFICATES, GRAPHS, PACKAGED, complete
 from ptcc_certify.cli.families import mode_options, read_graph_or_family, refuse_options
 from ptcc_certify.cli.scenario import MEMORY, graph_of, refuse_beside
 from ptcc_certify.cli.terminal import FIGURES, print_lines, progress, refuse_output
@@ -56,7 +55,7 @@ class _Figure(click.Choice):  # type: ignore[type-arg]  # no generic class befor
     metavar="CERT|GRAPH..",
     is_eager=True,
     callback=graph_of,
-    shell_complete=complete((*CERTIFICATES, *GRAPHS), PACKAGED),
+    type=click.Path(),
 )
 @click.option(
     "--what",

@@ -16,14 +16,13 @@ from copy import copy
 from dataclasses import FrozenInstanceError
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import numpy as np
 
 from ptcc_certify.errors import GraphError, NumberError, gated
 from ptcc_certify.graphs.display_hook import Shown
 from ptcc_certify.graphs.equality import ReadOnly
-from ptcc_certify.graphs.other_names import CallableTuple
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, nearest_float, shorten, writable
 from ptcc_certify.graphs.tables import first_five, import_pandas
 
@@ -110,6 +109,26 @@ def in_all(count: int) -> str:
     ('', ' (2 in all)')
     """
     return f" ({count} in all)" if count > 1 else ""
+
+
+_T = TypeVar("_T")
+
+
+class CallableTuple(tuple[_T, ...]):
+    """A tuple that may be called, too, as in networkx: ``graph.edges()`` is ``graph.edges``.
+
+    Examples
+    --------
+    >>> graph = SignedDigraph.from_edges([("a", "b", -1)])
+    >>> graph.labels(), graph.edges() == graph.edges == (("a", "b", -1),)
+    (('a', 'b'), True)
+    """
+
+    __slots__ = ()
+
+    def __call__(self) -> Self:
+        """Return the tuple itself."""
+        return self
 
 
 #: Edges whose lines are hashed at a time.

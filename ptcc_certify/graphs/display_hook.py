@@ -9,14 +9,13 @@ from importlib import import_module
 from typing import Any
 
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.graphs.other_names import Hinted, HintedClass
 
 #: The module that registers, loaded when a notebook first asks.
 _DRAWN_BY = "ptcc_certify.report.notebook"
 
 
-class Shown(Hinted, metaclass=HintedClass):
-    """A class that notebooks show as HTML, and that says where something is that it does not have.
+class Shown:
+    """A class that notebooks show as HTML.
 
     Examples
     --------

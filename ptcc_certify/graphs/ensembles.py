@@ -22,7 +22,6 @@ import numpy as np
 from ptcc_certify.errors import NumberError, ParameterError, gated
 from ptcc_certify.graphs.digraph import SignedDigraph, Weights
 from ptcc_certify.graphs.io.files import parse_toml, read_bytes
-from ptcc_certify.graphs.other_names import Hinted, HintedClass
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, given, parse_exact, shorten, whole_number
 
 CONNECTIVITIES = ("strong", "quasi-strong", "weak", "disconnected")
@@ -43,7 +42,7 @@ class _Block(NamedTuple):
 
 @gated
 @dataclass(frozen=True)
-class Ensemble(Hinted, metaclass=HintedClass):
+class Ensemble:
     """A family of random signed digraphs of stated classes, each a function of its number alone.
 
     The classes take turns: graph ``i`` has connectivity ``connectivity[i % c]`` and leaders that are balanced as

@@ -20,9 +20,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ptcc_certify.errors import GraphError, NumberError, did_you_mean, gated
-from ptcc_certify.graphs.digraph import Exact, SignedDigraph, Weights, ordered_labels, refuse_unknown_orientation
+from ptcc_certify.graphs.digraph import (
+    CallableTuple,
+    Exact,
+    SignedDigraph,
+    Weights,
+    ordered_labels,
+    refuse_unknown_orientation,
+)
 from ptcc_certify.graphs.display_hook import Shown
-from ptcc_certify.graphs.other_names import CallableTuple
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, shorten
 from ptcc_certify.graphs.tables import import_pandas
 

@@ -13,7 +13,6 @@ from lmi.exact.decimal_rounding import near
 from ptcc_certify.errors import NumberError, ParameterError, gated
 from ptcc_certify.graphs.digraph import Exact
 from ptcc_certify.graphs.io import as_graph
-from ptcc_certify.graphs.other_names import Hinted, HintedClass
 from ptcc_certify.graphs.rationals import as_fraction, no_number, shorten, whole_number
 from ptcc_certify.protocols.base import Protocol, aligned
 from ptcc_certify.protocols.casadi_latex import to_latex
@@ -37,7 +36,7 @@ PLURALS = ("positions", "velocities", "accelerations", "jerks")
 
 @gated
 @dataclass(frozen=True)
-class Agents(Hinted, metaclass=HintedClass):
+class Agents:
     """Agents of order n, one equation for each coordinate of space, and what is asked of their protocol.
 
         x_k^(n) + a_n x_k^(n-1) + .. + a_1 x_k = u_k

@@ -19,7 +19,6 @@ import numpy as np
 from ptcc_certify.errors import NumberError, ParameterError, gated
 from ptcc_certify.graphs.digraph import Exact
 from ptcc_certify.graphs.equality import ByValue
-from ptcc_certify.graphs.other_names import Hinted, HintedClass
 from ptcc_certify.graphs.rationals import as_fraction, nearest_float, shorten, whole_number
 from ptcc_certify.protocols.casadi_latex import to_latex
 from ptcc_certify.protocols.expression import ATOMS, Program, enclosure, floats, parse, symbolic
@@ -33,7 +32,7 @@ TOLERANCE = 1e-12
 _GRID, _BISECTIONS, _BOXES, _INSTANTS, _CHUNK = 513, 48, 40_000, 20_000, 64
 
 
-class Disturbance(Hinted, metaclass=HintedClass):
+class Disturbance:
     """The disturbances of all agents; ``agents`` count from 0, so that ``k = agent + 1``."""
 
     @property

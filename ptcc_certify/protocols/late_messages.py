@@ -16,7 +16,6 @@ from typing import Any
 
 from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.graphs.digraph import Exact, SignedDigraph
-from ptcc_certify.graphs.other_names import Hinted, HintedClass
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.protocols.parameters import Given, NotNegative, parameter, readable
@@ -27,7 +26,7 @@ MOST_LOSSES = 10**6
 
 @gated
 @dataclass(frozen=True)
-class LateMessages(Hinted, metaclass=HintedClass):
+class LateMessages:
     """How late and how exact is what agents hear.
 
     Parameters

@@ -9,7 +9,6 @@ from typing import Any, Self, overload
 
 from ptcc_certify.errors import NumberError, ParameterError, gated
 from ptcc_certify.graphs.digraph import Exact
-from ptcc_certify.graphs.other_names import Hinted, HintedClass
 from ptcc_certify.graphs.rationals import as_fraction, no_number, shorten
 
 _SMALLEST, _LARGEST = Fraction(1, 10**300), Fraction(10**300)
@@ -65,7 +64,7 @@ class Given:
         instance.__dict__[self.name] = None if value is None else parameter(self.name, value)
 
 
-class Parameters(Hinted, metaclass=HintedClass):
+class Parameters:
     """What frozen dataclasses of such fields share."""
 
     @property

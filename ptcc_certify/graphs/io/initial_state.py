@@ -64,8 +64,8 @@ def as_state(values: Any, graph: Any, name: str = "x0") -> list[Fraction]:
     rows = as_states(values, graph, name)
     if (size := len(rows[0])) != 1:
         raise ParameterError(
-            f"the initial state {name} has {size} numbers for each agent; give one, or certify vectors by "
-            "certify_vectors(graph, protocol, x0)"
+            f"the initial state {name} has {size} numbers for each agent; give one: each coordinate "
+            "has a certificate of its own"
         )
     return [row[0] for row in rows]
 
