@@ -16,7 +16,7 @@ let keys = [ "schema"; "producer"; "graph"; "structure"; "claim"; "protocol"; "p
 (* keys of some certificates alone: their claims are of other motions, and are not read; or they are claims besides the
    others, which keep their meaning: named, and not believed, with their obligations *)
 let not_read = [ "boxes", "a certificate of a family";
-  "restricted", "a certificate of a family" ]
+  "restricted", "a certificate of a family"; "formation", "single integrators in a formation" ]
 let besides = [ "messages", "messages that are late, lost or rounded, and of leaders that move beside them"; "leaders", "leaders that move" ]
 (* kinds of obligations and what they are of have these letters alone: what is printed of them can be no other line *)
 let named = String.for_all (function 'a' .. 'z' | '0' .. '9' | '-' | '.' | '[' | ']' -> true | _ -> false)

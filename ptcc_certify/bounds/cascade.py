@@ -12,17 +12,28 @@ in every coordinate, and so in the Euclidean norm over them. With ``b = beta/2``
     I <= (e^(-b s) - e^(-alpha s))/((alpha - b) eta(0))
 
 the first being exact for ``rho1 = 0``; fractions stand for their limits where numbers coincide.
+
+Where ``L`` is far larger than its rate, ``|q(0)|`` is, too. With ``' = d/ds``, ``g = alpha + theta``, ``theta =
+eta'/eta``, ``G`` the integral of ``g`` and ``r = X' + g X``: ``r' = -L r + theta' X`` and ``X'' + g X' = -L r``. So with
+``R >= |r|``, ``S >= |X|``
+
+    R' = -b R + theta' S,   S = e^-G S(0) + J,   J' = -g J + R,   J(0) = 0,   e^-G = e^(-alpha s) eta(0)/eta
+
+and no ``L`` is in ``r(0) = x'(0)/eta(0) + g(0) X(0)``. An agent whose deviations and errors have the constants ``c``
+and ``c^E`` deviates by at most ``sqrt(c) S``, and its velocity by the lesser of ``eta sqrt(c) (R + g S)`` and ``eta
+sqrt(c^E) J + e^(-alpha s) sqrt(c) |x'(0)|``. Both bounds of ``|X|`` hold; :func:`course` steps through the latter.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
 
-from lmi.exact.decimal_rounding import float_down
+from lmi.exact.decimal_rounding import float_down, float_up
 from lmi.exact.elementary_enclosures import rounded
 from ptcc_certify.bounds.agents import States, initial_value, root_product
 from ptcc_certify.bounds.input.tightest_bound import round_up
@@ -33,13 +44,26 @@ from ptcc_certify.protocols.gain import Gain
 Rows = tuple[tuple[Fraction, ...], ...]
 #: By this share what is formed in floats is enlarged; bits to which what bounds every agent is rounded.
 _ROOM, BITS = 1e-9, 256
+#: Steps of a course, more or less, each by the same share of what remains.
+_STEPS = 400
 
 
 class Roots(NamedTuple):
-    """Of a Lyapunov function not below ``sqrt(V)`` of the initial positions, and of ``q(0)``."""
+    """Of a Lyapunov function not below ``sqrt(V)`` of the initial positions, of ``q(0)``, ``r(0)``, and velocities."""
 
     state: Fraction
     drive: Fraction
+    combined: Fraction | None = None
+    velocity: Fraction | None = None
+
+
+class Course(NamedTuple):
+    """Bounds of ``R``, ``S`` and ``J`` at some instants, and ``g`` there."""
+
+    combined: np.ndarray
+    state: np.ndarray
+    integral: np.ndarray
+    pull: np.ndarray
 
 
 def positions_of(states: States, offsets: Sequence[Sequence[Fraction]]) -> Rows:
@@ -90,9 +114,16 @@ def combined_state(states: States, offsets: Sequence[Sequence[Fraction]], gain: 
     )
 
 
-def roots_of(structure: Structure, V: LyapunovFunction, positions: Rows, error: Rows) -> Roots:
-    """Return ``sqrt(V)`` of positions and of ``q(0)``, rounded up."""
-    return Roots(root_of(structure, V, positions), root_of(structure, V, error))
+def initial_rows(
+    structure: Structure, states: States, offsets: Sequence[Sequence[Fraction]], gain: Gain, alpha: Fraction
+) -> tuple[Rows, Rows, Rows, Rows]:
+    """Return positions less places, ``q(0)``, ``r(0)`` and velocities, of which :class:`Roots` are."""
+    return (
+        positions_of(states, offsets),
+        tracking_error(structure, states, offsets, gain.first),
+        combined_state(states, offsets, gain, alpha),
+        tuple(tuple(chain[1] for chain in agent) for agent in states),
+    )
 
 
 def root_of(structure: Structure, V: LyapunovFunction, rows: Rows) -> Fraction:
@@ -117,6 +148,46 @@ def drive_integral(gain: Gain, rate: Fraction, alpha: Fraction, remaining: np.nd
     first = T * np.exp(-slowest * rho1 * T * (1 - q) - min(b * k, a * k + 1) * z) * _falling(abs(a * k + 1 - b * k), z)
     second = np.exp(-slowest * s) * _falling(abs(a - b), s) / float(gain.first)
     return np.minimum(first, second) * (1 + _ROOM)
+
+
+def course(gain: Gain, rate: Fraction, alpha: Fraction, roots: Roots, remaining: np.ndarray) -> Course:
+    """Return bounds of ``R``, ``S`` and ``J`` where ``1 - t/T`` is ``remaining``, above 0, from above.
+
+    Step by step: in a step in which ``theta`` grows by ``d`` and ``s`` by ``D``, let ``m = int e^(-g s)`` over it, with
+    the ``g`` it begins with. ``S <= (S + m R)/(1 - m d)`` all along, which times ``d`` is what ``theta' S`` adds to
+    ``R``.
+
+    Examples
+    --------
+    >>> gain, one = Gain(T=1, rho1=1, rho2=1, kappa=2), Fraction(1)
+    >>> late = course(gain, 2 * one, one, Roots(one, one, one), np.array([1.0, 0.01]))
+    >>> float(late.state[0]), bool(0 < late.state[1] < 1e-3)
+    (1.0, True)
+    """
+    q = np.unique(np.concatenate([np.geomspace(remaining.min(), 1, _STEPS), remaining]))[::-1]
+    a, b, k, linear = float_down(alpha), float_down(rate / 2), float(gain.pole), float(gain.rho1 * gain.T)
+    past = linear * q + k  # eta (T - t)
+    theta = (k / past) ** 2 / k
+    grows = linear * (q[:-1] - q[1:]) / (past[:-1] * past[1:]) * (k / past[:-1] + k / past[1:])
+    steps = linear * (q[:-1] - q[1:]) + k * np.log(q[:-1] / q[1:])
+    falls = np.exp(-a * steps) * (past[:-1] / past[1:]) * (q[1:] / q[:-1])  # of e^-G
+    R, first = float_up(roots.combined or Fraction(0)), float_up(roots.state)
+    S, J, values = first, 0.0, np.empty((len(q), 3))
+    values[0] = R, S, J
+    for i, (D, d, fall) in enumerate(zip(steps.tolist(), grows.tolist(), falls.tolist(), strict=True)):
+        g = a + float(theta[i])
+        m = float(_falling(g, D))
+        if m * d > 0.5:
+            values[i + 1 :] = np.inf
+            break
+        more = d * (S + m * R) / (1 - m * d)
+        J = J * fall + R * math.exp(-min(b, g) * D) * float(_falling(abs(b - g), D)) + more * m
+        R, first = R * math.exp(-b * D) + more, first * fall
+        S = first + J
+        values[i + 1] = R, S, J
+    values *= 1 + _ROOM
+    at = len(q) - 1 - np.searchsorted(q[::-1], remaining)
+    return Course(*values[at].T, float_up(alpha) + theta[at])
 
 
 def _falling(x: float, z: np.ndarray) -> np.ndarray:

@@ -95,7 +95,11 @@ class AgentsPart(AgentsAnswer):
         if self.protocol.gain_cap is not None:
             return ()
         found = []
-        if self.decay < 2 * n:
+        if self.decay < 2 * n and n == 1 and self.matrix.gains == (1,):  # the paper's: its decay follows from its rate
+            k, kappa = self.protocol.gain.pole, self.protocol.base.kappa
+            mend = f"--rho2 {up(2 / (self.matrix.rate * kappa), 4)}"
+            found.append((f"rate {down(self.matrix.rate)} is below 2/(rho2 kappa) = {up(2 / k, 4)}", mend))
+        elif self.decay < 2 * n:
             found.append((f"decay {down(self.decay)} is below 2 n = {2 * n}", f"--decay {2 * n}"))
         if any(self.protocol.own):
             alpha, least = self.protocol.own[1], self.least_rest
@@ -231,7 +235,9 @@ def prove_agents(
     best = max((rate for rate in proved if rate > 0), default=None)
     scaled = ScaledAgent(agents.coefficients, agents.own, gain.rho1, gain.pole, gain.first, agents.cap)
     if agents.of_paper:
-        matrix = paper_matrix(scaled, best or Fraction(1))
+        enough = [V for V in functions if V.proved_rate * gain.pole >= 2]  # by which the input is bounded
+        states = None if initial_state is None else scaled_states(initial_state, offsets, Fraction(1))
+        matrix = paper_matrix(scaled, least_input(structure, enough, ((Fraction(1),),), states) or best or Fraction(1))
     else:
         rate = agents.decay_rate / gain.pole
         matrix = agent_matrix(scaled, rate, Fraction(1) if best is None else _coupling(best))

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any, NamedTuple
 
 from lmi.exact.decimal_rounding import up
 from ptcc_certify.bounds.agents import States
 from ptcc_certify.bounds.formation import GroupDrift, drift_until_deadline, formation_of_biases
-from ptcc_certify.checker.input_formulas import root_above
+from ptcc_certify.checker.input_formulas import InitialSet, root_above
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io.initial_state import as_states, random_states
 from ptcc_certify.graphs.rationals import shorten, writable
+from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.agents import DERIVATIVES, MOST_DIMENSION, PLURALS, Agents
 from ptcc_certify.protocols.gain import Gain
@@ -58,6 +60,42 @@ def single_integrators(agents: Any, protocol: Any, limits: Any) -> tuple[Any, An
     return None, limits if own in limits else (own, *limits)
 
 
+class Formation(NamedTuple):
+    """Single integrators on a line: the initial state less the places ``h``, these, and limits of the gain."""
+
+    initial_state: list[Fraction] | None
+    offsets: tuple[Fraction, ...]
+    limits: tuple[Any, ...]
+
+    def shift(self, initial_set: InitialSet | None) -> InitialSet | None:
+        """Return a set of initial states less the places."""
+        if initial_set is None:
+            return None
+        return replace(initial_set, center=[x - h for x, h in zip(initial_set.center, self.offsets, strict=True)])
+
+
+def formation_on_a_line(
+    agents: Agents, chains: Chains, protocol: Protocol, asked: Mapping[str, Any]
+) -> Formation | None:
+    """Return single integrators of the paper's protocol about places: ``x - h`` has the plain certificate.
+
+    None for other agents, refused beside what is not asked of them: of order n, in several dimensions, and under a cap
+    the sliding-mode protocol, which limits nothing of single integrators. Of large graphs the plain certificate has
+    Lyapunov functions that bound no input: formations that ask for nothing but their agents keep that of order n.
+    """
+    unset, capped = [name for name in _NOT_OF_AGENTS if _given(asked.get(name))], agents.cap is not None
+    large = len(chains.offsets) > EXACT_NODES and not unset
+    if not agents.of_paper or chains.dimension > 1 or large or (capped and protocol.reaching is not None):
+        refuse_agents(agents, protocol, asked)
+        return None
+    _, limits = single_integrators(replace(agents, offsets=None, biases=None), protocol, asked["limits"])
+    places = tuple(h for (h,) in chains.offsets)
+    begin = None
+    if chains.states is not None:
+        begin = [x - h for ((x,),), h in zip(chains.states, places, strict=True)]
+    return Formation(begin, places, limits)
+
+
 def refuse_agents(agents: Any, protocol: Protocol, asked: dict[str, Any]) -> None:
     """Refuse what is not asked of agents of order n, or not proved of them.
 
@@ -69,8 +107,7 @@ def refuse_agents(agents: Any, protocol: Protocol, asked: dict[str, Any]) -> Non
     if not isinstance(agents, Agents):
         raise ParameterError(f"agents = {shorten(repr(agents))}: give Agents(order=2) for double integrators")
     for name, value in asked.items():
-        empty = value is None or (isinstance(value, list | tuple) and not any(one is not None for one in value))
-        if name in _NOT_OF_AGENTS and not empty:
+        if name in _NOT_OF_AGENTS and _given(value):
             raise ParameterError(f"{name} is for single integrators; of agents of order n: {_NOT_OF_AGENTS[name]}")
     sigma0 = asked.get("sigma0")
     if sigma0 is not None and any(_entries(sigma0)):
@@ -79,6 +116,11 @@ def refuse_agents(agents: Any, protocol: Protocol, asked: dict[str, Any]) -> Non
             "derivative); otherwise their final positions depend on the disturbance: leave it out"
         )
     agents.refuse_motion(protocol.T)
+
+
+def _given(value: Any) -> bool:
+    """Tell whether something is asked: no None, and no list of these."""
+    return value is not None and not (isinstance(value, list | tuple) and not any(one is not None for one in value))
 
 
 def _entries(values: Any) -> list[Any]:

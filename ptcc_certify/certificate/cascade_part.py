@@ -15,14 +15,12 @@ from ptcc_certify.bounds.agents import States, error_constants, root_product
 from ptcc_certify.bounds.agents_comparison import AgentsComparison, compare_with_bounds
 from ptcc_certify.bounds.cascade import (
     Roots,
-    combined_state,
+    course,
     drive_integral,
+    initial_rows,
     input_from,
     input_is_bounded,
-    positions_of,
     root_of,
-    roots_of,
-    tracking_error,
 )
 from ptcc_certify.bounds.final_state import Influence
 from ptcc_certify.certificate.agents_answer import AgentsAnswer, Intervals, Residual, UsedFunction, final_states
@@ -182,7 +180,9 @@ class CascadePart(AgentsAnswer):
         clock, found = gain.clock_at_remaining(q), []
         for V, root in zip(self.functions, roots, strict=True):
             own = float_up(root.state) * np.exp(-float_down(V.proved_rate) / 2 * clock)
-            found.append(own + float_up(root.drive) * drive_integral(gain, V.proved_rate, self.alpha, q))
+            own += float_up(root.drive) * drive_integral(gain, V.proved_rate, self.alpha, q)
+            known = root.combined is not None
+            found.append(np.minimum(own, course(gain, V.proved_rate, self.alpha, root, q).state) if known else own)
         return found
 
     @cached_property
@@ -194,25 +194,31 @@ class CascadePart(AgentsAnswer):
     def deviation_bound(self, remaining: np.ndarray) -> np.ndarray:
         """Return (N, 2, M) bounds of the deviation of positions and velocities from the common motion.
 
-        ``sqrt(c_k) sqrt(V)`` and ``eta sqrt(c_k^E) sqrt(V) + e^(-alpha s) sqrt(c_k V(q(0)))``. Infinite where nothing
-        is proved, or without an initial state.
+        Of positions ``sqrt(c_k V)``. Of velocities the least of ``eta sqrt(c_k^E V) + e^(-alpha s) sqrt(c_k V(q(0)))``
+        and what the course of ``r`` tells, by each function. Infinite where nothing is proved, or without an initial
+        state.
         """
         if not self.roots:
             return np.full((self.structure.graph.n_nodes, 2, len(np.atleast_1d(remaining))), np.inf)
         q, N, gain = np.atleast_1d(np.asarray(remaining, dtype=float)), self.structure.graph.n_nodes, self.protocol.gain
-        near, errors, drive = (np.full((N, len(q)), np.inf) for _ in range(3))
+        near, fast, errors, drive, integral, begin = (np.full((N, len(q)), np.inf) for _ in range(6))
         fading = np.exp(-float_down(self.alpha) * gain.clock_at_remaining(q))
         each = zip(self.functions, self.roots, self._values(self.roots, q), self.error_constants, strict=True)
         for V, root, value, constants in each:
+            own = course(gain, V.proved_rate, self.alpha, root, q)
             if V.deviation is not None:
                 c = np.array([float_up(root_product(x)) for x in V.deviation.agents])
                 near = np.minimum(near, np.outer(c, value))
+                fast = np.minimum(fast, np.outer(c, own.combined + own.pull * own.state))
                 drive = np.minimum(drive, np.outer(c, float_up(root.drive) * fading))
+                begin = np.minimum(begin, np.outer(c, float_up(root.velocity or Fraction(0)) * fading))
             if constants is not None:
                 c = np.array([float_up(root_product(x)) for x in constants])
                 errors = np.minimum(errors, np.outer(c, value))
+                integral = np.minimum(integral, np.outer(c, own.integral))
         eta = np.array([self.protocol.value(x) for x in q])
-        return np.stack([near, eta * errors + drive], axis=1) * (1 + 1e-9)
+        speeds = np.min([eta * fast, eta * errors + drive, eta * integral + begin], axis=0)
+        return np.stack([near, speeds], axis=1) * (1 + 1e-9)
 
     def compare(self, run: AgentsTrajectory) -> AgentsComparison | None:
         """Compare a run with what is proved of it; None where nothing disagrees."""
@@ -267,9 +273,8 @@ def prove_cascade(
     protocol = CascadeProtocol.of(base, agents.alpha, offsets)
     roots: tuple[Roots, ...] = ()
     if initial_state is not None:
-        error = tracking_error(structure, initial_state, offsets, base.gain.first)
-        begin = positions_of(initial_state, offsets)
-        roots = tuple(roots_of(structure, V, begin, error) for V in used)
+        rows = initial_rows(structure, initial_state, offsets, base.gain, agents.alpha)
+        roots = tuple(Roots(*(root_of(structure, V, each) for each in rows)) for V in used)
     part = CascadePart(
         structure,
         protocol,
@@ -292,7 +297,6 @@ def _input(part: CascadePart) -> tuple[Fraction, ...] | None:
     gain, base, begin = part.protocol.gain, part.protocol.base, part.initial_state
     if begin is None:
         return None
-    combined = combined_state(begin, part.protocol.offsets, gain, part.alpha)
     speeds = [root_product(sum((chain[1] ** 2 for chain in agent), Fraction(0))) for agent in begin]
     bounds = [
         input_from(
@@ -301,7 +305,7 @@ def _input(part: CascadePart) -> tuple[Fraction, ...] | None:
             V.proved_rate,
             constants,
             root.state,
-            root_of(part.structure, V, combined),
+            root.combined or Fraction(0),
             speeds,
         )
         for V, constants, root in zip(part.functions, part.error_constants, part.roots, strict=True)

@@ -108,6 +108,8 @@ class Certificate(Content, FromFile, Shown):
         The file that it was read from.
     agents : AgentsAnswer or None
         What is proved of agents of order n; then initial and final states are there, and not above.
+    offsets : tuple of N Fraction, or None
+        Places of single integrators in a formation under a cap: everything else is of ``x - offsets``.
 
     References
     ----------
@@ -220,12 +222,12 @@ class Certificate(Content, FromFile, Shown):
         if self.agents is not None:
             return self.structure.to_pandas().assign(**self.agents.columns())
         table, unknown = self.structure.to_pandas(), np.full(self.graph.n_nodes, np.nan)
-        start, deviation = self.initial_state, unknown
+        start, end, deviation = self.initial_positions, self.final_positions, unknown
         if start is not None and self.functions:
             share = 1 if self.direct else float(self.protocol.span / self.protocol.T)
             deviation = self.deviation_bound([0.01 * share])[:, 0]
         table["x(0)"] = unknown if start is None else [float(x) for x in start]
-        table["x(T)"] = unknown if self.final_state is None else np.asarray(self.final_state, dtype=float)
+        table["x(T)"] = unknown if end is None else np.asarray(end, dtype=float)
         table["deviation"] = np.where(np.isfinite(deviation), deviation, np.nan)
         return table
 

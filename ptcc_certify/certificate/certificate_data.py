@@ -141,6 +141,22 @@ class Content:
     tracking: Tracking | None = None
     source: Source | None = None
     agents: AgentsAnswer | None = None
+    offsets: tuple[Fraction, ...] | None = None
+
+    @property
+    def initial_positions(self) -> tuple[Fraction, ...] | None:
+        """Where agents begin: in a formation ``initial_state`` is less their places."""
+        if self.offsets is None or self.initial_state is None:
+            return self.initial_state
+        return tuple(x + h for x, h in zip(self.initial_state, self.offsets, strict=True))
+
+    @property
+    def final_positions(self) -> FinalState | None:
+        """Where agents end: in a formation ``final_state`` is less their places."""
+        if self.offsets is None or self.final_state is None:
+            return self.final_state
+        states = tuple(Fraction(x) + h for x, h in zip(self.final_state.states, self.offsets, strict=True))
+        return replace(self.final_state, states=states)
 
     def changed(self, **values: Any) -> Self:
         """Return the certificate with other parts, in whichever group they are; what follows is computed anew.

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
-from ptcc_certify.bounds.cascade import Roots
+from ptcc_certify.bounds.cascade import Roots, initial_rows, root_of
 from ptcc_certify.certificate.agents_answer import AgentsAnswer, Residual, UsedFunction
 from ptcc_certify.certificate.agents_part import AgentsPart
 from ptcc_certify.certificate.cascade_part import CascadePart
@@ -64,7 +64,7 @@ def _section_of_matrix(part: AgentsPart, out: Writer) -> dict[str, Any]:
 def _section_of_cascade(part: CascadePart, out: Writer) -> dict[str, Any]:
     used = [{"function": one.number, "inputs": out.state("inputs", one.inputs)} for one in part.used]
     known = part.initial_state is not None
-    roots = [dict(zip(("initial", "drive"), map(format_exact, root), strict=True)) for root in part.roots]
+    roots = [{"initial": format_exact(root.state), "drive": format_exact(root.drive)} for root in part.roots]
     absent = {"initial": None, "drive": None}
     begin, final, bounds = part.initial_state, part.final_state, part.input
     return {
@@ -108,15 +108,20 @@ def read_agents(
 def _read_cascade(
     section: Section, structure: Structure, base: Protocol, functions: Sequence[LyapunovFunction]
 ) -> CascadePart:
-    entries = section["functions"]
-    roots = [Roots(exact(one["initial"]), exact(one["drive"])) for one in entries if one["initial"] is not None]
+    entries, alpha, offsets = section["functions"], exact(section["cascade"]), _offsets(section)
+    used, begin = [functions[one["function"]] for one in entries], _states(section["initial_state"], exact)
+    roots = list[Roots]()
+    if begin is not None:
+        rows = initial_rows(structure, begin, offsets, base.gain, alpha)[2:]
+        for one, V in zip(entries, used, strict=True):
+            roots.append(Roots(exact(one["initial"]), exact(one["drive"]), *(root_of(structure, V, x) for x in rows)))
     return CascadePart(
         structure,
-        CascadeProtocol.of(base, exact(section["cascade"]), _offsets(section)),
+        CascadeProtocol.of(base, alpha, offsets),
         _used(section),
-        tuple(functions[one["function"]] for one in entries),
+        tuple(used),
         tuple(roots),
-        _states(section["initial_state"], exact),
+        begin,
         tuple(tuple(map(interval, row)) for row in section["motion"]),
         _states(section["final_state"], interval),
         _bounds(section),

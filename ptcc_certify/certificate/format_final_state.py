@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -82,6 +82,24 @@ def _enclose_final_state(content: Content, out: Writer) -> tuple[dict[str, Any],
             groups.append({"nodes": [labels[v] for v in component.nodes], "left_null_vector": left_null_vector})
     degenerate = None if final_state is None else list(final_state.degenerate)
     return {"components": groups, "containment_weights": None, "degenerate": degenerate}, final
+
+
+def formation_section(
+    content: Content, offsets: Sequence[Fraction], final: Mapping[str, Any] | None, out: Writer
+) -> dict[str, Any]:
+    """Write the places of a formation, and where its agents begin and end; ``final`` is where they end less these."""
+    ends = None
+    if final is not None and content.final_state is not None:
+        pairs = map(interval, final.values())
+        if beside(final.get("mid")):
+            radius = content.final_state.radius or ()
+            pairs = zip(map(Fraction, content.final_state.states), map(Fraction, radius), strict=True)
+        ends = {k: interval_text((x + h, r)) for k, (x, r), h in zip(out.labels, pairs, offsets, strict=True)}
+    return {
+        "offsets": out.state("offsets", offsets),
+        "initial_state": out.state("positions", content.initial_positions),
+        "final_state": ends,
+    }
 
 
 def _interval_text(x: Fraction | float, radius: Fraction) -> str | dict[str, str]:

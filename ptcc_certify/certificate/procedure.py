@@ -34,7 +34,13 @@ from ptcc_certify.bounds.late_messages import LateBounds, bound_late
 from ptcc_certify.bounds.longest_delay import LateCase
 from ptcc_certify.bounds.tracking import Tracking, bound_tracking
 from ptcc_certify.certificate.agents_part import prove_agents
-from ptcc_certify.certificate.agents_request import Chains, read_chains, refuse_agents, single_integrators
+from ptcc_certify.certificate.agents_request import (
+    Chains,
+    formation_on_a_line,
+    read_chains,
+    refuse_agents,
+    single_integrators,
+)
 from ptcc_certify.certificate.cascade_part import prove_cascade
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.certificate_data import Observations
@@ -252,9 +258,8 @@ def certify(
     }
     options["origins"] = origins_of(graph, x0, sigma0) | dict(origins or {})
     agents, options["limits"] = single_integrators(agents, protocol, limits)
-    of_agents = _agents_options(
-        agents, protocol, {**options, "sigma0": sigma0, "disturbance": disturbance}, v0, derivatives
-    )
+    asked = {**options, "sigma0": sigma0, "disturbance": disturbance}
+    of_agents = _agents_options(agents, protocol, asked, v0, derivatives)
     if isinstance(graph, Protocol):
         raise ParameterError("graph and protocol are exchanged; write certify(graph, protocol)")
     if uncertainty or is_family(graph):
@@ -266,10 +271,16 @@ def certify(
         raise ParameterError("signal is for families of graphs, which change; this is one graph: leave it out")
     progress, graph = listener(progress), as_graph(graph, orientation)
     refuse(graph, protocol, method, {"sigma0": sigma0, "disturbance": disturbance}, [*options["limits"], delta, noise])
-    structure = analyse(graph)
+    structure, chains, formation = analyse(graph), None, None
+    if of_agents is not None:
+        chains = read_chains(of_agents, graph, protocol.gain, x0, v0, derivatives)
+        formation = formation_on_a_line(of_agents, chains, protocol, asked)
+    if formation is not None:
+        x0, chains, options["limits"] = formation.initial_state, None, formation.limits
     request = read_request(structure, protocol, options)
+    if formation is not None:
+        request = replace(request, initial_set=formation.shift(request.initial_set))
     refuse_beside(structure, protocol, request)
-    chains = None if of_agents is None else read_chains(of_agents, graph, protocol.gain, x0, v0, derivatives)
     initial_state = None if x0 is None or chains else read_initial_state(structure, x0, "x0")
     manifold, reaching = read_sliding_variable(structure, protocol, sigma0)
     case = Case(structure, protocol, request, initial_state, manifold, progress)
@@ -278,11 +289,27 @@ def certify(
     if not runs and disturbance is not None and protocol.reaching is not None:
         _check_disturbance(disturbance, protocol.reaching, graph)
     certificate = case.certificate(disturbance, runs, reaching)
+    if formation is not None:
+        certificate = certificate.changed(offsets=formation.offsets)
     if of_agents is not None and chains is not None:
         certificate = _with_agents(certificate, of_agents, chains, wanted)
     certificate = _with_small_delays(certificate)
     progress(STEPS[5])
     return _with_word_of_check(certificate)
+
+
+def motion_of(certificate: Certificate, agents: Agents) -> Certificate:
+    """Return a certificate of agents of order n, with ``agents`` also of single integrators in a formation.
+
+    :func:`certify` has one certificate of these, that of ``x - h``; their motion, and how bounds depend on the
+    deadline, are taken from that of agents of order n.
+    """
+    if certificate.offsets is None:
+        return certificate
+    begin, places = certificate.initial_positions, tuple((h,) for h in certificate.offsets)
+    chains = Chains(None if begin is None else tuple(((x,),) for x in begin), 1, places)
+    plain = {"initial_state": None, "sigma0": None, "limits": (), "late": None, "tracking": None}
+    return _with_agents(certificate.changed(offsets=None, **plain), agents, chains, False)
 
 
 def _agents_options(agents: Any, protocol: Protocol, asked: dict[str, Any], v0: Any, derivatives: Any) -> Agents | None:
@@ -291,7 +318,7 @@ def _agents_options(agents: Any, protocol: Protocol, asked: dict[str, Any], v0: 
         if v0 is not None or derivatives is not None:
             raise ParameterError("v0: single integrators have no velocity to begin with; give agents=Agents(order=2)")
         return None
-    if isinstance(protocol, Protocol):
+    if isinstance(protocol, Protocol) and not getattr(agents, "of_paper", False):  # others when their states are read
         refuse_agents(agents, protocol, asked)
     return cast(Agents, agents)
 

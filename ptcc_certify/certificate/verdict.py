@@ -260,6 +260,11 @@ def judge_behaviour(structure: Structure, expected: str) -> Answer:
 def _judge_behaviour(certificate: Content, expected: str) -> Answer:
     """Tell the same of what the agents are, which may be of order n, and have places or a capped gain."""
     answer, part = judge_behaviour(certificate.structure, expected), certificate.agents
+    if part is None and certificate.offsets is not None:
+        what = f"{expected} of x - offsets"
+        if certificate.limits:
+            return Answer(OPEN, what, "limits of the gain leave something at T")
+        return replace(answer, what=what)
     if part is None:
         return answer
     what = f"{expected} of x - offsets" if part.formation else expected

@@ -29,7 +29,7 @@ from ptcc_certify.checker.family import check_family
 from ptcc_certify.checker.family_bounds import check_family_bounds
 from ptcc_certify.checker.family_rows import check_family_functions
 from ptcc_certify.checker.family_sliding import check_drive
-from ptcc_certify.checker.final_state import check_final_state
+from ptcc_certify.checker.final_state import check_final_state, check_formation
 from ptcc_certify.checker.graph import check_graph
 from ptcc_certify.checker.input import INPUT_NODES, Verified, check_input
 from ptcc_certify.checker.leaders import check_leaders
@@ -59,10 +59,10 @@ GRAPH = "a graph file is not read: compare the SHA-256 that is printed, or use p
 KEYS = (
     *("schema", "producer", "graph", "structure", "claim", "components", "protocol", "paper", "lyapunov", "rates"),
     *("overshoot", "initial_state", "sliding_variable", "influence", "final_state", "reaching_time", "input", "proof"),
-    *("verdict", "digest", "unverified", "boxes", "restricted", "agents", "messages", "leaders"),
+    *("verdict", "digest", "unverified", "boxes", "restricted", "agents", "messages", "leaders", "formation"),
 )
 #: Parts that need not be there.
-OPTIONAL = ("components", "boxes", "restricted", "agents", "messages", "leaders")
+OPTIONAL = ("components", "boxes", "restricted", "agents", "messages", "leaders", "formation")
 
 #: Parts that are null in a certificate of a family.
 NOT_OF_FAMILIES = ("paper", "rates", "overshoot", "influence")
@@ -212,6 +212,7 @@ def _verdict(doc: Document) -> str:
     claim = check_claim(doc, structure, protocol.sliding)
     begin = check_begin(doc, graph, protocol)
     final = check_final_state(doc, structure, claim, begin)
+    check_formation(doc, graph, begin)
     paper = check_paper(doc, structure, claim)
     functions = check_functions(doc, structure, final, paper)
     rate = check_rates(doc, paper, functions)
@@ -232,6 +233,7 @@ def _family_verdict(doc: Document, protocol: Protocol) -> str:
     need("agents" not in doc.data, "agents of order n on a family")
     need("messages" not in doc.data, "late messages of a family")
     need("leaders" not in doc.data, "leaders of a family that move")
+    need("formation" not in doc.data, "a formation of a family")
     family = check_family(doc)
     begin = check_begin(doc, family.modes[0].structure.graph, protocol)
     functions = check_family_functions(doc, family)

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
+from itertools import chain
 from operator import mul
 from typing import Any
 
@@ -321,6 +322,28 @@ def state_intervals(doc: Document, graph: Digraph, section: Any) -> tuple[Number
         return mid, radius
     intervals = [interval(x) for x in ordered(graph.labels, section, "final_state").values()]
     return Numbers([x for x, _ in intervals]), Numbers([r for _, r in intervals])
+
+
+def check_formation(doc: Document, graph: Digraph, begin: Begin) -> None:
+    """Verify that in a formation agents begin and end where the rest of the document tells, and their places besides."""
+    if "formation" not in doc.data:
+        return
+    need("agents" not in doc.data, "a formation beside that of agents of order n")
+    section, end = doc.section("formation"), doc.data["final_state"]
+    fields(section, ("offsets", "initial_state", "final_state"), "formation")
+    places, parts = by_agent(doc, graph, section["offsets"], "offsets"), (begin.state, end)
+    told = [section[key] for key in ("initial_state", "final_state")]
+    need(all((x is None) == (y is None) for x, y in zip(told, parts, strict=True)), "positions are told iff states are")
+    positions = Numbers([]) if begin.state is None else by_agent(doc, graph, told[0], "initial positions")
+    mids, radii = (Numbers([]), Numbers([])) if end is None else state_intervals(doc, graph, end)
+    own, wide = (Numbers([]), Numbers([])) if end is None else state_intervals(doc, graph, told[1])
+    known = [list(part) for part in (places, begin.state or (), positions, mids, radii, own, wide)]
+    bits = length(chain.from_iterable(known))
+    spend(8 * graph.n, bits, bits, "a formation")
+    h, x, y, mid, r, middle, radius = known
+    need(all(a + b == c for a, b, c in zip(x, h, y, strict=False)), "an agent of the formation begins elsewhere")
+    ends = zip(mid, h, r, middle, radius, strict=False)
+    need(all(abs(a + b - c) + s <= t for a, b, s, c, t in ends), "an agent of the formation ends elsewhere")
 
 
 def combined(weights: Sequence[Interval], values: Sequence[Interval]) -> Interval:

@@ -329,12 +329,12 @@ def _under_limits(
     norm = bounds.root_constant(k, None) * root
     need(exact(entry["norm"]) >= norm, "what is left is not proved")
     if entry["agents"] is not None:
-        deviation = doc.data["lyapunov"]["functions"][k]["deviation"]
-        need(deviation is not None, "deviations without constants")
-        least = [formulas.root_above(c) * root for c in _each(doc, verified, deviation["agents"], "agents")]
-        if period is None:
-            most = _largest_deviation(verified.final, bounds.initial_set)
-            least = [min(x, most) for x in least]
+        roots = {k: root} if period is not None else _roots(verified, limits, clock, bounds)
+        known = [(verified.functions[j].deviation, x) for j, x in roots.items()]
+        each = [[formulas.root_above(c) * x for c in constants] for constants, x in known if constants is not None]
+        need(bool(each), "deviations without constants")
+        most = [_largest_deviation(verified.final, bounds.initial_set)] if period is None else []
+        least = [min([*row, *most]) for row in zip(*each, strict=True)]
         _above(doc, verified, entry["agents"], "what is left", least)
     need((entry["largest"] is None) == (period is not None), "the largest input is bounded unless it is held")
     if entry["largest"] is not None:
@@ -349,6 +349,14 @@ def _under_limits(
         largest = exact(entry["largest"]) + top * max(each)
         need(noise["largest"] >= largest, "the largest input under noise is not proved")
     doc.done(f"||E|| at most {up(exact(entry['norm']))} at the deadline")
+
+
+def _roots(
+    verified: Verified, limits: formulas.Limits, clock: Fraction, bounds: formulas.InputBounds
+) -> dict[int, Fraction]:
+    """Return ``sqrt(V)`` at the deadline at most, of every Lyapunov function that says something of single agents."""
+    known = [j for j, f in enumerate(verified.functions) if f.form is not None and f.deviation is not None and f.rate > 0]
+    return {j: bounds.share(j, limits, clock, Fraction(0)) * bounds.initial_root(j) for j in known}
 
 
 def _largest_deviation(final: FinalState, initial_set: formulas.InitialSet) -> Fraction:

@@ -100,15 +100,19 @@ def _named_agents(options: Options) -> Agents | None:
     )
 
 
-def agents_keywords(options: Options, graph: SignedDigraph) -> dict[str, Any]:
-    """Return agents and their initial states as the library takes them; nothing for single integrators."""
+def agents_keywords(options: Options, graph: SignedDigraph, certified: bool = False) -> dict[str, Any]:
+    """Return agents and their initial states as the library takes them; nothing for single integrators.
+
+    What is certified of single integrators is certified of their formations on a line, too.
+    """
     from dataclasses import replace
 
     agents = agents_of(options)
     if agents is None:
         return {}
-    _refuse_unproved(options)
     d = options["dimension"] or 1
+    if not (certified and agents.of_paper and d == 1):
+        _refuse_unproved(options)
     for i, name in enumerate(("offsets", "biases")):
         if options[name] is not None:
             rows = read_vectors(options[name], [options["seed"], 4 + i], graph, d, f"--{name}")
@@ -145,9 +149,9 @@ def refuse_dimension(options: Options, command: str) -> None:
 
 def run_of_agents(graph: SignedDigraph, protocol: Protocol, keywords: dict[str, Any], samples: int) -> AgentsTrajectory:
     """Run agents of order n with the gains that ``ptcc certify`` proves, from their initial states to the deadline."""
-    from ptcc_certify.certificate.procedure import certify
+    from ptcc_certify.certificate.procedure import certify, motion_of
 
-    part = certify(graph, protocol, simulation=False, **keywords).agents
+    part = motion_of(certify(graph, protocol, simulation=False, **keywords), keywords["agents"]).agents
     if part is None or (graph.n_edges and not part.functions):
         raise ParameterError("no gains of these agents are proved; ptcc certify tells why")
     return part.simulate(samples=samples)

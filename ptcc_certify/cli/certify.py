@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -100,10 +101,10 @@ def _certify_graph(
 
     LOG.info("%s", one_line(f"read {graph}: {signed.n_nodes} nodes, {signed.n_edges} edges"))
     more = shared.sliding_keywords(protocol, options, signed) | _requests(options)
-    of_agents = agents_keywords(options, signed)
+    of_agents = agents_keywords(options, signed, certified=True)
     x0 = of_agents.pop("x0", None) or shared.read_initial_state(options["x0"], options["seed"], signed)
     if of_agents:
-        more = {name: value for name, value in more.items() if name not in ("limits", "disturbance")} | of_agents
+        more = _with_agents(more, of_agents)
     refuse_unheard(signed, options)
     more |= {"messages": messages_of(graph, signed, options), "leaders": leaders_of(options)}
     origins = _origins(options)
@@ -125,6 +126,15 @@ def _certify_graph(
     if output:
         screen.note(shared.written(certificate, output))
     return assessment.exit_code
+
+
+def _with_agents(more: dict[str, Any], of_agents: dict[str, Any]) -> dict[str, Any]:
+    """Add agents of order n to what is asked: a cap of the gain is theirs, unless a formation has more limits."""
+    agents, limits = of_agents["agents"], more.pop("limits", [])
+    if any(limit.stop_before is not None or limit.sample_period is not None for limit in limits):
+        return more | of_agents | {"agents": replace(agents, gain_cap=None), "limits": limits}
+    unasked = () if agents.of_paper else ("disturbance",)
+    return {name: value for name, value in more.items() if name not in unasked} | of_agents
 
 
 def _requests(options: shared.Options) -> dict[str, Any]:

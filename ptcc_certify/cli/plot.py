@@ -226,7 +226,7 @@ def _of_graph(
 
 def _of_agents(signed: SignedDigraph, protocol: Protocol, what: str, options: shared.Options) -> Certificate:
     """Return what the figure of agents of order n is drawn from: a certificate of theirs."""
-    from ptcc_certify.certificate.procedure import STEPS, certify
+    from ptcc_certify.certificate.procedure import STEPS, certify, motion_of
 
     of_agents = agents_keywords(options, signed)
     if not of_agents:
@@ -240,7 +240,8 @@ def _of_agents(signed: SignedDigraph, protocol: Protocol, what: str, options: sh
     if protocol.reaching is not None:
         search |= {"sigma0": shared.sliding_keywords(protocol, options, signed)["sigma0"]}
     with progress(STEPS) as begin:
-        return certify(signed, protocol, simulation=False, progress=begin, **of_agents, **search)
+        found = certify(signed, protocol, simulation=False, progress=begin, **of_agents, **search)
+        return motion_of(found, of_agents["agents"])
 
 
 def _draw(what: str, subject: Any, wide: bool, time_unit: str) -> Any:

@@ -236,11 +236,11 @@ def state_columns(
 
     The last head is for what an undecided certificate says of the final state; ``written`` writes a proved interval.
     """
-    x0, sigma0 = saved.initial_state or (), saved.sigma0 or ()
+    x0, sigma0, end = saved.initial_positions or (), saved.sigma0 or (), saved.final_positions
     columns = {heads[0]: [rational(x0[k]) for k in agents]}
     if not saved.direct:
         columns[heads[1]] = [rational(sigma0[k]) for k in agents]
-    if saved.final_state is not None and (intervals := saved.final_state.intervals):
+    if end is not None and (intervals := end.intervals):
         ends = heads[2] if saved.verdict == "certified" else heads[3]
         columns[ends] = [written(intervals[k]) for k in agents]
     return columns

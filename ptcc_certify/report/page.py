@@ -203,6 +203,7 @@ def _title(saved: Certificate, invariant: str) -> Markup:
     text = Markup("{} at {} = {}").format(behaviour, deadline, rational(saved.protocol.T)).replace("= \u2248", "\u2248")
     if saved.constant:
         text = Markup("every agent keeps {}").format(invariant)
+    text += " of x \N{MINUS SIGN} offsets" * (saved.offsets is not None)
     text += ", nothing late" * (saved.late is not None) + ", leaders at rest" * saved.leaders_move
     return text[:1].upper() + text[1:] if saved.verdict == "certified" else "Undecided: " + text
 
@@ -214,6 +215,8 @@ def _states(saved: Certificate) -> tuple[list[str], list[list[str]]]:
     heads = ("Initial state", "\u03c3(0)", "State at the deadline", "Limit, if it settles")
     agents, parts = _tabled(saved), agent_parts(saved)
     numbers = texts.state_columns(saved, heads, agents, enclosed)
+    if saved.offsets is not None:
+        numbers = {"Place h": [texts.rational(saved.offsets[k]) for k in agents], **numbers}
     known = ([texts.label(saved.graph.labels[k]) for k in agents], [parts[k] for k in agents])
     return ["Agent", "Part", *numbers], [list(row) for row in zip(*known, *numbers.values(), strict=True)]
 
@@ -222,8 +225,8 @@ def _tabled(saved: Certificate) -> list[int]:
     """Return the agents that have a row: all, or those that end highest and lowest, from the highest on."""
     if saved.graph.n_nodes <= ROWS:
         return list(range(saved.graph.n_nodes))
-    if (end := saved.final_state) is None:
-        highest, lowest = extremes(saved.initial_state or (), EXTREMES)
+    if (end := saved.final_positions) is None:
+        highest, lowest = extremes(saved.initial_positions or (), EXTREMES)
     else:
         highest, lowest = extremes(end.states, EXTREMES, end.radius)
     return highest + lowest
@@ -231,11 +234,11 @@ def _tabled(saved: Certificate) -> list[int]:
 
 def _endings(saved: Certificate) -> list[tuple[Markup, str]]:
     """Return agents and where they end, those together that end at the same; of many, the two extremes."""
-    if saved.final_state is None or not (intervals := saved.final_state.intervals):
+    if (end := saved.final_positions) is None or not (intervals := end.intervals):
         return []
     agents = sorted(range(len(intervals)), key=lambda k: intervals[k], reverse=True)
     if len(agents) > FEW:
-        highest, lowest = extremes(saved.final_state.states, 1, saved.final_state.radius)
+        highest, lowest = extremes(end.states, 1, end.radius)
         agents = highest + lowest
     same = groupby(agents, key=intervals.__getitem__)
     return [(texts.labels(list(nodes), saved.graph.labels, FEW), enclosed(value)) for value, nodes in same]

@@ -173,7 +173,9 @@ def _file_summary(path: str, document: Mapping[str, Any], report: CheckReport) -
 
 def _when(certificate: Certificate, when: str) -> str:
     """Tell of what a claim is, and when."""
-    return f" {when}" if certificate.agents is None else f"{claimed_of(certificate.agents)} {when}"
+    if certificate.agents is None:
+        return f"{' of x - offsets' * (certificate.offsets is not None)} {when}"
+    return f"{claimed_of(certificate.agents)} {when}"
 
 
 def _protocol_text(certificate: Certificate, origins: Mapping[str, str]) -> str:
@@ -184,6 +186,7 @@ def _protocol_text(certificate: Certificate, origins: Mapping[str, str]) -> str:
         begin = [f"{name} {origins.get(name, _origin(certificate.agents, i))}" for i, name in enumerate(names)]
     if certificate.initial_set is not None and (not begin or _is_set_asked(certificate)):
         begin = [initial_states_text(certificate.initial_set)]
+    begin += ["in a formation"] * (certificate.offsets is not None)
     if certificate.sigma0 is not None:
         begin += ["sigma(0) 0" if certificate.direct else f"sigma(0) {origins.get('sigma(0)', 'given')}"]
     return "; ".join([_gains_text(certificate.protocol), ", ".join(begin) or "no x(0)"])
@@ -224,7 +227,7 @@ def _claim_texts(structure: Structure, claims: Sequence[Claim], when: str = "", 
 
 def _short_final_state(certificate: Certificate) -> Lines:
     """Tell where the agents end, in two lines if all fit there, else how many where, or the least and largest state."""
-    result, labels = certificate.final_state, certificate.graph.labels
+    result, labels = certificate.final_positions, certificate.graph.labels
     if result is None:
         return
     degenerate = "; balanced leaders happen to meet at 0" * bool(result.degenerate)
@@ -398,10 +401,10 @@ def certificate_lines(
         yield "protocol", _gains_text(p)
         if certificate.limits or certificate.noise is not None or certificate.delta is not None:
             yield "", "a line that names no limits, noise or disturbances is without them"
-        if certificate.initial_state is not None:
+        if (begin := certificate.initial_positions) is not None:
             drawn = f" ({origins['x(0)']})" if "x(0)" in origins else ""
             alone = ", of the simulated run alone" * _is_set_asked(certificate)
-            yield "x(0)", value_list(structure.graph.labels, certificate.initial_state) + drawn + alone
+            yield "x(0)", value_list(structure.graph.labels, begin) + drawn + alone
         if certificate.agents is not None:
             yield from chain(long_lines(certificate.agents), _rate_lines(certificate))
             yield from _headed("simulated", _simulated_agents(certificate))
@@ -426,7 +429,7 @@ def _graph_lines(structure: Structure, name: str) -> Lines:
 
 def _final_state_lines(certificate: Certificate) -> Lines:
     """Tell where the agents end."""
-    result = certificate.final_state
+    result = certificate.final_positions
     if result is None:
         return
     yield "x(T)", f"{value_list(certificate.graph.labels, result.states)} ({_accuracy(result)})"

@@ -15,14 +15,17 @@ from scipy.linalg import expm
 
 from ptcc_certify.certificate.answer import MET, OPEN, REFUTED
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
-from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.certificate.procedure import certify, motion_of
 from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.checker import check
+from ptcc_certify.checker.input_formulas import InitialSet
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.agents import Agents
 from ptcc_certify.protocols.gain_limits import GainLimits
+from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.protocols.moving_leaders import MovingLeaders
 from ptcc_certify.report.screen import summary_lines
 
 TEAM = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("c", "a", -1), ("c", "d", 1), ("d", "c", 1)])
@@ -147,31 +150,149 @@ def test_one_integrator_under_a_gain_cap_and_disturbances_is_still_one_of_order_
     assert part is not None and part.protocol.gain_cap == 40
 
 
-@pytest.mark.parametrize("graph", [TEAM, ENEMIES, CAMPS], ids=["team", "enemies", "camps"])
-def test_single_integrators_in_a_formation_have_the_plain_bounds_about_their_places(graph: SignedDigraph):
-    """Order 1 of the agents is the paper's protocol: gains, final states and bounds are those of ``x - h``."""
-    N, strong = graph.n_nodes, NominalProtocol(T=2, rho1=1, rho2=5, kappa=2)
-    x0, h = [5, 2, 4, -1][:N], [1, -3, 2, 2][:N]
-    ours = certify(graph, strong, x0, agents=Agents(order=1, offsets=h), method="paper")
-    plain = certify(graph, strong, [x - y for x, y in zip(x0, h, strict=True)], method="paper", simulation=False)
-    part = ours.agents
-    assert isinstance(plain, Certificate) and plain.final_state is not None and part is not None
-    assert check(ours.to_dict()).accepted and ours.verdict == "certified"
-    assert part.protocol.gains == (1,) and part.matrix.rate == plain.rate
-    ends = [chain[0][0] - y for (chain,), y in zip(part.final_state or (), h, strict=True)]
-    assert ends == list(plain.final_state.states)
-    late = np.array([0.01, 1e-6])  # before, theirs is no larger than the largest state, either
-    assert np.allclose(part.deviation_bound(late)[:, 0], plain.deviation_bound(late), rtol=1e-7, atol=0)
-    assert part.input is not None and plain.effort is not None and plain.effort.peak is not None
-    for bound, peak in zip(part.input, plain.effort.peak.agents, strict=True):
-        assert peak <= bound * (1 + Fraction(1, 10**9))  # theirs is the least over several instants, ours at 0
-    assert ours.agents_comparison.worst <= 1 + 1e-7
+#: What plain single integrators are asked beside a graph, a protocol and an initial state.
+BESIDE: dict[str, tuple[Any, dict[str, Any]]] = {
+    "nothing": (NOMINAL, {}),
+    "a cap": (NOMINAL, {"limits": GainLimits(gain_cap="0.5")}),
+    "a stop and a period": (NOMINAL, {"limits": [GainLimits(stop_before="0.1"), GainLimits(sample_period="0.001")]}),
+    "noise and disturbances": (NOMINAL, {"limits": GainLimits(gain_cap=9), "noise": "0.1", "delta": "0.5"}),
+    "late messages": (NOMINAL, {"messages": LateMessages(delay="0.001", gain_cap=5)}),
+    "moving leaders": (NOMINAL, {"leaders": MovingLeaders(speed=1)}),
+    "sliding variables": (SLIDING, {"sigma0": [1, 0, -2, 1]}),
+}
+
+
+@pytest.mark.parametrize("name", BESIDE)
+@pytest.mark.parametrize("graph", [TEAM, CAMPS], ids=["team", "camps"])
+def test_single_integrators_in_a_formation_have_the_plain_certificate_of_their_places(
+    graph: SignedDigraph, name: str, tmp_path: Path
+):
+    """Every part of the file but the places is that of ``x0 - h`` under the same conditions; positions are shifted."""
+    protocol, beside = BESIDE[name]
+    if name == "moving leaders":
+        graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1), ("c", "d", 1), ("d", "b", "0.5")])
+    x0, h = [5, 2, 4, -1], [1, -3, "2/3", 2]
+    ours = certify(graph, protocol, x0, simulation=False, agents=Agents(order=1, offsets=h), **beside)
+    less = [x - Fraction(y) for x, y in zip(x0, h, strict=True)]
+    plain = certify(graph, protocol, less, simulation=False, **beside)
+    assert ours.verdict == "certified" and ours.agents is None and ours.offsets == tuple(map(Fraction, h))
+    own, other = (
+        {key: part for key, part in one.to_dict().items() if key not in ("digest", "unverified", "formation")}
+        for one in (ours, plain)
+    )
+    assert own == other and ours != plain
+    assert ours.initial_positions == tuple(map(Fraction, x0))
+    assert ours.final_positions is not None and plain.final_state is not None
+    shifted = [x - y for x, y in zip(ours.final_positions.states, ours.offsets, strict=True)]
+    assert shifted == list(plain.final_state.states)
+    told = ours.to_dict()["formation"]
+    assert [told["initial_state"][v] for v in graph.labels] == [str(x) for x in x0]
+    assert list(map(Fraction, told["final_state"].values())) == list(ours.final_positions.states)
+    ours.save(tmp_path / "places.json")
+    again = read_certificate(tmp_path / "places.json")
+    assert again == ours and again.offsets == ours.offsets
+    assert ours.to_pandas()["x(T)"].to_list() == [float(x) for x in ours.final_positions.states]
+    assert any("of x - offsets" in line for line in summary_lines(again, "team"))
+
+
+def test_bounds_of_a_formation_under_a_cap_hold_on_the_motion_that_agents_of_order_1_make():
+    """The motion is that of agents in their places; the bound of the input is no weaker than theirs."""
+    agents = Agents(order=1, offsets=[1, -3, 2, 2], gain_cap=4)
+    ours = certify(TEAM, NOMINAL, [5, 2, 4, -1], simulation=False, agents=agents)
+    part = motion_of(ours, agents).agents
+    assert part is not None and part.input is not None and ours.effort is not None
+    (left,) = ours.effort.residual
+    run = part.simulate()
+    ends = np.array([float(x) for x in ours.final_positions.states])
+    off = np.abs(run.states[:, 0, 0, -1] - ends)
+    assert left.agents is not None and left.largest is not None
+    assert all(0 <= x <= float(y) * (1 + 1e-7) for x, y in zip(off, left.agents, strict=True))
+    assert left.largest <= max(part.input) * (1 + Fraction(1, 10**9))
+
+
+@pytest.mark.parametrize("expected", ["bipartite-containment", "consensus"])
+def test_a_behaviour_under_a_cap_is_not_told_to_be_met_in_a_formation(expected: str):
+    agents = Agents(order=1, offsets=[1, -3, 2, 2], gain_cap=4)
+    asked = Expectations(behaviour=expected)
+    found = certify(TEAM, NOMINAL, [5, 2, 4, -1], simulation=False, agents=agents, expectations=asked)
+    assert found.assessment.answers[0].status == OPEN
+
+
+def test_biases_under_a_cap_make_the_same_certificate_as_the_places_that_they_make():
+    biases = [0, 0, 0, 1]
+    ours = certify(TEAM, NOMINAL, [5, 2, 4, -1], simulation=False, agents=Agents(order=1, biases=[0] * 4, gain_cap=4))
+    assert ours.offsets == (0, 0, 0, 0)
+    with pytest.raises(ParameterError, match="biases fit no formation"):
+        certify(TEAM, NOMINAL, [5, 2, 4, -1], agents=Agents(order=1, biases=biases, gain_cap=4))
+
+
+def test_in_the_plane_single_integrators_under_a_cap_keep_the_proof_of_agents_of_order_n():
+    agents = Agents(order=1, offsets=[[1, 0], [0, 0], [2, 1], [0, 3]], gain_cap=4)
+    part = certify(TEAM, NOMINAL, [[5, 1], [2, 0], [4, 1], [-1, 2]], simulation=False, agents=agents).agents
+    assert part is not None and part.residual is not None and part.dimension == 2
+
+
+def test_the_initial_set_of_a_formation_is_that_of_positions():
+    """All ``|x_k(0)| <= 10`` are a box about ``-h`` of what agents steer by."""
+    h = [1, -3, 2, 2]
+    ours = certify(TEAM, NOMINAL, simulation=False, agents=Agents(order=1, offsets=h), initial_set=10)
+    box = InitialSet([Fraction(-x) for x in h], [Fraction(10)] * 4)
+    plain = certify(TEAM, NOMINAL, simulation=False, initial_set=box)
+    assert ours.verdict == "certified" and ours.to_dict()["input"] == plain.to_dict()["input"]
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (None, "formation"),
+        ({"offsets": {"a": "1"}}, "missing"),
+        ({"offsets": {"a": "1", "b": "-3", "c": "2", "d": "nan"}}, ""),
+        ({"offsets": {"a": "1", "b": "-3", "c": "2", "d": "3"}}, "an agent of the formation begins elsewhere"),
+        ({"initial_state": {"a": "5", "b": "2", "c": "4", "d": "-2"}}, "an agent of the formation begins elsewhere"),
+        ({"initial_state": None}, "positions are told iff states are"),
+        ({"final_state": None}, "positions are told iff states are"),
+        ({"final_state": {"a": "4.5", "b": "0.5", "c": "5.5", "d": "-1.5"}}, "an agent of the formation ends elsewhere"),
+    ],
+)
+def test_places_and_positions_that_do_not_follow_are_rejected(change: Any, reason: str):
+    agents = Agents(order=1, offsets=[1, -3, 2, 2], gain_cap=4)
+    data = certify(TEAM, NOMINAL, [5, 2, 4, -1], simulation=False, agents=agents).to_dict()
+    assert check(data).accepted
+    report = check({**data, "formation": change and {**data["formation"], **change}})
+    assert not report.accepted and reason in (report.reason or "")
+
+
+def test_no_agents_of_order_n_stand_beside_a_formation():
+    of_order_two = certify(TEAM, NOMINAL, [5, 2, 4, -1], simulation=False, agents=Agents(order=2)).to_dict()
+    formation = certify(TEAM, NOMINAL, [5, 2, 4, -1], simulation=False, agents=Agents(order=1, offsets=[1, 0, 0, 0]))
+    report = check({**of_order_two, "formation": formation.to_dict()["formation"]})
+    assert report.reason == "a formation beside that of agents of order n"
+
+
+def test_a_formation_in_the_plane_is_bounded_by_the_function_that_needs_least_input():
+    """The fastest function of this graph nearly degenerates: by it inputs were bounded by 4e7, deviations by 480."""
+    graph = SignedDigraph.from_edges([("ann", "bob", 1), ("bob", "eve", -1)])
+    x0, h = [[7, 3], [5, -9], [6, 8]], [[1, 2], [3, 4], [5, 6]]
+    protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
+    part = certify(graph, protocol, x0, simulation=False, agents=Agents(order=1, offsets=h)).agents
+    assert part is not None and part.input is not None
+    run = part.simulate()
+    most = np.nanmax(np.sqrt((run.input**2).sum(axis=1)))
+    assert most <= max(part.input) <= 10 * most
+
+
+def test_in_the_plane_a_rate_too_slow_for_a_bounded_input_is_told_as_a_rate():
+    graph = SignedDigraph.from_edges([("ann", "bob", 1), ("bob", "eve", -1)])
+    agents = Agents(order=1, offsets=[[1, 2], [3, 4], [5, 6]])
+    protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
+    part = certify(graph, protocol, [[7, 3], [5, -9], [6, 8]], simulation=False, agents=agents, method="paper").agents
+    assert part is not None and part.unbounded == (("rate 0.999999 is below 2/(rho2 kappa) = 1", "--rho2 1.001"),)
 
 
 def test_single_integrators_run_the_equation_of_the_plain_protocol():
     import casadi as ca
 
-    part = made(TEAM, NOMINAL, [5, 2, 4, -1], Agents(order=1, offsets=[0] * 4)).agents
+    part = made(TEAM, NOMINAL, [[x, 0] for x in (5, 2, 4, -1)], Agents(order=1, offsets=[[0, 0]] * 4)).agents
     loops = [protocol.closed_loop(TEAM) for protocol in (part.protocol, NOMINAL)]
     slopes = [ca.Function("f", [loop["t"], loop["x"]], [loop["ode"]]) for loop in loops]
     for t in (0.0, 1.3, 1.999):

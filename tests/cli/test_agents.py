@@ -40,6 +40,31 @@ def test_single_integrators_under_a_gain_cap_are_those_of_the_plain_command():
     assert ptcc(*case, "--agents", "integrator").out == ptcc(*case).out
 
 
+def test_single_integrators_in_places_under_a_gain_cap_have_the_bounds_of_the_plain_command(tmp_path: Path):
+    """Bounds are those of ``x0 - h``, in all lines; where agents begin and end is told with the places."""
+    table = tmp_path / "ring.csv"
+    table.write_text("source,target,weight\na,b,1\nb,c,1\nc,d,-1\nd,a,-1\n")
+    case = ("certify", str(table), "--T", "2", "--rho1", "1", "--rho2", "2", "--kappa", "1", "--gain-cap", "4")
+    file, page = tmp_path / "p.json", tmp_path / "p.html"
+    ours = ptcc(*case, "--x0", "5,2,4,-1", "--offsets", "1,-3,2,2", "-o", str(file))
+    plain = ptcc(*case, "--x0", "4,5,2,-3")
+    assert ours.code == plain.code == 0 and "of x - offsets" in ours.out
+    for head in ("error", "input", "verdict"):
+        lines = [[line for line in one.out.splitlines() if line.startswith(head)] for one in (ours, plain)]
+        assert lines[0] == lines[1] and lines[0], head
+    assert "x(T)       a=4.5, b=0.5, c=5.5, d=-1.5 (exact; without limits)" in ours.out
+    assert ptcc("check", str(file)).code == 0 and ptcc("report", str(file), "-o", str(page)).code == 0
+    text = page.read_text(encoding="utf-8")
+    assert "Less their places: " in text and "Place h" in text
+    refused = ptcc("report", str(file), "-o", str(tmp_path / "p.tex"))
+    assert refused.code == 2 and "no statement in LaTeX of a formation" in refused.err
+    run = ptcc("simulate", *case[1:], "--x0", "5,2,4,-1", "--offsets", "1,-3,2,2")
+    first = [float(x) for x in run.out.splitlines()[1].split(",")[2:6]]
+    assert run.code == 0 and first == pytest.approx([5, 2, 4, -1], abs=1e-12)
+    drawn = ("plot", *case[1:], "--x0", "5,2,4,-1", "--offsets", "1,-3,2,2", "--what", "motion")
+    assert ptcc(*drawn, "-o", str(tmp_path / "m.png")).code == 0
+
+
 def test_a_limit_of_the_input_that_is_exceeded_at_first_is_refuted():
     done = ptcc(*CERTIFY, "--agents", "double-integrator", "--max-input", "1")
     assert done.code == 3 and "refuted: |u_k| <= 1 (it is up to" in done.out and "at the start, proved" in done.out

@@ -71,6 +71,18 @@ def test_the_statement_is_one_more_file_of_as_many_lines_as_is_said() -> None:
         assert f"{len(lines)} more" in page.read_text("utf-8")
 
 
+def test_forms_of_agents_that_are_not_read_are_told_in_one_line(tmp_path: Path) -> None:
+    program()
+    options: dict[str, Any] = {"simulation": False, "derivatives": [[0, 0, 0, 0]]}
+    cascade = certify(CAMPS, NominalProtocol(1, 1, 1, 4), [1, 2, 3, 4], agents=Agents(order=2, cascade=1), **options)
+    places = Agents(order=1, offsets=[1, 2, 3, 4], gain_cap=4)
+    formation = certify(CAMPS, NominalProtocol(1, 1, 1, 4), [1, 2, 3, 5], agents=places, simulation=False)
+    for document, what in ((json.loads(formation.to_json()), "formation"), (json.loads(cascade.to_json()), "cascade")):
+        assert check(document).accepted
+        code, text = said(document, tmp_path)
+        assert code == 2 and what in text and "use ptcc check" in text and text.count("\n") == 1
+
+
 def told(document: Json, path: tuple[str | int, ...], new: Any) -> Json:
     """A change that the proof tells as well, and a digest that fits."""
     for k, stated in enumerate(document["proof"]):

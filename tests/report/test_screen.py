@@ -329,7 +329,7 @@ def test_no_claim_hypothesis_or_parameter_is_cut_short():
     capped = ptcc.Agents(order=1, offsets=[1, 2], gain_cap=4)
     lines = summary_lines(ptcc.certify(PAIR, NOMINAL, [3, 5], agents=capped, simulation=False), "pair")
     text = " ".join(" ".join(lines).split())
-    assert "consensus of x - offsets but for what the cap leaves at T = 0.6 (Theorem 1.1)" in text
+    assert "consensus of x - offsets at T = 0.6, without limits (Theorem 1.1" in text
 
 
 def test_a_protocol_is_broken_between_terms_only():

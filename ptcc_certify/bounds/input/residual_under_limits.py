@@ -64,7 +64,10 @@ class LimitedBounds:
         """
         top = limits.largest_gain(self.bounds.gain)
         clock = rounded(limits.clock_below(self.bounds.gain), BOUND_BITS)  # short of what other roundings find
-        best = least((partial(self._bound_by, k, limits, clock, top) for k in self.functions), lambda entry: entry.norm)
+        each = [partial(self._bound_by, k, limits, clock, top) for k in self.functions]
+        best = least(each, lambda entry: entry.norm)
+        if best is not None and limits.sample_period is None:
+            best = replace(best, agents=self._least_deviations(limits, clock))
         if best is None or self.noise is None or limits.sample_period is not None:
             return best
         noisy = least(
@@ -82,15 +85,20 @@ class LimitedBounds:
         norm = round_up(bounds.root_constant(k, None) * residual)
         if hold and norm > self.first:
             return None
-        constants = self.deviations[k] if k < len(self.deviations) else None
-        sizes = [root_above(c) * residual for c in constants or ()]
-        if self.cap is not None and not hold:
-            sizes = [min(x, self.cap) for x in sizes]
+        constants = self.deviations[k] if hold and k < len(self.deviations) else None
+        agents = None if constants is None else tuple(round_up(root_above(c) * residual) for c in constants)
         peak = [] if self.peak is None else [self.peak.largest]
         largest = None if hold else round_up(min([top * max(bounds.error_bounds), *peak]))
-        return Limited(
-            limits, clock, k, growth, norm, None if constants is None else tuple(map(round_up, sizes)), largest
-        )
+        return Limited(limits, clock, k, growth, norm, agents, largest)
+
+    def _least_deviations(self, limits: Limits, clock: Fraction) -> tuple[Fraction, ...] | None:
+        """Return what is left of every agent without a zero-order hold, each by the function that leaves least."""
+        found = [[] if self.cap is None else [self.cap] * len(self.bounds.rows)]
+        for k, constants in enumerate(self.deviations):
+            if constants is not None and k in self.functions:
+                residual = self.bounds.share(k, limits, clock, Fraction(0)) * self.bounds.initial_root(k)
+                found.append([root_above(c) * residual for c in constants])
+        return tuple(map(round_up, map(min, zip(*filter(None, found), strict=True)))) if found[1:] else None
 
     def _add_noise(self, k: int, entry: Limited, top: Fraction) -> Limited:
         """Add the bounds under measurement noise by one Lyapunov function."""

@@ -133,6 +133,7 @@ def limits_text(run: Trajectory, certificate: Certificate | None) -> str:
             "without the limits of the gain": certificate.limits,
             "without late messages": certificate.late,
             "leaders at rest": certificate.leaders_move,
+            "less places in the formation": certificate.offsets,
         }
         return ", ".join(text for text, there in absent.items() if there)
     if limits is None:
