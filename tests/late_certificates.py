@@ -451,6 +451,7 @@ def with_messages(
         "staged": None,
         "settling": None,
         "form": None,
+        "lmi": None,
         "input": None,
     }
     proof, bounds, inputs, push = [], [], [], None
