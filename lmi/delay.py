@@ -25,6 +25,8 @@ from lmi.errors import NoCertificate
 #: By how much of ``P`` (in units of time of the largest entry of ``K``) and of ``T`` the inequality holds strictly, so
 #: that rounding keeps it.
 SLACK = 1e-5
+#: Largest lateness, in these units, with which something is searched.
+LATEST = 1e6
 #: Share of the trace of ``P`` that is minimised besides, so that no direction of it grows without bound.
 _TRACE = 1e-7
 
@@ -107,6 +109,8 @@ def delay_lyapunov(system: LateSystem, b: float, start: np.ndarray, least: np.nd
     if child_process.forked:
         raise NoCertificate("Clarabel is not run in a forked process")
     unit = max(float(np.abs(system.K).max(initial=0.0)), 1e-300)
+    if system.lateness.max(initial=0.0) > LATEST / unit:
+        raise NoCertificate("values are later than numbers allow")
     P, (m, q) = cp.Variable((len(start), len(start)), symmetric=True), system.C.shape
     N, size = P @ (system.A / unit), float(start @ start) + 1e-300
     N, limits = N + N.T - 2 * (b / unit + SLACK) * P, [P - least / unit >> 0]
@@ -124,7 +128,7 @@ def delay_lyapunov(system: LateSystem, b: float, start: np.ndarray, least: np.nd
         run_solver(problem, "clarabel", {"chordal_decomposition_merge_method": "parent_child"})
     if P.value is None or not np.isfinite(P.value).all():
         raise NoCertificate(f"the solver answered {problem.status}")
-    return (P.value + P.value.T) / 2 * unit, np.asarray(tau.value)[: len(system.weights)] * unit**2
+    return (P.value + P.value.T) / 2 * unit, np.asarray(tau.value) * unit**2 if q else np.zeros(0)
 
 
 def _slopes(system: LateSystem, unit: float, b: float) -> np.ndarray:

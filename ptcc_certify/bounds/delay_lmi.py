@@ -7,9 +7,9 @@ drawn to a state that differs from ``Q X(0)`` by at most ``walk_k sqrt(V(0))``.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 
@@ -41,6 +41,10 @@ _SHARES = (0.85, 0.5, 0.2, 0.05)
 _LEAST_SHARE, _FIRST, _STEPS, _HALVINGS = 0.01, 0.2, 10, 4
 #: What is left at ``T`` counts as this at least where a Lyapunov function is chosen.
 _LEAST_LEFT = 1e-2
+#: Largest rates are so much over the largest lateness.
+_IN_DELAY = 2.0
+#: Multipliers are at least this, over the largest one.
+_LEAST = 1e-12
 #: Room for rounding, relatively.
 _MORE = 1 + Fraction(1, 10**9)
 
@@ -95,15 +99,30 @@ class DelayLMIBounds:
         assert messages.gain_cap is not None
         self.structure, self.gain, self.messages, self.state = structure, gain, messages, initial_state
         self.cap, self.clock = messages.gain_cap, Limits(messages.gain_cap).clock_below(gain.exact)
-        rows = structure.graph.exact_rows(range(structure.graph.n_nodes))
-        unit = common_denominator({x.denominator for row in rows for x in row.values()}, structure.graph.n_edges)
-        first = {c.nodes[0] for c in influence.balanced}
-        self._laplacian = [{j: int(x * unit) for j, x in row.items()} for row in rows]
-        self._unit = unit
-        self._projection = [
-            {j: Fraction(x) for j, x in influence.row(v).items()} for v in range(structure.graph.n_nodes)
-        ]
-        self._free = [v for v in range(structure.graph.n_nodes) if v not in first]
+        self.influence = influence
+
+    def loop(self, factor: Fraction = Fraction(1)) -> LateLoop:
+        """Return what is late, every age multiplied by a factor."""
+        lateness = [self.cap * x * factor for x in self._ages]
+        channels = channels_of(self._edges, lateness, [not row for row in self._whole.laplacian], self._whole.own_late)
+        return replace(self._whole, channels=channels)
+
+    @cached_property
+    def _whole(self) -> LateLoop:
+        """The graph, nothing late."""
+        nodes, first = range(self.structure.graph.n_nodes), {c.nodes[0] for c in self.influence.balanced}
+        rows = self.structure.graph.exact_rows(nodes)
+        unit = common_denominator({x.denominator for row in rows for x in row.values()}, self.structure.graph.n_edges)
+        laplacian = [{j: int(x * unit) for j, x in row.items()} for row in rows]
+        projection = [{j: Fraction(x) for j, x in self.influence.row(v).items()} for v in nodes]
+        free = [v for v in nodes if v not in first]
+        return LateLoop(laplacian, unit, projection, free, (), self.messages.own_delay)
+
+    @cached_property
+    def _edges(self) -> list[tuple[int, int, int]]:
+        """Source, listener and weight of every edge."""
+        ends = zip(self.structure.graph.source.tolist(), self.structure.graph.target.tolist(), strict=True)
+        return [(s, t, -self._whole.laplacian[t][s]) for s, t in ends]
 
     @cached_property
     def _ages(self) -> list[Fraction]:
@@ -113,81 +132,82 @@ class DelayLMIBounds:
             return [age] * self.structure.graph.n_edges
         return [math.ceil(PARTS * (x + self.messages.held) / age) * age / PARTS for x in latencies]
 
-    def loop(self, factor: Fraction = Fraction(1)) -> LateLoop:
-        """Return what is late, every age multiplied by a factor."""
-        graph = self.structure.graph
-        ends = zip(graph.source.tolist(), graph.target.tolist(), strict=True)
-        edges = [(s, t, -self._laplacian[t][s]) for s, t in ends]
-        lateness, rests = [self.cap * x * factor for x in self._ages], [not row for row in self._laplacian]
-        channels = channels_of(edges, lateness, rests, self.messages.own_delay)
-        return LateLoop(self._laplacian, self._unit, self._projection, self._free, channels, self.messages.own_delay)
+    @property
+    def _small(self) -> bool:
+        """Whether anything is searched."""
+        return 0 < self.structure.graph.n_nodes - len(self.influence.balanced) <= LARGEST
 
     def best(self) -> tuple[DelayLMIBound, np.ndarray] | None:
         """Return what leaves least at ``T`` of what is found, with bounds of inputs; None if nothing is."""
-        if not 0 < len(self._free) <= LARGEST:
-            return None
-        loop, found = self.loop(), list[tuple[float, float, np.ndarray, np.ndarray]]()
-        system, start = _system(loop), np.array([float(x) for x in loop.coordinates(self.state)])
-        for share in _SHARES:
-            b = share * system.rate
-            if not b > 0:
-                return None
-            left = math.exp(-min(b * float(self.clock), 700.0))
-            gram = _gram(loop)
-            walking = len(system.walks) > 0
-            least = gram * (2 * b * max(left, _LEAST_LEFT) ** 2 if walking else 1.0)
-            with suppress(LMIError):
-                P, tau = delay_lyapunov(system, b, start, least)
-                away = math.sqrt(max(float(np.max(np.einsum("ij,ji->i", *_deviations(loop, P)))), 0.0))
-                walk = math.sqrt(_walk(loop) / (2 * b))
-                found.append((math.sqrt(max(start @ P @ start, 0.0)) * (walk + away * left), b, P, tau))
-        for _, b, P, tau in sorted(found, key=lambda one: one[0]):
-            with suppress(WorkError):
-                if (bound := self._proved(loop, Fraction(b), P, tau)) is not None:
+        found, loop = list[tuple[float, float, np.ndarray, np.ndarray]](), self.loop() if self._small else None
+        with suppress(OverflowError, WorkError):
+            if loop is not None:
+                found = sorted(self._search(loop), key=lambda one: one[0])
+            for _, b, P, tau in found:
+                if loop is not None and (bound := self._proved(loop, Fraction(b), P, tau)) is not None:
                     return bound
         return None
+
+    def _search(self, loop: LateLoop) -> Iterator[tuple[float, float, np.ndarray, np.ndarray]]:
+        """Yield functions, as far as floats tell: how much is left at ``T``, in some unit, and ``b, P, tau``."""
+        system, exact = _system(loop), loop.coordinates(self.state)
+        start = np.array([float(x / (max(map(abs, exact)) or 1)) for x in exact])
+        D, most = _dense(loop.deviations, len(loop.free)), _fastest(system)
+        # of how far the final state walks the largest sum of squares, over the columns that do
+        walk = max((float(sum(r**2 for j, r in row.items() if j in loop.walks)) for row in loop.camps), default=0.0)
+        for b in (share * most for share in _SHARES if most > 0):
+            left = math.exp(-min(b * float(self.clock), 700.0))
+            with suppress(LMIError):
+                size = 2 * b * max(left, _LEAST_LEFT) ** 2 if walk else 1.0
+                P, tau = delay_lyapunov(system, b, start, size * D.T @ D)
+                away = max(float(np.einsum("ij,ji->i", D, np.linalg.solve(P, D.T)).max()), 0.0)
+                root = math.sqrt(max(float(start @ P @ start), 0.0))
+                yield root * (math.sqrt(walk / (2 * b)) + math.sqrt(away) * left), b, P, tau
 
     def longest_delay(self) -> float:
         """Return about the longest delay that some function forgives: this certificate's limit, not the loop's.
 
         Infinite where nobody hears late of anybody who moves.
         """
-        if not 0 < len(self._free) <= LARGEST:
-            return 0.0
-        system = _system(self.loop())
-        start, least, b = np.zeros(len(self._free)), _gram(self.loop()), _LEAST_SHARE * system.rate
-        if not b > 0 or not len(system.lateness):
-            return math.inf if b > 0 else 0.0
+        with suppress(OverflowError):
+            if self._small:
+                return self._longest_factor() * float(self.messages.age)
+        return 0.0
+
+    def _longest_factor(self) -> float:
+        """Return by what all ages may be multiplied, about."""
+        system, D = _system(self.loop()), _dense(self._whole.deviations, len(self._whole.free))
+        if not system.rate > 0 or not len(system.lateness):
+            return math.inf if system.rate > 0 else 0.0
 
         def forgives(factor: float) -> bool:
+            late = replace(system, lateness=system.lateness * factor)
             with suppress(LMIError):
-                delay_lyapunov(_system(self.loop(Fraction(factor))), b, start, least)
+                delay_lyapunov(late, _LEAST_SHARE * _fastest(late), np.zeros(len(D[0])), D.T @ D)
                 return True
             return False
 
-        low = high = _FIRST / float(np.abs(system.K).max() * system.lateness.max())
+        low = _FIRST / float(np.abs(system.K).max() * system.lateness.max())
         step = 2.0 if forgives(low) else 0.5
         for _ in range(_STEPS):
-            high = low * step
-            if forgives(high) != (step > 1):
+            if forgives(low * step) != (step > 1):
                 break
-            low = high
+            low *= step
         else:
-            return low * float(self.messages.age) if step > 1 else 0.0
-        low, high = min(low, high), max(low, high)
+            return low if step > 1 else 0.0
+        low *= min(step, 1.0)
+        high = 2 * low
         for _ in range(_HALVINGS):
             middle = math.sqrt(low * high)
             low, high = (middle, high) if forgives(middle) else (low, middle)
-        return low * float(self.messages.age)
+        return low
 
     def _proved(
         self, loop: LateLoop, b: Fraction, P: np.ndarray, tau: np.ndarray
     ) -> tuple[DelayLMIBound, np.ndarray] | None:
         """Return what a rounded function states, if it is proved."""
-        if not (tau > 0).all() or not np.isfinite(P).all():
-            return None
         exact, matrix = arithmetic(), [[Fraction(x) for x in row] for row in P.tolist()]
-        each = [Fraction(x) for x in tau.tolist()]
+        each = [Fraction(x) for x in np.maximum(tau, _LEAST * tau.max(initial=1.0)).tolist()]
         lmi = DelayLMI(loop, b, matrix, each)
         if not lmi.proved(exact):
             return None
@@ -230,17 +250,6 @@ def _system(loop: LateLoop) -> LateSystem:
     )
 
 
-def _gram(loop: LateLoop) -> np.ndarray:
-    """Return ``D'D``, ``D`` the deviations from ``Q x``."""
-    D = _dense(loop.deviations, len(loop.free))
-    return D.T @ D
-
-
-def _deviations(loop: LateLoop, P: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    D = _dense(loop.deviations, len(loop.free))
-    return D, np.linalg.solve(P, D.T)
-
-
-def _walk(loop: LateLoop) -> float:
-    """Return the largest sum of squares of rows of ``R`` over what walks."""
-    return max((float(sum(r**2 for j, r in row.items() if j in loop.walks)) for row in loop.camps), default=0.0)
+def _fastest(system: LateSystem) -> float:
+    """Return a rate that none reaches: that of the system where nothing is late, or little more than one in a delay."""
+    return float(np.min(_IN_DELAY / system.lateness, initial=system.rate))

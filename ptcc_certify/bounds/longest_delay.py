@@ -77,18 +77,21 @@ class LateCase:
 
     def longest_forgiven(self, messages: LateMessages) -> float | None:
         """Return about the longest delay that a function of the whole graph forgives; None where none is asked."""
-        small, lmi = (self._whole(kind, messages) for kind in (SmallDelayBounds, DelayLMIBounds))
-        return None if small is None else max(small.longest_delay(self.forms), lmi.longest_delay())
+        lmi = self._whole(DelayLMIBounds, messages)
+        if lmi is None:
+            return None
+        small = self._whole(SmallDelayBounds, messages).longest_delay(self.forms) if self.forms else 0.0
+        return max(small, lmi.longest_delay())
 
     def with_forms(self, late: LateBounds) -> LateBounds:
         """Add what the best Lyapunov functions of the whole graph prove."""
-        late, bounds = self._with_settling(late), self._whole(SmallDelayBounds, late.messages)
+        late, bounds = self._with_settling(late), self._whole(SmallDelayBounds, late.messages) if self.forms else None
         form = None if bounds is None else bounds.best(self.forms)
-        if form is not None:
+        if bounds is not None and form is not None:
             inputs = bounds.inputs(next(one for one in self.forms if one.function == form.function), form)
             late = replace(late, form=form, input=_least(inputs, late.input))
-        found = None if bounds is None else self._whole(DelayLMIBounds, late.messages).best()
-        if found is not None:
+        lmi = self._whole(DelayLMIBounds, late.messages)
+        if lmi is not None and (found := lmi.best()) is not None:
             late = replace(late, lmi=found[0], input=_least(found[1], late.input))
         return late
 

@@ -211,10 +211,8 @@ def check_delay_lmi(
     loop, free = loop_of(messages, verified, cap), verified.structure.free_nodes
     need_rows(2 * graph.n)
     tau = [exact(x) for x in entries(witness["tau"], "tau", graph.n_edges)]
-    late, left = {e.edge for e in loop.channels}, exact(section["left"])
-    need(
-        b > 0 and 2 * b * cap * messages.delay <= LARGEST_GROWTH, "b is not positive, or b gain_cap delay is too large"
-    )
+    late, left = {e.edge: e.lateness for e in loop.channels}, exact(section["left"])
+    need(b > 0 and 2 * b * max(late.values(), default=0) <= LARGEST_GROWTH, "b is not positive, or too large")
     need(all(x > 0 if k in late else x == 0 for k, x in enumerate(tau)), "tau is positive iff messages are late")
     lmi = DelayLMI(loop, b, triangle(witness["matrix"], len(free)), [tau[e.edge] for e in loop.channels])
     need(lmi.proved(doc.exact), "the delay LMI is not proved")
