@@ -1,8 +1,12 @@
-"""The delay that is proved to do, over the one that does: ``python benchmarks/late_delay.py [FIRST LAST]``.
+"""The delay that is proved to do, over the one that does: ``python benchmarks/late_delay.py [FIRST LAST] [--whole]``.
 
 Random graphs of single leaders and one to six followers, of mixed, positive and camp-like signs. What may be left at
 the deadline is 5 % of the largest deviation from the final states at first. The delay that does is the longest constant
 one of which a run leaves no more; those that are proved are the longest ones by rows (any size) and by steps.
+
+With ``--whole``: graphs with a leader group, everything late, the own state too, under a capped gain. The delay that
+does is the largest constant one at which a constant gain settles; those that are proved are the longest ones that some
+function of the graph as it stands forgives, and that the delay LMI forgives.
 """
 
 from __future__ import annotations
@@ -17,10 +21,13 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
-from late_certificates import led_graph
+from late_certificates import grouped_graph, led_graph
 
+from ptcc_certify.bounds.delay_lmi import DelayLMIBounds
 from ptcc_certify.bounds.final_state import final_state
 from ptcc_certify.bounds.late_messages import LateBounds, bound_late
+from ptcc_certify.bounds.small_delays import SmallDelayBounds, delay_threshold
+from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.protocols import NominalProtocol
 from ptcc_certify.protocols.late_messages import LateMessages
@@ -74,9 +81,32 @@ def shares(seed: int) -> tuple[float, float, bool] | None:
     return (by_rows or 0) / does, (by_steps or 0) / does, rho2 >= 2
 
 
+def whole_shares(seed: int) -> tuple[float, float]:
+    """Return the longest delays that functions and the delay LMI forgive of a whole graph, over what it bears."""
+    rng = np.random.default_rng(seed)
+    graph, _ = grouped_graph(rng, int(rng.integers(1, 5)))
+    x0 = [Fraction(int(x), 10) for x in rng.integers(-100, 100, graph.n_nodes)]
+    protocol = NominalProtocol(T=1, rho1=1, rho2=3, kappa=1)
+    messages = LateMessages("0.001", own_delay=True, gain_cap=20)
+    cert = certify(graph, protocol, x0, simulation=False)
+    asked = cert.structure, protocol.gain, messages, cert.influence, x0
+    by_functions = SmallDelayBounds(*asked).longest_delay(cert.decaying_forms)
+    does = delay_threshold(cert.structure, 20)
+    return by_functions / does, DelayLMIBounds(*asked).longest_delay() / does
+
+
 def main() -> None:
     """Print quartiles over all seeds."""
-    first, last = (int(x) for x in (sys.argv[1:3] if len(sys.argv) > 2 else (0, 200)))
+    words = [word for word in sys.argv[1:] if word != "--whole"]
+    first, last = (int(x) for x in (words if len(words) == 2 else (0, 200)))
+    if len(words) < len(sys.argv[1:]):
+        shares_of_all = np.array([whole_shares(seed) for seed in range(first, last)])
+        print(f"{last - first} graphs; share of the delay that a constant gain bears, and the second over the first")
+        columns = {"functions": shares_of_all[:, 0], "delay LMI": shares_of_all[:, 1]}
+        columns["ratio"] = columns["delay LMI"] / columns["functions"]
+        for name, column in columns.items():
+            print(f"{name:10}" + "".join(f"{x:9.4f}" for x in np.quantile(column, [0, 0.25, 0.5, 0.75, 1])))
+        return
     found = [case for seed in range(first, last) if (case := shares(seed)) is not None]
     print(f"{last - first} graphs, {len(found)} with a longest delay between 0.002 T and T; share of it that is proved")
     print(f"{'':22}{'least':>8}{'1/4':>8}{'1/2':>8}{'3/4':>8}{'largest':>9}")

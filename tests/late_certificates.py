@@ -74,6 +74,17 @@ def settling(seed: int, gain_cap: Any = None) -> Json:
     return plain(graph, nominal(), x0, messages=LateMessages(delays, gain_cap=gain_cap))
 
 
+@cache
+def whole(seed: int, own_delay: bool, apart: bool = True) -> Json:
+    """A certificate of a leader group with followers under a capped gain, by the delay LMI, as it is made."""
+    rng = np.random.default_rng(seed)
+    graph, _ = grouped_graph(rng, int(rng.integers(1, 3)))
+    x0 = [Fraction(int(v), 10) for v in rng.integers(-50, 50, graph.n_nodes)]
+    delays = {(s, t): Fraction(int(rng.integers(2 if apart else 6, 7)), 1000) for s, t, _ in graph.edges}
+    messages = LateMessages(delays, own_delay=own_delay, gain_cap=8)
+    return plain(graph, nominal(), x0, messages=messages)
+
+
 def plain(graph: SignedDigraph, protocol: Any, x0: Any, **options: Any) -> Json:
     """The certificate of the graph as it stands."""
     return {**json.loads(certify(graph, protocol, x0, simulation=False, **options).to_json()), "unverified": {}}
@@ -451,6 +462,7 @@ def with_messages(
         "staged": None,
         "settling": None,
         "form": None,
+        "lmi": None,
         "input": None,
     }
     proof, bounds, inputs, push = [], [], [], None

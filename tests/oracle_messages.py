@@ -211,7 +211,9 @@ class LateOracle(Oracle):
             self.require(not self.said[key] or (self.single and not late and self.follow), key)
         if self.fled is not None:
             self.require(min(self.fled) >= 0 and "mu1" not in self.gains, "leaders: what they need")
-            self.require(not any(self.said[key] for key in ("missed", "staged", "settling", "form")), "leaders move")
+            self.require(
+                not any(self.said[key] for key in ("missed", "staged", "settling", "form", "lmi")), "leaders move"
+            )
         self.above_rows()
         if self.fled is not None:
             self.kept_after()
@@ -225,6 +227,8 @@ class LateOracle(Oracle):
             self.behind_settling_leaders()
         if self.said["form"] is not None:
             self.small_delays()
+        if self.said["lmi"] is not None:
+            self.delay_lmi()
         if self.said["input"] is not None:
             self.slopes()
 
@@ -493,20 +497,56 @@ class LateOracle(Oracle):
         value = sum((abs(F[i][j]) * pushed[i] * pushed[j] for i in range(self.n) for j in range(self.n)), Fraction(0))
         self.require(kap >= 0 and kap**2 >= value and b + h * q * kap <= r / 2, "form: kap")
         self.require(not ball(number(said["left"])) < (-ball(b) * self.clock(self.cap)).exp(), "form: left")
+        self.decays_along_motions("form", np.array([[float(x) for x in row] for row in F]), float(b))
+
+    def decays_along_motions(self, name: str, A: np.ndarray, b: float) -> None:
+        """Motions beside ``x'A x``, its rate ``2 b``, and how far agents are drawn away."""
+        said, T = self.said[name], float(self.gain[0])
         moved, residual = (np.array(list(map(float, self.vector(said[key])))) for key in ("moved", "residual"))
-        T = float(self.gain[0])
-        A = np.array([[float(x) for x in row] for row in F])
         Q = np.array([[float(x) for x in row] for row in self.Q])
         for runs, target in self.loop(1.2 * T):
             for X in runs.states:
                 V = np.sqrt(np.maximum(np.einsum("it,ij,jt->t", X, A, X), 0))
-                z = np.array([math.exp(-float(b) * runs.gain.clock(min(t, T))) for t in runs.times])
+                z = np.array([math.exp(-b * runs.gain.clock(min(t, T))) for t in runs.times])
                 ok = runs.times <= T
-                self.require(not np.any((V[0] * z * (1 + 1e-6) + FLOOR < V)[ok]), "form: a motion")
+                self.require(not np.any((V[0] * z * (1 + 1e-6) + FLOOR < V)[ok]), f"{name}: a motion")
                 off = np.abs(Q @ (X - X[:, :1]))
-                self.require(not np.any(off > moved[:, None] * (1 + 1e-6) + FLOOR), "form: moved")
+                self.require(not np.any(off > moved[:, None] * (1 + 1e-6) + FLOOR), f"{name}: moved")
                 end = np.abs(X[:, runs.times == T] - target[:, None])
-                self.require(not np.any(end > residual[:, None] * (1 + 1e-6) + FLOOR), "form: residual")
+                self.require(not np.any(end > residual[:, None] * (1 + 1e-6) + FLOOR), f"{name}: residual")
+
+    def delay_lmi(self) -> None:
+        """Motions, and the inequality with a column for every late edge, by eigenvalues."""
+        said = self.said["lmi"]
+        self.require(self.cap is not None and self.error == 0 and self.target is not None, "lmi: what it needs")
+        if self.false or self.cap is None:
+            return
+        step = self.witness("messages.lmi")
+        b, lower = number(step["numbers"]["b"]), step["witness"]["matrix"]
+        self.require(b > 0 and not ball(number(said["left"])) < (-ball(b) * self.clock(self.cap)).exp(), "lmi: left")
+        L, Q = (np.array([[float(x) for x in row] for row in S]) for S in (self.L, self.Q))
+        first = [min(part) for part in self.closed if any(self.Q[min(part)])]
+        free = [v for v in range(self.n) if v not in first]
+        C = (np.eye(self.n) - Q[:, first] / np.diag(Q)[first] @ np.eye(self.n)[first])[free]
+        P = np.array([[float(number(lower[max(i, j)][min(i, j)])) for j in range(len(free))] for i in range(len(free))])
+        own, late = self.said["own"] == "late", list[tuple[np.ndarray, np.ndarray, float, float]]()
+        for (s, t), x in zip(self.pairs, step["witness"]["tau"], strict=True):
+            w, h = float(self.weights[s, t]), float(self.cap * self.ages[s, t])
+            if float(number(x)) > 0:
+                m = np.eye(self.n)[s] - (np.sign(w) * np.eye(self.n)[t] if own else 0)
+                late.append((w * np.eye(self.n)[t], m, h, float(number(x))))
+            else:
+                self.require(h == 0 or (not own and not self.L[s][s]), "lmi: a late edge without a multiplier")
+        W, M = (np.array([e[k] for e in late]).reshape(len(late), self.n) for k in (0, 1))
+        h, each = (np.array([e[k] for e in late]) for k in (2, 3))
+        A, Z = C @ L[:, free], np.hstack([L[:, free], -W.T])
+        c = each * h * np.expm1(2 * float(b) * h) / (2 * float(b))
+        N = np.block([[P @ A + A.T @ P - 2 * float(b) * P, -P @ C @ W.T], [-(P @ C @ W.T).T, np.diag(each)]])
+        walk = np.hstack([np.zeros((len(first), len(free))), Q[first] @ W.T])
+        N = N - (M @ Z).T * c @ (M @ Z) - walk.T @ walk
+        size = np.sqrt(np.abs(np.diag(N)) + 1e-300)
+        self.require(np.linalg.eigvalsh(N / np.outer(size, size))[0] > -1e-7, "lmi: the inequality")
+        self.decays_along_motions("lmi", C.T @ P @ C, float(b))
 
     def behind_settling_leaders(self) -> None:
         said, step = self.said["settling"], self.witness("messages.settling")

@@ -26,6 +26,7 @@ from lmi.dyadic import round_to_bits
 from lmi.errors import LMIError, NoCertificate
 from lmi.exact.decimal_rounding import float_up, up
 from lmi.exact.elementary_enclosures import log, rounded
+from ptcc_certify.bounds.delay_lmi import DelayLMIBound
 from ptcc_certify.bounds.late_steps import Steps, search_steps
 from ptcc_certify.bounds.missed_deadline import Missed, find_missed
 from ptcc_certify.bounds.settling_leaders import Settling
@@ -111,6 +112,8 @@ class LateBounds:
         What a Lyapunov function of the whole graph proves under a capped gain.
     settling : Settling or None
         What holds of followers that hear late of leaders in groups.
+    lmi : DelayLMIBound or None
+        What the delay LMI proves of the whole graph under a capped gain.
     longest_delay : float or None
         About the longest delay that such functions forgive: this certificate's limit. None if it was not asked.
     unarrived : bool
@@ -134,6 +137,7 @@ class LateBounds:
     staged: tuple[Fraction, ...] | None = None
     residual: np.ndarray | None = None
     form: SmallDelays | None = None
+    lmi: DelayLMIBound | None = None
     longest_delay: float | None = None
     unarrived: bool = False
     input: np.ndarray | None = None
@@ -144,14 +148,16 @@ class LateBounds:
     @property
     def says_something(self) -> bool:
         """Whether anything is proved."""
-        return bool(self.rows or self.steps or self.missed or self.staged or self.settling or self.form)
+        whole = self.settling or self.form or self.lmi
+        return bool(self.rows or self.steps or self.missed or self.staged or whole)
 
     @property
     def largest(self) -> float:
         """The largest of the bounds of ``|x_k(T) - x_k*|``; infinite where nothing is bounded."""
         largest = math.inf if self.residual is None else float(self.residual.max())
         largest = largest if self.settling is None else min(largest, float(self.settling.residual.max()))
-        return largest if self.form is None else min(largest, float_up(max(self.form.residual)))
+        whole = [float_up(max(one.residual)) for one in (self.form, self.lmi) if one is not None]
+        return min([largest, *whole])
 
     def __repr__(self) -> str:
         within = "nothing" if math.isinf(self.largest) else f"every agent within {up(self.largest, 2)}"

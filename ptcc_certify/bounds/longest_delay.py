@@ -6,9 +6,11 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 
+from ptcc_certify.bounds.delay_lmi import DelayLMIBounds
 from ptcc_certify.bounds.final_state import Influence
 from ptcc_certify.bounds.late_messages import LateBounds, bound_late
 from ptcc_certify.bounds.settling_leaders import SettlingBounds
@@ -64,28 +66,34 @@ class LateCase:
         late = bound_late(self.structure, self.protocol, messages, self.initial_state, self.ends, self.leaders)
         return self.with_forms(late)
 
-    def small_delays(self, messages: LateMessages) -> SmallDelayBounds | None:
-        """Return what bounds small delays of the whole graph; None where nothing does."""
-        state, exact = self.initial_state, self.influence
-        if (
-            self.leaders is not None
-            or messages.gain_cap is None
-            or messages.value_error
-            or state is None
-            or exact is None
-            or not self.forms
-        ):
+    def _whole(self, kind: Any, messages: LateMessages) -> Any:
+        """Return what bounds delays of the whole graph by a kind of function; None where nothing does."""
+        state, exact, cap = self.initial_state, self.influence, messages.gain_cap
+        if self.leaders is not None or cap is None or messages.value_error or state is None:
             return None
-        return SmallDelayBounds(self.structure, self.protocol.gain, messages, exact, state)
+        if exact is None or not exact.exact:
+            return None
+        return kind(self.structure, self.protocol.gain, messages, exact, state)
+
+    def longest_forgiven(self, messages: LateMessages) -> float | None:
+        """Return about the longest delay that a function of the whole graph forgives; None where none is asked."""
+        lmi = self._whole(DelayLMIBounds, messages)
+        if lmi is None:
+            return None
+        small = self._whole(SmallDelayBounds, messages).longest_delay(self.forms) if self.forms else 0.0
+        return max(small, lmi.longest_delay())
 
     def with_forms(self, late: LateBounds) -> LateBounds:
         """Add what the best Lyapunov functions of the whole graph prove."""
-        late, bounds = self._with_settling(late), self.small_delays(late.messages)
+        late, bounds = self._with_settling(late), self._whole(SmallDelayBounds, late.messages) if self.forms else None
         form = None if bounds is None else bounds.best(self.forms)
-        if bounds is None or form is None:
-            return late
-        inputs = bounds.inputs(next(one for one in self.forms if one.function == form.function), form)
-        return replace(late, form=form, input=inputs if late.input is None else np.minimum(inputs, late.input))
+        if bounds is not None and form is not None:
+            inputs = bounds.inputs(next(one for one in self.forms if one.function == form.function), form)
+            late = replace(late, form=form, input=_least(inputs, late.input))
+        lmi = self._whole(DelayLMIBounds, late.messages)
+        if lmi is not None and (found := lmi.best()) is not None:
+            late = replace(late, lmi=found[0], input=_least(found[1], late.input))
+        return late
 
     def _with_settling(self, late: LateBounds) -> LateBounds:
         """Add what holds of followers that hear late of leaders in groups, unless these hear late, too."""
@@ -141,3 +149,8 @@ class LateCase:
             delay = {edge: Fraction(x) * factor for edge, x in given.items()}
         period = None if messages.period is None else messages.period * factor
         return self.bound(replace(messages, delay=delay, period=period))
+
+
+def _least(one: np.ndarray, other: np.ndarray | None) -> np.ndarray:
+    """Return the smaller bounds of two, of which the second may be missing."""
+    return one if other is None else np.minimum(one, other)

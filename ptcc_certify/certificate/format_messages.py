@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from lmi.exact.decimal_rounding import float_up
+from ptcc_certify.bounds.delay_lmi import DelayLMIBound
 from ptcc_certify.bounds.late_messages import LateBounds, RowBound, heard_wrong, late_rows
 from ptcc_certify.bounds.late_steps import bound_steps
 from ptcc_certify.bounds.missed_deadline import Missed
@@ -16,7 +17,7 @@ from ptcc_certify.bounds.settling_leaders import Settling
 from ptcc_certify.bounds.small_delays import SmallDelays
 from ptcc_certify.certificate.format_vectors import Reader, Writer, number, text
 from ptcc_certify.checker.messages import MOVING, ROW
-from ptcc_certify.checker.reading import exact
+from ptcc_certify.checker.reading import exact, triangle
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import Structure
@@ -60,6 +61,10 @@ def late_obligations(late: LateBounds | None) -> Iterator[Obligation]:
         phi = dict(zip(late.structure.graph.labels, map(format_exact, form.phi), strict=True))
         numbers = {"q": form.q, "b": form.b, "kap": form.kap}
         yield Obligation("late-form", "messages.form", numbers, {"function": form.function, "phi": phi})
+    if (lmi := late.lmi) is not None:
+        lower = [[float(x).hex() for x in row[: k + 1]] for k, row in enumerate(lmi.matrix)]
+        witness = {"matrix": lower, "tau": [float(x).hex() if x else "0" for x in lmi.tau]}
+        yield Obligation("late-lmi", "messages.lmi", {"b": lmi.b}, witness)
 
 
 def asked_messages(messages: LateMessages, graph: SignedDigraph, out: Writer) -> dict[str, Any]:
@@ -97,11 +102,12 @@ def messages_section(late: LateBounds, out: Writer) -> dict[str, Any]:
         "staged": staged and dict(zip(followers, map(format_exact, staged), strict=True)),
         "settling": late.settling and {name: text(getattr(late.settling, name)) for name in ("cap", "clock", "left")},
         "form": None if late.form is None else _form_section(late.form, graph.labels),
+        "lmi": None if late.lmi is None else _form_section(late.lmi, graph.labels),
         "input": None if late.input is None else agents_section(graph.labels, "late-input", late.input, out),
     }
 
 
-def _form_section(form: SmallDelays, labels: tuple[str, ...]) -> dict[str, Any]:
+def _form_section(form: SmallDelays | DelayLMIBound, labels: tuple[str, ...]) -> dict[str, Any]:
     agents = {
         name: dict(zip(labels, map(format_exact, getattr(form, name)), strict=True)) for name in ("moved", "residual")
     }
@@ -122,6 +128,15 @@ def _read_form(section: Mapping[str, Any] | None, step: Obligation | None, data:
         data.agents(section["moved"]),
         data.agents(section["residual"]),
     )
+
+
+def _read_lmi(section: Mapping[str, Any] | None, step: Obligation | None, data: Reader) -> DelayLMIBound | None:
+    if section is None or step is None:
+        return None
+    matrix = tuple(map(tuple, triangle(step.witness["matrix"], len(step.witness["matrix"]))))
+    moved, residual = (data.agents(section[name]) for name in ("moved", "residual"))
+    tau = tuple(map(exact, step.witness["tau"]))
+    return DelayLMIBound(step.numbers["b"], matrix, tau, exact(section["left"]), moved, residual)
 
 
 def _read_settling(section: Mapping[str, Any] | None, step: Obligation | None, data: Reader) -> Settling | None:
@@ -182,6 +197,7 @@ def read_late(
         staged and tuple(map(exact, staged.values())),
         None if residual is None else np.array([float_up(x) for x in data.agents(residual)]),
         _read_form(section["form"], steps.get(("late-form", "messages.form")), data),
+        lmi=_read_lmi(section["lmi"], steps.get(("late-lmi", "messages.lmi")), data),
         settling=_read_settling(section["settling"], steps.get(("late-settling", "messages.settling")), data),
         input=None if section["input"] is None else np.array([float_up(x) for x in data.agents(section["input"])]),
         leaders=leaders,

@@ -49,7 +49,8 @@ def judge_messages(certificate: Content) -> list[Answer]:
             answers.append(Answer(OPEN, "leaders that move", "no vector for their followers was found"))
         return answers
     if not late.says_something:
-        limit = f"; this certificate's limit is a delay of {late.longest_delay:.3g}" if late.longest_delay else ""
+        known = 0 < (late.longest_delay or 0) < math.inf
+        limit = f"; this certificate's limit is a delay of {late.longest_delay:.3g}" if known else ""
         wish = "" if most is None else _longest(late, f"within {near(most, 12)} at T is ")
         mend = "; give an initial state" * (certificate.initial_state is None)
         return [Answer(OPEN, "late messages", f"nothing is proved of what is left at T{mend}{limit}{wish}")]

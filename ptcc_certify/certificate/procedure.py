@@ -362,8 +362,7 @@ def _with_small_delays(certificate: Certificate) -> Certificate:
         certificate.decaying_forms,
         late.leaders,
     )
-    late, small = case.with_forms(late), case.small_delays(late.messages)
-    late = late if small is None else replace(late, longest_delay=small.longest_delay(case.forms))
+    late = replace(case.with_forms(late), longest_delay=case.longest_forgiven(late.messages))
     certificate, asked = certificate.changed(late=late), certificate.expectations.max_residual
     if asked is not None and late.messages.age and certificate.graph.n_nodes <= EXACT_NODES:
         certificate = certificate.changed(late=replace(late, enough=_longest_delay(certificate, case, late, asked)))

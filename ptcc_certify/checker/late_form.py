@@ -67,9 +67,9 @@ def check_form(
     need(left >= formulas.decay_above(b * formulas.Limits(cap).clock_below(messages.gain)), "left is not proved")
     root = formulas.root_above(initial_value(verified, known.form))
     moved = [lag / b * root * x for x in _moved(verified, pushed)]
-    claimed = _above(doc, graph, section["moved"], "moved", moved)
+    claimed = read_above(doc, graph, section["moved"], "moved", moved)
     rest = [x + formulas.root_above(c) * root * left for x, c in zip(claimed, known.deviations, strict=True)]
-    _above(doc, graph, section["residual"], "residual", rest)
+    read_above(doc, graph, section["residual"], "residual", rest)
     if inputs is not None:
         inputs.by_form(list(phi), b, root)
     doc.done(f"b = {down(b)}, gain at most {down(cap)}")
@@ -94,7 +94,7 @@ def function_of(doc: Document, verified: Verified, k: Any) -> Constants:
     return Constants(form, errors, list(deviations))
 
 
-def _above(doc: Document, graph: Digraph, entry: Any, what: str, least: Sequence[Fraction]) -> Numbers:
+def read_above(doc: Document, graph: Digraph, entry: Any, what: str, least: Sequence[Fraction]) -> Numbers:
     """Read bounds by agent, none of which is below what is proved."""
     values = by_agent(doc, graph, entry, what, files=False)
     low = next((label for label, x, y in zip(graph.labels, values, least, strict=True) if x < y), None)

@@ -12,6 +12,7 @@ from lmi.exact.elementary_enclosures import log
 from lmi.exact.numbers import longest, shorten
 from lmi.exact.work import spend
 from ptcc_certify.checker import input_formulas as formulas
+from ptcc_certify.checker.delay_lmi import check_delay_lmi
 from ptcc_certify.checker.follower_rows import Followers, Rows, followers_of
 from ptcc_certify.checker.graph import MANY_EDGES, by_agent
 from ptcc_certify.checker.input import Verified
@@ -28,13 +29,13 @@ from ptcc_certify.checker.side_files import Numbers
 
 KEYS = (
     *("latency", "packets", "delay", "own", "value_error", "gain_cap", "leaders"),
-    *("rows", "steps", "residual", "missed", "staged", "settling", "form", "input"),
+    *("rows", "steps", "residual", "missed", "staged", "settling", "form", "lmi", "input"),
 )
 #: Witnesses of rows, and instants of steps, that are read.
 MANY_ROWS, MANY_INSTANTS = 100, 2001
 #: Of an entry of rows, and what it has besides where leaders move; what is not proved there.
 ROW, MOVING = ("cap", "clock", "left", "initial", "floor"), ("drift", "after")
-AT_REST = ("missed", "staged", "settling", "form")
+AT_REST = ("missed", "staged", "settling", "form", "lmi")
 
 
 class Residual:
@@ -74,7 +75,7 @@ def check_messages(doc: Document, verified: Verified) -> None:
         need(all(section[key] is None for key in AT_REST), f"one of {', '.join(AT_REST)} though leaders move")
     need(len(entries(section["rows"], "rows")) <= MANY_ROWS, f"more than {MANY_ROWS} witnesses of rows")
     by_rows = bool(section["rows"]) or any(section[key] is not None for key in ("steps", "missed", "staged"))
-    stated = by_rows or section["form"] is not None or section["settling"] is not None
+    stated = by_rows or any(section[key] is not None for key in ("settling", "form", "lmi"))
     need(stated, "nothing is stated of late messages")
     bounded = bool(section["rows"]) or section["steps"] is not None
     need(bounded == (section["residual"] is not None), "a residual is stated iff rows or steps bound it")
@@ -87,6 +88,8 @@ def check_messages(doc: Document, verified: Verified) -> None:
         check_settling(doc, messages, verified, section["settling"], inputs)
     if section["form"] is not None:
         check_form(doc, messages, verified, section["form"], inputs)
+    if section["lmi"] is not None:
+        check_delay_lmi(doc, messages, verified, section["lmi"], inputs)
     if inputs is not None:
         inputs.close(doc)
 

@@ -114,8 +114,9 @@ def residual_text(certificate: Certificate) -> str:
     bounds = late.residual if late.residual is not None else np.full(certificate.graph.n_nodes, np.inf)
     if late.settling is not None:
         bounds = np.minimum(bounds, late.settling.residual)
-    if late.form is not None:
-        bounds = np.minimum(bounds, [float_up(x) for x in late.form.residual])
+    for one in (late.form, late.lmi):
+        if one is not None:
+            bounds = np.minimum(bounds, [float_up(x) for x in one.residual])
     names = certificate.graph.labels
     return shorten_list([f"{names[v]} {up(float(bounds[v]), 2)}" for v in range(len(names)) if bounds[v]])
 
@@ -147,7 +148,7 @@ def _left(late: LateBounds) -> list[str]:
     if math.isinf(late.largest):
         return [f"{cap}nothing is proved of what is left at T{_limits(late)}"]
     whole = ", from within 1 of it at first" * late.relative
-    formed = late.form is not None and float(max(late.form.residual)) <= late.largest
+    formed = late.largest in [float_up(max(one.residual)) for one in (late.form, late.lmi) if one is not None]
     settling = "; leaders hear each other at once, and settle by themselves" * (late.settling is not None)
     within = f"every agent within {up(late.largest, 2)} of its final state at T"
     if late.leaders is not None:
@@ -165,7 +166,7 @@ def _kept_off(late: LateBounds) -> list[str]:
 
 def _limits(late: LateBounds) -> str:
     """Tell the longest delay that the certificate forgives, and the one that constant gain does."""
-    if late.longest_delay is None:
+    if late.longest_delay is None or math.isinf(late.longest_delay):
         return ""
     threshold = _threshold(late)
     more = "" if math.isinf(threshold) else f", the loop's {threshold:.3g} at constant gain"

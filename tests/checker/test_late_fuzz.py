@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from late_certificates import led_graph, nominal, plain, settling, with_leaders, with_messages
+from late_certificates import led_graph, nominal, plain, settling, whole, with_leaders, with_messages
 from mutations import Json, at, changed, containers, leaves, of_container, of_leaf, resealed, same_claim
 from oracle_messages import late_claims
 from random_mutants import WAYS, Rng, fraction, mutant, nudged, pick
@@ -39,6 +39,8 @@ SINGLY = (
     "moving, capped of 2",
     "any moving of 2",
     "form False of 1",
+    "lmi False of 1",
+    "lmi True of 2",
     "settling of 1",
     "settling of 2",
 )
@@ -77,6 +79,7 @@ def cases() -> list[tuple[str, Json]]:
             if small["messages"]["form"] is not None:
                 some[f"form {late}"] = small
         found += [(f"{name} of {seed}", data) for name, data in some.items()]
+    found += [(f"lmi {late} of {seed}", whole(seed, late)) for seed, late in ((1, False), (2, True), (3, True))]
     found += [(f"settling of {seed}", settling(seed, cap)) for seed, cap in ((1, None), (2, 12))]
     for name, data in found:
         assert check(data).accepted, (name, check(data).reason)

@@ -228,6 +228,7 @@ def of_messages() -> list[str]:
         "late-residual",
         "late-staged",
         "late-form",
+        "late-lmi",
         "late-input",
         "late-settling",
         "tracking",

@@ -87,9 +87,8 @@ def plot_late(subject: Any, *, ax: Axes | None = None, time_unit: str = "") -> A
 def _draw_bound(ax: Axes, late: LateBounds, t: np.ndarray) -> None:
     if late.rows or late.steps is not None or late.settling is not None:
         ax.plot(t, late.largest_bound(t), color=BOUND, linewidth=1.8, label="proved bound")
-    elif late.form is not None:
-        level = float(max(late.form.residual))
-        ax.plot(t[-1:], [level], marker="_", color=BOUND, markersize=12, label="proved at $T$", linestyle="none")
+    elif late.form is not None or late.lmi is not None:
+        ax.plot(t[-1:], [late.largest], marker="_", color=BOUND, markersize=12, label="proved at $T$", linestyle="none")
 
 
 @styled

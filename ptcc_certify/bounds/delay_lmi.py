@@ -1,0 +1,255 @@
+"""Delays of a whole graph under a capped gain by the delay LMI: searched in floats, rounded, proved as in the check.
+
+What is stated follows from :mod:`ptcc_certify.checker.delay_lmi`: ``sqrt(V(s)) <= e^(-b s) sqrt(V(0))``; the agents are
+drawn to a state that differs from ``Q X(0)`` by at most ``walk_k sqrt(V(0))``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cached_property
+
+import numpy as np
+
+from lmi.delay import LateSystem, delay_lyapunov
+from lmi.errors import LMIError
+from lmi.exact import arithmetic
+from lmi.exact.decimal_rounding import float_up
+from lmi.exact.elementary_enclosures import rounded
+from lmi.exact.numbers import common_denominator
+from lmi.exact.work import WorkError
+from ptcc_certify.bounds.final_state import Influence
+from ptcc_certify.bounds.small_delays import left_above
+from ptcc_certify.checker.delay_lmi import DelayLMI, LateLoop, Row, channels_of
+from ptcc_certify.checker.input_formulas import BITS, Limits
+from ptcc_certify.checker.late_input import gain_above
+from ptcc_certify.checker.late_messages import PARTS
+from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.protocols.gain import Gain
+from ptcc_certify.protocols.late_messages import LateMessages
+
+#: Above so many free agents nothing is searched.
+LARGEST = 20
+#: Values of ``b`` that are tried, as shares of the rate where nothing is late.
+_SHARES = (0.85, 0.5, 0.2, 0.05)
+#: The share at which the longest delay is sought, the lateness that is tried first, times the largest entry of ``L``,
+#: and the number of factors 2 from there up or down, and then of halvings.
+_LEAST_SHARE, _FIRST, _STEPS, _HALVINGS = 0.01, 0.2, 10, 4
+#: What is left at ``T`` counts as this at least where a Lyapunov function is chosen.
+_LEAST_LEFT = 1e-2
+#: Largest rates are so much over the largest lateness.
+_IN_DELAY = 2.0
+#: Multipliers are at least this, over the largest one.
+_LEAST = 1e-12
+#: Room for rounding, relatively.
+_MORE = 1 + Fraction(1, 10**9)
+
+
+@dataclass(frozen=True, eq=False)
+class DelayLMIBound:
+    """What the delay LMI proves.
+
+    Attributes
+    ----------
+    b : Fraction
+    matrix : m rows of m Fractions
+        ``P``, of the coordinates of the free agents.
+    tau : tuple of Fraction
+        By edge; 0 where nothing is late.
+    left : Fraction
+        ``e^(-b s(T))`` from above.
+    moved, residual : tuple of N Fraction
+        How far from ``Q X(0)`` agents are drawn to, and are at ``T``, from above.
+    """
+
+    b: Fraction
+    matrix: tuple[tuple[Fraction, ...], ...]
+    tau: tuple[Fraction, ...]
+    left: Fraction
+    moved: tuple[Fraction, ...]
+    residual: tuple[Fraction, ...]
+
+
+class DelayLMIBounds:
+    """Bounds of one graph under one capped gain.
+
+    Parameters
+    ----------
+    structure : Structure
+    gain : Gain
+    messages : LateMessages
+        With a ``gain_cap``.
+    influence : Influence
+        Exact.
+    initial_state : sequence of N Fraction
+    """
+
+    def __init__(
+        self,
+        structure: Structure,
+        gain: Gain,
+        messages: LateMessages,
+        influence: Influence,
+        initial_state: Sequence[Fraction],
+    ):
+        assert messages.gain_cap is not None
+        self.structure, self.gain, self.messages, self.state = structure, gain, messages, initial_state
+        self.cap, self.clock = messages.gain_cap, Limits(messages.gain_cap).clock_below(gain.exact)
+        self.influence = influence
+
+    def loop(self, factor: Fraction = Fraction(1)) -> LateLoop:
+        """Return what is late, every age multiplied by a factor."""
+        lateness = [self.cap * x * factor for x in self._ages]
+        channels = channels_of(self._edges, lateness, [not row for row in self._whole.laplacian], self._whole.own_late)
+        return replace(self._whole, channels=channels)
+
+    @cached_property
+    def _whole(self) -> LateLoop:
+        """The graph, nothing late."""
+        nodes, first = range(self.structure.graph.n_nodes), {c.nodes[0] for c in self.influence.balanced}
+        rows = self.structure.graph.exact_rows(nodes)
+        unit = common_denominator({x.denominator for row in rows for x in row.values()}, self.structure.graph.n_edges)
+        laplacian = [{j: int(x * unit) for j, x in row.items()} for row in rows]
+        projection = [{j: Fraction(x) for j, x in self.influence.row(v).items()} for v in nodes]
+        free = [v for v in nodes if v not in first]
+        return LateLoop(laplacian, unit, projection, free, (), self.messages.own_delay)
+
+    @cached_property
+    def _edges(self) -> list[tuple[int, int, int]]:
+        """Source, listener and weight of every edge."""
+        ends = zip(self.structure.graph.source.tolist(), self.structure.graph.target.tolist(), strict=True)
+        return [(s, t, -self._whole.laplacian[t][s]) for s, t in ends]
+
+    @cached_property
+    def _ages(self) -> list[Fraction]:
+        """What is heard over each edge is so old at most, rounded up to 64ths of the oldest."""
+        latencies, age = self.messages.latencies(self.structure.graph), self.messages.age
+        if not isinstance(latencies, tuple):
+            return [age] * self.structure.graph.n_edges
+        return [math.ceil(PARTS * (x + self.messages.held) / age) * age / PARTS for x in latencies]
+
+    @property
+    def _small(self) -> bool:
+        """Whether anything is searched."""
+        return 0 < self.structure.graph.n_nodes - len(self.influence.balanced) <= LARGEST
+
+    def best(self) -> tuple[DelayLMIBound, np.ndarray] | None:
+        """Return what leaves least at ``T`` of what is found, with bounds of inputs; None if nothing is."""
+        found, loop = list[tuple[float, float, np.ndarray, np.ndarray]](), self.loop() if self._small else None
+        with suppress(OverflowError, WorkError):
+            if loop is not None:
+                found = sorted(self._search(loop), key=lambda one: one[0])
+            for _, b, P, tau in found:
+                if loop is not None and (bound := self._proved(loop, Fraction(b), P, tau)) is not None:
+                    return bound
+        return None
+
+    def _search(self, loop: LateLoop) -> Iterator[tuple[float, float, np.ndarray, np.ndarray]]:
+        """Yield functions, as far as floats tell: how much is left at ``T``, in some unit, and ``b, P, tau``."""
+        system, exact = _system(loop), loop.coordinates(self.state)
+        start = np.array([float(x / (max(map(abs, exact)) or 1)) for x in exact])
+        D, most = _dense(loop.deviations, len(loop.free)), _fastest(system)
+        # of how far the final state walks the largest sum of squares, over the columns that do
+        walk = max((float(sum(r**2 for j, r in row.items() if j in loop.walks)) for row in loop.camps), default=0.0)
+        for b in (share * most for share in _SHARES if most > 0):
+            left = math.exp(-min(b * float(self.clock), 700.0))
+            with suppress(LMIError):
+                size = 2 * b * max(left, _LEAST_LEFT) ** 2 if walk else 1.0
+                P, tau = delay_lyapunov(system, b, start, size * D.T @ D)
+                away = max(float(np.einsum("ij,ji->i", D, np.linalg.solve(P, D.T)).max()), 0.0)
+                root = math.sqrt(max(float(start @ P @ start), 0.0))
+                yield root * (math.sqrt(walk / (2 * b)) + math.sqrt(away) * left), b, P, tau
+
+    def longest_delay(self) -> float:
+        """Return about the longest delay that some function forgives: this certificate's limit, not the loop's.
+
+        Infinite where nobody hears late of anybody who moves.
+        """
+        with suppress(OverflowError):
+            if self._small:
+                return self._longest_factor() * float(self.messages.age)
+        return 0.0
+
+    def _longest_factor(self) -> float:
+        """Return by what all ages may be multiplied, about."""
+        system, D = _system(self.loop()), _dense(self._whole.deviations, len(self._whole.free))
+        if not system.rate > 0 or not len(system.lateness):
+            return math.inf if system.rate > 0 else 0.0
+
+        def forgives(factor: float) -> bool:
+            late = replace(system, lateness=system.lateness * factor)
+            with suppress(LMIError):
+                delay_lyapunov(late, _LEAST_SHARE * _fastest(late), np.zeros(len(D[0])), D.T @ D)
+                return True
+            return False
+
+        low = _FIRST / float(np.abs(system.K).max() * system.lateness.max())
+        step = 2.0 if forgives(low) else 0.5
+        for _ in range(_STEPS):
+            if forgives(low * step) != (step > 1):
+                break
+            low *= step
+        else:
+            return low if step > 1 else 0.0
+        low *= min(step, 1.0)
+        high = 2 * low
+        for _ in range(_HALVINGS):
+            middle = math.sqrt(low * high)
+            low, high = (middle, high) if forgives(middle) else (low, middle)
+        return low
+
+    def _proved(
+        self, loop: LateLoop, b: Fraction, P: np.ndarray, tau: np.ndarray
+    ) -> tuple[DelayLMIBound, np.ndarray] | None:
+        """Return what a rounded function states, if it is proved."""
+        exact, matrix = arithmetic(), [[Fraction(x) for x in row] for row in P.tolist()]
+        each = [Fraction(x) for x in np.maximum(tau, _LEAST * tau.max(initial=1.0)).tolist()]
+        lmi = DelayLMI(loop, b, matrix, each)
+        if not lmi.proved(exact):
+            return None
+        root, left, constants = lmi.root(self.state), left_above(b * self.clock), lmi.constants(exact)
+        moved = [rounded(root * x * _MORE, BITS, up=True) for x in constants.walk]
+        residual = [
+            rounded(x + root * c * left * _MORE, BITS, up=True) for x, c in zip(moved, constants.away, strict=True)
+        ]
+        by_edge = dict(zip((e.edge for e in loop.channels), each, strict=True))
+        edges = tuple(by_edge.get(k, Fraction(0)) for k in range(self.structure.graph.n_edges))
+        y = root * gain_above(self.gain.exact, self.cap, b)
+        inputs = np.array([float_up(x * y * _MORE) for x in lmi.inputs(*constants)]) + 1e-300
+        return DelayLMIBound(b, tuple(map(tuple, matrix)), edges, left, tuple(moved), tuple(residual)), inputs
+
+
+def _dense(rows: Sequence[Row], width: int) -> np.ndarray:
+    """Return sparse rational rows as an array."""
+    found = np.zeros((len(rows), width))
+    for i, row in enumerate(rows):
+        for j, x in row.items():
+            found[i, j] = float(x)
+    return found
+
+
+def _system(loop: LateLoop) -> LateSystem:
+    """Return a loop in floats."""
+    m, n, q, channels = len(loop.free), len(loop.laplacian), len(loop.listeners), loop.channels
+    place = {v: k for k, v in enumerate(loop.listeners)}
+    Z = _dense([{j: Fraction(x, loop.unit) for j, x in row.items()} for row in loop.slopes], m + q)
+    return LateSystem(
+        _dense(loop.system, m),
+        _dense(loop.pushed, q),
+        Z[:, :m],
+        np.array(loop.listeners, dtype=int),
+        np.array([place[e.listener] for e in channels], dtype=int),
+        np.array([float(Fraction(e.weight, loop.unit)) for e in channels]),
+        np.array([float(e.lateness) for e in channels]),
+        _dense([{v: Fraction(x) for v, x in loop.heard(e).items()} for e in channels], n),
+        _dense(list(loop.walks.values()), q),
+    )
+
+
+def _fastest(system: LateSystem) -> float:
+    """Return a rate that none reaches: that of the system where nothing is late, or little more than one in a delay."""
+    return float(np.min(_IN_DELAY / system.lateness, initial=system.rate))

@@ -1,0 +1,120 @@
+"""Delays of whole graphs under a capped gain by the delay LMI: longer ones, and no longer than the loop bears."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from late_certificates import grouped_graph
+
+from lmi.exact.decimal_rounding import float_up
+from ptcc_certify.bounds.delay_lmi import DelayLMIBounds
+from ptcc_certify.bounds.final_state import influence
+from ptcc_certify.bounds.longest_delay import LateCase
+from ptcc_certify.bounds.small_delays import SmallDelayBounds, delay_threshold
+from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.structure import analyse
+from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.protocols.late_messages import LateMessages
+
+PROTOCOL, CAP = NominalProtocol(T=1, rho1=1, rho2=3, kappa=1), 20
+#: A group of three that leads two followers.
+TEAM = SignedDigraph.from_edges([(1, 2, 1), (2, 3, -2), (3, 1, -1), (1, 4, 1), (4, 5, -1), (5, 4, "0.5")])
+
+
+def bounds(graph: SignedDigraph, delay: object, own: bool, x0: list[Fraction] | None = None) -> DelayLMIBounds:
+    structure, messages = analyse(graph), LateMessages(delay, own_delay=own, gain_cap=CAP)
+    start = x0 or [Fraction(k) for k in range(graph.n_nodes)]
+    return DelayLMIBounds(structure, PROTOCOL.gain, messages, influence(structure), start)
+
+
+@pytest.mark.parametrize("own", [False, True])
+def test_delays_of_a_whole_graph_are_certified_that_are_five_times_as_long_as_those_of_its_functions(own: bool) -> None:
+    probe = LateMessages("0.001", own_delay=own, gain_cap=CAP)
+    cert = certify(TEAM, PROTOCOL, [3, 1, 2, -4, 5], messages=probe, simulation=False)
+    small = SmallDelayBounds(cert.structure, PROTOCOL.gain, probe, cert.influence, cert.initial_state or ())
+    delay = Fraction(f"{5 * small.longest_delay(cert.decaying_forms):.3e}")
+    longer = LateMessages(delay, own_delay=own, gain_cap=CAP)
+    found = certify(TEAM, PROTOCOL, [3, 1, 2, -4, 5], messages=longer, simulation=False)
+    assert found.verdict == "certified" and found.checked is not None and found.checked.accepted
+    assert found.late is not None and found.late.form is None and found.late.lmi is not None
+    assert math.isfinite(found.late.largest) and found.late.input is not None
+    assert (found.late.longest_delay or 0) > delay
+
+
+def test_less_is_left_at_the_deadline_than_by_the_functions_where_both_prove_something() -> None:
+    messages = LateMessages("0.0002", own_delay=True, gain_cap=CAP)
+    late = certify(TEAM, PROTOCOL, [3, 1, 2, -4, 5], messages=messages, simulation=False).late
+    assert late is not None and late.form is not None and late.lmi is not None
+    assert late.largest == float_up(max(late.lmi.residual))
+    assert late.largest < float(max(late.form.residual))
+
+
+def test_the_longest_delay_for_a_wanted_residual_is_sought_by_it_too() -> None:
+    graph, start = analyse(TEAM), [Fraction(k) for k in (3, 1, 2, -4, 5)]
+    cert = certify(TEAM, PROTOCOL, start, simulation=False)
+    ends = None if cert.final_state is None else cert.final_state.intervals
+    case = LateCase(graph, PROTOCOL, cert.initial_state, ends, cert.influence, cert.decaying_forms)
+    late = case.bound(LateMessages("0.0001", own_delay=True, gain_cap=CAP))
+    longest = case.longest(late, Fraction(1))
+    assert longest is not None and longest.lmi is not None and longest.form is None
+    assert longest.largest <= 1
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_no_delay_is_forgiven_at_which_a_constant_gain_diverges(seed: int) -> None:
+    graph, _ = grouped_graph(np.random.default_rng(seed), 1 + seed % 3)
+    longest = bounds(graph, "0.001", True).longest_delay()
+    assert 0.05 * delay_threshold(analyse(graph), CAP) < longest < delay_threshold(analyse(graph), CAP)
+    assert bounds(graph, Fraction(f"{longest * 0.9:.3e}"), True).best() is not None
+
+
+def test_leaders_that_rest_are_forgiven_any_delay() -> None:
+    star = SignedDigraph.from_edges([(1, 3, 1), (2, 3, -1)])
+    assert bounds(star, "0.001", False).longest_delay() == math.inf
+    found = bounds(star, 1000, False).best()
+    assert found is not None and not any(found[0].moved)
+    assert 0 < bounds(star, "0.001", True).longest_delay() < math.inf
+
+
+def test_nothing_is_searched_of_large_graphs() -> None:
+    ring = SignedDigraph.from_edges([(k, (k + 1) % 40, 1) for k in range(40)])
+    assert bounds(ring, "0.0001", False).best() is None and bounds(ring, "0.0001", False).longest_delay() == 0
+
+
+def test_what_a_state_at_rest_leaves_is_nothing() -> None:
+    pair = SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1)])
+    found = bounds(pair, "0.001", True, [Fraction(2), Fraction(2)]).best()
+    assert found is not None and not any(found[0].residual)
+
+
+def test_small_weights_and_large_ones_scale_as_the_clock_does() -> None:
+    edges = [(1, 2, 1), (2, 1, 2), (2, 3, -1)]
+    one = bounds(SignedDigraph.from_edges(edges), "0.001", True).longest_delay()
+    for factor in (Fraction(1, 10**6), Fraction(10**6)):
+        scaled = SignedDigraph.from_edges([(s, t, w * factor) for s, t, w in edges])
+        assert bounds(scaled, Fraction(1, 1000) / factor, True).longest_delay() == pytest.approx(
+            one / float(factor), rel=0.05
+        )
+
+
+def test_states_and_weights_at_the_ends_of_floats_are_taken_or_left_without_a_traceback() -> None:
+    edges = [(1, 2, 1), (2, 1, 2), (2, 3, -1)]
+    for factor in (Fraction(10) ** 290, 1 / Fraction(10) ** 290):
+        start = [factor * k for k in (1, -2, 3)]
+        found = bounds(SignedDigraph.from_edges(edges), "0.001", True, start).best()
+        assert found is not None and max(found[0].residual) < factor
+    for factor in (Fraction(10) ** 300, 1 / Fraction(10) ** 300):
+        graph = SignedDigraph.from_edges([(s, t, w * factor) for s, t, w in edges])
+        assert bounds(graph, "0.001", True).best() is None
+        assert bounds(graph, "0.001", True).longest_delay() >= 0
+
+
+def test_delays_of_many_times_the_deadline_are_forgiven_where_few_listen_to_each_other() -> None:
+    chain = SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1), (2, 3, 1), (3, 4, 1)])
+    late = {(2, 3): Fraction(5), (3, 4): Fraction(5)}
+    found = bounds(chain, late, False).best()
+    assert found is not None and 0 < found[0].b < 0.02
