@@ -32,7 +32,7 @@ from ptcc_certify.graphs.io import as_state
 from ptcc_certify.graphs.other_names import Hinted
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.structure import ClosedComponent, Structure, analyse
-from ptcc_certify.graphs.tables import import_pandas, position, series
+from ptcc_certify.graphs.tables import import_pandas, place_of, position, series
 from ptcc_certify.theorems.lemmas import (
     EXACT_NODES,
     containment_weights,
@@ -122,24 +122,31 @@ class Influence:
         """The balanced closed components with their ``left_null_vectors``."""
         return zip(self.balanced, self.left_null_vectors, strict=True)
 
-    def row(self, node: int) -> dict[int, Number]:
+    def row(self, node: int | str) -> dict[int, Number]:
         """Return the row of ``Q`` of one node as ``{leader index: weight}``.
 
         Parameters
         ----------
-        node : int
-            Its index.
+        node : int or str
+            Its index, or its label if that is a text.
 
         Returns
         -------
         dict of int to Fraction or float
             Empty for a node that ends at 0 from every initial state.
 
+        Raises
+        ------
+        UnknownAgentError
+            There is no such node.
+
         Examples
         --------
-        >>> influence(analyse(SignedDigraph.from_edges([("a", "c", 1), ("b", "c", -3)]))).row(1)
-        {0: Fraction(1, 4), 2: Fraction(-3, 4)}
+        >>> who = influence(analyse(SignedDigraph.from_edges([("a", "c", 1), ("b", "c", -3)])))
+        >>> who.row(1), who.row("c") == who.row(1)
+        ({0: Fraction(1, 4), 2: Fraction(-3, 4)}, True)
         """
+        node = place_of(node, self.structure.graph.labels)
         where = np.flatnonzero(self.structure.followers == node)
         weights: Sequence[Number] = [dict(zip(c.nodes, c.gauge or (), strict=True)).get(node, 0) for c in self.balanced]
         if where.size:

@@ -18,6 +18,7 @@ from ptcc_certify.certificate.verdict import CERTIFIED
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.io import as_graph, as_states
 from ptcc_certify.graphs.io.files import refuse_no_path
+from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.simulation.trajectory import Trajectory
 
@@ -129,7 +130,11 @@ class VectorCertificate:
         return iter(self.components)
 
     def __getitem__(self, component: int) -> Certificate:
-        return self.components[component]
+        try:
+            return self.components[component]
+        except (IndexError, TypeError):
+            where = f"{len(self)} components count from 0, and each has its agents: [0].final_state[label]"
+            raise ParameterError(f"there is no component [{shorten(repr(component))}]; the {where}") from None
 
     def __repr__(self) -> str:
         rate = "none" if self.rate is None else down(self.rate)
