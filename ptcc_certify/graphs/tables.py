@@ -31,7 +31,7 @@ def position(label: Hashable, labels: Sequence[str]) -> int:
     return labels.index(str(label))
 
 
-def place_of(agent: Hashable, labels: Sequence[str]) -> int:
+def place_of(agent: Any, labels: Sequence[str]) -> int:
     """Return where an agent stands that is named by its place from 0, or by its label if that is a text.
 
     Raises
