@@ -39,6 +39,9 @@ from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.protocols.late_messages import LateMessages
 from ptcc_certify.protocols.moving_leaders import MovingLeaders
 from ptcc_certify.protocols.nominal import NominalProtocol
+from ptcc_certify.protocols.sliding_mode import SlidingModeProtocol
+from ptcc_certify.report.notebook import trajectory_html
+from ptcc_certify.report.page import report_html
 from ptcc_certify.report.plots.agents import CAMP_STYLES, NAME_SIZE, NAMED_AGENTS, NAMED_OF_PART
 from ptcc_certify.report.plots.decay import plot_decay
 from ptcc_certify.report.plots.graph import GROUND, plot_graph
@@ -989,3 +992,15 @@ def test_a_motion_names_its_agents_and_all_panels_have_the_same_times():
     assert [sorted(text.get_text() for text in ax.texts) for ax in panels[:2]] == [["ann", "bob"], ["ann, bob"]]
     assert len(panels) == 4 and {ax.get_xlim() for ax in panels} == {panels[1].get_xlim()}
     assert "deadline $T$" in {text.get_text() for text in panels[0].get_legend().get_texts()}
+
+
+def test_where_sliding_variables_are_0_neither_they_nor_their_deadline_are_announced() -> None:
+    graph, x0 = SignedDigraph.from_edges([(1, 2, 1), (2, 1, -1)]), [1, 2]
+    p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
+    for sigma0, moves in (([0, 0], False), ([1, 0], True)):
+        cert = certify(graph, p, x0, sigma0=sigma0, method="paper")
+        assert cert.trajectory is not None
+        for ax in (plot_trajectory(cert), plot_input(cert), plot_decay(cert)):
+            assert ("$T_r$" in labelled(ax)) == moves
+        assert ("drives the sliding variable" in report_html(cert)) == moves
+        assert ("sliding variables over time" in trajectory_html(cert.trajectory)) == moves

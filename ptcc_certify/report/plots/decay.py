@@ -117,7 +117,7 @@ def plot_decay(
     ax.set_xscale("log" if axis == "left" else "linear")
     ax.set_xlim(place[0], place[max(last, 1)])
     p = subject.protocol
-    if p.reaching is not None:
+    if p.reaching is not None and (proved is None or not proved.direct):
         (at,) = _places(p.gain, None, np.array([float(p.span / p.T)]))[axis]
         ax.axvline(at, color="black", linewidth=0.8, linestyle=(0, (5, 2, 1, 2)), label="$T_r$")
     name = r"\varepsilon" if proved is not None and proved.envelope.coordinates == "eps" else "E"
