@@ -19,6 +19,7 @@ from scipy.sparse.linalg import LinearOperator, bicgstab, splu
 
 from lmi.diagonal_solution import DiagonalCertificate
 from lmi.errors import NoCertificate
+from lmi.search_time import checkpoint
 
 #: Inverse iterations at most; they end when the bound of the smallest eigenvalue gains less than this, relatively.
 _ROUNDS, _GAIN = 40, 1e-9
@@ -146,19 +147,23 @@ def solve_columns(B: Any, right: np.ndarray, diagonal: np.ndarray) -> np.ndarray
 def _krylov(B: Any, right: np.ndarray, diagonal: np.ndarray, tolerance: float) -> tuple[np.ndarray, bool]:
     """Solve by BiCGSTAB, refined once if the tolerance is small; tell whether it converged."""
     own = LinearOperator(B.shape, matvec=lambda r: r / diagonal)
-    x, info = bicgstab(B, right, rtol=tolerance, maxiter=_PRODUCTS, M=own)
+    x, info = bicgstab(B, right, rtol=tolerance, maxiter=_PRODUCTS, M=own, callback=_in_time)
     if info < 0:  # from a right-hand side of few rows the search reaches few a step, and breaks down: begin everywhere
         start = np.random.default_rng(0).uniform(-1, 1, right.size) * np.abs(right / diagonal).max()
-        x, _ = bicgstab(B, right, x0=start, rtol=tolerance, maxiter=_PRODUCTS, M=own)
+        x, _ = bicgstab(B, right, x0=start, rtol=tolerance, maxiter=_PRODUCTS, M=own, callback=_in_time)
     residual = right - B @ x
     loose = tolerance > _REFINED
     if not np.linalg.norm(residual) <= (2 if loose else 1e3) * tolerance * np.linalg.norm(right):
         return x, False
     if loose:
         return x, True
-    correction, _ = bicgstab(B, residual, rtol=1e-6, maxiter=_PRODUCTS, M=own)
+    correction, _ = bicgstab(B, residual, rtol=1e-6, maxiter=_PRODUCTS, M=own, callback=_in_time)
     better = x + correction
     return (better if np.abs(right - B @ better).max() < np.abs(residual).max() else x), True
+
+
+def _in_time(_: np.ndarray) -> None:
+    checkpoint()
 
 
 def fill_core(block: Any) -> int:

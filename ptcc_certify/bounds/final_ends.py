@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable
+from collections.abc import Iterable
 from fractions import Fraction
 from typing import Any
 
 from lmi.exact.decimal_rounding import down, up
 from ptcc_certify.graphs.rationals import shorten
-from ptcc_certify.graphs.tables import position
+from ptcc_certify.graphs.tables import place_of
 
 Interval = tuple[Fraction, Fraction]
 
@@ -44,15 +44,12 @@ class FinalEnds(tuple[Interval | None, ...]):
 
     def __getitem__(self, key: Any) -> Any:
         """Return the ends of an agent, by its place from 0, or by its label if that is a text."""
-        return super().__getitem__(position(key, self.labels) if _is_label(key) else key)
+        from_end = hasattr(key, "__index__") and -len(self) <= key < 0
+        return super().__getitem__(key if from_end or isinstance(key, slice) else place_of(key, self.labels))
 
     def __repr__(self) -> str:
         texts = [f"{shorten(label)} {_text(ends)}" for label, ends in zip(self.labels[:8], self, strict=False)]
         return f"FinalEnds({', '.join(texts)}{', ...' if len(self) > 8 else ''})"
-
-
-def _is_label(key: Hashable) -> bool:
-    return not isinstance(key, slice) and not hasattr(key, "__index__")
 
 
 def _text(ends: Interval | None) -> str:

@@ -17,21 +17,25 @@ the certificate forms them exactly.
 from __future__ import annotations
 
 import heapq
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+import math
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lmi.child_process import apart
 from lmi.errors import LMIError
+from lmi.search_time import checkpoint, seconds_left
 from lmi.sparse_h_matrix import SparseHMatrix, solve
 from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import as_state
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.structure import ClosedComponent, Structure, analyse
-from ptcc_certify.graphs.tables import import_pandas, position, series
+from ptcc_certify.graphs.tables import import_pandas, place_of, position, series
 from ptcc_certify.theorems.lemmas import (
     EXACT_NODES,
     containment_weights,
@@ -57,6 +61,8 @@ _MORE, _ULP = 1 + 1e-6, 2.0**-52
 _TINY = 1e-320
 #: States below this size, or above its reciprocal, leave no room for radii in float64, and are taken in another unit.
 _SMALLEST = Fraction(1, 10**290)
+#: Bits of all weights from which on exact work may take long.
+_MANY_DIGITS = 200_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,24 +127,31 @@ class Influence:
         """The balanced closed components with their ``left_null_vectors``."""
         return zip(self.balanced, self.left_null_vectors, strict=True)
 
-    def row(self, node: int) -> dict[int, Number]:
+    def row(self, node: int | str) -> dict[int, Number]:
         """Return the row of ``Q`` of one node as ``{leader index: weight}``.
 
         Parameters
         ----------
-        node : int
-            Its index.
+        node : int or str
+            Its index, or its label if that is a text.
 
         Returns
         -------
         dict of int to Fraction or float
             Empty for a node that ends at 0 from every initial state.
 
+        Raises
+        ------
+        UnknownAgentError
+            There is no such node.
+
         Examples
         --------
-        >>> influence(analyse(SignedDigraph.from_edges([("a", "c", 1), ("b", "c", -3)]))).row(1)
-        {0: Fraction(1, 4), 2: Fraction(-3, 4)}
+        >>> who = influence(analyse(SignedDigraph.from_edges([("a", "c", 1), ("b", "c", -3)])))
+        >>> who.row(1), who.row("c") == who.row(1)
+        ({0: Fraction(1, 4), 2: Fraction(-3, 4)}, True)
         """
+        node = place_of(node, self.structure.graph.labels)
         where = np.flatnonzero(self.structure.followers == node)
         weights: Sequence[Number] = [dict(zip(c.nodes, c.gauge or (), strict=True)).get(node, 0) for c in self.balanced]
         if where.size:
@@ -177,6 +190,7 @@ class Influence:
                 final[v] = float(x)
             return final, values
         for v, weights in zip(self.structure.followers.tolist(), self.containment_weights, strict=True):
+            checkpoint()
             final[v] = sum((w * c for w, c in zip(weights, values, strict=True) if w), zero)
         return final, values
 
@@ -245,7 +259,7 @@ def influence(graph: Any, *, exact: bool | None = None, orientation: str | None 
     graph : graph-like or Structure
         Whatever :func:`ptcc_certify.as_graph` takes.
     exact : bool, optional
-        Rationals or floats; by default rationals for graphs of at most ``EXACT_NODES`` nodes.
+        Rationals or floats; by default rationals for graphs of at most ``EXACT_NODES`` nodes, and for such groups.
     orientation : {"information", "listens"}, optional
         See :func:`ptcc_certify.as_graph`.
 
@@ -263,9 +277,28 @@ def influence(graph: Any, *, exact: bool | None = None, orientation: str | None 
     ((Fraction(3, 4), Fraction(-1, 4)),)
     """
     structure = analyse(graph, orientation)
-    graph = structure.graph
-    exact = graph.n_nodes <= EXACT_NODES if exact is None else exact
-    left_null_vectors: list[tuple[Number, ...]] = []
+    floats = exact is False
+    exact = structure.graph.n_nodes <= EXACT_NODES if exact is None else exact
+    left_null_vectors = _left_null_vectors(structure, exact, floats)
+    balanced = [c for c in structure.closed_components if c.balanced]
+    weights: Sequence[Sequence[Number]] | None = None
+    if exact:
+        weights = _in_time(partial(exact_containment_weights, structure), structure.graph)
+    elif structure.followers.size * len(balanced) <= MANY_WEIGHTS:
+        found = containment_weights(structure)
+        weights = None if found is None else found.tolist()
+    rows = None if weights is None else tuple(map(tuple, weights))
+    return Influence(structure, left_null_vectors, rows, exact)
+
+
+def influence_in_floats(structure: Structure) -> Influence:
+    """Compute ``Q`` in floats, without the weights of followers: where there is no time for more."""
+    return Influence(structure, _left_null_vectors(structure, False, True), None, False)
+
+
+def _left_null_vectors(structure: Structure, exact: bool, floats: bool) -> tuple[tuple[Number, ...], ...]:
+    """Return the weights of leaders: exact, in floats, or exact in small groups."""
+    graph, left_null_vectors = structure.graph, list[tuple[Number, ...]]()
     several = [v for c in structure.closed_components if len(c.nodes) > 1 for v in c.nodes]
     groups, place = graph.subgraph(several) if several else graph, {v: i for i, v in enumerate(several)}
     balanced = [c for c in structure.closed_components if c.balanced]
@@ -273,24 +306,31 @@ def influence(graph: Any, *, exact: bool | None = None, orientation: str | None 
         if len(component.nodes) == 1:
             left_null_vectors.append((Fraction(1),))
             continue
+        checkpoint()
         block = groups.subgraph([place[v] for v in component.nodes])
         eta: Sequence[Number]
-        if exact or block.n_nodes <= EXACT_NODES:
-            eta = exact_left_vector(block)
+        if exact or (block.n_nodes <= EXACT_NODES and not floats):
+            eta = _in_time(partial(exact_left_vector, block), block)
         else:
             p = left_vector(block)
             whole = dyadic_left_vector(block, p)
             total = sum(whole or ())
             eta = [Fraction(w, total) for w in whole] if whole else p.tolist()
         left_null_vectors.append(tuple(g * w for g, w in zip(component.gauge or (), eta, strict=True)))
-    weights: Sequence[Sequence[Number]] | None = None
-    if exact:
-        weights = exact_containment_weights(structure)
-    elif structure.followers.size * len(balanced) <= MANY_WEIGHTS:
-        found = containment_weights(structure)
-        weights = None if found is None else found.tolist()
-    rows = None if weights is None else tuple(map(tuple, weights))
-    return Influence(structure, tuple(left_null_vectors), rows, exact)
+    return tuple(left_null_vectors)
+
+
+def _in_time(work: Callable[[], Any], graph: SignedDigraph) -> Any:
+    """Return what exact work gives: under a time limit in a process of its own if it may take long."""
+    apart_from_here = math.isfinite(seconds_left()) and takes_long(graph)
+    return next(apart(lambda: iter([work()]))) if apart_from_here else work()
+
+
+def takes_long(graph: SignedDigraph) -> bool:
+    """Tell whether what is exact of a graph may take long: it has many digits, or agents above ``EXACT_NODES``."""
+    if graph.n_nodes > EXACT_NODES:
+        return True
+    return sum(w.numerator.bit_length() + w.denominator.bit_length() for _, _, w in graph.edges) > _MANY_DIGITS
 
 
 @dataclass(frozen=True)
@@ -484,6 +524,7 @@ def enclose(influence: Influence) -> Influence:
     >>> bool(abs(Fraction(final.states[1]) + Fraction(1, 3)) <= final.radius[1] < 1e-9)  # c ends at -1/3
     True
     """
+    checkpoint()
     structure, F = influence.structure, influence.structure.followers
     u = np.ones(structure.graph.n_nodes)
     if F.size:
@@ -629,6 +670,7 @@ def _enclose_left_null_vector(
     structure: Structure, component: ClosedComponent, null_vector: np.ndarray, u: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Enclose ``eta' M(L_k) = 0``, ``eta'1 = 1`` of one group, signs of the camps included; fill in its ``u``."""
+    checkpoint()
     nodes = np.array(component.nodes)
     block = structure.graph.laplacian().tocsr()[nodes][:, nodes].tocsr()
     signs = np.array(component.gauge or (), dtype=float)
@@ -658,6 +700,7 @@ def _enclose_followers(
     structure: Structure, exact: dict[int, Fraction], middle: np.ndarray, radius: np.ndarray, u: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return middles and radii of the followers, in a unit near to the largest leader."""
+    checkpoint()
     F = structure.followers
     unit = float(np.exp2(np.floor(np.log2(np.maximum(np.abs(middle), radius).max()))))
     rows = structure.graph.laplacian().tocsr()[F]
@@ -687,6 +730,7 @@ def _exact_error(
     weights = [Fraction(x) for x in u.tolist()]
     error = Fraction(0)
     for v, row, more in zip(F, structure.graph.exact_rows(F), blur.tolist(), strict=True):
+        checkpoint()
         residual = sum((x * values[j] for j, x in row.items()), Fraction(0))
         signs = (weights[j] * (x if j == v else -abs(x)) for j, x in row.items() if j in following)
         comparison = sum(signs, Fraction(0))

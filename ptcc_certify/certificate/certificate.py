@@ -283,7 +283,7 @@ class Certificate(Content, FromFile, Shown):
         behaviour = f"{len(self.structure.components)} components"
         if self.claim:
             behaviour = self.claim.sharpest
-        return f"Certificate({behaviour}, Theorem {self.theorem.number}, rate {rate}, {self.verdict})"
+        return f"Certificate({behaviour}, {self.theorems_named}, rate {rate}, {self.verdict})"
 
 
 def read_certificate(

@@ -34,7 +34,7 @@ from ptcc_certify.certificate.request import Expectations, Request
 from ptcc_certify.checker import INPUT_NODES, CheckReport
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
 from ptcc_certify.checker.quadratic_form import Form
-from ptcc_certify.errors import ParameterError, PTCCError, gated
+from ptcc_certify.errors import ParameterError, PTCCError, SimulationError, gated
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure
@@ -43,8 +43,10 @@ from ptcc_certify.lyapunov.rate_upper_bound import RateBound, optimality_ratio
 from ptcc_certify.lyapunov.search import DIAGONAL, Search
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.disturbance import ExpressionDisturbance
+from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.protocols.reaching_time import ReachingTime
 from ptcc_certify.simulation.agents import AgentsTrajectory
+from ptcc_certify.simulation.late_messages import can_run, simulate_late
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.trajectory import Trajectory
 from ptcc_certify.theorems.claims import Claim, sliding_claim
@@ -284,6 +286,12 @@ class Content:
     def theorem(self) -> Theorem:
         """The theorem whose hypotheses the graph meets."""
         return theorem_for(self.structure, self.protocol.kind)
+
+    @property
+    def theorems_named(self) -> str:
+        """The theorem of the claim, or those of the components: ``Theorems 1.2 and 2.1``."""
+        numbers = sorted({claim.theorem for claim in self.claims})
+        return f"Theorem{'s' * (len(numbers) > 1)} {' and '.join(filter(None, (', '.join(numbers[:-1]), numbers[-1])))}"
 
     @cached_property
     def claims(self) -> tuple[Claim, ...]:
@@ -643,6 +651,33 @@ class Content:
             if self.disturbance == WORST_CASE:
                 raise
             return simulate(self.graph, self.protocol, x0, disturbance=WORST_CASE, **options)
+
+    @cached_property
+    def asked_trajectory(self) -> Trajectory | None:
+        """The run of what was asked where messages are late, leaders move, or one set of limits holds the gain.
+
+        Messages are as late as allowed, leaders move away from the farthest follower as fast as they may. None where
+        nothing of that was asked, or where there is no such run: delays too short for one, or too many agents.
+        """
+        late, tracking = self.late, self.tracking
+        if self.initial_state is None:
+            return None
+        start = [float(x) for x in self.initial_state]
+        try:
+            if late is not None:
+                if not can_run(self.protocol, late.messages):
+                    return None
+                return simulate_late(self.graph, self.protocol, late.messages, start, leaders=late.leaders)
+            if tracking is not None:
+                from ptcc_certify.simulation.moving_leaders import simulate_tracking  # it loads SciPy
+
+                return simulate_tracking(self.graph, self.protocol, tracking.leaders, start, u=tracking.witness.u)
+            if len(self.limits) != 1 or not self.direct:
+                return None
+            (limits,) = self.limits
+            return self.simulate(actuator=GainLimits(limits.gain_cap, limits.stop_before, limits.sample_period))
+        except (ParameterError, SimulationError):
+            return None
 
     def with_simulation(self, **options: Any) -> Self:
         """Return the same with ``trajectory`` and, if a bound was proved, ``comparison``.

@@ -29,6 +29,8 @@ from ptcc_certify.bounds.final_state import (
     enclosed_final_state,
     final_state,
     influence,
+    influence_in_floats,
+    takes_long,
 )
 from ptcc_certify.bounds.late_messages import LateBounds, bound_late
 from ptcc_certify.bounds.longest_delay import LateCase
@@ -95,6 +97,8 @@ STEPS = (
     "final state",
     "independent check",
 )
+#: The share of a time limit that the final state may take.
+ENDING = 0.3
 #: The share of a time limit after which the searches end, so that what they found is checked within it, and the shares
 #: of the time then left that the first of the steps may take.
 SEARCHING, SHARES = 0.4, (0.3, 0.3, 0.8, 1.0)
@@ -535,17 +539,25 @@ class Case:
     def final_state(self, run: Trajectory | None) -> tuple[Influence, FinalState | None]:
         """Compute who decides whom, and where the agents end: exactly, or enclosed."""
         self.progress(STEPS[4])
-        structure, matrix, x0 = self.structure, influence(self.structure), self.initial_state
+        structure, x0 = self.structure, self.initial_state
         sigma0 = self.sigma0 or (Fraction(0),) * structure.graph.n_nodes
         first = None if x0 is None else [x - s if s else x for x, s in zip(x0, sigma0, strict=True)]
-        result = None
-        if not matrix.exact:
-            try:
-                enclosed = enclose(matrix)
-                result = None if first is None else enclosed_final_state(enclosed, first)
-                matrix = enclosed
-            except NotEnclosedError as error:
-                self.notes.append(f"the final state is floating point only: {error}")
+        matrix, result = None, None
+        seconds = ENDING * self.request.time_limit if takes_long(structure.graph) else math.inf
+        with deadline.time_limit(seconds):
+            with share_of_time(0.5, f"exact {STEPS[4]}", self.cut_off):
+                found = influence(structure)
+                if first is not None and found.exact:
+                    result = final_state(structure, first, matrix=found)
+                matrix = found
+            matrix = matrix or influence_in_floats(structure)
+            if not matrix.exact:
+                try:
+                    enclosed = enclose(matrix)
+                    result = None if first is None else enclosed_final_state(enclosed, first)
+                    matrix = enclosed
+                except (NotEnclosedError, OutOfTime) as error:
+                    self.notes.append(f"the final state is floating point only: {error}")
         if result is None and first is not None:
             result = final_state(structure, first, matrix=matrix)
         if run is not None and result is not None:

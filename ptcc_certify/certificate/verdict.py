@@ -47,7 +47,7 @@ LAST = Fraction(1, 100)
 _DIGITS = 3
 _LARGEST_CLOCK = 1e12
 #: Steps of :func:`certify` without which there may be a rate; the time limit may end the others, which seek one.
-NO_SEARCHES = ("simulation", "upper bound on the decay rate")
+NO_SEARCHES = ("simulation", "upper bound on the decay rate", "exact final state")
 #: From so many decades between weights on, they are named as the reason that nothing was proved.
 MANY_DECADES = 8
 

@@ -24,7 +24,7 @@ from ptcc_certify.errors import GraphError, NumberError, gated
 from ptcc_certify.graphs.display_hook import Shown
 from ptcc_certify.graphs.equality import ReadOnly
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, nearest_float, shorten, writable
-from ptcc_certify.graphs.tables import first_five, import_pandas
+from ptcc_certify.graphs.tables import first_five, import_pandas, place_of
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -511,21 +511,26 @@ class SignedDigraph(ReadOnly, Shown):
         nodes = range(self.n_nodes)
         return [[row.get(column, Fraction(0)) for column in nodes] for row in self.exact_rows(nodes)]
 
-    def exact_rows(self, nodes: Iterable[int]) -> list[dict[int, Fraction]]:
+    def exact_rows(self, nodes: Iterable[int | str]) -> list[dict[int, Fraction]]:
         """Return rows of the signed Laplacian as ``{column: rational}``, without zeros.
 
         Parameters
         ----------
-        nodes : iterable of int
-            Indices of the rows.
+        nodes : iterable of int or str
+            Indices of the rows, or their labels if these are texts.
 
         Returns
         -------
         list of dict of int to Fraction
+
+        Raises
+        ------
+        UnknownAgentError
+            There is no such node.
         """
         start = np.searchsorted(self.target, np.arange(self.n_nodes + 1))
         rows = []
-        for node in nodes:
+        for node in (place_of(node, self.labels) for node in nodes):
             edges = range(int(start[node]), int(start[node + 1]))
             row = {int(self.source[edge]): -self._weights.fraction(edge) for edge in edges}
             total = sum(map(abs, row.values()), Fraction(0))

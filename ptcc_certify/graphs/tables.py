@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Hashable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -28,6 +29,31 @@ def position(label: Hashable, labels: Sequence[str]) -> int:
     if str(label) not in labels:
         raise UnknownAgentError(f"no agent is called {shorten(repr(label))}; there are {first_five(labels)}")
     return labels.index(str(label))
+
+
+def place_of(agent: Any, labels: Sequence[str]) -> int:
+    """Return where an agent stands that is named by its place from 0, or by its label if that is a text.
+
+    Raises
+    ------
+    UnknownAgentError
+        No agent stands there, or is called so.
+
+    Examples
+    --------
+    >>> place_of("b", ["a", "b"]), place_of(1, ["a", "b"])
+    (1, 1)
+    >>> place_of(2, ["a", "b"])
+    Traceback (most recent call last):
+    ptcc_certify.errors.UnknownAgentError: no agent has place 2; places are 0 to 1, labels are texts: a, b
+    """
+    if not hasattr(agent, "__index__"):
+        return position(agent, labels)
+    place = operator.index(agent)
+    if not 0 <= place < len(labels):
+        where = f"places are 0 to {len(labels) - 1}, labels are texts: {first_five(labels)}"
+        raise UnknownAgentError(f"no agent has place {place}; {where}")
+    return place
 
 
 def first_five(labels: Sequence[str]) -> str:

@@ -35,7 +35,7 @@ from ptcc_certify.report.family_screen import (
 )
 from ptcc_certify.report.notation import above, rational
 from ptcc_certify.report.plots.counterexample import plot_counterexample
-from ptcc_certify.report.plots.family import keeps_dwell, plot_family, plot_family_decay
+from ptcc_certify.report.plots.family import keeps_promise, plot_family, plot_family_decay
 from ptcc_certify.report.plots.family_graph import plot_family_graph
 from ptcc_certify.report.plots.family_input import plot_family_input
 from ptcc_certify.report.restricted_screen import agreement_text, restricted_entries, rests, signal_text
@@ -120,7 +120,7 @@ def family_view(saved: FamilyCertificate, runs: Sequence[FamilyTrajectory]) -> d
         "worst_ratio": max((ratio.worst_ratio for ratio in ratios), default=0.0),
         "violated": any(ratio.violated for ratio in ratios),
         "judged": sum(ratio.judged for ratio in ratios),
-        "dwelling": keeps_dwell(saved, runs),
+        "of_the_kind": saved.signal != "any" and keeps_promise(saved, runs),
         "worst_runs": sum(run.signal.startswith("worst") for run in runs),
         "groups": [
             _sentence(texts.printable(groups_text(c, saved.direct), 2000))

@@ -48,8 +48,7 @@ def draw(saved: Certificate, wanted: Sequence[str]) -> dict[str, Any]:
         there["sliding"] = slid and not saved.direct and n <= INPUT_NODES
         there["input"] = n <= INPUT_NODES and (slid or not saved.constant)
     drawn = [name for name in wanted if there.get(name)]
-    # the input of the run that the other figures show, without limits of the gain
-    axes = (plot_input(run, certificate=saved) if name == "input" else PLOTS[name](saved) for name in drawn)
+    axes = (PLOTS[name](saved) for name in drawn)
     return {name: ax.figure for name, ax in zip(drawn, axes, strict=True)}
 
 

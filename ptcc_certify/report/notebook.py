@@ -115,7 +115,9 @@ def trajectory_html(trajectory: Trajectory) -> str:
     """Show a trajectory: what its ``repr`` says, and states (and sliding variables) over time."""
     drawable = trajectory.states.ndim == 2 and trajectory.t.size > 1 and len(trajectory.labels) <= SHOWN_NODES
     figure = plot_run(trajectory) if drawable else None
-    alt = f"states{' and sliding variables' if trajectory.sliding else ''} over time"
+    alt = (
+        f"states{' and sliding variables' if trajectory.sliding and trajectory.sliding.sigma0.any() else ''} over time"
+    )
     return _page([f"{'trajectory':<{_HEAD}}{trajectory!r}"], figure, alt)
 
 

@@ -36,6 +36,7 @@ from ptcc_certify.report.late_lines import late_lines, tracking_lines
 from ptcc_certify.report.notation import above, agent_parts, enclosed, printable, rational
 from ptcc_certify.report.plots.agents import camp_groups
 from ptcc_certify.report.plots.distributions import plot_degrees, plot_final_states
+from ptcc_certify.report.plots.subject import ideal_text, limits_text
 from ptcc_certify.report.structure_text import camps, remarks_on
 from ptcc_certify.report.told_instants import FEW as FEW_INSTANTS
 from ptcc_certify.report.told_instants import told_instants
@@ -178,6 +179,8 @@ def _view(saved: Certificate) -> dict[str, Any]:
         "kinds": Counter(m.kind for m in saved.envelope.functions).items(),
         "remaining": _remaining(saved),
         "reaching": list(islice(zip(labels, saved.sigma0 or (), saved.reaching or (), strict=False), ROWS)),
+        "asked": limits_text(saved.asked_trajectory, saved) if saved.asked_trajectory is not None else "",
+        "ideal": ideal_text(saved),
         "figures": draw(saved, ("graph", "states", "sliding", "decay", "input", "late", "tracking"))
         | _distributions(saved),
         "camp_counts": Counter(camp_groups(saved.structure)[saved.structure.leaders]).items(),

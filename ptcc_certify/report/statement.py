@@ -25,6 +25,7 @@ from ptcc_certify.protocols.casadi_latex import symbol_latex
 from ptcc_certify.report import notation as texts
 from ptcc_certify.report.family_page import THEOREM, family_facts, remaining, state_rows
 from ptcc_certify.report.family_screen import BOUND_KINDS
+from ptcc_certify.report.plots.subject import ideal_text
 from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_name
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
 
@@ -190,7 +191,10 @@ def _instant(saved: FamilyCertificate, name: str) -> Markup:
 
 def _captions(saved: Certificate) -> dict[str, str]:
     """Return captions that say whether the bound is proved; through a reaching phase it is integrated in floats."""
-    return _CAPTIONS | {"decay": _CAPTIONS["decay"].replace("%s", _bound_word(saved))}
+    decay = _CAPTIONS["decay"].replace("%s", _bound_word(saved))
+    if saved.asked_trajectory is not None:
+        decay += f" Bounds and circles: {ideal_text(saved)}; without circles: the run that was asked."
+    return _CAPTIONS | {"decay": decay}
 
 
 def _bound_word(saved: Certificate | FamilyCertificate) -> str:

@@ -14,6 +14,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+from collections.abc import Hashable, Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +22,7 @@ import numpy as np
 
 from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.graphs.rationals import shorten, whole_number
+from ptcc_certify.graphs.tables import position
 from ptcc_certify.protocols.agents import AgentsProtocol
 from ptcc_certify.simulation.cvodes import Motion, Phase, Tolerances
 
@@ -90,6 +92,16 @@ class AgentsTrajectory:
     def final_state(self) -> np.ndarray:
         """(N, d, n) array: at the last instant, ``T`` or next to it."""
         return self.states[..., -1]
+
+    def __getitem__(self, label: Hashable) -> np.ndarray:
+        """(d, n, M) array: position, velocity and so on of one agent, in every coordinate."""
+        return self.states[position(label, self.labels)]
+
+    def __len__(self) -> int:
+        return len(self.labels)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.labels)
 
     def to_csv(self) -> str:
         r"""Return ``t,remaining,<label>,..,v(<label>),..,u(<label>),..`` as text, one row per instant, floats in full.

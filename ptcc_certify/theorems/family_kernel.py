@@ -19,6 +19,7 @@ import numpy as np
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.graphs.tables import place_of
 from ptcc_certify.theorems.lemmas import solve_exact
 
 #: A row of the basis that is neither zero nor, up to its sign, a unit vector.
@@ -123,14 +124,17 @@ class Kernel:
         assert solution is not None, "a follower block is never singular"
         return dict(zip(own, solution, strict=True))
 
-    def row(self, node: int) -> Sequence[Fraction]:
-        """Return ``B_k`` of a node, exact.
+    def row(self, node: int | str) -> Sequence[Fraction]:
+        """Return ``B_k`` of a node, exact: by its index, or by its label if that is a text.
 
         Raises
         ------
+        UnknownAgentError
+            There is no such node.
         TooLarge
             The edges alone do not tell it, nor the rows of more than 120 agents.
         """
+        node = place_of(node, self.structure.graph.labels)
         code = int(self.codes[node])
         if code == UNKNOWN:
             number = int(self.numbers[node])

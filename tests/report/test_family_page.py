@@ -5,6 +5,7 @@ import re
 from dataclasses import replace
 from datetime import date
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -210,11 +211,29 @@ def test_under_a_dwell_time_the_page_shows_signals_that_keep_it(clock: str):
         assert all(b - a >= 0.2999 for a, b in pairwise(times))
     assert sum(len(run.switches) > 1 for run in runs) > 2
     page = words(report_html(saved, runs=runs))
-    assert "8 runs from the initial state of the certificate under random signals that keep the promise." in page
+    assert "8 runs from the initial state of the certificate under signals that keep the promise." in page
     assert f"under 8 signals, which keep the promise: at least 0.3 of {'time' if clock == 't' else 'the clock'}" in page
     assert "need not keep" not in page
     for drawn in (plot_family(saved, runs=runs), plot_family_input(saved, runs=runs)):
-        assert drawn.get_legend().get_title().get_text() == "8 signals with this dwell time"
+        assert drawn.get_legend().get_title().get_text() == "8 signals of the kind asked for"
+
+
+@pytest.mark.parametrize("signal", ["constant", ClockShares(["0.75", "0.25"]), JointWindows(2, on="0.5", clock="s")])
+def test_the_runs_of_a_family_are_under_signals_of_the_kind_that_was_asked(signal: Any) -> None:
+    other = SignedDigraph.from_edges([("ann", "<b>", 1), ("<b>", "eve", 2), ("ann", "eve", 1)])
+    cert = certify(Family.switching([DAY, other]), PROTOCOL, [1, 2, 3], signal=signal)
+    runs = sample_runs(cert)
+    for run in runs:
+        switches = run.switches[np.isfinite(run.switches)]
+        if signal == "constant":
+            assert switches.tolist() == [0]
+        elif isinstance(signal, ClockShares):
+            lengths = np.diff(switches)
+            n = len(lengths) // 2
+            assert lengths[: 2 * n : 2].sum() == pytest.approx(3 * lengths[1 : 2 * n : 2].sum())
+        else:
+            assert np.diff(switches) == pytest.approx(1)
+    assert "of the kind asked for" in plot_family(cert, runs=runs).get_legend().get_title().get_text()
 
 
 def test_the_statement_defines_the_clock_and_what_windows_leave_less_of():

@@ -39,6 +39,9 @@ from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.protocols.late_messages import LateMessages
 from ptcc_certify.protocols.moving_leaders import MovingLeaders
 from ptcc_certify.protocols.nominal import NominalProtocol
+from ptcc_certify.protocols.sliding_mode import SlidingModeProtocol
+from ptcc_certify.report.notebook import trajectory_html
+from ptcc_certify.report.page import report_html
 from ptcc_certify.report.plots.agents import CAMP_STYLES, NAME_SIZE, NAMED_AGENTS, NAMED_OF_PART
 from ptcc_certify.report.plots.decay import plot_decay
 from ptcc_certify.report.plots.graph import GROUND, plot_graph
@@ -226,7 +229,7 @@ def test_of_a_certificate_under_limits_the_run_under_them_is_drawn_and_they_are_
         titles[name] = legend.get_title().get_text()
         first = np.nanmax([line.get_ydata()[0] for line in agent_lines(ax)])  # type: ignore[index]
         for other in (plot_trajectory(cert), plot_decay(cert)):
-            assert other.get_legend().get_title().get_text() == "without the limits of the gain"  # type: ignore[union-attr]
+            assert other.get_legend().get_title().get_text() == titles[name]  # type: ignore[union-attr]
         ideal = np.abs(cert.trajectory.input[:, 0]).max()
         assert (first == pytest.approx(ideal)) == (name != "capped")
     assert titles == {"held": "held over 0.01", "capped": "gain at most 0.5", "both": "without the limits of the gain"}
@@ -254,7 +257,7 @@ def test_inputs_of_agents_of_order_n_are_drawn_below_their_proved_peak(agents: A
     assert highest <= max(cert.agents.input)
 
 
-def test_with_late_messages_their_bound_is_drawn_beside_that_of_messages_at_once() -> None:
+def test_with_late_messages_their_bound_of_the_input_is_drawn_and_not_that_of_messages_at_once() -> None:
     graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1), ("a", "c", 2)])
     protocol = NominalProtocol(T=1, rho1=1, rho2=3, kappa=1)
     cert = certify(graph, protocol, [1, 2, 3], messages=CAPPED, method="perron")
@@ -262,7 +265,9 @@ def test_with_late_messages_their_bound_is_drawn_beside_that_of_messages_at_once
     texts = [text.get_text() for text in drawn(plot_input(cert)).texts]
     (told,) = [text for text in texts if text.startswith("late messages: at most ")]
     assert float(told.split()[4].rstrip(",")) >= cert.late.input.max()
-    assert any("certified peak" in text and "messages at once" in text for text in texts)
+    assert not any("certified peak" in text for text in texts)
+    punctual = [text.get_text() for text in drawn(plot_input(cert.trajectory, certificate=cert)).texts]
+    assert any("certified peak" in text and "messages at once" in text for text in punctual)
 
 
 def test_a_held_input_is_drawn_in_steps_where_every_period_is_sampled() -> None:
@@ -493,9 +498,52 @@ def test_the_axis_of_an_input_that_is_large_for_a_short_time_alone_is_logarithmi
             assert labelled(end)["$T_r$"].get_xdata()[0] == pytest.approx(float(example.protocol().reaching.T_r))  # type: ignore[attr-defined,union-attr]
 
 
-def test_states_of_a_certificate_with_late_messages_say_that_they_are_without() -> None:
+def test_the_bound_of_a_disconnected_graph_is_named_by_the_theorems_of_its_components() -> None:
+    pairs, mixed = [("c", "d", 1), ("e", "f", 1)], [("a", "b", 1), ("b", "a", -1), ("c", "d", 1), ("e", "d", 1)]
+    for edges, named in ((pairs, "Theorem 2.1"), (mixed, "Theorems 1.2 and 3.1")):
+        cert = certify(SignedDigraph.from_edges(edges), PROTOCOL, range(len({v for e in edges for v in e[:2]})))
+        assert {claim.theorem for claim in cert.claims} == set(named.split()[1::2])
+        assert f"bound of {named}" in labelled(plot_decay(cert)) and named in repr(cert)
+
+
+ASKED: dict[str, dict[str, Any]] = {
+    "messages late by up to 0.05": {"messages": LateMessages(delay="0.05")},
+    "gain at most 20, messages late by up to 0.05": {"messages": LateMessages(delay="0.05", gain_cap=20)},
+    "gain at most 20, off by 0.1": {"messages": LateMessages(value_error="0.1", gain_cap=20)},
+    "leaders move at up to 1": {"leaders": MovingLeaders(speed=1)},
+    "messages late by up to 0.05, leaders move at up to 1": {
+        "messages": LateMessages(delay="0.05"),
+        "leaders": MovingLeaders(speed=1),
+    },
+    "gain at most 5": {"limits": [GainLimits(gain_cap=5)]},
+    "off from $T$ - 0.2": {"limits": [GainLimits(stop_before="0.2")]},
+    "gain at most 5, without disturbance, without noise": {
+        "limits": [GainLimits(gain_cap=5)],
+        "noise": "0.1",
+        "delta": "0.1",
+    },
+}
+
+
+@pytest.mark.parametrize("title", ASKED)
+def test_the_run_that_is_drawn_is_the_one_that_was_asked(title: str) -> None:
+    graph = SignedDigraph.from_edges([(1, 2, 1), (2, 3, -1), (1, 4, 1), (3, 4, -1)])
+    protocol, x0 = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1), [1, 0, 2, -1]
+    cert = certify(graph, protocol, x0, method="paper", **ASKED[title])
+    (states,) = plot_run(cert).axes
+    drawn_axes = states, plot_decay(cert), plot_input(cert)
+    assert {ax.get_legend().get_title().get_text() for ax in drawn_axes} == {title}  # type: ignore[union-attr]
+    acts = {name: value for name, value in ASKED[title].items() if name in ("messages", "leaders")}
+    run = simulate(graph, protocol, x0, actuator=next(iter(ASKED[title].get("limits", ())), None), **acts)
+    ends = [line.get_ydata()[-1] for line in agent_lines(states)]  # type: ignore[index]
+    assert sorted(ends) == pytest.approx(sorted(run.states[:, -1]), abs=1e-6)
+    bounds = [line.get_label() for line in drawn_axes[1].lines if "bound" in str(line.get_label())]
+    assert all(str(label).endswith(("nothing late", "leaders at rest", "no limits")) for label in bounds)
+
+
+def test_where_delays_are_too_short_for_a_run_the_states_say_that_they_are_without() -> None:
     graph = SignedDigraph.from_edges([(1, 2, 1), (2, 3, -1)])
-    cert = certify(graph, PROTOCOL, [1, 0, 2], messages=LateMessages(delay="0.05"), method="paper")
+    cert = certify(graph, PROTOCOL, [1, 0, 2], messages=LateMessages(delay="1e-9"), method="paper")
     (ax,) = plot_run(cert).axes
     assert ax.get_legend().get_title().get_text() == "without late messages"  # type: ignore[union-attr]
 
@@ -944,3 +992,15 @@ def test_a_motion_names_its_agents_and_all_panels_have_the_same_times():
     assert [sorted(text.get_text() for text in ax.texts) for ax in panels[:2]] == [["ann", "bob"], ["ann, bob"]]
     assert len(panels) == 4 and {ax.get_xlim() for ax in panels} == {panels[1].get_xlim()}
     assert "deadline $T$" in {text.get_text() for text in panels[0].get_legend().get_texts()}
+
+
+def test_where_sliding_variables_are_0_neither_they_nor_their_deadline_are_announced() -> None:
+    graph, x0 = SignedDigraph.from_edges([(1, 2, 1), (2, 1, -1)]), [1, 2]
+    p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
+    for sigma0, moves in (([0, 0], False), ([1, 0], True)):
+        cert = certify(graph, p, x0, sigma0=sigma0, method="paper")
+        assert cert.trajectory is not None
+        for ax in (plot_trajectory(cert), plot_input(cert), plot_decay(cert)):
+            assert ("$T_r$" in labelled(ax)) == moves
+        assert ("drives the sliding variable" in report_html(read_certificate(cert))) == moves
+        assert ("sliding variables over time" in trajectory_html(cert.trajectory)) == moves

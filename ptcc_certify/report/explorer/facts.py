@@ -64,7 +64,7 @@ def without_flags(verdict: str) -> str:
 def _claim(certificate: Certificate) -> str:
     p, behaviours = certificate.protocol, dict.fromkeys(claim.sharpest for claim in certificate.claims)
     when = f"T = {near(p.T)}" if p.reaching is None else f"T_r + T_s = {near(p.T)} whatever the disturbance"
-    which = f"Theorem {certificate.theorem.number}" if certificate.claim is None else certificate.claim.reference
+    which = certificate.theorems_named if certificate.claim is None else certificate.claim.reference
     return f"{', '.join(behaviours)} at {when} ({which})"
 
 

@@ -95,8 +95,9 @@ class View:
 
     @property
     def panels(self) -> tuple[str, ...]:
-        """The panels of the protocol at hand."""
-        return tuple(name for name in PANELS if name != "sliding" or self.settings.kind == "sliding-mode")
+        """The panels of which there is something to show: sliding variables only where they move."""
+        moves = self.settings.kind == "sliding-mode" and self.settings.reaching
+        return tuple(name for name in PANELS if name != "sliding" or moves)
 
     @cached_property
     def figure(self) -> Figure:

@@ -110,10 +110,11 @@ def draw_agents(
 
 
 def draw_deadlines(ax: Axes, run: Trajectory) -> None:
-    """Draw the deadline, and the first one of the sliding-mode protocol, as vertical lines."""
+    """Draw the deadline, and where sliding variables move that of theirs, as vertical lines."""
     if run.protocol.prescribed:
         ax.axvline(float(run.protocol.T), color="black", linewidth=0.8, linestyle=":", label="deadline $T$")
-    if (sliding := run.protocol.reaching) is not None:
+    sliding = run.protocol.reaching
+    if sliding is not None and run.sliding is not None and run.sliding.sigma0.any():
         ax.axvline(float(sliding.T_r), color="black", linewidth=0.8, linestyle=(0, (5, 2, 1, 2)), label="$T_r$")
 
 

@@ -14,7 +14,7 @@ from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.protocols.gain import Gain
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled, time_label
-from ptcc_certify.report.plots.subject import limits_text, require_same, trajectory_of
+from ptcc_certify.report.plots.subject import ideal_run_of, ideal_text, limits_text, require_same
 from ptcc_certify.simulation.trajectory import Trajectory
 
 #: Horizontal axes of the decay, and their labels; that of time has a unit.
@@ -43,7 +43,8 @@ def plot_decay(
     every instant. Thin: each of them. Dashed: the theorem's own. If only Theorem 1.1's own coordinates were proved,
     ``||eps(t)||`` instead. Through a reaching phase the bounds are integrated in floating point: numerical. The run,
     with circles, is drawn down to the integrator's floor, its tolerance times the size of the states times what ``E``
-    multiplies them by: below, a run says nothing.
+    multiplies them by: below, a run says nothing. Where limits of the gain, late messages or moving leaders were asked,
+    that run is drawn besides; the bounds, and the run with circles, are without these.
 
     Parameters
     ----------
@@ -82,7 +83,8 @@ def plot_decay(
     if axis not in _DECAY_AXES:
         raise ParameterError(f'axis "{axis}" is unknown; one of {", ".join(_DECAY_AXES)}')
     proved = subject if isinstance(subject, Certificate) else certificate
-    run = None if isinstance(subject, Certificate) and subject.trajectory is None else trajectory_of(subject)
+    run = None if isinstance(subject, Certificate) and subject.trajectory is None else ideal_run_of(subject)
+    asked = subject.asked_trajectory if isinstance(subject, Certificate) else None
     if proved is not None:
         _require_bounds(proved, run)
     remaining = np.geomspace(1, _LAST, _INSTANTS) if run is None else run.remaining[run.remaining > 0]
@@ -101,20 +103,26 @@ def plot_decay(
     if run is not None and norm.any():
         bottom = max(_BELOW_FLOOR * floor, min(float(norm.min()), bottom) / 3)
         seen = resolved(norm, best, floor)
-        _draw_run(ax, place, seen / scale, floor / scale, bottom / scale)
+        _draw_run(ax, place, seen / scale, floor / scale, bottom / scale, "" if asked is None else ideal_text(subject))
         last = int(np.flatnonzero(((best if bounds else norm) >= bottom) | (seen > best))[-1])
         top = max(top, float(np.nan_to_num(seen).max()))  # a violated bound stays in sight
+    if asked is not None:
+        norm, floor, _ = error_norm(asked, proved)
+        seen = np.where(norm > floor, norm, np.nan)
+        top = max(top, float(np.nan_to_num(seen).max()))
+        where = _places(asked.protocol.gain, None, asked.remaining[asked.remaining > 0])[axis]
+        ax.plot(where, seen / scale, color=RUN, linewidth=1.1, label="simulated, as asked")
     ax.set_yscale("log")
     ax.set_ylim(bottom / scale, 3 * top / scale)
     ax.set_xscale("log" if axis == "left" else "linear")
     ax.set_xlim(place[0], place[max(last, 1)])
     p = subject.protocol
-    if p.reaching is not None:
+    if p.reaching is not None and (proved is None or not proved.direct):
         (at,) = _places(p.gain, None, np.array([float(p.span / p.T)]))[axis]
         ax.axvline(at, color="black", linewidth=0.8, linestyle=(0, (5, 2, 1, 2)), label="$T_r$")
     name = r"\varepsilon" if proved is not None and proved.envelope.coordinates == "eps" else "E"
     label = time_label(_DECAY_AXES[axis], time_unit) if axis == "time" else _DECAY_AXES[axis]
-    title = "" if run is None else limits_text(run, proved)
+    title = "" if run is None else limits_text(run if asked is None else asked, proved)
     return finished(ax, label, rf"$\|{name}(t)\| \,/\, \|{name}(0)\|$", title)
 
 
@@ -173,21 +181,26 @@ def _bounds(
         values = replace(envelope, functions=(function,)).norm_bound(remaining, x0) / unit
         if function.kind == "paper":
             style: dict[str, Any] = {"color": "black", "linewidth": 0.9, "linestyle": "--", "zorder": 2.1}
-            style["label"] = f"bound of Theorem {certificate.theorem.number}"
+            style["label"] = f"bound of {certificate.theorems_named}"
         else:
             style = {"color": BOUND, "linewidth": 0.6, "alpha": 0.6, "linestyle": "-.", "label": label}
             label = None
         bounds[function.name] = values, style
     best = envelope.norm_bound(remaining, x0) / unit
     label = "proved bound from $x(0)$" if certificate.direct else "bound from $x(0)$ (numerical)"
+    label += f",\n{without}" if (without := ideal_text(certificate)) else ""
     return bounds | {_BEST: (best, {"color": BOUND, "linewidth": 1.8, "label": label})}
 
 
-def _draw_run(ax: Axes, place: np.ndarray, seen: np.ndarray, floor: float, bottom: float) -> None:
-    """Draw what a run says, and the floor below which it says nothing, if that is in sight."""
+def _draw_run(ax: Axes, place: np.ndarray, seen: np.ndarray, floor: float, bottom: float, without: str) -> None:
+    """Draw what a run says, and the floor below which it says nothing, if that is in sight.
+
+    Where it is not the run that was asked for it is pale, and named by what it is without.
+    """
     if np.isfinite(seen).any():
         marks: dict[str, Any] = {"marker": "o", "markersize": 2.8, "markerfacecolor": "white", "markevery": 0.1}
-        ax.plot(place, seen, color=RUN, linewidth=1.1, label="simulated (CVODES)", **marks)
+        colour, label = (BEHIND, f"simulated, {without}") if without else (RUN, "simulated (CVODES)")
+        ax.plot(place, seen, color=colour, linewidth=1.1, label=label, **marks)
     if bottom < floor:
         ax.axhspan(bottom, floor, color=BEHIND, alpha=0.12, linewidth=0)
         ax.axhline(floor, color=BEHIND, linewidth=0.9, linestyle=":", label="integrator's floor")

@@ -12,6 +12,8 @@ from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finishe
 
 #: Bars of a histogram.
 BARS = 40
+#: Share of their size by which values differ that share a bar, and what is drawn as 0.
+_ALIKE, _SMALL = 1e-6, 1e-290
 
 
 @styled
@@ -49,8 +51,18 @@ def plot_final_states(certificate: Content, *, ax: Axes | None = None) -> Axes:
     parts = {"leaders": (values[leaders], RUN), "followers": (values[followers], BEHIND)}
     there = {name: part for name, part in parts.items() if part[0].size}
     samples, colours = zip(*there.values(), strict=True)
-    ax.hist(samples, BARS, color=list(colours), label=list(there), stacked=True)
+    ax.hist(samples, BARS, range=_extent(values), color=list(colours), label=list(there), stacked=True)
     return finished(ax, "final state", "agents")
+
+
+def _extent(values: np.ndarray) -> tuple[float, float]:
+    """Return between which values bars stand; of values that differ in their last digits only, a range about them."""
+    low, high = float(values.min()), float(values.max())
+    size = max(abs(low), abs(high))
+    if high - low > _ALIKE * size and high - low > _SMALL:
+        return low, high
+    about = 0.5 if size < _SMALL else 0.05 * size
+    return low - about, high + about
 
 
 @styled

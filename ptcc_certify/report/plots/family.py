@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -17,11 +18,13 @@ from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, find_camps
 from ptcc_certify.report.plots.agents import CAMP_STYLES, NAMED_AGENTS, draw_deadlines, family_groups, name_agents
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled, time_label
 from ptcc_certify.simulation.family_run import FamilyTrajectory, simulate_family
-from ptcc_certify.simulation.signals import RandomDwellSignal, RandomSignal, Signal
-from ptcc_certify.theorems.restricted_signals import DwellTime
+from ptcc_certify.simulation.signals import ConstantSignal, PeriodicSignal, RandomDwellSignal, RandomSignal, Signal
+from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows
 
 #: Random signals that are drawn beside the worst cases.
 _RANDOM = 8
+#: Periods of the clock in which modes have their shares.
+_PERIODS = (0.25, 0.5, 1.0, 2.0, 4.0)
 #: Samples of runs that begin off the sliding manifold: half as many, since there are as many again before ``T_r``.
 _SAMPLES = 101
 #: The bar of a final interval.
@@ -36,7 +39,8 @@ def sample_runs(certificate: FamilyCertificate, signals: Iterable[Signal] | None
     ----------
     certificate : FamilyCertificate
     signals : iterable of Signal, optional
-        By default eight random ones, and worst cases; of a certificate for a dwell time random ones that keep it.
+        By default eight random ones, and worst cases; of a certificate for constant signals, a dwell time, shares or
+        windows signals of that kind.
 
     Raises
     ------
@@ -54,17 +58,31 @@ def sample_runs(certificate: FamilyCertificate, signals: Iterable[Signal] | None
 
 
 def _signals(certificate: FamilyCertificate) -> list[Signal]:
-    """Return random signals and worst cases; under a dwell time random ones that keep it."""
-    if isinstance(certificate.signal, DwellTime):
-        return [RandomDwellSignal(certificate.signal, seed) for seed in range(_RANDOM)]
-    return [*map(RandomSignal, range(_RANDOM)), *worst_case_signals(certificate)]
+    """Return signals of the kind that was asked for; where that is any random ones, and worst cases."""
+    return _of_the_kind(certificate) or [*map(RandomSignal, range(_RANDOM)), *worst_case_signals(certificate)]
 
 
-def keeps_dwell(certificate: FamilyCertificate, runs: Sequence[FamilyTrajectory]) -> bool:
-    """Tell whether runs are those under random signals that keep the dwell time of a certificate."""
-    if not isinstance(certificate.signal, DwellTime):
-        return False
-    own = {RandomDwellSignal(certificate.signal, seed).text for seed in range(_RANDOM)}
+def _of_the_kind(certificate: FamilyCertificate) -> list[Signal]:
+    """Return signals that keep what a certificate was asked of; none where that is any, or where none is known."""
+    signal, modes = certificate.signal, certificate.family.modes
+    if isinstance(signal, DwellTime):
+        return [RandomDwellSignal(signal, seed) for seed in range(_RANDOM)]
+    if signal == "constant":
+        levels = (0.0, 0.5, 1.0) if not all(mode.known.all() for mode in modes) else (0.5,)
+        members = [ConstantSignal(i, level) for i in range(len(modes)) for level in levels]
+        return list(members[:: math.ceil(len(members) / _RANDOM)])
+    if isinstance(signal, ClockShares):
+        shares = [(i, float(share)) for i, share in enumerate(signal.shares) if share]
+        return [PeriodicSignal([(i, share * period) for i, share in shares]) for period in _PERIODS]
+    if isinstance(signal, JointWindows) and len(modes) * signal.on <= signal.length:
+        word = [(i, float(signal.length) / len(modes)) for i in range(len(modes))]
+        return [PeriodicSignal(word[k:] + word[:k]) for k in range(min(len(word), _RANDOM))]
+    return []
+
+
+def keeps_promise(certificate: FamilyCertificate, runs: Sequence[FamilyTrajectory]) -> bool:
+    """Tell whether runs are those under signals of the kind that a certificate was asked of."""
+    own = {signal.text for signal in _of_the_kind(certificate)}
     return all(run.signal in own for run in runs)
 
 
@@ -202,7 +220,7 @@ def plot_family_decay(
     floor = FLOOR_FACTOR * first.rtol * scale
     if not (bound >= floor).any():
         raise ParameterError("every agent begins where it ends: there is no decay to draw")
-    own = subject.signal == "any" or keeps_dwell(subject, runs)
+    own = subject.signal == "any" or keeps_promise(subject, runs)
     label: str | None = "random signals" if own else "any signal (random)"
     any_worst, known = False, _known_end(subject)
     for run in runs:
@@ -261,7 +279,7 @@ def _known_end(certificate: FamilyCertificate) -> np.ndarray | None:
 
 def count_of_signals(certificate: FamilyCertificate, runs: Sequence[FamilyTrajectory]) -> str:
     """Tell how many signals are drawn, and where some are promised, whether these keep the promise or are any."""
-    kept = " with this dwell time" if keeps_dwell(certificate, runs) else " of any kind"
+    kept = " of the kind asked for" if keeps_promise(certificate, runs) else " of any kind"
     return f"{len(runs)} signals" + kept * (certificate.signal != "any")
 
 

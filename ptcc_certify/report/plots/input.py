@@ -13,7 +13,6 @@ from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.certificate.late_answers import largest_late_input
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.report.input_lines import initial_states_text
 from ptcc_certify.report.plots.agents import draw_agents, draw_deadlines, name_agents
 from ptcc_certify.report.plots.agents_input import plot_agents_input
@@ -22,6 +21,8 @@ from ptcc_certify.report.plots.peaks import Peak, draw_peaks
 from ptcc_certify.report.plots.style import BOUND, RUN, axes_of, finished, styled, time_label
 from ptcc_certify.report.plots.subject import limits_text, require_same, structure_of, trajectory_of
 from ptcc_certify.simulation.agents import AgentsTrajectory
+from ptcc_certify.simulation.late_messages import LateRun
+from ptcc_certify.simulation.moving_leaders import TrackingRun
 from ptcc_certify.simulation.trajectory import Trajectory
 
 #: An error ``|e_k|`` below so many tolerances of the integrator, in units of what it is made of, is not resolved.
@@ -40,9 +41,10 @@ def plot_input(
     is the input that acts. Nothing is drawn where the integrator no longer resolves what the gain multiplies. No peak
     is drawn where none holds: for runs that begin later than 0, sampled inputs, disturbance or noise of the nominal
     protocol, boundary layers. Of a certificate with one set of limits of the gain the run under these is drawn, and
-    their peak; the legend names them. A held input is drawn in steps if every period is sampled. With late messages
-    their bound is drawn besides, as far as there is one. Of a family the largest input under each of many signals is
-    drawn, below its bound for every signal; of agents of order n the size of each agent's input.
+    their peak; with late messages or moving leaders the run with these, and what bounds its input, if anything does;
+    the legend names them. A held input is drawn in steps if every period is sampled. Of a family the largest input
+    under each of many signals is drawn, below its bound for every signal; of agents of order n the size of each
+    agent's input.
 
     Parameters
     ----------
@@ -76,7 +78,7 @@ def plot_input(
         return plot_family_input(subject, ax=ax, time_unit=time_unit)
     if isinstance(subject, AgentsTrajectory) or (isinstance(subject, Certificate) and subject.agents is not None):
         return plot_agents_input(subject, ax=ax, time_unit=time_unit)
-    run, structure = _run_under_limits(subject), structure_of(subject)
+    run, structure = trajectory_of(subject), structure_of(subject)
     certificate = subject if isinstance(subject, Certificate) else certificate
     ax, size = axes_of(ax), np.abs(_resolved_input(run))
     steps = "steps-post" if _every_period_sampled(run) else "default"
@@ -85,15 +87,6 @@ def plot_input(
     draw_deadlines(ax, run)
     name_agents(ax, run, size, named)
     return finished(ax, time_label("time $t$", time_unit), "input $|u_k|$", limits_text(run, certificate))
-
-
-def _run_under_limits(subject: Any) -> Trajectory:
-    """Return the run of a subject; of a certificate with one set of limits of the gain, that under these."""
-    if isinstance(subject, Certificate) and len(subject.limits) == 1 and subject.direct:
-        run, (limits,) = subject.trajectory, subject.limits
-        if run is None or run.actuator is None:
-            return subject.simulate(actuator=GainLimits(limits.gain_cap, limits.stop_before, limits.sample_period))
-    return trajectory_of(subject)
 
 
 def _every_period_sampled(run: Trajectory) -> bool:
@@ -111,6 +104,10 @@ def _peaks(run: Trajectory, certificate: Certificate) -> list[Peak]:
     if late is not None and (largest := largest_late_input(late, certificate.protocol)) is not None:
         whole = ", from within 1 of the final states" * late.relative
         found.append(Peak(float(largest), f"late messages: at most {up(largest, 4)}{whole}", BOUND))
+    tracking = certificate.tracking if isinstance(run, TrackingRun) else None
+    if tracking is not None and tracking.input is not None:
+        most = float(tracking.input.max())
+        found.append(Peak(most, f"moving leaders: at most {up(most, 4)}", BOUND))
     return found
 
 
@@ -278,7 +275,7 @@ def _certified_peak(trajectory: Trajectory, certificate: Certificate) -> float |
 
 
 def _certified_effort(trajectory: Trajectory, certificate: Certificate) -> Effort | None:
-    """Return what is proved about the input of a run; None if the run is disturbed, or does not begin at 0.
+    """Return what is proved of the input of a punctual run that begins at 0 without a disturbance; None of others.
 
     Raises
     ------
@@ -289,4 +286,5 @@ def _certified_effort(trajectory: Trajectory, certificate: Certificate) -> Effor
     effort, slid = certificate.effort, trajectory.sliding
     unknown = trajectory.forcing is not None or 0.0 not in trajectory.t[:1]
     unknown = unknown or (slid is not None and slid.boundary_layer is not None)
+    unknown = unknown or isinstance(trajectory, LateRun | TrackingRun)
     return None if unknown else effort

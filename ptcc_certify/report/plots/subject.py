@@ -18,6 +18,8 @@ from ptcc_certify.graphs.kinds_of_file import kind_of
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.simulation.trajectory import Trajectory
 
+#: What limits a gain, in the order of the parameters of ``GainLimits``.
+_LIMITS = ("gain at most", "off from $T$ -", "held over")
 #: What makes the subject of most figures.
 _CERTIFY = "give certify(graph, protocol, x0)"
 
@@ -59,7 +61,15 @@ def refuse_family(subject: Any) -> None:
 
 
 def trajectory_of(subject: Any) -> Trajectory:
+    """Return the run of what was asked of a certificate, with its limits of the gain, or else :func:`ideal_run_of`."""
+    asked = subject.asked_trajectory if isinstance(subject, Certificate) else None
+    return ideal_run_of(subject if asked is None else asked)
+
+
+def ideal_run_of(subject: Any) -> Trajectory:
     """Return a run of one initial state: the subject itself, or that of a certificate, which is simulated if need be.
+
+    Of a certificate it is the run that its bounds over time are of: nothing late, leaders at rest, no limits.
 
     Raises
     ------
@@ -68,10 +78,10 @@ def trajectory_of(subject: Any) -> Trajectory:
 
     Examples
     --------
-    >>> from ptcc_certify.report.plots.subject import trajectory_of
+    >>> from ptcc_certify.report.plots.subject import ideal_run_of
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5], simulation=False)
-    >>> trajectory_of(cert).states[:, 0]
+    >>> ideal_run_of(cert).states[:, 0]
     array([3., 5.])
     """
     run = subject
@@ -125,22 +135,34 @@ def structure_of(subject: Any) -> Structure:
     return subject.structure if isinstance(subject, Certificate) else analyse(as_graph(subject))
 
 
+def ideal_text(certificate: Certificate) -> str:
+    """Say what of a certificate is not in its bounds over time: limits of the gain, late messages, moving leaders."""
+    late, moving = certificate.late, certificate.leaders_move
+    absent = {"no limits": certificate.limits, "nothing late": late, "leaders at rest": moving}
+    return ", ".join(text for text, there in absent.items() if there)
+
+
 def limits_text(run: Trajectory, certificate: Certificate | None) -> str:
-    """Name what limits the gain of a run, or say what of a certificate is not in it: limits, late messages, motion."""
-    limits = run.actuator
-    if limits is None and certificate is not None:
+    """Name limits of the gain, late messages, moving leaders of a run; say what of a certificate it is without."""
+    limits, messages, leaders = run.actuator, getattr(run, "messages", None), getattr(run, "leaders", None)
+    numbers: dict[str, Any] = {}
+    if limits is not None:
+        numbers = dict(zip(_LIMITS, (limits.gain_cap, limits.stop_before, limits.sample_period), strict=True))
+    numbers |= {} if messages is None else {"messages late by up to": messages.age, "off by": messages.value_error}
+    named = [f"{name} {near(number)}" for name, number in numbers.items() if number]
+    named += [] if leaders is None else [f"leaders move at up to {near(leaders.speed)}"]
+    if certificate is not None:
+        forced = certificate.sigma0 is None and run.forcing is None and leaders is None
         absent = {
-            "without the limits of the gain": certificate.limits,
-            "without late messages": certificate.late,
-            "leaders at rest": certificate.leaders_move,
+            "without the limits of the gain": limits is None and certificate.limits,
+            "without late messages": messages is None and certificate.late,
+            "leaders at rest": leaders is None and certificate.leaders_move,
+            "without disturbance": forced and certificate.delta,
+            "without noise": forced and certificate.noise,
             "less places in the formation": certificate.offsets,
         }
-        return ", ".join(text for text, there in absent.items() if there)
-    if limits is None:
-        return ""
-    numbers = (limits.gain_cap, limits.stop_before, limits.sample_period)
-    named = zip(("gain at most", "off from $T$ -", "held over"), numbers, strict=True)
-    return ", ".join(f"{name} {near(number)}" for name, number in named if number is not None)
+        named += [text for text, there in absent.items() if there]
+    return ", ".join(named)
 
 
 def require_same(run: Trajectory, certificate: Certificate) -> None:
