@@ -233,7 +233,7 @@ def test_a_refuted_expectation_is_3(command: str):
 
 
 def test_check_reads_the_graph_as_its_reader_says_not_its_sender(folder: Path):
-    """Orientation, repeated edges, self-loops, ties without direction: what only the sender said is named, and fails."""
+    """Orientation, repeated edges, self-loops: what only the sender said is named, and the check fails."""
     Path("g.csv").write_text("a,b,1\na,b,1\nb,c,-0.5\nc,c,1\nc,a,2\nc,d,3\n")
     reading = ("--edges", "listens", "--duplicates", "sum", "--drop-self-loops")
     assert ptcc("certify", "g.csv", *reading, "--no-simulation", "-o", "c.json").code == 0
@@ -272,8 +272,8 @@ def test_check_tells_from_standard_input_what_would_agree(folder: Path):
 def test_check_takes_every_option_about_reading_that_other_commands_take():
     """None of them falls back to what the certificate says."""
     from ptcc_certify.cli import options
-    from ptcc_certify.cli.check_and_report import check
     from ptcc_certify.cli.certify import certify
+    from ptcc_certify.cli.check_and_report import check
 
     own = {parameter.name for parameter in check.params}
     decorated = {option.name for option in options.reading_options(lambda: None).__click_params__}
