@@ -256,7 +256,7 @@ def real_table(folder: Path, names: list[str], runs: int) -> list[dict[str, Any]
         with tempfile.TemporaryDirectory() as place:
             out = str(Path(place) / "c.json")
             made = [command("certify", file, *READING, "--no-simulation", "-o", out) for _ in range(runs)]
-            checked = [command("check", out, file, "--memory", str(MEMORY)) for _ in range(runs)]
+            checked = [command("check", out, file, *READING, "--memory", str(MEMORY)) for _ in range(runs)]
             assert all(code == 0 for _, _, code in checked), checked
             data = json.loads(Path(out).read_text())
         graph = ptcc.read_graph(file, orientation="listens", drop_self_loops=True)

@@ -1,6 +1,5 @@
 (** The certificate as a record, and what it claims: all that must be read to believe the theorem of [Main.v]. *)
-Require Import ZArith QArith Qreals List Bool Reals.
-From Coquelicot Require Import Coquelicot.
+Require Import ZArith QArith Qreals List Bool Reals. From Coquelicot Require Import Coquelicot.
 Import ListNotations. Open Scope R_scope.
 
 (** * Signed digraphs *)
@@ -148,13 +147,16 @@ Definition sliding_claim (c : cert) : Prop := match kind c with Nominal _ => Tru
            added c S t i <= Q2R (nth i (sliding_input c) 0%Q)) /\
          forall z, nth i (reaching c) None = Some z -> Q2R T_r * (1 - exp (- Q2R z)) <= t -> S t i = 0) end.
 (** what one Lyapunov function proves, along every motion *)
-Definition function_claim (c : cert) (f : func) : Prop := forall X S t0 t, moves_from c X S t0 ->
-  let q := exp (- (Q2R (rate f) * (s c t - s c t0))) in let V := V (edges c) (ly f) in
-  let N x := norm2 (order c) (coords (edges c) (ly f) x) in let off i := X t i - end_state c (fun j => X 0 j - S 0 j) i
-  in t0 <= t < deadline c -> V (X t) <= q * V (X t0) /\ N (X t) <= Q2R (overshoot f) * (q * N (X t0)) /\
-  (forall a cs, deviation f = Some (a, cs) -> norm2 (order c) off <= Q2R a * (q * V (X t0)) /\
-     forall i, (i < order c)%nat -> sq (off i) <= Q2R (nth i cs 0%Q) * (q * V (X t0))) /\
+Definition decay_claim c f : Prop := forall X S t0 t, moves_from c X S t0 -> let q := exp (- (Q2R (rate f) *
+  (s c t - s c t0))) in let V := V (edges c) (ly f) in let N x := norm2 (order c) (coords (edges c) (ly f) x) in
+  let off i := X t i - end_state c (fun j => X 0 j - S 0 j) i in t0 <= t < deadline c -> V (X t) <= q * V (X t0) /\
+  N (X t) <= Q2R (overshoot f) * (q * N (X t0)) /\ (forall a cs, deviation f = Some (a, cs) -> norm2 (order c) off <=
+  Q2R a * (q * V (X t0)) /\ forall i, (i < order c)%nat -> sq (off i) <= Q2R (nth i cs 0%Q) * (q * V (X t0))) /\
   forall cs i, constants f = Some cs -> (i < order c)%nat -> sq (lap (edges c) (X t) i) <= Q2R (nth i cs 0%Q) * V (X t).
+(** and of which matrices: the ends of the spectrum of [P], on the nodes that listen to somebody *)
+Definition function_claim (c : cert) (f : func) : Prop := decay_claim c f /\ 0 < Q2R (lowest f) /\ forall P z,
+  ly f = InE P -> (forall i, ~ In i (map tgt (edges c)) -> z i = 0) -> let N := norm2 (order c) z in
+  Q2R (lowest f) * N <= qbil P z z <= Q2R (highest f) * N.
 (** the inequalities of the paper's own function *)
 Definition margin_form (es : list edge) (n : nat) (m : margin) (r : R) (x : nat -> R) : R :=
   fold_right (fun i a => match nth i (gammas m) None with Some g => Q2R g * sq (x i) | None =>
@@ -162,9 +164,8 @@ Definition margin_form (es : list edge) (n : nat) (m : margin) (r : R) (x : nat 
 Definition margin_claim (c : cert) (m : margin) : Prop := forall x j, (forall i, (i < order c)%nat -> ~ In i (on m) ->
   x i = 0) -> (j < order c)%nat -> x j <> 0 -> let S r := margin_form (edges c) (order c) m r x in
   Q2R (least m) * norm2 (order c) x < S 1 /\ (Q2R (least m) = 0 -> forall r, 0 < r <= 1 -> 0 < S r).
-Definition leader_claim (c : cert) (l : list Q * Q) : Prop := forall X S t0 t, moves_from c X S t0 ->
-  let W x := qdot (fst l) (fun i => sq (lap (edges c) x i)) in
-  t0 <= t < deadline c -> W (X t) <= exp (- (Q2R (snd l) * (s c t - s c t0))) * W (X t0).
+Definition leader_claim c l : Prop := forall X S t0 t, moves_from c X S t0 -> t0 <= t < deadline c -> let W x :=
+  qdot (fst l) (fun i => sq (lap (edges c) x i)) in W (X t) <= exp (- (Q2R (snd l) * (s c t - s c t0))) * W (X t0).
 (** where nothing moves: components by camps, and nobody beyond the largest value of a balanced one of its own *)
 Definition at_rest (c : cert) (y : nat -> R) : Prop := (forall i, (i < order c)%nat -> lap (edges c) y i = 0) /\
   (forall C i, In C (comps c) -> In i (nodes C) -> let h := hd O (nodes C) in

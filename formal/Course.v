@@ -333,7 +333,7 @@ Hypothesis Gx : good (common (start c)) (start c) = true.
 Hypothesis Hreach : check_reaching c = true.
 Hypothesis HFs : forall f, In f (funcs c) -> exists F m, form n (dls d) (dL d) (ly f) = Some (F, m) /\
   (forall x, Q2R (rate f) * bil F x x <= bil F (lap es x) x + bil F x (lap es x)) /\
-  check_ends c d f = true /\ check_constants c d f = true /\ function_claim c f.
+  check_ends c d f = true /\ check_constants c d f = true /\ decay_claim c f.
 Variables (X S : R -> nat -> R).
 Hypothesis HM : moves c X S.
 Hypothesis X0 : forall i, (i < n)%nat -> X 0 i = Q2R (nth i (start c) 0%Q).

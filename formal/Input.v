@@ -43,35 +43,40 @@ Hypothesis Hls : good (dls d) (map wt es) = true.
 Lemma end_form_ok PZ e q x : bil (end_form n PZ e q) x x
   = IZR (Zpos (Qden q)) * bil PZ x x - IZR (Qnum q) * IZR e * norm2 n x.
 Proof. unfold end_form. rewrite bil_madd, !bil_mscale, bil_ones, opp_IZR, mult_IZR. ring. Qed.
+Lemma matrix_ends_ok f P : check_ends c d f = true -> ly f = InE P -> forall z, (forall i, mem i (dsrc d) = true -> z i = 0) ->
+  Q2R (lowest f) * norm2 n z <= qbil P z z <= Q2R (highest f) * norm2 n z.
+Proof.
+  unfold check_ends. intros H EP z Hz. apply andb_prop in H as [_ H3]. rewrite EP in H3. cbv zeta in H3.
+  set (e := common (concat P)) in *. set (PZ := map (map (scaled e)) P) in *.
+  apply andb_prop in H3 as [H3 H5]. apply andb_prop in H3 as [H3 H4]. apply andb_prop in H3 as [G E0].
+  apply Z.ltb_lt in E0. apply IZR_lt in E0.
+  assert (B : bil PZ z z = IZR e * qbil P z z) by (apply bil_scaled; assumption).
+  split.
+  - pose proof (semidefinite_off_ok _ _ _ H4 z Hz) as K. fold n in K. rewrite end_form_ok, B in K.
+    assert (D : 0 < IZR (Zpos (Qden (lowest f)))) by (apply IZR_lt; reflexivity).
+    unfold Q2R. apply (Rmult_le_reg_l (IZR e * IZR (Zpos (Qden (lowest f))))); [nra|].
+    replace (IZR e * IZR (Zpos (Qden (lowest f))) * (IZR (Qnum (lowest f)) * / IZR (Zpos (Qden (lowest f))) * norm2 n z))
+      with (IZR (Qnum (lowest f)) * IZR e * norm2 n z) by (field; lra). lra.
+  - pose proof (semidefinite_off_ok _ _ _ H5 z Hz) as K. rewrite bil_mscale in K. fold n in K. rewrite end_form_ok, B in K.
+    assert (D : 0 < IZR (Zpos (Qden (highest f)))) by (apply IZR_lt; reflexivity).
+    unfold Q2R. apply (Rmult_le_reg_l (IZR e * IZR (Zpos (Qden (highest f))))); [nra|].
+    replace (IZR e * IZR (Zpos (Qden (highest f))) * (IZR (Qnum (highest f)) * / IZR (Zpos (Qden (highest f))) * norm2 n z))
+      with (IZR (Qnum (highest f)) * IZR e * norm2 n z) by (field; lra). lra.
+Qed.
 Lemma ends_ok f : check_ends c d f = true -> 0 < Q2R (lowest f) /\
   (forall x, Q2R (lowest f) * norm2 n (coords es (ly f) x) <= V es (ly f) x) /\
   (forall x, V es (ly f) x <= Q2R (highest f) * norm2 n (coords es (ly f) x)).
 Proof.
-  unfold check_ends. intros H. apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 _].
+  intros H0. pose proof H0 as H. unfold check_ends in H. apply andb_prop in H as [H H3]. apply andb_prop in H as [H1 _].
   assert (L0 : 0 < Q2R (lowest f)).
   { apply Z.ltb_lt in H1. unfold Q2R. apply Rmult_lt_0_compat; [apply IZR_lt; assumption|].
     apply Rinv_0_lt_compat. apply IZR_lt. reflexivity. }
-  split; [exact L0|]. destruct (ly f) as [P|p g|p]; [| |discriminate].
-  - cbv zeta in H3. set (e := common (concat P)) in *. set (PZ := map (map (scaled e)) P) in *.
-    apply andb_prop in H3 as [H3 H5]. apply andb_prop in H3 as [H3 H4]. apply andb_prop in H3 as [G E0].
-    apply Z.ltb_lt in E0. apply IZR_lt in E0.
-    assert (Hx : forall x i, mem i (dsrc d) = true -> lap es x i = 0) by (intros x i; apply (lap_source n)).
-    assert (B : forall x, bil PZ x x = IZR e * qbil P x x) by (intros x; apply bil_scaled; assumption).
-    split; intros x; cbn [V coords]; set (z := lap es x).
-    + pose proof (semidefinite_off_ok _ _ _ H4 z (Hx x)) as K. fold n in K. rewrite end_form_ok, B in K.
-      assert (D : 0 < IZR (Zpos (Qden (lowest f)))) by (apply IZR_lt; reflexivity).
-      unfold Q2R. apply (Rmult_le_reg_l (IZR e * IZR (Zpos (Qden (lowest f))))); [nra|].
-      replace (IZR e * IZR (Zpos (Qden (lowest f))) * (IZR (Qnum (lowest f)) * / IZR (Zpos (Qden (lowest f))) * norm2 n z))
-        with (IZR (Qnum (lowest f)) * IZR e * norm2 n z) by (field; lra). lra.
-    + pose proof (semidefinite_off_ok _ _ _ H5 z (Hx x)) as K. rewrite bil_mscale in K. fold n in K. rewrite end_form_ok, B in K.
-      assert (D : 0 < IZR (Zpos (Qden (highest f)))) by (apply IZR_lt; reflexivity).
-      unfold Q2R. apply (Rmult_le_reg_l (IZR e * IZR (Zpos (Qden (highest f))))); [nra|].
-      replace (IZR e * IZR (Zpos (Qden (highest f))) * (IZR (Qnum (highest f)) * / IZR (Zpos (Qden (highest f))) * norm2 n z))
-        with (IZR (Qnum (highest f)) * IZR e * norm2 n z) by (field; lra). lra.
+  split; [exact L0|]. destruct (ly f) as [P|p g|p] eqn:El; [| |discriminate].
+  - split; intros x; apply (matrix_ends_ok f P H0 El); intros i; apply (lap_source n).
   - apply andb_prop in H3 as [Hl H3]. apply Nat.eqb_eq in Hl. rewrite forallb_forall in H3.
     assert (K : forall z : nat -> R, Q2R (lowest f) * norm2 (length p) z <= qdot p (fun i => sq (z i)) /\
       qdot p (fun i => sq (z i)) <= Q2R (highest f) * norm2 (length p) z).
-    { clear Hl. induction p as [|a p IH]; intros z.
+    { clear Hl El. induction p as [|a p IH]; intros z.
       - unfold norm2. simpl. lra.
       - simpl length. rewrite norm2_shift. simpl.
         destruct (IH ltac:(intros; apply H3; right; assumption) (shift z)) as [A B].

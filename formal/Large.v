@@ -101,7 +101,7 @@ Proof.
   pose proof HW as H'. unfold check_weighted in H'. destruct (ly f) as [P|p g|p] eqn:El; try discriminate.
   split; [|exists p; reflexivity].
   assert (Eout : from_ (by_key (number (places Cs)) es) 0 = filter (fun e => (number (places Cs) e =? 0)%nat) es) by apply key_filter.
-  apply (weighted_ok c (from_ (by_key (number (places Cs)) es) 0) (fst v) _ K f p edges_in Hprot) in HW; [exact HW| |exact El|].
+  apply (whole_weighted_ok c (from_ (by_key (number (places Cs)) es) 0) (fst v) _ K f p edges_in Hprot) in HW; [exact HW| |exact El|].
   - intros e He. rewrite Eout in He. apply filter_In in He. apply He.
   - intros x z. fold es n. rewrite Eout.
     rewrite (fsum_ext _ _ (fun i => gamma_of Cs (snd v) i * (Q2R (nth i p 0%Q) * sq (z i)))).
@@ -139,7 +139,7 @@ Proof.
     sq (lap es (X t) i) <= sq C * exp (- (r * clock (deadline c) (Q2R (rho1 c)) (k c) t))).
   { unfold check_moves in H. fold es in H. destruct es as [|e l] eqn:Ee.
     - exists 1, 0. split; [lra|]. split; [lra|]. intros t i _ _. unfold lap. simpl. unfold sq. lra.
-    - rewrite <- Ee. apply existsb_exists in H as [f [Hf Hr]]. destruct (function_large f Hf) as [Cl [p El]].
+    - rewrite <- Ee. apply existsb_exists in H as [f [Hf Hr]]. destruct (function_large f Hf) as [[Cl _] [p El]].
       set (a := Rabs (Q2R (overshoot f) * (exp (Q2R (rate f) * s c t0) * norm2 n (lap es (X t0))))).
       exists (Q2R (rate f)), (sqrt a). split; [exact (Qpos _ Hr)|]. split; [apply sqrt_pos|]. intros t i Ht Hi.
       destruct (Cl X Sl t0 t HX Ht) as [_ [N _]]. rewrite El in N. cbn [coords] in N. fold es n in N.
@@ -254,7 +254,7 @@ Proof.
   unfold check_input_large in H. rewrite Hb in H. simpl in H. destruct (T_pos c Hprot) as [P1 [P2 P3]].
   apply orb_prop in H as [H|H].
   - exists 0. intros t i _ _. destruct (edges c) eqn:E; [|discriminate]. simpl. rewrite Rmult_0_r, Rabs_R0. lra.
-  - apply existsb_exists in H as [f [Hf Hr]]. destruct (function_large f Hf) as [Cl [p El]].
+  - apply existsb_exists in H as [f [Hf Hr]]. destruct (function_large f Hf) as [[Cl _] [p El]].
     apply Qle_bool_iff, Qle_Rle in Hr. rewrite !Q2R_mult in Hr. fold (k c) in Hr. replace (Q2R 2) with 2 in Hr by (unfold Q2R; simpl; lra).
     pose proof HX as [_ HQ].
     apply (input_bounded n _ _ _ P1 P2 P3 (Q2R (rate f)) t0 (proj1 HQ) ltac:(lra) (fun t i => lap (edges c) (X t) i)

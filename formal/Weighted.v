@@ -135,7 +135,7 @@ Hypothesis H : check_weighted c outer d gamma K f = true.
 Hypothesis Hinner : forall x, let z := lap (edges c) x in
   fsum (seq 0 (order c)) (fun i => IZR (gamma i) / IZR K * (Q2R (nth i p 0%Q) * sq (z i))) + 2 * esum outer (half_edge p z)
     <= 2 * esum (edges c) (half_edge p z).
-Lemma weighted_ok : function_claim c f.
+Lemma weighted_ok : decay_claim c f.
 Proof.
   intros X Sl t0 t HX q V' N off Ht. unfold check_weighted in H. rewrite Hp in H.
   destruct (deviation f) eqn:Ed; [discriminate|]. destruct (constants f) eqn:Ec; [discriminate|].
@@ -167,5 +167,11 @@ Proof.
     rewrite H3. apply Rmult_le_compat_l; [lra|exact A'].
   - intros a cs E. discriminate.
   - intros cs i E. discriminate.
+Qed.
+Lemma whole_weighted_ok : function_claim c f.
+Proof.
+  split; [apply weighted_ok|]. split; [|intros P z E; rewrite Hp in E; discriminate].
+  unfold check_weighted in H. rewrite Hp in H. destruct (deviation f); [discriminate|]. destruct (constants f); [discriminate|].
+  apply andb_prop in H as [H' _]. apply andb_prop in H' as [H' _]. apply andb_prop in H' as [_ H2]. exact (Qpos _ H2).
 Qed.
 End Function.

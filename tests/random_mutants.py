@@ -6,7 +6,8 @@ import copy
 import hashlib
 import io
 import json
-from collections.abc import Callable, Sequence
+import os
+from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -17,6 +18,14 @@ from oracle import number
 Rng = np.random.Generator
 #: A change of a certificate and its side files, and how often it is taken.
 Way = tuple[Callable[[Rng, Json, dict[str, bytes]], Json], float]
+
+SEED = int(os.environ.get("PTCC_FUZZ_SEED", "0"))
+
+
+def numbers(most: int) -> Iterator[int]:
+    """The cases that are drawn."""
+    only = os.environ.get("PTCC_FUZZ_ONLY")
+    return iter([int(only)] if only else range(int(os.environ.get("PTCC_FUZZ_COUNT", most))))
 
 
 def fraction(text: Any) -> Fraction | None:

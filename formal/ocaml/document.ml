@@ -29,14 +29,15 @@ let integer what = function
   | _ -> bad (what ^ ": an integer is due")
 
 (* the nodes, and where they stand *)
-type nodes = { labels : string array; index : (string, int) Hashtbl.t }
+module Labels = Map.Make (String)
+type nodes = { labels : string array; index : int Labels.t }
 let nodes_of v =
   let labels = Array.of_list (List.map (text "nodes") (entries "nodes" v)) in
   need (Array.length labels > 0) "nodes: there is none";
-  let index = Hashtbl.create (Array.length labels) in
-  Array.iteri (fun i s -> need (not (Hashtbl.mem index s)) "a node occurs twice"; Hashtbl.add index s i) labels;
-  { labels; index }
-let node nodes what v = match Hashtbl.find_opt nodes.index (text what v) with
+  let index = ref Labels.empty in
+  Array.iteri (fun i s -> need (not (Labels.mem s !index)) "a node occurs twice"; index := Labels.add s i !index) labels;
+  { labels; index = !index }
+let node nodes what v = match Labels.find_opt (text what v) nodes.index with
   | Some i -> i | None -> bad (what ^ ": an unknown node")
 (* so many integers, or any number of them where a list is given *)
 let integers what count v =
@@ -61,9 +62,10 @@ let by_agent nodes read what v =
 let state nodes what v =
   if beside v then Side.numbers what (Array.length nodes.labels) v else by_agent nodes number what v
 
-(* JSON as section 16 hashes it *)
+(* the SHA-256 of JSON, as section 16 has it *)
 let hashed (v : Json.t) : string =
-  let b = Buffer.create 4096 in
+  let b = Buffer.create 65536 and sum = Sha256.start () in
+  let feed () = Sha256.feed sum (Buffer.contents b); Buffer.clear b in
   let quoted s =
     Buffer.add_char b '"';
     let n = String.length s in
@@ -87,6 +89,7 @@ let hashed (v : Json.t) : string =
     go 0; Buffer.add_char b '"' in
   let rec put depth v =
     need (depth <= 8) "nested too deep";
+    if Buffer.length b > 60000 then feed ();
     match v with
     | Null -> Buffer.add_string b "null" | Bool x -> Buffer.add_string b (string_of_bool x)
     | Num s -> Buffer.add_string b (Number.Z.to_string (integer "a number outside unverified" (Num s)))
@@ -97,7 +100,7 @@ let hashed (v : Json.t) : string =
         List.iteri (fun i (k, x) -> if i > 0 then Buffer.add_char b ','; quoted k; Buffer.add_char b ':'; put (depth + 1) x)
           (List.sort (fun (a, _) (b, _) -> compare a b) l);
         Buffer.add_char b '}' in
-  put 0 v; Buffer.contents b
+  put 0 v; feed (); Sha256.finish sum
 
 (* a text as the lines of the graph's SHA-256 have it *)
 let line_text s =
@@ -132,6 +135,8 @@ let take p kind of_ keys =
        | Some keys -> let n = fields ("numbers of " ^ what) keys (get "numbers") in (fun k -> number k (n k)), get "witness")
 let proved p kind of_ keys =
   let n, w = take p kind of_ (Some keys) in p.checked <- (kind, of_) :: p.checked; n, w
+(* says of the last obligation what the theorem says, where that is not all of its fixed text *)
+let said p words = match p.checked with (kind, of_) :: l -> p.checked <- (kind, of_ ^ ": " ^ words) :: l | [] -> ()
 let bare p kind of_ keys =
   let n, w = proved p kind of_ keys in need (w = Null) (kind ^ ": a witness that nothing asks for"); n
 (* without numbers and witness *)

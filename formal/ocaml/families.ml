@@ -44,6 +44,7 @@ let mode_of nodes v =
   let edges = map (edge_of nodes) (entries "edges" (get "edges")) in
   ignore (List.fold_left (fun last e ->
     let at = (e.head, e.tail, sign e) in need (compare last at < 0) "edges are in another order"; at) (-1, -1, 0) edges);
+  Number.limited "edges" (List.concat_map (fun e -> [ e.bottom; e.top ]) edges);
   let table = Hashtbl.create 64 in
   List.iter (fun e ->
     let at = (e.head, e.tail) in
@@ -260,6 +261,7 @@ let form_of nodes parts modes proof work k v =
   let multipliers = List.mapi (fun i m ->
     let numbers, witness = proved proof "family-rate" (Printf.sprintf "%s.modes[%d]" of_ i) [ "b" ] in
     let b = numbers "b" in
+    if not (Number.equal b rate) then said proof "at the rate of the function";
     let taus = match witness with
       | Null -> List.map (fun _ -> None) m.ties
       | w ->
@@ -299,7 +301,7 @@ let certificate (j : Json.t) : t =
   ignore (text "producer" (get "producer"));
   need (match get "unverified" with Obj _ -> true | _ -> false) "unverified is not an object";
   let outside = match j with Obj l -> List.filter (fun (k, _) -> k <> "digest" && k <> "unverified") l | _ -> [] in
-  need (get "digest" = Str (Sha256.hex (hashed (Obj outside)))) "digest: the certificate was changed after it was made";
+  need (get "digest" = Str (hashed (Obj outside))) "digest: the certificate was changed after it was made";
   List.iter (fun key -> need (get key = Null) (key ^ " of a family")) [ "paper"; "rates"; "overshoot"; "influence" ];
   let graph = fields "graph" [ "nodes"; "modes"; "sha256" ] (get "graph") in
   let nodes = nodes_of (graph "nodes") in

@@ -59,6 +59,17 @@ let rational (s : string) : q =
         let m, e = cut 'e' (String.lowercase_ascii t) in
         let e = match e with None -> 0 | Some e -> exponent 400 e in
         pointed (fun s -> s = "" || digits s) 10 m 10 e
+(* sizes of section 17 of FORMAT.md, judged before anything is formed: of a common denominator in bits, of so many entries
+   over it, and of the rows of a dense matrix *)
+let most_common = 100_000 and most_bits = 400_000_000 and most_rows = 400
+let limited what ?(entries = 0) (l : q list) =
+  let too_long () = raise (Bad (what ^ ": numbers too long for exact arithmetic; round them")) in
+  let common = List.fold_left (fun d (x : q) ->
+    if Z.equal x.qden Z.one then d else
+    let d = Z.lcm d x.qden in if Z.numbits d > most_common then too_long () else d) Z.one l in
+  let widest = List.fold_left (fun a (x : q) -> Stdlib.max a (Z.numbits x.qnum)) 0 l in
+  if (Z.numbits common + widest) * Stdlib.max entries (List.length l) > most_bits then too_long ()
+let few_rows what n = if n > most_rows then raise (Bad (Printf.sprintf "%s of more than %d rows" what most_rows))
 (* above the root, and near it *)
 let root (v : q) : q =
   if Z.sign v.qnum <= 0 then zero else begin

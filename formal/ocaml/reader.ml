@@ -7,7 +7,7 @@ module Z = Number.Z
 
 type t = {
   nodes : nodes; cert : cert; sha256 : string; theorem : string;
-  verdict : string; checked : (string * string) list; unchecked : (string * string) list; sections : string list;
+  checked : (string * string) list; unchecked : (string * string) list; sections : string list;
   hints : Checker.hints; rest : Json.t list }
 
 let keys = [ "schema"; "producer"; "graph"; "structure"; "claim"; "protocol"; "paper"; "lyapunov"; "rates"; "overshoot";
@@ -52,11 +52,13 @@ let graph v =
         | _ -> bad "an edge has three entries") (entries "edges" e) in
   ignore (List.fold_left (fun last e ->
     let at = (e.tgt, e.src) in need (compare last at < 0) "edges are in another order"; at) (-1, -1) edges);
+  Number.limited "edges" (List.map (fun e -> e.wt) edges);
   let name i = nodes.labels.(i) in
-  let lines = List.map (fun s -> "[" ^ line_text s ^ "]\n") (List.sort compare (Array.to_list nodes.labels))
-    @ List.map (fun e -> Printf.sprintf "[%s, %s, \"%s\"]\n" (line_text (name e.src)) (line_text (name e.tgt)) (Number.text e.wt))
-        (List.sort (fun a b -> compare (name a.src, name a.tgt) (name b.src, name b.tgt)) edges) in
-  let sha256 = Sha256.hex (String.concat "" lines) in
+  let sum = Sha256.start () in
+  List.iter (fun s -> Sha256.feed sum ("[" ^ line_text s ^ "]\n")) (List.sort compare (Array.to_list nodes.labels));
+  List.iter (fun e -> Sha256.feed sum (Printf.sprintf "[%s, %s, \"%s\"]\n" (line_text (name e.src)) (line_text (name e.tgt)) (Number.text e.wt)))
+    (List.sort (fun a b -> compare (name a.src, name a.tgt) (name b.src, name b.tgt)) edges);
+  let sha256 = Sha256.finish sum in
   need (get "sha256" = Str sha256) "graph: another SHA-256 than that of the edges";
   nodes, edges, sha256
 
@@ -142,6 +144,7 @@ let components nodes structure influence =
   if get "containment_weights" = Null then
     let comps, lefts = large_components nodes listed (get "components") in comps, lefts, followers, get "degenerate", true
   else
+  let () = Number.few_rows "containment_weights, in a certificate" n in
   let balanced = List.length (List.filter (fun (_, b, _) -> b) listed) in
   let rows = ordered (List.map (fun i -> nodes.labels.(i)) followers) "containment_weights" (get "containment_weights") in
   let rows = List.map2 (fun i row ->
@@ -170,15 +173,19 @@ let components nodes structure influence =
 (* a Lyapunov matrix on all nodes, 0 elsewhere; the weights of a diagonal one *)
 let matrix nodes what own rows =
   let n = Array.length nodes.labels in
+  Number.few_rows what n;
   let m = Array.make_matrix n n Number.zero in
   List.iteri (fun a row ->
     let row = List.map (number what) (entries what row) in
+    Number.limited what ~entries:(n * n) row;
     need (List.length row = a + 1) (what ^ ": the rows of a lower triangle");
     List.iteri (fun b x -> let i = own.(a) and j = own.(b) in m.(i).(j) <- x; m.(j).(i) <- x) row) rows;
   need (List.length rows = Array.length own) (what ^ ": the rows of a lower triangle");
-  Array.to_list (Array.map Array.to_list m)
+  let m = Array.to_list (Array.map Array.to_list m) in
+  Number.limited what (List.concat m); m
 let diagonal_matrix nodes weights =
   let n = Array.length nodes.labels in
+  Number.few_rows "a dense matrix" n; Number.limited "diagonal" ~entries:(n * n) (List.map snd weights);
   let m = Array.make_matrix n n Number.zero in
   List.iter (fun (i, w) -> m.(i).(i) <- w) weights;
   Array.to_list (Array.map Array.to_list m)
@@ -249,6 +256,7 @@ let function_ nodes listening comps vectors facts edges_in proof gauge paper num
              if following proof <> "rate" then bad (of_ ^ ": its rate is not proved");
              need (Number.equal (bare proof "rate" of_ [ "b" ] "b") rate) (of_ ^ ": b is not the rate");
              let e = bare proof "overshoot" of_ [ "lowest"; "highest" ] in
+             said proof "lowest I <= P <= highest I, on agents that listen";
              InE (matrix nodes "lower_triangle" (Array.of_list own) (entries "lower_triangle" rows)), false, e "lowest", e "highest"
          | "perron" | "lmi" ->
              if following proof = "dominance" then begin
@@ -319,6 +327,7 @@ let upper nodes comps proof bound =
 (* the same by the trace of a strong component, named by its first node *)
 let mean nodes all proof bound =
   let numbers, witness = proved proof "rate-mean" "rates" [ "upper_bound" ] in
+  said proof "upper_bound >= 2 trace(A)/r, which no form exceeds";
   need (Number.equal (numbers "upper_bound") bound) "rate-mean: another upper bound";
   let first = node nodes "rate-mean" ((fields "the witness" [ "node" ] witness) "node") in
   let inside = Pieces.strong_component all first in
@@ -350,7 +359,7 @@ let certificate (j : Json.t) : t =
   ignore (text "producer" (get "producer"));
   ignore (match get "unverified" with Obj _ -> () | _ -> bad "unverified is not an object");
   let outside = match j with Obj l -> List.filter (fun (k, _) -> k <> "digest" && k <> "unverified") l | _ -> [] in
-  need (get "digest" = Str (Sha256.hex (hashed (Obj outside)))) "digest: the certificate was changed after it was made";
+  need (get "digest" = Str (hashed (Obj outside))) "digest: the certificate was changed after it was made";
   let nodes, edges, sha256 = graph (get "graph") in
   let structure = fields "structure"
     [ "connectivity"; "closed_components"; "leaders"; "followers"; "balanced"; "sign_symmetric" ] (get "structure") in
@@ -361,7 +370,12 @@ let certificate (j : Json.t) : t =
   bare_of proof "claim" "graph";
   if get "influence" = Null then unsupported "an undecided certificate, without influence";
   let comps, lefts, followers, degenerate, enclosed = components nodes structure (get "influence") in
-  let all = Pieces.graph (Array.length nodes.labels) edges in
+  let n = Array.length nodes.labels in
+  if not enclosed then begin
+    Number.limited "edges" ~entries:(n * n) (List.map (fun e -> e.wt) edges);
+    List.iter (fun get -> Number.limited "influence" ~entries:(n * List.length comps) (List.concat_map get comps))
+      [ (fun (one : comp) -> one.share); (fun one -> one.null) ] end;
+  let all = Pieces.graph n edges in
   let found = Pieces.find all in
   let pieces = List.map (Pieces.piece all comps) found.pieces in
   let final_beside = match get "final_state" with
@@ -382,6 +396,8 @@ let certificate (j : Json.t) : t =
         List.map2 (fun x r -> need (Z.sign r.qnum >= 0) "final_state: a radius is negative"; x, r) (column "mid") (column "radius")
     | Some _, v -> by_agent nodes interval "final_state" v
     | None, _ -> bad "a final state without an initial state" in
+  Number.limited "the initial state" (Option.value start ~default:[] @ sliding);
+  Number.limited "the final state" (List.concat_map (fun (x, r) -> [ x; r ]) final);
   let degenerate = match start, degenerate with
     | None, v -> need (v = Null) "influence.degenerate without an initial state"; None
     | Some _, _ when enclosed -> not_checked "influence.degenerate"; None
@@ -523,7 +539,7 @@ let certificate (j : Json.t) : t =
   let certified = if of_agents then verdict = "certified" else rate "proved" <> None || edges = [] in
   need (verdict = (if certified then "certified" else "undecided")) "what was proved makes another verdict";
   if not certified then unsupported "an undecided certificate";
-  { nodes; rest = proof.rest; hints = { vectors = List.rev !vectors; facts = !facts; lefts; around }; sha256; verdict; theorem; checked = List.rev proof.checked; unchecked = List.rev proof.unchecked;
+  { nodes; rest = proof.rest; hints = { vectors = List.rev !vectors; facts = !facts; lefts; around }; sha256; theorem; checked = List.rev proof.checked; unchecked = List.rev proof.unchecked;
     sections = List.rev !left_out;
     cert = { order = Array.length nodes.labels; edges; kind; rho1; rho2; kappa; comps; pieces; all_balanced = found.balance;
       sign_symmetric = Pieces.sign_symmetric all; funcs = functions;

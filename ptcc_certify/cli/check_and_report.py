@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +10,9 @@ import click
 from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
-from ptcc_certify.cli.families import family_of_files, mode_options, same_family
+from ptcc_certify.cli.families import mode_options
+from ptcc_certify.cli.same_graph import READING, compare
+from ptcc_certify.cli.scenario import graph_of
 from ptcc_certify.cli.terminal import Screen, print_json, print_lines, progress, screen_options
 from ptcc_certify.errors import ExitCode, ParameterError
 
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @shared.certificate_argument
-@click.argument("graph", nargs=-1, type=click.Path())
+@click.argument("graph", nargs=-1, is_eager=True, callback=graph_of, type=click.Path())
 @shared.reading_options
 @mode_options
 @click.option("--stdlib", is_flag=True, help="Use the standard library alone, even where python-flint is installed.")
@@ -42,10 +43,11 @@ def check(
     """Check CERTIFICATE exactly, without a solver; with GRAPH, that it speaks of this graph.
 
     CERTIFICATE is a file, or - for standard input (side files are then those in this folder). GRAPH is read as the
-    certificate says that it was read, which is printed; the options about reading override that. Of a family name all
-    its graphs, in any order. Prints claim and verdict; -v tells every obligation with what was verified. Exit code 0
-    if the claim is proved, 1 if it is rejected, 4 if the certificate itself says undecided. With --verified all that
-    was not checked is named, and an undecided certificate is not read.
+    options say, as by the other commands, or a scenario; never as the certificate says. Where that alone gives its
+    graph, the check fails and names the options that would agree. Of a family name all its graphs, in any order.
+    Prints claim and verdict; -v tells every obligation with what was verified. Exit code 0 if the claim is proved, 1 if
+    it is rejected, 4 if the certificate itself says undecided. With --verified all that was not checked is named: exit
+    code 4 if a claim is among it; an undecided certificate is not read.
     `python -m ptcc_certify.checker` does the same, without other packages.
     """
     from ptcc_certify.certificate.checking import read_and_check
@@ -56,31 +58,21 @@ def check(
     if certificate == "-" and "-" in graph:
         raise ParameterError("CERTIFICATE and GRAPH cannot both be standard input; name a file for one")
     source = click.get_current_context().get_parameter_source
-    given = [name for name in shared.READING if source(name) is ParameterSource.COMMANDLINE]
+    given = [name for name in READING if source(name) is ParameterSource.COMMANDLINE]
     if given and not graph:
         raise ParameterError(f"{shared.flag_of(given[0])} tells how a graph is read; name it: ptcc check CERT GRAPH")
-    proved = None
+    report: CheckReport
     with progress(("independent check",), screen.quiet) as begin:
         begin("independent check")
         if verified:
-            proved = verified_check(certificate)
-            document, report = proved.document, proved.report
+            document, report = verified_check(certificate)
         else:
             document, report = read_and_check(certificate, stdlib=stdlib, memory=memory)
     how: dict[str, str] = {}
     if graph and report.accepted:
-        if "modes" in document["graph"]:
-            report, how = same_family(certificate, document, report, graph, options)
-        elif len(graph) > 1:
-            raise ParameterError("this certificate is of one graph; name one")
-        else:
-            report, how = _same_graph(certificate, document, report, graph[0], options)
-    if proved is not None:
-        proved = replace(proved, report=report)
+        report, how = compare(certificate, document, report, graph, options)
     if as_json:
-        print_json(report.to_dict() | how | ({"not_checked": list(proved.not_checked)} if proved else {}))
-    elif proved is not None:
-        print_lines(*(f"graph      {text}" for text in how.values() or _own_graph(document, report)), *proved.lines())
+        print_json(report.to_dict() | how)
     else:
         lines = [f"graph      {text}" for text in how.values() or _own_graph(document, report)]
         screen.show(
@@ -112,34 +104,6 @@ def _own_graph(document: dict[str, Any], report: CheckReport) -> list[str]:
     parts = [counted(len(modes), "mode")] * (len(modes) > 1)
     parts += [counted(len(graph["nodes"]), "node"), counted(count, "edge")]
     return [f"{', '.join(parts)}, as in the file; name yours to compare; SHA-256 {report.sha256}"]
-
-
-def _same_graph(
-    certificate: str, document: dict[str, Any], report: CheckReport, graph: str, options: shared.Options
-) -> tuple[CheckReport, dict[str, str]]:
-    """Compare GRAPH with that of an accepted certificate; return the report, and how GRAPH was read."""
-    from ptcc_certify.certificate.format_graph import certificate_graph
-    from ptcc_certify.certificate.format_vectors import read_side_files
-    from ptcc_certify.graphs.difference import difference
-    from ptcc_certify.graphs.io.graph_files import read_graph_as, reading_flags
-
-    family = family_of_files(graph, document["graph"]["read"], options)
-    if family is not None and family.graph is None:
-        reason = f"one graph in the certificate, a family in the files: {family!r}"
-        return replace(report, accepted=False, obligations=(), rejected="graph", reason=reason), {}
-    source = click.get_current_context().get_parameter_source
-    names = [name for name in shared.READING if source(name) is ParameterSource.COMMANDLINE]
-    overrides = {"orientation" if name == "edges" else name: options[name] for name in names}
-    signed = None if family is None else family.graph
-    if signed is None:
-        signed = read_graph_as(shared.graph_file(graph), document["graph"]["read"], **overrides)
-    way = "as the options say" if overrides else "as the certificate says"
-    how = {"graph_read": f"{graph}, read {way}: {reading_flags(signed.read)}"}
-    if signed.sha256 == report.sha256:
-        return report, how
-    checked = certificate_graph(document, read_side_files(document, Path(certificate).parent))
-    reason = f"another graph than {graph}: {difference(checked, signed)}"
-    return replace(report, accepted=False, obligations=(), rejected="graph", reason=reason), how
 
 
 @click.command()

@@ -12,13 +12,12 @@ import click
 from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
-from ptcc_certify.cli.scenario import OF_FAMILIES, is_scenario, read_scenario, scenario_record
+from ptcc_certify.cli.scenario import scenario_record
 from ptcc_certify.cli.terminal import LOG, Screen, print_json, progress
 from ptcc_certify.errors import ExitCode, ParameterError, one_line
 from ptcc_certify.graphs.rationals import shorten
 
 if TYPE_CHECKING:
-    from ptcc_certify.checker import CheckReport
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.family import Family
     from ptcc_certify.theorems.family_behaviour import FamilyComponent
@@ -29,8 +28,6 @@ _NOT_OF_FAMILIES = (
     *("noise", *shared.LIMITS, "method", "at", "initial_bound", "simulation", "max_residual"),
     *("delay", "period", "packet_loss", "quantisation", "own_delay", "leader_speed", "sign_gain"),
 )
-#: Options that tell how files of families are read, and the keywords of read_family.
-_READING = {"edges": "orientation"} | {n: n for n in (*shared.READING[1:], "uncertainty", "optional")}
 
 
 def _pair(context: click.Context, parameter: click.Parameter, texts: Sequence[str]) -> tuple[tuple[str, str], ...]:
@@ -158,28 +155,37 @@ def refuse_restricted(options: shared.Options) -> None:
 
 def read_graph_or_family(graphs: tuple[str, ...], options: shared.Options) -> SignedDigraph | Family:
     """Return what files and options make: a family, or the graph where there is one, with known weights."""
-    from ptcc_certify.graphs.io import read_family
-    from ptcc_certify.graphs.io.family_files import is_family_file
-
     if len(graphs) > 1 and not options["switching"]:
         named = shorten(", ".join(graphs), 200)
         mend = "add --switching if any of them may act at any time; ptcc batch takes many, each by itself"
         raise ParameterError(f"{named}: {len(graphs)} graphs; {mend}")
     if len(graphs) == 1 and options["switching"] and not click.get_current_context().params.get("quiet"):
         click.echo("note: --switching with one graph changes nothing; name the other modes beside it", err=True)
-    files = _files(graphs)
+    return graph_or_family(files_of(graphs), options)
+
+
+def graph_or_family(files: Sequence[Any], options: shared.Options) -> SignedDigraph | Family:
+    """Return the family of files, read as the options say, or the graph where there is one, with known weights."""
+    from ptcc_certify.graphs.io import read_family
+    from ptcc_certify.graphs.io.family_files import is_family_file
+
     uncertain = options["uncertainty"] is not None or options["optional"]
     if len(files) == 1 and not uncertain and not is_family_file(files[0]):
         return shared.read(files[0], options)
-    how = {name: options[name] for name in shared.READING if name != "edges"}
-    more = {"uncertainty": options["uncertainty"] or 0, "optional": options["optional"]}
-    family = read_family(files, orientation=options["edges"], **more, **how)
+    family = read_family(files, **family_keywords(options))
     if family.graph is None:
         return family
     return shared.read(files[0], options) if not is_family_file(files[0]) else family.graph
 
 
-def _files(graphs: tuple[str, ...]) -> list[Any]:
+def family_keywords(options: shared.Options) -> dict[str, Any]:
+    """Return what ``read_family`` is told by the options."""
+    more = {"uncertainty": options["uncertainty"] or 0, "optional": options["optional"]}
+    return shared.reading_keywords(options) | more
+
+
+def files_of(graphs: tuple[str, ...]) -> list[Any]:
+    """Return the files of graphs that a command line names; standard input as one that is read more than once."""
     if graphs.count("-") > 1:
         raise ParameterError("- stands for standard input, which is one graph; name files for the others")
     return [_standard_input() if graph == "-" else shared.graph_file(graph) for graph in graphs]
@@ -351,76 +357,3 @@ def _constant_alone(constant: Sequence[FamilyComponent], every: Sequence[FamilyC
         for one, other in zip(constant, every, strict=True)
     )
     return () if follows else constant
-
-
-def same_family(
-    certificate: str, document: dict[str, Any], report: CheckReport, graphs: tuple[str, ...], options: shared.Options
-) -> tuple[CheckReport, dict[str, str]]:
-    """Compare the family of an accepted certificate with that of files; return the report, and how these were read.
-
-    They are read as the certificate says, but for what options or a scenario say. The order of files does not count.
-    """
-    from dataclasses import replace
-
-    from ptcc_certify.certificate.format_family import certificate_family
-    from ptcc_certify.certificate.format_vectors import read_side_files
-    from ptcc_certify.graphs.family_difference import family_difference, mode_order
-
-    graphs, family, how = _read_again(document["unverified"].get("read"), graphs, options)
-    name = ", ".join(graphs)
-    meant = certificate_family(document["graph"], read_side_files(document, Path(certificate).parent))
-    order = mode_order(meant, family)
-    if order is None:
-        reason = f"another family than {name}: {family_difference(meant, family)}"
-        return replace(report, accepted=False, obligations=(), rejected="graph", reason=reason), {"graph_read": how}
-    facts = {"graph_read": how}
-    named, own = ([mode.name for mode in modes] for modes in ([family.modes[k] for k in order], meant.modes))
-    if len(order) > 1 and named != own:
-        facts["modes"] = f"modes {', '.join(named)} are called {', '.join(own)} in the certificate"
-    elif order != tuple(range(len(order))):
-        facts["modes"] = f"the same modes in another order than in the certificate, {', '.join(own)}"
-    return report, facts
-
-
-def family_of_files(graph: str, read: Any, options: shared.Options) -> Family | None:
-    """Return the family that a file makes with options or a scenario, read as a certificate says; None of a graph file.
-
-    It may be one graph: a file of intervals whose ends are equal.
-    """
-    from ptcc_certify.graphs.io.family_files import is_family_file
-
-    own = read_scenario(graph) if is_scenario(graph) else None
-    several = own is not None and len(own.graphs) > 1
-    asked = any(options[name] or (own is not None and own.options.get(name)) for name in OF_FAMILIES)
-    if not (several or asked or is_family_file(shared.graph_file(graph))):
-        return None
-    way = {
-        "orientation": None if read["orientation"] == "matrix" else read["orientation"],
-        "duplicates": {"refused": "refuse"}.get(read["duplicates"], read["duplicates"]),
-        "drop_self_loops": read["self_loops"] != "refused",
-        "undirected": read["undirected"],
-    }
-    return _read_again(way, (graph,), options)[1]
-
-
-def _read_again(read: Any, graphs: tuple[str, ...], options: shared.Options) -> tuple[tuple[str, ...], Family, str]:
-    """Read files as a certificate says, a scenario as it says itself, either but for the options of this call."""
-    from ptcc_certify.graphs.io.family_files import family_flags, keywords_of, read_family
-
-    source = click.get_current_context().get_parameter_source
-    given = {name for name in _READING if source(name) is ParameterSource.COMMANDLINE}
-    way = "as the options say"
-    keywords = keywords_of(read)
-    if len(graphs) == 1 and is_scenario(graphs[0]):
-        scenario = read_scenario(graphs[0])
-        own = {name: value for name, value in scenario.options.items() if name in _READING and name not in given}
-        own |= {"optional": _pairs(own["optional"])} if "optional" in own else {}
-        graphs, options, given, way = scenario.graphs, {**options, **own}, {*_READING}, "as the scenario says"
-    elif keywords and not given:
-        way = "as the certificate says"
-    now = {_READING[name]: options[name] for name in (given if keywords else _READING)}
-    if "uncertainty" in now:
-        now["uncertainty"] = now["uncertainty"] or 0
-    keywords |= now
-    family = read_family(_files(graphs), **keywords)
-    return graphs, family, f"{', '.join(graphs)}, read {way}: {family_flags(family.read, graphs[0])}"

@@ -299,9 +299,19 @@ def read(graph: Any, options: Options) -> SignedDigraph:
     """Read GRAPH, or a file object, as the options say."""
     from ptcc_certify.graphs.io import read_graph
 
-    how = {name: options[name] for name in READING if name != "edges"}
     file = graph_file(graph) if isinstance(graph, str) else graph
-    return read_graph(file, orientation=options["edges"], **how)
+    return read_graph(file, **reading_keywords(options))
+
+
+def reading_keywords(options: Options) -> dict[str, Any]:
+    """Return what ``read_graph`` is told by the options about reading that are there.
+
+    Examples
+    --------
+    >>> reading_keywords({"edges": "listens", "undirected": False, "T": "1"})
+    {'orientation': 'listens', 'undirected': False}
+    """
+    return {"orientation" if name == "edges" else name: options[name] for name in READING if name in options}
 
 
 def protocol_of(options: Options, disturbed: tuple[str, ...] = ("delta",)) -> Protocol:

@@ -21,28 +21,30 @@ BUILD = (
 )
 
 
-@dataclass(frozen=True)
-class VerifiedCheck:
+@dataclass(frozen=True, repr=False)
+class VerifiedReport(CheckReport):
     """What the verified checker said.
 
     Attributes
     ----------
-    document : dict
-        The certificate.
-    report : CheckReport
-        With the obligations that it verified.
     not_checked : tuple of str
-        The obligations and the parts of the document that it did not check.
+        The obligations and the parts of the document that it did not check; a claim among them makes the verdict
+        ``undecided``.
+    last : str
+        What it said in its last line of a certificate that it accepted.
     """
 
-    document: dict[str, Any]
-    report: CheckReport
-    not_checked: tuple[str, ...]
+    not_checked: tuple[str, ...] = ()
+    last: str = ""
 
-    def lines(self) -> list[str]:
-        """Return the report as text, what was not checked before the last line."""
-        *verified, last = self.report.lines()
-        return [*verified, *(f"not checked {what}" for what in self.not_checked), last]
+    def to_dict(self) -> dict[str, Any]:
+        """Return the report as JSON-ready data."""
+        return super().to_dict() | {"not_checked": list(self.not_checked)}
+
+    def _lines(self) -> list[str]:
+        *verified, last = super()._lines()
+        left = [f"not checked {what}" for what in self.not_checked]
+        return [*verified, *left, f"accepted   {self.last}"] if self.accepted else [*verified, last]
 
 
 def executable() -> Path:
@@ -64,8 +66,8 @@ def executable() -> Path:
     return Path(found)
 
 
-def verified_check(certificate: str) -> VerifiedCheck:
-    """Check a certificate with the verified checker.
+def verified_check(certificate: str) -> tuple[dict[str, Any], VerifiedReport]:
+    """Check a certificate with the verified checker; return its JSON object beside the report.
 
     Parameters
     ----------
@@ -91,10 +93,10 @@ def verified_check(certificate: str) -> VerifiedCheck:
     except OSError as error:
         raise ParameterError(f"{program} cannot be run ({error.strerror}); {BUILD}") from None
     output = run.stdout.decode("utf-8", "replace").rstrip("\n").split("\n")
-    if run.returncode not in (0, 1) or not output[0]:
+    if run.returncode not in (0, 1, 4) or not output[0]:
         message = run.stderr.decode("utf-8", "replace").strip().removeprefix(f"{PROGRAM}: ")
         raise FormatError(f"{certificate}: {message or f'{PROGRAM} ended with code {run.returncode}'}")
-    return VerifiedCheck(document, _report(output, run.returncode), tuple(_after("not checked ", output)))
+    return document, _report(output, run.returncode)
 
 
 def _after(mark: str, output: list[str]) -> list[str]:
@@ -102,21 +104,24 @@ def _after(mark: str, output: list[str]) -> list[str]:
     return [line.removeprefix(mark).strip() for line in output if line.startswith(mark)]
 
 
-def _report(output: list[str], code: int) -> CheckReport:
+def _report(output: list[str], code: int) -> VerifiedReport:
     """Return what the executable printed, as the checker would report it."""
     obligations = []
     for line in _after("verified ", output):
-        kind, _, of = line.partition(" of ")
+        kind, _, rest = line.partition(" of ")
+        of, _, words = rest.partition(": ")
         if kind in OBLIGATIONS:
-            obligations.append(VerifiedObligation(kind, of, "by the verified checker"))
+            obligations.append(VerifiedObligation(kind, of, words or "by the verified checker"))
     rejected = " ".join(_after("rejected ", output)) or None
     sha256 = output[0].rpartition(" ")[2] if output[0].startswith("graph ") else ""
-    return CheckReport(
-        accepted=code == 0,
-        verdict="certified" if code == 0 else "",
+    return VerifiedReport(
+        accepted=code != 1,
+        verdict={0: "certified", 4: "undecided"}.get(code, ""),
         obligations=tuple(obligations),
         rejected=rejected and rejected.partition(":")[0],
         reason=rejected and (rejected.partition(": ")[2] or "not proved"),
         arithmetic="the verified checker",
         sha256=sha256,
+        not_checked=tuple(_after("not checked ", output)),
+        last=" ".join(_after("accepted ", output)),
     )

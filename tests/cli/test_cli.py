@@ -232,21 +232,63 @@ def test_a_refuted_expectation_is_3(command: str):
         assert run.err == f"{said}\n" and run.out  # the answer is printed all the same
 
 
-def test_check_reads_the_graph_as_the_certificate_says(folder: Path):
-    """Orientation, repeated edges, self-loops and ties without direction; options of the command override."""
+def test_check_reads_the_graph_as_its_reader_says_not_its_sender(folder: Path):
+    """Orientation, repeated edges, self-loops: what only the sender said is named, and the check fails."""
     Path("g.csv").write_text("a,b,1\na,b,1\nb,c,-0.5\nc,c,1\nc,a,2\nc,d,3\n")
     reading = ("--edges", "listens", "--duplicates", "sum", "--drop-self-loops")
     assert ptcc("certify", "g.csv", *reading, "--no-simulation", "-o", "c.json").code == 0
-    run = detailed("check", "c.json", "g.csv")
+    run = detailed("check", "c.json", "g.csv", *reading)
     assert run.code == 0
-    assert run.out.splitlines()[0] == f"graph      g.csv, read as the certificate says: {' '.join(reading)}"
-    assert one_object(ptcc("check", "c.json", "g.csv", "--json").out)["graph_read"].endswith(" ".join(reading))
-    run = detailed("check", "c.json", "g.csv", "--duplicates", "last")
-    assert run.code == 1 and "read as the options say: --edges listens --duplicates last" in run.out
-    assert "another weight" in run.out
-    Path("ties.csv").write_text("a,b,1\nb,c,2\n")
+    assert run.out.splitlines()[0] == f"graph      g.csv, read as the options say: {' '.join(reading)}"
+    assert one_object(ptcc("check", "c.json", "g.csv", *reading, "--json").out)["graph_read"].endswith(
+        " ".join(reading)
+    )
+    for words in ((), reading[:2], reading[2:], reading[4:], ("--edges", "information", *reading[2:])):
+        run = detailed("check", "c.json", "g.csv", *words)
+        missing = [flag for flag in ("--edges", "--duplicates", "--drop-self-loops") if flag not in words]
+        assert run.code == 1 and run.err == "", run
+        last = run.out.splitlines()[-1]
+        assert last.startswith("rejected   graph: ") and last.endswith(" is what you mean")
+        assert all(flag in last.partition("accepted if")[2] for flag in missing)
+        assert "--edges listens" in last or words[:2] == reading[:2]
+        assert one_object(ptcc("check", "c.json", "g.csv", *words, "--json").out)["accepted"] is False
+    run = detailed("check", "c.json", "g.csv", *reading, "--duplicates", "last")
+    assert run.code == 1 and run.out.splitlines()[-1].endswith("accepted if --duplicates sum is what you mean")
+
+
+def test_check_tells_from_standard_input_what_would_agree(folder: Path):
+    content = b"a,b,1\nb,c,2\n"
+    Path("ties.csv").write_bytes(content)
     assert ptcc("certify", "ties.csv", "--undirected", "--no-simulation", "-o", "t.json").code == 0
-    assert ptcc("check", "t.json", "ties.csv").code == 0
+    assert ptcc("check", "t.json", "ties.csv", "--undirected").code == 0
+    for words, stdin in (("ties.csv", b""), ("-", content)):
+        run = ptcc("check", "t.json", words, stdin=stdin)
+        assert run.code == 1 and "accepted if --undirected is what you mean" in " ".join(run.out.split())
+    assert ptcc("certify", "ties.csv", "--no-simulation", "-o", "p.json").code == 0
+    run = ptcc("check", "p.json", "ties.csv", "--undirected")
+    assert run.code == 1 and "accepted if --no-undirected is what you mean" in " ".join(run.out.split())
+
+
+def test_check_takes_every_option_about_reading_that_other_commands_take():
+    """None of them falls back to what the certificate says."""
+    from ptcc_certify.cli import options
+    from ptcc_certify.cli.certify import certify
+    from ptcc_certify.cli.check_and_report import check
+
+    own = {parameter.name for parameter in check.params}
+    decorated = {option.name for option in options.reading_options(lambda: None).__click_params__}
+    assert decorated <= own and set(options.READING) <= decorated
+    assert {p.name for p in certify.params} & {"uncertainty", "optional", *decorated} <= own
+
+
+def test_a_scenario_says_how_check_reads_its_graph(folder: Path):
+    Path("g.csv").write_text("a,b,1\nb,c,-0.5\nc,a,2\nc,d,3\n")
+    Path("s.toml").write_text('[graph]\nfile = "g.csv"\nedges = "listens"\n')
+    assert ptcc("certify", "s.toml", "--no-simulation", "-o", "c.json").code == 0
+    run = detailed("check", "c.json", "s.toml")
+    assert run.code == 0 and run.out.startswith("graph      g.csv, read as the scenario says: --edges listens\n"), run
+    assert ptcc("check", "c.json", "g.csv").code == 1
+    assert ptcc("check", "c.json", "s.toml", "--edges", "information").code == 1
 
 
 @pytest.mark.parametrize(
@@ -295,7 +337,7 @@ def test_weights_that_exact_proofs_cannot_take_are_refused_in_one_line(folder: P
 
 @pytest.mark.parametrize("ending", ["npy", "mtx"])
 @pytest.mark.parametrize("options", [(), ("--edges", "information"), ("--edges", "listens")])
-def test_check_reads_a_matrix_as_its_certificate_says(folder: Path, ending: str, options: tuple[str, ...]):
+def test_check_reads_a_matrix_as_its_reader_says(folder: Path, ending: str, options: tuple[str, ...]):
     W = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 2.0, 0.0]])
     if ending == "npy":
         np.save("m.npy", W)
@@ -304,8 +346,14 @@ def test_check_reads_a_matrix_as_its_certificate_says(folder: Path, ending: str,
 
         mmwrite("m.mtx", W)
     assert ptcc("certify", f"m.{ending}", *options, "--x0", "1,2,3", "--no-simulation", "-o", "c.json").code == 0
-    run = ptcc("check", "c.json", f"m.{ending}")
+    run = ptcc("check", "c.json", f"m.{ending}", *options)
     assert run.code == 0 and "accepted" in run.out, run.out
+    run = ptcc("check", "c.json", f"m.{ending}")
+    said = " ".join(run.out.split())
+    if options == ("--edges", "information"):
+        assert run.code == 1 and said.endswith("accepted if --edges information is what you mean"), run.out
+    else:
+        assert run.code == 0, run.out
 
 
 @pytest.mark.parametrize("digits", [50, 200, 400])
@@ -340,7 +388,7 @@ def test_check_tells_every_obligation_and_its_verdict_by_exit_code(folder: Path)
                 lines.pop(0) == f"graph      16 nodes, 28 edges, as in the file; name yours to compare; SHA-256 {sha}"
             )
         else:
-            assert lines.pop(0) == "graph      fig5b, read as the certificate says: --edges information"
+            assert lines.pop(0) == "graph      fig5b, read by default: --edges information"
         assert len(lines) == len(read("c.json")["proof"]) + 1
         assert all(line.startswith("verified   ") for line in lines[:-1])
         assert lines[-1].startswith("accepted   certified;")

@@ -165,12 +165,18 @@ def family_flags(read: Mapping[str, Any], path: str = "") -> str:
     words += ["--drop-self-loops"] * bool(read.get("drop_self_loops"))
     words += ["--undirected"] * bool(read.get("undirected"))
     if (share := read.get("uncertainty", "0")) not in ("0", 0):
-        words.append(f"--uncertainty {_percent(share)}")
+        words.append(f"--uncertainty {percent(share)}")
     return " ".join(words + [f"--optional {','.join(pair)}" for pair in read.get("optional", ())])
 
 
-def _percent(share: str) -> str:
-    """Write a share as a percentage, if that is a short decimal."""
+def percent(share: str) -> str:
+    """Write a share as a percentage, if that is a short decimal.
+
+    Examples
+    --------
+    >>> percent("1/20"), percent("1/3")
+    ('5%', '1/3')
+    """
     short = near(100 * read_share(share), 6)
     return share if "/" in short or short.startswith("~") else f"{short}%"
 

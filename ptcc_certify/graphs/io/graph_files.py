@@ -150,14 +150,24 @@ def read_graph_as(path: Source, read: Mapping[str, Any], **options: Any) -> Sign
     >>> read_graph_as(StringIO("a,b,1"), graph.read) == graph
     True
     """
+    return read_graph(path, **keywords_as(path, read) | options)
+
+
+def keywords_as(path: Source, read: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the keywords with which :func:`read_graph` reads a file as another graph was read.
+
+    Examples
+    --------
+    >>> keywords_as("g.csv", read_graph(StringIO("a,b,1"), orientation="listens").read)
+    {'orientation': 'listens', 'duplicates': 'refuse', 'drop_self_loops': False, 'undirected': False}
+    """
     turned = "information" if name_and_ending(path)[1] in MATRICES else "listens"  # each kind has its own default
-    as_read = {
+    return {
         "orientation": turned if read["orientation"] == turned else None,
         "duplicates": {"refused": "refuse"}.get(read["duplicates"], read["duplicates"]),
         "drop_self_loops": read["self_loops"] != "refused",
         "undirected": read["undirected"],
     }
-    return read_graph(path, **as_read | options)
 
 
 def reading_flags(read: Mapping[str, Any]) -> str:
