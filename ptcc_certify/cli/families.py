@@ -16,6 +16,7 @@ from ptcc_certify.cli.scenario import OF_FAMILIES, is_scenario, read_scenario, s
 from ptcc_certify.cli.terminal import LOG, Screen, print_json, progress
 from ptcc_certify.errors import ExitCode, ParameterError, one_line
 from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.reading import options_of_record
 
 if TYPE_CHECKING:
     from ptcc_certify.checker import CheckReport
@@ -171,9 +172,8 @@ def read_graph_or_family(graphs: tuple[str, ...], options: shared.Options) -> Si
     uncertain = options["uncertainty"] is not None or options["optional"]
     if len(files) == 1 and not uncertain and not is_family_file(files[0]):
         return shared.read(files[0], options)
-    how = {name: options[name] for name in shared.READING if name != "edges"}
     more = {"uncertainty": options["uncertainty"] or 0, "optional": options["optional"]}
-    family = read_family(files, orientation=options["edges"], **more, **how)
+    family = read_family(files, **more, **shared.reading_of(options))
     if family.graph is None:
         return family
     return shared.read(files[0], options) if not is_family_file(files[0]) else family.graph
@@ -394,12 +394,7 @@ def family_of_files(graph: str, read: Any, options: shared.Options) -> Family | 
     asked = any(options[name] or (own is not None and own.options.get(name)) for name in OF_FAMILIES)
     if not (several or asked or is_family_file(shared.graph_file(graph))):
         return None
-    way = {
-        "orientation": None if read["orientation"] == "matrix" else read["orientation"],
-        "duplicates": {"refused": "refuse"}.get(read["duplicates"], read["duplicates"]),
-        "drop_self_loops": read["self_loops"] != "refused",
-        "undirected": read["undirected"],
-    }
+    way = {"orientation": None if read["orientation"] == "matrix" else read["orientation"]} | options_of_record(read)
     return _read_again(way, (graph,), options)[1]
 
 
