@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
@@ -85,7 +85,7 @@ class Settings:
     expect: str | None = None
     min_rate: Fraction | None = None
     time_limit: Fraction | None = None
-    reading: Reading = Reading()
+    reading: Reading = field(default_factory=Reading)
 
     @classmethod
     def of(cls, protocol: Protocol, **settings: Any) -> Settings:

@@ -14,7 +14,6 @@ from ptcc_certify.cli.design_of_agents import command_of_agents, design_of_agent
 from ptcc_certify.cli.options import (
     OneGraph,
     Options,
-    flag_of,
     graph_argument,
     json_option,
     number_option,

@@ -420,8 +420,8 @@ class SignedDigraph(ReadOnly, Shown):
         Raises
         ------
         GraphError
-            ``graph`` is undirected (say so, or give ``graph.to_directed()``), a multigraph with edges that repeat others,
-            an edge has no weight, or an attribute that makes a family of it.
+            ``graph`` is undirected (say so, or give ``graph.to_directed()``), a multigraph (say what becomes of
+            duplicates), an edge has no weight, or an attribute that makes a family of it.
 
         Examples
         --------

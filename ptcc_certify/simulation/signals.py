@@ -15,8 +15,8 @@ import numpy as np
 
 from ptcc_certify.errors import FormatError, NumberError, ParameterError
 from ptcc_certify.graphs.io.edge_list import records
-from ptcc_certify.graphs.io.signs import find
 from ptcc_certify.graphs.io.files import Source, name_and_ending, read_bytes
+from ptcc_certify.graphs.io.signs import find
 from ptcc_certify.graphs.rationals import number_within, parse_exact, shorten, whole_number
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS
 from ptcc_certify.lyapunov.family_function import FamilyFunction

@@ -49,8 +49,8 @@ def as_graph(graph: Any, orientation: str | None = None, **reading: Any) -> Sign
         Of an edge ``(a, b)``, or of the entry in row a and column b: information flows a -> b, or a listens to b.
         Edges flow by default, for a matrix it must be said.
     **reading : Any
-        ``duplicates``, ``drop_self_loops``, ``drop_zeros``, ``undirected``, ``laplacian``, ``columns``, ``variable`` as in
-        :func:`~ptcc_certify.graphs.io.read_graph`, as far as they say something about what is given.
+        The other keywords of :func:`~ptcc_certify.graphs.io.read_graph` but ``format``, such as ``laplacian=True`` or
+        ``columns="a,b,w"``, as far as they say something about what is given.
 
     Returns
     -------
@@ -86,12 +86,12 @@ def as_graph(graph: Any, orientation: str | None = None, **reading: Any) -> Sign
     if isinstance(graph, str | os.PathLike) or hasattr(graph, "read"):
         file = file_or_packaged(graph) if isinstance(graph, str) else graph
         return read_as(file, how, ask=True)  # type: ignore[arg-type]
-    way = {"orientation": orientation or "information"}
+    way = orientation or "information"
     if hasattr(graph, "is_multigraph"):
         weight = how.titles[2] if how.titles else None
-        return SignedDigraph.from_networkx(graph, weight, **way, **_only(how, reading, _OF_EDGES, "columns"))
-    if (rows := _rows_of_table(graph, how)) is not None:
-        return graph_of(rows, "", how)
+        return SignedDigraph.from_networkx(graph, weight, orientation=way, **_only(how, reading, _OF_EDGES, "columns"))
+    if (table := _rows_of_table(graph, how)) is not None:
+        return graph_of(table, "", how)
     if hasattr(graph, "columns") or hasattr(graph, "tocoo") or isinstance(graph, np.ndarray):
         _refuse_edge_array(graph)
         return SignedDigraph.from_matrix(graph, orientation=orientation, **_only(how, reading, _OF_MATRICES))
@@ -100,9 +100,9 @@ def as_graph(graph: Any, orientation: str | None = None, **reading: Any) -> Sign
     rows = list(graph)
     if rows and all(isinstance(row, list) and row and all(isinstance(edge, tuple) for edge in row) for row in rows):
         raise GraphError('a list of edge lists is no graph; of a family give a dict, {"day": edges, "night": edges2}')
-    if _rows_of_matrix(rows):
+    if _rows_of_matrix(rows, how.laplacian is not None):
         return SignedDigraph.from_matrix(rows, orientation=orientation, **_only(how, reading, _OF_MATRICES))
-    return SignedDigraph.from_edges(rows, **way, **_only(how, reading, _OF_EDGES))
+    return SignedDigraph.from_edges(rows, orientation=way, **_only(how, reading, _OF_EDGES))
 
 
 #: What may be said of edges, and of a matrix, that are in memory.
@@ -162,15 +162,15 @@ def _refuse_edge_array(array: Any) -> None:
         )
 
 
-def _rows_of_matrix(rows: list[Any]) -> bool:
+def _rows_of_matrix(rows: list[Any], told: bool) -> bool:
     """Tell a list of rows of a matrix from a list of edges: edges are tuples, or hold texts, or are not square."""
     if not rows or not all(isinstance(row, list | np.ndarray) and len(row) == len(rows) for row in rows):
         return False
-    if len(rows) != 3 or all(row[k] in (0, "0") for k, row in enumerate(rows)):  # 0 is no weight of an edge
+    if told or len(rows) != 3 or all(row[k] in (0, "0") for k, row in enumerate(rows)):  # 0 is no weight of an edge
         return True
     if any(isinstance(entry, str) for row in rows for entry in row[:2]):
         return False
     raise GraphError(
         "three lists of three numbers may be edges or a matrix; write edges as tuples (source, target, weight), "
-        "and a matrix with zeros on its diagonal"
+        "and a matrix with zeros on its diagonal, or with laplacian=True"
     )

@@ -16,7 +16,7 @@ from ptcc_certify.graphs.io.files import lines_of
 from ptcc_certify.graphs.io.graph_from_rows import DECIMALS, HEADER_MEND, Numbers, Rows
 from ptcc_certify.graphs.io.signs import WEIGHT, plain, sign_of_word
 from ptcc_certify.graphs.io.table_columns import Columns, columns_of
-from ptcc_certify.graphs.io.text_matrices import bracketed_matrix, table_as_matrix
+from ptcc_certify.graphs.io.text_matrices import bracketed_matrix, is_entry, table_as_matrix
 from ptcc_certify.graphs.rationals import parse_exact, shorten
 from ptcc_certify.graphs.reading import Reading
 from ptcc_certify.graphs.size_limits import MAX_LINE
@@ -96,9 +96,9 @@ def read_edge_list(data: bytes, name: str, how: Reading) -> Rows:
     if table and not how.titles and len(table[0]) >= len(table) - 1:  # of a matrix, all rows are needed
         begin += islice(numbered, len(table[0]) + 2)
         table = [row for _, row in begin if len(row) > 1]
-        if all(len(row) > 1 or not "".join(row).strip() for _, row in begin):
-            if (matrix := table_as_matrix(table, name)) is not None:
-                return matrix
+        declares = any(len(row) == 1 and row[0].strip() for _, row in begin)
+        if not declares and (matrix := table_as_matrix(table, name)) is not None:
+            return matrix
     started = next((number for number, row in begin if len(row) > 1), 0)
     columns = columns_of(table[0], table[1:], f"{name}, line {started}", how) if table else Columns()
     draft = _EdgeList(name, columns, started)
@@ -229,10 +229,13 @@ def _refuse_ambiguous(draft: _EdgeList, rows: Rows, data: bytes) -> None:
         if signs and used <= {*signs, "1", "+1"}:
             what = f"the {which} column holds signs: name a file of interactions .sif"
             raise FormatError(f"{name}: {what}, or tell the columns, such as --columns {_SIGN_AT[which]}")
+    if odd := [label for label in labels if is_entry(label) and not label.isdigit() and sign_of_word(label) is None]:
+        what = f"a node called {shorten(odd[0])}: a matrix, or edges?"
+        raise FormatError(f"{name}: {what} Save a matrix as .npy or .mtx; of edges, {tell}")
     alone = len(set(draft.first)) == len(draft.first) > 2
-    if alone and 1 < len(weights) and all(text.isdigit() and text in labels for text in weights):
-        if all(rows.labels[t] != rows.weights[w] for t, w in zip(draft.second, draft.codes, strict=True)):
-            raise FormatError(f"{name}: a list of neighbours, or edges with weights that are nodes? Of edges, {tell}")
+    nodes = alone and len(weights) > 1 and all(text.isdigit() and text in labels for text in weights)
+    if nodes and all(rows.labels[t] != rows.weights[w] for t, w in zip(draft.second, draft.codes, strict=True)):
+        raise FormatError(f"{name}: a list of neighbours, or edges with weights that are nodes? Of edges, {tell}")
 
 
 def _is_small(text: str) -> bool:

@@ -111,8 +111,8 @@ def read_graph(
     -------
     SignedDigraph
         ``graph.read`` tells how the file was read: ``orientation`` ("matrix" for one whose rows listen), ``duplicates``
-        ("refused", "sum" or "last"), ``self_loops`` ("refused" or "dropped N"), ``undirected`` and ``notes``; ``zeros``,
-        ``laplacian``, ``columns`` and ``variable`` where these were asked for.
+        ("refused", "sum" or "last"), ``self_loops`` ("refused" or "dropped N"), ``undirected`` and ``notes``;
+        ``zeros``, ``laplacian``, ``columns`` and ``variable`` where these were asked for.
 
     Raises
     ------

@@ -208,7 +208,9 @@ class _Draft:
         if weights and None not in words:
             self.notes += ("signs read from words",) if any(len(text) > 1 for text in weights) else ()
             return [Fraction(word) for word in words if word is not None]
-        values = [self.parsed(weight, code) for code, weight in enumerate(weights)]
+        order = sorted(range(len(weights)), key=lambda code: words[code] is not None)  # what is neither is told first
+        by_code = {code: self.parsed(weights[code], code) for code in order}
+        values = [by_code[code] for code in range(len(weights))]
         if (title := self.rows.weight_title) and (odd := _codes(values, title)) is not None:
             what = f'column "{shorten(title)}" holds {odd}: codes of relations, or weights?'
             self.refuse(int(np.argmax(self.codes == values.index(odd))), f"{what} {self.columns_mend()}")

@@ -16,8 +16,8 @@ from ptcc_certify.errors import FormatError, NumberError, ParameterError, PTCCEr
 from ptcc_certify.graphs.digraph import SignedDigraph, labels_beside
 from ptcc_certify.graphs.io.conversion import as_graph
 from ptcc_certify.graphs.io.edge_list import records
-from ptcc_certify.graphs.io.signs import find
 from ptcc_certify.graphs.io.files import name_and_ending, read_bytes
+from ptcc_certify.graphs.io.signs import find
 from ptcc_certify.graphs.rationals import MINUS, as_fraction, parse_exact, shorten
 from ptcc_certify.graphs.tables import first_five
 

@@ -26,9 +26,8 @@ def read_json(data: bytes, name: str, how: Reading) -> Rows:
         document = json.loads(
             decoded(data, name), parse_float=str, parse_int=str, parse_constant=str, object_pairs_hook=_once
         )
-    if isinstance(document, list) and document and all(isinstance(row, list) for row in document):
-        if (rows := bracketed_matrix(data, name)) is not None:
-            return rows
+    if isinstance(document, list) and (matrix := bracketed_matrix(data, name)) is not None:
+        return matrix
     if isinstance(document, list) and document and all(isinstance(row, dict) for row in document):
         document = {"links": document}
     found = [key for key in _LINKS if isinstance(document, dict) and isinstance(document.get(key), list)]

@@ -97,10 +97,11 @@ def read_gexf(data: bytes, name: str, how: Reading) -> Rows:
         graphs = root.findall("graph")
         if len(graphs) != 1:
             raise FormatError(f"{name}: {len(graphs)} graphs; keep one")
-        titles, default = {}, {}
+        titles, default = dict[str | None, str](), dict[str, str]()
         for attribute in graphs[0].findall("attributes[@class='edge']/attribute"):
             titles[attribute.get("id")] = title = attribute.get("title", "").lower()
-            default |= {title: one.text or "" for one in attribute.findall("default")}
+            if (value := attribute.findtext("default")) is not None:
+                default[title] = value
         nodes = [*graphs[0].iter("node")]
         identifiers = [node.get("id", "") for node in nodes]
         number = {node: i for i, node in enumerate(identifiers)}

@@ -87,6 +87,8 @@ def _networks(lines: Sequence[str], name: str) -> Iterator[_Network]:
         kind, _, rest = line[1:].partition(" ") if " " in line else line[1:].partition("\t")
         kind, rest = kind.lower(), rest.strip()
         relation = re.match(r"(?::\s*(\d+)\s*)?(?:\"([^\"]*)\"|'([^']*)')?\s*$", rest)
+        if kind == "vertices" and not read:
+            continue  # of a partition or a vector
         if kind in ("network", "vertices"):
             if kind == "network" or network.vertices is not None:
                 if network.vertices is not None:

@@ -113,8 +113,8 @@ def _told(titles: tuple[str, ...], others: Sequence[Sequence[str]], place: str, 
         at.append(k)
     by_title = not all(wanted.isdigit() for wanted in how.titles)
     if not by_title and edge_columns(titles, place) is None and not _is_header(titles, at[2], others):
-        return Columns(*at, told=True)
-    return Columns(*at, titles=titles, told=True, notes=(_note([titles[k] for k in at], 2),))
+        return Columns(at[0], at[1], at[2], told=True)
+    return Columns(at[0], at[1], at[2], titles=titles, told=True, notes=(_note([titles[k] for k in at], 2),))
 
 
 def _is_header(titles: Sequence[str], weight: int, others: Sequence[Sequence[str]]) -> bool:
@@ -136,4 +136,5 @@ def _direction(titles: Sequence[str], place: str) -> str:
         return ""
     what = f"the header {', '.join(map(shorten, titles[:3]))} names no source and target"
     line = place.rpartition(", ")[2]
-    return f"{line}: {what}; say --edges listens if {shorten(titles[0])} listens to {shorten(titles[1])}, or --edges information"
+    ends = f"{shorten(titles[0])} listens to {shorten(titles[1])}"
+    return f"{line}: {what}; say --edges listens if {ends}, or --edges information"

@@ -72,7 +72,7 @@ def bracketed_matrix(data: bytes, name: str) -> Rows | None:
     if not re.match(rb"(\xef\xbb\xbf)?\s*(\w+\s*=\s*)?([\w.]+\()?\s*\[", data[:400]):
         return None
     text = "\n".join(line for line in decoded(data, name).splitlines() if line.strip()[:1] not in ("#", "%"))
-    if (match := _BRACKETS.fullmatch(text)) is None:
+    if (match := _BRACKETS.fullmatch(text)) is None or '"' in text or "{" in text:
         return None
     inner = match[1][1:-1]
     nested = re.findall(r"\[([^\[\]]*)\]", inner)
@@ -90,7 +90,8 @@ def table_as_matrix(table: Sequence[Line], name: str) -> Rows | None:
     """Read the rows of a whole table as a matrix; None if they are none.
 
     Rows and columns of a matrix may have labels, which are the same. Without them n rows of n numbers are a matrix if
-    they cannot be edges: the diagonal is 0, or a node would be called by a negative number or a fraction.
+    the diagonal is 0, or that of a Laplacian, and if they are no edges: a third weight would be 0, or a node would be
+    called by a negative number or a fraction.
     """
     lines = [[text.strip() for text in line] for line in table]
     if len(lines) < 2:
@@ -100,9 +101,10 @@ def table_as_matrix(table: Sequence[Line], name: str) -> Rows | None:
     n = len(lines) - 1
     columns = lines[0][1:] if len(lines[0]) == len(lines[1]) else lines[0]
     labels = [line[0] for line in lines[1:]]
-    if all(len(line) == n + 1 for line in lines[1:]) and len(set(labels)) == n and set(columns) == set(labels):
-        if len(columns) == n and all(labels):
-            return _labelled(labels, columns, [line[1:] for line in lines[1:]], name)
+    corner = len(lines[0]) == len(lines[1]) and _NUMBER.fullmatch(lines[0][0]) is not None
+    same = not corner and all(labels) and len(set(labels)) == n == len(columns) and set(columns) == set(labels)
+    if same and all(len(line) == n + 1 for line in lines[1:]):
+        return _labelled(labels, columns, [line[1:] for line in lines[1:]], name)
     if not lines[0][0] and all(lines[0][1:]) and all(map(is_entry, filter(None, lines[1][1:]))) and lines[1][0]:
         what = "looks like a matrix with names, and its rows and columns have different ones"
         raise FormatError(f"{name}, line 1: {what}; give both the same, or write rows of edges")
@@ -129,7 +131,7 @@ def _plain(lines: list[list[str]]) -> Rows | None:
     ends = [text for line in lines for text in line[:2]]
     no_labels = any(not re.fullmatch(r"\d+", text) for text in ends)
     no_diagonal = all(is_zero(line[k]) for k, line in enumerate(lines))
-    if no_labels or (no_diagonal and n > 2) or (n > 3 and _like_laplacian(lines)):
+    if (no_diagonal and (n > 2 or no_labels)) or ((n > 3 or no_labels) and _like_laplacian(lines)):
         return _told([str(i) for i in range(1, n + 1)], lines)
     return None
 

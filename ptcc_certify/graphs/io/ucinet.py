@@ -87,7 +87,7 @@ class _Dl:
         number = {label: i for i, label in enumerate(labels)}
         number |= {} if self.embedded else {str(i): i - 1 for i in range(1, self.n + 1)}
         for line, nodes in zip(body, ends, strict=True):
-            if len(nodes) < 2 or not lists and len(line) != 3 or not all(text in number for text in nodes):
+            if len(nodes) < 2 or (not lists and len(line) != 3) or not all(text in number for text in nodes):
                 self.refuse(
                     f'row "{shorten(" ".join(line))}" is no edge of the n={self.n} nodes with a weight; mend it'
                 )
