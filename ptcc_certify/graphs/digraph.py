@@ -373,14 +373,16 @@ class SignedDigraph(ReadOnly, Shown):
             if (odd := np.flatnonzero(~np.isfinite(values))).size:
                 place = f"row {shorten(names[row[odd[0]]])}, column {shorten(names[column[odd[0]]])}"
                 raise GraphError(f"{place} of the matrix is {values[odd[0]]}; write 0 where there is no edge")
-        else:
-            weights = []
+        elif values.dtype.kind == "O":
             for k, m, value in zip(row.tolist(), column.tolist(), values.tolist(), strict=True):
                 try:
-                    weights.append(as_fraction(value, "the entry"))
+                    as_fraction(value, "the entry")
                 except NumberError as error:
                     place = f"row {shorten(names[k])}, column {shorten(names[m])}"
                     raise GraphError(f"{place} of the matrix: {error}") from None
+            weights = values.tolist()
+        else:
+            weights = values.tolist()
         how = Reading(
             orientation=orientation,
             duplicates=duplicates,
@@ -791,8 +793,20 @@ def _in_memory(
     from ptcc_certify.graphs.io.graph_from_rows import Rows, graph_of
     from ptcc_certify.graphs.io.signs import is_sign
 
-    rows = Rows(labels, first, second, weights, np.arange(len(first)), lambda row: "", matrix=matrix)
+    values, codes = _distinct(weights)
+    rows = Rows(labels, first, second, values, codes, lambda row: "", matrix=matrix)
     rows.weight_title = title if is_sign(title) else ""
-    rows.sign_title, rows.signs = signs
-    rows.sign_codes = np.arange(len(rows.signs))
+    rows.sign_title, rows.signs, rows.sign_codes = signs[0], *_distinct(signs[1])
     return graph_of(rows, "", how)
+
+
+def _distinct(values: Any) -> tuple[Any, Any]:
+    """Return the different values, an array of them if that is given, and which of these each value is."""
+    if isinstance(values, np.ndarray):
+        return values, np.arange(values.size)
+    table: dict[tuple[type, Any], int] = {}
+    try:
+        codes = [table.setdefault((type(value), value), len(table)) for value in values]
+    except TypeError:  # a value that has no hash, which is refused as no number
+        return list(values), np.arange(len(values))
+    return [value for _, value in table], codes

@@ -59,7 +59,7 @@ _MENDS = {
     "HDF5": "save the matrix as .npy or .mtx, in MATLAB with save(FILE, 'W', '-v7')",
     "Parquet": "in Python as_graph(pandas.read_parquet(FILE)), or save it as CSV",
     "Feather (Arrow)": "in Python as_graph(pandas.read_feather(FILE)), or save it as CSV",
-    "a pickle": "which may run code and is not read; save the graph as GraphML, or the matrix as .npy",
+    "a pickle": "a pickle may run code, so it is not read; save the graph as GraphML, or the matrix as .npy",
     "a page": "fetch the file itself, not the page that offers it",
     **dict.fromkeys(("an SQLite database", "Stata data", "SPSS data"), "save the table as CSV"),
     **{f"packed by {how}": "unpack it, or pack it with gzip" for how in ("bzip2", "xz", "zstd", "7-Zip", "RAR")},

@@ -161,6 +161,7 @@ ROWS = [
     Input("g.txt", "1 2 4\n2 1 3 5\n", says=("line 2", '"5"')),
     Input("g.csv", "a,b,0.5,-1\nb,a,1,1\n", says=("line 1", '"-1"', "sign")),
     Input("g.csv", "a,b,0.5,inhibits\n", says=("line 1", '"inhibits"')),
+    Input("g.txt", "2001 2002 2005 2007\n2002 2001 2004 2009\n", says=("line 1", '"2007"')),
     Input("g.csv", "6,2,4,1289241911\n6,5,-2,1289241941\n", "6>2=4 6>5=-2"),
     Input("g.csv", "source,target,weight\na,b,-1,5\n", says=("line 2", "4 fields")),
     Input("g.tsv", "% sym signed\n1 2 1\n2 3 -1\n", says=("% sym", "--undirected")),
@@ -204,10 +205,12 @@ MATRICES = [
     Input("g.txt", "0 1\n1 0\n", says=("edge 0 -> 1 has no weight",)),
     Input("g.txt", "1 2 5 7\n2 1 6 7\n3 1 8 9\n4 1 8 9\n", says=("line 1", "--columns 1,2,3")),
     Input("g.json", "[[0, -1], [2, 0]]", "2>1=-1 1>2=2"),
+    Input("g.csv", "a,b,c\n0,1,-1\n2,0,0\n0,3,0\n", "b>a=1 c>a=-1 a>b=2 b>c=3"),
 ]
 FORMATS = [
     Input("g.json", links(directed=True), "ann>bob=-1/2"),
     Input("g.json", links("edges"), "ann>bob=-1/2"),
+    Input("g.txt", links("edges"), "ann>bob=-1/2"),
     Input("g.json", links(directed=False), says=("directed", "--undirected")),
     Input("g.json", links(directed=False), "ann>bob=-1/2 bob>ann=-1/2", how={"undirected": True}),
     Input(

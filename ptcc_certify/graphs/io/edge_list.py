@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Iterable, Iterator
-from contextlib import suppress
+from fractions import Fraction
 from itertools import chain, islice
 
 import numpy as np
@@ -24,7 +24,7 @@ from ptcc_certify.graphs.size_limits import MAX_LINE
 _SEPARATORS = ("\t", ",", ";", None)  # None: blanks
 #: Rows that are looked at before columns are told; different fields after the third that are; where signs are first.
 _LOOKED_AT, _EXTRA, _SIGN_AT = 20, 10**5, {"first": "2,3,1", "second": "1,3,2"}
-#: From this number on a whole number after the third column is taken for a year or a time.
+#: From this number on a number after the third column is taken for a year or a time.
 _TIMES = 1900
 
 
@@ -101,8 +101,12 @@ def read_edge_list(data: bytes, name: str, how: Reading) -> Rows:
             return matrix
     started = next((number for number, row in begin if len(row) > 1), 0)
     columns = columns_of(table[0], table[1:], f"{name}, line {started}", how) if table else Columns()
+    if columns.titles:
+        begin = [row for row in begin if row[0] != started]
+    elif table:
+        _refuse_titles(table[0], f"{name}, line {started}", data)
     draft = _EdgeList(name, columns, started)
-    draft.read(chain(begin, numbered), data)
+    draft.read(chain(begin, numbered))
     rows = draft.rows()
     if not columns.titles and not columns.told:
         _refuse_ambiguous(draft, rows, data)
@@ -134,18 +138,14 @@ class _EdgeList:
         self.first, self.second, self.codes = list[int](), list[int](), list[int]()
         self.sign_codes, self.numbers = list[int](), list[int]()
         self.extra: dict[str, int] = {}  # fields after the third of a table without header, and the line of each
-        self.remarks = False
 
-    def read(self, rows: Iterable[tuple[int, list[str]]], data: bytes) -> None:
-        """Read all rows."""
+    def read(self, rows: Iterable[tuple[int, list[str]]]) -> None:
+        """Read all rows but for a header."""
         columns, nodes, weights, signs = self.columns, self.nodes, self.weights, self.signs
+        first, second, codes, numbers = self.first, self.second, self.codes, self.numbers
         s, t, w, sign = columns.source, columns.target, columns.weight, columns.sign
         width = len(columns.titles) or (10**9 if columns.told else 3)
         for number, row in rows:
-            if number == self.started:
-                if columns.titles:
-                    continue
-                _refuse_titles(row, f"{self.name}, line {number}", data)
             if len(row) > width and any(map(str.strip, row[width:])):
                 self.more_fields(number, row, width)
             try:
@@ -155,10 +155,10 @@ class _EdgeList:
             except LookupError:
                 self.no_edge(number, [field.strip() for field in row])
                 continue
-            self.first.append(source)
-            self.second.append(target)
-            self.codes.append(code)
-            self.numbers.append(number)
+            first.append(source)
+            second.append(target)
+            codes.append(code)
+            numbers.append(number)
 
     def more_fields(self, number: int, row: list[str], width: int) -> None:
         """Refuse fields beyond a header; keep those after the third of a table without."""
@@ -219,31 +219,43 @@ def _refuse_ambiguous(draft: _EdgeList, rows: Rows, data: bytes) -> None:
     tell = "begin with a header source,target,weight, or tell the columns: --columns 1,2,3"
     if draft.extra:
         _refuse_decimal_commas(data, name)
+        least = max(Fraction(_TIMES), *(10 * _size(text) for text in (*weights, *labels)))
     for field, line in draft.extra.items():
-        if field and (field in labels or sign_of_word(field) is not None or _is_small(field)):
+        if field and (field in labels or sign_of_word(field) is not None or not _is_time(field, least)):
             what = f'a weight, and "{shorten(field)}" in another column: neighbours, a sign or the weight?'
             raise FormatError(f"{name}, line {line}: {what} If there are edges, {tell}")
     for ends, which in ((draft.first, "first"), (draft.second, "second")):
-        used = {rows.labels[k] for k in set(ends)}
-        signs = {label for label in used if label == "-1" or sign_of_word(label)}
-        if signs and used <= {*signs, "1", "+1"}:
+        signs = all(_is_sign(rows.labels[k]) for k in ends) and {rows.labels[k] for k in ends}
+        if signs and signs != {"1"}:
             what = f"the {which} column holds signs: name a file of interactions .sif"
             raise FormatError(f"{name}: {what}, or tell the columns, such as --columns {_SIGN_AT[which]}")
-    if odd := [label for label in labels if is_entry(label) and not label.isdigit() and sign_of_word(label) is None]:
+    if odd := [label for label in labels if not label.isdigit() and is_entry(label) and sign_of_word(label) is None]:
         what = f"a node called {shorten(odd[0])}: a matrix, or edges?"
         raise FormatError(f"{name}: {what} Save a matrix as .npy or .mtx; of edges, {tell}")
-    alone = len(set(draft.first)) == len(draft.first) > 2
-    nodes = alone and len(weights) > 1 and all(text.isdigit() and text in labels for text in weights)
-    if nodes and all(rows.labels[t] != rows.weights[w] for t, w in zip(draft.second, draft.codes, strict=True)):
+    nodes = len(weights) > 1 and all(text.isdigit() and text in labels for text in weights)
+    alone = nodes and len(set(draft.first)) == len(draft.first) > 2
+    if alone and all(rows.labels[t] != rows.weights[w] for t, w in zip(draft.second, draft.codes, strict=True)):
         raise FormatError(f"{name}: a list of neighbours, or edges with weights that are nodes? Of edges, {tell}")
 
 
-def _is_small(text: str) -> bool:
-    """Tell whether a text is a number, and neither a year nor a time."""
-    with suppress(NumberError):
-        value = parse_exact(text)
-        return not (value >= _TIMES and (value.denominator == 1 or value > 10**6))
-    return False
+def _is_sign(label: str) -> bool:
+    return label in ("1", "-1") or sign_of_word(label) is not None
+
+
+def _size(text: str) -> Fraction:
+    """Return the size of a number, 0 of another text."""
+    try:
+        return abs(parse_exact(text))
+    except NumberError:
+        return Fraction(0)
+
+
+def _is_time(text: str, least: Fraction) -> bool:
+    """Tell whether a text is a year or a time, which is larger than nodes and weights, or no number at all."""
+    try:
+        return parse_exact(text) >= least
+    except NumberError:
+        return not is_entry(text)
 
 
 def _refuse_decimal_commas(data: bytes, name: str) -> None:

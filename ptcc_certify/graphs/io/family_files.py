@@ -15,7 +15,7 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family, Mode, read_share
 from ptcc_certify.graphs.io.edge_list import direction_of_comments, records
 from ptcc_certify.graphs.io.files import Source, name_and_ending
-from ptcc_certify.graphs.io.graph_files import MATRICES, graph_bytes, is_edge_list, read_graph
+from ptcc_certify.graphs.io.graph_files import MATRICES, format_of, graph_bytes, is_edge_list, read_graph
 from ptcc_certify.graphs.io.signs import find, is_sign, sign_of_word, weight_and_sign
 from ptcc_certify.graphs.io.table_columns import edge_columns
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, parse_exact, shorten
@@ -200,6 +200,8 @@ def is_family_file(path: Source) -> bool:
     data = graph_bytes(path, name, ending)
     if hasattr(path, "seek"):
         path.seek(0)
+    if not is_edge_list(format_of(data, ending)):
+        return False
     rows = ([field.strip() for field in row] for _, row in records(data, name))
     first = next((row for row in rows if len(row) > 1), [])
     return edge_columns(first, name) is not None and interval_columns(first, name) != (None, None, None)
@@ -277,6 +279,8 @@ def _interval_rows(
     data = graph_bytes(path, name, ending)
     if hasattr(path, "seek"):
         path.seek(0)
+    if not is_edge_list(format_of(data, ending)):
+        return None
     lines = [(number, [field.strip() for field in row]) for number, row in records(data, name) if any(row)]
     first = next((row for _, row in lines if len(row) > 1), [])
     if (ends := edge_columns(first, name)) is None:

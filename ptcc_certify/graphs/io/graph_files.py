@@ -172,11 +172,23 @@ def _rows(path: Source, how: Reading, format: str | None = None) -> tuple[Rows, 
     if format and ending not in _READERS:
         raise ParameterError(f'format "{shorten(ending)}" is unknown; use one of {", ".join(_READERS)}')
     data = graph_bytes(path, name, ending)
-    if format is None and is_edge_list(ending):
-        begin = data[:4096].removeprefix(b"\xef\xbb\xbf").lstrip()
-        kinds = [kind for pattern, kind in _BEGINNINGS.items() if re.match(pattern, begin, re.IGNORECASE | re.DOTALL)]
-        ending = kinds[0] if kinds else ending
+    ending = ending if format else format_of(data, ending)
     return _READERS.get(ending, read_edge_list)(data, name, how), name
+
+
+def format_of(data: bytes, ending: str) -> str:
+    """Return the format of a file: what its ending says, or its first bytes where that says an edge list.
+
+    Examples
+    --------
+    >>> format_of(b"<graphml>", "txt"), format_of(b"a,b,1", "csv")
+    ('graphml', 'csv')
+    """
+    begin = data[:4096].removeprefix(b"\xef\xbb\xbf").lstrip()
+    for pattern, kind in _BEGINNINGS.items():
+        if is_edge_list(ending) and re.match(pattern, begin, re.IGNORECASE | re.DOTALL):
+            return kind
+    return ending
 
 
 def graph_bytes(path: Source, name: str, ending: str) -> bytes:

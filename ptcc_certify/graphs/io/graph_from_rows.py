@@ -19,7 +19,7 @@ from ptcc_certify.graphs.digraph import (
     in_all,
     ordered_labels,
 )
-from ptcc_certify.graphs.io.laplacian import Diagonal, diagonal_of
+from ptcc_certify.graphs.io.laplacian import Diagonal, diagonal_of, fits_one_node
 from ptcc_certify.graphs.io.signs import DIRECTIONS, NO_SIGN, sign_of_word
 from ptcc_certify.graphs.rationals import MINUS, as_fraction, nearest_float, parse_exact, shorten
 from ptcc_certify.graphs.reading import Reading
@@ -52,6 +52,7 @@ class Rows:
     sign_title: str = ""
     weight_title: str = ""  # of a column whose numbers are codes of relations, unless they are 1 and -1
     asks: str = ""  # why the direction must be told
+    columns: bool = True  # may columns, or the attribute of weights, be told?
 
 
 class Numbers(dict[str, int]):
@@ -157,7 +158,8 @@ class _Draft:
 
     def zero(self) -> np.ndarray:
         """Tell which edges have weight 0."""
-        return np.array([not value for value in self.values], dtype=bool)[self.codes]
+        zero = self.values == 0 if isinstance(self.values, np.ndarray) else [not value for value in self.values]
+        return np.array(zero, dtype=bool)[self.codes]
 
     def edge(self, edge: int) -> str:
         labels = self.rows.labels
@@ -204,27 +206,33 @@ class _Draft:
 
     def read_weights(self, weights: Sequence[Any]) -> list[Fraction]:
         """Read all weights exactly; where they are words for signs and nothing else, as 1 and -1."""
-        words = [sign_of_word(weight) if isinstance(weight, str) else None for weight in weights]
-        if weights and None not in words:
-            self.notes += ("signs read from words",) if any(len(text) > 1 for text in weights) else ()
-            return [Fraction(word) for word in words if word is not None]
-        order = sorted(range(len(weights)), key=lambda code: words[code] is not None)  # what is neither is told first
-        by_code = {code: self.parsed(weights[code], code) for code in order}
-        values = [by_code[code] for code in range(len(weights))]
+        if not any(isinstance(weight, str) for weight in weights):
+            values = [self.parsed(weight, code) for code, weight in enumerate(weights)]
+        else:
+            words = [sign_of_word(weight) if isinstance(weight, str) else None for weight in weights]
+            if None not in words:
+                self.notes += ("signs read from words",) if any(len(text) > 1 for text in weights) else ()
+                return [Fraction(word) for word in words if word is not None]
+            order = sorted(range(len(weights)), key=lambda code: words[code] is not None)
+            by_code = {code: self.parsed(weights[code], code) for code in order}  # what is neither is told first
+            values = [by_code[code] for code in range(len(weights))]
         if (title := self.rows.weight_title) and (odd := _codes(values, title)) is not None:
             what = f'column "{shorten(title)}" holds {odd}: codes of relations, or weights?'
-            self.refuse(int(np.argmax(self.codes == values.index(odd))), f"{what} {self.columns_mend()}")
+            self.refuse(int(np.argmax(self.codes == values.index(odd))), f"{what}; {self.columns_mend()}")
         return values
 
     def columns_mend(self) -> str:
         if not self.name:
-            return "Give weight= (of a table columns=), or write 1 and -1"
-        return "Write 1 and -1, or name the columns of source, target and weight: --columns a,b,w"
+            return "write 1 and -1, or name the weight: weight=, of a table columns="
+        tell = ", or name the columns of source, target and weight: --columns a,b,w"
+        return f"write 1 and -1{tell if self.rows.columns else ''}"
 
     def parsed(self, weight: Any, code: int) -> Fraction:
         """Read a weight exactly, or name the first edge that has it."""
         quoted = f'"{shorten(str(weight))}"'
         try:
+            if isinstance(weight, Fraction):
+                return weight  # the graph itself refuses one that no float64 is near
             value = parse_exact(weight) if isinstance(weight, str) else as_fraction(weight, "weight")
             if not value or SMALLEST_WEIGHT <= abs(nearest_float(value)) <= LARGEST_WEIGHT:
                 return value
@@ -271,7 +279,7 @@ class _Draft:
         if (odd := _codes([*map(Fraction, factors)], rows.sign_title)) is not None:
             what = f'column "{title}" holds {", ".join(map(str, sorted(factors)))} and no -1: signs?'
             self.refuse(
-                int(np.argmax(np.asarray(rows.sign_codes) == factors.index(int(odd)))), f"{what} {self.columns_mend()}"
+                int(np.argmax(np.asarray(rows.sign_codes) == factors.index(int(odd)))), f"{what}; {self.columns_mend()}"
             )
         pairs, which = np.unique(self.codes * len(texts) + np.asarray(rows.sign_codes), return_inverse=True)
         both = [(Fraction(self.values[p // len(texts)]), factors[p % len(texts)]) for p in pairs.tolist()]
@@ -291,9 +299,9 @@ class _Draft:
         try:
             if (number := parse_exact(text)) in (-1, 0, 1):
                 return int(number)
-            what = f"is neither 1 nor -1: a code of a relation? {self.columns_mend()}"
+            what = f"is neither 1 nor -1: a code of a relation; {self.columns_mend()}"
         except NumberError:
-            what = f"{NO_SIGN}. {self.columns_mend()}"
+            what = f"{NO_SIGN}; {self.columns_mend()}"
         edge = int(np.argmax(np.asarray(self.rows.sign_codes) == code))
         return self.refuse(edge, f'"{shorten(text)}" of edge {self.edge(edge)} in column "{title}" {what}')
 
@@ -305,6 +313,8 @@ class _Draft:
             return
         entries = np.array([nearest_float(v) if isinstance(v, Fraction) else v for v in self.values])[self.codes]
         first, second = np.asarray(self.rows.first), np.asarray(self.rows.second)
+        if not self.how.laplacian and not fits_one_node(first, second, entries):
+            return
         found = diagonal_of(first, second, entries, len(self.rows.labels), self.how.undirected)
         if self.how.undirected and not found.laplacian:  # of both halves
             found = diagonal_of(first, second, entries, len(self.rows.labels), False)

@@ -43,6 +43,23 @@ class Diagonal:
         return self.loops > 0 and any(found)
 
 
+def fits_one_node(first: np.ndarray, second: np.ndarray, entries: np.ndarray) -> bool:
+    """Tell whether one entry of the diagonal, the first, may be a Laplacian's: it costs less than to ask of all.
+
+    Examples
+    --------
+    >>> L = np.array([[1, 1], [-2, 2]])
+    >>> fits_one_node(*np.nonzero(L), L[np.nonzero(L)])
+    True
+    """
+    place = int(np.argmax(first == second))
+    node, diagonal = first[place], entries[place]
+    row, column = (entries[(ends == node) & (first != second)] for ends in (first, second))
+    both = np.append(row, column)
+    sums = [abs(np.sum(f(one))) for one in (row, column, both) for f in (np.abs, np.array)]
+    return any(abs(total - abs(diagonal)) <= _ROUNDED * np.abs(both).sum() for total in sums)
+
+
 def diagonal_of(first: np.ndarray, second: np.ndarray, entries: np.ndarray, n: int, both: bool) -> Diagonal:
     """Compare the diagonal of an n x n matrix with its other entries; ``both`` if (k, l) stands for (l, k), too.
 

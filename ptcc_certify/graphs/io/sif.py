@@ -31,5 +31,5 @@ def read_sif(data: bytes, name: str, how: Reading) -> Rows:
             codes.append(relations[fields[1]])
             numbers.append(number)
     rows = Rows(list(nodes.texts), first, second, list(relations.texts), codes, lambda row: f"line {numbers[row]}")
-    rows.weight_title = "relation"
+    rows.weight_title, rows.columns = "relation", False
     return rows
