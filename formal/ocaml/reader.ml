@@ -25,14 +25,20 @@ let of_besides kind = kind = "tracking" || (String.length kind > 5 && String.sub
 let graph v =
   let get = fields "graph" [ "nodes"; "edges"; "read"; "sha256" ] v in
   let nodes = nodes_of (get "nodes") in
-  let read = fields "graph.read" [ "orientation"; "duplicates"; "self_loops"; "undirected" ] (get "read") in
+  let asked = match get "read" with
+    | Obj l -> List.filter (fun k -> List.mem_assoc k l) [ "zeros"; "laplacian"; "columns"; "variable" ] | _ -> [] in
+  let read = fields "graph.read" ([ "orientation"; "duplicates"; "self_loops"; "undirected" ] @ asked) (get "read") in
   need (List.mem (text "orientation" (read "orientation")) [ "information"; "listens"; "matrix" ]) "graph.read: orientation";
   need (List.mem (text "duplicates" (read "duplicates")) [ "refused"; "sum"; "last" ]) "graph.read: duplicates";
+  let dropped s = String.length s >= 9 && String.length s <= 20 && String.sub s 0 8 = "dropped "
+    && Number.digits (String.sub s 8 (String.length s - 8)) in
   let loops = text "self_loops" (read "self_loops") in
-  let dropped = String.length loops >= 9 && String.length loops <= 20 && String.sub loops 0 8 = "dropped "
-    && Number.digits (String.sub loops 8 (String.length loops - 8)) in
-  need (loops = "refused" || dropped) "graph.read: self_loops";
+  need (loops = "refused" || dropped loops) "graph.read: self_loops";
   ignore (truth "graph.read: undirected" (read "undirected"));
+  List.iter (fun k -> match k with
+    | "zeros" -> need (dropped (text "zeros" (read k))) "graph.read: zeros"
+    | "laplacian" -> ignore (truth "graph.read: laplacian" (read k))
+    | k -> ignore (text k (read k))) asked;
   let edges = match get "edges" with
     | Obj _ as v ->
         let get = fields "edges" [ "count"; "source"; "target"; "weight"; "scale" ] v in

@@ -21,7 +21,7 @@ from typing import Any
 from ptcc_certify.batch.backends import compute_rows, default_workers
 from ptcc_certify.batch.output import Journal, Table, journal_path, refuse_table, table_bytes
 from ptcc_certify.batch.rows import COLUMNS, Row
-from ptcc_certify.batch.settings import LARGEST_SETTING, Reading, Settings
+from ptcc_certify.batch.settings import LARGEST_SETTING, Settings
 from ptcc_certify.batch.sources import chosen_sources
 from ptcc_certify.certificate.request import listener
 from ptcc_certify.errors import ParameterError, PTCCError
@@ -29,6 +29,7 @@ from ptcc_certify.graphs.ensembles import Ensemble
 from ptcc_certify.graphs.io import write_atomically, write_graph
 from ptcc_certify.graphs.io.files import refuse_no_path
 from ptcc_certify.graphs.rationals import shorten, whole_number
+from ptcc_certify.graphs.reading import Reading
 from ptcc_certify.protocols import Protocol
 
 __all__ = ["COLUMNS", "Row", "Settings", "certify_many", "default_workers", "table_bytes", "write_graphs"]
@@ -80,8 +81,9 @@ def certify_many(
         - ``disturbance=None``: what a simulated run meets under the sliding-mode protocol;
         - ``method="best"``, ``simulation=False``, ``time_limit=None`` (seconds for each graph), ``expect=None``,
           ``min_rate=None``, ``initial_bound=None``;
-        - ``orientation=None``, ``duplicates="refuse"``, ``drop_self_loops=False``, ``undirected=False``: how files are
-          read, see :func:`ptcc_certify.read_graph`; of graphs in memory only ``orientation`` can be told.
+        - ``orientation=None``, ``duplicates="refuse"``, ``drop_self_loops=False``, ``drop_zeros=False``,
+          ``undirected=False``, ``laplacian=None``, ``columns=None``, ``variable=None``: how files are read, see
+          :func:`ptcc_certify.read_graph`; of graphs in memory only ``orientation`` can be told.
 
         :class:`ptcc_certify.batch.Settings` tells all about each.
 

@@ -5,15 +5,16 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any, Literal
+from typing import Any
 
 from ptcc_certify.certificate.request import refuse
 from ptcc_certify.errors import NumberError, ParameterError, gated, unknown_parameter
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import by_label
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, shorten, whole_number
+from ptcc_certify.graphs.reading import Reading
 from ptcc_certify.graphs.structure import behaviour_name
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.base import refuse_no_protocol
@@ -26,25 +27,6 @@ InitialState = str | Sequence[Any] | Mapping[Any, Any] | None
 LARGEST_SETTING = 2**64 - 1
 #: How to get the packages that several workers, Dask and Parquet need.
 INSTALL = 'install it with: pip install "ptcc-certify[batch]"'
-
-
-@dataclass(frozen=True)
-class Reading:
-    """How files are read; see :func:`ptcc_certify.read_graph`.
-
-    Attributes
-    ----------
-    orientation : {"information", "listens"}, optional
-    duplicates : {"refuse", "sum", "last"}
-        What becomes of two rows for the same ordered pair.
-    drop_self_loops, undirected : bool
-        Drop self-loops; let each edge go both ways.
-    """
-
-    orientation: str | None = None
-    duplicates: Literal["refuse", "sum", "last"] = "refuse"
-    drop_self_loops: bool = False
-    undirected: bool = False
 
 
 @gated
@@ -103,7 +85,7 @@ class Settings:
     expect: str | None = None
     min_rate: Fraction | None = None
     time_limit: Fraction | None = None
-    reading: Reading = Reading()
+    reading: Reading = field(default_factory=Reading)
 
     @classmethod
     def of(cls, protocol: Protocol, **settings: Any) -> Settings:

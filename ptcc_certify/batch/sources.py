@@ -12,7 +12,6 @@ from glob import glob, has_magic
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ptcc_certify.batch.settings import Reading
 from ptcc_certify.errors import FormatError, ParameterError, PTCCError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.ensembles import Ensemble
@@ -20,6 +19,7 @@ from ptcc_certify.graphs.io import as_graph, read_graph
 from ptcc_certify.graphs.io.files import read_bytes
 from ptcc_certify.graphs.io.packaged import GRAPHS, file_or_packaged, graph_path
 from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.reading import OPTIONS, Reading
 
 #: Where a graph comes from: a path, an ensemble and a number in it, or the graph itself; or why there is none.
 Origin = str | tuple[Ensemble, int] | SignedDigraph | PTCCError
@@ -108,7 +108,7 @@ def _given(graph: Any, reading: Reading, alone: bool) -> SignedDigraph | PTCCErr
     Of a graph in memory only its orientation can be told.
     """
     file = isinstance(graph, str | os.PathLike)
-    for name in () if file else ("duplicates", "drop_self_loops", "undirected"):
+    for name in () if file else OPTIONS[1:]:
         if getattr(reading, name) != getattr(Reading, name):
             raise ParameterError(f"{name} tells how files are read; beside graphs in memory leave it out")
     try:

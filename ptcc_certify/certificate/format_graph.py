@@ -14,6 +14,7 @@ from ptcc_certify.checker import MANY_COMPONENTS
 from ptcc_certify.checker.reading import exact
 from ptcc_certify.checker.side_files import SideFiles
 from ptcc_certify.graphs.digraph import SignedDigraph, Weights
+from ptcc_certify.graphs.reading import RECORDED
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.theorems.claims import Claim
 
@@ -46,7 +47,7 @@ def graph_section(graph: SignedDigraph, out: Writer) -> dict[str, Any]:
     return {
         "nodes": list(graph.labels),
         "edges": edges,
-        "read": {key: read[key] for key in ("orientation", "duplicates", "self_loops", "undirected")},
+        "read": {key: read[key] for key in RECORDED if key in read},
         "sha256": graph.sha256,
     }
 

@@ -21,18 +21,27 @@ NODE_BYTES, EDGE_BYTES = 700, (100, 300)
 def check_graph(doc: Document) -> Digraph:
     """Read nodes and edges; verify their order and their hash."""
     section = fields(doc.section("graph"), ("nodes", "edges", "read", "sha256"), "graph")
-    how = fields(section["read"], ("orientation", "duplicates", "self_loops", "undirected"), "read")
-    need(how["orientation"] in ("information", "listens", "matrix"), "read: an unknown orientation")
-    need(how["duplicates"] in ("refused", "sum", "last"), "read: duplicates")
-    loops = how["self_loops"]
-    need(isinstance(loops, str) and bool(re.fullmatch(r"refused|dropped [0-9]{1,12}", loops)), "read: self_loops")
-    need(isinstance(how["undirected"], bool), "read: undirected")
+    check_read(section["read"])
     labels, index = read_nodes(section)
     _fit(NODE_BYTES * len(labels))
     graph = digraph(doc, labels, *_edges(doc, section["edges"], index))
     doc.sha256 = graph.sha256()
     need(section["sha256"] == doc.sha256, "the SHA-256 of the edge list is another")
     return graph
+
+
+def check_read(read: Any) -> None:
+    """Verify the form of what is told of the reading of a file: four keys, and others where they were asked for."""
+    need(isinstance(read, dict), "read is not an object")
+    asked = tuple(key for key in ("zeros", "laplacian", "columns", "variable") if key in read)
+    how = fields(read, ("orientation", "duplicates", "self_loops", "undirected", *asked), "read")
+    need(how["orientation"] in ("information", "listens", "matrix"), "read: an unknown orientation")
+    need(how["duplicates"] in ("refused", "sum", "last"), "read: duplicates")
+    for key, pattern in (("self_loops", r"refused|dropped [0-9]{1,12}"), ("zeros", r"dropped [0-9]{1,12}")):
+        text = how.get(key, "dropped 0")
+        need(isinstance(text, str) and bool(re.fullmatch(pattern, text)), f"read: {key}")
+    for key, kind in (("undirected", bool), ("laplacian", bool), ("columns", str), ("variable", str)):
+        need(isinstance(how.get(key, kind()), kind), f"read: {key}")
 
 
 def read_nodes(section: dict[str, Any]) -> tuple[list[str], dict[str, int]]:

@@ -355,7 +355,9 @@ def _roots(
     verified: Verified, limits: formulas.Limits, clock: Fraction, bounds: formulas.InputBounds
 ) -> dict[int, Fraction]:
     """Return ``sqrt(V)`` at the deadline at most, of every Lyapunov function that says something of single agents."""
-    known = [j for j, f in enumerate(verified.functions) if f.form is not None and f.deviation is not None and f.rate > 0]
+    known = [
+        j for j, f in enumerate(verified.functions) if f.form is not None and f.deviation is not None and f.rate > 0
+    ]
     return {j: bounds.share(j, limits, clock, Fraction(0)) * bounds.initial_root(j) for j in known}
 
 

@@ -14,13 +14,13 @@ from ptcc_certify.cli.design_of_agents import command_of_agents, design_of_agent
 from ptcc_certify.cli.options import (
     OneGraph,
     Options,
-    flag_of,
     graph_argument,
     json_option,
     number_option,
     output_option,
     read,
     reading_options,
+    reading_words,
 )
 from ptcc_certify.cli.scenario import places_of, scenario_record
 from ptcc_certify.cli.terminal import FIGURES, LOG, Screen, print_json, progress, refuse_output, screen_options
@@ -166,10 +166,7 @@ def _refuse_incomplete(options: dict[str, Any], special: bool) -> None:
 
 def _certify_command(certify_options: list[str], graph: str, options: Options) -> list[str]:
     """Return the words of the command that certifies the gains of a design again, quoted for a shell."""
-    flags = [] if options["edges"] is None else ["--edges", options["edges"]]
-    flags += [] if options["duplicates"] == "refuse" else ["--duplicates", options["duplicates"]]
-    flags += [flag_of(name) for name in ("drop_self_loops", "undirected") if options[name]]
-    flags += certify_options
+    flags = reading_words(options) + certify_options
     words = [*flags, "--", graph] if graph.startswith("-") and graph != "-" else [graph, *flags]
     return [shlex.quote(word) for word in ("ptcc", "certify", *words)]
 

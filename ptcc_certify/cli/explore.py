@@ -38,8 +38,8 @@ def explore(graph: str, port: int, no_browser: bool, **options: Any) -> int:
         raise ParameterError("-: the code that the explorer shows reads the graph again; save it and name the file")
     if is_scenario(graph):
         refuse_as_graph(graph)
-    name, explorer, how = graph, Explorer(), dict(options)
-    source = reading_of(graph, how.pop("edges"), **how)
+    name, explorer = graph, Explorer()
+    source = reading_of(graph, **shared.reading_of(options))
     if shared.graph_file(graph) == graph:  # no packaged one
         name = Path(graph).name
         explorer = Explorer(shared.read(graph, options), name, source)

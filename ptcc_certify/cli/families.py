@@ -181,7 +181,7 @@ def graph_or_family(files: Sequence[Any], options: shared.Options) -> SignedDigr
 def family_keywords(options: shared.Options) -> dict[str, Any]:
     """Return what ``read_family`` is told by the options."""
     more = {"uncertainty": options["uncertainty"] or 0, "optional": options["optional"]}
-    return shared.reading_keywords(options) | more
+    return shared.reading_of(options) | more
 
 
 def files_of(graphs: tuple[str, ...]) -> list[Any]:

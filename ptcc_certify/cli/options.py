@@ -26,6 +26,7 @@ from ptcc_certify.cli.scenario import (
 )
 from ptcc_certify.errors import ParameterError, PTCCError
 from ptcc_certify.graphs.kinds_of_file import TOML, kind_of, refuse_as_certificate, refuse_as_graph, shell_word
+from ptcc_certify.graphs.reading import OPTIONS, option_flags
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate
@@ -36,7 +37,8 @@ if TYPE_CHECKING:
 #: What the commands are given, by the names of their parameters.
 Options = Mapping[str, Any]
 
-READING = ("edges", "duplicates", "drop_self_loops", "undirected")
+#: Options that tell how a graph is read, by the names of their parameters; ``edges`` is the orientation.
+READING = ("edges", *OPTIONS[1:])
 LIMITS = ("gain_cap", "stop_before", "sample_period")
 #: Parameters of the sliding-mode protocol: what they are by default, and what they are.
 _SLIDING = {
@@ -161,7 +163,15 @@ reading_options = options_of(
         help="What becomes of two rows for one ordered pair.",
     ),
     _switch("--drop-self-loops/--no-drop-self-loops", help="Ignore edges of a node to itself."),
+    _switch("--drop-zeros/--no-drop-zeros", help="Ignore edges of weight 0."),
     _switch("--undirected/--no-undirected", help="Every row counts in both directions."),
+    click.option(
+        "--laplacian/--no-laplacian",
+        default=None,
+        help="The matrix is a signed Laplacian D - W, or none though its diagonal holds the sums.",
+    ),
+    click.option("--columns", metavar="A,B,W", help="Source, target and weight of a table: titles, or numbers from 1."),
+    click.option("--variable", metavar="NAME", help="Which matrix, network or relation of a file with several."),
 )
 #: GRAPH, or SCENARIO.toml, whose other keys become defaults of the options; hence it is read before these.
 graph_argument = click.argument(
@@ -300,18 +310,24 @@ def read(graph: Any, options: Options) -> SignedDigraph:
     from ptcc_certify.graphs.io import read_graph
 
     file = graph_file(graph) if isinstance(graph, str) else graph
-    return read_graph(file, **reading_keywords(options))
+    return read_graph(file, **reading_of(options))
 
 
-def reading_keywords(options: Options) -> dict[str, Any]:
-    """Return what ``read_graph`` is told by the options about reading that are there.
+def reading_of(options: Options) -> dict[str, Any]:
+    """Return how a graph is read, as the keywords of ``read_graph``; what is not among the options is left out.
 
     Examples
     --------
-    >>> reading_keywords({"edges": "listens", "undirected": False, "T": "1"})
+    >>> reading_of({"edges": "listens", "undirected": False, "T": "1"})
     {'orientation': 'listens', 'undirected': False}
     """
     return {"orientation" if name == "edges" else name: options[name] for name in READING if name in options}
+
+
+def reading_words(options: Options) -> list[str]:
+    """Return how a graph is read, as words of the command line."""
+    way = [] if options["edges"] is None else ["--edges", options["edges"]]
+    return way + [word for flag in option_flags(options) for word in flag.split(" ", 1)]
 
 
 def protocol_of(options: Options, disturbed: tuple[str, ...] = ("delta",)) -> Protocol:

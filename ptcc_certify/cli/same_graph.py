@@ -131,7 +131,8 @@ class _Pair:
         if self.kind == "family":
             keywords = keywords_of(self.document["unverified"].get("read"))
         else:
-            keywords = keywords_as(self.files[0], self.document["graph"]["read"])
+            file = self.files[0]
+            keywords = keywords_as(file, self.document["graph"]["read"])
         named = {"edges" if name == "orientation" else name: value for name, value in keywords.items()}
         return {name: value for name, value in named.items() if name in READING}
 

@@ -24,6 +24,7 @@ from ptcc_certify.errors import GraphError, NumberError, gated
 from ptcc_certify.graphs.display_hook import Shown
 from ptcc_certify.graphs.equality import ReadOnly
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, nearest_float, shorten, writable
+from ptcc_certify.graphs.reading import Reading
 from ptcc_certify.graphs.tables import first_five, import_pandas, place_of
 
 if TYPE_CHECKING:
@@ -235,17 +236,24 @@ class SignedDigraph(ReadOnly, Shown):
         nodes: Iterable[Hashable] = (),
         *,
         orientation: str = "information",
+        duplicates: str = "refuse",
+        drop_self_loops: bool = False,
+        drop_zeros: bool = False,
+        undirected: bool = False,
     ) -> SignedDigraph:
         """Build a graph from ``(source, target, weight)`` triples.
 
         Parameters
         ----------
         edges : iterable of (label, label, weight)
-            A weight is an int, Fraction, float (the dyadic number it is) or a text of the exact grammar.
+            A weight is an int, Fraction, float (the dyadic number it is) or a text of the exact grammar. Where all are
+            words for signs (``+``, ``-``, activates, inhibits, ..) these are 1 and -1.
         nodes : iterable of labels, optional
             Further nodes, and the wish for an order: these come first unless all labels are integers.
         orientation : {"information", "listens"}
             ``information``: information flows first -> second. ``listens``: the first listens to the second.
+        duplicates, drop_self_loops, drop_zeros, undirected
+            As in :func:`ptcc_certify.read_graph`.
 
         Raises
         ------
@@ -282,21 +290,28 @@ class SignedDigraph(ReadOnly, Shown):
                 raise GraphError(f"edge {shorten(repr(edge))} is not a triple (source, target, weight){mend}") from None
             heads.append(number(first))
             tails.append(number(second))
-            try:
-                values.append(as_fraction(weight, "weight"))  # type: ignore[arg-type]
-            except NumberError as error:
-                raise GraphError(f"edge {shorten(str(first))} -> {shorten(str(second))}: {error}") from None
-        if orientation == "listens":
-            heads, tails = tails, heads
-        labels, rank = ordered_labels(list(known))
-        source = rank[np.array(heads, dtype=np.int64)]
-        target = rank[np.array(tails, dtype=np.int64)]
-        return cls(labels, source, target, Weights(values), {"orientation": orientation})
+            values.append(weight)
+        how = Reading(
+            orientation=orientation,
+            duplicates=duplicates,
+            drop_self_loops=drop_self_loops,
+            drop_zeros=drop_zeros,
+            undirected=undirected,
+        )
+        return _in_memory(how, list(known), heads, tails, values)
 
     @classmethod
     @gated
     def from_matrix(
-        cls, matrix: Any, labels: Iterable[Hashable] | None = None, *, orientation: str | None = None
+        cls,
+        matrix: Any,
+        labels: Iterable[Hashable] | None = None,
+        *,
+        orientation: str | None = None,
+        duplicates: str = "refuse",
+        drop_self_loops: bool = False,
+        undirected: bool = False,
+        laplacian: bool | None = None,
     ) -> SignedDigraph:
         """Build a graph from an adjacency matrix: its entry (k, l) is read as the row ``k, l, entry`` of an edge list.
 
@@ -310,13 +325,18 @@ class SignedDigraph(ReadOnly, Shown):
         ----------
         matrix : (N, N) array, SciPy sparse matrix or pandas DataFrame
             Integers are exact, floats are the dyadic numbers they are, texts obey the exact grammar: ``"-0.3"`` is
-            -3/10. Entries may be Fractions; the diagonal must be zero. A DataFrame has the same labels on rows and
-            columns, in any order; those of the rows become the nodes.
+            -3/10. Entries may be Fractions; the diagonal is zero, or a Laplacian's. A DataFrame has the same labels on
+            rows and columns, in any order; those of the rows become the nodes.
         labels : iterable of N labels, optional
             ``1 .. N`` by default; none beside those of a DataFrame.
         orientation : {"information", "listens"} or None
             ``information``: information flows from the row to the column. ``listens``: the row listens to the column.
             None is refused: it must be said.
+        laplacian : bool, optional
+            The matrix is a signed Laplacian ``D - W``: a weight is minus the entry. A matrix whose diagonal holds the
+            sums of its rows is refused unless this says what it is.
+        duplicates, drop_self_loops, undirected
+            As in :func:`ptcc_certify.read_graph`; entries of a sparse matrix may be repeated.
 
         Raises
         ------
@@ -367,45 +387,62 @@ class SignedDigraph(ReadOnly, Shown):
         names = [str(label) for label in own]
         if len(names) != shape[0]:
             raise GraphError(f"{len(names)} labels for {shape[0]} rows")
+        weights: Any = values
         if values.dtype.kind == "f":
             if (odd := np.flatnonzero(~np.isfinite(values))).size:
                 place = f"row {shorten(names[row[odd[0]]])}, column {shorten(names[column[odd[0]]])}"
                 raise GraphError(f"{place} of the matrix is {values[odd[0]]}; write 0 where there is no edge")
-            weights = Weights(values.astype(np.float64))
-        else:
-            exact = []
+        elif values.dtype.kind == "O":
             for k, m, value in zip(row.tolist(), column.tolist(), values.tolist(), strict=True):
                 try:
-                    exact.append(as_fraction(value, "the entry"))
+                    as_fraction(value, "the entry")
                 except NumberError as error:
                     place = f"row {shorten(names[k])}, column {shorten(names[m])}"
                     raise GraphError(f"{place} of the matrix: {error}") from None
-            weights = Weights(exact)
-        if orientation == "information":
-            return cls(names, row, column, weights, {"orientation": "information"})
-        return cls(names, column, row, weights, {"orientation": "matrix"})
+            weights = values.tolist()
+        else:
+            weights = values.tolist()
+        how = Reading(
+            orientation=orientation,
+            duplicates=duplicates,
+            drop_self_loops=drop_self_loops,
+            undirected=undirected,
+            laplacian=laplacian,
+        )
+        return _in_memory(how, names, row, column, weights, matrix=True)
 
     @classmethod
     @gated
     def from_networkx(
-        cls, graph: nx.DiGraph, weight: str = "weight", *, orientation: str = "information"
+        cls,
+        graph: nx.DiGraph,
+        weight: str | None = None,
+        *,
+        orientation: str = "information",
+        duplicates: str = "refuse",
+        drop_self_loops: bool = False,
+        drop_zeros: bool = False,
+        undirected: bool = False,
     ) -> SignedDigraph:
         """Build a graph from a networkx ``DiGraph``.
 
         Parameters
         ----------
         graph : networkx.DiGraph
-        weight : str
-            The attribute of edges that holds their weights.
+        weight : str, optional
+            The attribute of edges that holds their weights, and it alone; by default ``weight``, times ``sign`` or
+            ``type`` if these are there and are signs, or one of these.
         orientation : {"information", "listens"}
             ``information``: information flows along an edge ``u -> v``. ``listens``: u listens to v, as in trust and
             rating data.
+        duplicates, drop_self_loops, drop_zeros, undirected
+            As in :func:`ptcc_certify.read_graph`.
 
         Raises
         ------
         GraphError
-            ``graph`` is undirected (say ``graph.to_directed()``), a multigraph, an edge has no weight, or an attribute
-            that makes a family of it.
+            ``graph`` is undirected (say so, or give ``graph.to_directed()``), a multigraph (say what becomes of
+            duplicates), an edge has no weight, or an attribute that makes a family of it.
 
         Examples
         --------
@@ -415,17 +452,29 @@ class SignedDigraph(ReadOnly, Shown):
         >>> SignedDigraph.from_networkx(team).edges, SignedDigraph.from_networkx(team, orientation="listens").edges
         ((('ann', 'bob', Fraction(-2, 1)),), (('bob', 'ann', Fraction(-2, 1)),))
         """
-        refuse_networkx(graph)
-        mend = 'give each edge a signed number, or name the attribute: from_networkx(graph, weight="sign")'
-        triples = []
-        for u, v, data in graph.edges(data=True):
-            if more := OF_EDGES & data.keys():
-                uncertain = f'edge {shorten(str(u))} -> {shorten(str(v))} has the attribute "{min(more)}"'
-                raise GraphError(f"{uncertain}, which makes a family of graphs; ptcc_certify.as_family takes it")
-            if weight not in data:
-                raise GraphError(f'edge {shorten(str(u))} -> {shorten(str(v))} has no attribute "{weight}"; {mend}')
-            triples.append((u, v, data[weight]))
-        return cls.from_edges(triples, graph.nodes, orientation=orientation)
+        refuse_unknown_orientation(orientation)
+        refuse_networkx(graph, undirected=undirected, multigraph=duplicates != "refuse")
+        from ptcc_certify.graphs.io.attributes import values_of_edges
+
+        ends, data = [edge[:2] for edge in graph.edges], [more for *_, more in graph.edges(data=True)]
+        edge = lambda k: f"{shorten(str(ends[k][0]))} -> {shorten(str(ends[k][1]))}"  # noqa: E731
+        values = values_of_edges(data, edge, "", weight)
+        known: dict[str, Hashable] = {}
+        for node in graph:
+            refuse_unnamed(node, "the graph")
+            if known.setdefault(str(node), node) != node:
+                raise GraphError(f"two different nodes are both written {shorten(str(node))}; rename one of them")
+        place = {node: k for k, node in enumerate(graph)}
+        how = Reading(
+            orientation=orientation,
+            duplicates=duplicates,
+            drop_self_loops=drop_self_loops,
+            drop_zeros=drop_zeros,
+            undirected=undirected,
+        )
+        heads, tails = [place[u] for u, _ in ends], [place[v] for _, v in ends]
+        signs = values.sign, values.signs
+        return _in_memory(how, list(known), heads, tails, values.weights, title=values.weight, signs=signs)
 
     # ------------------------------------------------------------------ reading
 
@@ -734,8 +783,8 @@ def ordered_labels(labels: list[str]) -> tuple[list[str], np.ndarray]:
     return [labels[i] for i in order], np.argsort(order)
 
 
-def refuse_networkx(graph: Any) -> None:
-    """Refuse what is no directed networkx graph with one edge at most from node to node.
+def refuse_networkx(graph: Any, undirected: bool = False, multigraph: bool = False) -> None:
+    """Refuse what is no directed networkx graph with one edge at most from node to node, unless others are taken.
 
     Examples
     --------
@@ -746,7 +795,42 @@ def refuse_networkx(graph: Any) -> None:
     """
     if not hasattr(graph, "is_multigraph"):
         raise GraphError(f"a {type(graph).__name__} is no networkx graph; ptcc_certify.as_graph takes other data")
-    if graph.is_multigraph():
-        raise GraphError("the networkx graph is a multigraph; merge parallel edges into one signed edge first")
-    if not graph.is_directed():
-        raise GraphError("the networkx graph is undirected; give graph.to_directed() if both ends listen")
+    if graph.is_multigraph() and not multigraph:
+        mend = 'merge parallel edges into one signed edge first, or give duplicates="sum" or "last"'
+        raise GraphError(f"the networkx graph is a multigraph; {mend}")
+    if not graph.is_directed() and not undirected:
+        mend = "give graph.to_directed(), or undirected=True, if both ends listen"
+        raise GraphError(f"the networkx graph is undirected; {mend}")
+
+
+def _in_memory(
+    how: Reading,
+    labels: list[str],
+    first: Any,
+    second: Any,
+    weights: Any,
+    matrix: bool = False,
+    title: str = "",
+    signs: tuple[str, Sequence[Any]] = ("", ()),
+) -> SignedDigraph:
+    """Build a graph of rows ``first, second, weight`` by the rules for files; ``title`` is that of the weights."""
+    from ptcc_certify.graphs.io.graph_from_rows import Rows, graph_of
+    from ptcc_certify.graphs.io.signs import is_sign
+
+    values, codes = _distinct(weights)
+    rows = Rows(labels, first, second, values, codes, lambda row: "", matrix=matrix)
+    rows.weight_title = title if is_sign(title) else ""
+    rows.sign_title, rows.signs, rows.sign_codes = signs[0], *_distinct(signs[1])
+    return graph_of(rows, "", how)
+
+
+def _distinct(values: Any) -> tuple[Any, Any]:
+    """Return the different values, an array of them if that is given, and which of these each value is."""
+    if isinstance(values, np.ndarray):
+        return values, np.arange(values.size)
+    table: dict[tuple[type, Any], int] = {}
+    try:
+        codes = [table.setdefault((type(value), value), len(table)) for value in values]
+    except TypeError:  # a value that has no hash, which is refused as no number
+        return list(values), np.arange(len(values))
+    return [value for _, value in table], codes

@@ -24,6 +24,45 @@ _SIGNATURES = {
     b"<html": "a page",
     b"PK\x03\x04": "a zip archive",
     b"PK\x05\x06": "a zip archive",
+    b"\xd0\xcf\x11\xe0": "an old Excel workbook",
+    b"RDX2": "R data",
+    b"RDX3": "R data",
+    b"RDA": "R data",
+    b"X\n\0\0\0": "R data",
+    b"\x89HDF": "HDF5",
+    b"PAR1": "Parquet",
+    b"ARROW1": "Feather (Arrow)",
+    b"FEA1": "Feather (Arrow)",
+    **{b"\x80" + bytes([version]): "a pickle" for version in range(2, 6)},
+    b"SQLite format 3": "an SQLite database",
+    b"<stata_dta>": "Stata data",
+    b"$FL2": "SPSS data",
+    b"BZh": "packed by bzip2",
+    b"\xfd7zXZ": "packed by xz",
+    b"\x28\xb5\x2f\xfd": "packed by zstd",
+    b"7z\xbc\xaf": "packed by 7-Zip",
+    b"Rar!": "packed by RAR",
+}
+#: What in a zip archive says what it is.
+_ARCHIVES = {
+    b"xl/": "an Excel workbook",
+    b"word/": "a Word document",
+    b"mimetypeapplication/vnd.oasis": "an OpenDocument file",
+}
+#: What is to be done with what is no graph.
+_MENDS = {
+    **dict.fromkeys(
+        ("an Excel workbook", "an old Excel workbook", "an OpenDocument file"), "save the sheet as CSV UTF-8"
+    ),
+    "a zip archive": "unpack it, or save a spreadsheet as CSV",
+    "R data": "write it with write.csv(edges, FILE, row.names = FALSE)",
+    "HDF5": "save the matrix as .npy or .mtx, in MATLAB with save(FILE, 'W', '-v7')",
+    "Parquet": "in Python as_graph(pandas.read_parquet(FILE)), or save it as CSV",
+    "Feather (Arrow)": "in Python as_graph(pandas.read_feather(FILE)), or save it as CSV",
+    "a pickle": "a pickle may run code, so it is not read; save the graph as GraphML, or the matrix as .npy",
+    "a page": "fetch the file itself, not the page that offers it",
+    **dict.fromkeys(("an SQLite database", "Stata data", "SPSS data"), "save the table as CSV"),
+    **{f"packed by {how}": "unpack it, or pack it with gzip" for how in ("bzip2", "xz", "zstd", "7-Zip", "RAR")},
 }
 #: What graphs are kept in that begins like an archive.
 _PACKED = ("npz",)
@@ -40,7 +79,8 @@ def kind_of(path: str) -> str:
     -------
     str
         "missing", "a folder", "a pipe" (standard input, too), "empty", "a certificate", "a notebook", "JSON", "a PDF",
-        "an image", "a page", "a zip archive", "a scenario", "TOML" of another kind, and "" for all else, as graphs are.
+        "an Excel workbook" and others by their first bytes, "a scenario", "TOML" of another kind, and "" for all else,
+        as graphs are; JSON may be one, too.
 
     Examples
     --------
@@ -81,7 +121,8 @@ def kind_of_content(first: bytes, ending: str) -> str:
     start = first.removeprefix(b"\xef\xbb\xbf").lstrip()
     for signature, kind in _SIGNATURES.items():
         if start[: len(signature)].lower() == signature.lower() and not (kind == "a zip archive" and ending in _PACKED):
-            return kind
+            inside = (what for mark, what in _ARCHIVES.items() if mark in first)
+            return next(inside, kind) if kind == "a zip archive" else kind
     if b"<svg" in start.lower() and start.startswith(b"<?xml"):
         return "an image"
     if start.startswith((b"{", b"[")):
@@ -130,6 +171,7 @@ def refuse_content_as_graph(content: bytes, name: str, ending: str, path: object
 def _refuse_kind_as_graph(kind: str, name: str, path: object) -> None:
     text = os.fspath(path) if isinstance(path, str | os.PathLike) else "FILE"
     word = shell_word(text)
+    mend = "write rows source,target,weight"
     mends = {
         "a folder": f"name a file in it, or all: ptcc batch {shell_word(str(Path(text, '*.csv')))}",
         "a certificate": f"ptcc check {word} checks it, ptcc report {word} -o page.html shows it; in Python "
@@ -137,10 +179,9 @@ def _refuse_kind_as_graph(kind: str, name: str, path: object) -> None:
         "a scenario": f"ptcc certify {word} runs it"
         if text.endswith(".toml")
         else "save it as .toml: ptcc certify FILE.toml runs it",
-        "a zip archive": "unpack it, or save a spreadsheet as CSV",
     }
-    if kind not in ("", PIPE):
-        raise FormatError(f"{name}: is {kind}, not a graph; {mends.get(kind, 'write rows source,target,weight')}")
+    if kind not in ("", PIPE, "JSON"):
+        raise FormatError(f"{name}: is {kind}, not a graph; {(_MENDS | mends).get(kind, mend)}")
 
 
 def refuse_as_certificate(path: str, before_graph: bool = False, content: bytes | None = None) -> None:

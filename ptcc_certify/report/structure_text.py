@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import PurePath
 
-from ptcc_certify.graphs.io.edge_list import BY_HEADER
+from ptcc_certify.graphs.io.table_columns import BY_HEADER
 from ptcc_certify.graphs.structure import ClosedComponent, Structure
 from ptcc_certify.report.text_layout import TEXT, columns, counted, printable, shorten_label, shorten_list, shorten_text
 
@@ -20,6 +20,8 @@ SHORT_ORIENTATION = ORIENTATION | {
     "listens": "row a,b: a listens to b",
 }
 _BY_HEADER = {"information": "information flows source -> target", "listens": "source listens to target"}
+#: How the one remark begins that may be cut: what it tells makes no other graph.
+IGNORED = "columns ignored"
 #: Remarks for the long screen alone: "(0 negative)" tells the one, and the other is about pairs of edges.
 _LONG_REMARKS = _POSITIVE, _ASYMMETRIC = "all weights positive", "sign-asymmetric"
 
@@ -29,7 +31,7 @@ Lines = Iterator[tuple[str, str]]
 
 def graph_entries(structure: Structure, name: str) -> list[tuple[str, str]]:
     """Return the first two lines of every short screen: which graph, and how its rows were read."""
-    return [("graph", _graph_text(structure, name)), ("read", _reading_text(structure))]
+    return [("graph", _graph_text(structure, name)), *_reading_entries(structure)]
 
 
 def _graph_text(structure: Structure, name: str) -> str:
@@ -49,14 +51,22 @@ def _connectivity(structure: Structure) -> str:
     return words.get(structure.connectivity, f"disconnected, {len(structure.components):,} components")
 
 
-def _reading_text(structure: Structure) -> str:
-    """Tell how the rows were read, and what is particular about the graph, as far as it fits."""
+def _reading_entries(structure: Structure) -> list[tuple[str, str]]:
+    """Tell how the rows were read: in full what makes another graph of them, and what else as far as it fits."""
     text = SHORT_ORIENTATION[structure.graph.read["orientation"]]
     remarks = [remark for remark in remarks_on(structure) if remark not in _LONG_REMARKS]
     if BY_HEADER in remarks:
         remarks.remove(BY_HEADER)
         text = f"{BY_HEADER}: {_BY_HEADER[structure.graph.read['orientation']]}"
-    return shorten_text("; ".join([text, *remarks]), TEXT)
+    ignored = [remark for remark in remarks if remark.startswith(IGNORED)]
+    lines = [text]
+    for remark in [remark for remark in remarks if remark not in ignored]:
+        if columns(f"{lines[-1]}; {remark}") <= TEXT:
+            lines[-1] += f"; {remark}"
+        else:
+            lines.append(remark)
+    lines[-1] = shorten_text("; ".join([lines[-1], *ignored]), max(TEXT, columns(lines[-1])))
+    return [("" if number else "read", line) for number, line in enumerate(lines)]
 
 
 def leader_lines(structure: Structure, most: int, width: int = 40) -> Lines:
@@ -119,5 +129,8 @@ def remarks_on(structure: Structure) -> list[str]:
         (not some, "no edges, is this the right file?"),
         (read["duplicates"] != "refused", f"duplicates {read['duplicates']}"),
         (read["self_loops"] != "refused", f"self-loops {read['self_loops']}"),
+        ("zeros" in read, f"weights 0 {read.get('zeros')}"),
+        (read["undirected"], "each row goes both ways"),
+        ("variable" in read, f"variable {shorten_label(str(read.get('variable')))}"),
     )
     return [*(text for holds, text in remarks if holds), *read["notes"]]

@@ -14,8 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ptcc_certify.errors import FormatError, NumberError, ParameterError
-from ptcc_certify.graphs.io.edge_list import column, records
+from ptcc_certify.graphs.io.edge_list import records
 from ptcc_certify.graphs.io.files import Source, name_and_ending, read_bytes
+from ptcc_certify.graphs.io.signs import find
 from ptcc_certify.graphs.rationals import number_within, parse_exact, shorten, whole_number
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS
 from ptcc_certify.lyapunov.family_function import FamilyFunction
@@ -150,7 +151,7 @@ class TableSignal(Signal):
         lines = [(k, [c.strip() for c in row]) for k, row in records(read_bytes(path, name), name) if any(row)]
         first = lines[0][1] if lines else []
         time, clock, mode, level = (
-            column(first, names, name) for names in (("t", "time"), ("clock", "s"), ("mode",), ("level",))
+            find(first, names, name) for names in (("t", "time"), ("clock", "s"), ("mode",), ("level",))
         )
         instant = clock if time is None else time
         if instant is None or mode is None or (time is not None and clock is not None):

@@ -190,7 +190,7 @@ def test_attributes_of_networkx_edges_make_a_family(tmp_path):
             as_family(nx.DiGraph([("a", "b", attributes)]))
     for name, write in (("g.graphml", nx.write_graphml), ("g.gml", lambda g, p: nx.write_gml(g, p, stringizer=str))):
         write(unsure.subgraph("ab"), tmp_path / name)
-        with pytest.raises(FormatError, match="which makes a family; as a CSV file"):
+        with pytest.raises(FormatError, match="which makes a family of graphs; as a CSV file"):
             read_family(tmp_path / name)
 
 

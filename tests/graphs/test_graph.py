@@ -361,7 +361,7 @@ NETWORKX = SignedDigraph.from_networkx
         (EDGES, [("a", "b", "0.0")], "weight 0 of edge a -> b"),
         (EDGES, [("a", "b", float("nan"))], "edge a -> b: weight is nan, not a finite number"),
         (EDGES, [("a", "b", float("inf"))], "not a finite number"),
-        (EDGES, [("a", "b", "x")], 'edge a -> b: "x" is not a number'),
+        (EDGES, [("a", "b", "x")], 'weight "x" of edge a -> b is not a number'),
         (EDGES, [("a", "b", True)], "not a number"),
         (EDGES, [("a", "b", None)], "not a number"),
         (EDGES, [("a", "b", 10**400)], "edge a -> b is outside the range of float64"),

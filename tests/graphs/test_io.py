@@ -103,8 +103,8 @@ def test_columns_beyond_the_third_are_ignored_and_said():
     assert text("a,b,1\n").read["notes"] == ()
     assert text("a,b,1,2026\n").read["notes"] == ("columns ignored: after the third",)
     assert text("a,b,1\nb,a,1,late\n").read["notes"] == ("columns ignored: after the third",)
+    assert text("a,b,1,1289241911.7\n").read["notes"] == ("columns ignored: after the third",)
     assert text("source,time,target,weight\na,9,b,1\n").read["notes"] == ('columns ignored: "time"',)
-    assert text("source,target,weight\na,b,1,9\n").read["notes"] == ("columns ignored: beyond the header",)
 
 
 @pytest.mark.parametrize("rows", ["a,b,-1,5\n", "# trust\na,b,1\nb,a,-0,25\n"])
@@ -598,6 +598,9 @@ def test_repeated_edges_of_graph_formats_are_merged_on_request(put, kind):
     assert ("a", "b", Fraction(1, 4)) in edges(read_graph(path, duplicates="last"))
     assert ("a", "b", Fraction(-1, 4)) in edges(read_graph(path, duplicates="sum"))
     assert ("a", "b", Fraction(3, 4)) in edges(read_graph(path, duplicates="sum", undirected=True))
+    if kind == "net":  # its rows come as they stand in the file
+        assert ("a", "b", Fraction(1)) in edges(read_graph(path, duplicates="last", undirected=True))
+        return
     with pytest.raises(FormatError, match="which of two opposite edges is the last"):
         read_graph(path, duplicates="last", undirected=True)
 
@@ -714,20 +717,19 @@ BAD_FILES = [
     ("g.csv", ROWS + "b,c,nan\n" + ROWS, ["line 11:", '"nan"', "edge b -> c", "not a finite number", "remove the row"]),
     ("g.csv", "a,b,1\n\n# x\nb,c,-inf\n", ["line 4:", '"-inf"', "edge b -> c", "not a finite number"]),
     ("g.csv", "a,b,1\nx\nb,c,Infinity\n", ["line 3:", "not a finite number"]),
-    ("g.csv", "a,b,+\n", ["line 1:", 'weight "+" of edge a -> b is not a number; write 1 or -1']),
-    ("g.csv", "source,target,sign\na,b,positive\n", ["line 2:", 'weight "positive" of edge a -> b', "write 1 or -1"]),
+    ("g.csv", "a,b,+\nb,c,2\n", ["line 1:", 'weight "+" of edge a -> b is not a number; write 1 or -1']),
+    ("g.csv", "source,target,sign\na,b,positive\nb,c,1\n", ["line 2:", 'weight "positive" of edge a -> b', "1 or -1"]),
     (
         "W.csv",
         ",ann,bob,eve\nann,0,1,0\n",
-        ["line 1:", "looks like a matrix with names", "from_matrix(pandas.read_csv"],
+        ["line 1:", "looks like a matrix with names", "rows and columns have different ones"],
     ),
     ("el.txt", "0 1 {'weight': 1}\n", ["line 1:", "edge 0 -> 1 is not a number", "write_weighted_edgelist"]),
     ("g.csv", ",b,1\n", ["line 1:", "the source is empty"]),
     ("g.csv", "a,b,\N{MINUS SIGN}2\n", ["line 1:", "is not a number; write -2"]),
     ("g.csv", "listener,speaker,weight\na,b,1\n", ["line 1:", "names no source and target"]),
-    ("W.txt", "0 -1 0.5\n1/3 0 0\n0 2 0\n", ["looks like a 3 x 3 matrix", ".npy or .mtx"]),
     ("g.csv", "a,b,1\nb,c,strong\n", ["line 2:", 'weight "strong" of edge b -> c is not a number']),
-    ("g.csv", "origin,end,strength\na,b,1\n", ["line 1:", '"strength"', "header", "source, target, weight"]),
+    ("g.csv", "origin,end,strength\na,b,x\n", ["line 1:", '"strength"', "header", "source, target, weight"]),
     ("g.csv", "a;b;1\na;c;0,5\n", ["line 2:", '"0,5"', "point"]),
     ("g.csv", "a,b,1/0\n", ["line 1:", "divides by zero"]),
     ("g.csv", "a,b,1e500\n", ["line 1:", "exponent", "edge a -> b"]),
@@ -761,6 +763,7 @@ BAD_FILES = [
     ),
     ("g.csv", "origin;end;strength\na;b;0,5\n", ["line 1:", "name its columns", "decimals with a point"]),
     ("g.csv", "Rater of;Rated by;weight\na;b;1\nb;c;0,5\n", ["line 1:", "names no source", "decimals with a point"]),
+    ("g.csv", "source,target,weight\na,b,1,9\n", ["line 2:", "4 fields, and the header has 3", "quote"]),
     ("g.csv", 'a,b,1\n"b,c,1\nd,e,1\n', ["line 2:", "quote"]),
     ("g.csv", 'a,b,1\n"b"x,c,1\n', ["line 2:", "quotes"]),
     ("g.csv", 'a,b,1\n"x\ny",c,1\nc,d,nan\n', ["line 4:", '"nan"']),
@@ -847,10 +850,10 @@ BAD_FILES = [
     ("g.net", "*Vertices many\n", ["*Vertices n"]),
     ("g.net", "*Vertices 999999999\n", ["more than"]),
     ("g.net", pajek("*Edges"), ["*Edges", "--undirected"]),
-    ("g.net", pajek() + "*Edges\n2 3 1\n", ["one list, of *Arcs or of *Edges"]),
-    ("g.net", pajek() + "*Arcs :2\n2 3 1\n", ["one list, of *Arcs or of *Edges"]),
-    ("g.net", pajek("*Matrix"), ["one list, of *Arcs or of *Edges"]),
-    ("g.net", pajek("*Arcslist"), ["one list, of *Arcs or of *Edges"]),
+    ("g.net", pajek() + "*Arcs :2\n2 3 1\n", ['several relations ("1", "2")', "--variable"]),
+    ("g.net", pajek() + "*Rows\n2 3 1\n", ["line 9:", '"*Rows"', "lists of *Arcs"]),
+    ("g.net", pajek("*Matrix"), ["line 7:", "not 3 rows of 3 numbers"]),
+    ("g.net", pajek("*Arcslist"), ["line 7:", "1 to 3"]),
     ("g.net", pajek() + "1 3\n", ["edge New York -> c has no weight"]),
     ("g.net", pajek() + "1 3 strong\n", ["edge New York -> c has no weight"]),
     ("g.net", pajek() + "1\n", ['row "1"', "1 to 3"]),
@@ -862,8 +865,6 @@ BAD_FILES = [
     ("g.net", pajek().replace("3 c", "4 c"), ["1 to 3"]),
     ("g.net", pajek().replace("3 c", "1 c"), ["declared twice"]),
     ("g.net", pajek().replace("3 c", "3 2"), ["same label"]),
-    ("g.net", pajek().replace("3 c", "3 O'Brien"), ["apostrophe"]),
-    ("g.net", pajek().replace("3 c", "3 a\\b"), ["backslash"]),
     ("g.net", pajek().replace("York", 'York"'), ["Pajek", "quotation"]),
     ("g.mtx", "", ["line 1:", "%%MatrixMarket"]),
     ("g.mtx", mtx("pattern"), ["line 1:", "pattern"]),

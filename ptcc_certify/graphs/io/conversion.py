@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ptcc_certify.errors import FormatError, GraphError, ParameterError, did_you_mean
-from ptcc_certify.graphs.digraph import WAY, SignedDigraph, in_all, labels_beside, refuse_unnamed
+from ptcc_certify.graphs.digraph import SignedDigraph, labels_beside, refuse_unnamed
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.graphs.io.edge_list import header
-from ptcc_certify.graphs.io.files import name_and_ending
-from ptcc_certify.graphs.io.graph_files import MATRICES, read_graph
+from ptcc_certify.graphs.io.graph_files import read_as
+from ptcc_certify.graphs.io.graph_from_rows import Rows, graph_of
 from ptcc_certify.graphs.io.packaged import GRAPHS, file_or_packaged
+from ptcc_certify.graphs.io.table_columns import BY_HEADER, RATERS, columns_of, edge_columns
 from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.reading import Reading
 from ptcc_certify.graphs.tables import first_five
 
 TAKEN = (
@@ -24,7 +26,7 @@ TAKEN = (
 )
 
 
-def as_graph(graph: Any, orientation: str | None = None) -> SignedDigraph:
+def as_graph(graph: Any, orientation: str | None = None, **reading: Any) -> SignedDigraph:
     """Return the signed digraph that a user holds, in whatever form.
 
     Every function that takes a graph takes all of these.
@@ -40,11 +42,15 @@ def as_graph(graph: Any, orientation: str | None = None) -> SignedDigraph:
         - an adjacency matrix, whose orientation must be said: a NumPy array, a SciPy sparse matrix or array, a list of
           rows, or a DataFrame with the same labels on rows and columns; ``"-0.3"`` is exact, ``-0.3`` a nearby float;
         - a DataFrame of edges with columns ``source``, ``target``, ``weight`` in any order (or the other names of
-          :func:`~ptcc_certify.graphs.io.read_graph`); more columns are ignored, which ``read["notes"]`` says;
+          :func:`~ptcc_certify.graphs.io.read_graph`, or those of ``columns``); a column ``sign`` or ``type`` beside
+          ``weight`` is its factor, others are ignored, which ``read["notes"]`` says;
         - a list of ``(source, target, weight)``.
     orientation : {"information", "listens"}, optional
         Of an edge ``(a, b)``, or of the entry in row a and column b: information flows a -> b, or a listens to b.
         Edges flow by default, for a matrix it must be said.
+    **reading : Any
+        The other keywords of :func:`~ptcc_certify.graphs.io.read_graph` but ``format``, such as ``laplacian=True`` or
+        ``columns="a,b,w"``, as far as they say something about what is given.
 
     Returns
     -------
@@ -65,69 +71,87 @@ def as_graph(graph: Any, orientation: str | None = None) -> SignedDigraph:
     True
     """
     if isinstance(own := graph if isinstance(graph, SignedDigraph) else getattr(graph, "graph", None), SignedDigraph):
-        if orientation is not None:
-            raise ParameterError("a SignedDigraph has its orientation; leave out orientation=")
+        if orientation is not None or reading:
+            given = ", ".join(f"{name}=" for name in (*["orientation"] * (orientation is not None), *reading))
+            raise ParameterError(f"a SignedDigraph has its orientation and its edges; leave out {given}")
         return own
     if isinstance(graph, Family):
         raise GraphError(
             f"{graph!r} is several graphs, and one is asked for; certify, decide and simulate_family take families"
         )
-    way = orientation or "information"
+    how = Reading(orientation=orientation, **reading)
     if isinstance(graph, str) and not os.path.exists(graph) and graph not in GRAPHS and "." not in graph:  # noqa: PTH110
         names = f"({', '.join(GRAPHS)}); check the path{did_you_mean(graph, GRAPHS)}"
         raise FormatError(f"{shorten(graph)}: no such file, and no packaged graph {names}")
     if isinstance(graph, str | os.PathLike) or hasattr(graph, "read"):
-        name, ending = name_and_ending(graph)  # type: ignore[arg-type]
-        if orientation is None and ending in MATRICES:
-            raise GraphError(f"{name}: a matrix {WAY}")
-        return read_graph(file_or_packaged(graph) if isinstance(graph, str) else graph, orientation=orientation)  # type: ignore[arg-type]
+        file = file_or_packaged(graph) if isinstance(graph, str) else graph
+        return read_as(file, how, ask=True)  # type: ignore[arg-type]
+    way = orientation or "information"
     if hasattr(graph, "is_multigraph"):
-        return SignedDigraph.from_networkx(graph, orientation=way)
-    if (edges := _edges_of_table(graph)) is not None:
-        rows, notes = edges
-        built = SignedDigraph.from_edges(rows, orientation=way)
-        built.read["notes"] = notes
-        return built
+        weight = how.titles[2] if how.titles else None
+        return SignedDigraph.from_networkx(graph, weight, orientation=way, **_only(how, reading, _OF_EDGES, "columns"))
+    if (table := _rows_of_table(graph, how)) is not None:
+        return graph_of(table, "", how)
     if hasattr(graph, "columns") or hasattr(graph, "tocoo") or isinstance(graph, np.ndarray):
         _refuse_edge_array(graph)
-        return SignedDigraph.from_matrix(graph, orientation=orientation)
+        return SignedDigraph.from_matrix(graph, orientation=orientation, **_only(how, reading, _OF_MATRICES))
     if isinstance(graph, dict | set | frozenset | bytes | bytearray) or not isinstance(graph, Iterable):
         raise GraphError(f"{shorten(repr(graph))} is not read as a graph; give {TAKEN}")
     rows = list(graph)
     if rows and all(isinstance(row, list) and row and all(isinstance(edge, tuple) for edge in row) for row in rows):
         raise GraphError('a list of edge lists is no graph; of a family give a dict, {"day": edges, "night": edges2}')
-    if _rows_of_matrix(rows):
-        return SignedDigraph.from_matrix(rows, orientation=orientation)
-    return SignedDigraph.from_edges(rows, orientation=way)
+    if _rows_of_matrix(rows, how.laplacian is not None):
+        return SignedDigraph.from_matrix(rows, orientation=orientation, **_only(how, reading, _OF_MATRICES))
+    return SignedDigraph.from_edges(rows, orientation=way, **_only(how, reading, _OF_EDGES))
 
 
-def _edges_of_table(table: Any) -> tuple[list[tuple[Any, Any, Any]], tuple[str, ...]] | None:
-    """Return edges and notes of a DataFrame with the columns of an edge list; None of anything else."""
+#: What may be said of edges, and of a matrix, that are in memory.
+_OF_EDGES = ("duplicates", "drop_self_loops", "drop_zeros", "undirected")
+_OF_MATRICES = ("duplicates", "drop_self_loops", "undirected", "laplacian")
+
+
+def _only(how: Reading, given: Iterable[str], names: tuple[str, ...], read: str = "") -> dict[str, Any]:
+    """Return the options of these names; refuse any other that is given, but for one that was read."""
+    if rest := [name for name in given if name not in (*names, read)]:
+        raise ParameterError(f"{rest[0]}: says nothing about a graph in memory of this kind; leave {rest[0]} out")
+    return {name: getattr(how, name) for name in names}
+
+
+def _rows_of_table(table: Any, how: Reading) -> Rows | None:
+    """Return the rows of a DataFrame with the columns of an edge list; None of anything else."""
     if not hasattr(table, "columns") or not hasattr(table, "to_numpy"):
         return None
     names = [str(name) for name in table.columns]
     if set(labels_beside(table) or ()) == set(names):
         return None  # an adjacency matrix
-    if (columns := header(names, "the DataFrame")) is None:
+    if not how.titles and edge_columns(names, "the DataFrame") is None:
         raise GraphError(
-            f"a DataFrame with the columns {first_five(names)} is no graph; name them source, target, weight, or "
-            "give an adjacency matrix with the same labels on rows and columns"
+            f"a DataFrame with the columns {first_five(names)} is no graph; name them source, target, weight, tell "
+            'them: columns="a,b,w", or give an adjacency matrix with the same labels on rows and columns'
         )
-    parts = [list(table[table.columns[i]]) for i in columns]
-    for what, column in zip(("source", "target"), parts, strict=False):
-        for row, label in enumerate(column, 1):
-            refuse_unnamed(label, f"row {row}, {what} of the DataFrame")
-    _refuse_self_loops(parts[0], parts[1], names[columns[0]], names[columns[1]])
-    ignored = [f'"{shorten(name)}"' for i, name in enumerate(names) if i not in columns]
-    notes = ("columns ignored: " + ", ".join(ignored[:20]),) if ignored else ()
-    return list(zip(*parts, strict=True)), notes
-
-
-def _refuse_self_loops(sources: list[Any], targets: list[Any], first: str, second: str) -> None:
-    loops = [str(a) for a, b in zip(sources, targets, strict=True) if str(a) == str(b)]
-    if loops:
-        mend = f'remove {"them" if len(loops) > 1 else "it"}: df[df["{shorten(first)}"] != df["{shorten(second)}"]]'
-        raise GraphError(f"self-loop at node {shorten(loops[0])}{in_all(len(loops))}; {mend}")
+    how.refuse("variable", "the DataFrame", "a table of edges")
+    columns = columns_of(names, [], "the DataFrame", how)
+    if not columns.titles:
+        columns = replace(columns, titles=tuple(names))
+    ends, known = [], dict[str, tuple[int, Any]]()
+    for what, k in (("source", columns.source), ("target", columns.target)):
+        ends.append(list(table[table.columns[k]]))
+        for row, node in enumerate(ends[-1], 1):
+            refuse_unnamed(node, f"row {row}, {what} of the DataFrame")
+    for node in (node for pair in zip(*ends, strict=True) for node in pair):
+        if known.setdefault(str(node), (len(known), node))[1] != node:
+            raise GraphError(f"two different nodes are both written {shorten(str(node))}; rename one of them")
+    first, second = ([known[str(node)][0] for node in end] for end in ends)
+    weights = list(table[table.columns[columns.weight]])
+    rows = Rows([*known], first, second, weights, range(len(weights)), lambda row: "")
+    rows.weight_title = columns.codes
+    if columns.sign is not None:
+        rows.signs = list(table[table.columns[columns.sign]])
+        rows.sign_codes, rows.sign_title = range(len(rows.signs)), names[columns.sign]
+    ignored = [f'"{shorten(title)}"' for title in columns.ignored]
+    rows.notes = tuple(note for note in columns.notes if note not in (BY_HEADER, RATERS))
+    rows.notes += ("columns ignored: " + ", ".join(ignored[:20]),) if ignored else ()
+    return rows
 
 
 def _refuse_edge_array(array: Any) -> None:
@@ -138,15 +162,15 @@ def _refuse_edge_array(array: Any) -> None:
         )
 
 
-def _rows_of_matrix(rows: list[Any]) -> bool:
+def _rows_of_matrix(rows: list[Any], told: bool) -> bool:
     """Tell a list of rows of a matrix from a list of edges: edges are tuples, or hold texts, or are not square."""
     if not rows or not all(isinstance(row, list | np.ndarray) and len(row) == len(rows) for row in rows):
         return False
-    if len(rows) != 3 or all(row[k] in (0, "0") for k, row in enumerate(rows)):  # 0 is no weight of an edge
+    if told or len(rows) != 3 or all(row[k] in (0, "0") for k, row in enumerate(rows)):  # 0 is no weight of an edge
         return True
     if any(isinstance(entry, str) for row in rows for entry in row[:2]):
         return False
     raise GraphError(
         "three lists of three numbers may be edges or a matrix; write edges as tuples (source, target, weight), "
-        "and a matrix with zeros on its diagonal"
+        "and a matrix with zeros on its diagonal, or with laplacian=True"
     )

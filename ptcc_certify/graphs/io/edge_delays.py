@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from itertools import chain, islice
 
 from ptcc_certify.errors import FormatError, NumberError
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.graphs.io.edge_list import column, edge_columns, records
+from ptcc_certify.graphs.io.edge_list import records
 from ptcc_certify.graphs.io.files import Source, name_and_ending, read_bytes
+from ptcc_certify.graphs.io.signs import find
+from ptcc_certify.graphs.io.table_columns import columns_of
 from ptcc_certify.graphs.rationals import parse_exact, shorten
+from ptcc_certify.graphs.reading import Reading
 
 
 def read_delays(path: Source, graph: SignedDigraph, title: str = "delay") -> dict[tuple[str, str], Fraction]:
@@ -41,16 +45,18 @@ def read_delays(path: Source, graph: SignedDigraph, title: str = "delay") -> dic
     """
     name, _ = name_and_ending(path)
     rows = records(read_bytes(path, name), name)
-    number, fields = next(((number, row) for number, row in rows if len(row) > 1), (1, []))
+    begin = list(islice((row for row in rows if len(row[1]) > 1), 20))
+    number, fields = begin[0] if begin else (1, [])
     place, titles = f"{name}, line {number}", [field.strip() for field in fields]
-    ends = edge_columns(titles, place)
-    at = None if ends is None else column(titles, [title.lower()], place)
-    if ends is None or at is None:
+    told = columns_of(titles, [row for _, row in begin[1:]], place, Reading(columns=graph.read.get("columns")))
+    at = find(told.titles, [title.lower()], place)
+    if at is None:
         raise FormatError(f'{place}: no column "{shorten(title)}"; begin with a header source,target,weight,{title}')
-    first, second = ends[:2] if graph.read["orientation"] != "listens" else (ends[1], ends[0])
+    ends = told.source, told.target
+    first, second = ends if graph.read["orientation"] != "listens" else ends[::-1]
     delays: dict[tuple[str, str], Fraction] = {}
     known: dict[str, Fraction] = {}  # many edges, few delays
-    for number, row in rows:
+    for number, row in chain(begin[1:], rows):
         if len([field for field in row if field.strip()]) < 2:
             continue
         place, text = f"{name}, line {number}", row[at].strip() if at < len(row) else ""

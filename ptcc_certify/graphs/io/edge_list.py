@@ -4,27 +4,28 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import suppress
-from itertools import chain
+from collections.abc import Iterable, Iterator
+from fractions import Fraction
+from itertools import chain, islice
 
 import numpy as np
 
 from ptcc_certify.errors import FormatError, NumberError
-from ptcc_certify.graphs.digraph import OF_EDGES, SignedDigraph, ordered_labels
+from ptcc_certify.graphs.digraph import SignedDigraph, ordered_labels
 from ptcc_certify.graphs.io.files import lines_of
 from ptcc_certify.graphs.io.graph_from_rows import DECIMALS, HEADER_MEND, Numbers, Rows
+from ptcc_certify.graphs.io.signs import WEIGHT, plain, sign_of_word
+from ptcc_certify.graphs.io.table_columns import Columns, columns_of
+from ptcc_certify.graphs.io.text_matrices import bracketed_matrix, is_entry, table_as_matrix
 from ptcc_certify.graphs.rationals import parse_exact, shorten
+from ptcc_certify.graphs.reading import Reading
 from ptcc_certify.graphs.size_limits import MAX_LINE
 
 _SEPARATORS = ("\t", ",", ";", None)  # None: blanks
-_SOURCE = ("source", "from", "fromnodeid", "fromnode", "fromid", "sourcenode", "sourceid", "src", "rater")
-_TARGET = ("target", "to", "tonodeid", "tonode", "toid", "targetnode", "targetid", "dst", "rated", "ratee")
-_WEIGHT = ("weight", "sign", "rating", "value", "w")
-#: The note of a file whose header puts source and target elsewhere than source first.
-BY_HEADER = "columns by header"
-#: The note of a file whose raters were read as those who are heard.
-RATERS = "raters listen? --edges listens"
+#: Rows that are looked at before columns are told; different fields after the third that are; where signs are first.
+_LOOKED_AT, _EXTRA, _SIGN_AT = 20, 10**5, {"first": "2,3,1", "second": "1,3,2"}
+#: From this number on a number after the third column is taken for a year or a time.
+_TIMES = 1900
 
 
 def records(data: bytes, name: str) -> Iterator[tuple[int, list[str]]]:
@@ -81,104 +82,180 @@ def _other_separator(line: str) -> bool:
     return re.fullmatch(r"[^\t,;]+([\t,;])[^\t,;]+\1\s*[+-]?\d[\d.,/eE+-]*\s*", line) is not None
 
 
-def column(row: Sequence[str], names: Sequence[str], place: str) -> int | None:
-    """Return the column that bears the first of ``names`` that occurs, whatever its case, blanks and hyphens."""
-    titles = [_plain(field) for field in row]
-    for name in names:
-        if titles.count(_plain(name)) > 1:
-            raise FormatError(f'{place}: two columns are named "{name}"; rename one')
-        if _plain(name) in titles:
-            return titles.index(_plain(name))
-    return None
-
-
-def _plain(title: str) -> str:
-    """Return a title in small letters, without what may stand between its words."""
-    return re.sub(r"[\s_-]", "", title.lower())
-
-
-def edge_columns(row: Sequence[str], place: str) -> tuple[int, int, int | None] | None:
-    """Return the columns of source, target and, if it is named, weight; None if a row names no source and target."""
-    source, target = column(row, _SOURCE, place), column(row, _TARGET, place)
-    return None if source is None or target is None else (source, target, column(row, _WEIGHT, place))
-
-
-def header(row: Sequence[str], place: str) -> tuple[int, int, int] | None:
-    """Return the columns of source, target and weight if a row is a header, else None.
-
-    Examples
-    --------
-    >>> header(["weight", "from", "to"], "a.csv, line 1"), header(["a", "b", "1"], "a.csv, line 1")
-    ((1, 2, 0), None)
-    """
-    if (columns := edge_columns(row, place)) is None:
-        return None
-    if column(row, sorted(OF_EDGES), place) is not None:
-        mend = "ptcc classify, certify, simulate and plot take it, and ptcc_certify.read_family"
-        raise FormatError(f"{place}: uncertain weights or optional edges, which make a family of graphs; {mend}")
-    source, target, weight = columns
-    if weight is not None:
-        return source, target, weight
-    try:
-        parse_exact("".join(row[2:3]))
-    except NumberError:
-        raise FormatError(f"{place}: the header names no weight; name one column weight, sign or rating") from None
-    return None
-
-
-def read_edge_list(data: bytes, name: str) -> Rows:
-    """Read an edge list; a row with one field declares a node."""
+def read_edge_list(data: bytes, name: str, how: Reading) -> Rows:
+    """Read an edge list, where a row with one field declares a node, or a matrix as text."""
     if data.startswith(b"%%MatrixMarket"):
         raise FormatError(f'{name}, line 1: a Matrix Market file; name it .mtx or pass the format "mtx"')
-    nodes, weights = Numbers(), Numbers()
-    first, second, codes, numbers = [], [], [], []
-    ignored: dict[str, None] = {}
-    started, named, raters = 0, False, False
-    width, (s, t, w) = 3, (0, 1, 2)
-    for number, row in records(data, name):
-        if not started and len(row) > 1:
-            started = number
-            if columns := header([field.strip() for field in row], f"{name}, line {number}"):
-                named, width, (s, t, w) = True, len(row), columns
-                raters = row[s].strip().lower() == "rater"
-                ignored = {f'"{shorten(field.strip())}"': None for i, field in enumerate(row) if i not in columns}
-                continue
-            if "".join(row[2:3]).strip().lower() in _WEIGHT:
-                titles = ", ".join(shorten(field.strip()) for field in row[:3])
-                mend = "name the column of who is heard source, that of who listens target"
-                mend += DECIMALS * (re.search(rb"[;\t]\s*[+-]?\d+,\d+\s*$", data, re.MULTILINE) is not None)
-                raise FormatError(f"{name}, line {number}: the header {titles} names no source and target; {mend}")
-        if len(row) > width and any(map(str.strip, row[width:])):
-            ignored["beyond the header" if named else "after the third"] = None
-        try:
-            source, target, code = nodes[row[s]], nodes[row[t]], weights[row[w]]
-        except LookupError:
-            mend = HEADER_MEND if number == started else ""
-            if label := _declared([field.strip() for field in row], (s, t, w), f"{name}, line {number}", mend):
-                _ = nodes[label]
-            continue
-        first.append(source)
-        second.append(target)
-        codes.append(code)
-        numbers.append(number)
-    notes = (BY_HEADER,) * (s > 0) + (RATERS,) * raters
-    notes += ("columns ignored: " + ", ".join(list(ignored)[:20]),) if ignored else ()
-    if not named and ignored:
-        _refuse_decimal_commas(data, name)
-    if not named and len(numbers) > 2:
-        _refuse_matrix(data, len(numbers), name)
-    rows = Rows(list(nodes.texts), first, second, list(weights.texts), codes, lambda row: f"line {numbers[row]}")
-    rows.headerless, rows.notes = not named, notes
+    how.refuse("variable", name, "a table of edges")
+    if not how.titles and (matrix := bracketed_matrix(data, name)) is not None:
+        return matrix
+    undirected = direction_of_comments(data, name)
+    numbered = records(data, name)
+    begin = list(islice(numbered, _LOOKED_AT))
+    table = [row for _, row in begin if len(row) > 1]
+    if table and not how.titles and len(table[0]) >= len(table) - 1:  # of a matrix, all rows are needed
+        begin += islice(numbered, len(table[0]) + 2)
+        table = [row for _, row in begin if len(row) > 1]
+        declares = any(len(row) == 1 and row[0].strip() for _, row in begin)
+        if not declares and (matrix := table_as_matrix(table, name)) is not None:
+            return matrix
+    started = next((number for number, row in begin if len(row) > 1), 0)
+    columns = columns_of(table[0], table[1:], f"{name}, line {started}", how) if table else Columns()
+    if columns.titles:
+        begin = [row for row in begin if row[0] != started]
+    elif table:
+        _refuse_titles(table[0], f"{name}, line {started}", data)
+    draft = _EdgeList(name, columns, started)
+    draft.read(chain(begin, numbered))
+    rows = draft.rows()
+    if not columns.titles and not columns.told:
+        _refuse_ambiguous(draft, rows, data)
+    rows.undirected = undirected
     return rows
 
 
-def _refuse_matrix(data: bytes, n: int, name: str) -> None:
-    """Refuse n rows of n numbers with zeros on the diagonal: as edges, the third would have weight 0."""
-    with suppress(NumberError):
-        rows = (row for _, row in records(data, name) if row[1:])
-        if all(len(row) == n and [*map(parse_exact, row)][k] == 0 for k, row in enumerate(rows)):
-            mend = "save it as .npy or .mtx, or write rows source,target,weight"
-            raise FormatError(f"{name}: looks like a {n} x {n} matrix, not like a table of edges; {mend}")
+def direction_of_comments(data: bytes, name: str) -> str:
+    """Return what comments before the first row say of undirected edges, as KONECT and SNAP do; "" if nothing."""
+    for line in data[:2000].decode("utf-8", "replace").removeprefix("\ufeff").splitlines():
+        if line.strip()[:1] not in "#%":
+            break
+        if konect := re.match(r"%\s*(sym|asym|bip)\b", line):
+            if konect[1] == "bip":
+                mend = "give the nodes of each its own names, such as u1 and v1, and leave out this line"
+                raise FormatError(f"{name}, line 1: % bip: two sets of nodes share their numbers; {mend}")
+            return "% sym" if konect[1] == "sym" else ""
+        if re.match(r"#\s*undirected graph\b", line, re.IGNORECASE):
+            return "# Undirected graph"
+    return ""
+
+
+class _EdgeList:
+    """The rows of a table, as they come."""
+
+    def __init__(self, name: str, columns: Columns, started: int):
+        self.name, self.columns, self.started = name, columns, started
+        self.nodes, self.weights, self.signs = Numbers(), Numbers(), Numbers()
+        self.first, self.second, self.codes = list[int](), list[int](), list[int]()
+        self.sign_codes, self.numbers = list[int](), list[int]()
+        self.extra: dict[str, int] = {}  # fields after the third of a table without header, and the line of each
+
+    def read(self, rows: Iterable[tuple[int, list[str]]]) -> None:
+        """Read all rows but for a header."""
+        columns, nodes, weights, signs = self.columns, self.nodes, self.weights, self.signs
+        first, second, codes, numbers = self.first, self.second, self.codes, self.numbers
+        s, t, w, sign = columns.source, columns.target, columns.weight, columns.sign
+        width = len(columns.titles) or (10**9 if columns.told else 3)
+        for number, row in rows:
+            if len(row) > width and any(map(str.strip, row[width:])):
+                self.more_fields(number, row, width)
+            try:
+                source, target, code = nodes[row[s]], nodes[row[t]], weights[row[w]]
+                if sign is not None:
+                    self.sign_codes.append(signs[row[sign]])
+            except LookupError:
+                self.no_edge(number, [field.strip() for field in row])
+                continue
+            first.append(source)
+            second.append(target)
+            codes.append(code)
+            numbers.append(number)
+
+    def more_fields(self, number: int, row: list[str], width: int) -> None:
+        """Refuse fields beyond a header; keep those after the third of a table without."""
+        if self.columns.titles:
+            what = f"{len(row)} fields, and the header has {width}"
+            raise FormatError(f"{self.name}, line {number}: {what}; quote fields that hold the separator")
+        if len(self.extra) < _EXTRA:
+            for field in row[width:]:
+                self.extra.setdefault(field.strip(), number)
+
+    def no_edge(self, number: int, row: list[str]) -> None:
+        """Declare the node of a row without an edge, or refuse the row."""
+        columns, place = self.columns, f"{self.name}, line {number}"
+        ends = (columns.source, columns.target, columns.weight)
+        if columns.sign is not None and all(k < len(row) and row[k] for k in ends):
+            title = shorten(columns.titles[columns.sign])
+            raise FormatError(
+                f'{place}: edge {shorten(row[ends[0]])} -> {shorten(row[ends[1]])} has no "{title}"; add one'
+            )
+        mend = HEADER_MEND if number == self.started else ""
+        if label := _declared(row, ends, place, mend):
+            _ = self.nodes[label]
+
+    def rows(self) -> Rows:
+        """Return what was read; refuse titles that are nodes, too."""
+        columns, numbers = self.columns, self.numbers
+        where = lambda row: f"line {numbers[row]}"  # noqa: E731
+        rows = Rows(list(self.nodes.texts), self.first, self.second, list(self.weights.texts), self.codes, where)
+        ignored = [f'"{shorten(title)}"' for title in columns.ignored] or ["after the third"] * bool(self.extra)
+        rows.headerless, rows.notes, rows.asks = not columns.titles, columns.notes, columns.asks
+        rows.notes += ("columns ignored: " + ", ".join(ignored[:20]),) if ignored else ()
+        rows.weight_title = columns.codes
+        if columns.sign is not None:
+            rows.signs, rows.sign_codes, rows.sign_title = (
+                list(self.signs.texts),
+                self.sign_codes,
+                columns.titles[columns.sign],
+            )
+        ends = [columns.titles[k] for k in (columns.source, columns.target)] if columns.guessed else []
+        if again := [title for title in ends if title in self.nodes.texts]:
+            what = f"{shorten(again[0])} is a title, and a node in another row"
+            raise FormatError(f"{self.name}, line {self.started}: {what}; name the columns source, target, weight")
+        return rows
+
+
+def _refuse_titles(row: list[str], place: str, data: bytes) -> None:
+    """Refuse a first row that names a weight, but no source and target."""
+    if plain("".join(row[2:3])) in (*WEIGHT, "sign"):
+        titles = ", ".join(shorten(field.strip()) for field in row[:3])
+        mend = "name the column of who is heard source, that of who listens target"
+        mend += DECIMALS * (re.search(rb"[;\t]\s*[+-]?\d+,\d+\s*$", data, re.MULTILINE) is not None)
+        raise FormatError(f"{place}: the header {titles} names no source and target; {mend}")
+
+
+def _refuse_ambiguous(draft: _EdgeList, rows: Rows, data: bytes) -> None:
+    """Refuse a table without header whose rows may be something else than ``source,target,weight``."""
+    name, labels, weights = draft.name, draft.nodes.texts, draft.weights.texts
+    tell = "begin with a header source,target,weight, or tell the columns: --columns 1,2,3"
+    if draft.extra:
+        _refuse_decimal_commas(data, name)
+        least = max(Fraction(_TIMES), *(10 * _size(text) for text in (*weights, *labels)))
+    for field, line in draft.extra.items():
+        if field and (field in labels or sign_of_word(field) is not None or not _is_time(field, least)):
+            what = f'a weight, and "{shorten(field)}" in another column: neighbours, a sign or the weight?'
+            raise FormatError(f"{name}, line {line}: {what} If there are edges, {tell}")
+    for ends, which in ((draft.first, "first"), (draft.second, "second")):
+        signs = all(_is_sign(rows.labels[k]) for k in ends) and {rows.labels[k] for k in ends}
+        if signs and signs != {"1"}:
+            what = f"the {which} column holds signs: name a file of interactions .sif"
+            raise FormatError(f"{name}: {what}, or tell the columns, such as --columns {_SIGN_AT[which]}")
+    if odd := [label for label in labels if not label.isdigit() and is_entry(label) and sign_of_word(label) is None]:
+        what = f"a node called {shorten(odd[0])}: a matrix, or edges?"
+        raise FormatError(f"{name}: {what} Save a matrix as .npy or .mtx; of edges, {tell}")
+    nodes = len(weights) > 1 and all(text.isdigit() and text in labels for text in weights)
+    alone = nodes and len(set(draft.first)) == len(draft.first) > 2
+    if alone and all(rows.labels[t] != rows.weights[w] for t, w in zip(draft.second, draft.codes, strict=True)):
+        raise FormatError(f"{name}: a list of neighbours, or edges with weights that are nodes? Of edges, {tell}")
+
+
+def _is_sign(label: str) -> bool:
+    return label in ("1", "-1") or sign_of_word(label) is not None
+
+
+def _size(text: str) -> Fraction:
+    """Return the size of a number, 0 of another text."""
+    try:
+        return abs(parse_exact(text))
+    except NumberError:
+        return Fraction(0)
+
+
+def _is_time(text: str, least: Fraction) -> bool:
+    """Tell whether a text is a year or a time, which is larger than nodes and weights, or no number at all."""
+    try:
+        return parse_exact(text) >= least
+    except NumberError:
+        return not is_entry(text)
 
 
 def _refuse_decimal_commas(data: bytes, name: str) -> None:
@@ -199,9 +276,6 @@ def _declared(row: list[str], columns: tuple[int, int, int], place: str, mend: s
     if source and target:
         edge = f"{shorten(source)} -> {shorten(target)}"
         raise FormatError(f"{place}: edge {edge} has no weight; add one in a third column{mend}")
-    if mend and not row[0] and all(row[1:]) and not re.fullmatch(r"[+-]?[\d./eE+-]+", row[-1]):
-        read = 'SignedDigraph.from_matrix(pandas.read_csv(FILE, index_col=0), orientation="listens")'
-        raise FormatError(f"{place}: looks like a matrix with names; write rows of edges, or in Python {read}")
     if target or weight or not source:
         raise FormatError(f"{place}: the {'target' if source else 'source'} is empty; name a node or remove the row")
     return source

@@ -11,9 +11,9 @@ from ptcc_certify.errors import GraphError, NumberError, ParameterError
 from ptcc_certify.graphs.digraph import OF_EDGES, SignedDigraph, refuse_networkx
 from ptcc_certify.graphs.family import Family, read_share
 from ptcc_certify.graphs.io.conversion import as_graph
-from ptcc_certify.graphs.io.edge_list import edge_columns
 from ptcc_certify.graphs.io.family_files import interval_columns, is_family_file, read_family, refuse_outside, truth
 from ptcc_certify.graphs.io.packaged import GRAPHS, file_or_packaged
+from ptcc_certify.graphs.io.table_columns import edge_columns
 from ptcc_certify.graphs.rationals import as_fraction, shorten
 
 #: Of weights in intervals.

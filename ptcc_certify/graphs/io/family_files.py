@@ -13,10 +13,13 @@ from lmi.exact.decimal_rounding import near
 from ptcc_certify.errors import FormatError, GraphError, NumberError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family, Mode, read_share
-from ptcc_certify.graphs.io.edge_list import column, edge_columns, records
+from ptcc_certify.graphs.io.edge_list import direction_of_comments, records
 from ptcc_certify.graphs.io.files import Source, name_and_ending
-from ptcc_certify.graphs.io.graph_files import MATRICES, graph_bytes, is_edge_list, read_graph
+from ptcc_certify.graphs.io.graph_files import MATRICES, format_of, graph_bytes, is_edge_list, read_graph
+from ptcc_certify.graphs.io.signs import find, is_sign, sign_of_word, weight_and_sign
+from ptcc_certify.graphs.io.table_columns import edge_columns
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, parse_exact, shorten
+from ptcc_certify.graphs.reading import Reading, option_flags
 
 _LEAST = ("weight_min", "min_weight", "w_min", "least", "min", "lower")
 _LARGEST = ("weight_max", "max_weight", "w_max", "largest", "max", "upper")
@@ -26,7 +29,11 @@ _KEYWORDS: dict[str, Any] = {
     "orientation": (str, type(None)),
     "duplicates": str,
     "drop_self_loops": bool,
+    "drop_zeros": bool,
     "undirected": bool,
+    "laplacian": (bool, type(None)),
+    "columns": (str, type(None)),
+    "variable": (str, type(None)),
     "uncertainty": str,
     "optional": list,
 }
@@ -99,7 +106,7 @@ def read_family(
         while name in named:  # no mode may take the place of another
             name, again = f"{stem} ({again})", again + 1
         if rows is not None:
-            if options.get("duplicates", "refuse") != "refuse" or options.get("drop_self_loops"):
+            if any(value != getattr(Reading, option) for option, value in options.items()):
                 raise ParameterError("rows with intervals are neither merged nor dropped; mend them in the file")
             nodes, edges = rows
             off = set(wanted) & {pair for edge in edges for pair in _both(edge[:2], undirected)}
@@ -160,10 +167,7 @@ def family_flags(read: Mapping[str, Any], path: str = "") -> str:
     way = read.get("orientation")
     matrix = way is None and name_and_ending(path)[1] in MATRICES
     words = ["a matrix" if matrix else f"--edges {way or 'information'}"]
-    merged = read.get("duplicates", "refuse")
-    words += [f"--duplicates {merged}"] * (merged != "refuse")
-    words += ["--drop-self-loops"] * bool(read.get("drop_self_loops"))
-    words += ["--undirected"] * bool(read.get("undirected"))
+    words += option_flags(read)
     if (share := read.get("uncertainty", "0")) not in ("0", 0):
         words.append(f"--uncertainty {percent(share)}")
     return " ".join(words + [f"--optional {','.join(pair)}" for pair in read.get("optional", ())])
@@ -202,6 +206,8 @@ def is_family_file(path: Source) -> bool:
     data = graph_bytes(path, name, ending)
     if hasattr(path, "seek"):
         path.seek(0)
+    if not is_edge_list(format_of(data, ending)):
+        return False
     rows = ([field.strip() for field in row] for _, row in records(data, name))
     first = next((row for row in rows if len(row) > 1), [])
     return edge_columns(first, name) is not None and interval_columns(first, name) != (None, None, None)
@@ -220,7 +226,7 @@ def interval_columns(first: Sequence[str], place: str) -> tuple[int | None, int 
     >>> interval_columns(["source", "target", "weight_min", "weight_max"], "a.csv")
     (2, 3, None)
     """
-    low, high, may_fail = (column(first, names, place) for names in (_LEAST, _LARGEST, _OPTIONAL))
+    low, high, may_fail = (find(first, names, place) for names in (_LEAST, _LARGEST, _OPTIONAL))
     if (low is None) != (high is None):
         raise FormatError(f"{place}: the header names one end of the intervals; name weight_min and weight_max")
     return low, high, may_fail
@@ -279,6 +285,8 @@ def _interval_rows(
     data = graph_bytes(path, name, ending)
     if hasattr(path, "seek"):
         path.seek(0)
+    if not is_edge_list(format_of(data, ending)):
+        return None
     lines = [(number, [field.strip() for field in row]) for number, row in records(data, name) if any(row)]
     first = next((row for _, row in lines if len(row) > 1), [])
     if (ends := edge_columns(first, name)) is None:
@@ -288,14 +296,22 @@ def _interval_rows(
         return None
     if low is None and ends[2] is None:
         raise FormatError(f"{name}: the header names no weight; name a column weight, or weight_min and weight_max")
+    _refuse_other_readings(first, low is not None, data, name, undirected)
     if low is not None and share:
         raise FormatError(f"{name}: gives intervals itself; leave out the uncertainty, or write those of all files")
     if orientation != "information":
         ends = ends[1], ends[0], ends[2]
     nodes: dict[str, None] = {}
     rows: dict[tuple[str, str], tuple[int, Row]] = {}
-    for number, row in lines[1 + next(k for k, (_, fields) in enumerate(lines) if fields == first) :]:
+    body = lines[1 + next(k for k, (_, fields) in enumerate(lines) if fields == first) :]
+    if low is None:
+        body = _with_numbers(body, weight_and_sign(first, name)[0])
+    for number, row in body:
         where = f"{name}, line {number}"
+        if len(row) > len(first) and any(row[len(first) :]):
+            raise FormatError(
+                f"{where}: {len(row)} fields, and the header has {len(first)}; quote fields with separators"
+            )
         if len([*filter(None, row)]) == 1:
             nodes[row[0] or row[-1]] = None
             continue
@@ -310,6 +326,26 @@ def _interval_rows(
     if not nodes:
         raise FormatError(f"{name}: no edge and no node below the header; give rows")
     return list(nodes), [row for _, row in rows.values()]
+
+
+def _refuse_other_readings(first: Sequence[str], intervals: bool, data: bytes, name: str, undirected: bool) -> None:
+    """Refuse a column of signs beside weights or intervals, and comments that say of undirected edges."""
+    weight, sign = weight_and_sign(first, name)
+    beside = sign if sign is not None or not intervals else weight
+    if beside is not None and is_sign(first[beside]):
+        mend = "write the sign into the weights or both ends of the intervals, and leave the column out"
+        raise FormatError(f'{name}: a column "{shorten(first[beside])}" beside the weights; {mend}')
+    if (said := direction_of_comments(data, name)) and not undirected:
+        raise FormatError(f"{name}: {said} means undirected edges; let each go both ways with --undirected")
+
+
+def _with_numbers(body: list[tuple[int, list[str]]], weight: int | None) -> list[tuple[int, list[str]]]:
+    """Return rows with 1 and -1 in the place of words for signs, where their weights are nothing else."""
+    rows = [row for _, row in body if weight is not None and weight < len(row) and row[weight]]
+    if weight is not None and rows and all(sign_of_word(row[weight]) for row in rows):
+        for row in rows:
+            row[weight] = str(sign_of_word(row[weight]))
+    return body
 
 
 def _text(edge: Sequence[Any]) -> str:

@@ -4,24 +4,48 @@ from __future__ import annotations
 
 import gzip
 import os
-from collections.abc import Iterable, Mapping
+import re
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 from ptcc_certify.errors import FormatError, GraphError, ParameterError
-from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.graphs.io.edge_list import RATERS, edge_list, read_edge_list
+from ptcc_certify.graphs.digraph import WAY, SignedDigraph
+from ptcc_certify.graphs.io.edge_list import edge_list, read_edge_list
 from ptcc_certify.graphs.io.files import Source, name_and_ending, read_bytes, refuse_no_path, write_atomically
-from ptcc_certify.graphs.io.graph_from_rows import graph_of
+from ptcc_certify.graphs.io.graph_from_rows import Rows, graph_of
+from ptcc_certify.graphs.io.json_graphs import read_json
 from ptcc_certify.graphs.io.matrix_files import read_mat, read_mtx, read_npy, read_npz
-from ptcc_certify.graphs.io.networkx_formats import read_gml, read_graphml, read_pajek
+from ptcc_certify.graphs.io.networkx_formats import read_gexf, read_gml, read_graphml
+from ptcc_certify.graphs.io.pajek import read_pajek
+from ptcc_certify.graphs.io.sif import read_sif
+from ptcc_certify.graphs.io.table_columns import RATERS
+from ptcc_certify.graphs.io.ucinet import read_dl
 from ptcc_certify.graphs.kinds_of_file import refuse_content_as_graph
 from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.reading import Reading, option_flags, options_of_record
 
 MATRICES = {"mtx": read_mtx, "npz": read_npz, "npy": read_npy, "mat": read_mat}
-_GRAPHS = {"graphml": read_graphml, "gml": read_gml, "net": read_pajek, "pajek": read_pajek}
+_GRAPHS = {
+    "graphml": read_graphml,
+    "gml": read_gml,
+    "gexf": read_gexf,
+    "json": read_json,
+    **dict.fromkeys(("net", "paj", "pajek"), read_pajek),
+    "dl": read_dl,
+    "sif": read_sif,
+}
 #: Endings of files that are no edge lists.
 OTHER_FORMATS = (*_GRAPHS, *MATRICES)
 _READERS = dict.fromkeys(("csv", "tsv", "txt", "edges", "edgelist"), read_edge_list) | _GRAPHS | MATRICES
+#: How files of some formats begin, which other endings may hide.
+_BEGINNINGS = {
+    rb"<\?xml[^>]*>\s*(<!--.*?-->\s*)*<graphml\b|<graphml\b": "graphml",
+    rb"<\?xml[^>]*>\s*(<!--.*?-->\s*)*<gexf\b|<gexf\b": "gexf",
+    rb"\*(vertices|network)\s": "pajek",
+    rb"dl\s+n(m|r|c)?\s*=": "dl",
+    rb"(creator\b[^\n]*\n\s*)?graph\s*\[": "gml",
+    rb"\{": "json",
+}
 
 
 def read_graph(
@@ -30,7 +54,11 @@ def read_graph(
     orientation: str | None = None,
     duplicates: Literal["refuse", "sum", "last"] = "refuse",
     drop_self_loops: bool = False,
+    drop_zeros: bool = False,
     undirected: bool = False,
+    laplacian: bool | None = None,
+    columns: str | Sequence[str] | None = None,
+    variable: str | None = None,
     format: str | None = None,
 ) -> SignedDigraph:
     r"""Read a signed digraph from a file.
@@ -38,10 +66,15 @@ def read_graph(
     An **edge list** has one edge ``source,target,weight`` per line. Commas, tabs, semicolons or blanks separate the
     fields, whichever the first row uses; ``#`` and ``%`` begin comment lines; fields may be quoted; a row with one
     field declares a node. A first row of known names (source, from, src, fromnodeid; target, to, dst, tonodeid;
-    weight, sign, rating, value, w) is a header, and columns are then found by name. Columns beyond the three are
-    ignored, which ``graph.read["notes"]`` says. **GraphML, GML and Pajek** edges need an attribute ``weight``
-    (or ``sign``), in Pajek the third column. A **matrix** (Matrix Market, ``.npz``, ``.npy``, ``.mat``) has
-    listeners as rows unless ``orientation`` says otherwise: entry (k, l) is what k makes of l.
+    weight, sign, rating, value, w) is a header, and columns are then found by name; so is a first row such as
+    ``Gene1,Gene2,Type`` above numbers or signs. Words for signs (``+``, ``-``, activates, inhibits, ..) are 1 and -1
+    where a column holds nothing else; a column ``sign`` or ``type`` beside ``weight`` is its factor. Columns that are
+    not read are told by ``graph.read["notes"]``. A table may be a **matrix**, plain, with labels, or in brackets.
+
+    **GraphML, GML, GEXF, node-link JSON** edges need an attribute ``weight`` (or ``sign``, or both), **Pajek** and
+    **UCINET DL** a third column; **SIF** has rows ``a activates b c``. A **matrix** (Matrix Market, ``.npz``, ``.npy``,
+    ``.mat``, ``.dl``, text) has listeners as rows unless ``orientation`` says otherwise: entry (k, l) is what k makes
+    of l. What may be one thing or another is refused with what would tell it.
 
     Weights are exact. In an edge list ``0.1``, ``1/3`` and ``0x1p-2`` are the numbers that they say. GraphML, GML,
     Pajek and Matrix Market go through float64, and a float is then the shortest decimal that names it: ``0.1`` is
@@ -58,17 +91,27 @@ def read_graph(
         of networkx needs ``"information"``.
     duplicates : {"refuse", "sum", "last"}
         What becomes of two rows for the same ordered pair.
-    drop_self_loops, undirected : bool
-        Drop self-loops instead of refusing them. Let each edge go both ways; a file that says itself that it is
-        undirected is refused without this.
+    drop_self_loops, drop_zeros, undirected : bool
+        Drop self-loops, or edges of weight 0, instead of refusing them. Let each edge go both ways; a file that says
+        itself that it is undirected is refused without this.
+    laplacian : bool, optional
+        The matrix is a signed Laplacian ``D - W``, whose weights are minus its entries. A matrix whose diagonal holds
+        the sums of its rows is refused unless this says what it is.
+    columns : str or sequence of str, optional
+        Source, target and weight of a table, by title or number from 1, as ``"from,to,score"``; of nodes and edges with
+        attributes the last counts.
+    variable : str, optional
+        Which of several matrices, networks or relations.
     format : str, optional
-        One of the endings csv, tsv, txt, edges, edgelist, graphml, gml, net, pajek, mtx, npz, npy, mat.
+        One of the endings csv, tsv, txt, edges, edgelist, graphml, gml, gexf, json, net, paj, pajek, dl, sif, mtx, npz,
+        npy, mat. Otherwise the ending of the name tells it, or the first bytes.
 
     Returns
     -------
     SignedDigraph
         ``graph.read`` tells how the file was read: ``orientation`` ("matrix" for one whose rows listen), ``duplicates``
-        ("refused", "sum" or "last"), ``self_loops`` ("refused" or "dropped N"), ``undirected`` and ``notes``.
+        ("refused", "sum" or "last"), ``self_loops`` ("refused" or "dropped N"), ``undirected`` and ``notes``;
+        ``zeros``, ``laplacian``, ``columns`` and ``variable`` where these were asked for.
 
     Raises
     ------
@@ -88,16 +131,63 @@ def read_graph(
         ...
     ptcc_certify.errors.FormatError: input, line 1: weight "nan" of edge a -> b is not a finite number; ...
     """
+    how = Reading(
+        orientation=orientation,
+        duplicates=duplicates,
+        drop_self_loops=drop_self_loops,
+        drop_zeros=drop_zeros,
+        undirected=undirected,
+        laplacian=laplacian,
+        columns=columns,
+        variable=variable,
+    )
+    return read_as(path, how, format)
+
+
+def read_as(path: Source, how: Reading, format: str | None = None, ask: bool = False) -> SignedDigraph:
+    """Read a file; ``ask`` for the direction of a matrix that is not told.
+
+    Examples
+    --------
+    >>> read_as(StringIO("a,b,1"), Reading(orientation="listens")).edges[0]
+    ('b', 'a', Fraction(1, 1))
+    """
+    rows, name = _rows(path, how, format)
+    return _graph(rows, name, how, ask)
+
+
+def _graph(rows: Rows, name: str, how: Reading, ask: bool = False) -> SignedDigraph:
+    if ask and rows.matrix and how.orientation is None:
+        raise GraphError(f"{name}: a matrix {WAY}")
+    if how.orientation is not None:
+        rows.notes = tuple(note for note in rows.notes if note != RATERS)
+    return graph_of(rows, name, how)
+
+
+def _rows(path: Source, how: Reading, format: str | None = None) -> tuple[Rows, str]:
+    """Return what a file says, and its name."""
     name, ending = name_and_ending(path)
     ending = ending if format is None else str(format).lower().lstrip(".")
-    _refuse_unknown("orientation", orientation or "information", ("information", "listens"))
-    _refuse_unknown("duplicates", duplicates, ("refuse", "sum", "last"))
-    _refuse_unknown("format", ending if format else "csv", _READERS)
-    rows = _READERS.get(ending, read_edge_list)(graph_bytes(path, name, ending), name)
-    way = "matrix" if ending in MATRICES and orientation != "information" else orientation or "information"
-    if way != "information":
-        rows.notes = tuple(note for note in rows.notes if note != RATERS)
-    return graph_of(rows, name, way, duplicates, bool(drop_self_loops), bool(undirected))
+    if format and ending not in _READERS:
+        raise ParameterError(f'format "{shorten(ending)}" is unknown; use one of {", ".join(_READERS)}')
+    data = graph_bytes(path, name, ending)
+    ending = ending if format else format_of(data, ending)
+    return _READERS.get(ending, read_edge_list)(data, name, how), name
+
+
+def format_of(data: bytes, ending: str) -> str:
+    """Return the format of a file: what its ending says, or its first bytes where that says an edge list.
+
+    Examples
+    --------
+    >>> format_of(b"<graphml>", "txt"), format_of(b"a,b,1", "csv")
+    ('graphml', 'csv')
+    """
+    begin = data[:4096].removeprefix(b"\xef\xbb\xbf").lstrip()
+    for pattern, kind in _BEGINNINGS.items():
+        if is_edge_list(ending) and re.match(pattern, begin, re.IGNORECASE | re.DOTALL):
+            return kind
+    return ending
 
 
 def graph_bytes(path: Source, name: str, ending: str) -> bytes:
@@ -124,50 +214,25 @@ def is_edge_list(ending: str) -> bool:
     return _READERS.get(ending, read_edge_list) is read_edge_list
 
 
-def read_graph_as(path: Source, read: Mapping[str, Any], **options: Any) -> SignedDigraph:
-    """Read a file as another graph was read; see :func:`read_graph`.
-
-    Parameters
-    ----------
-    path : str, Path or file object
-    read : mapping
-        ``graph.read`` of the other graph, or of its certificate.
-    **options : keywords of :func:`read_graph`
-        Count in place of what ``read`` says.
-
-    Returns
-    -------
-    SignedDigraph
-
-    Raises
-    ------
-    FormatError, ParameterError
-        See :func:`read_graph`.
-
-    Examples
-    --------
-    >>> graph = read_graph(StringIO("a,b,1"), orientation="listens")
-    >>> read_graph_as(StringIO("a,b,1"), graph.read) == graph
-    True
-    """
-    return read_graph(path, **keywords_as(path, read) | options)
-
-
 def keywords_as(path: Source, read: Mapping[str, Any]) -> dict[str, Any]:
     """Return the keywords with which :func:`read_graph` reads a file as another graph was read.
 
+    Parameters
+    ----------
+    path : Source
+        Asked only whether it holds a matrix, which has another direction by default.
+    read : mapping
+        ``graph.read`` of that graph.
+
     Examples
     --------
-    >>> keywords_as("g.csv", read_graph(StringIO("a,b,1"), orientation="listens").read)
-    {'orientation': 'listens', 'duplicates': 'refuse', 'drop_self_loops': False, 'undirected': False}
+    >>> how = keywords_as(StringIO("a,b,1"), read_graph(StringIO("a,b,1"), orientation="listens").read)
+    >>> how["orientation"], how["duplicates"]
+    ('listens', 'refuse')
     """
-    turned = "information" if name_and_ending(path)[1] in MATRICES else "listens"  # each kind has its own default
-    return {
-        "orientation": turned if read["orientation"] == turned else None,
-        "duplicates": {"refused": "refuse"}.get(read["duplicates"], read["duplicates"]),
-        "drop_self_loops": read["self_loops"] != "refused",
-        "undirected": read["undirected"],
-    }
+    asked = options_of_record(read)
+    turned = "information" if _rows(path, Reading(**asked))[0].matrix else "listens"
+    return {"orientation": turned if read["orientation"] == turned else None, **asked}
 
 
 def reading_flags(read: Mapping[str, Any]) -> str:
@@ -188,15 +253,7 @@ def reading_flags(read: Mapping[str, Any]) -> str:
     '--edges listens --duplicates sum'
     """
     words = ["a matrix" if read["orientation"] == "matrix" else f"--edges {read['orientation']}"]
-    words += [f"--duplicates {read['duplicates']}"] * (read["duplicates"] != "refused")
-    words += ["--drop-self-loops"] * (read["self_loops"] != "refused")
-    words += ["--undirected"] * bool(read["undirected"])
-    return " ".join(words)
-
-
-def _refuse_unknown(option: str, value: str, choices: Iterable[str]) -> None:
-    if value not in choices:
-        raise ParameterError(f'{option} "{shorten(str(value))}" is unknown; use one of {", ".join(choices)}')
+    return " ".join(words + option_flags(options_of_record(read)))
 
 
 def write_graph(graph: SignedDigraph, path: str | os.PathLike[str]) -> None:

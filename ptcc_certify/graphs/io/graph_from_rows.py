@@ -1,4 +1,4 @@
-"""The rows of a file, whatever its format, and the rules that turn them into a graph or refuse them."""
+"""The rows of a graph, whatever its format, and the rules that turn them into a graph or refuse them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -19,31 +19,40 @@ from ptcc_certify.graphs.digraph import (
     in_all,
     ordered_labels,
 )
-from ptcc_certify.graphs.rationals import MINUS, nearest_float, parse_exact, shorten
+from ptcc_certify.graphs.io.laplacian import Diagonal, diagonal_of, fits_one_node
+from ptcc_certify.graphs.io.signs import DIRECTIONS, NO_SIGN, sign_of_word
+from ptcc_certify.graphs.rationals import MINUS, as_fraction, nearest_float, parse_exact, shorten
+from ptcc_certify.graphs.reading import Reading
 
 #: What the first row of a table without a header may be.
 HEADER_MEND = "; if this row is a header, name its columns source, target, weight"
 #: What is said at once of a table with such a row and decimal commas.
 DECIMALS = "; write decimals with a point, too"
-
-#: What stands for a sign in some tables.
-WORDS_OF_SIGN = ("+", "-", MINUS, "positive", "negative", "pos", "neg", "plus", "minus")
+#: Whole weights from 0 to this, and no other, look like codes.
+_LARGEST_CODE = 9
 
 
 @dataclass
 class Rows:
-    """What a file says, before any rule is applied: ``labels[first[r]], labels[second[r]], weights[codes[r]]``."""
+    """What a source says, before any rule is applied: ``labels[first[r]], labels[second[r]], weights[codes[r]]``."""
 
     labels: list[str]
     first: Sequence[int] | np.ndarray
     second: Sequence[int] | np.ndarray
-    weights: Sequence[str] | np.ndarray  # distinct: texts of the exact grammar, or an array of integers or floats
+    weights: Sequence[Any] | np.ndarray  # distinct: texts of the exact grammar, or numbers, or an array of numbers
     codes: Sequence[int] | np.ndarray
     where: Callable[[int], str]  # "line 14" of row 13; "" where the format does not tell
     undirected: str = ""  # what in the file says that its edges have no direction
     in_order: bool = True  # do the rows come as they stand in the file?
     headerless: bool = False
+    matrix: bool = False  # entries of a matrix, whose rows listen unless it is said that they inform
     notes: tuple[str, ...] = ()
+    signs: Sequence[Any] = ()  # distinct signs beside the weights, of the column ``sign_title``
+    sign_codes: Sequence[int] | np.ndarray = ()
+    sign_title: str = ""
+    weight_title: str = ""  # of a column whose numbers are codes of relations, unless they are 1 and -1
+    asks: str = ""  # why the direction must be told
+    columns: bool = True  # may columns, or the attribute of weights, be told?
 
 
 class Numbers(dict[str, int]):
@@ -58,49 +67,76 @@ class Numbers(dict[str, int]):
         return self.setdefault(text, self.texts.setdefault(stripped, len(self.texts)))
 
 
-def graph_of(
-    rows: Rows, name: str, orientation: str, duplicates: str, drop_self_loops: bool, undirected: bool
-) -> SignedDigraph:
-    """Build the graph, or refuse the first row that breaks a rule; see :func:`ptcc_certify.graphs.io.read_graph`."""
-    if not rows.labels:
+def graph_of(rows: Rows, name: str, how: Reading) -> SignedDigraph:
+    """Build the graph, or tell all rules that it breaks; see :func:`ptcc_certify.graphs.io.read_graph`.
+
+    Parameters
+    ----------
+    rows : Rows
+    name : str
+        Of the file; "" of data in memory, where mends are parameters instead of flags.
+    how : Reading
+    """
+    if name and not rows.labels:
         raise FormatError(f"{name}: no edge and no node in this file; give rows source,target,weight")
-    if len(set(rows.labels)) < len(rows.labels):
+    if name and len(set(rows.labels)) < len(rows.labels):
         label = Counter(rows.labels).most_common(1)[0][0]
         raise FormatError(f'{name}: two nodes have the label "{shorten(label)}"; rename one')
-    if rows.undirected and not undirected:
-        raise FormatError(f"{name}: {rows.undirected} means undirected edges; let each go both ways with --undirected")
-    draft = _Draft(rows, name, listens=orientation != "information")
-    loops = draft.drop_self_loops(drop_self_loops)
-    draft.refuse_zeros("weight 0")
-    notes = draft.merge_duplicates(duplicates, undirected)
+    if rows.asks and how.orientation is None:
+        raise FormatError(f"{name}, {rows.asks}")
+    draft = _Draft(rows, name, how)
+    draft.multiply_signs()
+    draft.read_laplacian()
+    loops = draft.drop(draft.source == draft.target)
+    if not how.drop_self_loops and loops.size:
+        draft.tell_self_loops(loops)
+    zeros = draft.drop(draft.zero())
+    if not how.drop_zeros and zeros.size:
+        draft.tell_zeros(zeros, "weight 0")
+    if draft.undirected and not how.undirected:
+        text = f"{draft.undirected} means undirected edges"
+        draft.problems.append(_Problem(None, text, "let each go both ways with {}", "undirected"))
+    notes = draft.merge_duplicates()
+    draft.refuse_problems()
     source, target, codes = draft.source, draft.target, draft.codes
-    if undirected:
+    if how.undirected:
         source, target, codes = np.append(source, target), np.append(target, source), np.append(codes, codes)
     labels, rank = ordered_labels(rows.labels)
-    read = {
-        "orientation": orientation,
-        "duplicates": "refused" if duplicates == "refuse" else duplicates,
-        "self_loops": f"dropped {loops}" if drop_self_loops else "refused",
-        "undirected": undirected,
-        "notes": rows.notes + notes,
-    }
+    read = how.record(rows.matrix, loops.size, zeros.size + draft.cancelled)
+    read["notes"] = (*draft.notes, *rows.notes, *notes)
     try:
         return SignedDigraph(labels, rank[source], rank[target], Weights(draft.values, codes), read)
     except GraphError as error:
+        if not name:
+            raise
         raise FormatError(f"{name}: {error}") from None
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """A rule that rows break: the first row, what it says, how it is mended, and the option that mends it."""
+
+    row: int | None
+    text: str
+    mend: str  # {} stands for the option
+    option: str
 
 
 class _Draft:
     """The edges that remain, as arrays; edge ``e`` stood in row ``row[e]`` and has the weight ``values[codes[e]]``."""
 
-    def __init__(self, rows: Rows, name: str, listens: bool):
-        self.rows, self.name = rows, name
+    def __init__(self, rows: Rows, name: str, how: Reading):
+        self.rows, self.name, self.how = rows, name, how
+        self.notes: tuple[str, ...] = ()
+        self.problems: list[_Problem] = []
+        self.cancelled, self.undirected = 0, rows.undirected
         first, second = np.asarray(rows.first, dtype=np.int64), np.asarray(rows.second, dtype=np.int64)
-        self.source, self.target = (second, first) if listens else (first, second)
+        self.listens = how.orientation == "listens" or (rows.matrix and how.orientation is None)
+        self.source, self.target = (second, first) if self.listens else (first, second)
         self.row, self.codes = np.arange(first.size), np.array(rows.codes, dtype=np.int64)
         self.values: list[Fraction] | np.ndarray
         if not isinstance(rows.weights, np.ndarray):
-            self.values = [self.parsed(text, code) for code, text in enumerate(rows.weights)]
+            self.values = self.read_weights(rows.weights)
         elif rows.weights.dtype.kind == "f":  # a float is the dyadic number that it is
             self.values = rows.weights.astype(np.float64)
             if (odd := np.flatnonzero(~np.isfinite(self.values)[self.codes])).size:
@@ -113,56 +149,222 @@ class _Draft:
         self.source, self.target = self.source[which], self.target[which]
         self.codes, self.row = self.codes[which], self.row[which]
 
+    def drop(self, which: np.ndarray) -> np.ndarray:
+        """Leave out edges; return their rows."""
+        rows = self.row[which]
+        if rows.size:
+            self.keep(~which)
+        return rows
+
+    def zero(self) -> np.ndarray:
+        """Tell which edges have weight 0."""
+        zero = self.values == 0 if isinstance(self.values, np.ndarray) else [not value for value in self.values]
+        return np.array(zero, dtype=bool)[self.codes]
+
     def edge(self, edge: int) -> str:
         labels = self.rows.labels
         return f"{shorten(labels[self.source[edge]])} -> {shorten(labels[self.target[edge]])}"
 
-    def refuse(self, edge: int, message: str) -> NoReturn:
-        where = self.rows.where(int(self.row[edge]))
-        raise FormatError(f"{self.name}{where and ', '}{where}: {message}")
+    def edge_of_row(self, row: int) -> str:
+        ends = int(self.rows.first[row]), int(self.rows.second[row])
+        source, target = ends[::-1] if self.listens else ends
+        return f"{shorten(self.rows.labels[source])} -> {shorten(self.rows.labels[target])}"
 
-    def parsed(self, text: str, code: int) -> Fraction:
+    def option(self, text: str) -> str:
+        """Write an option as a flag, or as a parameter of data in memory."""
+        name, _, value = text.partition(" ")
+        if self.name:
+            return f"--{name.replace('_', '-')} {value}".strip()
+        return f"{name}=" + (" or ".join(f'"{word}"' for word in value.split("|")) if value else "True")
+
+    def place(self, row: int | None) -> str:
+        where = "" if row is None else self.rows.where(row)
+        return ", ".join(filter(None, (self.name, where)))
+
+    def fail(self, place: str, message: str) -> NoReturn:
+        if not self.name:
+            raise GraphError(message)
+        raise FormatError(f"{place}: {message}")
+
+    def refuse(self, edge: int, message: str) -> NoReturn:
+        self.fail(self.place(int(self.row[edge])), message)
+
+    def refuse_problems(self) -> None:
+        """Refuse all that rows break in one message, with the options that mend it."""
+        if len(self.problems) == 1:
+            (one,) = self.problems
+            self.fail(self.place(one.row), f"{one.text}; {one.mend.format(self.option(one.option))}")
+        if self.problems:
+            places = ["" if one.row is None else self.rows.where(one.row) for one in self.problems]
+            texts = [
+                f"{place}: {one.text}" if place else one.text for place, one in zip(places, self.problems, strict=True)
+            ]
+            options = (" " if self.name else ", ").join(self.option(one.option) for one in self.problems)
+            self.fail(self.name, f"{'; '.join(texts)}; mend these, or read it with {options}")
+
+    # ------------------------------------------------------------------ weights and signs
+
+    def read_weights(self, weights: Sequence[Any]) -> list[Fraction]:
+        """Read all weights exactly; where they are words for signs and nothing else, as 1 and -1."""
+        if not any(isinstance(weight, str) for weight in weights):
+            values = [self.parsed(weight, code) for code, weight in enumerate(weights)]
+        else:
+            words = [sign_of_word(weight) if isinstance(weight, str) else None for weight in weights]
+            if None not in words:
+                self.notes += ("signs read from words",) if any(len(text) > 1 for text in weights) else ()
+                return [Fraction(word) for word in words if word is not None]
+            order = sorted(range(len(weights)), key=lambda code: words[code] is not None)
+            by_code = {code: self.parsed(weights[code], code) for code in order}  # what is neither is told first
+            values = [by_code[code] for code in range(len(weights))]
+        if (title := self.rows.weight_title) and (odd := _codes(values, title)) is not None:
+            what = f'column "{shorten(title)}" holds {odd}: codes of relations, or weights?'
+            self.refuse(int(np.argmax(self.codes == values.index(odd))), f"{what}; {self.columns_mend()}")
+        return values
+
+    def columns_mend(self) -> str:
+        if not self.name:
+            return "write 1 and -1, or name the weight: weight=, of a table columns="
+        tell = ", or name the columns of source, target and weight: --columns a,b,w"
+        return f"write 1 and -1{tell if self.rows.columns else ''}"
+
+    def parsed(self, weight: Any, code: int) -> Fraction:
         """Read a weight exactly, or name the first edge that has it."""
-        quoted = f'"{shorten(text)}"'
+        quoted = f'"{shorten(str(weight))}"'
         try:
-            value = parse_exact(text)
+            if isinstance(weight, Fraction):
+                return weight  # the graph itself refuses one that no float64 is near
+            value = parse_exact(weight) if isinstance(weight, str) else as_fraction(weight, "weight")
             if not value or SMALLEST_WEIGHT <= abs(nearest_float(value)) <= LARGEST_WEIGHT:
                 return value
             message, mend = " is outside the range of float64", "rescale the weights"
         except NumberError as error:
+            if not isinstance(weight, str):
+                edge = int(np.argmax(self.codes == code))
+                self.refuse(edge, f"edge {self.edge(edge)}: {error}")
             message = str(error).removeprefix(quoted) if str(error).startswith(quoted) else f": {error}"
-            mend = "remove the row or give a weight"
-            if "," in text:
-                mend = "write decimals with a point"
-            elif text.lower() in WORDS_OF_SIGN:
-                mend = "write 1 or -1"
-            elif text.startswith("{"):
-                mend = "write the file with networkx.write_weighted_edgelist"
-            elif MINUS in text:
-                mend = f"write {text.replace(MINUS, '-')[:40]}"
-            elif code == 0 and self.rows.headerless and "finite" not in message:
-                mend += HEADER_MEND + DECIMALS * any("," in other for other in self.rows.weights[1:])
+            mend = self.mend_of_text(weight, message, code)
         edge = int(np.argmax(self.codes == code))
         return self.refuse(edge, f"weight {quoted} of edge {self.edge(edge)}{message}; {mend}")
 
-    def drop_self_loops(self, allowed: bool) -> int:
-        loops = np.flatnonzero(self.source == self.target)
-        if loops.size and not allowed:
-            which = f"{shorten(self.rows.labels[self.source[loops[0]]])}{in_all(loops.size)}"
-            mend = "remove these rows" if loops.size > 1 and self.rows.where(0).startswith("line") else "remove it"
-            self.refuse(loops[0], f"self-loop at node {which}; {mend}, or drop all with --drop-self-loops")
-        self.keep(self.source != self.target)
-        return int(loops.size)
+    def mend_of_text(self, text: str, message: str, code: int) -> str:
+        """Tell how a text is mended that is no number."""
+        if "," in text:
+            return "write decimals with a point"
+        if sign_of_word(text) is not None:
+            return "write 1 or -1, as in the other rows"
+        if text.startswith("{"):
+            return "write the file with networkx.write_weighted_edgelist"
+        if MINUS in text:
+            return f"write {text.replace(MINUS, '-')[:40]}"
+        if "finite" in message or not message.endswith("not a number"):
+            return "remove the row or give a weight"
+        mend = "give one, or a word for a sign such as + - activates inhibits"
+        if code == 0 and self.rows.headerless:
+            mend += HEADER_MEND + DECIMALS * any("," in other for other in self.rows.weights[1:])
+        return mend
 
-    def refuse_zeros(self, what: str) -> None:
-        edges = np.flatnonzero(np.array([not value for value in self.values], dtype=bool)[self.codes])
-        if edges.size:
-            named = ", ".join(self.edge(edge) for edge in edges[:5].tolist())
-            which = f"{what} of edge {named}{in_all(edges.size)}"
-            self.refuse(edges[0], f"{which}: neither ally nor opponent; remove it or give a weight")
+    def multiply_signs(self) -> None:
+        """Multiply weights that tell sizes by the signs beside them; refuse signs that say something else."""
+        rows, title = self.rows, shorten(self.rows.sign_title)
+        texts = [str(sign).strip() for sign in rows.signs]
+        if not texts:
+            return
+        directions = [DIRECTIONS.get(text.lower()) for text in texts]
+        if None not in directions:
+            if len(set(directions)) > 1:
+                self.fail(self.name, f'column "{title}" holds directed and undirected edges; write both as two rows')
+            self.undirected = self.undirected or (f'column "{title}"' if directions[0] else "")
+            return
+        factors = [self.factor(text, code, title) for code, text in enumerate(texts)]
+        if (odd := _codes([*map(Fraction, factors)], rows.sign_title)) is not None:
+            what = f'column "{title}" holds {", ".join(map(str, sorted(factors)))} and no -1: signs?'
+            self.refuse(
+                int(np.argmax(np.asarray(rows.sign_codes) == factors.index(int(odd)))), f"{what}; {self.columns_mend()}"
+            )
+        pairs, which = np.unique(self.codes * len(texts) + np.asarray(rows.sign_codes), return_inverse=True)
+        both = [(Fraction(self.values[p // len(texts)]), factors[p % len(texts)]) for p in pairs.tolist()]
+        if any(weight < 0 for weight, _ in both):
+            for k, (weight, factor) in enumerate(both):
+                if weight * factor <= 0:
+                    edge = int(np.argmax(which == k))
+                    what = f'weight {weight} of edge {self.edge(edge)} and {factor} in column "{title}" disagree'
+                    self.refuse(edge, f"{what}; {self.columns_mend()}")
+        self.values, self.codes = [abs(weight) * factor for weight, factor in both], which.astype(np.int64)
+        self.notes += (f'weights times column "{title}"',)
 
-    def merge_duplicates(self, duplicates: str, undirected: bool) -> tuple[str, ...]:
-        """Refuse or merge the rows of one pair (of one unordered pair, if edges go both ways); note how many."""
+    def factor(self, text: str, code: int, title: str) -> int:
+        """Return the sign that a text stands for, or 0; refuse any other."""
+        if (word := sign_of_word(text)) is not None:
+            return word
+        try:
+            if (number := parse_exact(text)) in (-1, 0, 1):
+                return int(number)
+            what = f"is neither 1 nor -1: a code of a relation; {self.columns_mend()}"
+        except NumberError:
+            what = f"{NO_SIGN}; {self.columns_mend()}"
+        edge = int(np.argmax(np.asarray(self.rows.sign_codes) == code))
+        return self.refuse(edge, f'"{shorten(text)}" of edge {self.edge(edge)} in column "{title}" {what}')
+
+    # ------------------------------------------------------------------ rules
+
+    def read_laplacian(self) -> None:
+        """Read the weights of a Laplacian, if it is told to be one; refuse what looks like one untold."""
+        if self.how.laplacian is False or not (self.how.laplacian or (self.source == self.target).any()):
+            return
+        entries = np.array([nearest_float(v) if isinstance(v, Fraction) else v for v in self.values])[self.codes]
+        first, second = np.asarray(self.rows.first), np.asarray(self.rows.second)
+        if not self.how.laplacian and not fits_one_node(first, second, entries):
+            return
+        found = diagonal_of(first, second, entries, len(self.rows.labels), self.how.undirected)
+        if self.how.undirected and not found.laplacian:  # of both halves
+            found = diagonal_of(first, second, entries, len(self.rows.labels), False)
+        if not self.how.laplacian:
+            if found.laplacian and (self.rows.matrix or found.loops > 1):
+                what = "the diagonal holds the sums of the other entries, as a Laplacian's"
+                other = self.option("laplacian") if self.name else "laplacian=True"
+                no = "--no-laplacian" if self.name else "laplacian=False"
+                self.fail(self.name, f"{what}; read it with {other}, or add {no} if these are self-loops")
+            return
+        self.refuse_no_laplacian(found)
+        self.drop(self.source == self.target)
+        self.values = -self.values if isinstance(self.values, np.ndarray) else [-value for value in self.values]
+        ordinary = not (found.rows or found.columns)
+        self.notes += ("a Laplacian: each weight is minus the entry",)
+        self.notes += ("its rows sum to 0, those of the protocol's signed Laplacian do not",) if ordinary else ()
+
+    def refuse_no_laplacian(self, found: Diagonal) -> None:
+        """Refuse what is no Laplacian ``D - W``, or tells its direction by columns where none was said."""
+        if found.negative and found.loops:
+            self.fail(self.name, "the diagonal is minus the sums of magnitudes: minus a Laplacian; give its negative")
+        if not (found.rows or found.columns or found.balanced_rows or found.balanced_columns):
+            label = shorten(self.rows.labels[found.odd])
+            self.fail(self.name, f"no Laplacian: the diagonal of row {label} is not the sum of magnitudes beside it")
+        by_columns = not (found.rows or found.balanced_rows)
+        if by_columns and self.how.orientation is None and self.name:
+            what = "a Laplacian whose columns hold the sums: do columns listen?"
+            self.fail(self.name, f"{what} Say --edges information, or --edges listens if rows do")
+
+    def tell_self_loops(self, rows: np.ndarray) -> None:
+        label = shorten(self.rows.labels[int(self.rows.first[rows[0]])])
+        mend = "remove them" if rows.size > 1 else "remove it"
+        if rows.size > 1 and self.rows.where(0).startswith("line"):
+            mend = "remove these rows"
+        text = f"self-loop at node {label}{in_all(rows.size)}"
+        self.problems.append(_Problem(int(rows[0]), text, f"{mend}, or drop all with {{}}", "drop_self_loops"))
+
+    def tell_zeros(self, rows: np.ndarray, what: str) -> None:
+        named = ", ".join(self.edge_of_row(row) for row in rows[:5].tolist())
+        text = f"{what} of edge {named}{in_all(rows.size)}"
+        text += ": neither ally nor opponent"
+        values = sorted(set(self.values)) if len(self.values) <= _LARGEST_CODE + 1 else []
+        if not self.rows.matrix and values[1:] not in ([], [1]) and set(values) <= {*range(_LARGEST_CODE + 1)}:
+            text += f" (are {', '.join(map(str, values))} codes of relations?)"
+        mend = "remove it or give a weight, or drop all with {}"
+        self.problems.append(_Problem(int(rows[0]), text, mend, "drop_zeros"))
+
+    def merge_duplicates(self) -> tuple[str, ...]:
+        """Tell or merge the rows of one pair (of one unordered pair, if edges go both ways); note how many."""
+        duplicates, undirected = self.how.duplicates, self.how.undirected
         low, high = self.source, self.target
         if undirected:
             low, high = np.minimum(low, high), np.maximum(low, high)
@@ -173,11 +375,14 @@ class _Draft:
         if duplicates == "refuse":
             second = int(np.argmax(first[pair] != np.arange(key.size)))
             earlier = self.rows.where(int(self.row[first[pair[second]]])) or "an earlier one"
-            which = f"{self.edge(second)} (the first is {earlier}){in_all(repeated)}"
-            self.refuse(second, f"second row for edge {which}; keep one, or merge with --duplicates sum|last")
+            which = f"{self.edge(second)} (the first is {earlier})" if self.name else self.edge(second)
+            text = f"{'second row for edge' if self.name else 'two edges'} {which}{in_all(repeated)}"
+            mend = "keep one, or merge with {}"
+            self.problems.append(_Problem(int(self.row[second]), text, mend, "duplicates sum|last"))
+            return ()
         if duplicates == "last":
-            if undirected and not self.rows.undirected and not self.rows.in_order:
-                raise FormatError(f"{self.name}: which of two opposite edges is the last is not known; use sum")
+            if undirected and not self.undirected and not self.rows.in_order:
+                self.fail(self.name, "which of two opposite edges is the last is not known; use sum")
             self.keep(key.size - 1 - np.unique(key[::-1], return_index=True)[1])
         else:
             values: list[Fraction] = [Fraction(value) for value in self.values]
@@ -187,5 +392,21 @@ class _Draft:
             self.codes[first[list(sums)]] = np.arange(len(values), len(values) + len(sums))
             self.values = values + list(sums.values())
             self.keep(np.sort(first))
-            self.refuse_zeros("sum 0 of the weights")
+            rows = self.drop(self.zero())
+            self.cancelled = rows.size
+            if rows.size and not self.how.drop_zeros:
+                self.tell_zeros(rows, "sum 0 of the weights")
         return (f"{repeated} repeated rows were merged ({duplicates})",)
+
+
+def _codes(values: Sequence[Fraction], title: str) -> Fraction | None:
+    """Return a number that makes a column of relations one of codes; None where it holds signs, 1 and -1.
+
+    A column called sign may hold 1 alone, or any number beside a negative one.
+    """
+    numbers = set(values)
+    if title.strip().lower() == "sign":
+        return None if min(numbers, default=0) < 0 else next((v for v in values if v != 1), None)
+    if not numbers or (-1 in numbers and numbers <= {-1, 0, 1}):
+        return None
+    return next((v for v in values if v not in (-1, 1)), values[0])

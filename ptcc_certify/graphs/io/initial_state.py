@@ -15,8 +15,9 @@ import numpy as np
 from ptcc_certify.errors import FormatError, NumberError, ParameterError, PTCCError, did_you_mean
 from ptcc_certify.graphs.digraph import SignedDigraph, labels_beside
 from ptcc_certify.graphs.io.conversion import as_graph
-from ptcc_certify.graphs.io.edge_list import column, records
+from ptcc_certify.graphs.io.edge_list import records
 from ptcc_certify.graphs.io.files import name_and_ending, read_bytes
+from ptcc_certify.graphs.io.signs import find
 from ptcc_certify.graphs.rationals import MINUS, as_fraction, parse_exact, shorten
 from ptcc_certify.graphs.tables import first_five
 
@@ -334,13 +335,13 @@ def read_vectors_of_file(path: str | os.PathLike[str], graph: SignedDigraph, dim
 
 def _node_and_value(row: Sequence[str], place: str) -> tuple[int | None, int | None]:
     """Return the columns of a header; beside that of the nodes a single other one holds the values, however called."""
-    node, value = column(row, _NODE, place), column(row, _VALUE, place)
+    node, value = find(row, _NODE, place), find(row, _VALUE, place)
     if node is not None and value is None and len(row) == 2:
         with suppress(NumberError):
             parse_exact(row[1 - node])
             return node, None  # a row of a node that is called so
         return node, 1 - node
-    if node is not None and value is not None and None not in (column(row, (t,), place) for t in "xy"):
+    if node is not None and value is not None and None not in (find(row, (t,), place) for t in "xy"):
         raise FormatError(f"{place}: x and y are coordinates of a vector; keep one column, called value")
     return node, value
 

@@ -20,6 +20,7 @@ from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.io import files
 from ptcc_certify.graphs.io.graph_from_rows import Rows
 from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.reading import Reading
 from ptcc_certify.graphs.size_limits import MAX_NODES
 
 Array = np.ndarray
@@ -59,7 +60,8 @@ def _entries(row: Array, column: Array, entries: Array, n: int, labels: Array | 
         raise FormatError(f"{name}: labels must be {n} texts or integers")
     names = [label.decode("utf-8") if isinstance(label, bytes) else str(label) for label in labels.tolist()]
     weights, codes = np.unique(entries, return_inverse=True)
-    return Rows(names, row, column, weights, codes, lambda e: f"row {row[e] + 1}, column {column[e] + 1}")
+    where = lambda e: f"row {row[e] + 1}, column {column[e] + 1}"  # noqa: E731
+    return Rows(names, row, column, weights, codes, where, matrix=True)
 
 
 def _uncompressed(start: Array, index: Array, entries: Array, n: int) -> tuple[Array, Array, Array]:
@@ -73,19 +75,30 @@ def _uncompressed(start: Array, index: Array, entries: Array, n: int) -> tuple[A
     return np.repeat(np.arange(n), np.diff(start)), index[: start[-1]], entries[: start[-1]]
 
 
-def _the_matrix(shapes: Mapping[str, tuple[int, ...]], variables: Iterable[str], name: str) -> str:
-    """Return the name of the only square matrix; a single number counts only where there is nothing else."""
+def _the_matrix(shapes: Mapping[str, tuple[int, ...]], variables: Iterable[str], name: str, wanted: str | None) -> str:
+    """Return the name of the only square matrix, or of the one that is wanted.
+
+    A single number counts only where there is nothing else.
+    """
+    if wanted is not None:
+        if wanted not in shapes:
+            names = ", ".join(shorten(k) for k in list(shapes)[:20]) or "nothing"
+            raise FormatError(f"{name}: no numeric matrix is called {shorten(wanted)}; there are {names}")
+        return wanted
     square = [k for k, shape in shapes.items() if len(shape) == 2 and shape[0] == shape[1]]
     square = [k for k in square if shapes[k][0] > 1] or square
     if len(square) != 1:
         names = ", ".join(shorten(k) for k in (square or list(variables))[:20]) or "nothing"
         what = "several square matrices" if square else "no square numeric matrix"
-        raise FormatError(f"{name}: {what} among its variables ({names}); keep one")
+        mend = "choose one with --variable NAME" if square else "save one"
+        raise FormatError(f"{name}: {what} among its variables ({names}); {mend}")
     return square[0]
 
 
-def read_mtx(data: bytes, name: str) -> Rows:
+def read_mtx(data: bytes, name: str, how: Reading) -> Rows:
     """Read a Matrix Market file; a decimal is the decimal, not the float that it passes through."""
+    how.refuse("columns", name, "a matrix")
+    how.refuse("variable", name, "a file of one matrix")
     lines = files.lines_of(data, name)
     banner = re.fullmatch(_BANNER, " ".join(lines[0].lower().split()))
     if banner is None:
@@ -115,16 +128,19 @@ def read_mtx(data: bytes, name: str) -> Rows:
     return rows
 
 
-def read_npy(data: bytes, name: str) -> Rows:
+def read_npy(data: bytes, name: str, how: Reading) -> Rows:
     """Read a matrix that ``numpy.save`` wrote."""
+    how.refuse("columns", name, "a matrix")
+    how.refuse("variable", name, "a file of one matrix")
     if not data.startswith(b"\x93NUMPY"):
         raise FormatError(f"{name}: not a NumPy array file; write it with numpy.save")
     with files.one_line_errors(name, "a NumPy array"):
         return _dense(np.load(BytesIO(data), allow_pickle=False), None, name)
 
 
-def read_npz(data: bytes, name: str) -> Rows:
-    """Read the only square matrix of an archive of ``numpy.savez`` or ``scipy.sparse.save_npz``."""
+def read_npz(data: bytes, name: str, how: Reading) -> Rows:
+    """Read the only square matrix, or ``variable``, of an archive of ``numpy.savez`` or ``scipy.sparse.save_npz``."""
+    how.refuse("columns", name, "a matrix")
     with files.one_line_errors(name, "an .npz archive"):
         with zipfile.ZipFile(BytesIO(data)) as functions:
             files.refuse_large(sum(function.file_size for function in functions.infolist()), name)
@@ -133,7 +149,8 @@ def read_npz(data: bytes, name: str) -> Rows:
         labels = arrays.pop("labels", None)
         if "format" not in arrays:
             numeric = {key: array.shape for key, array in arrays.items() if array.dtype.kind in "iufc"}
-            return _dense(arrays[_the_matrix(numeric, arrays, name)], labels, name)
+            return _dense(arrays[_the_matrix(numeric, arrays, name, how.variable)], labels, name)
+        how.refuse("variable", name, "an archive of one sparse matrix")
         layout, entries, shape = arrays["format"].astype(str).item(), arrays["data"], arrays["shape"].tolist()
         _refuse_no_adjacency(shape, entries.dtype, name)
         if layout == "coo":
@@ -146,12 +163,13 @@ def read_npz(data: bytes, name: str) -> Rows:
         return _entries(row, column, entries, shape[0], labels, name)
 
 
-def read_mat(data: bytes, name: str) -> Rows:
-    """Read the only square matrix of a MATLAB 5 file.
+def read_mat(data: bytes, name: str, how: Reading) -> Rows:
+    """Read the only square matrix, or ``variable``, of a MATLAB 5 file.
 
     The file holds tagged elements, compressed or not; a variable is an element that holds elements: flags with the
     class, dimensions, name, and for a real matrix one array, or three if it is sparse.
     """
+    how.refuse("columns", name, "a matrix")
     with files.one_line_errors(name, "a MATLAB file"):
         order = {b"IM": "<", b"MI": ">"}.get(data[126:128])
         if order is None or data.startswith(b"MATLAB 7.3"):
@@ -164,7 +182,8 @@ def read_mat(data: bytes, name: str) -> Rows:
                 shape, label = tuple(next(parts).tolist()), next(parts).tobytes().decode("latin-1")
                 variables[label] = flags, shape, parts
         real = {k: v for k, v in variables.items() if v[0] & 0xFF >= _MAT_SPARSE and not v[0] & _MAT_NOT_REAL}
-        flags, shape, parts = variables[_the_matrix({k: v[1] for k, v in real.items()}, variables, name)]
+        wanted = _the_matrix({k: v[1] for k, v in real.items()}, variables, name, how.variable)
+        flags, shape, parts = variables[wanted]
         if flags & 0xFF != _MAT_SPARSE:
             return _dense(next(parts).reshape(shape, order="F"), None, name)
         row, start, entries = parts

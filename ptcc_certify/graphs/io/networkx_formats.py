@@ -1,4 +1,4 @@
-"""GraphML, GML and Pajek, read by networkx.
+"""GraphML and GML, read by networkx, and GEXF.
 
 networkx forgives much: what it would merge, drop or take for something else is refused here, before or after.
 """
@@ -7,51 +7,43 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Mapping
 from typing import Any
 from xml.etree import ElementTree
 
 from ptcc_certify.errors import FormatError
-from ptcc_certify.graphs.digraph import OF_EDGES
+from ptcc_certify.graphs.io.attributes import attribute_rows, both_ways, lower_case, names_or_identifiers
 from ptcc_certify.graphs.io.files import decoded, lines_of, one_line_errors
-from ptcc_certify.graphs.io.graph_from_rows import Numbers, Rows
+from ptcc_certify.graphs.io.graph_from_rows import Rows
 from ptcc_certify.graphs.rationals import shorten
-from ptcc_certify.graphs.size_limits import MAX_NODES
+from ptcc_certify.graphs.reading import Reading
 
 
-def _rows(graph: Any, labels: list[str], undirected: str, name: str) -> Rows:
+def _rows(graph: Any, labels: list[str], undirected: str, name: str, how: Reading) -> Rows:
     """Turn a networkx multigraph into rows; ``str`` of a float is the shortest decimal that names it."""
-    default = _lower_case(graph.graph.get("edge_default", {}))
-    number, weights = {node: i for i, node in enumerate(graph)}, Numbers()
-    first, second, codes = [], [], []
-    for u, v, data in graph.edges(data=True):
-        first.append(number[u])
-        second.append(number[v])
-        attributes = default | _lower_case(data)
-        if more := OF_EDGES & attributes.keys():
-            edge = f"{shorten(labels[first[-1]])} -> {shorten(labels[second[-1]])}"
-            mend = "as a CSV file with columns source, target, weight_min, weight_max, optional it is read"
-            raise FormatError(f'{name}: edge {edge} has the attribute "{min(more)}", which makes a family; {mend}')
-        try:
-            codes.append(weights[str(attributes.get("weight", attributes.get("sign", "")))])
-        except KeyError:
-            edge = f"{shorten(labels[first[-1]])} -> {shorten(labels[second[-1]])}"
-            raise FormatError(f"{name}: edge {edge} has no weight; give it a number as weight or sign") from None
-    undirected = "" if graph.is_directed() else undirected
-    return Rows(labels, first, second, list(weights.texts), codes, lambda row: "", undirected, in_order=False)
+    default = lower_case(graph.graph.get("edge_default", {}))
+    number = {node: i for i, node in enumerate(graph)}
+    ends = [(number[u], number[v]) for u, v in graph.edges()]
+    data = [
+        default | {key: str(value) for key, value in lower_case(more).items()} for *_, more in graph.edges(data=True)
+    ]
+    rows = attribute_rows(labels, ends, data, name, how)
+    rows.undirected = "" if graph.is_directed() else undirected
+    rows.in_order = False
+    return rows
 
 
-def _lower_case(attributes: Mapping[str, Any]) -> dict[str, Any]:
-    return {key.lower(): value for key, value in attributes.items()}
-
-
-def read_graphml(data: bytes, name: str) -> Rows:
-    """Read GraphML of one flat graph; the identifiers of the nodes are their labels."""
-    import networkx as nx
-
+def _markup(data: bytes, name: str) -> str:
     text = decoded(data, name)
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise FormatError(f"{name}: a DOCTYPE declaration, which may define entities; remove it")
+    return text
+
+
+def read_graphml(data: bytes, name: str, how: Reading) -> Rows:
+    """Read GraphML of one flat graph; nodes are called by their names where identifiers only number them."""
+    import networkx as nx
+
+    text = _markup(data, name)
     with one_line_errors(name, "GraphML"):
         graph = nx.parse_graphml(text, edge_key_type=str, force_multigraph=True)
         # networkx reads the first of several graphs, skips nested ones, merges what is declared twice, and declares
@@ -66,11 +58,12 @@ def read_graphml(data: bytes, name: str) -> Rows:
                 raise FormatError(f"{name}: node {shorten(node)} is declared {declared[node]} times; declare it once")
         if count["edge"] != graph.number_of_edges():
             raise FormatError(f"{name}: two edges between the same nodes have the same id; rename one")
-        return _rows(graph, list(graph), 'edgedefault="undirected"', name)
+        labels = names_or_identifiers([*graph], [more for _, more in graph.nodes(data=True)])
+        return _rows(graph, labels, 'edgedefault="undirected"', name, how)
 
 
-def read_gml(data: bytes, name: str) -> Rows:
-    """Read GML; labels are texts or integers, or else the identifiers of the nodes."""
+def read_gml(data: bytes, name: str, how: Reading) -> Rows:
+    """Read GML; labels are texts or integers, or else the names or the identifiers of the nodes."""
     import networkx as nx
 
     text = "\n".join(lines_of(data, name))
@@ -83,40 +76,50 @@ def read_gml(data: bytes, name: str) -> Rows:
         bare = re.sub(r'"[^"]*"|#.*', '""', text)
         if graph.is_directed() and set(re.findall(r"\bdirected\s+([^\s\]]+)", bare)) != {"1"}:
             raise FormatError(f"{name}: directed is neither 0 nor 1, or both; write directed 1")
-        labels = [_lower_case(attributes).get("label", node) for node, attributes in graph.nodes(data=True)]
-        for label in labels:
+        nodes = [(str(node), lower_case(attributes)) for node, attributes in graph.nodes(data=True)]
+        if not any("label" in attributes for _, attributes in nodes):
+            labels = names_or_identifiers([node for node, _ in nodes], [attributes for _, attributes in nodes])
+            return _rows(graph, labels, "directed 0", name, how)
+        own = [attributes.get("label", node) for node, attributes in nodes]
+        for label in own:
             if not isinstance(label, str | int) and label not in ((), []):  # the texts "()" and "[]" arrive as these
                 raise FormatError(f"{name}: label {shorten(str(label))} is no text and no integer; write it in quotes")
-        return _rows(graph, [str(label) for label in labels], "directed 0", name)
+        return _rows(graph, [str(label) for label in own], "directed 0", name, how)
 
 
-def read_pajek(data: bytes, name: str) -> Rows:
-    """Read Pajek: ``*Vertices n``, rows ``number label`` where labels are not numbers, one list of arcs or edges."""
-    import networkx as nx
-
-    # networkx takes comments for nodes, a section that it does not know for rows of the one before, and leaves out
-    # backslashes and apostrophes, as a shell does.
-    lines = [line.strip() for line in lines_of(data, name)]
-    lines = [line for line in lines if line and not line.lower().startswith(("%", "/*", "*network"))]
-    heads = [i for i, line in enumerate(lines) if line.startswith("*")]
-    sections = "\n".join(lines[i].lower() for i in heads)
-    if not re.fullmatch(r"\*vertices\s+[0-9]{1,9}(\n\*(arcs|edges)([ \t].*)?)?", sections, re.ASCII) or heads[0] > 0:
-        raise FormatError(f"{name}: not *Vertices n and then one list, of *Arcs or of *Edges; write it so")
-    if re.search(r"[\\']", re.sub(r'"[^"\\]*"', "", "\n".join(lines))):
-        raise FormatError(f"{name}: a backslash, or an apostrophe outside of quotes; put labels in double quotes")
-    n, end = int(sections.split()[1]), heads[1] if len(heads) > 1 else len(lines)
-    if n > MAX_NODES:
-        raise FormatError(f"{name}: {n} nodes are more than {MAX_NODES}")
-    declared = {row.split()[0]: row for row in lines[1:end]}
-    numbers = {str(i): f"{i} {i}" for i in range(1, n + 1)}
-    if len(declared) < end - 1 or not numbers.keys() >= declared.keys():
-        raise FormatError(f"{name}: a node is declared twice, or is not one of 1 to {n}; mend the rows of *Vertices")
-    for row in lines[end + 1 :]:
-        if len(row.split()) < 2 or not numbers.keys() >= set(row.split()[:2]):
-            raise FormatError(f'{name}: row "{shorten(row)}" does not name two of the nodes 1 to {n}; mend it')
-    with one_line_errors(name, "Pajek"):
-        edges = (" ".join(row.split()[:3]) for row in lines[end:])
-        graph = nx.parse_pajek([lines[0], *(numbers | declared).values(), *edges])
-        if len(graph) != n:
-            raise FormatError(f"{name}: two nodes have the same label; rename one")
-        return _rows(graph, list(graph), "*Edges", name)
+def read_gexf(data: bytes, name: str, how: Reading) -> Rows:
+    """Read GEXF of one flat graph: edges are undirected unless they, or the graph, say otherwise."""
+    text = _markup(data, name)
+    with one_line_errors(name, "GEXF"):
+        root = ElementTree.fromstring(text)
+        for element in root.iter():
+            element.tag = element.tag.rpartition("}")[2]
+        graphs = root.findall("graph")
+        if len(graphs) != 1:
+            raise FormatError(f"{name}: {len(graphs)} graphs; keep one")
+        titles, default = dict[str | None, str](), dict[str, str]()
+        for attribute in graphs[0].findall("attributes[@class='edge']/attribute"):
+            titles[attribute.get("id")] = title = attribute.get("title", "").lower()
+            if (value := attribute.findtext("default")) is not None:
+                default[title] = value
+        nodes = [*graphs[0].iter("node")]
+        identifiers = [node.get("id", "") for node in nodes]
+        number = {node: i for i, node in enumerate(identifiers)}
+        if len(number) < len(nodes):
+            raise FormatError(f"{name}: two nodes have the same id; rename one")
+        named = [node.get("label") or "" for node in nodes]
+        labels = named if all(named) and len(set(named)) == len(named) else identifiers
+        kind = graphs[0].get("defaultedgetype", "undirected")
+        ends, attributes, undirected = [], [], []
+        for edge in graphs[0].iter("edge"):
+            for end in ("source", "target"):
+                if edge.get(end) not in number:
+                    raise FormatError(f"{name}: {end} {shorten(str(edge.get(end)))} of an edge is no node; declare it")
+            ends.append((number[edge.get("source", "")], number[edge.get("target", "")]))
+            values = {titles.get(one.get("for"), ""): one.get("value", "") for one in edge.iter("attvalue")}
+            own = {"weight": edge.get("weight", "")} if "weight" in edge.keys() else {}  # noqa: SIM118
+            attributes.append(default | values | own)
+            undirected.append(edge.get("type", kind) != "directed")
+        return both_ways(
+            attribute_rows(labels, ends, attributes, name, how), undirected, 'edges of type "undirected"', how
+        )

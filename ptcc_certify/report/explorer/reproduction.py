@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import shlex
 from textwrap import fill
+from typing import Any
 
 from ptcc_certify.graphs.io.packaged import GRAPHS
+from ptcc_certify.graphs.reading import Reading, option_flags
 from ptcc_certify.protocols import SlidingModeProtocol
 from ptcc_certify.report.explorer.question import Question
-
-#: How a graph was read, unless it says otherwise: option of ``read_graph`` and flag of ``ptcc``.
-_READING = {"duplicates": "refuse", "drop_self_loops": False, "undirected": False}
 
 
 def python_of(question: Question) -> str:
@@ -41,9 +40,8 @@ def command_of(question: Question) -> str:
     """Return the ``ptcc certify`` of a question."""
     settings, source = question.settings, dict(question.source or {})
     words = ["ptcc", "certify", str(source.pop("path", settings.graph))]
-    for key, value in source.items():
-        flag = "--edges" if key == "orientation" else f"--{key.replace('_', '-')}"
-        words += [flag] if value is True else [flag, str(value)]
+    words += ["--edges", str(source["orientation"])] if "orientation" in source else []
+    words += [word for flag in option_flags(source) for word in flag.split(" ", 1)]
     words += [] if settings.kind == "nominal" else ["--protocol", settings.kind]
     for key, value in _texts(question).items():
         words += [f"--{key.replace('_', '-')}", value]
@@ -56,10 +54,9 @@ def command_of(question: Question) -> str:
     return shlex.join(words)
 
 
-def reading_of(path: str, orientation: str | None, **how: str | bool) -> dict[str, str | bool]:
+def reading_of(path: str, **how: Any) -> dict[str, Any]:
     """Return where a graph was read from and how, but for what is so unless it is told."""
-    options = {key: value for key, value in how.items() if value != _READING[key]}
-    return {"path": path} | ({} if orientation is None else {"orientation": orientation}) | options
+    return {"path": path} | {key: value for key, value in how.items() if value != getattr(Reading, key)}
 
 
 def _texts(question: Question) -> dict[str, str]:

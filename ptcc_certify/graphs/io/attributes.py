@@ -1,0 +1,129 @@
+"""Graphs of nodes and edges with attributes: which of these is the weight, which the sign, which the label."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NoReturn
+
+import numpy as np
+
+from ptcc_certify.errors import FormatError, GraphError
+from ptcc_certify.graphs.digraph import OF_EDGES
+from ptcc_certify.graphs.io.graph_from_rows import Numbers, Rows
+from ptcc_certify.graphs.io.signs import is_sign, weight_and_sign
+from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.reading import Reading
+
+Attributes = Mapping[str, Any]
+
+
+def lower_case(attributes: Attributes) -> dict[str, Any]:
+    """Return attributes with their titles in small letters."""
+    return {str(key).lower(): value for key, value in attributes.items()}
+
+
+def names_or_identifiers(identifiers: Sequence[str], nodes: Sequence[Attributes]) -> list[str]:
+    """Return what nodes are called: by ``label`` or ``name`` where identifiers only number them, as igraph's n0, n1.
+
+    Examples
+    --------
+    >>> names_or_identifiers(["n0", "n1"], [{"name": "ann"}, {"name": "bob"}])
+    ['ann', 'bob']
+    >>> names_or_identifiers(["ann", "bob"], [{"name": "Ann B."}, {"name": "Bob C."}])
+    ['ann', 'bob']
+    """
+    if all(re.fullmatch(r"n?[0-9]+", node) for node in identifiers):
+        for title in ("label", "name"):
+            names = [str(lower_case(node).get(title, "")).strip() for node in nodes]
+            if names and all(names) and len(set(names)) == len(names):
+                return names
+    return list(identifiers)
+
+
+@dataclass(frozen=True)
+class Values:
+    """Weights of edges, their signs if these stand beside them, and the titles of both."""
+
+    weights: list[Any]
+    signs: list[Any]
+    weight: str
+    sign: str
+
+
+def values_of_edges(data: Sequence[Attributes], edge: Callable[[int], str], name: str, told: str | None) -> Values:
+    """Return what edges say of their weights; ``told`` is the attribute that holds them, and it alone.
+
+    Raises
+    ------
+    FormatError or GraphError
+        An edge has no weight, no sign where others have one, or what makes a family; ``edge(k)`` names the edge k.
+    """
+    titles = list(dict.fromkeys(title for one in data for title in one))
+    if more := [title for title in titles if title in OF_EDGES]:
+        k = next(k for k, one in enumerate(data) if min(more) in one)
+        mend = "as a CSV file with columns source, target, weight_min, weight_max, optional it is read"
+        mend = mend if name else "ptcc_certify.as_family takes it"
+        _fail(name, f'edge {edge(k)} has the attribute "{min(more)}", which makes a family of graphs; {mend}')
+    at = weight_and_sign(titles, name or "the edges") if told is None else (None, None)
+    weight, sign = (None if k is None else titles[k] for k in at)
+    if weight is None or sign is None or not any(_has(one, weight) and _has(one, sign) for one in data):
+        either = [title for title in (told or weight or "weight", sign) if title is not None]  # each edge has its own
+        weights = [next((one[title] for title in either if _has(one, title)), None) for one in data]
+        signs, sign = list[Any](), None
+    else:
+        weights, signs = [one.get(weight) for one in data], [one.get(sign) for one in data]
+        either = [weight]
+    for k, value in enumerate(weights):
+        if value is None or not _has(data[k], *either):
+            what = "weight" if name else f'attribute "{either[0]}"'
+            mend = "give it a number as weight or sign, or name the attribute"
+            _fail(name, f"edge {edge(k)} has no {what}; {mend}{': --columns source,target,NAME' if name else ''}")
+        if signs and not _has(data[k], str(sign)):
+            _fail(name, f'edge {edge(k)} has no "{sign}", and others have; give each one')
+    return Values(weights, signs, "" if told else either[0], sign or "")
+
+
+def _has(attributes: Attributes, *titles: str) -> bool:
+    return any(str(attributes.get(title, "")).strip() for title in titles)
+
+
+def _fail(name: str, message: str) -> NoReturn:
+    if name:
+        raise FormatError(f"{name}: {message}")
+    raise GraphError(message)
+
+
+def attribute_rows(
+    labels: list[str], ends: Sequence[tuple[int, int]], data: Sequence[Attributes], name: str, how: Reading
+) -> Rows:
+    """Turn edges with attributes, which are texts, into rows."""
+    how.refuse("variable", name, "a file of one graph")
+    data = [lower_case(one) for one in data]
+    edge = lambda k: " -> ".join(shorten(labels[end]) for end in ends[k])  # noqa: E731
+    told = how.titles[2].lower() if how.titles else None
+    values = values_of_edges(data, edge, name, told)
+    weights, signs = Numbers(), Numbers()
+    codes, sign_codes = [weights[str(one)] for one in values.weights], [signs[str(one)] for one in values.signs]
+    rows = Rows(labels, [a for a, _ in ends], [b for _, b in ends], list(weights.texts), codes, lambda row: "")
+    rows.signs, rows.sign_codes, rows.sign_title = list(signs.texts), sign_codes, values.sign
+    rows.weight_title = values.weight if is_sign(values.weight) else ""
+    return rows
+
+
+def both_ways(rows: Rows, undirected: Sequence[bool], what: str, how: Reading) -> Rows:
+    """Let some rows go both ways: of a file of them alone that must be asked for, beside directed ones they say so."""
+    some = np.flatnonzero(undirected)
+    if some.size == len(undirected) and some.size:
+        rows.undirected = what
+    elif some.size and not how.undirected:
+        first, second = np.asarray(rows.first), np.asarray(rows.second)
+        where, last = rows.where, len(undirected)
+        place = np.append(np.arange(last), some)
+        rows.first, rows.second = np.append(first, second[some]), np.append(second, first[some])
+        rows.codes = np.asarray(rows.codes)[place]
+        rows.sign_codes = np.asarray(rows.sign_codes)[place] if len(rows.signs) else ()
+        rows.where = lambda row: where(int(place[row]))
+        rows.notes += (f"{what} go both ways ({some.size})",)
+    return rows

@@ -1,0 +1,86 @@
+"""Graphs as JSON: node-link data of networkx and D3, lists of edges, matrices."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from ptcc_certify.errors import FormatError
+from ptcc_certify.graphs.io.attributes import attribute_rows, names_or_identifiers
+from ptcc_certify.graphs.io.files import decoded, one_line_errors
+from ptcc_certify.graphs.io.graph_from_rows import Rows
+from ptcc_certify.graphs.io.text_matrices import bracketed_matrix
+from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.reading import Reading
+
+_LINKS = ("links", "edges")
+_FORM = 'give {"directed": true, "nodes": [{"id": ..}], "links": [{"source": .., "target": .., "weight": ..}]}'
+
+
+def read_json(data: bytes, name: str, how: Reading) -> Rows:
+    """Read node-link data, whose links may name nodes by ``id`` or, where there is none, by position from 0.
+
+    Numbers are texts, so that they are read exactly. Links have a direction unless ``directed`` says false.
+    """
+    with one_line_errors(name, "JSON"):
+        document = json.loads(
+            decoded(data, name), parse_float=str, parse_int=str, parse_constant=str, object_pairs_hook=_once
+        )
+    if isinstance(document, list) and (matrix := bracketed_matrix(data, name)) is not None:
+        return matrix
+    if isinstance(document, list) and document and all(isinstance(row, dict) for row in document):
+        document = {"links": document}
+    found = [key for key in _LINKS if isinstance(document, dict) and isinstance(document.get(key), list)]
+    if len(found) != 1:
+        raise FormatError(f"{name}: is JSON, not a graph; {_FORM}")
+    links, nodes = document[found[0]], document.get("nodes", [])
+    if not isinstance(nodes, list) or not all(isinstance(one, dict) for one in links):
+        raise FormatError(f"{name}: nodes or {found[0]} of the JSON are no lists of objects; {_FORM}")
+    if document.get("directed", True) not in (True, False):
+        raise FormatError(f"{name}: directed is neither true nor false; write one")
+    labels, number = _nodes(nodes, name)
+    ends = [tuple(_end(one, end, k, labels, number, bool(nodes), name) for end in ("source", "target"))
+            for k, one in enumerate(links, 1)]  # fmt: skip
+    data_of_links = [
+        {key: str(value) for key, value in one.items() if key not in ("source", "target", "key")} for one in links
+    ]
+    rows = attribute_rows(labels, ends, data_of_links, name, how)  # type: ignore[arg-type]
+    rows.undirected = "" if document.get("directed", True) else '"directed": false'
+    rows.where = lambda row: f"{found[0]}[{row}]"
+    return rows
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    if len(dict(pairs)) < len(pairs):
+        raise ValueError("a key occurs twice in an object")
+    return dict(pairs)
+
+
+def _nodes(nodes: list[Any], name: str) -> tuple[list[str], dict[str, int]]:
+    """Return the labels of the nodes, and their positions by what links call them."""
+    if not all(isinstance(one, dict) for one in nodes):
+        identifiers = [str(one) for one in nodes]
+        attributes: list[dict[str, Any]] = [{} for _ in nodes]
+    elif all("id" in one for one in nodes):
+        identifiers, attributes = [str(one["id"]) for one in nodes], nodes
+    else:
+        identifiers, attributes = [str(k) for k in range(len(nodes))], nodes
+    number = {one: k for k, one in enumerate(identifiers)}
+    if len(number) < len(nodes):
+        raise FormatError(f"{name}: two nodes have the same id; rename one")
+    return names_or_identifiers(identifiers, attributes), number
+
+
+def _end(
+    link: dict[str, Any], end: str, k: int, labels: list[str], number: dict[str, int], declared: bool, name: str
+) -> int:
+    """Return the position of an end of a link; where no nodes are declared, links declare them."""
+    label = link.get(end)
+    if not isinstance(label, str) or not label:
+        raise FormatError(f"{name}: link {k} has no {end} that is a text or a number; {_FORM}")
+    if label not in number:
+        if declared:
+            raise FormatError(f"{name}: {end} {shorten(label)} of link {k} is no node; declare it")
+        number[label] = len(labels)
+        labels.append(label)
+    return number[label]

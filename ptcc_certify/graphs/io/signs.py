@@ -1,0 +1,95 @@
+"""Words for signs, and which column or attribute of an edge holds its weight and its sign."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from ptcc_certify.errors import FormatError
+from ptcc_certify.graphs.rationals import MINUS, shorten
+
+_POSITIVE = (
+    "+ positive pos plus up activate activates activated activating activation activator act induce induces induction "
+    "stimulate stimulates stimulation upregulate upregulates upregulation promote promotes enhance enhances "
+    "ally allies friend friends trust trusts like likes support supports agree agrees alliance --> ->"
+)
+_NEGATIVE = (
+    f"- {MINUS} negative neg minus down inhibit inhibits inhibited inhibiting inhibition inhibitor inh repress "
+    "represses repressed repressing repression repressor suppress suppresses suppression downregulate downregulates "
+    "downregulation block blocks enemy enemies foe foes opponent opponents rival rivals distrust distrusts dislike "
+    "dislikes oppose opposes disagree disagrees hostility --| -| |"
+)
+_SIGNS = dict.fromkeys(_POSITIVE.split(), 1) | dict.fromkeys(_NEGATIVE.split(), -1)
+#: Titles of weights, and of what is a sign beside a weight: of both the first that occurs counts.
+WEIGHT = ("weight", "rating", "value", "w")
+SIGN = (
+    *("sign", "type", "edgetype", "effect", "relation", "relationship", "interaction", "interactiontype"),
+    *("regulation", "polarity", "valence", "attitude", "mor"),
+)
+#: What Gephi writes as the type of edges.
+DIRECTIONS = {"directed": False, "undirected": True}
+#: What is said of a word that is none for a sign.
+NO_SIGN = "is neither a number nor a word for a sign, such as + - activates inhibits"
+
+
+def plain(title: str) -> str:
+    """Return a title in small letters, without what may stand between its words.
+
+    Examples
+    --------
+    >>> plain("From-Node_Id")
+    'fromnodeid'
+    """
+    return re.sub(r"[\s_-]", "", title.lower())
+
+
+def sign_of_word(text: str) -> int | None:
+    """Return 1 or -1 for a word that stands for a sign, None for any other text, numbers too.
+
+    Examples
+    --------
+    >>> sign_of_word("Activates"), sign_of_word("down-regulation"), sign_of_word("-"), sign_of_word("1")
+    (1, -1, -1, None)
+    """
+    word = text.strip().lower()
+    return _SIGNS.get(word, _SIGNS.get(plain(word)))
+
+
+def is_sign(title: str) -> bool:
+    """Tell whether a title is one of signs, whose numbers are codes of relations unless they are 1 and -1.
+
+    Examples
+    --------
+    >>> is_sign("Edge Type"), is_sign("weight")
+    (True, False)
+    """
+    return plain(title) in SIGN
+
+
+def find(titles: Sequence[str], names: Sequence[str], place: str) -> int | None:
+    """Return the position of the title that is the first of ``names`` to occur; None if none does.
+
+    Examples
+    --------
+    >>> find(["To Node", "Weight"], ["sign", "weight"], "a.csv")
+    1
+    """
+    written = [plain(title) for title in titles]
+    for name in names:
+        if written.count(plain(name)) > 1:
+            raise FormatError(f'{place}: two columns are named "{shorten(name)}"; rename one')
+        if plain(name) in written:
+            return written.index(plain(name))
+    return None
+
+
+def weight_and_sign(titles: Sequence[str], place: str) -> tuple[int | None, int | None]:
+    """Return the positions of the weight and of the sign beside it; a sign alone is the weight.
+
+    Examples
+    --------
+    >>> weight_and_sign(["sign", "year", "weight"], "a.csv"), weight_and_sign(["year", "sign"], "a.csv")
+    ((2, 0), (1, None))
+    """
+    weight, sign = find(titles, WEIGHT, place), find(titles, SIGN, place)
+    return (sign, None) if weight is None else (weight, sign)

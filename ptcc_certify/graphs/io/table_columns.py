@@ -1,0 +1,140 @@
+"""Which columns of a table hold source, target, weight and sign of its edges, and whether its first row tells that."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ptcc_certify.errors import FormatError
+from ptcc_certify.graphs.digraph import OF_EDGES
+from ptcc_certify.graphs.io.signs import find, is_sign, plain, weight_and_sign
+from ptcc_certify.graphs.io.text_matrices import is_entry
+from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.reading import Reading
+
+_SOURCE = ("source", "from", "fromnodeid", "fromnode", "fromid", "sourcenode", "sourceid", "src", "rater")
+_TARGET = ("target", "to", "tonodeid", "tonode", "toid", "targetnode", "targetid", "dst", "rated", "ratee")
+#: Titles of who listens in the first column, and of who is heard in the second: they turn the direction round.
+_LISTENERS = r"listener|follower|rater|trust[eo]r|voter|receiver|hearer|reader|subscriber"
+_HEARD = r"speaker|heard|followee|followed|rated|trustee|trusted|sender|leader"
+_NO_TITLE = re.compile(r"nan|na|n/?a|none|null|inf|infinity|true|false|unknown|x|\?*", re.IGNORECASE)
+#: The note of a file whose header puts source and target elsewhere than source first.
+BY_HEADER = "columns by header"
+#: The note of a file whose raters were read as those who are heard.
+RATERS = "raters listen? --edges listens"
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Positions of source, target, weight and, beside the weight, sign; the titles if the first row is a header."""
+
+    source: int = 0
+    target: int = 1
+    weight: int = 2
+    sign: int | None = None
+    titles: tuple[str, ...] = ()
+    told: bool = False  # by the option
+    notes: tuple[str, ...] = ()
+    asks: str = ""  # why the direction must be told
+    guessed: bool = False  # the first row names no source and target, but is none of edges
+
+    @property
+    def ignored(self) -> list[str]:
+        """Titles of columns that are not read."""
+        used = (self.source, self.target, self.weight, self.sign)
+        return [title for k, title in enumerate(self.titles) if k not in used]
+
+    @property
+    def codes(self) -> str:
+        """The title of a weight whose numbers would be codes of relations; "" of others."""
+        title = self.titles[self.weight] if self.titles and not self.told else ""
+        return title if is_sign(title) else ""
+
+
+def edge_columns(row: Sequence[str], place: str) -> tuple[int, int, int | None] | None:
+    """Return the columns of source, target and, if it is named, weight; None if a row names no source and target."""
+    source, target = find(row, _SOURCE, place), find(row, _TARGET, place)
+    return None if source is None or target is None else (source, target, weight_and_sign(row, place)[0])
+
+
+def columns_of(first: Sequence[str], others: Sequence[Sequence[str]], place: str, how: Reading) -> Columns:
+    """Return the columns of a table from its first row and some of the others.
+
+    Examples
+    --------
+    >>> columns_of(["weight", "from", "to"], [], "a.csv, line 1", Reading()).source
+    1
+    >>> columns_of(["Gene1", "Gene2", "Type"], [["a", "b", "-"]], "a.csv, line 1", Reading()).notes
+    ('columns Gene1, Gene2, Type',)
+    """
+    titles = tuple(field.strip() for field in first)
+    if how.titles:
+        return _told(titles, others, place, how)
+    if edge_columns(titles, place) is not None:
+        return named_columns(titles, place)
+    weight, sign = weight_and_sign(titles, place)
+    if len(titles) < 3 or not _is_header(titles, weight if weight is not None else 2, others):
+        return Columns()
+    weight = 2 if weight is None else weight
+    if weight < 2 or (sign is not None and sign < 2):
+        mend = "name two columns source and target, or tell all: --columns a,b,w"
+        raise FormatError(f"{place}: the header {', '.join(map(shorten, titles))} names no source and target; {mend}")
+    return Columns(0, 1, weight, sign, titles, False, (_note(titles, weight),), _direction(titles, place), True)
+
+
+def named_columns(titles: Sequence[str], place: str) -> Columns:
+    """Return the columns of a row that names source and target; none where it is a row of edges all the same."""
+    if find(titles, sorted(OF_EDGES), place) is not None:
+        mend = "ptcc classify, certify, simulate and plot take it, and ptcc_certify.read_family"
+        raise FormatError(f"{place}: uncertain weights or optional edges, which make a family of graphs; {mend}")
+    source, target, _ = edge_columns(titles, place) or (0, 1, None)
+    weight, sign = weight_and_sign(titles, place)
+    if weight is None:
+        if is_entry("".join(titles[2:3])):
+            return Columns()
+        mend = "name one column weight, sign or rating, or tell the three: --columns source,target,NAME"
+        raise FormatError(f"{place}: the header names no weight; {mend}")
+    notes = (BY_HEADER,) * (source > 0) + (RATERS,) * (plain(titles[source]) == "rater")
+    return Columns(source, target, weight, sign, tuple(titles), notes=notes)
+
+
+def _told(titles: tuple[str, ...], others: Sequence[Sequence[str]], place: str, how: Reading) -> Columns:
+    """Return the columns that the option tells, by title or by number from 1."""
+    at = []
+    for wanted in how.titles:
+        if re.fullmatch(r"[0-9]{1,4}", wanted):
+            k = int(wanted) - 1
+            if not 0 <= k < len(titles):
+                raise FormatError(f"{place}: no column {wanted}; there are 1 to {len(titles)}")
+        elif (k := find(titles, [wanted], place)) is None:  # type: ignore[assignment]
+            there = ", ".join(map(shorten, titles[:20]))
+            raise FormatError(f'{place}: no column "{shorten(wanted)}"; the first row has {there}')
+        at.append(k)
+    by_title = not all(wanted.isdigit() for wanted in how.titles)
+    if not by_title and edge_columns(titles, place) is None and not _is_header(titles, at[2], others):
+        return Columns(at[0], at[1], at[2], told=True)
+    return Columns(at[0], at[1], at[2], titles=titles, told=True, notes=(_note([titles[k] for k in at], 2),))
+
+
+def _is_header(titles: Sequence[str], weight: int, others: Sequence[Sequence[str]]) -> bool:
+    """Tell whether a row is of titles: where all others have a number, or a sign, it has a word that is none."""
+    title = titles[weight]
+    if not re.match(r"[^\W\d_]", title) or _NO_TITLE.fullmatch(title) or is_entry(title):
+        return False
+    below = [row[weight].strip() for row in others if len(row) > max(weight, 1)]
+    return bool(below) and (all(map(is_entry, below)) or (is_sign(title) and all(below)))
+
+
+def _note(titles: Sequence[str], weight: int) -> str:
+    return f"columns {', '.join(shorten(title) for title in (titles[0], titles[1], titles[weight]))}"
+
+
+def _direction(titles: Sequence[str], place: str) -> str:
+    """Return why the direction must be told; "" where no title hints that the first column listens."""
+    if not (re.match(_LISTENERS, plain(titles[0])) or re.match(_HEARD, plain(titles[1]))):
+        return ""
+    what = f"the header {', '.join(map(shorten, titles[:3]))} names no source and target"
+    line = place.rpartition(", ")[2]
+    ends = f"{shorten(titles[0])} listens to {shorten(titles[1])}"
+    return f"{line}: {what}; say --edges listens if {ends}, or --edges information"

@@ -1,0 +1,497 @@
+"""No file is taken for another graph in silence: what may be read in two ways is read by what tells it, or refused."""
+
+from __future__ import annotations
+
+import io
+import json
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import networkx as nx
+import numpy as np
+import pytest
+from bad_inputs import ptcc as run
+from scipy import sparse
+from scipy.io import mmwrite, savemat
+
+import ptcc_certify as ptcc
+from ptcc_certify.errors import FormatError, GraphError, ParameterError
+from ptcc_certify.graphs.io import read_family, read_graph
+from ptcc_certify.graphs.io.graph_files import keywords_as, reading_flags
+from ptcc_certify.graphs.reading import OPTIONS
+
+
+@dataclass(frozen=True)
+class Input:
+    """A file, how it is read, and its edges ``source>target=weight``, or the words of its refusal."""
+
+    name: str
+    content: str | bytes
+    edges: str = ""
+    says: tuple[str, ...] = ()
+    how: dict[str, Any] = field(default_factory=dict)
+
+
+def npy(matrix: Any) -> bytes:
+    file = io.BytesIO()
+    np.save(file, np.array(matrix, dtype=float))
+    return file.getvalue()
+
+
+def mat(**matrices: Any) -> bytes:
+    file = io.BytesIO()
+    savemat(file, matrices)
+    return file.getvalue()
+
+
+def npz(**matrices: Any) -> bytes:
+    file = io.BytesIO()
+    np.savez(file, **matrices)
+    return file.getvalue()
+
+
+def mtx(matrix: Any) -> bytes:
+    file = io.BytesIO()
+    mmwrite(file, sparse.coo_array(np.array(matrix, dtype=float)), symmetry="general")
+    return file.getvalue()
+
+
+def graphml(edge: str, node: str = "", keys: str = "") -> str:
+    return f"""<graphml xmlns="http://graphml.graphdrawing.org/xmlns">
+<key id="w" for="edge" attr.name="weight" attr.type="double"/>
+<key id="s" for="edge" attr.name="sign" attr.type="{keys or "int"}"/>
+<key id="v" for="node" attr.name="name" attr.type="string"/>
+<graph edgedefault="directed"><node id="n0">{node and '<data key="v">ann</data>'}</node>
+<node id="n1">{node and '<data key="v">bob</data>'}</node>
+<edge source="n0" target="n1">{edge}</edge></graph></graphml>"""
+
+
+def gexf(kind: str = 'defaultedgetype="directed"', edge: str = 'weight="-0.5"', values: str = "") -> str:
+    return f"""<?xml version="1.0"?><gexf xmlns="http://gexf.net/1.3" version="1.3"><graph {kind}>
+<attributes class="edge"><attribute id="0" title="sign" type="integer"/></attributes>
+<nodes><node id="0" label="ann"/><node id="1" label="bob"/></nodes>
+<edges><edge id="0" source="0" target="1" {edge}>{values}</edge></edges></graph></gexf>"""
+
+
+def links(key: str = "links", **more: Any) -> str:
+    nodes = [{"id": "ann"}, {"id": "bob"}]
+    return json.dumps({"nodes": nodes, key: [{"source": "ann", "target": "bob", "weight": -0.5}], **more})
+
+
+LAPLACIAN = [[2, -1, 1], [-1, 1, 0], [0, 3, 3]]
+OF_LAPLACIAN = "2>1=1 3>1=-1 1>2=1 2>3=-3"
+NET = '*Vertices 3\n1 "ann"\n2 "bob"\n3 "eve"\n'
+
+SIGNS = [
+    Input("g.csv", "source,target,weight,sign\na,b,0.5,-1\nb,a,1,1\n", "a>b=-1/2 b>a=1"),
+    Input("g.csv", "source,target,weight,type\na,b,0.5,inhibits\nb,a,1,activates\n", "a>b=-1/2 b>a=1"),
+    Input("g.csv", "sign,source,weight,target\n-,a,2,b\n+,b,1,a\n", "a>b=-2 b>a=1"),
+    Input("g.csv", "source,target,weight,sign\na,b,-2,-1\nb,a,1,1\n", "a>b=-2 b>a=1"),
+    Input("g.csv", "source,target,weight,sign\na,b,-2,1\nb,a,1,1\n", says=("line 2", "disagree")),
+    Input("g.csv", "source,target,weight,sign\na,b,2,\nb,a,1,1\n", says=("line 2", 'no "sign"')),
+    Input("g.csv", "source,target,weight,sign\na,b,2,0\nb,a,1,-1\n", says=("line 2", "weight 0", "--drop-zeros")),
+    Input("g.csv", "source,target,weight,sign\na,b,2,0\nb,a,1,1\n", says=("line 2", "no -1", "--columns")),
+    Input("g.csv", "source,target,weight,type\na,b,2,1\nb,a,1,2\n", says=("line 3", '"2"', "code", "--columns")),
+    Input("g.csv", "source,target,weight,type\na,b,2,friend\nb,a,1,kin\n", says=("line 3", '"kin"', "--columns")),
+    Input(
+        "g.csv",
+        "source,target,weight,type\na,b,2,friend\nb,a,1,kin\n",
+        "a>b=2 b>a=1",
+        how={"columns": "source,target,weight"},
+    ),
+    Input("g.csv", "Source,Target,Type,Weight\na,b,Directed,-2\n", "a>b=-2"),
+    Input("g.csv", "Source,Target,Type,Weight\na,b,Undirected,-2\n", says=("undirected", "--undirected")),
+    Input("g.csv", "Source,Target,Type,Weight\na,b,Undirected,-2\n", "a>b=-2 b>a=-2", how={"undirected": True}),
+    Input("g.csv", "source,target,type\na,b,1\nb,a,2\n", says=("line 3", '"type" holds 2', "codes")),
+    Input("g.csv", "source,target,relation\na,b,0\nb,a,1\n", says=("line 2", '"relation" holds 0', "codes")),
+    Input("g.csv", "source,target,type\na,b,1\nb,a,-1\n", "a>b=1 b>a=-1"),
+    Input("g.csv", "source,target,sign\na,b,up\nb,a,down\n", "a>b=1 b>a=-1"),
+    Input("g.csv", "a,b,+\nb,a,-\n", "a>b=1 b>a=-1"),
+    Input("g.csv", "a,b,activation\nb,a,repression\n", "a>b=1 b>a=-1"),
+    Input("g.csv", "a,b,activates\nb,a,binds\n", says=("line 2", '"binds"', "word for a sign")),
+    Input("g.csv", "a,b,activates\nb,a,1\n", says=("line 1", '"activates"', "write 1 or -1")),
+    Input("g.csv", "a,b,1\nb,c,2\nc,a,0\n", says=("line 3", "0, 1, 2", "codes of relations", "--drop-zeros")),
+    Input("g.graphml", graphml('<data key="w">0.5</data><data key="s">-1</data>'), "n0>n1=-1/2"),
+    Input("g.graphml", graphml('<data key="w">0.5</data><data key="s">3</data>'), says=('"3"', "code")),
+    Input("g.graphml", graphml('<data key="s">inhibits</data>', keys="string"), "n0>n1=-1"),
+    Input("g.graphml", graphml('<data key="w">-2</data>', node="named"), "ann>bob=-2"),
+    Input(
+        "g.gml",
+        'graph [ directed 1 node [ id 0 name "ann" ] node [ id 1 name "bob" ] '
+        "edge [ source 0 target 1 weight 0.5 sign -1 ] ]",
+        "ann>bob=-1/2",
+    ),
+]
+LAPLACIANS = [
+    Input("g.npy", npy(LAPLACIAN), says=("Laplacian", "--laplacian", "--no-laplacian")),
+    Input("g.npy", npy(LAPLACIAN), says=("Laplacian", "--laplacian"), how={"drop_self_loops": True}),
+    Input("g.npy", npy(LAPLACIAN), OF_LAPLACIAN, how={"laplacian": True}),
+    Input("g.npy", npy(LAPLACIAN), "2>1=-1 3>1=1 1>2=-1 2>3=3", how={"laplacian": False, "drop_self_loops": True}),
+    Input("g.mtx", mtx(LAPLACIAN), says=("Laplacian", "--laplacian")),
+    Input("g.mtx", mtx(LAPLACIAN), OF_LAPLACIAN, how={"laplacian": True}),
+    Input("g.mat", mat(L=LAPLACIAN), OF_LAPLACIAN, how={"laplacian": True}),
+    Input("g.npz", npz(L=np.array(LAPLACIAN)), says=("Laplacian", "--laplacian"), how={"drop_self_loops": True}),
+    Input("g.txt", "2 -1 1\n-1 1 0\n0 3 3\n", says=("Laplacian", "--laplacian")),
+    Input("g.txt", "2 -1 1\n-1 1 0\n0 3 3\n", OF_LAPLACIAN, how={"laplacian": True}),
+    Input("g.npy", npy(np.transpose(LAPLACIAN)), says=("columns", "--edges information"), how={"laplacian": True}),
+    Input("g.npy", npy(np.transpose(LAPLACIAN)), OF_LAPLACIAN, how={"laplacian": True, "orientation": "information"}),
+    Input("g.npy", npy([[0, 1], [-1, 0]]), says=("no Laplacian", "row 1"), how={"laplacian": True}),
+    Input("g.npy", npy([[1, -0.5], [-0.5, 1]]), says=("no Laplacian", "row 1"), how={"laplacian": True}),
+    Input("g.npy", npy([[-1, 1], [2, -2]]), says=("minus a Laplacian", "negative"), how={"laplacian": True}),
+    Input("g.npy", npy([[-1, 1], [2, -2]]), says=("Laplacian", "--laplacian"), how={"drop_self_loops": True}),
+    # an ordinary Laplacian of signed weights: the rows sum to 0, the weights are the same
+    Input("g.npy", npy([[1, -2, 1], [0, 0, 0], [-3, 0, 3]]), says=("Laplacian",), how={"drop_self_loops": True}),
+    Input("g.npy", npy([[1, -2, 1], [0, 0, 0], [-3, 0, 3]]), "2>1=2 3>1=-1 1>3=3", how={"laplacian": True}),
+    Input("g.csv", "1,1,1\n1,2,-1\n2,1,-1\n2,2,1\n", says=("Laplacian",), how={"drop_self_loops": True}),
+    Input("g.csv", "1,1,1\n1,2,-1\n2,1,-1\n2,2,1\n", "1>2=1 2>1=1", how={"laplacian": True}),
+]
+ROWS = [
+    Input("g.sif", "12 1 15\n15 -1 17\n17 1 12\n", "12>15=1 15>17=-1 17>12=1"),
+    Input("g.sif", "a\tactivates\tb\tc\nb\tinhibits\ta\nlone\n", "a>b=1 a>c=1 b>a=-1"),
+    Input("g.sif", "a pp b\n", says=("line 1", '"pp"', "word for a sign")),
+    Input("g.sif", "a 1 b\nb 2 a\n", says=("line 2", "codes")),
+    Input("g.sif", "a activates\n", says=("line 1", "no row of SIF")),
+    Input("g.txt", "a activates b\nb inhibits a\n", says=("signs", ".sif")),
+    Input("g.txt", "12 1 15\n15 -1 17\n17 1 12\n", says=("second column", ".sif", "--columns 1,3,2")),
+    Input("g.txt", "12 1 15\n15 -1 17\n17 1 12\n", "12>15=1 15>17=-1 17>12=1", how={"columns": "1,3,2"}),
+    Input("g.txt", "1 2 4 6\n2 1 3 5\n3 2 4 5\n", says=("line 1", "--columns 1,2,3")),
+    Input("g.txt", "1 2 3\n2 1 3\n3 1 2\n", says=("neighbours", "--columns 1,2,3")),
+    Input("g.txt", "1 2 4\n2 1 3 5\n", says=("line 2", '"5"')),
+    Input("g.csv", "a,b,0.5,-1\nb,a,1,1\n", says=("line 1", '"-1"', "sign")),
+    Input("g.csv", "a,b,0.5,inhibits\n", says=("line 1", '"inhibits"')),
+    Input("g.txt", "2001 2002 2005 2007\n2002 2001 2004 2009\n", says=("line 1", '"2007"')),
+    Input("g.csv", "6,2,4,1289241911\n6,5,-2,1289241941\n", "6>2=4 6>5=-2"),
+    Input("g.csv", "source,target,weight\na,b,-1,5\n", says=("line 2", "4 fields")),
+    Input("g.tsv", "% sym signed\n1 2 1\n2 3 -1\n", says=("% sym", "--undirected")),
+    Input("g.tsv", "% sym signed\n1 2 1\n2 3 -1\n", "1>2=1 2>1=1 2>3=-1 3>2=-1", how={"undirected": True}),
+    Input("g.tsv", "% bip signed\n1 1 1\n2 1 -1\n", says=("% bip", "two sets of nodes")),
+    Input("g.tsv", "% asym signed\n1 2 1\n2 3 -1\n", "1>2=1 2>3=-1"),
+    Input("g.txt", "# Undirected graph: x\n1 2 1\n", says=("Undirected", "--undirected")),
+    Input("g.csv", "Gene1,Gene2,Type\na,b,+\nb,c,-\n", "a>b=1 b>c=-1"),
+    Input("g.csv", "TF,Gene,Effect,PMID\na,b,activates,99\nb,c,represses,7\n", "a>b=1 b>c=-1"),
+    Input("g.csv", "Gene1,Gene2,Type\na,b,activates\nb,c,binds\n", says=("line 3", '"binds"')),
+    Input("g.csv", "listener,speaker,weight\na,b,1\n", says=("line 1", "no source and target", "--edges listens")),
+    Input("g.csv", "listener,speaker,weight\na,b,1\n", "b>a=1", how={"orientation": "listens"}),
+    Input("g.csv", "ann,bob,strong\nbob,eve,1\n", says=("line 1", "bob is a title, and a node")),
+    Input("g.csv", "id,from,to,score,weight\n9,a,b,-3,1\n", "a>b=-3", how={"columns": "from,to,score"}),
+    Input("g.csv", "a,b,1,-3\n", "a>b=-3", how={"columns": "1,2,4"}),
+    Input("g.csv", "a,b,1\n", says=("no column 4", "1 to 3"), how={"columns": "1,2,4"}),
+    Input("g.csv", "source,target,weight\na,b,1\n", says=('no column "score"', "weight"), how={"columns": "1,2,score"}),
+    Input(
+        "g.csv",
+        "a,a,1\na,b,0\nb,c,1\nb,c,2\n",
+        says=("line 1: self-loop", "line 2: weight 0", "line 4: second row", "--drop-self-loops --drop-zeros --dup"),
+    ),
+    Input("g.csv", "a,b,0\nb,c,1\n", "b>c=1", how={"drop_zeros": True}),
+]
+MATRICES = [
+    Input("g.csv", ",ada,bo\nada,0,-0.7\nbo,0.3,0\n", "bo>ada=-7/10 ada>bo=3/10"),
+    Input("g.csv", ",ada,bo\nada,0,-0.7\nbo,0.3,0\n", "ada>bo=-7/10 bo>ada=3/10", how={"orientation": "information"}),
+    Input("g.csv", ",ada,bo\nbo,0.3,0\nada,0,-0.7\n", "bo>ada=-7/10 ada>bo=3/10"),
+    Input("g.txt", "ada bo cy\nada 0 -1 0\nbo 1 0 0\ncy 0 1 0\n", "bo>ada=-1 ada>bo=1 bo>cy=1"),
+    Input("g.csv", ",ada,bo\nada,0,\nbo,0.3,0\n", says=("row ada, column bo", "empty")),
+    Input("g.csv", ",ada,bo\nada,0,1\ncy,0.3,0\n", says=("matrix with names", "different")),
+    Input("g.txt", "[0 -1 1; -1 0 -1; 1 -1 0]\n", "2>1=-1 3>1=1 1>2=-1 3>2=-1 1>3=1 2>3=-1"),
+    Input("g.txt", "W = [0 -1\n 2 0];\n", "2>1=-1 1>2=2"),
+    Input("g.txt", "array([[ 0., -1.],\n       [ 2.,  0.]])\n", "2>1=-1 1>2=2"),
+    Input("g.txt", "[[ 0. -1.]\n [ 2.  0.]]\n", "2>1=-1 1>2=2"),
+    Input("g.txt", "[[0 1 ... 0]\n ...\n [1 0 ... 0]]\n", says=("printed in parts",)),
+    Input("g.txt", "[0 -1 1; -1 0]\n", says=("no square matrix",)),
+    Input("g.txt", "0 -1 0.5\n1/3 0 0\n0 2 0\n", "2>1=-1 3>1=1/2 1>2=1/3 2>3=2"),
+    Input("g.csv", "0,+,-\n-,0,0\n0,+,0\n", "2>1=1 3>1=-1 1>2=-1 2>3=1"),
+    Input("g.txt", "0 -1\n2 0\n", "2>1=-1 1>2=2"),
+    Input("g.txt", "0 1\n1 0\n", says=("edge 0 -> 1 has no weight",)),
+    Input("g.txt", "1 2 5 7\n2 1 6 7\n3 1 8 9\n4 1 8 9\n", says=("line 1", "--columns 1,2,3")),
+    Input("g.json", "[[0, -1], [2, 0]]", "2>1=-1 1>2=2"),
+    Input("g.csv", "a,b,c\n0,1,-1\n2,0,0\n0,3,0\n", "b>a=1 c>a=-1 a>b=2 b>c=3"),
+]
+FORMATS = [
+    Input("g.json", links(directed=True), "ann>bob=-1/2"),
+    Input("g.json", links("edges"), "ann>bob=-1/2"),
+    Input("g.txt", links("edges"), "ann>bob=-1/2"),
+    Input("g.json", links(directed=False), says=("directed", "--undirected")),
+    Input("g.json", links(directed=False), "ann>bob=-1/2 bob>ann=-1/2", how={"undirected": True}),
+    Input(
+        "g.json",
+        '{"nodes": [{"name": "a"}, {"name": "b"}], "links": [{"source": 0, "target": 1, "value": -2}]}',
+        "a>b=-2",
+    ),
+    Input(
+        "g.json",
+        '{"nodes": [{"id": "a"}], "links": [{"source": "a", "target": "b", "weight": 1}]}',
+        says=("is no node",),
+    ),
+    Input("g.json", '{"graph": 5}', says=("is JSON, not a graph", "links")),
+    Input("g.json", '[{"source": "a", "target": "b", "weight": 0.1, "sign": "-"}]', "a>b=-1/10"),
+    Input("g.gexf", gexf(), "ann>bob=-1/2"),
+    Input(
+        "g.gexf",
+        gexf(edge='weight="0.5"', values='<attvalues><attvalue for="0" value="-1"/></attvalues>'),
+        "ann>bob=-1/2",
+    ),
+    Input("g.gexf", gexf(kind=""), says=("undirected", "--undirected")),
+    Input("g.xml", gexf(), "ann>bob=-1/2"),
+    Input("g.net", NET + "*Arcs\n1 2 1\n*Edges\n2 3 -1\n", "ann>bob=1 bob>eve=-1 eve>bob=-1"),
+    Input("g.net", NET + "*Edges\n2 3 -1\n", says=("*Edges", "--undirected")),
+    Input("g.net", NET + "*Matrix\n0 -1 0\n0 0 2\n0 0 0\n", "ann>bob=-1 bob>eve=2"),
+    Input("g.net", NET + "*Arcslist\n1 2 3\n", "ann>bob=1 ann>eve=1"),
+    Input("g.net", NET + '*Arcs :1 "trust"\n1 2 1\n*Arcs :2 "hate"\n2 3 1\n', says=('"trust", "hate"', "--variable")),
+    Input("g.net", NET + '*Arcs :1 "trust"\n1 2 1\n*Arcs :2 "hate"\n2 3 -1\n', "bob>eve=-1", how={"variable": "hate"}),
+    Input("g.net", NET.replace("3\n", "3 2\n", 1) + "*Edges\n1 3 1\n", says=("two sets of nodes",)),
+    Input("g.net", NET.replace('"eve"', "O'Brien") + "*Arcs\n1 3 1\n", "ann>O'Brien=1"),
+    Input("g.paj", f"*Network one\n{NET}*Arcs\n1 2 -1\n*Partition p\n*Vertices 3\n1\n2\n1\n", "ann>bob=-1"),
+    Input(
+        "g.dl",
+        "dl n=3 format=fullmatrix\nlabels:\nada,bo,cy\ndata:\n0 1 -1\n1 0 0\n0 -1 0\n",
+        "bo>ada=1 cy>ada=-1 ada>bo=1 bo>cy=-1",
+    ),
+    Input("g.dl", "DL N = 2\nLABELS EMBEDDED\nDATA:\n     ada bo\nada 0 -2\nbo 1 0\n", "bo>ada=-2 ada>bo=1"),
+    Input("g.dl", "dl n=2 format=edgelist1\nlabels embedded\ndata:\nada bo -2\n", "ada>bo=-2"),
+    Input("g.dl", "dl n=3 format=nodelist1\ndata:\n1 2 3\n", "1>2=1 1>3=1"),
+    Input("g.dl", "dl nr=2 nc=3\ndata:\n1 2 3\n4 5 6\n", says=("one number n",)),
+    Input("g.dl", "dl n=2\ndata:\n0 1 1\n", says=("3 entries", "2 x 2")),
+    Input("g.mat", mat(A=[[0, 1], [1, 0]], B=[[0, -2], [1, 0]]), "2>1=-2 1>2=1", how={"variable": "B"}),
+    Input("g.mat", mat(A=[[0, 1], [1, 0]], B=[[0, -2], [1, 0]]), says=("A, B", "--variable")),
+    Input("g.mat", mat(A=[[0, 1], [1, 0]]), says=("called C", "A"), how={"variable": "C"}),
+    *(
+        Input(f"g.{ending}", first + b"\0" * 60, says=(kind, mend))
+        for ending, first, kind, mend in [
+            ("xlsx", b"PK\3\4 xl/workbook.xml", "an Excel workbook", "CSV"),
+            ("csv", b"\xd0\xcf\x11\xe0", "an old Excel workbook", "CSV"),
+            ("RData", b"RDX3\nX\n", "R data", "write.csv"),
+            ("h5", b"\x89HDF\r\n", "HDF5", ".npy"),
+            ("parquet", b"PAR1", "Parquet", "read_parquet"),
+            ("feather", b"ARROW1", "Feather", "read_feather"),
+            ("pkl", b"\x80\x04", "a pickle", "not read"),
+            ("csv", b"<!DOCTYPE html><html>", "a page", "the file itself"),
+            ("csv", b"%PDF-1.7", "a PDF", "rows source,target,weight"),
+            ("csv", b"\x89PNG", "an image", "rows source,target,weight"),
+            ("csv", b"SQLite format 3", "SQLite", "CSV"),
+            ("bz2", b"BZh91", "packed by bzip2", "gzip"),
+        ]
+    ),
+]
+INPUTS = SIGNS + LAPLACIANS + ROWS + MATRICES + FORMATS
+
+
+def put(folder: Path, name: str, content: str | bytes) -> Path:
+    path = folder / name
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
+    return path
+
+
+def told(graph: ptcc.SignedDigraph) -> set[tuple[str, str, Fraction]]:
+    return set(graph.edges)
+
+
+def expected(edges: str) -> set[tuple[str, str, Fraction]]:
+    parts = [edge.replace("=", ">").split(">") for edge in edges.split(" ")]
+    return {(source, target, Fraction(weight)) for source, target, weight in parts}
+
+
+@pytest.mark.parametrize("one", INPUTS, ids=[f"{k} {one.name}" for k, one in enumerate(INPUTS)])
+def test_a_file_is_the_graph_that_it_says_or_is_refused(tmp_path, one):
+    path = put(tmp_path, one.name, one.content)
+    if one.edges:
+        graph = read_graph(path, **one.how)
+        assert told(graph) == expected(one.edges)
+        assert told(read_graph(path, **keywords_as(path, graph.read))) == expected(one.edges)
+        return
+    with pytest.raises(FormatError) as caught:
+        read_graph(path, **one.how)
+    message = str(caught.value)
+    assert message.startswith(str(path)) and "\n" not in message and caught.value.__cause__ is None
+    for word in one.says:
+        assert word in message
+
+
+# ---------------------------------------------------------------------------------------------- in memory
+
+
+def test_signs_beside_weights_of_networkx_edges_are_their_factors():
+    graph = nx.DiGraph()
+    graph.add_edge("a", "b", weight=0.5, sign=-1)
+    graph.add_edge("b", "a", weight=1, sign="+")
+    assert told(ptcc.as_graph(graph)) == expected("a>b=-1/2 b>a=1")
+    assert told(ptcc.SignedDigraph.from_networkx(graph, "weight")) == expected("a>b=1/2 b>a=1")
+    graph["b"]["a"]["sign"] = 2
+    with pytest.raises(GraphError, match='"2" of edge b -> a in column "sign" is neither 1 nor -1'):
+        ptcc.as_graph(graph)
+    del graph["b"]["a"]["sign"]
+    with pytest.raises(GraphError, match='edge b -> a has no "sign", and others have'):
+        ptcc.as_graph(graph)
+
+
+def test_a_type_of_networkx_edges_that_is_a_code_is_no_weight():
+    graph = nx.DiGraph([("a", "b", {"type": 1}), ("b", "a", {"type": 2})])
+    with pytest.raises(GraphError, match="codes of relations"):
+        ptcc.as_graph(graph)
+    assert told(ptcc.SignedDigraph.from_networkx(graph, "type")) == expected("a>b=1 b>a=2")
+
+
+def test_networkx_graphs_take_what_the_flags_say():
+    multi = nx.MultiDiGraph([("a", "b", {"weight": 1}), ("a", "b", {"weight": -3}), ("b", "b", {"weight": 1})])
+    graph = ptcc.SignedDigraph.from_networkx(multi, duplicates="sum", drop_self_loops=True)
+    assert told(graph) == expected("a>b=-2") and graph.read["self_loops"] == "dropped 1"
+    both = ptcc.as_graph(nx.Graph([("a", "b", {"weight": -3})]), undirected=True)
+    assert told(both) == expected("a>b=-3 b>a=-3")
+
+
+def test_signs_beside_weights_of_a_pandas_table_are_their_factors():
+    pandas = pytest.importorskip("pandas")
+    table = pandas.DataFrame(
+        {"source": [1, 2], "target": [2, 1], "weight": [0.5, 1], "type": ["inhibits", "activates"]}
+    )
+    assert told(ptcc.as_graph(table)) == expected("1>2=-1/2 2>1=1")
+    assert told(ptcc.as_graph(table, columns="source,target,weight")) == expected("1>2=1/2 2>1=1")
+    table["type"] = [1, 2]
+    with pytest.raises(GraphError, match='in column "type" is neither 1 nor -1'):
+        ptcc.as_graph(table)
+    named = table.rename(columns={"source": "Gene1", "target": "Gene2", "weight": "score"})
+    assert told(ptcc.as_graph(named, columns=("Gene1", "Gene2", "score"))) == expected("1>2=1/2 2>1=1")
+
+
+def test_a_laplacian_in_memory_is_named_and_read():
+    with pytest.raises(GraphError, match="as a Laplacian's; read it with laplacian=True"):
+        ptcc.SignedDigraph.from_matrix(LAPLACIAN, orientation="listens")
+    for matrix in (LAPLACIAN, np.array(LAPLACIAN, dtype=float), sparse.csr_array(np.array(LAPLACIAN))):
+        graph = ptcc.SignedDigraph.from_matrix(matrix, orientation="listens", laplacian=True)
+        assert told(graph) == expected(OF_LAPLACIAN)
+        assert (graph.laplacian().toarray() == LAPLACIAN).all()
+        assert ptcc.as_graph(matrix, "listens", laplacian=True) == graph
+
+
+def test_edges_in_memory_take_what_the_flags_say():
+    edges = [("a", "b", 1), ("a", "b", -3), ("b", "b", 2), ("b", "c", 0)]
+    with pytest.raises(GraphError) as caught:
+        ptcc.as_graph(edges)
+    for word in ("self-loop at node b", "weight 0 of edge b -> c", "two edges a -> b", "drop_self_loops=True"):
+        assert word in str(caught.value)
+    graph = ptcc.as_graph(edges, duplicates="sum", drop_self_loops=True, drop_zeros=True)
+    assert told(graph) == expected("a>b=-2")
+    assert told(ptcc.as_graph([("a", "b", "inhibits")], undirected=True)) == expected("a>b=-1 b>a=-1")
+    with pytest.raises(ParameterError, match="laplacian"):
+        ptcc.as_graph(edges, laplacian=True)
+
+
+def test_a_matrix_as_text_asks_for_its_direction_in_python(tmp_path):
+    path = put(tmp_path, "W.csv", MATRICES[0].content)
+    with pytest.raises(GraphError, match="does not tell its direction"):
+        ptcc.as_graph(path)
+    assert told(ptcc.as_graph(path, "information")) == expected(MATRICES[1].edges)
+
+
+# ---------------------------------------------------------------------------------------------- families
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        ("source,target,weight_min,weight_max,sign\na,b,1,2,-1\n", 'a column "sign" beside the weights'),
+        ("source,target,weight,sign,optional\na,b,1,-1,yes\n", 'a column "sign" beside the weights'),
+        ("source,target,weight_min,weight_max\na,b,1,2,9\n", "line 2: 5 fields, and the header has 4"),
+        ("% sym\nsource,target,weight_min,weight_max\na,b,1,2\n", "% sym means undirected edges"),
+    ],
+)
+def test_files_of_families_have_the_same_guards(tmp_path, content, says):
+    with pytest.raises(FormatError, match=says):
+        read_family(put(tmp_path, "g.csv", content))
+
+
+def test_words_for_signs_are_read_in_files_of_families(tmp_path):
+    family = read_family(put(tmp_path, "g.csv", "source,target,weight,optional\na,b,inhibits,yes\nb,a,+,no\n"))
+    mode = family.modes[0]
+    ends = {
+        (mode.labels[s], mode.labels[t]): mode.edge_interval(k)
+        for k, (s, t) in enumerate(zip(mode.source, mode.target, strict=True))
+    }
+    assert ends == {("a", "b"): (-1, 0), ("b", "a"): (1, 1)}
+
+
+# ---------------------------------------------------------------------------------------------- command line
+
+
+FLAGS = ("--drop-self-loops", "--drop-zeros", "--duplicates", "last", "--columns", "from,to,score", "--undirected")
+TABLE = "from,to,score,sign\nann,ann,1,x\nann,bob,0,x\nbob,eve,2,x\nbob,eve,-2,x\n"
+
+
+def test_a_certificate_tells_how_its_graph_was_read_and_the_check_reads_it_so(tmp_path):
+    path, out = put(tmp_path, "g.csv", TABLE), tmp_path / "c.json"
+    done = run("certify", str(path), *FLAGS, "--no-simulation", "-o", str(out))
+    assert done.code in (0, 4), done.err
+    read = json.loads(out.read_text())["graph"]["read"]
+    assert (read["zeros"], read["columns"], read["self_loops"]) == ("dropped 1", "from,to,score", "dropped 1")
+    flags = "--edges information --duplicates last --drop-self-loops --drop-zeros --undirected --columns from,to,score"
+    assert reading_flags(read) == flags
+    assert run("check", str(out), str(path), *FLAGS).code in (0, 4)
+    assert "accepted" not in run("check", str(out), str(path), *FLAGS, "--columns", "1,2,4").out
+    for key, wrong in (("zeros", "dropped"), ("laplacian", "yes"), ("columns", 3), ("variable", None)):
+        document = json.loads(out.read_text())
+        document["graph"]["read"][key] = wrong
+        assert not ptcc.check(document).accepted
+
+
+def test_a_laplacian_is_checked_as_it_was_certified(tmp_path):
+    path, out = put(tmp_path, "L.npy", npy([[1, -1], [-1, 1]])), tmp_path / "c.json"
+    assert run("certify", str(path), "--laplacian", "--no-simulation", "-o", str(out)).code == 0
+    assert json.loads(out.read_text())["graph"]["read"]["laplacian"] is True
+    assert run("check", str(out), str(path), "--laplacian").code == 0
+
+
+@pytest.mark.parametrize("command", ["classify", "certify", "simulate", "design", "plot", "check", "batch", "explore"])
+def test_every_command_that_reads_a_graph_has_all_options_of_reading(command):
+    from ptcc_certify.cli import cli
+    from ptcc_certify.cli.options import READING
+
+    names = {parameter.name for parameter in cli.commands[command].params}
+    assert {*READING} <= names and len(READING) == len(OPTIONS)
+
+
+def test_a_scenario_has_all_options_of_reading(tmp_path):
+    put(tmp_path, "g.csv", TABLE)
+    scenario = put(
+        tmp_path,
+        "s.toml",
+        '[graph]\nfile = "g.csv"\nduplicates = "last"\ndrop_self_loops = true\ndrop_zeros = true\nundirected = true\n'
+        'columns = "from,to,score"\n',
+    )
+    assert "3 nodes, 2 edges" in run("classify", str(scenario)).out
+    put(tmp_path, "L.npy", npy([[1, -1], [-1, 1]]))
+    scenario.write_text('[graph]\nfile = "L.npy"\nlaplacian = true\n')
+    assert "2 nodes, 2 edges" in run("classify", str(scenario)).out
+    assert "Laplacian" in run("classify", str(scenario), "--no-laplacian").err + run("classify", str(scenario)).out
+    put(tmp_path, "g.mat", mat(A=[[0, 1], [1, 0]], B=[[0, -2], [0, 0]]))
+    scenario.write_text('[graph]\nfile = "g.mat"\nvariable = "B"\n')
+    assert "2 nodes, 1 edge " in run("classify", str(scenario)).out
+
+
+def test_a_batch_reads_as_it_is_told(tmp_path):
+    put(tmp_path, "g.csv", TABLE)
+    done = run("batch", str(tmp_path / "*.csv"), *FLAGS)
+    assert "ann,ann" not in done.out and "g.csv" in done.out and "from,to" not in done.err
+    rows = ptcc.certify_many(
+        str(tmp_path / "g.csv"),
+        ptcc.NominalProtocol(T=1, rho1=1, rho2=1, kappa=2),
+        duplicates="last",
+        drop_self_loops=True,
+        drop_zeros=True,
+        columns="from,to,score",
+    )
+    assert rows[0]["error"] is None and rows[0]["edges"] == 1
+
+
+def test_the_read_line_tells_in_full_what_makes_another_graph(tmp_path):
+    header = "source,target,weight,sign," + ",".join(f"a_long_title_of_a_column_{k}" for k in range(30))
+    rows = "".join(f"ann,bob,0.5,-1,{'7,' * 29}7\n" for _ in range(3)) + f"bob,bob,1,1,{'7,' * 29}7\n"
+    path = put(tmp_path, "g.csv", header + "\n" + rows)
+    for command in (["classify"], ["certify", "--no-simulation"], ["classify", "-v"]):
+        out = " ".join(run(*command, str(path), "--duplicates", "sum", "--drop-self-loops", "--undirected").out.split())
+        for word in ('weights times column "sign"', "2 repeated rows were merged (sum)", "self-loops dropped 1"):
+            assert word in out, (command, out)
+
+
+def test_the_text_of_the_terminal_names_the_columns_of_a_header_that_was_guessed(tmp_path):
+    out = run("classify", str(put(tmp_path, "g.csv", "Gene1,Gene2,Type\na,b,+\nb,c,-\n"))).out
+    assert "columns Gene1, Gene2, Type" in out and "3 nodes" in out
