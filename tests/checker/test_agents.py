@@ -117,6 +117,7 @@ def numbers(values: list[str], factor: Fraction | int) -> list[str]:
 # ---------------------------------------------------------------------- what is true is accepted
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize("name", SETTINGS)
 def test_every_kind_of_agent_is_accepted_and_true(name: str):
     data = made(name)

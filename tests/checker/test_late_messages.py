@@ -143,6 +143,7 @@ def with_all(data: Json, *changes: tuple[tuple[Any, ...], Any]) -> Json:
 # ---------------------------------------------------------------------- what is true is accepted
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", NAMES)
 def test_what_follows_is_accepted_with_and_without_arrays_and_has_the_shape_of_the_schema(name: str, monkeypatch: Any):
     data = samples()[name]
@@ -155,11 +156,13 @@ def test_what_follows_is_accepted_with_and_without_arrays_and_has_the_shape_of_t
         assert report.obligations == reports[0].obligations
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("name", thinned(NAMES, 3))
 def test_motions_keep_to_what_is_accepted(name: str):
     assert late_claims(samples()[name]) == []
 
 
+@pytest.mark.few(5)
 @pytest.mark.parametrize(
     ("name", "path", "factor", "claim"),
     [

@@ -126,6 +126,7 @@ def test_work_that_lasts_says_where_it_is_without_a_terminal(
     assert capsys.readouterr().err == ""
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("words", "steps"),
     [
