@@ -54,8 +54,9 @@ def test_the_transcript_is_what_ptcc_prints():
 def test_the_set_up_commands_are_there():
     first, second = [line for _, block in blocks(TEXT, "sh") if block not in SESSIONS for line in block.splitlines()]
     assert "pip install" in first and first.endswith("ptcc certify fig1b")
-    assert second == "bash .ci/run"
-    assert (README.parent / ".ci" / "run").exists()
+    assert second == "pytest"
+    assert "`bash .ci/run`" in TEXT
+    assert "\npytest\n" in (README.parent / ".ci" / "run").read_text(encoding="utf-8")  # as the README says it
 
 
 def test_the_packaged_graphs_and_the_theorem_table_are_complete():

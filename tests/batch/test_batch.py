@@ -101,6 +101,7 @@ CLASSES = [
 ]
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize(("connectivity", "balanced", "undirected"), CLASSES)
 def test_graphs_are_of_their_class(connectivity: str, balanced: bool, undirected: bool):
     for degree in (0, 2.5, 1000):

@@ -246,6 +246,7 @@ POWERS = (F(1, 2), F(1), F(5, 2))
 SLIDING = ("1.1", "1.2", "2.1 K=1", "2.2", "3.1 mixed", "3.2", "disconnected mixed")
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(("name", "power"), thinned([(name, power) for name in SLIDING for power in POWERS], 8))
 def test_no_input_of_the_sliding_mode_is_above_its_bounds(name: str, power: Fraction):
     rng = np.random.default_rng(len(name))

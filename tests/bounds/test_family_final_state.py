@@ -41,6 +41,7 @@ def compare_with_vertices(seed: int) -> None:
     assert value.exact and (value.lower, value.upper) == (min(values), max(values))
 
 
+@pytest.mark.few(16)
 @pytest.mark.parametrize("seed", range(40))
 def test_final_values_are_those_of_all_vertices(seed):
     compare_with_vertices(seed)

@@ -135,6 +135,7 @@ def random_sparse(n: int, seed: int) -> SignedDigraph:
     return SignedDigraph.from_edges([(j, i, w) for (j, i), w in edges.items()], nodes=range(n))
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("n", "slides"), [(500, False), (400, True), pytest.param(1000, False, marks=pytest.mark.campaign)]
 )
@@ -323,6 +324,7 @@ def fan() -> SignedDigraph:
     return SignedDigraph.from_edges(rows)
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("graph", "start"),
     thinned(

@@ -52,6 +52,7 @@ def sliding_run(certificate: Certificate) -> SlidingTrajectory:
 # ---------------------------------------------------------------------- the paper's examples
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize(("number", "name"), RUNS)
 def test_the_examples_behave_as_the_paper_reports(number: str, name: str):
     cert, run = example(number, name), sliding_run(example(number, name))

@@ -107,17 +107,17 @@ def test_what_is_proved_before_the_limit_stands(monkeypatch: pytest.MonkeyPatch)
 
 
 HOLDS = """
-import ctypes, sys
+import ctypes, os, sys
 from ptcc_certify import NominalProtocol, SignedDigraph, certify
 from ptcc_certify.lyapunov import search as sharpen
 
 def holds(system, thorough):
     yield from ()
+    os.write(1, b"holds\\n")
     ctypes.PyDLL(None).sleep(600)  # the interpreter is held: no other thread, no handler of a signal runs
 
 sharpen._lmi_candidates = holds
 ring = SignedDigraph.from_edges([(i, (i + 1) % 50, 1 if i else -1) for i in range(50)])
-print("began", flush=True)
 cert = certify(ring, NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), [1] * 50, time_limit=float(sys.argv[1]))
 print(cert.verdict, cert.cut_off)
 """
@@ -127,8 +127,8 @@ linux = pytest.mark.skipif(sys.platform != "linux", reason="processes are copied
 @linux
 def test_a_solver_that_holds_the_interpreter_is_ended_at_the_limit():
     run = subprocess.run([sys.executable, "-c", HOLDS, "12"], capture_output=True, text=True, timeout=300, check=True)
-    began, told = run.stdout.splitlines()
-    assert began == "began" and told.startswith("certified ") and "'class lmi'" in told  # a busy machine cuts off more
+    *_, told = run.stdout.splitlines()
+    assert told.startswith("certified ") and "'class lmi'" in told  # a busy machine cuts off more
 
 
 @linux
@@ -136,8 +136,7 @@ def test_a_solver_that_holds_the_interpreter_is_ended_by_an_interrupt():
     run = subprocess.Popen(
         [sys.executable, "-c", HOLDS, "600"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
-    assert run.stdout is not None and run.stdout.readline() == "began\n"
-    time.sleep(4)
+    assert run.stdout is not None and run.stdout.readline() == "holds\n"
     run.send_signal(signal.SIGINT)
     _, err = run.communicate(timeout=60)
     assert run.returncode != 0 and "KeyboardInterrupt" in err

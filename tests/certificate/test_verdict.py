@@ -54,6 +54,7 @@ def weak(k: int, sliding: bool = False) -> Certificate:
 # ---------------------------------------------------------------------- usefulness
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize(("k", "sliding"), thinned([(k, k % 3 == 0) for k in range(1, 11)], 2))
 def test_the_gains_that_are_named_leave_one_percent_and_bound_the_input(k: int, sliding: bool):
     """Certified with what the line says, nothing else changed, at most a hundredth is left, of a bounded input."""
@@ -134,6 +135,7 @@ def strong() -> Certificate:
     return certify(load_graph("fig1a"), protocol, [9, -8, 7, -6, 5, 4], simulation=False)
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize("rate", ["met", "refuted", "left open", None])
 @pytest.mark.parametrize("most", ["met", "refuted", "left open", None])
 @pytest.mark.parametrize("behaviour", ["met", "refuted", None])
@@ -162,6 +164,7 @@ def test_codes_are_worst_first():
     assert worst_code([4, 0, 1, 3]) == 1 and worst_code([0, 4]) == 4 and worst_code([]) == 0
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("options", "code", "says"),
     thinned(

@@ -24,6 +24,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cpu_time import at_most
 from generators import KINDS, all_classes, random_graph
 from mutations import Json, changed, mutants, resealed, same_claim
 from paper_examples import paper_examples
@@ -301,6 +302,7 @@ def judge(
     return stops, passed
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(("name", "slides"), thinned(SAMPLE, 3))
 def test_no_mutant_is_accepted(name: str, slides: bool):
     stops, passed = judge(made(name, 5, slides), 79, SAMPLE.index((name, slides)), False)
@@ -344,10 +346,9 @@ def test_numbers_about_the_input_that_cost_too_much_are_refused():
     rows = [f"1/{p**600}" for p in primes]
     center = {label: rows[k] for k, label in enumerate(data["graph"]["nodes"])}
     many = changed(data, ("input", "initial_set", "center"), center)
-    began = time.perf_counter()
-    report = check(resealed(many), stdlib=True)
+    with at_most(20):
+        report = check(resealed(many), stdlib=True)
     assert not report.accepted and "denominator" in (report.reason or "")
-    assert time.perf_counter() - began < 20
     aside = changed(
         data, ("input", "initial_set", "center"), {"file": "x.npy", "sha256": "0" * 64, "count": len(center)}
     )
@@ -819,6 +820,7 @@ def test_no_mutant_of_a_certificate_with_side_files_is_accepted(name: str, slide
 # ---------------------------------------------------------------------- factors of leader groups
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize("aside", [False, True])
 @pytest.mark.parametrize("name", thinned(["1.1", "1.2", "2.2", "2.1 K>=2", "3.1 mixed", "3.2", "3.1 no single"], 2))
 def test_groups_are_proved_by_factors(name: str, aside: bool):
@@ -914,17 +916,21 @@ def test_what_is_proved_once_holds_for_all_multiples_of_the_weights():
 # ---------------------------------------------------------------------- limits
 
 
-def one_line(path: Path, seconds: float = 20) -> str:
-    begin = time.monotonic()
+def one_line(path: Path, seconds: int = 20) -> str:
+    """What the checker says in a process that may take so many seconds, of its own, and 3 GB."""
+
+    def limit() -> None:
+        resource.setrlimit(resource.RLIMIT_AS, (3 * 2**30, 3 * 2**30))
+        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
+
     done = subprocess.run(
         [sys.executable, "-m", "ptcc_certify.checker", str(path)],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=600,
         env={**os.environ, "PYTHONPATH": str(PACKAGE.parent)},
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (3 * 2**30, 3 * 2**30)),
+        preexec_fn=limit,
     )
-    assert time.monotonic() - begin < seconds
     assert done.returncode in (1, 2)
     said = (done.stderr or done.stdout).strip().splitlines()
     assert len(said) == 1 or done.returncode == 1
@@ -977,9 +983,8 @@ def test_huge_and_hostile_files_are_refused(tmp_path: Path, capsys: pytest.Captu
 
 
 def timed(data: Json, seconds: float, **options: bool) -> None:
-    begin = time.monotonic()
-    report = check(resealed(data), **options)
-    assert time.monotonic() - begin < seconds
+    with at_most(seconds):
+        report = check(resealed(data), **options)
     assert report.rejected or report.accepted
 
 
@@ -1002,9 +1007,8 @@ def test_long_numbers_and_many_rows_take_bounded_time():
     block = {"name": "P", "nodes": nodes, "diagonal": ["1"] * len(nodes), "times_rho": False}
     function = {"class": "lmi", "coordinates": "E", "blocks": [block], "rho": None, "rate": "-9", "overshoot": "1"}
     forged = {**wide, "lyapunov": {"functions": [{**function, "deviation": None}]}}
-    begin = time.monotonic()
-    assert "rows" in (check(resealed(forged)).reason or "")
-    assert time.monotonic() - begin < 10
+    with at_most(10):
+        assert "rows" in (check(resealed(forged)).reason or "")
     slow = made("1.1", 5, True)
     z = {label: f"{k + 1}/1000" for k, label in enumerate(slow["graph"]["nodes"])}
     slow = changed(slow, ("protocol",), {**slow["protocol"], "mu2": "1900", "mu3": "90"})
@@ -1078,10 +1082,9 @@ def test_a_label_that_the_terminal_cannot_show(tmp_path: Path):
 @pytest.mark.parametrize("text", ["1e999999999", "1e401", "9" * 10**7, "0x1p99999", "1/0", "1_0", "١", "", "1/-2", "."])
 def test_numbers_outside_the_grammar_are_rejected(text: str):
     data = made("1.1", 5)
-    begin = time.monotonic()
-    rejected(changed(data, ("initial_state", data["graph"]["nodes"][0]), text), "initial_state")
-    rejected(changed(data, ("graph", "edges", 0, 2), text), "graph")
-    assert time.monotonic() - begin < 2
+    with at_most(2):
+        rejected(changed(data, ("initial_state", data["graph"]["nodes"][0]), text), "initial_state")
+        rejected(changed(data, ("graph", "edges", 0, 2), text), "graph")
 
 
 # ---------------------------------------------------------------------- texts
@@ -1117,29 +1120,27 @@ def test_a_cycle_through_a_follower_does_not_unbalance_its_leaders():
 @pytest.mark.parametrize("stdlib", [False, True])
 @pytest.mark.parametrize("bits", [-(10**9), -(10**6), 10**9])
 def test_factors_with_odd_bits_cost_nothing(bits: int, stdlib: bool):
-    begin = time.perf_counter()
     judge = arithmetic(stdlib).residual_definite
     entries, factor = ([0, 1], [0, 1], [1, 1]), SparseFactor([0, 1], [0, 1, 2], [0, 1], [1, 1], [0, 0], bits)
-    assert not judge(2, entries, factor)
-    assert not judge(2, entries, factor._replace(exponents=[65_536, -65_536], bits=65_536), power=-65_536)
-    assert time.perf_counter() - begin < 5
+    with at_most(5):
+        assert not judge(2, entries, factor)
+        assert not judge(2, entries, factor._replace(exponents=[65_536, -65_536], bits=65_536), power=-65_536)
 
 
 def test_factors_that_would_fill_the_memory_are_not_judged():
     n = 9000
     column = [0, n, *range(n + 1, 2 * n)], [*range(n), *range(1, n)], [0] * (2 * n - 1)
     diagonal = list(range(n)), list(range(n)), [1] * n
-    begin = time.perf_counter()
-    for stdlib in (True, False):
-        factor = SparseFactor(list(range(n)), *column, [0] * n, 10)
-        assert not arithmetic(stdlib).residual_definite(n, diagonal, factor)
-    assert time.perf_counter() - begin < 20
+    factor = SparseFactor(list(range(n)), *column, [0] * n, 10)
+    with at_most(20):
+        for stdlib in (True, False):
+            assert not arithmetic(stdlib).residual_definite(n, diagonal, factor)
 
 
 def test_weights_of_one_hash_are_told_apart_in_time():
-    begin = time.perf_counter()
-    distinct, which = numbered([1 + k * (2**61 - 1) for k in range(20_001)])
-    assert len(distinct) == len(which) == 20_001 and time.perf_counter() - begin < 5
+    with at_most(5):
+        distinct, which = numbered([1 + k * (2**61 - 1) for k in range(20_001)])
+    assert len(distinct) == len(which) == 20_001
 
 
 def test_integers_of_64_bits_in_a_file_are_integers(tmp_path: Path) -> None:

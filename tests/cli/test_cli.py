@@ -11,7 +11,6 @@ import re
 import shlex
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from dataclasses import replace
 from fractions import Fraction
@@ -21,6 +20,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bad_inputs import BAD_INPUTS, BadInput, Run, detailed, listing, ptcc, write
+from cpu_time import at_most
 from generators import all_classes, random_graph
 from scipy.linalg import expm
 from selection import thinned
@@ -86,9 +86,9 @@ def assert_refused(run: Run) -> None:
 @pytest.mark.parametrize("case", BAD_INPUTS, ids=lambda case: case.name)
 def test_bad_input_is_refused_in_one_line(case: BadInput, folder: Path):
     write(case.files, folder)
-    before, started = listing(folder), time.perf_counter()
-    run = ptcc(*case.args, stdin=case.stdin)
-    assert time.perf_counter() - started < 10
+    before = listing(folder)
+    with at_most(10):
+        run = ptcc(*case.args, stdin=case.stdin)
     assert_refused(run)
     assert re.search(case.says, run.err), run.err
     assert listing(folder) == before
@@ -101,6 +101,7 @@ def test_the_names_of_the_table_differ():
 SAMPLE = ("weight NaN", "XML entity bomb", "T NaN", "unknown command")
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("case", [c for c in BAD_INPUTS if c.name in SAMPLE], ids=lambda case: case.name)
 def test_bad_input_to_a_process_of_its_own(case: BadInput, folder: Path):
     write(case.files, folder)
@@ -291,6 +292,7 @@ def test_a_scenario_says_how_check_reads_its_graph(folder: Path):
     assert ptcc("check", "c.json", "s.toml", "--edges", "information").code == 1
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize(
     ("edges", "said"),
     [
@@ -759,6 +761,7 @@ def test_simulate_says_when_the_run_has_not_settled():
     assert "note" not in run.out
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("name", "magic"), [("a.png", b"\x89PNG\r\n\x1a\n"), ("a.svg", b"<?xml"), ("a.pdf", b"%PDF"), ("A.PNG", b"\x89PNG")]
 )
@@ -792,6 +795,7 @@ def test_max_input_is_met_refuted_or_undecided(most: str, code: int, says: str):
     assert run.code == code and says in run.out.splitlines()[-1]
 
 
+@pytest.mark.few(9)
 @pytest.mark.parametrize(
     ("given", "most", "code", "says"),
     [

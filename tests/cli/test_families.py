@@ -188,6 +188,7 @@ def test_the_json_is_the_certificate_or_the_decision():
     assert [mode["name"] for mode in decision["modes"]] == ["day", "spoiled"]
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(
     ("words", "code", "says"),
     thinned(

@@ -525,6 +525,7 @@ def of_box(name: str, protocol: Any, sigma0: Any = None) -> dict[str, Any]:
     return json.loads(made.to_json())
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("name", BOXES)
 def test_what_the_input_takes_over_a_box_of_initial_states_is_verified(name: str, tmp_path: Path) -> None:
     program()

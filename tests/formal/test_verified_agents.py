@@ -46,6 +46,7 @@ SETTINGS = {
 UNREAD = ("large form", "undecided", "radius", "dominance", "weak components")
 
 
+@pytest.mark.few(11)
 @pytest.mark.parametrize("name", SETTINGS)
 def test_certificates_of_agents_are_accepted_and_every_obligation_is_verified(name: str, tmp_path: Path) -> None:
     program()
@@ -202,6 +203,7 @@ def test_where_agents_that_meet_at_rest_end_is_verified_and_what_is_forged_of_it
     assert code == 1
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize(
     "setting",
     [

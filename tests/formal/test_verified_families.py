@@ -197,6 +197,7 @@ def narrower(entry: Any) -> list[Any]:
     ]
 
 
+@pytest.mark.few(3)
 @pytest.mark.parametrize("protocol", [NOMINAL, SLIDING], ids=["nominal", "sliding"])
 @pytest.mark.parametrize("name", ENDING)
 def test_agents_end_in_their_intervals_and_no_narrower_one_is_accepted(
@@ -311,6 +312,7 @@ def test_without_functions_a_common_kernel_that_is_none_is_rejected(tmp_path: Pa
         assert code == 1 and "claim" in text, text
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("kind", DEPENDING)
 def test_that_a_component_depends_on_the_signal_is_verified_by_its_witness(kind: str, tmp_path: Path) -> None:
     program()

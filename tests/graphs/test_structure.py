@@ -253,6 +253,7 @@ def constructed(name: str) -> Iterator[Made]:
         yield random_graph(rng, **(kwargs | changes))
 
 
+@pytest.mark.few(31)
 @pytest.mark.parametrize("name", thinned(CLASSES, 2))
 def test_every_field_agrees_with_the_definitions_and_with_the_construction(name):
     for made in constructed(name):
@@ -324,6 +325,7 @@ def balanced_parts(n: int, edges: Iterable[tuple[int, int, int]]) -> list[bool]:
     return [find(v) not in torn for v in range(n)]
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("negative", thinned([0.3, 0.001, 0.0], 3))
 @pytest.mark.parametrize(
     ("mean_in_degree", "block"), thinned([(0.5, None), (1.0, None), (3.0, None), (1.5, 4), (2.0, 10)])

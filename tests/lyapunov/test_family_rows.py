@@ -198,6 +198,7 @@ def follow(seed: int, kind: str) -> int:
     return count
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize("kind", KINDS)
 def test_functions_of_followers_decay_along_random_signals(kind):
     assert sum(follow(seed, kind) for seed in range(3)) > 1

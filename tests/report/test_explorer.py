@@ -399,6 +399,7 @@ def made(
     return make
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     "settings",
     thinned(

@@ -340,7 +340,6 @@ def test_nothing_on_the_page_moves_while_values_change(browser: Any, address: st
             page.move(name, value)
             if kind == "nominal" or name != "delta":
                 page.settle()
-            page.page.wait_for_timeout(100)
             assert page.boxes() == before, name
         page.write("delta" if kind == "sliding-mode" else "T", "")
         page.page.wait_for_selector(".refused")
@@ -360,7 +359,6 @@ def test_a_moved_slider_changes_image_and_text(browser: Any, forty: Path, capsys
             page.page.select_option("#kind", kind)
             for graph in (forty.name, *GRAPHS):
                 page.page.select_option("#graph", graph)
-                page.page.wait_for_timeout(50)
                 page.settle()
                 seconds = []
                 for value in ("0.8", "1.2", "1.6"):
@@ -416,13 +414,20 @@ def test_an_answer_that_another_page_cut_off_is_asked_for_again(browser: Any, ad
 
 
 @pytest.mark.browser
-def test_what_is_computed_after_a_refusal_is_not_called_refused(browser: Any, address: str):
-    page = Page(browser, address, 1280, 900)
+def test_what_is_computed_after_a_refusal_is_not_called_refused(
+    browser: Any, server: ExplorerServer, monkeypatch: pytest.MonkeyPatch
+):
+    """The server begins to compute only when the page was looked at."""
+    page, looked_at, preview = Page(browser, server.address, 1280, 900), threading.Event(), server.explorer.preview
     page.write("rho2", "-1")
     page.page.wait_for_selector("#verdict.bad")
-    page.write("rho2", "1.3")
-    assert page.page.inner_text("#verdict").split() == ["Verdict", "computing"]
-    assert page.page.eval_on_selector_all("figure", "all => all.every(one => one.classList.contains('old'))")
+    monkeypatch.setattr(server.explorer, "preview", lambda settings: looked_at.wait() and preview(settings))
+    try:
+        page.write("rho2", "1.3")
+        assert page.page.inner_text("#verdict").split() == ["Verdict", "computing"]
+        assert page.page.eval_on_selector_all("figure", "all => all.every(one => one.classList.contains('old'))")
+    finally:
+        looked_at.set()
     page.settle()
     assert not page.page.query_selector_all("figure.old")
 
@@ -436,8 +441,12 @@ def test_nothing_is_asked_of_the_network_and_no_script_of_another_is_run(browser
     assert all(url.removeprefix("blob:").startswith(server.address) or url.startswith("blob:") for url in page.requests)
     assert all("127.0.0.1" in url for url in page.requests)
     assert page.errors == []
-    page.page.evaluate("document.body.insertAdjacentHTML('beforeend', '<img src=x onerror=\"window.hurt=1\">')")
-    page.page.wait_for_timeout(100)
+    page.page.evaluate(
+        """() => new Promise(failed => {
+             document.body.insertAdjacentHTML("beforeend", '<img src="x" onerror="window.hurt = 1">');
+             document.body.lastElementChild.addEventListener("error", () => failed());
+           })"""
+    )
     assert page.page.evaluate("window.hurt") is None  # the policy of the page forbids it
 
 
@@ -448,7 +457,6 @@ def test_the_page_works_by_keyboard_and_every_control_has_a_name(browser: Any, a
     page.page.focus('[data-of="rho2"]')
     page.page.keyboard.press("ArrowRight")
     assert page.page.input_value("#rho2") == "1.05"
-    page.page.wait_for_timeout(50)
     page.settle()
     assert page.shown() != before
     for control in page.page.query_selector_all("#controls input, #controls select, button"):
@@ -460,7 +468,6 @@ def test_the_page_works_by_keyboard_and_every_control_has_a_name(browser: Any, a
 def test_the_address_keeps_the_settings(browser: Any, address: str):
     page = Page(browser, address, 1280, 900)
     page.page.fill("#T", "0.35")
-    page.page.wait_for_timeout(50)
     page.settle()
     page.page.reload()
     page.settle()

@@ -202,6 +202,7 @@ def test_the_commands_of_a_page_work(tmp_path: Path):
         assert done.returncode == 0, done
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     "name",
     [
@@ -631,6 +632,7 @@ def test_every_row_of_the_table_begins_with_a_label_and_not_with_an_argument(tmp
     assert after and not set(after) & set("[*")
 
 
+@pytest.mark.few(1)
 @pytest.mark.parametrize(
     "size", ["1e300", "0", *(pytest.param(size, marks=pytest.mark.campaign) for size in ("1e-250", "1e160"))]
 )
