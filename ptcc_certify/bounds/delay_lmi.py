@@ -157,7 +157,7 @@ class DelayLMIBounds:
         walk = max((float(sum(r**2 for j, r in row.items() if j in loop.walks)) for row in loop.camps), default=0.0)
         for b in (share * most for share in _SHARES if most > 0):
             left = math.exp(-min(b * float(self.clock), 700.0))
-            with suppress(LMIError):
+            with suppress(LMIError, np.linalg.LinAlgError):
                 size = 2 * b * max(left, _LEAST_LEFT) ** 2 if walk else 1.0
                 P, tau = delay_lyapunov(system, b, start, size * D.T @ D)
                 away = max(float(np.einsum("ij,ji->i", D, np.linalg.solve(P, D.T)).max()), 0.0)

@@ -51,7 +51,7 @@ class Channel(NamedTuple):
     lateness: Fraction  #: on the clock, at most
 
 
-class Constants(NamedTuple):
+class AgentConstants(NamedTuple):
     """Bounds by agent."""
 
     away: list[Fraction]  #: of ``|x_k - (Q x)_k|`` over ``sqrt(V)``
@@ -117,10 +117,8 @@ class LateLoop:
     @cached_property
     def system(self) -> list[Row]:
         """The rows of ``A``."""
-        bits, own = (
-            length(chain(*(row.values() for row in self.camps))),
-            longest(chain(*map(dict.values, self.laplacian))),
-        )
+        bits = length(chain(*(row.values() for row in self.camps)))
+        own = longest(chain(*map(dict.values, self.laplacian)))
         added = sum(len(self.laplacian[self.first[k]]) for row in self.camps for k in row)
         spend(added, bits * max(len(self.first), 1), own + self.unit.bit_length(), "the delay LMI")
         rows = []
@@ -303,7 +301,7 @@ class DelayLMI:
         value = sum((x * y * p for x, row in zip(xi, self.rational, strict=True) for y, p in zip(xi, row, strict=True)))
         return root_above(Fraction(value))
 
-    def constants(self, exact: Arithmetic) -> Constants:
+    def constants(self, exact: Arithmetic) -> AgentConstants:
         """Return what ``P``, which is definite, says of every agent."""
         loop, m = self.loop, len(self.loop.free)
         D, scale = _sparse_integers(loop.deviations)
@@ -315,7 +313,7 @@ class DelayLMI:
         away = [root_above(x * self.scale / scale**2) for x in found[:n]]
         slope = [root_above(x * self.scale / loop.unit**2) for x in found[n:]]
         walk = [sum((r**2 for j, r in row.items() if j in loop.walks), Fraction(0)) for row in loop.camps]
-        return Constants(away, slope, [root_above(x * share) for x in walk])
+        return AgentConstants(away, slope, [root_above(x * share) for x in walk])
 
     def inputs(self, away: Sequence[Fraction], slope: Sequence[Fraction], walk: Sequence[Fraction]) -> list[Fraction]:
         """Return ``phi_k`` with ``|F_k| <= phi_k sqrt(V(0)) e^(-b s)``.

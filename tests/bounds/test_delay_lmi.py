@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
 from late_certificates import grouped_graph
 
 from lmi.exact.decimal_rounding import float_up
+from ptcc_certify import read_certificate
 from ptcc_certify.bounds.delay_lmi import DelayLMIBounds
 from ptcc_certify.bounds.final_state import influence
 from ptcc_certify.bounds.longest_delay import LateCase
@@ -51,6 +53,17 @@ def test_less_is_left_at_the_deadline_than_by_the_functions_where_both_prove_som
     assert late is not None and late.form is not None and late.lmi is not None
     assert late.largest == float_up(max(late.lmi.residual))
     assert late.largest < float(max(late.form.residual))
+
+
+def test_what_a_certificate_says_of_it_is_read_back(tmp_path: Path) -> None:
+    messages = LateMessages("0.002", own_delay=True, gain_cap=CAP)
+    cert = certify(TEAM, PROTOCOL, [3, 1, 2, -4, 5], messages=messages, simulation=False)
+    cert.save(tmp_path / "c.json")
+    made, found = cert.late, read_certificate(tmp_path / "c.json").late
+    assert made is not None and found is not None and made.lmi is not None and found.lmi is not None
+    for name in ("b", "matrix", "tau", "left", "moved", "residual"):
+        assert getattr(found.lmi, name) == getattr(made.lmi, name)
+    assert found.largest == made.largest
 
 
 def test_the_longest_delay_for_a_wanted_residual_is_sought_by_it_too() -> None:
