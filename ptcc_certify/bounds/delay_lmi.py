@@ -30,6 +30,7 @@ from ptcc_certify.checker.late_input import gain_above
 from ptcc_certify.checker.late_messages import PARTS
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.protocols.gain import Gain
+from ptcc_certify.protocols.gain_limits import LimitedGain
 from ptcc_certify.protocols.late_messages import LateMessages
 
 #: Above so many free agents nothing is searched.
@@ -62,8 +63,9 @@ class DelayLMIBound:
         By edge; 0 where nothing is late.
     left : Fraction
         ``e^(-b s(T))`` from above.
-    moved, residual : tuple of N Fraction
-        How far from ``Q X(0)`` agents are drawn to, and are at ``T``, from above.
+    moved, away, residual : tuple of N Fraction
+        How far from ``Q X(0)`` agents are drawn to, what beside that decays of their deviations, where they are at
+        first, and how far from ``Q X(0)`` they are at ``T``, from above.
     """
 
     b: Fraction
@@ -71,7 +73,14 @@ class DelayLMIBound:
     tau: tuple[Fraction, ...]
     left: Fraction
     moved: tuple[Fraction, ...]
+    away: tuple[Fraction, ...]
     residual: tuple[Fraction, ...]
+
+    def deviation_bound(self, gain: LimitedGain, t: np.ndarray) -> np.ndarray:
+        """Return what bounds ``|x_k - (Q X(0))_k|`` at instants up to ``T``, ``(N, M)`` floats."""
+        moved, away = (np.array([[float_up(x)] for x in values]) for values in (self.moved, self.away))
+        bound: np.ndarray = (moved + away * np.exp(-float(self.b) * gain.clock(t))) * float(_MORE)
+        return bound
 
 
 class DelayLMIBounds:
@@ -213,14 +222,14 @@ class DelayLMIBounds:
             return None
         root, left, constants = lmi.root(self.state), left_above(b * self.clock), lmi.constants(exact)
         moved = [rounded(root * x * _MORE, BITS, up=True) for x in constants.walk]
-        residual = [
-            rounded(x + root * c * left * _MORE, BITS, up=True) for x, c in zip(moved, constants.away, strict=True)
-        ]
+        away = [rounded(root * x * _MORE, BITS, up=True) for x in constants.away]
+        residual = [rounded(x + y * left, BITS, up=True) for x, y in zip(moved, away, strict=True)]
         by_edge = dict(zip((e.edge for e in loop.channels), each, strict=True))
         edges = tuple(by_edge.get(k, Fraction(0)) for k in range(self.structure.graph.n_edges))
         y = root * gain_above(self.gain.exact, self.cap, b)
         inputs = np.array([float_up(x * y * _MORE) for x in lmi.inputs(*constants)]) + 1e-300
-        return DelayLMIBound(b, tuple(map(tuple, matrix)), edges, left, tuple(moved), tuple(residual)), inputs
+        bounds = (tuple(x) for x in (moved, away, residual))
+        return DelayLMIBound(b, tuple(map(tuple, matrix)), edges, left, *bounds), inputs
 
 
 def _dense(rows: Sequence[Row], width: int) -> np.ndarray:

@@ -198,7 +198,7 @@ def check_delay_lmi(
 ) -> None:
     """Verify ``sqrt(V) <= e^(-b s) sqrt(V(0))`` under late messages, how far the final state may move, and inputs."""
     doc.at = "messages.lmi"
-    fields(section, ("left", "moved", "residual"), "lmi")
+    fields(section, ("left", "moved", "away", "residual"), "lmi")
     graph, cap, state = verified.structure.graph, messages.gain_cap, verified.begin.state
     if cap is None or state is None:
         raise RejectedError("lmi without a cap of the gain, or without an initial state")
@@ -217,7 +217,8 @@ def check_delay_lmi(
     need(left >= decay_above(b * Limits(cap).clock_below(messages.gain)), "left is not proved")
     root, (away, slope, walk) = lmi.root([state[v] for v in range(graph.n)]), lmi.constants(doc.exact)
     moved = read_above(doc, graph, section["moved"], "moved", [root * x for x in walk])
-    rest = [x + root * c * left for x, c in zip(moved, away, strict=True)]
+    first = read_above(doc, graph, section["away"], "away", [root * x for x in away])
+    rest = [x + y * left for x, y in zip(moved, first, strict=True)]
     read_above(doc, graph, section["residual"], "residual", rest)
     if inputs is not None:
         inputs.by_form(lmi.inputs(away, slope, walk), b, root)
