@@ -42,7 +42,7 @@ _SHARES = (0.85, 0.5, 0.2, 0.05)
 _LEAST_SHARE, _FIRST, _STEPS, _HALVINGS = 0.01, 0.2, 10, 4
 #: What is left at ``T`` counts as this at least where a Lyapunov function is chosen.
 _LEAST_LEFT = 1e-2
-#: Largest rates are so much over the largest lateness.
+#: Rates that are tried are below this, over the largest lateness.
 _IN_DELAY = 2.0
 #: Multipliers are at least this, over the largest one.
 _LEAST = 1e-12
@@ -148,12 +148,12 @@ class DelayLMIBounds:
 
     def best(self) -> tuple[DelayLMIBound, np.ndarray] | None:
         """Return what leaves least at ``T`` of what is found, with bounds of inputs; None if nothing is."""
-        found, loop = list[tuple[float, float, np.ndarray, np.ndarray]](), self.loop() if self._small else None
+        if not self._small:
+            return None
         with suppress(OverflowError, WorkError):
-            if loop is not None:
-                found = sorted(self._search(loop), key=lambda one: one[0])
-            for _, b, P, tau in found:
-                if loop is not None and (bound := self._proved(loop, Fraction(b), P, tau)) is not None:
+            loop = self.loop()
+            for _, b, P, tau in sorted(self._search(loop), key=lambda one: one[0]):
+                if (bound := self._proved(loop, Fraction(b), P, tau)) is not None:
                     return bound
         return None
 
@@ -260,5 +260,5 @@ def _system(loop: LateLoop) -> LateSystem:
 
 
 def _fastest(system: LateSystem) -> float:
-    """Return a rate that none reaches: that of the system where nothing is late, or little more than one in a delay."""
+    """Return the rate of which shares are tried: that where nothing is late, or two over the largest lateness."""
     return float(np.min(_IN_DELAY / system.lateness, initial=system.rate))
