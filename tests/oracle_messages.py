@@ -547,6 +547,11 @@ class LateOracle(Oracle):
         size = np.sqrt(np.abs(np.diag(N)) + 1e-300)
         self.require(np.linalg.eigvalsh(N / np.outer(size, size))[0] > -1e-7, "lmi: the inequality")
         self.decays_along_motions("lmi", C.T @ P @ C, float(b))
+        moved, away = (np.array(list(map(float, self.vector(said[key]))))[:, None] for key in ("moved", "away"))
+        for runs, target in self.loop():
+            z = np.array([math.exp(-float(b) * runs.gain.clock(t)) for t in runs.times])
+            most = (moved + away * z) * (1 + 1e-6) + FLOOR
+            self.require(not np.any(runs.away(target) > most), "lmi: away")
 
     def behind_settling_leaders(self) -> None:
         said, step = self.said["settling"], self.witness("messages.settling")

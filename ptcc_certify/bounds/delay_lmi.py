@@ -30,6 +30,7 @@ from ptcc_certify.checker.late_input import gain_above
 from ptcc_certify.checker.late_messages import PARTS
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.protocols.gain import Gain
+from ptcc_certify.protocols.gain_limits import LimitedGain
 from ptcc_certify.protocols.late_messages import LateMessages
 
 #: Above so many free agents nothing is searched.
@@ -41,7 +42,7 @@ _SHARES = (0.85, 0.5, 0.2, 0.05)
 _LEAST_SHARE, _FIRST, _STEPS, _HALVINGS = 0.01, 0.2, 10, 4
 #: What is left at ``T`` counts as this at least where a Lyapunov function is chosen.
 _LEAST_LEFT = 1e-2
-#: Largest rates are so much over the largest lateness.
+#: Rates that are tried are below this, over the largest lateness.
 _IN_DELAY = 2.0
 #: Multipliers are at least this, over the largest one.
 _LEAST = 1e-12
@@ -62,8 +63,9 @@ class DelayLMIBound:
         By edge; 0 where nothing is late.
     left : Fraction
         ``e^(-b s(T))`` from above.
-    moved, residual : tuple of N Fraction
-        How far from ``Q X(0)`` agents are drawn to, and are at ``T``, from above.
+    moved, away, residual : tuple of N Fraction
+        How far from ``Q X(0)`` agents are drawn to, what beside that decays of their deviations, where they are at
+        first, and how far from ``Q X(0)`` they are at ``T``, from above.
     """
 
     b: Fraction
@@ -71,7 +73,14 @@ class DelayLMIBound:
     tau: tuple[Fraction, ...]
     left: Fraction
     moved: tuple[Fraction, ...]
+    away: tuple[Fraction, ...]
     residual: tuple[Fraction, ...]
+
+    def deviation_bound(self, gain: LimitedGain, t: np.ndarray) -> np.ndarray:
+        """Return what bounds ``|x_k - (Q X(0))_k|`` at instants up to ``T``, ``(N, M)`` floats."""
+        moved, away = (np.array([[float_up(x)] for x in values]) for values in (self.moved, self.away))
+        bound: np.ndarray = (moved + away * np.exp(-float(self.b) * gain.clock(t))) * float(_MORE)
+        return bound
 
 
 class DelayLMIBounds:
@@ -139,12 +148,12 @@ class DelayLMIBounds:
 
     def best(self) -> tuple[DelayLMIBound, np.ndarray] | None:
         """Return what leaves least at ``T`` of what is found, with bounds of inputs; None if nothing is."""
-        found, loop = list[tuple[float, float, np.ndarray, np.ndarray]](), self.loop() if self._small else None
+        if not self._small:
+            return None
         with suppress(OverflowError, WorkError):
-            if loop is not None:
-                found = sorted(self._search(loop), key=lambda one: one[0])
-            for _, b, P, tau in found:
-                if loop is not None and (bound := self._proved(loop, Fraction(b), P, tau)) is not None:
+            loop = self.loop()
+            for _, b, P, tau in sorted(self._search(loop), key=lambda one: one[0]):
+                if (bound := self._proved(loop, Fraction(b), P, tau)) is not None:
                     return bound
         return None
 
@@ -157,7 +166,7 @@ class DelayLMIBounds:
         walk = max((float(sum(r**2 for j, r in row.items() if j in loop.walks)) for row in loop.camps), default=0.0)
         for b in (share * most for share in _SHARES if most > 0):
             left = math.exp(-min(b * float(self.clock), 700.0))
-            with suppress(LMIError):
+            with suppress(LMIError, np.linalg.LinAlgError):
                 size = 2 * b * max(left, _LEAST_LEFT) ** 2 if walk else 1.0
                 P, tau = delay_lyapunov(system, b, start, size * D.T @ D)
                 away = max(float(np.einsum("ij,ji->i", D, np.linalg.solve(P, D.T)).max()), 0.0)
@@ -213,14 +222,14 @@ class DelayLMIBounds:
             return None
         root, left, constants = lmi.root(self.state), left_above(b * self.clock), lmi.constants(exact)
         moved = [rounded(root * x * _MORE, BITS, up=True) for x in constants.walk]
-        residual = [
-            rounded(x + root * c * left * _MORE, BITS, up=True) for x, c in zip(moved, constants.away, strict=True)
-        ]
+        away = [rounded(root * x * _MORE, BITS, up=True) for x in constants.away]
+        residual = [rounded(x + y * left, BITS, up=True) for x, y in zip(moved, away, strict=True)]
         by_edge = dict(zip((e.edge for e in loop.channels), each, strict=True))
         edges = tuple(by_edge.get(k, Fraction(0)) for k in range(self.structure.graph.n_edges))
         y = root * gain_above(self.gain.exact, self.cap, b)
         inputs = np.array([float_up(x * y * _MORE) for x in lmi.inputs(*constants)]) + 1e-300
-        return DelayLMIBound(b, tuple(map(tuple, matrix)), edges, left, tuple(moved), tuple(residual)), inputs
+        bounds = (tuple(x) for x in (moved, away, residual))
+        return DelayLMIBound(b, tuple(map(tuple, matrix)), edges, left, *bounds), inputs
 
 
 def _dense(rows: Sequence[Row], width: int) -> np.ndarray:
@@ -251,5 +260,5 @@ def _system(loop: LateLoop) -> LateSystem:
 
 
 def _fastest(system: LateSystem) -> float:
-    """Return a rate that none reaches: that of the system where nothing is late, or little more than one in a delay."""
+    """Return the rate of which shares are tried: that where nothing is late, or two over the largest lateness."""
     return float(np.min(_IN_DELAY / system.lateness, initial=system.rate))

@@ -210,15 +210,21 @@ class LateBounds:
         if self.steps is not None:
             at = np.searchsorted([float(x) for x in self.steps.instants], t * (1 - 1e-15), side="right") - 1
             whole = np.minimum(whole, self.steps.bounds[np.maximum(at, 0)].T)
-        if self.settling is not None:
-            whole = np.minimum(whole, self.settling.deviation_bound(self.gain, t)[self.structure.followers])
+        for one in self._of_all:
+            whole = np.minimum(whole, one.deviation_bound(self.gain, t)[self.structure.followers])
         return whole
 
     def largest_bound(self, t: Sequence[float] | np.ndarray) -> np.ndarray:
         """Return what bounds the largest ``|x_k - x_k*|`` of all agents at instants, ``(M,)`` floats."""
-        if self.settling is None:
+        bounds = [one.deviation_bound(self.gain, np.asarray(t, dtype=float)) for one in self._of_all]
+        if not bounds:
             return np.asarray(self.deviation_bound(t).max(axis=0))
-        return np.asarray(self.settling.deviation_bound(self.gain, np.asarray(t, dtype=float)).max(axis=0))
+        return np.asarray(np.minimum.reduce(bounds).max(axis=0))
+
+    @property
+    def _of_all(self) -> list[Settling | DelayLMIBound]:
+        """What bounds deviations of all agents at every instant."""
+        return [one for one in (self.settling, self.lmi) if one is not None]
 
 
 def bound_late(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -102,15 +102,15 @@ def messages_section(late: LateBounds, out: Writer) -> dict[str, Any]:
         "staged": staged and dict(zip(followers, map(format_exact, staged), strict=True)),
         "settling": late.settling and {name: text(getattr(late.settling, name)) for name in ("cap", "clock", "left")},
         "form": None if late.form is None else _form_section(late.form, graph.labels),
-        "lmi": None if late.lmi is None else _form_section(late.lmi, graph.labels),
+        "lmi": None if late.lmi is None else _form_section(late.lmi, graph.labels, ("moved", "away", "residual")),
         "input": None if late.input is None else agents_section(graph.labels, "late-input", late.input, out),
     }
 
 
-def _form_section(form: SmallDelays | DelayLMIBound, labels: tuple[str, ...]) -> dict[str, Any]:
-    agents = {
-        name: dict(zip(labels, map(format_exact, getattr(form, name)), strict=True)) for name in ("moved", "residual")
-    }
+def _form_section(
+    form: SmallDelays | DelayLMIBound, labels: tuple[str, ...], names: Sequence[str] = ("moved", "residual")
+) -> dict[str, Any]:
+    agents = {name: dict(zip(labels, map(format_exact, getattr(form, name)), strict=True)) for name in names}
     return {"left": format_exact(form.left), **agents}
 
 
@@ -134,9 +134,9 @@ def _read_lmi(section: Mapping[str, Any] | None, step: Obligation | None, data: 
     if section is None or step is None:
         return None
     matrix = tuple(map(tuple, triangle(step.witness["matrix"], len(step.witness["matrix"]))))
-    moved, residual = (data.agents(section[name]) for name in ("moved", "residual"))
+    bounds = (data.agents(section[name]) for name in ("moved", "away", "residual"))
     tau = tuple(map(exact, step.witness["tau"]))
-    return DelayLMIBound(step.numbers["b"], matrix, tau, exact(section["left"]), moved, residual)
+    return DelayLMIBound(step.numbers["b"], matrix, tau, exact(section["left"]), *bounds)
 
 
 def _read_settling(section: Mapping[str, Any] | None, step: Obligation | None, data: Reader) -> Settling | None:

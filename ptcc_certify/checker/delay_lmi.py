@@ -51,7 +51,7 @@ class Channel(NamedTuple):
     lateness: Fraction  #: on the clock, at most
 
 
-class Constants(NamedTuple):
+class AgentConstants(NamedTuple):
     """Bounds by agent."""
 
     away: list[Fraction]  #: of ``|x_k - (Q x)_k|`` over ``sqrt(V)``
@@ -117,10 +117,8 @@ class LateLoop:
     @cached_property
     def system(self) -> list[Row]:
         """The rows of ``A``."""
-        bits, own = (
-            length(chain(*(row.values() for row in self.camps))),
-            longest(chain(*map(dict.values, self.laplacian))),
-        )
+        bits = length(chain(*(row.values() for row in self.camps)))
+        own = longest(chain(*map(dict.values, self.laplacian)))
         added = sum(len(self.laplacian[self.first[k]]) for row in self.camps for k in row)
         spend(added, bits * max(len(self.first), 1), own + self.unit.bit_length(), "the delay LMI")
         rows = []
@@ -200,7 +198,7 @@ def check_delay_lmi(
 ) -> None:
     """Verify ``sqrt(V) <= e^(-b s) sqrt(V(0))`` under late messages, how far the final state may move, and inputs."""
     doc.at = "messages.lmi"
-    fields(section, ("left", "moved", "residual"), "lmi")
+    fields(section, ("left", "moved", "away", "residual"), "lmi")
     graph, cap, state = verified.structure.graph, messages.gain_cap, verified.begin.state
     if cap is None or state is None:
         raise RejectedError("lmi without a cap of the gain, or without an initial state")
@@ -219,7 +217,8 @@ def check_delay_lmi(
     need(left >= decay_above(b * Limits(cap).clock_below(messages.gain)), "left is not proved")
     root, (away, slope, walk) = lmi.root([state[v] for v in range(graph.n)]), lmi.constants(doc.exact)
     moved = read_above(doc, graph, section["moved"], "moved", [root * x for x in walk])
-    rest = [x + root * c * left for x, c in zip(moved, away, strict=True)]
+    first = read_above(doc, graph, section["away"], "away", [root * x for x in away])
+    rest = [x + y * left for x, y in zip(moved, first, strict=True)]
     read_above(doc, graph, section["residual"], "residual", rest)
     if inputs is not None:
         inputs.by_form(lmi.inputs(away, slope, walk), b, root)
@@ -303,7 +302,7 @@ class DelayLMI:
         value = sum((x * y * p for x, row in zip(xi, self.rational, strict=True) for y, p in zip(xi, row, strict=True)))
         return root_above(Fraction(value))
 
-    def constants(self, exact: Arithmetic) -> Constants:
+    def constants(self, exact: Arithmetic) -> AgentConstants:
         """Return what ``P``, which is definite, says of every agent."""
         loop, m = self.loop, len(self.loop.free)
         D, scale = _sparse_integers(loop.deviations)
@@ -315,7 +314,7 @@ class DelayLMI:
         away = [root_above(x * self.scale / scale**2) for x in found[:n]]
         slope = [root_above(x * self.scale / loop.unit**2) for x in found[n:]]
         walk = [sum((r**2 for j, r in row.items() if j in loop.walks), Fraction(0)) for row in loop.camps]
-        return Constants(away, slope, [root_above(x * share) for x in walk])
+        return AgentConstants(away, slope, [root_above(x * share) for x in walk])
 
     def inputs(self, away: Sequence[Fraction], slope: Sequence[Fraction], walk: Sequence[Fraction]) -> list[Fraction]:
         """Return ``phi_k`` with ``|F_k| <= phi_k sqrt(V(0)) e^(-b s)``.

@@ -32,7 +32,7 @@ def late_lines(certificate: Certificate) -> Lines:
     if late.leaders is not None:
         yield "leaders", leaders_text(late.leaders)
     texts = [*_impossible(late), *([] if late.direct else _left(late)), *_stages(late), *_kept_off(late)]
-    if (at := certificate.at) is not None and (late.rows or late.steps or late.settling):
+    if (at := certificate.at) is not None and (late.rows or late.steps or late.settling or late.lmi):
         texts.append(f"at t = {near(at)} every agent within {up(float(late.largest_bound([float(at)])[0]), 2)}")
     yield "late" if late.says_something else "LATE", texts[0]
     yield from (("", text) for text in texts[1:])

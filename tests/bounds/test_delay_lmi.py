@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
 from late_certificates import grouped_graph
 
 from lmi.exact.decimal_rounding import float_up
+from ptcc_certify import read_certificate
 from ptcc_certify.bounds.delay_lmi import DelayLMIBounds
 from ptcc_certify.bounds.final_state import influence
 from ptcc_certify.bounds.longest_delay import LateCase
@@ -19,6 +21,7 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.protocols import NominalProtocol
 from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.simulation.late_messages import simulate_late
 
 PROTOCOL, CAP = NominalProtocol(T=1, rho1=1, rho2=3, kappa=1), 20
 #: A group of three that leads two followers.
@@ -51,6 +54,17 @@ def test_less_is_left_at_the_deadline_than_by_the_functions_where_both_prove_som
     assert late is not None and late.form is not None and late.lmi is not None
     assert late.largest == float_up(max(late.lmi.residual))
     assert late.largest < float(max(late.form.residual))
+
+
+def test_what_a_certificate_says_of_it_is_read_back(tmp_path: Path) -> None:
+    messages = LateMessages("0.002", own_delay=True, gain_cap=CAP)
+    cert = certify(TEAM, PROTOCOL, [3, 1, 2, -4, 5], messages=messages, simulation=False)
+    cert.save(tmp_path / "c.json")
+    made, found = cert.late, read_certificate(tmp_path / "c.json").late
+    assert made is not None and found is not None and made.lmi is not None and found.lmi is not None
+    for name in ("b", "matrix", "tau", "left", "moved", "away", "residual"):
+        assert getattr(found.lmi, name) == getattr(made.lmi, name)
+    assert found.largest == made.largest
 
 
 def test_the_longest_delay_for_a_wanted_residual_is_sought_by_it_too() -> None:
@@ -118,3 +132,16 @@ def test_delays_of_many_times_the_deadline_are_forgiven_where_few_listen_to_each
     late = {(2, 3): Fraction(5), (3, 4): Fraction(5)}
     found = bounds(chain, late, False).best()
     assert found is not None and 0 < found[0].b < 0.02
+
+
+def test_deviations_on_the_way_are_bounded_of_leaders_too() -> None:
+    messages = LateMessages("0.002", own_delay=True, gain_cap=CAP)
+    cert = certify(TEAM, PROTOCOL, [3, 1, 2, -4, 5], messages=messages, simulation=False, at="0.5")
+    assert cert.late is not None and cert.final_state is not None and cert.initial_state is not None
+    t = np.linspace(0, 1, 51)
+    bound = cert.late.largest_bound(t)
+    assert (np.diff(bound) <= 0).all() and bound[0] < 1e3
+    assert bound[-1] == pytest.approx(cert.late.largest, rel=1e-6)
+    run = simulate_late(TEAM, PROTOCOL, messages, [float(x) for x in cert.initial_state])
+    away = np.abs(run.states - np.asarray(cert.final_state, dtype=float)[:, None]).max(axis=0)
+    assert (away <= cert.late.largest_bound(run.t)).all()

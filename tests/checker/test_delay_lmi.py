@@ -89,7 +89,7 @@ def test_bounds_below_what_is_proved_are_refused(seed: int, own: bool):
     data = whole(seed, own)
     said = data["messages"]["lmi"]
     assert "left is not proved" in reason(data, (*TOP, "left"), scaled(said["left"], Fraction(99, 100)))
-    for key in ("moved", "residual"):
+    for key in ("moved", "away", "residual"):
         for label, x in said[key].items():
             if number(x) > 0:
                 less = scaled(x, Fraction(999, 1000))

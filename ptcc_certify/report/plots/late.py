@@ -64,7 +64,7 @@ def plot_late(subject: Any, *, ax: Axes | None = None, time_unit: str = "") -> A
     if x0 is None or ends is None:
         raise ParameterError("the certificate has no initial state to run from; certify with x0")
     ax, F = axes_of(ax), certificate.structure.followers
-    nodes = F if F.size and late.settling is None else np.arange(certificate.graph.n_nodes)
+    nodes = F if F.size and late.settling is None and late.lmi is None else np.arange(certificate.graph.n_nodes)
     start, goal = [float(x) for x in x0], np.asarray(ends, dtype=float)[:, None]
     options: dict[str, Any] = {"leaders": late.leaders}
     t = np.linspace(0, float(certificate.protocol.T), 401)
@@ -85,9 +85,9 @@ def plot_late(subject: Any, *, ax: Axes | None = None, time_unit: str = "") -> A
 
 
 def _draw_bound(ax: Axes, late: LateBounds, t: np.ndarray) -> None:
-    if late.rows or late.steps is not None or late.settling is not None:
+    if late.rows or late.steps is not None or late.settling is not None or late.lmi is not None:
         ax.plot(t, late.largest_bound(t), color=BOUND, linewidth=1.8, label="proved bound")
-    elif late.form is not None or late.lmi is not None:
+    elif late.form is not None:
         ax.plot(t[-1:], [late.largest], marker="_", color=BOUND, markersize=12, label="proved at $T$", linestyle="none")
 
 
