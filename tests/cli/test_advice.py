@@ -79,7 +79,11 @@ def advices(command: tuple[str, ...], text: str) -> Iterator[tuple[tuple[str, ..
     text = re.sub(r"ptcc (?:certify|check|plot|simulate|design|batch) [^;:()]*", "", text)
     if subjects and re.search(r"leave (it|one|them) out", text):
         yield (without(command, *subjects),)
-    together = re.search(r"give both|design needs|--\S+ with --\S+|give --\S+ and --\S+", text)
+    if "give both" in text:
+        missing = [name for name in subjects if name not in command]
+        yield (sum(((name, VALUES[name]) for name in missing), command),)
+        return
+    together = re.search(r"design needs|--\S+ with --\S+|give --\S+ and --\S+", text)
     changed: tuple[str, ...] = command
     for match in _OPTION.finditer(text):
         name, before, after = match[0], text[: match.start()], text[match.end() :]
