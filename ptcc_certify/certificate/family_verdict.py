@@ -17,6 +17,7 @@ from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.certificate.family_content import FamilyContent
 from ptcc_certify.certificate.restricted_bounds import deviation_of_signal
 from ptcc_certify.certificate.restricted_claims import LastModeClaim
+from ptcc_certify.certificate.restricted_reasons import reasons_for_none
 from ptcc_certify.certificate.verdict import CERTIFIED, LAST, MET, OPEN, REFUTED, UNDECIDED, Answer, Assessment
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.graphs.family import Mode
@@ -57,6 +58,9 @@ def assess_family(certificate: FamilyContent, report: CheckReport | None) -> Ass
     answers = [] if asked.behaviour is None else [_judge_behaviour(certificate, components, asked.behaviour)]
     answers += [] if asked.min_rate is None else [_judge_rate(certificate, asked.min_rate)]
     answers += [] if asked.max_input is None else [_judge_input(certificate, asked.max_input)]
+    reasons = (reason for reason, leaves_open in reasons_for_none(certificate).values() if leaves_open)
+    if asked.behaviour is None and asked.min_rate is None and (reason := next(reasons, "")):
+        answers.append(Answer(OPEN, "what these signals do", reason))
     if report is None or not report.accepted:
         why = (
             _without_report(components)

@@ -164,7 +164,7 @@ def refuse(
     _refuse_long(_distinct_weights(graph), graph.n_nodes, "the weights", lambda: f"edge {_longest_edge(graph)}")
 
 
-_NO_SET = "(--initial-bound) is not taken up here, bounds are from one initial state; give x0 alone"
+_NO_SET = "(--initial-bound) is not taken up here, bounds are from one initial state; leave it out, and give x0"
 #: What is not certified beside late messages, and what to do instead.
 _NOT_LATE = {
     "initial_set": _NO_SET,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
@@ -24,15 +24,15 @@ _MOST_ORDER = 8
 #: Options that need ``--agents``.
 _OWN = ("cascade", "rest", "decay", "drag", "plant", "v0", "a0", "offsets", "biases")
 
-#: What is said where late messages are asked of agents of order n.
-_MESSAGES = "late messages are proved of single integrators alone: leave it out, or leave out --agents"
+#: What is said where late messages are asked of agents of order n; then what makes them such is named.
+_MESSAGES = "late messages are proved of single integrators alone: leave it out, or leave out"
 #: Options that are of single integrators alone, and what to do instead.
 _OF_SINGLE_INTEGRATORS = {
     "stop_before": "leave it out, or cap the gain with --gain-cap",
     "sample_period": "leave it out, or cap the gain with --gain-cap",
     "noise": "leave it out",
     "at": "leave it out; -v tells bounds at several instants",
-    "initial_bound": "give the initial state with --x0 and --v0 instead",
+    "initial_bound": "give the initial state with --x0 instead",
     **dict.fromkeys(("delay", "period", "packet_loss", "quantisation"), _MESSAGES),
     **dict.fromkeys(("leader_speed", "sign_gain"), "leave it out; their leaders move as their plant does"),
 }
@@ -75,7 +75,7 @@ def _named_agents(options: Options) -> Agents | None:
     kind = options["agents"]
     if kind is None:
         given = [name for name in _OWN if options[name] is not None]
-        if given and given[0] not in ("offsets", "biases"):
+        if given and not {"offsets", "biases"} & set(given):
             raise ParameterError(f"{flag_of(given[0])}: is for agents of order n; give --agents double-integrator, say")
         if not given:
             return None
@@ -129,11 +129,30 @@ def agents_keywords(options: Options, graph: SignedDigraph, certified: bool = Fa
     return more | ({"derivatives": later} if later or any(text is not None for text in given) else {})
 
 
+def agents_flags(options: Options) -> str:
+    """Return the options without which agents are single integrators, as they were given."""
+    return " and ".join(flag_of(name) for name in ("agents", *_OWN) if options[name] is not None)
+
+
+def refuse_agents_of_family(options: Options, verb: str) -> NoReturn:
+    """Refuse agents of order n where a family of graphs is given, by the options that make them."""
+    flags = agents_flags(options)
+    verbs = ("is", "it") if " and " not in flags else ("are", "them")
+    raise ParameterError(
+        f"{flags}: {verbs[0]} not for families of graphs yet; leave {verbs[1]} out, or {verb} one graph"
+    )
+
+
 def _refuse_unproved(options: Options) -> None:
-    """Refuse what is asked of single integrators alone, by the names of the options."""
-    for name, mend in _OF_SINGLE_INTEGRATORS.items():
-        if options.get(name) is not None:
-            raise ParameterError(f"{flag_of(name)}: is not proved of agents of order n; {mend}")
+    """Refuse what is asked of single integrators alone, by the names of the options: those with one mend at once."""
+    given = [name for name in _OF_SINGLE_INTEGRATORS if options.get(name) is not None]
+    if given:
+        mend = _OF_SINGLE_INTEGRATORS[given[0]]
+        flags = [flag_of(name) for name in given if _OF_SINGLE_INTEGRATORS[name] == mend]
+        mend += f" {agents_flags(options)}" if mend == _MESSAGES else ""
+        verb, mend = ("is", mend) if len(flags) == 1 else ("are", mend.replace("leave it", "leave them"))
+        whom = "in a formation" if options["agents"] is None else "of order n"
+        raise ParameterError(f"{' and '.join(flags)}: {verb} not proved of agents {whom}; {mend}")
     if options["kind"] == "nominal" and options.get("delta") is not None:
         mend = "take --protocol sliding-mode, under which disturbances within delta move nothing"
         raise ParameterError(f"--delta: is not proved of agents of order n under the nominal protocol; {mend}")

@@ -10,7 +10,14 @@ import click
 
 from lmi.exact.decimal_rounding import down
 from ptcc_certify.cli import options as shared
-from ptcc_certify.cli.agents import agents_keywords, agents_of, agents_options, dimension_option, refuse_dimension
+from ptcc_certify.cli.agents import (
+    agents_keywords,
+    agents_of,
+    agents_options,
+    dimension_option,
+    refuse_agents_of_family,
+    refuse_dimension,
+)
 from ptcc_certify.cli.families import (
     certify_family,
     family_options,
@@ -79,7 +86,7 @@ def certify(graph: tuple[str, ...], output: str | None, as_json: bool, screen: S
     protocol, given = shared.protocol_of(options), read_graph_or_family(graph, options)
     if isinstance(given, Family):
         if agents_of(options) is not None:
-            raise ParameterError("--agents: is not for families of graphs yet; certify one graph")
+            refuse_agents_of_family(options, "certify")
         return certify_family(graph, given, output, as_json, screen, options)
     refuse_restricted(options)
     return _certify_graph(graph[0], given, protocol, output, as_json, screen, options)

@@ -49,7 +49,7 @@ def refuse_of_agents() -> None:
             flag = flag_of("protocol" if name == "kind" else name)
             says = "is not searched for single integrators; give it to ptcc certify, or add --agents double-integrator"
             if name == "x0":
-                says = "single integrators are designed for all states within a bound; here it is --initial-bound R"
+                says = "single integrators are designed for all states within a bound; give --initial-bound R instead"
             raise ParameterError(f"{flag}: {says}")
 
 

@@ -129,7 +129,7 @@ def signals_of(options: shared.Options) -> SignalClass:
     from ptcc_certify.theorems.restricted_signals import WINDOWS_OF_TIME, ClockShares, JointWindows
 
     if options["window"] is not None:
-        raise ParameterError(f"--window: {WINDOWS_OF_TIME}: --clock-window")
+        raise ParameterError(f"--window: {WINDOWS_OF_TIME}: --clock-window with --window-on instead")
     dwell = dwell_of(options)
     given: list[Any] = [] if dwell is None else [dwell]
     length, on = options["clock_window"], options["window_on"]

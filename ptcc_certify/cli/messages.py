@@ -56,7 +56,7 @@ def messages_of(graph: str, signed: SignedDigraph, options: Options) -> LateMess
         raise ParameterError("--packet-loss says nothing by itself; give --period, the time between two messages")
     if all(options[name] is None for name in _ASKING):
         if options["own_delay"]:
-            raise ParameterError("--own-delay says nothing by itself; give --delay")
+            raise ParameterError("--own-delay says nothing by itself; give --delay and --gain-cap")
         return None
     step = options["quantisation"]
     if step is not None and step < 0:

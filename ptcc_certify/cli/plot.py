@@ -10,7 +10,14 @@ import click
 from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
-from ptcc_certify.cli.agents import agents_keywords, agents_of, agents_options, dimension_option, refuse_dimension
+from ptcc_certify.cli.agents import (
+    agents_keywords,
+    agents_of,
+    agents_options,
+    dimension_option,
+    refuse_agents_of_family,
+    refuse_dimension,
+)
 from ptcc_certify.cli.families import mode_options, read_graph_or_family, refuse_options
 from ptcc_certify.cli.scenario import MEMORY, graph_of, refuse_beside
 from ptcc_certify.cli.terminal import FIGURES, print_lines, progress, refuse_output
@@ -183,7 +190,7 @@ def _of_family(family: Family, what: str, options: shared.Options) -> Family | F
 
     refuse_options(options)
     if what in OF_AGENTS or agents_of(options) is not None:
-        raise ParameterError("--agents: is not for families of graphs yet; draw one graph")
+        refuse_agents_of_family(options, "draw")
     given = click.get_current_context().get_parameter_source("disturbance") is ParameterSource.COMMANDLINE
     if given and options["disturbance"] is not None:
         raise ParameterError("--disturbance: runs of a family are drawn under the worst one; leave it out")

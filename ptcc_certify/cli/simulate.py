@@ -11,7 +11,14 @@ import click
 from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
-from ptcc_certify.cli.agents import agents_keywords, agents_of, agents_options, run_of_agents
+from ptcc_certify.cli.agents import (
+    agents_flags,
+    agents_keywords,
+    agents_of,
+    agents_options,
+    refuse_agents_of_family,
+    run_of_agents,
+)
 from ptcc_certify.cli.families import (
     dwell_of,
     dwell_options,
@@ -109,7 +116,7 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
         _refuse_messages(options, "families of graphs" if isinstance(signed, Family) else "agents of order n")
     if special:
         if isinstance(signed, Family):
-            raise ParameterError("--agents: is not for families of graphs yet; simulate one graph")
+            refuse_agents_of_family(options, "simulate")
         motion = _run_agents(signed, protocol, options)
         _write(motion, output, plot_of_agents, {"wide": wide, "time_unit": time_unit})
         if protocol.reaching is not None:
@@ -163,14 +170,13 @@ def _run_agents(signed: SignedDigraph, protocol: Protocol, options: shared.Optio
     """Return the run of agents of order n."""
     for name in ("steps", "boundary_layer"):
         if options[name] is not None:
-            raise ParameterError(
-                f"{shared.flag_of(name)}: is for single integrators; leave it out, or leave out --agents"
-            )
+            mend = f"leave it out, or leave out {agents_flags(options)}"
+            raise ParameterError(f"{shared.flag_of(name)}: is for single integrators; {mend}")
     source = click.get_current_context().get_parameter_source
     if options["kind"] == "nominal" and options["disturbance"] is not None:
         raise ParameterError("--disturbance: agents of order n run without, or under --protocol sliding-mode")
     if source("signal") == ParameterSource.COMMANDLINE:
-        raise ParameterError("--signal: is for families (--switching, --uncertainty, intervals); this is one graph")
+        raise ParameterError("--signal: is for families of graphs; this is one graph: leave it out")
     refuse_restricted(options)
     more = agents_keywords(options, signed)
     if protocol.reaching is not None:
@@ -244,7 +250,8 @@ def _run_family(
     x0 = shared.read_initial_state(options["x0"], options["seed"], family.modes[0].mandatory)
     promise = dwell_of(options)
     if promise is not None and signal != "random":
-        raise ParameterError(f"--dwell and --clock-dwell are of random signals; leave out --signal {shorten(signal)}")
+        flag = "--dwell" if options["dwell"] is not None else "--clock-dwell"
+        raise ParameterError(f"{flag} is of random signals; leave it out, or leave out --signal {shorten(signal)}")
     played = as_signal(signal, options["seed"]) if promise is None else RandomDwellSignal(promise, options["seed"])
     more = shared.sliding_keywords(protocol, options, family.modes[0].mandatory)
     return simulate_family(family, protocol, x0, played, times=times, samples=options["samples"], **more)

@@ -16,7 +16,15 @@ from ptcc_certify.certificate.restricted_states import constant_states, last_sta
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import BIPARTITE_CONTAINMENT, STABILITY
-from ptcc_certify.report.restricted_screen import RESTS, agreement_text, of_mode, restricted_entries, rests
+from ptcc_certify.report.restricted_screen import (
+    RESTS,
+    TINY,
+    TOO_SMALL,
+    agreement_text,
+    of_mode,
+    restricted_entries,
+    rests,
+)
 from ptcc_certify.report.sliding_lines import sliding_lines
 from ptcc_certify.report.structure_text import Lines, structure_text
 from ptcc_certify.report.text_layout import (
@@ -448,10 +456,9 @@ def _rate_entries(certificate: FamilyCertificate) -> Lines:
     explicit = [explicit_rate(part.component) for part in certificate.parts]
     logs = [one.log10_decay_rate for one in explicit if one is not None]
     if logs and len(logs) == sum(part.component.nodes.size > 1 for part in certificate.parts):
-        yield (
-            "rate",
-            f"above 1e{int(min(logs)) - 1}, in closed form; no larger one was proved{why}" + f"; {limit}" * bool(limit),
-        )
+        power = int(min(logs)) - 1
+        least = TOO_SMALL if power < TINY else f"above 1e{power}"
+        yield "rate", f"{least}, in closed form; no larger one was proved{why}" + f"; {limit}" * bool(limit)
     else:
         yield "rate", f"there is one, but none was proved{why}" + f"; {limit}" * bool(limit)
 

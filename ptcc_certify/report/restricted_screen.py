@@ -14,6 +14,7 @@ from ptcc_certify.certificate.restricted_claims import (
     ShareClaim,
     WindowClaim,
 )
+from ptcc_certify.certificate.restricted_reasons import TOO_SMALL, reasons_for_none
 from ptcc_certify.graphs.family import Mode
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, CONSENSUS, CONTAINMENT
 from ptcc_certify.report.text_layout import printable, shorten_label
@@ -25,6 +26,8 @@ from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, Joi
 if TYPE_CHECKING:
     from ptcc_certify.certificate.family_content import FamilyContent
 
+#: The power of 10 below which what shrinks is not told as a number.
+TINY = -100
 #: What agents do in a mode without edges, an outage.
 RESTS = "every agent keeps its value"
 CLOCK = {"t": "time", "s": "the clock"}
@@ -49,20 +52,26 @@ def restricted_entries(certificate: FamilyContent) -> Iterator[tuple[str, str]]:
         longer = certificate.signal.least > certificate.protocol.T
         head = head[0], head[1] + ", longer than T: at most one switch" * longer
     several = len(certificate.parts) > 1
-    if not certificate.restricted:
-        yield *head[:1], f"{head[1]}: nothing more is proved"  # type: ignore[misc]
+
+    def where(component: int) -> str:
+        name = shorten_label(certificate.parts[component].component.family.labels[0])
+        return f"component of {printable(name)}: " if several else ""
+
+    none = reasons_for_none(certificate)
+    if not certificate.restricted and not none:
+        yield head[0], f"{head[1]}: nothing more is proved"
+    for number, (reason, _) in none.items():
+        yield head[0], f"{where(number)}{head[1]}: {reason}"
     for claim in certificate.restricted:
-        if isinstance(claim, FinalValueClaim) and not _stands_alone(certificate, claim):
+        if claim.component in none or (isinstance(claim, FinalValueClaim) and not _stands_alone(certificate, claim)):
             continue
-        name = shorten_label(certificate.parts[claim.component].component.family.labels[0])
-        where = f"component of {printable(name)}: " if several else ""
         if isinstance(claim, LastModeClaim | FinalValueClaim):
             text = _last_mode_text(certificate, claim)
         elif isinstance(claim, ShareClaim):
             text = _share_text(certificate, claim)
         else:
             text = _window_text(claim) if isinstance(claim, WindowClaim) else _rate_text(certificate, claim)
-        yield head[0], f"{where}{head[1]}: {text}"
+        yield head[0], f"{where(claim.component)}{head[1]}: {text}"
 
 
 def signal_text(signal: SignalClass) -> tuple[str, str]:
@@ -120,13 +129,13 @@ def _window_text(claim: WindowClaim) -> str:
     rate = claim.rate
     size = math.log10(rate.eta.numerator) - math.log10(rate.eta.denominator)
     left = math.floor(math.log10(rate.multiple) + rate.exponent * size)
+    if left < TINY:
+        return f"{claim.behaviour}; {TOO_SMALL}"
     in_each = f"in every {near(rate.window, 6)} of the clock"
     return f"{claim.behaviour}; what is left shrinks by 1e{left} of it, or more, {in_each}"
 
 
 def _share_text(certificate: FamilyContent, claim: ShareClaim) -> str:
-    if claim.behaviour is None:
-        return "no rate is proved"
     names = (printable(mode_name(certificate.family, k)) for k in range(len(certificate.family.modes)))
     own = map(down, claim.form.function.rates)
     each = ", ".join(f"{name} {rate}" for name, rate in zip(names, own, strict=True))

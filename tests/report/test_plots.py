@@ -44,6 +44,7 @@ from ptcc_certify.report.notebook import trajectory_html
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.plots.agents import CAMP_STYLES, NAME_SIZE, NAMED_AGENTS, NAMED_OF_PART
 from ptcc_certify.report.plots.decay import plot_decay
+from ptcc_certify.report.plots.distributions import plot_final_states
 from ptcc_certify.report.plots.graph import GROUND, plot_graph
 from ptcc_certify.report.plots.graph_layout import FREE_NODES, arc, arrows_of
 from ptcc_certify.report.plots.input import plot_effort, plot_input
@@ -1007,3 +1008,15 @@ def test_where_sliding_variables_are_0_neither_they_nor_their_deadline_are_annou
             assert ("$T_r$" in labelled(ax)) == moves
         assert ("drives the sliding variable" in report_html(read_certificate(cert))) == moves
         assert ("sliding variables over time" in trajectory_html(cert.trajectory)) == moves
+
+
+@pytest.mark.parametrize(
+    "ends", [(1, 1 + 2**-50, 1), (0, 0, 0), (1e-320, 2e-320, 0), (-1e300, 1e300, 3), (1e300, 1e300, 1e300)]
+)
+def test_bars_of_final_states_that_agree_but_for_last_digits_are_drawn(ends: tuple[float, ...]) -> None:
+    graph = SignedDigraph.from_edges([("a", "b", 1), ("c", "d", 1), ("e", "f", 1)])
+    states = [x for end in ends for x in (end, 0)]
+    ax = drawn(plot_final_states(certify(graph, PROTOCOL, states, simulation=False, method="paper")))
+    assert sum(bar.get_height() for bar in ax.patches) == 6  # type: ignore[attr-defined]
+    low, high = ax.get_xlim()
+    assert all(low <= x <= high for x in ends)

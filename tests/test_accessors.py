@@ -1,0 +1,70 @@
+"""What is told of an agent is asked for by its label, and who does not exist is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+import ptcc_certify as ptcc
+from ptcc_certify.errors import ParameterError, UnknownAgentError
+
+GRAPH = ptcc.SignedDigraph.from_edges([("ann", "bob", -1), ("bob", "ann", -1), ("ann", "eve", 2)])
+PROTOCOL, X0 = ptcc.NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), [3, 1, 2]
+FAMILY = ptcc.as_family([("ann", "bob", -1, -1), ("bob", "ann", -1, -1), ("ann", "eve", 1, 2)])
+
+
+def certify(**options: Any) -> Any:
+    return ptcc.certify(GRAPH, PROTOCOL, X0, method="paper", **options)
+
+
+BY_PLACE_TOO: dict[str, Callable[[], Callable[[Any], Any]]] = {
+    "influence": lambda: ptcc.influence(GRAPH).row,
+    "influence of a certificate": lambda: certify().influence.row,
+    "final states of a family": lambda: ptcc.certify(FAMILY, PROTOCOL, X0).final_states.__getitem__,
+    "kernel of a family": lambda: ptcc.decide(FAMILY)[0].kernel.row,
+    "rows of the Laplacian": lambda: lambda agent: GRAPH.exact_rows([agent]),
+}
+BY_LABEL: dict[str, Callable[[], Callable[[Any], Any]]] = {
+    "final state": lambda: certify().final_state.__getitem__,
+    "run": lambda: lambda agent: certify().trajectory[agent].tolist(),
+    "run of a family": lambda: lambda agent: ptcc.simulate_family(FAMILY, PROTOCOL, X0)[agent].tolist(),
+    "run of agents of order n": lambda: (
+        lambda agent: certify(agents=ptcc.Agents(order=2)).agents.simulate(samples=5)[agent].tolist()
+    ),
+    "run with late messages": lambda: (
+        lambda agent: ptcc.simulate_late(GRAPH, PROTOCOL, ptcc.LateMessages(delay="0.1"), X0)[agent].tolist()
+    ),
+}
+
+
+@pytest.mark.parametrize("accessor", [*BY_PLACE_TOO, *BY_LABEL])
+def test_labels_count_and_unknown_agents_are_refused(accessor: str) -> None:
+    get = (BY_PLACE_TOO | BY_LABEL)[accessor]()
+    assert get("eve")
+    for nobody in ("joe", 7, -7, None, 1.5):
+        with pytest.raises(UnknownAgentError, match=r"no agent (is called|has place) .*ann, bob, eve"):
+            get(nobody)
+
+
+@pytest.mark.parametrize("accessor", BY_PLACE_TOO)
+def test_a_place_tells_what_the_label_there_does(accessor: str) -> None:
+    get = BY_PLACE_TOO[accessor]()
+    assert [get(k) for k in range(3)] == [get(label) for label in GRAPH.labels]
+
+
+def test_a_row_of_the_influence_holds_all_weights_of_its_table() -> None:
+    who = ptcc.influence(GRAPH)
+    table = who.to_pandas()
+    for label in GRAPH.labels:
+        row = {GRAPH.labels[k]: float(weight) for k, weight in who.row(label).items()}
+        assert row == {leader: x for leader, x in table.loc[label].to_dict().items() if x}
+
+
+def test_of_vectors_components_are_counted_and_agents_refused() -> None:
+    cert = ptcc.certify_vectors(GRAPH, PROTOCOL, [[3, 1], [1, 1], [2, 1]], method="paper", simulation=False)
+    assert cert[1] is cert.components[1] and cert[-1] is cert[1] and len(cert[:1]) == 1
+    for wrong in ("ann", 2):
+        with pytest.raises(ParameterError, match=r"the 2 components count from 0"):
+            cert[wrong]
