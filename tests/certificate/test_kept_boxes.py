@@ -81,7 +81,6 @@ def reached(family: Family, x: list[Fraction], rng: random.Random) -> tuple[np.n
     return low, high
 
 
-@pytest.mark.few(3)
 @pytest.mark.parametrize("seed", thinned(range(12), 3))
 def test_every_signal_keeps_agents_within_the_ends_of_all_walks(seed: int):
     rng = random.Random(seed)

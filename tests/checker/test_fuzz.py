@@ -181,7 +181,6 @@ def with_limits() -> Json:
     return data
 
 
-@pytest.mark.few(6)
 @pytest.mark.parametrize(
     ("path", "share"),
     [

@@ -79,7 +79,6 @@ def compare(document: Json, path: tuple, folder: Path) -> bool:
     return False
 
 
-@pytest.mark.few(3)
 @pytest.mark.parametrize("name", ["3.1 all single", "2.1 K=1", "3.1 mixed", "1.1"])
 def test_a_large_form_is_accepted_and_what_is_proved_of_it_is_named(name: str, tmp_path: Path) -> None:
     for sliding in (False, True):
