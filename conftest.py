@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from dataclasses import replace
 from fractions import Fraction
 from io import BytesIO, StringIO
@@ -10,6 +12,11 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
+
+# Compiled files are kept, whatever the shell says: else every process of a test compiles the sources again, and
+# pytest rewrites all assertions in every run.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 
 @pytest.fixture(scope="session")

@@ -766,7 +766,6 @@ def test_an_example_must_run(title, example, missing):
     assert list(faults_of_parts("one", doc)) == missing
 
 
-@pytest.mark.few(11)
 @pytest.mark.parametrize(("package", "name"), PUBLIC, ids=[f"{p.__name__}.{n}" for p, n in PUBLIC])
 def test_every_public_name_tells_statement_parameters_units_errors_source_and_example(package, name):
     thing = getattr(package, name)

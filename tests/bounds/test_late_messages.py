@@ -117,7 +117,6 @@ def test_220_graphs_of_constant_varying_and_square_delays_keep_their_bounds(bloc
     assert max(worst) <= 1 + ROUNDING
 
 
-@pytest.mark.few(2)
 @pytest.mark.parametrize("seed", range(4, 7))
 def test_delays_of_single_edges_leave_no_more_than_the_largest_for_all_and_no_run_exceeds_that(seed: int) -> None:
     rng, structure, protocol, x0, ends = _case(seed)

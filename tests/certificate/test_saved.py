@@ -109,7 +109,6 @@ def test_a_sliding_mode_certificate_comes_back_as_it_was(name: str, tmp_path: Pa
     assert np.array_equal(saved.deviation_bound([0.5, 1e-6]), made.deviation_bound([0.5, 1e-6]))
 
 
-@pytest.mark.few(3)
 @pytest.mark.parametrize(
     "options",
     thinned(

@@ -820,7 +820,6 @@ def test_no_mutant_of_a_certificate_with_side_files_is_accepted(name: str, slide
 # ---------------------------------------------------------------------- factors of leader groups
 
 
-@pytest.mark.few(6)
 @pytest.mark.parametrize("aside", [False, True])
 @pytest.mark.parametrize("name", thinned(["1.1", "1.2", "2.2", "2.1 K>=2", "3.1 mixed", "3.2", "3.1 no single"], 2))
 def test_groups_are_proved_by_factors(name: str, aside: bool):

@@ -53,6 +53,7 @@ def refused(path: list[str | int], value: object) -> str | None:
     return report.reason
 
 
+@pytest.mark.few(2)
 @pytest.mark.parametrize("count", [2, pytest.param(4, marks=pytest.mark.campaign)])
 @pytest.mark.parametrize("kind", KINDS)
 def test_functions_of_followers_are_accepted(kind, count):

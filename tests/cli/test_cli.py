@@ -101,7 +101,6 @@ def test_the_names_of_the_table_differ():
 SAMPLE = ("weight NaN", "XML entity bomb", "T NaN", "unknown command")
 
 
-@pytest.mark.few(3)
 @pytest.mark.parametrize("case", [c for c in BAD_INPUTS if c.name in SAMPLE], ids=lambda case: case.name)
 def test_bad_input_to_a_process_of_its_own(case: BadInput, folder: Path):
     write(case.files, folder)
@@ -292,7 +291,6 @@ def test_a_scenario_says_how_check_reads_its_graph(folder: Path):
     assert ptcc("check", "c.json", "s.toml", "--edges", "information").code == 1
 
 
-@pytest.mark.few(6)
 @pytest.mark.parametrize(
     ("edges", "said"),
     [
@@ -795,7 +793,6 @@ def test_max_input_is_met_refuted_or_undecided(most: str, code: int, says: str):
     assert run.code == code and says in run.out.splitlines()[-1]
 
 
-@pytest.mark.few(9)
 @pytest.mark.parametrize(
     ("given", "most", "code", "says"),
     [

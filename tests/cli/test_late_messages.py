@@ -89,7 +89,6 @@ def test_a_behaviour_asked_for_at_T_is_refuted_where_an_agent_is_proved_to_miss_
     assert "this certificate's limit is" in " ".join(left.out.split())
 
 
-@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("graph", "delay", "more", "status"),
     thinned(
@@ -126,7 +125,6 @@ def test_no_delay_is_told_that_the_check_does_not_accept(monkeypatch: pytest.Mon
     assert "older" not in ptcc("certify", *words).out
 
 
-@pytest.mark.few(4)
 @pytest.mark.parametrize(
     ("words", "said"),
     [

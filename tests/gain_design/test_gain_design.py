@@ -123,7 +123,6 @@ TASKS += [(name, 10, 1, {"deadline": 8}) for name in (*GRAPHS, "pair", "random2"
 TIGHTENED = [task for task in TASKS if "deadline" not in task[3] and (not task[3] or "fig5" not in task[0])]
 
 
-@pytest.mark.few(4)
 @pytest.mark.parametrize(("name", "U", "R", "asked"), thinned(TASKS, 8), ids=str)
 def test_a_design_is_certified_and_holds_in_simulations(name, U, R, asked):
     found = designed(name, U, R, **asked)

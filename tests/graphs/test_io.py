@@ -933,7 +933,6 @@ BAD_FILES = [
 ]
 
 
-@pytest.mark.few(61)
 @pytest.mark.parametrize(
     ("name", "content", "words"), BAD_FILES, ids=[f"{name}, {words[0]}" for name, _, words in BAD_FILES]
 )

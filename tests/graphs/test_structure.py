@@ -253,7 +253,6 @@ def constructed(name: str) -> Iterator[Made]:
         yield random_graph(rng, **(kwargs | changes))
 
 
-@pytest.mark.few(31)
 @pytest.mark.parametrize("name", thinned(CLASSES, 2))
 def test_every_field_agrees_with_the_definitions_and_with_the_construction(name):
     for made in constructed(name):

@@ -104,7 +104,6 @@ def test_a_state_at_rest_that_moves_elsewhere_has_no_quotient():
 # ---------------------------------------------------------------------- proved rates
 
 
-@pytest.mark.few(2)
 def test_the_proved_rate_holds_exactly_at_every_member_drawn(certified):
     quotient, functions, _ = certified
     rng, n = np.random.default_rng(1), len(quotient.nodes)

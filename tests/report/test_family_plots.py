@@ -134,7 +134,6 @@ def test_a_state_that_moves_rests_up_to_half_the_deadline_and_not_after(name):
     assert np.ptp(states[:, t < 0.5], axis=1).max() < 1e-9 < 1e-2 < np.ptp(states, axis=1).max()
 
 
-@pytest.mark.few(11)
 @pytest.mark.parametrize("behaviour", ["stability", "bipartite consensus", "interval bipartite consensus"])
 @pytest.mark.parametrize("name", DECIDED)
 def test_every_refutation_is_drawn(name, behaviour):

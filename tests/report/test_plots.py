@@ -141,7 +141,6 @@ def peak_of(ax: Axes) -> Annotation | None:
     return next((text for text in ax.texts if text.get_text().startswith("certified peak")), None)  # type: ignore[return-value]
 
 
-@pytest.mark.few(3)
 @pytest.mark.parametrize("name", ["fig1a", "fig3b", "apart", "single"])
 def test_each_of_few_agents_has_a_line_of_its_camp_and_its_name(name: str) -> None:
     cert = certified(name)
@@ -240,7 +239,6 @@ def test_of_a_certificate_under_limits_the_run_under_them_is_drawn_and_they_are_
 CAPPED = ptcc_certify.LateMessages(delay="0.01", gain_cap=40)
 
 
-@pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("agents", "x0"),
     [
@@ -624,7 +622,6 @@ def test_figures_are_drawn_into_given_axes() -> None:
 # ---------------------------------------------------------------------- decay, runs, style
 
 
-@pytest.mark.few(2)
 @pytest.mark.parametrize("axis", ["left", "time", "clock"])
 def test_the_decay_lies_under_the_bound_and_the_bound_is_the_best_of_all(axis: str) -> None:
     cert = certified("fig3b")

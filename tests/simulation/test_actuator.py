@@ -180,7 +180,6 @@ def certified():
     return certify(load_graph("fig1a"), PROTOCOL, simulation=False)
 
 
-@pytest.mark.few(9)
 @pytest.mark.parametrize("limits", LIMITS, ids=str)
 def test_a_proved_envelope_holds_on_the_clock_that_acts(limits):
     cert = certified()
@@ -215,7 +214,6 @@ def brute_force(rows, x, until, h, cap, stop, p):
     return course, x
 
 
-@pytest.mark.few(7)
 @pytest.mark.parametrize(
     ("cap", "stop", "h"),
     thinned(product([None, "0.05", "0.3", 5, 1000], [None, "0.13"], ["0.07", "0.2", "0.05", "0.59", "0.9"]), 7),
@@ -326,7 +324,6 @@ def test_a_disturbed_run_is_that_of_another_integrator(text, delta, function):
     assert f"disturbance {'constant' if not isinstance(text, str) else text}" in repr(run)
 
 
-@pytest.mark.few(21)
 @pytest.mark.parametrize("limits", LIMITS, ids=str)
 @pytest.mark.parametrize("noisy", [False, True])
 def test_a_disturbed_and_noisy_run_behind_limits_is_that_of_another_integrator(limits, noisy):

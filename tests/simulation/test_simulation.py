@@ -396,7 +396,6 @@ def test_fractions_are_a_start():
     np.testing.assert_allclose(run.states[:, 0], np.array(X0) / 3)
 
 
-@pytest.mark.few(4)
 @pytest.mark.parametrize(
     ("name", "exponent"),
     thinned(product(["fig1a", "fig1b", "fig3a", "fig5b"], [-300, -150, -20, 6, 12, 20, 50, 150, 300])),
