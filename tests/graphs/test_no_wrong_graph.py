@@ -354,7 +354,7 @@ def test_signs_beside_weights_of_a_pandas_table_are_their_factors():
 
 
 def test_a_laplacian_in_memory_is_named_and_read():
-    with pytest.raises(GraphError, match="as a Laplacian's; read it with laplacian=True"):
+    with pytest.raises(GraphError, match="as a Laplacian's; read it with as_graph"):
         ptcc.SignedDigraph.from_matrix(LAPLACIAN, orientation="listens")
     for matrix in (LAPLACIAN, np.array(LAPLACIAN, dtype=float), sparse.csr_array(np.array(LAPLACIAN))):
         graph = ptcc.SignedDigraph.from_matrix(matrix, orientation="listens", laplacian=True)

@@ -78,8 +78,8 @@ def values_of_edges(data: Sequence[Attributes], edge: Callable[[int], str], name
     for k, value in enumerate(weights):
         if value is None or not _has(data[k], *either):
             what = "weight" if name else f'attribute "{either[0]}"'
-            mend = "give it a number as weight or sign, or name the attribute"
-            _fail(name, f"edge {edge(k)} has no {what}; {mend}{': --columns source,target,NAME' if name else ''}")
+            tell = "--columns source,target,NAME" if name else "from_networkx(graph, weight=NAME)"
+            _fail(name, f"edge {edge(k)} has no {what}; give each edge a signed number, or name the attribute: {tell}")
         if signs and not _has(data[k], str(sign)):
             _fail(name, f'edge {edge(k)} has no "{sign}", and others have; give each one')
     return Values(weights, signs, "" if told else either[0], sign or "")

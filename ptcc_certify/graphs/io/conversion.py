@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ptcc_certify.errors import FormatError, GraphError, ParameterError, did_you_mean
-from ptcc_certify.graphs.digraph import SignedDigraph, labels_beside, refuse_unnamed
+from ptcc_certify.graphs.digraph import SignedDigraph, labels_beside, refuse_unknown_orientation, refuse_unnamed
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io.graph_files import read_as
 from ptcc_certify.graphs.io.graph_from_rows import Rows, graph_of
@@ -79,6 +79,8 @@ def as_graph(graph: Any, orientation: str | None = None, **reading: Any) -> Sign
         raise GraphError(
             f"{graph!r} is several graphs, and one is asked for; certify, decide and simulate_family take families"
         )
+    if orientation is not None:
+        refuse_unknown_orientation(orientation)
     how = Reading(orientation=orientation, **reading)
     if isinstance(graph, str) and not os.path.exists(graph) and graph not in GRAPHS and "." not in graph:  # noqa: PTH110
         names = f"({', '.join(GRAPHS)}); check the path{did_you_mean(graph, GRAPHS)}"

@@ -175,7 +175,12 @@ class _Draft:
         name, _, value = text.partition(" ")
         if self.name:
             return f"--{name.replace('_', '-')} {value}".strip()
-        return f"{name}=" + (" or ".join(f'"{word}"' for word in value.split("|")) if value else "True")
+        return f'{name}="{value.partition("|")[0]}"' if value else f"{name}=True"
+
+    def call(self, *options: str) -> str:
+        """Write options as flags, or as the call that takes them."""
+        words = [self.option(option) for option in options]
+        return " ".join(words) if self.name else f"as_graph(.., {', '.join(words)})"
 
     def place(self, row: int | None) -> str:
         where = "" if row is None else self.rows.where(row)
@@ -193,13 +198,13 @@ class _Draft:
         """Refuse all that rows break in one message, with the options that mend it."""
         if len(self.problems) == 1:
             (one,) = self.problems
-            self.fail(self.place(one.row), f"{one.text}; {one.mend.format(self.option(one.option))}")
+            self.fail(self.place(one.row), f"{one.text}; {one.mend.format(self.call(one.option))}")
         if self.problems:
             places = ["" if one.row is None else self.rows.where(one.row) for one in self.problems]
             texts = [
                 f"{place}: {one.text}" if place else one.text for place, one in zip(places, self.problems, strict=True)
             ]
-            options = (" " if self.name else ", ").join(self.option(one.option) for one in self.problems)
+            options = self.call(*(one.option for one in self.problems))
             self.fail(self.name, f"{'; '.join(texts)}; mend these, or read it with {options}")
 
     # ------------------------------------------------------------------ weights and signs
@@ -321,9 +326,10 @@ class _Draft:
         if not self.how.laplacian:
             if found.laplacian and (self.rows.matrix or found.loops > 1):
                 what = "the diagonal holds the sums of the other entries, as a Laplacian's"
-                other = self.option("laplacian") if self.name else "laplacian=True"
                 no = "--no-laplacian" if self.name else "laplacian=False"
-                self.fail(self.name, f"{what}; read it with {other}, or add {no} if these are self-loops")
+                self.fail(
+                    self.name, f"{what}; read it with {self.call('laplacian')}, or add {no} if these are self-loops"
+                )
             return
         self.refuse_no_laplacian(found)
         self.drop(self.source == self.target)
