@@ -13,7 +13,7 @@ import numpy as np
 from ptcc_certify.errors import FormatError, NumberError
 from ptcc_certify.graphs.digraph import SignedDigraph, ordered_labels
 from ptcc_certify.graphs.io.files import lines_of
-from ptcc_certify.graphs.io.graph_from_rows import DECIMALS, HEADER_MEND, Numbers, Rows
+from ptcc_certify.graphs.io.graph_from_rows import DECIMALS, HEADER_MEND, Numbers, Rows, Signs
 from ptcc_certify.graphs.io.signs import WEIGHT, plain, sign_of_word
 from ptcc_certify.graphs.io.table_columns import Columns, columns_of
 from ptcc_certify.graphs.io.text_matrices import bracketed_matrix, is_entry, table_as_matrix
@@ -192,11 +192,7 @@ class _EdgeList:
         rows.notes += ("columns ignored: " + ", ".join(ignored[:20]),) if ignored else ()
         rows.weight_title = columns.codes
         if columns.sign is not None:
-            rows.signs, rows.sign_codes, rows.sign_title = (
-                list(self.signs.texts),
-                self.sign_codes,
-                columns.titles[columns.sign],
-            )
+            rows.signs = Signs(list(self.signs.texts), self.sign_codes, columns.titles[columns.sign])
         ends = [columns.titles[k] for k in (columns.source, columns.target)] if columns.guessed else []
         if again := [title for title in ends if title in self.nodes.texts]:
             what = f"{shorten(again[0])} is a title, and a node in another row"

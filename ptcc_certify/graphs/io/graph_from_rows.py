@@ -32,6 +32,15 @@ DECIMALS = "; write decimals with a point, too"
 _LARGEST_CODE = 9
 
 
+@dataclass(frozen=True)
+class Signs:
+    """Signs beside weights: that of row r is ``values[codes[r]]``, in the column or attribute ``title``."""
+
+    values: Sequence[Any]
+    codes: Sequence[int] | np.ndarray
+    title: str
+
+
 @dataclass
 class Rows:
     """What a source says, before any rule is applied: ``labels[first[r]], labels[second[r]], weights[codes[r]]``."""
@@ -47,9 +56,7 @@ class Rows:
     headerless: bool = False
     matrix: bool = False  # entries of a matrix, whose rows listen unless it is said that they inform
     notes: tuple[str, ...] = ()
-    signs: Sequence[Any] = ()  # distinct signs beside the weights, of the column ``sign_title``
-    sign_codes: Sequence[int] | np.ndarray = ()
-    sign_title: str = ""
+    signs: Signs | None = None
     weight_title: str = ""  # of a column whose numbers are codes of relations, unless they are 1 and -1
     asks: str = ""  # why the direction must be told
     columns: bool = True  # may columns, or the attribute of weights, be told?
@@ -270,23 +277,24 @@ class _Draft:
 
     def multiply_signs(self) -> None:
         """Multiply weights that tell sizes by the signs beside them; refuse signs that say something else."""
-        rows, title = self.rows, shorten(self.rows.sign_title)
-        texts = [str(sign).strip() for sign in rows.signs]
-        if not texts:
+        if (signs := self.rows.signs) is None or not len(signs.values):
             return
+        texts, beside, title = (
+            [str(sign).strip() for sign in signs.values],
+            np.asarray(signs.codes),
+            shorten(signs.title),
+        )
         directions = [DIRECTIONS.get(text.lower()) for text in texts]
         if None not in directions:
             if len(set(directions)) > 1:
                 self.fail(self.name, f'column "{title}" holds directed and undirected edges; write both as two rows')
             self.undirected = self.undirected or (f'column "{title}"' if directions[0] else "")
             return
-        factors = [self.factor(text, code, title) for code, text in enumerate(texts)]
-        if (odd := _codes([*map(Fraction, factors)], rows.sign_title)) is not None:
+        factors = [self.factor(text, beside == code, title) for code, text in enumerate(texts)]
+        if (odd := _codes([*map(Fraction, factors)], signs.title)) is not None:
             what = f'column "{title}" holds {", ".join(map(str, sorted(factors)))} and no -1: signs?'
-            self.refuse(
-                int(np.argmax(np.asarray(rows.sign_codes) == factors.index(int(odd)))), f"{what}; {self.columns_mend()}"
-            )
-        pairs, which = np.unique(self.codes * len(texts) + np.asarray(rows.sign_codes), return_inverse=True)
+            self.refuse(int(np.argmax(beside == factors.index(int(odd)))), f"{what}; {self.columns_mend()}")
+        pairs, which = np.unique(self.codes * len(texts) + beside, return_inverse=True)
         both = [(Fraction(self.values[p // len(texts)]), factors[p % len(texts)]) for p in pairs.tolist()]
         if any(weight < 0 for weight, _ in both):
             for k, (weight, factor) in enumerate(both):
@@ -297,8 +305,8 @@ class _Draft:
         self.values, self.codes = [abs(weight) * factor for weight, factor in both], which.astype(np.int64)
         self.notes += (f'weights times column "{title}"',)
 
-    def factor(self, text: str, code: int, title: str) -> int:
-        """Return the sign that a text stands for, or 0; refuse any other."""
+    def factor(self, text: str, beside: np.ndarray, title: str) -> int:
+        """Return the sign that a text stands for, or 0; refuse any other, of the first of the edges ``beside``."""
         if (word := sign_of_word(text)) is not None:
             return word
         try:
@@ -307,7 +315,7 @@ class _Draft:
             what = f"is neither 1 nor -1: a code of a relation; {self.columns_mend()}"
         except NumberError:
             what = f"{NO_SIGN}; {self.columns_mend()}"
-        edge = int(np.argmax(np.asarray(self.rows.sign_codes) == code))
+        edge = int(np.argmax(beside))
         return self.refuse(edge, f'"{shorten(text)}" of edge {self.edge(edge)} in column "{title}" {what}')
 
     # ------------------------------------------------------------------ rules
