@@ -206,7 +206,7 @@ MISTAKES = {
     "ptcc.certify_many(G, p, methd='perron')": "ParameterError: certify_many has no parameter methd; did you mean meth",
     "ptcc.certify_many(G, p, uncertainty='20%')": "ParameterError: certify_many has no parameter uncertainty, which ma",
     "ptcc.certify(G, p, dwell=0.5)": "ParameterError: certify has no parameter dwell; say signal=DwellTime(...) of ptc",
-    "ptcc.certify(pd.DataFrame({'from': list('aa'), 'to': list('aa'), 'w': 1}), p)": "... as_graph(.., drop_self_loops=True)",
+    "ptcc.certify(pd.DataFrame({'from': list('aa'), 'to': list('aa'), 'w': 1}), p)": "... drop_self_loops=True)",
     "ptcc.certify([('a', 'a', 1), ('b', 'b', 1)], p)": "GraphError: self-loop at node a (2 in all); remove them",
     "ptcc.SignedDigraph([('a', 'b', 1)])": "... weights), or SignedDigraph.from_edges([(source, target, weight), ...])",
     "ptcc.certify(p, G)": "ParameterError: graph and protocol are exchanged; write certify(graph, protocol)",

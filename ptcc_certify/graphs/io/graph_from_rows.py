@@ -279,11 +279,8 @@ class _Draft:
         """Multiply weights that tell sizes by the signs beside them; refuse signs that say something else."""
         if (signs := self.rows.signs) is None or not len(signs.values):
             return
-        texts, beside, title = (
-            [str(sign).strip() for sign in signs.values],
-            np.asarray(signs.codes),
-            shorten(signs.title),
-        )
+        texts = [str(sign).strip() for sign in signs.values]
+        beside, title = np.asarray(signs.codes), shorten(signs.title)
         directions = [DIRECTIONS.get(text.lower()) for text in texts]
         if None not in directions:
             if len(set(directions)) > 1:
@@ -298,7 +295,7 @@ class _Draft:
         both = [(Fraction(self.values[p // len(texts)]), factors[p % len(texts)]) for p in pairs.tolist()]
         if any(weight < 0 for weight, _ in both):
             for k, (weight, factor) in enumerate(both):
-                if weight * factor <= 0:
+                if weight * factor < 0:
                     edge = int(np.argmax(which == k))
                     what = f'weight {weight} of edge {self.edge(edge)} and {factor} in column "{title}" disagree'
                     self.refuse(edge, f"{what}; {self.columns_mend()}")
@@ -378,7 +375,8 @@ class _Draft:
 
     def merge_duplicates(self) -> tuple[str, ...]:
         """Tell or merge the rows of one pair (of one unordered pair, if edges go both ways); note how many."""
-        duplicates, undirected = self.how.duplicates, self.how.undirected
+        duplicates = self.how.duplicates
+        undirected = self.how.undirected or (duplicates == "refuse" and bool(self.undirected))
         low, high = self.source, self.target
         if undirected:
             low, high = np.minimum(low, high), np.maximum(low, high)
