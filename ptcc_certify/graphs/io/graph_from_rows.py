@@ -323,12 +323,16 @@ class _Draft:
             return
         entries = np.array([nearest_float(v) if isinstance(v, Fraction) else v for v in self.values])[self.codes]
         first, second = np.asarray(self.rows.first), np.asarray(self.rows.second)
-        if not self.how.laplacian and not fits_one_node(first, second, entries):
+        if not self.how.laplacian and not self.rows.matrix and not fits_one_node(first, second, entries):
             return
         found = diagonal_of(first, second, entries, len(self.rows.labels), self.how.undirected)
         if self.how.undirected and not found.laplacian:  # of both halves
             found = diagonal_of(first, second, entries, len(self.rows.labels), False)
         if not self.how.laplacian:
+            if self.rows.matrix and found.normalised and not found.laplacian:
+                what = "a positive diagonal, and no positive entry beside it, as of a normalised Laplacian; give W"
+                no = "--no-laplacian" if self.name else "laplacian=False"
+                self.fail(self.name, f"{what}, or add {no} if these are self-loops")
             if found.laplacian and (self.rows.matrix or found.loops > 1):
                 what = "the diagonal holds the sums of the other entries, as a Laplacian's"
                 no = "--no-laplacian" if self.name else "laplacian=False"
