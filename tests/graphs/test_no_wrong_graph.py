@@ -409,6 +409,17 @@ def test_files_of_families_have_the_same_guards(tmp_path, content, says):
         read_family(put(tmp_path, "g.csv", content))
 
 
+def test_a_family_of_matrices_as_text_tells_its_direction_and_its_conversions(tmp_path):
+    one = put(tmp_path, "one.csv", MATRICES[0].content)
+    family = read_family([one, one], uncertainty="10%")
+    assert family.read["orientation"] == "listens" and "one: a 2 x 2 matrix as text" in family.notes
+    out = run("classify", str(one), "--uncertainty", "10%").out
+    assert "a listens to b" in out
+    table = put(tmp_path, "table.csv", "ada,bo,1\n")
+    with pytest.raises(GraphError, match="one is a matrix as text and table is a table of edges: say --edges"):
+        read_family([one, table])
+
+
 def test_words_for_signs_are_read_in_files_of_families(tmp_path):
     family = read_family(put(tmp_path, "g.csv", "source,target,weight,optional\na,b,inhibits,yes\nb,a,+,no\n"))
     mode = family.modes[0]
