@@ -233,7 +233,9 @@ class SignedDigraph(ReadOnly, Shown):
             Further nodes, and the wish for an order: these come first unless all labels are integers.
         orientation : {"information", "listens"}
             ``information``: information flows first -> second. ``listens``: the first listens to the second.
-        duplicates, drop_self_loops, drop_zeros, undirected
+        duplicates : {"refuse", "sum", "last"}
+            As in :func:`ptcc_certify.read_graph`.
+        drop_self_loops, drop_zeros, undirected : bool
             As in :func:`ptcc_certify.read_graph`.
 
         Raises
@@ -318,8 +320,10 @@ class SignedDigraph(ReadOnly, Shown):
         laplacian : bool, optional
             The matrix is a signed Laplacian ``D - W``: a weight is minus the entry. A matrix whose diagonal holds the
             sums of its rows is refused unless this says what it is.
-        duplicates, drop_self_loops, undirected
-            As in :func:`ptcc_certify.read_graph`; entries of a sparse matrix may be repeated.
+        duplicates : {"refuse", "sum", "last"}
+            As in :func:`ptcc_certify.read_graph`: entries of a sparse matrix may be repeated.
+        drop_self_loops, undirected : bool
+            As in :func:`ptcc_certify.read_graph`.
 
         Raises
         ------
@@ -420,7 +424,9 @@ class SignedDigraph(ReadOnly, Shown):
         orientation : {"information", "listens"}
             ``information``: information flows along an edge ``u -> v``. ``listens``: u listens to v, as in trust and
             rating data.
-        duplicates, drop_self_loops, drop_zeros, undirected
+        duplicates : {"refuse", "sum", "last"}
+            As in :func:`ptcc_certify.read_graph`.
+        drop_self_loops, drop_zeros, undirected : bool
             As in :func:`ptcc_certify.read_graph`.
 
         Raises

@@ -229,7 +229,7 @@ class _Draft:
             by_code = {code: self.parsed(weights[code], code) for code in order}  # what is neither is told first
             values = [by_code[code] for code in range(len(weights))]
         if (title := self.rows.weight_title) and (odd := _codes(values, title)) is not None:
-            what = f'column "{shorten(title)}" holds {odd}: codes of relations, or weights?'
+            what = f'column "{shorten(title)}" holds {odd}: codes of relations, not signs'
             self.refuse(int(np.argmax(self.codes == values.index(odd))), f"{what}; {self.columns_mend()}")
         return values
 
@@ -289,7 +289,7 @@ class _Draft:
             return
         factors = [self.factor(text, beside == code, title) for code, text in enumerate(texts)]
         if (odd := _codes([*map(Fraction, factors)], signs.title)) is not None:
-            what = f'column "{title}" holds {", ".join(map(str, sorted(factors)))} and no -1: signs?'
+            what = f'column "{title}" holds {", ".join(map(str, sorted(factors)))} and no -1'
             self.refuse(int(np.argmax(beside == factors.index(int(odd)))), f"{what}; {self.columns_mend()}")
         pairs, which = np.unique(self.codes * len(texts) + beside, return_inverse=True)
         both = [(Fraction(self.values[p // len(texts)]), factors[p % len(texts)]) for p in pairs.tolist()]
