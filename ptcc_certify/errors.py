@@ -74,7 +74,7 @@ class GraphError(PTCCError, ValueError):
     --------
     >>> SignedDigraph.from_edges([("a", "b", 0)])
     Traceback (most recent call last):
-    ptcc_certify.errors.GraphError: weight 0 of edge a -> b: neither ally nor opponent; remove it or give a weight
+    ptcc_certify.errors.GraphError: weight 0 of edge a -> b: neither ally nor opponent; remove it or give a weight...
     """
 
 

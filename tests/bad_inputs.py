@@ -206,7 +206,7 @@ FILES = [
     _graph("matrix of complex numbers", _array(np.array([[0, 1j], [1, 0]])), "complex128", file="g.npy"),
     _graph("matrix of objects (pickle)", _array(np.array([[0, "x"], [1, 0]], dtype=object)), "Object", file="g.npy"),
     _graph("matrix cut short", _array(np.ones((9, 9)))[:-64], "NumPy", file="g.npy"),
-    _graph("archive of two matrices", _archive(A=np.ones((2, 2)), B=np.ones((3, 3))), "keep one", file="g.npz"),
+    _graph("archive of two matrices", _archive(A=np.ones((2, 2)), B=np.ones((3, 3))), "--variable NAME", file="g.npz"),
     _graph("archive without a matrix", _archive(text=np.array(["a"])), "no square", file="g.npz"),
     _graph("archive that is no archive", b"PK\x03\x04 nonsense", ".npz", file="g.npz"),
     _graph("MATLAB file of zeros", bytes(500), "MATLAB", file="g.mat"),

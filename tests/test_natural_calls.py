@@ -196,7 +196,7 @@ MISTAKES = {
     "ptcc.certify(G, p, scenario='s.toml')": "ParameterError: scenario = 's.toml' is none; give the mapping that",
     "ptcc.certify_many(G, p, methd='perron')": "ParameterError: certify_many has no parameter methd; did you mean meth",
     "ptcc.certify_many(G, p, uncertainty='20%')": "ParameterError: certify_many has no parameter uncertainty, which ma",
-    "ptcc.certify(pd.DataFrame({'from': list('aa'), 'to': list('aa'), 'w': 1}), p)": '... df[df["from"] != df["to"]]',
+    "ptcc.certify(pd.DataFrame({'from': list('aa'), 'to': list('aa'), 'w': 1}), p)": "... drop_self_loops=True)",
     "ptcc.certify([('a', 'a', 1), ('b', 'b', 1)], p)": "GraphError: self-loop at node a (2 in all); remove them",
     "ptcc.certify(p, G)": "ParameterError: graph and protocol are exchanged; write certify(graph, protocol)",
     "ptcc.theorems.restricted_signals.DwellTime(0.5)": "DwellTime(0.5, clock='t')",

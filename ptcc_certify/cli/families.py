@@ -205,7 +205,11 @@ def _names(graphs: tuple[str, ...], family: Family, options: shared.Options) -> 
     from ptcc_certify.graphs.io.graph_files import MATRICES
     from ptcc_certify.report.structure_text import SHORT_ORIENTATION
 
-    way = options["edges"] or ("matrix" if PurePath(graphs[0]).suffix[1:] in MATRICES else "information")
+    way = (
+        family.read.get("orientation")
+        or options["edges"]
+        or ("matrix" if PurePath(graphs[0]).suffix[1:] in MATRICES else "information")
+    )
     tied = "; undirected, both directions change together" * any(mode.tied for mode in family.modes)
     return ", ".join(PurePath(graph).name for graph in graphs), SHORT_ORIENTATION[way] + tied
 

@@ -252,7 +252,9 @@ class SignedDigraph(ReadOnly, Shown):
             Further nodes, and the wish for an order: these come first unless all labels are integers.
         orientation : {"information", "listens"}
             ``information``: information flows first -> second. ``listens``: the first listens to the second.
-        duplicates, drop_self_loops, drop_zeros, undirected
+        duplicates : {"refuse", "sum", "last"}
+            As in :func:`ptcc_certify.read_graph`.
+        drop_self_loops, drop_zeros, undirected : bool
             As in :func:`ptcc_certify.read_graph`.
 
         Raises
@@ -265,6 +267,8 @@ class SignedDigraph(ReadOnly, Shown):
         >>> SignedDigraph.from_edges([("a", "b", 1)], orientation="listens").edges[0]
         ('b', 'a', Fraction(1, 1))
         """
+        from ptcc_certify.graphs.io.graph_in_memory import graph_in_memory
+
         refuse_unknown_orientation(orientation)
         if not isinstance(edges, Iterable):
             raise GraphError(f"{shorten(repr(edges))} is no list of edges; give triples (source, target, weight)")
@@ -298,7 +302,7 @@ class SignedDigraph(ReadOnly, Shown):
             drop_zeros=drop_zeros,
             undirected=undirected,
         )
-        return _in_memory(how, list(known), heads, tails, values)
+        return graph_in_memory(how, list(known), heads, tails, values)
 
     @classmethod
     @gated
@@ -335,8 +339,10 @@ class SignedDigraph(ReadOnly, Shown):
         laplacian : bool, optional
             The matrix is a signed Laplacian ``D - W``: a weight is minus the entry. A matrix whose diagonal holds the
             sums of its rows is refused unless this says what it is.
-        duplicates, drop_self_loops, undirected
-            As in :func:`ptcc_certify.read_graph`; entries of a sparse matrix may be repeated.
+        duplicates : {"refuse", "sum", "last"}
+            As in :func:`ptcc_certify.read_graph`: entries of a sparse matrix may be repeated.
+        drop_self_loops, undirected : bool
+            As in :func:`ptcc_certify.read_graph`.
 
         Raises
         ------
@@ -351,6 +357,8 @@ class SignedDigraph(ReadOnly, Shown):
         >>> SignedDigraph.from_matrix([[0, -1], [0, 0]], orientation="information").edges
         (('1', '2', Fraction(-1, 1)),)
         """
+        from ptcc_certify.graphs.io.graph_in_memory import graph_in_memory
+
         if hasattr(matrix, "is_multigraph"):
             raise GraphError("a networkx graph is no matrix; it is read by SignedDigraph.from_networkx")
         if orientation is None:
@@ -409,7 +417,7 @@ class SignedDigraph(ReadOnly, Shown):
             undirected=undirected,
             laplacian=laplacian,
         )
-        return _in_memory(how, names, row, column, weights, matrix=True)
+        return graph_in_memory(how, names, row, column, weights, matrix=True)
 
     @classmethod
     @gated
@@ -435,7 +443,9 @@ class SignedDigraph(ReadOnly, Shown):
         orientation : {"information", "listens"}
             ``information``: information flows along an edge ``u -> v``. ``listens``: u listens to v, as in trust and
             rating data.
-        duplicates, drop_self_loops, drop_zeros, undirected
+        duplicates : {"refuse", "sum", "last"}
+            As in :func:`ptcc_certify.read_graph`.
+        drop_self_loops, drop_zeros, undirected : bool
             As in :func:`ptcc_certify.read_graph`.
 
         Raises
@@ -455,6 +465,7 @@ class SignedDigraph(ReadOnly, Shown):
         refuse_unknown_orientation(orientation)
         refuse_networkx(graph, undirected=undirected, multigraph=duplicates != "refuse")
         from ptcc_certify.graphs.io.attributes import values_of_edges
+        from ptcc_certify.graphs.io.graph_in_memory import graph_in_memory
 
         ends, data = [edge[:2] for edge in graph.edges], [more for *_, more in graph.edges(data=True)]
         edge = lambda k: f"{shorten(str(ends[k][0]))} -> {shorten(str(ends[k][1]))}"  # noqa: E731
@@ -473,8 +484,7 @@ class SignedDigraph(ReadOnly, Shown):
             undirected=undirected,
         )
         heads, tails = [place[u] for u, _ in ends], [place[v] for _, v in ends]
-        signs = values.sign, values.signs
-        return _in_memory(how, list(known), heads, tails, values.weights, title=values.weight, signs=signs)
+        return graph_in_memory(how, list(known), heads, tails, values)
 
     # ------------------------------------------------------------------ reading
 
@@ -801,36 +811,3 @@ def refuse_networkx(graph: Any, undirected: bool = False, multigraph: bool = Fal
     if not graph.is_directed() and not undirected:
         mend = "give graph.to_directed(), or undirected=True, if both ends listen"
         raise GraphError(f"the networkx graph is undirected; {mend}")
-
-
-def _in_memory(
-    how: Reading,
-    labels: list[str],
-    first: Any,
-    second: Any,
-    weights: Any,
-    matrix: bool = False,
-    title: str = "",
-    signs: tuple[str, Sequence[Any]] = ("", ()),
-) -> SignedDigraph:
-    """Build a graph of rows ``first, second, weight`` by the rules for files; ``title`` is that of the weights."""
-    from ptcc_certify.graphs.io.graph_from_rows import Rows, graph_of
-    from ptcc_certify.graphs.io.signs import is_sign
-
-    values, codes = _distinct(weights)
-    rows = Rows(labels, first, second, values, codes, lambda row: "", matrix=matrix)
-    rows.weight_title = title if is_sign(title) else ""
-    rows.sign_title, rows.signs, rows.sign_codes = signs[0], *_distinct(signs[1])
-    return graph_of(rows, "", how)
-
-
-def _distinct(values: Any) -> tuple[Any, Any]:
-    """Return the different values, an array of them if that is given, and which of these each value is."""
-    if isinstance(values, np.ndarray):
-        return values, np.arange(values.size)
-    table: dict[tuple[type, Any], int] = {}
-    try:
-        codes = [table.setdefault((type(value), value), len(table)) for value in values]
-    except TypeError:  # a value that has no hash, which is refused as no number
-        return list(values), np.arange(len(values))
-    return [value for _, value in table], codes

@@ -56,6 +56,7 @@ _MENDS = {
     ),
     "a zip archive": "unpack it, or save a spreadsheet as CSV",
     "R data": "write it with write.csv(edges, FILE, row.names = FALSE)",
+    "Graphviz DOT": "save it as GraphML or GML",
     "HDF5": "save the matrix as .npy or .mtx, in MATLAB with save(FILE, 'W', '-v7')",
     "Parquet": "in Python as_graph(pandas.read_parquet(FILE)), or save it as CSV",
     "Feather (Arrow)": "in Python as_graph(pandas.read_feather(FILE)), or save it as CSV",
@@ -125,6 +126,8 @@ def kind_of_content(first: bytes, ending: str) -> str:
             return next(inside, kind) if kind == "a zip archive" else kind
     if b"<svg" in start.lower() and start.startswith(b"<?xml"):
         return "an image"
+    if re.match(rb"(strict\s+)?(di)?graph\b[^\[\n]*\{", start):
+        return "Graphviz DOT"
     if start.startswith((b"{", b"[")):
         return _kind_of_json(start, ending)
     return ""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import PurePath
 
-from ptcc_certify.graphs.io.table_columns import BY_HEADER
+from ptcc_certify.graphs.io.table_columns import BY_HEADER, IGNORED
 from ptcc_certify.graphs.structure import ClosedComponent, Structure
 from ptcc_certify.report.text_layout import TEXT, columns, counted, printable, shorten_label, shorten_list, shorten_text
 
@@ -20,8 +20,6 @@ SHORT_ORIENTATION = ORIENTATION | {
     "listens": "row a,b: a listens to b",
 }
 _BY_HEADER = {"information": "information flows source -> target", "listens": "source listens to target"}
-#: How the one remark begins that may be cut: what it tells makes no other graph.
-IGNORED = "columns ignored"
 #: Remarks for the long screen alone: "(0 negative)" tells the one, and the other is about pairs of edges.
 _LONG_REMARKS = _POSITIVE, _ASYMMETRIC = "all weights positive", "sign-asymmetric"
 

@@ -144,6 +144,8 @@ LAPLACIANS = [
     # an ordinary Laplacian of signed weights: the rows sum to 0, the weights are the same
     Input("g.npy", npy([[1, -2, 1], [0, 0, 0], [-3, 0, 3]]), says=("Laplacian",), how={"drop_self_loops": True}),
     Input("g.npy", npy([[1, -2, 1], [0, 0, 0], [-3, 0, 3]]), "2>1=2 3>1=-1 1>3=3", how={"laplacian": True}),
+    Input("g.npy", npy([[1, -0.5], [-0.5, 1]]), says=("normalised Laplacian",), how={"drop_self_loops": True}),
+    Input("g.npy", npy([[1, -0.5], [0.5, 1]]), says=("self-loop at node 1 (2 in all)", "--drop-self-loops")),
     Input("g.csv", "1,1,1\n1,2,-1\n2,1,-1\n2,2,1\n", says=("Laplacian",), how={"drop_self_loops": True}),
     Input("g.csv", "1,1,1\n1,2,-1\n2,1,-1\n2,2,1\n", "1>2=1 2>1=1", how={"laplacian": True}),
 ]
@@ -156,6 +158,10 @@ ROWS = [
     Input("g.txt", "a activates b\nb inhibits a\n", says=("signs", ".sif")),
     Input("g.txt", "12 1 15\n15 -1 17\n17 1 12\n", says=("second column", ".sif", "--columns 1,3,2")),
     Input("g.txt", "12 1 15\n15 -1 17\n17 1 12\n", "12>15=1 15>17=-1 17>12=1", how={"columns": "1,3,2"}),
+    Input("g.txt", "12 1 15\n15 1 17\n", says=("second column", ".sif")),
+    Input("g.txt", "2 1 0.5\n3 1 -0.5\n", "2>1=1/2 3>1=-1/2"),
+    Input("g.txt", "5 7 1082040961\n7 8 1082155839\n", says=("times",)),
+    Input("g.dot", "digraph G {\n a -> b [weight=1];\n}\n", says=("Graphviz DOT", "GraphML")),
     Input("g.txt", "1 2 4 6\n2 1 3 5\n3 2 4 5\n", says=("line 1", "--columns 1,2,3")),
     Input("g.txt", "1 2 3\n2 1 3\n3 1 2\n", says=("neighbours", "--columns 1,2,3")),
     Input("g.txt", "1 2 4\n2 1 3 5\n", says=("line 2", '"5"')),
@@ -185,6 +191,9 @@ ROWS = [
         says=("line 1: self-loop", "line 2: weight 0", "line 4: second row", "--drop-self-loops --drop-zeros --dup"),
     ),
     Input("g.csv", "a,b,0\nb,c,1\n", "b>c=1", how={"drop_zeros": True}),
+    Input("g.csv", "source,target,weight\n0,1,1\n1,0,2\n2,3,0\n", "0>1=1 1>0=2", how={"drop_zeros": True}),
+    Input("g.txt", "% sym\n1 2 1\n2 1 3\n", says=("% sym", "line 3: second row", "--undirected --duplicates")),
+    Input("g.csv", "0.5,-0.3,1\n0.2,0.7,2\n", says=("a node called 0.5", "--columns 1,2,3")),
 ]
 MATRICES = [
     Input("g.csv", ",ada,bo\nada,0,-0.7\nbo,0.3,0\n", "bo>ada=-7/10 ada>bo=3/10"),
@@ -354,7 +363,7 @@ def test_signs_beside_weights_of_a_pandas_table_are_their_factors():
 
 
 def test_a_laplacian_in_memory_is_named_and_read():
-    with pytest.raises(GraphError, match="as a Laplacian's; read it with laplacian=True"):
+    with pytest.raises(GraphError, match="as a Laplacian's; read it with as_graph"):
         ptcc.SignedDigraph.from_matrix(LAPLACIAN, orientation="listens")
     for matrix in (LAPLACIAN, np.array(LAPLACIAN, dtype=float), sparse.csr_array(np.array(LAPLACIAN))):
         graph = ptcc.SignedDigraph.from_matrix(matrix, orientation="listens", laplacian=True)
@@ -398,6 +407,17 @@ def test_a_matrix_as_text_asks_for_its_direction_in_python(tmp_path):
 def test_files_of_families_have_the_same_guards(tmp_path, content, says):
     with pytest.raises(FormatError, match=says):
         read_family(put(tmp_path, "g.csv", content))
+
+
+def test_a_family_of_matrices_as_text_tells_its_direction_and_its_conversions(tmp_path):
+    one = put(tmp_path, "one.csv", MATRICES[0].content)
+    family = read_family([one, one], uncertainty="10%")
+    assert family.read["orientation"] == "listens" and "one: a 2 x 2 matrix as text" in family.notes
+    out = run("classify", str(one), "--uncertainty", "10%").out
+    assert "a listens to b" in out
+    table = put(tmp_path, "table.csv", "ada,bo,1\n")
+    with pytest.raises(GraphError, match="one is a matrix as text and table is a table of edges: say --edges"):
+        read_family([one, table])
 
 
 def test_words_for_signs_are_read_in_files_of_families(tmp_path):

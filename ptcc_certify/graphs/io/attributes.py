@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any, NoReturn
 
 import numpy as np
 
 from ptcc_certify.errors import FormatError, GraphError
 from ptcc_certify.graphs.digraph import OF_EDGES
-from ptcc_certify.graphs.io.graph_from_rows import Numbers, Rows
+from ptcc_certify.graphs.io.graph_from_rows import Numbers, Rows, Signs
 from ptcc_certify.graphs.io.signs import is_sign, weight_and_sign
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading
@@ -46,10 +46,10 @@ def names_or_identifiers(identifiers: Sequence[str], nodes: Sequence[Attributes]
 class Values:
     """Weights of edges, their signs if these stand beside them, and the titles of both."""
 
-    weights: list[Any]
-    signs: list[Any]
-    weight: str
-    sign: str
+    weights: Any
+    signs: list[Any] = field(default_factory=list)
+    weight: str = ""
+    sign: str = ""
 
 
 def values_of_edges(data: Sequence[Attributes], edge: Callable[[int], str], name: str, told: str | None) -> Values:
@@ -78,8 +78,8 @@ def values_of_edges(data: Sequence[Attributes], edge: Callable[[int], str], name
     for k, value in enumerate(weights):
         if value is None or not _has(data[k], *either):
             what = "weight" if name else f'attribute "{either[0]}"'
-            mend = "give it a number as weight or sign, or name the attribute"
-            _fail(name, f"edge {edge(k)} has no {what}; {mend}{': --columns source,target,NAME' if name else ''}")
+            tell = "--columns source,target,NAME" if name else "from_networkx(graph, weight=NAME)"
+            _fail(name, f"edge {edge(k)} has no {what}; give each edge a signed number, or name the attribute: {tell}")
         if signs and not _has(data[k], str(sign)):
             _fail(name, f'edge {edge(k)} has no "{sign}", and others have; give each one')
     return Values(weights, signs, "" if told else either[0], sign or "")
@@ -107,7 +107,7 @@ def attribute_rows(
     weights, signs = Numbers(), Numbers()
     codes, sign_codes = [weights[str(one)] for one in values.weights], [signs[str(one)] for one in values.signs]
     rows = Rows(labels, [a for a, _ in ends], [b for _, b in ends], list(weights.texts), codes, lambda row: "")
-    rows.signs, rows.sign_codes, rows.sign_title = list(signs.texts), sign_codes, values.sign
+    rows.signs = Signs(list(signs.texts), sign_codes, values.sign) if values.signs else None
     rows.weight_title = values.weight if is_sign(values.weight) else ""
     return rows
 
@@ -123,7 +123,8 @@ def both_ways(rows: Rows, undirected: Sequence[bool], what: str, how: Reading) -
         place = np.append(np.arange(last), some)
         rows.first, rows.second = np.append(first, second[some]), np.append(second, first[some])
         rows.codes = np.asarray(rows.codes)[place]
-        rows.sign_codes = np.asarray(rows.sign_codes)[place] if len(rows.signs) else ()
+        if rows.signs is not None:
+            rows.signs = replace(rows.signs, codes=np.asarray(rows.signs.codes)[place])
         rows.where = lambda row: where(int(place[row]))
         rows.notes += (f"{what} go both ways ({some.size})",)
     return rows

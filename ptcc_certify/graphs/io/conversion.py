@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from ptcc_certify.errors import FormatError, GraphError, ParameterError, did_you_mean
-from ptcc_certify.graphs.digraph import SignedDigraph, labels_beside, refuse_unnamed
+from ptcc_certify.graphs.digraph import SignedDigraph, labels_beside, refuse_unknown_orientation, refuse_unnamed
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io.graph_files import read_as
-from ptcc_certify.graphs.io.graph_from_rows import Rows, graph_of
+from ptcc_certify.graphs.io.graph_from_rows import Rows, Signs, graph_of
+from ptcc_certify.graphs.io.graph_in_memory import distinct
 from ptcc_certify.graphs.io.packaged import GRAPHS, file_or_packaged
 from ptcc_certify.graphs.io.table_columns import BY_HEADER, RATERS, columns_of, edge_columns
 from ptcc_certify.graphs.rationals import shorten
@@ -79,6 +80,8 @@ def as_graph(graph: Any, orientation: str | None = None, **reading: Any) -> Sign
         raise GraphError(
             f"{graph!r} is several graphs, and one is asked for; certify, decide and simulate_family take families"
         )
+    if orientation is not None:
+        refuse_unknown_orientation(orientation)
     how = Reading(orientation=orientation, **reading)
     if isinstance(graph, str) and not os.path.exists(graph) and graph not in GRAPHS and "." not in graph:  # noqa: PTH110
         names = f"({', '.join(GRAPHS)}); check the path{did_you_mean(graph, GRAPHS)}"
@@ -142,12 +145,10 @@ def _rows_of_table(table: Any, how: Reading) -> Rows | None:
         if known.setdefault(str(node), (len(known), node))[1] != node:
             raise GraphError(f"two different nodes are both written {shorten(str(node))}; rename one of them")
     first, second = ([known[str(node)][0] for node in end] for end in ends)
-    weights = list(table[table.columns[columns.weight]])
-    rows = Rows([*known], first, second, weights, range(len(weights)), lambda row: "")
+    rows = Rows([*known], first, second, *distinct(table[table.columns[columns.weight]]), lambda row: "")
     rows.weight_title = columns.codes
     if columns.sign is not None:
-        rows.signs = list(table[table.columns[columns.sign]])
-        rows.sign_codes, rows.sign_title = range(len(rows.signs)), names[columns.sign]
+        rows.signs = Signs(*distinct(table[table.columns[columns.sign]]), names[columns.sign])
     ignored = [f'"{shorten(title)}"' for title in columns.ignored]
     rows.notes = tuple(note for note in columns.notes if note not in (BY_HEADER, RATERS))
     rows.notes += ("columns ignored: " + ", ".join(ignored[:20]),) if ignored else ()

@@ -13,9 +13,9 @@ import numpy as np
 from ptcc_certify.errors import FormatError, NumberError
 from ptcc_certify.graphs.digraph import SignedDigraph, ordered_labels
 from ptcc_certify.graphs.io.files import lines_of
-from ptcc_certify.graphs.io.graph_from_rows import DECIMALS, HEADER_MEND, Numbers, Rows
+from ptcc_certify.graphs.io.graph_from_rows import DECIMALS, HEADER_MEND, Numbers, Rows, Signs
 from ptcc_certify.graphs.io.signs import WEIGHT, plain, sign_of_word
-from ptcc_certify.graphs.io.table_columns import Columns, columns_of
+from ptcc_certify.graphs.io.table_columns import Columns, columns_of, names_edges
 from ptcc_certify.graphs.io.text_matrices import bracketed_matrix, is_entry, table_as_matrix
 from ptcc_certify.graphs.rationals import parse_exact, shorten
 from ptcc_certify.graphs.reading import Reading
@@ -26,6 +26,8 @@ _SEPARATORS = ("\t", ",", ";", None)  # None: blanks
 _LOOKED_AT, _EXTRA, _SIGN_AT = 20, 10**5, {"first": "2,3,1", "second": "1,3,2"}
 #: From this number on a number after the third column is taken for a year or a time.
 _TIMES = 1900
+#: From this number on whole weights throughout are taken for seconds since 1970.
+_SECONDS = 10**8
 
 
 def records(data: bytes, name: str) -> Iterator[tuple[int, list[str]]]:
@@ -93,7 +95,8 @@ def read_edge_list(data: bytes, name: str, how: Reading) -> Rows:
     numbered = records(data, name)
     begin = list(islice(numbered, _LOOKED_AT))
     table = [row for _, row in begin if len(row) > 1]
-    if table and not how.titles and len(table[0]) >= len(table) - 1:  # of a matrix, all rows are needed
+    tells = bool(how.titles) or bool(table and names_edges(table[0]))
+    if table and not tells and len(table[0]) >= len(table) - 1:  # perhaps a matrix, of which all rows are needed
         begin += islice(numbered, len(table[0]) + 2)
         table = [row for _, row in begin if len(row) > 1]
         declares = any(len(row) == 1 and row[0].strip() for _, row in begin)
@@ -192,11 +195,7 @@ class _EdgeList:
         rows.notes += ("columns ignored: " + ", ".join(ignored[:20]),) if ignored else ()
         rows.weight_title = columns.codes
         if columns.sign is not None:
-            rows.signs, rows.sign_codes, rows.sign_title = (
-                list(self.signs.texts),
-                self.sign_codes,
-                columns.titles[columns.sign],
-            )
+            rows.signs = Signs(list(self.signs.texts), self.sign_codes, columns.titles[columns.sign])
         ends = [columns.titles[k] for k in (columns.source, columns.target)] if columns.guessed else []
         if again := [title for title in ends if title in self.nodes.texts]:
             what = f"{shorten(again[0])} is a title, and a node in another row"
@@ -226,9 +225,11 @@ def _refuse_ambiguous(draft: _EdgeList, rows: Rows, data: bytes) -> None:
             raise FormatError(f"{name}, line {line}: {what} If there are edges, {tell}")
     for ends, which in ((draft.first, "first"), (draft.second, "second")):
         signs = all(_is_sign(rows.labels[k]) for k in ends) and {rows.labels[k] for k in ends}
-        if signs and signs != {"1"}:
+        if signs and (signs != {"1"} or (len(ends) > 1 and any(text in labels for text in weights))):
             what = f"the {which} column holds signs: name a file of interactions .sif"
             raise FormatError(f"{name}: {what}, or tell the columns, such as --columns {_SIGN_AT[which]}")
+    if len(weights) > 1 and all(text.isdigit() and int(text[:20]) >= _SECONDS for text in weights):
+        raise FormatError(f"{name}: the third column holds times, not weights? If there are weights, {tell}")
     if odd := [label for label in labels if not label.isdigit() and is_entry(label) and sign_of_word(label) is None]:
         what = f"a node called {shorten(odd[0])}: a matrix, or edges?"
         raise FormatError(f"{name}: {what} Save a matrix as .npy or .mtx; of edges, {tell}")

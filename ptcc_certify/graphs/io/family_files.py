@@ -17,7 +17,7 @@ from ptcc_certify.graphs.io.edge_list import direction_of_comments, records
 from ptcc_certify.graphs.io.files import Source, name_and_ending
 from ptcc_certify.graphs.io.graph_files import MATRICES, format_of, graph_bytes, is_edge_list, read_graph
 from ptcc_certify.graphs.io.signs import find, is_sign, sign_of_word, weight_and_sign
-from ptcc_certify.graphs.io.table_columns import edge_columns
+from ptcc_certify.graphs.io.table_columns import BY_HEADER, IGNORED, edge_columns
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, parse_exact, shorten
 from ptcc_certify.graphs.reading import Reading, option_flags
 
@@ -37,6 +37,8 @@ _KEYWORDS: dict[str, Any] = {
     "uncertainty": str,
     "optional": list,
 }
+#: What files are whose rows have the directions of ``graph.read``.
+_WAYS = {"matrix": "a matrix as text", "information": "a table of edges"}
 _YES, _NO = ("yes", "true", "1", "x"), ("no", "false", "0", "")
 
 Pair = tuple[Hashable, Hashable]
@@ -98,6 +100,7 @@ def read_family(
     sources: list[Any] = [paths] if one else list(paths)  # type: ignore[arg-type]
     share, wanted = read_share(uncertainty), [(str(s), str(t)) for s, t in optional]
     named: dict[str, Family] = {}
+    ways, notes = dict[str, str](), list[str]()
     missing = set(wanted)
     for number, path in enumerate(sources, 1):
         rows = _interval_rows(path, orientation or "information", share, undirected)
@@ -114,6 +117,11 @@ def read_family(
             named[name] = Family.from_intervals(edges, nodes, undirected=undirected)
         else:
             graph = read_graph(path, orientation=orientation, undirected=undirected, **options)
+            if orientation is None and name_and_ending(path)[1] not in MATRICES:
+                ways[graph.read["orientation"]] = name
+            notes += [
+                f"{shorten(name)}: {note}" for note in graph.read["notes"] if not note.startswith((IGNORED, BY_HEADER))
+            ]
             off = {pair for pair in wanted if _has(graph, pair)}
             named[name] = Family.from_graph(graph, uncertainty=share, optional=off)
         missing -= off
@@ -122,10 +130,15 @@ def read_family(
         turned = any(_has(mode, (target, source)) for family in named.values() for mode in family.modes)
         mend = f"{_text((target, source))} is: name the one who is heard first" if turned else "check the labels"
         raise GraphError(f"optional edge {_text((source, target))} is in no file; {mend}")
+    if len(ways) > 1:
+        told = " and ".join(f"{shorten(name)} is {_WAYS[way]}" for way, name in ways.items())
+        raise GraphError(f"{told}: say --edges listens or information, which counts for both")
+    orientation = "listens" if "matrix" in ways else orientation  # a matrix as text, whose ending does not tell it
     read = {"orientation": orientation, "undirected": undirected, **options}
     read |= {"uncertainty": format_exact(share), "optional": [list(pair) for pair in wanted]}
     family = Family.switching(named)
-    return replace(family, read=read, notes=family.notes + _given_again([str(path) for path in sources], [*named]))
+    again_given = _given_again([str(path) for path in sources], [*named])
+    return replace(family, read=read, notes=(*family.notes, *again_given, *notes))
 
 
 def _given_again(paths: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:

@@ -44,7 +44,7 @@ _BEGINNINGS = {
     rb"\*(vertices|network)\s": "pajek",
     rb"dl\s+n(m|r|c)?\s*=": "dl",
     rb"(creator\b[^\n]*\n\s*)?graph\s*\[": "gml",
-    rb"\{": "json",
+    rb"\{\s*[\"}]": "json",
 }
 
 

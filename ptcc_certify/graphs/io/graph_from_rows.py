@@ -32,6 +32,15 @@ DECIMALS = "; write decimals with a point, too"
 _LARGEST_CODE = 9
 
 
+@dataclass(frozen=True)
+class Signs:
+    """Signs beside weights: that of row r is ``values[codes[r]]``, in the column or attribute ``title``."""
+
+    values: Sequence[Any]
+    codes: Sequence[int] | np.ndarray
+    title: str
+
+
 @dataclass
 class Rows:
     """What a source says, before any rule is applied: ``labels[first[r]], labels[second[r]], weights[codes[r]]``."""
@@ -47,9 +56,7 @@ class Rows:
     headerless: bool = False
     matrix: bool = False  # entries of a matrix, whose rows listen unless it is said that they inform
     notes: tuple[str, ...] = ()
-    signs: Sequence[Any] = ()  # distinct signs beside the weights, of the column ``sign_title``
-    sign_codes: Sequence[int] | np.ndarray = ()
-    sign_title: str = ""
+    signs: Signs | None = None
     weight_title: str = ""  # of a column whose numbers are codes of relations, unless they are 1 and -1
     asks: str = ""  # why the direction must be told
     columns: bool = True  # may columns, or the attribute of weights, be told?
@@ -175,7 +182,12 @@ class _Draft:
         name, _, value = text.partition(" ")
         if self.name:
             return f"--{name.replace('_', '-')} {value}".strip()
-        return f"{name}=" + (" or ".join(f'"{word}"' for word in value.split("|")) if value else "True")
+        return f'{name}="{value.partition("|")[0]}"' if value else f"{name}=True"
+
+    def call(self, *options: str) -> str:
+        """Write options as flags, or as the call that takes them."""
+        words = [self.option(option) for option in options]
+        return " ".join(words) if self.name else f"as_graph(.., {', '.join(words)})"
 
     def place(self, row: int | None) -> str:
         where = "" if row is None else self.rows.where(row)
@@ -193,13 +205,13 @@ class _Draft:
         """Refuse all that rows break in one message, with the options that mend it."""
         if len(self.problems) == 1:
             (one,) = self.problems
-            self.fail(self.place(one.row), f"{one.text}; {one.mend.format(self.option(one.option))}")
+            self.fail(self.place(one.row), f"{one.text}; {one.mend.format(self.call(one.option))}")
         if self.problems:
             places = ["" if one.row is None else self.rows.where(one.row) for one in self.problems]
             texts = [
                 f"{place}: {one.text}" if place else one.text for place, one in zip(places, self.problems, strict=True)
             ]
-            options = (" " if self.name else ", ").join(self.option(one.option) for one in self.problems)
+            options = self.call(*(one.option for one in self.problems))
             self.fail(self.name, f"{'; '.join(texts)}; mend these, or read it with {options}")
 
     # ------------------------------------------------------------------ weights and signs
@@ -217,7 +229,7 @@ class _Draft:
             by_code = {code: self.parsed(weights[code], code) for code in order}  # what is neither is told first
             values = [by_code[code] for code in range(len(weights))]
         if (title := self.rows.weight_title) and (odd := _codes(values, title)) is not None:
-            what = f'column "{shorten(title)}" holds {odd}: codes of relations, or weights?'
+            what = f'column "{shorten(title)}" holds {odd}: codes of relations, not signs'
             self.refuse(int(np.argmax(self.codes == values.index(odd))), f"{what}; {self.columns_mend()}")
         return values
 
@@ -265,35 +277,33 @@ class _Draft:
 
     def multiply_signs(self) -> None:
         """Multiply weights that tell sizes by the signs beside them; refuse signs that say something else."""
-        rows, title = self.rows, shorten(self.rows.sign_title)
-        texts = [str(sign).strip() for sign in rows.signs]
-        if not texts:
+        if (signs := self.rows.signs) is None or not len(signs.values):
             return
+        texts = [str(sign).strip() for sign in signs.values]
+        beside, title = np.asarray(signs.codes), shorten(signs.title)
         directions = [DIRECTIONS.get(text.lower()) for text in texts]
         if None not in directions:
             if len(set(directions)) > 1:
                 self.fail(self.name, f'column "{title}" holds directed and undirected edges; write both as two rows')
             self.undirected = self.undirected or (f'column "{title}"' if directions[0] else "")
             return
-        factors = [self.factor(text, code, title) for code, text in enumerate(texts)]
-        if (odd := _codes([*map(Fraction, factors)], rows.sign_title)) is not None:
-            what = f'column "{title}" holds {", ".join(map(str, sorted(factors)))} and no -1: signs?'
-            self.refuse(
-                int(np.argmax(np.asarray(rows.sign_codes) == factors.index(int(odd)))), f"{what}; {self.columns_mend()}"
-            )
-        pairs, which = np.unique(self.codes * len(texts) + np.asarray(rows.sign_codes), return_inverse=True)
+        factors = [self.factor(text, beside == code, title) for code, text in enumerate(texts)]
+        if (odd := _codes([*map(Fraction, factors)], signs.title)) is not None:
+            what = f'column "{title}" holds {", ".join(map(str, sorted(factors)))} and no -1'
+            self.refuse(int(np.argmax(beside == factors.index(int(odd)))), f"{what}; {self.columns_mend()}")
+        pairs, which = np.unique(self.codes * len(texts) + beside, return_inverse=True)
         both = [(Fraction(self.values[p // len(texts)]), factors[p % len(texts)]) for p in pairs.tolist()]
         if any(weight < 0 for weight, _ in both):
             for k, (weight, factor) in enumerate(both):
-                if weight * factor <= 0:
+                if weight * factor < 0:
                     edge = int(np.argmax(which == k))
                     what = f'weight {weight} of edge {self.edge(edge)} and {factor} in column "{title}" disagree'
                     self.refuse(edge, f"{what}; {self.columns_mend()}")
         self.values, self.codes = [abs(weight) * factor for weight, factor in both], which.astype(np.int64)
         self.notes += (f'weights times column "{title}"',)
 
-    def factor(self, text: str, code: int, title: str) -> int:
-        """Return the sign that a text stands for, or 0; refuse any other."""
+    def factor(self, text: str, beside: np.ndarray, title: str) -> int:
+        """Return the sign that a text stands for, or 0; refuse any other, of the first of the edges ``beside``."""
         if (word := sign_of_word(text)) is not None:
             return word
         try:
@@ -302,7 +312,7 @@ class _Draft:
             what = f"is neither 1 nor -1: a code of a relation; {self.columns_mend()}"
         except NumberError:
             what = f"{NO_SIGN}; {self.columns_mend()}"
-        edge = int(np.argmax(np.asarray(self.rows.sign_codes) == code))
+        edge = int(np.argmax(beside))
         return self.refuse(edge, f'"{shorten(text)}" of edge {self.edge(edge)} in column "{title}" {what}')
 
     # ------------------------------------------------------------------ rules
@@ -313,17 +323,22 @@ class _Draft:
             return
         entries = np.array([nearest_float(v) if isinstance(v, Fraction) else v for v in self.values])[self.codes]
         first, second = np.asarray(self.rows.first), np.asarray(self.rows.second)
-        if not self.how.laplacian and not fits_one_node(first, second, entries):
+        if not self.how.laplacian and not self.rows.matrix and not fits_one_node(first, second, entries):
             return
         found = diagonal_of(first, second, entries, len(self.rows.labels), self.how.undirected)
         if self.how.undirected and not found.laplacian:  # of both halves
             found = diagonal_of(first, second, entries, len(self.rows.labels), False)
         if not self.how.laplacian:
+            if self.rows.matrix and found.normalised and not found.laplacian:
+                what = "a positive diagonal, and no positive entry beside it, as of a normalised Laplacian; give W"
+                no = "--no-laplacian" if self.name else "laplacian=False"
+                self.fail(self.name, f"{what}, or add {no} if these are self-loops")
             if found.laplacian and (self.rows.matrix or found.loops > 1):
                 what = "the diagonal holds the sums of the other entries, as a Laplacian's"
-                other = self.option("laplacian") if self.name else "laplacian=True"
                 no = "--no-laplacian" if self.name else "laplacian=False"
-                self.fail(self.name, f"{what}; read it with {other}, or add {no} if these are self-loops")
+                self.fail(
+                    self.name, f"{what}; read it with {self.call('laplacian')}, or add {no} if these are self-loops"
+                )
             return
         self.refuse_no_laplacian(found)
         self.drop(self.source == self.target)
@@ -364,7 +379,8 @@ class _Draft:
 
     def merge_duplicates(self) -> tuple[str, ...]:
         """Tell or merge the rows of one pair (of one unordered pair, if edges go both ways); note how many."""
-        duplicates, undirected = self.how.duplicates, self.how.undirected
+        duplicates = self.how.duplicates
+        undirected = self.how.undirected or (duplicates == "refuse" and bool(self.undirected))
         low, high = self.source, self.target
         if undirected:
             low, high = np.minimum(low, high), np.maximum(low, high)

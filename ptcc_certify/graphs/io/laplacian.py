@@ -22,6 +22,8 @@ class Diagonal:
         It is the sums of their magnitudes: a signed Laplacian ``D - W``.
     balanced_rows, balanced_columns : bool
         It is minus the sums: an ordinary Laplacian, whose rows or columns sum to 0.
+    normalised : bool
+        It is positive, and no other entry is: as of a normalised Laplacian, or one that is grounded.
     negative : bool
         It is minus the sums of magnitudes: minus a Laplacian.
     odd : int
@@ -33,6 +35,7 @@ class Diagonal:
     columns: bool
     balanced_rows: bool
     balanced_columns: bool
+    normalised: bool
     negative: bool
     odd: int
 
@@ -91,6 +94,7 @@ def diagonal_of(first: np.ndarray, second: np.ndarray, entries: np.ndarray, n: i
         columns=some and bool(equal(by_columns, by_columns).all()),
         balanced_rows=some and bool(equal(-signed_rows, by_rows).all()),
         balanced_columns=some and bool(equal(-signed_columns, by_columns).all()),
+        normalised=some and bool((entries[loops] > 0).all() and (entries[off] < 0).all()),
         negative=some and bool(equal(-by_rows, by_rows).all() or equal(-by_columns, by_columns).all()),
         odd=-1 if rows.all() else int(np.argmin(rows)),
     )

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.digraph import OF_EDGES
-from ptcc_certify.graphs.io.signs import find, is_sign, plain, weight_and_sign
+from ptcc_certify.graphs.io.signs import SIGN, WEIGHT, find, is_sign, plain, weight_and_sign
 from ptcc_certify.graphs.io.text_matrices import is_entry
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading
@@ -21,6 +21,8 @@ _HEARD = r"speaker|heard|followee|followed|rated|trustee|trusted|sender|leader"
 _NO_TITLE = re.compile(r"nan|na|n/?a|none|null|inf|infinity|true|false|unknown|x|\?*", re.IGNORECASE)
 #: The note of a file whose header puts source and target elsewhere than source first.
 BY_HEADER = "columns by header"
+#: How a note begins of columns that are not read.
+IGNORED = "columns ignored"
 #: The note of a file whose raters were read as those who are heard.
 RATERS = "raters listen? --edges listens"
 
@@ -56,6 +58,18 @@ def edge_columns(row: Sequence[str], place: str) -> tuple[int, int, int | None] 
     """Return the columns of source, target and, if it is named, weight; None if a row names no source and target."""
     source, target = find(row, _SOURCE, place), find(row, _TARGET, place)
     return None if source is None or target is None else (source, target, weight_and_sign(row, place)[0])
+
+
+def names_edges(row: Sequence[str]) -> bool:
+    """Tell whether a row has a title of edges: of a source and a target, or of a weight.
+
+    Examples
+    --------
+    >>> names_edges(["Gene1", "Gene2", "Type"]), names_edges(["ann", "bob", "eve"])
+    (True, False)
+    """
+    written = {plain(field) for field in row}
+    return not written.isdisjoint((*WEIGHT, *SIGN)) or not (written.isdisjoint(_SOURCE) or written.isdisjoint(_TARGET))
 
 
 def columns_of(first: Sequence[str], others: Sequence[Sequence[str]], place: str, how: Reading) -> Columns:

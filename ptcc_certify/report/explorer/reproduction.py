@@ -54,9 +54,10 @@ def command_of(question: Question) -> str:
     return shlex.join(words)
 
 
-def reading_of(path: str, **how: Any) -> dict[str, Any]:
+def reading_of(path: str, orientation: str | None, **how: Any) -> dict[str, Any]:
     """Return where a graph was read from and how, but for what is so unless it is told."""
-    return {"path": path} | {key: value for key, value in how.items() if value != getattr(Reading, key)}
+    options = {"orientation": orientation, **how}
+    return {"path": path} | {key: value for key, value in options.items() if value != getattr(Reading, key)}
 
 
 def _texts(question: Question) -> dict[str, str]:
