@@ -39,6 +39,8 @@ from ptcc_certify.certificate.cascade_part import prove_cascade
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.certificate_data import Observations
 from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
+from ptcc_certify.certificate.format_final_state import stated_ends
+from ptcc_certify.certificate.format_vectors import Interval
 from ptcc_certify.certificate.request import (
     Expectations,
     Request,
@@ -330,7 +332,7 @@ def _with_small_delays(certificate: Certificate) -> Certificate:
         certificate.structure,
         certificate.protocol,
         certificate.initial_state,
-        None if final is None else final.intervals,
+        stated_ends(certificate.influence, final, certificate.initial_state),
         certificate.influence,
         certificate.decaying_forms,
         late.leaders,
@@ -428,7 +430,8 @@ class Case:
             search = self.search(proof)
             limit = self.upper_bound()
         matrix, result = self.final_state(trajectory)
-        late, tracking = self.late_messages(result), self.tracking(result)
+        ends = stated_ends(matrix, result, self.initial_state)
+        late, tracking = self.late_messages(ends), self.tracking(ends)
         proved = [proof.rate, *(V.rate for V in search.functions)]
         return Certificate(
             structure=self.structure,
@@ -530,7 +533,7 @@ class Case:
                 )
         return matrix, result
 
-    def late_messages(self, result: FinalState | None) -> LateBounds | None:
+    def late_messages(self, ends: Sequence[Interval] | None) -> LateBounds | None:
         """Bound what late messages leave at the deadline; None if nothing is asked of them."""
         messages = self.request.messages
         if messages is None:
@@ -539,12 +542,11 @@ class Case:
             raise ParameterError(
                 "late messages ask for sigma(0) = 0, so that no sliding variable moves; leave sigma0 out"
             )
-        ends = None if result is None else result.intervals
         return bound_late(self.structure, self.protocol, messages, self.initial_state, ends, self.request.leaders)
 
-    def tracking(self, result: FinalState | None) -> Tracking | None:
+    def tracking(self, ends: Sequence[Interval] | None) -> Tracking | None:
         """Bound how followers track leaders that move; None if nothing is asked of that, or messages are late."""
-        leaders, ends = self.request.leaders, None if result is None else result.intervals
+        leaders = self.request.leaders
         if leaders is None or self.request.messages is not None:
             return None
         try:
