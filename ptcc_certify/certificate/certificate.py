@@ -22,7 +22,7 @@ from ptcc_certify.certificate.certificate_file import FromFile, bytes_of, text_o
 from ptcc_certify.certificate.checking import check, read_and_check, refuse_no_certificate
 from ptcc_certify.certificate.format import certificate_document, read_document
 from ptcc_certify.certificate.format_vectors import Writer, read_side_files
-from ptcc_certify.certificate.verdict import CERTIFIED, Assessment, assess, verdict_of
+from ptcc_certify.certificate.verdict import CERTIFIED, UNDECIDED, Assessment, assess, verdict_of
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.errors import FormatError, PTCCError, gated
 from ptcc_certify.graphs.display_hook import Shown, plot, summary
@@ -136,14 +136,13 @@ class Certificate(Content, FromFile, Shown):
         return document if not out.files else certificate_document(self, self.verdict)[0]
 
     @cached_property
-    def checked(self) -> CheckReport | None:
-        """What the independent check says of the certificate as it is written; None if nothing was proved."""
+    def checked(self) -> CheckReport:
+        """What the independent check says of the certificate as it is written, certified or undecided."""
         if self.source is not None:
             return self.source.report
-        proved = self.constant or self.rate is not None
-        if not proved or not (self.influence.exact or self.influence.enclosure is not None):
-            return None
-        document, out = self._document(CERTIFIED)
+        enclosed = self.influence.exact or self.influence.enclosure is not None
+        proved = enclosed and (self.constant or self.rate is not None)
+        document, out = self._document(CERTIFIED if proved else UNDECIDED)
         return check(document, files=out.files, memory=1 if self.graph.n_nodes <= EXACT_NODES else LARGE_MEMORY)
 
     @property

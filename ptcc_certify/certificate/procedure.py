@@ -314,13 +314,15 @@ def _with_agents(certificate: Certificate, agents: Agents, chains: Chains, run: 
         )
     except NoCertificate as error:
         raise ParameterError(f"agents: {error}; ask for a smaller decay or a lower order") from None
-    notes, motion = [*certificate.notes, *chains.notes], None
+    notes, cut_off, motion = [*certificate.notes, *chains.notes], list(certificate.cut_off), None
     if run and part.initial_state is not None:
-        try:
-            motion = part.simulate()
-        except SimulationError as error:
-            notes.append(f"simulation: {error}")
-    return certificate.changed(agents=part, notes=tuple(notes), agents_run=motion)
+        limit = SEARCHING * certificate.time_limit
+        with deadline.time_limit(limit), share_of_time(SHARES[0], STEPS[0], cut_off):
+            try:
+                motion = part.simulate()
+            except SimulationError as error:
+                notes.append(f"simulation: {error}")
+    return certificate.changed(agents=part, notes=tuple(notes), cut_off=tuple(cut_off), agents_run=motion)
 
 
 def _with_small_delays(certificate: Certificate) -> Certificate:
@@ -351,7 +353,7 @@ def _longest_delay(certificate: Certificate, case: LateCase, late: LateBounds, a
     if longest is None or longest is late:
         return None if longest is None else late.messages.age
     report = certificate.changed(late=longest).checked
-    return longest.messages.age if report is not None and report.accepted else None
+    return longest.messages.age if report.accepted else None
 
 
 def _check_disturbance(disturbance: Any, protocol: ReachingProtocol, graph: SignedDigraph) -> None:
@@ -383,10 +385,10 @@ def _among(values: set[Any], value: Any) -> bool:
 def _with_word_of_check(certificate: Certificate) -> Certificate:
     """Check a certificate, and note what the check has to say besides."""
     report = certificate.checked
-    if report is not None and report.accepted and report.memory > 1:
+    if report.accepted and report.memory > 1:
         note = f"the check of this certificate needs more than 1 GB: ptcc check --memory {math.ceil(report.memory)}"
         return certificate.changed(notes=(*certificate.notes, note))
-    if report is not None and not report.accepted:
+    if not report.accepted:
         note = f"the independent check does not accept {report.rejected}: {report.reason}"
         return certificate.changed(notes=(note, *certificate.notes))
     return certificate

@@ -20,7 +20,7 @@ import lmi
 from lmi import search_time
 from lmi.child_process import apart
 from lmi.search_time import checkpoint, seconds_left, share_of_time, time_limit
-from ptcc_certify import NominalProtocol, SignedDigraph, certify, check, simulate
+from ptcc_certify import Agents, NominalProtocol, SignedDigraph, certify, check, simulate
 from ptcc_certify.certificate.procedure import STEPS
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import load_graph
@@ -288,3 +288,11 @@ def test_the_screen_names_what_was_cut_off():
     run = ptcc("certify", "fig1a", "--time-limit", "1e-9", "-v")
     assert run.code == 4
     assert "cut off" in run.out and "the paper's certificate" in run.out
+
+
+def test_the_run_of_agents_of_order_n_ends_at_its_share_of_the_time_limit():
+    team = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1), ("c", "a", -1)])
+    made = certify(
+        team, NominalProtocol(T=1, rho1=1, rho2=8, kappa=1), [3, 1, 2], agents=Agents(order=2), time_limit=1e-6
+    )
+    assert "simulation" in made.cut_off and made.agents_run is None
