@@ -295,4 +295,4 @@ def test_the_run_of_agents_of_order_n_ends_at_its_share_of_the_time_limit():
     made = certify(
         team, NominalProtocol(T=1, rho1=1, rho2=8, kappa=1), [3, 1, 2], agents=Agents(order=2), time_limit=1e-6
     )
-    assert "simulation" in made.cut_off and made.agents_run is None
+    assert "simulation" in made.cut_off and made.observed.agents_run is None
