@@ -1,7 +1,6 @@
 """Random command lines of every kind, over graphs of every class and families, and what a run of one must not do.
 
-    command = random_command("late", seed)     # files, and the arguments of ptcc
-    run_command(command, folder)               # raises AssertionError where the program contradicts itself
+    run_case("late", seed, folder)  # raises AssertionError where the program contradicts itself
 
 Sizes are mostly small, with a tail to 400 nodes that holds both sides of the size up to which everything is exact.
 """
@@ -19,12 +18,14 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from bad_inputs import ptcc
+from bad_inputs import Run, ptcc
 from families import KINDS as FAMILY_KINDS
 from families import random_family
 from generators import WEIGHTS, all_classes, random_graph, smallest
 from late_certificates import grouped_graph, led_graph
 
+from ptcc_certify import Expectations, GainLimits, NominalProtocol, box, certify, ellipsoid
+from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Mode
 from ptcc_certify.graphs.rationals import format_exact
@@ -352,8 +353,53 @@ def run_command(command: Command, folder: Path) -> Outcome:
     path, begin = folder / "c.json", time.perf_counter()
     path.unlink(missing_ok=True)
     run = ptcc(*command.arguments)
-    told, written = run.out + run.err, path.exists()
     where = f"{command.kind!r} {command.seed}: ptcc {' '.join(command.arguments)}"[:600]
+    _judge(where, run, path)
+    return Outcome(command, run.code, path.exists(), time.perf_counter() - begin, run.out + run.err)
+
+
+def run_set(seed: int, folder: Path) -> Outcome:
+    """Certify from a box or an ellipsoid of initial states, which the library alone takes, and check what it wrote.
+
+    Raises
+    ------
+    AssertionError
+        As in :func:`run_command`.
+    """
+    draw = Draw(f"set {seed}")
+    graph, begin, path = draw.graph(min(draw.size(), 130)), time.perf_counter(), folder / "c.json"
+    n, values = graph.n_nodes, ("0", "1", "-1", "2.5", "1/3", "-7e-3")
+    center = [Fraction(draw.choice(values)) for _ in range(n)]
+    if draw.random() < 0.5:
+        widths = [abs(Fraction(draw.choice(values))) for _ in range(n)]
+        low, high = ([x + s * r for x, r in zip(center, widths, strict=True)] for s in (-1, 1))
+        initial_set = box(low, high)
+    else:
+        initial_set = ellipsoid(center, [[draw.choice(values) for _ in range(n)] for _ in range(draw.randint(1, 4))])
+    protocol = NominalProtocol(T=draw.number(0.05, 20), rho1=1, rho2=draw.number(0.1, 20), kappa=2)
+    asked = Expectations(max_input=Fraction(draw.number(1, 1e4)))
+    caps = [GainLimits(gain_cap=draw.number(2, 100))] if draw.random() < 0.4 else []
+    options = {"initial_set": initial_set, "limits": caps, "expectations": asked, "time_limit": 4}
+    path.unlink(missing_ok=True)
+    try:
+        made = certify(graph, protocol, center, simulation=False, **options)
+        made.save(path)
+        run = Run(int(made.assessment.exit_code), made.summary(), "")
+    except ParameterError as error:  # weights that are too long for exact proofs
+        run = Run(2, "", f"ptcc: {error}\n")
+    _judge(f"'set' {seed}", run, path)
+    command = Command("set", seed, n, (), {})
+    return Outcome(command, run.code, path.exists(), time.perf_counter() - begin, run.out + run.err)
+
+
+def run_case(kind: str, seed: int, folder: Path) -> Outcome:
+    """Run what a kind and a seed stand for: a command of :data:`KINDS`, or a "set" of initial states."""
+    return run_set(seed, folder) if kind == "set" else run_command(random_command(kind, seed), folder)
+
+
+def _judge(where: str, run: Run, path: Path) -> None:
+    """Judge what a run printed and wrote."""
+    told, written = run.out + run.err, path.exists()
     assert run.code in DOCUMENTED, f"{where}: exit code {run.code}: {told[-800:]}"
     assert not NEVER.search(" ".join(told.split())), f"{where}: {told[-800:]}"
     if run.code == 2:
@@ -367,4 +413,3 @@ def run_command(command: Command, folder: Path) -> Outcome:
         assert checked.code in (0, 4), f"{where}: check: {checked.code}: {checked.out[-800:]}{checked.err[-800:]}"
         verdict = json.loads(path.read_text())["verdict"]
         assert (checked.code == 0) == (verdict == "certified"), f"{where}: check: {checked.code}, {verdict}"
-    return Outcome(command, run.code, written, time.perf_counter() - begin, told)
