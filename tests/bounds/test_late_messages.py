@@ -782,6 +782,6 @@ def test_rows_that_floats_do_not_resolve_leave_what_is_late_unproved(delay: obje
 
     monkeypatch.setattr(FollowerRows, "witness", unresolved)
     structure = analyse(SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 1), ("c", "b", 1)]))
-    messages = LateMessages(delay=delay, quantisation="0.1", gain_cap=5)
+    messages = LateMessages(delay=delay, value_error="0.1", gain_cap=5)
     bounds = bound_late(structure, NominalProtocol(T=1, rho1=1, rho2=4, kappa=1), messages)
     assert bounds.rows == () and bounds.steps is None and not bounds.says_something
