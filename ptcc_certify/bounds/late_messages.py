@@ -371,23 +371,24 @@ def search_rows(
             candidates.append(row_bound(rows, gain, messages, first, witness, leaders))
 
     small = rows.D.size <= SEARCHED_FOLLOWERS
-    if not messages.age:
-        for loss in _LOSSES[: None if small else 1]:
-            offer(1.0, loss)
-    else:
-        if small:
-            most = min(rows.largest_q(), _LARGEST_Q)
-            tried = np.exp(math.log(most) * np.linspace(0, 1, _TRIED + 2)[1:-1] ** 2)
-            for q in tried:
-                offer(float(q), _LOSSES[0])
-            best = min(candidates, key=_largest, default=None)
-            if best is not None:
-                for loss in _LOSSES[1:]:
-                    offer(float(best.witness.q), loss)
+    with suppress(LMIError):  # the equations of the followers are too ill-conditioned for floats
+        if not messages.age:
+            for loss in _LOSSES[: None if small else 1]:
+                offer(1.0, loss)
         else:
-            best_q = _best_q(rows, gain, messages, _LARGEST_Q)
-            for loss in _LOSSES[1:]:
-                offer(best_q, loss)
+            if small:
+                most = min(rows.largest_q(), _LARGEST_Q)
+                tried = np.exp(math.log(most) * np.linspace(0, 1, _TRIED + 2)[1:-1] ** 2)
+                for q in tried:
+                    offer(float(q), _LOSSES[0])
+                best = min(candidates, key=_largest, default=None)
+                if best is not None:
+                    for loss in _LOSSES[1:]:
+                        offer(float(best.witness.q), loss)
+            else:
+                best_q = _best_q(rows, gain, messages, _LARGEST_Q)
+                for loss in _LOSSES[1:]:
+                    offer(best_q, loss)
     if not candidates:
         return ()
     chosen = [min(candidates, key=_largest)]

@@ -134,19 +134,16 @@ class Certificate(Content, FromFile, Shown):
         return document if not files else certificate_document(self, files=False)[0]
 
     @cached_property
-    def checked(self) -> CheckReport | None:
-        """What the independent check says of the certificate as it is written; None if nothing was proved."""
+    def checked(self) -> CheckReport:
+        """What the independent check says of the certificate as it is written, certified or undecided."""
         if self.source is not None:
             return self.source.report
-        proved = self.constant or self.rate is not None
-        if not proved or not (self.influence.exact or self.influence.enclosure is not None):
-            return None
         return self._recorded[2]
 
     @property
     def obligations(self) -> tuple[VerifiedObligation, ...]:
         """What the independent check verified, in its order."""
-        return () if self.checked is None else self.checked.obligations
+        return self.checked.obligations
 
     @property
     def verdict(self) -> str:

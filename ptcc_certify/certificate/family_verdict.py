@@ -14,6 +14,7 @@ from fractions import Fraction
 import numpy as np
 
 from lmi.exact.decimal_rounding import down, near, up
+from ptcc_certify.certificate.answer import rejection_text, standing
 from ptcc_certify.certificate.family_content import FamilyContent
 from ptcc_certify.certificate.restricted_bounds import deviation_of_signal
 from ptcc_certify.certificate.restricted_claims import LastModeClaim
@@ -62,12 +63,8 @@ def assess_family(certificate: FamilyContent, report: CheckReport | None) -> Ass
     if asked.behaviour is None and asked.min_rate is None and (reason := next(reasons, "")):
         answers.append(Answer(OPEN, "what these signals do", reason))
     if report is None or not report.accepted:
-        why = (
-            _without_report(components)
-            if report is None
-            else f"the independent check does not accept {report.rejected}: {report.reason}"
-        )
-        return Assessment(UNDECIDED, False, None, why, "", tuple(answers))
+        why = _without_report(components) if report is None else rejection_text(report)
+        return Assessment(UNDECIDED, False, None, why, "", standing(answers, report))
     useful, caveat, rho2 = _usefulness(certificate), "", Fraction(0)
     effects: list[str] = []
     if useful is False:

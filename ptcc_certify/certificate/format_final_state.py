@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from ptcc_certify.bounds.final_state import FinalState, rounding_radius
+from ptcc_certify.bounds.final_state import FinalState, Influence, rounding_radius
 from ptcc_certify.certificate.certificate_data import Content
 from ptcc_certify.certificate.format_vectors import (
+    LONG,
+    Interval,
     Reader,
     Writer,
     agents_ends,
@@ -38,9 +40,8 @@ def _exact_final_state(content: Content) -> tuple[dict[str, Any], dict[str, Any]
     ends: dict[str, Any] | None = None
     if content.final_state is not None and content.initial_state is not None:
         sigma0 = content.sigma0 or [Fraction(0)] * len(labels)
-        first = [(x - s, Fraction(0)) for x, s in zip(content.initial_state, sigma0, strict=True)]
-        final = agents_ends(matrix, first)
-        ends = {label: interval_text(final[v]) for v, label in enumerate(labels)}
+        first = [x - s for x, s in zip(content.initial_state, sigma0, strict=True)]
+        ends = dict(zip(labels, _exact_texts(matrix, first), strict=True))
     section = {
         "components": [
             {"nodes": [labels[v] for v in c.nodes], "left_null_vector": [interval_text(w) for w in null_vector]}
@@ -60,15 +61,14 @@ def _enclose_final_state(content: Content, out: Writer) -> tuple[dict[str, Any],
     assert matrix.enclosure is not None
     final: dict[str, Any] | None = None
     if final_state is not None and final_state.radius is not None:
-        pairs = list(zip(final_state.states, final_state.radius, strict=True))
-        if out.aside(len(labels)) and all(isinstance(x, float) or r == 0 for x, r in pairs):
-            radius = [float(r) if isinstance(x, float) else rounding_radius(x) for x, r in pairs]
+        if out.aside(len(labels)) and all(isinstance(x, float) or r == 0 for x, r in _pairs(final_state)):
+            radius = [float(r) if isinstance(x, float) else rounding_radius(x) for x, r in _pairs(final_state)]
             final = {
                 "mid": out.vector("mid", np.asarray(final_state)),
                 "radius": out.vector("radius", np.array(radius)),
             }
         else:
-            final = {label: _interval_text(x, r) for label, (x, r) in zip(labels, pairs, strict=True)}
+            final = dict(zip(labels, _texts(final_state), strict=True))
     groups = []
     for k, (component, null_vector) in enumerate(matrix.groups):
         if k in matrix.enclosure.left_null_vectors:
@@ -102,12 +102,56 @@ def formation_section(
     }
 
 
-def _interval_text(x: Fraction | float, radius: Fraction) -> str | dict[str, str]:
-    if radius == 0:
-        return exact_or_ball(Fraction(x))
-    if isinstance(x, float):
-        return {"mid": repr(x), "radius": repr(float(radius))}
-    return {"mid": format_exact(x), "radius": format_exact(radius)}
+def stated_ends(
+    matrix: Influence, final_state: FinalState | None, begin: Sequence[Fraction] | None
+) -> Sequence[Interval] | None:
+    """Return the final state as a file states it, which what is proved of it must rest on; None if nothing is proved.
+
+    A float is the decimal that its text is, a rational that is too long for a text an interval.
+
+    Parameters
+    ----------
+    matrix : Influence
+    final_state : FinalState or None
+    begin : sequence of N Fraction, or None
+        ``X(0) - sigma(0)``.
+
+    Examples
+    --------
+    >>> graph = SignedDigraph.from_edges([("a", "c", 1), ("b", "c", 9)])
+    >>> matrix = enclose(influence(graph, exact=False))
+    >>> begin = [Fraction(1), Fraction(0), Fraction(0)]
+    >>> stated_ends(matrix, enclosed_final_state(matrix, begin), begin)[1][0]  # of c, no float
+    Fraction(1, 10)
+    """
+    if final_state is None or begin is None or final_state.intervals is None:
+        return None
+    if len(begin) > LONG:
+        return final_state.intervals
+    return [interval(x) for x in (_exact_texts(matrix, begin) if matrix.exact else _texts(final_state))]
+
+
+def _exact_texts(matrix: Influence, begin: Sequence[Fraction]) -> list[str | dict[str, str]]:
+    """Write the final state of a small graph."""
+    return [interval_text(x) for x in agents_ends(matrix, [(x, Fraction(0)) for x in begin])]
+
+
+def _pairs(final_state: FinalState) -> zip[tuple[Fraction | float, Fraction]]:
+    """Return middle and radius of every agent."""
+    return zip(final_state.states, final_state.radius or [Fraction(0)] * len(final_state), strict=True)
+
+
+def _texts(final_state: FinalState) -> list[str | dict[str, str]]:
+    """Write the intervals of a final state; many floats as the dyadic numbers that they are in a side file, too."""
+    digits = repr if len(final_state) <= LONG else float.hex
+    return [
+        exact_or_ball(Fraction(x))
+        if r == 0
+        else {"mid": digits(x), "radius": digits(float(r))}
+        if isinstance(x, float)
+        else {"mid": format_exact(x), "radius": format_exact(r)}
+        for x, r in _pairs(final_state)
+    ]
 
 
 def read_final_state(document: Mapping[str, Any], structure: Structure, data: Reader) -> FinalState | None:

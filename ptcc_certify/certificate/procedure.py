@@ -47,6 +47,8 @@ from ptcc_certify.certificate.cascade_part import prove_cascade
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.certificate_data import Observations
 from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
+from ptcc_certify.certificate.format_final_state import stated_ends
+from ptcc_certify.certificate.format_vectors import Interval
 from ptcc_certify.certificate.request import (
     Expectations,
     Request,
@@ -343,13 +345,15 @@ def _with_agents(certificate: Certificate, agents: Agents, chains: Chains, run: 
         )
     except NoCertificate as error:
         raise ParameterError(f"agents: {error}; ask for a smaller decay or a lower order") from None
-    notes, motion = [*certificate.notes, *chains.notes], None
+    notes, cut_off, motion = [*certificate.notes, *chains.notes], list(certificate.cut_off), None
     if run and part.initial_state is not None:
-        try:
-            motion = part.simulate()
-        except SimulationError as error:
-            notes.append(f"simulation: {error}")
-    return certificate.changed(agents=part, notes=tuple(notes), agents_run=motion)
+        limit = SEARCHING * certificate.time_limit
+        with deadline.time_limit(limit), share_of_time(SHARES[0], STEPS[0], cut_off):
+            try:
+                motion = part.simulate()
+            except SimulationError as error:
+                notes.append(f"simulation: {error}")
+    return certificate.changed(agents=part, notes=tuple(notes), cut_off=tuple(cut_off), agents_run=motion)
 
 
 def _with_small_delays(certificate: Certificate) -> Certificate:
@@ -361,7 +365,7 @@ def _with_small_delays(certificate: Certificate) -> Certificate:
         certificate.structure,
         certificate.protocol,
         certificate.initial_state,
-        None if final is None else final.intervals,
+        stated_ends(certificate.influence, final, certificate.initial_state),
         certificate.influence,
         certificate.decaying_forms,
         late.leaders,
@@ -379,7 +383,7 @@ def _longest_delay(certificate: Certificate, case: LateCase, late: LateBounds, a
     if longest is None or longest is late:
         return None if longest is None else late.messages.age
     report = certificate.changed(late=longest).checked
-    return longest.messages.age if report is not None and report.accepted else None
+    return longest.messages.age if report.accepted else None
 
 
 def _check_disturbance(disturbance: Any, protocol: ReachingProtocol, graph: SignedDigraph) -> None:
@@ -411,10 +415,10 @@ def _among(values: set[Any], value: Any) -> bool:
 def _with_word_of_check(certificate: Certificate) -> Certificate:
     """Check a certificate, and note what the check has to say besides."""
     report = certificate.checked
-    if report is not None and report.accepted and report.memory > 1:
+    if report.accepted and report.memory > 1:
         note = f"the check of this certificate needs more than 1 GB: ptcc check --memory {math.ceil(report.memory)}"
         return certificate.changed(notes=(*certificate.notes, note))
-    if report is not None and not report.accepted:
+    if not report.accepted:
         note = f"the independent check does not accept {report.rejected}: {report.reason}"
         return certificate.changed(notes=(note, *certificate.notes))
     return certificate
@@ -458,7 +462,8 @@ class Case:
             search = self.search(proof)
             limit = self.upper_bound()
         matrix, result = self.final_state(trajectory)
-        late, tracking = self.late_messages(result), self.tracking(result)
+        ends = stated_ends(matrix, result, self.initial_state)
+        late, tracking = self.late_messages(ends), self.tracking(ends)
         proved = [proof.rate, *(V.rate for V in search.functions)]
         return Certificate(
             structure=self.structure,
@@ -568,7 +573,7 @@ class Case:
                 )
         return matrix, result
 
-    def late_messages(self, result: FinalState | None) -> LateBounds | None:
+    def late_messages(self, ends: Sequence[Interval] | None) -> LateBounds | None:
         """Bound what late messages leave at the deadline; None if nothing is asked of them."""
         messages = self.request.messages
         if messages is None:
@@ -577,12 +582,11 @@ class Case:
             raise ParameterError(
                 "late messages ask for sigma(0) = 0, so that no sliding variable moves; leave sigma0 out"
             )
-        ends = None if result is None else result.intervals
         return bound_late(self.structure, self.protocol, messages, self.initial_state, ends, self.request.leaders)
 
-    def tracking(self, result: FinalState | None) -> Tracking | None:
+    def tracking(self, ends: Sequence[Interval] | None) -> Tracking | None:
         """Bound how followers track leaders that move; None if nothing is asked of that, or messages are late."""
-        leaders, ends = self.request.leaders, None if result is None else result.intervals
+        leaders = self.request.leaders
         if leaders is None or self.request.messages is not None:
             return None
         try:

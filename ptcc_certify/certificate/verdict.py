@@ -25,7 +25,7 @@ import numpy as np
 from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.bounds.envelope import Envelope
 from ptcc_certify.certificate.agents_answer import AgentsAnswer
-from ptcc_certify.certificate.answer import MET, OPEN, REFUTED, Answer
+from ptcc_certify.certificate.answer import MET, OPEN, REFUTED, Answer, rejection_text, rejects, standing
 from ptcc_certify.certificate.certificate_data import Content
 from ptcc_certify.certificate.late_answers import (
     at_deadline,
@@ -239,11 +239,11 @@ the input is not bounded; --rho2 0.501 (rho2 kappa 0.501) leaves 1 % and bounds 
         limited = certificate.effort is not None and certificate.effort.residual
         useful, remark, rho2 = (_limited_usefulness if limited else _usefulness)(certificate)
         caveat, advice = ("", "") if limited else _advise(certificate, rho2)
-    violated = certificate.violated
+    violated = certificate.violated and not rejects(report)
     ignored = sorted({answer.what for answer in answers if answer.status == OPEN} & {"limits", "noise"})
     ignored += ["disturbances"] * (certificate.delta is not None)
     without = f" without {' and '.join(ignored)}" if ignored else ""
-    return Assessment(verdict, violated, useful, remark, advice, tuple(answers), caveat, without)
+    return Assessment(verdict, violated, useful, remark, advice, standing(answers, report), caveat, without)
 
 
 # ---------------------------------------------------------------------- expectations
@@ -486,8 +486,8 @@ def _useful_rho2(envelope: Envelope, constant: float, kappa: Fraction) -> Fracti
 
 def _next_step(certificate: Content, report: CheckReport | None) -> str:
     """Tell why nothing was decided, and what to try."""
-    if report is not None and not report.accepted:
-        return f"the independent check rejects {report.rejected}; please report this graph"
+    if report is not None and rejects(report):
+        return rejection_text(report)
     method, notes, n = certificate.method, certificate.notes, certificate.graph.n_nodes
     if certificate.rate is None:
         if any(name not in NO_SEARCHES for name in certificate.cut_off):

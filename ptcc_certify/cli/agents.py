@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+import os
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
@@ -184,7 +184,7 @@ def read_vectors(text: str, seed: Any, graph: SignedDigraph, dimension: int, nam
         return random_states(seed, graph.n_nodes, dimension)
     if dimension == 1:
         return [[x] for x in read_initial_state(text, seed, graph, name)]
-    if Path(text).is_file():
+    if os.path.isfile(text):  # noqa: PTH113 - that of Path refuses texts that are longer than the names of files
         return read_vectors_of_file(text, graph, dimension)
     texts = text.split(",")
     if len(texts) != graph.n_nodes * dimension:

@@ -102,6 +102,7 @@ def _certify_graph(
     options: shared.Options,
 ) -> int:
     """Certify what the protocol does on one graph."""
+    from ptcc_certify.certificate.answer import rejects
     from ptcc_certify.certificate.procedure import STEPS
     from ptcc_certify.certificate.procedure import certify as run
     from ptcc_certify.report.screen import certificate_lines, summary_lines
@@ -119,7 +120,8 @@ def _certify_graph(
         named = {"graph": Path(graph).name, **origins}
         certificate = run(signed, protocol, x0, origins=named, progress=begin, **more)
     _log_result(certificate)
-    if output:
+    saved = output is not None and not rejects(certificate.checked)
+    if output and saved:
         certificate.save(output)
         LOG.info("%s", one_line(f"written {output}"))
     assessment = certificate.assessment
@@ -131,7 +133,7 @@ def _certify_graph(
     case = certificate, graph, origins
     screen.show(lambda: summary_lines(*case), lambda: certificate_lines(*case))
     if output:
-        screen.note(shared.written(certificate, output))
+        screen.note(shared.written(certificate, output) if saved else shared.NOTHING_WRITTEN)
     return assessment.exit_code
 
 

@@ -314,7 +314,7 @@ def certify_family(
         return assessment.exit_code
     screen.show(lambda: family_summary(certificate, name, origins), lambda: family_lines(certificate, name, origins))
     if output:
-        screen.note(f"written    {output}" if saved else "note       nothing is certified, and nothing was written")
+        screen.note(f"written    {output}" if saved else shared.NOTHING_WRITTEN)
     return assessment.exit_code
 
 

@@ -49,6 +49,8 @@ _SLIDING = {
     "mu3": ("1", "Sliding mode: factor of its growing part."),
     "delta": ("sliding mode: 1; nominal: none", "Bound of every disturbance."),
 }
+#: What is told of a file that was asked for where nothing is certified.
+NOTHING_WRITTEN = "note       nothing is certified, and nothing was written"
 #: Options that are times.
 _TIMES = ("--sample-period", "--stop-before", "--deadline", "--at")
 

@@ -14,6 +14,7 @@ import numpy as np
 from lmi.exact.decimal_rounding import down, float_up, up
 from ptcc_certify.bounds.input.worst_initial_state import WorstInitialState, worst_initial_state
 from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.verdict import CERTIFIED
 from ptcc_certify.checker.input_formulas import Limits
 from ptcc_certify.gain_design.request import DesignRequest, Request, fit_of
 from ptcc_certify.graphs.display_hook import Shown
@@ -37,9 +38,11 @@ class TradeOff(NamedTuple):
 def refusal(certificate: Certificate) -> str:
     """Tell that the independent check does not accept a certificate, and why; empty if it does."""
     report = certificate.checked
-    if report is not None and report.accepted:
+    if certificate.verdict == CERTIFIED:
         return ""
-    return "the independent check does not accept" + ("" if report is None else f" {report.rejected}: {report.reason}")
+    if report.accepted:
+        return "the independent check accepts it as undecided, not as certified"
+    return f"the independent check does not accept {report.rejected}: {report.reason}"
 
 
 def texts(source: Any, *names: str) -> dict[str, str | None]:

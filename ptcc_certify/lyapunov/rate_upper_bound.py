@@ -22,7 +22,7 @@ import numpy as np
 from lmi.definiteness_proofs import prove_positive_definite
 from lmi.dyadic import round_to_bits
 from lmi.exact.decimal_rounding import float_down
-from ptcc_certify.graphs.rationals import format_exact
+from ptcc_certify.graphs.rationals import format_exact, writable
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.error_system import rounded_matrix
 from ptcc_certify.theorems.lemmas import EXACT_NODES, component_blocks, single_followers
@@ -113,9 +113,10 @@ def optimality_ratio(rate: Fraction | None, upper_bound: Fraction | None) -> flo
 
 
 def mean_bound(structure: Structure) -> RateBound | None:
-    """Return twice the mean nonzero eigenvalue of the strong component where that is least; None if no agent listens.
+    """Return twice the mean nonzero eigenvalue of the strong component where that is least.
 
-    Which one is found in floats; its trace is exact, and costs no more than a sum over its edges.
+    None if no agent listens, or the number is too long to be written. Which one is found in floats; its trace is exact,
+    and costs no more than a sum over its edges.
 
     Examples
     --------
@@ -138,7 +139,8 @@ def mean_bound(structure: Structure) -> RateBound | None:
         trace = Fraction(sum(map(abs, table[edges].tolist())), scale)
     else:
         trace = sum((abs(graph.exact_weight(i)) for i in edges.tolist()), Fraction(0))
-    return RateBound(2 * trace / int(count[least]), (int(np.flatnonzero(number == least)[0]),))
+    value = 2 * trace / int(count[least])
+    return RateBound(value, (int(np.flatnonzero(number == least)[0]),)) if writable(value) else None
 
 
 def _slowest(structure: Structure) -> tuple[tuple[int, ...], float, int] | None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lmi.exact.decimal_rounding import down, near, up
+from ptcc_certify.certificate.answer import rejects
 from ptcc_certify.certificate.restricted_claims import LastModeClaim
 from ptcc_certify.certificate.restricted_states import constant_states, last_states, states_of_signal
 from ptcc_certify.graphs.family import Family, Mode
@@ -99,9 +100,14 @@ def family_summary(certificate: FamilyCertificate, name: str, origins: Mapping[s
     verdict    certified; checked without a solver
     """
     components, T = [part.component for part in certificate.parts], certificate.protocol.T
-    entries = [
+    asked = [
         *_family_entries(certificate.family, name, origins),
         ("protocol", _protocol_text(certificate, origins)),
+    ]
+    if rejects(certificate.checked):
+        return wrap_lines(format_lines([*asked, ("verdict", _verdict(certificate))]))
+    entries = [
+        *asked,
         *_claim_entries(components, f" at T = {near(T)}", False, certificate),
         *_rate_entries(certificate),
         *restricted_entries(certificate),
@@ -141,6 +147,8 @@ def family_lines(certificate: FamilyCertificate, name: str, origins: Mapping[str
     """Return the lines of ``ptcc certify -v`` for a family, as long as they are."""
     components, family = [part.component for part in certificate.parts], certificate.family
     entries = [*_family_entries(family, name, origins), ("nodes", shorten_list(family.labels))]
+    if rejects(certificate.checked):
+        return format_lines([*entries, ("proof", _proof_text(certificate)), ("verdict", certificate.assessment.text)])
     entries += _mode_entries(family, components)
     entries += [("protocol", _gains(certificate))]
     if certificate.initial_state is not None:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.bounds.final_state import extremes
+from ptcc_certify.certificate.answer import rejects
 from ptcc_certify.errors import PTCCError
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.report.agents_lines import answers, claimed_of, long_lines
@@ -96,6 +97,9 @@ def summary_lines(certificate: Certificate, name: str, origins: Mapping[str, str
     verdict    certified; checked without a solver
     """
     p = certificate.protocol
+    asked = [*graph_entries(certificate.structure, name), ("protocol", _protocol_text(certificate, origins))]
+    if rejects(certificate.checked):
+        return wrap_lines(format_lines([*asked, ("verdict", _short_verdict(certificate))]))
     whatever = "" if p.reaching is None else f", any |d_k| <= {down(p.reaching.delta, 12)}"
     if p.reaching is not None and p.reaching.delta == 0:
         whatever = ", without disturbances"
@@ -110,8 +114,7 @@ def summary_lines(certificate: Certificate, name: str, origins: Mapping[str, str
     )
     drawn = _is_set_asked(certificate)
     entries = [
-        *graph_entries(certificate.structure, name),
-        ("protocol", _protocol_text(certificate, origins)),
+        *asked,
         *late_lines(certificate),
         *tracking_lines(certificate),
         *_headed("claim", claims),
@@ -389,6 +392,10 @@ def certificate_lines(
     def lines() -> Lines:
         yield from _graph_lines(structure, name)
         yield "structure", structure_text(structure)
+        if rejects(certificate.checked):
+            yield from (("note", note) for note in certificate.notes[:1])
+            yield "verdict", certificate.assessment.text
+            return
         yield from late_lines(certificate)
         if by_agent := residual_text(certificate):
             yield "", f"left at T by agent: {by_agent}"
@@ -467,10 +474,7 @@ def _rate_lines(certificate: Certificate) -> Lines:
     if certificate.agents is None:
         yield from _residual_lines(certificate) if certificate.direct else _reaching_lines(certificate)
     proved = f"{len(certificate.obligations)} proof obligations proved in {arithmetic(certificate.direct)}"
-    text, report = proved, certificate.checked
-    if report is not None:
-        text += "; checked without a solver: " + ("accepted" if report.accepted else f"{report.rejected} REJECTED")
-    yield "proof", text
+    yield "proof", f"{proved}; checked without a solver: accepted"
 
 
 def _class_lines(certificate: Certificate) -> Lines:

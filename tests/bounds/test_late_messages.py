@@ -18,6 +18,7 @@ from late_motion import Flight, Gain, LateMotion, by_chance, instants, oldest_of
 from scipy.linalg import expm
 from selection import thinned
 
+from lmi.errors import NoCertificate
 from ptcc_certify.bounds import late_messages
 from ptcc_certify.bounds.final_state import final_state
 from ptcc_certify.bounds.late_messages import LateBounds, bound_late
@@ -772,3 +773,15 @@ def test_values_that_are_off_by_less_than_floats_hold_are_certified() -> None:
     messages, leaders = LateMessages("1e-300"), MovingLeaders("1e-300")
     made = certify(graph, NominalProtocol(), [1, 2, 3], messages=messages, leaders=leaders, simulation=False)
     assert made.verdict == "certified" and made.late is not None and made.late.largest < 1e-6
+
+
+@pytest.mark.parametrize("delay", [0, "0.01"])
+def test_rows_that_floats_do_not_resolve_leave_what_is_late_unproved(delay: object, monkeypatch: pytest.MonkeyPatch):
+    def unresolved(*_: object) -> None:
+        raise NoCertificate("the comparison matrix is not resolved")
+
+    monkeypatch.setattr(FollowerRows, "witness", unresolved)
+    structure = analyse(SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 1), ("c", "b", 1)]))
+    messages = LateMessages(delay=delay, value_error="0.1", gain_cap=5)
+    bounds = bound_late(structure, NominalProtocol(T=1, rho1=1, rho2=4, kappa=1), messages)
+    assert bounds.rows == () and bounds.steps is None and not bounds.says_something

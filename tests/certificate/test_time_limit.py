@@ -21,7 +21,7 @@ import lmi
 from lmi import search_time
 from lmi.child_process import apart
 from lmi.search_time import checkpoint, seconds_left, share_of_time, time_limit
-from ptcc_certify import NominalProtocol, SignedDigraph, certify, check, simulate
+from ptcc_certify import Agents, NominalProtocol, SignedDigraph, certify, check, simulate
 from ptcc_certify.certificate.procedure import STEPS
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import load_graph
@@ -299,3 +299,11 @@ def test_the_time_limit_ends_an_exact_final_state_and_an_enclosed_one_is_proved(
     assert time.monotonic() - begin < 30
     assert "exact final state" in cert.cut_off and cert.final_state is not None and cert.final_state.radius is not None
     assert all(abs(x) <= r for x, r in zip(cert.final_state.states, cert.final_state.radius, strict=True))  # at x_0 = 0
+
+
+def test_the_run_of_agents_of_order_n_ends_at_its_share_of_the_time_limit():
+    team = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1), ("c", "a", -1)])
+    made = certify(
+        team, NominalProtocol(T=1, rho1=1, rho2=8, kappa=1), [3, 1, 2], agents=Agents(order=2), time_limit=1e-6
+    )
+    assert "simulation" in made.cut_off and made.observed.agents_run is None

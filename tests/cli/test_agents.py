@@ -289,3 +289,11 @@ def test_a_deadline_of_the_cascade_is_designed_and_proved_again_by_the_command_t
     (command,) = re.findall(r"ptcc (certify fig1a .*?--max-input 40)", told)
     again = ptcc(*shlex.split(command), "--no-simulation")
     assert again.code == 0 and "met: |u_k| <= 40" in " ".join(again.out.split())
+
+
+def test_coordinates_may_take_more_letters_than_the_name_of_a_file(tmp_path: Path):
+    path = tmp_path / "many.csv"
+    path.write_text("".join(f"{k},{k + 1},1\n" for k in range(100)))
+    state = ",".join(["-1/3"] * 202)
+    made = ptcc("certify", str(path), "--agents", "2", "--dimension", "2", "--x0", state, "--no-simulation", "-q")
+    assert made.code in (0, 4) and not made.err

@@ -17,6 +17,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ptcc_certify.bounds.final_state import final_state
+from ptcc_certify.certificate.answer import rejects
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.certificate.request import refuse
@@ -63,8 +64,8 @@ class View:
 
     @cached_property
     def facts(self) -> dict[str, str]:
-        """What is claimed and bounded, by heads that are the same for all settings; empty if they are refused."""
-        if self.certificate is None:
+        """What is claimed and bounded, by heads that are the same for all settings; empty if refused, or rejected."""
+        if self.certificate is None or (self.checked and rejects(self.certificate.checked)):
             return {}
         return facts_of(self.certificate) | ({"simulated": run_of(self.certificate)} if self.checked else {})
 

@@ -1,0 +1,150 @@
+"""What is proved rests on what the file states, so that the check accepts it; where it does not, nothing is claimed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bad_inputs import ptcc
+from late_certificates import led_graph
+from selection import thinned
+
+from ptcc_certify import Expectations, LateMessages, MovingLeaders, NominalProtocol, SignedDigraph, certify
+from ptcc_certify.bounds import missed_deadline
+from ptcc_certify.bounds.missed_deadline import Missed
+from ptcc_certify.certificate import certificate as certificates
+from ptcc_certify.certificate import family_certificate
+from ptcc_certify.certificate.answer import Answer, standing
+from ptcc_certify.checker import CheckReport
+from ptcc_certify.graphs.structure import analyse
+from ptcc_certify.lyapunov import dominance
+from ptcc_certify.lyapunov.rate_upper_bound import mean_bound
+
+PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
+LATE = LateMessages(delay="0.01")
+REJECTED = CheckReport(False, "", (), "rates", "because this test says so", "none", "")
+CHAIN = "source,target,weight\na,b,1\nb,c,-1\n"
+
+
+# ---------------------------------------------------------------------- what the file states
+
+
+@pytest.mark.parametrize("seed", thinned([0, 2, 3, 4, 5], 3))
+def test_who_misses_the_deadline_is_proved_of_final_states_that_are_enclosed(seed: int):
+    """Above 120 agents the file states decimals, which are not the floats that were computed."""
+    rng = np.random.default_rng(seed)
+    graph = led_graph(rng, 3, 120, acyclic=True, signs="gauge")
+    x0 = [Fraction(int(x), 100) for x in rng.integers(-500, 500, graph.n_nodes)]
+    made = certify(graph, PROTOCOL, x0, messages=LATE, simulation=False, method="perron")
+    assert made.late is not None and made.late.missed is not None and made.influence.enclosure is not None
+    assert made.checked.accepted, made.checked.reason
+
+
+@pytest.mark.parametrize("how", [{"messages": LATE}, {"leaders": MovingLeaders(speed="0.1")}], ids=["late", "leaders"])
+def test_agents_that_begin_at_a_final_state_that_is_too_long_to_be_written(how: dict[str, Any]):
+    """Its weights are exact, and the file states an interval: agents at its middle may be off it by the radius."""
+    rng, n = np.random.default_rng(1), 100
+
+    def weight() -> int:
+        return int(rng.integers(2**61, 2**62)) * 2**40 + int(rng.integers(1, 2**40))
+
+    names = [f"f{k}" for k in range(n)]
+    pairs = list(zip(names, [*names[1:], names[0]], strict=True))
+    edges = [("a", "f0", weight()), ("b", "f1", weight())]
+    edges += [(s, t, weight()) for s, t in pairs] + [(t, s, weight()) for s, t in pairs]
+    graph = SignedDigraph.from_edges(edges)
+    made = certify(graph, PROTOCOL, [1] * graph.n_nodes, simulation=False, method="perron", **how)
+    assert isinstance(made.to_dict()["final_state"]["f3"], dict)
+    assert made.checked.accepted, made.checked.reason
+
+
+def test_an_upper_bound_that_is_too_long_to_be_written_is_left_out():
+    """Twice the mean eigenvalue of 130 agents with weights of many digits takes more digits than a file may hold."""
+    n, rng = 130, np.random.default_rng(0)
+    weights = [Fraction(int(rng.integers(1, 2**60)), int(rng.integers(2**59, 2**60)) | 1) for _ in range(n)]
+    graph = SignedDigraph.from_edges([(k, (k + 1) % n, w) for k, w in enumerate(weights)])
+    assert mean_bound(analyse(graph)) is None
+    made = certify(graph, PROTOCOL, simulation=False, time_limit=5)
+    assert made.checked.accepted and made.upper_bound is None
+
+
+# ---------------------------------------------------------------------- where the check rejects
+
+
+@pytest.fixture
+def rejecting(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """A folder with two graphs, and a check that rejects all certificates."""
+    monkeypatch.chdir(tmp_path)
+    for module in (certificates, family_certificate):
+        monkeypatch.setattr(module, "check", lambda *args, **options: REJECTED)
+    Path("chain.csv").write_text(CHAIN)
+    Path("other.csv").write_text("source,target,weight\na,b,2\na,c,1\n")
+    return tmp_path
+
+
+COMMANDS = {
+    "behaviour": ["chain.csv", "--expect", "stability"],
+    "rate": ["chain.csv", "--min-rate", "1000"],
+    "input": ["chain.csv", "--max-input", "0.001"],
+    "met": ["chain.csv", "--expect", "bipartite-consensus", "--min-rate", "0.001"],
+    "late": ["chain.csv", "--delay", "0.01", "--max-residual", "1e-9"],
+    "leaders": ["chain.csv", "--leader-speed", "1", "--max-input", "1e-3"],
+    "agents": ["chain.csv", "--agents", "2", "--max-input", "1e-3", "--expect", "stability"],
+    "family": ["chain.csv", "other.csv", "--switching", "--expect", "stability", "--min-rate", "1000"],
+}
+
+
+@pytest.mark.parametrize("options", COMMANDS.values(), ids=COMMANDS)
+@pytest.mark.parametrize("long", [False, True], ids=["short", "long"])
+def test_where_the_check_rejects_nothing_is_claimed_refuted_or_written(options: list[str], long: bool, rejecting: Path):
+    run = ptcc("certify", *options, "--no-simulation", "-o", "c.json", *(["-v"] if long else []))
+    text = " ".join(run.out.split())
+    assert run.code == 4 and not (rejecting / "c.json").exists()
+    assert "undecided: the independent check rejects rates, a defect of this program: nothing is claimed" in text
+    assert "nothing was written" in text
+    assert not {"claim", "rate", "error", "input", "INPUT", "late", "x(T)"} & {
+        line[:10].strip() for line in run.out.splitlines()
+    }
+    for word in ("refuted:", "met:", "at least", "proved"):
+        assert word not in text
+
+
+def test_a_refutation_rests_on_what_the_check_accepts(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    """An agent that is said to miss the deadline by more than is so: rejected, and no answer."""
+    honest: Callable[..., Missed | None] = missed_deadline.find_missed
+
+    def more(*case: Any) -> Missed | None:
+        found = honest(*case)
+        return None if found is None else replace(found, bound=found.bound * 2)
+
+    monkeypatch.setattr("ptcc_certify.bounds.late_messages.find_missed", more)
+    graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1)])
+    made = certify(graph, PROTOCOL, [1, 3, 4], messages=LATE, simulation=False, expectations="bipartite consensus")
+    assert made.checked.rejected == "late-missed of messages.missed"
+    assert made.assessment.exit_code == 4 and made.assessment.asked == "left open"
+    monkeypatch.undo()
+    true = certify(graph, PROTOCOL, [1, 3, 4], messages=LATE, simulation=False, expectations="bipartite consensus")
+    assert true.checked.accepted and true.assessment.asked == "refuted" and true.assessment.exit_code == 3
+
+
+def test_a_certificate_without_a_rate_is_checked_and_its_answers_rest_on_that(monkeypatch: pytest.MonkeyPatch):
+    """The upper bound is all that is proved of this ring, and refutes what is above it."""
+    monkeypatch.setattr(dominance, "FILL_ROWS", -1)
+    ring = SignedDigraph.from_edges([(k, (k + 1) % 121, 1) for k in range(121)])
+    made = certify(ring, PROTOCOL, simulation=False, expectations=Expectations(min_rate=1000))
+    assert made.rate is None and made.checked.accepted and made.verdict == "undecided"
+    assert made.assessment.asked == "refuted" and made.assessment.exit_code == 3
+    monkeypatch.setattr(certificates, "check", lambda *args, **options: REJECTED)
+    again = made.changed(notes=())
+    assert again.assessment.asked == "left open" and again.assessment.exit_code == 4
+
+
+def test_what_is_decided_of_a_family_and_not_certified_leaves_answers_open():
+    """Whether rest states agree takes exact rows of more than 120 agents: no certificate, so nothing is refuted."""
+    answers = standing([Answer("refuted", "consensus"), Answer("met", "rate >= 1")], None)
+    assert {answer.status for answer in answers} == {"left open"}
