@@ -96,7 +96,7 @@ def formation_on_a_line(
     return Formation(begin, places, limits)
 
 
-def refuse_agents(agents: Any, protocol: Protocol, asked: dict[str, Any]) -> None:
+def refuse_agents(agents: Any, protocol: Protocol, asked: Mapping[str, Any]) -> None:
     """Refuse what is not asked of agents of order n, or not proved of them.
 
     Raises

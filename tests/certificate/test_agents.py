@@ -251,7 +251,10 @@ def test_the_initial_set_of_a_formation_is_that_of_positions():
         ({"initial_state": {"a": "5", "b": "2", "c": "4", "d": "-2"}}, "an agent of the formation begins elsewhere"),
         ({"initial_state": None}, "positions are told iff states are"),
         ({"final_state": None}, "positions are told iff states are"),
-        ({"final_state": {"a": "4.5", "b": "0.5", "c": "5.5", "d": "-1.5"}}, "an agent of the formation ends elsewhere"),
+        (
+            {"final_state": {"a": "4.5", "b": "0.5", "c": "5.5", "d": "-1.5"}},
+            "an agent of the formation ends elsewhere",
+        ),
     ],
 )
 def test_places_and_positions_that_do_not_follow_are_rejected(change: Any, reason: str):
