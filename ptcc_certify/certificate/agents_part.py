@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -297,22 +298,23 @@ def prove_agents(
     )
     decided = initial_state is not None and bool(used or not structure.graph.n_edges)
     final = final_states(part, influence) if decided else None
-    phases = _phases(part, scaled)
-    return replace(part, final_state=final, residual=_residual(part), input=_input(part, influence), phases=phases)
+    return replace(part, final_state=final, residual=_residual(part), input=_input(part, influence))
 
 
-def _phases(part: AgentsPart, agent: ScaledAgent) -> tuple[Phase, ...]:
-    """Return phases of functions that bound deviations; later ones of that which bounds them best at first."""
-    if part.order < 2 or part.initial_state is None or part.protocol.gain_cap is not None:
-        return ()
+def with_phases(part: AgentsPart) -> AgentsPart:
+    """Add phases of functions that bound deviations; later ones of that which bounds them best at first."""
+    protocol, gain = part.protocol, part.protocol.gain
+    if part.order < 2 or part.initial_state is None or protocol.gain_cap is not None:
+        return part
+    agent = ScaledAgent(protocol.plant, protocol.own, gain.rho1, gain.pole, gain.first, None)
     each = zip(part.used, part.functions, part.initial_values, strict=True)
     known = [(max(V.deviation.agents) * value, one.number, V) for one, V, value in each if V.deviation is not None]
     known.sort(key=lambda entry: entry[:2])
-    return tuple(
-        phase
-        for k, (_, number, V) in enumerate(known)
-        for phase in find_phases(agent, part.matrix, number, V.proved_rate, later=k == 0)
-    )
+    found = list[Phase]()
+    with suppress(np.linalg.LinAlgError):  # of a matrix that is positive definite by less than the rounding of floats
+        for k, (_, number, V) in enumerate(known):
+            found += find_phases(agent, part.matrix, number, V.proved_rate, later=k == 0)
+    return replace(part, phases=tuple(found))
 
 
 def _coupling(rate: Fraction) -> Fraction:
