@@ -188,6 +188,8 @@ let certificate json : t =
         let get = fields "input" [ "agents"; "largest" ] v in
         let tops = by_agent r.nodes number "input" (get "agents") in
         need (Number.equal (number "largest" (get "largest")) (largest tops)) "the largest input is another"; tops in
+  List.iteri (fun i _ -> skipped proof "agent-phase" (Printf.sprintf "phases[%d]" i))
+    (match json with Obj l -> (match List.assoc_opt "phases" l with Some v -> entries "phases" v | None -> []) | _ -> []);
   need (proof.rest = []) "an obligation that nothing asks for";
   let slope = r.cert.rho1 in
   let cert = { r.cert with funcs; rho1 = if Z.sign slope.qnum = 0 then Number.one else slope } in

@@ -84,6 +84,8 @@ let obligations = [
     "Schur complement");
   "agent-input", ("the input of no agent exceeds these",
     "error constants, Lyapunov decrease");
+  "agent-phase", ("from this zeta on a function decays at this rate, by a matrix that is not below the former",
+    "Lyapunov decrease of a Kronecker product");
 ]
 (* and of section 13 *)
 let sliding_bound = "||sigma(t)|| <= phi(t,T_r)^(-mu3) e^(-mu2 t) ||sigma(0)||"

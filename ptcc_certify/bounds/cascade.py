@@ -14,8 +14,8 @@ in every coordinate, and so in the Euclidean norm over them. With ``b = beta/2``
 the first being exact for ``rho1 = 0``; fractions stand for their limits where numbers coincide.
 
 Where ``L`` is far larger than its rate, ``|q(0)|`` is, too. With ``' = d/ds``, ``g = alpha + theta``, ``theta =
-eta'/eta``, ``G`` the integral of ``g`` and ``r = X' + g X``: ``r' = -L r + theta' X`` and ``X'' + g X' = -L r``. So with
-``R >= |r|``, ``S >= |X|``
+eta'/eta``, ``G`` the integral of ``g`` and ``r = X' + g X``: ``r' = -L r + theta' X`` and ``X'' + g X' = -L r``. So
+with ``R >= |r|``, ``S >= |X|``
 
     R' = -b R + theta' S,   S = e^-G S(0) + J,   J' = -g J + R,   J(0) = 0,   e^-G = e^(-alpha s) eta(0)/eta
 
@@ -187,7 +187,8 @@ def course(gain: Gain, rate: Fraction, alpha: Fraction, roots: Roots, remaining:
         values[i + 1] = R, S, J
     values *= 1 + _ROOM
     at = len(q) - 1 - np.searchsorted(q[::-1], remaining)
-    return Course(*values[at].T, float_up(alpha) + theta[at])
+    combined, state, integral = values[at].T
+    return Course(combined, state, integral, float_up(alpha) + theta[at])
 
 
 def _falling(x: float, z: np.ndarray) -> np.ndarray:

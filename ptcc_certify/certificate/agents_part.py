@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 
@@ -31,7 +32,16 @@ from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.agents import Agents, AgentsProtocol
 from ptcc_certify.simulation.agents import AgentsTrajectory
-from ptcc_certify.theorems.agent_decrease import AgentMatrix, ScaledAgent, agent_matrix, paper_matrix, round_and_prove
+from ptcc_certify.theorems.agent_decrease import (
+    AgentMatrix,
+    Matrix,
+    Phase,
+    ScaledAgent,
+    agent_matrix,
+    find_phases,
+    paper_matrix,
+    round_and_prove,
+)
 from ptcc_certify.theorems.theorem import Obligation
 
 
@@ -57,6 +67,8 @@ class AgentsPart(AgentsAnswer):
     residual : Residual or None
     input : tuple of N Fraction, or None
         Bounds of the Euclidean norm of every agent's input.
+    phases : tuple of Phase
+        Faster decrease of single functions, nearer to the deadline.
     """
 
     structure: Structure
@@ -69,7 +81,7 @@ class AgentsPart(AgentsAnswer):
     final_state: Intervals | None = None
     residual: Residual | None = None
     input: tuple[Fraction, ...] | None = None
-    notes: tuple[str, ...] = field(default=())
+    phases: tuple[Phase, ...] = ()
 
     @property
     def decay(self) -> Fraction:
@@ -121,6 +133,7 @@ class AgentsPart(AgentsAnswer):
         return [
             Obligation("agent-decrease", "agents", {"rate": self.matrix.rate}),
             Obligation("agent-coupling", "agents", {"coupling": self.matrix.coupling}),
+            *(Obligation("agent-phase", f"phases[{k}]", {"rate": phase.rate}) for k, phase in enumerate(self.phases)),
         ]
 
     # ------------------------------------------------------------------ bounds over time
@@ -131,20 +144,31 @@ class AgentsPart(AgentsAnswer):
         Infinite where nothing is proved, or without an initial state.
         """
         q = np.atleast_1d(np.asarray(remaining, dtype=float))
-        roots = np.full((self.structure.graph.n_nodes, self.order), np.inf)
-        for V, value in zip(self.functions, self.initial_values, strict=False):
-            if V.deviation is not None:
+        bounds = np.full((self.structure.graph.n_nodes, self.order, len(q)), np.inf)
+        powers = np.outer(np.arange(self.order), np.log([self.protocol.value(x) for x in q]))
+        for one, V, value in zip(self.used, self.functions, self.initial_values, strict=False):
+            if V.deviation is None:
+                continue
+            for W, falls in self._courses(one.number, q):
                 rows = [
-                    [float_up(root_product(c, self.matrix.W[i][i], value)) for i in range(self.order)]
-                    for c in V.deviation.agents
+                    [float_up(root_product(c, W[i][i], value)) for i in range(self.order)] for c in V.deviation.agents
                 ]
-                roots = np.minimum(roots, np.array(rows))
-        eta = np.array([self.protocol.value(x) for x in q])
-        with np.errstate(over="ignore", invalid="ignore"):
-            fall = -float_down(self.matrix.rate) / 2 * self.protocol.clock(q) + np.outer(
-                np.arange(self.order), np.log(eta)
-            )
-            return roots[:, :, None] * np.exp(fall + 1e-9)
+                with np.errstate(over="ignore", invalid="ignore"):
+                    own = np.array(rows)[:, :, None] * np.exp(powers - falls / 2 + 1e-9)
+                bounds = np.where(np.isfinite(falls), np.minimum(bounds, own), bounds)
+        return bounds
+
+    def _courses(self, function: int, q: np.ndarray) -> Iterator[tuple[Matrix, np.ndarray]]:
+        """Yield matrices of a function, and by which exponent it has fallen by these; minus infinity before."""
+        s, gain, former, since = self.protocol.clock(q), self.protocol.gain, self.matrix.rate, 1.0
+        yield self.matrix.W, float_down(former) * s
+        fallen, begun = 0.0, 0.0
+        for phase in self.phases:
+            if phase.function == function:
+                since = min(since, phase.begins(gain.rho1, gain.pole, gain.T))
+                clock = float(self.protocol.clock(np.array([since]))[0])
+                fallen, begun, former = fallen + float_down(former) * (clock - begun), clock, phase.rate
+                yield phase.W, np.where(q <= since, fallen + float_down(former) * (s - clock), -np.inf)
 
     def compare(self, run: AgentsTrajectory) -> AgentsComparison | None:
         """Compare a run with what is proved of it; None where nothing disagrees."""
@@ -265,6 +289,22 @@ def prove_agents(
     decided = initial_state is not None and bool(used or not structure.graph.n_edges)
     final = final_states(part, influence) if decided else None
     return replace(part, final_state=final, residual=_residual(part), input=_input(part, influence))
+
+
+def with_phases(part: AgentsPart) -> AgentsPart:
+    """Add phases of functions that bound deviations; later ones of that which bounds them best at first."""
+    protocol, gain = part.protocol, part.protocol.gain
+    if part.order < 2 or part.initial_state is None or protocol.gain_cap is not None:
+        return part
+    agent = ScaledAgent(protocol.plant, protocol.own, gain.rho1, gain.pole, gain.first, None)
+    each = zip(part.used, part.functions, part.initial_values, strict=True)
+    known = [(max(V.deviation.agents) * value, one.number, V) for one, V, value in each if V.deviation is not None]
+    known.sort(key=lambda entry: entry[:2])
+    found = list[Phase]()
+    with suppress(np.linalg.LinAlgError):  # of a matrix that is positive definite by less than the rounding of floats
+        for k, (_, number, V) in enumerate(known):
+            found += find_phases(agent, part.matrix, number, V.proved_rate, later=k == 0)
+    return replace(part, phases=tuple(found))
 
 
 def _coupling(rate: Fraction) -> Fraction:

@@ -83,8 +83,8 @@ def formation_on_a_line(
     the sliding-mode protocol, which limits nothing of single integrators. Of large graphs the plain certificate has
     Lyapunov functions that bound no input: formations that ask for nothing but their agents keep that of order n.
     """
-    unset, capped = [name for name in _NOT_OF_AGENTS if _given(asked.get(name))], agents.cap is not None
-    large = len(chains.offsets) > EXACT_NODES and not unset
+    more, capped = [name for name in _NOT_OF_AGENTS if _given(asked.get(name))], agents.cap is not None
+    large = len(chains.offsets) > EXACT_NODES and not more
     if not agents.of_paper or chains.dimension > 1 or large or (capped and protocol.reaching is not None):
         refuse_agents(agents, protocol, asked)
         return None
@@ -96,7 +96,7 @@ def formation_on_a_line(
     return Formation(begin, places, limits)
 
 
-def refuse_agents(agents: Any, protocol: Protocol, asked: dict[str, Any]) -> None:
+def refuse_agents(agents: Any, protocol: Protocol, asked: Mapping[str, Any]) -> None:
     """Refuse what is not asked of agents of order n, or not proved of them.
 
     Raises

@@ -109,7 +109,8 @@ class Certificate(Content, FromFile, Shown):
     agents : AgentsAnswer or None
         What is proved of agents of order n; then initial and final states are there, and not above.
     offsets : tuple of N Fraction, or None
-        Places of single integrators in a formation under a cap: everything else is of ``x - offsets``.
+        Places of single integrators in a formation: initial and final state and everything else are of ``x - offsets``;
+        :attr:`initial_positions` and :attr:`final_positions` are of ``x``.
 
     References
     ----------

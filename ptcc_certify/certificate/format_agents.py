@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
@@ -18,7 +19,7 @@ from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.agents import AgentsProtocol
 from ptcc_certify.protocols.cascade import CascadeProtocol
-from ptcc_certify.theorems.agent_decrease import AgentMatrix
+from ptcc_certify.theorems.agent_decrease import AgentMatrix, Phase
 
 Section = Mapping[str, Any]
 #: Bits of numerator and denominator up to which an enclosed final state is written as it is.
@@ -96,13 +97,36 @@ def _by_agent(out: Writer, values: Sequence[Any]) -> dict[str, Any]:
 
 
 def read_agents(
-    section: Section | None, structure: Structure, base: Protocol, functions: Sequence[LyapunovFunction]
+    document: Section, structure: Structure, base: Protocol, functions: Sequence[LyapunovFunction]
 ) -> AgentsAnswer | None:
-    """Read the section of an accepted certificate; None if it has none."""
+    """Read the section of an accepted certificate, and its phases; None if it has none."""
+    section = document.get("agents")
     if section is None:
         return None
-    read = _read_cascade if "cascade" in section else _read_matrix
-    return read(section, structure, base, functions)
+    if "cascade" in section:
+        return _read_cascade(section, structure, base, functions)
+    phases = tuple(map(_read_phase, document.get("phases", ())))
+    return replace(_read_matrix(section, structure, base, functions), phases=phases)
+
+
+def phases_section(part: AgentsAnswer | None) -> list[dict[str, Any]]:
+    """Return the section ``phases``; empty without phases."""
+    return [
+        {
+            "function": phase.function,
+            "rate": format_exact(phase.rate),
+            "coupling": format_exact(phase.coupling),
+            "lower_triangle": [_texts(row[: i + 1]) for i, row in enumerate(phase.W)],
+            "points": _texts(phase.points),
+        }
+        for phase in getattr(part, "phases", ())
+    ]
+
+
+def _read_phase(entry: Section) -> Phase:
+    W = tuple(map(tuple, triangle(entry["lower_triangle"], len(entry["lower_triangle"]))))
+    points = tuple(map(exact, entry["points"]))
+    return Phase(entry["function"], W, exact(entry["rate"]), exact(entry["coupling"]), points)
 
 
 def _read_cascade(

@@ -90,10 +90,9 @@ def formation_section(
     """Write the places of a formation, and where its agents begin and end; ``final`` is where they end less these."""
     ends = None
     if final is not None and content.final_state is not None:
-        pairs = map(interval, final.values())
-        if beside(final.get("mid")):
-            radius = content.final_state.radius or ()
-            pairs = zip(map(Fraction, content.final_state.states), map(Fraction, radius), strict=True)
+        pairs: Sequence[Interval] = content.final_state.intervals or ()
+        if not beside(final.get("mid")):
+            pairs = list(map(interval, final.values()))
         ends = {k: interval_text((x + h, r)) for k, (x, r), h in zip(out.labels, pairs, offsets, strict=True)}
     return {
         "offsets": out.state("offsets", offsets),

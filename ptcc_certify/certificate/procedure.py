@@ -35,7 +35,7 @@ from ptcc_certify.bounds.final_state import (
 from ptcc_certify.bounds.late_messages import LateBounds, bound_late
 from ptcc_certify.bounds.longest_delay import LateCase
 from ptcc_certify.bounds.tracking import Tracking, bound_tracking
-from ptcc_certify.certificate.agents_part import prove_agents
+from ptcc_certify.certificate.agents_part import AgentsPart, prove_agents, with_phases
 from ptcc_certify.certificate.agents_request import (
     Chains,
     formation_on_a_line,
@@ -312,6 +312,8 @@ def motion_of(certificate: Certificate, agents: Agents) -> Certificate:
     """
     if certificate.offsets is None:
         return certificate
+    if any(certificate.sigma0 or ()):
+        raise ParameterError("sigma0: the motion of a formation is shown with sliding variables that begin at 0")
     begin, places = certificate.initial_positions, tuple((h,) for h in certificate.offsets)
     chains = Chains(None if begin is None else tuple(((x,),) for x in begin), 1, places)
     plain = {"initial_state": None, "sigma0": None, "limits": (), "late": None, "tracking": None}
@@ -345,6 +347,7 @@ def _with_agents(certificate: Certificate, agents: Agents, chains: Chains, run: 
         )
     except NoCertificate as error:
         raise ParameterError(f"agents: {error}; ask for a smaller decay or a lower order") from None
+    part = with_phases(part) if isinstance(part, AgentsPart) else part
     notes, cut_off, motion = [*certificate.notes, *chains.notes], list(certificate.cut_off), None
     if run and part.initial_state is not None:
         limit = SEARCHING * certificate.time_limit

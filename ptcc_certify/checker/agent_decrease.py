@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from fractions import Fraction
 from itertools import chain, pairwise
 
@@ -10,13 +11,16 @@ from lmi.exact.decimal_rounding import down
 from lmi.exact.matrix_polynomials import nonnegative_between, semidefinite
 from lmi.exact.numbers import integers, longest
 from lmi.exact.work import spend
-from ptcc_certify.checker.agent_model import Agents
+from ptcc_certify.checker.agent_bounds import Used
+from ptcc_certify.checker.agent_model import LONGEST, MANY_POINTS, Agents
 from ptcc_certify.checker.lyapunov import Function
 from ptcc_certify.checker.matrix_products import Matrix
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import need
+from ptcc_certify.checker.reading import entries, exact, fields, length, need, triangle
 
 Rows = list[list[Fraction]]
+#: Phases of all functions.
+MANY_PHASES = 100
 
 
 def check_decrease(doc: Document, agents: Agents, used: Sequence[Function]) -> None:
@@ -39,6 +43,42 @@ def check_decrease(doc: Document, agents: Agents, used: Sequence[Function]) -> N
     _check_gains(agents)
     need(all(agents.coupling * f.rate >= 1 for f in used), "the coupling is too weak for a Lyapunov function")
     doc.done(f"c = {down(agents.coupling)}, {len(used)} Lyapunov functions")
+
+
+def check_phases(doc: Document, agents: Agents, used: Sequence[Used]) -> None:
+    """Verify faster decrease of functions that are used, from some ``zeta`` on, by matrices not below the former."""
+    if "phases" not in doc.data:
+        return
+    need(agents.cap is None, "phases of a gain that is capped")
+    former = {use.number: (agents.W, 1 / agents.first_gain) for use in used}
+    rates = {use.number: use.function.rate for use in used}
+    section = entries(doc.section("phases"), "phases")
+    need(len(section) <= MANY_PHASES, f"more than {MANY_PHASES} phases")
+    for k, entry in enumerate(section):
+        doc.at = f"phases[{k}]"
+        fields(entry, ("function", "rate", "coupling", "lower_triangle", "points"), "a phase")
+        number = entry["function"]
+        need(type(number) is int and number in former, "a phase of a function that is not used")
+        numbers = doc.open("agent-phase", f"phases[{k}]", ["rate"])
+        need(len(entries(entry["points"], "points")) <= MANY_POINTS, f"more than {MANY_POINTS} points")
+        W, points = triangle(entry["lower_triangle"], agents.n), [exact(x) for x in entry["points"]]
+        coupling, rate = exact(entry["coupling"]), exact(entry["rate"])
+        bits = length((coupling, rate, *points, *chain.from_iterable(W)))
+        need(bits <= LONGEST, f"a phase with a number of {bits} bits; {LONGEST} are taken")
+        need(numbers["rate"] == rate > 0 and coupling > 0, "the rate is another, or not positive")
+        before, end = former[number]
+        need(len(points) >= 2 and points[0] == 0 and points[-1] <= end, "points of a phase that begins too early")
+        need(all(low < high for low, high in pairwise(points)), "points are not in ascending order")
+        more, _ = integers([[x - y for x, y in zip(*rows, strict=True)] for rows in zip(W, before, strict=True)])
+        need(semidefinite(more), "the matrix of a phase is below the former")
+        scale = coupling * rates[number]
+        own = replace(agents, W=[[x / scale for x in row] for row in W], coupling=1 / rates[number], rate=rate)
+        _check_gains(own)
+        F = _form(own, _uncapped(own))
+        holds = all(nonnegative_between(F, low, high) for low, high in pairwise(points))
+        need(holds, "the decrease of a phase is not proved between two points")
+        former[number] = W, points[-1]
+        doc.done(f"r = {down(rate)}")
 
 
 def _check_points(agents: Agents) -> None:

@@ -325,7 +325,7 @@ def state_intervals(doc: Document, graph: Digraph, section: Any) -> tuple[Number
 
 
 def check_formation(doc: Document, graph: Digraph, begin: Begin) -> None:
-    """Verify that in a formation agents begin and end where the rest of the document tells, and their places besides."""
+    """Verify that agents of a formation begin and end where the rest of the document tells, and their places added."""
     if "formation" not in doc.data:
         return
     need("agents" not in doc.data, "a formation beside that of agents of order n")

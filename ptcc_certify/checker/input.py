@@ -331,10 +331,10 @@ def _under_limits(
     if entry["agents"] is not None:
         roots = {k: root} if period is not None else _roots(verified, limits, clock, bounds)
         known = [(verified.functions[j].deviation, x) for j, x in roots.items()]
-        each = [[formulas.root_above(c) * x for c in constants] for constants, x in known if constants is not None]
-        need(bool(each), "deviations without constants")
+        sizes = [[formulas.root_above(c) * x for c in constants] for constants, x in known if constants is not None]
+        need(bool(sizes), "deviations without constants")
         most = [_largest_deviation(verified.final, bounds.initial_set)] if period is None else []
-        least = [min([*row, *most]) for row in zip(*each, strict=True)]
+        least = [min([*row, *most]) for row in zip(*sizes, strict=True)]
         _above(doc, verified, entry["agents"], "what is left", least)
     need((entry["largest"] is None) == (period is not None), "the largest input is bounded unless it is held")
     if entry["largest"] is not None:

@@ -16,7 +16,7 @@ Then ``V = sum_kl Z_kl y_k'P y_l`` has ``dV/ds = Y'[Z (x) (A_z'P + P A_z) - c (Z
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
@@ -27,15 +27,18 @@ import numpy as np
 from lmi.dyadic import round_to_bits
 from lmi.errors import NoCertificate
 from lmi.exact import arithmetic
+from lmi.exact.decimal_rounding import down
 from lmi.exact.matrix_polynomials import nonnegative_between, semidefinite
 from lmi.exact.numbers import integers
-from lmi.feedback import feedback_matrix
+from lmi.feedback import feedback_matrix, later_matrix
 
 Matrix = tuple[tuple[Fraction, ...], ...]
 #: Significant bits of the entries of ``W``, and digits of the gains: the first that prove.
 BITS, DIGITS = 40, (4, 6, 9, 12, 15)
 #: Ends of intervals of ``zeta`` at most.
 MOST_POINTS = 257
+#: Later phases: how often the first gain their gain is at least; how much faster they are at least, and bisections.
+LATER, FASTER, BISECTIONS = (2, 6, 40), 1.01, 5
 
 
 @dataclass(frozen=True)
@@ -151,6 +154,37 @@ class AgentMatrix:
     def inverse(self) -> Matrix:
         """``P = W^-1``."""
         return inverse(self.W)
+
+
+@dataclass(frozen=True)
+class Phase:
+    """Faster decrease of a Lyapunov function ``V`` of the graph, of the rate ``beta``, from some ``zeta`` on.
+
+    With ``W`` not below the former matrix, ``W K = d b`` and ``beta d b b' - rate W - A_z W - W A_z' >= 0``: so the
+    form of ``W`` is not above that of the former matrix where this phase begins.
+
+    Attributes
+    ----------
+    function : int
+        The number of ``V``.
+    W : n rows of n Fraction
+    rate : Fraction
+    coupling : Fraction
+        ``d``.
+    points : tuple of Fraction
+        From 0 to where it begins.
+    """
+
+    function: int
+    W: Matrix
+    rate: Fraction
+    coupling: Fraction
+    points: tuple[Fraction, ...]
+
+    def begins(self, rho1: Fraction, k: Fraction, T: Fraction) -> float:
+        """Return ``1 - t/T`` where ``zeta``, which is ``T (1 - t/T)/(rho1 T (1 - t/T) + k)``, is the last point."""
+        zeta = self.points[-1]
+        return min(float(k * zeta / (T * (1 - rho1 * zeta))), 1.0)
 
 
 def inverse(W: Matrix) -> Matrix:
@@ -271,6 +305,75 @@ def round_and_prove(agent: ScaledAgent, found: np.ndarray, rate: Fraction, coupl
         if (points := prove_decrease(agent, exact, rate)) is not None:
             return AgentMatrix(exact, rate, points, coupling, K)
     return None
+
+
+def find_phases(
+    agent: ScaledAgent, matrix: AgentMatrix, function: int, beta: Fraction, later: bool = True
+) -> list[Phase]:
+    """Return phases of a Lyapunov function of the rate ``beta``, one after the other, each faster than the former.
+
+    The first has the ``W`` of all functions: this one may decay faster by it than the slowest that is used. Those
+    that are ``later`` have matrices of their own, from where the gain is :data:`LATER` times the first one on.
+
+    Examples
+    --------
+    >>> zero, one = Fraction(0), Fraction(1)
+    >>> agent = ScaledAgent((zero, one), (zero, zero), one, one, 2 * one, None)
+    >>> [round(float(p.rate), 1) > 4 for p in find_phases(agent, agent_matrix(agent, Fraction(4), one), 0, 2 * one)][:1]
+    [True]
+    """
+    if agent.span is None or agent.cap is not None:
+        return []
+    W, c, found = _floats(matrix.W), float(matrix.coupling), list[Phase]()
+    gains, driven = _floats((matrix.gains,))[0], np.zeros_like(W)
+    driven[-1, -1] = c * float(beta)
+    frame = np.linalg.inv(np.linalg.cholesky(W))
+    whole = agent.vertices(matrix.points)
+    slowest = min(float(np.linalg.eigvalsh(frame @ (driven - A @ W - W @ A.T) @ frame.T).min()) for A in whole)
+    rate = Fraction(down(Fraction(max(slowest, 0.0)) * (1 - Fraction(1, 10**6)), 6))
+    if rate >= FASTER * matrix.rate and (
+        points := prove_decrease(agent, _scaled(matrix.W, 1 / (matrix.coupling * beta)), rate)
+    ):
+        found.append(Phase(function, matrix.W, rate, matrix.coupling, points))
+    for times in LATER if later else ():
+        rest = replace(agent, first=agent.first * times)
+        former, rate = (found[-1].W, found[-1].rate) if found else (matrix.W, matrix.rate)
+        phase = _later_phase(rest, gains, matrix.gains, former, function, beta, rate)
+        found += [] if phase is None else [phase]
+    return found
+
+
+def _later_phase(
+    agent: ScaledAgent,
+    floats: np.ndarray,
+    gains: Sequence[Fraction],
+    former: Matrix,
+    function: int,
+    beta: Fraction,
+    rate: Fraction,
+) -> Phase | None:
+    """Return the fastest phase that is found, if it is faster than the former by :data:`FASTER`."""
+    systems, W = agent.vertices(agent.span or ()), _floats(former)
+    low, high, best = float(rate), 2 * float(rate), None
+    for _ in range(BISECTIONS):
+        middle = (low + high) / 2
+        found = later_matrix(systems, floats, W, float(beta), middle)
+        low, high = (low, middle) if found is None else (middle, high)
+        best = best if found is None else (found, middle)
+    if best is None or best[1] < FASTER * float(rate):
+        return None
+    matrix, chosen = best
+    d = Fraction(f"{(matrix @ floats)[-1]:.6e}")
+    rounded = [[round_to_bits(float(x), BITS) for x in row] for row in matrix]
+    exact, pace = with_gains(rounded, [x / d for x in gains]), Fraction(f"{chosen:.5e}")
+    rows = zip(exact, former, strict=True)
+    above = nonnegative(tuple(tuple(x - y for x, y in zip(*pair, strict=True)) for pair in rows))
+    points = prove_decrease(agent, _scaled(exact, 1 / (d * beta)), pace) if above and d > 0 else None
+    return None if points is None else Phase(function, exact, pace, d, points)
+
+
+def _scaled(W: Matrix, factor: Fraction) -> Matrix:
+    return tuple(tuple(factor * x for x in row) for row in W)
 
 
 def with_gains(W: Sequence[Sequence[Fraction]], g: Sequence[Fraction]) -> Matrix:

@@ -16,6 +16,7 @@ from generators import all_classes, random_graph
 from oracle_cascade import false_claims_of_cascade, moved
 from scipy.integrate import solve_ivp
 
+from ptcc_certify.bounds.cascade import Roots, course
 from ptcc_certify.certificate.cascade_part import CascadePart
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.procedure import certify
@@ -378,3 +379,43 @@ def test_what_is_not_proved_is_refused_with_the_reason(agents: Any, options: Any
     with pytest.raises(ParameterError) as caught:
         made(TEAM, FAST, [5, 2, 4, -1], Agents(**{"cascade": 2, **agents}), **options)
     assert says in str(caught.value) and "\n" not in str(caught.value)
+
+
+# ---------------------------------------------------------------------- course
+
+
+def test_the_course_is_above_the_solution_of_its_equations_and_near_it():
+    """``R' = -b R + theta' S``, ``J' = -g J + R``, ``S = e^-G S(0) + J``, by another integrator."""
+    for rho1, k, rate, alpha in ((1, 2, 3, 1), (10, 1, "0.2", "0.5"), ("0.01", 6, 2, 3), (3, 2, 7, "0.1")):
+        gain = NominalProtocol(T=2, rho1=rho1, rho2=k, kappa=1).gain
+        a, b, linear, pole = float(F(alpha)), float(F(rate)) / 2, float(gain.rho1), float(gain.pole)
+
+        def slope(z: float, y: Sequence[float], a: float = a, b: float = b, rho1: float = linear, k: float = pole):
+            rest = 2 * math.exp(-z)  # T - t
+            eta = rho1 + k / rest
+            theta, grows = k / (rest * eta) ** 2, 2 * rho1 * k * rest / (eta * rest) ** 4  # dtheta/ds
+            R, J, S0 = y
+            S, pace = S0 + J, eta * rest
+            return [pace * (-b * R + grows * S), pace * (-(a + theta) * J + R), -pace * (a + theta) * S0]
+
+        remaining = np.array([0.5, 0.1, 1e-3])
+        run = solve_ivp(
+            slope, (0, 7), [5.0, 0.0, 2.0], t_eval=-np.log(remaining), rtol=1e-11, atol=1e-60, first_step=1e-6
+        )
+        ours = course(gain, F(rate), F(alpha), Roots(F(2), F(0), F(5), F(0)), remaining)
+        for bound, exact in ((ours.combined, run.y[0]), (ours.integral, run.y[1]), (ours.state, run.y[1] + run.y[2])):
+            assert (exact <= bound * (1 + 1e-9)).all() and (bound <= 1.3 * exact).all()
+
+
+def test_eigenvalues_that_lie_far_apart_do_not_loosen_bounds_of_the_cascade():
+    """By ``q(0)`` alone the bounds of this team were 160 times its motion, of velocities 48,000 times."""
+    wide = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 200), ("c", "b", 100), ("c", "d", 300)])
+    certificate = made(wide, FAST, [0, 1, 2, 3], Agents(order=2, cascade=2), method="best", simulation=True)
+    holds(certificate)
+    part = part_of(certificate)
+    run = part.simulate()
+    m = int(np.argmin(np.abs(run.remaining - 0.1)))
+    eta = part.protocol.value(float(run.remaining[m]))
+    seen = np.abs(run.scaled[:, 0, :, m]).max(axis=0) * [1, eta] * np.exp(-run.rate * run.clock[m] / 2)
+    bound = part.deviation_bound(run.remaining[[m]])[:, :, 0].max(axis=0)
+    assert (seen <= bound * (1 + 1e-7)).all() and (bound <= 20 * seen).all()

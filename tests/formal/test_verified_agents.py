@@ -17,8 +17,11 @@ from mutations import Json, at, changed, mutants, nudged, resealed
 from selection import every
 from verified import compare, named, program, said
 
+from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.protocols.agents import Agents
 
 F = Fraction
 SOURCES = Path(__file__).resolve().parents[2] / "formal"
@@ -72,16 +75,26 @@ def test_the_statement_is_one_more_file_of_as_many_lines_as_is_said() -> None:
         assert f"{len(lines)} more" in page.read_text("utf-8")
 
 
-def test_forms_of_agents_that_are_not_read_are_told_in_one_line(tmp_path: Path) -> None:
+def test_a_formation_of_single_integrators_is_told_in_one_line(tmp_path: Path) -> None:
     program()
-    options: dict[str, Any] = {"simulation": False, "derivatives": [[0, 0, 0, 0]]}
-    cascade = certify(CAMPS, NominalProtocol(1, 1, 1, 4), [1, 2, 3, 4], agents=Agents(order=2, cascade=1), **options)
-    places = Agents(order=1, offsets=[1, 2, 3, 4], gain_cap=4)
-    formation = certify(CAMPS, NominalProtocol(1, 1, 1, 4), [1, 2, 3, 5], agents=places, simulation=False)
-    for document, what in ((json.loads(formation.to_json()), "formation"), (json.loads(cascade.to_json()), "cascade")):
-        assert check(document).accepted
-        code, text = said(document, tmp_path)
-        assert code == 2 and what in text and "use ptcc check" in text and text.count("\n") == 1
+    places = Agents(order=1, offsets=[1, 2, 3, 4])
+    formation = certify(CAMPS, NominalProtocol(1, 1, 1, 4), [1, 2, 3, 5], agents=places, simulation=False).to_dict()
+    assert check(formation).accepted
+    code, text = said(formation, tmp_path)
+    assert code == 2 and "formation" in text and "use ptcc check" in text and text.count("\n") == 1
+
+
+def test_phases_are_named_as_not_checked_and_the_rest_is_verified(tmp_path: Path) -> None:
+    program()
+    agents = Agents(order=3, drag="1/3")
+    document = certify(CAMPS, NominalProtocol(1, 1, 1, 4), [1, 2, 3, 5], agents=agents, simulation=False).to_dict()
+    assert check(document).accepted and document["phases"]
+    code, text = said(document, tmp_path)
+    assert code == 0, text
+    assert {part for part in named(text) if part.startswith("agent-phase")} == {
+        f"agent-phase of phases[{k}]" for k in range(len(document["phases"]))
+    }
+    assert "not checked phases" in text
 
 
 def told(document: Json, path: tuple[str | int, ...], new: Any) -> Json:
