@@ -310,7 +310,7 @@ def sparse(rng: Rng, data: Json, files: dict[str, bytes]) -> Parts:
     n, digits = int(10 ** rng.uniform(2, 4.5 if few else 2.4)), int(10 ** rng.uniform(0, 3.5))
     nodes, rows = [str(k) for k in range(n)], int(10 ** rng.uniform(0, 2)) if few else n - 1
     own = nodes[1:]
-    entry = lambda i, j: str(4 * n) if i == j else long_text(rng, digits) if not few else "0"  # noqa: E731
+    entry = lambda i, j: str(4 * n) if i == j and few else long_text(rng, digits) if not few else "0"  # noqa: E731
     lower = [[entry(i, j) for j in range(i + 1)] for i in range(min(rows, n - 1))]
     block = {"name": "P", "nodes": own, "times_rho": False}
     shape = {"lower_triangle": lower} if rng.random() < 0.7 else {"diagonal": [row[-1] for row in lower]}
