@@ -13,6 +13,10 @@ import numpy as np
 from mutations import Json, at, changed, containers, leaves, resealed
 from random_mutants import Rng, fraction, pick, with_hash
 
+from ptcc_certify.checker.obligations import OBLIGATIONS
+
+READ = {"orientation": "information", "duplicates": "refused", "self_loops": "refused", "undirected": False}
+
 #: Text from which a file is put together without keeping the whole.
 Parts = list[bytes]
 
@@ -301,36 +305,59 @@ def blanks(rng: Rng, data: Json, files: dict[str, bytes]) -> Parts:
 
 
 def sparse(rng: Rng, data: Json, files: dict[str, bytes]) -> Parts:
-    """Very many nodes, of which few listen, with a small matrix."""
-    n, listen = int(10 ** rng.uniform(2, 4.6)), int(10 ** rng.uniform(0, 2))
-    nodes = [str(k) for k in range(n)]
-    edges = [["0", str(k), "1"] for k in range(1, min(listen, n - 1) + 1)]
-    own = [target for _, target, _ in edges]
-    alone = [x for x in nodes if x not in set(own)]
-    closed = [{"nodes": [x], "balanced": True, "gauge": [1]} for x in alone]
-    structure = {"connectivity": "disconnected", "closed_components": closed, "leaders": alone, "followers": own}
+    """Very many nodes that all listen to the first, with few rows of a matrix, or with many long ones."""
+    few = rng.random() < 0.5
+    n, digits = int(10 ** rng.uniform(2, 4.5 if few else 2.4)), int(10 ** rng.uniform(0, 3.5))
+    nodes, rows = [str(k) for k in range(n)], int(10 ** rng.uniform(0, 2)) if few else n - 1
+    own = nodes[1:]
+    entry = lambda i, j: str(4 * n) if i == j and few else long_text(rng, digits) if not few else "0"  # noqa: E731
+    lower = [[entry(i, j) for j in range(i + 1)] for i in range(min(rows, n - 1))]
     block = {"name": "P", "nodes": own, "times_rho": False}
-    full = {"lower_triangle": [["0"] * i + ["1"] for i in range(len(own))]}
-    function = {"class": "full", "coordinates": "E", "blocks": [{**block, **full}], "rho": None}
-    function |= {"rate": "1", "overshoot": "1", "deviation": None}
-    rate = {"kind": "rate", "of": "lyapunov.functions[0]", "numbers": {"b": "1"}, "witness": None}
-    rate |= {"proves": "P L + L'P - b P > 0 on the range of L", "lemma": "Lyapunov decrease"}
+    shape = {"lower_triangle": lower} if rng.random() < 0.7 else {"diagonal": [row[-1] for row in lower]}
+    function = {"class": "full" if "lower_triangle" in shape else "lmi", "coordinates": "E", "rho": None}
+    function |= {"blocks": [{**block, **shape}], "rate": "1", "overshoot": "1", "deviation": None}
+    steps = [("structure", "graph", {}), ("claim", "graph", {}), ("final-state", "graph", {})]
+    steps += [("rate", "lyapunov.functions[0]", {"b": "1"})]
+    steps += [("overshoot", "lyapunov.functions[0]", {"lowest": "1", "highest": "1"})] * ("lower_triangle" in shape)
+    proof = [{"kind": kind, "of": of, "numbers": values, "witness": None} for kind, of, values in steps]
     data = {
         **data,
-        "graph": {"nodes": nodes, "edges": edges, "read": data["graph"].get("read"), "sha256": ""},
-        "structure": structure | {"balanced": True, "sign_symmetric": True},
+        "graph": {"nodes": nodes, "edges": [["0", x, "1"] for x in own], "read": READ, "sha256": ""},
+        "structure": {
+            **{"connectivity": "quasi-strong", "balanced": True, "sign_symmetric": True},
+            **{"closed_components": [{"nodes": ["0"], "balanced": True, "gauge": [1]}], "leaders": ["0"]},
+            "followers": own,
+        },
+        "claim": {"theorem": "2.1", "behaviour": "interval bipartite consensus", "corollaries": ["3", "4"]},
         "protocol": {"kind": "nominal", "T": "1", "rho1": "1", "rho2": "1", "kappa": "2"},
-        **dict.fromkeys(("paper", "claim", "sliding_variable", "reaching_time")),
         "lyapunov": {"functions": [function] * int(rng.choice([1, 3]))},
-        "proof": [*(s for s in data["proof"] if s["kind"] in ("structure", "claim")), rate],
+        "rates": {"paper": None, "diagonal": None, "proved": "1", "upper_bound": None},
+        "overshoot": {"value": "1", "of": "||E||^2"},
+        "influence": {
+            "components": [{"nodes": ["0"], "left_null_vector": ["1"]}],
+            **{"containment_weights": {x: ["1"] for x in own}, "degenerate": None},
+        },
+        **dict.fromkeys(("paper", "initial_state", "sliding_variable", "final_state", "reaching_time")),
+        "proof": [{**step, **dict(zip(("proves", "lemma"), OBLIGATIONS[step["kind"]], strict=True))} for step in proof],
     }
     data.pop("components", None)
-    if n <= 3000:
-        data = with_influence(rng, data, 2)
-    else:
-        vectors = {"components": [], "containment_weights": None, "degenerate": None}
-        data = {**data, "influence": vectors, "initial_state": None, "final_state": None}
     return [dumped(resealed(with_hash(data)))]
+
+
+def nearly(rng: Rng, data: Json, files: dict[str, bytes]) -> Parts:
+    """Numbers that are longer, and nearly the same: what rests on them is formed, and nearly holds."""
+    digits, share = int(10 ** rng.uniform(1, 3.2)), 10 ** rng.uniform(-2, 0)
+    key = pick(rng, ["lyapunov", "lyapunov", "influence", "final_state", "initial_state", "graph", "proof", "paper"])
+    common = 10**digits + int(rng.integers(10**9))
+    same = rng.random() < 0.5
+    for path, text in [p for p in leaves(data) if p[0][0] == key and "sha256" not in p[0]]:
+        value = fraction(text)
+        if value and rng.random() < share:
+            q = common + (0 if same else int(rng.integers(10**9)))
+            data = changed(data, path, f"{value.numerator * (q + 1)}/{value.denominator * q}")
+    with contextlib.suppress(KeyError, TypeError, ValueError):
+        data = with_hash(data)
+    return [dumped(resealed(data))]
 
 
 def modes(rng: Rng, data: Json, files: dict[str, bytes]) -> Parts:
@@ -353,5 +380,5 @@ def modes(rng: Rng, data: Json, files: dict[str, bytes]) -> Parts:
 
 HOSTILE: list[Callable[[Rng, Json, dict[str, bytes]], Parts]] = [
     *(cut, flipped, noise, wide, deep, long_numbers, many, labels, star, lying, factors, instants),
-    *(collisions, blanks, sparse, modes),
+    *(collisions, blanks, sparse, modes, nearly),
 ]

@@ -103,4 +103,8 @@ def more_cases() -> list[Case]:
         ("late", led, {"messages": LateMessages(delay="0.01")}),
     ):
         found.append((name, certify(edges, strong, [1, 2, 3], simulation=False, **more).to_json()))
+    for n, method in ((40, "full"), (90, "best")):
+        graph = random_graph(np.random.default_rng(n), "weak", "mixed", n=n).graph
+        plain = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
+        found.append((f"{n} nodes", certify(graph, plain, list(range(n)), simulation=False, method=method).to_json()))
     return [(name, {**json.loads(text), "unverified": {}}, {}) for name, text in found]

@@ -63,11 +63,11 @@ def read(path: str | Path) -> dict[str, Any]:
             content = file.read(MAX_BYTES + 1)
         if len(content) > MAX_BYTES:
             raise ValueError(f"more than {MAX_BYTES} bytes")
-        text = content.decode("utf-8-sig")
-        loaded = loaded_bytes(content, text)
+        loaded = loaded_bytes(content)
         if not (keeps(loaded) and fits(loaded, MAX_LOADED)):
             tenths = -(-loaded // 10**8)
             raise ValueError(f"it may take {tenths // 10}.{tenths % 10} GB in memory; allow more by --memory")
+        text = content.decode("utf-8-sig")
         del content
         # integers of 64 bits, as side files have them too; longer ones have no place in a certificate
         integer = lambda text: int(text) if len(text) <= 20 else number(text)  # noqa: E731
@@ -102,18 +102,23 @@ def _why(error: Exception) -> str:
     return (error.strerror if isinstance(error, OSError) else None) or str(error)
 
 
-def loaded_bytes(content: bytes, text: str) -> int:
+def loaded_bytes(content: bytes) -> int:
     """Bound the memory of a JSON text and of what it becomes, from its brackets, commas, colons and quotes.
+
+    Nothing is decoded yet: one wide character makes every character of a long text take four bytes.
 
     Examples
     --------
-    >>> loaded_bytes(b"[[], []]", "[[], []]")
-    359
+    >>> loaded_bytes(b"[[], []]"), loaded_bytes("[[], ['\U0001f600']]".encode())
+    (359, 431)
     """
     objects, arrays, keys, commas, quotes = (content.count(x) for x in (b"{", b"[", b":", b",", b'"'))
-    width = 1 if text.isascii() else -(-(sys.getsizeof(text) - 80) // len(text))  # bytes of a character
+    width, length = 1, len(content)
+    if not content.isascii():
+        width = 4 if re.search(rb"[\xf0-\xff]", content) else 2 if re.search(rb"[\xc4-\xff]", content) else 1
+        length = len(content.translate(None, bytes(range(0x80, 0xC0))))  # bytes that begin a character
     numbers = max(0, commas + 1 + keys - quotes // 2)
-    return 190 * objects + 90 * arrays + 70 * keys + 9 * commas + 26 * quotes + 32 * numbers + 2 * width * len(text)
+    return 190 * objects + 90 * arrays + 70 * keys + 9 * commas + 26 * quotes + 32 * numbers + 2 * width * length
 
 
 def digest(data: Mapping[str, Any]) -> str:

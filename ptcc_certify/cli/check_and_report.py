@@ -65,7 +65,7 @@ def check(
     with progress(("independent check",), screen.quiet) as begin:
         begin("independent check")
         if verified:
-            document, report = verified_check(certificate)
+            document, report = verified_check(certificate, memory)
         else:
             document, report = read_and_check(certificate, stdlib=stdlib, memory=memory)
     how: dict[str, str] = {}

@@ -66,13 +66,15 @@ def executable() -> Path:
     return Path(found)
 
 
-def verified_check(certificate: str) -> tuple[dict[str, Any], VerifiedReport]:
+def verified_check(certificate: str, memory: float = 1) -> tuple[dict[str, Any], VerifiedReport]:
     """Check a certificate with the verified checker; return its JSON object beside the report.
 
     Parameters
     ----------
     certificate : str
-        A path, or ``-`` for standard input.
+        A path.
+    memory : float
+        GB that the check may take; of the processor it takes at most ten seconds for each.
 
     Raises
     ------
@@ -89,12 +91,15 @@ def verified_check(certificate: str) -> tuple[dict[str, Any], VerifiedReport]:
     except UnreadableError as error:
         raise FormatError(str(error)) from None
     try:
-        run = subprocess.run([program, "--obligations", certificate], capture_output=True, check=False)
+        words = [program, "--obligations", "--memory", str(memory), certificate]
+        run = subprocess.run(words, capture_output=True, check=False)
     except OSError as error:
         raise ParameterError(f"{program} cannot be run ({error.strerror}); {BUILD}") from None
     output = run.stdout.decode("utf-8", "replace").rstrip("\n").split("\n")
     if run.returncode not in (0, 1, 4) or not output[0]:
         message = run.stderr.decode("utf-8", "replace").strip().removeprefix(f"{PROGRAM}: ")
+        if run.returncode < 0 or "out of memory" in message.lower():
+            message = "the check takes too much memory or time; allow more by --memory"
         raise FormatError(f"{certificate}: {message or f'{PROGRAM} ended with code {run.returncode}'}")
     return document, _report(output, run.returncode)
 

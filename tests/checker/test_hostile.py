@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hostile_files import HOSTILE
+from hostile_files import HOSTILE, colliding, sparse
 from mutations import Json
 from random_mutants import SEED, numbers, pick
 from true_certificates import cases, more_cases
@@ -108,3 +108,36 @@ def test_two_thousand_hostile_files_stay_within_a_gigabyte_and_ten_seconds(
     with capsys.disabled():
         for way, worst in found.items():
             print(f"\nseed {SEED}, {way}: {worst}")
+
+
+def test_colliding_keys_and_a_matrix_of_many_nodes_cost_the_verified_checker_little(
+    worker: Callable[[str, Path], Json], tmp_path: Path
+):
+    """Once 1 s of 15,000 keys, four times that of twice as many; and 2.5 GB of one row for 18,000 nodes."""
+    try:
+        program = str(executable())
+    except ParameterError as error:
+        pytest.skip(f"no verified checker: {error}")
+    _, data, _ = cases()[0]
+    keys = [one + other for one in colliding() for other in colliding()][:60_000]
+    (tmp_path / "keys.json").write_text(json.dumps({**data, "unverified": dict.fromkeys(keys, 0)}))
+    many = (sparse(np.random.default_rng(seed), data, {})[0] for seed in range(1000))
+    (tmp_path / "nodes.json").write_bytes(next(text for text in many if b'"15000"' in text))
+    for name, code in (("keys.json", 0), ("nodes.json", 1)):
+        answer = worker(program, tmp_path / name)
+        assert answer["code"] == code and answer["memory"] < 2 * 10**8 and answer["seconds"] < 3, answer
+
+
+def test_what_the_verified_checker_would_need_more_for_ends_in_one_line(tmp_path: Path):
+    try:
+        program = executable()
+    except ParameterError as error:
+        pytest.skip(f"no verified checker: {error}")
+    (tmp_path / "c.json").write_text('{"schema": "ptcc-certificate/2", "unverified": [' + "1," * 2_000_000 + "1]}")
+    for words in (["--memory", "0.05"], ["--memory", "0.001"]):
+        run = subprocess.run([program, *words, tmp_path / "c.json"], capture_output=True, text=True, check=False)
+        assert run.returncode == 2 and run.stdout == "" and run.stderr.count("\n") == 1, run
+        assert "allow more by --memory" in run.stderr
+    for words in (["--memory", "0"], ["--memory", "-1"], ["--memory", "nan"], ["--memory"]):
+        run = subprocess.run([program, *words, tmp_path / "c.json"], capture_output=True, text=True, check=False)
+        assert run.returncode == 2 and run.stderr.startswith("usage") and run.stderr.count("\n") == 1, run

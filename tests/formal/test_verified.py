@@ -13,18 +13,22 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bad_inputs import ptcc
 from generators import all_classes, random_graph, smallest
 from mutations import changed, mutants, resealed
 from paper_examples import paper_examples
 from selection import every, thinned
 from verified import AT_REST, SKIPPED, UNREAD, compare, named, program, said
 
+from ptcc_certify.certificate.family_certificate import certify_family
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
 from ptcc_certify.checker.input_formulas import InitialSet
 from ptcc_certify.checker.obligations import OBLIGATIONS
 from ptcc_certify.cli.verified import VARIABLE, executable, verified_check
 from ptcc_certify.errors import FormatError, ParameterError
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.family import Family
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.protocols.late_messages import LateMessages
@@ -142,6 +146,61 @@ def test_claims_besides_those_of_the_graph_are_named_and_not_believed(tmp_path: 
         assert code == 1 and "unknown" in text
         code, text = said(resealed({**document, "proof": more["proof"]}), tmp_path)
         assert code == 1 and "nothing asks for" in text
+
+
+def test_a_claim_that_is_not_checked_stands_in_the_last_line_with_exit_code_4(tmp_path: Path) -> None:
+    """Late messages are claimed, and not spoken of by the theorem; what all else says is told as by the other check."""
+    program()
+    edges = [("l", "a", 1), ("a", "b", 1), ("b", "a", 1)]
+    cert = certify(edges, NominalProtocol(1, 1, 1, 2), [1, 2, 3], simulation=False, messages=LateMessages(delay="0.02"))
+    cert.save(tmp_path / "c.json")
+    file = str(tmp_path / "c.json")
+    plain, run = (ptcc("check", file, *words) for words in ((), ("--verified",)))
+    told = " ".join(run.out.split())
+    assert plain.code == 0 and run.code == 4, run
+    assert re.search(r"accepted undecided: not checked: messages, all that is said of [^;]*; .* obligations", told)
+    assert "accepted certified" not in told
+    heads = [[line[:10] for line in one.out.splitlines()] for one in (plain, run)]
+    assert {"claim     ", "x(T)      "} <= set(heads[1]) and heads[0][:4] == heads[1][:4]
+    data = json.loads(ptcc("check", file, "--verified", "--json").out)
+    assert data["verdict"] == "undecided" and any("messages" in what for what in data["not_checked"])
+
+
+def test_claim_final_state_and_error_bound_are_printed_as_by_the_other_check(tmp_path: Path) -> None:
+    program()
+    (tmp_path / "c.json").write_text(paper_examples()[1])
+    plain, run = (ptcc("check", str(tmp_path / "c.json"), *words).out.splitlines() for words in ((), ("--verified",)))
+    named_ = [line for line in run if line.startswith("accepted")]
+    assert len(named_) == 1 and "by the verified checker" in " ".join(run)
+    assert run[: run.index(named_[0])] == plain[: len(plain) - 1]
+    assert {"claim", "x(T)", "error"} <= {line.split(" ")[0] for line in run}
+
+
+def test_what_is_said_of_an_obligation_is_what_the_theorem_says(tmp_path: Path) -> None:
+    """The fixed texts of three kinds say more: strict ends, an equality, the rate of every mode."""
+    program()
+    texts = [said(json.loads(text), tmp_path).text for text in paper_examples()]
+    assert any("verified    rate-mean of rates: upper_bound >= 2 trace(A)/r" in text for text in texts)
+    edges = [("a", "b", 1), ("b", "a", -1), ("b", "c", -2), ("c", "d", 1)]
+    cert = certify(edges, NominalProtocol(2, 3, 1, 2), [1, 2, 3, -4], simulation=False, method="full")
+    text = said(json.loads(cert.to_json()), tmp_path).text
+    assert re.search(r"verified    overshoot of lyapunov\.functions\[\d\]: lowest I <= P <= highest I", text)
+    modes = [[("a", "b", w), ("b", "a", w)] for w in (1, 5)]
+    family = Family.switching([SignedDigraph.from_edges(edges) for edges in modes])
+    made = certify_family(family, NominalProtocol(1, 1, 1, 2), [1, 2])
+    proof = json.loads(made.to_json())["proof"]
+    rates = {o["of"]: Fraction(o["numbers"]["b"]) for o in proof if o["kind"] == "family-rate"}
+    text = said(json.loads(made.to_json()), tmp_path).text
+    assert len(set(rates.values())) > 1
+    for of, rate in rates.items():
+        faster = rate != min(r for place, r in rates.items() if place.partition("].")[0] == of.partition("].")[0])
+        assert f"verified    family-rate of {of}{': at the rate of the function' * faster}\n" in text
+
+
+def test_ends_of_the_spectrum_are_part_of_the_theorem() -> None:
+    text = (SOURCES / "Certificate.v").read_text("utf-8")
+    claim = text[text.index("Definition function_claim") :].partition("(**")[0]
+    assert "lowest f" in claim and "highest f" in claim and "qbil P z z" in claim
 
 
 def test_late_messages_of_leaders_that_move_are_named_with_all_their_obligations(tmp_path: Path) -> None:
