@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import math
 import os
 import pickle
 import signal
 import sys
 import threading
+import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextvars import ContextVar
@@ -16,14 +18,16 @@ from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from typing import Any
 
-from lmi.errors import LMIError
-from lmi.search_time import checkpoint, seconds_left
+from lmi.errors import LMIError, OutOfTime
+from lmi.search_time import begin_child, checkpoint, processor_left, seconds_left, take_over, work_counted
 
 _ITEM, _ERROR, _END = range(3)
 #: Whether another thread than the main one may copy its process: all others are idle, and hold nothing.
 any_thread: ContextVar[bool] = ContextVar("any_thread", default=False)
 #: PR_SET_PDEATHSIG of Linux.
 _DEATH_SIGNAL = 1
+#: Seconds between two looks at the processor time of a child.
+_LOOK = 1.0
 
 #: Whether this process is such a child.
 forked = False
@@ -66,7 +70,7 @@ def apart(work: Callable[[], Iterable[Any]]) -> Iterator[Any]:
         yield from work()
         return
     here, there = Pipe(duplex=False)
-    parent = os.getpid()
+    parent, left = os.getpid(), processor_left()
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # until either process is ready for it
     try:
         with warnings.catch_warnings():
@@ -79,12 +83,14 @@ def apart(work: Callable[[], Iterable[Any]]) -> Iterator[Any]:
         yield from work()
         return
     if child == 0:
+        begin_child(left)
         _work(work, here, there, parent)
     try:
         there.close()
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         while True:
-            kind, value = _receive(here)
+            kind, value, worked = _receive(here, child, left)
+            take_over(worked)
             if kind == _END:
                 return
             if kind == _ERROR:
@@ -94,7 +100,8 @@ def apart(work: Callable[[], Iterable[Any]]) -> Iterator[Any]:
         here.close()
         with contextlib.suppress(ProcessLookupError, ChildProcessError):  # where children are not waited for
             os.kill(child, signal.SIGKILL)
-            os.waitpid(child, 0)
+            used = os.wait4(child, 0)[2]
+            take_over(0.0, used.ru_utime + used.ru_stime)
 
 
 def _work(work: Callable[[], Iterable[Any]], here: Connection, there: Connection, parent: int) -> None:
@@ -110,10 +117,10 @@ def _work(work: Callable[[], Iterable[Any]], here: Connection, there: Connection
         here.close()
         try:
             for value in work():
-                there.send((_ITEM, value))
-            there.send((_END, None))
+                there.send((_ITEM, value, work_counted()))
+            there.send((_END, None, work_counted()))
         except BaseException as error:
-            there.send((_ERROR, _portable(error)))
+            there.send((_ERROR, _portable(error), work_counted()))
     finally:
         os._exit(0)
 
@@ -126,11 +133,13 @@ def _portable(error: BaseException) -> BaseException:
         return LMIError(f"{type(error).__name__}: {error}")
 
 
-def _receive(here: Connection) -> Any:
+def _receive(here: Connection, child: int, left: float) -> Any:
     """Return what the child sent, as soon as it comes before the time limit."""
     checkpoint()
-    while not here.poll(min(seconds_left(), 3600.0)):
+    while not here.poll(min(seconds_left(), 3600.0 if left == math.inf else _LOOK)):
         checkpoint()
+        if left < math.inf and time.clock_gettime(~child << 3 | 2) > left:  # the clock of all threads of a process
+            raise OutOfTime("the time limit is reached")
     try:
         return here.recv()
     except (EOFError, OSError):  # before or amid an item

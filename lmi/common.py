@@ -25,7 +25,7 @@ from lmi import child_process
 from lmi.diagonal import run_solver
 from lmi.errors import MatrixError, NoCertificate, OutOfTime
 from lmi.matrix_classes import square
-from lmi.search_time import checkpoint, seconds_left, uncounted
+from lmi.search_time import checkpoint, seconds_left, spend, uncounted
 
 #: Steps at most, and the relative gain that is worth another one.
 _STEPS, _GAIN = 12, 1e-4
@@ -37,6 +37,8 @@ _LEAST, _LARGEST_CONDITION = 1e-7, 1e12
 _TRUST = (0.3, 0.8)
 #: Rows up to which Clarabel takes a matrix as it is; with a diagonal ``P`` those of sparse matrices have zeros.
 _WHOLE_ROWS = {False: 60, True: 24}
+#: Seconds that a program takes for each block: what multiplies a power of its rows, by what ``P`` is.
+_SECONDS = {"full": (1.8e-7, 4), "diagonal": (2e-3, 1), "fixed": (0.02, 1)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -296,6 +298,7 @@ class _Search:
             constraints.append(inequality(P, mode, tau, own, rise, unit) >> 0)
             taus.append(tau)
         problem = cp.Problem(cp.Maximize(t[0] if self.shares is None else self.shares @ t), constraints)
+        spend(program_seconds(modes, "diagonal" if self.diagonal else "full"))
         run_program(problem, n + max(mode.radii.size for mode in modes), self.tolerance, self.diagonal)
         if p.value is None or not np.isfinite(p.value).all():
             raise NoCertificate(f"the solver answered {problem.status}")
@@ -316,6 +319,19 @@ def inequality(P: Any, mode: UncertainMatrix, tau: Any, b: Any, t: Any, unit: fl
     H, F = (sparse.csr_array(x / math.sqrt(unit)) for x in (mode.H, mode.F))
     coupling = P @ F
     return cp.bmat([[form - H @ cp.diag(tau) @ H.T, coupling], [coupling.T, cp.diag(tau)]])
+
+
+def program_seconds(modes: Sequence[UncertainMatrix], shape: str) -> float:
+    """Return about how long a program with an inequality for each mode takes, from sizes alone.
+
+    Examples
+    --------
+    >>> one = UncertainMatrix.known(np.eye(24))
+    >>> program_seconds([one], "diagonal") < program_seconds([one], "full") < program_seconds([one, one], "full") < 1
+    True
+    """
+    factor, power = _SECONDS[shape]
+    return sum(factor * float(len(mode.A) + mode.radii.size) ** power for mode in modes)
 
 
 def run_program(problem: Any, rows: int, tolerance: float, diagonal: bool = False) -> None:
@@ -379,6 +395,7 @@ def least_condition(
         unit = float(np.abs(mode.A).max(initial=0.0)) or 1.0
         constraints.append(inequality(P, mode, taus[-1], rate, 0.0, unit) >> 0)
     problem = cp.Problem(cp.Minimize(c), constraints)
+    spend(program_seconds(modes, shape))
     run_program(problem, n + max(mode.radii.size for mode in modes), tolerance, shape == "diagonal")
     if p.value is None or not np.isfinite(p.value).all():
         raise NoCertificate(f"the solver answered {problem.status}")
@@ -462,6 +479,7 @@ def _multipliers(mode: UncertainMatrix) -> np.ndarray:
     unit = float(np.abs(mode.A).max(initial=0.0)) or 1.0
     tau, t = cp.Variable(len(mode.radii)), cp.Variable()
     problem = cp.Problem(cp.Maximize(t), [inequality(np.eye(len(mode.A)), mode, tau, 0.0, t, unit) >> 0])
+    spend(program_seconds([mode], "fixed"))
     run_program(problem, len(mode.A) + len(mode.radii), 1e-7)
     if tau.value is None or not np.isfinite(tau.value).all():
         raise NoCertificate(f"the solver answered {problem.status}")

@@ -16,9 +16,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from lmi import child_process
-from lmi.common import CommonCertificate, UncertainMatrix, common_lyapunov, evaluate, inequality, run_program
+from lmi.common import (
+    CommonCertificate,
+    UncertainMatrix,
+    common_lyapunov,
+    evaluate,
+    inequality,
+    program_seconds,
+    run_program,
+)
 from lmi.errors import MatrixError, NoCertificate, OutOfTime
-from lmi.search_time import checkpoint, uncounted
+from lmi.search_time import checkpoint, spend, uncounted
 
 #: Steps at most for one ``m``, the relative gain that is worth another one, and values of ``ln m`` that are tried.
 _STEPS, _GAIN, _TRIALS = 8, 1e-3, 6
@@ -174,6 +182,7 @@ class _Program:
         common = [S.T @ P @ S for S, P in zip(self.factors, forms, strict=True)]
         constraints += [self.ratio * P - Q >> 0 for P in common for Q in common if P is not Q]
         problem = cp.Problem(cp.Maximize(t), constraints)
+        spend(len(self.modes) * program_seconds(self.modes, "full"))  # with an inequality for each pair of modes
         run_program(problem, n + max(mode.radii.size for mode in self.modes), 1e-7)
         if t.value is None or any(P.value is None or not np.isfinite(P.value).all() for P in forms):
             raise NoCertificate(f"the solver answered {problem.status}")

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lmi import search_time as deadline
+from lmi.blas_threads import one_thread
 from lmi.exact.decimal_rounding import down
 from lmi.search_time import share_of_time
 from ptcc_certify.bounds.attracting_box import AttractingBox, box_of_family
@@ -46,11 +47,11 @@ from ptcc_certify.checker.restricted_signals import reachable_bounds
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.display_hook import Shown, family_summary, plot_of_family
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.graphs.size_limits import EXACT_NODES
-from ptcc_certify.graphs.structure import STABILITY, analyse
+from ptcc_certify.graphs.size_limits import EXACT_NODES, ONE_THREAD_NODES
+from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY, analyse
 from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.family_rate_upper_bound import prove_family_rate_bound
-from ptcc_certify.lyapunov.family_search import FamilySearch, search_family
+from ptcc_certify.lyapunov.family_search import CLOSED_ROWS, FamilySearch, search_family
 from ptcc_certify.lyapunov.follower_function import follower_functions
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.squares_function import SquaresFunction, squares_function
@@ -283,7 +284,8 @@ def certify_family(
     sigma0 : state-like, optional
         Sliding mode: ``sigma(0)``, like ``x0``; without it 0, which leaves no reaching phase.
     time_limit : float, optional
-        Seconds of wall time for the searches; without it 60, and 1 more for every 1,000 nodes.
+        Seconds of wall time for the searches; without it the work of 60 s of one core, and of 1 s more for every 1,000
+        nodes, so that what is found does not depend on how busy the machine is.
     signal : {"any", "constant"}, DwellTime, JointWindows or ClockShares
         Restricted signals of which more is claimed, beside what holds for every signal.
     expectations : Expectations or str, optional
@@ -334,7 +336,8 @@ def certify_family(
     progress(STEPS[0])
     components = decide(family)
     parts, notes, still = [], list(family.notes), sigma is None or not any(sigma)
-    with deadline.time_limit(seconds):
+    few = one_thread(family.n_nodes <= ONE_THREAD_NODES)
+    with few, deadline.time_limit(seconds, work=time_limit is None):
         for component in components:
             part = _prove(component, notes, progress)
             parts.append(_with_means(part) if initial_state is not None and still else part)
@@ -425,6 +428,15 @@ def _squares(component: FamilyComponent, notes: list[str] | None = None) -> list
     return [] if found is None else [found]
 
 
+def _dense(component: FamilyComponent, notes: list[str]) -> tuple[ProvedFunction, ...]:
+    """Return a dense form of a component of some hundreds of agents, if one is proved."""
+    if component.nodes.size > CLOSED_ROWS or component.behaviour not in (STABILITY, BIPARTITE_CONSENSUS):
+        return ()
+    search = search_family(Quotient.of(component), ["full"])
+    notes += search.notes
+    return search.functions
+
+
 def _prove(component: FamilyComponent, notes: list[str], progress: Callable[[str], None]) -> ComponentProof:
     bare = ComponentProof(component)
     if component.kernel is None or component.nodes.size == 1 or not bare.certifiable:
@@ -435,6 +447,7 @@ def _prove(component: FamilyComponent, notes: list[str], progress: Callable[[str
         with share_of_time(1.0, STEPS[2], notes):
             functions += follower_functions(component, notes=notes)
             functions += _squares(component, notes) if not functions else []
+            functions += _dense(component, notes) if not functions else []
         return ComponentProof(component, tuple(functions))
     quotient = Quotient.of(component)
     bound, search = None, FamilySearch()

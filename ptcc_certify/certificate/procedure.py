@@ -17,6 +17,7 @@ from typing import Any, cast, overload
 import numpy as np
 
 from lmi import search_time as deadline
+from lmi.blas_threads import one_thread
 from lmi.child_process import apart
 from lmi.errors import LMIError, NoCertificate, OutOfTime
 from lmi.search_time import share_of_time
@@ -68,7 +69,13 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io import as_family, as_graph
 from ptcc_certify.graphs.io.family_conversion import is_family
-from ptcc_certify.graphs.size_limits import EXACT_NODES, FACTOR_NODES, SEARCH_NODES, SIMULATED_NODES
+from ptcc_certify.graphs.size_limits import (
+    EXACT_NODES,
+    FACTOR_NODES,
+    ONE_THREAD_NODES,
+    SEARCH_NODES,
+    SIMULATED_NODES,
+)
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.lyapunov.error_system import ErrorSystem
 from ptcc_certify.lyapunov.function import LyapunovFunction
@@ -198,7 +205,7 @@ def certify(
     time_limit : float, optional
         Seconds of wall time. Simulation and searches may take 40 % together, each its share of what is left; what is
         proved by then stands and is checked, and ``cut_off`` names what was ended. Without it they have 60 s, and 1 s
-        more for every 1,000 nodes.
+        more for every 1,000 nodes, of work: what is found then does not depend on how busy the machine is.
     expectations : Expectations or str, optional
         What is asked besides: a behaviour (a text names one), a rate, a bound of the input. It decides nothing but the
         ``assessment``.
@@ -294,14 +301,15 @@ def certify(
     runs = wanted and initial_state is not None
     if not runs and disturbance is not None and protocol.reaching is not None:
         _check_disturbance(disturbance, protocol.reaching, graph)
-    certificate = case.certificate(disturbance, runs, reaching)
-    if formation is not None:
-        certificate = certificate.changed(offsets=formation.offsets)
-    if of_agents is not None and chains is not None:
-        certificate = _with_agents(certificate, of_agents, chains, wanted)
-    certificate = _with_small_delays(certificate)
-    progress(STEPS[5])
-    return _with_word_of_check(certificate)
+    with one_thread(graph.n_nodes <= ONE_THREAD_NODES):
+        certificate = case.certificate(disturbance, runs, reaching)
+        if formation is not None:
+            certificate = certificate.changed(offsets=formation.offsets)
+        if of_agents is not None and chains is not None:
+            certificate = _with_agents(certificate, of_agents, chains, wanted)
+        certificate = _with_small_delays(certificate)
+        progress(STEPS[5])
+        return _with_word_of_check(certificate)
 
 
 def motion_of(certificate: Certificate, agents: Agents) -> Certificate:
@@ -459,7 +467,7 @@ class Case:
 
     def certificate(self, disturbance: Any, runs: bool, reaching: tuple[ReachingTime, ...] | None) -> Certificate:
         """Return what the steps find and prove, before the independent check."""
-        with deadline.time_limit(SEARCHING * self.request.time_limit):
+        with deadline.time_limit(SEARCHING * self.request.time_limit, work=self.request.by_work):
             trajectory = self.simulation(disturbance) if runs else None
             lyapunov, proof, numerical = self.paper()
             search = self.search(proof)

@@ -109,6 +109,8 @@ class Request:
         How leaders move.
     time_limit : float
         Seconds that the searches were given, infinity for no limit.
+    by_work : bool
+        Whether they were seconds of work, since nobody asked for a limit, and not of wall time.
     expectations : Expectations
         What is asked besides; what became of it is part of ``assessment``.
     scenario : mapping or None
@@ -127,6 +129,7 @@ class Request:
     messages: LateMessages | None = None
     leaders: MovingLeaders | None = None
     time_limit: float = math.inf
+    by_work: bool = False
     expectations: Expectations = field(default_factory=Expectations)
     scenario: Mapping[str, Any] | None = None
     origins: Mapping[str, str] = field(default_factory=dict, hash=False)
@@ -246,6 +249,7 @@ def read_request(structure: Structure, protocol: Protocol, arguments: Mapping[st
         messages=_one_of(LateMessages, "messages", arguments["messages"], "delay='0.01'"),
         leaders=_one_of(MovingLeaders, "leaders", arguments["leaders"], "speed=1"),
         time_limit=read_seconds(arguments["time_limit"], structure.graph),
+        by_work=arguments["time_limit"] is None,
         expectations=read_expectations(arguments["expectations"]),
         scenario=scenario,
         origins=arguments["origins"],
@@ -261,7 +265,7 @@ def listener(progress: Callable[..., None] | None) -> Callable[..., None]:
 
 
 def read_seconds(time_limit: Any, graph: Sized) -> float:
-    """Return the seconds of a time limit; None: 60, and 1 more for every 1,000 nodes.
+    """Return the seconds of a time limit; None: 60 of work, and 1 more for every 1,000 nodes.
 
     Examples
     --------

@@ -259,8 +259,9 @@ time_limit_option = click.option(
     "--time-limit",
     type=float,
     metavar="SECONDS",
-    help="For simulation and searches of a graph together, not for decisions and checks; near it what is found may "
-    "differ from run to run.  [default: 60, and 1 more for every 1,000 nodes]",
+    help="Of wall time, for simulation and searches of a graph together, not for decisions and checks; near it what is "
+    "found may differ from run to run.  [default: the work of 60 s, and of 1 s more for every 1,000 nodes, which does "
+    "not depend on how busy the machine is]",
 )
 output_option = click.option(
     "-o",

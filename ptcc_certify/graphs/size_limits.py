@@ -9,6 +9,8 @@ MAX_BYTES, MAX_LINE, MAX_NODES = 2**30, 65_536, 2 * 10**6
 
 #: Nodes up to which null vectors, final states and proofs are computed in exact rationals.
 EXACT_NODES = 120
+#: Nodes up to which BLAS has one thread: more take longer, many times on a busy machine, and round differently.
+ONE_THREAD_NODES = 400
 #: Nodes above which null vectors and eigenvalues are computed by sparse methods, eigenvalues up to so many.
 DENSE_NODES, FACTOR_NODES = 500, 20_000
 #: Nodes up to which the paper's certificate (dense semidefinite cones) is searched.

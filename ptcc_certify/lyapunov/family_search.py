@@ -11,6 +11,7 @@ docs/theory/families.md, "Common quadratic functions", "Uncertain weights" and "
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -19,10 +20,11 @@ from fractions import Fraction
 import numpy as np
 
 from lmi.common import CommonCertificate, best_multipliers, common_lyapunov, least_condition
+from lmi.common_closed_form import closed_form_lyapunov
 from lmi.dyadic import round_to_bits
-from lmi.errors import LMIError, OutOfTime
-from lmi.search_time import checkpoint, seconds_left, share_of_time, time_limit
-from ptcc_certify.checker.matrix_products import WITH_MULTIPLIERS
+from lmi.errors import LMIError, NoCertificate, OutOfTime
+from lmi.search_time import checkpoint, part_of_time, share_of_time
+from ptcc_certify.checker.matrix_products import LARGEST_ROWS, WITH_MULTIPLIERS
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.lyapunov.error_system import rounded_matrix
 from ptcc_certify.lyapunov.family_function import FamilyFunction, prove_ends, prove_mode, with_constants
@@ -31,11 +33,11 @@ from ptcc_certify.lyapunov.undirected_family import undirected_function
 
 #: Classes of functions.
 KINDS = ("undirected", "diagonal", "full")
-#: Rows up to which a full matrix, and a diagonal one, is searched.
-FULL_ROWS, DIAGONAL_ROWS = 24, EXACT_NODES
+#: Rows up to which a full matrix, and a diagonal one, is searched, and a full one taken from Lyapunov equations.
+FULL_ROWS, DIAGONAL_ROWS, CLOSED_ROWS = 24, EXACT_NODES, LARGEST_ROWS
 #: What is told where the check would refuse a proof, between the rows that it takes and those that there may be.
 TOO_MANY_ROWS = "agents and uncertain edges in one mode are above the rows of a proof"
-#: Share of the time of the search for the diagonal matrix, which comes first, where there is a limit.
+#: Share of the time of the search for the diagonal matrix, which comes before the full one.
 _DIAGONAL_SHARE = 0.3
 #: Share of the time of a class for the climb to the largest rate.
 _CLIMB_SHARE = 0.7
@@ -104,9 +106,10 @@ def search_family(
     >>> round(float(best.rate), 2), len(best.rates), float(best.rates[1]) >= float(best.rate)
     (0.96, 2, True)
     """
-    if len(quotient.nodes) > DIAGONAL_ROWS:
-        return FamilySearch(notes=(f"{len(quotient.nodes)} agents are above the {DIAGONAL_ROWS} of the searches",))
-    if not quotient.nodes or all(mode.at_rest for mode in quotient.modes):
+    n = len(quotient.nodes)
+    if n > CLOSED_ROWS:
+        return FamilySearch(notes=(f"{n} agents are above the {CLOSED_ROWS} of the searches",))
+    if not n or all(mode.at_rest for mode in quotient.modes):
         return FamilySearch()
     functions: list[FamilyFunction] = []
     notes: list[str] = []
@@ -114,31 +117,47 @@ def search_family(
     if "undirected" in kinds:
         with share_of_time(1.0, "undirected", cut_off):
             functions += filter(None, [undirected_function(quotient)])
+    if shares is None and any(V.optimal for V in functions):
+        return FamilySearch(tuple(functions), tuple(notes), tuple(cut_off))
     most = max(mode.proof_rows for mode in quotient.modes)
-    if shares is not None or not any(V.optimal for V in functions):
-        small = "full" in kinds and len(quotient.nodes) <= FULL_ROWS
-        limited = np.isfinite(seconds_left()) and small  # else nothing comes after the diagonal one
-        for kind, rows, share in (("diagonal", DIAGONAL_ROWS, _DIAGONAL_SHARE), ("full", FULL_ROWS, 1.0)):
-            if kind not in kinds or (
-                enough is not None and any(_worth(quotient, V, shares) >= enough for V in functions)
-            ):
-                continue
-            if most > WITH_MULTIPLIERS:
-                notes.append(f"class {kind}: {most:,} {TOO_MANY_ROWS}, {WITH_MULTIPLIERS} at most")
-                continue
-            if len(quotient.nodes) > rows:
-                notes.append(f"class {kind} is searched up to {rows} rows; these are {len(quotient.nodes)}")
-                continue
-            with share_of_time(share if limited else 1.0, f"class {kind}", cut_off):
-                try:
-                    for function in _common_functions(quotient, kind, notes, shares):  # kept, whatever comes after
-                        functions.append(function)
-                except OutOfTime:
-                    raise
-                except (LMIError, np.linalg.LinAlgError) as error:
-                    notes.append(f"class {kind}: {error}")
+    if most > WITH_MULTIPLIERS:
+        return FamilySearch(
+            tuple(functions), (f"{most:,} {TOO_MANY_ROWS}, {WITH_MULTIPLIERS} at most",), tuple(cut_off)
+        )
+    closed = _closed_function(quotient, cut_off) if "full" in kinds and shares is None else None
+    share = _DIAGONAL_SHARE if "full" in kinds and n <= FULL_ROWS else 1.0  # else nothing comes after the diagonal one
+    for kind, rows, own in (("diagonal", DIAGONAL_ROWS, share), ("full", FULL_ROWS, 1.0)):
+        if kind not in kinds or (enough is not None and any(_worth(quotient, V, shares) >= enough for V in functions)):
+            continue
+        if n > rows:
+            if closed is None:
+                notes.append(f"class {kind} is searched up to {rows} rows; these are {n}")
+            continue
+        with share_of_time(own, f"class {kind}", cut_off):
+            try:
+                for function in _common_functions(quotient, kind, notes, shares):  # kept, whatever comes after
+                    functions.append(function)
+            except OutOfTime:
+                raise
+            except (LMIError, np.linalg.LinAlgError) as error:
+                notes.append(f"class {kind}: {error}")
+    if closed is not None and not any(_worth(quotient, V, shares) >= closed.rate for V in functions):
+        functions.append(closed)
     functions.sort(key=lambda V: (-_worth(quotient, V, shares), V.overshoot))
     return FamilySearch(tuple(functions), tuple(notes), tuple(cut_off))
+
+
+def _closed_function(quotient: Quotient, cut_off: list[str]) -> FamilyFunction | None:
+    """Return a full matrix that Lyapunov equations give; None if its rate is not positive.
+
+    It takes little time, and so comes first: what is searched for longer may be cut off.
+    """
+    moving = [number for number, mode in enumerate(quotient.modes) if not mode.at_rest]
+    with share_of_time(1.0, "Lyapunov equations", cut_off), contextlib.suppress(NoCertificate, np.linalg.LinAlgError):
+        certificate = closed_form_lyapunov([quotient.modes[number].array for number in moving])
+        if certificate.rate > 0:
+            return prove_certificate(quotient, "full", certificate, moving)
+    return None
 
 
 def _worth(quotient: Quotient, V: FamilyFunction, shares: Sequence[float] | None) -> Fraction:
@@ -158,7 +177,7 @@ def _common_functions(
     arrays = [quotient.modes[number].array for number in moving]
     with np.errstate(all="ignore"):
         own = None if shares is None else [shares[number] for number in moving]
-        with time_limit(_CLIMB_SHARE * max(seconds_left(), 0.0)):  # what it has by then is proved in the rest
+        with part_of_time(_CLIMB_SHARE):  # what it has by then is proved in the rest
             best = common_lyapunov(arrays, shape=kind, shares=own)
         goal = [best.rate] * len(arrays) if shares is None else best.rates
         condition, top = math.inf, max(goal)

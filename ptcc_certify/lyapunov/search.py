@@ -26,7 +26,7 @@ from lmi.child_process import apart
 from lmi.definiteness_proofs import prove_generalized_margin
 from lmi.errors import LMIError, OutOfTime
 from lmi.matrix_classes import block_columns
-from lmi.search_time import checkpoint, seconds_left, share_of_time, time_limit
+from lmi.search_time import checkpoint, part_of_time, share_of_time
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.dominance import dominant_functions
@@ -137,7 +137,7 @@ def search_functions(system: ErrorSystem, method: str, clocks: Sequence[float], 
         "full": (0.4, lambda: _full_candidates(system, losses)),
         "lmi": (0.6, lambda: _lmi_candidates(system, method == "lmi" or at is not None)),
     }
-    with np.errstate(all="ignore"), time_limit(SEARCHING * seconds_left()):  # the rest is for the proofs
+    with np.errstate(all="ignore"), part_of_time(SEARCHING):  # the rest is for the proofs
         for kind, (share, search) in searches.items():
             if method not in (kind, "best"):
                 continue

@@ -16,7 +16,7 @@ from ptcc_certify.certificate.restricted_claims import LastModeClaim
 from ptcc_certify.certificate.restricted_states import constant_states, last_states, states_of_signal
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.size_limits import EXACT_NODES
-from ptcc_certify.graphs.structure import BIPARTITE_CONTAINMENT, STABILITY
+from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, BIPARTITE_CONTAINMENT, STABILITY
 from ptcc_certify.report.restricted_screen import (
     RESTS,
     TINY,
@@ -473,18 +473,19 @@ def _rate_entries(certificate: FamilyCertificate) -> Lines:
 
 def _no_search(certificate: FamilyCertificate) -> str:
     """Tell why no rate was proved: too many agents for a search, or too little time; nothing where it is not known."""
-    from ptcc_certify.lyapunov.family_search import TOO_MANY_ROWS
+    from ptcc_certify.lyapunov.family_search import CLOSED_ROWS, TOO_MANY_ROWS
 
     without = [part.component for part in certificate.parts if part.component.nodes.size > 1 and not part.rate]
     largest = max(without, key=lambda component: component.nodes.size, default=None)
     late = any("cut off" in note for note in certificate.notes)
-    if largest is not None and largest.nodes.size > EXACT_NODES:
-        if largest.behaviour != STABILITY:
-            return f"{largest.nodes.size:,} agents are above the {EXACT_NODES:,} of the searches"
-        if not late:
-            return f"weighted squares of {largest.nodes.size:,} agents prove none"
+    if largest is not None and largest.behaviour != STABILITY:
+        most = CLOSED_ROWS if largest.behaviour == BIPARTITE_CONSENSUS else EXACT_NODES
+        if largest.nodes.size > most:
+            return f"{largest.nodes.size:,} agents are above the {most:,} of the searches"
     if large := next((note for note in certificate.notes if TOO_MANY_ROWS in note), ""):
-        return large.partition(": ")[2]
+        return large
+    if largest is not None and largest.nodes.size > EXACT_NODES and not late:
+        return f"closed forms of {largest.nodes.size:,} agents prove none"
     return "the searches took too long; raise --time-limit" * late
 
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from lmi.search_time import checkpoint, seconds_left
+from lmi.search_time import checkpoint, processor_left, seconds_left
 
 
 @contextmanager
@@ -61,15 +61,20 @@ def interruptible() -> Iterator[None]:
 
 @contextmanager
 def _alarm(handler: Callable[[int, Any], None]) -> Iterator[None]:
-    """Call the handler when the time limit is reached, if there is one and nobody else has set a timer."""
-    limit = seconds_left()
-    if not math.isfinite(limit) or not hasattr(signal, "setitimer") or signal.getitimer(signal.ITIMER_REAL)[0]:
+    """Call the handler when the limit of time or processor time is reached, where nobody else has set this timer."""
+    if not hasattr(signal, "setitimer"):
         yield
         return
-    previous = signal.signal(signal.SIGALRM, handler)
-    signal.setitimer(signal.ITIMER_REAL, max(limit, 1e-3) + 1e-3)
+    limit, timer, number = seconds_left(), signal.ITIMER_REAL, signal.SIGALRM
+    if not math.isfinite(limit):
+        limit, timer, number = processor_left(), signal.ITIMER_PROF, signal.SIGPROF
+    if not math.isfinite(limit) or signal.getitimer(timer)[0]:
+        yield
+        return
+    previous = signal.signal(number, handler)
+    signal.setitimer(timer, max(limit, 1e-3) + 1e-3)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, previous)
+        signal.setitimer(timer, 0.0)
+        signal.signal(number, previous)

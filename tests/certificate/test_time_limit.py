@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
 import signal
@@ -16,19 +17,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bad_inputs import ptcc
+from threadpoolctl import threadpool_info, threadpool_limits
 
 import lmi
 from lmi import search_time
+from lmi.blas_threads import one_thread
 from lmi.child_process import apart
-from lmi.search_time import checkpoint, seconds_left, share_of_time, time_limit
+from lmi.search_time import checkpoint, part_of_time, seconds_left, share_of_time, spend, time_limit
 from ptcc_certify import Agents, NominalProtocol, SignedDigraph, certify, check, simulate
+from ptcc_certify.certificate.family_certificate import certify_family
 from ptcc_certify.certificate.procedure import STEPS
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import load_graph
+from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov import search as search_functions
 from ptcc_certify.lyapunov.error_system import ErrorSystem
 from ptcc_certify.lyapunov.search import Candidate
 
+linux = pytest.mark.skipif(sys.platform != "linux", reason="processes are copied on Linux only")
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
 
 
@@ -88,6 +94,91 @@ def test_without_time_nothing_is_claimed_and_everything_is_named(name: str):
     assert report.accepted and report.verdict == "undecided"
 
 
+def leaping(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let an hour of wall time go by whenever somebody looks at the clock: a machine as busy as can be."""
+    now = itertools.count(step=3600.0)
+    monkeypatch.setattr(search_time, "_now", lambda: next(now))
+
+
+def test_without_a_limit_asked_for_no_wall_time_changes_what_is_found_of_a_graph(monkeypatch: pytest.MonkeyPatch):
+    at_leisure = certify(load_graph("fig1a"), PROTOCOL, [1] * 6)
+    leaping(monkeypatch)
+    busy = certify(load_graph("fig1a"), PROTOCOL, [1] * 6)
+    assert busy == at_leisure and not busy.cut_off
+    assert certify(load_graph("fig1a"), PROTOCOL, [1] * 6, time_limit=3600).cut_off  # a limit that is asked for
+
+
+def test_without_a_limit_asked_for_no_wall_time_changes_what_is_found_of_a_family(monkeypatch: pytest.MonkeyPatch):
+    family = Family.from_intervals([(k, (k + 1) % 7, 1, 2) for k in range(7)])
+    at_leisure = certify_family(family, PROTOCOL)
+    leaping(monkeypatch)
+    busy = certify_family(family, PROTOCOL)
+    assert busy == at_leisure and not any("cut off" in note for note in busy.notes)
+
+
+def test_a_step_is_not_begun_if_it_takes_more_than_the_work_that_is_left():
+    with time_limit(10, work=True), part_of_time(0.5):
+        spend(3)
+        with pytest.raises(lmi.OutOfTime):
+            spend(3)
+        spend(1)
+    spend(1e9)  # without a limit
+
+
+@linux
+def test_work_apart_counts_as_work_here():
+    def counts() -> Iterator[int]:
+        spend(3)
+        yield 1
+        spend(3)
+        yield 2
+
+    found = []
+    with time_limit(5, work=True):
+        with pytest.raises(lmi.OutOfTime):
+            for value in apart(counts):
+                found.append(value)
+        with pytest.raises(lmi.OutOfTime):
+            spend(3)
+        spend(1)
+    assert found == [1]
+
+
+@linux
+def test_a_process_that_works_without_counting_is_ended_by_its_processor_time(monkeypatch: pytest.MonkeyPatch):
+    def never_ends() -> Iterator[int]:
+        yield 1
+        while True:
+            pass
+
+    monkeypatch.setattr(search_time, "_PATIENCE", 0.1)
+    found = []
+    with time_limit(3, work=True), pytest.raises(lmi.OutOfTime):
+        for value in apart(never_ends):
+            found.append(value)
+    assert found == [1]
+
+
+def test_small_matrices_are_multiplied_by_one_thread_until_the_last_leaves():
+    def threads() -> list[int]:
+        return [pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"]
+
+    def enter() -> None:
+        with one_thread():
+            pass
+
+    enter()  # which loads all there is to load
+    with threadpool_limits(2, user_api="blas"):
+        before, other = threads(), threading.Thread(target=enter)
+        with one_thread():
+            other.start()
+            other.join()
+            assert set(threads()) == {1}
+        assert threads() == before
+        with one_thread(False):
+            assert threads() == before
+
+
 def test_what_is_proved_before_the_limit_stands(monkeypatch: pytest.MonkeyPatch):
     """On a clock that goes on in a search without end alone, however busy the machine is."""
     search, now = search_functions._lmi_candidates, [0.0]
@@ -121,7 +212,6 @@ ring = SignedDigraph.from_edges([(i, (i + 1) % 50, 1 if i else -1) for i in rang
 cert = certify(ring, NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), [1] * 50, time_limit=float(sys.argv[1]))
 print(cert.verdict, cert.cut_off)
 """
-linux = pytest.mark.skipif(sys.platform != "linux", reason="processes are copied on Linux only")
 
 
 @linux

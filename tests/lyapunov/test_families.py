@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from fractions import Fraction
 
@@ -13,6 +14,8 @@ from selection import thinned
 
 import lmi
 import lmi.common
+from ptcc_certify import NominalProtocol
+from ptcc_certify.certificate.family_certificate import certify_family
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
@@ -199,7 +202,7 @@ def test_a_time_limit_leaves_what_was_proved_before():
     quotient = Quotient(random_family(np.random.default_rng(5), "consensus", 8, 3, TENTH))
     with lmi.time_limit(0):
         search = search_family(quotient)
-    assert search.functions == () and search.cut_off == ("class diagonal", "class full")
+    assert search.functions == () and search.cut_off == ("Lyapunov equations", "class diagonal", "class full")
 
 
 def test_what_was_climbed_to_before_a_time_limit_is_proved():
@@ -219,10 +222,29 @@ def test_what_was_climbed_to_before_a_time_limit_is_proved():
     assert search.functions and len(calls) == 2
 
 
+def test_where_no_program_can_be_afforded_there_is_a_useful_rate_all_the_same(monkeypatch: pytest.MonkeyPatch):
+    quotient = Quotient(random_family(np.random.default_rng(5), "consensus", 24, 1, TENTH))
+    monkeypatch.setattr(lmi.common, "program_seconds", lambda *_: math.inf)
+    with lmi.time_limit(60, work=True):
+        search = search_family(quotient)
+    assert {"class diagonal", "class full"} <= set(search.cut_off)
+    (V,) = search.functions
+    assert V.kind == "full" and V.rate > Fraction(1, 10)
+
+
+def test_consensus_of_more_agents_than_programs_take_has_a_rate_that_the_check_accepts():
+    hub = [(0, k, Fraction(9, 10), Fraction(11, 10)) for k in range(1, 130)]
+    rim = [(k, k + 1, Fraction(9, 10), Fraction(11, 10)) for k in range(1, 129)]
+    family = Family.from_intervals([*hub, *rim, (129, 0, Fraction(9, 10), Fraction(11, 10))])
+    certificate = certify_family(family, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3))
+    assert certificate.behaviours == ("bipartite consensus",) and certificate.verdict == "certified"
+    assert certificate.rate > Fraction(1, 10)
+
+
 def test_large_families_are_left_to_others():
-    path = Family.from_intervals([(k, k + 1, 1, 2) for k in range(300)])
+    path = Family.from_intervals([(k, k + 1, 1, 2) for k in range(500)])
     search = search_family(Quotient(path))
-    assert search.functions == () and "300 agents" in search.notes[0]
+    assert search.functions == () and "500 agents" in search.notes[0]
     assert prove_family_rate_bound(Quotient(path)) is None
 
 
