@@ -70,15 +70,20 @@ def without(command: tuple[str, ...], *names: str) -> tuple[str, ...]:
 
 def advices(command: tuple[str, ...], text: str) -> Iterator[tuple[tuple[str, ...], ...]]:
     """Yield for every advice the commands that follow it: one of them must not be refused."""
-    head = re.search(r"^ptcc: (?:\w+ \()?(--[^:;]*?)(?::|\)| is | are | says | belongs )", text, re.MULTILINE)
+    head = re.search(
+        r"^ptcc: (?:\w+ \()?(--[^:;]*?)(?::|\)| is | are | says | belongs | ask | replaces | has )", text, re.MULTILINE
+    )
     subjects = set(_OPTION.findall(head[1])) if head else set()
     text = re.sub(r"\s+", " ", text.replace("\\\n", " "))
     for whole in re.findall(r"ptcc ((?:certify|check|plot|simulate|design) [^;:()]*)", text):
         if re.search(r"[\w/]+\.(csv|json)", whole) and not re.search(r"GRAPH|\.\.|fig\d", whole):
             yield (tuple(shlex.split(whole)),)
     text = re.sub(r"ptcc (?:certify|check|plot|simulate|design|batch) [^;:()]*", "", text)
-    if subjects and re.search(r"leave (it|one|them) out", text):
+    if subjects and re.search(r"leave (it|them) out", text):
         yield (without(command, *subjects),)
+    if "leave one out" in text:
+        yield tuple(without(command, name) for name in sorted(subjects))
+        return
     if "give both" in text:
         missing = [name for name in subjects if name not in command]
         yield (sum(((name, VALUES[name]) for name in missing), command),)

@@ -265,7 +265,11 @@ def test_the_cascade_is_certified_and_checked_from_a_scenario(tmp_path: Path):
         ("certify", ("--agents", "2", "--cascade", "1", "--rest", "1"), "leave --rest out"),
         ("certify", ("--agents", "2", "--cascade", "1", "--gain-cap", "9"), "leave --gain-cap out"),
         ("certify", ("--agents", "2", "--cascade", "1", "--delay", "0.1"), "--delay: is not proved of agents of order"),
-        ("certify", ("--agents", "2", "--packet-loss", "1", "--period", "0.1"), "--period: is not proved of agents of"),
+        (
+            "certify",
+            ("--agents", "2", "--packet-loss", "1", "--period", "0.1"),
+            "--period and --packet-loss: are not proved of agents of",
+        ),
         ("certify", ("--agents", "2", "--cascade", "1e6"), "cascade = 1e+06 is too large to enclose the common motion"),
         ("certify", ("--agents", "2", "--rest", "1e6"), "take a smaller rest, or rho1"),
         ("certify", ("--agents", "2", "--cascade", "1", "--leader-speed", "1"), "--leader-speed: is not proved of"),
