@@ -19,6 +19,7 @@ from scipy.io import mmwrite, savemat
 import ptcc_certify as ptcc
 from ptcc_certify.errors import FormatError, GraphError, ParameterError
 from ptcc_certify.graphs.io import read_family, read_graph
+from ptcc_certify.graphs.io.edge_delays import read_delays
 from ptcc_certify.graphs.io.graph_files import keywords_as, reading_flags
 from ptcc_certify.graphs.reading import OPTIONS
 
@@ -458,6 +459,18 @@ def test_a_laplacian_is_checked_as_it_was_certified(tmp_path):
     assert run("certify", str(path), "--laplacian", "--no-simulation", "-o", str(out)).code == 0
     assert json.loads(out.read_text())["graph"]["read"]["laplacian"] is True
     assert run("check", str(out), str(path), "--laplacian").code == 0
+
+
+def test_delays_of_a_column_are_those_of_the_edges_that_were_read(tmp_path):
+    rows = "from,to,score,delay\nann,bob,1,0.02\nbob,ann,1,0.01\neve,ann,0,0.03\nbob,eve,-1,0.02\n"
+    path = put(tmp_path, "g.csv", rows)
+    graph = read_graph(path, columns="from,to,score", drop_zeros=True)
+    delays = read_delays(path, graph)
+    assert delays == {
+        ("ann", "bob"): Fraction(1, 50),
+        ("bob", "ann"): Fraction(1, 100),
+        ("bob", "eve"): Fraction(1, 50),
+    }
 
 
 @pytest.mark.parametrize("command", ["classify", "certify", "simulate", "design", "plot", "check", "batch", "explore"])

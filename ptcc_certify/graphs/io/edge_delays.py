@@ -78,4 +78,7 @@ def read_delays(path: Source, graph: SignedDigraph, title: str = "delay") -> dic
         delays[source, target] = max(value, delays.get((source, target), value))
         if graph.read["undirected"]:
             delays[target, source] = max(value, delays.get((target, source), value))
+    if "zeros" in graph.read:  # edges of weight 0 were dropped
+        edges = {edge[:2] for edge in graph.edges}
+        delays = {pair: delay for pair, delay in delays.items() if pair in edges}
     return delays

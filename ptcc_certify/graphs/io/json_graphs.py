@@ -39,12 +39,14 @@ def read_json(data: bytes, name: str, how: Reading) -> Rows:
     if document.get("directed", True) not in (True, False):
         raise FormatError(f"{name}: directed is neither true nor false; write one")
     labels, number = _nodes(nodes, name)
-    ends = [tuple(_end(one, end, k, labels, number, bool(nodes), name) for end in ("source", "target"))
-            for k, one in enumerate(links, 1)]  # fmt: skip
+    ends = []
+    for k, one in enumerate(links, 1):
+        source, target = (_end(one, end, k, labels, number, bool(nodes), name) for end in ("source", "target"))
+        ends.append((source, target))
     data_of_links = [
         {key: str(value) for key, value in one.items() if key not in ("source", "target", "key")} for one in links
     ]
-    rows = attribute_rows(labels, ends, data_of_links, name, how)  # type: ignore[arg-type]
+    rows = attribute_rows(labels, ends, data_of_links, name, how)
     rows.undirected = "" if document.get("directed", True) else '"directed": false'
     rows.where = lambda row: f"{found[0]}[{row}]"
     return rows

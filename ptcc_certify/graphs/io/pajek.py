@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.io.attributes import both_ways
@@ -21,6 +22,7 @@ _BESIDE = ("partition", "vector", "permutation", "cluster", "hierarchy", "events
 _FORM = "not *Vertices n and then lists of *Arcs, *Edges, *Arcslist, *Edgeslist or a *Matrix; write it so"
 
 Line = tuple[int, str]
+_One = TypeVar("_One")
 
 
 @dataclass
@@ -65,8 +67,9 @@ def read_pajek(data: bytes, name: str, how: Reading) -> Rows:
     return both_ways(rows, draft.undirected, "*Edges", how)
 
 
-def _chosen(named: dict, what: str, name: str, how: Reading):  # type: ignore[no-untyped-def,type-arg]
-    if how.variable in named:
+def _chosen(named: Mapping[str, _One], what: str, name: str, how: Reading) -> _One:
+    """Return the network or relation that is told by its name, or name all."""
+    if how.variable is not None and how.variable in named:
         return named[how.variable]
     names = ", ".join(f'"{shorten(one)}"' for one in list(named)[:20])
     raise FormatError(f"{name}: several {what} ({names}); choose one with --variable NAME")
