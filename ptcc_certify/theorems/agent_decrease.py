@@ -319,8 +319,9 @@ def find_phases(
     --------
     >>> zero, one = Fraction(0), Fraction(1)
     >>> agent = ScaledAgent((zero, one), (zero, zero), one, one, 2 * one, None)
-    >>> [round(float(p.rate), 1) > 4 for p in find_phases(agent, agent_matrix(agent, Fraction(4), one), 0, 2 * one)][:1]
-    [True]
+    >>> phases = find_phases(agent, agent_matrix(agent, Fraction(4), one), 0, 2 * one)  # c beta is 2, where 1 would do
+    >>> len(phases) > 0, all(phase.rate > 4 for phase in phases)
+    (True, True)
     """
     if agent.span is None or agent.cap is not None:
         return []
