@@ -662,8 +662,8 @@ class Content:
         late, tracking = self.late, self.tracking
         if self.initial_state is None:
             return None
-        start = [float(x) for x in self.initial_state]
         try:
+            start = [float(x) for x in self.initial_state]
             if late is not None:
                 if not can_run(self.protocol, late.messages):
                     return None
@@ -676,7 +676,7 @@ class Content:
                 return None
             (limits,) = self.limits
             return self.simulate(actuator=GainLimits(limits.gain_cap, limits.stop_before, limits.sample_period))
-        except (ParameterError, SimulationError):
+        except (ParameterError, SimulationError, OverflowError):
             return None
 
     def with_simulation(self, **options: Any) -> Self:

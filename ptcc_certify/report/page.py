@@ -165,6 +165,7 @@ def _view(saved: Certificate) -> dict[str, Any]:
     notes = saved.document["unverified"].get("notes")
     peaks = effort.peak.agents if effort and effort.peak else ()
     verdict_text, larger_rho2 = _in_words(saved)
+    asked = None if saved.trajectory is None else saved.asked_trajectory
     return texts.facts(saved) | {
         **{"verdict_text": verdict_text, "larger_rho2": larger_rho2},
         **{"structure": saved.structure, "protocol": saved.protocol, "invariant": invariant},
@@ -179,7 +180,7 @@ def _view(saved: Certificate) -> dict[str, Any]:
         "kinds": Counter(m.kind for m in saved.envelope.functions).items(),
         "remaining": _remaining(saved),
         "reaching": list(islice(zip(labels, saved.sigma0 or (), saved.reaching or (), strict=False), ROWS)),
-        "asked": limits_text(saved.asked_trajectory, saved) if saved.asked_trajectory is not None else "",
+        "asked": "" if asked is None else limits_text(asked, saved),
         "ideal": ideal_text(saved),
         "figures": draw(saved, ("graph", "states", "sliding", "decay", "input", "late", "tracking"))
         | _distributions(saved),

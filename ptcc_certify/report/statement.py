@@ -192,7 +192,7 @@ def _instant(saved: FamilyCertificate, name: str) -> Markup:
 def _captions(saved: Certificate) -> dict[str, str]:
     """Return captions that say whether the bound is proved; through a reaching phase it is integrated in floats."""
     decay = _CAPTIONS["decay"].replace("%s", _bound_word(saved))
-    if saved.asked_trajectory is not None:
+    if saved.trajectory is not None and saved.asked_trajectory is not None:
         decay += f" Bounds and circles: {ideal_text(saved)}; without circles: the run that was asked."
     return _CAPTIONS | {"decay": decay}
 

@@ -85,7 +85,7 @@ def advices(command: tuple[str, ...], text: str) -> Iterator[tuple[tuple[str, ..
         yield tuple(without(command, name) for name in sorted(subjects))
         return
     if "give both" in text:
-        missing = [name for name in subjects if name not in command]
+        missing = [name for name in dict.fromkeys(_OPTION.findall(text)) if name not in command]
         yield (sum(((name, VALUES[name]) for name in missing), command),)
         return
     together = re.search(r"design needs|--\S+ with --\S+|give --\S+ and --\S+", text)

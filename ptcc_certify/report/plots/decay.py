@@ -84,7 +84,7 @@ def plot_decay(
         raise ParameterError(f'axis "{axis}" is unknown; one of {", ".join(_DECAY_AXES)}')
     proved = subject if isinstance(subject, Certificate) else certificate
     run = None if isinstance(subject, Certificate) and subject.trajectory is None else ideal_run_of(subject)
-    asked = subject.asked_trajectory if isinstance(subject, Certificate) else None
+    asked = subject.asked_trajectory if isinstance(subject, Certificate) and run is not None else None
     if proved is not None:
         _require_bounds(proved, run)
     remaining = np.geomspace(1, _LAST, _INSTANTS) if run is None else run.remaining[run.remaining > 0]
