@@ -21,8 +21,7 @@ from ptcc_certify.checker.side_files import Numbers
 BITS = 96
 #: Largest exponent ``w`` of :func:`rest_integral`.
 LARGEST_EXPONENT = 1000
-#: What an entry of the final states costs, in products, and more for each derivative where the motion is rounded, but
-#: in the large form.
+#: What an entry of the final states costs, in products, and more for each derivative where the motion is rounded.
 ENTRY, ROUNDED_ENTRY = 800, 800
 #: By agent, coordinate by coordinate, numbers for position, velocity and so on.
 States = Sequence[Sequence[Sequence[Fraction]]]
@@ -110,7 +109,7 @@ def check_final_states(
     labels, n = final.structure.graph.labels, agents.n
     rounded = any(wide for row in M for _, wide in row)
     bits = length(chain((x for row in M for pair in row for x in pair), *chain.from_iterable(states)))
-    products = ENTRY + (n * ROUNDED_ENTRY if rounded and final.weights is not None else 0)
+    products = ENTRY + (n * ROUNDED_ENTRY if rounded else 0)
     spend(products * len(labels) * agents.d * n, bits, bits, "the final states of agents")
     section = ordered(labels, doc.data["agents"]["final_state"], "final_state")
     claimed = [
