@@ -45,7 +45,7 @@ def compare(
     certificate: str, document: dict[str, Any], report: CheckReport, graphs: tuple[str, ...], options: shared.Options
 ) -> tuple[CheckReport, dict[str, str]]:
     """Compare files with the graph or family of an accepted certificate; return the report, and how they were read."""
-    pair = _Pair(document, Path(certificate).parent, graphs, files_of(graphs))
+    pair = _Pair(document, report.sha256, Path(certificate).parent, graphs, files_of(graphs))
     name, way = ", ".join(graphs), _way()
     try:
         found = pair.compare(options)
@@ -69,6 +69,7 @@ class _Pair:
     """A certificate, and files that may hold its graph or family."""
 
     document: Mapping[str, Any]
+    sha256: str
     folder: Path
     graphs: tuple[str, ...]
     files: Sequence[Any]
@@ -97,7 +98,7 @@ class _Pair:
             reason = f"one graph in the certificate, a family in the files: {graph!r}"
             return Compared(reason, {"graph_read": family_flags(graph.read, self.graphs[0])})
         how = {"graph_read": reading_flags(graph.read)}
-        if graph.sha256 == self.document["graph"]["sha256"]:
+        if graph.sha256 == self.sha256:
             return Compared(None, how)
         checked = certificate_graph(self.document, read_side_files(self.document, self.folder))
         return Compared(f"another graph than {self.graphs[0]}: {difference(checked, graph)}", how)
@@ -160,7 +161,7 @@ def _flags_that_agree(pair: _Pair, options: shared.Options) -> str | None:
         for told in ({**options, **sender, **typed}, {**options, **sender}):
             try:
                 if pair.compare(told).reason is None:
-                    return _flags(options, told, pair.files[0])
+                    return _flags(options, told, pair.files[0]) or None
             except PTCCError:
                 continue
     return None

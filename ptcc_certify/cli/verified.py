@@ -91,7 +91,7 @@ def verified_check(certificate: str, memory: float = 1) -> tuple[dict[str, Any],
     except UnreadableError as error:
         raise FormatError(str(error)) from None
     try:
-        words: list[Any] = [program, "--obligations", "--memory", str(memory), certificate]
+        words = [str(program), "--obligations", "--memory", str(memory), certificate]
         run = subprocess.run(words, capture_output=True, check=False)
     except OSError as error:
         raise ParameterError(f"{program} cannot be run ({error.strerror}); {BUILD}") from None
