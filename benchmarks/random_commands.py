@@ -17,7 +17,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]  # this package, whichever is installed
 
-from random_commands import KINDS, run_case
+from random_commands import KINDS, run_case  # noqa: E402
 
 
 def main(first: int, last: int, kinds: list[str]) -> int:
