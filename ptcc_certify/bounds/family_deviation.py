@@ -20,6 +20,7 @@ from ptcc_certify.checker.family_bounds import deviations, least
 from ptcc_certify.checker.family_function import Scaled
 from ptcc_certify.checker.family_sliding import Drive
 from ptcc_certify.graphs.rationals import nearest_float
+from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
 
 _SLACK = 1 + 1e-12
 
@@ -32,14 +33,20 @@ class Function(BoundsFunction, Protocol):
         """Bounds of ``|xi_k| / sqrt(V)``."""
 
 
-def deviation_on_clock(V: Function, stable: bool, x: Sequence[Fraction], clock: np.ndarray) -> np.ndarray | None:
+def deviation_on_clock(
+    V: Function, behaviour: str | None, x: Sequence[Fraction], clock: np.ndarray
+) -> np.ndarray | None:
     """Bound ``|x_k(t) - x_k(T)|`` by a function of a component, (n, M); None if it does not decay.
+
+    That is what the speeds add up to until the deadline. Agents that end at 0 are no farther from it than they are
+    large, and those that come to ``+-c`` no farther than from some other agent: at all times ``c`` is between the
+    least and the largest ``g_k x_k``, since no signal lets these grow apart.
 
     Parameters
     ----------
     V : Function
-    stable : bool
-        Whether all agents end at 0.
+    behaviour : str or None
+        Of the component.
     x : sequence of n Fraction
         The initial state.
     clock : (M,) array
@@ -47,10 +54,26 @@ def deviation_on_clock(V: Function, stable: bool, x: Sequence[Fraction], clock: 
     moves, unit = deviations([V], x)
     if not moves:
         return None
-    if stable:
-        root = V.root(x)
-        moves, unit = least([(moves, Fraction(1, unit)), *((vector, factor * root) for vector, factor in V.sizes)])
+    if behaviour in (STABILITY, BIPARTITE_CONSENSUS):
+        root, own = V.root(x), V.sizes
+        if behaviour == BIPARTITE_CONSENSUS:
+            own = [_from_others(own, len(x))]
+        moves, unit = least([(moves, Fraction(1, unit)), *((vector, factor * root) for vector, factor in own)])
     return _times([Fraction(moves[k], unit) for k in range(len(x))], _decay(V, clock))
+
+
+def _from_others(sizes: Sequence[Scaled], n: int) -> Scaled:
+    """Bound how far each agent is from any other, by how far they are from the pivot, which is not named.
+
+    Examples
+    --------
+    >>> _from_others([({1: 3, 2: 5}, Fraction(1, 2))], 3)
+    ({0: 5, 1: 8, 2: 8}, Fraction(1, 2))
+    """
+    from_pivot, scale = least(sizes)
+    reach = [from_pivot.get(k, 0) for k in range(n)]
+    second, largest = sorted([0, *reach])[-2:]
+    return {k: x + (second if x == largest else largest) for k, x in enumerate(reach)}, Fraction(1, scale)
 
 
 def input_on_clock(V: Function, x: Sequence[Fraction], clock: np.ndarray, gain: np.ndarray) -> np.ndarray:

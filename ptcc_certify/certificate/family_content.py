@@ -435,7 +435,7 @@ class FamilyContent:
                 bounds[nodes] = 0 if driven is None else sliding_sizes(driven, self._phase, at)
             for V in functions:
                 if driven is None:
-                    own = deviation_on_clock(V, stable, x, at.clock)
+                    own = deviation_on_clock(V, part.component.behaviour, x, at.clock)
                 else:
                     own = deviation_while_driven(V, stable, x, driven, self._phase, at)
                 if own is not None:

@@ -20,7 +20,6 @@ from ptcc_certify.certificate.restricted_claims import RateClaim
 from ptcc_certify.checker.family_function import Scaled
 from ptcc_certify.checker.family_limits import WeightedMean
 from ptcc_certify.checker.input_formulas import root_above
-from ptcc_certify.graphs.structure import STABILITY
 from ptcc_certify.lyapunov.mode_forms import mode_functions
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.theorems.restricted_signals import DwellTime
@@ -117,19 +116,18 @@ def _deviation(
 ) -> np.ndarray | None:
     """Bound the agents of a component; None where so many switches are allowed that nothing would be said."""
     assert claim.forms is not None
-    stable = part.component.behaviour == STABILITY
     pairs = mode_functions(Quotient.of(part.component), claim.forms)
     functions = [BoundFunction(quotient, V) for quotient, V in pairs if V.input_constants]
     if len(functions) < len(pairs):
         return None
     if not isinstance(claim.signal, DwellTime):  # one mode acts for ever
-        own = [deviation_on_clock(V, stable, x, clock) for V in functions]
+        own = [deviation_on_clock(V, part.component.behaviour, x, clock) for V in functions]
         return np.max([one for one in own if one is not None], axis=0)
     switches = claim.signal.switches(certificate.protocol.T) if claim.signal.clock == "t" else 1
     if switches * max(map(int.bit_length, claim.ratio.as_integer_ratio())) > _BITS:
         return None
     V = SwitchedFunction(functions, claim.rate, claim.ratio**switches)
-    return deviation_on_clock(V, stable, x, clock)
+    return deviation_on_clock(V, part.component.behaviour, x, clock)
 
 
 def _largest(some: Sequence[Scaled]) -> Scaled:

@@ -105,8 +105,8 @@ def test_the_gain_that_is_proposed_makes_the_bound_useful_and_bounds_the_input()
 
 def test_where_no_rate_is_proved_the_line_says_why():
     cases = (
-        (130, 1, 9, "(130 agents are above the 120"),
-        (130, -1, 9, "(weighted squares of 130 agents prove none)"),
+        (430, 1, 9, "(430 agents are above the 400"),
+        (130, -1, 9, "(closed forms of 130 agents prove none)"),
         (60, -1, 0.01, "raise --time-limit)"),
     )
     for size, sign, seconds, told in cases:
