@@ -110,15 +110,15 @@ def loaded_bytes(content: bytes) -> int:
     Examples
     --------
     >>> loaded_bytes(b"[[], []]"), loaded_bytes("[[], ['\U0001f600']]".encode())
-    (359, 431)
+    (359, 455)
     """
-    objects, arrays, keys, commas, quotes = (content.count(x) for x in (b"{", b"[", b":", b",", b'"'))
-    width, length = 1, len(content)
+    objects, arrays, keys, commas, quotes, escapes = (content.count(x) for x in (b"{", b"[", b":", b",", b'"', b"\\"))
+    width = 1
     if not content.isascii():
         width = 4 if re.search(rb"[\xf0-\xff]", content) else 2 if re.search(rb"[\xc4-\xff]", content) else 1
-        length = len(content.translate(None, bytes(range(0x80, 0xC0))))  # bytes that begin a character
     numbers = max(0, commas + 1 + keys - quotes // 2)
-    return 190 * objects + 90 * arrays + 70 * keys + 9 * commas + 26 * quotes + 32 * numbers + 2 * width * length
+    entries = 190 * objects + 90 * arrays + 70 * keys + 9 * commas + 26 * quotes + 32 * numbers
+    return entries + 80 * escapes + 2 * width * len(content)
 
 
 def digest(data: Mapping[str, Any]) -> str:
