@@ -17,7 +17,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # this package, whichever is installed
 
-from random_commands import KINDS, run_case  # noqa: E402
+from random_commands import KINDS, run_case
 
 
 def main(first: int, last: int, kinds: list[str]) -> int:
