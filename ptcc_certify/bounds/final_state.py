@@ -613,8 +613,11 @@ def _enclosed(
     )
     F = structure.followers
     if F.size and (middle.any() or radius.any()):
-        leaders = {v: x for v, (x, _) in exact.items()}
-        middle[F], radius[F] = _enclose_followers(structure, leaders, middle, radius, enclosure.witness)
+        largest = float(np.maximum(np.abs(middle), radius).max())
+        middle[F], radius[F] = _enclose_followers(structure, middle, radius, enclosure.witness)
+        if not radius[F].max() <= _NARROW * largest:
+            leaders = exact | _exact_leaders(influence, enclosure, state, spread)
+            exact |= _exactly_enclosed_followers(structure, leaders, middle[F].tolist(), enclosure.witness)
     final: list[Number] = [x if unit == 1 else Fraction(x) * unit for x in middle.tolist()]
     spreads = [Fraction(r) * unit for r in radius.tolist()]
     for v, (x, r) in exact.items():
@@ -697,9 +700,9 @@ def _enclose_left_null_vector(
 
 
 def _enclose_followers(
-    structure: Structure, exact: dict[int, Fraction], middle: np.ndarray, radius: np.ndarray, u: np.ndarray
+    structure: Structure, middle: np.ndarray, radius: np.ndarray, u: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return middles and radii of the followers, in a unit near to the largest leader."""
+    """Return middles and radii of the followers in floats, in a unit near to the largest leader."""
     checkpoint()
     F = structure.followers
     unit = float(np.exp2(np.floor(np.log2(np.maximum(np.abs(middle), radius).max()))))
@@ -713,28 +716,47 @@ def _enclose_followers(
         state[F] = followers
         comparison = 2 * block.diagonal() * u[F] - abs(block) @ u[F]
         residual = np.abs(rows @ state) + blur + _ROUNDING * (abs(rows) @ np.abs(state))
-        error = float((residual / comparison).max()) * 1.01
-    if not error * u[F].max() <= _NARROW:
-        error = _exact_error(structure, exact, state, blur + _ULP * (abs(rows) @ np.abs(state)), u, unit)
-    final = followers * unit
-    return final, (error * u[F] * unit + _spacing(final)) * _MORE
+        error = float(np.where(comparison > 0, residual / comparison, np.inf).max()) * 1.01
+        final = followers * unit
+        return final, (error * u[F] * unit + _spacing(final)) * _MORE
 
 
-def _exact_error(
-    structure: Structure, exact: dict[int, Fraction], state: np.ndarray, blur: np.ndarray, u: np.ndarray, unit: float
-) -> float:
-    """Return ``max_i (|r_i| + s_i) / (M(L_F) u)_i``, the residual in rationals."""
-    F = structure.followers.tolist()
-    following = set(F)
-    values = [exact[v] / Fraction(unit) if v in exact else Fraction(x) for v, x in enumerate(state.tolist())]
-    weights = [Fraction(x) for x in u.tolist()]
-    error = Fraction(0)
-    for v, row, more in zip(F, structure.graph.exact_rows(F), blur.tolist(), strict=True):
+def _exact_leaders(
+    influence: Influence, enclosure: Enclosure, state: Sequence[Fraction], spread: Sequence[Fraction] | None
+) -> dict[int, tuple[Fraction, Fraction]]:
+    """Return middles and radii of the groups whose left null vectors are enclosed, in rationals, as the check does."""
+    leaders: dict[int, tuple[Fraction, Fraction]] = {}
+    for k, vectors in enclosure.left_null_vectors.items():
         checkpoint()
-        residual = sum((x * values[j] for j, x in row.items()), Fraction(0))
-        signs = (weights[j] * (x if j == v else -abs(x)) for j, x in row.items() if j in following)
-        comparison = sum(signs, Fraction(0))
-        if comparison <= 0:
+        nodes, gauge = influence.balanced[k].nodes, influence.balanced[k].gauge or ()
+        weights, radii = ([Fraction(repr(x)) for x in vector.tolist()] for vector in vectors)
+        value = sum((w * state[v] for v, w in zip(nodes, weights, strict=True)), Fraction(0))
+        blur = sum((r * abs(state[v]) for v, r in zip(nodes, radii, strict=True)), Fraction(0))
+        if spread is not None:
+            blur += sum((abs(w) + r) * spread[v] for v, w, r in zip(nodes, weights, radii, strict=True))
+        leaders |= {v: (sign * value, blur) for v, sign in zip(nodes, gauge, strict=True)}
+    return leaders
+
+
+def _exactly_enclosed_followers(
+    structure: Structure, leaders: Mapping[int, tuple[Fraction, Fraction]], followers: Sequence[float], u: np.ndarray
+) -> dict[int, tuple[Fraction, Fraction]]:
+    """Return middles, the decimals of floats, and radii of the followers, with residuals in rationals.
+
+    These are the numbers that a certificate states, and the residuals those that its check forms: nothing is added for
+    rounding, which ill-conditioned equations would make much wider than what is proved.
+    """
+    F = structure.followers.tolist()
+    middles, weights = [Fraction(repr(x)) for x in followers], dict(zip(F, map(Fraction, u[F].tolist()), strict=True))
+    values = {v: x for v, (x, _) in leaders.items()} | dict(zip(F, middles, strict=True))
+    error = Fraction(0)
+    for v, row in zip(F, structure.graph.exact_rows(F), strict=True):
+        checkpoint()
+        residual = abs(sum((x * values[j] for j, x in row.items()), Fraction(0)))
+        residual += sum(abs(x) * leaders[j][1] for j, x in row.items() if j in leaders)
+        comparison = sum((weights[j] * (x if j == v else -abs(x)) for j, x in row.items() if j in weights), Fraction(0))
+        if comparison <= 0 or residual * _SMALLEST > comparison:
             raise NotEnclosedError("the followers' equations are too ill-conditioned for floats")
-        error = max(error, (abs(residual) + Fraction(more)) / comparison)
-    return float(error) * _MORE
+        error = max(error, residual / comparison)
+    radii = [Fraction(float(error * weight) * _MORE + bool(error) * _TINY) for weight in weights.values()]
+    return dict(zip(F, zip(middles, radii, strict=True), strict=True))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import Any
 
 from ptcc_certify.checker import CheckReport
 
@@ -40,6 +41,17 @@ def rejection_text(report: CheckReport) -> str:
         f"the independent check rejects {report.rejected}, a defect of this program: nothing is claimed; "
         "please report this graph"
     )
+
+
+def rejection(report: CheckReport) -> dict[str, Any]:
+    """Return what is left of a certificate that the check rejects, as JSON-ready data: no claim.
+
+    Examples
+    --------
+    >>> rejection(check({"schema": "ptcc-certificate/2"}))["verdict"]
+    'undecided'
+    """
+    return {"verdict": "undecided", "rejected": report.rejected, "reason": report.reason}
 
 
 def standing(answers: Iterable[Answer], report: CheckReport | None) -> tuple[Answer, ...]:

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 
 from lmi.exact.decimal_rounding import down
+from ptcc_certify.certificate.answer import rejection, rejects
 from ptcc_certify.certificate.certificate_data import Content, Source
 from ptcc_certify.certificate.certificate_file import FromFile, bytes_of, text_of, write_certificate
 from ptcc_certify.certificate.checking import read_and_check, refuse_no_certificate
@@ -60,11 +61,11 @@ class RejectedCertificate(PTCCError, ValueError):
     c.json input
     """
 
-    def __init__(self, path: Path, report: CheckReport):
+    def __init__(self, path: Path, report: CheckReport, mend: str = "certify the graph again"):
         self.path = path
         self.report = report
         reason = f"the independent check rejects {report.rejected}: {report.reason}"
-        super().__init__(f"{shorten(str(path), 200)}: {reason}; certify the graph again")
+        super().__init__(f"{shorten(str(path), 200)}: {reason}; {mend}")
 
 
 @gated
@@ -128,10 +129,12 @@ class Certificate(Content, FromFile, Shown):
 
     @property
     def document(self) -> Mapping[str, Any]:
-        """The JSON. What stands under ``unverified`` is its own word."""
+        """The JSON. What stands under ``unverified`` is its own word; where the check rejects, nothing but that."""
         if self.source is not None:
             return self.source.document
-        document, files, _ = self._recorded
+        document, files, report = self._recorded
+        if rejects(report):
+            return rejection(report)
         return document if not files else certificate_document(self, files=False)[0]
 
     @cached_property
@@ -164,7 +167,8 @@ class Certificate(Content, FromFile, Shown):
     def to_dict(self) -> dict[str, Any]:
         """Return the certificate as JSON-ready data of schema ``ptcc-certificate/2``, without side files: a copy.
 
-        One that was read is what its file says.
+        One that was read is what its file says. Of one that the independent check rejects, a defect of this program,
+        it tells the verdict, what is rejected and why, and no claim.
         """
         return deepcopy(dict(self.document))
 
@@ -189,7 +193,13 @@ class Certificate(Content, FromFile, Shown):
             Another ending.
         FormatError
             The file cannot be written.
+        RejectedCertificate
+            The independent check does not accept it, a defect of this program: nothing is written.
         """
+        refuse_no_path(path)
+        if rejects(self.checked):
+            mend = "this is a defect of this program, nothing was written; please report this graph"
+            raise RejectedCertificate(Path(path), self.checked, mend)
         write_certificate(path, *self.for_check())
 
     def for_check(self) -> tuple[Mapping[str, Any], Mapping[str, bytes]]:

@@ -21,6 +21,7 @@ from lmi.exact.decimal_rounding import down
 from lmi.search_time import share_of_time
 from ptcc_certify.bounds.attracting_box import AttractingBox, box_of_family
 from ptcc_certify.bounds.kept_means import with_means
+from ptcc_certify.certificate.answer import rejection, rejects
 from ptcc_certify.certificate.certificate_file import FromFile, write_certificate
 from ptcc_certify.certificate.family_content import ComponentProof, FamilyContent, ProvedFunction
 from ptcc_certify.certificate.family_table import family_table
@@ -182,7 +183,12 @@ class FamilyCertificate(FamilyContent, FromFile, Shown):
         return "certified" if self.checked is not None and self.checked.accepted else "undecided"
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the certificate as JSON-ready data, without side files: a copy."""
+        """Return the certificate as JSON-ready data, without side files: a copy.
+
+        Of one that the independent check rejects, a defect of this program, the verdict, what is rejected and why.
+        """
+        if self.checked is not None and rejects(self.checked):
+            return rejection(self.checked)
         document, files = self.for_check()
         whole = family_document(self, files=False)[0] if files and self.source is None else document
         return json.loads(json.dumps({**whole, "verdict": self.verdict}))

@@ -298,7 +298,7 @@ def _write_obligation(obligation: Obligation, out: Writer) -> dict[str, Any]:
     elif isinstance(witness, tuple):
         witness = {"u": dict(zip(out.labels, map(format_exact, witness), strict=True))}
     elif isinstance(witness, np.ndarray):
-        by_label = zip(out.labels, map(repr, witness.tolist()), strict=True)
+        by_label = zip(out.labels, map(float.hex, witness.tolist()), strict=True)
         witness = {"u": out.vector("u", witness) if out.aside(witness.size) else dict(by_label)}
     return {"numbers": {name: format_exact(value) for name, value in obligation.numbers.items()}, "witness": witness}
 

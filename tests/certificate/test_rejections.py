@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
@@ -14,13 +15,25 @@ from bad_inputs import ptcc
 from late_certificates import led_graph
 from selection import thinned
 
-from ptcc_certify import Expectations, LateMessages, MovingLeaders, NominalProtocol, SignedDigraph, certify
+from ptcc_certify import (
+    Expectations,
+    Family,
+    LateMessages,
+    MovingLeaders,
+    NominalProtocol,
+    SignedDigraph,
+    certify,
+    read_graph,
+)
 from ptcc_certify.bounds import missed_deadline
 from ptcc_certify.bounds.missed_deadline import Missed
-from ptcc_certify.certificate import certificate as certificates
-from ptcc_certify.certificate import family_certificate
+from ptcc_certify.certificate import format, format_family
 from ptcc_certify.certificate.answer import Answer, standing
+from ptcc_certify.certificate.certificate import RejectedCertificate
+from ptcc_certify.certificate.family_certificate import certify_family
 from ptcc_certify.checker import CheckReport
+from ptcc_certify.checker.final_state import WIDEST
+from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.lyapunov import dominance
 from ptcc_certify.lyapunov.rate_upper_bound import mean_bound
@@ -28,6 +41,7 @@ from ptcc_certify.lyapunov.rate_upper_bound import mean_bound
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
 LATE = LateMessages(delay="0.01")
 REJECTED = CheckReport(False, "", (), "rates", "because this test says so", "none", "")
+LEFT = {"verdict": "undecided", "rejected": "rates", "reason": "because this test says so"}
 CHAIN = "source,target,weight\na,b,1\nb,c,-1\n"
 
 
@@ -63,6 +77,24 @@ def test_agents_that_begin_at_a_final_state_that_is_too_long_to_be_written(how: 
     assert made.checked.accepted, made.checked.reason
 
 
+@pytest.mark.parametrize(("decades", "seed"), [(1, 0), (2, 4), (2, 8), (2.5, 3), (3, 6)])
+def test_followers_of_ill_conditioned_equations_are_as_wide_as_is_proved(decades: float, seed: int):
+    """A chain of 130 followers between two leaders; its weights are spread over twice so many decades."""
+    rng, n = np.random.default_rng(seed), 130
+
+    def weight() -> Fraction:
+        return Fraction(f"{10 ** rng.uniform(-decades, decades):.3g}")
+
+    edges = [("a", 0, weight()), ("b", n - 1, weight())]
+    edges += [(k, k + 1, weight()) for k in range(n - 1)] + [(k + 1, k, weight()) for k in range(n - 1)]
+    graph = SignedDigraph.from_edges(edges)
+    x0 = [k % 4 - 1 for k in range(n + 2)]
+    made = certify(graph, PROTOCOL, x0, simulation=False, method="perron")
+    assert made.checked.accepted, made.checked.reason
+    assert made.final_state is not None and made.final_state.radius is not None
+    assert max(made.final_state.radius) > WIDEST * max(x0)  # the check lets no interval be much wider than is proved
+
+
 def test_an_upper_bound_that_is_too_long_to_be_written_is_left_out():
     """Twice the mean eigenvalue of 130 agents with weights of many digits takes more digits than a file may hold."""
     n, rng = 130, np.random.default_rng(0)
@@ -76,12 +108,17 @@ def test_an_upper_bound_that_is_too_long_to_be_written_is_left_out():
 # ---------------------------------------------------------------------- where the check rejects
 
 
+def reject(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the check that lays down proofs reject all certificates."""
+    for module in (format, format_family):
+        monkeypatch.setattr(module, "record", lambda sections, *rest: ({**sections, "digest": "0"}, REJECTED))
+
+
 @pytest.fixture
 def rejecting(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     """A folder with two graphs, and a check that rejects all certificates."""
     monkeypatch.chdir(tmp_path)
-    for module in (certificates, family_certificate):
-        monkeypatch.setattr(module, "check", lambda *args, **options: REJECTED)
+    reject(monkeypatch)
     Path("chain.csv").write_text(CHAIN)
     Path("other.csv").write_text("source,target,weight\na,b,2\na,c,1\n")
     return tmp_path
@@ -114,6 +151,26 @@ def test_where_the_check_rejects_nothing_is_claimed_refuted_or_written(options: 
         assert word not in text
 
 
+@pytest.mark.parametrize("options", COMMANDS.values(), ids=COMMANDS)
+def test_where_the_check_rejects_json_tells_that_alone(options: list[str], rejecting: Path):
+    run = ptcc("certify", *options, "--no-simulation", "--json", "-o", "c.json")
+    assert run.code == 4 and not (rejecting / "c.json").exists()
+    assert json.loads(run.out) == LEFT
+
+
+def test_where_the_check_rejects_nothing_is_saved(rejecting: Path):
+    graph, other = (read_graph(name) for name in ("chain.csv", "other.csv"))
+    made = certify(graph, PROTOCOL, simulation=False)
+    with pytest.raises(RejectedCertificate, match=r"rejects rates: because this test says so; .* nothing was written"):
+        made.save("c.json")
+    family = certify_family(Family.switching([graph, other]), PROTOCOL)
+    with pytest.raises(ParameterError, match="no certificate is written"):
+        family.save("c.json")
+    assert not Path("c.json").exists()
+    for one in (made, family):
+        assert one.to_dict() == json.loads(one.to_json()) == LEFT
+
+
 def test_a_refutation_rests_on_what_the_check_accepts(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
     """An agent that is said to miss the deadline by more than is so: rejected, and no answer."""
     honest: Callable[..., Missed | None] = missed_deadline.find_missed
@@ -139,7 +196,7 @@ def test_a_certificate_without_a_rate_is_checked_and_its_answers_rest_on_that(mo
     made = certify(ring, PROTOCOL, simulation=False, expectations=Expectations(min_rate=1000))
     assert made.rate is None and made.checked.accepted and made.verdict == "undecided"
     assert made.assessment.asked == "refuted" and made.assessment.exit_code == 3
-    monkeypatch.setattr(certificates, "check", lambda *args, **options: REJECTED)
+    reject(monkeypatch)
     again = made.changed(notes=())
     assert again.assessment.asked == "left open" and again.assessment.exit_code == 4
 
