@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import ptcc_certify as ptcc
-from ptcc_certify.errors import ParameterError, UnknownAgentError
+from ptcc_certify.errors import UnknownAgentError
 
 GRAPH = ptcc.SignedDigraph.from_edges([("ann", "bob", -1), ("bob", "ann", -1), ("ann", "eve", 2)])
 PROTOCOL, X0 = ptcc.NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), [3, 1, 2]
@@ -60,11 +60,3 @@ def test_a_row_of_the_influence_holds_all_weights_of_its_table() -> None:
     for label in GRAPH.labels:
         row = {GRAPH.labels[k]: float(weight) for k, weight in who.row(label).items()}
         assert row == {leader: x for leader, x in table.loc[label].to_dict().items() if x}
-
-
-def test_of_vectors_components_are_counted_and_agents_refused() -> None:
-    cert = ptcc.certify_vectors(GRAPH, PROTOCOL, [[3, 1], [1, 1], [2, 1]], method="paper", simulation=False)
-    assert cert[1] is cert.components[1] and cert[-1] is cert[1] and len(cert[:1]) == 1
-    for wrong in ("ann", 2):
-        with pytest.raises(ParameterError, match=r"the 2 components count from 0"):
-            cert[wrong]

@@ -117,6 +117,7 @@ def stated_ends(
 
     Examples
     --------
+    >>> from ptcc_certify.bounds.final_state import enclose, enclosed_final_state
     >>> graph = SignedDigraph.from_edges([("a", "c", 1), ("b", "c", 9)])
     >>> matrix = enclose(influence(graph, exact=False))
     >>> begin = [Fraction(1), Fraction(0), Fraction(0)]

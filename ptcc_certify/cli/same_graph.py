@@ -133,7 +133,10 @@ class _Pair:
             keywords = keywords_of(self.document["unverified"].get("read"))
         else:
             file = self.files[0]
-            keywords = keywords_as(file, self.document["graph"]["read"])
+            try:
+                keywords = keywords_as(file, self.document["graph"]["read"])
+            except PTCCError:  # a file of another kind than the sender's
+                return {}
         named = {"edges" if name == "orientation" else name: value for name, value in keywords.items()}
         return {name: value for name, value in named.items() if name in READING}
 

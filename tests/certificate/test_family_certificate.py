@@ -70,12 +70,8 @@ def test_where_ends_depend_on_the_signal_the_obligation_says_so():
     assert step.detail == "none claimed: ends depend on the signal"
 
 
-def test_what_only_one_graph_has_is_told_with_what_a_family_has():
+def test_a_component_tells_how_many_nodes_it_has_and_what_these_do():
     cert = certify_family(Family.from_intervals([("a", "b", 1, 2)]), NominalProtocol(T=1, rho1=1, rho2=1, kappa=3))
-    for name, meant in (("final_state", "final_states"), ("behaviour", "behaviours"), ("envelope", "deviation_bound")):
-        assert hasattr(cert, meant)
-        with pytest.raises(AttributeError, match=f"has no attribute '{name}'; see its {meant}"):
-            getattr(cert, name)
     assert repr(cert.parts[0].component) == "FamilyComponent(2 nodes, bipartite consensus for every signal)"
 
 

@@ -34,6 +34,7 @@ VALUES = {
         "--uncertainty": "10%",
         "--edges": "listens",
         "--duplicates": "sum",
+        "--columns": "source,target,low",
         "--T-r": "1",
         "--T-s": "1",
         "--memory": "2",

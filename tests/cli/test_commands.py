@@ -318,7 +318,7 @@ def test_click_completes_commands_options_and_values_without_anything_that_compu
     [
         (("why", "fig1a"), 'there is no command "why"; the line why of classify and certify tells the counterexample'),
         (("design", "fig1a", "--max-input", "3", "--T", "2"), "; here it is --deadline"),
-        (("design", "fig1a", "--max-input", "3", "--x0", "1"), "; here it is --initial-bound"),
+        (("design", "fig1a", "--max-input", "3", "--x0", "1"), "give --initial-bound R instead"),
         (("plot", "fig1a", "--what", "sliding"), "the sliding variables are under states"),
         (("plot", "fig1a", "--what", "slides"), "'slides' is not one of"),
     ],

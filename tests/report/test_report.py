@@ -196,7 +196,7 @@ def test_the_commands_of_a_page_work(tmp_path: Path):
     assert commands == ["ptcc check 'my c.json'", "python -m ptcc_certify.checker 'my c.json'"]
     assert "--edges listens" in page
     environment = {**os.environ, "PYTHONPATH": str(Path(ptcc_certify.__file__).parents[1])}
-    for command in (*commands, f"{commands[0]} g.csv"):
+    for command in (*commands, f"{commands[0]} g.csv --edges listens"):
         words = shlex.split(command.replace("ptcc check", "python -m ptcc_certify.cli check"))
         done = subprocess.run([sys.executable, *words[1:]], cwd=tmp_path, env=environment, capture_output=True)
         assert done.returncode == 0, done

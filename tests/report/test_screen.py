@@ -315,7 +315,7 @@ def test_instants_of_the_page_are_those_of_the_screen():
 
 
 def test_undecided_for_want_of_time_names_the_search():
-    assert set(NO_SEARCHES) <= set(STEPS)
+    assert set(NO_SEARCHES) - {"exact final state"} <= set(STEPS)  # which gives way to an enclosed one
     text = ptcc.certify(PAIR, NOMINAL, [5, 1], time_limit=1e-9).assessment.text
     assert text == "undecided: no rate is proved, the search took its share of 1e-09 s; raise --time-limit"
 
