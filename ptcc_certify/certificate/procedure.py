@@ -576,6 +576,8 @@ class Case:
                     self.notes.append(f"the final state is floating point only: {error}")
         if result is None and first is not None:
             result = final_state(structure, first, matrix=matrix)
+            if not np.isfinite(np.asarray(result)).all():
+                result = None  # what the note of the enclosure tells
         if run is not None and result is not None:
             gap = float(np.abs(run.final_state - np.asarray(result)).max())
             if gap > SETTLED * max(float(max(map(abs, (*(x0 or ()), *sigma0)))), 1e-300):

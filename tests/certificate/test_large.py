@@ -364,6 +364,18 @@ def test_what_floats_cannot_solve_is_undecided_and_says_so(graph: SignedDigraph)
     assert check(json.loads(cert.to_json())).accepted
 
 
+def test_a_final_state_that_floats_cannot_compute_is_none(monkeypatch: pytest.MonkeyPatch):
+    """No number is told of it, on the screen neither; the note says why."""
+    monkeypatch.setattr(final_states, "containment_weights", lambda structure: None)
+    monkeypatch.setattr(
+        final_states, "follower_state", lambda structure, state: np.full(structure.followers.size, np.nan)
+    )
+    cert = certify(chain([1] * 130), NOMINAL, [1] * 131, simulation=False)
+    assert cert.final_state is None and cert.verdict == "undecided" and cert.checked.accepted
+    assert "x(T)" not in cert.summary() and "nan" not in cert.summary()
+    assert any("too ill-conditioned for floats" in note for note in cert.notes)
+
+
 def test_a_leader_group_over_many_decades():
     """Its rate is proved by itself; floats alone would claim a little too much."""
     rng = np.random.default_rng(0)
