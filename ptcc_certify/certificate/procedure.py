@@ -305,8 +305,6 @@ def certify(
         certificate = case.certificate(disturbance, runs, reaching)
         if formation is not None:
             certificate = certificate.changed(offsets=formation.offsets)
-            if (run := certificate.trajectory) is not None:
-                certificate = certificate.changed(trajectory=certificate.in_places(run))
         if of_agents is not None and chains is not None:
             certificate = _with_agents(certificate, of_agents, chains, wanted)
         certificate = _with_small_delays(certificate)

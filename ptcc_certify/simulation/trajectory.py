@@ -108,9 +108,9 @@ class Trajectory(ByValue, Shown):
     @property
     def positions(self) -> np.ndarray:
         """Where agents are: in a formation ``states`` and their places."""
-        return self.in_places(self.states)
+        return self._in_places(self.states)
 
-    def in_places(self, values: np.ndarray) -> np.ndarray:
+    def _in_places(self, values: np.ndarray) -> np.ndarray:
         """Return values of the N agents with their places in the formation, if they are in one."""
         return values if self.offsets is None else values + self.offsets[..., None]
 
