@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from ptcc_certify import Certificate, GainLimits, NominalProtocol, SignedDigraph, SlidingModeProtocol, certify
+from ptcc_certify import Agents, Certificate, GainLimits, NominalProtocol, SignedDigraph, SlidingModeProtocol, certify
 from ptcc_certify.checker import digest
 from ptcc_certify.examples import EXAMPLES, load_graph
 
@@ -96,6 +96,7 @@ MADE = {
     "disconnected": disconnected,
     "single": lambda: certify(SignedDigraph.from_edges([], ["alone"]), NOMINAL, [3], simulation=False),
     "hostile": hostile,
+    "formation": lambda: nominal(agents=Agents(order=1, offsets=["1/3", -2, 0, 4, 7, -5])),
 }
 
 

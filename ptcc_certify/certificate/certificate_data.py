@@ -160,6 +160,12 @@ class Content:
         states = tuple(Fraction(x) + h for x, h in zip(self.final_state.states, self.offsets, strict=True))
         return replace(self.final_state, states=states)
 
+    def _in_places(self, run: Trajectory) -> Trajectory:
+        """Return a run of ``initial_state`` that tells positions: in a formation with the places of its agents."""
+        if self.offsets is None:
+            return run
+        return replace(run, offsets=np.array([float(h) for h in self.offsets]))
+
     def changed(self, **values: Any) -> Self:
         """Return the certificate with other parts, in whichever group they are; what follows is computed anew.
 
@@ -253,7 +259,8 @@ class Content:
     @property
     def trajectory(self) -> Trajectory | None:
         """A simulated run."""
-        return self.observed.trajectory
+        run = self.observed.trajectory
+        return None if run is None else self._in_places(run)
 
     @property
     def numerical_rate(self) -> float | None:
@@ -643,14 +650,15 @@ class Content:
         """
         x0 = [float(x) for x in self._require_initial_state()]
         if self.sigma0 is None:
-            return simulate(self.graph, self.protocol, x0, **options)
+            return self._in_places(simulate(self.graph, self.protocol, x0, **options))
         options["sigma0"] = [float(x) for x in self.sigma0]
         try:
-            return simulate(self.graph, self.protocol, x0, disturbance=self.disturbance, **options)
+            run = simulate(self.graph, self.protocol, x0, disturbance=self.disturbance, **options)
         except ParameterError:
             if self.disturbance == WORST_CASE:
                 raise
-            return simulate(self.graph, self.protocol, x0, disturbance=WORST_CASE, **options)
+            run = simulate(self.graph, self.protocol, x0, disturbance=WORST_CASE, **options)
+        return self._in_places(run)
 
     @cached_property
     def asked_trajectory(self) -> Trajectory | None:
@@ -667,11 +675,13 @@ class Content:
             if late is not None:
                 if not can_run(self.protocol, late.messages):
                     return None
-                return simulate_late(self.graph, self.protocol, late.messages, start, leaders=late.leaders)
+                run: Trajectory = simulate_late(self.graph, self.protocol, late.messages, start, leaders=late.leaders)
+                return self._in_places(run)
             if tracking is not None:
                 from ptcc_certify.simulation.moving_leaders import simulate_tracking  # it loads SciPy
 
-                return simulate_tracking(self.graph, self.protocol, tracking.leaders, start, u=tracking.witness.u)
+                run = simulate_tracking(self.graph, self.protocol, tracking.leaders, start, u=tracking.witness.u)
+                return self._in_places(run)
             if len(self.limits) != 1 or not self.direct:
                 return None
             (limits,) = self.limits

@@ -312,22 +312,6 @@ def certify(
         return _with_word_of_check(certificate)
 
 
-def motion_of(certificate: Certificate, agents: Agents) -> Certificate:
-    """Return a certificate of agents of order n, with ``agents`` also of single integrators in a formation.
-
-    :func:`certify` has one certificate of these, that of ``x - h``; their motion, and how bounds depend on the
-    deadline, are taken from that of agents of order n.
-    """
-    if certificate.offsets is None:
-        return certificate
-    if any(certificate.sigma0 or ()):
-        raise ParameterError("sigma0: the motion of a formation is shown with sliding variables that begin at 0")
-    begin, places = certificate.initial_positions, tuple((h,) for h in certificate.offsets)
-    chains = Chains(None if begin is None else tuple(((x,),) for x in begin), 1, places)
-    plain = {"initial_state": None, "sigma0": None, "limits": (), "late": None, "tracking": None}
-    return _with_agents(certificate.changed(offsets=None, **plain), agents, chains, False)
-
-
 def _agents_options(agents: Any, protocol: Protocol, asked: dict[str, Any], v0: Any, derivatives: Any) -> Agents | None:
     """Return agents of order n, None for single integrators, or refuse what is asked of them."""
     if agents is None:

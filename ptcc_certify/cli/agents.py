@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
@@ -12,10 +13,14 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import shorten
 
 if TYPE_CHECKING:
+    from fractions import Fraction
+
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.protocols import Protocol
     from ptcc_certify.protocols.agents import Agents
     from ptcc_certify.simulation.agents import AgentsTrajectory
+    from ptcc_certify.simulation.trajectory import Trajectory
+
 
 #: Agents by their names, and their orders.
 NAMES = {"integrator": 1, "double-integrator": 2, "triple-integrator": 3}
@@ -105,18 +110,13 @@ def agents_keywords(options: Options, graph: SignedDigraph, certified: bool = Fa
 
     What is certified of single integrators is certified of their formations on a line, too.
     """
-    from dataclasses import replace
-
     agents = agents_of(options)
     if agents is None:
         return {}
     d = options["dimension"] or 1
     if not (certified and agents.of_paper and d == 1):
         _refuse_unproved(options)
-    for i, name in enumerate(("offsets", "biases")):
-        if options[name] is not None:
-            rows = read_vectors(options[name], [options["seed"], 4 + i], graph, d, f"--{name}")
-            agents = replace(agents, **{name: rows})
+    agents = _in_places(agents, options, graph, d)
     given = [options["v0"], options["a0"]]
     later = [
         None if text is None or text.strip() == "0" else read_vectors(text, [options["seed"], i + 2], graph, d, flag)
@@ -127,6 +127,38 @@ def agents_keywords(options: Options, graph: SignedDigraph, certified: bool = Fa
     x0 = read_vectors(options["x0"], options["seed"], graph, d, "--x0")
     more: dict[str, Any] = {"agents": agents, "x0": x0}
     return more | ({"derivatives": later} if later or any(text is not None for text in given) else {})
+
+
+def places_of(options: Options, graph: SignedDigraph, protocol: Protocol) -> Sequence[Fraction] | None:
+    """Return the places of single integrators on a line, less which they run as plain ones do; None for others."""
+    from ptcc_certify.certificate.agents_request import read_offsets
+
+    agents, d = agents_of(options), options["dimension"] or 1
+    if agents is None or not agents.of_paper or d > 1:
+        return None
+    return tuple(h for (h,) in read_offsets(_in_places(agents, options, graph, d), graph, d, protocol.gain))
+
+
+def run_in_places(
+    graph: SignedDigraph, protocol: Protocol, x0: Any, places: Sequence[Fraction] | None, **options: Any
+) -> Trajectory:
+    """Run single integrators, in a formation if they have places."""
+    from ptcc_certify.simulation.run import simulate, simulate_formation
+
+    if places is None:
+        return simulate(graph, protocol, x0, **options)
+    return simulate_formation(graph, protocol, x0, places, **options)
+
+
+def _in_places(agents: Agents, options: Options, graph: SignedDigraph, dimension: int) -> Agents:
+    """Return agents with the places and biases that the options give."""
+    from dataclasses import replace
+
+    for i, name in enumerate(("offsets", "biases")):
+        if options[name] is not None:
+            rows = read_vectors(options[name], [options["seed"], 4 + i], graph, dimension, f"--{name}")
+            agents = replace(agents, **{name: rows})
+    return agents
 
 
 def agents_flags(options: Options) -> str:
@@ -168,9 +200,9 @@ def refuse_dimension(options: Options, command: str) -> None:
 
 def run_of_agents(graph: SignedDigraph, protocol: Protocol, keywords: dict[str, Any], samples: int) -> AgentsTrajectory:
     """Run agents of order n with the gains that ``ptcc certify`` proves, from their initial states to the deadline."""
-    from ptcc_certify.certificate.procedure import certify, motion_of
+    from ptcc_certify.certificate.procedure import certify
 
-    part = motion_of(certify(graph, protocol, simulation=False, **keywords), keywords["agents"]).agents
+    part = certify(graph, protocol, simulation=False, **keywords).agents
     if part is None or (graph.n_edges and not part.functions):
         raise ParameterError("no gains of these agents are proved; ptcc certify tells why")
     return part.simulate(samples=samples)

@@ -15,8 +15,10 @@ from ptcc_certify.cli.agents import (
     agents_of,
     agents_options,
     dimension_option,
+    places_of,
     refuse_agents_of_family,
     refuse_dimension,
+    run_in_places,
 )
 from ptcc_certify.cli.families import mode_options, read_graph_or_family, refuse_options
 from ptcc_certify.cli.scenario import MEMORY, graph_of, refuse_beside
@@ -169,6 +171,8 @@ def _of_certificate(
         if begins:
             one = certificate.graph if isinstance(certificate, Certificate) else certificate.family.modes[0].mandatory
             x0 = shared.read_initial_state(options["x0"], options["seed"], one)
+            if isinstance(certificate, Certificate) and certificate.offsets is not None:
+                x0 = [x - h for x, h in zip(x0, certificate.offsets, strict=True)]
             certificate = replace(certificate, initial_state=tuple(x0))  # to be drawn: what is proved holds for all
         elif certificate.initial_state is None:
             raise ParameterError(f"{path}: the certificate holds no initial state; give one with --x0")
@@ -210,30 +214,32 @@ def _of_graph(
 ) -> Certificate | Trajectory | tuple[SignedDigraph, Any]:
     """Return what the figure of a graph is drawn from: itself, a run, or for its decay a certificate."""
     from ptcc_certify.certificate.procedure import STEPS, certify
-    from ptcc_certify.simulation.run import simulate
+    from ptcc_certify.protocols.agents import Agents
 
     protocol = shared.protocol_of(options, () if what == "decay" else ("delta", "disturbance"))
     if what in ("graph", "spectrum"):
         return signed, protocol
     refuse_beside(click.get_current_context().meta.get(MEMORY), f"plot --what {what}")
-    if what in OF_AGENTS or agents_of(options) is not None:
+    places = None if what == "formation" else places_of(options, signed, protocol)
+    if places is None and (what in OF_AGENTS or agents_of(options) is not None):
         return _of_agents(signed, protocol, what, options)
     x0 = shared.read_initial_state(options["x0"], options["seed"], signed, within=options["initial_bound"])
     if what == "decay":
         if shared.actuator_of(options) is not None:
             raise ParameterError("decay is drawn without limits of the gain; leave them out, or ask for --what states")
         more = shared.sliding_keywords(protocol, options, signed)
+        more |= {} if places is None else {"agents": Agents(1, offsets=places)}
         search = {name: options[name] for name in ("method", "time_limit")}
         with progress(STEPS) as begin:
             return certify(signed, protocol, x0, simulation=True, progress=begin, **more, **search)
     with progress(("simulation",)) as begin:
         begin("simulation")
-        return simulate(signed, protocol, x0, **shared.run_keywords(protocol, options, signed))
+        return run_in_places(signed, protocol, x0, places, **shared.run_keywords(protocol, options, signed))
 
 
 def _of_agents(signed: SignedDigraph, protocol: Protocol, what: str, options: shared.Options) -> Certificate:
     """Return what the figure of agents of order n is drawn from: a certificate of theirs."""
-    from ptcc_certify.certificate.procedure import STEPS, certify, motion_of
+    from ptcc_certify.certificate.procedure import STEPS, certify
 
     of_agents = agents_keywords(options, signed)
     if not of_agents:
@@ -247,8 +253,7 @@ def _of_agents(signed: SignedDigraph, protocol: Protocol, what: str, options: sh
     if protocol.reaching is not None:
         search |= {"sigma0": shared.sliding_keywords(protocol, options, signed)["sigma0"]}
     with progress(STEPS) as begin:
-        found = certify(signed, protocol, simulation=False, progress=begin, **of_agents, **search)
-        return motion_of(found, of_agents["agents"])
+        return certify(signed, protocol, simulation=False, progress=begin, **of_agents, **search)
 
 
 def _draw(what: str, subject: Any, wide: bool, time_unit: str) -> Any:
@@ -263,6 +268,7 @@ def _draw(what: str, subject: Any, wide: bool, time_unit: str) -> Any:
     from ptcc_certify.report.plots.late import plot_late, plot_tracking
     from ptcc_certify.report.plots.spectrum import plot_spectrum
     from ptcc_certify.report.plots.trajectory import plot_run
+    from ptcc_certify.simulation.trajectory import Trajectory
 
     if isinstance(subject, Family | FamilyCertificate):
         if what in OF_A_CERTIFICATE:
@@ -273,13 +279,13 @@ def _draw(what: str, subject: Any, wide: bool, time_unit: str) -> Any:
             )
         return plot_of_family(subject, what, **({"time_unit": time_unit} if what in OF_A_RUN else {}))
     subject, protocol = subject if isinstance(subject, tuple) else (subject, None)
+    if what == "states" or (what == "motion" and isinstance(subject, Trajectory)):
+        return plot_run(subject, wide=wide, time_unit=time_unit)
     if what in OF_AGENTS:
         return plot_motion(subject, wide=wide, time_unit=time_unit) if what == "motion" else plot_formation(subject)
     if what == "graph":
         return plot_graph(subject)
     if what == "spectrum":
         return plot_spectrum(subject, protocol=protocol)
-    if what == "states":
-        return plot_run(subject, wide=wide, time_unit=time_unit)
     figures = {"input": plot_input, "decay": plot_decay, "late": plot_late, "tracking": plot_tracking}
     return figures[what](subject, time_unit=time_unit)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +16,9 @@ from ptcc_certify.cli.agents import (
     agents_keywords,
     agents_of,
     agents_options,
+    places_of,
     refuse_agents_of_family,
+    run_in_places,
     run_of_agents,
 )
 from ptcc_certify.cli.families import (
@@ -89,6 +91,8 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
     rho2 = 0 runs the nominal protocol without a deadline (asymptotic baseline). With --dimension d, --x0 takes N*d
     numbers, agent after agent, and columns are headed <label>[1] to <label>[d].
 
+    Of a formation on a line (--offsets) states are positions, with whatever limits and messages other runs take.
+
     Agents of order n run with the gains that `certify` proves under the same --method, up to the deadline; beside
     their positions there are columns v(<label>), a(<label>).
 
@@ -112,6 +116,8 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
     if vectors and options["kind"] != "nominal" and not special:
         raise ParameterError("the sliding-mode protocol is simulated for scalar agents; leave out --dimension")
     signed = read_graph_or_family(graph, options)
+    places = None if isinstance(signed, Family) else places_of(options, signed, protocol)
+    special = special and places is None
     if special or isinstance(signed, Family):
         _refuse_messages(options, "families of graphs" if isinstance(signed, Family) else "agents of order n")
     if special:
@@ -124,8 +130,8 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
         return ExitCode.OK
     if click.get_current_context().get_parameter_source("method") is ParameterSource.COMMANDLINE:
         raise ParameterError("--method: chooses the gains of agents of order n; leave it out, or add --agents")
-    beside = None if isinstance(signed, Family) else _run_beside(graph[0], signed, protocol, options)
-    trajectory = beside or _run(signed, protocol, options)
+    beside = None if isinstance(signed, Family) else _run_beside(graph[0], signed, protocol, options, places)
+    trajectory = beside or _run(signed, protocol, options, places)
     _write(trajectory, output, plot_of_run, {"wide": wide, "time_unit": time_unit})
     if beside is not None:
         return ExitCode.OK
@@ -191,10 +197,10 @@ def _refuse_messages(options: shared.Options, what: str) -> None:
             raise ParameterError(f"{shared.flag_of(name)}: is not simulated of {what}; leave it out")
 
 
-def _run_beside(graph: str, signed: SignedDigraph, protocol: Protocol, options: shared.Options) -> Trajectory | None:
+def _run_beside(
+    graph: str, signed: SignedDigraph, protocol: Protocol, options: shared.Options, places: Sequence[Fraction] | None
+) -> Trajectory | None:
     """Return the run with late messages or leaders that move; None if nothing is asked of them."""
-    from ptcc_certify.simulation.run import simulate as run
-
     messages, leaders = messages_of(graph, signed, options), leaders_of(options)
     if messages is None and leaders is None:
         return None
@@ -214,13 +220,14 @@ def _run_beside(graph: str, signed: SignedDigraph, protocol: Protocol, options: 
     sigma0 = shared.sliding_keywords(protocol, options, signed).get("sigma0")
     x0 = shared.read_initial_state(options["x0"], options["seed"], signed)
     more: Any = {"messages": messages, "leaders": leaders, "pattern": options["age_pattern"], "seed": options["seed"]}
-    return run(signed, protocol, x0, sigma0=sigma0, **more)
+    return run_in_places(signed, protocol, x0, places, sigma0=sigma0, **more)
 
 
-def _run(signed: SignedDigraph | Family, protocol: Protocol, options: shared.Options) -> Trajectory:
+def _run(
+    signed: SignedDigraph | Family, protocol: Protocol, options: shared.Options, places: Sequence[Fraction] | None
+) -> Trajectory:
     """Return the run of a graph, or of a family under a signal."""
     from ptcc_certify.graphs.family import Family
-    from ptcc_certify.simulation.run import simulate as run
 
     steps = options["steps"]
     times = None if steps is None else [protocol.T * k / steps for k in range(steps + 1)]
@@ -232,7 +239,8 @@ def _run(signed: SignedDigraph | Family, protocol: Protocol, options: shared.Opt
     more = shared.run_keywords(protocol, options, signed) | {n: options[n] for n in ("samples", "boundary_layer")}
     if options["noise"] is not None:
         more |= {"noise": "telegraph", "noise_bound": options["noise"]}
-    return run(signed, protocol, shared.read_initial_states(options, signed), times=times, **more)
+    x0 = shared.read_initial_states(options, signed)
+    return run_in_places(signed, protocol, x0, places, times=times, **more)
 
 
 def _run_family(

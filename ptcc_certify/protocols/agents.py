@@ -14,7 +14,7 @@ from ptcc_certify.errors import NumberError, ParameterError, gated
 from ptcc_certify.graphs.digraph import Exact
 from ptcc_certify.graphs.io import as_graph
 from ptcc_certify.graphs.rationals import as_fraction, no_number, shorten, whole_number
-from ptcc_certify.protocols.base import Protocol, aligned
+from ptcc_certify.protocols.base import Protocol, aligned, position_latex
 from ptcc_certify.protocols.casadi_latex import to_latex
 from ptcc_certify.protocols.gain import Gain
 from ptcc_certify.protocols.nominal import coupling
@@ -419,7 +419,7 @@ class AgentsProtocol:
 
         g, n = ca.SX.sym("g"), self.order
         shown = any(any(row) for row in self.offsets)
-        own = "\\left(x_{k} - h_{k}\\right)" if shown else "x_{k}"
+        own = position_latex("k", shown)
         total = ca.SX(0)
         for i, (K, f) in enumerate(zip(self.gains, self.own, strict=True)):
             total += float(K) * g ** (n - i) * ca.SX.sym(_derivative("e_{k}", i))
@@ -430,7 +430,7 @@ class AgentsProtocol:
     def _where(self) -> list[str]:
         """Return the LaTeX of the relative positions and of the gain."""
         shown = any(any(row) for row in self.offsets)
-        listener, source = (f"\\left(x_{{{v}}} - h_{{{v}}}\\right)" if shown else f"x_{{{v}}}" for v in "kl")
+        listener, source = (position_latex(v, shown) for v in "kl")
         pull = rf"\left({source} - \operatorname{{sign}}\left(w_{{kl}}\right) {listener}\right)"
         error = rf"\sum_{{l=1}}^{{N}} w_{{kl}} {pull}"
         gain = self.gain.latex(numbers=True)

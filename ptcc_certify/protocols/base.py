@@ -79,8 +79,11 @@ class Protocol(Parameters, ABC):
         """Return the closed loop on ``graph`` as CasADi's ``{"t", "x", "ode"}``, with ``"p"`` for disturbances."""
 
     @abstractmethod
-    def latex(self, graph: Any = None) -> str:
-        """Return the protocol in LaTeX, printed from its expressions: of an agent k, or of every agent of a graph."""
+    def latex(self, graph: Any = None, places: bool = False) -> str:
+        """Return the protocol in LaTeX, printed from its expressions: of an agent k, or of every agent of a graph.
+
+        With ``places`` that of a formation, in which ``x_k - h_k`` stands where ``x_k`` does.
+        """
 
     def _repr_latex_(self) -> str:
         return f"$${self.latex()}$$"
@@ -188,6 +191,17 @@ def symbols(name: str, graph: SignedDigraph) -> ca.SX:
     import casadi as ca
 
     return ca.vertcat(*(ca.SX.sym(f"{name}{k}") for k in range(1, graph.n_nodes + 1)))
+
+
+def position_latex(index: int | str, places: bool) -> str:
+    r"""Return the LaTeX of an agent's state, in a formation less its place.
+
+    Examples
+    --------
+    >>> print(position_latex("k", False), position_latex(2, True))
+    x_{k} \left(x_{2} - h_{2}\right)
+    """
+    return rf"\left(x_{{{index}}} - h_{{{index}}}\right)" if places else f"x_{{{index}}}"
 
 
 def aligned(rows: list[str]) -> str:

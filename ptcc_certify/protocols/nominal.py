@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.graphs.io import as_graph
-from ptcc_certify.protocols.base import Protocol, aligned, symbols
+from ptcc_certify.protocols.base import Protocol, aligned, position_latex, symbols
 from ptcc_certify.protocols.casadi_latex import to_latex
 from ptcc_certify.protocols.parameters import NotNegative, Positive
 
@@ -104,7 +104,7 @@ class NominalProtocol(Protocol):
         x, t = symbols("x", graph), ca.SX.sym("t")
         return {"t": t, "x": x, "ode": self.input(graph, x, t)}
 
-    def latex(self, graph: Any = None) -> str:
+    def latex(self, graph: Any = None, places: bool = False) -> str:
         r"""Return the protocol in LaTeX, printed from its expressions: for an agent k, or for every agent of a graph.
 
         Parameters
@@ -112,6 +112,8 @@ class NominalProtocol(Protocol):
         graph : graph-like, optional
             At most 20 nodes. Agents are numbered from 1 in the order of ``graph.labels``, and the parameters are
             numbers; without a graph they are letters.
+        places : bool
+            Of agents in a formation: ``x_k - h_k`` in place of ``x_k``.
 
         Raises
         ------
@@ -133,21 +135,23 @@ class NominalProtocol(Protocol):
         g &= \begin{cases} 2 + \frac{3}{1 - t}, & t < 1 \\ 2, & t \ge 1 \end{cases}
         \end{aligned}
         """
-        rows = nominal_rows(None if graph is None else as_graph(graph))
+        rows = nominal_rows(None if graph is None else as_graph(graph), places=places)
         return aligned([*rows, f"g &= {self.gain.latex(numbers=graph is not None)}"])
 
 
-def nominal_rows(graph: SignedDigraph | None, mark: str = "") -> list[str]:
+def nominal_rows(graph: SignedDigraph | None, mark: str = "", places: bool = False) -> list[str]:
     """Return the rows of the nominal input, of an agent k or of every agent; ``mark`` is put behind each ``u``."""
     import casadi as ca
 
     g = ca.SX.sym("g")
     if graph is None:
-        summand = g * _pull(*(ca.SX.sym(name) for name in ("w_kl", "x_k", "x_l")))
+        names = ("w_kl", position_latex("k", places), position_latex("l", places))
+        summand = g * _pull(*map(ca.SX.sym, names))
         return [rf"u_{{k}}{mark} &= \sum_{{l=1}}^{{N}} {to_latex(summand)}"]
     if graph.n_nodes > _LATEX_NODES:
         raise ParameterError(f"LaTeX of {graph.n_nodes} agents is too long; the limit is {_LATEX_NODES} nodes")
-    inputs = g * coupling(graph, symbols("x", graph))
+    states = ca.vertcat(*(ca.SX.sym(position_latex(k + 1, places)) for k in range(graph.n_nodes)))
+    inputs = g * coupling(graph, states)
     return [rf"u_{{{k + 1}}}{mark} &= {to_latex(inputs[k])}" for k in range(graph.n_nodes)]
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from lmi.exact.decimal_rounding import near
 from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.graphs.io import as_graph
-from ptcc_certify.protocols.base import ReachingProtocol, aligned, symbols
+from ptcc_certify.protocols.base import ReachingProtocol, aligned, position_latex, symbols
 from ptcc_certify.protocols.casadi_latex import to_latex
 from ptcc_certify.protocols.nominal import NominalProtocol, nominal_rows
 from ptcc_certify.protocols.parameters import NotNegative, Positive
@@ -137,13 +137,15 @@ class SlidingModeProtocol(ReachingProtocol):
             "ode": ca.vertcat(motion, -self.nominal.input(graph, x, t)),
         }
 
-    def latex(self, graph: Any = None) -> str:
+    def latex(self, graph: Any = None, places: bool = False) -> str:
         r"""Return the protocol in LaTeX, printed from its expressions; see :meth:`NominalProtocol.latex`.
 
         Parameters
         ----------
         graph : graph-like, optional
             At most 20 nodes: the rows of every agent, with numbers. Without a graph the row of an agent k, in letters.
+        places : bool
+            Of agents in a formation: ``x_k - h_k`` in place of ``x_k``.
 
         Returns
         -------
@@ -172,14 +174,14 @@ class SlidingModeProtocol(ReachingProtocol):
         nominal = r"u_{k}^{\mathrm{nom}}"
         mu1 = float(self.mu1) if numbers else ca.SX.sym("mu1")
         expression = _add_reaching_terms(ca.SX.sym(nominal), ca.SX.sym("sigma_k"), mu1, ca.SX.sym("h"))
-        sigma = ca.SX.sym("x_k") + ca.SX.sym("varsigma_k")
+        sigma = ca.SX.sym(position_latex("k", places)) + ca.SX.sym("varsigma_k")
         gain = self.gain.latex(numbers=numbers, letters=("T_{r} + T_{s}", "rho1", "rho2", "kappa"))
         reaching = self.reaching_gain.latex(numbers=numbers, letters=("T_r", "mu2", "mu3", "kappa"))
         return aligned(
             [
                 f"u_{{k}} &= {to_latex(expression)}",
                 rf"\sigma_{{k}} &= {to_latex(sigma)}, \quad \dot\varsigma_{{k}} = -{nominal}",
-                *nominal_rows(None if graph is None else as_graph(graph), r"^{\mathrm{nom}}"),
+                *nominal_rows(None if graph is None else as_graph(graph), r"^{\mathrm{nom}}", places),
                 f"g &= {gain}",
                 f"h &= {reaching}",
             ]

@@ -171,7 +171,7 @@ def _view(saved: Certificate) -> dict[str, Any]:
         **{"structure": saved.structure, "protocol": saved.protocol, "invariant": invariant},
         **{"heading": texts.indexed(title), "title": title.replace("<sup>", "^").striptags()},
         "remarks": remarks_on(saved.structure),
-        "equations": texts.formula_svg(saved.protocol.latex(), inline=False),
+        "equations": texts.formula_svg(saved.protocol.latex(places=saved.offsets is not None), inline=False),
         "parameters": [(name, getattr(saved.protocol, name)) for name in texts.parameter_names(saved.protocol)],
         "statements": {theorem.number: theorem.statement for theorem in THEOREMS},
         "states": _states(saved),

@@ -108,9 +108,8 @@ def write_report(
     if isinstance(saved, FamilyCertificate):
         _write_family(saved, path, suffix, simulation, progress, day)
         return saved.verdict
-    if (saved.agents is not None or saved.offsets is not None) and suffix == ".tex":
-        whose = "agents of order n" if saved.agents is not None else "a formation"
-        raise ParameterError(f"there is no statement in LaTeX of {whose} yet; write the page, FILE.html")
+    if saved.agents is not None and suffix == ".tex":
+        raise ParameterError("there is no statement in LaTeX of agents of order n yet; write the page, FILE.html")
     saved, why = _with_run(saved, simulation)
     progress("report")
     if suffix == ".tex":

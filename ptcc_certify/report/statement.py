@@ -319,12 +319,16 @@ def _late(saved: Certificate) -> dict[str, Fraction | float | str | None]:
 
 
 def _states(saved: Certificate) -> tuple[list[str], list[tuple[str, str, tuple[str, ...]]]]:
-    """Return heads and rows of the table of initial and final states."""
-    if saved.initial_state is None:
+    """Return heads and rows of the table of places in a formation, and of initial and final states."""
+    if saved.initial_state is None and saved.offsets is None:
         return [], []
     heads = ("$x_{k}(0)$", r"$\sigma_{k}(0)$", "at the deadline", "limit, if it settles")
     agents = range(min(saved.graph.n_nodes, texts.LISTED))
-    numbers = texts.state_columns(saved, heads, agents, lambda x: texts.enclosed(x) if x[1] else texts.rational(x[0]))
+    numbers = {} if saved.offsets is None else {"$h_{k}$": [texts.rational(saved.offsets[k]) for k in agents]}
+    if saved.initial_state is not None:
+        numbers |= texts.state_columns(
+            saved, heads, agents, lambda x: texts.enclosed(x) if x[1] else texts.rational(x[0])
+        )
     labels = [_cut(label) for label in saved.graph.labels[: texts.LISTED]]
     parts = [part.removeprefix("leader of ") for part in texts.agent_parts(saved)]  # a column of two has little room
     return list(numbers), list(zip(labels, parts, zip(*numbers.values(), strict=True), strict=False))

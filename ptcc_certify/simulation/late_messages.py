@@ -75,7 +75,7 @@ class LateRun(Trajectory):
     targets: np.ndarray | None = None
 
     def _more_columns(self) -> list[tuple[str, np.ndarray]]:
-        return [] if self.targets is None else target_columns(self.labels, self.targets)
+        return [] if self.targets is None else target_columns(self.labels, self._in_places(self.targets))
 
 
 @gated

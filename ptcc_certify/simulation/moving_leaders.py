@@ -48,7 +48,7 @@ class TrackingRun(Trajectory):
     targets: np.ndarray
 
     def _more_columns(self) -> list[tuple[str, np.ndarray]]:
-        return target_columns(self.labels, self.targets)
+        return target_columns(self.labels, self._in_places(self.targets))
 
 
 @gated

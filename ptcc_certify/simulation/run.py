@@ -204,6 +204,38 @@ def simulate(
     return replace(run, stats=dict(run.stats) | {"seconds": time.perf_counter() - begin})
 
 
+def simulate_formation(graph: Any, protocol: Protocol, x0: Any, offsets: Any, **options: Any) -> Trajectory:
+    """Run single integrators in a formation: less their places they move as they do without.
+
+    Parameters
+    ----------
+    graph, protocol, x0, **options
+        As for :func:`simulate`; ``x0`` is where agents begin.
+    offsets : state-like
+        Their places.
+
+    Returns
+    -------
+    Trajectory
+        Its ``positions`` are where agents are, its ``states`` less their places.
+
+    Examples
+    --------
+    >>> from ptcc_certify.simulation.run import simulate_formation
+    >>> team = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)])
+    >>> run = simulate_formation(team, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1], [0, 5], times=[0, 1])
+    >>> run.positions.round(9)
+    array([[ 3. , -0.5],
+           [ 1. ,  4.5]])
+    """
+    graph = as_graph(graph, options.pop("orientation", None))
+    rows, places = as_states(x0, graph, "x0"), as_states(offsets, graph, "offsets")
+    if len(rows[0]) != len(places[0]):
+        raise ParameterError(f"offsets has {len(places[0])} numbers for each agent, x0 has {len(rows[0])}")
+    less = [[x - h for x, h in zip(*pair, strict=True)] for pair in zip(rows, places, strict=True)]
+    return replace(simulate(graph, protocol, less, **options), offsets=_floats(places, graph, "offsets"))
+
+
 def _refuse_beside(
     graph: SignedDigraph,
     messages: LateMessages | None,

@@ -59,6 +59,8 @@ class Trajectory(ByValue, Shown):
         Disturbance and measurement noise of the nominal protocol in words; None if there is neither.
     held_input : (N, M) or (N, S, M) array or None
         The input under zero-order hold, if the actuator samples.
+    offsets : (N,) array or None
+        Places in a formation; then ``states`` are less these, and tables and figures tell :attr:`positions`.
 
     References
     ----------
@@ -88,6 +90,7 @@ class Trajectory(ByValue, Shown):
     actuator: GainLimits | None = field(default=None, kw_only=True)
     forcing: str | None = field(default=None, kw_only=True)
     held_input: np.ndarray | None = field(default=None, kw_only=True)
+    offsets: np.ndarray | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         self.lock()
@@ -101,6 +104,15 @@ class Trajectory(ByValue, Shown):
     def labels(self) -> tuple[str, ...]:
         """The N agents, in the order of the rows of ``states``."""
         return self.graph.labels
+
+    @property
+    def positions(self) -> np.ndarray:
+        """Where agents are: in a formation ``states`` and their places."""
+        return self._in_places(self.states)
+
+    def _in_places(self, values: np.ndarray) -> np.ndarray:
+        """Return values of the N agents with their places in the formation, if they are in one."""
+        return values if self.offsets is None else values + self.offsets[..., None]
 
     @property
     def deadline_resolved(self) -> bool:
@@ -231,8 +243,11 @@ class Trajectory(ByValue, Shown):
         if self.states.ndim == 3:
             numbers = range(1, self.states.shape[1] + 1)
             names = pandas.MultiIndex.from_product([columns, numbers], names=["node", "component"])
+        values = self.positions if what == "states" else getattr(self, what)
         return pandas.DataFrame(
-            getattr(self, what).reshape(-1, self.t.size).T + 0.0, index=pandas.Index(self.t, name="t"), columns=names
+            values.reshape(-1, self.t.size).T + 0.0,
+            index=pandas.Index(self.t, name="t"),
+            columns=names,
         )
 
     @gated
@@ -255,7 +270,7 @@ class Trajectory(ByValue, Shown):
         writer = csv.writer(text, lineterminator="\n")
         more = self._more_columns()
         writer.writerow(["t", "remaining", *names, *(name for name, _ in more), *(f"u({name})" for name in names)])
-        states, inputs = (values.reshape(len(names), -1) for values in (self.states, self.input + 0.0))
+        states, inputs = (values.reshape(len(names), -1) for values in (self.positions, self.input + 0.0))
         table = np.vstack([self.t, self.remaining, states, *(values for _, values in more), inputs])
         writer.writerows(table.T.tolist())
         return text.getvalue()

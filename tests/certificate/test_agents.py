@@ -15,7 +15,7 @@ from scipy.linalg import expm
 
 from ptcc_certify.certificate.answer import MET, OPEN, REFUTED
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
-from ptcc_certify.certificate.procedure import certify, motion_of
+from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.checker import check
 from ptcc_certify.checker.input_formulas import InitialSet
@@ -196,10 +196,11 @@ def test_single_integrators_in_a_formation_have_the_plain_certificate_of_their_p
 
 
 def test_bounds_of_a_formation_under_a_cap_hold_on_the_motion_that_agents_of_order_1_make():
-    """The motion is that of agents in their places; the bound of the input is no weaker than theirs."""
+    """The motion, in the plane, is that of agents in their places; the bound of the input is no weaker than theirs."""
     agents = Agents(order=1, offsets=[1, -3, 2, 2], gain_cap=4)
     ours = certify(TEAM, NOMINAL, [5, 2, 4, -1], simulation=False, agents=agents)
-    part = motion_of(ours, agents).agents
+    in_plane = Agents(order=1, offsets=[[1, 0], [-3, 0], [2, 0], [2, 0]], gain_cap=4)
+    part = certify(TEAM, NOMINAL, [[x, 0] for x in (5, 2, 4, -1)], simulation=False, agents=in_plane).agents
     assert part is not None and part.input is not None and ours.effort is not None
     (left,) = ours.effort.residual
     run = part.simulate()
@@ -208,6 +209,30 @@ def test_bounds_of_a_formation_under_a_cap_hold_on_the_motion_that_agents_of_ord
     assert left.agents is not None and left.largest is not None
     assert all(0 <= x <= float(y) * (1 + 1e-7) for x, y in zip(off, left.agents, strict=True))
     assert left.largest <= max(part.input) * (1 + Fraction(1, 10**9))
+
+
+@pytest.mark.parametrize("name", BESIDE)
+def test_runs_of_a_formation_tell_positions(name: str):
+    """What is asked and the run beside the bounds begin at ``x0``, and differ from ``x - h`` by ``h`` at any time."""
+    protocol, beside = BESIDE[name]
+    graph = TEAM
+    if name == "moving leaders":
+        graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1), ("c", "d", 1), ("d", "b", "0.5")])
+    x0, h = [5, 2, 4, -1], [1, -3, Fraction(2, 3), 2]
+    ours = certify(graph, protocol, x0, simulation=True, agents=Agents(order=1, offsets=h), **beside)
+    plain = certify(graph, protocol, [x - y for x, y in zip(x0, h, strict=True)], simulation=True, **beside)
+    runs = [(ours.trajectory, plain.trajectory), (ours.asked_trajectory, plain.asked_trajectory)]
+    assert ours.comparison is not None and not ours.comparison.violated
+    for run, less in runs:
+        assert (run is None) == (less is None)
+        if run is not None and less is not None:
+            assert run.positions[:, 0] == pytest.approx(x0, rel=1e-12)
+            assert np.array_equal(run.states, less.states) and np.array_equal(run.input, less.input)
+            table, other = (np.loadtxt(one.to_csv().splitlines()[1:], delimiter=",") for one in (run, less))
+            shift = np.array([float(x) for x in h])
+            assert table[:, 2:6] == pytest.approx(other[:, 2:6] + shift, abs=1e-12)
+            if name == "moving leaders" and hasattr(run, "targets"):
+                assert table[:, 6:10] == pytest.approx(other[:, 6:10] + shift, abs=1e-12)
 
 
 @pytest.mark.parametrize("expected", ["bipartite-containment", "consensus"])

@@ -9,10 +9,13 @@ import re
 import shlex
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from bad_inputs import ptcc
+
+import ptcc_certify
 
 CERTIFY = ("certify", "fig1a", "--method", "paper", "--T", "2", "--no-simulation")
 
@@ -56,13 +59,65 @@ def test_single_integrators_in_places_under_a_gain_cap_have_the_bounds_of_the_pl
     assert ptcc("check", str(file)).code == 0 and ptcc("report", str(file), "-o", str(page)).code == 0
     text = page.read_text(encoding="utf-8")
     assert "Less their places: " in text and "Place h" in text
-    refused = ptcc("report", str(file), "-o", str(tmp_path / "p.tex"))
-    assert refused.code == 2 and "no statement in LaTeX of a formation" in refused.err
+    assert "less its place h" in text
+    written = ptcc("report", str(file), "-o", str(tmp_path / "p.tex"))
+    assert written.code == 0 and "z_{k} = x_{k} - h_{k}" in (tmp_path / "p.tex").read_text()
+    assert ptcc("plot", str(file), "--what", "states", "-o", str(tmp_path / "s.png")).code == 0
     run = ptcc("simulate", *case[1:], "--x0", "5,2,4,-1", "--offsets", "1,-3,2,2")
     first = [float(x) for x in run.out.splitlines()[1].split(",")[2:6]]
     assert run.code == 0 and first == pytest.approx([5, 2, 4, -1], abs=1e-12)
     drawn = ("plot", *case[1:], "--x0", "5,2,4,-1", "--offsets", "1,-3,2,2", "--what", "motion")
     assert ptcc(*drawn, "-o", str(tmp_path / "m.png")).code == 0
+
+
+@pytest.mark.parametrize(
+    "limits",
+    [
+        ("--stop-before", "0.1"),
+        ("--gain-cap", "4", "--stop-before", "0.1"),
+        ("--sample-period", "0.01"),
+        ("--noise", "0.1", "--gain-cap", "4"),
+        ("--delta", "1", "--disturbance", "sin(k*t)"),
+        ("--delay", "0.05"),
+        ("--leader-speed", "0.5"),
+        ("--protocol", "sliding-mode", "--sigma0", "1,0,-2,1"),
+        ("--biases", "0,0,0,0"),
+    ],
+)
+def test_formations_run_as_their_states_less_places_do(limits: tuple[str, ...], tmp_path: Path):
+    """Whatever limits the gain or acts on a run: positions are those of the run from ``x0 - h``, and ``h``."""
+    table = tmp_path / "path.csv"
+    table.write_text("source,target,weight\na,b,1\nb,c,-2\nc,d,1\nd,b,-1\n")
+    ours = ptcc("simulate", str(table), "--x0", "5,2,4,-1", "--offsets", "1,-3,2,2", *limits)
+    plain = ptcc("simulate", str(table), "--x0", "4,5,2,-3", *[x for x in limits if x not in ("--biases", "0,0,0,0")])
+    assert ours.code == plain.code == 0, ours.err
+    heads = ours.out.splitlines()[0].split(",")
+    assert heads == plain.out.splitlines()[0].split(",")
+    own, other = (np.loadtxt(one.out.splitlines()[1:], delimiter=",") for one in (ours, plain))
+    places = dict(zip("abcd", (1, -3, 2, 2), strict=True))
+    shift = [places.get(head.removeprefix("target(").removesuffix(")"), 0) for head in heads]
+    shift = [0 if head.startswith(("u(", "sigma(")) else x for head, x in zip(heads, shift, strict=True)]
+    assert own == pytest.approx(other + np.array(shift), abs=1e-12)
+
+
+def test_a_certificate_of_places_alone_is_drawn_from_positions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """What ``--x0`` gives to a certificate without an initial state is where agents begin, as it is to ``certify``."""
+    protocol = ptcc_certify.NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
+    agents = ptcc_certify.Agents(order=1, offsets=[1, 2, 3, 4, 5, 9])
+    ptcc_certify.certify("fig1a", protocol, agents=agents).save(tmp_path / "c.json")
+    drawn: list[Any] = []
+    monkeypatch.setattr("ptcc_certify.cli.plot._draw", lambda what, subject, *_: drawn.append(subject))
+    monkeypatch.setattr("ptcc_certify.report.plots.style.save_figure", lambda *_: None)
+    assert ptcc("plot", str(tmp_path / "c.json"), "--x0", "6,5,4,3,2,1", "--what", "states").code == 0
+    assert drawn[0].trajectory.positions[:, 0] == pytest.approx([6, 5, 4, 3, 2, 1], rel=1e-12)
+
+
+@pytest.mark.parametrize("what", ["states", "motion", "input", "decay"])
+def test_figures_of_a_formation_take_limits_of_the_gain(what: str, tmp_path: Path):
+    case = ("plot", "fig1a", "--offsets", "1,2,3,4,5,6", "--what", what, "-o", str(tmp_path / "f.png"))
+    limits = () if what == "decay" else ("--stop-before", "0.1", "--gain-cap", "9")
+    drawn = ptcc(*case, *limits)
+    assert drawn.code == 0 and (tmp_path / "f.png").stat().st_size > 0, drawn.err
 
 
 def test_a_limit_of_the_input_that_is_exceeded_at_first_is_refuted():

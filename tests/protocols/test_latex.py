@@ -253,6 +253,19 @@ def test_latex_of_a_graph_is_the_input_of_every_agent(instant, rho2):
     assert printed == pytest.approx(np.array(u).ravel(), rel=1e-12, abs=1e-12)
 
 
+def test_in_a_formation_every_state_is_less_its_place():
+    graph, protocol = signed_graph(), NominalProtocol("0.6", "0.1", "0.3", 2)
+    state, h = np.random.default_rng(4).normal(size=(2, 5))
+    values = {f"x{k + 1}": state[k] for k in range(5)} | {f"h{k + 1}": h[k] for k in range(5)}
+    placed, less = rows_of(protocol.latex(graph, places=True)), rows_of(protocol.latex(graph))
+    own = {f"x{k + 1}": state[k] - h[k] for k in range(5)}
+    for k in range(5):
+        name = f"u_{{{k + 1}}}"
+        assert read(placed[name], g=3, **values) == pytest.approx(read(less[name], g=3, **own), rel=1e-12, abs=1e-12)
+    general = rows_of(protocol.latex(places=True))["u_{k}"].removeprefix(r"\sum_{l=1}^{N} ")
+    assert read(general, g=3, wkl=-2, xl=5, hl=1, xk=4, hk=-3) == 3 * -2 * ((5 - 1) + (4 + 3))
+
+
 @pytest.mark.parametrize("instant", [0.1, 0.55, 0.8])
 def test_the_generic_form_is_the_input_of_every_agent(instant):
     graph, protocol = signed_graph(3), NominalProtocol("0.6", "0.1", "0.3", 2)

@@ -236,6 +236,24 @@ def test_of_a_certificate_under_limits_the_run_under_them_is_drawn_and_they_are_
     assert titles == {"held": "held over 0.01", "capped": "gain at most 0.5", "both": "without the limits of the gain"}
 
 
+@pytest.mark.parametrize("limits", [None, GainLimits(gain_cap="0.5")], ids=["ideal", "capped"])
+def test_figures_of_a_formation_show_positions(limits: GainLimits | None) -> None:
+    """Lines of states begin at ``x0`` and end at final positions; no word tells them less places."""
+    start, h = [-4, 3, -1, 2, -2, 5], [1, -2, 0, 4, 30, -50]
+    agents = ptcc_certify.Agents(order=1, offsets=h)
+    cert = certify(graph_of("fig3b"), EXAMPLES[2].protocol(), start, limits=limits or (), agents=agents)
+    assert cert.final_positions is not None and cert.trajectory is not None
+    for ax in (plot_trajectory(cert), plot_run(cert).axes[0], *([] if limits else [plot_trajectory(cert.trajectory)])):
+        ends = np.array([[line.get_ydata()[k] for k in (0, -1)] for line in agent_lines(drawn(ax))])  # type: ignore[index]
+        assert sorted(ends[:, 0]) == pytest.approx(sorted(start))
+        if limits is None:
+            assert sorted(ends[:, 1]) == pytest.approx(sorted(map(float, cert.final_positions.states)), abs=1e-6)
+        legend = ax.get_legend()
+        assert legend is not None and legend.get_title().get_text() == ("" if limits is None else "gain at most 0.5")
+    (low, high) = plot_final_states(cert).get_xlim()
+    assert low <= min(cert.final_positions.states) and high >= max(cert.final_positions.states)
+
+
 CAPPED = ptcc_certify.LateMessages(delay="0.01", gain_cap=40)
 
 

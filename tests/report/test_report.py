@@ -543,7 +543,7 @@ def test_letters_are_large_enough_and_details_open_on_paper():
 
 
 @pytest.mark.skipif(shutil.which("pdflatex") is None, reason="no pdflatex to compile with")
-@pytest.mark.parametrize("name", ["limits", "sliding", "disconnected", "single", "hostile"])
+@pytest.mark.parametrize("name", ["limits", "sliding", "disconnected", "single", "hostile", "formation"])
 def test_a_statement_compiles(name: str, tmp_path: Path):
     example(name).save(tmp_path / "c.json")
     assert write_report(tmp_path / "c.json", tmp_path / "state_ment.tex") == "certified"
@@ -689,6 +689,35 @@ def test_a_statement_holds_hypotheses_claim_and_numbers(tmp_path: Path):
     assert r"\includegraphics[width=\linewidth]{g.pdf}" in text and "{d.pdf}" in text
     assert text.count("\\begin{") == text.count("\\end{")
     assert "the gain is at most $50$" in text and r"|n_{k}| \le 0.01" in text and r"|d_{k}| \le 1/3" in text
+
+
+@pytest.mark.parametrize("sigma0", [None, [1, 0, -2, 1, 0, 3]], ids=["nominal", "sliding"])
+def test_a_statement_of_a_formation_is_that_of_states_less_places_but_for_where_agents_are(sigma0: Any):
+    """Bounds are those of the statement of ``x0 - h``; the protocol and the table tell places and positions."""
+    graph, h, x0 = "fig3a", [Fraction(1, 3), -2, 0, 4, 7, -5], [-4, 3, -1, 2, -2, 5]
+    protocol: Any = NOMINAL if sigma0 is None else SLIDING
+    options: dict[str, Any] = {"simulation": False, "sigma0": sigma0}
+    ours = read_certificate(certify(graph, protocol, x0, agents=Agents(order=1, offsets=h), **options).to_dict())
+    less = [x - y for x, y in zip(x0, h, strict=True)]
+    plain = read_certificate(certify(graph, protocol, less, **options).to_dict())
+    text, other = report_latex(ours), report_latex(plain)
+    assert protocol.latex(places=True) in text and protocol.latex() not in text
+    assert "x_{k}(t)" not in text and "$E = -L Z$" in text and "$z_{k} = x_{k} - h_{k}$" in text
+    before, after = (
+        part[part.index("occurs at $T") : part.index(r"\end{proposition}")].replace("x_{k}", "z_{k}")
+        for part in (text, other)
+    )
+    assert before == after.replace("-L X", "-L Z")
+    rows = [line.removeprefix("{}").removesuffix(r" \\").split(" & ") for line in text.splitlines() if line[:2] == "{}"]
+    told = [[Fraction(cell.strip("$ \\")) for cell in row[2:]] for row in rows]
+    assert ours.final_positions is not None
+    assert [(row[0], row[1], row[-1]) for row in told] == list(zip(h, x0, ours.final_positions.states, strict=True))
+
+
+def test_a_statement_of_a_formation_without_an_initial_state_tells_the_places():
+    made = certify("fig3a", NOMINAL, agents=Agents(order=1, offsets=[1, -2, 0, 4, 7, -5]), simulation=False)
+    text = report_latex(read_certificate(made.to_dict()))
+    assert "Agent & Part & $h_{k}$ \\\\" in text and "positions where agents" not in text
 
 
 def test_through_a_reaching_phase_the_statement_tells_what_is_left_from_T_r_on(tmp_path: Path):

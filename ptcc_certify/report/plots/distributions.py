@@ -43,9 +43,9 @@ def plot_final_states(certificate: Content, *, ax: Axes | None = None) -> Axes:
     >>> int(sum(bar.get_height() for bar in ax.patches))
     3
     """
-    if certificate.final_state is None:
+    if (ends := certificate.final_positions) is None:
         raise ParameterError("the certificate has no final state; certify the graph with x0")
-    values, followers = np.asarray(certificate.final_state), certificate.structure.followers
+    values, followers = np.asarray(ends), certificate.structure.followers
     leaders = np.delete(np.arange(values.size), followers)
     ax = axes_of(ax)
     parts = {"leaders": (values[leaders], RUN), "followers": (values[followers], BEHIND)}

@@ -159,7 +159,6 @@ def limits_text(run: Trajectory, certificate: Certificate | None) -> str:
             "leaders at rest": leaders is None and certificate.leaders_move,
             "without disturbance": forced and certificate.delta,
             "without noise": forced and certificate.noise,
-            "less places in the formation": certificate.offsets,
         }
         named += [text for text, there in absent.items() if there]
     return ", ".join(named)

@@ -31,6 +31,7 @@ from ptcc_certify.report.plots.subject import limits_text, structure_of, traject
 def plot_trajectory(subject: Any, *, ax: Axes | None = None, time_unit: str = "") -> Axes:
     """Draw the states ``x_k(t)`` of one run, in the colours and lines of the camps, and the deadline ``T``.
 
+    In a formation these are positions, the places added.
     Of up to eight agents each has a line with its name. Of more, parts of the graph with more than three agents are
     drawn as their range and median, and the agents that begin highest and lowest by name.
 
@@ -60,9 +61,9 @@ def plot_trajectory(subject: Any, *, ax: Axes | None = None, time_unit: str = ""
     ('time $t$ (s)', ['ann', 'bob', 'ann', 'bob'])
     """
     run, structure, ax = trajectory_of(subject), structure_of(subject), axes_of(ax)
-    named = draw_agents(ax, run, run.states, structure)
+    named = draw_agents(ax, run, run.positions, structure)
     draw_deadlines(ax, run)
-    name_agents(ax, run, run.states, named, ends=True)
+    name_agents(ax, run, run.positions, named, ends=True)
     title = limits_text(run, subject if isinstance(subject, Certificate) else None)
     return finished(ax, time_label("time $t$", time_unit), "state $x_k$", title)
 
