@@ -38,6 +38,26 @@ def at_deadline(certificate: Content, answer: Answer) -> Answer:
     return Answer(OPEN, what, "nobody is proved to settle at T")
 
 
+def judge_rate_beside(certificate: Content, least: Fraction, what: str) -> Answer | None:
+    """Tell the same of a rate where messages are late, leaders move or the gain is held; None where nothing of it is.
+
+    The rates of a certificate, and the upper bound on them, are those of the loop without these.
+    """
+    late = certificate.late
+    if certificate.constant or certificate.agents is not None:
+        return None
+    if certificate.leaders_move:
+        return Answer(OPEN, what, "no rate is proved while leaders move")
+    if any(limits.sample_period is not None for limits in certificate.limits):
+        return Answer(OPEN, what, "no rate is proved of a gain that is held")
+    if (late is None and certificate.request.messages is None) or (late is not None and late.direct):
+        return None
+    if late is None or late.lmi is None:
+        return Answer(OPEN, what, "no rate is proved with late messages")
+    rate = 2 * late.lmi.b
+    return Answer(MET if rate >= least else OPEN, what, f"with late messages {down(rate)} is proved")
+
+
 def judge_messages(certificate: Content) -> list[Answer]:
     """Tell what becomes of what may be left at ``T`` with late messages, and whether anything is proved of these."""
     late, most = certificate.late, certificate.expectations.max_residual

@@ -31,6 +31,7 @@ from ptcc_certify.certificate.late_answers import (
     at_deadline,
     judge_input_beside,
     judge_messages,
+    judge_rate_beside,
     use_of_late,
     use_of_tracking,
 )
@@ -276,6 +277,8 @@ def _judge_behaviour(certificate: Content, expected: str) -> Answer:
 def judge_rate(certificate: Content, least: Fraction) -> Answer:
     """Tell whether a rate of at least so much is proved, or excluded by the proved upper bound."""
     what, rate, bound = f"rate >= {near(least, 12)}", certificate.rate, certificate.upper_bound
+    if (beside := judge_rate_beside(certificate, least, what)) is not None:
+        return beside
     if certificate.agents is not None:
         rate, bound = certificate.agents.rate if certificate.agents.functions else None, None
     if certificate.constant or (rate is not None and rate >= least):

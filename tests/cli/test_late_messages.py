@@ -651,3 +651,24 @@ def test_gains_that_are_changed_leave_late_messages_undecided() -> None:
     assert int(made.assessment.exit_code) == 0
     other = made.changed(protocol=NominalProtocol(T=2, rho1=1, rho2=4, kappa=1))
     assert int(other.assessment.exit_code) == 4
+
+
+def test_a_rate_is_asked_of_the_loop_with_late_messages_moving_leaders_or_a_held_gain(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """That of the loop without these says nothing of it."""
+    monkeypatch.chdir(tmp_path)
+    Path("ring.csv").write_text("a,b,1\nb,c,1\nc,d,1\nd,a,-1\n")
+    Path("led.csv").write_text("lead,a,1\na,b,1\n")
+    own = ("--delay", "0.03", "--gain-cap", "10", "--own-delay")
+    for graph, rate, more, code in (
+        ("ring.csv", "0.5", (), 0),
+        ("ring.csv", "0.5", own, 4),
+        ("ring.csv", "0.01", own, 0),
+        ("led.csv", "0.5", (), 0),
+        ("led.csv", "0.5", ("--delay", "0.01"), 4),
+        ("led.csv", "0.5", ("--leader-speed", "1"), 4),
+        ("led.csv", "0.5", ("--sample-period", "0.001", "--gain-cap", "9"), 4),
+    ):
+        run = ptcc("certify", graph, "--rho2", "3", "--min-rate", rate, "--no-simulation", *more)
+        assert run.code == code, (graph, rate, more, run.out)
