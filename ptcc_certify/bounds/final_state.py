@@ -33,7 +33,7 @@ from lmi.sparse_h_matrix import SparseHMatrix, solve
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import as_state
-from ptcc_certify.graphs.rationals import nearest_float
+from ptcc_certify.graphs.rationals import nearest_float, writable
 from ptcc_certify.graphs.structure import ClosedComponent, Structure, analyse
 from ptcc_certify.graphs.tables import import_pandas, place_of, position, series
 from ptcc_certify.theorems.lemmas import (
@@ -532,8 +532,8 @@ def enclose(influence: Influence) -> Influence:
     left_null_vectors = {
         k: _enclose_left_null_vector(structure, component, np.array(null_vector, dtype=float), u)
         for k, (component, null_vector) in enumerate(influence.groups)
-        if not all(isinstance(w, Fraction | int) for w in null_vector)
-    }
+        if not all(isinstance(w, Fraction | int) and writable(Fraction(w)) for w in null_vector)
+    }  # a file states a rational that is too long to be written in a ball
     return replace(influence, enclosure=Enclosure(left_null_vectors, u))
 
 

@@ -205,3 +205,14 @@ def test_what_is_decided_of_a_family_and_not_certified_leaves_answers_open():
     """Whether rest states agree takes exact rows of more than 120 agents: no certificate, so nothing is refuted."""
     answers = standing([Answer("refuted", "consensus"), Answer("met", "rate >= 1")], None)
     assert {answer.status for answer in answers} == {"left open"}
+
+
+def test_a_left_null_vector_that_is_too_long_to_be_written_is_enclosed():
+    """Of a leader group that is solved exactly in a graph that is not: what a file rounds needs a witness."""
+    rng, n = np.random.default_rng(2), 100
+    names = [f"a{k}" for k in range(n)]
+    pairs = list(zip(names, [*names[1:], names[0]], strict=True))
+    edges = [(s, t, int(rng.integers(2**61, 2**62)) * 2**40 + 1) for s, t in [*pairs, *((t, s) for s, t in pairs)]]
+    followers = [("a0", "f0", 1), *((f"f{k}", f"f{k + 1}", 1) for k in range(40)), ("f40", "f20", -1)]
+    made = certify(SignedDigraph.from_edges([*edges, *followers]), PROTOCOL, simulation=False, method="perron")
+    assert made.graph.n_nodes > 120 and made.checked.accepted, made.checked.reason
