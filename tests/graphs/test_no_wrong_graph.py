@@ -125,6 +125,16 @@ SIGNS = [
         "ann>bob=-1/2",
     ),
 ]
+UNKNOWN_SIGNS = [
+    case
+    for word in ("+-", "-+", "+ -", "_+", "neg-", "-pos", "+/-", "_")
+    for case in (
+        Input("g.csv", f"source,target,weight\na,b,{word}\nb,c,-\nc,a,+\n", says=("line 2", f'"{word}"')),
+        Input("g.csv", f"source,target,weight,effect\na,b,1,{word}\nb,c,1,-\nc,a,1,+\n", says=(f'"{word}"',)),
+        Input("g.sif", f"a\t+\tb\nb\t{word}\tc\n", says=("line 2", f'"{word}"')),
+        Input("g.txt", f"a\tb\t-\nb\tc\t+\nc\ta\t{word}\n", says=("line 3", f'"{word}"')),
+    )
+]
 LAPLACIANS = [
     Input("g.npy", npy(LAPLACIAN), says=("Laplacian", "--laplacian", "--no-laplacian")),
     Input("g.npy", npy(LAPLACIAN), says=("Laplacian", "--laplacian"), how={"drop_self_loops": True}),
@@ -283,7 +293,7 @@ FORMATS = [
         ]
     ),
 ]
-INPUTS = SIGNS + LAPLACIANS + ROWS + MATRICES + FORMATS
+INPUTS = SIGNS + UNKNOWN_SIGNS + LAPLACIANS + ROWS + MATRICES + FORMATS
 
 
 def put(folder: Path, name: str, content: str | bytes) -> Path:
