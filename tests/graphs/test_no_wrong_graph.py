@@ -135,6 +135,54 @@ UNKNOWN_SIGNS = [
         Input("g.txt", f"a\tb\t-\nb\tc\t+\nc\ta\t{word}\n", says=("line 3", f'"{word}"')),
     )
 ]
+#: Headers whose second column is the source, and headers that may mean either direction.
+TURNED = [
+    "destination,source,weight",
+    "target,regulator,weight",
+    "target_gene,regulator,weight",
+    "Target gene,TF,Mode",
+    "target_id,tf,weight",
+    "gene,TF,score",
+    "destination,origin,score",
+    "dest,orig,score",
+    "End,Start,score",
+    "influenced,influencer,score",
+    "to_node,whoever,score",
+    "whatever,from_id,score",
+]
+EITHER = [
+    "node,listens_to,score",
+    "child,parent,score",
+    "head,tail,score",
+    "agent,neighbor,score",
+    "Gene2,Gene1,score",
+    "target,follower,weight",
+    "Trustor,Trustee,Trust",
+]
+DIRECTIONS = [
+    *(Input("g.csv", f"{header}\na,b,2\nb,c,-3\nc,a,1\n", "b>a=2 c>b=-3 a>c=1") for header in TURNED),
+    *(
+        Input("g.csv", f"{header}\na,b,2\nb,c,-3\nc,a,1\n", edges, says, how)
+        for header in EITHER
+        for edges, says, how in [
+            ("", ("line 1", "names no source and target", "--edges listens if", "--edges information"), {}),
+            ("b>a=2 c>b=-3 a>c=1", (), {"columns": "2,1,3"}),
+        ]
+    ),
+    Input("g.csv", "child,parent,score\na,b,2\nb,a,1\n", "b>a=2 a>b=1", how={"orientation": "listens"}),
+    Input("g.csv", "child,parent,score\na,b,2\nb,a,1\n", "a>b=2 b>a=1", how={"orientation": "information"}),
+    Input("g.csv", "id,target,weight\na,b,2\nb,c,-3\n", says=("line 1", "no source and target", "--columns")),
+    Input("g.csv", "target,year,score,tf\na,9,2,b\nb,8,1,c\n", says=("line 1", "no source and target", "--columns")),
+    Input("g.csv", "tf,regulator,weight\na,b,2\nb,c,-3\n", says=("line 1", "no source and target", "--columns")),
+    Input("g.csv", "tf,gene,weight_min,weight_max\na,b,2,3\nb,c,-3,1\n", says=("a family of graphs",)),
+    Input("g.csv", "Gene1,Gene2,score,start,end\na,b,2,3,4\nb,c,-1,3,4\n", "a>b=2 b>c=-1"),
+    *(
+        Input("g.csv", f"{header},score\na,b,2\nb,c,-1\n", "a>b=2 b>c=-1")
+        for header in ("i,j", "u,v", "node_a,node_b", "Gene1,Gene2", "gene_symbol_1,gene_symbol_2", "TF,Gene")
+    ),
+    Input("g.csv", "row,column,value\na,b,2\nb,c,-3\n", says=("line 1", "no source and target", "--columns")),
+    Input("g.csv", "a,b,trust\nb,c,1\n", says=("line 1", '"trust"')),
+]
 LAPLACIANS = [
     Input("g.npy", npy(LAPLACIAN), says=("Laplacian", "--laplacian", "--no-laplacian")),
     Input("g.npy", npy(LAPLACIAN), says=("Laplacian", "--laplacian"), how={"drop_self_loops": True}),
@@ -293,7 +341,7 @@ FORMATS = [
         ]
     ),
 ]
-INPUTS = SIGNS + UNKNOWN_SIGNS + LAPLACIANS + ROWS + MATRICES + FORMATS
+INPUTS = SIGNS + UNKNOWN_SIGNS + DIRECTIONS + LAPLACIANS + ROWS + MATRICES + FORMATS
 
 
 def put(folder: Path, name: str, content: str | bytes) -> Path:
@@ -538,3 +586,8 @@ def test_the_read_line_tells_in_full_what_makes_another_graph(tmp_path):
 def test_the_text_of_the_terminal_names_the_columns_of_a_header_that_was_guessed(tmp_path):
     out = run("classify", str(put(tmp_path, "g.csv", "Gene1,Gene2,Type\na,b,+\nb,c,-\n"))).out
     assert "columns Gene1, Gene2, Type" in out and "3 nodes" in out
+
+
+def test_the_text_of_the_terminal_names_columns_that_a_header_turns_round(tmp_path):
+    out = run("classify", str(put(tmp_path, "g.csv", "End,Start,score\na,b,2\nb,a,-1\n"))).out
+    assert "columns Start, End, score" in out

@@ -231,8 +231,9 @@ def keywords_as(path: Source, read: Mapping[str, Any]) -> dict[str, Any]:
     ('listens', 'refuse')
     """
     asked = options_of_record(read)
-    turned = "information" if _rows(path, Reading(**asked))[0].matrix else "listens"
-    return {"orientation": turned if read["orientation"] == turned else None, **asked}
+    rows, way = _rows(path, Reading(**asked))[0], read["orientation"]
+    turned = "information" if rows.matrix else "listens"
+    return {"orientation": way if way == turned or rows.asks else None, **asked}
 
 
 def reading_flags(read: Mapping[str, Any]) -> str:
