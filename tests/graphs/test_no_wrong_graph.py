@@ -183,6 +183,86 @@ DIRECTIONS = [
     Input("g.csv", "row,column,value\na,b,2\nb,c,-3\n", says=("line 1", "no source and target", "--columns")),
     Input("g.csv", "a,b,trust\nb,c,1\n", says=("line 1", '"trust"')),
 ]
+#: Columns beside weights that are all positive, for the edges a>b, b>c: what they make of the weights, or the refusal.
+SIGNS_BESIDE = [
+    *(
+        Input("g.csv", f"source,target,weight,{title}\na,b,2,{one}\nb,c,1,{other}\n", "a>b=-2 b>c=1")
+        for title, one, other in [
+            ("mode", "inhibits", "activates"),
+            ("label", "foe", "friend"),
+            ("trust", "distrust", "trust"),
+            ("stance", "oppose", "support"),
+            ("sgn", "-1", "1"),
+            ("s", "-1", "1"),
+            ("Sign of edge", "-1", "+1"),
+            ("x", "-", "+"),
+            ("value", "-1", "1"),
+        ]
+    ),
+    *(
+        Input(
+            "g.csv", f"source,target,weight,{title}\nb,c,1,{other}\na,b,2,{one}\n", says=(row, title, one, "--columns")
+        )
+        for row, title, one, other in [
+            ("line 3", "negative", "True", "False"),
+            ("line 3", "is_negative", "1", "0"),
+            ("line 3", "inhibition", "yes", "no"),
+            ("line 3", "positive", "0", "1"),
+            ("line 3", "sgn", "0", "1"),
+            ("line 3", "rating", "-5", "3"),
+            ("line 3", "sgn", "-1", "0"),
+            ("line 3", "kind", "inhibits", ""),
+            ("line 3", "kind", "inhibits", "unknown"),
+            ("line 2", "kind", "-", "-"),
+        ]
+    ),
+    Input("g.csv", "source,target,weight,rating\na,b,2,-5\nb,c,1,3\n", "a>b=-5 b>c=3", how={"columns": "1,2,4"}),
+    Input("g.csv", "source,target,weight,rating\na,b,2,-5\nb,c,1,3\n", "a>b=2 b>c=1", how={"columns": "1,2,3"}),
+    Input("g.csv", "source,target,weight,negative\na,b,2,False\nb,c,1,False\n", "a>b=2 b>c=1"),
+    Input("g.csv", "source,target,weight,assigned\na,b,2,1\nb,c,1,0\n", "a>b=2 b>c=1"),
+    Input("g.csv", "source,target,weight,lng\na,b,2,-71.5\nb,c,1,3\n", "a>b=2 b>c=1"),
+    Input("g.csv", "source,target,weight,kind\na,b,-2,inhibits\nb,c,1,activates\n", "a>b=-2 b>c=1"),
+    Input(
+        "g.csv", "source,target,weight,kind\na,b,-2,activates\nb,c,1,activates\nc,a,1,inhibits\n", says=("disagree",)
+    ),
+    Input("g.csv", "source,target,weight,party\na,b,-2,1\nb,c,1,-1\n", "a>b=-2 b>c=1"),
+    Input("g.csv", "source,target,sign,type\na,b,1,negative\nb,c,-1,positive\n", says=("line 2", "disagree")),
+    Input("g.csv", "source,target,weight,sign,type\na,b,2,-1,enemy\nb,c,1,1,ally\n", "a>b=-2 b>c=1"),
+    Input("g.csv", "source,target,weight,sign,type\na,b,2,-1,ally\nb,c,1,1,enemy\n", says=("line 2", "disagree")),
+    Input("g.csv", "source,target,weight,directed\na,b,2,true\nb,c,-1,false\n", says=("directed and undirected",)),
+    Input("g.csv", "source,target,weight,directed\na,b,2,0\nb,c,-1,0\n", says=("undirected", "--undirected")),
+    Input("g.csv", "source,target,weight,directed\na,b,2,1\nb,c,-1,1\n", "a>b=2 b>c=-1"),
+    Input(
+        "g.csv",
+        "source,target,weight,rating\n" + "".join(f"a,n{k},1,{k}\n" for k in range(1500)) + "b,a,1,-5\n",
+        says=('"rating" holds -5',),
+    ),
+    Input(
+        "g.graphml",
+        graphml('<data key="w">2</data><data key="s">true</data>', keys="boolean").replace('"sign"', '"negative"'),
+        says=('"negative"', "--columns"),
+    ),
+    Input(
+        "g.graphml",
+        graphml('<data key="w">2</data><data key="s">-1</data>').replace('"sign"', '"mark"'),
+        "n0>n1=-2",
+    ),
+    Input(
+        "g.gml",
+        'graph [ directed 1 node [ id 0 label "a" ] node [ id 1 label "b" ] '
+        "edge [ source 0 target 1 weight 2 negative 1 ] edge [ source 1 target 0 weight 1 negative 0 ] ]",
+        says=('"negative"', "--columns"),
+    ),
+    Input(
+        "g.gexf",
+        gexf(edge='weight="2"', values='<attvalues><attvalue for="0" value="-1"/></attvalues>').replace(
+            'title="sign"', 'title="mark"'
+        ),
+        "ann>bob=-2",
+    ),
+    Input("g.json", '[{"source": "a", "target": "b", "weight": 2, "mode": "inhibits"}]', "a>b=-2"),
+    Input("g.json", '[{"source": "a", "target": "b", "weight": 2, "negative": true}]', says=('"negative"',)),
+]
 LAPLACIANS = [
     Input("g.npy", npy(LAPLACIAN), says=("Laplacian", "--laplacian", "--no-laplacian")),
     Input("g.npy", npy(LAPLACIAN), says=("Laplacian", "--laplacian"), how={"drop_self_loops": True}),
@@ -341,7 +421,7 @@ FORMATS = [
         ]
     ),
 ]
-INPUTS = SIGNS + UNKNOWN_SIGNS + DIRECTIONS + LAPLACIANS + ROWS + MATRICES + FORMATS
+INPUTS = SIGNS + UNKNOWN_SIGNS + DIRECTIONS + SIGNS_BESIDE + LAPLACIANS + ROWS + MATRICES + FORMATS
 
 
 def put(folder: Path, name: str, content: str | bytes) -> Path:
@@ -449,6 +529,25 @@ def test_a_matrix_as_text_asks_for_its_direction_in_python(tmp_path):
     with pytest.raises(GraphError, match="does not tell its direction"):
         ptcc.as_graph(path)
     assert told(ptcc.as_graph(path, "information")) == expected(MATRICES[1].edges)
+
+
+def test_signs_of_any_title_in_memory_are_factors_or_refused_and_what_is_not_read_is_named():
+    graph = nx.DiGraph(
+        [("a", "b", {"weight": 2, "mode": "inhibits", "year": 9}), ("b", "a", {"weight": 1, "mode": "+"})]
+    )
+    read = ptcc.as_graph(graph)
+    assert told(read) == expected("a>b=-2 b>a=1")
+    assert read.read["notes"] == ('weights times column "mode"', 'columns ignored: "year"')
+    assert told(ptcc.SignedDigraph.from_networkx(graph, "weight")) == expected("a>b=2 b>a=1")
+    graph["a"]["b"]["negative"], graph["b"]["a"]["negative"] = True, False
+    del graph["a"]["b"]["mode"], graph["b"]["a"]["mode"]
+    with pytest.raises(GraphError, match='column "negative" holds True'):
+        ptcc.as_graph(graph)
+    pandas = pytest.importorskip("pandas")
+    table = pandas.DataFrame({"source": ["a", "b"], "target": ["b", "a"], "weight": [2, 1], "s": [-1, 1], "t": [8, 9]})
+    assert told(ptcc.as_graph(table)) == expected("a>b=-2 b>a=1")
+    with pytest.raises(GraphError, match='column "is_negative" holds True'):
+        ptcc.as_graph(table.assign(s=9, is_negative=[True, False]))
 
 
 # ---------------------------------------------------------------------------------------------- families

@@ -12,6 +12,7 @@ import numpy as np
 
 from ptcc_certify.errors import FormatError, NumberError
 from ptcc_certify.graphs.digraph import SignedDigraph, ordered_labels
+from ptcc_certify.graphs.io.columns_beside import Column
 from ptcc_certify.graphs.io.files import lines_of
 from ptcc_certify.graphs.io.graph_from_rows import DECIMALS, HEADER_MEND, Numbers, Rows, Signs
 from ptcc_certify.graphs.io.signs import WEIGHT, plain, sign_of_word
@@ -140,6 +141,7 @@ class _EdgeList:
         self.nodes, self.weights, self.signs = Numbers(), Numbers(), Numbers()
         self.first, self.second, self.codes = list[int](), list[int](), list[int]()
         self.sign_codes, self.numbers = list[int](), list[int]()
+        self.beside = [(k, Column(columns.titles[k])) for k in columns.ignored]
         self.extra: dict[str, int] = {}  # fields after the third of a table without header, and the line of each
 
     def read(self, rows: Iterable[tuple[int, list[str]]]) -> None:
@@ -162,6 +164,8 @@ class _EdgeList:
             second.append(target)
             codes.append(code)
             numbers.append(number)
+            for k, column in self.beside:
+                column.add(row[k] if k < len(row) else "")
 
     def more_fields(self, number: int, row: list[str], width: int) -> None:
         """Refuse fields beyond a header; keep those after the third of a table without."""
@@ -190,9 +194,9 @@ class _EdgeList:
         columns, numbers = self.columns, self.numbers
         where = lambda row: f"line {numbers[row]}"  # noqa: E731
         rows = Rows(list(self.nodes.texts), self.first, self.second, list(self.weights.texts), self.codes, where)
-        ignored = [f'"{shorten(title)}"' for title in columns.ignored] or ["after the third"] * bool(self.extra)
         rows.headerless, rows.notes, rows.asks = not columns.titles, columns.notes, columns.asks
-        rows.notes += ("columns ignored: " + ", ".join(ignored[:20]),) if ignored else ()
+        rows.notes += ("columns ignored: after the third",) if self.extra else ()
+        rows.beside, rows.told = [column for _, column in self.beside], columns.told
         rows.weight_title = columns.codes
         if columns.sign is not None:
             rows.signs = Signs(list(self.signs.texts), self.sign_codes, columns.titles[columns.sign])

@@ -51,10 +51,10 @@ class Columns:
     guessed: bool = False  # the first row names no source and target, but is none of edges
 
     @property
-    def ignored(self) -> list[str]:
-        """Titles of columns that are not read."""
+    def ignored(self) -> list[int]:
+        """Columns that are not read."""
         used = (self.source, self.target, self.weight, self.sign)
-        return [title for k, title in enumerate(self.titles) if k not in used]
+        return [k for k in range(len(self.titles)) if k not in used]
 
     @property
     def codes(self) -> str:
