@@ -263,6 +263,33 @@ SIGNS_BESIDE = [
     Input("g.json", '[{"source": "a", "target": "b", "weight": 2, "mode": "inhibits"}]', "a>b=-2"),
     Input("g.json", '[{"source": "a", "target": "b", "weight": 2, "negative": true}]', says=('"negative"',)),
 ]
+ORDINARY = [
+    Input("g.csv", "0;1,5;-1\n1;0;2\n0;1;0\n", says=("decimal commas", "with a point")),
+    Input("g.csv", "source;target;weight\na;b;1,5\n", says=("line 2", "decimals with a point")),
+    Input("g.csv", "a;b;1,5\nb;c;-2,5\n", says=("line 1", "decimals with a point")),
+    Input("out.a", "% asym posweighted\n1 2 1 0\n2 3 5 0\n3 1 1 0\n", "1>2=1 2>3=5 3>1=1"),
+    Input("out.a", "% asym signed\n1 2 1 12345\n2 3 -5 123\n3 1 1 1\n", "1>2=1 2>3=-5 3>1=1"),
+    Input("out.a", "% asym signed\n1 2 0 3\n2 3 -5 0\n3 1 1 1\n4 1 1 2\n", says=("line 2", "weight 0")),
+    Input(
+        "g.csv",
+        "Trustor,Trustee,Trust\n1,2,4\n2,3,-4\n",
+        "2>1=4 3>2=-4",
+        how={"orientation": "listens"},
+    ),
+    Input("g.csv", "source,target,Trust\n1,2,4\n2,3,-4\n", says=("line 1", '"Trust"')),
+    *(
+        Input("g.txt", table, says=("line 2", "4 fields", "row.names = FALSE"))
+        for table in (
+            '"source" "target" "weight"\n"1" "a" "b" 4\n"2" "b" "c" -4\n',
+            "source target weight\n1 a b 4\n2 b c -4\n",
+            "V1 V2 V3\na 0 1 -1\nb 1 0 1\nc 1 0 0\n",
+            "   V1 V2 V3\n1  0  1 -1\n2  1  0  1\n3  1  0  0\n",
+        )
+    ),
+    # the same tables written with row.names = FALSE
+    Input("g.txt", '"source" "target" "weight"\n"a" "b" 4\n"b" "c" -4\n', "a>b=4 b>c=-4"),
+    Input("g.txt", '"V1" "V2" "V3"\n0 1 -1\n1 0 1\n1 0 0\n', "V2>V1=1 V3>V1=-1 V1>V2=1 V3>V2=1 V1>V3=1"),
+]
 LAPLACIANS = [
     Input("g.npy", npy(LAPLACIAN), says=("Laplacian", "--laplacian", "--no-laplacian")),
     Input("g.npy", npy(LAPLACIAN), says=("Laplacian", "--laplacian"), how={"drop_self_loops": True}),
@@ -421,7 +448,7 @@ FORMATS = [
         ]
     ),
 ]
-INPUTS = SIGNS + UNKNOWN_SIGNS + DIRECTIONS + SIGNS_BESIDE + LAPLACIANS + ROWS + MATRICES + FORMATS
+INPUTS = SIGNS + UNKNOWN_SIGNS + DIRECTIONS + SIGNS_BESIDE + ORDINARY + LAPLACIANS + ROWS + MATRICES + FORMATS
 
 
 def put(folder: Path, name: str, content: str | bytes) -> Path:
@@ -690,3 +717,25 @@ def test_the_text_of_the_terminal_names_the_columns_of_a_header_that_was_guessed
 def test_the_text_of_the_terminal_names_columns_that_a_header_turns_round(tmp_path):
     out = run("classify", str(put(tmp_path, "g.csv", "End,Start,score\na,b,2\nb,a,-1\n"))).out
     assert "columns Start, End, score" in out
+
+
+def test_notes_on_columns_are_not_cut_but_for_the_names_of_those_that_are_no_signs(tmp_path):
+    many = ",".join(f"a_long_title_of_a_column_{k}" for k in range(30))
+    path = put(
+        tmp_path,
+        "g.csv",
+        f"id,source,target,weight,kind,sign_of_the_first_year,{many}\n"
+        f"1,a,b,2,inhibits,0.3,{'7,' * 29}7\n2,b,a,1,activates,0.1,{'7,' * 29}7\n",
+    )
+    lines = [line.strip() for line in run("classify", str(path)).out.splitlines()]
+    text = " ".join(lines)
+    for whole in (
+        "columns by header: ",
+        'weights times column "kind"',
+        'perhaps signs, ignored: "sign_of_the_first_year"',
+    ):
+        assert whole in text
+    (ignored,) = [line for line in lines if line.startswith('columns ignored: "id", "a_long_title')]
+    assert ignored.endswith("...")
+    short = run("classify", str(put(tmp_path, "s.csv", "RATER,RATEE,RATING,TIME\n1,2,4,99\n2,1,-4,98\n"))).out
+    assert "raters listen? --edges listens" in short and 'columns ignored: "TIME"' in short

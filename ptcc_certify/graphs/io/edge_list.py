@@ -97,7 +97,10 @@ def read_edge_list(data: bytes, name: str, how: Reading) -> Rows:
     begin = list(islice(numbered, _LOOKED_AT))
     table = [row for _, row in begin if len(row) > 1]
     tells = bool(how.titles) or bool(table and names_edges(table[0]))
-    if table and not tells and len(table[0]) >= len(table) - 1:  # perhaps a matrix, of which all rows are needed
+    konect = re.match(rb"(\xef\xbb\xbf)?%\s*(sym|asym)\b", data) is not None  # nodes, weight and time
+    if (
+        table and not tells and not konect and len(table[0]) >= len(table) - 1
+    ):  # perhaps a matrix, of which all rows are needed
         begin += islice(numbered, len(table[0]) + 2)
         table = [row for _, row in begin if len(row) > 1]
         declares = any(len(row) == 1 and row[0].strip() for _, row in begin)
@@ -113,7 +116,7 @@ def read_edge_list(data: bytes, name: str, how: Reading) -> Rows:
     draft.read(chain(begin, numbered))
     rows = draft.rows()
     if not columns.titles and not columns.told:
-        _refuse_ambiguous(draft, rows, data)
+        _refuse_ambiguous(draft, rows, data, konect)
     rows.undirected = undirected
     return rows
 
@@ -170,8 +173,9 @@ class _EdgeList:
     def more_fields(self, number: int, row: list[str], width: int) -> None:
         """Refuse fields beyond a header; keep those after the third of a table without."""
         if self.columns.titles:
-            what = f"{len(row)} fields, and the header has {width}"
-            raise FormatError(f"{self.name}, line {number}: {what}; quote fields that hold the separator")
+            what = f"{len(row)} fields, and the header has {width}; quote fields that hold the separator"
+            what += ", or write the table of R with row.names = FALSE" if len(row) == width + 1 else ""
+            raise FormatError(f"{self.name}, line {number}: {what}")
         if len(self.extra) < _EXTRA:
             for field in row[width:]:
                 self.extra.setdefault(field.strip(), number)
@@ -216,14 +220,22 @@ def _refuse_titles(row: list[str], place: str, data: bytes) -> None:
         raise FormatError(f"{place}: the header {titles} names no source and target; {mend}")
 
 
-def _refuse_ambiguous(draft: _EdgeList, rows: Rows, data: bytes) -> None:
-    """Refuse a table without header whose rows may be something else than ``source,target,weight``."""
+def _refuse_ambiguous(draft: _EdgeList, rows: Rows, data: bytes, konect: bool) -> None:
+    """Refuse a table without header whose rows may be something else than ``source,target,weight``.
+
+    ``konect``: its first line, as KONECT writes it, tells that the fourth column holds times.
+    """
     name, labels, weights = draft.name, draft.nodes.texts, draft.weights.texts
     tell = "begin with a header source,target,weight, or tell the columns: --columns 1,2,3"
-    if draft.extra:
+    commas = [label for label in labels if re.fullmatch(r"[+-]?\d+,\d+", label)]
+    if commas and b'"' not in data:
+        which = "nodes, or a matrix, with decimal commas? Write decimals with a point, or quote the names of nodes"
+        raise FormatError(f"{name}: {commas[0]} among {which}")
+    extra = dict[str, int]() if konect else draft.extra
+    if extra:
         _refuse_decimal_commas(data, name)
         least = max(Fraction(_TIMES), *(10 * _size(text) for text in (*weights, *labels)))
-    for field, line in draft.extra.items():
+    for field, line in extra.items():
         if field and (field in labels or sign_of_word(field) is not None or not _is_time(field, least)):
             what = f'a weight, and "{shorten(field)}" in another column: neighbours, a sign or the weight?'
             raise FormatError(f"{name}, line {line}: {what} If there are edges, {tell}")
