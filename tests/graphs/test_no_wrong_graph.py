@@ -216,6 +216,9 @@ SIGNS_BESIDE = [
             ("line 2", "kind", "-", "-"),
         ]
     ),
+    Input(
+        "g.csv", "source,target,weight,p,q\na,b,2,-1,1\nb,c,1,1,-1\n", says=("line 2", '"q"', "disagree", "--columns")
+    ),
     Input("g.csv", "source,target,weight,rating\na,b,2,-5\nb,c,1,3\n", "a>b=-5 b>c=3", how={"columns": "1,2,4"}),
     Input("g.csv", "source,target,weight,rating\na,b,2,-5\nb,c,1,3\n", "a>b=2 b>c=1", how={"columns": "1,2,3"}),
     Input("g.csv", "source,target,weight,negative\na,b,2,False\nb,c,1,False\n", "a>b=2 b>c=1"),
@@ -585,6 +588,9 @@ def test_signs_of_any_title_in_memory_are_factors_or_refused_and_what_is_not_rea
     [
         ("source,target,weight_min,weight_max,sign\na,b,1,2,-1\n", 'a column "sign" beside the weights'),
         ("source,target,weight,sign,optional\na,b,1,-1,yes\n", 'a column "sign" beside the weights'),
+        ("source,target,weight_min,weight_max,mode\na,b,1,2,inhibits\n", 'column "mode" holds inhibits beside'),
+        ("source,target,weight,is_negative,optional\na,b,1,1,yes\n", 'column "is_negative" holds 1 beside'),
+        ("source,target,weight,directed,optional\na,b,-1,false,yes\n", 'column "directed" holds false beside'),
         ("source,target,weight_min,weight_max\na,b,1,2,9\n", "line 2: 5 fields, and the header has 4"),
         ("% sym\nsource,target,weight_min,weight_max\na,b,1,2\n", "% sym means undirected edges"),
     ],

@@ -45,7 +45,7 @@ def as_graph(graph: Any, orientation: str | None = None, **reading: Any) -> Sign
           rows, or a DataFrame with the same labels on rows and columns; ``"-0.3"`` is exact, ``-0.3`` a nearby float;
         - a DataFrame of edges with columns ``source``, ``target``, ``weight`` in any order (or the other names of
           :func:`~ptcc_certify.graphs.io.read_graph`, or those of ``columns``); a column ``sign`` or ``type`` beside
-          ``weight`` is its factor, others are ignored, which ``read["notes"]`` says;
+          ``weight``, or another of signs, is its factor, others are ignored, which ``read["notes"]`` says;
         - a list of ``(source, target, weight)``.
     orientation : {"information", "listens"}, optional
         Of an edge ``(a, b)``, or of the entry in row a and column b: information flows a -> b, or a listens to b.

@@ -295,7 +295,9 @@ class _Draft:
             codes = column.codes or []
             if what.kind == "directions":
                 self.multiply(Signs(directions(column.title, values), codes, column.title))
-            elif what.kind == "words" or (what.kind == "numbers" and (positive or is_signed(column.title))):
+            elif what.kind == "words" or (
+                what.kind == "numbers" and (positive or self.read_too or is_signed(column.title))
+            ):
                 self.multiply(Signs(values, codes, column.title))
                 self.read_too.add(column.title)
             elif positive:
