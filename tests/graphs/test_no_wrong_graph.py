@@ -600,6 +600,19 @@ def test_files_of_families_have_the_same_guards(tmp_path, content, says):
         read_family(put(tmp_path, "g.csv", content))
 
 
+def test_families_in_memory_have_the_same_guards():
+    pandas = pytest.importorskip("pandas")
+    interval = {"weight_min": 1, "weight_max": 2}
+    for more, says in (({"mode": "inhibits"}, "mode"), ({"sign": -1}, "sign"), ({"negative": True}, "negative")):
+        with pytest.raises(GraphError, match=f'column "{says}" holds'):
+            ptcc.as_family(nx.DiGraph([("a", "b", interval | more)]))
+        says = "weight -1 lies outside" if says == "sign" else f'column "{says}" holds'  # a sign alone is the weight
+        with pytest.raises(GraphError, match=says):
+            ptcc.as_family(pandas.DataFrame([{"source": "a", "target": "b"} | interval | more]))
+    family = ptcc.as_family(nx.DiGraph([("a", "b", {"weight_min": -2, "weight_max": -1, "mode": "inhibits"})]))
+    assert family.modes[0].edge_interval(0) == (-2, -1)
+
+
 def test_a_family_of_matrices_as_text_tells_its_direction_and_its_conversions(tmp_path):
     one = put(tmp_path, "one.csv", MATRICES[0].content)
     family = read_family([one, one], uncertainty="10%")

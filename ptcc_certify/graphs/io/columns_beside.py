@@ -9,7 +9,7 @@ from typing import Any
 
 from ptcc_certify.errors import NumberError
 from ptcc_certify.graphs.io.signs import DIRECTIONS, plain, sign_of_word
-from ptcc_certify.graphs.rationals import parse_exact
+from ptcc_certify.graphs.rationals import MINUS, parse_exact, shorten
 
 #: Different values of a column up to which it may hold signs; of one with more, only a negative number counts.
 _MOST = 1000
@@ -104,6 +104,25 @@ def verdict(title: str, values: Sequence[str]) -> Verdict:
     if negative and (signed or re.search(_SIZES, written)):
         return Verdict("doubt", negative[0], True)
     return Verdict("", "", signed or bool(negative))
+
+
+def signs_beside_intervals(columns: Iterable[Column], weights: Iterable[Any]) -> str:
+    """Return why a column beside uncertain weights is refused: it may hold their signs; "" if none does.
+
+    Examples
+    --------
+    >>> signs_beside_intervals([column_of("mode", ["inhibits"])], [1, 2]).partition(";")[0]
+    'column "mode" holds inhibits beside the weights'
+    >>> signs_beside_intervals([column_of("mode", ["inhibits"])], [-2, -1])
+    ''
+    """
+    positive = not any(str(weight).strip()[:1] in ("-", MINUS) for weight in weights if str(weight).strip())
+    for column in columns:
+        what = verdict(column.title, [*column.values])
+        if what.kind and (positive or what.kind == "directions"):
+            mend = "write signs into the weights or both ends of the intervals, and leave the column out"
+            return f'column "{shorten(column.title)}" holds {shorten(what.value)} beside the weights; {mend}'
+    return ""
 
 
 def is_signed(title: str) -> bool:

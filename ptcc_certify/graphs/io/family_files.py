@@ -13,13 +13,13 @@ from lmi.exact.decimal_rounding import near
 from ptcc_certify.errors import FormatError, GraphError, NumberError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family, Mode, read_share
-from ptcc_certify.graphs.io.columns_beside import column_of, verdict
+from ptcc_certify.graphs.io.columns_beside import column_of, signs_beside_intervals
 from ptcc_certify.graphs.io.edge_list import direction_of_comments, records
 from ptcc_certify.graphs.io.files import Source, name_and_ending
 from ptcc_certify.graphs.io.graph_files import MATRICES, format_of, graph_bytes, is_edge_list, read_graph
 from ptcc_certify.graphs.io.signs import find, is_sign, sign_of_word, weight_and_sign
 from ptcc_certify.graphs.io.table_columns import BY_HEADER, IGNORED, edge_columns
-from ptcc_certify.graphs.rationals import MINUS, as_fraction, format_exact, parse_exact, shorten
+from ptcc_certify.graphs.rationals import as_fraction, format_exact, parse_exact, shorten
 from ptcc_certify.graphs.reading import Reading, option_flags
 
 _LEAST = ("weight_min", "min_weight", "w_min", "least", "min", "lower")
@@ -320,7 +320,11 @@ def _interval_rows(
     body = lines[1 + next(k for k, (_, fields) in enumerate(lines) if fields == first) :]
     if low is None:
         body = _with_numbers(body, weight_and_sign(first, name)[0])
-    _refuse_signs_beside(first, ends, columns, body, name)
+    others = [k for k in range(len(first)) if k not in (*ends, *columns)]
+    full = [[*row, *[""] * len(first)] for _, row in body if len(row) > 1]
+    weights = [row[k] for row in full for k in (low, high, ends[2]) if k is not None]
+    if text := signs_beside_intervals([column_of(first[k], (row[k] for row in full)) for k in others], weights):
+        raise FormatError(f"{name}: {text}")
     for number, row in body:
         where = f"{name}, line {number}"
         if len(row) > len(first) and any(row[len(first) :]):
@@ -352,27 +356,6 @@ def _refuse_other_readings(first: Sequence[str], intervals: bool, data: bytes, n
         raise FormatError(f'{name}: a column "{shorten(first[beside])}" beside the weights; {mend}')
     if (said := direction_of_comments(data, name)) and not undirected:
         raise FormatError(f"{name}: {said} means undirected edges; let each go both ways with --undirected")
-
-
-def _refuse_signs_beside(
-    first: Sequence[str],
-    ends: Sequence[int | None],
-    columns: Sequence[int | None],
-    body: Sequence[tuple[int, list[str]]],
-    name: str,
-) -> None:
-    """Refuse a column of any title that may hold the signs of weights, or of intervals, that are all positive."""
-    rows = [row for _, row in body if len(row) > 1]
-    weights = [k for k in (*columns[:2], ends[2]) if k is not None]
-    positive = not any(k < len(row) and row[k][:1] in ("-", MINUS) and row[k] for row in rows for k in weights)
-    for k, title in enumerate(first):
-        if k in ends or k in columns:
-            continue
-        what = verdict(title, [*column_of(title, (row[k] if k < len(row) else "" for row in rows)).values])
-        if what.kind and (positive or what.kind == "directions"):
-            text = f'column "{shorten(title)}" holds {shorten(what.value)} beside the weights'
-            mend = "write signs into the weights or both ends of the intervals, and leave the column out"
-            raise FormatError(f"{name}: {text}; {mend}")
 
 
 def _with_numbers(body: list[tuple[int, list[str]]], weight: int | None) -> list[tuple[int, list[str]]]:
