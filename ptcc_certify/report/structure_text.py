@@ -56,14 +56,13 @@ def _reading_entries(structure: Structure) -> list[tuple[str, str]]:
     if BY_HEADER in remarks:
         remarks.remove(BY_HEADER)
         text = f"{BY_HEADER}: {_BY_HEADER[structure.graph.read['orientation']]}"
-    ignored = [remark for remark in remarks if remark.startswith(IGNORED)]
+    ignored = [shorten_text(remark, TEXT) for remark in remarks if remark.startswith(IGNORED)]
     lines = [text]
-    for remark in [remark for remark in remarks if remark not in ignored]:
+    for remark in [*(remark for remark in remarks if not remark.startswith(IGNORED)), *ignored]:
         if columns(f"{lines[-1]}; {remark}") <= TEXT:
             lines[-1] += f"; {remark}"
         else:
             lines.append(remark)
-    lines[-1] = shorten_text("; ".join([lines[-1], *ignored]), max(TEXT, columns(lines[-1])))
     return [("" if number else "read", line) for number, line in enumerate(lines)]
 
 

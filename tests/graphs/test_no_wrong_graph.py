@@ -125,6 +125,174 @@ SIGNS = [
         "ann>bob=-1/2",
     ),
 ]
+UNKNOWN_SIGNS = [
+    case
+    for word in ("+-", "-+", "+ -", "_+", "neg-", "-pos", "+/-", "_")
+    for case in (
+        Input("g.csv", f"source,target,weight\na,b,{word}\nb,c,-\nc,a,+\n", says=("line 2", f'"{word}"')),
+        Input("g.csv", f"source,target,weight,effect\na,b,1,{word}\nb,c,1,-\nc,a,1,+\n", says=(f'"{word}"',)),
+        Input("g.sif", f"a\t+\tb\nb\t{word}\tc\n", says=("line 2", f'"{word}"')),
+        Input("g.txt", f"a\tb\t-\nb\tc\t+\nc\ta\t{word}\n", says=("line 3", f'"{word}"')),
+    )
+]
+#: Headers whose second column is the source, and headers that may mean either direction.
+TURNED = [
+    "destination,source,weight",
+    "target,regulator,weight",
+    "target_gene,regulator,weight",
+    "Target gene,TF,Mode",
+    "target_id,tf,weight",
+    "gene,TF,score",
+    "destination,origin,score",
+    "dest,orig,score",
+    "End,Start,score",
+    "influenced,influencer,score",
+    "to_node,whoever,score",
+    "whatever,from_id,score",
+]
+EITHER = [
+    "node,listens_to,score",
+    "child,parent,score",
+    "head,tail,score",
+    "agent,neighbor,score",
+    "Gene2,Gene1,score",
+    "target,follower,weight",
+    "Trustor,Trustee,Trust",
+]
+DIRECTIONS = [
+    *(Input("g.csv", f"{header}\na,b,2\nb,c,-3\nc,a,1\n", "b>a=2 c>b=-3 a>c=1") for header in TURNED),
+    *(
+        Input("g.csv", f"{header}\na,b,2\nb,c,-3\nc,a,1\n", edges, says, how)
+        for header in EITHER
+        for edges, says, how in [
+            ("", ("line 1", "names no source and target", "--edges listens if", "--edges information"), {}),
+            ("b>a=2 c>b=-3 a>c=1", (), {"columns": "2,1,3"}),
+        ]
+    ),
+    Input("g.csv", "child,parent,score\na,b,2\nb,a,1\n", "b>a=2 a>b=1", how={"orientation": "listens"}),
+    Input("g.csv", "child,parent,score\na,b,2\nb,a,1\n", "a>b=2 b>a=1", how={"orientation": "information"}),
+    Input("g.csv", "id,target,weight\na,b,2\nb,c,-3\n", says=("line 1", "no source and target", "--columns")),
+    Input("g.csv", "target,year,score,tf\na,9,2,b\nb,8,1,c\n", says=("line 1", "no source and target", "--columns")),
+    Input("g.csv", "tf,regulator,weight\na,b,2\nb,c,-3\n", says=("line 1", "no source and target", "--columns")),
+    Input("g.csv", "tf,gene,weight_min,weight_max\na,b,2,3\nb,c,-3,1\n", says=("a family of graphs",)),
+    Input("g.csv", "Gene1,Gene2,score,start,end\na,b,2,3,4\nb,c,-1,3,4\n", "a>b=2 b>c=-1"),
+    *(
+        Input("g.csv", f"{header},score\na,b,2\nb,c,-1\n", "a>b=2 b>c=-1")
+        for header in ("i,j", "u,v", "node_a,node_b", "Gene1,Gene2", "gene_symbol_1,gene_symbol_2", "TF,Gene")
+    ),
+    Input("g.csv", "row,column,value\na,b,2\nb,c,-3\n", says=("line 1", "no source and target", "--columns")),
+    Input("g.csv", "a,b,trust\nb,c,1\n", says=("line 1", '"trust"')),
+]
+#: Columns beside weights that are all positive, for the edges a>b, b>c: what they make of the weights, or the refusal.
+SIGNS_BESIDE = [
+    *(
+        Input("g.csv", f"source,target,weight,{title}\na,b,2,{one}\nb,c,1,{other}\n", "a>b=-2 b>c=1")
+        for title, one, other in [
+            ("mode", "inhibits", "activates"),
+            ("label", "foe", "friend"),
+            ("trust", "distrust", "trust"),
+            ("stance", "oppose", "support"),
+            ("sgn", "-1", "1"),
+            ("s", "-1", "1"),
+            ("Sign of edge", "-1", "+1"),
+            ("x", "-", "+"),
+            ("value", "-1", "1"),
+        ]
+    ),
+    *(
+        Input(
+            "g.csv", f"source,target,weight,{title}\nb,c,1,{other}\na,b,2,{one}\n", says=(row, title, one, "--columns")
+        )
+        for row, title, one, other in [
+            ("line 3", "negative", "True", "False"),
+            ("line 3", "is_negative", "1", "0"),
+            ("line 3", "inhibition", "yes", "no"),
+            ("line 3", "positive", "0", "1"),
+            ("line 3", "sgn", "0", "1"),
+            ("line 3", "rating", "-5", "3"),
+            ("line 3", "sgn", "-1", "0"),
+            ("line 3", "kind", "inhibits", ""),
+            ("line 3", "kind", "inhibits", "unknown"),
+            ("line 2", "kind", "-", "-"),
+        ]
+    ),
+    Input(
+        "g.csv", "source,target,weight,p,q\na,b,2,-1,1\nb,c,1,1,-1\n", says=("line 2", '"q"', "disagree", "--columns")
+    ),
+    Input("g.csv", "source,target,weight,rating\na,b,2,-5\nb,c,1,3\n", "a>b=-5 b>c=3", how={"columns": "1,2,4"}),
+    Input("g.csv", "source,target,weight,rating\na,b,2,-5\nb,c,1,3\n", "a>b=2 b>c=1", how={"columns": "1,2,3"}),
+    Input("g.csv", "source,target,weight,negative\na,b,2,False\nb,c,1,False\n", "a>b=2 b>c=1"),
+    Input("g.csv", "source,target,weight,assigned\na,b,2,1\nb,c,1,0\n", "a>b=2 b>c=1"),
+    Input("g.csv", "source,target,weight,lng\na,b,2,-71.5\nb,c,1,3\n", "a>b=2 b>c=1"),
+    Input("g.csv", "source,target,weight,kind\na,b,-2,inhibits\nb,c,1,activates\n", "a>b=-2 b>c=1"),
+    Input(
+        "g.csv", "source,target,weight,kind\na,b,-2,activates\nb,c,1,activates\nc,a,1,inhibits\n", says=("disagree",)
+    ),
+    Input("g.csv", "source,target,weight,party\na,b,-2,1\nb,c,1,-1\n", "a>b=-2 b>c=1"),
+    Input("g.csv", "source,target,sign,type\na,b,1,negative\nb,c,-1,positive\n", says=("line 2", "disagree")),
+    Input("g.csv", "source,target,weight,sign,type\na,b,2,-1,enemy\nb,c,1,1,ally\n", "a>b=-2 b>c=1"),
+    Input("g.csv", "source,target,weight,sign,type\na,b,2,-1,ally\nb,c,1,1,enemy\n", says=("line 2", "disagree")),
+    Input("g.csv", "source,target,weight,directed\na,b,2,true\nb,c,-1,false\n", says=("directed and undirected",)),
+    Input("g.csv", "source,target,weight,directed\na,b,2,0\nb,c,-1,0\n", says=("undirected", "--undirected")),
+    Input("g.csv", "source,target,weight,directed\na,b,2,1\nb,c,-1,1\n", "a>b=2 b>c=-1"),
+    Input(
+        "g.csv",
+        "source,target,weight,rating\n" + "".join(f"a,n{k},1,{k}\n" for k in range(1500)) + "b,a,1,-5\n",
+        says=('"rating" holds -5',),
+    ),
+    Input(
+        "g.graphml",
+        graphml('<data key="w">2</data><data key="s">true</data>', keys="boolean").replace('"sign"', '"negative"'),
+        says=('"negative"', "--columns"),
+    ),
+    Input(
+        "g.graphml",
+        graphml('<data key="w">2</data><data key="s">-1</data>').replace('"sign"', '"mark"'),
+        "n0>n1=-2",
+    ),
+    Input(
+        "g.gml",
+        'graph [ directed 1 node [ id 0 label "a" ] node [ id 1 label "b" ] '
+        "edge [ source 0 target 1 weight 2 negative 1 ] edge [ source 1 target 0 weight 1 negative 0 ] ]",
+        says=('"negative"', "--columns"),
+    ),
+    Input(
+        "g.gexf",
+        gexf(edge='weight="2"', values='<attvalues><attvalue for="0" value="-1"/></attvalues>').replace(
+            'title="sign"', 'title="mark"'
+        ),
+        "ann>bob=-2",
+    ),
+    Input("g.json", '[{"source": "a", "target": "b", "weight": 2, "mode": "inhibits"}]', "a>b=-2"),
+    Input("g.json", '[{"source": "a", "target": "b", "weight": 2, "negative": true}]', says=('"negative"',)),
+]
+ORDINARY = [
+    Input("g.csv", "0;1,5;-1\n1;0;2\n0;1;0\n", says=("decimal commas", "with a point")),
+    Input("g.csv", "source;target;weight\na;b;1,5\n", says=("line 2", "decimals with a point")),
+    Input("g.csv", "a;b;1,5\nb;c;-2,5\n", says=("line 1", "decimals with a point")),
+    Input("out.a", "% asym posweighted\n1 2 1 0\n2 3 5 0\n3 1 1 0\n", "1>2=1 2>3=5 3>1=1"),
+    Input("out.a", "% asym signed\n1 2 1 12345\n2 3 -5 123\n3 1 1 1\n", "1>2=1 2>3=-5 3>1=1"),
+    Input("out.a", "% asym signed\n1 2 0 3\n2 3 -5 0\n3 1 1 1\n4 1 1 2\n", says=("line 2", "weight 0")),
+    Input(
+        "g.csv",
+        "Trustor,Trustee,Trust\n1,2,4\n2,3,-4\n",
+        "2>1=4 3>2=-4",
+        how={"orientation": "listens"},
+    ),
+    Input("g.csv", "source,target,Trust\n1,2,4\n2,3,-4\n", says=("line 1", '"Trust"')),
+    *(
+        Input("g.txt", table, says=("line 2", "4 fields", "row.names = FALSE"))
+        for table in (
+            '"source" "target" "weight"\n"1" "a" "b" 4\n"2" "b" "c" -4\n',
+            "source target weight\n1 a b 4\n2 b c -4\n",
+            "V1 V2 V3\na 0 1 -1\nb 1 0 1\nc 1 0 0\n",
+            "   V1 V2 V3\n1  0  1 -1\n2  1  0  1\n3  1  0  0\n",
+        )
+    ),
+    # the same tables written with row.names = FALSE
+    Input("g.txt", '"source" "target" "weight"\n"a" "b" 4\n"b" "c" -4\n', "a>b=4 b>c=-4"),
+    Input("g.txt", '"V1" "V2" "V3"\n0 1 -1\n1 0 1\n1 0 0\n', "V2>V1=1 V3>V1=-1 V1>V2=1 V3>V2=1 V1>V3=1"),
+]
 LAPLACIANS = [
     Input("g.npy", npy(LAPLACIAN), says=("Laplacian", "--laplacian", "--no-laplacian")),
     Input("g.npy", npy(LAPLACIAN), says=("Laplacian", "--laplacian"), how={"drop_self_loops": True}),
@@ -283,7 +451,7 @@ FORMATS = [
         ]
     ),
 ]
-INPUTS = SIGNS + LAPLACIANS + ROWS + MATRICES + FORMATS
+INPUTS = SIGNS + UNKNOWN_SIGNS + DIRECTIONS + SIGNS_BESIDE + ORDINARY + LAPLACIANS + ROWS + MATRICES + FORMATS
 
 
 def put(folder: Path, name: str, content: str | bytes) -> Path:
@@ -393,6 +561,25 @@ def test_a_matrix_as_text_asks_for_its_direction_in_python(tmp_path):
     assert told(ptcc.as_graph(path, "information")) == expected(MATRICES[1].edges)
 
 
+def test_signs_of_any_title_in_memory_are_factors_or_refused_and_what_is_not_read_is_named():
+    graph = nx.DiGraph(
+        [("a", "b", {"weight": 2, "mode": "inhibits", "year": 9}), ("b", "a", {"weight": 1, "mode": "+"})]
+    )
+    read = ptcc.as_graph(graph)
+    assert told(read) == expected("a>b=-2 b>a=1")
+    assert read.read["notes"] == ('weights times column "mode"', 'columns ignored: "year"')
+    assert told(ptcc.SignedDigraph.from_networkx(graph, "weight")) == expected("a>b=2 b>a=1")
+    graph["a"]["b"]["negative"], graph["b"]["a"]["negative"] = True, False
+    del graph["a"]["b"]["mode"], graph["b"]["a"]["mode"]
+    with pytest.raises(GraphError, match='column "negative" holds True'):
+        ptcc.as_graph(graph)
+    pandas = pytest.importorskip("pandas")
+    table = pandas.DataFrame({"source": ["a", "b"], "target": ["b", "a"], "weight": [2, 1], "s": [-1, 1], "t": [8, 9]})
+    assert told(ptcc.as_graph(table)) == expected("a>b=-2 b>a=1")
+    with pytest.raises(GraphError, match='column "is_negative" holds True'):
+        ptcc.as_graph(table.assign(s=9, is_negative=[True, False]))
+
+
 # ---------------------------------------------------------------------------------------------- families
 
 
@@ -401,6 +588,9 @@ def test_a_matrix_as_text_asks_for_its_direction_in_python(tmp_path):
     [
         ("source,target,weight_min,weight_max,sign\na,b,1,2,-1\n", 'a column "sign" beside the weights'),
         ("source,target,weight,sign,optional\na,b,1,-1,yes\n", 'a column "sign" beside the weights'),
+        ("source,target,weight_min,weight_max,mode\na,b,1,2,inhibits\n", 'column "mode" holds inhibits beside'),
+        ("source,target,weight,is_negative,optional\na,b,1,1,yes\n", 'column "is_negative" holds 1 beside'),
+        ("source,target,weight,directed,optional\na,b,-1,false,yes\n", 'column "directed" holds false beside'),
         ("source,target,weight_min,weight_max\na,b,1,2,9\n", "line 2: 5 fields, and the header has 4"),
         ("% sym\nsource,target,weight_min,weight_max\na,b,1,2\n", "% sym means undirected edges"),
     ],
@@ -408,6 +598,19 @@ def test_a_matrix_as_text_asks_for_its_direction_in_python(tmp_path):
 def test_files_of_families_have_the_same_guards(tmp_path, content, says):
     with pytest.raises(FormatError, match=says):
         read_family(put(tmp_path, "g.csv", content))
+
+
+def test_families_in_memory_have_the_same_guards():
+    pandas = pytest.importorskip("pandas")
+    interval = {"weight_min": 1, "weight_max": 2}
+    for more, says in (({"mode": "inhibits"}, "mode"), ({"sign": -1}, "sign"), ({"negative": True}, "negative")):
+        with pytest.raises(GraphError, match=f'column "{says}" holds'):
+            ptcc.as_family(nx.DiGraph([("a", "b", interval | more)]))
+        says = "weight -1 lies outside" if says == "sign" else f'column "{says}" holds'  # a sign alone is the weight
+        with pytest.raises(GraphError, match=says):
+            ptcc.as_family(pandas.DataFrame([{"source": "a", "target": "b"} | interval | more]))
+    family = ptcc.as_family(nx.DiGraph([("a", "b", {"weight_min": -2, "weight_max": -1, "mode": "inhibits"})]))
+    assert family.modes[0].edge_interval(0) == (-2, -1)
 
 
 def test_a_family_of_matrices_as_text_tells_its_direction_and_its_conversions(tmp_path):
@@ -528,3 +731,30 @@ def test_the_read_line_tells_in_full_what_makes_another_graph(tmp_path):
 def test_the_text_of_the_terminal_names_the_columns_of_a_header_that_was_guessed(tmp_path):
     out = run("classify", str(put(tmp_path, "g.csv", "Gene1,Gene2,Type\na,b,+\nb,c,-\n"))).out
     assert "columns Gene1, Gene2, Type" in out and "3 nodes" in out
+
+
+def test_the_text_of_the_terminal_names_columns_that_a_header_turns_round(tmp_path):
+    out = run("classify", str(put(tmp_path, "g.csv", "End,Start,score\na,b,2\nb,a,-1\n"))).out
+    assert "columns Start, End, score" in out
+
+
+def test_notes_on_columns_are_not_cut_but_for_the_names_of_those_that_are_no_signs(tmp_path):
+    many = ",".join(f"a_long_title_of_a_column_{k}" for k in range(30))
+    path = put(
+        tmp_path,
+        "g.csv",
+        f"id,source,target,weight,kind,sign_of_the_first_year,{many}\n"
+        f"1,a,b,2,inhibits,0.3,{'7,' * 29}7\n2,b,a,1,activates,0.1,{'7,' * 29}7\n",
+    )
+    lines = [line.strip() for line in run("classify", str(path)).out.splitlines()]
+    text = " ".join(lines)
+    for whole in (
+        "columns by header: ",
+        'weights times column "kind"',
+        'perhaps signs, ignored: "sign_of_the_first_year"',
+    ):
+        assert whole in text
+    (ignored,) = [line for line in lines if line.startswith('columns ignored: "id", "a_long_title')]
+    assert ignored.endswith("...")
+    short = run("classify", str(put(tmp_path, "s.csv", "RATER,RATEE,RATING,TIME\n1,2,4,99\n2,1,-4,98\n"))).out
+    assert "raters listen? --edges listens" in short and 'columns ignored: "TIME"' in short

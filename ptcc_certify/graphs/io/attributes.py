@@ -11,6 +11,7 @@ import numpy as np
 
 from ptcc_certify.errors import FormatError, GraphError
 from ptcc_certify.graphs.digraph import OF_EDGES
+from ptcc_certify.graphs.io.columns_beside import Column, column_of
 from ptcc_certify.graphs.io.graph_from_rows import Numbers, Rows, Signs
 from ptcc_certify.graphs.io.signs import is_sign, weight_and_sign
 from ptcc_certify.graphs.rationals import shorten
@@ -50,6 +51,8 @@ class Values:
     signs: list[Any] = field(default_factory=list)
     weight: str = ""
     sign: str = ""
+    beside: list[Column] = field(default_factory=list)  # attributes that are not read
+    told: bool = False
 
 
 def values_of_edges(data: Sequence[Attributes], edge: Callable[[int], str], name: str, told: str | None) -> Values:
@@ -82,7 +85,9 @@ def values_of_edges(data: Sequence[Attributes], edge: Callable[[int], str], name
             _fail(name, f"edge {edge(k)} has no {what}; give each edge a signed number, or name the attribute: {tell}")
         if signs and not _has(data[k], str(sign)):
             _fail(name, f'edge {edge(k)} has no "{sign}", and others have; give each one')
-    return Values(weights, signs, "" if told else either[0], sign or "")
+    others = [title for title in titles if title not in (*either, sign, "id")]
+    beside = [column_of(title, [one.get(title, "") for one in data]) for title in others]
+    return Values(weights, signs, "" if told else either[0], sign or "", beside, told is not None)
 
 
 def _has(attributes: Attributes, *titles: str) -> bool:
@@ -108,6 +113,7 @@ def attribute_rows(
     codes, sign_codes = [weights[str(one)] for one in values.weights], [signs[str(one)] for one in values.signs]
     rows = Rows(labels, [a for a, _ in ends], [b for _, b in ends], list(weights.texts), codes, lambda row: "")
     rows.signs = Signs(list(signs.texts), sign_codes, values.sign) if values.signs else None
+    rows.beside, rows.told = values.beside, values.told
     rows.weight_title = values.weight if is_sign(values.weight) else ""
     return rows
 
@@ -125,6 +131,8 @@ def both_ways(rows: Rows, undirected: Sequence[bool], what: str, how: Reading) -
         rows.codes = np.asarray(rows.codes)[place]
         if rows.signs is not None:
             rows.signs = replace(rows.signs, codes=np.asarray(rows.signs.codes)[place])
+        for column in rows.beside:
+            column.codes = None if column.codes is None else np.asarray(column.codes)[place].tolist()
         rows.where = lambda row: where(int(place[row]))
         rows.notes += (f"{what} go both ways ({some.size})",)
     return rows

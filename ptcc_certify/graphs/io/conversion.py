@@ -12,6 +12,7 @@ import numpy as np
 from ptcc_certify.errors import FormatError, GraphError, ParameterError, did_you_mean
 from ptcc_certify.graphs.digraph import SignedDigraph, labels_beside, refuse_unknown_orientation, refuse_unnamed
 from ptcc_certify.graphs.family import Family
+from ptcc_certify.graphs.io.columns_beside import column_of
 from ptcc_certify.graphs.io.graph_files import read_as
 from ptcc_certify.graphs.io.graph_from_rows import Rows, Signs, graph_of
 from ptcc_certify.graphs.io.graph_in_memory import distinct
@@ -44,7 +45,7 @@ def as_graph(graph: Any, orientation: str | None = None, **reading: Any) -> Sign
           rows, or a DataFrame with the same labels on rows and columns; ``"-0.3"`` is exact, ``-0.3`` a nearby float;
         - a DataFrame of edges with columns ``source``, ``target``, ``weight`` in any order (or the other names of
           :func:`~ptcc_certify.graphs.io.read_graph`, or those of ``columns``); a column ``sign`` or ``type`` beside
-          ``weight`` is its factor, others are ignored, which ``read["notes"]`` says;
+          ``weight``, or another of signs, is its factor, others are ignored, which ``read["notes"]`` says;
         - a list of ``(source, target, weight)``.
     orientation : {"information", "listens"}, optional
         Of an edge ``(a, b)``, or of the entry in row a and column b: information flows a -> b, or a listens to b.
@@ -149,9 +150,8 @@ def _rows_of_table(table: Any, how: Reading) -> Rows | None:
     rows.weight_title = columns.codes
     if columns.sign is not None:
         rows.signs = Signs(*distinct(table[table.columns[columns.sign]]), names[columns.sign])
-    ignored = [f'"{shorten(title)}"' for title in columns.ignored]
+    rows.beside, rows.told = [column_of(names[k], table[table.columns[k]]) for k in columns.ignored], columns.told
     rows.notes = tuple(note for note in columns.notes if note not in (BY_HEADER, RATERS))
-    rows.notes += ("columns ignored: " + ", ".join(ignored[:20]),) if ignored else ()
     return rows
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from ptcc_certify.errors import FormatError, NumberError
 from ptcc_certify.graphs.digraph import SignedDigraph, ordered_labels
+from ptcc_certify.graphs.io.columns_beside import Column
 from ptcc_certify.graphs.io.files import lines_of
 from ptcc_certify.graphs.io.graph_from_rows import DECIMALS, HEADER_MEND, Numbers, Rows, Signs
 from ptcc_certify.graphs.io.signs import WEIGHT, plain, sign_of_word
@@ -96,7 +97,10 @@ def read_edge_list(data: bytes, name: str, how: Reading) -> Rows:
     begin = list(islice(numbered, _LOOKED_AT))
     table = [row for _, row in begin if len(row) > 1]
     tells = bool(how.titles) or bool(table and names_edges(table[0]))
-    if table and not tells and len(table[0]) >= len(table) - 1:  # perhaps a matrix, of which all rows are needed
+    konect = re.match(rb"(\xef\xbb\xbf)?%\s*(sym|asym)\b", data) is not None  # nodes, weight and time
+    if (
+        table and not tells and not konect and len(table[0]) >= len(table) - 1
+    ):  # perhaps a matrix, of which all rows are needed
         begin += islice(numbered, len(table[0]) + 2)
         table = [row for _, row in begin if len(row) > 1]
         declares = any(len(row) == 1 and row[0].strip() for _, row in begin)
@@ -112,7 +116,7 @@ def read_edge_list(data: bytes, name: str, how: Reading) -> Rows:
     draft.read(chain(begin, numbered))
     rows = draft.rows()
     if not columns.titles and not columns.told:
-        _refuse_ambiguous(draft, rows, data)
+        _refuse_ambiguous(draft, rows, data, konect)
     rows.undirected = undirected
     return rows
 
@@ -140,6 +144,7 @@ class _EdgeList:
         self.nodes, self.weights, self.signs = Numbers(), Numbers(), Numbers()
         self.first, self.second, self.codes = list[int](), list[int](), list[int]()
         self.sign_codes, self.numbers = list[int](), list[int]()
+        self.beside = [(k, Column(columns.titles[k])) for k in columns.ignored]
         self.extra: dict[str, int] = {}  # fields after the third of a table without header, and the line of each
 
     def read(self, rows: Iterable[tuple[int, list[str]]]) -> None:
@@ -162,12 +167,15 @@ class _EdgeList:
             second.append(target)
             codes.append(code)
             numbers.append(number)
+            for k, column in self.beside:
+                column.add(row[k] if k < len(row) else "")
 
     def more_fields(self, number: int, row: list[str], width: int) -> None:
         """Refuse fields beyond a header; keep those after the third of a table without."""
         if self.columns.titles:
-            what = f"{len(row)} fields, and the header has {width}"
-            raise FormatError(f"{self.name}, line {number}: {what}; quote fields that hold the separator")
+            what = f"{len(row)} fields, and the header has {width}; quote fields that hold the separator"
+            what += ", or write the table of R with row.names = FALSE" if len(row) == width + 1 else ""
+            raise FormatError(f"{self.name}, line {number}: {what}")
         if len(self.extra) < _EXTRA:
             for field in row[width:]:
                 self.extra.setdefault(field.strip(), number)
@@ -190,9 +198,9 @@ class _EdgeList:
         columns, numbers = self.columns, self.numbers
         where = lambda row: f"line {numbers[row]}"  # noqa: E731
         rows = Rows(list(self.nodes.texts), self.first, self.second, list(self.weights.texts), self.codes, where)
-        ignored = [f'"{shorten(title)}"' for title in columns.ignored] or ["after the third"] * bool(self.extra)
         rows.headerless, rows.notes, rows.asks = not columns.titles, columns.notes, columns.asks
-        rows.notes += ("columns ignored: " + ", ".join(ignored[:20]),) if ignored else ()
+        rows.notes += ("columns ignored: after the third",) if self.extra else ()
+        rows.beside, rows.told = [column for _, column in self.beside], columns.told
         rows.weight_title = columns.codes
         if columns.sign is not None:
             rows.signs = Signs(list(self.signs.texts), self.sign_codes, columns.titles[columns.sign])
@@ -212,14 +220,22 @@ def _refuse_titles(row: list[str], place: str, data: bytes) -> None:
         raise FormatError(f"{place}: the header {titles} names no source and target; {mend}")
 
 
-def _refuse_ambiguous(draft: _EdgeList, rows: Rows, data: bytes) -> None:
-    """Refuse a table without header whose rows may be something else than ``source,target,weight``."""
+def _refuse_ambiguous(draft: _EdgeList, rows: Rows, data: bytes, konect: bool) -> None:
+    """Refuse a table without header whose rows may be something else than ``source,target,weight``.
+
+    ``konect``: its first line, as KONECT writes it, tells that the fourth column holds times.
+    """
     name, labels, weights = draft.name, draft.nodes.texts, draft.weights.texts
     tell = "begin with a header source,target,weight, or tell the columns: --columns 1,2,3"
-    if draft.extra:
+    commas = [label for label in labels if re.fullmatch(r"[+-]?\d+,\d+", label)]
+    if commas and b'"' not in data:
+        which = "nodes, or a matrix, with decimal commas? Write decimals with a point, or quote the names of nodes"
+        raise FormatError(f"{name}: {commas[0]} among {which}")
+    extra = dict[str, int]() if konect else draft.extra
+    if extra:
         _refuse_decimal_commas(data, name)
         least = max(Fraction(_TIMES), *(10 * _size(text) for text in (*weights, *labels)))
-    for field, line in draft.extra.items():
+    for field, line in extra.items():
         if field and (field in labels or sign_of_word(field) is not None or not _is_time(field, least)):
             what = f'a weight, and "{shorten(field)}" in another column: neighbours, a sign or the weight?'
             raise FormatError(f"{name}, line {line}: {what} If there are edges, {tell}")

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from ptcc_certify.errors import GraphError, NumberError, ParameterError
 from ptcc_certify.graphs.digraph import OF_EDGES, SignedDigraph, refuse_networkx
 from ptcc_certify.graphs.family import Family, read_share
+from ptcc_certify.graphs.io.columns_beside import column_of, signs_beside_intervals
 from ptcc_certify.graphs.io.conversion import as_graph
 from ptcc_certify.graphs.io.family_files import interval_columns, is_family_file, read_family, refuse_outside, truth
 from ptcc_certify.graphs.io.packaged import GRAPHS, file_or_packaged
@@ -186,6 +187,10 @@ def _entries_of_table(table: Any) -> list[_Entry] | None:
         [absent] * m if k is None else list(table[table.columns[k]])
         for k, absent in ((ends[2], None), (low, None), (high, None), (may_fail, False))
     ]
+    others = [k for k in range(len(names)) if k not in (*ends, low, high, may_fail)]
+    beside = [column_of(names[k], table[table.columns[k]]) for k in others]
+    if text := signs_beside_intervals(beside, (weight for column in rest[:3] for weight in column)):
+        raise GraphError(f"the DataFrame: {text}")
     at = [list(table[table.columns[k]]) for k in ends[:2]] + rest
     return [_Entry(f"row {row} of the DataFrame", *entry) for row, entry in enumerate(zip(*at, strict=True), 1)]
 
@@ -195,6 +200,11 @@ def _entries_of_networkx(graph: Any) -> list[_Entry] | None:
         return None
     refuse_networkx(graph)
     absent = {"weight": None, "weight_min": None, "weight_max": None, "optional": False}
+    edges = [data for *_, data in graph.edges(data=True)]
+    titles = dict.fromkeys(str(title) for data in edges for title in data if title not in absent)
+    beside = [column_of(title, (data.get(title, "") for data in edges)) for title in titles]
+    if text := signs_beside_intervals(beside, (data.get(title, "") for data in edges for title in [*absent][:3])):
+        raise GraphError(f"the graph: {text}")
     return [
         _Entry(f"edge {shorten(str(u))} -> {shorten(str(v))}", u, v, *(data.get(k, absent[k]) for k in absent))
         for u, v, data in graph.edges(data=True)

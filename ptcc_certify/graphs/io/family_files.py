@@ -13,6 +13,7 @@ from lmi.exact.decimal_rounding import near
 from ptcc_certify.errors import FormatError, GraphError, NumberError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family, Mode, read_share
+from ptcc_certify.graphs.io.columns_beside import column_of, signs_beside_intervals
 from ptcc_certify.graphs.io.edge_list import direction_of_comments, records
 from ptcc_certify.graphs.io.files import Source, name_and_ending
 from ptcc_certify.graphs.io.graph_files import MATRICES, format_of, graph_bytes, is_edge_list, read_graph
@@ -319,6 +320,11 @@ def _interval_rows(
     body = lines[1 + next(k for k, (_, fields) in enumerate(lines) if fields == first) :]
     if low is None:
         body = _with_numbers(body, weight_and_sign(first, name)[0])
+    others = [k for k in range(len(first)) if k not in (*ends, *columns)]
+    full = [[*row, *[""] * len(first)] for _, row in body if len(row) > 1]
+    weights = [row[k] for row in full for k in (low, high, ends[2]) if k is not None]
+    if text := signs_beside_intervals([column_of(first[k], (row[k] for row in full)) for k in others], weights):
+        raise FormatError(f"{name}: {text}")
     for number, row in body:
         where = f"{name}, line {number}"
         if len(row) > len(first) and any(row[len(first) :]):

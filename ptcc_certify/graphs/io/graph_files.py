@@ -68,8 +68,9 @@ def read_graph(
     field declares a node. A first row of known names (source, from, src, fromnodeid; target, to, dst, tonodeid;
     weight, sign, rating, value, w) is a header, and columns are then found by name; so is a first row such as
     ``Gene1,Gene2,Type`` above numbers or signs. Words for signs (``+``, ``-``, activates, inhibits, ..) are 1 and -1
-    where a column holds nothing else; a column ``sign`` or ``type`` beside ``weight`` is its factor. Columns that are
-    not read are told by ``graph.read["notes"]``. A table may be a **matrix**, plain, with labels, or in brackets.
+    where a column holds nothing else; a column ``sign`` or ``type`` beside ``weight`` is its factor, as is another of
+    signs beside weights that are all positive. Columns that are not read are told by ``graph.read["notes"]``. A table
+    may be a **matrix**, plain, with labels, or in brackets.
 
     **GraphML, GML, GEXF, node-link JSON** edges need an attribute ``weight`` (or ``sign``, or both), **Pajek** and
     **UCINET DL** a third column; **SIF** has rows ``a activates b c``. A **matrix** (Matrix Market, ``.npz``, ``.npy``,
@@ -231,8 +232,9 @@ def keywords_as(path: Source, read: Mapping[str, Any]) -> dict[str, Any]:
     ('listens', 'refuse')
     """
     asked = options_of_record(read)
-    turned = "information" if _rows(path, Reading(**asked))[0].matrix else "listens"
-    return {"orientation": turned if read["orientation"] == turned else None, **asked}
+    rows, way = _rows(path, Reading(**asked))[0], read["orientation"]
+    turned = "information" if rows.matrix else "listens"
+    return {"orientation": way if way == turned or rows.asks else None, **asked}
 
 
 def reading_flags(read: Mapping[str, Any]) -> str:

@@ -19,6 +19,7 @@ from ptcc_certify.graphs.digraph import (
     in_all,
     ordered_labels,
 )
+from ptcc_certify.graphs.io.columns_beside import Column, directions, is_signed, verdict
 from ptcc_certify.graphs.io.laplacian import Diagonal, diagonal_of, fits_one_node
 from ptcc_certify.graphs.io.signs import DIRECTIONS, NO_SIGN, sign_of_word
 from ptcc_certify.graphs.rationals import MINUS, as_fraction, nearest_float, parse_exact, shorten
@@ -59,6 +60,8 @@ class Rows:
     signs: Signs | None = None
     weight_title: str = ""  # of a column whose numbers are codes of relations, unless they are 1 and -1
     asks: str = ""  # why the direction must be told
+    beside: Sequence[Column] = ()  # what is not read
+    told: bool = False  # were the columns told, so that those beside them say nothing?
     columns: bool = True  # may columns, or the attribute of weights, be told?
 
 
@@ -93,6 +96,7 @@ def graph_of(rows: Rows, name: str, how: Reading) -> SignedDigraph:
         raise FormatError(f"{name}, {rows.asks}")
     draft = _Draft(rows, name, how)
     draft.multiply_signs()
+    draft.read_beside()
     draft.read_laplacian()
     loops = draft.drop(draft.source == draft.target)
     if not how.drop_self_loops and loops.size:
@@ -110,7 +114,7 @@ def graph_of(rows: Rows, name: str, how: Reading) -> SignedDigraph:
         source, target, codes = np.append(source, target), np.append(target, source), np.append(codes, codes)
     labels, rank = ordered_labels(rows.labels)
     read = how.record(rows.matrix, loops.size, zeros.size + draft.cancelled)
-    read["notes"] = (*draft.notes, *rows.notes, *notes)
+    read["notes"] = (*draft.notes, *rows.notes, *notes, *draft.ignored())
     try:
         return SignedDigraph(labels, rank[source], rank[target], Weights(draft.values, codes), read)
     except GraphError as error:
@@ -137,6 +141,7 @@ class _Draft:
         self.notes: tuple[str, ...] = ()
         self.problems: list[_Problem] = []
         self.cancelled, self.undirected = 0, rows.undirected
+        self.read_too = set[str]()  # titles of columns beside that turned out to be signs
         first, second = np.asarray(rows.first, dtype=np.int64), np.asarray(rows.second, dtype=np.int64)
         self.listens = how.orientation == "listens" or (rows.matrix and how.orientation is None)
         self.source, self.target = (second, first) if self.listens else (first, second)
@@ -276,9 +281,43 @@ class _Draft:
         return mend
 
     def multiply_signs(self) -> None:
+        """Multiply weights by the signs of a column that is named so."""
+        if (signs := self.rows.signs) is not None and len(signs.values):
+            self.multiply(signs)
+
+    def read_beside(self) -> None:
+        """Multiply weights that are all positive by signs in another column; refuse what may be signs."""
+        for column in () if self.rows.told else self.rows.beside:
+            what, values, title = verdict(column.title, [*column.values]), [*column.values], shorten(column.title)
+            if not what.kind or not len(self.codes):
+                continue
+            positive = not any(value < 0 for value in self.values)
+            codes = column.codes or []
+            if what.kind == "directions":
+                self.multiply(Signs(directions(column.title, values), codes, column.title))
+            elif what.kind == "words" or (
+                what.kind == "numbers" and (positive or self.read_too or is_signed(column.title))
+            ):
+                self.multiply(Signs(values, codes, column.title))
+                self.read_too.add(column.title)
+            elif positive:
+                text = f'column "{title}" holds {shorten(what.value)}, and all weights are positive: are these signs?'
+                mend = "If so, write 1 and -1" if self.name else "if so, write 1 and -1"
+                tell = self.columns_mend().removeprefix("write 1 and -1")
+                place = self.place(codes.index(column.values[what.value])) if codes else self.name
+                self.fail(place, f"{text} {mend} throughout{tell}")
+
+    def ignored(self) -> tuple[str, ...]:
+        """Note the columns that are not read: first, in full, those that hold or name what may be signs."""
+        left = [column for column in self.rows.beside if column.title not in self.read_too]
+        named = [column for column in left if verdict(column.title, [*column.values]).named]
+        others = [f'"{shorten(column.title)}"' for column in left if column not in named]
+        told = [f'"{shorten(column.title)}"' for column in named]
+        notes = (f"perhaps signs, ignored: {', '.join(told)}",) if told else ()
+        return (*notes, f"columns ignored: {', '.join(others[:20])}") if others else notes
+
+    def multiply(self, signs: Signs) -> None:
         """Multiply weights that tell sizes by the signs beside them; refuse signs that say something else."""
-        if (signs := self.rows.signs) is None or not len(signs.values):
-            return
         texts = [str(sign).strip() for sign in signs.values]
         beside, title = np.asarray(signs.codes), shorten(signs.title)
         directions = [DIRECTIONS.get(text.lower()) for text in texts]

@@ -25,6 +25,7 @@ def graph_in_memory(
     """
     values = weights if isinstance(weights, Values) else Values(weights)
     rows = Rows(labels, first, second, *distinct(values.weights), lambda row: "", matrix=matrix)
+    rows.beside, rows.told = values.beside, values.told
     rows.weight_title = values.weight if is_sign(values.weight) else ""
     rows.signs = Signs(*distinct(values.signs), values.sign) if values.signs else None
     return graph_of(rows, "", how)

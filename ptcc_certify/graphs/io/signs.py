@@ -48,11 +48,12 @@ def sign_of_word(text: str) -> int | None:
 
     Examples
     --------
-    >>> sign_of_word("Activates"), sign_of_word("down-regulation"), sign_of_word("-"), sign_of_word("1")
-    (1, -1, -1, None)
+    >>> [sign_of_word(word) for word in ("Activates", "down-regulation", "-", "+-", "neg-", "1")]
+    [1, -1, -1, None, None, None]
     """
     word = text.strip().lower()
-    return _SIGNS.get(word, _SIGNS.get(plain(word)))
+    letters = re.fullmatch(r"[^\W\d_].*[^\W\d_]", word)  # what stands between + and -, or at an end, is no gap
+    return _SIGNS.get(word, _SIGNS.get(plain(word)) if letters else None)
 
 
 def is_sign(title: str) -> bool:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.digraph import OF_EDGES
-from ptcc_certify.graphs.io.signs import SIGN, WEIGHT, find, is_sign, plain, weight_and_sign
+from ptcc_certify.graphs.io.signs import SIGN, WEIGHT, find, is_sign, plain, sign_of_word, weight_and_sign
 from ptcc_certify.graphs.io.text_matrices import is_entry
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading
@@ -18,6 +18,15 @@ _TARGET = ("target", "to", "tonodeid", "tonode", "toid", "targetnode", "targetid
 #: Titles of who listens in the first column, and of who is heard in the second: they turn the direction round.
 _LISTENERS = r"listener|follower|rater|trust[eo]r|voter|receiver|hearer|reader|subscriber"
 _HEARD = r"speaker|heard|followee|followed|rated|trustee|trusted|sender|leader"
+#: What follows the name of an end in a title, and words for either end: the first count in any column, the others,
+#: which may tell times or places, only in the first two.
+_REST = r"(node|vertex|gene|protein|agent|id|name|label|index)*"
+_STARTS = (rf"(source|src|from){_REST}", rf"(start|origin|orig|tf|transcriptionfactor|regulator|influencer){_REST}")
+_ENDS = (rf"(target|tgt|dst|to){_REST}", rf"(end|dest|destination|influenced|regulated){_REST}")
+#: Titles of what is no node.
+_NO_END = r"|\W*|\d+|no|nr|id|idx|index|row|key|x|unnamed.*|(edge|link|row)(id|nr|no)?|.*(time|date|year|stamp|count)"
+#: Two titles that say nothing of a direction, the first is then who is heard: Gene1 and Gene2, a and b.
+_NEUTRAL = r"(?P<what>.*?)(1.(?P=what)2|a.(?P=what)b|i.(?P=what)j|u.(?P=what)v|s.(?P=what)t|0.(?P=what)1)(?P<rest>\w*)"
 _NO_TITLE = re.compile(r"nan|na|n/?a|none|null|inf|infinity|true|false|unknown|x|\?*", re.IGNORECASE)
 #: The note of a file whose header puts source and target elsewhere than source first.
 BY_HEADER = "columns by header"
@@ -42,10 +51,10 @@ class Columns:
     guessed: bool = False  # the first row names no source and target, but is none of edges
 
     @property
-    def ignored(self) -> list[str]:
-        """Titles of columns that are not read."""
+    def ignored(self) -> list[int]:
+        """Columns that are not read."""
         used = (self.source, self.target, self.weight, self.sign)
-        return [title for k, title in enumerate(self.titles) if k not in used]
+        return [k for k in range(len(self.titles)) if k not in used]
 
     @property
     def codes(self) -> str:
@@ -81,6 +90,8 @@ def columns_of(first: Sequence[str], others: Sequence[Sequence[str]], place: str
     1
     >>> columns_of(["Gene1", "Gene2", "Type"], [["a", "b", "-"]], "a.csv, line 1", Reading()).notes
     ('columns Gene1, Gene2, Type',)
+    >>> columns_of(["Gene", "TF", "Score"], [["a", "b", "2"]], "a.csv, line 1", Reading()).source
+    1
     """
     titles = tuple(field.strip() for field in first)
     if how.titles:
@@ -90,18 +101,55 @@ def columns_of(first: Sequence[str], others: Sequence[Sequence[str]], place: str
     weight, sign = weight_and_sign(titles, place)
     if len(titles) < 3 or not _is_header(titles, weight if weight is not None else 2, others):
         return Columns()
+    _refuse_family(titles, place)
     weight = 2 if weight is None else weight
-    if weight < 2 or (sign is not None and sign < 2):
-        mend = "name two columns source and target, or tell all: --columns a,b,w"
-        raise FormatError(f"{place}: the header {', '.join(map(shorten, titles))} names no source and target; {mend}")
-    return Columns(0, 1, weight, sign, titles, False, (_note(titles, weight),), _direction(titles, place), True)
+    source, target, known = _ends(titles, place)
+    if not {source, target}.isdisjoint({weight, sign}):
+        raise FormatError(f"{place}: {_no_ends(titles)}")
+    asks = _direction(titles[source], titles[target], known, place)
+    return Columns(source, target, weight, sign, titles, False, (_note(titles, source, target, weight),), asks, True)
+
+
+def _ends(titles: Sequence[str], place: str) -> tuple[int, int, bool]:
+    """Return the columns of source and target among titles other than these two, and whether a title tells them.
+
+    Where the first two hold a word for one end alone, the other of them is the other end.
+    """
+    written = [plain(title) for title in titles]
+    found = []
+    for sure, near in (_STARTS, _ENDS):
+        words = [k for k, title in enumerate(written) if re.fullmatch(rf"{sure}|{near}", title)]
+        here = [k for k in words if k < 2 or re.fullmatch(sure, written[k])]
+        if len(here) > 1 or (words and not here and re.fullmatch(_NEUTRAL, " ".join(written[:2])) is None):
+            raise FormatError(f"{place}: {_no_ends(titles)}")
+        found.append(here[0] if here else None)
+    source, target = found
+    if source is None and target is None:
+        source, target = 0, 1
+    elif source is None or target is None:
+        end = target if source is None else source
+        if end not in (0, 1):
+            raise FormatError(f"{place}: {_no_ends(titles)}")
+        source, target = (1 - end, end) if source is None else (end, 1 - end)
+    if any(re.fullmatch(_NO_END, written[k]) and len(titles[k]) != 1 for k in (source, target)):
+        raise FormatError(f"{place}: {_no_ends(titles)}")
+    return source, target, found != [None, None]
+
+
+def _no_ends(titles: Sequence[str]) -> str:
+    mend = "name two columns source and target, or tell all: --columns a,b,w"
+    return f"the header {', '.join(map(shorten, titles[:20]))} names no source and target; {mend}"
+
+
+def _refuse_family(titles: Sequence[str], place: str) -> None:
+    if find(titles, sorted(OF_EDGES), place) is not None:
+        mend = "ptcc classify, certify, simulate and plot take it, and ptcc_certify.read_family"
+        raise FormatError(f"{place}: uncertain weights or optional edges, which make a family of graphs; {mend}")
 
 
 def named_columns(titles: Sequence[str], place: str) -> Columns:
     """Return the columns of a row that names source and target; none where it is a row of edges all the same."""
-    if find(titles, sorted(OF_EDGES), place) is not None:
-        mend = "ptcc classify, certify, simulate and plot take it, and ptcc_certify.read_family"
-        raise FormatError(f"{place}: uncertain weights or optional edges, which make a family of graphs; {mend}")
+    _refuse_family(titles, place)
     source, target, _ = edge_columns(titles, place) or (0, 1, None)
     weight, sign = weight_and_sign(titles, place)
     if weight is None:
@@ -128,27 +176,37 @@ def _told(titles: tuple[str, ...], others: Sequence[Sequence[str]], place: str, 
     by_title = not all(wanted.isdigit() for wanted in how.titles)
     if not by_title and edge_columns(titles, place) is None and not _is_header(titles, at[2], others):
         return Columns(at[0], at[1], at[2], told=True)
-    return Columns(at[0], at[1], at[2], titles=titles, told=True, notes=(_note([titles[k] for k in at], 2),))
+    return Columns(at[0], at[1], at[2], titles=titles, told=True, notes=(_note(titles, *at),))
 
 
 def _is_header(titles: Sequence[str], weight: int, others: Sequence[Sequence[str]]) -> bool:
-    """Tell whether a row is of titles: where all others have a number, or a sign, it has a word that is none."""
+    """Tell whether a row is of titles: where all others have a number, or a sign, it has a word that is none.
+
+    The word may be one for a sign, such as Trust, beside a title of an end and above numbers.
+    """
     title = titles[weight]
-    if not re.match(r"[^\W\d_]", title) or _NO_TITLE.fullmatch(title) or is_entry(title):
+    if not re.match(r"[^\W\d_]", title) or _NO_TITLE.fullmatch(title):
         return False
     below = [row[weight].strip() for row in others if len(row) > max(weight, 1)]
+    if is_entry(title):
+        ends = (_LISTENERS, *_STARTS), (_HEARD, *_ENDS)
+        named = any(re.fullmatch("|".join(words), plain(end)) for words, end in zip(ends, titles, strict=False))
+        return named and bool(below) and all(is_entry(text) and sign_of_word(text) is None for text in below)
     return bool(below) and (all(map(is_entry, below)) or (is_sign(title) and all(below)))
 
 
-def _note(titles: Sequence[str], weight: int) -> str:
-    return f"columns {', '.join(shorten(title) for title in (titles[0], titles[1], titles[weight]))}"
+def _note(titles: Sequence[str], *columns: int) -> str:
+    return f"columns {', '.join(shorten(titles[k]) for k in columns)}"
 
 
-def _direction(titles: Sequence[str], place: str) -> str:
-    """Return why the direction must be told; "" where no title hints that the first column listens."""
-    if not (re.match(_LISTENERS, plain(titles[0])) or re.match(_HEARD, plain(titles[1]))):
+def _direction(source: str, target: str, known: bool, place: str) -> str:
+    """Return why the direction must be told; "" where titles tell it, or say as little as Gene1 and Gene2."""
+    ends = plain(source), plain(target)
+    if not (re.match(_LISTENERS, ends[0]) or re.match(_HEARD, ends[1])) and (
+        known or re.fullmatch(_NEUTRAL, " ".join(ends))
+    ):
         return ""
-    what = f"the header {', '.join(map(shorten, titles[:3]))} names no source and target"
+    what = f"the header {shorten(source)}, {shorten(target)}, .. names no source and target"
     line = place.rpartition(", ")[2]
-    ends = f"{shorten(titles[0])} listens to {shorten(titles[1])}"
-    return f"{line}: {what}; say --edges listens if {ends}, or --edges information"
+    if_listens = f"if {shorten(source)} listens to {shorten(target)}"
+    return f"{line}: {what}; say --edges listens {if_listens}, or --edges information"
