@@ -526,8 +526,8 @@ class Envelope:
         return result
 
     def _state_scale(self, function: LyapunovFunction, states: np.ndarray, unit: float) -> float:
-        """Bound ``sqrt(V(dz)) / unit`` for an error ``|dx_k| <= max |x_k|`` in every entry."""
-        size = np.abs(states).max(axis=1)
+        """Bound ``sqrt(V(dz)) / unit`` for errors as large as the largest state: tolerances are of the whole."""
+        size = np.full(states.shape[0], np.abs(states).max(initial=0.0))
         if function.coordinates == "E":
             size = np.asarray(abs(self._laplacian) @ size)[function.rows]  # type: ignore[arg-type, operator]
         else:

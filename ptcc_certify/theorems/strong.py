@@ -50,7 +50,7 @@ class BalancedStrong(Theorem):
         if not V.blocks:
             return RateProof(None, ())
         b = _prove_weighted_deviation(structure.graph, V, self.rate(structure, V))
-        if b is None:
+        if b is None or b <= 0:
             return RateProof(None, (), failed="2 a(L) is not proved positive")
         return RateProof(b, (Obligation("deviation-decrease", "paper", {"b": b}),))
 

@@ -312,3 +312,17 @@ def test_margins_below_the_sight_of_the_solver_are_proved_from_closed_forms():
         cert = certify(SignedDigraph.from_edges(edges), protocol, simulation=False)
         assert cert.verdict == "certified", cert.notes
         assert cert.rate is not None and cert.rate > 0
+
+
+def test_the_floor_of_a_run_is_that_of_the_largest_state_of_all():
+    """CVODES has one tolerance for all agents: beside 4e5, what happens at 1e-7 is below it."""
+    graph = SignedDigraph.from_edges([("a", "b", "1.43")], ["c"])
+    protocol = NominalProtocol(T="0.2", rho1="0.07", rho2="0.1", kappa=4)
+    assert not certify(graph, protocol, ["1e-7", 0, "4e5"]).violated
+
+
+def test_a_rate_that_is_not_positive_is_none(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("ptcc_certify.theorems.strong._prove_weighted_deviation", lambda *_: Fraction(-1, 10**14))
+    graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1), ("c", "a", -1)])
+    made = certify(graph, NominalProtocol(), simulation=False, method="paper")
+    assert made.checked.accepted and made.paper_rate is None
