@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import is_dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from ptcc_certify.certificate.format_effort import LIMITS, effort_section, energ
 from ptcc_certify.certificate.format_final_state import final_state_sections, formation_section, read_final_state
 from ptcc_certify.certificate.format_graph import certificate_graph, claim_sections, graph_section, structure_section
 from ptcc_certify.certificate.format_leaders import leaders_section, read_tracking
-from ptcc_certify.certificate.format_messages import Vectors, messages_section, read_late
+from ptcc_certify.certificate.format_messages import messages_section, read_late
 from ptcc_certify.certificate.format_unproved import nothing_proved, read_unproved, write_unproved
 from ptcc_certify.certificate.format_vectors import (
     Reader,
@@ -35,8 +35,11 @@ from ptcc_certify.certificate.format_vectors import (
     text,
 )
 from ptcc_certify.certificate.request import Expectations, Request
+from ptcc_certify.certificate.write_sections import write
 from ptcc_certify.checker import SCHEMA, SLIDING_BOUND, SLIDING_CLOCK, CheckReport
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
+from ptcc_certify.checker.leaders import LeadersSection
+from ptcc_certify.checker.messages import MessagesSection
 from ptcc_certify.checker.reading import RejectedError, exact, triangle
 from ptcc_certify.errors import one_line
 from ptcc_certify.graphs.rationals import format_exact
@@ -54,7 +57,7 @@ def certificate_document(
 ) -> tuple[dict[str, Any], Mapping[str, bytes], CheckReport]:
     """Return a certificate as JSON-ready data, its side files, and what the check says, which lays down the proof."""
     graph, structure = content.graph, content.structure
-    out = Writer(graph.labels, files)
+    out = Writer(graph.labels, files, [graph.labels[v] for v in structure.followers])
     influence, final = final_state_sections(content, out)
     run = content.trajectory
     document: dict[str, Any] = {
@@ -91,9 +94,9 @@ def certificate_document(
     if content.offsets is not None:
         document["formation"] = formation_section(content, content.offsets, final, out)
     if content.late is not None and content.late.says_something:
-        document["messages"] = messages_section(content.late, out)
+        document["messages"] = write(MessagesSection, messages_section(content.late), out)
     if content.tracking is not None:
-        document["leaders"] = leaders_section(content.tracking, out)
+        document["leaders"] = write(LeadersSection, leaders_section(content.tracking), out)
     document |= {"digest": "", "unverified": _write_unverified(content)}
     given = {(o.kind, o.of): _write_obligation(o, out) for o in content.witnesses}
     document, report = record(document, given, out.files, graph.n_nodes)
@@ -114,7 +117,7 @@ def read_document(
         for k, section in enumerate(functions)
     ]
     lyapunov = next((replace(V, objective=paper["objective"]) for V in functions if V.kind == "paper"), None)
-    initial_state, rho = data.state(document["initial_state"]), None
+    initial_state, rho, relative = data.state(document["initial_state"]), None, document["final_state"] is None
     if paper is not None and paper["rho_interval"] is not None:
         rho = ExactInterval(*(number(paper["rho_interval"][key]) for key in ("printed", "exact")))
     effort = read_effort(document, structure, protocol, data, steps)
@@ -134,9 +137,9 @@ def read_document(
         "limit": _read_limit(steps, data),
         "final_state": read_final_state(document, structure, data),
         "matrix": None,
-        "late": read_late(document, structure, protocol, data, steps)
+        "late": read_late(report, structure, protocol, relative)
         or nothing_proved(request, structure, protocol, initial_state is None),
-        "tracking": read_tracking(document, structure, protocol, data, steps),
+        "tracking": read_tracking(report, structure, protocol, relative),
         "request": request,
         "observed": _read_observations(document["unverified"]),
         "source": Source(path, sha256, document, report, effort, files),
@@ -293,8 +296,8 @@ def _write_obligation(obligation: Obligation, out: Writer) -> dict[str, Any]:
         witness = energy_witness(witness)
     elif isinstance(witness, Peak):
         witness = peak_witness(witness, out)
-    elif isinstance(witness, Vectors):
-        witness = witness.written(out)
+    elif is_dataclass(witness):
+        witness = write(type(witness), witness, out)
     elif isinstance(witness, tuple):
         witness = {"u": dict(zip(out.labels, map(format_exact, witness), strict=True))}
     elif isinstance(witness, np.ndarray):

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from fractions import Fraction
-from typing import Any
 
-import numpy as np
-
-from lmi.exact.decimal_rounding import float_up
 from ptcc_certify.bounds.tracking import Tracking
-from ptcc_certify.certificate.format_messages import Vectors, agents_section
-from ptcc_certify.certificate.format_vectors import Reader, Writer, number, text
-from ptcc_certify.checker.reading import exact
-from ptcc_certify.graphs.rationals import format_exact
+from ptcc_certify.certificate.format_vectors import floats, floats_up
+from ptcc_certify.checker.leaders import LeadersAsked, LeadersSection
+from ptcc_certify.checker.obligations import CheckReport
+from ptcc_certify.checker.sections import RowVector
+from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.follower_rows import RowWitness
 from ptcc_certify.protocols.base import Protocol
@@ -25,54 +22,31 @@ def tracking_obligations(tracking: Tracking | None) -> Iterator[Obligation]:
     """Yield what was proved of moving leaders."""
     if tracking is not None:
         witness = tracking.witness
-        yield Obligation("tracking", "leaders", {"a": witness.b}, Vectors({"u": witness.u}))
+        yield Obligation("tracking", "leaders", {"a": witness.b}, RowVector(u=Numbers(witness.u)))
 
 
-def asked_leaders(leaders: MovingLeaders) -> dict[str, Any]:
+def asked_leaders(leaders: MovingLeaders) -> LeadersAsked:
     """Return how leaders move, as files have it."""
-    return {
-        "speed": format_exact(leaders.speed),
-        "disturbance": format_exact(leaders.disturbance),
-        "sign_gain": text(leaders.sign_gain),
-    }
+    return LeadersAsked(speed=leaders.speed, disturbance=leaders.disturbance, sign_gain=leaders.sign_gain)
 
 
-def read_leaders(section: Mapping[str, Any]) -> MovingLeaders:
+def read_leaders(section: LeadersAsked) -> MovingLeaders:
     """Return what a certificate says of how leaders move."""
-    return MovingLeaders(exact(section["speed"]), exact(section["disturbance"]), number(section["sign_gain"]))
+    return MovingLeaders(section.speed, section.disturbance, section.sign_gain)
 
 
-def leaders_section(tracking: Tracking, out: Writer) -> dict[str, Any]:
+def leaders_section(tracking: Tracking) -> LeadersSection:
     """Return what is proved with moving leaders, as files have it."""
-    leaders, labels, bound = tracking.leaders, tracking.structure.graph.labels, tracking.input
-    return {
-        **asked_leaders(leaders),
-        "initial": format_exact(tracking.initial),
-        "input": None if bound is None else agents_section(labels, "tracking", bound, out),
-        "after": format_exact(tracking.after),
-    }
+    asked, bound = vars(asked_leaders(tracking.leaders)), None if tracking.input is None else Numbers(tracking.input)
+    return LeadersSection(**asked, initial=tracking.initial, input=bound, after=tracking.after)
 
 
-def read_tracking(
-    document: Mapping[str, Any],
-    structure: Structure,
-    protocol: Protocol,
-    data: Reader,
-    steps: Mapping[tuple[str, str], Obligation],
-) -> Tracking | None:
+def read_tracking(report: CheckReport, structure: Structure, protocol: Protocol, relative: bool) -> Tracking | None:
     """Return what an accepted certificate says of moving leaders; None if it says nothing."""
-    section = document.get("leaders")
+    section: LeadersSection | None = report.sections.get("leaders")
     if section is None:
         return None
-    step, bound = steps["tracking", "leaders"], section["input"]
-    u = data.floats(step.witness["u"], structure.followers.size)
-    return Tracking(
-        read_leaders(section),
-        structure,
-        protocol,
-        RowWitness(Fraction(1), step.numbers["a"], u),
-        exact(section["initial"]),
-        document["final_state"] is None,
-        exact(section["after"]),
-        None if bound is None else np.array([float_up(x) for x in data.agents(bound)]),
-    )
+    step = report.proved["tracking", "leaders"]
+    rows = RowWitness(Fraction(1), step["a"], floats(step["witness"].u))
+    leaders, bound = read_leaders(section), floats_up(section.input)
+    return Tracking(leaders, structure, protocol, rows, section.initial, relative, section.after, bound)

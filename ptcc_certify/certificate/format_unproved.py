@@ -7,14 +7,20 @@ under ``unverified``, so that whoever reads the file is told that it was, and is
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from ptcc_certify.bounds.late_messages import LateBounds
 from ptcc_certify.certificate.certificate_data import Content
 from ptcc_certify.certificate.format_leaders import asked_leaders, read_leaders
-from ptcc_certify.certificate.format_messages import asked_messages, read_messages
-from ptcc_certify.certificate.format_vectors import Reader, Writer, readable
+from ptcc_certify.certificate.format_messages import delays, read_messages
+from ptcc_certify.certificate.format_vectors import Writer, readable
 from ptcc_certify.certificate.request import Request
+from ptcc_certify.certificate.write_sections import write
+from ptcc_certify.checker.late_messages import Delays
+from ptcc_certify.checker.leaders import LeadersAsked
+from ptcc_certify.checker.sections import Context, read
+from ptcc_certify.checker.side_files import SideFiles
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.protocols.base import Protocol
 from ptcc_certify.protocols.gain_limits import GainLimits
@@ -27,18 +33,22 @@ def write_unproved(content: Content) -> dict[str, Any]:
         return {}
     asked: dict[str, Any] = {}
     if messages is not None:
-        asked["messages"] = asked_messages(messages, content.graph, Writer(content.graph.labels))
-    return asked if leaders is None else {**asked, "leaders": asked_leaders(leaders)}
+        asked["messages"] = write(Delays, delays(messages, content.graph), Writer(content.graph.labels))
+        del asked["messages"]["leaders"]
+    return asked if leaders is None else {**asked, "leaders": write(LeadersAsked, asked_leaders(leaders), Writer(()))}
 
 
 def read_unproved(document: Mapping[str, Any], structure: Structure) -> dict[str, Any]:
     """Read what :func:`write_unproved` wrote, unless something of the kind is proved."""
-    asked, data = document["unverified"].get("asked"), Reader(structure.graph.labels, {})
+    asked, graph = document["unverified"].get("asked"), structure.graph
+    at = Context(SideFiles(Path(), {}), graph.labels, edges=graph.n_edges)
     if not isinstance(asked, dict) or "messages" in document or "leaders" in document:
         return {}
     return {
-        "messages": readable(lambda: read_messages(asked["messages"], structure, data)),
-        "leaders": readable(lambda: read_leaders(asked["leaders"])),
+        "messages": readable(
+            lambda: read_messages(read(Delays, asked["messages"] | {"leaders": None}, at, "messages"), structure)
+        ),
+        "leaders": readable(lambda: read_leaders(read(LeadersAsked, asked["leaders"], at, "leaders"))),
     }
 
 

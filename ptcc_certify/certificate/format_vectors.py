@@ -13,10 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from lmi.exact.decimal_rounding import float_up
 from lmi.exact.definite import SparseFactor
 from ptcc_certify.bounds.final_state import Influence, enclosed_ends
 from ptcc_certify.checker.reading import RejectedError, exact
-from ptcc_certify.checker.side_files import SideFiles, beside
+from ptcc_certify.checker.side_files import Numbers, SideFiles, beside
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.io.files import read_bytes
 from ptcc_certify.graphs.rationals import format_exact, writable
@@ -39,6 +40,8 @@ class Writer:
         Of the nodes.
     files : bool
         Whether vectors of more than ``LONG`` entries go to side files.
+    followers : sequence of str
+        The labels of followers.
 
     Attributes
     ----------
@@ -48,8 +51,8 @@ class Writer:
         The proofs of leader groups that are written already: first row, rate, weights.
     """
 
-    def __init__(self, labels: Sequence[str], files: bool = False):
-        self.labels, self._aside = labels, files
+    def __init__(self, labels: Sequence[str], files: bool = False, followers: Sequence[str] = ()):
+        self.labels, self.followers, self._aside = labels, followers, files
         self.files: dict[str, bytes] = {}
         self.written_groups: set[tuple[int, Fraction, bytes]] = set()
 
@@ -109,6 +112,16 @@ class Writer:
         return {**self.vector(name, np.array(whole, dtype=np.int64)), "scale": str(scale)}
 
 
+def floats(numbers: Numbers) -> np.ndarray:
+    """Return the floats nearest to numbers, each rounded once."""
+    return np.array([float(x) if numbers.scale is None else x / numbers.scale for x in numbers.values])
+
+
+def floats_up(numbers: Numbers | None) -> np.ndarray | None:
+    """Return floats that numbers do not exceed; None of None."""
+    return None if numbers is None else np.array([float_up(x) for x in numbers])
+
+
 class Reader:
     """Reads the vectors of an accepted document; the check has verified that every part is there.
 
@@ -132,8 +145,7 @@ class Reader:
 
     def floats(self, section: Any, length: int) -> np.ndarray:
         """Read a vector as the floats nearest to its numbers, each rounded once."""
-        numbers = self.files.numbers(section, "a vector", length)
-        return np.array([float(x) if numbers.scale is None else x / numbers.scale for x in numbers.values])
+        return floats(self.files.numbers(section, "a vector", length))
 
     def state(self, section: Any) -> tuple[Fraction, ...] | None:
         """Read one number of each agent: by label, or from a side file."""

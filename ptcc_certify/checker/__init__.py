@@ -185,7 +185,8 @@ def _report(doc: Document, account: Account) -> CheckReport:
     except MALFORMED as error:
         reason = f"malformed ({type(error).__name__})"
     at, obligations, needed = None if reason is None else doc.at, tuple(doc.obligations), float(account.needed)
-    return CheckReport(reason is None, verdict, obligations, at, reason, doc.exact.name, doc.sha256, needed)
+    results = (reason is None, verdict, obligations, at, reason, doc.exact.name, doc.sha256, needed)
+    return CheckReport(*results, doc.sections, doc.proved)
 
 
 def _verdict(doc: Document) -> str:

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from itertools import chain
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from lmi.exact.decimal_rounding import down
 from lmi.exact.definite import Arithmetic
@@ -29,12 +29,13 @@ from lmi.exact.numbers import integers, longest
 from lmi.exact.work import spend
 from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.input_formulas import BITS, Limits, decay_above, root_above
-from ptcc_certify.checker.late_form import LARGEST_GROWTH, read_above
+from ptcc_certify.checker.late_form import LARGEST_GROWTH, proved_above
 from ptcc_certify.checker.late_input import Inputs
 from ptcc_certify.checker.late_messages import PARTS, Messages
 from ptcc_certify.checker.matrix_products import Matrix, Sparse, need_rows, times
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, length, need, triangle
+from ptcc_certify.checker.reading import RejectedError, length, need
+from ptcc_certify.checker.sections import FewAgents, Several, Triangle
 
 Row = dict[int, Fraction]
 #: How often the bounds of ``|F_k|`` are put into themselves.
@@ -193,33 +194,50 @@ def channels_of(
     return [Channel(k, s, t, w, h) for k, ((s, t, w), h) in enumerate(each) if h and (own_late or not rests[s])]
 
 
+@dataclass(frozen=True, kw_only=True)
+class LateLMI:
+    """What one matrix proves: the share that is left, how far ends move, deviations at first, and what is left."""
+
+    left: Fraction
+    moved: FewAgents
+    away: FewAgents
+    residual: FewAgents
+
+
+@dataclass(frozen=True, kw_only=True)
+class LateLMIWitness:
+    """``P``, and ``tau`` of every edge."""
+
+    matrix: Triangle
+    tau: Several[Fraction]
+
+
 def check_delay_lmi(
-    doc: Document, messages: Messages, verified: Verified, section: Any, inputs: Inputs | None = None
+    doc: Document, messages: Messages, verified: Verified, section: LateLMI, inputs: Inputs | None = None
 ) -> None:
     """Verify ``sqrt(V) <= e^(-b s) sqrt(V(0))`` under late messages, how far the final state may move, and inputs."""
     doc.at = "messages.lmi"
-    fields(section, ("left", "moved", "away", "residual"), "lmi")
     graph, cap, state = verified.structure.graph, messages.gain_cap, verified.begin.state
     if cap is None or state is None:
         raise RejectedError("lmi without a cap of the gain, or without an initial state")
     need(messages.value_error == 0, "lmi of values that are off")
     need(verified.final.exact, "lmi without an exact influence of the leaders")
-    obligation = doc.open("late-lmi", "messages.lmi", ["b"], witness=True)
-    witness, b = fields(obligation["witness"], ("matrix", "tau"), "the witness"), obligation["b"]
+    obligation = doc.open("late-lmi", "messages.lmi", ["b"], witness=LateLMIWitness)
+    P, tau, b = obligation["witness"].matrix, obligation["witness"].tau, obligation["b"]
     loop, free = loop_of(messages, verified, cap), verified.structure.free_nodes
     need_rows(2 * graph.n)
-    tau = [exact(x) for x in entries(witness["tau"], "tau", graph.n_edges)]
-    late, left = {e.edge: e.lateness for e in loop.channels}, exact(section["left"])
+    need(len(tau) == graph.n_edges and len(P) == len(free), "a matrix or tau of another size")
+    late, left = {e.edge: e.lateness for e in loop.channels}, section.left
     need(b > 0 and 2 * b * max(late.values(), default=0) <= LARGEST_GROWTH, "b is not positive, or too large")
     need(all(x > 0 if k in late else x == 0 for k, x in enumerate(tau)), "tau is positive iff messages are late")
-    lmi = DelayLMI(loop, b, triangle(witness["matrix"], len(free)), [tau[e.edge] for e in loop.channels])
+    lmi = DelayLMI(loop, b, P, [tau[e.edge] for e in loop.channels])
     need(lmi.proved(doc.exact), "the delay LMI is not proved")
     need(left >= decay_above(b * Limits(cap).clock_below(messages.gain)), "left is not proved")
     root, (away, slope, walk) = lmi.root([state[v] for v in range(graph.n)]), lmi.constants(doc.exact)
-    moved = read_above(doc, graph, section["moved"], "moved", [root * x for x in walk])
-    first = read_above(doc, graph, section["away"], "away", [root * x for x in away])
+    moved = proved_above(graph, section.moved, "moved", [root * x for x in walk])
+    first = proved_above(graph, section.away, "away", [root * x for x in away])
     rest = [x + y * left for x, y in zip(moved, first, strict=True)]
-    read_above(doc, graph, section["residual"], "residual", rest)
+    proved_above(graph, section.residual, "residual", rest)
     if inputs is not None:
         inputs.by_form(lmi.inputs(away, slope, walk), b, root)
     doc.done(f"b = {down(b)}, gain at most {down(cap)}")

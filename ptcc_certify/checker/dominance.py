@@ -41,7 +41,7 @@ def check_dominance(
 ) -> None:
     """Verify ``S_ii d_i > sum_j |S_ij| d_j`` for all rows, after each leader group by itself."""
     graph, number = structure.graph, structure.number
-    obligation = doc.open("dominance", of, ["b"], witness=True)
+    obligation = doc.open("dominance", of, ["b"], witness=Any)
     need(obligation["b"] == rate, "b is not the rate")
     witness = fields(obligation["witness"], ("vector", "groups"), "the witness")
     vector = doc.files.numbers(witness["vector"], "vector", len(nodes))

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
-from typing import Protocol
+from typing import Any, Protocol
 
 from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.numbers import integers, longest, sized
@@ -187,7 +187,7 @@ def check_family_bounds(
     final = doc.section("final_state")
     need((final is None) == (x is None), "final states are claimed iff there is an initial state")
     if x is not None:
-        witness = doc.open("family-final-state", "final_state", witness=True)["witness"]
+        witness = doc.open("family-final-state", "final_state", witness=Any)["witness"]
         known: dict[int, Interval | None] = {}
         for component, kept in zip(family.components, check_means(doc, family, witness, x), strict=True):
             known |= final_states(component, [V for V in functions if V.component is component], kept, x, drive)

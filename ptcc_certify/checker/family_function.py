@@ -138,7 +138,7 @@ def check_form(doc: Document, family: Family, component: Component, entry: Any, 
     rates = []
     modes = []
     for k in range(len(family.modes)):
-        numbers = doc.open("family-rate", f"{of}.modes[{k}]", ["b"], witness=True)
+        numbers = doc.open("family-rate", f"{of}.modes[{k}]", ["b"], witness=Any)
         modes.append(quotient_of(family, k, component, nodes))
         decreases(doc.exact, modes[k], (P, scale), component.whole[1], numbers["b"], numbers["witness"])
         rates.append(numbers["b"])

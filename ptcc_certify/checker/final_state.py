@@ -185,7 +185,7 @@ def check_final_state(doc: Document, structure: Structure, claim: Claim, begin: 
         need(all(state is None for _, state in claim.components), "a final state of a component without one of all")
     if influence is None:
         return FinalState(structure, {})
-    witness = doc.open("final-state", "graph", witness=True)["witness"]
+    witness = doc.open("final-state", "graph", witness=Any)["witness"]
     fields(influence, ("components", "containment_weights", "degenerate"), "influence")
     u = None if witness is None else by_agent(doc, graph, fields(witness, ("u",), "the witness")["u"], "u")
     need(u is None or u.positive(), "u is not positive")

@@ -24,8 +24,9 @@ def check_graph(doc: Document) -> Digraph:
     check_read(section["read"])
     labels, index = read_nodes(section)
     _fit(NODE_BYTES * len(labels))
+    doc.context.labels, doc.context.index = labels, index
     graph = digraph(doc, labels, *_edges(doc, section["edges"], index))
-    doc.sha256 = graph.sha256()
+    doc.sha256, doc.context.edges = graph.sha256(), graph.n_edges
     need(section["sha256"] == doc.sha256, "the SHA-256 of the edge list is another")
     return graph
 

@@ -121,7 +121,7 @@ def _threshold(doc: Document, verified: Verified, section: Mapping[str, Any]) ->
     if bounded is None:
         return
     need(isinstance(bounded, bool), "bounded is no truth value")
-    by = doc.open("input-threshold", "input", witness=True)["witness"]
+    by = doc.open("input-threshold", "input", witness=Any)["witness"]
     if by == "rate":
         holds = not verified.structure.graph.listening or (verified.rate is not None and verified.rate * k >= 2)
         need(bounded and holds, "no rate proves that the input stays bounded")
@@ -222,7 +222,7 @@ def _bounds(
 def _peak(doc: Document, verified: Verified, section: Any, bounds: formulas.InputBounds) -> None:
     """Verify the peak of every agent's input and of their norm."""
     section = fields(section["peak"], ("agents", "largest", "norm"), "peak")
-    obligation = doc.open("input-peak", "input", ["z"], witness=True)
+    obligation = doc.open("input-peak", "input", ["z"], witness=Any)
     witness = fields(obligation["witness"], ("agents", "norm"), "the witness")
     ways = ordered(verified.structure.graph.labels, witness["agents"], "agents").values()
     own = verified.sliding_part() if verified.protocol.sliding else [Fraction(0)] * len(bounds.rows)
@@ -242,7 +242,7 @@ def _energy(doc: Document, verified: Verified, section: Any, bounds: formulas.In
     if not isinstance(doc.following("input-energy", "input").get("witness"), dict):
         _by_function(doc, section["energy"], "input-energy", formulas.energy_above, bounds)
         return
-    obligation = doc.open("input-energy", "input", ["p", "m0", "m1"], witness=True)
+    obligation = doc.open("input-energy", "input", ["p", "m0", "m1"], witness=Any)
     matrices = fields(obligation["witness"], ("W0", "W1"), "the witness")
     need(bounds.reaching is None, "sliding variables move")
     even = _remainder(doc, verified, matrices["W0"], Fraction(0), obligation["m0"], bounds)
@@ -257,7 +257,7 @@ def _path_length(doc: Document, verified: Verified, section: Any, bounds: formul
 
 def _by_function(doc: Document, bound: Any, kind: str, of: formulas.Of, bounds: formulas.InputBounds) -> None:
     """Verify a bound for the norm that follows from one function and an instant."""
-    obligation = doc.open(kind, "input", ["z"], witness=True)
+    obligation = doc.open(kind, "input", ["z"], witness=Any)
     _at_most(doc, bound, bounds.bound(of, None, obligation["witness"], obligation["z"]))
 
 
@@ -317,7 +317,7 @@ def _under_limits(
     need(period is None or period <= verified.gain.T, "a period beyond the deadline")
     limits, clock = formulas.Limits(cap, stop, period), exact(entry["clock"])
     top = limits.largest_gain(verified.gain)
-    obligation = doc.open("limited-gain", of, ["growth"], witness=True)
+    obligation = doc.open("limited-gain", of, ["growth"], witness=Any)
     chosen = [obligation["witness"]] if entry["noise"] is None else entries(obligation["witness"], "the witness", 2)
     k = chosen[0]
     form = bounds.form(k)
@@ -390,7 +390,7 @@ def _disturbance(doc: Document, verified: Verified, section: Any, bounds: formul
     """Verify what disturbances within ``delta`` add under the nominal protocol."""
     need(not verified.protocol.sliding, "the sliding-mode protocol has its own claims")
     section = fields(section["disturbed"], ("delta", "inputs", "drift"), "disturbed")
-    obligation = doc.open("nominal-disturbed", "input", ["delta"], witness=True)
+    obligation = doc.open("nominal-disturbed", "input", ["delta"], witness=Any)
     delta = exact(section["delta"])
     need(delta == obligation["delta"] and delta > 0, "another delta")
     _above(doc, verified, section["inputs"], "the input", bounds.disturbed(obligation["witness"], delta))

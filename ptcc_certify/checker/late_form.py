@@ -21,7 +21,8 @@ from ptcc_certify.checker.late_input import Inputs
 from ptcc_certify.checker.late_messages import Messages
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.quadratic_form import Form
-from ptcc_certify.checker.reading import RejectedError, exact, fields, length, need
+from ptcc_certify.checker.reading import RejectedError, length, need
+from ptcc_certify.checker.sections import FewAgents
 from ptcc_certify.checker.side_files import Numbers
 
 #: Largest ``b gain_cap delay``; what is larger asks for a ``q`` that nothing allows.
@@ -37,21 +38,36 @@ class Constants:
     deviations: Sequence[Fraction]
 
 
+@dataclass(frozen=True, kw_only=True)
+class LateForm:
+    """A Lyapunov function under small delays: the share that is left, how far ends move, and what is left."""
+
+    left: Fraction
+    moved: FewAgents
+    residual: FewAgents
+
+
+@dataclass(frozen=True, kw_only=True)
+class LateFormWitness:
+    """The number of the Lyapunov function, and ``phi`` of every agent."""
+
+    function: int
+    phi: FewAgents
+
+
 def check_form(
-    doc: Document, messages: Messages, verified: Verified, section: Any, inputs: Inputs | None = None
+    doc: Document, messages: Messages, verified: Verified, section: LateForm, inputs: Inputs | None = None
 ) -> None:
     """Verify ``sqrt(V) <= e^(-b s) sqrt(V(0))`` under late messages, how far the final state may move, and inputs."""
     doc.at = "messages.form"
-    fields(section, ("left", "moved", "residual"), "form")
     graph, cap = verified.structure.graph, messages.gain_cap
     if cap is None:
         raise RejectedError("form without a cap of the gain")
     need(messages.value_error == 0, "form of values that are off")
-    obligation = doc.open("late-form", "messages.form", ["q", "b", "kap"], witness=True)
-    witness = fields(obligation["witness"], ("function", "phi"), "the witness")
+    obligation = doc.open("late-form", "messages.form", ["q", "b", "kap"], witness=LateFormWitness)
     q, b, kap = (obligation[key] for key in ("q", "b", "kap"))
-    known = function_of(doc, verified, witness["function"])
-    phi, left = by_agent(doc, graph, witness["phi"], "phi", files=False), exact(section["left"])
+    known = function_of(doc, verified, obligation["witness"].function)
+    phi, left = obligation["witness"].phi, section.left
     need(all(x >= 0 for x in phi), "phi is negative")
     lag = cap * messages.delay * q
     bits = length((b, kap, lag, left, known.form.rate, *phi, *known.errors, *known.deviations))
@@ -67,9 +83,9 @@ def check_form(
     need(left >= formulas.decay_above(b * formulas.Limits(cap).clock_below(messages.gain)), "left is not proved")
     root = formulas.root_above(initial_value(verified, known.form))
     moved = [lag / b * root * x for x in _moved(verified, pushed)]
-    claimed = read_above(doc, graph, section["moved"], "moved", moved)
+    claimed = proved_above(graph, section.moved, "moved", moved)
     rest = [x + formulas.root_above(c) * root * left for x, c in zip(claimed, known.deviations, strict=True)]
-    read_above(doc, graph, section["residual"], "residual", rest)
+    proved_above(graph, section.residual, "residual", rest)
     if inputs is not None:
         inputs.by_form(list(phi), b, root)
     doc.done(f"b = {down(b)}, gain at most {down(cap)}")
@@ -94,9 +110,8 @@ def function_of(doc: Document, verified: Verified, k: Any) -> Constants:
     return Constants(form, errors, list(deviations))
 
 
-def read_above(doc: Document, graph: Digraph, entry: Any, what: str, least: Sequence[Fraction]) -> Numbers:
-    """Read bounds by agent, none of which is below what is proved."""
-    values = by_agent(doc, graph, entry, what, files=False)
+def proved_above(graph: Digraph, values: Numbers, what: str, least: Sequence[Fraction]) -> Numbers:
+    """Return bounds by agent, none of which is below what is proved."""
     low = next((label for label, x, y in zip(graph.labels, values, least, strict=True) if x < y), None)
     need(low is None, f"{what} of agent {shorten(low or '')} is not proved")
     return values

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Container, Sequence
 from fractions import Fraction
-from typing import Any
 
 from lmi.exact.decimal_rounding import up
 from lmi.exact.numbers import longest, shorten
 from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.follower_rows import Rows
-from ptcc_certify.checker.graph import by_agent
 from ptcc_certify.checker.input_formulas import PrescribedGain, decay_above
 from ptcc_certify.checker.late_messages import Messages
 from ptcc_certify.checker.late_steps import clock_below
@@ -51,8 +49,8 @@ class Inputs:
     doc : Document
     graph : Digraph
     messages : Messages
-    entry : JSON value
-        Numbers by agent.
+    values : Numbers
+        By agent.
 
     Raises
     ------
@@ -60,12 +58,12 @@ class Inputs:
         The gain has no cap.
     """
 
-    def __init__(self, doc: Document, graph: Digraph, messages: Messages, entry: Any):
+    def __init__(self, doc: Document, graph: Digraph, messages: Messages, values: Numbers):
         doc.at = "messages.input"
         if messages.gain_cap is None:
             raise RejectedError("input without a cap of the gain")
         self.graph, self.messages, self.gain_cap = graph, messages, messages.gain_cap
-        self.values, self.scale = by_agent(doc, graph, entry, "input").over(range(graph.n))
+        self.values, self.scale = values.over(range(graph.n))
         need(min(self.values) >= 0, "an input is negative")
         self.met = bytearray(graph.n)
 

@@ -6,21 +6,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil
-from typing import Any
+from typing import Literal
 
 from lmi.exact.numbers import longest
 from lmi.exact.work import spend
-from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.input_formulas import PrescribedGain
-from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import entries, exact, fields, length, need
-from ptcc_certify.checker.side_files import Numbers, beside
+from ptcc_certify.checker.reading import length, need
+from ptcc_certify.checker.sections import EdgeNumbers, NotNegative, Positive
+from ptcc_certify.checker.side_files import Numbers
 
 #: Ages of what is heard over single edges are rounded up to so many parts of the largest one.
 PARTS = 64
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Moving:
     """Leaders that move.
 
@@ -30,8 +29,8 @@ class Moving:
         Of every leader, and of every follower, at most.
     """
 
-    speed: Fraction
-    disturbance: Fraction
+    speed: NotNegative
+    disturbance: NotNegative
 
     @property
     def push(self) -> Fraction:
@@ -101,7 +100,28 @@ class Messages:
         return each if min(each) < PARTS else (PARTS,)
 
 
-def read_messages(doc: Document, graph: Digraph, gain: PrescribedGain, section: dict[str, Any]) -> Messages:
+@dataclass(frozen=True, kw_only=True)
+class Packets:
+    """Values that are sent every so often, and held until the next one arrives."""
+
+    period: Positive
+    losses: NotNegative
+
+
+@dataclass(frozen=True, kw_only=True)
+class Delays:
+    """What the file says of how late messages are; ``latency``: one number for all edges, or one for each."""
+
+    latency: Fraction | EdgeNumbers
+    packets: Packets | None
+    delay: Fraction
+    own: Literal["fresh", "late"]
+    value_error: NotNegative
+    gain_cap: Positive | None
+    leaders: Moving | None
+
+
+def read_messages(gain: PrescribedGain, section: Delays) -> Messages:
     """Read the ages of what is heard, how far it is off, and what caps the gain.
 
     Raises
@@ -109,41 +129,17 @@ def read_messages(doc: Document, graph: Digraph, gain: PrescribedGain, section: 
     RejectedError
         Some of it does not fit the rest.
     """
-    latency, packets = _latency(doc, graph, section["latency"]), section["packets"]
+    latency, packets, delay = section.latency, section.packets, section.delay
+    if isinstance(latency, Fraction):
+        latency = Numbers([latency])
+    need(len(latency) > 0, "latencies without edges")
     need(all(x >= 0 for x in latency.values), "a latency is negative")
     age = latency.largest()
     if packets is not None:
-        fields(packets, ("period", "losses"), "packets")
-        period, losses = exact(packets["period"]), exact(packets["losses"])
-        need(period > 0, "period is not positive")
-        need(losses >= 0 and losses.denominator == 1, "losses is no number of packets")
-        age += (losses + 1) * period
-    delay, error = exact(section["delay"]), exact(section["value_error"])
+        need(packets.losses.denominator == 1, "losses is no number of packets")
+        age += (packets.losses + 1) * packets.period
     need(delay == age, "delay is not the largest age of what is heard")
-    need(error >= 0, "value_error is negative")
-    need(delay > 0 or error > 0, "nothing is late, and nothing is off")
-    need(section["own"] in ("fresh", "late"), "own is neither fresh nor late")
-    late, cap = section["own"] == "late", None if section["gain_cap"] is None else exact(section["gain_cap"])
-    need(cap is None or cap > 0, "gain_cap is not positive")
+    need(delay > 0 or section.value_error > 0, "nothing is late, and nothing is off")
+    late, cap = section.own == "late", section.gain_cap
     need(cap is not None or not late, "the own state is late, and the gain has no cap: the protocol diverges")
-    return Messages(gain, latency, delay, late, error, cap, _moving(section["leaders"]))
-
-
-def _moving(entry: Any) -> Moving | None:
-    """Read how leaders move; None if they rest."""
-    if entry is None:
-        return None
-    fields(entry, ("speed", "disturbance"), "leaders")
-    speed, disturbance = exact(entry["speed"]), exact(entry["disturbance"])
-    need(speed >= 0 and disturbance >= 0, "a speed or a disturbance is negative")
-    return Moving(speed, disturbance)
-
-
-def _latency(doc: Document, graph: Digraph, entry: Any) -> Numbers:
-    """Read a number for all edges, or one for each, in their order."""
-    if isinstance(entry, str):
-        return Numbers([exact(entry)])
-    need(graph.n_edges > 0, "latencies without edges")
-    if not beside(entry):
-        entries(entry, "latency", graph.n_edges)
-    return doc.files.numbers(entry, "latency", graph.n_edges)
+    return Messages(gain, latency, delay, late, section.value_error, cap, section.leaders)

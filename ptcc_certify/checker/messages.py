@@ -3,39 +3,77 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
-from typing import Any
 
 from lmi.exact.decimal_rounding import down, up
 from lmi.exact.elementary_enclosures import log
 from lmi.exact.numbers import longest, shorten
 from lmi.exact.work import spend
 from ptcc_certify.checker import input_formulas as formulas
-from ptcc_certify.checker.delay_lmi import check_delay_lmi
+from ptcc_certify.checker.delay_lmi import LateLMI, check_delay_lmi
 from ptcc_certify.checker.follower_rows import Followers, Rows, followers_of
-from ptcc_certify.checker.graph import MANY_EDGES, by_agent
+from ptcc_certify.checker.graph import MANY_EDGES
 from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.late_drift import drift_above
-from ptcc_certify.checker.late_form import check_form
+from ptcc_certify.checker.late_form import LateForm, check_form
 from ptcc_certify.checker.late_input import Inputs
-from ptcc_certify.checker.late_messages import Messages, Moving, read_messages
+from ptcc_certify.checker.late_messages import Delays, Messages, Moving, read_messages
 from ptcc_certify.checker.late_steps import FIXED, Steps, clock_below
-from ptcc_certify.checker.missed_deadline import check_missed, check_staged
+from ptcc_certify.checker.missed_deadline import MissedDeadline, check_missed, check_staged
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import entries, exact, fields, length, need
-from ptcc_certify.checker.settling_leaders import check_settling
+from ptcc_certify.checker.reading import length, need
+from ptcc_certify.checker.sections import Agents, ByFollower, FollowerNumbers, Positive, RowVector, Several
+from ptcc_certify.checker.settling_leaders import SettlingSection, check_settling
 from ptcc_certify.checker.side_files import Numbers
 
-KEYS = (
-    *("latency", "packets", "delay", "own", "value_error", "gain_cap", "leaders"),
-    *("rows", "steps", "residual", "missed", "staged", "settling", "form", "lmi", "input"),
-)
 #: Witnesses of rows, and instants of steps, that are read.
 MANY_ROWS, MANY_INSTANTS = 100, 2001
-#: Of an entry of rows, and what it has besides where leaders move; what is not proved there.
-ROW, MOVING = ("cap", "clock", "left", "initial", "floor"), ("drift", "after")
+#: What is not proved where leaders move.
 AT_REST = ("missed", "staged", "settling", "form", "lmi")
+
+
+@dataclass(frozen=True, kw_only=True)
+class RowsBound:
+    """A bound by rows; ``drift`` and ``after`` where leaders move."""
+
+    cap: Positive | None
+    clock: Fraction | None
+    left: Fraction
+    initial: Fraction
+    floor: Fraction
+    drift: Fraction | None = None
+    after: Fraction | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class StepsBound:
+    """A bound from instant to instant."""
+
+    instants: Several[Fraction]
+
+
+@dataclass(frozen=True, kw_only=True)
+class StepsStart:
+    """The witness of a bound from instant to instant."""
+
+    start: FollowerNumbers
+
+
+@dataclass(frozen=True, kw_only=True)
+class MessagesSection(Delays):
+    """What the file says of late messages."""
+
+    rows: Several[RowsBound]
+    steps: StepsBound | None
+    residual: Agents | None
+    missed: MissedDeadline | None
+    staged: ByFollower[Fraction] | None
+    settling: SettlingSection | None
+    form: LateForm | None
+    lmi: LateLMI | None
+    input: Agents | None
 
 
 class Residual:
@@ -65,31 +103,31 @@ def check_messages(doc: Document, verified: Verified) -> None:
     """Verify everything that is said of late messages, if there is something."""
     if "messages" not in doc.data:
         return
-    section, graph = fields(doc.section("messages"), KEYS, "messages"), verified.structure.graph
+    section, graph = doc.section("messages", MessagesSection), verified.structure.graph
     need("leaders" not in doc.data, "leaders that move beside late messages stand under messages")
     sigma = verified.begin.sigma
     need(sigma is None or not any(sigma.values), "late messages while sliding variables move")
-    messages = read_messages(doc, graph, verified.gain, section)
+    messages = read_messages(verified.gain, section)
     if messages.leaders is not None:
         need(not verified.protocol.sliding, "leaders that move under the sliding-mode protocol")
-        need(all(section[key] is None for key in AT_REST), f"one of {', '.join(AT_REST)} though leaders move")
-    need(len(entries(section["rows"], "rows")) <= MANY_ROWS, f"more than {MANY_ROWS} witnesses of rows")
-    by_rows = bool(section["rows"]) or any(section[key] is not None for key in ("steps", "missed", "staged"))
-    stated = by_rows or any(section[key] is not None for key in ("settling", "form", "lmi"))
+        need(all(getattr(section, key) is None for key in AT_REST), f"one of {', '.join(AT_REST)} though leaders move")
+    need(len(section.rows) <= MANY_ROWS, f"more than {MANY_ROWS} witnesses of rows")
+    bounded = bool(section.rows) or section.steps is not None
+    by_rows = bounded or section.missed is not None or section.staged is not None
+    stated = by_rows or any(x is not None for x in (section.settling, section.form, section.lmi))
     need(stated, "nothing is stated of late messages")
-    bounded = bool(section["rows"]) or section["steps"] is not None
-    need(bounded == (section["residual"] is not None), "a residual is stated iff rows or steps bound it")
-    inputs = None if section["input"] is None else Inputs(doc, graph, messages, section["input"])
+    need(bounded == (section.residual is not None), "a residual is stated iff rows or steps bound it")
+    inputs = None if section.input is None else Inputs(doc, graph, messages, section.input)
     if by_rows:
         need(not messages.late, "rows, steps, missed or staged of a late own state")
         followers = followers_of(doc, verified.structure, verified.begin)
         _check_followers(doc, messages, verified, followers, section, inputs)
-    if section["settling"] is not None:
-        check_settling(doc, messages, verified, section["settling"], inputs)
-    if section["form"] is not None:
-        check_form(doc, messages, verified, section["form"], inputs)
-    if section["lmi"] is not None:
-        check_delay_lmi(doc, messages, verified, section["lmi"], inputs)
+    if section.settling is not None:
+        check_settling(doc, messages, verified, section.settling, inputs)
+    if section.form is not None:
+        check_form(doc, messages, verified, section.form, inputs)
+    if section.lmi is not None:
+        check_delay_lmi(doc, messages, verified, section.lmi, inputs)
     if inputs is not None:
         inputs.close(doc)
 
@@ -99,32 +137,31 @@ def _check_followers(
     messages: Messages,
     verified: Verified,
     followers: Followers,
-    section: dict[str, Any],
+    section: MessagesSection,
     inputs: Inputs | None,
 ) -> None:
     """Verify what is said of the followers of leaders that rest."""
-    residual = None if section["residual"] is None else _residual(doc, followers, section["residual"])
+    residual = None if section.residual is None else _residual(doc, followers, section.residual)
     parts = messages.parts()
-    for k, entry in enumerate(section["rows"]):
+    for k, entry in enumerate(section.rows):
         _check_rows(doc, messages, followers, parts, entry, f"messages.rows[{k}]", residual, inputs)
-    if section["steps"] is not None:
-        _check_steps(doc, messages, followers, parts, section["steps"], residual)
+    if section.steps is not None:
+        _check_steps(doc, messages, followers, parts, section.steps.instants, residual)
     if residual is not None:
         doc.open("late-residual", "messages.residual")
         low = residual.met.find(0)
         label = followers.structure.graph.labels[followers.nodes[max(low, 0)]]
         need(low < 0, f"the residual of agent {shorten(label)} is not proved")
         doc.done(f"at most {up(Fraction(max(residual.values), residual.scale))}")
-    if section["missed"] is not None:
-        check_missed(doc, messages, followers, verified.begin, section["missed"])
-    if section["staged"] is not None:
-        check_staged(doc, messages, followers, section["staged"])
+    if section.missed is not None:
+        check_missed(doc, messages, followers, verified.begin, section.missed)
+    if section.staged is not None:
+        check_staged(doc, messages, followers, section.staged)
 
 
-def _residual(doc: Document, followers: Followers, entry: Any) -> Residual:
-    """Read bounds by agent; leaders rest."""
+def _residual(doc: Document, followers: Followers, values: Numbers) -> Residual:
+    """Return bounds by agent; leaders rest."""
     doc.at, structure = "messages.residual", followers.structure
-    values = by_agent(doc, structure.graph, entry, "residual")
     need(all(values.values[v] == 0 for group in structure.closed for v in group), "a residual of a leader that rests")
     return Residual(Numbers([values.values[v] for v in followers.nodes], values.scale))
 
@@ -134,25 +171,23 @@ def _check_rows(
     messages: Messages,
     followers: Followers,
     parts: Sequence[int],
-    entry: Any,
+    entry: RowsBound,
     of: str,
     residual: Residual | None,
     inputs: Inputs | None,
 ) -> None:
     """Verify ``|x_k - x*_k| <= u_k (initial e^(-b s) + floor)`` by one witness of rows."""
     doc.at = of
-    fields(entry, ROW if messages.leaders is None else (*ROW, *MOVING), of)
-    cap, clock = (None if entry[key] is None else exact(entry[key]) for key in ("cap", "clock"))
-    left, initial, floor = (exact(entry[key]) for key in ("left", "initial", "floor"))
-    obligation = doc.open("late-rows", of, ["q", "b"], witness=True)
+    cap, clock, left, initial, floor = entry.cap, entry.clock, entry.left, entry.initial, entry.floor
+    for x in (entry.drift, entry.after):
+        need((x is None) == (messages.leaders is None), "drift and after are told iff leaders move")
+    obligation = doc.open("late-rows", of, ["q", "b"], witness=RowVector)
     q, b = obligation["q"], obligation["b"]
-    u = followers.vector(doc, fields(obligation["witness"], ("u",), "the witness")["u"], "u")
     need(q > 1 or (q == 1 and messages.delay == 0), "q is not above 1")
     need((cap is None) == (messages.delay == 0), "cap is null iff nothing is late")
-    need(cap is None or cap > 0, "cap is not positive")
     bits = length((q, b, left, clock or left, cap or left, messages.delay, messages.gain.T, messages.gain.rho1))
     spend(50, bits, bits, "rows of followers")
-    rows = Rows(followers, u)
+    rows = Rows(followers, obligation["witness"].u)
     rows.decay(q, b, parts)
     need(cap is None or b * cap * messages.delay <= log(q)[0], "b cap delay is above ln q")
     limit = min((x for x in (cap, messages.gain_cap) if x is not None), default=None)
@@ -176,10 +211,10 @@ def _check_rows(
 
 
 def _drift(
-    messages: Messages, leaders: Moving, rows: Rows, b: Fraction, limit: Fraction | None, entry: Any
+    messages: Messages, leaders: Moving, rows: Rows, b: Fraction, limit: Fraction | None, entry: RowsBound
 ) -> tuple[Fraction, Fraction]:
     """Verify what leaders that move, and disturbances, add at ``T``, and at all times."""
-    drift, after, gain = exact(entry["drift"]), exact(entry["after"]), messages.gain
+    drift, after, gain = entry.drift or Fraction(0), entry.after or Fraction(0), messages.gain
     bits = length((leaders.push, rows.least, drift, after, b, limit or b, gain.T, gain.rho1, gain.k))
     spend(100, bits, bits, "drift of followers")
     need(drift >= leaders.push / rows.least * drift_above(gain, b, limit), "drift is not proved")
@@ -192,19 +227,17 @@ def _check_steps(
     messages: Messages,
     followers: Followers,
     parts: Sequence[int],
-    section: Any,
+    instants: Sequence[Fraction],
     residual: Residual | None,
 ) -> None:
     """Verify the start of a solution that never grows, and form its bounds at the deadline."""
     doc.at = "messages.steps"
-    texts = entries(fields(section, ("instants",), "steps")["instants"], "instants")
-    need(2 <= len(texts) <= MANY_INSTANTS, f"instants are fewer than 2 or more than {MANY_INSTANTS}")
-    gain, instants = messages.gain, [exact(x) for x in texts]
+    gain = messages.gain
+    need(2 <= len(instants) <= MANY_INSTANTS, f"instants are fewer than 2 or more than {MANY_INSTANTS}")
     need(all(a < b for a, b in pairwise(instants)), "instants do not ascend")
     need(instants[0] == 0 and instants[-1] == gain.T, "instants do not reach from 0 to the deadline")
     need(messages.delay > 0, "steps though nothing is late")
-    witness = fields(doc.open("late-steps", "messages.steps", witness=True)["witness"], ("start",), "the witness")
-    start = followers.vector(doc, witness["start"], "start")
+    start = doc.open("late-steps", "messages.steps", witness=StepsStart)["witness"].start
     need(all(x >= 0 for x in start.values), "start is negative")
     values, scale = start.over(range(len(start)))
     error, limits = messages.wrong * scale, formulas.Limits(messages.gain_cap)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 from lmi.exact.decimal_rounding import down
 from lmi.exact.elementary_enclosures import exp, log
@@ -13,33 +13,47 @@ from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import edges_of
 from ptcc_certify.checker.final_state import state_intervals
 from ptcc_certify.checker.follower_rows import Followers
-from ptcc_certify.checker.graph import ordered, positions
 from ptcc_certify.checker.input_formulas import BITS
 from ptcc_certify.checker.late_messages import Messages
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.protocol import Begin
-from ptcc_certify.checker.reading import exact, fields, length, need
+from ptcc_certify.checker.reading import length, need
+from ptcc_certify.checker.sections import FollowerIntegers, Node, Positive
 
 #: Products of short integers that an exponential and a logarithm cost, about.
 EACH_EXPONENTIAL = 1000
 
 
-def check_missed(doc: Document, messages: Messages, followers: Followers, begin: Begin, section: Any) -> None:
+@dataclass(frozen=True, kw_only=True)
+class MissedDeadline:
+    """An agent, and how far it is away from its final state at the deadline, at least."""
+
+    agent: Node
+    bound: Positive
+
+
+@dataclass(frozen=True, kw_only=True)
+class Signs:
+    """The witness of a missed deadline: 1, -1 or 0 of every follower."""
+
+    gauge: FollowerIntegers
+
+
+def check_missed(
+    doc: Document, messages: Messages, followers: Followers, begin: Begin, section: MissedDeadline
+) -> None:
     """Verify that an agent is away from its final state at the deadline, by the signs of those that it hears of."""
     doc.at = "messages.missed"
     graph, nodes = followers.structure.graph, followers.nodes
-    fields(section, ("agent", "bound"), "missed")
-    (agent,), bound = positions(doc, graph, [section["agent"]], "agent"), exact(section["bound"])
+    agent, bound = section.agent, section.bound
     need(followers.structure.number[agent] < 0, "a leader does not miss its final state")
-    need(bound > 0, "the bound is not positive")
     ideal = not messages.late and messages.value_error == 0 and messages.gain_cap is None
     need(ideal, "missed of a capped gain, of values that are off, or of a late own state")
     final = doc.data["final_state"]
     need(final is not None and begin.state is not None, "missed without a final state")
     mid, radius = state_intervals(doc, graph, final)
     state = begin.state or mid
-    witness = fields(doc.open("late-missed", "messages.missed", witness=True)["witness"], ("gauge",), "the witness")
-    signs = doc.files.integers(witness["gauge"], "gauge", len(nodes))
+    signs = doc.open("late-missed", "messages.missed", witness=Signs)["witness"].gauge
     need(all(g in (-1, 0, 1) for g in signs), "gauge: a sign is neither 1, -1 nor 0")
     gauge = dict(zip(nodes, signs, strict=True))
     need(gauge[agent] != 0, "gauge: no sign of the agent")
@@ -79,20 +93,19 @@ def _left_below(messages: Messages, followers: Followers, agent: int, away: dict
     return total
 
 
-def check_staged(doc: Document, messages: Messages, followers: Followers, section: Any) -> None:
+def check_staged(doc: Document, messages: Messages, followers: Followers, section: Sequence[Fraction]) -> None:
     """Verify deadlines of their own, each the delay after those of all that are heard."""
     doc.at = "messages.staged"
     graph, nodes = followers.structure.graph, followers.nodes
     ideal = not messages.late and messages.value_error == 0 and messages.gain_cap is None
     need(ideal, "staged of a capped gain, of values that are off, or of a late own state")
-    texts = ordered([graph.labels[v] for v in nodes], section, "staged").values()
     doc.open("late-staged", "messages.staged")
     levels = _levels(followers)
     last = max(levels)
     due = [messages.gain.T - (last - level) * messages.delay for level in range(last + 1)]
     need(due[1] > 0, "information from the leaders has not arrived by the deadline")
-    for v, level, text in zip(nodes, levels, texts, strict=True):
-        need(exact(text) == due[level], f"the deadline of agent {shorten(graph.labels[v])} is another")
+    for v, level, deadline in zip(nodes, levels, section, strict=True):
+        need(deadline == due[level], f"the deadline of agent {shorten(graph.labels[v])} is another")
     doc.done(f"{last} levels, the first at {down(due[1])}")
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +60,8 @@ class CheckReport:
         Of the graph.
     memory : float
         The ``memory``, in GB, for which all that was checked is allowed.
+    sections, proved : dict
+        What the certificate says, as far as it was read: sections by key; numbers and witnesses by kind and place.
 
     Examples
     --------
@@ -76,6 +79,8 @@ class CheckReport:
     arithmetic: str
     sha256: str
     memory: float = 0.0
+    sections: Mapping[str, Any] = field(default_factory=dict, compare=False)
+    proved: Mapping[tuple[str, str], Mapping[str, Any]] = field(default_factory=dict, compare=False)
 
     def __repr__(self) -> str:
         if not self.accepted:

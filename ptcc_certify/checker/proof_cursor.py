@@ -12,6 +12,7 @@ from typing import Any
 from lmi.exact.definite import Arithmetic
 from ptcc_certify.checker.obligations import OBLIGATIONS, VerifiedObligation
 from ptcc_certify.checker.reading import digest, exact, fields, need
+from ptcc_certify.checker.sections import Context, read
 from ptcc_certify.checker.side_files import SideFiles
 
 
@@ -31,17 +32,28 @@ class Document:
         What is being verified.
     sha256 : str
         Of the graph.
+    context : Context
+        Labels of agents and of followers, as far as they are known.
+    sections : dict
+        What sections say, by key.
+    proved : dict
+        Numbers and witnesses of obligations, by kind and place.
     """
 
     def __init__(self, data: dict[str, Any], files: SideFiles, arithmetic: Arithmetic):
         self.data, self.files, self.exact = data, files, arithmetic
         self.obligations: list[VerifiedObligation] = []
         self.at, self.sha256 = "format", ""
+        self.context, self.sections = Context(files), dict[str, Any]()
+        self.proved: dict[tuple[str, str], dict[str, Any]] = {}
 
-    def section(self, key: str) -> Any:
-        """Return a part of the document, which is what is verified next."""
+    def section(self, key: str, kind: Any = Any) -> Any:
+        """Return a part of the document, as it is declared; it is what is verified next."""
         self.at = key
-        return self.data[key]
+        value = self.data[key]
+        if kind is not Any:
+            value = self.sections[key] = read(kind, value, self.context, key)
+        return value
 
     def following(self, kind: str, of: str) -> Mapping[str, Any]:
         """Return the next obligation, not verified yet, if it is this one, else nothing."""
@@ -49,17 +61,23 @@ class Document:
         obligation = proof[k] if k < len(proof) and isinstance(proof[k], dict) else {}
         return obligation if (obligation.get("kind"), obligation.get("of")) == (kind, of) else {}
 
-    def open(self, kind: str, of: str, numbers: Sequence[str] = (), witness: bool = False) -> dict[str, Any]:
-        """Take the next obligation of the proof, which must be this one; return its numbers and its witness."""
+    def open(self, kind: str, of: str, numbers: Sequence[str] = (), witness: Any = None) -> dict[str, Any]:
+        """Take the next obligation of the proof, which must be this one; return its numbers and its witness.
+
+        ``witness`` declares the witness: a section, or Any; None if there is none.
+        """
         self.at = f"{kind} of {of}"
         need(len(self.obligations) < len(self.data["proof"]), "the proof does not list this obligation")
         keys = ("kind", "of", "proves", "lemma", "numbers", "witness")
         obligation = fields(self.data["proof"][len(self.obligations)], keys, "an obligation")
         texts = [obligation[key] for key in keys[:4]]
         need(texts == [kind, of, *OBLIGATIONS[kind]], "the proof lists another obligation here")
-        need(witness or obligation["witness"] is None, "a witness that nothing asks for")
+        need(witness is not None or obligation["witness"] is None, "a witness that nothing asks for")
         values = {key: exact(x) for key, x in fields(obligation["numbers"], numbers, "numbers").items()}
-        return {**values, "witness": obligation["witness"]}
+        told = obligation["witness"]
+        values["witness"] = told if witness in (None, Any) else read(witness, told, self.context, "the witness")
+        self.proved[kind, of] = values
+        return values
 
     def done(self, detail: str) -> None:
         """Close the obligation that was opened last."""
@@ -101,7 +119,7 @@ class Recorder(Document):
         """Return an obligation if it is given, else nothing."""
         return self.given.get((kind, of), {})
 
-    def open(self, kind: str, of: str, numbers: Sequence[str] = (), witness: bool = False) -> dict[str, Any]:
+    def open(self, kind: str, of: str, numbers: Sequence[str] = (), witness: Any = None) -> dict[str, Any]:
         """Lay down an obligation, and take it as any other."""
         proves, lemma = OBLIGATIONS[kind]
         obligation: dict[str, Any] = {

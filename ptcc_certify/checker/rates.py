@@ -45,7 +45,7 @@ def check_rate_bound(doc: Document, structure: Structure) -> Fraction | None:
     if entry is None:
         return None
     mean = bool(doc.following("rate-mean", "rates"))
-    obligation = doc.open("rate-mean" if mean else "rate-upper-bound", "rates", ["upper_bound"], witness=True)
+    obligation = doc.open("rate-mean" if mean else "rate-upper-bound", "rates", ["upper_bound"], witness=Any)
     need(exact(entry) == obligation["upper_bound"], "the upper bound is another")
     (_mean if mean else _inertia)(doc, structure, obligation["upper_bound"], obligation["witness"])
     doc.done(f"upper bound on the decay rate {up(obligation['upper_bound'])}")

@@ -130,7 +130,7 @@ def _forms(
     for k, lower in enumerate(entries(section, "forms", len(family.modes))):
         form = integers(triangle(lower, len(nodes)))
         need(doc.exact.definite(form[0]), "P is not proved definite")
-        numbers = doc.open("family-rate", f"{of}.modes[{k}]", ["b"], witness=True)
+        numbers = doc.open("family-rate", f"{of}.modes[{k}]", ["b"], witness=Any)
         mode = quotient_of(family, k, component, nodes)
         decreases(doc.exact, mode, form, component.whole[1], numbers["b"], numbers["witness"])
         doc.done(f"b = {down(numbers['b'])}")
@@ -372,13 +372,13 @@ def _check_shares(doc: Document, family: Family, x: Sequence[Fraction] | None, e
     need(doc.exact.definite(form[0]), "P is not proved definite")
     mean = Fraction(0)
     for k, share in enumerate(shares):
-        numbers = doc.open("family-rate", f"{of}.modes[{k}]", ["b"], witness=True)
+        numbers = doc.open("family-rate", f"{of}.modes[{k}]", ["b"], witness=Any)
         decreases(
             doc.exact, quotient_of(family, k, common, nodes), form, common.whole[1], numbers["b"], numbers["witness"]
         )
         mean += share * numbers["b"]
         doc.done(f"b = {down(numbers['b'])}" if numbers["b"] > 0 else "nothing decays")
-    witness = doc.open("clock-shares", of, witness=told)["witness"]
+    witness = doc.open("clock-shares", of, witness=Any if told else None)["witness"]
     rate = exact(entry["rate"])
     need(rate <= mean, "the rate is not proved")
     need(entry["behaviour"] == (common.behaviour if rate > 0 else None), "another behaviour")

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 from lmi.exact.decimal_rounding import down
 from lmi.exact.elementary_enclosures import log
@@ -13,36 +13,50 @@ from lmi.exact.work import spend
 from ptcc_certify.checker import input_formulas as formulas
 from ptcc_certify.checker.digraph import edges_of
 from ptcc_certify.checker.follower_rows import Followers, away_of, heard_later
-from ptcc_certify.checker.graph import by_agent
 from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.late_form import Constants, function_of, initial_value
 from ptcc_certify.checker.late_input import Inputs
 from ptcc_certify.checker.late_messages import Messages
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import exact, fields, length, need
+from ptcc_certify.checker.reading import length, need
+from ptcc_certify.checker.sections import FewAgents, Positive
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.checker.structure import Structure
 
 
+@dataclass(frozen=True, kw_only=True)
+class SettlingSection:
+    """Followers of leaders in groups: a cap, how far the clock comes under it, and the share that is left then."""
+
+    cap: Positive
+    clock: Fraction
+    left: Fraction
+
+
+@dataclass(frozen=True, kw_only=True)
+class SettlingWitness:
+    """A Lyapunov function of the leaders, and a number of every agent."""
+
+    function: int
+    u: FewAgents
+
+
 def check_settling(
-    doc: Document, messages: Messages, verified: Verified, section: Any, inputs: Inputs | None = None
+    doc: Document, messages: Messages, verified: Verified, section: SettlingSection, inputs: Inputs | None = None
 ) -> None:
     """Verify ``|x_k - x*_k| <= u_k e^(-b s_c)`` for every agent, leaders by a Lyapunov function of theirs."""
     doc.at = "messages.settling"
-    fields(section, ("cap", "clock", "left"), "settling")
     structure, gain = verified.structure, messages.gain
     need(messages.delay > 0 and messages.value_error == 0, "settling leaders where nothing is late, or values are off")
     need(not messages.late, "settling leaders of a late own state")
     need(verified.begin.state is not None and doc.data["final_state"] is not None, "settling leaders without a state")
     need(bool(structure.followers), "no follower")
     _hear_at_once(messages, structure)
-    cap, clock, left = (exact(section[key]) for key in ("cap", "clock", "left"))
-    obligation = doc.open("late-settling", "messages.settling", ["q", "b"], witness=True)
-    witness = fields(obligation["witness"], ("function", "u"), "the witness")
-    q, b = obligation["q"], obligation["b"]
-    known = function_of(doc, verified, witness["function"])
-    u = by_agent(doc, structure.graph, witness["u"], "u", files=False)
-    need(q > 1 and cap > 0, "q is not above 1, or cap not positive")
+    cap, clock, left = section.cap, section.clock, section.left
+    obligation = doc.open("late-settling", "messages.settling", ["q", "b"], witness=SettlingWitness)
+    q, b, u = obligation["q"], obligation["b"], obligation["witness"].u
+    known = function_of(doc, verified, obligation["witness"].function)
+    need(q > 1, "q is not above 1")
     need(0 < b <= known.form.rate / 2, "b is not positive, or above half the rate of the leaders")
     bits = length((q, b, left, clock, cap, messages.delay, gain.T, gain.rho1, *u, *known.deviations))
     spend(50 + 20 * structure.graph.n, bits, bits, "settling leaders")

@@ -30,7 +30,7 @@ class Numbers:
     (Fraction(1, 3), ([3, 2], 6), ([4], 2))
     """
 
-    def __init__(self, values: Sequence[Any], scale: int | None = None):
+    def __init__(self, values: Any, scale: int | None = None):
         self.values, self.scale = values, scale
 
     def __len__(self) -> int:

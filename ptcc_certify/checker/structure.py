@@ -103,6 +103,7 @@ def check_structure(doc: Document, graph: Digraph, section: Any, of: str = "grap
         closed.append(nodes)
         gauges.append(gauge)
     structure = Structure(graph, closed, gauges, _closed_components(graph, closed))
+    doc.context.followers = [graph.labels[v] for v in structure.followers]
     signs = {v: g for _, nodes, gauge in structure.balanced for v, g in zip(nodes, gauge, strict=True)}
     need(graph.fits([signs.get(v, 0) for v in range(graph.n)]), "camps of a component")
     for key, expected in (("leaders", [v for nodes in closed for v in nodes]), ("followers", structure.followers)):

@@ -69,7 +69,7 @@ def test_a_witness_that_does_not_prove_it_is_refused(seed: int, own: bool):
     late = next(k for k, x in enumerate(witness["tau"]) if x != "0")
     for value in ("0", "-1"):
         assert "tau is positive iff" in reason(data, (*every, "tau", late), value)
-    assert "lower_triangle" in reason(data, (*every, "matrix"), witness["matrix"][:-1])
+    assert "another size" in reason(data, (*every, "matrix"), witness["matrix"][:-1])
 
 
 def test_a_multiplier_of_an_edge_that_is_not_late_is_refused():
@@ -116,6 +116,7 @@ def test_without_a_cap_or_a_state_or_with_values_that_are_off_it_is_refused():
     data = whole(1, False)
     step, said = place(data), data["messages"]["lmi"]
     bare = plain(SignedDigraph.from_edges([(1, 2, 1), (2, 3, -1), (3, 2, 1)]), NominalProtocol(1, 1, 3, 1), [3, 1, 2])
+    said = {"left": said["left"]} | {k: dict.fromkeys("123", "1") for k in ("moved", "away", "residual")}
     for options, what in (({}, "without a cap"), ({"gain_cap": 20, "value_error": "1/10"}, "values that are off")):
         forged = with_messages(bare, "1/100", **options)
         forged["messages"] |= {"lmi": said, "input": None}
