@@ -20,7 +20,7 @@ from ptcc_certify.bounds.input.effort import EnergyIntegral, Peak
 from ptcc_certify.certificate.certificate_data import Content, Observations, Source
 from ptcc_certify.certificate.checking import record
 from ptcc_certify.certificate.format_agents import agents_section, phases_section, read_agents
-from ptcc_certify.certificate.format_effort import LIMITS, effort_section, energy_witness, peak_witness, read_effort
+from ptcc_certify.certificate.format_effort import LIMITS, effort_section, peak_witness, read_effort
 from ptcc_certify.certificate.format_final_state import final_state_sections, formation_section, read_final_state
 from ptcc_certify.certificate.format_graph import certificate_graph, claim_sections, graph_section, structure_section
 from ptcc_certify.certificate.format_leaders import leaders_section, read_tracking
@@ -37,10 +37,14 @@ from ptcc_certify.certificate.format_vectors import (
 from ptcc_certify.certificate.request import Expectations, Request
 from ptcc_certify.certificate.write_sections import write
 from ptcc_certify.checker import SCHEMA, SLIDING_BOUND, SLIDING_CLOCK, CheckReport
+from ptcc_certify.checker.agent_decrease import PhaseSection
+from ptcc_certify.checker.input import EnergyWitness, InputSection
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
 from ptcc_certify.checker.leaders import LeadersSection
 from ptcc_certify.checker.messages import MessagesSection
+from ptcc_certify.checker.protocol import ReachingTimes
 from ptcc_certify.checker.reading import RejectedError, exact, triangle
+from ptcc_certify.checker.sections import Several
 from ptcc_certify.errors import one_line
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import Structure, analyse, behaviour_name
@@ -83,14 +87,15 @@ def certificate_document(
         "influence": influence,
         "final_state": final,
         "reaching_time": reaching_section(graph.labels, content.reaching),
-        "input": effort_section(content.effort, out),
+        "input": write(InputSection | None, effort_section(content.effort, graph.n_nodes), out),
         "proof": [],
         "verdict": "",
     }
     if content.agents is not None:
-        document["agents"] = agents_section(content.agents, out)
+        section = agents_section(content.agents)
+        document["agents"] = write(type(section), section, out)
         if phases := phases_section(content.agents):
-            document["phases"] = phases
+            document["phases"] = write(Several[PhaseSection], phases, out)
     if content.offsets is not None:
         document["formation"] = formation_section(content, content.offsets, final, out)
     if content.late is not None and content.late.says_something:
@@ -120,7 +125,7 @@ def read_document(
     initial_state, rho, relative = data.state(document["initial_state"]), None, document["final_state"] is None
     if paper is not None and paper["rho_interval"] is not None:
         rho = ExactInterval(*(number(paper["rho_interval"][key]) for key in ("printed", "exact")))
-    effort = read_effort(document, structure, protocol, data, steps)
+    effort = read_effort(report, structure, protocol, initial_state)
     request = _read_request(document["unverified"], None if effort is None else effort.initial_set)
     request = replace(request, **read_unproved(document, structure))
     return {
@@ -128,7 +133,7 @@ def read_document(
         "protocol": protocol,
         "initial_state": initial_state,
         "sigma0": data.state(document["sliding_variable"]),
-        "reaching": read_reaching(document["reaching_time"], protocol),
+        "reaching": read_reaching(report.sections.get("reaching_time"), protocol),
         "lyapunov": lyapunov,
         "proof": RateProof(
             None if lyapunov is None else lyapunov.rate, tuple(o for o in proof if o.of.split(".")[0] == "paper"), rho
@@ -143,7 +148,7 @@ def read_document(
         "request": request,
         "observed": _read_observations(document["unverified"]),
         "source": Source(path, sha256, document, report, effort, files),
-        "agents": read_agents(document, structure, protocol, functions),
+        "agents": read_agents(report, structure, protocol, functions),
         "offsets": data.state(document["formation"]["offsets"]) if "formation" in document else None,
     }
 
@@ -174,15 +179,16 @@ def reaching_section(labels: Sequence[str], reaching: Sequence[ReachingTime] | N
     """Return proved reaching times as files have them."""
     if reaching is None:
         return None
-    times = {label: text(r.z) for label, r in zip(labels, reaching, strict=True)}
-    return {"bound": SLIDING_BOUND, "clock": SLIDING_CLOCK, "z": times}
+    times = ReachingTimes(bound=SLIDING_BOUND, clock=SLIDING_CLOCK, z=[r.z for r in reaching])
+    section: dict[str, Any] = write(ReachingTimes, times, Writer(labels))
+    return section
 
 
-def read_reaching(section: Mapping[str, Any] | None, protocol: Protocol) -> tuple[ReachingTime, ...] | None:
+def read_reaching(section: ReachingTimes | None, protocol: Protocol) -> tuple[ReachingTime, ...] | None:
     """Return the reaching times of an accepted certificate."""
     if section is None or protocol.reaching is None:
         return None
-    return tuple(ReachingTime(protocol.reaching.T_r, number(z)) for z in section["z"].values())
+    return tuple(ReachingTime(protocol.reaching.T_r, z) for z in section.z)
 
 
 # ---------------------------------------------------------------------- Lyapunov functions
@@ -292,11 +298,11 @@ def _write_obligation(obligation: Obligation, out: Writer) -> dict[str, Any]:
     witness = obligation.witness
     if isinstance(witness, Dominance):
         witness = _dominance_witness(witness, out)
-    elif isinstance(witness, EnergyIntegral):
-        witness = energy_witness(witness)
-    elif isinstance(witness, Peak):
-        witness = peak_witness(witness, out)
     elif is_dataclass(witness):
+        if isinstance(witness, EnergyIntegral):
+            witness = EnergyWitness(W0=witness.matrices[0], W1=witness.matrices[1])
+        elif isinstance(witness, Peak):
+            witness = peak_witness(witness)
         witness = write(type(witness), witness, out)
     elif isinstance(witness, tuple):
         witness = {"u": dict(zip(out.labels, map(format_exact, witness), strict=True))}

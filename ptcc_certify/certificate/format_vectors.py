@@ -15,6 +15,7 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import float_up
 from lmi.exact.definite import SparseFactor
+from lmi.exact.numbers import longest
 from ptcc_certify.bounds.final_state import Influence, enclosed_ends
 from ptcc_certify.checker.reading import RejectedError, exact
 from ptcc_certify.checker.side_files import Numbers, SideFiles, beside
@@ -25,6 +26,8 @@ from ptcc_certify.graphs.structure import Structure
 
 #: Vectors above this length go to side files.
 LONG = 50_000
+#: Bits of numerator and denominator up to which an interval is written as it is.
+_SHORT_BITS = 256
 #: Decimals of the middle of a ball, and its radius, where an exact number would be too long.
 _DECIMALS, _RADIUS = 120, Fraction(1, 10**60)
 
@@ -115,6 +118,16 @@ class Writer:
 def floats(numbers: Numbers) -> np.ndarray:
     """Return the floats nearest to numbers, each rounded once."""
     return np.array([float(x) if numbers.scale is None else x / numbers.scale for x in numbers.values])
+
+
+def numbers(values: Sequence[Fraction] | np.ndarray | None) -> Numbers | None:
+    """Return numbers as the sections have them; None of None."""
+    return None if values is None else Numbers(values)
+
+
+def fractions(values: Numbers | None) -> tuple[Fraction, ...] | None:
+    """Return numbers that were read; None of None."""
+    return None if values is None else tuple(values)
 
 
 def floats_up(numbers: Numbers | None) -> np.ndarray | None:
@@ -240,8 +253,12 @@ def exact_or_ball(value: Fraction) -> str | dict[str, str]:
 
 
 def interval_text(interval: Interval) -> str | dict[str, str]:
-    """Write an interval: exactly if its radius is 0, otherwise as a ball that contains it."""
-    return exact_or_ball(interval[0]) if interval[1] == 0 else _ball_text(interval)
+    """Write an interval: exactly if its radius is 0, or its numbers are short; otherwise as a ball that contains it."""
+    if interval[1] == 0:
+        return exact_or_ball(interval[0])
+    if longest(n for x in interval for n in x.as_integer_ratio()) <= _SHORT_BITS:
+        return {"mid": format_exact(interval[0]), "radius": format_exact(interval[1])}
+    return _ball_text(interval)
 
 
 def _ball_text(interval: Interval) -> dict[str, str]:

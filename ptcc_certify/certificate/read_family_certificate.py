@@ -69,7 +69,13 @@ def read_family_certificate(source: Source) -> FamilyCertificate:
     }
     kept |= {"expectations": _read_expectations(document["unverified"].get("asked")), "source": source}
     return FamilyCertificate(
-        family, protocol, parts, state, sigma0, read_reaching(document["reaching_time"], protocol), **kept
+        family,
+        protocol,
+        parts,
+        state,
+        sigma0,
+        read_reaching(source.report.sections.get("reaching_time"), protocol),
+        **kept,
     )
 
 

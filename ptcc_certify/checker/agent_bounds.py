@@ -8,7 +8,6 @@ from fractions import Fraction
 from functools import cached_property
 from itertools import chain
 from operator import mul
-from typing import Any
 
 from lmi.exact.decimal_rounding import up
 from lmi.exact.elementary_enclosures import exp, rounded
@@ -18,13 +17,13 @@ from ptcc_certify.checker.agent_model import Agents
 from ptcc_certify.checker.agent_motion import States
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.final_state import FinalState
-from ptcc_certify.checker.graph import by_agent, ordered
 from ptcc_certify.checker.input import Verified, check_constants
 from ptcc_certify.checker.input_formulas import Limits, root_above
 from ptcc_certify.checker.lyapunov import Function
 from ptcc_certify.checker.matrix_products import Matrix
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import entries, exact, fields, need
+from ptcc_certify.checker.reading import need
+from ptcc_certify.checker.sections import ByAgent, FewAgents, NotNegative, Several
 from ptcc_certify.checker.side_files import Numbers
 
 #: Bits to which long numbers are rounded, upwards, before they bound every agent.
@@ -65,14 +64,22 @@ class Used:
         return [1 / own[v] if v in own else Fraction(0) for v in range(graph.n)]
 
 
-def read_used(doc: Document, verified: Verified, entry: Any, before: int) -> Used:
-    """Read which Lyapunov function is used, after the one of number ``before``, and verify its constants."""
-    doc.at, k, known = "agents.functions", entry["function"], verified.functions
-    need(type(k) is int and before < k < len(known), "functions that are used: none such, or in another order")
+@dataclass(frozen=True, kw_only=True)
+class UsedSection:
+    """A Lyapunov function that is used, by its number, and constants of a full matrix."""
+
+    function: int
+    inputs: FewAgents | None
+
+
+def verify_used(doc: Document, verified: Verified, entry: UsedSection, before: int) -> Used:
+    """Return which Lyapunov function is used, after the one of number ``before``, and verify its constants."""
+    doc.at, k, known = "agents.functions", entry.function, verified.functions
+    need(before < k < len(known), "functions that are used: none such, or in another order")
     need(known[k].rate > 0, "a Lyapunov function that is used and does not decay")
     constants = None
-    if entry["inputs"] is not None:
-        constants = check_constants(doc, verified.structure.graph, known[k], k, entry["inputs"])
+    if entry.inputs is not None:
+        constants = check_constants(doc, verified.structure.graph, known[k], k, entry.inputs)
     return Used(k, known[k], constants)
 
 
@@ -205,16 +212,29 @@ def _adjugate(W: Matrix) -> tuple[Matrix, int]:
     return [row[n:] for row in rows], before
 
 
-def check_residual(doc: Document, begin: Begin, used: Sequence[Used], section: Any) -> None:
+@dataclass(frozen=True, kw_only=True)
+class ResidualSection:
+    """How far the clock comes with a capped gain, and what is left of positions, velocities and so on by agent."""
+
+    clock: NotNegative
+    agents: ByAgent[Several[Fraction]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class AgentsInput:
+    """Bounds of the inputs, and the largest of them."""
+
+    agents: FewAgents
+    largest: Fraction
+
+
+def check_residual(doc: Document, begin: Begin, used: Sequence[Used], section: ResidualSection) -> None:
     """Verify what is left at the deadline with a capped gain, of positions, velocities and so on."""
     doc.open("agent-residual", "agents")
     agents, labels = begin.agents, begin.graph.labels
-    fields(section, ("clock", "agents"), "residual")
-    clock, cap = exact(section["clock"]), agents.cap or Fraction(0)
-    need(clock >= 0, "the clock is negative")
+    clock, cap, numbers = section.clock, agents.cap or Fraction(0), section.agents
     need(clock <= _clock_below(agents), "the clock is not proved")
-    values = ordered(labels, section["agents"], "residual")
-    numbers = [[exact(x) for x in entries(row, "derivatives", agents.n)] for row in values.values()]
+    need(all(len(row) == agents.n for row in numbers), f"derivatives has not {agents.n} entries")
     decay = exp(-min(agents.rate * clock, Fraction(LARGEST_DECAY)))[1]
     powers = [rounded(cap ** (2 * i) * agents.W[i][i] * decay, BITS, up=True) for i in range(agents.n)]
     known = [(use.function.deviation, begin.value(use.function)) for use in used if use.function.deviation is not None]
@@ -235,13 +255,11 @@ def _clock_below(agents: Agents) -> Fraction:
 
 
 def check_input(
-    doc: Document, begin: Begin, used: Sequence[Used], section: Any, final: FinalState, mu1: Fraction
+    doc: Document, begin: Begin, used: Sequence[Used], section: AgentsInput, final: FinalState, mu1: Fraction
 ) -> None:
     """Verify the bound of every agent's input, in Euclidean norm over space; ``mu1`` is 0 without sliding variables."""
     doc.open("agent-input", "agents")
-    agents, graph = begin.agents, begin.graph
-    fields(section, ("agents", "largest"), "input")
-    values = by_agent(doc, graph, section["agents"], "the input", files=False)
+    agents, graph, values = begin.agents, begin.graph, section.agents
     (P, times), gain = begin.inverse, agents.eta_0 if agents.bounded else agents.cap or Fraction(0)
     common = rounded(gain ** (2 * agents.n) * agents.coupling**2 * P[-1][-1] / times, BITS, up=True)
     known = [(c, begin.value(use.function)) for use in used if (c := use.error_constants(graph)) is not None]
@@ -251,7 +269,7 @@ def check_input(
         rest = x - own - mu1 * agents.d
         holds = rest >= 0 and rest**2 >= common * min(c[v] * value for c, value in known)
         need(holds, f"the input of agent {shorten(graph.labels[v])} is not proved")
-    need(exact(section["largest"]) == max(values), "the largest input is another")
+    need(section.largest == max(values), "the largest input is another")
     doc.done(f"at most {up(max(values))}")
 
 

@@ -3,28 +3,48 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from itertools import chain
 from operator import mul
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from lmi.exact.decimal_rounding import down, up
 from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.numbers import integers, longest, shorten, sized
 from lmi.exact.work import spend
-from ptcc_certify.checker.agent_bounds import BITS, Used, Weights, read_used
-from ptcc_certify.checker.agent_model import LARGEST_DIMENSION, LONGEST, Chains, count
-from ptcc_certify.checker.agent_motion import States, check_final_states, check_motion, read_offsets, read_states
+from ptcc_certify.checker.agent_bounds import BITS, AgentsInput, Used, UsedSection, Weights, verify_used
+from ptcc_certify.checker.agent_model import LARGEST_DIMENSION, LONGEST, Chains, within
+from ptcc_certify.checker.agent_motion import States, check_final_states, check_motion, need_shape, sized_offsets
 from ptcc_certify.checker.digraph import Digraph
-from ptcc_certify.checker.graph import by_agent
 from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.checker.lyapunov import Function
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import entries, exact, fields, length, need
+from ptcc_certify.checker.reading import length, need
+from ptcc_certify.checker.sections import Ball, ByAgent, Positive, Several
 
-KEYS = ("cascade", "dimension", "functions", "offsets", "initial_state", "motion", "final_state", "input")
-FUNCTION = ("function", "inputs", "initial", "drive")
+
+@dataclass(frozen=True, kw_only=True)
+class TrackedSection(UsedSection):
+    """A Lyapunov function that is used, and what it is worth at the beginning."""
+
+    initial: Fraction | None
+    drive: Fraction | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class CascadeSection:
+    """What the file says of double integrators that track the velocity of the paper's protocol."""
+
+    cascade: Positive
+    dimension: int
+    functions: Several[TrackedSection]
+    offsets: ByAgent[Several[Fraction]]
+    initial_state: ByAgent[Several[Several[Fraction]]] | None
+    motion: Several[Several[Ball]]
+    final_state: ByAgent[Several[Several[Ball]]] | None
+    input: AgentsInput | None
 
 
 class Vectors(NamedTuple):
@@ -73,31 +93,30 @@ class Tracked(NamedTuple):
 
 def check_cascade(doc: Document, verified: Verified) -> bool:
     """Verify the section ``agents`` of the cascade; return whether agreement and where it happens were proved."""
-    section, graph = fields(doc.section("agents"), KEYS, "agents"), verified.structure.graph
-    alpha, d = exact(section["cascade"]), count(section, "dimension", LARGEST_DIMENSION)
+    section, graph = doc.section("agents", CascadeSection), verified.structure.graph
+    alpha, d = section.cascade, within("dimension", section.dimension, LARGEST_DIMENSION)
     gain = verified.gain
     longest_number = length((alpha, gain.T, gain.rho1, gain.k))
     need(longest_number <= LONGEST, f"agents: a number of {longest_number} bits; {LONGEST} are taken")
-    need(alpha > 0, "the rate of the cascade is not positive")
     agents = Chains(2, d, (Fraction(0),) * 2, (Fraction(0), alpha), None, gain)
-    offsets, begin = read_offsets(section["offsets"], graph.labels, agents), section["initial_state"]
-    states = None if begin is None else read_states(graph.labels, begin, "initial_state", agents)
+    offsets, states = sized_offsets(section.offsets, agents), section.initial_state
+    need_shape(states, "initial_state", agents)
     drive = None if states is None else _drive(graph, agents, states, offsets)
-    used = _functions(doc, verified, section["functions"], drive)
+    used = _functions(doc, verified, section, drive)
     doc.at = "agents.motion"
-    M = check_motion(doc, agents, section["motion"])
+    M = check_motion(doc, agents, section.motion)
     doc.at = "agents.final_state"
     moves = bool(graph.listening)
     proved = doc.data["influence"] is not None and (bool(used) or not moves)
-    if section["final_state"] is not None:
+    if section.final_state is not None:
         need(proved and states is not None, "a final state without initial states or a proof")
         rests = not moves or any(one.use.function.rate * gain.k > 2 for one in used)
-        check_final_states(doc, agents, verified.final, M[: 1 + rests], states or (), offsets)
+        check_final_states(doc, agents, verified.final, M[: 1 + rests], states or (), offsets, section.final_state)
     doc.at = "agents.input"
-    if section["input"] is not None:
+    if section.input is not None:
         need(drive is not None, "a bound of the input without initial states")
         if drive is not None:
-            _check_input(doc, verified, agents, used, drive)
+            _check_input(doc, verified, agents, used, drive, section.input)
     return proved
 
 
@@ -118,17 +137,17 @@ def _drive(graph: Digraph, agents: Chains, states: States, offsets: Sequence[Seq
     return Drive(Vectors(positions, scale), Vectors(errors, scale * q * unit), Vectors(velocities, scale))
 
 
-def _functions(doc: Document, verified: Verified, section: Any, drive: Drive | None) -> list[Tracked]:
-    """Read which Lyapunov functions are used, and verify what they are worth at the beginning."""
-    graph, read = verified.structure.graph, list[tuple[Used, Any]]()
-    for entry in entries(section, "functions"):
+def _functions(doc: Document, verified: Verified, section: CascadeSection, drive: Drive | None) -> list[Tracked]:
+    """Return which Lyapunov functions are used, and verify what they are worth at the beginning."""
+    graph, read = verified.structure.graph, list[tuple[Used, TrackedSection]]()
+    for entry in section.functions:
         before = read[-1][0].number if read else -1
-        read.append((read_used(doc, verified, fields(entry, FUNCTION, "a function that is used"), before), entry))
+        read.append((verify_used(doc, verified, entry, before), entry))
     numbers = doc.open("agent-cascade", "agents", ["alpha"])
-    need(numbers["alpha"] == exact(doc.data["agents"]["cascade"]), "alpha is another than that of the cascade")
+    need(numbers["alpha"] == section.cascade, "alpha is another than that of the cascade")
     used = list[Tracked]()
     for use, entry in read:
-        roots = [None if entry[key] is None else exact(entry[key]) for key in ("initial", "drive")]
+        roots = [entry.initial, entry.drive]
         need(all((x is None) == (drive is None) for x in roots), "initial values are told iff there are initial states")
         bits = length(x for x in roots if x is not None)
         spend(4, bits, bits, "initial values")
@@ -140,7 +159,9 @@ def _functions(doc: Document, verified: Verified, section: Any, drive: Drive | N
     return used
 
 
-def _check_input(doc: Document, verified: Verified, agents: Chains, used: Sequence[Tracked], drive: Drive) -> None:
+def _check_input(
+    doc: Document, verified: Verified, agents: Chains, used: Sequence[Tracked], drive: Drive, section: AgentsInput
+) -> None:
     """Verify the bound of every agent's input, in Euclidean norm over space."""
     graph, k, alpha, eta = verified.structure.graph, agents.gain.k, agents.own[1], agents.eta_0
     theta = (1 - agents.gain.rho1 / eta) ** 2 / k
@@ -156,8 +177,7 @@ def _check_input(doc: Document, verified: Verified, agents: Chains, used: Sequen
             bounds.append([root_above(c) * size for c in constants])
     need(bool(bounds), "a bound of the input though no function and no alpha bound it")
     doc.open("agent-input", "agents")
-    section = fields(doc.data["agents"]["input"], ("agents", "largest"), "input")
-    values = by_agent(doc, graph, section["agents"], "the input", files=False)
+    values = section.agents
     added = (verified.protocol.gains["mu1"] if verified.protocol.sliding else Fraction(0)) * agents.d
     columns, scale = drive.velocities
     bits = longest(chain.from_iterable(columns))
@@ -166,5 +186,5 @@ def _check_input(doc: Document, verified: Verified, agents: Chains, used: Sequen
         speed = root_above(Fraction(sum(column[v] ** 2 for column in columns), scale**2))
         least = min(each[v] for each in bounds) + alpha * eta * speed
         need(x >= least + added, f"the input of agent {shorten(graph.labels[v])} is not proved")
-    need(exact(section["largest"]) == max(values), "the largest input is another")
+    need(section.largest == max(values), "the largest input is another")
     doc.done(f"at most {up(max(values))}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import chain, pairwise
 
@@ -16,7 +16,8 @@ from ptcc_certify.checker.agent_model import LONGEST, MANY_POINTS, Agents
 from ptcc_certify.checker.lyapunov import Function
 from ptcc_certify.checker.matrix_products import Matrix
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import entries, exact, fields, length, need, triangle
+from ptcc_certify.checker.reading import length, need
+from ptcc_certify.checker.sections import Positive, Several, Triangle
 
 Rows = list[list[Fraction]]
 #: Phases of all functions.
@@ -45,6 +46,17 @@ def check_decrease(doc: Document, agents: Agents, used: Sequence[Function]) -> N
     doc.done(f"c = {down(agents.coupling)}, {len(used)} Lyapunov functions")
 
 
+@dataclass(frozen=True, kw_only=True)
+class PhaseSection:
+    """A function that is used, and the matrix by which it decreases faster from some ``zeta`` on."""
+
+    function: int
+    rate: Positive
+    coupling: Positive
+    lower_triangle: Triangle
+    points: Several[Fraction]
+
+
 def check_phases(doc: Document, agents: Agents, used: Sequence[Used]) -> None:
     """Verify faster decrease of functions that are used, from some ``zeta`` on, by matrices not below the former."""
     if "phases" not in doc.data:
@@ -52,20 +64,19 @@ def check_phases(doc: Document, agents: Agents, used: Sequence[Used]) -> None:
     need(agents.cap is None, "phases of a gain that is capped")
     former = {use.number: (agents.W, 1 / agents.first_gain) for use in used}
     rates = {use.number: use.function.rate for use in used}
-    section = entries(doc.section("phases"), "phases")
+    section = doc.section("phases", Several[PhaseSection])
     need(len(section) <= MANY_PHASES, f"more than {MANY_PHASES} phases")
     for k, entry in enumerate(section):
         doc.at = f"phases[{k}]"
-        fields(entry, ("function", "rate", "coupling", "lower_triangle", "points"), "a phase")
-        number = entry["function"]
-        need(type(number) is int and number in former, "a phase of a function that is not used")
+        number, rate, coupling = entry.function, entry.rate, entry.coupling
+        W, points = entry.lower_triangle, entry.points
+        need(number in former, "a phase of a function that is not used")
         numbers = doc.open("agent-phase", f"phases[{k}]", ["rate"])
-        need(len(entries(entry["points"], "points")) <= MANY_POINTS, f"more than {MANY_POINTS} points")
-        W, points = triangle(entry["lower_triangle"], agents.n), [exact(x) for x in entry["points"]]
-        coupling, rate = exact(entry["coupling"]), exact(entry["rate"])
+        need(len(W) == agents.n, f"lower_triangle has not {agents.n} entries")
+        need(len(points) <= MANY_POINTS, f"more than {MANY_POINTS} points")
         bits = length((coupling, rate, *points, *chain.from_iterable(W)))
         need(bits <= LONGEST, f"a phase with a number of {bits} bits; {LONGEST} are taken")
-        need(numbers["rate"] == rate > 0 and coupling > 0, "the rate is another, or not positive")
+        need(numbers["rate"] == rate, "the rate is another")
         before, end = former[number]
         need(len(points) >= 2 and points[0] == 0 and points[-1] <= end, "points of a phase that begins too early")
         need(all(low < high for low, high in pairwise(points)), "points are not in ascending order")

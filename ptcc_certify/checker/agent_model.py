@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
 
 from lmi.exact.numbers import integers
 from ptcc_certify.checker.input_formulas import PrescribedGain
 from ptcc_certify.checker.matrix_products import Matrix
-from ptcc_certify.checker.reading import entries, exact, length, need, triangle
+from ptcc_certify.checker.reading import length, need
+from ptcc_certify.checker.sections import Several, Triangle
 
 #: Largest order, and largest dimension of space.
 LARGEST_ORDER, LARGEST_DIMENSION = 8, 8
@@ -94,15 +94,29 @@ class Agents(Chains):
         return spare >= 0 and self.plant[1] + spare * self.first_gain >= 0
 
 
-def read_agents(section: Any, gain: PrescribedGain) -> Agents:
-    """Return what the section says of one agent, within its limits; the section has its keys."""
-    n, d = (count(section, *limit) for limit in (("order", LARGEST_ORDER), ("dimension", LARGEST_DIMENSION)))
-    plant, own, gains = (_each(section[key], n, key) for key in ("plant", "own", "gains"))
-    W = triangle(section["lower_triangle"], n)
-    need(len(entries(section["points"], "points")) <= MANY_POINTS, f"more than {MANY_POINTS} points")
-    points = [exact(x) for x in section["points"]]
-    coupling, rate = exact(section["coupling"]), exact(section["rate"])
-    cap = None if section["gain_cap"] is None else exact(section["gain_cap"])
+@dataclass(frozen=True, kw_only=True)
+class OneAgent:
+    """What the file says of one agent."""
+
+    order: int
+    dimension: int
+    plant: Several[Fraction]
+    own: Several[Fraction]
+    gains: Several[Fraction]
+    coupling: Fraction
+    lower_triangle: Triangle
+    rate: Fraction
+    gain_cap: Fraction | None
+    points: Several[Fraction]
+
+
+def agents_of(section: OneAgent, gain: PrescribedGain) -> Agents:
+    """Return what the section says of one agent, within its limits."""
+    n, d = within("order", section.order, LARGEST_ORDER), within("dimension", section.dimension, LARGEST_DIMENSION)
+    plant, own, gains, W, points = section.plant, section.own, section.gains, section.lower_triangle, section.points
+    need(all(len(x) == n for x in (plant, own, gains, W)), f"plant, own, gains or lower_triangle has not {n} entries")
+    need(len(points) <= MANY_POINTS, f"more than {MANY_POINTS} points")
+    coupling, rate, cap = section.coupling, section.rate, section.gain_cap
     agents = Agents(n, d, plant, own, cap, gain, gains, coupling, W, rate, points)
     numbers = (*plant, *own, *gains, *points, *(x for row in W for x in row), coupling, rate, cap or coupling)
     longest = length((*numbers, gain.T, gain.rho1, gain.k))
@@ -130,12 +144,7 @@ def _check_own(agents: Agents) -> None:
         need(agents.cap is None, "feedback of the own velocity with a gain that is capped")
 
 
-def count(section: Any, key: str, largest: int) -> int:
-    """Read an integer from 1 to ``largest``."""
-    value = section[key]
-    need(type(value) is int and 1 <= value <= largest, f"{key} is no integer from 1 to {largest}")
+def within(key: str, value: int, largest: int) -> int:
+    """Return an integer from 1 to ``largest``."""
+    need(1 <= value <= largest, f"{key} is no integer from 1 to {largest}")
     return value
-
-
-def _each(entry: Any, n: int, what: str) -> list[Fraction]:
-    return [exact(x) for x in entries(entry, what, n)]

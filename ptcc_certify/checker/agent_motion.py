@@ -12,9 +12,8 @@ from lmi.exact.numbers import integers, longest, shorten
 from lmi.exact.work import spend
 from ptcc_certify.checker.agent_model import Chains
 from ptcc_certify.checker.final_state import FinalState
-from ptcc_certify.checker.graph import ordered
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import Interval, entries, exact, interval, length, need
+from ptcc_certify.checker.reading import Interval, length, need
 from ptcc_certify.checker.side_files import Numbers
 
 #: Bits to which an integral is enclosed.
@@ -27,11 +26,11 @@ ENTRY, ROUNDED_ENTRY = 800, 800
 States = Sequence[Sequence[Sequence[Fraction]]]
 
 
-def check_motion(doc: Document, agents: Chains, section: Any) -> list[list[Interval]]:
+def check_motion(doc: Document, agents: Chains, M: Sequence[Sequence[Interval]]) -> Sequence[Sequence[Interval]]:
     """Verify ``M``, which takes the common motion from time 0 to the deadline; return it."""
     doc.open("agent-motion", "agents")
     n = agents.n
-    M = [[interval(x) for x in entries(row, "a row", n)] for row in entries(section, "motion", n)]
+    need(len(M) == n and all(len(row) == n for row in M), f"motion has not {n} rows of {n} entries")
     true, radius = _motion(agents)
     for row, exact_row in zip(M, true, strict=True):
         for (mid, wide), (low, high) in zip(row, exact_row, strict=True):
@@ -99,7 +98,13 @@ def rest_integral(p: Fraction, w: Fraction, bits: int = BITS) -> Interval:
 
 
 def check_final_states(
-    doc: Document, agents: Chains, final: FinalState, M: Sequence[Sequence[Interval]], states: States, offsets: Any
+    doc: Document,
+    agents: Chains,
+    final: FinalState,
+    M: Sequence[Sequence[Interval]],
+    states: States,
+    offsets: Sequence[Sequence[Fraction]],
+    claimed: Sequence[Sequence[Sequence[Interval]]],
 ) -> None:
     """Verify the interval of every agent, coordinate and derivative: ``h_k + sum_l Q_kl sum_j M_ij g_lj``.
 
@@ -111,11 +116,7 @@ def check_final_states(
     bits = length(chain((x for row in M for pair in row for x in pair), *chain.from_iterable(states)))
     products = ENTRY + (n * ROUNDED_ENTRY if rounded else 0)
     spend(products * len(labels) * agents.d * n, bits, bits, "the final states of agents")
-    section = ordered(labels, doc.data["agents"]["final_state"], "final_state")
-    claimed = [
-        [[interval(x) for x in entries(row, "derivatives", len(M))] for row in entries(rows, "coordinates", agents.d)]
-        for rows in section.values()
-    ]
+    need_shape(claimed, "final_state", agents, len(M))
     for axis in range(agents.d):
         G = [[row[axis][j] - (offsets[v][axis] if j == 0 else 0) for v, row in enumerate(states)] for j in range(n)]
         before = [final.values(Numbers(g)) for g in G] if rounded else []
@@ -151,16 +152,13 @@ def _combined(row: Sequence[Fraction], G: Sequence[Sequence[Fraction]]) -> list[
     return [Fraction(x, unit * scale) for x in sums]
 
 
-def read_states(labels: Sequence[str], entry: Any, what: str, agents: Chains) -> States:
-    """Read by agent numbers for every coordinate and derivative."""
-    section = ordered(labels, entry, what)
-    return [
-        [[exact(x) for x in entries(row, "derivatives", agents.n)] for row in entries(rows, "coordinates", agents.d)]
-        for rows in section.values()
-    ]
+def need_shape(states: Sequence[Sequence[Sequence[Any]]] | None, what: str, agents: Chains, n: int = 0) -> None:
+    """Refuse states unless those of every agent are of every coordinate, with ``n`` derivatives of each."""
+    fits = all(len(rows) == agents.d and all(len(row) == (n or agents.n) for row in rows) for rows in states or ())
+    need(fits, f"{what} is not of {agents.d} coordinates with {n or agents.n} derivatives each")
 
 
-def read_offsets(section: Any, labels: Sequence[str], agents: Chains) -> list[list[Fraction]]:
-    """Read the offset of every agent, coordinate by coordinate."""
-    rows = ordered(labels, section, "offsets").values()
-    return [[exact(x) for x in entries(row, "an offset", agents.d)] for row in rows]
+def sized_offsets(offsets: Sequence[Sequence[Fraction]], agents: Chains) -> Sequence[Sequence[Fraction]]:
+    """Return the offset of every agent, which has all coordinates."""
+    need(all(len(row) == agents.d for row in offsets), f"offsets has not {agents.d} entries of an agent")
+    return offsets

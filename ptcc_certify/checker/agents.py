@@ -3,23 +3,41 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 from lmi.exact.work import spend
-from ptcc_certify.checker.agent_bounds import Begin, Used, check_input, check_residual, read_used
+from ptcc_certify.checker.agent_bounds import (
+    AgentsInput,
+    Begin,
+    ResidualSection,
+    Used,
+    UsedSection,
+    check_input,
+    check_residual,
+    verify_used,
+)
 from ptcc_certify.checker.agent_cascade import check_cascade
 from ptcc_certify.checker.agent_decrease import check_decrease, check_phases
-from ptcc_certify.checker.agent_model import Agents, read_agents
-from ptcc_certify.checker.agent_motion import check_final_states, check_motion, read_offsets, read_states
+from ptcc_certify.checker.agent_model import Agents, OneAgent, agents_of
+from ptcc_certify.checker.agent_motion import check_final_states, check_motion, need_shape, sized_offsets
 from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import entries, fields, length, need
+from ptcc_certify.checker.reading import length, need
+from ptcc_certify.checker.sections import Ball, ByAgent, Several
 
-KEYS = (
-    *("order", "dimension", "plant", "own", "gains", "coupling", "lower_triangle", "rate", "gain_cap", "points"),
-    *("functions", "offsets", "initial_state", "motion", "final_state", "residual", "input"),
-)
+
+@dataclass(frozen=True, kw_only=True)
+class AgentsSection(OneAgent):
+    """What the file says of agents of order n."""
+
+    functions: Several[UsedSection]
+    offsets: ByAgent[Several[Fraction]]
+    initial_state: ByAgent[Several[Several[Fraction]]] | None
+    motion: Several[Several[Ball]]
+    final_state: ByAgent[Several[Several[Ball]]] | None
+    residual: ResidualSection | None
+    input: AgentsInput | None
 
 
 def check_agents(doc: Document, verified: Verified) -> bool:
@@ -31,29 +49,31 @@ def check_agents(doc: Document, verified: Verified) -> bool:
     if isinstance(doc.data["agents"], dict) and "cascade" in doc.data["agents"]:
         need("phases" not in doc.data, "phases of the cascade")
         return check_cascade(doc, verified)
-    section, graph = fields(doc.section("agents"), KEYS, "agents"), verified.structure.graph
-    agents = read_agents(section, verified.gain)
-    offsets = read_offsets(section["offsets"], graph.labels, agents)
-    states = section["initial_state"]
+    section, graph = doc.section("agents", AgentsSection), verified.structure.graph
+    agents = agents_of(section, verified.gain)
+    offsets, states = sized_offsets(section.offsets, agents), section.initial_state
+    need_shape(states, "initial_state", agents)
     begin = None
     if states is not None:
-        begin = Begin(agents, graph, read_states(graph.labels, states, "initial_state", agents), offsets)
+        begin = Begin(agents, graph, states, offsets)
         longest = length(x for part in (*begin.states, offsets) for row in part for x in row)
         spend(20 * agents.d * agents.n * graph.n, longest, longest, "the initial states")
-    used = _functions(doc, verified, section["functions"])
+    used = list[Used]()
+    for entry in section.functions:
+        used.append(verify_used(doc, verified, entry, used[-1].number if used else -1))
     check_decrease(doc, agents, [use.function for use in used])
     doc.at = "agents.motion"
-    M = check_motion(doc, agents, section["motion"])
+    M = check_motion(doc, agents, section.motion)
     doc.at = "agents.final_state"
     final = verified.final
     proved = doc.data["influence"] is not None and (bool(used) or not graph.listening)
     need(
-        (begin is not None and proved) or section["final_state"] is None,
+        (begin is not None and proved) or section.final_state is None,
         "a final state without initial states or a proof",
     )
-    if begin is not None and section["final_state"] is not None:
-        check_final_states(doc, agents, final, M, begin.states, offsets)
-    _bounds(doc, verified, agents, begin, used)
+    if begin is not None and section.final_state is not None:
+        check_final_states(doc, agents, final, M, begin.states, offsets, section.final_state)
+    _bounds(doc, verified, section, agents, begin, used)
     check_phases(doc, agents, used)
     return proved
 
@@ -66,28 +86,25 @@ def _check_document(doc: Document, verified: Verified) -> None:
     need(not any(verified.begin.sigma or ()), "agents of order n begin with sliding variables that are 0")
 
 
-def _functions(doc: Document, verified: Verified, section: Any) -> list[Used]:
-    """Read which Lyapunov functions are used, and verify constants of the input of full ones."""
-    used = list[Used]()
-    for entry in entries(section, "functions"):
-        before = used[-1].number if used else -1
-        used.append(read_used(doc, verified, fields(entry, ("function", "inputs"), "a function that is used"), before))
-    return used
-
-
-def _bounds(doc: Document, verified: Verified, agents: Agents, begin: Begin | None, used: Sequence[Used]) -> None:
+def _bounds(
+    doc: Document,
+    verified: Verified,
+    section: AgentsSection,
+    agents: Agents,
+    begin: Begin | None,
+    used: Sequence[Used],
+) -> None:
     """Verify what is left at the deadline, and the input."""
-    section, graph = doc.data["agents"], verified.structure.graph
-    doc.at = "agents.residual"
+    graph, doc.at = verified.structure.graph, "agents.residual"
     deviates = any(use.function.deviation is not None for use in used)
     need(
-        (section["residual"] is not None) == (agents.cap is not None and begin is not None and deviates),
+        (section.residual is not None) == (agents.cap is not None and begin is not None and deviates),
         "what is left at the deadline is told iff there are a cap, initial states and deviations",
     )
-    if begin is not None and section["residual"] is not None:
-        check_residual(doc, begin, used, section["residual"])
+    if begin is not None and section.residual is not None:
+        check_residual(doc, begin, used, section.residual)
     doc.at = "agents.input"
-    if section["input"] is None:
+    if section.input is None:
         return
     need(begin is not None and bool(used), "a bound of the input without initial states or Lyapunov functions")
     if any(agents.own):
@@ -100,4 +117,4 @@ def _bounds(doc: Document, verified: Verified, agents: Agents, begin: Begin | No
     need(any(use.error_constants(graph) is not None for use in used), "a bound of the input without its constants")
     if begin is not None:
         mu1 = verified.protocol.gains["mu1"] if verified.protocol.sliding else Fraction(0)
-        check_input(doc, begin, used, section["input"], verified.final, mu1)
+        check_input(doc, begin, used, section.input, verified.final, mu1)

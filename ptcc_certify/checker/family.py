@@ -182,6 +182,7 @@ def _connectivity(structure: Structure) -> str:
 def _read_modes(doc: Document) -> tuple[list[str], list[tuple[list[Edge], int, bool]]]:
     section = fields(doc.section("graph"), ("nodes", "modes", "sha256"), "graph")
     labels, index = read_nodes(section)
+    doc.context.labels, doc.context.index = labels, index
     items = entries(section["modes"], "modes")
     need(0 < len(items) <= MANY_MODES, f"no mode, or more than {MANY_MODES}")
     drafts = []

@@ -12,6 +12,7 @@ this is said of ``y = x - sigma``, with what :mod:`~ptcc_certify.checker.family_
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, Protocol
 
@@ -26,9 +27,10 @@ from ptcc_certify.checker.family_sliding import Drive, Sizes, nominal_gain
 from ptcc_certify.checker.graph import ordered
 from ptcc_certify.checker.input_formulas import BITS, root_above
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.protocol import Begin, check_sliding_part, sliding_part
+from ptcc_certify.checker.protocol import Begin, SlidingPart, check_sliding_part, sliding_part
 from ptcc_certify.checker.protocol import Protocol as Parameters
-from ptcc_certify.checker.reading import Interval, RejectedError, exact, fields, interval, length, need
+from ptcc_certify.checker.reading import Interval, RejectedError, interval, length, need
+from ptcc_certify.checker.sections import FewAgents
 
 Gains = Mapping[str, Fraction]
 #: Products of short integers that a root costs, about.
@@ -201,6 +203,15 @@ def check_family_bounds(
     _check_input(doc, family, functions, (protocol, begin, drive), x)
 
 
+@dataclass(frozen=True, kw_only=True)
+class FamilyInput:
+    """What the file says of the input for every signal; ``sliding`` under the sliding-mode protocol."""
+
+    bounded: bool | None
+    peaks: FewAgents | None
+    sliding: SlidingPart | None = None
+
+
 def _check_input(
     doc: Document,
     family: Family,
@@ -209,14 +220,14 @@ def _check_input(
     x: Sequence[Fraction] | None,
 ) -> None:
     protocol, begin, drive = sliding
-    section = fields(doc.section("input"), ("bounded", "peaks", *["sliding"] * protocol.sliding), "input")
-    check_sliding_part(doc, family.modes[0].structure.graph, protocol, begin, section.get("sliding"))
+    section = doc.section("input", FamilyInput)
+    check_sliding_part(doc, family.modes[0].structure.graph, protocol, begin, section.sliding)
     doc.at = "input"
-    if section["bounded"] is None:
-        need(section["peaks"] is None, "peaks of an input that is not proved bounded")
+    if section.bounded is None:
+        need(section.peaks is None, "peaks of an input that is not proved bounded")
         return
     doc.open("family-input", "input")
-    need(section["bounded"] is True, "an input that is proved not bounded has no place here")
+    need(section.bounded, "an input that is proved not bounded has no place here")
     gains = protocol.gains
     pole = gains["rho2"] * gains["kappa"]
     for component in family.components:
@@ -226,15 +237,13 @@ def _check_input(
             "no rate proves that the input is bounded",
         )
     added = sliding_part(gains, begin.sigma) if begin.sigma is not None else [Fraction(0)] * len(family.labels)
-    if (entry := section["peaks"]) is None:
+    if section.peaks is None:
         need(x is None or added is None, "no peaks")
         doc.done("bounded")
         return
     if x is None or added is None:
         raise RejectedError("peaks without an initial state, or of a sliding part that is not bounded")
-    nominal = [
-        exact(text) - more for text, more in zip(ordered(family.labels, entry, "peaks").values(), added, strict=True)
-    ]
+    nominal = [peak - more for peak, more in zip(section.peaks, added, strict=True)]
     for component in family.components:
         bounds, unit = peaks([V for V in functions if V.component is component], gains, x, drive)
         bits = length(nominal[v] for v in component.nodes), max(longest(bounds.values()), unit.bit_length())

@@ -222,7 +222,7 @@ def check_drive(
         sigma0 = dict(enumerate(begin.sigma))
         bits = longest(edge[4] for mode in family.modes for edge in mode.edges)
         spend(10 * sum(len(mode.edges) for mode in family.modes), bits, 128, "what sliding variables do")
-        times = [None if z is None else exact(z) for z in doc.data["reaching_time"]["z"].values()]
+        times = doc.sections["reaching_time"].z
         edges = ([(s, t, Fraction(high, mode.unit)) for s, t, _, _, high in mode.edges] for mode in family.modes)
         result = Drive.of(protocol.gains, sigma0, last_time(times, begin.sigma), list(edges))
     doc.at = "lyapunov.drives"

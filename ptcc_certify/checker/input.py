@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from itertools import chain
-from typing import Any
+from typing import Annotated, Any, Literal
 
 from lmi.exact.decimal_rounding import down, up
 from lmi.exact.numbers import integers, longest, shorten, sized
@@ -16,21 +16,116 @@ from lmi.exact.work import spend
 from ptcc_certify.checker import input_formulas as formulas
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.final_state import FinalState
-from ptcc_certify.checker.graph import by_agent, ordered
 from ptcc_certify.checker.lyapunov import Function
 from ptcc_certify.checker.matrix_products import Matrix, block, congruence, decrease, less, need_rows, only
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.protocol import Begin, Protocol, check_sliding_part, sliding_part
-from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, length, need, triangle
+from ptcc_certify.checker.protocol import Begin, Protocol, SlidingPart, check_sliding_part, sliding_part
+from ptcc_certify.checker.reading import RejectedError, entries, exact, length, need
+from ptcc_certify.checker.sections import ByAgent, FewAgents, Positive, Rule, Several, Triangle
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.checker.structure import Structure
 
-KEYS = ("bounded", "threshold", "initial_set", "constants", "sliding")
-LIMIT_KEYS = ("gain_cap", "stop_before", "sample_period", "clock", "norm", "agents", "largest", "noise")
 #: Graphs up to this size have bounds of the input.
 INPUT_NODES = 400
 #: Limits of actuators that are read.
 MANY_LIMITS = 100
+
+
+@dataclass(frozen=True, kw_only=True)
+class Threshold:
+    """Proved bounds of ``rho2 kappa min Re lambda``."""
+
+    lower: Fraction | None
+    upper: Fraction | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Box:
+    """Initial states within a radius of a center, agent by agent."""
+
+    center: FewAgents
+    radius: Annotated[FewAgents, Rule(lambda x: min(x) >= 0, "is negative")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ellipsoid:
+    """Initial states: a center, and what the unit ball of the axes adds."""
+
+    center: FewAgents
+    axes: Several[FewAgents]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PeakSection:
+    """Bounds of ``|u_k|``, the largest of them, and a bound of the norm."""
+
+    agents: FewAgents
+    largest: Fraction
+    norm: Fraction
+
+
+@dataclass(frozen=True, kw_only=True)
+class PeakWitness:
+    """A Lyapunov function and an instant ``z`` for every agent, and a function for the norm."""
+
+    agents: ByAgent[Any]
+    norm: Any
+
+
+@dataclass(frozen=True, kw_only=True)
+class EnergyWitness:
+    """Two matrices."""
+
+    W0: Triangle
+    W1: Triangle
+
+
+@dataclass(frozen=True, kw_only=True)
+class NoiseSection:
+    """A bound of the noise, and what it makes of ``norm`` and ``largest``."""
+
+    bound: Positive
+    norm: Fraction
+    largest: Fraction
+
+
+@dataclass(frozen=True, kw_only=True)
+class LimitedSection:
+    """What is left at the deadline under limits of the gain."""
+
+    gain_cap: Positive | None
+    stop_before: Positive | None
+    sample_period: Positive | None
+    clock: Fraction
+    norm: Fraction
+    agents: FewAgents | None
+    largest: Fraction | None
+    noise: NoiseSection | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class DisturbedSection:
+    """What disturbances within ``delta`` add to inputs, and to where agents end."""
+
+    delta: Positive
+    inputs: FewAgents
+    drift: FewAgents | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class InputSection:
+    """What the file says of the input."""
+
+    bounded: bool | None
+    threshold: Threshold
+    initial_set: Box | Ellipsoid | None
+    constants: Several[FewAgents | None]
+    peak: PeakSection | None
+    energy: Fraction | None
+    path_length: Fraction | None
+    sliding: SlidingPart | None
+    residual: Several[LimitedSection]
+    disturbed: DisturbedSection | None
 
 
 @dataclass(frozen=True)
@@ -69,41 +164,35 @@ class Verified:
 
 def check_input(doc: Document, verified: Verified) -> None:
     """Verify the section ``input``."""
-    section = doc.section("input")
+    section = doc.section("input", InputSection | None)
     decays = verified.rate is not None or not verified.structure.graph.listening
     need((section is not None) == decays, "the input is spoken of iff the decay is proved")
     if section is None:
         return
-    fields(section, (*KEYS, *PARTS), "input")
-    need(len(entries(section["residual"], "residual")) <= MANY_LIMITS, f"more than {MANY_LIMITS} limits")
+    need(len(section.residual) <= MANY_LIMITS, f"more than {MANY_LIMITS} limits")
     _threshold(doc, verified, section)
-    constants = _constants(doc, verified, entries(section["constants"], "constants", len(verified.functions)))
-    check_sliding_part(doc, verified.structure.graph, verified.protocol, verified.begin, section["sliding"])
-    initial_set = _initial_set(doc, verified, section["initial_set"])
+    need(len(section.constants) == len(verified.functions), f"constants has not {len(verified.functions)} entries")
+    constants = _constants(doc, verified, section.constants)
+    check_sliding_part(doc, verified.structure.graph, verified.protocol, verified.begin, section.sliding)
+    initial_set = _initial_set(doc, verified, section.initial_set)
     if initial_set is None:
         for key in PARTS:
-            empty = section[key] is None or (key == "residual" and not section[key])
+            empty = getattr(section, key) in (None, [])
             need(empty, f"{key} without an initial state, or of too large a graph")
         return
     try:
         bounds = _bounds(doc, verified, initial_set, constants)
         for key, verify in PARTS.items():
             doc.at = f"input.{key}"
-            if section[key] is not None:
+            if getattr(section, key) is not None:
                 verify(doc, verified, section, bounds)
     except (ValueError, OverflowError) as error:
         raise RejectedError(str(error)) from None
 
 
-def _each(doc: Document, verified: Verified, entry: Any, what: str) -> Numbers:
-    """Read numbers by agent, which are in no side file here."""
-    return by_agent(doc, verified.structure.graph, entry, what, files=False)
-
-
-def _above(doc: Document, verified: Verified, entry: Any, what: str, least: Sequence[Fraction]) -> Numbers:
-    """Read bounds by agent, none of which is below what is proved."""
-    values, labels = _each(doc, verified, entry, what), verified.structure.graph.labels
-    low = next((label for label, x, y in zip(labels, values, least, strict=True) if x < y), None)
+def proved_above(graph: Digraph, values: Numbers, what: str, least: Sequence[Fraction]) -> Numbers:
+    """Return bounds by agent, none of which is below what is proved."""
+    low = next((label for label, x, y in zip(graph.labels, values, least, strict=True) if x < y), None)
     need(low is None, f"{what} of agent {shorten(low or '')} is not proved")
     return values
 
@@ -111,17 +200,15 @@ def _above(doc: Document, verified: Verified, entry: Any, what: str, least: Sequ
 # ---------------------------------------------------------------------- bounded or not
 
 
-def _threshold(doc: Document, verified: Verified, section: Mapping[str, Any]) -> None:
+def _threshold(doc: Document, verified: Verified, section: InputSection) -> None:
     """Verify whether the input stays bounded for every initial state, and the bounds of the threshold."""
-    ends, k = fields(section["threshold"], ("lower", "upper"), "threshold"), verified.gain.k
+    bounded, k = section.bounded, verified.gain.k
     for key, rate in (("lower", verified.rate), ("upper", verified.limit)):
         value = None if rate is None else k * rate / 2
-        need((None if ends[key] is None else exact(ends[key])) == value, f"the {key} end is not the proved one")
-    bounded = section["bounded"]
+        need(getattr(section.threshold, key) == value, f"the {key} end is not the proved one")
     if bounded is None:
         return
-    need(isinstance(bounded, bool), "bounded is no truth value")
-    by = doc.open("input-threshold", "input", witness=Any)["witness"]
+    by = doc.open("input-threshold", "input", witness=Literal["rate", "upper_bound", "spectrum"])["witness"]
     if by == "rate":
         holds = not verified.structure.graph.listening or (verified.rate is not None and verified.rate * k >= 2)
         need(bounded and holds, "no rate proves that the input stays bounded")
@@ -131,7 +218,6 @@ def _threshold(doc: Document, verified: Verified, section: Mapping[str, Any]) ->
             "no limit proves that the input grows",
         )
     else:
-        need(by == "spectrum", "another proof")
         place = _spectrum(doc, verified.structure, 1 / k)
         need(bounded == (place in ("beyond", "on")), f"the spectrum is {place} the line")
     doc.done("the input stays bounded" if bounded else "the input of some initial state grows without limit")
@@ -150,7 +236,7 @@ def _spectrum(doc: Document, structure: Structure, line: Fraction) -> str:
 # ---------------------------------------------------------------------- constants, initial states
 
 
-def _constants(doc: Document, verified: Verified, section: Sequence[Any]) -> list[list[Fraction] | None]:
+def _constants(doc: Document, verified: Verified, section: Sequence[Numbers | None]) -> list[list[Fraction] | None]:
     """Verify ``e_k^2 <= c_k V`` for full matrices; for diagonal ones the constants follow."""
     results: list[list[Fraction] | None] = [None] * len(section)
     for k, (entry, function) in enumerate(zip(section, verified.functions, strict=True)):
@@ -160,13 +246,13 @@ def _constants(doc: Document, verified: Verified, section: Sequence[Any]) -> lis
     return results
 
 
-def check_constants(doc: Document, graph: Digraph, function: Function, k: int, entry: Any) -> list[Fraction]:
+def check_constants(doc: Document, graph: Digraph, function: Function, k: int, values: Numbers) -> list[Fraction]:
     """Verify ``e_v^2 <= c_v V`` for the full matrix of the Lyapunov function ``k``; return ``c``."""
     form = function.form
     if form is None or form.matrix is None:
         raise RejectedError("constants that follow from a diagonal")
     doc.open("input-constants", f"lyapunov.functions[{k}]")
-    constants, (P, scale), forms = list(by_agent(doc, graph, entry, "constants", files=False)), form.entries, []
+    constants, (P, scale), forms = list(values), form.entries, []
     for v, c in enumerate(constants):
         p, q = (c / scale).as_integer_ratio()
         sized(v + 1, longest((q, q * p)), "constants")
@@ -177,22 +263,17 @@ def check_constants(doc: Document, graph: Digraph, function: Function, k: int, e
     return constants
 
 
-def _initial_set(doc: Document, verified: Verified, section: Any) -> formulas.InitialSet | None:
-    """Read the set of initial states; None if there is none, or the graph is too large."""
+def _initial_set(doc: Document, verified: Verified, section: Box | Ellipsoid | None) -> formulas.InitialSet | None:
+    """Return the set of initial states; None if there is none, or the graph is too large."""
     doc.at = "input.initial_set"
     small = verified.structure.graph.n <= INPUT_NODES and bool(verified.structure.graph.listening)
     if section is None:
         return formulas.InitialSet(list(verified.begin.state)) if verified.begin.state is not None and small else None
     need(small, "initial states of too large a graph, or of one that does not move")
-    shape = "axes" if isinstance(section, dict) and "axes" in section else "radius"
-    center = list(_each(doc, verified, fields(section, ("center", shape), "initial_set")["center"], "center"))
-    if shape == "axes":
-        axes = entries(section["axes"], "axes")
-        need(len(axes) <= INPUT_NODES, "too many axes")
-        return formulas.InitialSet(center, axes=[list(_each(doc, verified, x, "an axis")) for x in axes])
-    radius = list(_each(doc, verified, section["radius"], "radius"))
-    need(all(r >= 0 for r in radius), "a radius is negative")
-    return formulas.InitialSet(center, radius)
+    if isinstance(section, Box):
+        return formulas.InitialSet(list(section.center), list(section.radius))
+    need(len(section.axes) <= INPUT_NODES, "too many axes")
+    return formulas.InitialSet(list(section.center), axes=list(map(list, section.axes)))
 
 
 def _bounds(
@@ -207,8 +288,8 @@ def _bounds(
     rows = [{j: Fraction(x, graph.unit) for j, x in graph.row(v).items()} for v in range(graph.n)]
     reaching = None
     if any(sigma0):
-        times = [z for z, s in zip(doc.data["reaching_time"]["z"].values(), sigma0, strict=True) if s]
-        last = None if None in times else max(map(exact, times))
+        times = [z for z, s in zip(doc.sections["reaching_time"].z, sigma0, strict=True) if s]
+        last = None if None in times else max(times)
         push = g["mu1"] + g["delta"]
         reaching = formulas.Reaching(sigma0, g["T_r"], g["T_s"], g["mu2"], g["mu3"] * g["kappa"], push, last)
     return formulas.InputBounds(
@@ -219,40 +300,39 @@ def _bounds(
 # ---------------------------------------------------------------------- peak, energy, length
 
 
-def _peak(doc: Document, verified: Verified, section: Any, bounds: formulas.InputBounds) -> None:
+def _peak(doc: Document, verified: Verified, section: InputSection, bounds: formulas.InputBounds) -> None:
     """Verify the peak of every agent's input and of their norm."""
-    section = fields(section["peak"], ("agents", "largest", "norm"), "peak")
-    obligation = doc.open("input-peak", "input", ["z"], witness=Any)
-    witness = fields(obligation["witness"], ("agents", "norm"), "the witness")
-    ways = ordered(verified.structure.graph.labels, witness["agents"], "agents").values()
+    peak: Any = section.peak
+    obligation = doc.open("input-peak", "input", ["z"], witness=PeakWitness)
+    witness = obligation["witness"]
     own = verified.sliding_part() if verified.protocol.sliding else [Fraction(0)] * len(bounds.rows)
     least = []
-    for v, (k, z) in enumerate(entries(how, "an agent", 2) for how in ways):
+    for v, (k, z) in enumerate(entries(how, "an agent", 2) for how in witness.agents):
         least.append(bounds.bound(formulas.peak_above, v, k, exact(z)) + own[v])
-    peaks = _above(doc, verified, section["agents"], "the peak", least)
-    need(exact(section["largest"]) == max(peaks), "the largest peak is another")
-    norm = bounds.bound(formulas.peak_above, None, witness["norm"], obligation["z"])
+    peaks = proved_above(verified.structure.graph, peak.agents, "the peak", least)
+    need(peak.largest == max(peaks), "the largest peak is another")
+    norm = bounds.bound(formulas.peak_above, None, witness.norm, obligation["z"])
     norm += formulas.root_above(sum((x * x for x in own), Fraction(0)))
-    need(exact(section["norm"]) >= norm, "the peak of the norm is not proved")
-    doc.done(f"at most {up(max(peaks))}, norm {up(exact(section['norm']))}")
+    need(peak.norm >= norm, "the peak of the norm is not proved")
+    doc.done(f"at most {up(max(peaks))}, norm {up(peak.norm)}")
 
 
-def _energy(doc: Document, verified: Verified, section: Any, bounds: formulas.InputBounds) -> None:
+def _energy(doc: Document, verified: Verified, section: InputSection, bounds: formulas.InputBounds) -> None:
     """Verify the energy, by one function or by two matrices."""
     if not isinstance(doc.following("input-energy", "input").get("witness"), dict):
-        _by_function(doc, section["energy"], "input-energy", formulas.energy_above, bounds)
+        _by_function(doc, section.energy, "input-energy", formulas.energy_above, bounds)
         return
-    obligation = doc.open("input-energy", "input", ["p", "m0", "m1"], witness=Any)
-    matrices = fields(obligation["witness"], ("W0", "W1"), "the witness")
+    obligation = doc.open("input-energy", "input", ["p", "m0", "m1"], witness=EnergyWitness)
+    matrices = obligation["witness"]
     need(bounds.reaching is None, "sliding variables move")
-    even = _remainder(doc, verified, matrices["W0"], Fraction(0), obligation["m0"], bounds)
-    grown = _remainder(doc, verified, matrices["W1"], 1 / verified.gain.k, obligation["m1"], bounds)
-    _at_most(doc, section["energy"], formulas.integral_above(verified.gain, even, grown, obligation["p"]))
+    even = _remainder(doc, verified, matrices.W0, Fraction(0), obligation["m0"], bounds)
+    grown = _remainder(doc, verified, matrices.W1, 1 / verified.gain.k, obligation["m1"], bounds)
+    _at_most(doc, section.energy, formulas.integral_above(verified.gain, even, grown, obligation["p"]))
 
 
-def _path_length(doc: Document, verified: Verified, section: Any, bounds: formulas.InputBounds) -> None:
+def _path_length(doc: Document, verified: Verified, section: InputSection, bounds: formulas.InputBounds) -> None:
     """Verify the length of the path."""
-    _by_function(doc, section["path_length"], "input-length", formulas.length_above, bounds)
+    _by_function(doc, section.path_length, "input-length", formulas.length_above, bounds)
 
 
 def _by_function(doc: Document, bound: Any, kind: str, of: formulas.Of, bounds: formulas.InputBounds) -> None:
@@ -261,13 +341,13 @@ def _by_function(doc: Document, bound: Any, kind: str, of: formulas.Of, bounds: 
     _at_most(doc, bound, bounds.bound(of, None, obligation["witness"], obligation["z"]))
 
 
-def _at_most(doc: Document, bound: Any, least: Fraction) -> None:
-    need(exact(bound) >= least, "the bound is not proved")
-    doc.done(f"at most {up(exact(bound))}")
+def _at_most(doc: Document, bound: Fraction | None, least: Fraction) -> None:
+    need(bound is not None and bound >= least, "the bound is not proved")
+    doc.done(f"at most {up(bound or least)}")
 
 
 def _remainder(
-    doc: Document, verified: Verified, entry: Any, c: Fraction, m: Fraction, bounds: formulas.InputBounds
+    doc: Document, verified: Verified, rows: Any, c: Fraction, m: Fraction, bounds: formulas.InputBounds
 ) -> Fraction:
     """Verify ``W L + L'W - c W > m I`` on the range of ``L``, and ``W > 0`` besides unless ``c = 0``.
 
@@ -275,7 +355,7 @@ def _remainder(
     """
     graph, nodes = verified.structure.graph, verified.structure.graph.listening
     need_rows(graph.n)
-    rows = triangle(entry, len(nodes))
+    need(len(rows) == len(nodes), f"lower_triangle has not {len(nodes)} entries")
     W, scale = integers(rows)
     S, more = decrease(doc.exact, W, block(graph, nodes), c, graph.unit)
     for T in [less(S, m * scale * more), *([W] if c else [])]:  # W > 0 need not be known for c = 0: E tends to 0
@@ -298,27 +378,30 @@ def _on_range(doc: Document, structure: Structure, S: Matrix) -> Matrix:
 # ---------------------------------------------------------------------- limits of actuators
 
 
-def _residual(doc: Document, verified: Verified, section: Any, bounds: formulas.InputBounds) -> None:
+def _residual(doc: Document, verified: Verified, section: InputSection, bounds: formulas.InputBounds) -> None:
     """Verify what is left under each of the limits."""
-    for k, entry in enumerate(section["residual"]):
-        _under_limits(doc, verified, f"input.residual[{k}]", entry, section["peak"], bounds)
+    for k, entry in enumerate(section.residual):
+        _under_limits(doc, verified, f"input.residual[{k}]", entry, section.peak, bounds)
 
 
 def _under_limits(
-    doc: Document, verified: Verified, of: str, entry: Any, peak: Any, bounds: formulas.InputBounds
+    doc: Document,
+    verified: Verified,
+    of: str,
+    entry: LimitedSection,
+    peak: PeakSection | None,
+    bounds: formulas.InputBounds,
 ) -> None:
     """Verify what is left at the deadline under limits of the gain, and the largest input."""
     doc.at = of
-    fields(entry, LIMIT_KEYS, of)
     need(not verified.protocol.sliding, "limits are for the nominal protocol")
-    cap, stop, period = (None if entry[key] is None else exact(entry[key]) for key in LIMIT_KEYS[:3])
-    need(all(x is None or x > 0 for x in (cap, stop, period)), "a limit is not positive")
+    cap, stop, period = entry.gain_cap, entry.stop_before, entry.sample_period
     need(stop is None or stop < verified.gain.T, "a stop beyond the deadline")
     need(period is None or period <= verified.gain.T, "a period beyond the deadline")
-    limits, clock = formulas.Limits(cap, stop, period), exact(entry["clock"])
+    limits, clock = formulas.Limits(cap, stop, period), entry.clock
     top = limits.largest_gain(verified.gain)
     obligation = doc.open("limited-gain", of, ["growth"], witness=Any)
-    chosen = [obligation["witness"]] if entry["noise"] is None else entries(obligation["witness"], "the witness", 2)
+    chosen = [obligation["witness"]] if entry.noise is None else entries(obligation["witness"], "the witness", 2)
     k = chosen[0]
     form = bounds.form(k)
     need(period is not None or obligation["growth"] == 0, "growth belongs to a held gain")
@@ -327,28 +410,25 @@ def _under_limits(
     need(0 <= clock <= limits.clock_below(verified.gain), "the clock does not come so far")
     root = bounds.share(k, limits, clock, obligation["growth"]) * bounds.initial_root(k)
     norm = bounds.root_constant(k, None) * root
-    need(exact(entry["norm"]) >= norm, "what is left is not proved")
-    if entry["agents"] is not None:
+    need(entry.norm >= norm, "what is left is not proved")
+    if entry.agents is not None:
         roots = {k: root} if period is not None else _roots(verified, limits, clock, bounds)
         known = [(verified.functions[j].deviation, x) for j, x in roots.items()]
         sizes = [[formulas.root_above(c) * x for c in constants] for constants, x in known if constants is not None]
         need(bool(sizes), "deviations without constants")
         most = [_largest_deviation(verified.final, bounds.initial_set)] if period is None else []
         least = [min([*row, *most]) for row in zip(*sizes, strict=True)]
-        _above(doc, verified, entry["agents"], "what is left", least)
-    need((entry["largest"] is None) == (period is not None), "the largest input is bounded unless it is held")
-    if entry["largest"] is not None:
-        ends = [top * max(bounds.error_bounds)] + ([exact(peak["largest"])] if peak is not None else [])
-        need(exact(entry["largest"]) >= min(ends), "the largest input is not proved")
-    if entry["noise"] is not None:
+        proved_above(verified.structure.graph, entry.agents, "what is left", least)
+    need((entry.largest is None) == (period is not None), "the largest input is bounded unless it is held")
+    if entry.largest is not None:
+        ends = [top * max(bounds.error_bounds)] + ([peak.largest] if peak is not None else [])
+        need(entry.largest >= min(ends), "the largest input is not proved")
+    if (noise := entry.noise) is not None:
         need(period is None, "noise of a held gain")
-        noise = {key: exact(x) for key, x in fields(entry["noise"], ("bound", "norm", "largest"), "noise").items()}
-        need(noise["bound"] > 0, "noise of no size")
-        whole, each = bounds.noisy(chosen[1], noise["bound"])
-        need(noise["norm"] >= norm + whole, "what is left by noise is not proved")
-        largest = exact(entry["largest"]) + top * max(each)
-        need(noise["largest"] >= largest, "the largest input under noise is not proved")
-    doc.done(f"||E|| at most {up(exact(entry['norm']))} at the deadline")
+        whole, each = bounds.noisy(chosen[1], noise.bound)
+        need(noise.norm >= norm + whole, "what is left by noise is not proved")
+        need(noise.largest >= (entry.largest or 0) + top * max(each), "the largest input under noise is not proved")
+    doc.done(f"||E|| at most {up(entry.norm)} at the deadline")
 
 
 def _roots(
@@ -386,19 +466,19 @@ def _growth(doc: Document, structure: Structure, form: formulas.Form, growth: Fr
 # ---------------------------------------------------------------------- disturbances of the nominal protocol
 
 
-def _disturbance(doc: Document, verified: Verified, section: Any, bounds: formulas.InputBounds) -> None:
+def _disturbance(doc: Document, verified: Verified, section: InputSection, bounds: formulas.InputBounds) -> None:
     """Verify what disturbances within ``delta`` add under the nominal protocol."""
     need(not verified.protocol.sliding, "the sliding-mode protocol has its own claims")
-    section = fields(section["disturbed"], ("delta", "inputs", "drift"), "disturbed")
-    obligation = doc.open("nominal-disturbed", "input", ["delta"], witness=Any)
-    delta = exact(section["delta"])
-    need(delta == obligation["delta"] and delta > 0, "another delta")
-    _above(doc, verified, section["inputs"], "the input", bounds.disturbed(obligation["witness"], delta))
-    if section["drift"] is not None:
+    disturbed: Any = section.disturbed
+    obligation, graph = doc.open("nominal-disturbed", "input", ["delta"], witness=Any), verified.structure.graph
+    delta = disturbed.delta
+    need(delta == obligation["delta"], "another delta")
+    proved_above(graph, disturbed.inputs, "the input", bounds.disturbed(obligation["witness"], delta))
+    if disturbed.drift is not None:
         drift = [
             delta * verified.gain.T * sum(map(abs, row.values()), Fraction(0)) for row in verified.final.projection
         ]
-        _above(doc, verified, section["drift"], "the drift", drift)
+        proved_above(graph, disturbed.drift, "the drift", drift)
     doc.done(f"for every disturbance within {down(delta)}")
 
 

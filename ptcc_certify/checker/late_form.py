@@ -16,7 +16,7 @@ from lmi.exact.work import spend
 from ptcc_certify.checker import input_formulas as formulas
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.graph import by_agent
-from ptcc_certify.checker.input import Verified
+from ptcc_certify.checker.input import Verified, proved_above
 from ptcc_certify.checker.late_input import Inputs
 from ptcc_certify.checker.late_messages import Messages
 from ptcc_certify.checker.proof_cursor import Document
@@ -98,7 +98,7 @@ def function_of(doc: Document, verified: Verified, k: Any) -> Constants:
     form = function.form
     if form is None or form.coordinates != "E" or function.rate <= 0:
         raise RejectedError("a Lyapunov function of large graphs, of deviations, or without a rate")
-    deviation, constants = doc.data["lyapunov"]["functions"][k]["deviation"], doc.data["input"]["constants"][k]
+    deviation, constants = doc.data["lyapunov"]["functions"][k]["deviation"], doc.sections["input"].constants[k]
     need(deviation is not None, "a Lyapunov function without deviations")
     deviations = by_agent(doc, graph, deviation["agents"], "deviations", files=False)
     if form.diagonal is not None:
@@ -106,15 +106,8 @@ def function_of(doc: Document, verified: Verified, k: Any) -> Constants:
         errors = [1 / weight[v] if v in weight else Fraction(0) for v in range(graph.n)]
     else:
         need(constants is not None, "a full matrix without constants")
-        errors = list(by_agent(doc, graph, constants, "constants", files=False))
+        errors = list(constants)
     return Constants(form, errors, list(deviations))
-
-
-def proved_above(graph: Digraph, values: Numbers, what: str, least: Sequence[Fraction]) -> Numbers:
-    """Return bounds by agent, none of which is below what is proved."""
-    low = next((label for label, x, y in zip(graph.labels, values, least, strict=True) if x < y), None)
-    need(low is None, f"{what} of agent {shorten(low or '')} is not proved")
-    return values
 
 
 def _heard(graph: Digraph, phi: Numbers, late: bool) -> list[Fraction]:

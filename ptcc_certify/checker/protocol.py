@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 from lmi.exact.elementary_enclosures import decay_integrals_below
 from lmi.exact.numbers import shorten
 from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph
-from ptcc_certify.checker.graph import by_agent, ordered
+from ptcc_certify.checker.graph import by_agent
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError, exact, fields, need
+from ptcc_certify.checker.sections import ByAgent, FewAgents
 from ptcc_certify.checker.side_files import Numbers
 
 SLIDING_BOUND = "||sigma(t)|| <= phi(t,T_r)^(-mu3) e^(-mu2 t) ||sigma(0)||"
@@ -32,6 +32,23 @@ class Protocol:
 
     sliding: bool
     gains: dict[str, Fraction]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlidingPart:
+    """Whether the sliding part of the input is bounded for every ``sigma(0)``, and bounds of it."""
+
+    bounded: bool
+    agents: FewAgents | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReachingTimes:
+    """What Proposition 1 bounds, on which clock, and the reaching time of every agent."""
+
+    bound: str
+    clock: str
+    z: ByAgent[Fraction | None]
 
 
 @dataclass(frozen=True)
@@ -72,16 +89,14 @@ def check_begin(doc: Document, graph: Digraph, protocol: Protocol) -> Begin:
 
 def check_sliding(doc: Document, graph: Digraph, protocol: Protocol, begin: Begin) -> None:
     """Verify Proposition 1 and every reaching time."""
-    section, sigma0, g = doc.section("reaching_time"), begin.sigma, protocol.gains
-    if sigma0 is None:
-        need(section is None, "reaching times without sliding variables")
+    section, sigma0, g = doc.section("reaching_time", ReachingTimes | None), begin.sigma, protocol.gains
+    if sigma0 is None or section is None:
+        need(sigma0 is None and section is None, "reaching times are told iff there are sliding variables")
         return
-    fields(section, ("bound", "clock", "z"), "reaching_time")
-    need(section["bound"] == SLIDING_BOUND and section["clock"] == SLIDING_CLOCK, "another bound or clock")
-    texts = ordered(graph.labels, section["z"], "z").values()
+    need(section.bound == SLIDING_BOUND and section.clock == SLIDING_CLOCK, "another bound or clock")
     doc.open("sliding-bound", "protocol")
     doc.done("for every disturbance within delta")
-    z = [None if x is None else exact(x) for x in texts]
+    z = section.z
     if not any(x is not None and s for x, s in zip(z, sigma0, strict=True)):
         need(not any(z), "a reaching time of a variable that is 0 at time 0")
         return
@@ -111,20 +126,20 @@ def sliding_part(gains: Mapping[str, Fraction], sigma0: Sequence[Fraction] | Num
     return [gains["mu1"] + push * abs(s) for s in sigma0]
 
 
-def check_sliding_part(doc: Document, graph: Digraph, protocol: Protocol, begin: Begin, section: Any) -> None:
+def check_sliding_part(
+    doc: Document, graph: Digraph, protocol: Protocol, begin: Begin, section: SlidingPart | None
+) -> None:
     """Verify the sliding part of the input."""
     doc.at = "input.sliding"
     need((section is not None) == protocol.sliding, "a sliding part belongs to the sliding-mode protocol")
     if section is None:
         return
-    fields(section, ("bounded", "agents"), "sliding")
-    need(section["bounded"] is sliding_bounded(protocol.gains), "bounded for every initial state iff mu3 kappa >= 1")
-    if section["agents"] is not None:
+    need(section.bounded is sliding_bounded(protocol.gains), "bounded for every initial state iff mu3 kappa >= 1")
+    if section.agents is not None:
         doc.open("input-sliding", "input")
         least = sliding_part(protocol.gains, begin.sigma or Numbers([]))
         if least is None:
             raise RejectedError("the sliding part is not bounded")
-        values = by_agent(doc, graph, section["agents"], "the sliding part", files=False)
-        low = next((label for label, x, y in zip(graph.labels, values, least, strict=True) if x < y), None)
+        low = next((label for label, x, y in zip(graph.labels, section.agents, least, strict=True) if x < y), None)
         need(low is None, f"the sliding part of agent {shorten(low or '')} is not proved")
         doc.done("for every disturbance within delta")

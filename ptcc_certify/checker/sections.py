@@ -14,7 +14,7 @@ from functools import cache
 from typing import Annotated, Any, Literal, NamedTuple, TypeAlias, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from ptcc_certify.checker import reading
-from ptcc_certify.checker.reading import RejectedError, entries, exact, interval, need
+from ptcc_certify.checker.reading import entries, exact, interval, need
 from ptcc_certify.checker.side_files import Numbers, SideFiles, beside
 
 T = TypeVar("T")
@@ -114,9 +114,11 @@ def read(kind: Any, value: Any, at: Context, what: str) -> Any:
     if get_origin(kind) is Literal:
         need(any(type(value) is type(one) and value == one for one in get_args(kind)), f"{what} is {_names(kind)}")
         return value
+    if kind is Any:
+        return value
     if kind is Fraction:
         return exact(value)
-    if is_dataclass(kind):
+    if isinstance(kind, type) and is_dataclass(kind):
         return _section(kind, value, at, what)
     need(type(value) is (_NONE if kind is None else kind), f"{what} is not {_TYPES.get(kind, 'null')}")
     return value
@@ -133,6 +135,7 @@ def _section(kind: Any, value: Any, at: Context, what: str) -> Any:
     known = declared(kind)
     here = value if isinstance(value, dict) else {}
     reading.fields(value, [f.key for f in known if not f.optional or f.key in here], what)
+    need(all(here[f.key] is not None for f in known if f.optional and f.key in here), f"{what}: a key that is left out")
     return kind(**{f.name: read(f.kind, value[f.key], at, f.key) for f in known if f.key in here})
 
 
@@ -147,7 +150,7 @@ def _alternative(kinds: Sequence[Any], value: Any, at: Context, what: str) -> An
 
 def _has_words(kind: Any, value: Any) -> bool:
     """Tell whether a section has the words that are declared, and the keys if there are none."""
-    if not isinstance(value, dict) or not is_dataclass(kind):
+    if not isinstance(value, dict) or not (isinstance(kind, type) and is_dataclass(kind)):
         return True
     known = declared(kind)
     words = [f for f in known if get_origin(f.kind) is Literal]
