@@ -107,7 +107,7 @@ def check_cascade(doc: Document, verified: Verified) -> bool:
     M = check_motion(doc, agents, section.motion)
     doc.at = "agents.final_state"
     moves = bool(graph.listening)
-    proved = doc.data["influence"] is not None and (bool(used) or not moves)
+    proved = doc.sections["influence"] is not None and (bool(used) or not moves)
     if section.final_state is not None:
         need(proved and states is not None, "a final state without initial states or a proof")
         rests = not moves or any(one.use.function.rate * gain.k > 2 for one in used)

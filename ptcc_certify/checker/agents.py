@@ -66,7 +66,7 @@ def check_agents(doc: Document, verified: Verified) -> bool:
     M = check_motion(doc, agents, section.motion)
     doc.at = "agents.final_state"
     final = verified.final
-    proved = doc.data["influence"] is not None and (bool(used) or not graph.listening)
+    proved = doc.sections["influence"] is not None and (bool(used) or not graph.listening)
     need(
         (begin is not None and proved) or section.final_state is None,
         "a final state without initial states or a proof",

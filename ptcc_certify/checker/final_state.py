@@ -15,11 +15,12 @@ from lmi.exact.decimal_rounding import up
 from lmi.exact.numbers import integers, longest, shorten, sized
 from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph
-from ptcc_certify.checker.graph import by_agent, ordered, positions
+from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.matrix_products import Matrix, need_rows
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.protocol import Begin
-from ptcc_certify.checker.reading import Interval, RejectedError, entries, fields, interval, length, need, same
+from ptcc_certify.checker.reading import Interval, RejectedError, length, need, same
+from ptcc_certify.checker.sections import Agents, Ball, ByFollower, Ends, Nodes, Several
 from ptcc_certify.checker.side_files import Numbers, beside
 from ptcc_certify.checker.structure import MANY_COMPONENTS, Claim, Structure
 
@@ -176,29 +177,63 @@ class FinalState:
         return D, scale, [[half[max(i, j)][min(i, j)] for j in range(len(half))] for i in range(len(half))]
 
 
+@dataclass(frozen=True, kw_only=True)
+class LeftNullVector:
+    """The left null vector of a balanced leader group."""
+
+    nodes: Nodes
+    left_null_vector: Several[Ball]
+
+
+@dataclass(frozen=True, kw_only=True)
+class InfluenceSection:
+    """Left null vectors, containment weights unless the graph is large, and which groups meet at 0."""
+
+    components: Several[LeftNullVector]
+    containment_weights: ByFollower[Several[Ball]] | None
+    degenerate: Several[int] | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class AgentsVector:
+    """The witness of what is enclosed: a positive number of every agent."""
+
+    u: Agents
+
+
+@dataclass(frozen=True, kw_only=True)
+class FormationSection:
+    """The places of agents in a formation, and where they begin and end."""
+
+    offsets: Agents
+    initial_state: Agents | None
+    final_state: Ends | None
+
+
 def check_final_state(doc: Document, structure: Structure, claim: Claim, begin: Begin) -> FinalState:
     """Verify ``Q``, and the final state as ``Q (X(0) - sigma(0))``."""
-    final_state, influence, graph = doc.section("final_state"), doc.section("influence"), structure.graph
+    graph, final_state = structure.graph, doc.section("final_state", Ends | None)
+    influence = doc.section("influence", InfluenceSection | None)
     if influence is None or begin.state is None:
         without = "the influence of the leaders" if influence is None else "an initial state"
         need(final_state is None, f"a final state without {without}")
         need(all(state is None for _, state in claim.components), "a final state of a component without one of all")
     if influence is None:
         return FinalState(structure, {})
-    witness = doc.open("final-state", "graph", witness=Any)["witness"]
-    fields(influence, ("components", "containment_weights", "degenerate"), "influence")
-    u = None if witness is None else by_agent(doc, graph, fields(witness, ("u",), "the witness")["u"], "u")
+    witness = doc.open("final-state", "graph", witness=AgentsVector | None)["witness"]
+    u = None if witness is None else witness.u
     need(u is None or u.positive(), "u is not positive")
-    large = influence["containment_weights"] is None  # no weights of followers
-    final = FinalState(structure, _left_null_vectors(doc, structure, influence["components"], large, u), None, u)
-    if not large:
-        final = replace(final, weights=_weights(final, influence["containment_weights"]))
+    weights = influence.containment_weights
+    large = weights is None  # no weights of followers
+    final = FinalState(structure, _left_null_vectors(doc, structure, influence.components, large, u), None, u)
+    if weights is not None:
+        final = replace(final, weights=_weights(final, weights))
     detail = "influence of leader groups"
     if begin.state is None:
-        need(influence["degenerate"] is None, "a final state without an initial state")
+        need(influence.degenerate is None, "a final state without an initial state")
     else:
-        detail = f"enclosed, radius at most {up(_final(doc, final, final_state, influence['degenerate'], begin))}"
-        _components(graph, claim, final_state)
+        detail = f"enclosed, radius at most {up(_final(final, final_state, influence.degenerate, begin))}"
+        _components(graph, claim, doc.data["final_state"])
     doc.done("exact" if final.exact else detail)
     return final
 
@@ -231,14 +266,15 @@ def _worst(
 
 
 def _left_null_vectors(
-    doc: Document, structure: Structure, section: Any, large: bool, u: Numbers | None
+    doc: Document, structure: Structure, section: Sequence[LeftNullVector], large: bool, u: Numbers | None
 ) -> dict[int, list[Interval]]:
     """Verify ``eta' M(L_k) = 0``, ``eta'1 = 1`` for every group: within the radii, which may be 0."""
     groups, vectors = [b for b in structure.balanced if len(b[1]) > 1 or not large], {}
-    for entry, (k, group, gauge) in zip(entries(section, "components", len(groups)), groups, strict=True):
-        fields(entry, ("nodes", "left_null_vector"), "a component")
-        need(positions(doc, structure.graph, entry["nodes"], "a component") == group, "another component")
-        vectors[k] = [interval(x) for x in entries(entry["left_null_vector"], "left_null_vector", len(group))]
+    need(len(section) == len(groups), f"components has not {len(groups)} entries")
+    for entry, (k, group, gauge) in zip(section, groups, strict=True):
+        need(positions(doc, structure.graph, entry.nodes, "a component") == group, "another component")
+        need(len(entry.left_null_vector) == len(group), f"left_null_vector has not {len(group)} entries")
+        vectors[k] = list(entry.left_null_vector)
         _left_null_vector(structure.graph, group, [(g * x, r) for g, (x, r) in zip(gauge, vectors[k], strict=True)], u)
     return vectors
 
@@ -266,11 +302,11 @@ def _left_null_vector(graph: Digraph, group: Sequence[int], intervals: Sequence[
 # ---------------------------------------------------------------------- followers
 
 
-def _weights(final: FinalState, section: Any) -> list[list[Interval]]:
+def _weights(final: FinalState, weights: Sequence[Sequence[Interval]]) -> Sequence[Sequence[Interval]]:
     """Verify the columns ``L_F w = -L_FLk G_k 1``, within the radii; leaders of other components are at 0."""
     structure, graph, F = final.structure, final.structure.graph, final.structure.followers
-    section = ordered([graph.labels[v] for v in F], section, "containment_weights")
-    weights = [[interval(x) for x in entries(row, "a row", len(structure.balanced))] for row in section.values()]
+    count = len(structure.balanced)
+    need(all(len(row) == count for row in weights), f"a row has not {count} entries")
     rows = {v: graph.row(v) for v in F}
     for column, (_, group, gauge) in enumerate(structure.balanced):
         (middles,), scale = integers([[row[column][0] for row in weights]])
@@ -286,16 +322,19 @@ def _weights(final: FinalState, section: Any) -> list[list[Interval]]:
 # ---------------------------------------------------------------------- final state
 
 
-def _final(doc: Document, final: FinalState, section: Any, degenerate: Any, begin: Begin) -> Fraction:
+def _final(
+    final: FinalState, intervals: tuple[Numbers, Numbers] | None, degenerate: Sequence[int] | None, begin: Begin
+) -> Fraction:
     """Verify where the agents end; return the largest radius that is proved."""
     structure, shifted = final.structure, begin.state or Numbers([])
     if begin.sigma is not None:
         shifted = Numbers([x - s for x, s in zip(shifted, begin.sigma, strict=True)])
     values = final.values(shifted)
     need(all(abs(x) > r or r == 0 for x, r in values.values()), "a value that may or may not be 0")
-    need(same(degenerate, [k for k, (x, _) in values.items() if x == 0]), "which components meet at 0")
-    intervals, spare = state_intervals(doc, structure.graph, section), WIDEST * shifted.largest()
-    enclosures = final.enclosures(values)
+    need(degenerate == [k for k, (x, _) in values.items() if x == 0], "which components meet at 0")
+    spare, enclosures = WIDEST * shifted.largest(), final.enclosures(values)
+    if intervals is None:
+        raise RejectedError("no final state, though there is an initial state")
     for v, (x, r) in enclosures.items():
         mid, radius = intervals[0][v], intervals[1][v]
         if x != mid or r != radius:
@@ -312,32 +351,17 @@ def _narrow(label: str, off: Any, error: Any, radius: Any, spare: Any) -> None:
         raise RejectedError(f"the interval of agent {shorten(label)} is wider than what is proved")
 
 
-def state_intervals(doc: Document, graph: Digraph, section: Any) -> tuple[Numbers, Numbers]:
-    """Read middles and radii of the final state: two side vectors, or intervals by agent."""
-    if isinstance(section, dict) and beside(section.get("mid")):
-        fields(section, ("mid", "radius"), "final_state")
-        need(beside(section["radius"]), "radius is not a side vector")
-        mid, radius = (doc.files.numbers(section[key], key, graph.n) for key in ("mid", "radius"))
-        need(all(r >= 0 for r in radius.values), "a radius is negative")
-        return mid, radius
-    intervals = [interval(x) for x in ordered(graph.labels, section, "final_state").values()]
-    return Numbers([x for x, _ in intervals]), Numbers([r for _, r in intervals])
-
-
 def check_formation(doc: Document, graph: Digraph, begin: Begin) -> None:
     """Verify that agents of a formation begin and end where the rest of the document tells, and their places added."""
     if "formation" not in doc.data:
         return
     need("agents" not in doc.data, "a formation beside that of agents of order n")
-    section, end = doc.section("formation"), doc.data["final_state"]
-    fields(section, ("offsets", "initial_state", "final_state"), "formation")
-    places, parts = by_agent(doc, graph, section["offsets"], "offsets"), (begin.state, end)
-    told = [section[key] for key in ("initial_state", "final_state")]
-    need(all((x is None) == (y is None) for x, y in zip(told, parts, strict=True)), "positions are told iff states are")
-    positions = Numbers([]) if begin.state is None else by_agent(doc, graph, told[0], "initial positions")
-    mids, radii = (Numbers([]), Numbers([])) if end is None else state_intervals(doc, graph, end)
-    own, wide = (Numbers([]), Numbers([])) if end is None else state_intervals(doc, graph, told[1])
-    known = [list(part) for part in (places, begin.state or (), positions, mids, radii, own, wide)]
+    section, end = doc.section("formation", FormationSection), doc.sections["final_state"]
+    told = (section.initial_state, begin.state), (section.final_state, end)
+    need(all((x is None) == (y is None) for x, y in told), "positions are told iff states are")
+    none = Numbers([])
+    parts = section.offsets, begin.state or none, section.initial_state or none
+    known = [list(part) for part in (*parts, *(end or (none, none)), *(section.final_state or (none, none)))]
     bits = length(chain.from_iterable(known))
     spend(8 * graph.n, bits, bits, "a formation")
     h, x, y, mid, r, middle, radius = known

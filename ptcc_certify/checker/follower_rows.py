@@ -16,7 +16,6 @@ from lmi.exact.elementary_enclosures import exp, log, rounded
 from lmi.exact.numbers import longest, shorten, sized
 from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph
-from ptcc_certify.checker.final_state import state_intervals
 from ptcc_certify.checker.input_formulas import BITS
 from ptcc_certify.checker.late_messages import PARTS
 from ptcc_certify.checker.proof_cursor import Document
@@ -189,12 +188,11 @@ def followers_of(doc: Document, structure: Structure, begin: Begin) -> Followers
 
 def away_of(doc: Document, structure: Structure, begin: Begin) -> Followers:
     """Return the followers, with bounds of ``|x_k(0) - x*_k|``; 1 without a state."""
-    nodes, final = structure.followers, doc.data["final_state"]
+    nodes, final = structure.followers, doc.sections["final_state"]
     need(bool(nodes), "no follower")
     if final is None or begin.state is None:
         return Followers(structure, Numbers([1] * len(nodes), 1))
-    intervals = state_intervals(doc, structure.graph, final)
-    parts = [numbers.over(nodes) for numbers in (begin.state, *intervals)]
+    parts = [numbers.over(nodes) for numbers in (begin.state, *final)]
     scale = math.lcm(*(own for _, own in parts))
     sized(3 * len(nodes), scale.bit_length() + max(longest(values) for values, _ in parts), "the initial state")
     x, mid, radius = ([value * (scale // own) for value in values] for values, own in parts)

@@ -15,7 +15,6 @@ from lmi.exact.numbers import integers, longest, shorten
 from lmi.exact.work import spend
 from ptcc_certify.checker import input_formulas as formulas
 from ptcc_certify.checker.digraph import Digraph
-from ptcc_certify.checker.graph import by_agent
 from ptcc_certify.checker.input import Verified, proved_above
 from ptcc_certify.checker.late_input import Inputs
 from ptcc_certify.checker.late_messages import Messages
@@ -98,9 +97,9 @@ def function_of(doc: Document, verified: Verified, k: Any) -> Constants:
     form = function.form
     if form is None or form.coordinates != "E" or function.rate <= 0:
         raise RejectedError("a Lyapunov function of large graphs, of deviations, or without a rate")
-    deviation, constants = doc.data["lyapunov"]["functions"][k]["deviation"], doc.sections["input"].constants[k]
+    deviation, constants = doc.sections["lyapunov"].functions[k].deviation, doc.sections["input"].constants[k]
     need(deviation is not None, "a Lyapunov function without deviations")
-    deviations = by_agent(doc, graph, deviation["agents"], "deviations", files=False)
+    deviations = deviation.agents
     if form.diagonal is not None:
         weight = dict(zip(form.nodes, form.diagonal, strict=True))
         errors = [1 / weight[v] if v in weight else Fraction(0) for v in range(graph.n)]

@@ -5,25 +5,55 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any
+from typing import Literal
 
 from lmi.exact.decimal_rounding import down, up
 from lmi.exact.numbers import integers, longest, shorten, sized
 from lmi.exact.work import spend
 from ptcc_certify.checker.dominance import Proved, check_dominance
 from ptcc_certify.checker.final_state import FinalState
-from ptcc_certify.checker.graph import ordered, positions
+from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.matrix_products import Matrix, block, combined, decays, less, need_rows, only
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.quadratic_form import Form
-from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, need, same, triangle
+from ptcc_certify.checker.reading import RejectedError, need
+from ptcc_certify.checker.sections import FewAgents, Several
 from ptcc_certify.checker.side_files import Numbers, beside
 from ptcc_certify.checker.structure import Structure
-from ptcc_certify.checker.theorem_function import Paper
+from ptcc_certify.checker.theorem_function import BlockSection, Paper
 
 #: Lyapunov functions that are read.
 MANY_FUNCTIONS = 100
+#: What the first function has in common with the paper's certificate.
 KEYS = ("coordinates", "blocks", "rho", "rate", "overshoot")
+
+
+@dataclass(frozen=True, kw_only=True)
+class DeviationSection:
+    """``(x_k - (Q x)_k)^2 <= agents_k V``, and ``||x - Q x||^2 <= norm V``."""
+
+    agents: FewAgents
+    norm: Fraction
+
+
+@dataclass(frozen=True, kw_only=True)
+class FunctionSection:
+    """What the file says of a Lyapunov function."""
+
+    class_: Literal["paper", "perron", "lmi", "full"]
+    coordinates: Literal["E", "eps"]
+    blocks: Several[BlockSection]
+    rho: Fraction | None
+    rate: Fraction
+    overshoot: Fraction
+    deviation: DeviationSection | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class FunctionsSection:
+    """The Lyapunov functions that are used."""
+
+    functions: Several[FunctionSection]
 
 
 @dataclass(frozen=True)
@@ -54,8 +84,7 @@ class Function:
 
 def check_functions(doc: Document, structure: Structure, final: FinalState, paper: Paper | None) -> list[Function]:
     """Verify every Lyapunov function."""
-    section, of_paper = doc.section("lyapunov"), paper is not None and paper.rate is not None
-    items = entries(fields(section, ("functions",), "lyapunov")["functions"], "functions")
+    items, of_paper = doc.section("lyapunov", FunctionsSection).functions, paper is not None and paper.rate is not None
     need(len(items) <= MANY_FUNCTIONS, f"more than {MANY_FUNCTIONS} Lyapunov functions")
     need(not of_paper or bool(items), "the paper's certificate is not among the Lyapunov functions")
     need(bool(structure.graph.listening) or not items, "a Lyapunov function where nothing moves")
@@ -64,65 +93,67 @@ def check_functions(doc: Document, structure: Structure, final: FinalState, pape
     proofs: Proved = set()
     for k, entry in enumerate(items):
         doc.at = of = f"lyapunov.functions[{k}]"
-        fields(entry, ("class", *KEYS, "deviation"), "a Lyapunov function")
         if k == 0 and paper is not None and of_paper:
             function, form = _of_paper(doc, paper, entry)
-        elif entry["class"] in ("perron", "lmi") and doc.following("dominance", of):
+        elif entry.class_ in ("perron", "lmi") and doc.following("dominance", of):
             function, form = _by_rows(doc, structure, entry, of, proofs), None
         else:
             function, form = _searched(doc, structure, entry, of)
-        if entry["deviation"] is not None:
+        if entry.deviation is not None:
             if form is None:
                 raise RejectedError("a deviation without a form")
-            function = replace(function, deviation=_deviation(doc, final, entry["deviation"], form, of))
+            function = replace(function, deviation=_deviation(doc, final, entry.deviation, form, of))
         functions.append(function)
     return functions
 
 
-def _of_paper(doc: Document, paper: Paper, function: Any) -> tuple[Function, tuple[Matrix, Fraction]]:
+def _of_paper(doc: Document, paper: Paper, function: FunctionSection) -> tuple[Function, tuple[Matrix, Fraction]]:
     """Return the paper's function, which was verified before, with its form of the state."""
-    section, form = doc.data["paper"], paper.form
-    equal = function["class"] == "paper" and all(same(function[key], section[key]) for key in KEYS)
+    section, form = doc.sections["paper"], paper.form
+    equal = function.class_ == "paper" and all(getattr(function, key) == getattr(section, key) for key in KEYS)
     need(equal, "the first Lyapunov function is not the paper's certificate")
-    function = Function("paper", form.rate, exact(section["overshoot"]), form)
-    return function, form.of_state(doc.exact, paper.structure.graph)
+    verified = Function("paper", form.rate, section.overshoot, form)
+    return verified, form.of_state(doc.exact, paper.structure.graph)
 
 
-def _block(doc: Document, structure: Structure, function: Any, shape: str) -> tuple[list[int], Any]:
-    """Return the nodes of the one block of a function, and its entries as they are written."""
-    need(function["class"] in ("perron", "lmi", "full"), "an unknown class")
-    need(function["coordinates"] == "E" and function["rho"] is None, "other coordinates, or a rho")
-    (entry,) = entries(function["blocks"], "blocks", 1)
-    fields(entry, ("name", "nodes", shape, "times_rho"), "a block")
-    need(entry["name"] == "P" and entry["times_rho"] is False, "another block")
+def _block(doc: Document, structure: Structure, function: FunctionSection) -> tuple[list[int], BlockSection]:
+    """Return the nodes of the one block of a function, and the block."""
+    need(function.class_ != "paper", "another class")
+    need(function.coordinates == "E" and function.rho is None, "other coordinates, or a rho")
+    need(len(function.blocks) == 1, "blocks has not 1 entries")
+    (entry,) = function.blocks
+    full = function.class_ == "full"
+    need((entry.diagonal is None) == full and (entry.lower_triangle is not None) == full, "another shape of a block")
+    need(entry.name == "P" and not entry.times_rho, "another block")
     listening = structure.graph.listening
-    nodes = positions(doc, structure.graph, entry["nodes"], "nodes of a block", len(listening))
+    nodes = positions(doc, structure.graph, entry.nodes, "nodes of a block", len(listening))
     need(sorted(nodes) == listening, "nodes of a block")
-    return nodes, entry[shape]
+    return nodes, entry
 
 
-def _by_rows(doc: Document, structure: Structure, function: Any, of: str, proofs: Proved) -> Function:
+def _by_rows(doc: Document, structure: Structure, function: FunctionSection, of: str, proofs: Proved) -> Function:
     """Verify a diagonal function of a large graph row by row."""
-    nodes, entry = _block(doc, structure, function, "diagonal")
-    weights, rate = doc.files.numbers(entry, "diagonal", len(nodes)), exact(function["rate"])
+    nodes, entry = _block(doc, structure, function)
+    weights, rate = doc.files.numbers(entry.diagonal, "diagonal", len(nodes)), function.rate
     need(weights.positive(), "a weight is not positive")
     check_dominance(doc, structure, nodes, weights, rate, of, proofs)
     overshoot = Fraction(max(weights.values)) / Fraction(min(weights.values))
-    need(exact(function["overshoot"]) == overshoot, "the overshoot constant is another")
-    return Function(function["class"], rate, overshoot, None, (nodes, weights))
+    need(function.overshoot == overshoot, "the overshoot constant is another")
+    return Function(function.class_, rate, overshoot, None, (nodes, weights))
 
 
-def _searched(doc: Document, structure: Structure, function: Any, of: str) -> tuple[Function, tuple[Matrix, Fraction]]:
+def _searched(
+    doc: Document, structure: Structure, function: FunctionSection, of: str
+) -> tuple[Function, tuple[Matrix, Fraction]]:
     """Verify rate and overshoot constant of a diagonal or a full matrix; return its form of the state besides."""
-    full, graph = function["class"] == "full", structure.graph
-    nodes, entry = _block(doc, structure, function, "lower_triangle" if full else "diagonal")
+    (nodes, entry), rate, graph = _block(doc, structure, function), function.rate, structure.graph
     need_rows(graph.n)
-    rate = exact(function["rate"])
-    if full:
-        form = Form(rate, "E", nodes, None, triangle(entry, len(nodes)), Fraction(0))
+    if entry.lower_triangle is not None:
+        need(len(entry.lower_triangle) == len(nodes), f"lower_triangle has not {len(nodes)} entries")
+        form = Form(rate, "E", nodes, None, entry.lower_triangle, Fraction(0))
     else:
-        need(not beside(entry), "a side vector where it has no place")
-        weights = list(doc.files.numbers(entry, "diagonal", len(nodes)))
+        need(not beside(entry.diagonal), "a side vector where it has no place")
+        weights = list(doc.files.numbers(entry.diagonal, "diagonal", len(nodes)))
         low, high = min(weights), max(weights)
         need(low > 0, "a weight is not positive")
         form = Form(rate, "E", nodes, weights, None, low)
@@ -130,12 +161,12 @@ def _searched(doc: Document, structure: Structure, function: Any, of: str) -> tu
     F, times = form.of_state(doc.exact, graph)
     definite = decays(doc.exact, F, block(graph, range(graph.n)), rate, graph.unit, structure.free_nodes)
     need(definite, "not proved definite")
-    doc.done(f"b = {down(rate)}, class {function['class']}")
+    doc.done(f"b = {down(rate)}, class {function.class_}")
     if form.matrix:
         low, high = _ends(doc, form.matrix, of)
         form = replace(form, lowest=low)
-    need(exact(function["overshoot"]) == high / low, "the overshoot constant is another")
-    return Function(function["class"], rate, high / low, form), (F, times)
+    need(function.overshoot == high / low, "the overshoot constant is another")
+    return Function(function.class_, rate, high / low, form), (F, times)
 
 
 def _ends(doc: Document, rows: Sequence[Sequence[Fraction]], of: str) -> tuple[Fraction, Fraction]:
@@ -149,7 +180,7 @@ def _ends(doc: Document, rows: Sequence[Sequence[Fraction]], of: str) -> tuple[F
 
 
 def _deviation(
-    doc: Document, final: FinalState, section: Any, scaled_form: tuple[Matrix, Fraction], of: str
+    doc: Document, final: FinalState, section: DeviationSection, scaled_form: tuple[Matrix, Fraction], of: str
 ) -> list[Fraction]:
     """Verify ``(x_k - (Q x)_k)^2 <= c_k V``, ``||x - Q x||^2 <= c V``, in the coordinates ``free_nodes``.
 
@@ -158,10 +189,9 @@ def _deviation(
     doc.open("deviation", of)
     structure, (form, scale) = final.structure, scaled_form
     labels = structure.graph.labels
-    agents = ordered(labels, fields(section, ("agents", "norm"), "deviation")["agents"], "agents")
     (D, common, gram), S = final.deviations, only(form, structure.free_nodes)
     forms: list[tuple[list[int], int]] = []
-    constants = [exact(text) for text in agents.values()]
+    constants = list(section.agents)
     for row, c in zip(D, constants, strict=True):
         p, q = (c * common**2 / scale).as_integer_ratio()
         sized((len(forms) + 1) * len(row), longest((q,)) + longest(row), "deviations")
@@ -169,8 +199,8 @@ def _deviation(
         forms.append(([q * x for x in row], q * p))
     failed = doc.exact.bounded(S, forms)  # proves V > 0 besides
     need(failed is None, f"the constant of agent {shorten(labels[failed or 0])} is not proved")
-    p, q = (exact(section["norm"]) * common**2 / scale).as_integer_ratio()
+    p, q = (section.norm * common**2 / scale).as_integer_ratio()
     N = combined("the deviation of the norm", (p, S), (-q, gram))
     need(p >= 0 and doc.exact.definite(N), "the constant of the norm is not proved")
-    doc.done(f"norm at most {up(exact(section['norm']))}")
+    doc.done(f"norm at most {up(section.norm)}")
     return constants

@@ -11,7 +11,6 @@ from lmi.exact.elementary_enclosures import exp, log
 from lmi.exact.numbers import shorten
 from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import edges_of
-from ptcc_certify.checker.final_state import state_intervals
 from ptcc_certify.checker.follower_rows import Followers
 from ptcc_certify.checker.input_formulas import BITS
 from ptcc_certify.checker.late_messages import Messages
@@ -49,9 +48,9 @@ def check_missed(
     need(followers.structure.number[agent] < 0, "a leader does not miss its final state")
     ideal = not messages.late and messages.value_error == 0 and messages.gain_cap is None
     need(ideal, "missed of a capped gain, of values that are off, or of a late own state")
-    final = doc.data["final_state"]
+    final = doc.sections["final_state"]
     need(final is not None and begin.state is not None, "missed without a final state")
-    mid, radius = state_intervals(doc, graph, final)
+    mid, radius = final
     state = begin.state or mid
     signs = doc.open("late-missed", "messages.missed", witness=Signs)["witness"].gauge
     need(all(g in (-1, 0, 1) for g in signs), "gauge: a sign is neither 1, -1 nor 0")

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Literal
 
 from lmi.exact.elementary_enclosures import decay_integrals_below
 from lmi.exact.numbers import shorten
 from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph
-from ptcc_certify.checker.graph import by_agent
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import RejectedError, exact, fields, need
-from ptcc_certify.checker.sections import ByAgent, FewAgents
+from ptcc_certify.checker.reading import RejectedError, need
+from ptcc_certify.checker.sections import Agents, ByAgent, FewAgents, NotNegative, Positive
 from ptcc_certify.checker.side_files import Numbers
 
 SLIDING_BOUND = "||sigma(t)|| <= phi(t,T_r)^(-mu3) e^(-mu2 t) ||sigma(0)||"
@@ -22,8 +22,6 @@ SLIDING_CLOCK = "z = ln(T_r / (T_r - t)); null: certain at T_r only"
 REACHING_BITS = 64
 #: Products of short integers that an instant of a reaching time costs, about.
 EACH_INSTANT = 12_000
-NOMINAL = ("T", "rho1", "rho2", "kappa")
-SLIDING = ("T_r", "T_s", "rho1", "rho2", "kappa", "mu1", "mu2", "mu3", "delta")
 
 
 @dataclass(frozen=True)
@@ -32,6 +30,34 @@ class Protocol:
 
     sliding: bool
     gains: dict[str, Fraction]
+
+
+@dataclass(frozen=True, kw_only=True)
+class NominalSection:
+    """The nominal protocol; ``rho1`` may be 0 for agents of order n."""
+
+    kind: Literal["nominal"]
+    T: Positive
+    rho1: NotNegative
+    rho2: Positive
+    kappa: Positive
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlidingSection:
+    """The sliding-mode protocol, and what a run met, if any."""
+
+    kind: Literal["sliding-mode"]
+    T_r: Positive
+    T_s: Positive
+    rho1: NotNegative
+    rho2: Positive
+    kappa: Positive
+    mu1: Positive
+    mu2: Positive
+    mu3: Positive
+    delta: NotNegative
+    disturbance: str | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,28 +87,17 @@ class Begin:
 
 def check_protocol(doc: Document) -> Protocol:
     """Read the parameters, which are positive; mu1 is above delta."""
-    section = doc.section("protocol")
-    sliding = isinstance(section, dict) and section.get("kind") == "sliding-mode"
-    names = SLIDING if sliding else NOMINAL
-    section = fields(section, ("kind", *names, *(["disturbance"] if sliding else [])), "protocol")
-    need(sliding or section["kind"] == "nominal", "an unknown kind of protocol")
-    gains = {name: exact(section[name]) for name in names}
-    of_agents = "agents" in doc.data  # whose rho1 may be 0
-    may_be_zero = ("delta", "rho1") if of_agents else ("delta",)
-    need(all(value > 0 for name, value in gains.items() if name not in may_be_zero), "a parameter is not positive")
-    need(gains["rho1"] >= 0, "rho1 is negative")
-    if sliding:
-        need(0 <= gains["delta"] < gains["mu1"], "mu1 is not above delta")
-        need(section["disturbance"] is None or isinstance(section["disturbance"], str), "disturbance is not a text")
-    return Protocol(sliding, gains)
+    section = doc.section("protocol", NominalSection | SlidingSection)
+    gains = {name: value for name, value in vars(section).items() if name not in ("kind", "disturbance")}
+    need(section.rho1 > 0 or "agents" in doc.data, "rho1 is not positive")  # that of agents of order n may be 0
+    if isinstance(section, SlidingSection):
+        need(section.delta < section.mu1, "mu1 is not above delta")
+    return Protocol(isinstance(section, SlidingSection), gains)
 
 
-def check_begin(doc: Document, graph: Digraph, protocol: Protocol) -> Begin:
+def check_begin(doc: Document, protocol: Protocol) -> Begin:
     """Read ``X(0)`` and ``sigma(0)``."""
-    state, sigma = (
-        None if (section := doc.section(key)) is None else by_agent(doc, graph, section, key)
-        for key in ("initial_state", "sliding_variable")
-    )
+    state, sigma = (doc.section(key, Agents | None) for key in ("initial_state", "sliding_variable"))
     need((sigma is not None) == protocol.sliding, "sigma(0) belongs to the sliding-mode protocol, and is part of it")
     return Begin(state, sigma)
 

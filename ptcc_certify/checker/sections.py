@@ -48,6 +48,8 @@ FollowerIntegers: TypeAlias = Annotated[list[int], "integers of followers"]
 EdgeNumbers: TypeAlias = Annotated[Numbers, "numbers of edges"]
 #: The place of an agent that stands as its label.
 Node: TypeAlias = Annotated[int, "a label"]
+#: Middles and radii of every agent: by label, or two side vectors.
+Ends: TypeAlias = Annotated[tuple[Numbers, Numbers], "ends by agent"]
 #: Labels, or a side vector of places.
 Nodes: TypeAlias = Annotated[Any, "nodes"]
 
@@ -182,6 +184,8 @@ def _annotated(kind: Any, value: Any, at: Context, what: str) -> Any:
         return at.files.numbers(value, what, at.edges)
     if note == "integers of followers":
         return at.files.integers(value, what, len(at.followers))
+    if note == "ends by agent":
+        return _ends(value, at, what)
     labels = at.followers if note == "by follower" else at.labels
     if inner is Numbers and beside(value):
         need(len(get_args(kind)) == 2, f"{what} in a side file")
@@ -190,3 +194,15 @@ def _annotated(kind: Any, value: Any, at: Context, what: str) -> Any:
     if inner is Numbers:
         return Numbers([exact(x) for x in value.values()])
     return [read(get_args(inner)[0], x, at, what) for x in value.values()]
+
+
+def _ends(value: Any, at: Context, what: str) -> tuple[Numbers, Numbers]:
+    """Read middles and radii: two side vectors, or intervals by agent."""
+    if isinstance(value, dict) and beside(value.get("mid")):
+        reading.fields(value, ("mid", "radius"), what)
+        need(beside(value["radius"]), "radius is not a side vector")
+        mid, radius = (at.files.numbers(value[key], key, len(at.labels)) for key in ("mid", "radius"))
+        need(all(r >= 0 for r in radius.values), "a radius is negative")
+        return mid, radius
+    intervals = read(ByAgent[Ball], value, at, what)
+    return Numbers([x for x, _ in intervals]), Numbers([r for _, r in intervals])

@@ -49,7 +49,9 @@ def check_settling(
     structure, gain = verified.structure, messages.gain
     need(messages.delay > 0 and messages.value_error == 0, "settling leaders where nothing is late, or values are off")
     need(not messages.late, "settling leaders of a late own state")
-    need(verified.begin.state is not None and doc.data["final_state"] is not None, "settling leaders without a state")
+    need(
+        verified.begin.state is not None and doc.sections["final_state"] is not None, "settling leaders without a state"
+    )
     need(bool(structure.followers), "no follower")
     _hear_at_once(messages, structure)
     cap, clock, left = section.cap, section.clock, section.left

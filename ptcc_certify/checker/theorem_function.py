@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from lmi.exact.decimal_rounding import down
 from lmi.exact.numbers import integers
@@ -13,11 +13,45 @@ from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.matrix_products import block, congruence, decays, decrease, diagonal, less, need_rows
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.quadratic_form import Form
-from ptcc_certify.checker.reading import entries, exact, fields, need
+from ptcc_certify.checker.reading import entries, exact, need
+from ptcc_certify.checker.sections import Nodes, Positive, Several, Triangle, Vector
 from ptcc_certify.checker.structure import Claim, Structure
 
 #: By how much weights may be off the left null vector of the comparison matrix: this part of each diagonal term.
 NEAR = 10**9
+
+
+@dataclass(frozen=True, kw_only=True)
+class BlockSection:
+    """A block of a Lyapunov matrix: its diagonal, or a full matrix."""
+
+    name: str
+    nodes: Nodes
+    diagonal: Vector | None = None
+    lower_triangle: Triangle | None = None
+    times_rho: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class RhoInterval:
+    """The end of the interval of ``rho`` that the paper prints, and an admissible one; None: no end."""
+
+    printed: Fraction | None
+    exact: Fraction | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class PaperSection:
+    """What the file says of the Lyapunov function of the theorem's row."""
+
+    theorem: str
+    objective: str
+    coordinates: Literal["E", "eps"]
+    blocks: Several[BlockSection]
+    rho: Positive | None
+    rho_interval: RhoInterval | None
+    rate: Positive | None
+    overshoot: Fraction | None
 
 
 class Block(NamedTuple):
@@ -55,38 +89,31 @@ class Paper:
 
 def check_paper(doc: Document, structure: Structure, claim: Claim) -> Paper | None:
     """Verify the certificate of the theorem's row; None if there is none."""
-    section, graph = doc.section("paper"), structure.graph
+    section, graph = doc.section("paper", PaperSection | None), structure.graph
     if section is None:
         return None
-    keys = ("theorem", "objective", "coordinates", "blocks", "rho", "rho_interval", "rate", "overshoot")
     need_rows(graph.n)
-    fields(section, keys, "paper")
     objective, coordinates, expected = _row(structure, claim.theorem)
-    need(section["theorem"] == claim.theorem and section["objective"] == objective, "another theorem or objective")
-    need(section["coordinates"] == coordinates, "other coordinates")
+    need(section.theorem == claim.theorem and section.objective == objective, "another theorem or objective")
+    need(section.coordinates == coordinates, "other coordinates")
+    need(len(section.blocks) == len(expected), f"blocks has not {len(expected)} entries")
     blocks = []
-    for entry, (name, nodes, times_rho) in zip(
-        entries(section["blocks"], "blocks", len(expected)), expected, strict=True
-    ):
-        fields(entry, ("name", "nodes", "diagonal", "times_rho"), "a block")
-        need(entry["name"] == name and entry["times_rho"] is times_rho, "another block")
-        need(positions(doc, graph, entry["nodes"], "nodes of a block") == nodes, "nodes of a block")
-        weights = [exact(w) for w in entries(entry["diagonal"], "diagonal", len(nodes))]
+    for entry, (name, nodes, times_rho) in zip(section.blocks, expected, strict=True):
+        need(entry.name == name and entry.times_rho is times_rho and entry.lower_triangle is None, "another block")
+        need(positions(doc, graph, entry.nodes, "nodes of a block") == nodes, "nodes of a block")
+        weights = [exact(w) for w in entries(entry.diagonal, "diagonal", len(nodes))]
         need(all(w > 0 for w in weights), "a weight is not positive")
         blocks.append(Block(name, nodes, weights, times_rho))
-    need((section["rho"] is not None) == any(b.times_rho for b in blocks), "rho belongs to a block times rho")
-    rho = Fraction(1) if section["rho"] is None else exact(section["rho"])
-    need(rho > 0, "rho is not positive")
-    rate = None if section["rate"] is None else exact(section["rate"])
-    need(rate is None or rate > 0, "the rate is not positive")
+    need((section.rho is not None) == any(b.times_rho for b in blocks), "rho belongs to a block times rho")
+    rho, rate = section.rho or Fraction(1), section.rate
     paper = Paper(structure, coordinates, blocks, rho, rate)
     if not blocks:
-        need(rate is None and section["overshoot"] is None, "a rate where nothing moves")
+        need(rate is None and section.overshoot is None, "a rate where nothing moves")
     else:
         weights = list(paper.weights(rho).values())
-        need(exact(section["overshoot"]) == max(weights) / min(weights), "overshoot")
+        need(section.overshoot == max(weights) / min(weights), "overshoot")
     if rate is None or coordinates == "eps":
-        need(section["rho_interval"] is None, "an interval without a proof, or without rho")
+        need(section.rho_interval is None, "an interval without a proof, or without rho")
     if rate is not None and coordinates == "eps":
         _deviation_decrease(doc, paper, rate)
     elif rate is not None:
@@ -174,7 +201,7 @@ def _leaders(doc: Document, paper: Paper, theorem: str) -> dict[int, Fraction]:
 
 def _margin(doc: Document, paper: Paper, gamma: Mapping[int, Fraction], rate: Fraction) -> None:
     """Verify ``S - m I > 0``, and that the rate is ``m`` over the largest weight."""
-    has_rho = doc.data["paper"]["rho"] is not None
+    has_rho = doc.sections["paper"].rho is not None
     numbers = doc.open("margin", "paper", ["m", "rho"] if has_rho else ["m"])
     need(numbers.get("rho", paper.rho) == paper.rho, "another rho")
     weights = paper.weights(paper.rho)
@@ -199,12 +226,13 @@ def _exceeds(
 
 def _interval(doc: Document, paper: Paper, gamma: Mapping[int, Fraction]) -> None:
     """Verify that both ends of the interval of ``rho`` are admissible."""
-    section, rho = doc.data["paper"]["rho_interval"], doc.data["paper"]["rho"]
+    section, rho = doc.sections["paper"].rho_interval, doc.sections["paper"].rho
     doc.at = "rho-interval of paper"
     if rho is None:
         need(section is None, "an interval without rho")
         return
-    ends = {key: exact(x) for key, x in fields(section, ("printed", "exact"), "rho_interval").items() if x is not None}
+    need(section is not None, "rho_interval is missing")
+    ends = {key: x for key, x in vars(section).items() if x is not None}
     need(len(ends) != 1, "one end without the other")
     if not ends:
         leading = {v for b in paper.blocks if not b.times_rho for v in b.nodes}
