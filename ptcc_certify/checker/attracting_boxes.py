@@ -16,8 +16,8 @@ and the mirror image for ``-l_k``. With ``d`` of followers whose rows decay, ``r
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 from lmi.exact.decimal_rounding import down
 from lmi.exact.numbers import integers, longest, sized
@@ -27,18 +27,37 @@ from ptcc_certify.checker.family_rows import check_follower_rows
 from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.protocol import Begin
-from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, need
+from ptcc_certify.checker.reading import RejectedError, need
 from ptcc_certify.checker.restricted_signals import reachable_bounds
+from ptcc_certify.checker.sections import Nodes, Positive, Several, Vector
 
-KEYS = ("component", "nodes", "vector", "lower", "upper", "rate")
-KEPT = ("component", "lower", "upper")
+
+@dataclass(frozen=True, kw_only=True)
+class AttractingBox:
+    """A box to which followers come."""
+
+    component: int
+    nodes: Nodes
+    vector: Vector
+    lower: Several[Fraction]
+    upper: Several[Fraction]
+    rate: Positive
+
+
+@dataclass(frozen=True, kw_only=True)
+class KeptBox:
+    """A box in which all agents of a component stay."""
+
+    component: int
+    lower: Several[Fraction]
+    upper: Several[Fraction]
 
 
 def check_boxes(doc: Document, family: Family, begin: Begin) -> None:
     """Verify every box."""
     if "boxes" not in doc.data:
         return
-    items = entries(doc.section("boxes"), "boxes")
+    items = doc.section("boxes", Several[AttractingBox | KeptBox])
     need(bool(items), "no box")
     need(not (begin.sigma and any(begin.sigma)), "a box while sliding variables move")
     if begin.state is None:
@@ -46,44 +65,47 @@ def check_boxes(doc: Document, family: Family, begin: Begin) -> None:
     x, last = list(begin.state), (False, -1)
     for k, entry in enumerate(items):
         doc.at = of = f"boxes[{k}]"
-        kept = isinstance(entry, dict) and entry.keys() == set(KEPT)
-        number = fields(entry, KEPT if kept else KEYS, "a box")["component"]
-        known = type(number) is int and 0 <= number < len(family.components)
-        need(known and last < (kept, number), "an unknown component, or out of order")
-        need(family.components[number].depends, "a box where all agents come to rest")
+        kept, component = isinstance(entry, KeptBox), family.component(entry.component)
+        need(last < (kept, entry.component), "boxes are out of order")
+        need(component.depends, "a box where all agents come to rest")
         doc.open("kept-box" if kept else "attracting-box", of)
-        (_check_kept if kept else _check_box)(doc, family, family.components[number], x, entry)
-        last = kept, number
+        if isinstance(entry, KeptBox):
+            _check_kept(doc, component, x, entry)
+        else:
+            _check_box(doc, family, component, x, entry)
+        last = kept, entry.component
 
 
-def _check_kept(doc: Document, family: Family, component: Component, x: Sequence[Fraction], entry: Any) -> None:
+def _check_kept(doc: Document, component: Component, x: Sequence[Fraction], entry: KeptBox) -> None:
     """Verify a box in which all agents of a component stay at all times."""
     edges, n = component.part.edges, len(component.nodes)
     spend(100 * sum(1 + len(some) for some in edges), what="boxes")
     reach = reachable_bounds(component.nodes, {edge[:3] for some in edges for edge in some}, x)
-    lower, upper = ([exact(value) for value in entries(entry[key], key, n)] for key in ("lower", "upper"))
-    for v, low, high in zip(component.nodes, lower, upper, strict=True):
+    need(len(entry.lower) == len(entry.upper) == n, f"lower or upper has not {n} entries")
+    for v, low, high in zip(component.nodes, entry.lower, entry.upper, strict=True):
         need(low <= reach[v][0] and reach[v][1] <= high, "an agent may leave the box")
     doc.done(f"{n} agents")
 
 
-def _check_box(doc: Document, family: Family, component: Component, x: Sequence[Fraction], entry: Any) -> None:
+def _check_box(
+    doc: Document, family: Family, component: Component, x: Sequence[Fraction], entry: AttractingBox
+) -> None:
     edges = component.part.edges
     spend(100 * sum(1 + len(some) for some in edges), what="boxes")
-    nodes = positions(doc, family.modes[0].structure.graph, entry["nodes"], "followers")
+    nodes = positions(doc, family.modes[0].structure.graph, entry.nodes, "followers")
     inside = set(nodes)
     need(bool(nodes) and nodes == [v for v in component.nodes if v in inside], "followers")
     need(all(t in inside for some in edges for s, t, *_ in some if s in inside), "a follower is heard by another agent")
-    rate, n = exact(entry["rate"]), len(nodes)
-    need(rate > 0, "the rate is not positive")
-    vector = doc.files.numbers(entry["vector"], "vector", n)
+    rate, n = entry.rate, len(nodes)
+    vector = doc.files.numbers(entry.vector, "vector", n)
     need(vector.positive(), "the vector is not positive")
     d, scale = vector.over(range(n))
     rest = [v for v in component.nodes if v not in inside]
     sizes = dict(zip(nodes, d, strict=True)) | dict.fromkeys(rest, 0)
     check_follower_rows(family, component, nodes, sizes, {}, (rate, scale))
     reach = reachable_bounds(component.nodes, {edge[:3] for some in edges for edge in some}, x)
-    lower, upper = ([exact(value) for value in entries(entry[key], key, n)] for key in ("lower", "upper"))
+    need(len(entry.lower) == len(entry.upper) == n, f"lower or upper has not {n} entries")
+    lower, upper = list(entry.lower), list(entry.upper)
     (low, high), _ = integers([lower + [reach[v][0] for v in rest], upper + [reach[v][1] for v in rest]])
     top = dict(zip([*nodes, *rest], high, strict=True))
     bottom = dict(zip([*nodes, *rest], [-y for y in low], strict=True))

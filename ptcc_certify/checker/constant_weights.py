@@ -13,8 +13,9 @@ directions of every edge change together, ``eta`` is equal on ``R``, and ``c`` t
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Literal
 
 from lmi.exact.decimal_rounding import down, up
 from lmi.exact.numbers import integers, longest, sized
@@ -23,10 +24,29 @@ from ptcc_certify.checker.family import Component, Edge, Family, Mode
 from ptcc_certify.checker.family_limits import agents_heard
 from ptcc_certify.checker.graph import ordered
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, need
+from ptcc_certify.checker.reading import RejectedError, need
+from ptcc_certify.checker.sections import Several, Some
 
-KEYS = ("claim", "signals", "component", "modes")
-VALUE = ("lower", "upper", "within", "above", "below")
+
+@dataclass(frozen=True, kw_only=True)
+class FinalValue:
+    """Ends of the consensus value of a mode, how near to them it comes, and the vectors of the rows."""
+
+    lower: Fraction
+    upper: Fraction
+    within: Fraction
+    above: Some[Fraction] | None
+    below: Some[Fraction] | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class FinalValueSection:
+    """What the file says of where modes end whose weights are constant."""
+
+    claim: Literal["final value"]
+    signals: Literal["constant"]
+    component: int
+    modes: Several[FinalValue | None]
 
 
 def fitting_camps(nodes: Sequence[int], edges: Sequence[Edge]) -> dict[int, int] | None:
@@ -54,15 +74,14 @@ def fitting_camps(nodes: Sequence[int], edges: Sequence[Edge]) -> dict[int, int]
 
 
 def check_final_value(
-    doc: Document, family: Family, component: Component, x: Sequence[Fraction] | None, entry: Any, of: str
+    doc: Document, family: Family, component: Component, x: Sequence[Fraction] | None, entry: FinalValueSection, of: str
 ) -> None:
     """Verify the ends of the consensus value of every mode of which it is claimed."""
-    fields(entry, KEYS, "a claim")
-    need(entry["signals"] == "constant", "a final value of weights that may change")
     if x is None:
         raise RejectedError("a final value without an initial state")
     doc.open("final-value", of)
-    values = entries(entry["modes"], "modes", len(family.modes))
+    values = entry.modes
+    need(len(values) == len(family.modes), f"modes has not {len(family.modes)} entries")
     need(any(one is not None for one in values), "no final value of any mode")
     found = [_check_mode(family, component, k, x, one) for k, one in enumerate(values) if one is not None]
     low, high, within = min(v[0] for v in found), max(v[1] for v in found), max(v[2] for v in found)
@@ -70,9 +89,8 @@ def check_final_value(
 
 
 def _check_mode(
-    family: Family, component: Component, number: int, x: Sequence[Fraction], entry: Any
+    family: Family, component: Component, number: int, x: Sequence[Fraction], entry: FinalValue
 ) -> tuple[Fraction, Fraction, Fraction]:
-    fields(entry, VALUE, "a final value")
     mode, edges, closed = family.modes[number], component.part.edges[number], component.part.closed[number]
     spend(100 * (len(edges) + len(component.nodes)), what="final values")
     camps = fitting_camps(component.nodes, edges)
@@ -81,17 +99,17 @@ def _check_mode(
     pivot = mode.structure.closed[closed[0]][0]
     nodes = agents_heard(((s, t) for s, t, *_ in edges), {0: pivot})[0]
     (z,), scale = integers([[camps[v] * x[v] for v in nodes]])
-    lower, upper, within = (exact(entry[key]) for key in ("lower", "upper", "within"))
+    lower, upper, within = entry.lower, entry.upper, entry.within
     need(lower <= upper, "the lower end is the larger")
     if mode.tied:
-        need(entry["above"] is None and entry["below"] is None, "vectors of weights that change together")
+        need(entry.above is None and entry.below is None, "vectors of weights that change together")
         mean = Fraction(sum(z), scale * len(z))
         need(lower <= mean <= upper and mean + within >= upper and mean - within <= lower, "the mean is not enclosed")
         return lower, upper, within
     labels, into = [family.labels[v] for v in nodes], set(nodes)
     own = [edge for edge in edges if edge[1] in into]
-    for key, side, end in (("above", 1, upper), ("below", -1, -lower)):
-        h = [exact(value) for value in ordered(labels, entry[key], key).values()]
+    for key, told, side, end in (("above", entry.above, 1, upper), ("below", entry.below, -1, -lower)):
+        h = list(ordered(labels, told, key).values())
         most, least = _row_ends(mode, own, nodes, [side * y for y in z], scale, h)
         need(most <= end, "a row exceeds the end")
         need(end <= least + within, "no weights are known to come so near to the end")

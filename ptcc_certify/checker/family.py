@@ -74,6 +74,11 @@ class Family:
     modes: list[Mode]
     components: list[Component]
 
+    def component(self, number: int) -> Component:
+        """Return the component of a number that a file tells."""
+        need(0 <= number < len(self.components), "an unknown component")
+        return self.components[number]
+
 
 @dataclass(frozen=True, eq=False)
 class Part:

@@ -24,13 +24,12 @@ from ptcc_certify.checker.family_function import Scaled
 from ptcc_certify.checker.family_limits import WeightedMean, check_means, limits
 from ptcc_certify.checker.family_rows import Function as VerifiedFunction
 from ptcc_certify.checker.family_sliding import Drive, Sizes, nominal_gain
-from ptcc_certify.checker.graph import ordered
 from ptcc_certify.checker.input_formulas import BITS, root_above
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.protocol import Begin, SlidingPart, check_sliding_part, sliding_part
 from ptcc_certify.checker.protocol import Protocol as Parameters
-from ptcc_certify.checker.reading import Interval, RejectedError, interval, length, need
-from ptcc_certify.checker.sections import FewAgents
+from ptcc_certify.checker.reading import Interval, RejectedError, length, need
+from ptcc_certify.checker.sections import Ball, ByAgent, FewAgents
 
 Gains = Mapping[str, Fraction]
 #: Products of short integers that a root costs, about.
@@ -183,20 +182,20 @@ def check_family_bounds(
     drive: Drive | None,
 ) -> None:
     """Verify final states and inputs."""
-    labels, x = family.labels, None if begin.state is None else list(begin.state)
+    x = None if begin.state is None else list(begin.state)
     if x is not None and drive is not None:
         x = [value - drive.sigma0[v] for v, value in enumerate(x)]
-    final = doc.section("final_state")
+    final = doc.section("final_state", ByAgent[Ball | None] | None)
     need((final is None) == (x is None), "final states are claimed iff there is an initial state")
     if x is not None:
         witness = doc.open("family-final-state", "final_state", witness=Any)["witness"]
         known: dict[int, Interval | None] = {}
         for component, kept in zip(family.components, check_means(doc, family, witness, x), strict=True):
             known |= final_states(component, [V for V in functions if V.component is component], kept, x, drive)
-        for v, entry in enumerate(ordered(labels, final, "final_state").values()):
+        for v, entry in enumerate(final):
             need((known[v] is None) == (entry is None), "a final state that is not claimed, or one that is")
             if (ends := known[v]) is not None:
-                middle, radius = interval(entry)
+                middle, radius = entry
                 need(middle - radius <= ends[0] and ends[1] <= middle + radius, "a final state is not enclosed")
         count = sum(ends is not None for ends in known.values())
         doc.done(f"{count} agents" if count else "none claimed: ends depend on the signal")

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from operator import mul
-from typing import Any
+from typing import Literal
 
 from lmi.exact.decimal_rounding import down
 from lmi.exact.definite import Arithmetic
@@ -32,13 +32,44 @@ from ptcc_certify.checker.matrix_products import (
     transposed,
 )
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, need, triangle
+from ptcc_certify.checker.reading import RejectedError, need
+from ptcc_certify.checker.sections import Nodes, Several, Some, Triangle
 
 Vector = dict[int, Fraction]
 #: Integers by node, and a number by which all are multiplied.
 Scaled = tuple[Mapping[int, int], Fraction]
 Whole = dict[int, int]
-KEYS = ("class", "component", "nodes", "lower_triangle", "rate", "inputs", "coordinates", "means")
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeanSection:
+    """A weighted mean of agents, and how fast it changes at most."""
+
+    weights: Some[Fraction]
+    constant: Fraction
+
+
+@dataclass(frozen=True, kw_only=True)
+class FormSection:
+    """What the file says of a quadratic form of a component, or of a part of one that hears nobody else."""
+
+    class_: Literal["full", "diagonal", "undirected"]
+    component: int
+    nodes: Nodes
+    lower_triangle: Triangle
+    rate: Fraction
+    inputs: Some[Fraction]
+    coordinates: Some[Fraction]
+    means: Several[MeanSection]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Multipliers:
+    """The witness of a rate: a multiplier of every uncertain weight."""
+
+    multipliers: Several[Fraction]
+
+
 #: Means of one function.
 MANY_MEANS = 100
 
@@ -123,22 +154,21 @@ class FamilyFunction:
         return Fraction(total, self.scale * unit**2)
 
 
-def check_form(doc: Document, family: Family, component: Component, entry: Any, of: str) -> FamilyFunction:
+def check_form(doc: Document, family: Family, component: Component, entry: FormSection, of: str) -> FamilyFunction:
     """Verify a quadratic form of a component, or of a part of one that hears nobody else."""
     doc.at = of
-    fields(entry, KEYS, "a Lyapunov function")
-    need(entry["class"] in ("full", "diagonal", "undirected"), "an unknown class")
     graph = family.modes[0].structure.graph
-    nodes = positions(doc, graph, entry["nodes"], "nodes of a function")
+    nodes = positions(doc, graph, entry.nodes, "nodes of a function")
     pivots = set(component.pivots.values())
     need(nodes == [v for v in component.nodes if v not in pivots] and bool(nodes), "nodes of a function")
     need_rows(len(nodes))
-    (P, scale), rate = integers(triangle(entry["lower_triangle"], len(nodes))), exact(entry["rate"])
+    need(len(entry.lower_triangle) == len(nodes), f"lower_triangle has not {len(nodes)} entries")
+    (P, scale), rate = integers(entry.lower_triangle), entry.rate
     need(doc.exact.definite(P), "P is not proved definite")
     rates = []
     modes = []
     for k in range(len(family.modes)):
-        numbers = doc.open("family-rate", f"{of}.modes[{k}]", ["b"], witness=Any)
+        numbers = doc.open("family-rate", f"{of}.modes[{k}]", ["b"], witness=Multipliers | None)
         modes.append(quotient_of(family, k, component, nodes))
         decreases(doc.exact, modes[k], (P, scale), component.whole[1], numbers["b"], numbers["witness"])
         rates.append(numbers["b"])
@@ -147,29 +177,28 @@ def check_form(doc: Document, family: Family, component: Component, entry: Any, 
     doc.open("family-constants", of)
     labels = family.labels
     own = {v: labels[v] for v in component.nodes}
-    inputs = dict(zip(own, map(exact, ordered(list(own.values()), entry["inputs"], "inputs").values()), strict=True))
+    inputs = dict(zip(own, ordered(list(own.values()), entry.inputs, "inputs").values(), strict=True))
     some = [labels[v] for v in nodes]
-    coordinates = dict(zip(nodes, map(exact, ordered(some, entry["coordinates"], "coordinates").values()), strict=True))
-    means = [_mean(doc, graph, component, mean) for mean in entries(entry["means"], "means")]
+    coordinates = dict(zip(nodes, ordered(some, entry.coordinates, "coordinates").values(), strict=True))
+    means = [_mean(doc, graph, component, mean) for mean in entry.means]
     need(len(means) <= MANY_MEANS, f"more than {MANY_MEANS} means")
     _constants(doc.exact, modes, (P, scale), inputs, coordinates, means)
     doc.done(f"{len(inputs)} inputs, {len(coordinates)} coordinates" + f", {len(means)} means" * bool(means))
     return FamilyFunction(component, nodes, P, scale, rate, inputs, coordinates, means)
 
 
-def _mean(doc: Document, graph: Digraph, component: Component, entry: Any) -> WeightedMean:
+def _mean(doc: Document, graph: Digraph, component: Component, entry: MeanSection) -> WeightedMean:
     """Return a weighted mean of agents whose rows of the basis are 1 or -1 in one column, and 0 elsewhere."""
-    fields(entry, ("weights", "constant"), "a mean")
-    need(isinstance(entry["weights"], dict) and bool(entry["weights"]), "weights of a mean")
-    nodes = positions(doc, graph, list(entry["weights"]), "a mean")
+    need(bool(entry.weights), "weights of a mean")
+    nodes = positions(doc, graph, list(entry.weights), "a mean")
     need(set(nodes) <= set(component.nodes), "a mean of other agents")
     rows = [component.kernel[v] for v in nodes]
     column = next(iter(rows[0]), 0)
     need(all([*row] == [column] and abs(row[column]) == 1 for row in rows), "a mean of agents of several groups")
-    weights = [exact(text) for text in entry["weights"].values()]
+    weights = list(entry.weights.values())
     size = sum((q * row[column] for q, row in zip(weights, rows, strict=True)), Fraction(0))
     need(size != 0, "a mean of weight 0")
-    return WeightedMean(column, dict(zip(nodes, weights, strict=True)), size, exact(entry["constant"]))
+    return WeightedMean(column, dict(zip(nodes, weights, strict=True)), size, entry.constant)
 
 
 # ---------------------------------------------------------------------- the quotient
@@ -224,7 +253,12 @@ def _part(columns: dict[int, Whole], place: dict[int, int], edge: Edge, tied: bo
 
 
 def decreases(
-    judge: Arithmetic, mode: QuotientMode, form: tuple[Matrix, int], kernel_scale: int, b: Fraction, witness: Any
+    judge: Arithmetic,
+    mode: QuotientMode,
+    form: tuple[Matrix, int],
+    kernel_scale: int,
+    b: Fraction,
+    witness: Multipliers | None,
 ) -> None:
     """Verify ``P A + A'P >= b P`` for all members of a mode, ``P > 0``.
 
@@ -244,10 +278,10 @@ def decreases(
         S = combined("a form of a family", (b.denominator, S), (-b.numerator * unit, P))
         need(judge.definite(S), "not proved definite")
         return
-    texts = entries(fields(witness, ("multipliers",), "the witness")["multipliers"], "multipliers", len(parts))
-    q = len(texts)
+    q = len(witness.multipliers)
+    need(q == len(parts), f"multipliers has not {len(parts)} entries")
     need_rows_with_multipliers(n + q)
-    (taus,), common = integers([[exact(x) for x in texts]])
+    (taus,), common = integers([witness.multipliers])
     pushes = [_push(P, part) for part in parts]
     diagonal, squares = [[tau * (e == k) for k in range(q)] for e, tau in enumerate(taus)], _zeros(n)
     for tau, part in zip(taus, parts, strict=True):

@@ -16,25 +16,54 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Literal
 
 from lmi.exact.decimal_rounding import down
 from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.numbers import common_denominator, integers, longest, sized
 from lmi.exact.work import spend
 from ptcc_certify.checker.family import Component, Family, Part
-from ptcc_certify.checker.family_function import FamilyFunction, Scaled, check_form
+from ptcc_certify.checker.family_function import FamilyFunction, FormSection, Scaled, check_form
 from ptcc_certify.checker.family_limits import WeightedMean
-from ptcc_certify.checker.family_squares import SquaresFunction, check_squares
+from ptcc_certify.checker.family_squares import SquaresFunction, SquaresSection, check_squares
 from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import entries, exact, fields, need, same
+from ptcc_certify.checker.reading import need
+from ptcc_certify.checker.sections import Nodes, NotNegative, Positive, Several, Vector
 
 #: Lyapunov functions that are read.
 MANY_FUNCTIONS = 1000
 #: Bits of constants and values, which are rounded up.
 BITS = 64
-KEYS = ("class", "component", "vector", "parts", "rate")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PartSection:
+    """A part that followers hear: its form, by what it is divided, and bounds of its agents."""
+
+    nodes: Nodes
+    function: FormSection
+    times: Positive
+    bounds: Several[NotNegative]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RowsSection:
+    """What the file says of a function of rows."""
+
+    class_: Literal["rows"]
+    component: int
+    vector: Vector
+    parts: Several[PartSection]
+    rate: Fraction
+
+
+@dataclass(frozen=True, kw_only=True)
+class FamilyFunctionsSection:
+    """The Lyapunov functions of a family, and ``drives`` of them while sliding variables move."""
+
+    functions: Several[FormSection | RowsSection | SquaresSection]
+    drives: Several[Fraction] | None = None
 
 
 @dataclass(frozen=True)
@@ -103,32 +132,27 @@ Function = FamilyFunction | FollowerFunction | SquaresFunction
 
 def check_family_functions(doc: Document, family: Family) -> list[Function]:
     """Verify every function, its rates and constants."""
-    section = doc.section("lyapunov")
-    more = ["drives"] * (isinstance(section, dict) and "drives" in section)
-    section = fields(section, ("functions", *more), "lyapunov")
-    items = entries(section["functions"], "functions")
+    items = doc.section("lyapunov", FamilyFunctionsSection).functions
     need(len(items) <= MANY_FUNCTIONS, f"more than {MANY_FUNCTIONS} Lyapunov functions")
     result: list[Function] = []
     for k, entry in enumerate(items):
         doc.at = of = f"lyapunov.functions[{k}]"
-        need(isinstance(entry, dict) and "component" in entry and "class" in entry, "a Lyapunov function")
-        number = entry["component"]
-        need(type(number) is int and 0 <= number < len(family.components), "an unknown component")
-        component = family.components[number]
+        component = family.component(entry.component)
         need(not component.depends, "a Lyapunov function where there is no common kernel")
-        kind = entry["class"]
-        check = check_rows if kind == "rows" else check_squares if kind == "squares" else check_form
-        result.append(check(doc, family, component, entry, of))
+        if isinstance(entry, RowsSection):
+            result.append(check_rows(doc, family, component, entry, of))
+        elif isinstance(entry, SquaresSection):
+            result.append(check_squares(doc, family, component, entry, of))
+        else:
+            result.append(check_form(doc, family, component, entry, of))
     return result
 
 
-def check_rows(doc: Document, family: Family, component: Component, entry: Any, of: str) -> FollowerFunction:
+def check_rows(doc: Document, family: Family, component: Component, entry: RowsSection, of: str) -> FollowerFunction:
     """Verify a function of rows."""
-    fields(entry, KEYS, "a Lyapunov function")
-    items = entries(entry["parts"], "parts of a function")
-    need(len(items) <= MANY_FUNCTIONS, "too many parts of a function")
-    number = entry["component"]
-    parts = [_part(doc, family, component, item, f"{of}.parts[{j}]", number) for j, item in enumerate(items)]
+    need(len(entry.parts) <= MANY_FUNCTIONS, "too many parts of a function")
+    number = entry.component
+    parts = [_part(doc, family, component, item, f"{of}.parts[{j}]", number) for j, item in enumerate(entry.parts)]
     led = [v for part in parts for v in part.bounds]
     need(len(led) == len(set(led)), "parts of a function share an agent")
     resting = set(component.pivots.values()).difference(led)
@@ -137,10 +161,10 @@ def check_rows(doc: Document, family: Family, component: Component, entry: Any, 
     need(bool(followers), "no followers")
     _closed(component, [set(part.bounds) for part in parts], resting)
     numbers = doc.open("family-rows", of, ["b"])
-    rate = exact(entry["rate"])
+    rate = entry.rate
     need(numbers["b"] == rate, "b is not the rate")
     need(all(rate <= part.function.rate for part in parts), "a part that the followers hear is slower")
-    vector = doc.files.numbers(entry["vector"], "vector", len(followers))
+    vector = doc.files.numbers(entry.vector, "vector", len(followers))
     need(vector.positive(), "the vector is not positive")
     own, scale = vector.over(range(len(followers)))
     pivots = set(component.pivots.values())
@@ -158,9 +182,8 @@ def check_rows(doc: Document, family: Family, component: Component, entry: Any, 
     return FollowerFunction(component, only, scale * common, parts, rate, all_speeds)
 
 
-def _part(doc: Document, family: Family, component: Component, entry: Any, of: str, number: int) -> LeadingPart:
-    fields(entry, ("nodes", "function", "times", "bounds"), "a part of a function")
-    nodes = positions(doc, family.modes[0].structure.graph, entry["nodes"], "nodes of a part")
+def _part(doc: Document, family: Family, component: Component, entry: PartSection, of: str, number: int) -> LeadingPart:
+    nodes = positions(doc, family.modes[0].structure.graph, entry.nodes, "nodes of a part")
     inside = set(nodes)
     need(nodes == [v for v in component.nodes if v in inside] and bool(nodes), "nodes of a part")
     kernel = {v: component.kernel[v] for v in nodes}
@@ -169,16 +192,14 @@ def _part(doc: Document, family: Family, component: Component, entry: Any, of: s
     spend(sum(map(len, component.part.edges)), what="parts of a function")
     edges = [[edge for edge in some if edge[1] in inside] for some in component.part.edges]
     own = Component(Part(nodes, None, edges, component.part.closed), component.behaviour, kernel, pivots)
-    function = check_form(doc, family, own, entry["function"], of)
-    need(same(entry["function"]["component"], number), "another component of a part")
-    times = exact(entry["times"])
-    need(times > 0, "times is not positive")
-    texts = entries(entry["bounds"], "bounds", len(nodes))
-    bounds = dict(zip(nodes, map(exact, texts), strict=True))
+    function, times = check_form(doc, family, own, entry.function, of), entry.times
+    need(entry.function.component == number, "another component of a part")
+    need(len(entry.bounds) == len(nodes), f"bounds has not {len(nodes)} entries")
+    bounds = dict(zip(nodes, entry.bounds, strict=True))
     leading = set(pivots.values())
     for v, bound in bounds.items():
         c = function.inputs[v] if v in leading else function.coordinates[v]
-        need(bound >= 0 and bound**2 >= times**2 * c, "the bound of an agent of a part is not proved")
+        need(bound**2 >= times**2 * c, "the bound of an agent of a part is not proved")
     return LeadingPart(function, times, bounds)
 
 

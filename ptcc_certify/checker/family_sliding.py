@@ -34,7 +34,7 @@ from ptcc_certify.checker.input_formulas import (
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.protocol import Begin, check_sliding
 from ptcc_certify.checker.protocol import Protocol as Parameters
-from ptcc_certify.checker.reading import Interval, entries, exact, need
+from ptcc_certify.checker.reading import Interval, need
 
 Sizes = Mapping[int, Fraction]
 #: Stretches into which the time is cut while sliding variables move.
@@ -226,12 +226,12 @@ def check_drive(
         edges = ([(s, t, Fraction(high, mode.unit)) for s, t, _, _, high in mode.edges] for mode in family.modes)
         result = Drive.of(protocol.gains, sigma0, last_time(times, begin.sigma), list(edges))
     doc.at = "lyapunov.drives"
-    need((result is not None) == ("drives" in doc.data["lyapunov"]), "drives belong to sliding variables that move")
+    drives = doc.sections["lyapunov"].drives
+    need((result is None) == (drives is None), "drives belong to sliding variables that move")
     if result is not None:
-        for k, (V, text) in enumerate(
-            zip(functions, entries(doc.data["lyapunov"]["drives"], "drives", len(functions)), strict=True)
-        ):
+        need(len(drives) == len(functions), f"drives has not {len(functions)} entries")
+        for k, (V, drive) in enumerate(zip(functions, drives, strict=True)):
             doc.open("family-drive", f"lyapunov.functions[{k}]")
-            need(exact(text) >= result.constant(V), "what drives the function is not proved")
-            doc.done(f"c = {up(exact(text))}")
+            need(drive >= result.constant(V), "what drives the function is not proved")
+            doc.done(f"c = {up(drive)}")
     return result

@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 from lmi.exact.decimal_rounding import down
 from lmi.exact.numbers import common_denominator, integers, longest, sized
@@ -25,9 +25,27 @@ from ptcc_certify.checker.family_function import Scaled
 from ptcc_certify.checker.family_limits import WeightedMean
 from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import exact, fields, need
+from ptcc_certify.checker.reading import need
+from ptcc_certify.checker.sections import Vector
 
-KEYS = ("class", "component", "vector", "rate")
+
+@dataclass(frozen=True, kw_only=True)
+class SquaresSection:
+    """What the file says of a weighted sum of squares."""
+
+    class_: Literal["squares"]
+    component: int
+    vector: Vector
+    rate: Fraction
+
+
+@dataclass(frozen=True, kw_only=True)
+class FactorWitness:
+    """A sparse factor."""
+
+    factor: Any
+
+
 #: Bits of ``1/p``, which are rounded up, and products of short integers that a root costs, about.
 BITS, EACH_ROOT = 64, 300
 
@@ -129,20 +147,21 @@ class SquaresFunction(WeightedSquares):
     component: Component
 
 
-def check_squares(doc: Document, family: Family, component: Component, entry: Any, of: str) -> SquaresFunction:
+def check_squares(
+    doc: Document, family: Family, component: Component, entry: SquaresSection, of: str
+) -> SquaresFunction:
     """Verify a weighted sum of squares of a stable component."""
-    fields(entry, KEYS, "a Lyapunov function")
     need(component.behaviour == STABILITY, "a sum of squares where not all agents end at 0")
-    nodes, rate = component.nodes, exact(entry["rate"])
-    vector = doc.files.numbers(entry["vector"], "vector", len(nodes))
+    nodes, rate = component.nodes, entry.rate
+    vector = doc.files.numbers(entry.vector, "vector", len(nodes))
     need(vector.positive(), "the vector is not positive")
     own, scale = vector.over(range(len(nodes)))
     modes = [(edges, mode.unit) for edges, mode in zip(component.part.edges, family.modes, strict=True)]
     V = SquaresFunction(dict(zip(nodes, own, strict=True)), scale, rate, modes, component)
     for number, (edges, _) in enumerate(modes):
-        obligation = doc.open("family-squares", f"{of}.modes[{number}]", ["b"], witness=Any)
+        obligation = doc.open("family-squares", f"{of}.modes[{number}]", ["b"], witness=FactorWitness)
         need(obligation["b"] == rate, "b is not the rate")
-        section = fields(obligation["witness"], ("factor",), "the witness")["factor"]
+        section = obligation["witness"].factor
         factor, power = read_factor(doc, section, len(nodes))
         need(section["parents"] is None, "parents of no leader group")
         need(fits(len(edges) + len(nodes), LARGEST_FORM), "a component of too many edges")

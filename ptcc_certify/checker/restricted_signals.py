@@ -7,38 +7,118 @@ all members, and at a switch ``P_j <= ratio P_i`` bounds what it becomes.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Any, Literal
 
 from lmi.exact.decimal_rounding import down
 from lmi.exact.definite import Arithmetic
 from lmi.exact.elementary_enclosures import exp, log
 from lmi.exact.numbers import integers
 from lmi.exact.work import spend
-from ptcc_certify.checker.constant_weights import check_final_value, fitting_camps
+from ptcc_certify.checker.constant_weights import FinalValueSection, check_final_value, fitting_camps
 from ptcc_certify.checker.family import CONSENSUS, CONTAINMENT, INTERVAL, STABILITY, Component, Family
-from ptcc_certify.checker.family_function import decreases, quotient_of
+from ptcc_certify.checker.family_function import Multipliers, decreases, quotient_of
 from ptcc_certify.checker.family_limits import check_mean
 from ptcc_certify.checker.family_rows import Function
 from ptcc_certify.checker.graph import ordered, positions
 from ptcc_certify.checker.matrix_products import Matrix, combined, need_rows
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.protocol import Begin, Protocol
-from ptcc_certify.checker.reading import Interval, entries, exact, fields, interval, need, triangle
+from ptcc_certify.checker.reading import Interval, need
+from ptcc_certify.checker.sections import Ball, Nodes, NotNegative, Positive, Several, Some, Triangle
 
 #: Claims that are read.
 MANY_CLAIMS = 100
-RATE = ("claim", "signals", "component", "forms", "ratio", "rate", "bounded")
-LAST_MODE = ("claim", "signals", "component", "modes", "final_state")
-WINDOWS = ("claim", "signals", "component", "behaviour", "eta", "final_state")
-SHARES = ("claim", "signals", "component", "nodes", "form", "rate", "behaviour")
-SHARES_WITH_ENDS = (*SHARES, "final_state")
 #: Products of short integers that an edge of a claim costs, about.
 EACH_EDGE = 100
 #: Longest ratio, in bits, of which the logarithm is enclosed.
 RATIO_BITS = 4000
 
 Form = tuple[Matrix, int]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Dwell:
+    """A dwell time of modes, on a clock."""
+
+    dwell: Positive
+    clock: Literal["t", "s"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Windows:
+    """In every window every edge that may be on is on for some time."""
+
+    window: Positive
+    on: Positive
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shares:
+    """Shares of the clock that modes have."""
+
+    shares: Several[NotNegative]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RateSection:
+    """A rate for restricted signals."""
+
+    claim: Literal["rate"]
+    signals: Dwell | Literal["constant"]
+    component: int
+    forms: Several[Triangle] | None
+    ratio: Fraction
+    rate: Fraction
+    bounded: bool | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class LastModeSection:
+    """What each mode does where it is the last one, and where the agents end."""
+
+    claim: Literal["last mode"]
+    signals: Dwell | Literal["constant"]
+    component: int
+    modes: Several[str | None]
+    final_state: Some[Ball] | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class WindowsSection:
+    """What joint windows do."""
+
+    claim: Literal["windows"]
+    signals: Windows
+    component: int
+    behaviour: str
+    eta: Positive
+    final_state: Some[Ball] | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class SharesSection:
+    """What shares of the clock do; ``final_state`` where it is told."""
+
+    claim: Literal["shares"]
+    signals: Shares
+    component: int
+    nodes: Nodes
+    form: Triangle
+    rate: Fraction
+    behaviour: str | None
+    final_state: Some[Ball] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeanWitness:
+    """A mean that is kept: weights, or "equal"."""
+
+    mean: Any
+
+
+Section = RateSection | LastModeSection | WindowsSection | SharesSection | FinalValueSection
 
 
 def check_restricted(
@@ -51,75 +131,62 @@ def check_restricted(
     """Verify every claim for restricted signals."""
     if "restricted" not in doc.data:
         return
-    items = entries(doc.section("restricted"), "restricted")
+    items: Sequence[Section] = doc.section("restricted", Several[Section])
     need(0 < len(items) <= MANY_CLAIMS, f"no claim for restricted signals, or more than {MANY_CLAIMS}")
     gains, x = protocol.gains, None if begin.state is None else list(begin.state)
     need(not (begin.sigma and any(begin.sigma)), "restricted signals while sliding variables move")
-    classes = [entry.get("signals") if isinstance(entry, dict) else None for entry in items]
-    need(all(signals == classes[0] for signals in classes), "claims about different signals")
+    need(all(entry.signals == items[0].signals for entry in items), "claims about different signals")
     for k, entry in enumerate(items):
         doc.at = of = f"restricted[{k}]"
-        kind = entry.get("claim") if isinstance(entry, dict) else None
-        if kind == "final value":
-            check_final_value(doc, family, _component(family, entry.get("component")), x, entry, of)
+        component = family.component(entry.component)
+        if isinstance(entry, FinalValueSection):
+            check_final_value(doc, family, component, x, entry, of)
             continue
         need(not protocol.sliding, "restricted signals under the sliding-mode protocol")
-        if kind == "rate":
+        if isinstance(entry, RateSection):
             _check_rate(doc, family, functions, gains, entry, of)
-        elif kind == "last mode":
+        elif isinstance(entry, LastModeSection):
             _check_last_mode(doc, family, x, entry, of)
-        elif kind == "windows":
+        elif isinstance(entry, WindowsSection):
             _check_windows(doc, family, x, entry, of)
         else:
-            need(kind == "shares", "an unknown claim")
             _check_shares(doc, family, x, entry, of)
 
 
-def _component(family: Family, number: Any) -> Component:
-    need(type(number) is int and 0 <= number < len(family.components), "an unknown component")
-    return family.components[number]
-
-
-def _dwell(entry: Any) -> tuple[Fraction, str] | None:
-    """Return a dwell time and its clock; None: mode and weights never change."""
-    if entry == "constant":
-        return None
-    fields(entry, ("dwell", "clock"), "signals")
-    least, clock = exact(entry["dwell"]), entry["clock"]
-    need(least > 0 and clock in ("t", "s"), "a dwell time that is not positive, or of an unknown clock")
-    return least, clock
-
-
 def _check_rate(
-    doc: Document, family: Family, functions: Sequence[Function], gains: dict[str, Fraction], entry: Any, of: str
+    doc: Document,
+    family: Family,
+    functions: Sequence[Function],
+    gains: dict[str, Fraction],
+    entry: RateSection,
+    of: str,
 ) -> None:
-    fields(entry, RATE, "a claim")
-    component, dwell = _component(family, entry["component"]), _dwell(entry["signals"])
+    component, dwell = family.component(entry.component), entry.signals
     need(not component.depends and len(component.nodes) > 1, "a rate where nothing, or no common kernel, decays")
-    ratio, rate = exact(entry["ratio"]), exact(entry["rate"])
+    ratio, rate = entry.ratio, entry.rate
     forms: list[Form] = []
-    if entry["forms"] is None:
+    if entry.forms is None:
         own = [V.rate for V in functions if V.component is component]
         need(bool(own), "no function of this component")
         most = max(own)
     else:
-        forms, rates = _forms(doc, family, component, entry["forms"], of)
+        forms, rates = _forms(doc, family, component, entry.forms, of)
         most = min(rates)
     doc.open("restricted-rate", of)
-    need(ratio >= 1 and (bool(forms and dwell) or ratio == 1), "the ratio is not 1, or less")
-    if dwell is not None:
+    need(ratio >= 1 and (bool(forms and isinstance(dwell, Dwell)) or ratio == 1), "the ratio is not 1, or less")
+    if isinstance(dwell, Dwell):
         _check_ratio(doc.exact, forms, ratio)
-        if dwell[1] == "s" and ratio > 1:
+        if dwell.clock == "s" and ratio > 1:
             need(max(map(int.bit_length, ratio.as_integer_ratio())) <= RATIO_BITS, "a ratio that is too long")
-            most -= log(ratio)[1] / dwell[0]
+            most -= log(ratio)[1] / dwell.dwell
     need(rate <= most, "the rate is not proved")
     enough = rate * gains["rho2"] * gains["kappa"] >= 2
-    need(entry["bounded"] is (True if enough else None), "whether the input is bounded")
+    need(entry.bounded is (True if enough else None), "whether the input is bounded")
     doc.done(f"rate {down(rate)}" if rate > 0 else "nothing decays")
 
 
 def _forms(
-    doc: Document, family: Family, component: Component, section: Any, of: str
+    doc: Document, family: Family, component: Component, section: Sequence[Sequence[Sequence[Fraction]]], of: str
 ) -> tuple[list[Form], list[Fraction]]:
     """Verify the forms of all modes with their rates."""
     pivots = set(component.pivots.values())
@@ -127,10 +194,12 @@ def _forms(
     need(bool(nodes), "a form of no agents")
     need_rows(len(nodes))
     forms, rates = [], []
-    for k, lower in enumerate(entries(section, "forms", len(family.modes))):
-        form = integers(triangle(lower, len(nodes)))
+    need(len(section) == len(family.modes), f"forms has not {len(family.modes)} entries")
+    for k, rows in enumerate(section):
+        need(len(rows) == len(nodes), f"lower_triangle has not {len(nodes)} entries")
+        form = integers(rows)
         need(doc.exact.definite(form[0]), "P is not proved definite")
-        numbers = doc.open("family-rate", f"{of}.modes[{k}]", ["b"], witness=Any)
+        numbers = doc.open("family-rate", f"{of}.modes[{k}]", ["b"], witness=Multipliers | None)
         mode = quotient_of(family, k, component, nodes)
         decreases(doc.exact, mode, form, component.whole[1], numbers["b"], numbers["witness"])
         doc.done(f"b = {down(numbers['b'])}")
@@ -198,18 +267,18 @@ def mode_behaviour(family: Family, number: int, component: Component) -> str | N
     return INTERVAL if len(closed) == 1 else CONTAINMENT
 
 
-def _check_last_mode(doc: Document, family: Family, x: Sequence[Fraction] | None, entry: Any, of: str) -> None:
+def _check_last_mode(
+    doc: Document, family: Family, x: Sequence[Fraction] | None, entry: LastModeSection, of: str
+) -> None:
     """Verify what each mode does to a component where it is the last one, and where the agents end."""
-    fields(entry, LAST_MODE, "a claim")
-    component, dwell = _component(family, entry["component"]), _dwell(entry["signals"])
+    component, dwell = family.component(entry.component), entry.signals
     need(component.depends, "every signal does the same")
-    need(dwell is None or dwell[1] == "t", "modes that may change for ever")
+    need(not isinstance(dwell, Dwell) or dwell.clock == "t", "modes that may change for ever")
     doc.open("last-mode", of)
     spend(EACH_EDGE * sum(1 + len(edges) for edges in component.part.edges), what="restricted signals")
-    behaviours = entries(entry["modes"], "modes", len(family.modes))
     known = [mode_behaviour(family, k, component) for k in range(len(family.modes))]
-    need(behaviours == known, "another behaviour of a mode")
-    section = entry["final_state"]
+    need(entry.modes == known, "another behaviour of a mode")
+    section = entry.final_state
     need((section is None) == (x is None), "final states are claimed iff there is an initial state")
     if x is not None:
         edges = {edge[:3] for some in component.part.edges for edge in some}
@@ -289,12 +358,10 @@ def contraction_below(largest: Fraction, least: Fraction, window: Fraction, on: 
     return exp(-largest * window)[0] * min(Fraction(1), on * least)
 
 
-def _check_windows(doc: Document, family: Family, x: Sequence[Fraction] | None, entry: Any, of: str) -> None:
+def _check_windows(doc: Document, family: Family, x: Sequence[Fraction] | None, entry: WindowsSection, of: str) -> None:
     """Verify what joint windows do, and the contraction in as many as there are nodes."""
-    fields(entry, WINDOWS, "a claim")
-    component, signals = _component(family, entry["component"]), fields(entry["signals"], ("window", "on"), "signals")
-    window, on, eta = exact(signals["window"]), exact(signals["on"]), exact(entry["eta"])
-    need(0 < on <= window, "a window, or the part of it in which an edge is on")
+    component, window, on, eta = family.component(entry.component), entry.signals.window, entry.signals.on, entry.eta
+    need(on <= window, "a window, or the part of it in which an edge is on")
     need(component.depends, "every signal does the same")
     doc.open("joint-windows", of)
     spend(EACH_EDGE * sum(1 + len(edges) for edges in component.part.edges), what="restricted signals")
@@ -310,15 +377,15 @@ def _check_windows(doc: Document, family: Family, x: Sequence[Fraction] | None, 
     groups = closed_groups(component.nodes, on_edges)
     consensus = part.camps is not None and len(groups) == 1
     need(consensus or not any(balanced for _, balanced in groups), "nothing follows from these windows")
-    need(entry["behaviour"] == (CONSENSUS if consensus else STABILITY), "another behaviour")
-    need(0 < eta <= contraction_below(max(sums), min(weights), window, on), "the contraction is not proved")
-    section = entry["final_state"]
+    need(entry.behaviour == (CONSENSUS if consensus else STABILITY), "another behaviour")
+    need(eta <= contraction_below(max(sums), min(weights), window, on), "the contraction is not proved")
+    section = entry.final_state
     need((section is None) == (x is None), "final states are claimed iff there is an initial state")
     if x is not None:
         every = {edge[:3] for edges in part.edges for edge in edges}
         bounds = agreed_bounds(component.nodes, every, x, part.camps if consensus else None)
         _check_intervals(family, component, section, bounds)
-    doc.done(entry["behaviour"])
+    doc.done(entry.behaviour)
 
 
 def agreed_bounds(
@@ -339,10 +406,12 @@ def agreed_bounds(
     return {v: (low, high) if camps[v] > 0 else (-high, -low) for v in nodes}
 
 
-def _check_intervals(family: Family, component: Component, section: Any, bounds: Mapping[int, Interval]) -> None:
+def _check_intervals(
+    family: Family, component: Component, section: Mapping[str, Interval] | None, bounds: Mapping[int, Interval]
+) -> None:
     labels = [family.labels[v] for v in component.nodes]
     for v, end in zip(component.nodes, ordered(labels, section, "final_state").values(), strict=True):
-        middle, radius = interval(end)
+        middle, radius = end
         low, high = bounds[v]
         need(middle - radius <= low and high <= middle + radius, "a final state is not enclosed")
 
@@ -350,14 +419,12 @@ def _check_intervals(family: Family, component: Component, section: Any, bounds:
 # ---------------------------------------------------------------------- shares of the clock
 
 
-def _check_shares(doc: Document, family: Family, x: Sequence[Fraction] | None, entry: Any, of: str) -> None:
+def _check_shares(doc: Document, family: Family, x: Sequence[Fraction] | None, entry: SharesSection, of: str) -> None:
     """Verify one form for all modes, of which each has a rate of its own, and the mean of these rates."""
-    told = isinstance(entry, dict) and "final_state" in entry
-    fields(entry, SHARES_WITH_ENDS if told else SHARES, "a claim")
-    part = _component(family, entry["component"]).part
-    shares = [exact(x) for x in entries(fields(entry["signals"], ("shares",), "signals")["shares"], "shares")]
-    need(len(shares) == len(family.modes) and min(shares) >= 0 and sum(shares) == 1, "shares of the modes")
-    nodes = positions(doc, family.modes[0].structure.graph, entry["nodes"], "nodes of a form")
+    told, shares = entry.final_state is not None, entry.signals.shares
+    part = family.component(entry.component).part
+    need(len(shares) == len(family.modes) and sum(shares) == 1, "shares of the modes")
+    nodes = positions(doc, family.modes[0].structure.graph, entry.nodes, "nodes of a form")
     pivots = [v for v in part.nodes if v not in set(nodes)]
     need(bool(nodes) and set(nodes) <= set(part.nodes) and nodes == sorted(set(nodes)), "nodes of a form")
     if pivots:
@@ -368,28 +435,34 @@ def _check_shares(doc: Document, family: Family, x: Sequence[Fraction] | None, e
     else:
         common = Component(part, STABILITY, {v: {} for v in part.nodes}, {})
     need_rows(len(nodes))
-    form = integers(triangle(entry["form"], len(nodes)))
+    need(len(entry.form) == len(nodes), f"lower_triangle has not {len(nodes)} entries")
+    form = integers(entry.form)
     need(doc.exact.definite(form[0]), "P is not proved definite")
     mean = Fraction(0)
     for k, share in enumerate(shares):
-        numbers = doc.open("family-rate", f"{of}.modes[{k}]", ["b"], witness=Any)
+        numbers = doc.open("family-rate", f"{of}.modes[{k}]", ["b"], witness=Multipliers | None)
         decreases(
             doc.exact, quotient_of(family, k, common, nodes), form, common.whole[1], numbers["b"], numbers["witness"]
         )
         mean += share * numbers["b"]
         doc.done(f"b = {down(numbers['b'])}" if numbers["b"] > 0 else "nothing decays")
-    witness = doc.open("clock-shares", of, witness=Any if told else None)["witness"]
-    rate = exact(entry["rate"])
+    witness = doc.open("clock-shares", of, witness=MeanWitness | None if told else None)["witness"]
+    rate = entry.rate
     need(rate <= mean, "the rate is not proved")
-    need(entry["behaviour"] == (common.behaviour if rate > 0 else None), "another behaviour")
+    need(entry.behaviour == (common.behaviour if rate > 0 else None), "another behaviour")
     if told:
         need(x is not None and rate > 0, "a final state where none is known")
-        _check_share_ends(doc, family, common, x or [], entry["final_state"], witness)
+        _check_share_ends(doc, family, common, x or [], entry.final_state, witness)
     doc.done(f"rate {down(rate)}" if rate > 0 else "nothing decays")
 
 
 def _check_share_ends(
-    doc: Document, family: Family, common: Component, x: Sequence[Fraction], section: Any, witness: Any
+    doc: Document,
+    family: Family,
+    common: Component,
+    x: Sequence[Fraction],
+    section: Mapping[str, Interval] | None,
+    witness: MeanWitness | None,
 ) -> None:
     """Verify where agents end: at 0, at one value up to camps that a kept mean tells, or within all their bounds."""
     part = common.part
@@ -399,7 +472,6 @@ def _check_share_ends(
         bounds = agreed_bounds(part.nodes, every, x, part.camps if common.behaviour == CONSENSUS else None)
     else:
         need(common.behaviour == CONSENSUS, "a mean of agents that end at 0")
-        mean = fields(witness, ("mean",), "a witness")["mean"]
-        value = check_mean(doc, family, common, part.nodes, 1, mean, x)
+        value = check_mean(doc, family, common, part.nodes, 1, witness.mean, x)
         bounds = {v: (row[1] * value, row[1] * value) for v, row in common.kernel.items()}
     _check_intervals(family, common, section, bounds)

@@ -36,6 +36,8 @@ Agents: TypeAlias = Annotated[Numbers, "by agent"]
 FewAgents: TypeAlias = Annotated[Numbers, "by agent", "no file"]
 #: Anything else of each agent, or of each follower, by label.
 ByAgent = Annotated[Sequence[T], "by agent"]
+#: Anything of some agents, by label.
+Some = Annotated[Mapping[str, T], "by some agents"]
 ByFollower = Annotated[Sequence[T], "by follower"]
 #: A list.
 Several = Annotated[Sequence[T], "a list"]
@@ -146,8 +148,13 @@ def _alternative(kinds: Sequence[Any], value: Any, at: Context, what: str) -> An
     rest = [kind for kind in kinds if kind is not _NONE]
     if value is None and len(rest) < len(kinds):
         return None
-    fitting = [kind for kind in rest if (kind is Fraction) == isinstance(value, str) and _has_words(kind, value)]
+    fitting = [kind for kind in rest if _is_text(kind) == isinstance(value, str) and _has_words(kind, value)]
     return read((fitting or rest)[0], value, at, what)
+
+
+def _is_text(kind: Any) -> bool:
+    """Tell whether JSON has a text for it."""
+    return kind in (Fraction, str) or get_origin(kind) is Literal
 
 
 def _has_words(kind: Any, value: Any) -> bool:
@@ -186,6 +193,9 @@ def _annotated(kind: Any, value: Any, at: Context, what: str) -> Any:
         return at.files.integers(value, what, len(at.followers))
     if note == "ends by agent":
         return _ends(value, at, what)
+    if note == "by some agents":
+        need(isinstance(value, dict) and all(label in at.index for label in value), f"{what}: an unknown node")
+        return {label: read(get_args(inner)[1], x, at, what) for label, x in value.items()}
     labels = at.followers if note == "by follower" else at.labels
     if inner is Numbers and beside(value):
         need(len(get_args(kind)) == 2, f"{what} in a side file")
