@@ -32,8 +32,10 @@ from ptcc_certify.certificate.format_messages import late_obligations
 from ptcc_certify.certificate.format_vectors import final_state_witness
 from ptcc_certify.certificate.request import Expectations, Request
 from ptcc_certify.checker import INPUT_NODES, CheckReport
+from ptcc_certify.checker.final_state import AgentsVector
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
 from ptcc_certify.checker.quadratic_form import Form
+from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.errors import ParameterError, PTCCError, SimulationError, gated
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.size_limits import EXACT_NODES
@@ -564,11 +566,11 @@ class Content:
         """What the proof needs besides the claims: obligations with numbers or a witness, in any order."""
         obligations = []
         if self.influence.exact:
-            obligations.append(
-                Obligation("final-state", "graph", witness=final_state_witness(self.structure, self.influence))
-            )
+            u = final_state_witness(self.structure, self.influence)
+            obligations.append(Obligation("final-state", "graph", witness=u and AgentsVector(u=Numbers(u))))
         elif self.influence.enclosure is not None:
-            obligations.append(Obligation("final-state", "graph", witness=self.influence.enclosure.witness))
+            above = AgentsVector(u=Numbers(self.influence.enclosure.witness))
+            obligations.append(Obligation("final-state", "graph", witness=above))
         obligations += self.proof.obligations if self.proof.rate is not None else ()
         for V in self.functions:
             if V.kind != "paper":
@@ -577,8 +579,8 @@ class Content:
             if V.matrix is not None:
                 obligations.append(Obligation("overshoot", V.name, {"lowest": V.lowest, "highest": V.highest}))
         if self.limit is not None:
-            witness = self.limit.witness(self.graph.labels)
-            obligations.append(Obligation(self.limit.kind, "rates", {"upper_bound": self.limit.value}, witness))
+            bound = {"upper_bound": self.limit.value}
+            obligations.append(Obligation(self.limit.kind, "rates", bound, self.limit.witness))
         if self.effort is not None:
             obligations += self.effort.obligations
         if self.agents is not None:

@@ -31,20 +31,25 @@ from ptcc_certify.certificate.format_vectors import (
     Writer,
     factor_entry,
     finite,
-    number,
+    fractions,
     text,
 )
 from ptcc_certify.certificate.request import Expectations, Request
 from ptcc_certify.certificate.write_sections import write
 from ptcc_certify.checker import SCHEMA, SLIDING_BOUND, SLIDING_CLOCK, CheckReport
 from ptcc_certify.checker.agent_decrease import PhaseSection
+from ptcc_certify.checker.final_state import FormationSection, InfluenceSection
 from ptcc_certify.checker.input import EnergyWitness, InputSection
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
 from ptcc_certify.checker.leaders import LeadersSection
+from ptcc_certify.checker.lyapunov import DeviationSection, FunctionSection
 from ptcc_certify.checker.messages import MessagesSection
-from ptcc_certify.checker.protocol import ReachingTimes
-from ptcc_certify.checker.reading import RejectedError, exact, triangle
+from ptcc_certify.checker.protocol import NominalSection, ReachingTimes, SlidingSection
+from ptcc_certify.checker.rates import MeanWitness, OvershootSection, RatesSection
+from ptcc_certify.checker.reading import RejectedError, exact
 from ptcc_certify.checker.sections import Several
+from ptcc_certify.checker.side_files import Numbers
+from ptcc_certify.checker.theorem_function import BlockSection, PaperSection, RhoInterval
 from ptcc_certify.errors import one_line
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import Structure, analyse, behaviour_name
@@ -73,20 +78,15 @@ def certificate_document(
         "protocol": protocol_section(
             content.protocol, None if run is None or run.sliding is None else run.sliding.source
         ),
-        "paper": _write_paper(content),
+        "paper": write(PaperSection, paper_section(content), Writer(graph.labels)),
         "lyapunov": {"functions": [_write_function(V, out) for V in content.functions]},
-        "rates": {
-            "paper": text(content.paper_rate),
-            "diagonal": text(content.diagonal_rate),
-            "proved": text(content.rate),
-            "upper_bound": text(content.upper_bound),
-        },
-        "overshoot": _write_overshoot(content),
+        "rates": write(RatesSection, _rates(content), out),
+        "overshoot": write(OvershootSection, _overshoot(content), out),
         "initial_state": out.state("start", content.initial_state),
         "sliding_variable": out.state("sigma", content.sigma0),
-        "influence": influence,
+        "influence": write(InfluenceSection, influence, out),
         "final_state": final,
-        "reaching_time": reaching_section(graph.labels, content.reaching),
+        "reaching_time": write(ReachingTimes, reaching_section(content.reaching), out),
         "input": write(InputSection | None, effort_section(content.effort, graph.n_nodes), out),
         "proof": [],
         "verdict": "",
@@ -97,7 +97,7 @@ def certificate_document(
         if phases := phases_section(content.agents):
             document["phases"] = write(Several[PhaseSection], phases, out)
     if content.offsets is not None:
-        document["formation"] = formation_section(content, content.offsets, final, out)
+        document["formation"] = write(FormationSection, formation_section(content, content.offsets, final), out)
     if content.late is not None and content.late.says_something:
         document["messages"] = write(MessagesSection, messages_section(content.late), out)
     if content.tracking is not None:
@@ -113,18 +113,23 @@ def read_document(
 ) -> dict[str, Any]:
     """Return the fields of a certificate that was accepted; the structure is computed anew from the edges."""
     graph = certificate_graph(document, files)
-    structure, protocol, data = analyse(graph), read_protocol(document["protocol"]), Reader(graph.labels, files)
-    proof = tuple(_read_obligation(step) for step in document["proof"])
-    steps = {(step.kind, step.of): step for step in proof}
-    paper, functions = document["paper"], document["lyapunov"]["functions"]
+    structure, protocol, data = analyse(graph), read_protocol(report.sections["protocol"]), Reader(graph.labels, files)
+    sections, proved = report.sections, report.proved
+    paper: PaperSection | None = sections["paper"]
     functions = [
-        _read_function(f"lyapunov.functions[{k}]", section, structure, data, steps)
-        for k, section in enumerate(functions)
+        _read_function(f"lyapunov.functions[{k}]", section, structure, data, proved)
+        for k, section in enumerate(sections["lyapunov"].functions)
     ]
-    lyapunov = next((replace(V, objective=paper["objective"]) for V in functions if V.kind == "paper"), None)
-    initial_state, rho, relative = data.state(document["initial_state"]), None, document["final_state"] is None
-    if paper is not None and paper["rho_interval"] is not None:
-        rho = ExactInterval(*(number(paper["rho_interval"][key]) for key in ("printed", "exact")))
+    lyapunov = next((replace(V, objective=paper.objective) for V in functions if paper and V.kind == "paper"), None)
+    initial_state, relative = fractions(sections["initial_state"]), sections["final_state"] is None
+    rho = None
+    if paper is not None and paper.rho_interval is not None:
+        rho = ExactInterval(paper.rho_interval.printed, paper.rho_interval.exact)
+    obligations = tuple(
+        Obligation(kind, of, {key: x for key, x in step.items() if key != "witness"})
+        for (kind, of), step in proved.items()
+        if of.split(".")[0] == "paper"
+    )
     effort = read_effort(report, structure, protocol, initial_state)
     request = _read_request(document["unverified"], None if effort is None else effort.initial_set)
     request = replace(request, **read_unproved(document, structure))
@@ -132,15 +137,13 @@ def read_document(
         "structure": structure,
         "protocol": protocol,
         "initial_state": initial_state,
-        "sigma0": data.state(document["sliding_variable"]),
+        "sigma0": fractions(sections["sliding_variable"]),
         "reaching": read_reaching(report.sections.get("reaching_time"), protocol),
         "lyapunov": lyapunov,
-        "proof": RateProof(
-            None if lyapunov is None else lyapunov.rate, tuple(o for o in proof if o.of.split(".")[0] == "paper"), rho
-        ),
+        "proof": RateProof(None if lyapunov is None else lyapunov.rate, obligations, rho),
         "searched_functions": tuple(V for V in functions if V.kind != "paper"),
-        "limit": _read_limit(steps, data),
-        "final_state": read_final_state(document, structure, data),
+        "limit": _read_limit(proved, data),
+        "final_state": read_final_state(report, structure),
         "matrix": None,
         "late": read_late(report, structure, protocol, relative)
         or nothing_proved(request, structure, protocol, initial_state is None),
@@ -149,7 +152,7 @@ def read_document(
         "observed": _read_observations(document["unverified"]),
         "source": Source(path, sha256, document, report, effort, files),
         "agents": read_agents(report, structure, protocol, functions),
-        "offsets": data.state(document["formation"]["offsets"]) if "formation" in document else None,
+        "offsets": tuple(sections["formation"].offsets) if "formation" in sections else None,
     }
 
 
@@ -169,19 +172,16 @@ def protocol_section(protocol: Protocol, disturbance: str | None) -> dict[str, A
     return section if protocol.reaching is None else {**section, "disturbance": disturbance}
 
 
-def read_protocol(section: Mapping[str, Any]) -> Protocol:
+def read_protocol(section: NominalSection | SlidingSection) -> Protocol:
     """Return the protocol of an accepted certificate."""
-    parameters = {key: value for key, value in section.items() if key != "disturbance"}
-    return Protocol.from_dict({key: value if key == "kind" else exact(value) for key, value in parameters.items()})
+    return Protocol.from_dict({key: value for key, value in vars(section).items() if key != "disturbance"})
 
 
-def reaching_section(labels: Sequence[str], reaching: Sequence[ReachingTime] | None) -> dict[str, Any] | None:
+def reaching_section(reaching: Sequence[ReachingTime] | None) -> ReachingTimes | None:
     """Return proved reaching times as files have them."""
     if reaching is None:
         return None
-    times = ReachingTimes(bound=SLIDING_BOUND, clock=SLIDING_CLOCK, z=[r.z for r in reaching])
-    section: dict[str, Any] = write(ReachingTimes, times, Writer(labels))
-    return section
+    return ReachingTimes(bound=SLIDING_BOUND, clock=SLIDING_CLOCK, z=[r.z for r in reaching])
 
 
 def read_reaching(section: ReachingTimes | None, protocol: Protocol) -> tuple[ReachingTime, ...] | None:
@@ -194,100 +194,103 @@ def read_reaching(section: ReachingTimes | None, protocol: Protocol) -> tuple[Re
 # ---------------------------------------------------------------------- Lyapunov functions
 
 
-def _write_paper(content: Content) -> dict[str, Any] | None:
-    """Write the row of the theorem: its Lyapunov function, whether a rate of it was proved or not."""
+def paper_section(content: Content) -> PaperSection | None:
+    """Return the row of the theorem: its Lyapunov function, whether a rate of it was proved or not."""
     V, interval = content.lyapunov, content.proof.interval
     if V is None:
         return None
-    return {
-        "theorem": content.theorem.number,
-        "objective": V.objective,
-        "coordinates": V.coordinates,
-        "blocks": [_write_block(block, Writer(content.graph.labels)) for block in V.blocks],
-        "rho": text(V.rho),
-        "rho_interval": interval and {"printed": text(interval.printed), "exact": text(interval.exact)},
-        "rate": text(V.rate),
-        "overshoot": format_exact(V.overshoot) if V.blocks else None,
-    }
+    coordinates: Any = V.coordinates
+    return PaperSection(
+        theorem=content.theorem.number,
+        objective=V.objective,
+        coordinates=coordinates,
+        blocks=list(map(_block, V.blocks)),
+        rho=V.rho,
+        rho_interval=None if interval is None else RhoInterval(printed=interval.printed, exact=interval.exact),
+        rate=V.rate,
+        overshoot=V.overshoot if V.blocks else None,
+    )
+
+
+def _rates(content: Content) -> RatesSection:
+    rates = content.paper_rate, content.diagonal_rate, content.rate, content.upper_bound
+    return RatesSection(**dict(zip(("paper", "diagonal", "proved", "upper_bound"), rates, strict=True)))
 
 
 def _write_function(V: LyapunovFunction, out: Writer) -> dict[str, Any]:
     where = Writer(out.labels) if V.kind == "paper" else out  # as the section "paper" has it
-    deviation = V.deviation and {
-        "agents": dict(zip(out.labels, map(format_exact, V.deviation.agents), strict=True)),
-        "norm": format_exact(V.deviation.norm),
-    }
-    return {
-        "class": V.kind,
-        "coordinates": V.coordinates,
-        "blocks": [_write_block(block, where) for block in V.blocks],
-        "rho": text(V.rho),
-        "rate": text(V.rate),
-        "overshoot": format_exact(V.overshoot),
-        "deviation": deviation,
-    }
+    section: dict[str, Any] = write(FunctionSection, _function(V), where)
+    return section
+
+
+def _function(V: LyapunovFunction) -> FunctionSection:
+    bound, words = V.deviation, dict[str, Any](class_=V.kind, coordinates=V.coordinates)
+    return FunctionSection(
+        **words,
+        blocks=list(map(_block, V.blocks)),
+        rho=V.rho,
+        rate=V.proved_rate,
+        overshoot=V.overshoot,
+        deviation=None if bound is None else DeviationSection(agents=Numbers(bound.agents), norm=bound.norm),
+    )
+
+
+def _block(block: LyapunovBlock) -> BlockSection:
+    diagonal = block.diagonal if block.dyadic is None else block.dyadic
+    return BlockSection(
+        name=block.name,
+        nodes=block.nodes,
+        diagonal=diagonal if block.matrix is None else None,
+        lower_triangle=block.matrix,
+        times_rho=block.times_rho,
+    )
 
 
 def _read_function(
-    name: str,
-    section: Mapping[str, Any],
-    structure: Structure,
-    data: Reader,
-    steps: Mapping[tuple[str, str], Obligation],
+    name: str, section: FunctionSection, structure: Structure, data: Reader, proved: Mapping[tuple[str, str], Any]
 ) -> LyapunovFunction:
-    bound, full, rows = section["deviation"], steps.get(("overshoot", name)), steps.get(("dominance", name))
-    blocks = tuple(_read_block(block, data, rows is not None) for block in section["blocks"])
-    gauge = structure.closed_components[0].gauge if section["coordinates"] == "eps" else ()
+    bound, full, rows = section.deviation, proved.get(("overshoot", name)), proved.get(("dominance", name))
+    blocks = tuple(_read_block(block, data, rows is not None) for block in section.blocks)
+    gauge = structure.closed_components[0].gauge if section.coordinates == "eps" else ()
     return LyapunovFunction(
-        section["class"],
-        section["coordinates"],
+        section.class_,
+        section.coordinates,
         blocks,
-        number(section["rho"]),
-        number(section["rate"]),
-        None if full is None else (full.numbers["lowest"], full.numbers["highest"]),
+        section.rho,
+        section.rate,
+        None if full is None else (full["lowest"], full["highest"]),
         gauge or (),
-        dominance=None if rows is None else Dominance(data.floats(rows.witness["vector"], len(blocks[0].nodes))),
-        deviation=None if bound is None else DeviationBound(data.agents(bound["agents"]), exact(bound["norm"])),
+        dominance=None if rows is None else Dominance(data.floats(rows["witness"]["vector"], len(blocks[0].nodes))),
+        deviation=None if bound is None else DeviationBound(tuple(bound.agents), bound.norm),
         name=name,
     )
 
 
-def _write_block(block: LyapunovBlock, out: Writer) -> dict[str, Any]:
-    section: dict[str, Any] = {"name": block.name, "nodes": out.nodes(block.nodes)}
-    if block.matrix is not None:
-        section["lower_triangle"] = [[format_exact(x) for x in row[: i + 1]] for i, row in enumerate(block.matrix)]
-    elif block.dyadic is not None:
-        section["diagonal"] = out.floats("diagonal", block.dyadic)
-    else:
-        section["diagonal"] = [format_exact(w) for w in block.diagonal]
-    return {**section, "times_rho": block.times_rho}
-
-
-def _read_block(section: Mapping[str, Any], data: Reader, large: bool) -> LyapunovBlock:
-    nodes = data.nodes(section["nodes"])
-    if "lower_triangle" in section:
-        return LyapunovBlock(section["name"], nodes, matrix=triangle(section["lower_triangle"], len(nodes)))
+def _read_block(section: BlockSection, data: Reader, large: bool) -> LyapunovBlock:
+    nodes = data.nodes(section.nodes)
+    if section.lower_triangle is not None:
+        return LyapunovBlock(section.name, nodes, matrix=list(map(list, section.lower_triangle)))
     if large:
-        return LyapunovBlock(section["name"], nodes, dyadic=data.floats(section["diagonal"], len(nodes)))
-    return LyapunovBlock(section["name"], nodes, tuple(map(exact, section["diagonal"])), section["times_rho"])
+        return LyapunovBlock(section.name, nodes, dyadic=data.floats(section.diagonal, len(nodes)))
+    return LyapunovBlock(section.name, nodes, tuple(map(exact, section.diagonal or ())), section.times_rho)
 
 
-def _write_overshoot(content: Content) -> dict[str, Any] | None:
+def _overshoot(content: Content) -> OvershootSection | None:
     if content.rate is None:
         return None
     V = content.fastest
-    return {"value": format_exact(V.overshoot), "of": f"||{V.coordinates}||^2"}
+    return OvershootSection(value=V.overshoot, of=f"||{V.coordinates}||^2")
 
 
-def _read_limit(steps: Mapping[tuple[str, str], Obligation], data: Reader) -> RateBound | None:
-    step = steps.get(("rate-upper-bound", "rates")) or steps.get(("rate-mean", "rates"))
+def _read_limit(proved: Mapping[tuple[str, str], Any], data: Reader) -> RateBound | None:
+    step = proved.get(("rate-upper-bound", "rates")) or proved.get(("rate-mean", "rates"))
     if step is None:
         return None
-    value, section = step.numbers["upper_bound"], step.witness
-    if "node" in section:
-        return RateBound(value, data.nodes([section["node"]]))
-    form, vectors = triangle(section["lower_triangle"], len(section["nodes"])), section["vectors"]
-    return RateBound(value, data.nodes(section["nodes"]), form, tuple(tuple(map(exact, vector)) for vector in vectors))
+    value, witness = step["upper_bound"], step["witness"]
+    if isinstance(witness, MeanWitness):
+        return RateBound(value, (witness.node,))
+    vectors = tuple(map(tuple, witness.vectors))
+    return RateBound(value, data.nodes(witness.nodes), witness.lower_triangle, vectors)
 
 
 # ---------------------------------------------------------------------- proof
@@ -304,17 +307,7 @@ def _write_obligation(obligation: Obligation, out: Writer) -> dict[str, Any]:
         elif isinstance(witness, Peak):
             witness = peak_witness(witness)
         witness = write(type(witness), witness, out)
-    elif isinstance(witness, tuple):
-        witness = {"u": dict(zip(out.labels, map(format_exact, witness), strict=True))}
-    elif isinstance(witness, np.ndarray):
-        by_label = zip(out.labels, map(float.hex, witness.tolist()), strict=True)
-        witness = {"u": out.vector("u", witness) if out.aside(witness.size) else dict(by_label)}
     return {"numbers": {name: format_exact(value) for name, value in obligation.numbers.items()}, "witness": witness}
-
-
-def _read_obligation(section: Mapping[str, Any]) -> Obligation:
-    numbers = {name: exact(value) for name, value in section["numbers"].items()}
-    return Obligation(section["kind"], section["of"], numbers, section["witness"])
 
 
 def _dominance_witness(proof: Dominance, out: Writer) -> dict[str, Any]:

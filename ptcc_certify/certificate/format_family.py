@@ -29,9 +29,11 @@ from ptcc_certify.certificate.format_restricted import claim_entry, claim_steps,
 from ptcc_certify.certificate.format_upper_bound import upper_bound_entry
 from ptcc_certify.certificate.format_vectors import Writer
 from ptcc_certify.certificate.restricted_claims import Claim
+from ptcc_certify.certificate.write_sections import write
 from ptcc_certify.checker import NOT_OF_FAMILIES, SCHEMA, CheckReport
 from ptcc_certify.checker.family import THEOREM
 from ptcc_certify.checker.family_limits import EQUAL
+from ptcc_certify.checker.protocol import ReachingTimes
 from ptcc_certify.checker.reading import exact
 from ptcc_certify.checker.side_files import SideFiles
 from ptcc_certify.graphs.digraph import Weights
@@ -62,7 +64,7 @@ def family_document(
         | ({} if drives is None else {"drives": list(map(format_exact, drives))}),
         "initial_state": out.state("start", certificate.initial_state),
         "sliding_variable": out.state("sigma", certificate.sigma0),
-        "reaching_time": reaching_section(labels, certificate.reaching),
+        "reaching_time": write(ReachingTimes, reaching_section(certificate.reaching), out),
         "final_state": None
         if finals is None
         else {label: None if ends is None else enclosed(*ends) for label, ends in zip(labels, finals, strict=True)},

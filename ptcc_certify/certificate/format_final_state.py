@@ -13,49 +13,46 @@ from ptcc_certify.certificate.certificate_data import Content
 from ptcc_certify.certificate.format_vectors import (
     LONG,
     Interval,
-    Reader,
     Writer,
     agents_ends,
     exact_or_ball,
     influence_balls,
     interval_text,
+    numbers,
 )
-from ptcc_certify.checker.reading import interval
-from ptcc_certify.checker.side_files import beside
+from ptcc_certify.checker.final_state import FormationSection, InfluenceSection, LeftNullVector
+from ptcc_certify.checker.obligations import CheckReport
+from ptcc_certify.checker.reading import exact, interval
+from ptcc_certify.checker.side_files import Numbers, beside
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import Structure
 
 
-def final_state_sections(content: Content, out: Writer) -> tuple[dict[str, Any] | None, dict[str, Any] | None]:
-    """Write the influence of every leader, and the final state, exact or in balls; None if they are floating point."""
+def final_state_sections(content: Content, out: Writer) -> tuple[InfluenceSection | None, dict[str, Any] | None]:
+    """Return the influence of every leader, and the final state, exact or in balls; None if they are floating point."""
     if content.influence.exact:
         return _exact_final_state(content)
     return (None, None) if content.influence.enclosure is None else _enclose_final_state(content, out)
 
 
-def _exact_final_state(content: Content) -> tuple[dict[str, Any], dict[str, Any] | None]:
-    matrix, structure, labels = content.influence, content.structure, content.graph.labels
+def _exact_final_state(content: Content) -> tuple[InfluenceSection, dict[str, Any] | None]:
+    matrix, labels = content.influence, content.graph.labels
     left_null_vectors, containment_weights = influence_balls(matrix)
-    followers = structure.followers.tolist()
     ends: dict[str, Any] | None = None
     if content.final_state is not None and content.initial_state is not None:
         sigma0 = content.sigma0 or [Fraction(0)] * len(labels)
         first = [x - s for x, s in zip(content.initial_state, sigma0, strict=True)]
         ends = dict(zip(labels, _exact_texts(matrix, first), strict=True))
-    section = {
-        "components": [
-            {"nodes": [labels[v] for v in c.nodes], "left_null_vector": [interval_text(w) for w in null_vector]}
-            for c, null_vector in zip(matrix.balanced, left_null_vectors, strict=True)
-        ],
-        "containment_weights": {
-            labels[v]: [interval_text(w) for w in row] for v, row in zip(followers, containment_weights, strict=True)
-        },
-        "degenerate": None if ends is None else list(content.degenerate),
-    }
+    groups = zip(matrix.balanced, left_null_vectors, strict=True)
+    section = InfluenceSection(
+        components=[LeftNullVector(nodes=c.nodes, left_null_vector=null_vector) for c, null_vector in groups],
+        containment_weights=containment_weights,
+        degenerate=None if ends is None else list(content.degenerate),
+    )
     return section, ends
 
 
-def _enclose_final_state(content: Content, out: Writer) -> tuple[dict[str, Any], dict[str, Any] | None]:
+def _enclose_final_state(content: Content, out: Writer) -> tuple[InfluenceSection, dict[str, Any] | None]:
     """Write the final state of a large graph: left null vectors of leader groups, and its intervals."""
     labels, matrix, final_state = content.graph.labels, content.influence, content.final_state
     assert matrix.enclosure is not None
@@ -71,34 +68,30 @@ def _enclose_final_state(content: Content, out: Writer) -> tuple[dict[str, Any],
             final = dict(zip(labels, _texts(final_state), strict=True))
     groups = []
     for k, (component, null_vector) in enumerate(matrix.groups):
+        if len(component.nodes) == 1:
+            continue
+        values: Sequence[Interval] = [(Fraction(w), Fraction(0)) for w in null_vector]
         if k in matrix.enclosure.left_null_vectors:
-            middles, radii = (x.tolist() for x in matrix.enclosure.left_null_vectors[k])
-            left_null_vector: list[Any] = [
-                {"mid": repr(x), "radius": repr(r)} for x, r in zip(middles, radii, strict=True)
-            ]
-        else:
-            left_null_vector = [exact_or_ball(Fraction(w)) for w in null_vector]
-        if len(component.nodes) > 1:
-            groups.append({"nodes": [labels[v] for v in component.nodes], "left_null_vector": left_null_vector})
+            pairs = zip(*(x.tolist() for x in matrix.enclosure.left_null_vectors[k]), strict=True)
+            values = [(exact(repr(x)), exact(repr(r))) for x, r in pairs]
+        groups.append(LeftNullVector(nodes=component.nodes, left_null_vector=values))
     degenerate = None if final_state is None else list(final_state.degenerate)
-    return {"components": groups, "containment_weights": None, "degenerate": degenerate}, final
+    return InfluenceSection(components=groups, containment_weights=None, degenerate=degenerate), final
 
 
 def formation_section(
-    content: Content, offsets: Sequence[Fraction], final: Mapping[str, Any] | None, out: Writer
-) -> dict[str, Any]:
-    """Write the places of a formation, and where its agents begin and end; ``final`` is where they end less these."""
+    content: Content, offsets: Sequence[Fraction], final: Mapping[str, Any] | None
+) -> FormationSection:
+    """Return the places of a formation, and where its agents begin and end; ``final`` is where they end less these."""
     ends = None
     if final is not None and content.final_state is not None:
         pairs: Sequence[Interval] = content.final_state.intervals or ()
         if not beside(final.get("mid")):
             pairs = list(map(interval, final.values()))
-        ends = {k: interval_text((x + h, r)) for k, (x, r), h in zip(out.labels, pairs, offsets, strict=True)}
-    return {
-        "offsets": out.state("offsets", offsets),
-        "initial_state": out.state("positions", content.initial_positions),
-        "final_state": ends,
-    }
+        placed = [(x + h, r) for (x, r), h in zip(pairs, offsets, strict=True)]
+        ends = Numbers([x for x, _ in placed]), Numbers([r for _, r in placed])
+    positions = numbers(content.initial_positions)
+    return FormationSection(offsets=Numbers(offsets), initial_state=positions, final_state=ends)
 
 
 def stated_ends(
@@ -154,15 +147,12 @@ def _texts(final_state: FinalState) -> list[str | dict[str, str]]:
     ]
 
 
-def read_final_state(document: Mapping[str, Any], structure: Structure, data: Reader) -> FinalState | None:
-    """Read where the agents end; None if the certificate does not say."""
-    final = document["final_state"]
+def read_final_state(report: CheckReport, structure: Structure) -> FinalState | None:
+    """Return where the agents end; None if the certificate does not say."""
+    final = report.sections["final_state"]
     if final is None:
         return None
-    if list(final) == ["mid", "radius"] and beside(final["mid"]):
-        middle, radius = data.agents(final["mid"]), data.agents(final["radius"])
-    else:
-        middle, radius = zip(*map(interval, final.values()), strict=True)
+    middle, radius = map(tuple, final)
     values = [middle[c.nodes[0]] * (c.gauge or (1,))[0] for c in structure.closed_components if c.balanced]
-    spread = radius if any(radius) else None
-    return FinalState(structure.graph.labels, middle, tuple(values), tuple(document["influence"]["degenerate"]), spread)
+    degenerate, spread = tuple(report.sections["influence"].degenerate), radius if any(radius) else None
+    return FinalState(structure.graph.labels, middle, tuple(values), degenerate, spread)

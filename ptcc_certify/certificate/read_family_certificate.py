@@ -56,7 +56,7 @@ def read_family_certificate(source: Source) -> FamilyCertificate:
     state, sigma0 = (data.state(document[key]) for key in ("initial_state", "sliding_variable"))
     restricted = enumerate(document.get("restricted", ()))
     promised = tuple(read_claim(f"restricted[{k}]", entry, document["proof"], components) for k, entry in restricted)
-    protocol, disturbance = read_protocol(document["protocol"]), document["protocol"].get("disturbance")
+    protocol, disturbance = read_protocol(source.report.sections["protocol"]), document["protocol"].get("disturbance")
     kept: dict[str, Any] = {"signal": promised[0].signal if promised else "any", "restricted": promised}
     kept["disturbance"] = disturbance
     kept["boxes"] = {

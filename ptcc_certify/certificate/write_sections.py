@@ -50,7 +50,7 @@ def _fits(kind: Any, value: Any) -> bool:
     if get_origin(kind) is Annotated:
         return _fits(get_args(kind)[0], value)
     kind = get_origin(kind) or kind
-    return isinstance(kind, type) and isinstance(value, kind)
+    return kind is Any or (isinstance(kind, type) and isinstance(value, kind))
 
 
 def _text(value: Fraction | float) -> str:
@@ -67,6 +67,8 @@ def _annotated(inner: Any, note: Any, *rest: str, value: Any, out: Writer, key: 
         return interval_text(value)
     if note == "a list":
         return [write(get_args(inner)[0], one, out, key) for one in value]
+    if note == "ends by agent":
+        return dict(zip(out.labels, map(interval_text, zip(*value, strict=True)), strict=True))
     if note == "lower triangle":
         return [list(map(_text, row[: k + 1])) for k, row in enumerate(value)]
     if note == "a label":

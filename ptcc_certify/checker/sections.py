@@ -149,7 +149,13 @@ def _alternative(kinds: Sequence[Any], value: Any, at: Context, what: str) -> An
     if value is None and len(rest) < len(kinds):
         return None
     fitting = [kind for kind in rest if _is_text(kind) == isinstance(value, str) and _has_words(kind, value)]
-    return read((fitting or rest)[0], value, at, what)
+    return read(fitting[0] if fitting else max(rest, key=lambda kind: _common(kind, value)), value, at, what)
+
+
+def _common(kind: Any, value: Any) -> int:
+    """Return how many keys of a section are there."""
+    section = isinstance(kind, type) and is_dataclass(kind) and isinstance(value, dict)
+    return sum(f.key in value for f in declared(kind)) if section else 0
 
 
 def _is_text(kind: Any) -> bool:

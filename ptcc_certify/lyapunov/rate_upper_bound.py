@@ -15,14 +15,14 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 
 from lmi.definiteness_proofs import prove_positive_definite
 from lmi.dyadic import round_to_bits
 from lmi.exact.decimal_rounding import float_down
-from ptcc_certify.graphs.rationals import format_exact, writable
+from ptcc_certify.checker.rates import InertiaWitness, MeanWitness
+from ptcc_certify.graphs.rationals import writable
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.error_system import rounded_matrix
 from ptcc_certify.theorems.lemmas import EXACT_NODES, component_blocks, single_followers
@@ -58,15 +58,12 @@ class RateBound:
         """Kind of the obligation that proves it."""
         return "rate-upper-bound" if self.form else "rate-mean"
 
-    def witness(self, labels: Sequence[str]) -> dict[str, Any]:
-        """Return the node, or nodes, form and vectors as JSON-ready data."""
+    @property
+    def witness(self) -> MeanWitness | InertiaWitness:
+        """The node, or nodes, form and vectors, as the check takes them."""
         if not self.form:
-            return {"node": labels[self.nodes[0]]}
-        return {
-            "nodes": [labels[v] for v in self.nodes],
-            "lower_triangle": [[format_exact(x) for x in row[: i + 1]] for i, row in enumerate(self.form)],
-            "vectors": [[format_exact(x) for x in vector] for vector in self.vectors],
-        }
+            return MeanWitness(node=self.nodes[0])
+        return InertiaWitness(nodes=self.nodes, lower_triangle=self.form, vectors=self.vectors)
 
 
 def prove_rate_bound(structure: Structure) -> RateBound | None:

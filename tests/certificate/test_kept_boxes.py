@@ -137,15 +137,15 @@ def test_no_end_is_accepted_that_is_nearer():
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
-        ({"component": 1}, "an unknown component, or out of order"),
-        ({"component": -1}, "an unknown component, or out of order"),
-        ({"component": True}, "an unknown component, or out of order"),
-        ({"lower": ["1", "1", "-2"]}, "lower has not 4 entries"),
-        ({"upper": ["2", "2", "5", "5", "5"]}, "upper has not 4 entries"),
+        ({"component": 1}, "an unknown component"),
+        ({"component": -1}, "an unknown component"),
+        ({"component": True}, "component is not an integer"),
+        ({"lower": ["1", "1", "-2"]}, "lower or upper has not 4 entries"),
+        ({"upper": ["2", "2", "5", "5", "5"]}, "lower or upper has not 4 entries"),
         ({"upper": None}, "upper is not a list"),
         ({"upper": [2, 2, 5, 5]}, "a value of type int is not an exact number"),
-        ({"nodes": ["a", "b", "c", "d"]}, 'the key "vector" is missing'),
-        ({"rate": "1"}, 'the key "nodes" is missing'),
+        ({"nodes": ["a", "b", "c", "d"]}, 'the key "nodes" is not known'),
+        ({"rate": "1"}, 'the key "rate" is not known'),
     ],
 )
 def test_a_box_that_is_none_is_rejected(change: dict[str, Any], reason: str):
@@ -162,11 +162,11 @@ def test_boxes_have_an_order_and_obligations_of_their_own():
     for step, of in zip(kinds, ("boxes[1]", "boxes[0]"), strict=True):
         step["of"] = of
     turned["proof"] = [*turned["proof"][: -len(kinds)], *reversed(kinds)]
-    assert check(resealed(turned)).reason == "an unknown component, or out of order"
+    assert check(resealed(turned)).reason == "boxes are out of order"
     twice = copy.deepcopy(data)
     twice["boxes"].append(twice["boxes"][1])
     twice["proof"].append(twice["proof"][-1] | {"of": "boxes[2]"})
-    assert check(resealed(twice)).reason == "an unknown component, or out of order"
+    assert check(resealed(twice)).reason == "boxes are out of order"
     bare = copy.deepcopy(data)
     bare["proof"].pop()
     assert not check(resealed(bare)).accepted

@@ -375,7 +375,7 @@ FORGERIES: dict[str, tuple[str, Change, str, str]] = {
         "capped later",
         clocked(F(1001, 1000)), "agent-residual", "clock is not proved"),
     "a negative clock": (
-        "capped later", clocked(F(-1)), "agent-residual", "clock is negative"),
+        "capped later", clocked(F(-1)), "agents", "clock is negative"),
     "nothing left without a cap": (
         "double integrators", agents(residual={"clock": "1", "agents": {key: ["1", "1"] for key in "abcf"}}),
         "agents.residual", "iff"),
@@ -383,8 +383,8 @@ FORGERIES: dict[str, tuple[str, Change, str, str]] = {
     "no such function": ("double integrators", used(7), "agents.functions", "none such"),
     "a function before the first": ("double integrators", used(-1), "agents.functions", "none such"),
     "a function twice": ("double integrators", used(0, 0), "agents.functions", "none such"),
-    "a function that is a truth value": ("double integrators", used(False), "agents.functions", "none such"),
-    "a function by its text": ("double integrators", used("0"), "agents.functions", "none such"),
+    "a function that is a truth value": ("double integrators", used(False), "agents", "not an integer"),
+    "a function by its text": ("double integrators", used("0"), "agents", "not an integer"),
     "constants of a diagonal function": (
         "double integrators", agents(functions=[{"function": 0, "inputs": dict.fromkeys("abcf", "100")}]),
         "agents.functions|input-constants", "constants that follow"),
@@ -396,8 +396,8 @@ FORGERIES: dict[str, tuple[str, Change, str, str]] = {
     "order 0": ("double integrators", agents(order=0), "agents", "order is no integer from 1 to 8"),
     "order 9": ("double integrators", agents(order=9), "agents", "order is no integer from 1 to 8"),
     "a huge order": ("double integrators", agents(order=10**17), "agents", "order is no integer from 1 to 8"),
-    "an order that is a truth value": ("order 1", agents(order=True), "agents", "order is no integer from 1 to 8"),
-    "an order by its text": ("double integrators", agents(order="2"), "agents", "order is no integer from 1 to 8"),
+    "an order that is a truth value": ("order 1", agents(order=True), "agents", "order is not an integer"),
+    "an order by its text": ("double integrators", agents(order="2"), "agents", "order is not an integer"),
     "order 1 of what is of order 2": ("double integrators", agents(order=1), "agents", "has not 1 entries"),
     "dimension 0": ("double integrators", agents(dimension=0), "agents", "dimension is no integer"),
     "dimension 9": ("double integrators", agents(dimension=9), "agents", "dimension is no integer"),
@@ -409,10 +409,10 @@ FORGERIES: dict[str, tuple[str, Change, str, str]] = {
     "agents that explode": ("drag in the plane", agents(plant=["0", "-1e300"]), "agents", "move too far"),
     "offsets in a side file": ("double integrators", agents(offsets=SIDE), "agents", "the key"),
     "a final state in a side file": (
-        "double integrators", agents(final_state={"mid": SIDE, "radius": SIDE}), "agent-final-state", "the key"),
+        "double integrators", agents(final_state={"mid": SIDE, "radius": SIDE}), "agents", "the key"),
     "initial states in a side file": ("double integrators", agents(initial_state=SIDE), "agents", "the key"),
     "inputs in a side file": (
-        "double integrators", agents(input={"agents": SIDE, "largest": "1"}), "agent-input", "in a side file"),
+        "double integrators", agents(input={"agents": SIDE, "largest": "1"}), "agents", "in a side file"),
     "an agent less": (
         "double integrators", agents(offsets={key: ["0"] for key in "abc"}), "agents", 'the key "f" is missing'),
     "agents in another order": (

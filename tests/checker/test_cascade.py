@@ -201,8 +201,8 @@ LONG = "1." + "0" * 1000 + "1"
 SIDE = {"file": "x.npy", "sha256": "0" * 64, "count": 4}
 
 FORGERIES: dict[str, tuple[str, Change, str, str]] = {
-    "a negative alpha": ("plain", alpha("-2"), "agents", "the rate of the cascade is not positive"),
-    "an alpha of 0": ("plain", alpha("0"), "agents", "the rate of the cascade is not positive"),
+    "a negative alpha": ("plain", alpha("-2"), "agents", "cascade is not positive"),
+    "an alpha of 0": ("plain", alpha("0"), "agents", "cascade is not positive"),
     "a larger alpha": ("plain", alpha("3"), "agent-motion", "another"),
     "a smaller alpha": ("plain", alpha("19/10"), "agent-motion", "another"),
     "a huge alpha": ("plain", alpha("1e9"), "agent-motion", "1000"),
@@ -221,8 +221,8 @@ FORGERIES: dict[str, tuple[str, Change, str, str]] = {
     "another final position": ("plain", moved(0, 0), "agent-final-state", "ends elsewhere"),
     "another final position in the plane": ("formation", moved(1, 0), "agent-final-state", "ends elsewhere"),
     "a final velocity": ("plain", moved(0, 1), "agent-final-state", "ends elsewhere"),
-    "velocities that need not vanish": ("slow", with_velocities, "agent-final-state", "has not 1 entries"),
-    "velocities that are left out": ("plain", without_velocities, "agent-final-state", "has not 2 entries"),
+    "velocities that need not vanish": ("slow", with_velocities, "agent-final-state", "with 1 derivatives"),
+    "velocities that are left out": ("plain", without_velocities, "agent-final-state", "with 2 derivatives"),
     "a smaller input": ("plain", scaled("input", "agents", "f", factor=F(99, 100)), "agent-input", "input of agent f"),
     "a smaller input beside sliding terms": (
         "sliding variables", scaled("input", "agents", "a", factor=F(99, 100)), "agent-input", "input of agent a"),
@@ -247,7 +247,7 @@ FORGERIES: dict[str, tuple[str, Change, str, str]] = {
         "plain", lambda data: changed(data, ("agents", "motion", 1, 1), "1"), "agent-motion", "another"),
     "no such function": ("plain", entry(function=7), "agents.functions", "none such"),
     "a function before the first": ("plain", entry(function=-1), "agents.functions", "none such"),
-    "a function that is a truth value": ("plain", entry(function=False), "agents.functions", "none such"),
+    "a function that is a truth value": ("plain", entry(function=False), "agents", "not an integer"),
     "a function twice": ("plain", twice, "agents.functions", "none such"),
     "no function": ("plain", without_functions, "agents.final_state|agent-", "without initial states or a"),
     "constants of a diagonal function": (

@@ -777,7 +777,7 @@ def test_a_state_of_vectors_is_that_state_and_no_other():
             mutant = changed(data, ("final_state", key), side.integers(values))
             rejected_beside(mutant, {**files, **side.files}, "final-state of graph", "ends elsewhere|wider")
     alone = changed(data, ("final_state", "radius"), ["0"] * len(mids))
-    rejected_beside(alone, files, "final-state of graph", "not a side vector")
+    rejected_beside(alone, files, "final_state", "not a side vector")
 
 
 def test_labels_that_are_the_keys_of_a_side_vector():
