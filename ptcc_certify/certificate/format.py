@@ -103,7 +103,7 @@ def certificate_document(
     if content.tracking is not None:
         document["leaders"] = write(LeadersSection, leaders_section(content.tracking), out)
     document |= {"digest": "", "unverified": _write_unverified(content)}
-    given = {(o.kind, o.of): _write_obligation(o, out) for o in content.witnesses}
+    given = {(o.kind, o.of): write_obligation(o, out) for o in content.witnesses}
     document, report = record(document, given, out.files, graph.n_nodes)
     return document, out.files, report
 
@@ -296,7 +296,7 @@ def _read_limit(proved: Mapping[tuple[str, str], Any], data: Reader) -> RateBoun
 # ---------------------------------------------------------------------- proof
 
 
-def _write_obligation(obligation: Obligation, out: Writer) -> dict[str, Any]:
+def write_obligation(obligation: Obligation, out: Writer) -> dict[str, Any]:
     """Return numbers and witness of one step of the proof."""
     witness = obligation.witness
     if isinstance(witness, Dominance):

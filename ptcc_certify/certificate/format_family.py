@@ -12,36 +12,31 @@ import numpy as np
 from lmi.exact.elementary_enclosures import rounded
 from ptcc_certify.certificate.checking import record
 from ptcc_certify.certificate.family_content import FamilyContent
-from ptcc_certify.certificate.format import producer, protocol_section, reaching_section
-from ptcc_certify.certificate.format_family_rows import (
-    Step,
-    box_entry,
-    form_entry,
-    form_steps,
-    range_entry,
-    rows_entry,
-    rows_steps,
-    squares_entry,
-    squares_steps,
-)
+from ptcc_certify.certificate.format import producer, protocol_section, reaching_section, write_obligation
+from ptcc_certify.certificate.format_family_rows import box_section, function_section, function_steps, kept_section
 from ptcc_certify.certificate.format_graph import structure_section
-from ptcc_certify.certificate.format_restricted import claim_entry, claim_steps, enclosed
+from ptcc_certify.certificate.format_restricted import ball, claim_section, claim_steps
 from ptcc_certify.certificate.format_upper_bound import upper_bound_entry
 from ptcc_certify.certificate.format_vectors import Writer
 from ptcc_certify.certificate.restricted_claims import Claim
 from ptcc_certify.certificate.write_sections import write
 from ptcc_certify.checker import NOT_OF_FAMILIES, SCHEMA, CheckReport
 from ptcc_certify.checker.family import THEOREM
+from ptcc_certify.checker.family_bounds import FamilyInput
 from ptcc_certify.checker.family_limits import EQUAL
-from ptcc_certify.checker.protocol import ReachingTimes
+from ptcc_certify.checker.family_rows import FamilyFunctionsSection
+from ptcc_certify.checker.protocol import ReachingTimes, SlidingPart
 from ptcc_certify.checker.reading import exact
-from ptcc_certify.checker.side_files import SideFiles
+from ptcc_certify.checker.restricted_signals import Section
+from ptcc_certify.checker.sections import Ball, ByAgent
+from ptcc_certify.checker.side_files import Numbers, SideFiles
 from ptcc_certify.graphs.digraph import Weights
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import BIPARTITE_CONTAINMENT, INTERVAL_BIPARTITE_CONSENSUS, analyse
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
+from ptcc_certify.theorems.theorem import Obligation
 
 
 def family_document(
@@ -51,82 +46,66 @@ def family_document(
     out = Writer(certificate.family.labels, files)
     family, parts = certificate.family, certificate.parts
     components = [part.component for part in parts]
-    functions = [(k, V) for k, part in enumerate(parts) for V in part.functions]
-    finals, peaks, labels = certificate.final_states, certificate.input_peaks, family.labels
-    drives = certificate.drives
+    used = [function_section(part.component, k, V, out) for k, part in enumerate(parts) for V in part.functions]
+    finals, drives = certificate.final_states, certificate.drives
+    ends = None if finals is None else [None if pair is None else ball(*pair) for pair in finals]
     document: dict[str, Any] = {
         "schema": SCHEMA,
         "producer": producer(),
         **family_sections(family, components, out),
         "protocol": protocol_section(certificate.protocol, certificate.disturbance),
         **dict.fromkeys(NOT_OF_FAMILIES),
-        "lyapunov": {"functions": [_function(family, components[k], k, V, out) for k, V in functions]}
-        | ({} if drives is None else {"drives": list(map(format_exact, drives))}),
+        "lyapunov": write(FamilyFunctionsSection, FamilyFunctionsSection(functions=used, drives=drives), out),
         "initial_state": out.state("start", certificate.initial_state),
         "sliding_variable": out.state("sigma", certificate.sigma0),
         "reaching_time": write(ReachingTimes, reaching_section(certificate.reaching), out),
-        "final_state": None
-        if finals is None
-        else {label: None if ends is None else enclosed(*ends) for label, ends in zip(labels, finals, strict=True)},
-        "input": {
-            "bounded": certificate.bounded,
-            "peaks": None if peaks is None else dict(zip(labels, map(_up, peaks), strict=True)),
-            **_sliding_part(certificate),
-        },
+        "final_state": write(ByAgent[Ball | None], ends, out),
+        "input": write(FamilyInput, _input(certificate), out),
         "proof": [],
         "verdict": "",
     }
-    if certificate.boxes or certificate.ranges:
-        labelled = ((k, box, list(components[k].family.labels)) for k, box in sorted(certificate.boxes.items()))
-        document["boxes"] = [box_entry(own, k, box, out) for k, box, own in labelled]
-        document["boxes"] += [range_entry(k, ends) for k, ends in sorted(certificate.ranges.items())]
+    boxes: list[Any] = [box_section(components[k].nodes, k, box, out) for k, box in sorted(certificate.boxes.items())]
+    boxes += [kept_section(k, pairs) for k, pairs in sorted(certificate.ranges.items())]
+    if boxes:
+        document["boxes"] = [write(type(box), box, out) for box in boxes]
     if certificate.restricted:
-        document["restricted"] = [claim_entry(claim, _labels(certificate, claim)) for claim in certificate.restricted]
+        claims = [_claim(certificate, claim) for claim in certificate.restricted]
+        document["restricted"] = [write(type(claim), claim, out) for claim in claims]
     document |= {"digest": "", "unverified": _unverified(certificate)}
-    steps = _steps(certificate, out)
-    given = {(kind, of): {"numbers": numbers, "witness": witness} for kind, of, witness, numbers in steps}
+    given = {(o.kind, o.of): write_obligation(o, out) for o in _steps(certificate, out)}
     document, report = record(document, given, out.files, family.n_nodes)
     return document, out.files, report
-
-
-def _function(family: Family, component: FamilyComponent, number: int, V: Any, out: Writer) -> dict[str, Any]:
-    labels = [family.labels[v] for v in component.nodes.tolist()]
-    if V.kind == "squares":
-        return squares_entry(number, V, out)
-    return rows_entry(labels, number, V, out) if V.kind == "rows" else form_entry(labels, number, V)
 
 
 def _labels(certificate: FamilyContent, claim: Claim) -> Sequence[str]:
     return certificate.parts[claim.component].component.family.labels
 
 
-def _sliding_part(certificate: FamilyContent) -> dict[str, Any]:
-    """Write the sliding part of the input; nothing under the nominal protocol."""
-    bounded, own = certificate.sliding_bounded, certificate.sliding_peaks
-    if bounded is None:
-        return {}
-    agents = None if own is None else dict(zip(certificate.family.labels, map(_up, own), strict=True))
-    return {"sliding": {"bounded": bounded, "agents": agents}}
+def _claim(certificate: FamilyContent, claim: Claim) -> Section:
+    component = certificate.parts[claim.component].component
+    return claim_section(claim, component.nodes, component.family.labels)
 
 
-def _up(x: Fraction) -> str:
-    """Write a bound, rounded up to 60 bits or so."""
-    return format_exact(rounded(x, 60, up=True))
+def _input(certificate: FamilyContent) -> FamilyInput:
+    """Return bounds of the input, rounded up to 60 bits or so; the sliding part under that protocol."""
+    bounded, own, peaks = certificate.sliding_bounded, certificate.sliding_peaks, certificate.input_peaks
+    sliding = None if bounded is None else SlidingPart(bounded=bounded, agents=_up(own))
+    return FamilyInput(bounded=certificate.bounded, peaks=_up(peaks), sliding=sliding)
 
 
-def _steps(certificate: FamilyContent, out: Writer) -> Iterator[Step]:
-    """Yield kind, place, witness and numbers of the obligations that have some, in any order."""
+def _up(values: Sequence[Fraction] | None) -> Numbers | None:
+    return None if values is None else Numbers([rounded(x, 60, up=True) for x in values])
+
+
+def _steps(certificate: FamilyContent, out: Writer) -> Iterator[Obligation]:
+    """Yield the obligations that have numbers or a witness, in any order."""
     components = [part.component for part in certificate.parts]
-    functions: list[Any] = [V for part in certificate.parts for V in part.functions]
-    yield "family-claim", "graph", claim_witnesses(certificate.family, components), {}
+    functions = [V for part in certificate.parts for V in part.functions]
+    yield Obligation("family-claim", "graph", witness=claim_witnesses(certificate.family, components))
     for k, V in enumerate(functions):
-        of = f"lyapunov.functions[{k}]"
-        if V.kind == "squares":
-            yield from squares_steps(of, V, out)
-        else:
-            yield from (rows_steps if V.kind == "rows" else form_steps)(of, V)
+        yield from function_steps(f"lyapunov.functions[{k}]", V, out)
     if certificate.final_states is not None:
-        yield "family-final-state", "final_state", _means(certificate), {}
+        yield Obligation("family-final-state", "final_state", witness=_means(certificate))
     for k, claim in enumerate(certificate.restricted):
         yield from claim_steps(f"restricted[{k}]", claim, _labels(certificate, claim))
 

@@ -1,135 +1,199 @@
-"""Lyapunov functions in the file of a family's certificate, and their obligations."""
+"""Lyapunov functions and boxes of a family's certificate, and what proves them: given as sections, and read."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
+from math import ceil
 from typing import Any
 
 import numpy as np
 
 from ptcc_certify.bounds.attracting_box import AttractingBox
+from ptcc_certify.certificate.family_content import ProvedFunction
 from ptcc_certify.certificate.format_vectors import Writer, factor_entry
-from ptcc_certify.checker.reading import Interval, exact
+from ptcc_certify.checker import attracting_boxes
+from ptcc_certify.checker.attracting_boxes import KeptBox
+from ptcc_certify.checker.family_function import FormSection, MeanSection, Multipliers
+from ptcc_certify.checker.family_rows import PartSection, RowsSection
+from ptcc_certify.checker.family_squares import FactorWitness, SquaresSection
+from ptcc_certify.checker.reading import Interval
 from ptcc_certify.checker.side_files import SideFiles
-from ptcc_certify.graphs.rationals import format_exact
-from ptcc_certify.lyapunov.family_function import FamilyFunction
+from ptcc_certify.errors import FormatError
+from ptcc_certify.lyapunov.family_function import FamilyFunction, prove_ends
 from ptcc_certify.lyapunov.family_rows import FollowerDecay
 from ptcc_certify.lyapunov.follower_function import FollowerFunction, LeadingPart
-from ptcc_certify.lyapunov.squares_function import SquaresFunction
+from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.lyapunov.squares_function import FormTable, SquaresFunction
+from ptcc_certify.theorems.family_behaviour import FamilyComponent
+from ptcc_certify.theorems.theorem import Obligation
 
 #: Bits of integers that floats hold.
 _FLOAT_BITS = 53
+Proved = Mapping[tuple[str, str], Mapping[str, Any]]
 
 
-def form_entry(labels: list[str], number: int, V: FamilyFunction) -> dict[str, Any]:
-    """Return a quadratic form of the agents ``labels``."""
-    return {
-        "class": V.kind,
-        "component": number,
-        "nodes": [labels[v] for v in V.nodes],
-        "lower_triangle": [[format_exact(x) for x in row[: i + 1]] for i, row in enumerate(V.matrix)],
-        "rate": format_exact(V.rate),
-        "inputs": dict(zip(labels, map(format_exact, V.input_constants), strict=True)),
-        "coordinates": dict(zip([labels[v] for v in V.nodes], map(format_exact, V.coordinate_constants), strict=True)),
-        "means": [
-            {
-                "weights": {label: format_exact(w) for label, w in zip(labels, q, strict=True) if w},
-                "constant": format_exact(constant),
-            }
+def function_section(
+    component: FamilyComponent, number: int, V: ProvedFunction, out: Writer
+) -> FormSection | RowsSection | SquaresSection:
+    """Return a Lyapunov function of a component."""
+    if isinstance(V, SquaresFunction):
+        return SquaresSection(class_="squares", component=number, vector=V.vector, rate=V.rate)
+    nodes = component.nodes
+    if isinstance(V, FamilyFunction):
+        return _form(nodes, component.family.labels, number, V)
+    parts = [_part(nodes, component.family.labels, number, part) for part in V.parts]
+    return RowsSection(class_="rows", component=number, vector=_vector(V.vector, out), parts=parts, rate=V.rate)
+
+
+def _form(nodes: np.ndarray, labels: Sequence[str], number: int, V: FamilyFunction) -> FormSection:
+    """Return a quadratic form of some agents, which have these places and labels."""
+    kind: Any = V.kind
+    return FormSection(
+        class_=kind,
+        component=number,
+        nodes=nodes[list(V.nodes)],
+        lower_triangle=V.matrix,
+        rate=V.rate,
+        inputs=dict(zip(labels, V.input_constants, strict=True)),
+        coordinates=dict(zip([labels[v] for v in V.nodes], V.coordinate_constants, strict=True)),
+        means=[
+            MeanSection(weights={label: w for label, w in zip(labels, q, strict=True) if w}, constant=constant)
             for q, constant in V.means
         ],
-    }
+    )
 
 
-def rows_entry(labels: list[str], number: int, V: FollowerFunction, out: Writer) -> dict[str, Any]:
-    """Return a function of the followers of a component of the agents ``labels``."""
-    return {
-        "class": V.kind,
-        "component": number,
-        "vector": _vector(V.vector, out),
-        "parts": [_part(labels, number, part) for part in V.parts],
-        "rate": format_exact(V.rate),
-    }
+def _part(nodes: np.ndarray, labels: Sequence[str], number: int, part: LeadingPart) -> PartSection:
+    bounds, own = part.ends | part.speeds, part.agents.tolist()
+    function = _form(nodes[own], [labels[v] for v in own], number, part.function)
+    return PartSection(nodes=nodes[own], function=function, times=part.times, bounds=[bounds[v] for v in own])
 
 
-def _vector(d: np.ndarray, out: Writer) -> Any:
-    """Write positive integers; a long vector as floats, which hold what was rounded to their bits."""
+def _vector(d: np.ndarray, out: Writer) -> np.ndarray | list[Fraction]:
+    """Return positive integers; a long vector as floats, which hold what was rounded to their bits."""
     odd = max((int(x).bit_length() - (int(x) & -int(x)).bit_length() for x in d.tolist()), default=0)
     if out.aside(d.size) and odd < _FLOAT_BITS and int(d.max()).bit_length() < 1000:
-        return out.floats("vector", d.astype(float))
-    return [str(x) for x in d.tolist()]
+        return np.asarray(d.astype(float))
+    return list(map(Fraction, d.tolist()))
 
 
-def box_entry(labels: list[str], number: int, box: AttractingBox, out: Writer) -> dict[str, Any]:
-    """Return a box of the followers of a component of the agents ``labels``."""
-    return {
-        "component": number,
-        "nodes": [labels[v] for v in box.decay.nodes.tolist()],
-        "vector": _vector(box.decay.vector, out),
-        "lower": list(map(format_exact, box.lower)),
-        "upper": list(map(format_exact, box.upper)),
-        "rate": format_exact(2 * box.decay.rate),
-    }
+def box_section(nodes: np.ndarray, number: int, box: AttractingBox, out: Writer) -> attracting_boxes.AttractingBox:
+    """Return a box of the followers of a component of agents of these places."""
+    decay = box.decay
+    return attracting_boxes.AttractingBox(
+        component=number,
+        nodes=nodes[decay.nodes],
+        vector=_vector(decay.vector, out),
+        lower=box.lower,
+        upper=box.upper,
+        rate=2 * decay.rate,
+    )
 
 
-def range_entry(number: int, ends: Sequence[Interval]) -> dict[str, Any]:
+def kept_section(number: int, ends: Sequence[Interval]) -> KeptBox:
     """Return a box in which all agents of a component stay."""
     lower, upper = zip(*ends, strict=True)
-    return {"component": number, "lower": list(map(format_exact, lower)), "upper": list(map(format_exact, upper))}
+    return KeptBox(component=number, lower=lower, upper=upper)
 
 
-def read_range(entry: Mapping[str, Any]) -> tuple[Interval, ...]:
-    """Return what :func:`range_entry` has written."""
-    return tuple(zip(*(map(exact, entry[key]) for key in ("lower", "upper")), strict=True))
-
-
-def read_box(entry: Mapping[str, Any], labels: Sequence[str], files: SideFiles) -> AttractingBox:
+def read_box(entry: attracting_boxes.AttractingBox, labels: Sequence[str], files: SideFiles) -> AttractingBox:
     """Return a box of an accepted file."""
     index = {label: v for v, label in enumerate(labels)}
-    nodes = np.array([index[label] for label in entry["nodes"]], dtype=np.int64)
-    d, _ = files.numbers(entry["vector"], "vector", nodes.size).over(range(nodes.size))
-    decay = FollowerDecay(nodes, np.array(d, dtype=object), exact(entry["rate"]) / 2)
-    lower, upper = (tuple(map(exact, entry[key])) for key in ("lower", "upper"))
-    return AttractingBox(decay, lower, upper)
+    nodes = np.array([index[label] for label in entry.nodes], dtype=np.int64)
+    d, _ = files.numbers(entry.vector, "vector", nodes.size).over(range(nodes.size))
+    decay = FollowerDecay(nodes, np.array(d, dtype=object), entry.rate / 2)
+    return AttractingBox(decay, tuple(entry.lower), tuple(entry.upper))
 
 
-def _part(labels: list[str], number: int, part: LeadingPart) -> dict[str, Any]:
-    own = [labels[v] for v in part.agents.tolist()]
-    bounds = part.ends | part.speeds
-    return {
-        "nodes": own,
-        "function": form_entry(own, number, part.function),
-        "times": format_exact(part.times),
-        "bounds": [format_exact(bounds[v]) for v in part.agents.tolist()],
-    }
+# ---------------------------------------------------------------------- obligations
 
 
-def squares_entry(number: int, V: SquaresFunction, out: Writer) -> dict[str, Any]:
-    """Return a weighted sum of squares."""
-    vector = out.floats("vector", V.vector)
-    return {"class": V.kind, "component": number, "vector": vector, "rate": format_exact(V.rate)}
+def function_steps(of: str, V: ProvedFunction, out: Writer) -> Iterator[Obligation]:
+    """Yield the obligations of a Lyapunov function: of its modes, or of its parts, then of its rows."""
+    if isinstance(V, FamilyFunction):
+        for mode, rate in enumerate(V.rates):
+            witness = Multipliers(multipliers=V.multipliers[mode] if V.multipliers else ())
+            told = None if V.kind == "undirected" else witness
+            yield Obligation("family-rate", f"{of}.modes[{mode}]", {"b": rate}, told)
+    elif isinstance(V, SquaresFunction):
+        for mode, factor in enumerate(V.factors):
+            sparse = FactorWitness(factor=factor_entry(factor, V.power, out))
+            yield Obligation("family-squares", f"{of}.modes[{mode}]", {"b": V.rate}, sparse)
+    else:
+        for j, part in enumerate(V.parts):
+            yield from function_steps(f"{of}.parts[{j}]", part.function, out)
+        yield Obligation("family-rows", of, {"b": V.rate})
 
 
-Step = tuple[str, str, Any, dict[str, str]]
+# ---------------------------------------------------------------------- reading
 
 
-def form_steps(of: str, V: FamilyFunction) -> Iterator[Step]:
-    """Yield kind, place, witness and numbers of the obligations of a quadratic form."""
-    for mode, rate in enumerate(V.rates):
-        multipliers = V.multipliers[mode] if V.multipliers else ()
-        witness = {"multipliers": [format_exact(x) for x in multipliers]} if V.kind != "undirected" else None
-        yield "family-rate", f"{of}.modes[{mode}]", witness, {"b": format_exact(rate)}
+def read_function(
+    of: str,
+    section: FormSection | RowsSection | SquaresSection,
+    component: FamilyComponent,
+    proved: Proved,
+    files: SideFiles,
+) -> ProvedFunction:
+    """Return a Lyapunov function of an accepted file."""
+    if isinstance(section, SquaresSection):
+        n, modes = component.family.n_nodes, component.family.modes
+        own, scale = files.numbers(section.vector, "vector", n).over(range(n))
+        tables = [(table.edges, table.unit) for table in map(FormTable.of, modes)]
+        return SquaresFunction(dict(enumerate(own)), scale, section.rate, tables)
+    if isinstance(section, RowsSection):
+        return _read_rows(of, section, component, proved, files)
+    return _read_form(of, section, component.family.labels, proved)
 
 
-def rows_steps(of: str, V: FollowerFunction) -> Iterator[Step]:
-    """Yield the same of a function of followers: of its parts, then of its rows."""
-    for j, part in enumerate(V.parts):
-        yield from form_steps(f"{of}.parts[{j}]", part.function)
-    yield "family-rows", of, None, {"b": format_exact(V.rate)}
+def _read_form(of: str, section: FormSection, labels: Sequence[str], proved: Proved) -> FamilyFunction:
+    index = {label: v for v, label in enumerate(labels)}
+    nodes, matrix = tuple(index[label] for label in section.nodes), list(map(list, section.lower_triangle))
+    steps = rates_of(of, proved)
+    ends = prove_ends(matrix)
+    assert ends is not None, "the check has proved it definite"
+    return FamilyFunction(
+        section.class_,
+        tuple(v for v in range(len(labels)) if v not in set(nodes)),
+        nodes,
+        matrix,
+        tuple(step["b"] for step in steps),
+        tuple(tuple(step["witness"].multipliers) for step in steps if step["witness"] is not None),
+        *ends,
+        input_constants=tuple(section.inputs.values()),
+        coordinate_constants=tuple(section.coordinates.values()),
+        means=tuple(
+            (tuple(mean.weights.get(label, Fraction(0)) for label in labels), mean.constant) for mean in section.means
+        ),
+    )
 
 
-def squares_steps(of: str, V: SquaresFunction, out: Writer) -> Iterator[Step]:
-    """Yield the same of a weighted sum of squares: of every mode."""
-    for mode, factor in enumerate(V.factors):
-        witness = {"factor": factor_entry(factor, V.power, out)}
-        yield "family-squares", f"{of}.modes[{mode}]", witness, {"b": format_exact(V.rate)}
+def rates_of(of: str, proved: Proved) -> list[Mapping[str, Any]]:
+    """Return what was proved of every mode of a function or a claim."""
+    return [
+        step for (kind, place), step in proved.items() if kind == "family-rate" and place.startswith(f"{of}.modes[")
+    ]
+
+
+def _read_rows(
+    of: str, section: RowsSection, component: FamilyComponent, proved: Proved, files: SideFiles
+) -> FollowerFunction:
+    family, kernel = component.family, component.kernel
+    if kernel is None:
+        raise FormatError("rest states of more than 120 agents are verified, not read back; see ptcc check --json")
+    index = {label: v for v, label in enumerate(family.labels)}
+    pivots = {c.nodes[0] for c in kernel.structure.closed_components if c.balanced}
+    agents = [np.array([index[label] for label in part.nodes]) for part in section.parts]
+    outside = sorted(pivots.union(*(some.tolist() for some in agents)))
+    followers = np.setdiff1d(np.arange(family.n_nodes), outside)
+    d, scale = files.numbers(section.vector, "vector", followers.size).over(range(followers.size))
+    ends, parts = dict.fromkeys(outside, 0), []
+    for j, (some, part) in enumerate(zip(agents, section.parts, strict=True)):
+        own = family.restricted(some)
+        function = _read_form(f"{of}.parts[{j}]", part.function, own.labels, proved)
+        parts.append(LeadingPart(some, Quotient(own), function, part.times * scale))
+        bounds = zip(some.tolist(), part.bounds, strict=True)
+        ends |= {v: ceil(bound * scale) for v, bound in bounds if v not in pivots}
+    vectors = np.array(d, dtype=object), np.array(list(ends.values()), dtype=object)
+    return FollowerFunction(family, kernel, followers, *vectors, tuple(parts), section.rate)

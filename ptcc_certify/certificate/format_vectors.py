@@ -15,7 +15,6 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import float_up
 from lmi.exact.definite import SparseFactor
-from lmi.exact.numbers import longest
 from ptcc_certify.bounds.final_state import Influence, enclosed_ends
 from ptcc_certify.checker.reading import RejectedError, exact
 from ptcc_certify.checker.side_files import Numbers, SideFiles, beside
@@ -256,9 +255,16 @@ def interval_text(interval: Interval) -> str | dict[str, str]:
     """Write an interval: exactly if its radius is 0, or its numbers are short; otherwise as a ball that contains it."""
     if interval[1] == 0:
         return exact_or_ball(interval[0])
-    if longest(n for x in interval for n in x.as_integer_ratio()) <= _SHORT_BITS:
+    if all(map(writable, interval)) and all(
+        _odd_bits(n) <= _SHORT_BITS for x in interval for n in x.as_integer_ratio()
+    ):
         return {"mid": format_exact(interval[0]), "radius": format_exact(interval[1])}
     return _ball_text(interval)
+
+
+def _odd_bits(n: int) -> int:
+    """Return the bits of an integer but for a power of two."""
+    return n.bit_length() - (n & -n).bit_length()
 
 
 def _ball_text(interval: Interval) -> dict[str, str]:

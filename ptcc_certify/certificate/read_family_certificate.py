@@ -2,33 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from math import ceil
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from ptcc_certify.certificate.certificate_data import Source
 from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate
 from ptcc_certify.certificate.family_content import ProvedFunction
 from ptcc_certify.certificate.format import read_protocol, read_reaching
 from ptcc_certify.certificate.format_family import certificate_family
-from ptcc_certify.certificate.format_family_rows import read_box, read_range
+from ptcc_certify.certificate.format_family_rows import read_box, read_function
 from ptcc_certify.certificate.format_restricted import read_claim
 from ptcc_certify.certificate.format_upper_bound import read_upper_bound
-from ptcc_certify.certificate.format_vectors import Reader
+from ptcc_certify.certificate.format_vectors import fractions
 from ptcc_certify.certificate.request import Expectations
-from ptcc_certify.checker.reading import exact, triangle
+from ptcc_certify.checker.attracting_boxes import AttractingBox, KeptBox
 from ptcc_certify.checker.side_files import SideFiles
-from ptcc_certify.errors import FormatError, ParameterError
-from ptcc_certify.graphs.family import Family
-from ptcc_certify.lyapunov.family_function import FamilyFunction, prove_ends
+from ptcc_certify.errors import ParameterError
 from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound
-from ptcc_certify.lyapunov.follower_function import FollowerFunction, LeadingPart
 from ptcc_certify.lyapunov.quotient import Quotient
-from ptcc_certify.lyapunov.squares_function import FormTable, SquaresFunction
 from ptcc_certify.theorems.family_behaviour import FamilyComponent, decide
 
 
@@ -46,26 +39,27 @@ def read_family_certificate(source: Source) -> FamilyCertificate:
     ]
     files = SideFiles(Path(), source.files)
     functions: list[list[ProvedFunction]] = [[] for _ in components]
-    for k, section in enumerate(document["lyapunov"]["functions"]):
-        number = section["component"]
-        of = f"lyapunov.functions[{k}]"
-        functions[number].append(_read_function(of, section, components[number], document["proof"], files))
+    sections, proved = source.report.sections, source.report.proved
+    for k, section in enumerate(sections["lyapunov"].functions):
+        V = read_function(f"lyapunov.functions[{k}]", section, components[section.component], proved, files)
+        functions[section.component].append(V)
     bounds = _read_bounds(document["unverified"].get("upper_bounds"), components)
     parts = tuple(ComponentProof(c, tuple(V), b) for c, V, b in zip(components, functions, bounds, strict=True))
-    data = Reader(family.labels, source.files)
-    state, sigma0 = (data.state(document[key]) for key in ("initial_state", "sliding_variable"))
-    restricted = enumerate(document.get("restricted", ()))
-    promised = tuple(read_claim(f"restricted[{k}]", entry, document["proof"], components) for k, entry in restricted)
-    protocol, disturbance = read_protocol(source.report.sections["protocol"]), document["protocol"].get("disturbance")
+    state, sigma0 = (fractions(sections[key]) for key in ("initial_state", "sliding_variable"))
+    restricted = enumerate(sections.get("restricted", ()))
+    promised = tuple(read_claim(f"restricted[{k}]", entry, proved, components) for k, entry in restricted)
+    protocol, disturbance = read_protocol(sections["protocol"]), document["protocol"].get("disturbance")
     kept: dict[str, Any] = {"signal": promised[0].signal if promised else "any", "restricted": promised}
     kept["disturbance"] = disturbance
     kept["boxes"] = {
-        entry["component"]: read_box(entry, components[entry["component"]].family.labels, files)
-        for entry in document.get("boxes", ())
-        if "vector" in entry
+        entry.component: read_box(entry, components[entry.component].family.labels, files)
+        for entry in sections.get("boxes", ())
+        if isinstance(entry, AttractingBox)
     }
     kept["ranges"] = {
-        entry["component"]: read_range(entry) for entry in document.get("boxes", ()) if "vector" not in entry
+        entry.component: tuple(zip(entry.lower, entry.upper, strict=True))
+        for entry in sections.get("boxes", ())
+        if isinstance(entry, KeptBox)
     }
     kept |= {"expectations": _read_expectations(document["unverified"].get("asked")), "source": source}
     return FamilyCertificate(
@@ -74,7 +68,7 @@ def read_family_certificate(source: Source) -> FamilyCertificate:
         parts,
         state,
         sigma0,
-        read_reaching(source.report.sections.get("reaching_time"), protocol),
+        read_reaching(sections.get("reaching_time"), protocol),
         **kept,
     )
 
@@ -94,68 +88,3 @@ def _read_expectations(asked: Any) -> Expectations:
         return Expectations(asked["behaviour"])
     except (TypeError, LookupError, ParameterError):
         return Expectations()
-
-
-def _read_function(
-    of: str, section: Mapping[str, Any], component: FamilyComponent, proof: Any, files: SideFiles
-) -> ProvedFunction:
-    if section["class"] == "squares":
-        return _read_squares(section, component.family, files)
-    if section["class"] == "rows":
-        return _read_rows(of, section, component, proof, files)
-    return _read_form(of, section, component.family.labels, proof)
-
-
-def _read_form(of: str, section: Mapping[str, Any], labels: Sequence[str], proof: Any) -> FamilyFunction:
-    index = {label: v for v, label in enumerate(labels)}
-    nodes = tuple(index[label] for label in section["nodes"])
-    matrix = triangle(section["lower_triangle"], len(nodes))
-    steps = [x for x in proof if x["kind"] == "family-rate" and x["of"].startswith(f"{of}.modes[")]
-    witnesses = [step["witness"] for step in steps if step["witness"] is not None]
-    ends = prove_ends(matrix)
-    assert ends is not None, "the check has proved it definite"
-    return FamilyFunction(
-        section["class"],
-        tuple(v for v in range(len(labels)) if v not in set(nodes)),
-        nodes,
-        matrix,
-        tuple(exact(step["numbers"]["b"]) for step in steps),
-        tuple(tuple(map(exact, witness["multipliers"])) for witness in witnesses),
-        *ends,
-        input_constants=tuple(map(exact, section["inputs"].values())),
-        coordinate_constants=tuple(map(exact, section["coordinates"].values())),
-        means=tuple(
-            (tuple(exact(mean["weights"].get(label, "0")) for label in labels), exact(mean["constant"]))
-            for mean in section["means"]
-        ),
-    )
-
-
-def _read_rows(
-    of: str, section: Mapping[str, Any], component: FamilyComponent, proof: Any, files: SideFiles
-) -> FollowerFunction:
-    family, kernel = component.family, component.kernel
-    if kernel is None:
-        raise FormatError("rest states of more than 120 agents are verified, not read back; see ptcc check --json")
-    index = {label: v for v, label in enumerate(family.labels)}
-    pivots = {c.nodes[0] for c in kernel.structure.closed_components if c.balanced}
-    agents = [np.array([index[label] for label in part["nodes"]]) for part in section["parts"]]
-    outside = sorted(pivots.union(*(some.tolist() for some in agents)))
-    followers = np.setdiff1d(np.arange(family.n_nodes), outside)
-    d, scale = files.numbers(section["vector"], "vector", followers.size).over(range(followers.size))
-    ends, parts = dict.fromkeys(outside, 0), []
-    for j, (some, part) in enumerate(zip(agents, section["parts"], strict=True)):
-        own = family.restricted(some)
-        function = _read_form(f"{of}.parts[{j}]", part["function"], own.labels, proof)
-        parts.append(LeadingPart(some, Quotient(own), function, exact(part["times"]) * scale))
-        bounds = zip(some.tolist(), map(exact, part["bounds"]), strict=True)
-        ends |= {v: ceil(bound * scale) for v, bound in bounds if v not in pivots}
-    vectors = np.array(d, dtype=object), np.array(list(ends.values()), dtype=object)
-    return FollowerFunction(family, kernel, followers, *vectors, tuple(parts), exact(section["rate"]))
-
-
-def _read_squares(section: Mapping[str, Any], family: Family, files: SideFiles) -> SquaresFunction:
-    n = family.n_nodes
-    own, scale = files.numbers(section["vector"], "vector", n).over(range(n))
-    modes = [(table.edges, table.unit) for table in map(FormTable.of, family.modes)]
-    return SquaresFunction(dict(enumerate(own)), scale, exact(section["rate"]), modes)

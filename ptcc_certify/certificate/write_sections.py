@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import is_dataclass
 from fractions import Fraction
 from types import NoneType, UnionType
-from typing import Annotated, Any, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import numpy as np
 
@@ -49,6 +49,8 @@ def _fits(kind: Any, value: Any) -> bool:
     """Tell whether a value is of one of several kinds."""
     if get_origin(kind) is Annotated:
         return _fits(get_args(kind)[0], value)
+    if get_origin(kind) is Literal:
+        return value in get_args(kind)
     kind = get_origin(kind) or kind
     return kind is Any or (isinstance(kind, type) and isinstance(value, kind))
 
@@ -71,6 +73,8 @@ def _annotated(inner: Any, note: Any, *rest: str, value: Any, out: Writer, key: 
         return dict(zip(out.labels, map(interval_text, zip(*value, strict=True)), strict=True))
     if note == "lower triangle":
         return [list(map(_text, row[: k + 1])) for k, row in enumerate(value)]
+    if note == "by some agents":
+        return {label: write(get_args(inner)[1], x, out, key) for label, x in value.items()}
     if note == "a label":
         return out.labels[value]
     if note == "nodes":
