@@ -10,7 +10,7 @@ from ``T`` on ``m <= c / (a rho1)``. With the sign term the second part is left 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
@@ -19,11 +19,17 @@ import numpy as np
 
 from lmi.errors import LMIError, NoCertificate
 from lmi.exact.decimal_rounding import float_up, up
+from ptcc_certify.bounds.section_numbers import floats, floats_up
+from ptcc_certify.checker.leaders import LeadersAsked, LeadersSection
+from ptcc_certify.checker.obligations import CheckReport
+from ptcc_certify.checker.sections import RowVector
+from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness, refuse_leader_groups
 from ptcc_certify.protocols.base import Protocol
 from ptcc_certify.protocols.gain import Gain
 from ptcc_certify.protocols.moving_leaders import MovingLeaders
+from ptcc_certify.theorems.theorem import Obligation
 
 #: Losses of ``a`` that are tried for a more even ``u``; the share of the time that is left where they are compared.
 _LOSSES, _JUDGED = (0.01, 0.2, 0.6), 0.05
@@ -197,3 +203,37 @@ def _tracking(
         whole[rows.followers] = (rows.D * witness.u + rows.W @ witness.u) * float_up(most) * _MORE + float(sign or 0)
         whole[rows.followers] *= _MORE
     return Tracking(leaders, rows.structure, protocol, witness, initial, relative, after, whole)
+
+
+def tracking_obligations(tracking: Tracking | None) -> Iterator[Obligation]:
+    """Yield what was proved of moving leaders."""
+    if tracking is not None:
+        witness = tracking.witness
+        yield Obligation("tracking", "leaders", {"a": witness.b}, RowVector(u=Numbers(witness.u)))
+
+
+def asked_leaders(leaders: MovingLeaders) -> LeadersAsked:
+    """Return how leaders move, as files have it."""
+    return LeadersAsked(speed=leaders.speed, disturbance=leaders.disturbance, sign_gain=leaders.sign_gain)
+
+
+def read_leaders(section: LeadersAsked) -> MovingLeaders:
+    """Return what a certificate says of how leaders move."""
+    return MovingLeaders(section.speed, section.disturbance, section.sign_gain)
+
+
+def leaders_section(tracking: Tracking) -> LeadersSection:
+    """Return what is proved with moving leaders, as files have it."""
+    asked, bound = vars(asked_leaders(tracking.leaders)), None if tracking.input is None else Numbers(tracking.input)
+    return LeadersSection(**asked, initial=tracking.initial, input=bound, after=tracking.after)
+
+
+def read_tracking(report: CheckReport, structure: Structure, protocol: Protocol, relative: bool) -> Tracking | None:
+    """Return what an accepted certificate says of moving leaders; None if it says nothing."""
+    section: LeadersSection | None = report.sections.get("leaders")
+    if section is None:
+        return None
+    step = report.proved["tracking", "leaders"]
+    rows = RowWitness(Fraction(1), step["a"], floats(step["witness"].u))
+    leaders, bound = read_leaders(section), floats_up(section.input)
+    return Tracking(leaders, structure, protocol, rows, section.initial, relative, section.after, bound)

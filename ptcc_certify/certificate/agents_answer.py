@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -16,9 +17,12 @@ from lmi.exact.elementary_enclosures import sqrt
 from ptcc_certify.bounds.agent_motion import Interval
 from ptcc_certify.bounds.agents import States, first_inputs
 from ptcc_certify.bounds.agents_comparison import AgentsComparison
+from ptcc_certify.bounds.enclosed_ends import agents_ends, weighted_sum
 from ptcc_certify.bounds.final_state import Influence, NotEnclosedError
+from ptcc_certify.bounds.section_numbers import fractions
 from ptcc_certify.certificate.answer import MET, OPEN, REFUTED, Answer
-from ptcc_certify.certificate.format_vectors import agents_ends, weighted_sum
+from ptcc_certify.checker.agent_bounds import AgentsInput, UsedSection
+from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
@@ -299,3 +303,28 @@ def final_states(part: AgentsAnswer, influence: Influence) -> Intervals | None:
         )
         for k in range(len(offsets))
     )
+
+
+def inputs_section(bounds: Sequence[Fraction] | None) -> AgentsInput | None:
+    """Return bounds of the input of every agent."""
+    return None if bounds is None else AgentsInput(agents=Numbers(bounds), largest=max(bounds))
+
+
+def used_of(functions: Sequence[UsedSection]) -> tuple[UsedFunction, ...]:
+    """Return the functions that are used."""
+    return tuple(UsedFunction(one.function, fractions(one.inputs)) for one in functions)
+
+
+def rows_of(rows: Sequence[Sequence[Any]]) -> tuple[tuple[Any, ...], ...]:
+    """Return rows as tuples."""
+    return tuple(map(tuple, rows))
+
+
+def states_of(states: Sequence[Sequence[Sequence[Any]]] | None) -> tuple[tuple[tuple[Any, ...], ...], ...] | None:
+    """Return states of agents as tuples; None of None."""
+    return None if states is None else tuple(map(rows_of, states))
+
+
+def bounds_of(section: AgentsInput | None) -> tuple[Fraction, ...] | None:
+    """Return bounds of the inputs; None if there are none."""
+    return None if section is None else tuple(section.agents)

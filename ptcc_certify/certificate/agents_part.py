@@ -22,10 +22,25 @@ from ptcc_certify.bounds.agents import (
     scaled_states,
 )
 from ptcc_certify.bounds.agents_comparison import AgentsComparison, compare_agents
+from ptcc_certify.bounds.enclosed_ends import agents_ends
 from ptcc_certify.bounds.final_state import Influence
 from ptcc_certify.bounds.input.tightest_bound import round_up
-from ptcc_certify.certificate.agents_answer import AgentsAnswer, Intervals, Residual, UsedFunction, final_states
-from ptcc_certify.certificate.format_vectors import agents_ends
+from ptcc_certify.bounds.section_numbers import numbers
+from ptcc_certify.certificate.agents_answer import (
+    AgentsAnswer,
+    Intervals,
+    Residual,
+    UsedFunction,
+    bounds_of,
+    final_states,
+    inputs_section,
+    rows_of,
+    states_of,
+    used_of,
+)
+from ptcc_certify.checker.agent_bounds import ResidualSection, UsedSection
+from ptcc_certify.checker.agent_decrease import PhaseSection
+from ptcc_certify.checker.agents import AgentsSection
 from ptcc_certify.checker.input_formulas import Limits, decay_above
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
@@ -369,3 +384,57 @@ def _damping(part: AgentsPart, influence: Influence) -> list[Fraction] | None:
         along = root_product(sum(((abs(m) + r) ** 2 for m, r in common[k]), Fraction(0)))
         bounds.append(part.protocol.own[1] * eta * (eta * away + along))
     return bounds
+
+
+def matrix_section(part: AgentsPart) -> AgentsSection:
+    """Return the section ``agents`` of agents of order n."""
+    protocol, matrix, residual = part.protocol, part.matrix, part.residual
+    return AgentsSection(
+        order=part.order,
+        dimension=part.dimension,
+        plant=protocol.plant,
+        own=protocol.own,
+        gains=protocol.gains,
+        coupling=matrix.coupling,
+        lower_triangle=matrix.W,
+        rate=matrix.rate,
+        gain_cap=protocol.gain_cap,
+        points=matrix.points,
+        functions=[UsedSection(function=one.number, inputs=numbers(one.inputs)) for one in part.used],
+        offsets=protocol.offsets,
+        initial_state=part.initial_state,
+        motion=part.motion,
+        final_state=part.final_state,
+        residual=None if residual is None else ResidualSection(clock=residual.clock, agents=residual.agents),
+        input=inputs_section(part.input),
+    )
+
+
+def phases_section(part: AgentsAnswer) -> list[PhaseSection]:
+    """Return the section ``phases``; empty without phases."""
+    return [
+        PhaseSection(function=p.function, rate=p.rate, coupling=p.coupling, lower_triangle=p.W, points=p.points)
+        for p in getattr(part, "phases", ())
+    ]
+
+
+def read_matrix(
+    section: AgentsSection, structure: Structure, base: Protocol, functions: Sequence[LyapunovFunction]
+) -> AgentsPart:
+    """Return what an accepted certificate says of agents of order n, without phases."""
+    plant, own, gains, points = map(tuple, (section.plant, section.own, section.gains, section.points))
+    matrix = AgentMatrix(rows_of(section.lower_triangle), section.rate, points, section.coupling, gains)
+    protocol = AgentsProtocol(base, plant, own, gains, rows_of(section.offsets), section.gain_cap)
+    used, residual = used_of(section.functions), section.residual
+    return AgentsPart(
+        structure,
+        protocol,
+        matrix,
+        used,
+        tuple(functions[one.number] for one in used),
+        states_of(section.initial_state),
+        rows_of(section.motion),
+        states_of(section.final_state),
+        None if residual is None else Residual(residual.clock, rows_of(residual.agents)),
+        bounds_of(section.input),
+    )

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +24,20 @@ from ptcc_certify.bounds.cascade import (
     root_of,
 )
 from ptcc_certify.bounds.final_state import Influence
-from ptcc_certify.certificate.agents_answer import AgentsAnswer, Intervals, Residual, UsedFunction, final_states
+from ptcc_certify.bounds.section_numbers import numbers
+from ptcc_certify.certificate.agents_answer import (
+    AgentsAnswer,
+    Intervals,
+    Residual,
+    UsedFunction,
+    bounds_of,
+    final_states,
+    inputs_section,
+    rows_of,
+    states_of,
+    used_of,
+)
+from ptcc_certify.checker.agent_cascade import CascadeSection, TrackedSection
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
@@ -315,3 +329,51 @@ def _input(part: CascadePart) -> tuple[Fraction, ...] | None:
         return None
     extra = base.reaching.mu1 * part.dimension if base.reaching is not None else Fraction(0)
     return tuple(min(each) + extra for each in zip(*bounds, strict=True))
+
+
+def cascade_section(part: CascadePart) -> CascadeSection:
+    """Return the section ``agents`` of the cascade."""
+    roots: Sequence[Any] = part.roots if part.initial_state is not None else [None] * len(part.used)
+    pairs = zip(part.used, roots, strict=True)
+    return CascadeSection(
+        cascade=part.alpha,
+        dimension=part.dimension,
+        functions=[
+            TrackedSection(
+                function=one.number,
+                inputs=numbers(one.inputs),
+                initial=None if root is None else root.state,
+                drive=None if root is None else root.drive,
+            )
+            for one, root in pairs
+        ],
+        offsets=part.protocol.offsets,
+        initial_state=part.initial_state,
+        motion=part.motion,
+        final_state=part.final_state,
+        input=inputs_section(part.input),
+    )
+
+
+def read_cascade(
+    section: CascadeSection, structure: Structure, base: Protocol, functions: Sequence[LyapunovFunction]
+) -> CascadePart:
+    """Return what an accepted certificate says of the cascade."""
+    alpha, offsets, begin = section.cascade, rows_of(section.offsets), states_of(section.initial_state)
+    used, roots = [functions[one.function] for one in section.functions], list[Roots]()
+    if begin is not None:
+        rows = initial_rows(structure, begin, offsets, base.gain, alpha)[2:]
+        for one, V in zip(section.functions, used, strict=True):
+            told = one.initial or Fraction(0), one.drive or Fraction(0)
+            roots.append(Roots(*told, *(root_of(structure, V, x) for x in rows)))
+    return CascadePart(
+        structure,
+        CascadeProtocol.of(base, alpha, offsets),
+        used_of(section.functions),
+        tuple(used),
+        tuple(roots),
+        begin,
+        rows_of(section.motion),
+        states_of(section.final_state),
+        bounds_of(section.input),
+    )

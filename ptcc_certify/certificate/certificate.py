@@ -21,8 +21,8 @@ from ptcc_certify.certificate.answer import rejection, rejects
 from ptcc_certify.certificate.certificate_data import Content, Source
 from ptcc_certify.certificate.certificate_file import FromFile, bytes_of, text_of, write_certificate
 from ptcc_certify.certificate.checking import read_and_check, refuse_no_certificate
-from ptcc_certify.certificate.format import certificate_document, read_document
-from ptcc_certify.certificate.format_vectors import read_side_files
+from ptcc_certify.certificate.document import certificate_document, read_document
+from ptcc_certify.certificate.section_writer import read_side_files
 from ptcc_certify.certificate.verdict import Assessment, assess, verdict_of
 from ptcc_certify.checker import CheckReport, VerifiedObligation
 from ptcc_certify.errors import FormatError, PTCCError, gated

@@ -17,19 +17,17 @@ import numpy as np
 
 from ptcc_certify.bounds.agents_comparison import AgentsComparison
 from ptcc_certify.bounds.deviation_from_final_state import DeviationGeometry
+from ptcc_certify.bounds.enclosed_ends import final_state_witness
 from ptcc_certify.bounds.envelope import Comparison, Envelope, remaining_part
 from ptcc_certify.bounds.final_state import FinalState, Influence, final_state, influence
 from ptcc_certify.bounds.input.effort import Effort
 from ptcc_certify.bounds.input.effort_bounds import InputRequest, bound_effort, full_constants
 from ptcc_certify.bounds.input.worst_initial_state import WorstInitialState, worst_initial_state
-from ptcc_certify.bounds.late_messages import LateBounds
+from ptcc_certify.bounds.late_messages import LateBounds, late_obligations
 from ptcc_certify.bounds.sliding_envelope import SlidingEnvelope
 from ptcc_certify.bounds.small_delays import DecayingForm
-from ptcc_certify.bounds.tracking import Tracking
+from ptcc_certify.bounds.tracking import Tracking, tracking_obligations
 from ptcc_certify.certificate.agents_answer import AgentsAnswer
-from ptcc_certify.certificate.format_leaders import tracking_obligations
-from ptcc_certify.certificate.format_messages import late_obligations
-from ptcc_certify.certificate.format_vectors import final_state_witness
 from ptcc_certify.certificate.request import Expectations, Request
 from ptcc_certify.checker import INPUT_NODES, CheckReport
 from ptcc_certify.checker.final_state import AgentsVector

@@ -23,10 +23,11 @@ from ptcc_certify.bounds.attracting_box import AttractingBox, box_of_family
 from ptcc_certify.bounds.kept_means import with_means
 from ptcc_certify.certificate.answer import rejection, rejects
 from ptcc_certify.certificate.certificate_file import FromFile, write_certificate
-from ptcc_certify.certificate.family_content import ComponentProof, FamilyContent, ProvedFunction
+from ptcc_certify.certificate.document import family_document
+from ptcc_certify.certificate.family_content import ComponentProof, FamilyContent
 from ptcc_certify.certificate.family_table import family_table
 from ptcc_certify.certificate.family_verdict import assess_family
-from ptcc_certify.certificate.format_family import family_document
+from ptcc_certify.certificate.functions import ProvedFunction
 from ptcc_certify.certificate.request import (
     Expectations,
     listener,

@@ -27,6 +27,7 @@ from ptcc_certify.bounds.final_ends import FinalEnds
 from ptcc_certify.bounds.kept_means import LeadingGroup, leading_groups
 from ptcc_certify.bounds.reaching_phase import ReachingPhase
 from ptcc_certify.certificate.certificate_data import Source
+from ptcc_certify.certificate.functions import ProvedFunction
 from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.certificate.restricted_claims import (
     Claim,
@@ -57,8 +58,6 @@ from ptcc_certify.protocols.reaching_time import ReachingTime
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
 from ptcc_certify.theorems.family_kernel import UNKNOWN
 from ptcc_certify.theorems.restricted_signals import SignalClass
-
-ProvedFunction = FamilyFunction | FollowerFunction | SquaresFunction
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,6 +21,7 @@ from lmi.blas_threads import one_thread
 from lmi.child_process import apart
 from lmi.errors import LMIError, NoCertificate, OutOfTime
 from lmi.search_time import share_of_time
+from ptcc_certify.bounds.enclosed_ends import Interval
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.bounds.final_state import (
     FinalState,
@@ -48,8 +49,7 @@ from ptcc_certify.certificate.cascade_part import prove_cascade
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.certificate_data import Observations
 from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
-from ptcc_certify.certificate.format_final_state import stated_ends
-from ptcc_certify.certificate.format_vectors import Interval
+from ptcc_certify.certificate.final_state_sections import stated_ends
 from ptcc_certify.certificate.request import (
     Expectations,
     Request,

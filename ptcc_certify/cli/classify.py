@@ -34,7 +34,7 @@ def classify(graph: tuple[str, ...], expect: str | None, as_json: bool, screen: 
         return classify_family(graph, given, expect, as_json, screen, options)
     structure = analyse(given)
     if as_json:
-        from ptcc_certify.certificate.format_graph import structure_document
+        from ptcc_certify.certificate.graph_sections import structure_document
 
         print_json(structure_document(structure))
     else:

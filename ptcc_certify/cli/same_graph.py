@@ -86,8 +86,8 @@ class _Pair:
         return self._family(options) if self.kind == "family" else self._graph(options)
 
     def _graph(self, options: shared.Options) -> Compared:
-        from ptcc_certify.certificate.format_graph import certificate_graph
-        from ptcc_certify.certificate.format_vectors import read_side_files
+        from ptcc_certify.certificate.graph_sections import certificate_graph
+        from ptcc_certify.certificate.section_writer import read_side_files
         from ptcc_certify.graphs.difference import difference
         from ptcc_certify.graphs.family import Family
         from ptcc_certify.graphs.io.family_files import family_flags
@@ -105,8 +105,8 @@ class _Pair:
 
     def _family(self, options: shared.Options) -> Compared:
         """Compare families; the order of the files does not count."""
-        from ptcc_certify.certificate.format_family import certificate_family
-        from ptcc_certify.certificate.format_vectors import read_side_files
+        from ptcc_certify.certificate.graph_sections import certificate_family
+        from ptcc_certify.certificate.section_writer import read_side_files
         from ptcc_certify.graphs.family_difference import family_difference, mode_order
         from ptcc_certify.graphs.io.family_files import family_flags, read_family
 

@@ -18,10 +18,10 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from lmi.exact.decimal_rounding import up
+from ptcc_certify.bounds.enclosed_ends import agents_ends
 from ptcc_certify.bounds.shortest_time import shortest_time
 from ptcc_certify.certificate.agents_answer import AgentsAnswer
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.format_vectors import agents_ends
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.errors import ParameterError, gated

@@ -206,7 +206,7 @@ def bound_words(saved: FamilyCertificate) -> list[Markup]:
     part = min(parts, key=lambda p: p.upper_bound.value)  # type: ignore[union-attr]
     bound, family = part.upper_bound, saved.family
     assert bound is not None
-    from ptcc_certify.certificate.format_upper_bound import upper_bound_entry
+    from ptcc_certify.certificate.unverified import upper_bound_entry
     from ptcc_certify.lyapunov.quotient import Quotient
 
     lines = []

@@ -20,7 +20,7 @@ from ziamath.tex import tex2mml
 
 from lmi.exact.decimal_rounding import down, up
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.format import producer
+from ptcc_certify.certificate.document import producer
 from ptcc_certify.checker.input_formulas import InitialSet
 from ptcc_certify.graphs.rationals import format_exact, nearest_float, writable
 from ptcc_certify.protocols import Protocol

@@ -164,7 +164,7 @@ def _file_claim(claim: Mapping[str, str]) -> str:
 def _file_summary(path: str, document: Mapping[str, Any], report: CheckReport) -> list[str]:
     """Return the short screen of an accepted certificate, of a graph or a family, as its file says it."""
     from ptcc_certify.certificate.certificate import Certificate, accepted_certificate
-    from ptcc_certify.certificate.format_vectors import read_side_files
+    from ptcc_certify.certificate.section_writer import read_side_files
 
     origins = dict.fromkeys(("x(0)", "v(0)", "a(0)", "sigma(0)"), "as in the file")
     files = read_side_files(document, Path(path).parent)

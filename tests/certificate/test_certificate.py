@@ -27,10 +27,10 @@ from lmi.exact.decimal_rounding import float_up
 from ptcc_certify.batch import certify_many
 from ptcc_certify.certificate import procedure
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
-from ptcc_certify.certificate.format_graph import structure_document
-from ptcc_certify.certificate.format_vectors import exact_or_ball
+from ptcc_certify.certificate.graph_sections import structure_document
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.certificate.request import Expectations
+from ptcc_certify.certificate.section_writer import exact_or_ball
 from ptcc_certify.checker import OBLIGATIONS, CheckReport, UnreadableError, check, digest, read
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import GRAPHS, load_graph, select

@@ -17,11 +17,11 @@ from selection import thinned
 
 import ptcc_certify as ptcc
 from ptcc_certify.bounds.envelope import FRACTIONS
+from ptcc_certify.bounds.input.effort import effort_section
 from ptcc_certify.certificate import format_vectors as vectors
 from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate, read_certificate
-from ptcc_certify.certificate.format_effort import effort_section
-from ptcc_certify.certificate.format_graph import structure_document
-from ptcc_certify.certificate.format_vectors import Writer
+from ptcc_certify.certificate.graph_sections import structure_document
+from ptcc_certify.certificate.section_writer import Writer
 from ptcc_certify.checker import digest
 from ptcc_certify.errors import FormatError, ParameterError
 from ptcc_certify.examples import EXAMPLES, load_graph

@@ -28,8 +28,8 @@ from selection import thinned
 from ptcc_certify import checker
 from ptcc_certify.certificate import format_vectors
 from ptcc_certify.certificate.certificate import RejectedCertificate, read_certificate
+from ptcc_certify.certificate.document import family_document
 from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate, certify_family
-from ptcc_certify.certificate.format_family import family_document
 from ptcc_certify.checker import check
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family

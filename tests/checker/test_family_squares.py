@@ -17,7 +17,7 @@ from ptcc_certify.certificate import family_certificate, format_vectors
 from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
 from ptcc_certify.certificate.family_comparison import compare
-from ptcc_certify.certificate.format_family import certificate_family, family_sections
+from ptcc_certify.certificate.graph_sections import certificate_family, family_sections
 from ptcc_certify.checker import check
 from ptcc_certify.checker.reading import exact
 from ptcc_certify.graphs.family import Family

@@ -23,6 +23,7 @@ from ptcc_certify.bounds.input.effort import (
     Effort,
     Peak,
     SlidingPart,
+    first_input,
 )
 from ptcc_certify.bounds.input.energy import energy_integral
 from ptcc_certify.bounds.input.initial_set import largest_deviation
@@ -130,14 +131,6 @@ def bound_effort(request: InputRequest) -> Effort:
         disturbed=None if request.delta is None else bound_disturbed(bounds, usable, request.delta, influence),
         first=first_input(structure, request.protocol, region),
     )
-
-
-def first_input(structure: Structure, protocol: Protocol, region: InitialSet) -> Fraction | None:
-    """Return ``sup max_k |u_k(0)|``, exactly; None in sliding mode, for an ellipsoid, for a large graph."""
-    n = structure.graph.n_nodes
-    if protocol.reaching or region.axes or n > INPUT_NODES or not structure.graph.n_edges:
-        return None
-    return protocol.gain.first * max(map(region.largest, structure.graph.exact_rows(range(n))))
 
 
 def _decide_boundedness(

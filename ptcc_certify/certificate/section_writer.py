@@ -7,30 +7,27 @@ import io
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import is_dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import numpy as np
 
-from lmi.exact.decimal_rounding import float_up
-from lmi.exact.definite import SparseFactor
-from ptcc_certify.bounds.final_state import Influence, enclosed_ends
-from ptcc_certify.checker.reading import RejectedError, exact
+from ptcc_certify.bounds.enclosed_ends import DECIMALS, RADIUS
+from ptcc_certify.bounds.section_numbers import floats
+from ptcc_certify.checker.reading import Interval, RejectedError, exact
+from ptcc_certify.checker.sections import Rule, declared
 from ptcc_certify.checker.side_files import Numbers, SideFiles, beside
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.io.files import read_bytes
 from ptcc_certify.graphs.rationals import format_exact, writable
-from ptcc_certify.graphs.structure import Structure
 
 #: Vectors above this length go to side files.
 LONG = 50_000
 #: Bits of numerator and denominator up to which an interval is written as it is.
 _SHORT_BITS = 256
-#: Decimals of the middle of a ball, and its radius, where an exact number would be too long.
-_DECIMALS, _RADIUS = 120, Fraction(1, 10**60)
-
-Interval = tuple[Fraction, Fraction]
 
 
 class Writer:
@@ -114,26 +111,6 @@ class Writer:
         return {**self.vector(name, np.array(whole, dtype=np.int64)), "scale": str(scale)}
 
 
-def floats(numbers: Numbers) -> np.ndarray:
-    """Return the floats nearest to numbers, each rounded once."""
-    return np.array([float(x) if numbers.scale is None else x / numbers.scale for x in numbers.values])
-
-
-def numbers(values: Sequence[Fraction] | np.ndarray | None) -> Numbers | None:
-    """Return numbers as the sections have them; None of None."""
-    return None if values is None else Numbers(values)
-
-
-def fractions(values: Numbers | None) -> tuple[Fraction, ...] | None:
-    """Return numbers that were read; None of None."""
-    return None if values is None else tuple(values)
-
-
-def floats_up(numbers: Numbers | None) -> np.ndarray | None:
-    """Return floats that numbers do not exceed; None of None."""
-    return None if numbers is None else np.array([float_up(x) for x in numbers])
-
-
 class Reader:
     """Reads the vectors of an accepted document; the check has verified that every part is there.
 
@@ -200,18 +177,6 @@ def _side_files(value: Any) -> Iterator[tuple[str, str]]:
         yield from _side_files(part)
 
 
-def factor_entry(factor: SparseFactor, power: int, out: Writer, parents: np.ndarray | None = None) -> dict[str, Any]:
-    """Write a sparse factor of ``2^power`` times a matrix."""
-    keys = ("order", "indptr", "indices", "data", "exponents")
-    weights = None if factor.weights is None else out.integers("weights", factor.weights)
-    return {key: out.integers(key, getattr(factor, key)) for key in keys} | {
-        "bits": factor.bits,
-        "power": power,
-        "weights": weights,
-        "parents": None if parents is None else out.integers("parents", parents),
-    }
-
-
 def text(value: Fraction | None) -> str | None:
     """Write a rational, or null."""
     return None if value is None else format_exact(value)
@@ -248,7 +213,7 @@ def exact_or_ball(value: Fraction) -> str | dict[str, str]:
     >>> sorted(exact_or_ball(Fraction(1, 3**9000)))
     ['mid', 'radius']
     """
-    return format_exact(value) if writable(value) else _ball_text((value, _RADIUS))
+    return format_exact(value) if writable(value) else _ball_text((value, RADIUS))
 
 
 def interval_text(interval: Interval) -> str | dict[str, str]:
@@ -270,82 +235,91 @@ def _odd_bits(n: int) -> int:
 def _ball_text(interval: Interval) -> dict[str, str]:
     """Write an interval as a ball that contains it, with short decimals."""
     middle, radius = interval
-    unit = 10**_DECIMALS
+    unit = 10**DECIMALS
     mid = round(middle * unit)
     wide = math.ceil((radius + abs(middle - Fraction(mid, unit))) * unit)
-    return {"mid": f"{mid}e-{_DECIMALS}", "radius": f"{wide}e-{_DECIMALS}"}
+    return {"mid": f"{mid}e-{DECIMALS}", "radius": f"{wide}e-{DECIMALS}"}
 
 
-def weighted_sum(weights: Sequence[Interval], values: Sequence[Interval]) -> Interval:
-    """Return an interval that contains the sum of the products; of radius 0 where all of them are.
+def write(kind: Any, value: Any, out: Writer, key: str = "a vector") -> Any:
+    """Return what stands in the file for a value of this declaration.
 
-    Examples
-    --------
-    >>> middle, radius = weighted_sum([(Fraction(2), Fraction(1))], [(Fraction(3), Fraction(0))])
-    >>> str(middle), str(radius)
-    ('6', '3')
+    Parameters
+    ----------
+    kind : declaration
+    value : object
+        A section, or anything with attributes of these names: numbers as Fraction, or as floats, which are the dyadic
+        numbers that they are; vectors as sequences or arrays.
+    out : Writer
+        Where long vectors go.
+    key : str
+        Under which it stands, which names its side file.
     """
-    pairs = [(*weight, *value) for weight, value in zip(weights, values, strict=True)]
-    middle = sum((w * x for w, _, x, _ in pairs), Fraction(0))
-    return middle, sum((abs(w) * s + r * (abs(x) + s) for w, r, x, s in pairs), Fraction(0))
-
-
-def influence_balls(matrix: Influence) -> tuple[list[list[Interval]], list[list[Interval]]]:
-    """Return left null vectors and containment weights as intervals: of radius 0, unless too long to write."""
-    left_null_vectors = [_balls([Fraction(w) for w in null_vector]) for null_vector in matrix.left_null_vectors]
-    rows = matrix.containment_weights or ()
-    columns = [_balls([Fraction(row[k]) for row in rows]) for k in range(len(matrix.left_null_vectors))]
-    containment_weights = [list(row) for row in zip(*columns, strict=True)] if columns else [[] for _ in rows]
-    return left_null_vectors, containment_weights
-
-
-def agents_ends(matrix: Influence, begin: Sequence[Interval]) -> list[Interval]:
-    """Return ``Q x`` for intervals ``x`` of the agents.
-
-    Raises
-    ------
-    NotEnclosedError
-        Of a large graph, whose ``Q`` is enclosed: its equations are too ill-conditioned for floats.
-    """
-    if not matrix.exact:
-        return enclosed_ends(matrix, begin)
-    left_null_vectors, containment_weights = influence_balls(matrix)
-    groups = list(zip(matrix.balanced, left_null_vectors, strict=True))
-    values = [weighted_sum(null_vector, [begin[v] for v in c.nodes]) for c, null_vector in groups]
-    ends = [(Fraction(0), Fraction(0))] * len(begin)
-    for component, (middle, radius) in zip(matrix.balanced, values, strict=True):
-        for v, g in zip(component.nodes, component.gauge or (), strict=True):
-            ends[v] = g * middle, radius
-    for v, row in zip(matrix.structure.followers.tolist(), containment_weights, strict=True):
-        ends[v] = weighted_sum(row, values)
-    return ends
-
-
-def _balls(values: Sequence[Fraction]) -> list[Interval]:
-    if all(map(writable, values)):
-        return [(x, Fraction(0)) for x in values]
-    unit = 10**_DECIMALS
-    return [(Fraction(round(x * unit), unit), _RADIUS) for x in values]
-
-
-def final_state_witness(structure: Structure, matrix: Influence) -> tuple[Fraction, ...] | None:
-    """Return ``u > 0`` with ``M u > 0`` on followers and on leader groups less one agent, if balls need it.
-
-    ``M`` is the comparison matrix of ``L_F``, and that of ``L_k`` transposed. From it follows how far a ball's middle
-    may be from the truth.
-    """
-    left_null_vectors, containment_weights = influence_balls(matrix)
-    if not any(r for row in (*left_null_vectors, *containment_weights) for _, r in row):
+    if value is None:
         return None
-    u = np.ones(structure.graph.n_nodes)
-    L = structure.graph.laplacian().toarray()
-    M = np.diag(np.diag(L)) * 2 - np.abs(L)
-    groups = [(structure.followers.tolist(), M)]
-    for component, null_vector in zip(matrix.balanced, left_null_vectors, strict=True):
-        top = max(range(len(null_vector)), key=lambda i: abs(null_vector[i][0]))
-        groups.append(([v for i, v in enumerate(component.nodes) if i != top], M.T))
-    for nodes, block in groups:
-        if nodes:
-            own = block[np.ix_(nodes, nodes)]
-            u[nodes] = np.abs(np.linalg.solve(own / np.diag(own)[:, None], np.ones(len(nodes))))
-    return tuple(map(Fraction, u.tolist()))
+    if get_origin(kind) in (Union, UnionType):
+        kinds = [one for one in get_args(kind) if one is not NoneType]
+        return write(next((one for one in kinds if _fits(one, value)), kinds[0]), value, out, key)
+    value = value.values if isinstance(value, Numbers) else value
+    if get_origin(kind) is Annotated:
+        return _annotated(*get_args(kind), value=value, out=out, key=key)
+    if kind is Fraction:
+        return _text(value)
+    if isinstance(kind, type) and is_dataclass(kind):
+        pairs = ((f, getattr(value, f.name)) for f in declared(kind))
+        return {f.key: write(f.kind, one, out, f.key) for f, one in pairs if not (f.optional and one is None)}
+    return value
+
+
+def _fits(kind: Any, value: Any) -> bool:
+    """Tell whether a value is of one of several kinds."""
+    if get_origin(kind) is Annotated:
+        return _fits(get_args(kind)[0], value)
+    if get_origin(kind) is Literal:
+        return value in get_args(kind)
+    kind = get_origin(kind) or kind
+    return kind is Any or (isinstance(kind, type) and isinstance(value, kind))
+
+
+def _text(value: Fraction | float) -> str:
+    """Write a number exactly; a float as the dyadic number that it is."""
+    if isinstance(value, float):
+        return value.hex() if value else "0"
+    return format_exact(value)
+
+
+def _annotated(inner: Any, note: Any, *rest: str, value: Any, out: Writer, key: str) -> Any:
+    if isinstance(note, Rule):
+        return write(inner, value, out, key)
+    if note == "a ball":
+        return interval_text(value)
+    if note == "a list":
+        return [write(get_args(inner)[0], one, out, key) for one in value]
+    if note == "ends by agent":
+        return dict(zip(out.labels, map(interval_text, zip(*value, strict=True)), strict=True))
+    if note == "lower triangle":
+        return [list(map(_text, row[: k + 1])) for k, row in enumerate(value)]
+    if note == "by some agents":
+        return {label: write(get_args(inner)[1], x, out, key) for label, x in value.items()}
+    if note == "a label":
+        return out.labels[value]
+    if note == "nodes":
+        return out.nodes(value)
+    if note == "integers of followers":
+        return out.integers(key, np.asarray(value))
+    if note.startswith("numbers"):
+        return _numbers(value, out, key)
+    if inner is Numbers and not rest and isinstance(value, np.ndarray) and out.aside(value.size):
+        return out.vector(key, value)
+    if inner is Numbers and not rest and not isinstance(value, np.ndarray):
+        return out.state(key, value)
+    labels, each = out.followers if note == "by follower" else out.labels, Fraction if inner is Numbers else None
+    values = value.tolist() if isinstance(value, np.ndarray) else value
+    kind = each or get_args(inner)[0]
+    return {label: write(kind, x, out, key) for label, x in zip(labels, values, strict=True)}
+
+
+def _numbers(value: Any, out: Writer, key: str) -> Any:
+    if isinstance(value, np.ndarray):
+        return out.floats(key, value)
+    return format_exact(value) if isinstance(value, Fraction) else out.numbers(key, value)

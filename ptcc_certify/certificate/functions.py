@@ -1,7 +1,8 @@
-"""Lyapunov functions and boxes of a family's certificate, and what proves them: given as sections, and read."""
+"""Lyapunov functions and boxes in a certificate, with what proves them: given as sections, and read."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from math import ceil
@@ -9,27 +10,37 @@ from typing import Any
 
 import numpy as np
 
+from lmi.exact.definite import SparseFactor
 from ptcc_certify.bounds.attracting_box import AttractingBox
-from ptcc_certify.certificate.family_content import ProvedFunction
-from ptcc_certify.certificate.format_vectors import Writer, factor_entry
+from ptcc_certify.certificate.certificate_data import Content
+from ptcc_certify.certificate.section_writer import Reader, Writer, write
 from ptcc_certify.checker import attracting_boxes
 from ptcc_certify.checker.attracting_boxes import KeptBox
 from ptcc_certify.checker.family_function import FormSection, MeanSection, Multipliers
 from ptcc_certify.checker.family_rows import PartSection, RowsSection
 from ptcc_certify.checker.family_squares import FactorWitness, SquaresSection
-from ptcc_certify.checker.reading import Interval
-from ptcc_certify.checker.side_files import SideFiles
+from ptcc_certify.checker.lyapunov import DeviationSection, FunctionSection
+from ptcc_certify.checker.rates import MeanWitness, OvershootSection, RatesSection
+from ptcc_certify.checker.reading import Interval, exact
+from ptcc_certify.checker.side_files import Numbers, SideFiles
+from ptcc_certify.checker.theorem_function import BlockSection, PaperSection, RhoInterval
 from ptcc_certify.errors import FormatError
+from ptcc_certify.graphs.rationals import format_exact
+from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.family_function import FamilyFunction, prove_ends
 from ptcc_certify.lyapunov.family_rows import FollowerDecay
 from ptcc_certify.lyapunov.follower_function import FollowerFunction, LeadingPart
+from ptcc_certify.lyapunov.function import DeviationBound, Dominance, LyapunovBlock, LyapunovFunction
 from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.lyapunov.rate_upper_bound import RateBound
 from ptcc_certify.lyapunov.squares_function import FormTable, SquaresFunction
 from ptcc_certify.theorems.family_behaviour import FamilyComponent
 from ptcc_certify.theorems.theorem import Obligation
 
 #: Bits of integers that floats hold.
 _FLOAT_BITS = 53
+
+
 Proved = Mapping[tuple[str, str], Mapping[str, Any]]
 
 
@@ -106,9 +117,6 @@ def read_box(entry: attracting_boxes.AttractingBox, labels: Sequence[str], files
     return AttractingBox(decay, tuple(entry.lower), tuple(entry.upper))
 
 
-# ---------------------------------------------------------------------- obligations
-
-
 def function_steps(of: str, V: ProvedFunction, out: Writer) -> Iterator[Obligation]:
     """Yield the obligations of a Lyapunov function: of its modes, or of its parts, then of its rows."""
     if isinstance(V, FamilyFunction):
@@ -124,9 +132,6 @@ def function_steps(of: str, V: ProvedFunction, out: Writer) -> Iterator[Obligati
         for j, part in enumerate(V.parts):
             yield from function_steps(f"{of}.parts[{j}]", part.function, out)
         yield Obligation("family-rows", of, {"b": V.rate})
-
-
-# ---------------------------------------------------------------------- reading
 
 
 def read_function(
@@ -197,3 +202,138 @@ def _read_rows(
         ends |= {v: ceil(bound * scale) for v, bound in bounds if v not in pivots}
     vectors = np.array(d, dtype=object), np.array(list(ends.values()), dtype=object)
     return FollowerFunction(family, kernel, followers, *vectors, tuple(parts), section.rate)
+
+
+def paper_section(content: Content) -> PaperSection | None:
+    """Return the row of the theorem: its Lyapunov function, whether a rate of it was proved or not."""
+    V, interval = content.lyapunov, content.proof.interval
+    if V is None:
+        return None
+    coordinates: Any = V.coordinates
+    return PaperSection(
+        theorem=content.theorem.number,
+        objective=V.objective,
+        coordinates=coordinates,
+        blocks=list(map(_block, V.blocks)),
+        rho=V.rho,
+        rho_interval=None if interval is None else RhoInterval(printed=interval.printed, exact=interval.exact),
+        rate=V.rate,
+        overshoot=V.overshoot if V.blocks else None,
+    )
+
+
+def _rates(content: Content) -> RatesSection:
+    rates = content.paper_rate, content.diagonal_rate, content.rate, content.upper_bound
+    return RatesSection(**dict(zip(("paper", "diagonal", "proved", "upper_bound"), rates, strict=True)))
+
+
+def _write_function(V: LyapunovFunction, out: Writer) -> dict[str, Any]:
+    where = Writer(out.labels) if V.kind == "paper" else out  # as the section "paper" has it
+    section: dict[str, Any] = write(FunctionSection, _function(V), where)
+    return section
+
+
+def _function(V: LyapunovFunction) -> FunctionSection:
+    bound, words = V.deviation, dict[str, Any](class_=V.kind, coordinates=V.coordinates)
+    return FunctionSection(
+        **words,
+        blocks=list(map(_block, V.blocks)),
+        rho=V.rho,
+        rate=V.proved_rate,
+        overshoot=V.overshoot,
+        deviation=None if bound is None else DeviationSection(agents=Numbers(bound.agents), norm=bound.norm),
+    )
+
+
+def _block(block: LyapunovBlock) -> BlockSection:
+    diagonal = block.diagonal if block.dyadic is None else block.dyadic
+    return BlockSection(
+        name=block.name,
+        nodes=block.nodes,
+        diagonal=diagonal if block.matrix is None else None,
+        lower_triangle=block.matrix,
+        times_rho=block.times_rho,
+    )
+
+
+def _read_function(
+    name: str, section: FunctionSection, structure: Structure, data: Reader, proved: Mapping[tuple[str, str], Any]
+) -> LyapunovFunction:
+    bound, full, rows = section.deviation, proved.get(("overshoot", name)), proved.get(("dominance", name))
+    blocks = tuple(_read_block(block, data, rows is not None) for block in section.blocks)
+    gauge = structure.closed_components[0].gauge if section.coordinates == "eps" else ()
+    return LyapunovFunction(
+        section.class_,
+        section.coordinates,
+        blocks,
+        section.rho,
+        section.rate,
+        None if full is None else (full["lowest"], full["highest"]),
+        gauge or (),
+        dominance=None if rows is None else Dominance(data.floats(rows["witness"]["vector"], len(blocks[0].nodes))),
+        deviation=None if bound is None else DeviationBound(tuple(bound.agents), bound.norm),
+        name=name,
+    )
+
+
+def _read_block(section: BlockSection, data: Reader, large: bool) -> LyapunovBlock:
+    nodes = data.nodes(section.nodes)
+    if section.lower_triangle is not None:
+        return LyapunovBlock(section.name, nodes, matrix=list(map(list, section.lower_triangle)))
+    if large:
+        return LyapunovBlock(section.name, nodes, dyadic=data.floats(section.diagonal, len(nodes)))
+    return LyapunovBlock(section.name, nodes, tuple(map(exact, section.diagonal or ())), section.times_rho)
+
+
+def _overshoot(content: Content) -> OvershootSection | None:
+    if content.rate is None:
+        return None
+    V = content.fastest
+    return OvershootSection(value=V.overshoot, of=f"||{V.coordinates}||^2")
+
+
+def _read_limit(proved: Mapping[tuple[str, str], Any], data: Reader) -> RateBound | None:
+    step = proved.get(("rate-upper-bound", "rates")) or proved.get(("rate-mean", "rates"))
+    if step is None:
+        return None
+    value, witness = step["upper_bound"], step["witness"]
+    if isinstance(witness, MeanWitness):
+        return RateBound(value, (witness.node,))
+    vectors = tuple(map(tuple, witness.vectors))
+    return RateBound(value, data.nodes(witness.nodes), witness.lower_triangle, vectors)
+
+
+def _dominance_witness(proof: Dominance, out: Writer) -> dict[str, Any]:
+    """Return the vector, and the proof of every leader group, each factor once."""
+    groups: list[Any] = []
+    first = 0
+    for group, scale in zip(proof.groups, proof.scales, strict=True):
+        rate = format_exact(group.rate)
+        unit = math.frexp(float(group.weights[0]))[1]
+        key = first, group.rate, np.ldexp(group.weights, -unit).tobytes()
+        repeated = key in out.written_groups
+        out.written_groups.add(key)
+        if group.factor is None or repeated:
+            groups.append(rate)
+        else:
+            # The factor is that of the group's own weights, of which those of the function are a power of two.
+            power = group.power + 1 - math.frexp(scale)[1]
+            factor = factor_entry(group.factor, power, out, group.parents)
+            groups.append({"rate": rate, "factor": factor})
+        first += group.weights.size
+    return {"vector": out.floats("vector", proof.vector), "groups": groups}
+
+
+def factor_entry(factor: SparseFactor, power: int, out: Writer, parents: np.ndarray | None = None) -> dict[str, Any]:
+    """Write a sparse factor of ``2^power`` times a matrix."""
+    keys = ("order", "indptr", "indices", "data", "exponents")
+    weights = None if factor.weights is None else out.integers("weights", factor.weights)
+    return {key: out.integers(key, getattr(factor, key)) for key in keys} | {
+        "bits": factor.bits,
+        "power": power,
+        "weights": weights,
+        "parents": None if parents is None else out.integers("parents", parents),
+    }
+
+
+ProvedFunction = FamilyFunction | FollowerFunction | SquaresFunction

@@ -1,4 +1,4 @@
-"""Where the agents end, in the JSON of a certificate: influence of the leaders and final states, exact or in balls."""
+"""Influence of the leaders and final states in a certificate's file: exact, or in balls."""
 
 from __future__ import annotations
 
@@ -8,21 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from ptcc_certify.bounds.enclosed_ends import agents_ends, influence_balls
 from ptcc_certify.bounds.final_state import FinalState, Influence, rounding_radius
+from ptcc_certify.bounds.section_numbers import numbers
 from ptcc_certify.certificate.certificate_data import Content
-from ptcc_certify.certificate.format_vectors import (
-    LONG,
-    Interval,
-    Writer,
-    agents_ends,
-    exact_or_ball,
-    influence_balls,
-    interval_text,
-    numbers,
-)
+from ptcc_certify.certificate.section_writer import LONG, Writer, exact_or_ball, interval_text
 from ptcc_certify.checker.final_state import FormationSection, InfluenceSection, LeftNullVector
 from ptcc_certify.checker.obligations import CheckReport
-from ptcc_certify.checker.reading import exact, interval
+from ptcc_certify.checker.reading import Interval, exact, interval
 from ptcc_certify.checker.side_files import Numbers, beside
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import Structure

@@ -1,0 +1,269 @@
+"""Graph, structure and claim in a certificate's file, and in what ``ptcc classify`` prints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ptcc_certify.certificate.section_writer import Writer
+from ptcc_certify.checker import MANY_COMPONENTS
+from ptcc_certify.checker.family import THEOREM
+from ptcc_certify.checker.reading import exact
+from ptcc_certify.checker.side_files import SideFiles
+from ptcc_certify.graphs.digraph import SignedDigraph, Weights
+from ptcc_certify.graphs.family import Family, Mode
+from ptcc_certify.graphs.rationals import format_exact
+from ptcc_certify.graphs.reading import RECORDED
+from ptcc_certify.graphs.structure import BIPARTITE_CONTAINMENT, INTERVAL_BIPARTITE_CONSENSUS, Structure, analyse
+from ptcc_certify.theorems.claims import Claim
+from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
+
+
+def structure_document(structure: Structure) -> dict[str, Any]:
+    """Return graph, structure and claim as JSON-ready data, in the keys of a certificate."""
+    claims = [component.claim for component in structure.components]
+    out = Writer(structure.graph.labels)
+    data = {"graph": graph_section(structure.graph, out), "structure": structure_section(structure, out)}
+    return data | claim_sections(structure, claims, None, out)
+
+
+def graph_section(graph: SignedDigraph, out: Writer) -> dict[str, Any]:
+    """Return nodes, edges and how they were read."""
+    read, (table, scale) = graph.read, graph.weight_table()
+    edges: Any
+    if out.aside(graph.n_edges) and table is not None:
+        edges = {
+            "count": graph.n_edges,
+            "scale": str(scale),
+            "source": out.file("source", graph.source),
+            "target": out.file("target", graph.target),
+            "weight": out.file("weight", table),
+        }
+    else:
+        edges = [
+            [graph.labels[s], graph.labels[t], w]
+            for s, t, w in zip(graph.source.tolist(), graph.target.tolist(), graph.weight_texts, strict=True)
+        ]
+    return {
+        "nodes": list(graph.labels),
+        "edges": edges,
+        "read": {key: read[key] for key in RECORDED if key in read},
+        "sha256": graph.sha256,
+    }
+
+
+def certificate_graph(document: Mapping[str, Any], files: Mapping[str, bytes]) -> SignedDigraph:
+    """Return the graph of an accepted certificate.
+
+    Parameters
+    ----------
+    document : mapping
+        The parsed JSON.
+    files : mapping of str to bytes
+        Its side files.
+
+    Returns
+    -------
+    SignedDigraph
+
+    Examples
+    --------
+    >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
+    >>> document = certify(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), simulation=False).to_dict()
+    >>> certificate_graph(document, {}) == foes
+    True
+    """
+    section, side = document["graph"], SideFiles(Path(), files)
+    labels, edges = section["nodes"], section["edges"]
+    if isinstance(edges, dict):
+        source, target, weight = (
+            np.array(side.column(edges[key], edges["count"])) for key in ("source", "target", "weight")
+        )
+        scale = exact(edges["scale"])
+        values, codes = np.unique(weight, return_inverse=True)
+        weights = Weights([Fraction(x) / scale for x in values.tolist()], codes)
+    else:
+        index = {label: i for i, label in enumerate(labels)}
+        source = np.array([index[s] for s, _, _ in edges], dtype=np.int64)
+        target = np.array([index[t] for _, t, _ in edges], dtype=np.int64)
+        weights = Weights([exact(w) for _, _, w in edges])
+    return SignedDigraph(labels, source, target, weights, section["read"])
+
+
+def structure_section(structure: Structure, out: Writer) -> dict[str, Any]:
+    """Return components with the witnesses of their balance."""
+    labels = structure.graph.labels
+    closed = []
+    for component in structure.closed_components:
+        entry: dict[str, Any] = {"nodes": [labels[v] for v in component.nodes], "balanced": component.balanced}
+        if component.gauge is not None:
+            entry["gauge"] = list(component.gauge)
+        if component.negative_cycle is not None:
+            entry["negative_cycle"] = [[labels[s], labels[t]] for s, t in component.negative_cycle]
+        closed.append(entry)
+    return {
+        "connectivity": structure.connectivity,
+        "closed_components": closed,
+        "leaders": out.nodes(structure.leaders),
+        "followers": out.nodes(structure.followers),
+        "balanced": structure.balanced,
+        "sign_symmetric": structure.sign_symmetric,
+    }
+
+
+def claim_sections(
+    structure: Structure, claims: Sequence[Claim], final: Mapping[str, Any] | None, out: Writer
+) -> dict[str, Any]:
+    """Return theorem, behaviour and corollaries; of a disconnected graph those of every weak component."""
+    if len(claims) == 1:
+        return {"claim": _claim(claims[0])}
+    return {"claim": None, "components": _components(structure, claims, final, out)}
+
+
+def _claim(claim: Claim) -> dict[str, Any]:
+    return {"theorem": claim.theorem, "behaviour": claim.behaviour, "corollaries": list(claim.corollaries)}
+
+
+def _components(structure: Structure, claims: Sequence[Claim], final: Mapping[str, Any] | None, out: Writer) -> Any:
+    """Return connectivity, claim and final state of every weak component, in arrays if there are many."""
+    components, labels = structure.components, structure.graph.labels
+    if len(components) > MANY_COMPONENTS:
+        return {
+            "nodes": out.vector("component", structure.weak_component)
+            if out.aside(len(labels))
+            else [[labels[v] for v in c.nodes] for c in components],
+            "connectivity": [c.connectivity for c in components],
+            "theorem": [claim.theorem for claim in claims],
+            "behaviour": [claim.behaviour for claim in claims],
+            "corollaries": [list(claim.corollaries) for claim in claims],
+        }
+    if final is not None and len(final) != len(labels):  # in side files
+        final = None
+    return [
+        {
+            "nodes": [labels[v] for v in c.nodes],
+            "connectivity": c.connectivity,
+            "claim": _claim(claim),
+            "final_state": final and {labels[v]: final[labels[v]] for v in c.nodes},
+        }
+        for c, claim in zip(components, claims, strict=True)
+    ]
+
+
+def family_sections(family: Family, components: Sequence[FamilyComponent], out: Writer | None = None) -> dict[str, Any]:
+    """Return modes, the structure of their mandatory graphs, and the claim of every component."""
+    out, labels = out or Writer(family.labels), family.labels
+    structures = [structure_section(analyse(mode.mandatory), out) for mode in family.modes]
+    claims = [{"theorem": THEOREM, "behaviour": c.behaviour, "signal": "any"} for c in components]
+    sections: dict[str, Any] = {"graph": _modes(family, out), "structure": {"modes": structures}, "claim": claims[0]}
+    if len(claims) > 1:
+        nodes = [[labels[v] for v in c.nodes.tolist()] for c in components]
+        sections["claim"] = None
+        sections["components"] = [{"nodes": n, "claim": claim} for n, claim in zip(nodes, claims, strict=True)]
+    return sections
+
+
+def _modes(family: Family, out: Writer) -> dict[str, Any]:
+    modes = [{"name": mode.name, "undirected": mode.tied, "edges": _edges(mode, out)} for mode in family.modes]
+    return {"nodes": list(family.labels), "modes": modes, "sha256": family.sha256}
+
+
+def _edges(mode: Mode, out: Writer) -> Any:
+    labels = mode.labels
+    if not out.aside(mode.n_edges) or mode.lower.table.dtype == object:
+        columns = mode.source.tolist(), mode.target.tolist(), *mode.texts
+        return [[labels[s], labels[t], *dict.fromkeys(ends)] for s, t, *ends in zip(*columns, strict=True)]
+    ends = {}
+    for key, below, above in (("least", mode.upper, mode.lower), ("largest", mode.lower, mode.upper)):
+        values = np.where(mode.sign < 0, -below.table, above.table)
+        ends[key] = out.vector(key, values) | ({"scale": str(mode.lower.scale)} if values.dtype.kind == "i" else {})
+    source, target = out.vector("source", mode.source), out.vector("target", mode.target)
+    return {"count": mode.n_edges, "source": source, "target": target, **ends}
+
+
+def certificate_family(section: Mapping[str, Any], files: Mapping[str, bytes]) -> Family:
+    """Return the family of an accepted certificate; ``files`` are its side files.
+
+    Examples
+    --------
+    >>> from ptcc_certify.theorems.family_behaviour import decide
+    >>> family = Family.from_intervals([("a", "b", -2, -1), ("b", "a", -1, 0)])
+    >>> certificate_family(family_sections(family, decide(family))["graph"], {}) == family
+    True
+    """
+    labels, modes, side = tuple(section["nodes"]), [], SideFiles(Path(), files)
+    index = {label: v for v, label in enumerate(labels)}
+    for mode in section["modes"]:
+        rows = mode["edges"]
+        if isinstance(rows, dict):
+            source, target, *ends = _columns(rows, side)
+        else:
+            source, target = (np.array([index[row[k]] for row in rows], dtype=np.int64) for k in (0, 1))
+            ends = [([exact(row[k]) for row in rows], np.arange(len(rows))) for k in (2, -1)]
+        sign, lower, upper = _sizes(*ends)
+        modes.append(Mode(labels, source, target, sign, lower, upper, name=mode["name"], tied=mode["undirected"]))
+    return Family(tuple(modes))
+
+
+def _columns(rows: Mapping[str, Any], files: SideFiles) -> tuple[Any, ...]:
+    """Return sources and targets of edges in side files, and distinct values and their places of both ends."""
+    names = ("source", "target", "least", "largest")
+    entries = ({key: rows[name][key] for key in ("file", "sha256")} for name in names)
+    source, target, *ends = (np.array(files.column(entry, rows["count"])) for entry in entries)
+    distinct = []
+    for name, column in zip(names[2:], ends, strict=True):
+        values, codes = np.unique(column, return_inverse=True)
+        scale = exact(rows[name].get("scale", "1"))
+        distinct.append(([Fraction(x) / scale for x in values.tolist()], codes))
+    return source, target, *distinct
+
+
+def _sizes(least: tuple[list[Fraction], Any], largest: tuple[list[Fraction], Any]) -> tuple[np.ndarray, Any, Any]:
+    """Return signs and bounds of sizes of weights between the values ``[codes]`` of two lists."""
+    (low, below), (high, above) = least, largest
+    m, above = len(below), above + len(low)
+    positive = np.array([x > 0 for x in (*low, *high)], dtype=bool)[above]
+    codes = np.concatenate([np.where(positive, below, above), np.where(positive, above, below)])
+    both = Weights([abs(x) for x in (*low, *high)], codes)
+    return np.where(positive, 1, -1).astype(np.int8), both.take(np.arange(m)), both.take(np.arange(m, 2 * m))
+
+
+def claim_witnesses(family: Family, components: Sequence[FamilyComponent]) -> list[Any]:
+    """Return what proves the claim of every component; None where its edges alone do."""
+    first = analyse(family.modes[0].mandatory)
+    number = {c.nodes[0]: k for k, c in enumerate(first.closed_components, start=1)}
+    return [_witness(family, component, number) for component in components]
+
+
+def _witness(family: Family, component: FamilyComponent, number: Mapping[int, int]) -> Any:
+    nodes = component.nodes.tolist()
+    labels = [family.labels[v] for v in nodes]
+    if component.behaviour in (BIPARTITE_CONTAINMENT, INTERVAL_BIPARTITE_CONSENSUS):
+        assert component.kernel is not None
+        if not component.kernel.has_rows:
+            return None
+        structure = component.kernel.structure
+        columns = [str(number[nodes[c.nodes[0]]]) for c in structure.closed_components if c.balanced]
+        rows = {v: zip(columns, component.kernel.row(v), strict=True) for v in structure.followers.tolist()}
+        return {"rows": {labels[v]: {j: format_exact(x) for j, x in row if x} for v, row in rows.items()}}
+    why = component.counterexample
+    if component.behaviour != DEPENDS or why is None or why.kind != "moving rest state":
+        return None
+    edge = None
+    if why.edge is not None:
+        mode = component.family.modes[why.other]
+        edge = [labels[mode.source[why.edge]], labels[mode.target[why.edge]], int(mode.sign[why.edge])]
+    state: dict[str, Any] = {}
+    if why.state is not None:
+        state = {label: format_exact(x) for label, x in zip(labels, why.state, strict=True) if x}
+    elif (q := why.enclosure) is not None:
+        for label, middle, radius in zip(labels, q.middle, q.radius, strict=True):
+            if radius:
+                state[label] = {"mid": format_exact(middle * q.unit), "radius": format_exact(radius * q.unit)}
+            elif middle:
+                state[label] = format_exact(middle * q.unit)
+    return {"mode": why.mode, "other": why.other, "edge": edge, "state": state}

@@ -1,0 +1,266 @@
+"""What a certificate says beside its claims, which nobody checks: what was asked, searched and seen."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ptcc_certify.bounds.envelope import FRACTIONS, LAST_INSTANTS
+from ptcc_certify.bounds.input.effort import LIMITS
+from ptcc_certify.bounds.late_messages import LateBounds, delays, read_messages
+from ptcc_certify.bounds.tracking import asked_leaders, read_leaders
+from ptcc_certify.certificate.certificate_data import Content, Observations
+from ptcc_certify.certificate.request import Expectations, Request
+from ptcc_certify.certificate.section_writer import Writer, finite, readable, text, write
+from ptcc_certify.checker.input_formulas import InitialSet, Limits
+from ptcc_certify.checker.late_messages import Delays
+from ptcc_certify.checker.leaders import LeadersAsked
+from ptcc_certify.checker.reading import RejectedError, entries, exact, need
+from ptcc_certify.checker.sections import Context, read
+from ptcc_certify.checker.side_files import SideFiles
+from ptcc_certify.errors import one_line
+from ptcc_certify.graphs.rationals import format_exact
+from ptcc_certify.graphs.structure import Structure, behaviour_name
+from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound, Member, prove_again
+from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.lyapunov.search import METHODS
+from ptcc_certify.protocols.base import Protocol
+from ptcc_certify.protocols.gain_limits import GainLimits
+from ptcc_certify.theorems.counterexample_text import mode_name
+
+#: Members of a word or mixture that are read.
+_MANY = 100
+
+
+def upper_bound_entry(quotient: Quotient, bound: FamilyRateBound) -> dict[str, Any]:
+    """Return a bound as JSON-ready data.
+
+    Each member has its mode and the weights of its uncertain edges as ``[source, target, weight]``; those that change
+    nothing off the common rest states are left out. ``durations`` are those of a word, on the stretched clock, in its
+    order in time; of a mixture the shares.
+
+    Examples
+    --------
+    >>> from ptcc_certify.lyapunov.family_rate_upper_bound import prove_family_rate_bound
+    >>> quotient = Quotient(Family.from_intervals([("a", "b", 1, 2)]))
+    >>> upper_bound_entry(quotient, prove_family_rate_bound(quotient))["members"]
+    [{'mode': 0, 'name': 'the graph', 'weights': [['a', 'b', '1']]}]
+    """
+    members = [
+        {"mode": m.mode, "name": mode_name(quotient.family, m.mode), "weights": _weights(quotient, m)}
+        for m in bound.members
+    ]
+    durations = [format_exact(h) for h in bound.durations]
+    return {"value": format_exact(bound.value), "kind": bound.kind, "members": members, "durations": durations}
+
+
+def _weights(quotient: Quotient, member: Member) -> list[list[str]]:
+    mode, weights = quotient.family.modes[member.mode], []
+    for part, level in zip(quotient.modes[member.mode].parts, member.levels, strict=True):
+        low, high = mode.lower.fraction(part.edge), mode.upper.fraction(part.edge)
+        size = low + level * (high - low)
+        ends = (mode.labels[int(end[part.edge])] for end in (mode.source, mode.target))
+        weights.append([*ends, format_exact(int(mode.sign[part.edge]) * size)])
+    return weights
+
+
+def read_upper_bound(quotient: Quotient, entry: Any) -> FamilyRateBound | None:
+    """Return a bound that the file states, proved anew from its members; None if it is none, or not proved.
+
+    Examples
+    --------
+    >>> quotient = Quotient(Family.from_intervals([("a", "b", 1, 2)]))
+    >>> member = {"kind": "member", "members": [{"mode": 0, "weights": [["a", "b", "1"]]}], "durations": ["1"]}
+    >>> str(read_upper_bound(quotient, member | {"value": "2"}).value)
+    '2'
+    >>> read_upper_bound(quotient, member | {"value": "1"}) is None
+    True
+    """
+    try:
+        members = tuple(_member(quotient, one) for one in entries(entry["members"], "members"))
+        durations = tuple(exact(h) for h in entries(entry["durations"], "durations", len(members)))
+        need(0 < len(members) <= _MANY and all(h > 0 for h in durations), "no durations")
+        need(entry["kind"] in ("mixture", "word") or (entry["kind"] == "member" and len(members) == 1), "no bound")
+        need(entry["kind"] == "word" or sum(durations) == 1, "no shares")
+        value = exact(entry["value"])
+    except (RejectedError, LookupError, TypeError, ValueError, ArithmeticError):
+        return None
+    return prove_again(quotient, entry["kind"], members, durations, value)
+
+
+def _member(quotient: Quotient, entry: Mapping[str, Any]) -> Member:
+    number = entry["mode"]
+    need(type(number) is int and 0 <= number < len(quotient.modes), "no mode")
+    mode, parts = quotient.family.modes[number], quotient.modes[number].parts
+    levels, on = [], dict[tuple[int, int], Fraction]()
+    for part, row in zip(parts, entries(entry["weights"], "weights", len(parts)), strict=True):
+        low, high = mode.lower.fraction(part.edge), mode.upper.fraction(part.edge)
+        level = (int(mode.sign[part.edge]) * exact(row[2]) - low) / (high - low)
+        ends = int(mode.source[part.edge]), int(mode.target[part.edge])
+        on[ends] = on.get(ends, Fraction(0)) + level
+        need(0 <= level <= 1 and on[ends] <= 1, "no member of the family")
+        levels.append(level)
+    return Member(number, tuple(levels))
+
+
+def write_unproved(content: Content) -> dict[str, Any]:
+    """Return the late messages or moving leaders that were asked for where nothing is proved of them."""
+    messages, leaders, late = content.request.messages, content.request.leaders, content.late
+    if (late is not None and late.says_something) or content.tracking is not None:
+        return {}
+    asked: dict[str, Any] = {}
+    if messages is not None:
+        asked["messages"] = write(Delays, delays(messages, content.graph), Writer(content.graph.labels))
+        del asked["messages"]["leaders"]
+    return asked if leaders is None else {**asked, "leaders": write(LeadersAsked, asked_leaders(leaders), Writer(()))}
+
+
+def read_unproved(document: Mapping[str, Any], structure: Structure) -> dict[str, Any]:
+    """Read what :func:`write_unproved` wrote, unless something of the kind is proved."""
+    asked, graph = document["unverified"].get("asked"), structure.graph
+    at = Context(SideFiles(Path(), {}), graph.labels, edges=graph.n_edges)
+    if not isinstance(asked, dict) or "messages" in document or "leaders" in document:
+        return {}
+    return {
+        "messages": readable(
+            lambda: read_messages(read(Delays, asked["messages"] | {"leaders": None}, at, "messages"), structure)
+        ),
+        "leaders": readable(lambda: read_leaders(read(LeadersAsked, asked["leaders"], at, "leaders"))),
+    }
+
+
+def nothing_proved(request: Request, structure: Structure, protocol: Protocol, relative: bool) -> LateBounds | None:
+    """Return that nothing is proved of late messages that were asked for; None if none were.
+
+    Parameters
+    ----------
+    request : Request
+    structure : Structure
+    protocol : Protocol
+    relative : bool
+        Whether no initial state was given.
+    """
+    messages = request.messages
+    if messages is None:
+        return None
+    gain = GainLimits(gain_cap=messages.gain_cap).limit(protocol.gain)
+    return LateBounds(messages, structure, gain, relative, leaders=request.leaders)
+
+
+def _write_unverified(content: Content) -> dict[str, Any]:
+    search, envelope = content.search, content.envelope
+    remaining = (*(1 - f for f in FRACTIONS), *LAST_INSTANTS)
+    residual = {str(1 - q if q > 1e-3 else f"1-{q:g}"): q for q in remaining}
+    floats = None
+    if content.final_state is not None and not content.final_state.exact:
+        floats = dict(zip(content.graph.labels, map(finite, np.asarray(content.final_state).tolist()), strict=True))
+    return {
+        "spectral": finite(content.spectral_rate),
+        "optimality_ratio": content.optimality_ratio,
+        "paper_rate": finite(content.numerical_rate),
+        "rounding_loss": finite(content.rounding_loss),
+        "search": {
+            "method": content.method,
+            "at": None if content.at is None else float(content.at),
+            "searched": {kind: finite(rate) for kind, rate in search.searched.items()},
+            "diagonal_limit": finite(search.diagonal_limit),
+        },
+        "residual": {name: finite(envelope.residual(q)) for name, q in residual.items()} if content.direct else None,
+        "final_state": floats,
+        "asked": _write_request(content.request) | write_unproved(content),
+        "scenario": None if content.request.scenario is None else dict(content.request.scenario),
+        "origins": dict(content.request.origins),
+        "simulation": _write_run(content),
+        "time_limit": finite(content.time_limit),
+        "cut_off": list(content.cut_off),
+        "notes": list(content.notes),
+    }
+
+
+def _write_run(content: Content) -> dict[str, Any] | None:
+    run, comparison = content.trajectory, content.comparison
+    if comparison is None:
+        return None
+    section = {
+        "worst_ratio": finite(comparison.worst_ratio),
+        "floor": finite(comparison.floor),
+        "resolved_until": comparison.resolved_until,
+        "judged": comparison.judged,
+        "ratios": {str(k): finite(v) for k, v in comparison.ratios.items()},
+        "stop": comparison.stop,
+        "tolerances": {"relative": comparison.tolerance},
+        "deviation_ratio": finite(comparison.deviation_ratio),
+        "deadline_resolved": comparison.deadline_resolved,
+    }
+    if run is None or run.sliding is None:
+        return section
+    return section | {
+        "sliding_ratio": finite(comparison.sliding_ratio),
+        "reaching_kept": comparison.reaching_kept,
+        "reached": dict(zip(content.graph.labels, map(finite, run.sliding.reaching_z.tolist()), strict=True)),
+        "disturbance_bounded_by": run.sliding.bounded_by,
+    }
+
+
+def _read_observations(section: Mapping[str, Any]) -> Observations:
+    """Read what the file says of searches; other observations are made anew."""
+    return Observations(cut_off=_texts(section.get("cut_off")), notes=_texts(section.get("notes")))
+
+
+def _write_request(request: Request) -> dict[str, Any]:
+    """Return what was asked; what became of it is no part of the claim, and follows from what is."""
+    expectations = request.expectations
+    return {
+        "behaviour": expectations.behaviour,
+        "min_rate": text(expectations.min_rate),
+        "max_input": text(expectations.max_input),
+        "max_residual": text(expectations.max_residual),
+        "limits": [{name: text(getattr(entry, name)) for name in LIMITS} for entry in request.limits],
+        "delta": text(request.delta),
+        "noise": text(request.noise),
+    }
+
+
+def _read_request(unverified: Mapping[str, Any], initial_set: InitialSet | None) -> Request:
+    """Read what was asked; nothing of it is claimed, so that what cannot be read is left out."""
+    section, search, seconds = (unverified.get(key) for key in ("asked", "search", "time_limit"))
+    scenario, origins = unverified.get("scenario"), unverified.get("origins")
+    origins = origins.items() if isinstance(origins, dict) else ()
+    section = section if isinstance(section, dict) else {}
+    method, behaviour = search.get("method") if isinstance(search, dict) else None, section.get("behaviour")
+    try:
+        behaviour = behaviour_name(behaviour) if isinstance(behaviour, str) else None
+    except ValueError:
+        behaviour = None
+    entries = section.get("limits")
+    each = [[_positive(entry, key) for key in LIMITS] for entry in (entries if isinstance(entries, list) else [])[:100]]
+    return Request(
+        method=method if method in METHODS else "best",
+        initial_set=initial_set,
+        limits=tuple(Limits(*entry) for entry in each if any(entry)),
+        delta=_positive(section, "delta"),
+        noise=_positive(section, "noise"),
+        time_limit=float(seconds) if isinstance(seconds, int | float) and seconds is not True else math.inf,
+        expectations=Expectations(
+            behaviour, *(_positive(section, key) for key in ("min_rate", "max_input", "max_residual"))
+        ),
+        scenario=scenario if isinstance(scenario, dict) else None,
+        origins={key: one_line(origin)[:200] for key, origin in origins if isinstance(origin, str)},
+    )
+
+
+def _positive(section: Any, key: str) -> Fraction | None:
+    try:
+        value = None if section.get(key) is None else exact(section[key])
+    except (AttributeError, RejectedError):
+        return None
+    return value if value is not None and value > 0 else None
+
+
+def _texts(section: Any) -> tuple[str, ...]:
+    return tuple(one for one in section if isinstance(one, str)) if isinstance(section, list) else ()
