@@ -17,7 +17,7 @@ import numpy as np
 
 from ptcc_certify.bounds.enclosed_ends import DECIMALS, RADIUS
 from ptcc_certify.bounds.section_numbers import floats
-from ptcc_certify.checker.reading import Interval, RejectedError, exact
+from ptcc_certify.checker.reading import Interval, RejectedError
 from ptcc_certify.checker.sections import Rule, declared
 from ptcc_certify.checker.side_files import Numbers, SideFiles, beside
 from ptcc_certify.errors import FormatError
@@ -123,7 +123,7 @@ class Reader:
     """
 
     def __init__(self, labels: Sequence[str], files: Mapping[str, bytes]):
-        self.files, self._count = SideFiles(Path(), files), len(labels)
+        self.files = SideFiles(Path(), files)
         self._index = {label: i for i, label in enumerate(labels)}
 
     def nodes(self, section: Any) -> tuple[int, ...]:
@@ -135,22 +135,6 @@ class Reader:
     def floats(self, section: Any, length: int) -> np.ndarray:
         """Read a vector as the floats nearest to its numbers, each rounded once."""
         return floats(self.files.numbers(section, "a vector", length))
-
-    def state(self, section: Any) -> tuple[Fraction, ...] | None:
-        """Read one number of each agent: by label, or from a side file."""
-        if section is None:
-            return None
-        if beside(section):
-            return tuple(self.files.numbers(section, "a vector", self._count))
-        return tuple(map(exact, section.values()))
-
-    def numbers(self, section: Any, count: int) -> tuple[Fraction, ...]:
-        """Read what :meth:`Writer.numbers` wrote."""
-        return tuple(self.files.numbers(section, "a vector", count))
-
-    def agents(self, section: Any) -> tuple[Fraction, ...]:
-        """Read one number of each agent, which is there."""
-        return self.state(section) or ()
 
 
 def read_side_files(document: Mapping[str, Any], folder: Path) -> dict[str, bytes]:
@@ -180,11 +164,6 @@ def _side_files(value: Any) -> Iterator[tuple[str, str]]:
 def text(value: Fraction | None) -> str | None:
     """Write a rational, or null."""
     return None if value is None else format_exact(value)
-
-
-def number(digits: str | None) -> Fraction | None:
-    """Read what :func:`text` wrote."""
-    return None if digits is None else exact(digits)
 
 
 def readable(read: Callable[[], Any]) -> Any:

@@ -180,7 +180,7 @@ def test_what_the_checker_rejects_is_never_called_certified(monkeypatch: pytest.
         rate = Fraction(sections["rates"]["upper_bound"]) * 2
         return record({**sections, "rates": {**sections["rates"], "proved": str(rate)}}, *others)
 
-    monkeypatch.setattr("ptcc_certify.certificate.format.record", lying)
+    monkeypatch.setattr("ptcc_certify.certificate.document.record", lying)
     cert = certify(load_graph("fig1a"), NOMINAL, simulation=False)
     assert cert.verdict == "undecided"
     assert "does not accept" in cert.notes[0] and "rates" in cert.notes[0]

@@ -326,7 +326,7 @@ def test_nothing_is_called_certified_before_the_check(panel: Panel):
 
 def test_what_the_check_rejects_is_not_certified(explorer: Explorer, monkeypatch: pytest.MonkeyPatch):
     rejection = CheckReport(False, "undecided", (), "rate", "because this test says so", "none", "")
-    monkeypatch.setattr("ptcc_certify.certificate.format.record", lambda sections, *others: (sections, rejection))
+    monkeypatch.setattr("ptcc_certify.certificate.document.record", lambda sections, *others: (sections, rejection))
     view = explorer.view(Settings(T=0.9))
     assert view.text.startswith("verdict    undecided: the independent check rejects rate, a defect of this program")
     assert view.grade == "doubt"
