@@ -27,7 +27,7 @@ from ptcc_certify import (
 )
 from ptcc_certify.bounds import missed_deadline
 from ptcc_certify.bounds.missed_deadline import Missed
-from ptcc_certify.certificate import format, format_family
+from ptcc_certify.certificate import document
 from ptcc_certify.certificate.answer import Answer, standing
 from ptcc_certify.certificate.certificate import RejectedCertificate
 from ptcc_certify.certificate.family_certificate import certify_family
@@ -110,8 +110,7 @@ def test_an_upper_bound_that_is_too_long_to_be_written_is_left_out():
 
 def reject(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the check that lays down proofs reject all certificates."""
-    for module in (format, format_family):
-        monkeypatch.setattr(module, "record", lambda sections, *rest: ({**sections, "digest": "0"}, REJECTED))
+    monkeypatch.setattr(document, "record", lambda sections, *rest: ({**sections, "digest": "0"}, REJECTED))
 
 
 @pytest.fixture

@@ -18,11 +18,12 @@ from selection import thinned
 import ptcc_certify as ptcc
 from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.bounds.input.effort import effort_section
-from ptcc_certify.certificate import format_vectors as vectors
+from ptcc_certify.certificate import section_writer as vectors
 from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate, read_certificate
 from ptcc_certify.certificate.graph_sections import structure_document
-from ptcc_certify.certificate.section_writer import Writer
+from ptcc_certify.certificate.section_writer import Writer, write
 from ptcc_certify.checker import digest
+from ptcc_certify.checker.input import InputSection
 from ptcc_certify.errors import FormatError, ParameterError
 from ptcc_certify.examples import EXAMPLES, load_graph
 
@@ -76,8 +77,9 @@ def agree(saved: Certificate, made: ptcc.Certificate) -> None:
         assert (own.rate, own.overshoot, own.lowest) == (other.rate, other.overshoot, other.lowest)
         assert own.deviation == other.deviation and own.name == other.name
         assert own.nodes == other.nodes and own.gauge == other.gauge and np.array_equal(own.array, other.array)
-    out = Writer(made.graph.labels)
-    assert effort_section(saved.effort, out) == effort_section(made.effort, out)
+    n, out = made.graph.n_nodes, Writer(made.graph.labels)
+    sections = (write(InputSection | None, effort_section(x.effort, n), out) for x in (saved, made))
+    assert next(sections) == next(sections)
     if made.effort is not None and saved.effort is not None:
         own, other = saved.effort, made.effort
         assert [o for o in own.obligations if o.kind != "input-peak"] == [

@@ -38,8 +38,8 @@ from lmi.exact.polynomials import rank, row_sum
 from ptcc_certify import checker
 from ptcc_certify.bounds import final_state as final_states
 from ptcc_certify.bounds.input.initial_set import box, ellipsoid
-from ptcc_certify.certificate import format_vectors as vectors
 from ptcc_certify.certificate import procedure
+from ptcc_certify.certificate import section_writer as vectors
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.checking import record
 from ptcc_certify.certificate.procedure import certify

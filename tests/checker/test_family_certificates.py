@@ -26,7 +26,7 @@ from oracle_family_certificates import FamilyOracle, false_family_claims
 from selection import thinned
 
 from ptcc_certify import checker
-from ptcc_certify.certificate import format_vectors
+from ptcc_certify.certificate import section_writer
 from ptcc_certify.certificate.certificate import RejectedCertificate, read_certificate
 from ptcc_certify.certificate.document import family_document
 from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate, certify_family
@@ -886,7 +886,7 @@ def test_a_file_that_is_rejected_is_not_read(tmp_path: Path):
 
 
 def test_many_edges_are_read_from_side_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(format_vectors, "LONG", 2)
+    monkeypatch.setattr(section_writer, "LONG", 2)
     edges = [("a", "b", 1, 2), ("b", "a", "0", "0.1"), ("b", "a", "-0.25", 0), ("a", "c", -3, -3)]
     made = certificate(Family.from_intervals(edges), state=False)
     made.save(tmp_path / "c.json")

@@ -13,7 +13,7 @@ import pytest
 from mutations import Json, changed, resealed
 from row_families import bounds_of
 
-from ptcc_certify.certificate import family_certificate, format_vectors
+from ptcc_certify.certificate import family_certificate, section_writer
 from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
 from ptcc_certify.certificate.family_comparison import compare
@@ -99,7 +99,7 @@ def test_files_are_read_back(tmp_path: Path):
 
 
 def test_long_vectors_and_factors_go_to_side_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(format_vectors, "LONG", 100)
+    monkeypatch.setattr(section_writer, "LONG", 100)
     cert = certify_family(certificate(1).family, PROTOCOL)
     cert.save(tmp_path / "c.json")
     assert {path.name.split("-", 1)[1] for path in tmp_path.glob("*.npy")} >= {"vector.npy", "data.npy", "indices.npy"}

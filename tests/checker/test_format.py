@@ -22,8 +22,8 @@ from side_files import with_factors, with_side_files
 
 from ptcc_certify import checker
 from ptcc_certify.bounds import final_state as final_states
-from ptcc_certify.certificate import format_vectors as vectors
 from ptcc_certify.certificate import procedure
+from ptcc_certify.certificate import section_writer as vectors
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import MANY_COMPONENTS, OBLIGATIONS, check
 from ptcc_certify.checker.reading import RejectedError, exact
