@@ -286,6 +286,8 @@ def _annotated(inner: Any, note: Any, *rest: str, value: Any, out: Writer, key: 
         return out.nodes(value)
     if note == "integers of followers":
         return out.integers(key, np.asarray(value))
+    if note == "numbers" and not isinstance(value, np.ndarray):  # whose length the file does not tell
+        return list(map(format_exact, value))
     if note.startswith("numbers"):
         return _numbers(value, out, key)
     if inner is Numbers and not rest and isinstance(value, np.ndarray) and out.aside(value.size):
