@@ -283,6 +283,8 @@ def _annotated(inner: Any, note: Any, *rest: str, value: Any, out: Writer, key: 
     if note == "a label":
         return out.labels[value]
     if note == "nodes":
+        return [out.labels[v] for v in np.asarray(value).tolist()]
+    if note == "many nodes":
         return out.nodes(value)
     if note == "integers of followers":
         return out.integers(key, np.asarray(value))

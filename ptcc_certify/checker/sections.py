@@ -52,8 +52,9 @@ EdgeNumbers: TypeAlias = Annotated[Numbers, "numbers of edges"]
 Node: TypeAlias = Annotated[int, "a label"]
 #: Middles and radii of every agent: by label, or two side vectors.
 Ends: TypeAlias = Annotated[tuple[Numbers, Numbers], "ends by agent"]
-#: Labels, or a side vector of places.
+#: Labels; of many agents, labels or a side vector of places.
 Nodes: TypeAlias = Annotated[Any, "nodes"]
+ManyNodes: TypeAlias = Annotated[Any, "many nodes"]
 
 
 @dataclass
@@ -164,13 +165,13 @@ def _is_text(kind: Any) -> bool:
 
 
 def _has_words(kind: Any, value: Any) -> bool:
-    """Tell whether a section has the words that are declared, and the keys if there are none."""
+    """Tell whether a section has the first word that is declared, or the keys if there is none."""
     if not isinstance(value, dict) or not (isinstance(kind, type) and is_dataclass(kind)):
         return True
     known = declared(kind)
-    words = [f for f in known if get_origin(f.kind) is Literal]
-    if words:
-        return all(value.get(f.key) in get_args(f.kind) for f in words)
+    word = next((f for f in known if get_origin(f.kind) is Literal), None)
+    if word:
+        return value.get(word.key) in get_args(word.kind)
     return all(f.key in value for f in known if not f.optional)
 
 
@@ -189,7 +190,7 @@ def _annotated(kind: Any, value: Any, at: Context, what: str) -> Any:
     if note == "a label":
         need(isinstance(value, str) and value in at.index, f"{what}: an unknown node")
         return at.index[value]
-    if note in ("numbers", "nodes"):
+    if note in ("numbers", "nodes", "many nodes"):
         return value
     if note == "numbers of followers":
         return at.files.numbers(value, what, len(at.followers))

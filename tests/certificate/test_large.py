@@ -247,7 +247,7 @@ def test_forged_rates_of_large_groups_are_rejected(balanced: bool):
         where = ("influence", "components", 0, "left_null_vector", 5)
         for new in (
             {**null_vector, "radius": "1e-300"},
-            {**null_vector, "mid": str(float(null_vector["mid"]) + 1e-6)},
+            {**null_vector, "mid": str(Fraction(null_vector["mid"]) + Fraction(1, 10**6))},
             "0.01",
         ):
             rejected(changed(data, where, new), "final-state of graph")

@@ -36,6 +36,7 @@ from lmi.exact import arithmetic
 from lmi.exact.definite import SparseFactor
 from lmi.exact.polynomials import rank, row_sum
 from ptcc_certify import checker
+from ptcc_certify.bounds import enclosed_ends
 from ptcc_certify.bounds import final_state as final_states
 from ptcc_certify.bounds.input.initial_set import box, ellipsoid
 from ptcc_certify.certificate import procedure
@@ -201,7 +202,8 @@ LONG_FINAL_STATES = ("1.1", "2.1 K>=2", "2.1 K=1", "3.1 mixed", "3.1 all single"
 @pytest.mark.parametrize(("name", "slides"), thinned(product(LONG_FINAL_STATES, (False, True)), 5))
 def test_an_final_state_too_long_to_write_is_enclosed(name: str, slides: bool, monkeypatch: pytest.MonkeyPatch):
     """Where exact numbers would be too long, balls are proved instead; here whatever is no decimal fraction."""
-    monkeypatch.setattr(vectors, "writable", lambda x: 10**60 % x.denominator == 0)
+    for module in (vectors, enclosed_ends):
+        monkeypatch.setattr(module, "writable", lambda x: 10**60 % x.denominator == 0)
     data = made.__wrapped__(name, 5, slides)
     assert data["verdict"] == "certified"
     accepted(data)
