@@ -259,8 +259,8 @@ def _of_agents(signed: SignedDigraph, protocol: Protocol, what: str, options: sh
 def _draw(what: str, subject: Any, wide: bool, time_unit: str) -> Any:
     """Draw a figure of a certificate, a run, a family, or a graph with its protocol."""
     from ptcc_certify.certificate.family_certificate import FamilyCertificate
-    from ptcc_certify.graphs.display_hook import plot_of_family
     from ptcc_certify.graphs.family import Family
+    from ptcc_certify.report.figures import plot as plot_of
     from ptcc_certify.report.plots.agents_motion import plot_formation, plot_motion
     from ptcc_certify.report.plots.decay import plot_decay
     from ptcc_certify.report.plots.graph import plot_graph
@@ -277,7 +277,7 @@ def _draw(what: str, subject: Any, wide: bool, time_unit: str) -> Any:
             raise ParameterError(
                 "--wide is for the states of one graph; figures of families are one column wide: leave it out"
             )
-        return plot_of_family(subject, what, **({"time_unit": time_unit} if what in OF_A_RUN else {}))
+        return plot_of(subject, what, **({"time_unit": time_unit} if what in OF_A_RUN else {}))
     subject, protocol = subject if isinstance(subject, tuple) else (subject, None)
     if what == "states" or (what == "motion" and isinstance(subject, Trajectory)):
         return plot_run(subject, wide=wide, time_unit=time_unit)

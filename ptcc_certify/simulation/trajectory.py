@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ptcc_certify.errors import ParameterError, gated
-from ptcc_certify.graphs.display_hook import Shown, plot
 from ptcc_certify.graphs.equality import ByValue
 from ptcc_certify.graphs.rationals import number_within, shorten
 from ptcc_certify.graphs.tables import import_pandas, position
+from ptcc_certify.shown import Shown, rendered
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -211,7 +211,7 @@ class Trajectory(ByValue, Shown):
         -------
         matplotlib.axes.Axes
         """
-        return plot(self, what, **keywords)
+        return rendered("figures.plot", self, what, **keywords)
 
     def to_pandas(self, what: str = "states") -> pd.DataFrame:
         """Return the states as a DataFrame: one row per instant, indexed by ``t``, one column per agent.
