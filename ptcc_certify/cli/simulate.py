@@ -42,7 +42,6 @@ if TYPE_CHECKING:
     from ptcc_certify.graphs.family import Family
     from ptcc_certify.protocols import Protocol
     from ptcc_certify.simulation.agents import AgentsTrajectory
-    from ptcc_certify.simulation.family_run import FamilyTrajectory
     from ptcc_certify.simulation.trajectory import Trajectory
 
 _TABLES = ("", ".csv", ".txt")
@@ -135,7 +134,7 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
     _write(trajectory, output, plot_of_run, {"wide": wide, "time_unit": time_unit})
     if beside is not None:
         return ExitCode.OK
-    if protocol.prescribed and trajectory.actuator is None and not trajectory.deadline_resolved:
+    if protocol.prescribed and trajectory.conditions.actuator is None and not trajectory.deadline_resolved:
         click.echo("note: the run had not settled at the deadline; raise rho2 * kappa", err=True)
     return ExitCode.OK
 
@@ -245,9 +244,9 @@ def _run(
 
 def _run_family(
     family: Family, protocol: Protocol, times: list[Fraction] | None, options: shared.Options
-) -> FamilyTrajectory:
+) -> Trajectory:
     """Return the run of a family under a signal."""
-    from ptcc_certify.simulation.family_run import simulate_family
+    from ptcc_certify.simulation.run import simulate
     from ptcc_certify.simulation.signals import RandomDwellSignal, as_signal
 
     refuse_options(options)
@@ -262,4 +261,4 @@ def _run_family(
         raise ParameterError(f"{flag} is of random signals; leave it out, or leave out --signal {shorten(signal)}")
     played = as_signal(signal, options["seed"]) if promise is None else RandomDwellSignal(promise, options["seed"])
     more = shared.sliding_keywords(protocol, options, family.modes[0].mandatory)
-    return simulate_family(family, protocol, x0, played, times=times, samples=options["samples"], **more)
+    return simulate(family, protocol, x0, played, times=times, samples=options["samples"], **more)

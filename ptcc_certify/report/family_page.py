@@ -42,7 +42,7 @@ from ptcc_certify.report.restricted_screen import agreement_text, restricted_ent
 from ptcc_certify.report.structure_text import structure_text
 from ptcc_certify.report.text_layout import arithmetic
 from ptcc_certify.report.told_instants import FEW, told_instants
-from ptcc_certify.simulation.family_run import FamilyTrajectory
+from ptcc_certify.simulation.trajectory import Trajectory
 from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_name
 from ptcc_certify.theorems.family_behaviour import DEPENDS, Counterexample, FamilyComponent
 from ptcc_certify.theorems.family_claims import camps, component_holds, component_refutation
@@ -96,7 +96,7 @@ def _restricted(saved: FamilyCertificate) -> list[str]:
     return entries
 
 
-def family_view(saved: FamilyCertificate, runs: Sequence[FamilyTrajectory]) -> dict[str, Any]:
+def family_view(saved: FamilyCertificate, runs: Sequence[Trajectory]) -> dict[str, Any]:
     """Return everything that the template of a page shows of a family, beside its obligations."""
     why = _counterexamples(saved)
     figures = _figures(saved, runs, why)
@@ -381,7 +381,7 @@ def _sentence(text: str) -> str:
 
 
 def draw_family(
-    saved: FamilyCertificate, runs: Sequence[FamilyTrajectory], wanted: Sequence[str] = ("graph", "decay")
+    saved: FamilyCertificate, runs: Sequence[Trajectory], wanted: Sequence[str] = ("graph", "decay")
 ) -> dict[str, Any]:
     """Draw those of the wanted figures for which there is something to draw."""
     small = bool(runs) and saved.family.n_nodes <= INPUT_NODES
@@ -398,7 +398,7 @@ def draw_family(
 
 def _figures(
     saved: FamilyCertificate,
-    runs: Sequence[FamilyTrajectory],
+    runs: Sequence[Trajectory],
     why: Sequence[tuple[str, Markup, FamilyComponent, Counterexample]],
 ) -> dict[str, Any]:
     """Draw the graphs, runs within what is proved, and counterexamples: as far as there are any."""

@@ -25,6 +25,7 @@ from ptcc_certify.graphs.rationals import shorten, whole_number
 from ptcc_certify.graphs.tables import position
 from ptcc_certify.protocols.agents import AgentsProtocol
 from ptcc_certify.simulation.cvodes import Motion, Phase, Tolerances
+from ptcc_certify.simulation.members import Members
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -143,18 +144,19 @@ class _Deviations(Motion):
     def __init__(
         self, graph: SignedDigraph, state: np.ndarray, block: np.ndarray, of: AgentsProtocol, rate: float, rtol: float
     ):
-        super().__init__(graph, state, 1, Tolerances(rtol, rtol * max(float(np.abs(state).max(initial=0)), 1e-300)))
+        largest = max(float(np.abs(state).max(initial=0)), 1e-300)
+        super().__init__(Members(graph), state, Tolerances(rtol, rtol * largest))
         self._block, self._of, self._rate = block, of, rate
         self._options |= {"max_num_steps": 200_000}
         for key in ("newton_scheme", "use_preconditioner", "max_krylov"):
             self._options.pop(key, None)
 
-    def slope(self, x: ca.MX, phase: Phase, clock: ca.MX, ends: tuple[float, float]) -> ca.MX:
-        """Return ``dz/dclock``."""
+    def slope(self, x: ca.MX, phase: Phase, z: ca.MX) -> ca.MX:
+        """Return the slope of the deviations on the clock of the phase."""
         import casadi as ca
 
         n, rho1, k = self._of.order, float(self._of.gain.rho1), float(self._of.gain.pole)
-        R = phase.rate(clock, ca.exp)
+        R = phase.rate(z, ca.exp)
         g = phase.nominal(R)
         zeta = R / g
         theta = ca.MX(0) if phase.past else (1 - rho1 * zeta) ** 2 / k

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any, Literal
 
@@ -32,7 +32,8 @@ from ptcc_certify.protocols.gain import Gain
 from ptcc_certify.protocols.gain_limits import GainLimits, LimitedGain
 from ptcc_certify.protocols.late_messages import LateMessages
 from ptcc_certify.protocols.moving_leaders import MovingLeaders, refuse_together
-from ptcc_certify.simulation.trajectory import Trajectory
+from ptcc_certify.simulation.cvodes import Tolerances
+from ptcc_certify.simulation.trajectory import Conditions, Trajectory
 
 Pattern = Literal["oldest", "fresh", "varying", "square"]
 PATTERNS = ("oldest", "fresh", "varying", "square")
@@ -54,30 +55,6 @@ _ROUNDING = 2.0**-50
 IN_DELAY, _MOST_FOR_LEAST = 6, 5000
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class LateRun(Trajectory):
-    """A run with late messages, up to ``T``: its input is of what agents hear, ``gain sum_l w_kl (y_kl -+ x_k)``.
-
-    Attributes
-    ----------
-    messages : LateMessages
-    pattern : str
-        How old is what agents hear.
-    leaders : MovingLeaders or None
-        How leaders move.
-    targets : (N, M) array or None
-        ``-L_F^-1 L_FL X_L`` of followers, of leaders their states; None where leaders rest.
-    """
-
-    messages: LateMessages
-    pattern: str
-    leaders: MovingLeaders | None = None
-    targets: np.ndarray | None = None
-
-    def _more_columns(self) -> list[tuple[str, np.ndarray]]:
-        return [] if self.targets is None else target_columns(self.labels, self._in_places(self.targets))
-
-
 @gated
 def simulate_late(
     graph: Any,
@@ -90,7 +67,7 @@ def simulate_late(
     steps: int = STEPS,
     deadlines: Sequence[Fraction] | None = None,
     leaders: MovingLeaders | None = None,
-) -> LateRun:
+) -> Trajectory:
     """Run a protocol with late messages up to its deadline.
 
     Parameters
@@ -118,7 +95,8 @@ def simulate_late(
 
     Returns
     -------
-    LateRun
+    Trajectory
+        Its input is of what agents hear, ``gain sum_l w_kl (y_kl -+ x_k)``.
 
     Raises
     ------
@@ -181,7 +159,7 @@ def simulate_late(
         leading.move(states[i], states[i + 1], step)
         hearing.correct(states[i], states[i + 1], step, left)
     errors[-1] = heard - (own if messages.own_delay else D * states[-1])
-    run = _run(graph, protocol, messages, pattern, t, states.T, errors.T, time.perf_counter() - begin)
+    run = _run(graph, protocol, messages, t, states.T, errors.T, time.perf_counter() - begin)
     return run if fleeing is None else fleeing.added(run)
 
 
@@ -189,31 +167,26 @@ def _run(
     graph: SignedDigraph,
     protocol: Protocol,
     messages: LateMessages,
-    pattern: str,
     t: np.ndarray,
     states: np.ndarray,
     errors: np.ndarray,
     seconds: float,
-) -> LateRun:
+) -> Trajectory:
     """Return what was run as a trajectory; ``errors`` are those that agents hear of."""
     limits, remaining = GainLimits(gain_cap=messages.gain_cap), np.maximum(1 - t / t[-1], 0)
     gain = limits.limit(protocol.gain)
-    return LateRun(
+    return Trajectory(
         graph=graph,
         protocol=protocol,
         t=t,
         remaining=remaining,
         clock=gain.clock(t, remaining=remaining),
         states=states,
-        rtol=_ROUNDING,
-        atol=_ROUNDING,
-        deadline_index=t.size - 1,
+        tolerances=Tolerances(_ROUNDING, _ROUNDING),
         deadline_residual=residual_at_end(graph, states),
         stats={"steps": t.size - 1, "rhs": t.size - 1, "seconds": seconds},
-        actuator=None if limits.ideal else limits,
+        conditions=Conditions(None if limits.ideal else limits, messages=messages),
         held_input=gain.value(t, remaining) * errors,
-        messages=messages,
-        pattern=pattern,
     )
 
 
@@ -314,17 +287,13 @@ class _Fleeing:
         states[i + 1, worst.heads] += velocity * (self.t[i + 1] - self.t[i])
         states[i + 1, F] += worst.pushes(eps) * (1 - left[F]) / self.pull[i + 1]
 
-    def added(self, run: LateRun) -> LateRun:
+    def added(self, run: Trajectory) -> Trajectory:
         """Return a run with leaders, whose inputs are their velocities, and with targets."""
         assert run.held_input is not None
         inputs = run.held_input.copy()
         inputs[self.worst.heads] = self.inputs.T
-        return replace(run, held_input=inputs, leaders=self.leaders, targets=self.worst.targets(run.states))
-
-
-def target_columns(labels: Sequence[str], targets: np.ndarray) -> list[tuple[str, np.ndarray]]:
-    """Return the columns of a table that tell the targets, ``(N, M)``, by label."""
-    return [(f"target({label})", row) for label, row in zip(labels, targets, strict=True)]
+        conditions = replace(run.conditions, leaders=self.leaders)
+        return replace(run, held_input=inputs, conditions=conditions, targets=self.worst.targets(run.states))
 
 
 class _Leading:

@@ -12,7 +12,6 @@ steps.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,32 +22,15 @@ from ptcc_certify.graphs.rationals import whole_number
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.protocols.base import Protocol, refuse_no_protocol
 from ptcc_certify.protocols.moving_leaders import MovingLeaders
-from ptcc_certify.simulation.late_messages import residual_at_end, target_columns
-from ptcc_certify.simulation.trajectory import Trajectory
+from ptcc_certify.simulation.cvodes import Tolerances
+from ptcc_certify.simulation.late_messages import residual_at_end
+from ptcc_certify.simulation.trajectory import Conditions, Trajectory
 from ptcc_certify.simulation.worst_leaders import WorstLeaders
 
 #: Steps up to T; the share of what is left of T that a step takes; how near they come; where a run with sign term ends.
 STEPS, SHARE, NEAREST, PAST = 800, 0.02, 1e-7, 0.5
 #: Most steps of a run.
 MOST_STEPS = 20_000
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class TrackingRun(Trajectory):
-    """A run with moving leaders, from 0 beyond ``T``; the input of a leader is its velocity.
-
-    Attributes
-    ----------
-    leaders : MovingLeaders
-    targets : (N, M) array
-        ``-L_F^-1 L_FL X_L`` of followers; of leaders their states.
-    """
-
-    leaders: MovingLeaders
-    targets: np.ndarray
-
-    def _more_columns(self) -> list[tuple[str, np.ndarray]]:
-        return target_columns(self.labels, self._in_places(self.targets))
 
 
 @gated
@@ -60,7 +42,7 @@ def simulate_tracking(
     *,
     u: np.ndarray | None = None,
     steps: int = STEPS,
-) -> TrackingRun:
+) -> Trajectory:
     """Run followers of leaders that move away from the follower that is farthest off, as fast as they may.
 
     Parameters
@@ -79,7 +61,8 @@ def simulate_tracking(
 
     Returns
     -------
-    TrackingRun
+    Trajectory
+        From 0 beyond ``T``; the input of a leader is its velocity.
 
     Raises
     ------
@@ -127,20 +110,18 @@ def simulate_tracking(
             moved, eps = step_of(eps, clock[i], last[i], t[i + 1] - t[i])
             lead, inputs[i, heads] = lead + moved, moved / (t[i + 1] - t[i])
     end = int(np.argmax(remaining == 0))
-    return TrackingRun(
+    return Trajectory(
         graph=structure.graph,
         protocol=protocol,
         t=t,
         remaining=remaining,
         clock=protocol.gain.clock_at_remaining(remaining),
         states=states.T,
-        rtol=NEAREST,
-        atol=NEAREST,
-        deadline_index=end,
+        tolerances=Tolerances(NEAREST, NEAREST),
         deadline_residual=residual_at_end(structure.graph, states[: end + 1].T),
         stats={"steps": t.size - 1, "rhs": t.size - 1, "seconds": time.perf_counter() - begin},
         held_input=inputs.T,
-        leaders=leaders,
+        conditions=Conditions(leaders=leaders),
         targets=targets.T,
     )
 

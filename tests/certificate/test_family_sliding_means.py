@@ -19,7 +19,7 @@ from ptcc_certify.report.family_screen import family_lines
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.plots.family_input import plot_family_input
 from ptcc_certify.report.statement import family_latex
-from ptcc_certify.simulation.family_run import simulate_family
+from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.signals import RandomSignal
 from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows
 
@@ -37,7 +37,7 @@ def runs(certificate, played=3, **options):
     start, sigma0 = ([float(x) for x in state] for state in (certificate.initial_state, certificate.sigma0))
     for k in range(played):
         more = {"sigma0": sigma0, "disturbance": DISTURBANCES[k % 3], "past": 0, **options}
-        yield simulate_family(certificate.family, certificate.protocol, start, RandomSignal(k), **more)
+        yield simulate(certificate.family, certificate.protocol, start, RandomSignal(k), **more)
 
 
 def test_means_that_every_signal_keeps_are_those_of_x_minus_sigma():

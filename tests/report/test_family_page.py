@@ -28,7 +28,7 @@ from ptcc_certify.report.plots.family import plot_family, plot_family_decay, sam
 from ptcc_certify.report.plots.family_input import plot_family_input
 from ptcc_certify.report.report_file import write_report
 from ptcc_certify.report.statement import family_latex
-from ptcc_certify.simulation.family_run import simulate_family
+from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.signals import RandomSignal
 from ptcc_certify.theorems.family_behaviour import decide
 from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows
@@ -101,7 +101,7 @@ def test_ends_under_the_last_mode_stand_on_page_and_statement():
     assert "State at the deadline, all at one |x(T)|, for these signals" in page
     assert "& -- & $2$ & $[-1, 2]$" in statement and "U+2013" not in statement
     assert "(at least 0.2 of time between switches) more is proved: the last mode decides, bip" in statement
-    runs = [simulate_family(saved.family, PROTOCOL, [1, 2, 3], RandomSignal(1), times=[0, 0.5])]
+    runs = [simulate(saved.family, PROTOCOL, [1, 2, 3], RandomSignal(1), times=[0, 0.5])]
     axes = [plot_family(saved, runs=runs), plot_family_input(saved, runs=runs)]
     assert all("of any kind" in ax.get_legend().get_title().get_text() for ax in axes)
 
@@ -205,11 +205,11 @@ def test_under_a_dwell_time_the_page_shows_signals_that_keep_it(clock: str):
     saved = read_certificate(certify(SWITCHING, PROTOCOL, [1, 2, 3], signal=promise).to_dict())
     runs = sample_runs(saved)
     for run in runs:
-        instants = [x for x in run.switches.tolist() if math.isfinite(x)]
+        instants = [x for x in run.played.switches.tolist() if math.isfinite(x)]
         grid = np.linspace(0, 1, 200_000, endpoint=False)
         times = instants if clock == "s" else np.interp(instants, run.protocol.gain.clock(grid), grid).tolist()
         assert all(b - a >= 0.2999 for a, b in pairwise(times))
-    assert sum(len(run.switches) > 1 for run in runs) > 2
+    assert sum(len(run.played.switches) > 1 for run in runs) > 2
     page = words(report_html(saved, runs=runs))
     assert "8 runs from the initial state of the certificate under signals that keep the promise." in page
     assert f"under 8 signals, which keep the promise: at least 0.3 of {'time' if clock == 't' else 'the clock'}" in page
@@ -224,7 +224,7 @@ def test_the_runs_of_a_family_are_under_signals_of_the_kind_that_was_asked(signa
     cert = certify(Family.switching([DAY, other]), PROTOCOL, [1, 2, 3], signal=signal)
     runs = sample_runs(cert)
     for run in runs:
-        switches = run.switches[np.isfinite(run.switches)]
+        switches = run.played.switches[np.isfinite(run.played.switches)]
         if signal == "constant":
             assert switches.tolist() == [0]
         elif isinstance(signal, ClockShares):
@@ -309,6 +309,6 @@ def test_agents_that_listen_to_nobody_end_where_sliding_variables_bring_them(sig
     page, screen = words(report_html(read_certificate(made.to_dict()))), "\n".join(family_summary(made, "moved"))
     for text in (page, screen):
         assert ("a, b keep their value" in text) == made.direct != ("a, b end at x(0) - sigma(0)" in text)
-    run = simulate_family(moved, SLIDING, [0, 4, 100], RandomSignal(1), sigma0=sigma0)
+    run = simulate(moved, SLIDING, [0, 4, 100], RandomSignal(1), sigma0=sigma0)
     leaders = [run.labels.index(label) for label in "ab"]
     assert np.allclose(run.states[leaders, -1], [[0, 4, 100][v] - sigma0[v] for v in leaders])

@@ -15,7 +15,7 @@ from ptcc_certify.report.plots.family import plot_family, plot_family_decay, sam
 from ptcc_certify.report.plots.family_graph import plot_family_graph
 from ptcc_certify.report.plots.family_input import plot_family_input
 from ptcc_certify.report.plots.trajectory import plot_trajectory
-from ptcc_certify.simulation.family_run import simulate_family
+from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.signals import RandomSignal, WorstCaseSignal
 from ptcc_certify.theorems.family_behaviour import decide
 
@@ -58,7 +58,7 @@ def test_the_decay_of_every_run_lies_below_the_bound(drawn):
 
 def test_what_cannot_be_drawn_is_refused(drawn):
     certificate, _ = drawn
-    other = simulate_family(DAY, PROTOCOL, [1, 4, -3], times=[0, 1])
+    other = simulate(DAY, PROTOCOL, [1, 4, -3], times=[0, 1])
     for call, told in (
         (lambda: plot_family(other), "certificate of a family"),
         (lambda: plot_family(certificate, runs=[other]), "of the certificate"),
@@ -87,7 +87,7 @@ def test_no_agent_has_a_role_that_it_has_in_one_mode_alone():
     for other, names in ((night, {"first camp", "second camp"}), (spoiled, {"agents"})):
         family = Family.switching([day, other])
         for ax in (
-            plot_trajectory(simulate_family(family, PROTOCOL, [1, 4, -3], RandomSignal(1), times=[0, 0.5])),
+            plot_trajectory(simulate(family, PROTOCOL, [1, 4, -3], RandomSignal(1), times=[0, 0.5])),
             plot_family_graph(family),
         ):
             assert {t.get_text() for t in ax.get_legend().get_texts()} & set(CAMP_STYLES) == names

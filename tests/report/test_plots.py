@@ -54,7 +54,6 @@ from ptcc_certify.report.plots.style import DOUBLE_COLUMN, EDGE_STYLES, SINGLE_C
 from ptcc_certify.report.plots.trade_off import plot_trade_off
 from ptcc_certify.report.plots.trajectory import plot_run, plot_sliding, plot_trajectory
 from ptcc_certify.simulation.run import simulate
-from ptcc_certify.simulation.trajectory import SlidingTrajectory
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
 
 pytestmark = pytest.mark.filterwarnings(
@@ -318,10 +317,10 @@ def test_the_input_of_the_sliding_mode() -> None:
     peak = cert.effort and cert.effort.peak
     assert (peak_of(ax) is not None) == (peak is not None)
     run = cert.trajectory
-    assert isinstance(run, SlidingTrajectory)
+    assert run.sliding is not None
     late = run.t > float(run.protocol.T)  # there the input answers the disturbance alone
     answers = {line.get_ydata()[late].round(6).tobytes() for line in agent_lines(ax)}
-    assert answers == {row.round(6).tobytes() for row in np.abs(run.disturbance[:, late])}
+    assert answers == {row.round(6).tobytes() for row in np.abs(run.sliding.disturbance[:, late])}
     other = certify(graph, example.protocol(), start, sigma0=[1.0] * 6, simulation=False)
     with pytest.raises(ValueError, match=r"another sigma\(0\) than"):
         plot_input(cert.trajectory, certificate=other)

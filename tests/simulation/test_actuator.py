@@ -161,7 +161,7 @@ def test_the_input_is_the_effective_one_and_the_run_names_its_actuator():
     actuator = GainLimits(gain_cap=20, stop_before="0.01")
     run = simulate(TRIO, PROTOCOL, X0, actuator=actuator, times=[0, "0.3", "0.588", "0.59", "0.6", 1])
     np.testing.assert_allclose(run.input, np.array([0.6, 1.1, 20, 0, 0, 0]) * run.error, rtol=1e-12)
-    assert run.actuator == actuator
+    assert run.conditions.actuator == actuator
     assert "GainLimits(gain_cap=20, stop_before=1/100)" in repr(run)
     assert not run.deadline_resolved
     np.testing.assert_array_equal(run.states[:, 3:], run.states[:, [3]] * [1, 1, 1])
@@ -191,7 +191,7 @@ def test_a_proved_envelope_holds_on_the_clock_that_acts(limits):
 def test_an_ideal_actuator_changes_nothing():
     ideal, run = simulate(TRIO, PROTOCOL, X0, actuator=GainLimits()), simulate(TRIO, PROTOCOL, X0)
     np.testing.assert_array_equal(ideal.states, run.states)
-    assert ideal.actuator is None and "GainLimits" not in repr(ideal)
+    assert ideal.conditions.actuator is None and "GainLimits" not in repr(ideal)
 
 
 # ---------------------------------------------------------------------- sampled runs

@@ -16,7 +16,6 @@ from ptcc_certify.graphs.structure import Structure, analyse, find_camps
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, STEPS, tick_count
 from ptcc_certify.report.text_layout import columns, printable, shorten_text
 from ptcc_certify.simulation.agents import AgentsTrajectory
-from ptcc_certify.simulation.family_run import FamilyTrajectory
 from ptcc_certify.simulation.trajectory import Trajectory
 
 #: Colour and line of the parts of a graph, which differ without colours too.
@@ -85,7 +84,7 @@ def draw_agents(
     range and median, with a line for the agent whose quantity is the largest at first, and for that with the least;
     of a ``size``, which is never negative, the largest is drawn instead, and what is below it.
     """
-    group = family_groups(run.family) if isinstance(run, FamilyTrajectory) else camp_groups(structure)
+    group = family_groups(run.played.family) if isinstance(run, Trajectory) and run.played else camp_groups(structure)
     single: dict[int, str] = {}
     ranges = False
     step: Any = "post" if style.get("drawstyle") == "steps-post" else None

@@ -17,8 +17,9 @@ from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, find_camps
 from ptcc_certify.report.plots.agents import CAMP_STYLES, NAMED_AGENTS, draw_deadlines, family_groups, name_agents
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled, time_label
-from ptcc_certify.simulation.family_run import FamilyTrajectory, simulate_family
+from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.signals import ConstantSignal, PeriodicSignal, RandomDwellSignal, RandomSignal, Signal
+from ptcc_certify.simulation.trajectory import Trajectory
 from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows
 
 #: Random signals that are drawn beside the worst cases.
@@ -32,7 +33,7 @@ BAR: dict[str, Any] = {"linewidth": 2.5, "marker": "_", "markersize": 5}
 _AXES = {"left": "remaining time, $1 - t/T$", "time": "time $t$", "clock": "stretched clock $s(t)$"}
 
 
-def sample_runs(certificate: FamilyCertificate, signals: Iterable[Signal] | None = None) -> list[FamilyTrajectory]:
+def sample_runs(certificate: FamilyCertificate, signals: Iterable[Signal] | None = None) -> list[Trajectory]:
     """Return runs from a certificate's initial state.
 
     Parameters
@@ -54,7 +55,7 @@ def sample_runs(certificate: FamilyCertificate, signals: Iterable[Signal] | None
     more: dict[str, Any] = {}
     if certificate.sigma0 is not None:
         more = {"sigma0": [float(s) for s in certificate.sigma0], "samples": _SAMPLES}
-    return [simulate_family(certificate.family, certificate.protocol, start, signal, **more) for signal in chosen]
+    return [simulate(certificate.family, certificate.protocol, start, signal, **more) for signal in chosen]
 
 
 def _signals(certificate: FamilyCertificate) -> list[Signal]:
@@ -80,7 +81,7 @@ def _of_the_kind(certificate: FamilyCertificate) -> list[Signal]:
     return []
 
 
-def keeps_promise(certificate: FamilyCertificate, runs: Sequence[FamilyTrajectory]) -> bool:
+def keeps_promise(certificate: FamilyCertificate, runs: Sequence[Trajectory]) -> bool:
     """Tell whether runs are those under signals of the kind that a certificate was asked of."""
     own = {signal.text for signal in _of_the_kind(certificate)}
     return all(run.signal in own for run in runs)
@@ -103,7 +104,7 @@ def plot_family(
     subject: FamilyCertificate,
     *,
     ax: Axes | None = None,
-    runs: Sequence[FamilyTrajectory] | None = None,
+    runs: Sequence[Trajectory] | None = None,
     time_unit: str = "",
 ) -> Axes:
     """Draw the states ``x_k(t)`` under many signals, within what is proved for every signal.
@@ -118,7 +119,7 @@ def plot_family(
     subject : FamilyCertificate
         With an initial state.
     ax : Axes, optional
-    runs : sequence of FamilyTrajectory, optional
+    runs : sequence of Trajectory, optional
         By default under eight random signals and worst cases.
     time_unit : str
         Of the deadline, for the label of the axis: ``"s"``.
@@ -171,7 +172,7 @@ def plot_family_decay(
     subject: FamilyCertificate,
     *,
     ax: Axes | None = None,
-    runs: Sequence[FamilyTrajectory] | None = None,
+    runs: Sequence[Trajectory] | None = None,
     axis: str = "left",
     time_unit: str = "",
 ) -> Axes:
@@ -182,7 +183,7 @@ def plot_family_decay(
     subject : FamilyCertificate
         With an initial state and a proved rate.
     ax : Axes, optional
-    runs : sequence of FamilyTrajectory, optional
+    runs : sequence of Trajectory, optional
         By default under eight random signals and worst cases; those are drawn that have settled at ``T``, or of which
         it is proved where they end.
     axis : {"left", "time", "clock"}
@@ -252,7 +253,7 @@ def bound_label(certificate: FamilyCertificate) -> str:
     return "proved for every signal" if certificate.direct else "bound for every signal (numerical)"
 
 
-def runs_of(subject: Any, runs: Sequence[FamilyTrajectory] | None) -> list[FamilyTrajectory]:
+def runs_of(subject: Any, runs: Sequence[Trajectory] | None) -> list[Trajectory]:
     """Return runs that are given, or those that are drawn of a certificate by default.
 
     Raises
@@ -265,9 +266,13 @@ def runs_of(subject: Any, runs: Sequence[FamilyTrajectory] | None) -> list[Famil
             f"this figure is drawn from the certificate of a family, not from {type(subject).__name__}"
         )
     result = sample_runs(subject) if runs is None else list(runs)
-    if not result or not all(isinstance(run, FamilyTrajectory) and run.family == subject.family for run in result):
-        raise ParameterError("runs are what simulate_family returned for the family of the certificate")
+    if not result or not all(_is_of(run, subject.family) for run in result):
+        raise ParameterError("runs are what simulate returned for the family of the certificate")
     return result
+
+
+def _is_of(run: Any, family: Family) -> bool:
+    return isinstance(run, Trajectory) and run.played is not None and run.played.family == family
 
 
 def _known_end(certificate: FamilyCertificate) -> np.ndarray | None:
@@ -277,7 +282,7 @@ def _known_end(certificate: FamilyCertificate) -> np.ndarray | None:
     return np.array([float(low) for low, _ in ends]) if same else None
 
 
-def count_of_signals(certificate: FamilyCertificate, runs: Sequence[FamilyTrajectory]) -> str:
+def count_of_signals(certificate: FamilyCertificate, runs: Sequence[Trajectory]) -> str:
     """Tell how many signals are drawn, and where some are promised, whether these keep the promise or are any."""
     kept = " of the kind asked for" if keeps_promise(certificate, runs) else " of any kind"
     return f"{len(runs)} signals" + kept * (certificate.signal != "any")
@@ -293,7 +298,7 @@ def _extreme_agents(x: np.ndarray) -> list[int]:
 
 
 def _draw_tubes(
-    ax: Axes, certificate: FamilyCertificate, run: FamilyTrajectory, agents: list[int], groups: np.ndarray
+    ax: Axes, certificate: FamilyCertificate, run: Trajectory, agents: list[int], groups: np.ndarray
 ) -> list[float]:
     """Shade where the agents of each camp are for every signal; draw the final intervals beyond ``T``, return ends."""
     before = run.remaining > 0

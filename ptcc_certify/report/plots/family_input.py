@@ -14,8 +14,8 @@ from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.report.plots.agents import NAME_SIZE
 from ptcc_certify.report.plots.family import bound_label, count_of_signals, runs_of
 from ptcc_certify.report.plots.style import BOUND, RUN, axes_of, finished, styled, time_label
-from ptcc_certify.simulation.family_members import Members
-from ptcc_certify.simulation.family_run import FamilyTrajectory
+from ptcc_certify.simulation.members import Members
+from ptcc_certify.simulation.trajectory import Trajectory
 
 #: From this ratio of the largest input to its first size on, the axis is logarithmic; decades below the first size.
 _GROWTH, _DECADES = 20, 3
@@ -26,7 +26,7 @@ def plot_family_input(
     subject: FamilyCertificate,
     *,
     ax: Axes | None = None,
-    runs: Sequence[FamilyTrajectory] | None = None,
+    runs: Sequence[Trajectory] | None = None,
     time_unit: str = "",
 ) -> Axes:
     """Draw ``max_k |u_k(t)|`` under many signals below its bound for every signal, and the proved peak.

@@ -21,8 +21,6 @@ from ptcc_certify.report.plots.peaks import Peak, draw_peaks
 from ptcc_certify.report.plots.style import BOUND, RUN, axes_of, finished, styled, time_label
 from ptcc_certify.report.plots.subject import limits_text, require_same, structure_of, trajectory_of
 from ptcc_certify.simulation.agents import AgentsTrajectory
-from ptcc_certify.simulation.late_messages import LateRun
-from ptcc_certify.simulation.moving_leaders import TrackingRun
 from ptcc_certify.simulation.trajectory import Trajectory
 
 #: An error ``|e_k|`` below so many tolerances of the integrator, in units of what it is made of, is not resolved.
@@ -91,10 +89,10 @@ def plot_input(
 
 def _every_period_sampled(run: Trajectory) -> bool:
     """Whether the input is held, and known in each period up to the deadline."""
-    if run.actuator is None or run.actuator.sample_period is None:
+    if run.conditions.actuator is None or run.conditions.actuator.sample_period is None:
         return False
     longest = np.diff(run.t[run.t <= float(run.protocol.T)]).max(initial=0)
-    return bool(longest <= (1 + 1e-9) * float(run.actuator.sample_period))
+    return bool(longest <= (1 + 1e-9) * float(run.conditions.actuator.sample_period))
 
 
 def _peaks(run: Trajectory, certificate: Certificate) -> list[Peak]:
@@ -104,7 +102,8 @@ def _peaks(run: Trajectory, certificate: Certificate) -> list[Peak]:
     if late is not None and (largest := largest_late_input(late, certificate.protocol)) is not None:
         whole = ", from within 1 of the final states" * late.relative
         found.append(Peak(float(largest), f"late messages: at most {up(largest, 4)}{whole}", BOUND))
-    tracking = certificate.tracking if isinstance(run, TrackingRun) else None
+    leads = run.conditions.leaders is not None and run.conditions.messages is None
+    tracking = certificate.tracking if leads else None
     if tracking is not None and tracking.input is not None:
         most = float(tracking.input.max())
         found.append(Peak(most, f"moving leaders: at most {up(most, 4)}", BOUND))
@@ -164,7 +163,7 @@ def plot_effort(
     run = trajectory_of(subject)
     certificate = subject if isinstance(subject, Certificate) else certificate
     effort, bound = None if certificate is None else _certified_effort(run, certificate), None
-    if effort and effort.energy and not (effort.initial_set or run.actuator or run.sliding):
+    if effort and effort.energy and not (effort.initial_set or run.conditions.actuator or run.sliding):
         bound = float(effort.energy.value)
     ax, energy = axes_of(ax), _energy(run)
     ax.plot(run.t, energy, color=RUN, label="simulated (CVODES)")
@@ -262,7 +261,7 @@ def _certified_peak(trajectory: Trajectory, certificate: Certificate) -> float |
     ParameterError
         The certificate is of another graph, protocol or initial state.
     """
-    effort, actuator = _certified_effort(trajectory, certificate), trajectory.actuator
+    effort, actuator = _certified_effort(trajectory, certificate), trajectory.conditions.actuator
     if effort is None or (actuator is not None and actuator.sample_period is not None):
         return None
     acts = None if actuator is None else (actuator.gain_cap, actuator.stop_before, actuator.sample_period)
@@ -284,7 +283,8 @@ def _certified_effort(trajectory: Trajectory, certificate: Certificate) -> Effor
     """
     require_same(trajectory, certificate)
     effort, slid = certificate.effort, trajectory.sliding
-    unknown = trajectory.forcing is not None or 0.0 not in trajectory.t[:1]
+    met = trajectory.conditions
+    unknown = met.forcing is not None or 0.0 not in trajectory.t[:1]
     unknown = unknown or (slid is not None and slid.boundary_layer is not None)
-    unknown = unknown or isinstance(trajectory, LateRun | TrackingRun)
+    unknown = unknown or met.messages is not None or met.leaders is not None
     return None if unknown else effort

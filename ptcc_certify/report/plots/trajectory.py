@@ -121,7 +121,7 @@ def plot_sliding(
 
     Parameters
     ----------
-    subject : SlidingTrajectory or Certificate
+    subject : Trajectory or Certificate
         Of the sliding-mode protocol.
     ax : Axes, optional
     reaching : sequence of N ReachingTime, optional
@@ -147,13 +147,13 @@ def plot_sliding(
     >>> [text.get_text() for text in ax.get_legend().get_texts()][-3:]
     ['$\\sigma_k$ reaches 0', 'reaching time at most', '$T_r$']
     """
-    run, structure, ax = trajectory_of(subject).sliding, structure_of(subject), axes_of(ax)
-    if run is None:
+    run, structure, ax = trajectory_of(subject), structure_of(subject), axes_of(ax)
+    if (sliding := run.sliding) is None:
         raise ParameterError("the run has no sliding variables; simulate under the sliding-mode protocol")
     reaching = subject.reaching if reaching is None and isinstance(subject, Certificate) else reaching
-    T_r = float(run.protocol.T_r)
-    named = draw_agents(ax, run, run.sigma, structure)
-    reached = run.reaching_times[run.sigma0 != 0]
+    T_r = float(sliding.protocol.T_r)
+    named = draw_agents(ax, run, sliding.sigma, structure)
+    reached = sliding.reaching_times[sliding.sigma0 != 0]
     if np.isfinite(reached).any():
         marked: dict[str, Any] = {"color": "black", "markerfacecolor": "white", "markersize": 3.5, "zorder": 4}
         ax.plot(reached, np.zeros(reached.size), "o", **marked, label="$\\sigma_k$ reaches 0")
@@ -161,5 +161,5 @@ def plot_sliding(
         proved = [r.time for r in reaching if r.z is None or r.z > 0]
         ax.plot(proved, [0.0] * len(proved), "|", color=BOUND, markersize=12, zorder=3, label="reaching time at most")
     ax.axvline(T_r, color="black", linewidth=0.8, linestyle=(0, (5, 2, 1, 2)), label="$T_r$")
-    name_agents(ax, run, run.sigma, named, until=min(1.1 * T_r, float(run.t[-1])))
+    name_agents(ax, run, sliding.sigma, named, until=min(1.1 * T_r, float(run.t[-1])))
     return finished(ax, time_label("time $t$", time_unit), "sliding variable $\\sigma_k$")
