@@ -36,8 +36,8 @@ from ptcc_certify.report.family_screen import (
 from ptcc_certify.report.notation import above, rational
 from ptcc_certify.report.plots.counterexample import plot_counterexample
 from ptcc_certify.report.plots.family import keeps_promise, plot_family, plot_family_decay
-from ptcc_certify.report.plots.family_graph import plot_family_graph
 from ptcc_certify.report.plots.family_input import plot_family_input
+from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.restricted_screen import agreement_text, restricted_entries, rests, signal_text
 from ptcc_certify.report.structure_text import structure_text
 from ptcc_certify.report.text_layout import arithmetic
@@ -389,9 +389,7 @@ def draw_family(
     moves = bool(runs) and saved.common and saved.rate is not None
     there["decay"] = moves and bool(saved.deviation_bound([1.0]).max() > 0)
     axes = {
-        name: plot_family_graph(saved) if name == "graph" else _PLOTS[name](saved, runs=runs)
-        for name in wanted
-        if there[name]
+        name: plot_graph(saved) if name == "graph" else _PLOTS[name](saved, runs=runs) for name in wanted if there[name]
     }
     return {name: ax.figure for name, ax in axes.items()}
 

@@ -25,7 +25,6 @@ from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.report.family_screen import decision_lines, family_lines, family_text
 from ptcc_certify.report.figures import draw
 from ptcc_certify.report.plots.agents_motion import plot_motion
-from ptcc_certify.report.plots.family_graph import plot_family_graph
 from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.plots.style import figure_bytes
 from ptcc_certify.report.plots.trade_off import plot_trade_off
@@ -112,7 +111,7 @@ def _family_figure(family: Family) -> tuple[Any, str]:
     """Return a drawing of a family, unless it is large, and a text in its place."""
     if family.n_nodes > SHOWN_NODES:
         return None, ""
-    return plot_family_graph(family).figure, f"drawing of the family: {family_text(family, '')}"
+    return plot_graph(family).figure, f"drawing of the family: {family_text(family, '')}"
 
 
 @html_of.register(Trajectory)

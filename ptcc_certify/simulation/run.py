@@ -100,7 +100,8 @@ def simulate(
     disturbance : Disturbance, str, number, callable or sequence, optional
         Sliding mode: whatever :func:`ptcc_certify.protocols.disturbance.as_disturbance` takes, such as
         ``"sin(2*k*t)"``; by default the worst case, ``d_k = delta sign(sigma_k)``. It is refused where it exceeds
-        ``delta``, and of families where it reads the states. Nominal protocol: one that reads neither states nor sliding variables, by default none.
+        ``delta``, and of families where it reads the states. Nominal protocol: one that reads neither states nor
+        sliding variables, by default none.
     boundary_layer : float, optional
         Sliding mode, for comparison only: integrate ``tanh(sigma/boundary_layer)`` instead of the sign.
     actuator : GainLimits, optional

@@ -12,8 +12,8 @@ from ptcc_certify.report.family_screen import family_lines
 from ptcc_certify.report.plots.agents import CAMP_STYLES
 from ptcc_certify.report.plots.counterexample import plot_counterexample
 from ptcc_certify.report.plots.family import plot_family, plot_family_decay, sample_runs
-from ptcc_certify.report.plots.family_graph import plot_family_graph
 from ptcc_certify.report.plots.family_input import plot_family_input
+from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.plots.trajectory import plot_trajectory
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.signals import RandomSignal, WorstCaseSignal
@@ -88,20 +88,20 @@ def test_no_agent_has_a_role_that_it_has_in_one_mode_alone():
         family = Family.switching([day, other])
         for ax in (
             plot_trajectory(simulate(family, PROTOCOL, [1, 4, -3], RandomSignal(1), times=[0, 0.5])),
-            plot_family_graph(family),
+            plot_graph(family),
         ):
             assert {t.get_text() for t in ax.get_legend().get_texts()} & set(CAMP_STYLES) == names
 
 
 def test_modes_are_drawn_side_by_side_with_nodes_in_the_same_places():
-    ax = plot_family_graph(Family.switching({"day": DAY, "night": NIGHT}))
+    ax = plot_graph(Family.switching({"day": DAY, "night": NIGHT}))
     titles = [panel.get_title() for panel in ax.child_axes]
     places = [[text.get_position() for text in panel.texts if text.get_text() in "abc"] for panel in ax.child_axes]
     assert titles == ["day", "night"] and places[0] == places[1]
 
 
 def test_ranges_of_uncertain_weights_are_written_at_their_edges_and_edges_that_may_fail_are_named():
-    ax = plot_family_graph(Family.from_intervals([("a", "b", -2, -1), ("b", "c", 0, 3), ("c", "a", -1, 1)]))
+    ax = plot_graph(Family.from_intervals([("a", "b", -2, -1), ("b", "c", 0, 3), ("c", "a", -1, 1)]))
     assert {"1\N{EN DASH}2", "0\N{EN DASH}3"} <= {text.get_text() for text in ax.texts}
     assert {"uncertain weight", "may fail"} <= {text.get_text() for text in ax.get_legend().get_texts()}
 
@@ -111,7 +111,7 @@ def test_graphs_of_all_sizes_are_drawn(n):
     edges = [(k, (k + 1) % n, 0, 1 + k % 2) for k in range(n)] if n > 1 else []
     mode = Family.from_intervals(edges, nodes=range(n))
     for family in (mode, Family.switching([mode] * 8)):
-        plot_family_graph(family).figure.canvas.draw()
+        plot_graph(family).figure.canvas.draw()
 
 
 DECIDED = {

@@ -46,6 +46,19 @@ def camp_groups(structure: Structure) -> np.ndarray:
     return group
 
 
+def family_camps(family: Family) -> np.ndarray | None:
+    """Return the camp, of ``CAMP_STYLES``, of every node that all edges of all modes keep; None if there are none.
+
+    Examples
+    --------
+    >>> from ptcc_certify.report.plots.agents import family_camps
+    >>> family_camps(ptcc.as_family([("a", "b", -2, -1)])).tolist()
+    ['first camp', 'second camp']
+    """
+    gauge, violated, _ = find_camps(family.n_nodes, *family.union)
+    return None if violated.size else np.where(gauge > 0, "first camp", "second camp").astype(object)
+
+
 def family_groups(family: Family) -> np.ndarray:
     """Return the part of ``CAMP_STYLES`` that every node has in all modes; else the camps of all edges; else "agents".
 
@@ -59,9 +72,8 @@ def family_groups(family: Family) -> np.ndarray:
     own = [camp_groups(analyse(mode.mandatory)) for mode in family.modes]
     if all((one == own[0]).all() for one in own):
         return own[0]
-    gauge, violated, _ = find_camps(family.n_nodes, *family.union)
-    camps = np.where(gauge > 0, "first camp", "second camp").astype(object)
-    return np.full(family.n_nodes, "agents", dtype=object) if violated.size else camps
+    camps = family_camps(family)
+    return np.full(family.n_nodes, "agents", dtype=object) if camps is None else camps
 
 
 def text_width(text: str) -> float:

@@ -14,8 +14,15 @@ from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.certificate.family_comparison import worst_case_signals
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, find_camps
-from ptcc_certify.report.plots.agents import CAMP_STYLES, NAMED_AGENTS, draw_deadlines, family_groups, name_agents
+from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS
+from ptcc_certify.report.plots.agents import (
+    CAMP_STYLES,
+    NAMED_AGENTS,
+    draw_deadlines,
+    family_camps,
+    family_groups,
+    name_agents,
+)
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled, time_label
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.signals import ConstantSignal, PeriodicSignal, RandomDwellSignal, RandomSignal, Signal
@@ -85,18 +92,6 @@ def keeps_promise(certificate: FamilyCertificate, runs: Sequence[Trajectory]) ->
     """Tell whether runs are those under signals of the kind that a certificate was asked of."""
     own = {signal.text for signal in _of_the_kind(certificate)}
     return all(run.signal in own for run in runs)
-
-
-def family_camps(family: Family) -> np.ndarray | None:
-    """Return the camp, of ``CAMP_STYLES``, of every node that all edges of all modes keep; None if there are none.
-
-    Examples
-    --------
-    >>> family_camps(ptcc.as_family([("a", "b", -2, -1)])).tolist()
-    ['first camp', 'second camp']
-    """
-    gauge, violated, _ = find_camps(family.n_nodes, *family.union)
-    return None if violated.size else np.where(gauge > 0, "first camp", "second camp").astype(object)
 
 
 @styled
