@@ -21,7 +21,7 @@ The names at the top, by topic:
   ``worst_initial_state``, ``design``, ``design_agents``
 - Many graphs: ``Ensemble``, ``certify_many``
 - Figures: ``plot_trajectory``, ``plot_decay``, ``plot_run``, ``plot_sliding``, ``plot_trade_off``, ``plot_input``,
-  ``plot_effort``, ``plot_graph``, ``plot_spectrum``, ``plot_frontier``, ``plot_family``, ``plot_family_decay``,
+  ``plot_effort``, ``plot_graph``, ``plot_spectrum``, ``plot_frontier``,
   ``plot_motion``, ``plot_formation``, ``plot_late``, ``plot_tracking``, ``save_figure``, ``SINGLE_COLUMN``,
   ``DOUBLE_COLUMN``
 - Reports: ``write_report``, ``explore``, ``cite``
@@ -108,8 +108,6 @@ _EXPORTS = {
     "plot_graph": "report.plots.graph",
     "plot_spectrum": "report.plots.spectrum",
     "plot_frontier": "report.plots.spectrum",
-    "plot_family": "report.plots.family",
-    "plot_family_decay": "report.plots.family",
     "plot_late": "report.plots.late",
     "plot_tracking": "report.plots.late",
     "save_figure": "report.plots.style",

@@ -289,8 +289,8 @@ FAMILIES = {
     "ptcc.plot_graph(day)": "Axes",
     "ptcc.plot_input(ptcc.certify(day, p, [1, 2]))": "Axes",
     "ptcc.plot_spectrum(day)": "ParameterError: this figure is of one graph; of families draw plot_graph",
-    "ptcc.plot_decay(ptcc.certify(day, p, [1, 2]))": "ParameterError: this figure is of one graph",
-    "ptcc.plot_family(day)": "ParameterError: this figure is drawn from the certificate of a family, not from Family",
+    "ptcc.plot_decay(ptcc.certify(day, p, [1, 2]))": "Axes",
+    "ptcc.plot_trajectory(day)": "ParameterError: this figure is of one graph; of families draw plot_graph",
     "ptcc.decide(day)[0].plot()": "ParameterError: the component has no counterexample",
     "ptcc.analyse(day)": "GraphError: Family(2 nodes, 1 of 2 weights uncertain) is several graphs",
 }

@@ -146,8 +146,8 @@ class FamilyCertificate(FamilyContent, FromFile, Shown):
             Runs under many signals within what is proved for every signal: their error, their inputs, their states; or
             the graphs. None: :attr:`main_figure`.
         **keywords : Any
-            ``ax`` and others of the function that draws it: ``plot_family_decay``, ``plot_input``, ``plot_graph`` or
-            ``plot_family``.
+            ``ax`` and others of the function that draws it: ``plot_decay``, ``plot_input``, ``plot_graph`` or
+            ``plot_trajectory``.
 
         Returns
         -------

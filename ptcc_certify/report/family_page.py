@@ -33,11 +33,10 @@ from ptcc_certify.report.family_screen import (
     sharpest,
     told_ranges,
 )
+from ptcc_certify.report.figures import plot
 from ptcc_certify.report.notation import above, rational
 from ptcc_certify.report.plots.counterexample import plot_counterexample
-from ptcc_certify.report.plots.family import keeps_promise, plot_family, plot_family_decay
-from ptcc_certify.report.plots.family_input import plot_family_input
-from ptcc_certify.report.plots.graph import plot_graph
+from ptcc_certify.report.plots.runs import keeps_promise
 from ptcc_certify.report.restricted_screen import agreement_text, restricted_entries, rests, signal_text
 from ptcc_certify.report.structure_text import structure_text
 from ptcc_certify.report.text_layout import arithmetic
@@ -53,7 +52,6 @@ from ptcc_certify.theorems.restricted_signals import DwellTime
 MODES, WEIGHTS = 12, 8
 #: How sentences begin that do not begin with a label.
 _BEGINNINGS = ("the state ", "the leader ", "the signs ", "the graph ", "a state ", "no limit ", "held ")
-_PLOTS = {"states": plot_family, "decay": plot_family_decay, "input": plot_family_input}
 #: The theorem, as page and statement give it.
 THEOREM = (
     "If the mandatory graphs of all modes have one kernel K, and every uncertain edge joins agents whose rows of a"
@@ -388,9 +386,7 @@ def draw_family(
     there = {"graph": saved.family.n_nodes <= DRAWN_NODES, "states": small, "input": small}
     moves = bool(runs) and saved.common and saved.rate is not None
     there["decay"] = moves and bool(saved.deviation_bound([1.0]).max() > 0)
-    axes = {
-        name: plot_graph(saved) if name == "graph" else _PLOTS[name](saved, runs=runs) for name in wanted if there[name]
-    }
+    axes = {name: plot(saved, name, **({} if name == "graph" else {"runs": runs})) for name in wanted if there[name]}
     return {name: ax.figure for name, ax in axes.items()}
 
 

@@ -18,7 +18,6 @@ from ptcc_certify.graphs.size_limits import DRAWN_NODES, EXACT_NODES, INPUT_NODE
 from ptcc_certify.protocols.base import Protocol
 from ptcc_certify.report.plots.agents_motion import plot_formation, plot_motion
 from ptcc_certify.report.plots.decay import plot_decay
-from ptcc_certify.report.plots.family import plot_family, plot_family_decay
 from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.plots.input import plot_input
 from ptcc_certify.report.plots.late import plot_late, plot_tracking
@@ -40,8 +39,6 @@ PLOTS: dict[str, Callable[..., Any]] = {
     "motion": plot_motion,
     "formation": plot_formation,
 }
-#: The same of a family of graphs.
-_OF_FAMILIES = {"decay": plot_family_decay, "input": plot_input, "graph": plot_graph, "states": plot_family}
 
 
 def plot(subject: Any, what: str, **keywords: Any) -> Any:
@@ -59,13 +56,12 @@ def plot(subject: Any, what: str, **keywords: Any) -> Any:
     Traceback (most recent call last):
     ptcc_certify.errors.ParameterError: what = 'picture' is unknown; one of decay, input, graph, states, ...
     """
-    figures = _OF_FAMILIES if isinstance(subject, Family | FamilyCertificate) else PLOTS
-    if figures is _OF_FAMILIES and what == "spectrum":
+    if what not in PLOTS:
+        raise ParameterError(f"what = {what!r} is unknown; one of {', '.join(PLOTS)}")
+    if what == "spectrum" and isinstance(subject, Family | FamilyCertificate):
         why = "eigenvalues of single graphs do not tell what switching among them does"
         raise ParameterError(f"{why}; draw those of one graph, or the decay of the family")
-    if what not in figures:
-        raise ParameterError(f"what = {what!r} is unknown; one of {', '.join(figures)}")
-    return gated(figures[what])(subject, **keywords)
+    return gated(PLOTS[what])(subject, **keywords)
 
 
 def draw(saved: Certificate, wanted: Sequence[str]) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from ptcc_certify.graphs.size_limits import INPUT_NODES, REPEATED_NODES
 from ptcc_certify.report.family_page import draw_family
 from ptcc_certify.report.figures import draw
 from ptcc_certify.report.page import rejected_html, report_html
-from ptcc_certify.report.plots.family import sample_runs
+from ptcc_certify.report.plots.runs import sample_runs
 from ptcc_certify.report.plots.style import figure_bytes
 from ptcc_certify.report.statement import family_latex, report_latex
 from ptcc_certify.simulation.trajectory import Trajectory

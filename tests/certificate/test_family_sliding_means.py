@@ -17,7 +17,7 @@ from ptcc_certify.graphs.family import Family
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.report.family_screen import family_lines
 from ptcc_certify.report.page import report_html
-from ptcc_certify.report.plots.family_input import plot_family_input
+from ptcc_certify.report.plots.input import plot_input
 from ptcc_certify.report.statement import family_latex
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.signals import RandomSignal
@@ -101,7 +101,7 @@ def test_inputs_are_below_their_curve(sigma0):
         assert (np.abs(run.input[:, own]) <= bound * (1 + 1e-6) + 1e-6).all()
     first = certificate.input_bound([1.0])[:, 0]
     assert (first <= [float(x) * (1 + 1e-9) for x in certificate.input_peaks]).all()
-    assert "certified peak" in plot_family_input(certificate, runs=played).texts[0].get_text()
+    assert "certified peak" in plot_input(certificate, runs=played).texts[0].get_text()
 
 
 def test_where_the_sliding_part_may_grow_there_is_no_curve_of_the_input():

@@ -11,9 +11,10 @@ from ptcc_certify.protocols import NominalProtocol
 from ptcc_certify.report.family_screen import family_lines
 from ptcc_certify.report.plots.agents import CAMP_STYLES
 from ptcc_certify.report.plots.counterexample import plot_counterexample
-from ptcc_certify.report.plots.family import plot_family, plot_family_decay, sample_runs
-from ptcc_certify.report.plots.family_input import plot_family_input
+from ptcc_certify.report.plots.decay import plot_decay
 from ptcc_certify.report.plots.graph import plot_graph
+from ptcc_certify.report.plots.input import plot_input
+from ptcc_certify.report.plots.runs import sample_runs
 from ptcc_certify.report.plots.trajectory import plot_trajectory
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.signals import RandomSignal, WorstCaseSignal
@@ -32,7 +33,7 @@ def drawn():
 
 def test_every_run_lies_within_what_is_shaded(drawn):
     certificate, runs = drawn
-    ax = plot_family(certificate, runs=runs)
+    ax = plot_trajectory(certificate, runs=runs)
     tubes = [shade.get_paths()[0] for shade in ax.collections]
     assert tubes
     for run in runs:
@@ -42,13 +43,13 @@ def test_every_run_lies_within_what_is_shaded(drawn):
 
 
 def test_the_bars_of_final_states_are_named(drawn):
-    names = [text.get_text() for text in plot_family(drawn[0], runs=drawn[1]).get_legend().get_texts()]
+    names = [text.get_text() for text in plot_trajectory(drawn[0], runs=drawn[1]).get_legend().get_texts()]
     assert names[-3:] == ["proved for every signal", "final states, proved", "deadline $T$"]
 
 
 def test_the_decay_of_every_run_lies_below_the_bound(drawn):
     certificate, runs = drawn
-    ax = plot_family_decay(certificate, runs=runs, axis="clock")
+    ax = plot_decay(certificate, runs=runs, axis="clock")
     lines = {line.get_label(): line for line in ax.lines}
     bound = lines["proved for every signal"].get_ydata()
     gaps = [line.get_ydata() for line in ax.lines if len(line.get_ydata()) == len(bound)]
@@ -60,10 +61,11 @@ def test_what_cannot_be_drawn_is_refused(drawn):
     certificate, _ = drawn
     other = simulate(DAY, PROTOCOL, [1, 4, -3], times=[0, 1])
     for call, told in (
-        (lambda: plot_family(other), "certificate of a family"),
-        (lambda: plot_family(certificate, runs=[other]), "of the certificate"),
-        (lambda: plot_family_decay(certificate, axis="up"), "is unknown"),
-        (lambda: plot_family(certify_family(DAY, PROTOCOL)), "no initial state"),
+        (lambda: plot_trajectory(other, runs=[other]), "certificate of a family"),
+        (lambda: plot_trajectory(DAY), "of their certificates"),
+        (lambda: plot_trajectory(certificate, runs=[other]), "of the certificate"),
+        (lambda: plot_decay(certificate, axis="up"), "is unknown"),
+        (lambda: plot_trajectory(certify_family(DAY, PROTOCOL)), "no initial state"),
     ):
         with pytest.raises(ParameterError, match=told):
             call()
@@ -71,7 +73,7 @@ def test_what_cannot_be_drawn_is_refused(drawn):
 
 def test_the_input_of_every_run_lies_below_its_bound(drawn):
     certificate, runs = drawn
-    ax = plot_family_input(certificate, runs=runs)
+    ax = plot_input(certificate, runs=runs)
     lines = {line.get_label(): line for line in ax.lines}
     bound = lines["proved for every signal"]
     for line in ax.lines:
@@ -151,10 +153,10 @@ def test_a_behaviour_that_holds_has_no_counterexample():
 def test_states_are_drawn_where_no_limit_is_claimed():
     certificate = certify_family(DECIDED["edge"], PROTOCOL, [1, 2, 3])
     runs = sample_runs(certificate, [RandomSignal(1)])
-    assert not plot_family(certificate, runs=runs).collections
-    plot_family_input(certificate, runs=runs)
+    assert not plot_trajectory(certificate, runs=runs).collections
+    plot_input(certificate, runs=runs)
     with pytest.raises(ParameterError, match="no proved bound"):
-        plot_family_decay(certificate, runs=runs)
+        plot_decay(certificate, runs=runs)
 
 
 def test_states_come_first_where_no_bound_of_a_decay_is_proved():
@@ -177,6 +179,6 @@ def test_a_certificate_draws_its_figures_by_name(drawn):
 
 def test_the_certified_peak_has_the_digits_of_the_screen(drawn):
     certificate, runs = drawn
-    peak = plot_family_input(certificate, runs=runs).texts[0].get_text().removeprefix("certified peak ")
+    peak = plot_input(certificate, runs=runs).texts[0].get_text().removeprefix("certified peak ")
     assert f"|u_k| <= {peak}, " in "\n".join(family_lines(certificate, "day"))
     assert len(peak.replace(".", "").lstrip("0")) == 4

@@ -816,7 +816,7 @@ def test_every_figure_names_the_unit_of_time() -> None:
 
 def test_every_figure_has_one_signature() -> None:
     names = [name for name in ptcc_certify.__all__ if name.startswith("plot_")]
-    assert len(names) == 16
+    assert len(names) == 14
     for name in names:
         subject, *keywords = inspect.signature(getattr(ptcc_certify, name)).parameters.values()
         assert subject.name == "subject" and subject.default is inspect.Parameter.empty

@@ -96,7 +96,8 @@ def draw_agents(
     range and median, with a line for the agent whose quantity is the largest at first, and for that with the least;
     of a ``size``, which is never negative, the largest is drawn instead, and what is below it.
     """
-    group = family_groups(run.played.family) if isinstance(run, Trajectory) and run.played else camp_groups(structure)
+    played = run.played if isinstance(run, Trajectory) else None
+    group = camp_groups(structure) if played is None else family_groups(played.family)
     single: dict[int, str] = {}
     ranges = False
     step: Any = "post" if style.get("drawstyle") == "steps-post" else None
@@ -120,13 +121,14 @@ def draw_agents(
     return single
 
 
-def draw_deadlines(ax: Axes, run: Trajectory) -> None:
+def draw_deadlines(ax: Axes, run: Trajectory | AgentsTrajectory) -> None:
     """Draw the deadline, and where sliding variables move that of theirs, as vertical lines."""
-    if run.protocol.prescribed:
-        ax.axvline(float(run.protocol.T), color="black", linewidth=0.8, linestyle=":", label="deadline $T$")
-    sliding = run.protocol.reaching
-    if sliding is not None and run.sliding is not None and run.sliding.sigma0.any():
-        ax.axvline(float(sliding.T_r), color="black", linewidth=0.8, linestyle=(0, (5, 2, 1, 2)), label="$T_r$")
+    if isinstance(run, AgentsTrajectory) or run.protocol.prescribed:
+        ax.axvline(float(run.protocol.gain.T), color="black", linewidth=0.8, linestyle=":", label="deadline $T$")
+    sliding = run.sliding if isinstance(run, Trajectory) else None
+    if sliding is not None and sliding.sigma0.any():
+        reached = float(sliding.protocol.T_r)
+        ax.axvline(reached, color="black", linewidth=0.8, linestyle=(0, (5, 2, 1, 2)), label="$T_r$")
 
 
 def name_agents(

@@ -56,7 +56,7 @@ def refuse_family(subject: Any) -> None:
     ptcc_certify.errors.ParameterError: this figure is of one graph; of families draw plot_graph, and of their ...
     """
     if isinstance(subject, Family | FamilyCertificate):
-        others = "of their certificates plot_family, plot_family_decay and plot_input"
+        others = "of their certificates plot_trajectory, plot_decay and plot_input"
         raise ParameterError(f"this figure is of one graph; of families draw plot_graph, and {others}")
 
 
