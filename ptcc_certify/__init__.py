@@ -15,7 +15,7 @@ The names at the top, by topic:
 - Protocols, disturbances, actuators: ``Agents``, ``companion_form``, ``NominalProtocol``, ``SlidingModeProtocol``,
   ``ExpressionDisturbance``, ``SampledDisturbance``, ``StateDependent``, ``telegraph_noise``, ``GainLimits``,
   ``LateMessages``, ``MovingLeaders``
-- Runs: ``simulate``, ``simulate_late``, ``simulate_tracking``, ``Trajectory``
+- Runs: ``simulate``, ``Bounded``, ``simulate_late``, ``simulate_tracking``, ``Trajectory``
 - Certificates: ``certify``, ``Certificate``, ``Expectations``, ``read_certificate``, ``check``
 - Bounds and design: ``final_state``, ``influence``, ``formation_of_biases``, ``box``, ``ellipsoid``,
   ``worst_initial_state``, ``design``, ``design_agents``
@@ -74,6 +74,7 @@ _EXPORTS = {
     "MovingLeaders": "protocols.moving_leaders",
     # Runs
     "simulate": "simulation.run",
+    "Bounded": "simulation.nominal",
     "simulate_late": "simulation.late_messages",
     "simulate_tracking": "simulation.moving_leaders",
     "Trajectory": "simulation.trajectory",

@@ -34,7 +34,7 @@ CONTROL_RESEARCHER = {
     "ptcc.certify(W, p, orientation='rows')": "GraphError: orientation",
     "ptcc.certify(sparse.csr_matrix(W), p, orientation='information', **fast)": "Certificate(bipartite consensus",
     "ptcc.analyse(W, 'listens')": "Structure(2 nodes, strong",
-    "ptcc.simulate(W, p, [3, 1], orientation='listens', times=[0, 1])": "Trajectory(2 agents, 2 instants",
+    "ptcc.simulate(ptcc.as_graph(W, 'listens'), p, [3, 1], times=[0, 1])": "Trajectory(2 agents, 2 instants",
     "ptcc.simulate(g, p, [1, 2])": "ParameterError: the initial state x0 has 2 values for 3 agents; give one number",
     "ptcc.simulate(g, p, np.ones((3, 2)), times=[0, 1]).states.shape": "(3, 2, 2)",
     "ptcc.simulate(g, p, 'random', times=[0, 1])": "Trajectory(3 agents",

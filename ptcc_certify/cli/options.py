@@ -369,7 +369,13 @@ def run_keywords(protocol: Protocol, options: Options, graph: SignedDigraph) -> 
     """Return what acts on a simulated run, as the library takes it."""
     if protocol.reaching is not None:
         return sliding_keywords(protocol, options, graph)
-    return {"actuator": actuator_of(options)} | {name: options[name] for name in ("delta", "disturbance")}
+    from ptcc_certify.simulation.nominal import Bounded
+
+    delta, disturbance = options["delta"], options["disturbance"]
+    if delta is not None and disturbance is None:
+        raise ParameterError("--delta is the bound of a disturbance; give --disturbance too, or leave it out")
+    met = disturbance if delta is None or disturbance is None else Bounded(disturbance, delta)
+    return {"actuator": actuator_of(options), "disturbance": met}
 
 
 def actuator_of(options: Options) -> GainLimits | None:

@@ -218,7 +218,8 @@ def _run_beside(
     refuse_restricted(options)
     sigma0 = shared.sliding_keywords(protocol, options, signed).get("sigma0")
     x0 = shared.read_initial_state(options["x0"], options["seed"], signed)
-    more: Any = {"messages": messages, "leaders": leaders, "pattern": options["age_pattern"], "seed": options["seed"]}
+    more: Any = {"messages": messages, "leaders": leaders}
+    more |= {} if messages is None else {"signal": (options["age_pattern"], options["seed"])}
     return run_in_places(signed, protocol, x0, places, sigma0=sigma0, **more)
 
 
@@ -237,7 +238,9 @@ def _run(
     refuse_restricted(options)
     more = shared.run_keywords(protocol, options, signed) | {n: options[n] for n in ("samples", "boundary_layer")}
     if options["noise"] is not None:
-        more |= {"noise": "telegraph", "noise_bound": options["noise"]}
+        from ptcc_certify.simulation.nominal import Bounded
+
+        more["noise"] = Bounded("telegraph", options["noise"])
     x0 = shared.read_initial_states(options, signed)
     return run_in_places(signed, protocol, x0, places, times=times, **more)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from fractions import Fraction
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -31,6 +31,28 @@ MAX_JUMPS = 10**4
 _LAST_TAU = 40.0
 # Up to so many agents a dense product with ``L`` is faster than a sparse one.
 _DENSE_UP_TO = 64
+
+
+class Bounded(NamedTuple):
+    """A disturbance or measurement noise of the nominal protocol, with its bound.
+
+    Attributes
+    ----------
+    signal : Disturbance, str, number or sequence
+        Whatever :func:`ptcc_certify.protocols.disturbance.as_disturbance` takes, such as ``"sin(2*k*t)"``.
+    bound : int, float, str or Fraction
+        In units of the input, of noise in those of the states.
+
+    Examples
+    --------
+    >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
+    >>> run = simulate(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1], disturbance=Bounded("sin(t)", 1))
+    >>> run.conditions.forcing
+    'disturbance sin(t) within 1'
+    """
+
+    signal: Any
+    bound: Exact
 
 
 def forced(course: Course, limited: LimitedGain, instants: Instants, goal: float) -> tuple[np.ndarray, float | None]:
@@ -78,30 +100,26 @@ def forced(course: Course, limited: LimitedGain, instants: Instants, goal: float
 def as_forcing(
     graph: SignedDigraph,
     T: Fraction,
-    disturbance: Any,
-    delta: Exact | None,
-    noise: Any,
-    noise_bound: Exact | None,
+    disturbance: Bounded | None,
+    noise: Bounded | None,
     until: float,
 ) -> Forcing | None:
-    """Read a disturbance and measurement noise with their bounds; None if there is neither.
+    """Read a disturbance and measurement noise; None if there is neither.
 
     Raises
     ------
     ParameterError
-        A bound is missing, outside its domain, exceeded or without a signal; or a signal reads the states, or jumps
-        more than 10,000 times.
+        A bound is missing, outside its domain or exceeded; or a signal reads the states, or jumps more than 10,000
+        times.
     """
-    if noise is not None and noise_bound is None:
-        raise ParameterError("noise needs a bound; give noise_bound too")
     sources, bounds, words = [], [], []
-    signals = (("disturbance", disturbance, "delta", delta), ("noise", noise, "noise_bound", noise_bound))
     # Telegraph signals of the two differ by their seeds.
-    for seed, (name, value, bound_name, bound) in enumerate(signals):
-        if value is None and bound is not None:
-            raise ParameterError(f"{bound_name} is the bound of a {name}; give the {name} too, or leave it out")
-        limit = parameter(bound_name, 0 if bound is None else bound, zero_allowed=True)
-        source = as_disturbance("none" if value is None else value, graph.n_nodes, limit, until, seed)
+    for seed, (name, given) in enumerate((("disturbance", disturbance), ("noise", noise))):
+        if given is not None and not isinstance(given, Bounded):
+            raise ParameterError(f"{name} needs a bound; give Bounded({name}, bound)")
+        value, bound = Bounded("none", 0) if given is None else given
+        limit = parameter("delta" if name == "disturbance" else "the bound of the noise", bound, zero_allowed=True)
+        source = as_disturbance(value, graph.n_nodes, limit, until, seed)
         if not isinstance(source, ExpressionDisturbance | SampledDisturbance):
             domain = "the nominal protocol takes expressions of k and t, numbers and samples"
             raise ParameterError(f"{name} ({shorten(source.text)}) reads the states or sliding variables; {domain}")
@@ -110,7 +128,7 @@ def as_forcing(
             raise ParameterError(f"{name} has more than {MAX_JUMPS:,} samples until t = {until:.6g}; give fewer")
         sources.append(source)
         bounds.append(limit)
-        if value is not None:
+        if given is not None:
             words.append(f"{name} {shorten(source.text)} within {readable(limit)}")
     if not words:
         return None

@@ -10,14 +10,15 @@ for ``s`` to infinity, and from ``T`` on ``X' = -rho1 L X``. A simulation corrob
 
 from __future__ import annotations
 
+import inspect
 import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
 
-from ptcc_certify.errors import ParameterError, gated
+from ptcc_certify.errors import ParameterError, gated, unknown_parameter
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io import as_family, as_graph, as_states
 from ptcc_certify.graphs.io.family_conversion import is_family
@@ -32,15 +33,48 @@ from ptcc_certify.simulation.course import Course
 from ptcc_certify.simulation.cvodes import Motion, Tolerances
 from ptcc_certify.simulation.instants import PAST, Instants, default_instants, wanted_instants
 from ptcc_certify.simulation.interrupt import interruptible
-from ptcc_certify.simulation.late_messages import Pattern, simulate_late
+from ptcc_certify.simulation.late_messages import simulate_late
 from ptcc_certify.simulation.members import Choice, Members
-from ptcc_certify.simulation.nominal import as_forcing, forced, sample_and_hold
+from ptcc_certify.simulation.nominal import Bounded, as_forcing, forced, sample_and_hold
 from ptcc_certify.simulation.signals import ConstantSignal, Signal, as_signal
 from ptcc_certify.simulation.sliding import SlidingMotion, rounding_slack
 from ptcc_certify.simulation.trajectory import RESOLVED, Conditions, Played, Trajectory
 
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import Exact, SignedDigraph
+
+
+class Sampling(TypedDict, total=False):
+    """Where a run is sampled, and how it is integrated.
+
+    Attributes
+    ----------
+    times : increasing numbers >= 0
+        The instants wanted, in units of time. One that a float cannot tell from ``T`` counts as ``T``.
+    remaining : float
+        Without ``times``: instants uniform in ``tau`` go from ``1 - t/T = 1`` to this, 1e-8 by default; dimensionless.
+    samples : int
+        Without ``times``: so many of these instants, 201 by default, and half as many uniform in t (with ``rho2 = 0``:
+        so many uniform in t over [0, T]), and 0.5 T, 0.9 T, 0.99 T, T.
+    past : float
+        Without ``times``: go on to ``T (1 + past)``, by default a quarter of ``T``; dimensionless.
+    rtol, atol : float
+        Tolerances of CVODES, 1e-11 by default; ``atol`` is relative to the largest entry of each column of ``x0``, or
+        to the bound of the disturbance times ``T`` or of the noise under the nominal protocol if that is larger.
+    boundary_layer : float
+        Sliding mode, for comparison only: integrate ``tanh(sigma/boundary_layer)`` instead of the sign.
+    """
+
+    times: Iterable[Exact] | None
+    remaining: float
+    samples: int
+    past: float
+    rtol: float
+    atol: float
+    boundary_layer: float | None
+
+
+_DEFAULTS = Sampling(times=None, remaining=1e-8, samples=201, past=PAST, rtol=1e-11, atol=1e-11, boundary_layer=None)
 
 
 @gated
@@ -50,24 +84,13 @@ def simulate(
     x0: Any,
     signal: Any = None,
     *,
-    orientation: str | None = None,
     sigma0: Any = None,
     disturbance: Any = None,
-    boundary_layer: float | None = None,
+    noise: Bounded | None = None,
     actuator: GainLimits | None = None,
-    delta: Exact | None = None,
-    noise: Any = None,
-    noise_bound: Exact | None = None,
     messages: LateMessages | None = None,
     leaders: MovingLeaders | None = None,
-    pattern: Pattern = "oldest",
-    seed: int = 0,
-    times: Iterable[Exact] | None = None,
-    remaining: float = 1e-8,
-    samples: int = 201,
-    past: float = PAST,
-    rtol: float = 1e-11,
-    atol: float = 1e-11,
+    **sampling: Unpack[Sampling],
 ) -> Trajectory:
     """Integrate the closed loop of a protocol from ``X(0) = x0`` to the deadline and past it.
 
@@ -92,49 +115,28 @@ def simulate(
     signal : Signal, str, path, file object or sequence of rows, optional
         Of a family: ``"random"``, the default, ``"worst-case"``, ``"constant"``, a table of instants and modes, or a
         :class:`~ptcc_certify.simulation.signals.Signal`: see :func:`~ptcc_certify.simulation.signals.as_signal`.
-        ``X' = -gain(t) L(t) X``, the signal choosing ``L(t)``.
-    orientation : {"information", "listens"}, optional
-        Of an edge, or of the rows of a matrix; see :func:`ptcc_certify.as_graph`.
+        ``X' = -gain(t) L(t) X``, the signal choosing ``L(t)``. With ``messages`` how old is what agents hear: a pattern
+        of :func:`ptcc_certify.simulate_late`, or that and a seed, ``("varying", 3)``.
     sigma0 : state-like, optional
         Sliding mode: ``sigma(0)``, like ``x0``; without it 0, which leaves no reaching phase.
     disturbance : Disturbance, str, number, callable or sequence, optional
         Sliding mode: whatever :func:`ptcc_certify.protocols.disturbance.as_disturbance` takes, such as
         ``"sin(2*k*t)"``; by default the worst case, ``d_k = delta sign(sigma_k)``. It is refused where it exceeds
-        ``delta``, and of families where it reads the states. Nominal protocol: one that reads neither states nor
-        sliding variables, by default none.
-    boundary_layer : float, optional
-        Sliding mode, for comparison only: integrate ``tanh(sigma/boundary_layer)`` instead of the sign.
+        ``delta``, and of families where it reads the states. Nominal protocol: :class:`Bounded`, one that reads neither
+        states nor sliding variables; by default none.
+    noise : Bounded, optional
+        Nominal protocol: what is added to every measurement, with an actuator that bounds the gain.
     actuator : GainLimits, optional
         Nominal protocol: limits of the input; without sampling if there is a disturbance or noise.
-    delta : int, float, str or Fraction, optional
-        Nominal protocol: the bound of the disturbance, needed with it; in units of the input.
-    noise : Disturbance, str, number or sequence, optional
-        Nominal protocol: what is added to every measurement, like ``disturbance``; with an actuator that bounds the
-        gain.
-    noise_bound : int, float, str or Fraction, optional
-        The bound of ``noise``, needed with it; in units of the states.
     messages : LateMessages, optional
-        The run of :func:`ptcc_certify.simulate_late`, with ``pattern`` and ``seed``, at instants of its own up to
-        ``T``; nothing else acts on it, and sliding variables are 0.
+        The run of :func:`ptcc_certify.simulate_late`, at instants of its own up to ``T``; nothing else acts on it, and
+        sliding variables are 0.
     leaders : MovingLeaders, optional
         The run of :func:`ptcc_certify.simulate_tracking`, at instants of its own; nothing else acts on it. With
         ``messages`` that of :func:`ptcc_certify.simulate_late`.
-    pattern : {"oldest", "fresh", "varying", "square"}
-        Of ``messages``: how old is what agents hear.
-    seed : int
-        Of what is random in ``pattern``.
-    times : increasing numbers >= 0, optional
-        The instants wanted, in units of time. One that a float cannot tell from ``T`` counts as ``T``.
-    remaining : float
-        Without ``times``: instants uniform in ``tau`` go from ``1 - t/T = 1`` to this; dimensionless.
-    samples : int
-        Without ``times``: so many of these instants and half as many uniform in t (with ``rho2 = 0``: so many uniform
-        in t over [0, T]), and 0.5 T, 0.9 T, 0.99 T, T.
-    past : float
-        Without ``times``: go on to ``T (1 + past)``; dimensionless.
-    rtol, atol : float
-        Tolerances of CVODES; ``atol`` is relative to the largest entry of each column of ``x0``, or to ``delta T`` or
-        ``noise_bound`` of the nominal protocol if that is larger.
+    **sampling : Sampling
+        Where the run is sampled, and how it is integrated: ``times``, ``remaining``, ``samples``, ``past``, ``rtol``,
+        ``atol``, ``boundary_layer``, see :class:`Sampling`.
 
     Returns
     -------
@@ -174,20 +176,23 @@ def simulate(
     """
     begin = time.perf_counter()
     refuse_no_protocol(protocol)
-    family = as_family(graph, orientation) if signal is not None or is_family(graph) else None
-    one = as_graph(graph, orientation) if family is None else family.modes[0].mandatory
-    only: dict[str, Any] = {"actuator": actuator, "delta": delta, "noise": noise, "noise_bound": noise_bound}
-    only |= {"boundary_layer": boundary_layer}
-    if messages is not None or leaders is not None:
-        foreign = only | {"disturbance": disturbance, "times": times, "signal": signal}
+    how, beside = _sampling(sampling), messages is not None or leaders is not None
+    family = as_family(graph) if not beside and (signal is not None or is_family(graph)) else None
+    one = as_graph(graph) if family is None else family.modes[0].mandatory
+    layer = how["boundary_layer"]
+    only: dict[str, Any] = {"actuator": actuator, "noise": noise, "boundary_layer": layer}
+    if beside:
+        foreign = only | {"disturbance": disturbance, "times": how["times"]}
+        foreign |= {} if messages is not None else {"signal": signal}
         _refuse_beside(one, messages, leaders, sigma0, foreign)
         if messages is not None:
+            pattern, seed = signal if isinstance(signal, tuple) else ("oldest" if signal is None else signal, 0)
             return simulate_late(one, protocol, messages, x0, pattern=pattern, seed=seed, leaders=leaders)
         assert leaders is not None
         from ptcc_certify.simulation.moving_leaders import simulate_tracking  # it loads SciPy
 
         return simulate_tracking(one, protocol, leaders, x0)
-    initial_state, tolerances = _floats(x0, one, "x0"), Tolerances.within(rtol, atol)
+    initial_state, tolerances = _floats(x0, one, "x0"), Tolerances.within(how["rtol"], how["atol"])
     manifold = None if sigma0 is None else _floats(sigma0, one, "sigma0")
     _refuse_foreign(protocol, family, only | {"sigma0": sigma0, "disturbance": disturbance})
     if (protocol.reaching or family) and any(x is not None and x.ndim > 1 for x in (initial_state, manifold)):
@@ -195,18 +200,18 @@ def simulate(
         raise ParameterError(f"{who} from one initial state at a time; give N numbers x0 and sigma0")
     if actuator is not None and not isinstance(actuator, GainLimits):
         raise ParameterError(f"actuator = {shorten(repr(actuator))} is none; give GainLimits(gain_cap=50), say")
-    if times is None:
-        instants = default_instants(protocol, remaining, samples, past)
+    if how["times"] is None:
+        instants = default_instants(protocol, how["remaining"], how["samples"], how["past"])
     else:
-        instants = wanted_instants(protocol, times)
+        instants = wanted_instants(protocol, how["times"])
     played = ConstantSignal() if family is None else as_signal("random" if signal is None else signal)
     run = _Run(one, family, played, protocol, instants, tolerances)
     with interruptible():
         if protocol.reaching is None:
-            result = run.nominal(initial_state, actuator, (disturbance, delta, noise, noise_bound))
+            result = run.nominal(initial_state, actuator, disturbance, noise)
         else:
             manifold = np.zeros(one.n_nodes) if manifold is None else manifold
-            result = run.sliding(initial_state, manifold, disturbance, boundary_layer)
+            result = run.sliding(initial_state, manifold, disturbance, layer)
     return replace(result, stats=dict(result.stats) | {"seconds": time.perf_counter() - begin})
 
 
@@ -232,12 +237,12 @@ class _Run:
     def course(self, motion: Motion) -> Course:
         return Course(motion, lambda state: self.signal.play(motion.members, self.protocol.gain, state))
 
-    def nominal(self, x: np.ndarray, actuator: GainLimits | None, driving: tuple[Any, Any, Any, Any]) -> Trajectory:
+    def nominal(self, x: np.ndarray, actuator: GainLimits | None, disturbance: Any, noise: Any) -> Trajectory:
         """Return the run under the nominal protocol, whose gain may be limited, with what drives the agents."""
         limited = (actuator or GainLimits()).limit(self.protocol.gain)
         t, remaining, _ = self.instants
         until = float(t[-1])
-        forcing = as_forcing(self.graph, self.protocol.T, *driving, until) if self.family is None else None
+        forcing = as_forcing(self.graph, self.protocol.T, disturbance, noise, until) if self.family is None else None
         held = limited.limits.sample_period is not None
         if forcing is not None and held:
             raise ParameterError("a run with a sample period takes no disturbance and no noise; leave one of them out")
@@ -365,7 +370,7 @@ def simulate_formation(graph: Any, protocol: Protocol, x0: Any, offsets: Any, **
     array([[ 3. , -0.5],
            [ 1. ,  4.5]])
     """
-    graph = as_graph(graph, options.pop("orientation", None))
+    graph = as_graph(graph)
     rows, places = as_states(x0, graph, "x0"), as_states(offsets, graph, "offsets")
     if len(rows[0]) != len(places[0]):
         raise ParameterError(f"offsets has {len(places[0])} numbers for each agent, x0 has {len(rows[0])}")
@@ -373,16 +378,25 @@ def simulate_formation(graph: Any, protocol: Protocol, x0: Any, offsets: Any, **
     return replace(simulate(graph, protocol, less, **options), offsets=_floats(places, graph, "offsets"))
 
 
+def _sampling(given: Sampling) -> Sampling:
+    """Return all of what a run is sampled and integrated by, or refuse a keyword that is none of it."""
+    for name in given:
+        if name not in _DEFAULTS:
+            parameters = [*inspect.signature(simulate).parameters][:-1]
+            raise ParameterError(unknown_parameter("simulate", name, [*parameters, *_DEFAULTS]))
+    return {**_DEFAULTS, **given}
+
+
 def _refuse_foreign(protocol: Protocol, family: Family | None, given: Mapping[str, Any]) -> None:
     """Refuse what belongs to the other protocol, or is of one graph alone."""
-    of_nominal, of_sliding = ("actuator", "delta", "noise", "noise_bound"), ("sigma0", "boundary_layer", "disturbance")
-    forced_nominal = given["delta"] is not None and family is None
+    of_nominal, of_sliding = ("actuator", "noise"), ("sigma0", "boundary_layer", "disturbance")
+    forced_nominal = isinstance(given["disturbance"], Bounded) and family is None
     for name in of_nominal if protocol.reaching is not None else of_sliding:
         if given[name] is not None and not (name == "disturbance" and forced_nominal):
             other = "nominal" if name in of_nominal else "sliding-mode"
             mend = "leave it out or change the protocol"
             if name == "disturbance" and family is None:
-                mend = "under the nominal protocol give its bound delta too"
+                mend = "under the nominal protocol give Bounded(disturbance, delta)"
             raise ParameterError(f"{name} belongs to the {other} protocol; {mend}")
     for name in (*of_nominal, "boundary_layer") if family is not None else ():
         if given[name] is not None:

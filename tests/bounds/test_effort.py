@@ -33,6 +33,7 @@ from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.disturbance import as_disturbance
 from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.report.screen import certificate_lines
+from ptcc_certify.simulation.nominal import Bounded
 from ptcc_certify.simulation.run import simulate
 
 F = Fraction
@@ -569,8 +570,8 @@ def test_disturbances_add_no_more_than_certified(name: str):
             (0.75 * np.sign(L[0])).tolist(),
             (0.75 * rng.choice([-1, 1], n)).tolist(),
         ):
-            run = simulate(graph, protocol, floats(x0), disturbance=d, delta=delta, remaining=1e-5, past=0)
-            still = simulate(graph, protocol, [0] * n, disturbance=d, delta=delta, remaining=1e-5, past=0)
+            run = simulate(graph, protocol, floats(x0), disturbance=Bounded(d, delta), remaining=1e-5, past=0)
+            still = simulate(graph, protocol, [0] * n, disturbance=Bounded(d, delta), remaining=1e-5, past=0)
             moved = np.abs(run.final_state - np.asarray(cert.final_state))
             assert (moved <= drift + 1e-7).all()
             if isinstance(d, list) and d == (0.75 * signs).tolist():
@@ -775,7 +776,7 @@ def test_noise_under_a_limit_leaves_no_more_than_is_proved(name: str, actuator: 
     assert entry.noisy_norm is not None and entry.noisy_largest is not None
     L = graph.dense_laplacian()
     for text in ("0.05*sin(40*t+k)", "0.05*sign(sin(7*t*k))", "0.05"):
-        run = simulate(graph, protocol, x0, actuator=actuator, noise=text, noise_bound="1/20", past=0, remaining=1e-6)
+        run = simulate(graph, protocol, x0, actuator=actuator, noise=Bounded(text, "1/20"), past=0, remaining=1e-6)
         before = run.t < 1
         agents = np.arange(graph.n_nodes)
         n = as_disturbance(text, graph.n_nodes, "1/20", 1.0).values(run.t, agents, np.zeros(agents.size))
