@@ -73,6 +73,17 @@ def default_instants(protocol: Protocol, remaining: float, samples: int, past: f
     return Instants(*table[:, fresh])
 
 
+def steps_towards(T: float, longest: float, share: float, nearest: float) -> np.ndarray:
+    """Return what is left until ``T`` after steps at most so long, each at most a share of what is left, from 0 on.
+
+    The last but one instant is as near to ``T`` as ``nearest`` times ``T``.
+    """
+    left = [0.0, nearest * T]
+    while left[-1] < T:
+        left.append(left[-1] + min(longest, left[-1] * share))
+    return np.array([*left[:-1], T])[::-1]
+
+
 def wanted_instants(protocol: Protocol, times: Iterable[Exact]) -> Instants:
     """Return the instants wanted, what remains until ``T`` and ``T_r`` from exact rationals.
 

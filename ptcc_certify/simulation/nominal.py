@@ -7,13 +7,14 @@ course is on the stretched clock again.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ptcc_certify.errors import ParameterError, SimulationError
+from ptcc_certify.errors import ParameterError, SimulationError, gated
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.protocols.disturbance import ExpressionDisturbance, SampledDisturbance, as_disturbance
 from ptcc_certify.protocols.parameters import parameter, readable
@@ -21,7 +22,7 @@ from ptcc_certify.simulation.cvodes import Forcing, Phase
 from ptcc_certify.simulation.instants import Instants
 
 if TYPE_CHECKING:
-    from ptcc_certify.graphs.digraph import Exact, SignedDigraph
+    from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.protocols.gain_limits import LimitedGain, Periods
     from ptcc_certify.simulation.course import Course
 
@@ -33,15 +34,21 @@ _LAST_TAU = 40.0
 _DENSE_UP_TO = 64
 
 
-class Bounded(NamedTuple):
+@gated
+@dataclass(frozen=True)
+class Bounded:
     """A disturbance or measurement noise of the nominal protocol, with its bound.
 
-    Attributes
+    Parameters
     ----------
     signal : Disturbance, str, number or sequence
         Whatever :func:`ptcc_certify.protocols.disturbance.as_disturbance` takes, such as ``"sin(2*k*t)"``.
     bound : int, float, str or Fraction
         In units of the input, of noise in those of the states.
+
+    References
+    ----------
+    The network (2) of [Zhu]_, whose disturbances the nominal protocol meets too; docs/theory/disturbances.md.
 
     Examples
     --------
@@ -52,7 +59,7 @@ class Bounded(NamedTuple):
     """
 
     signal: Any
-    bound: Exact
+    bound: int | float | str | Fraction
 
 
 def forced(course: Course, limited: LimitedGain, instants: Instants, goal: float) -> tuple[np.ndarray, float | None]:
@@ -117,7 +124,7 @@ def as_forcing(
     for seed, (name, given) in enumerate((("disturbance", disturbance), ("noise", noise))):
         if given is not None and not isinstance(given, Bounded):
             raise ParameterError(f"{name} needs a bound; give Bounded({name}, bound)")
-        value, bound = Bounded("none", 0) if given is None else given
+        value, bound = ("none", 0) if given is None else (given.signal, given.bound)
         limit = parameter("delta" if name == "disturbance" else "the bound of the noise", bound, zero_allowed=True)
         source = as_disturbance(value, graph.n_nodes, limit, until, seed)
         if not isinstance(source, ExpressionDisturbance | SampledDisturbance):

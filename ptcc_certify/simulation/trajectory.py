@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Hashable, Iterator, Mapping
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -31,6 +31,40 @@ if TYPE_CHECKING:
 
 #: A state at the deadline is settled when its residual is below this multiple of the tolerances.
 RESOLVED = 100
+
+
+class ByAgent:
+    """A run, of which the rows of ``states`` are the agents of a graph: a mapping of their labels."""
+
+    graph: SignedDigraph
+    states: np.ndarray
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The N agents, in the order of the rows of ``states``."""
+        return self.graph.labels
+
+    def __getitem__(self, label: Hashable) -> np.ndarray:
+        """Return the states of one agent, the instants last."""
+        return self.states[position(label, self.labels)]
+
+    def __len__(self) -> int:
+        return len(self.labels)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.labels)
+
+    def __contains__(self, label: object) -> bool:
+        return str(label) in self.labels
+
+
+def csv_text(heads: Sequence[str], table: np.ndarray) -> str:
+    """Return a table with one column for each row of an array as text, floats in full."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(heads)
+    writer.writerows(table.T.tolist())
+    return text.getvalue()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -219,7 +253,7 @@ class Conditions:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Trajectory(ByValue, Shown):
+class Trajectory(ByAgent, ByValue, Shown):
     """The states of N agents at M instants.
 
     Attributes
@@ -303,11 +337,6 @@ class Trajectory(ByValue, Shown):
         """Which instant is ``T``; None if none is, or if there is no deadline."""
         at = np.flatnonzero((self.remaining == 0) & (self.t == float(self.protocol.T)) & self.protocol.prescribed)
         return int(at[0]) if at.size else None
-
-    @property
-    def labels(self) -> tuple[str, ...]:
-        """The N agents, in the order of the rows of ``states``."""
-        return self.graph.labels
 
     @property
     def positions(self) -> np.ndarray:
@@ -399,19 +428,6 @@ class Trajectory(ByValue, Shown):
             raise ParameterError(f"no instant of the trajectory is {fraction} T; simulate with times=[{wanted}]")
         return self.states[..., near[0]]
 
-    def __getitem__(self, label: Hashable) -> np.ndarray:
-        """(M,) or (S, M) array: the states of one agent."""
-        return self.states[position(label, self.labels)]
-
-    def __len__(self) -> int:
-        return len(self.labels)
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.labels)
-
-    def __contains__(self, label: object) -> bool:
-        return str(label) in self.labels
-
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
         return np.array(self.states, dtype=dtype)
 
@@ -484,14 +500,11 @@ class Trajectory(ByValue, Shown):
         names = list(self.labels)
         if self.states.ndim == 3:
             names = [f"{label}[{column}]" for label in names for column in range(1, self.states.shape[1] + 1)]
-        text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
         more = self._more_columns()
-        writer.writerow(["t", "remaining", *names, *(name for name, _ in more), *(f"u({name})" for name in names)])
+        heads = ["t", "remaining", *names, *(name for name, _ in more), *(f"u({name})" for name in names)]
         states, inputs = (values.reshape(len(names), -1) for values in (self.positions, self.input + 0.0))
         table = np.vstack([self.t, self.remaining, states, *(values for _, values in more), inputs])
-        writer.writerows(table.T.tolist())
-        return text.getvalue()
+        return csv_text(heads, table)
 
     def _more_columns(self) -> list[tuple[str, np.ndarray]]:
         """Return the mode that acts, sliding variables and targets, as far as there are any."""
