@@ -22,7 +22,7 @@ The names at the top, by topic:
 - Many graphs: ``Ensemble``, ``certify_many``
 - Figures: ``plot_trajectory``, ``plot_decay``, ``plot_run``, ``plot_sliding``, ``plot_trade_off``, ``plot_input``,
   ``plot_effort``, ``plot_graph``, ``plot_spectrum``, ``plot_frontier``,
-  ``plot_motion``, ``plot_formation``, ``plot_late``, ``plot_tracking``, ``save_figure``, ``SINGLE_COLUMN``,
+  ``plot_motion``, ``plot_formation``, ``plot_tracking``, ``save_figure``, ``SINGLE_COLUMN``,
   ``DOUBLE_COLUMN``
 - Reports: ``write_report``, ``explore``, ``cite``
 - Errors: ``PTCCError``
@@ -109,8 +109,7 @@ _EXPORTS = {
     "plot_graph": "report.plots.graph",
     "plot_spectrum": "report.plots.spectrum",
     "plot_frontier": "report.plots.spectrum",
-    "plot_late": "report.plots.late",
-    "plot_tracking": "report.plots.late",
+    "plot_tracking": "report.plots.tracking",
     "save_figure": "report.plots.style",
     "SINGLE_COLUMN": "report.plots.style",
     "DOUBLE_COLUMN": "report.plots.style",

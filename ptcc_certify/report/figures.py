@@ -20,9 +20,9 @@ from ptcc_certify.report.plots.agents_motion import plot_formation, plot_motion
 from ptcc_certify.report.plots.decay import plot_decay
 from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.plots.input import plot_input
-from ptcc_certify.report.plots.late import plot_late, plot_tracking
 from ptcc_certify.report.plots.spectrum import plot_spectrum
 from ptcc_certify.report.plots.style import figure_bytes
+from ptcc_certify.report.plots.tracking import plot_tracking
 from ptcc_certify.report.plots.trajectory import plot_sliding, plot_trajectory
 from ptcc_certify.simulation.late_messages import can_run
 
@@ -33,7 +33,7 @@ PLOTS: dict[str, Callable[..., Any]] = {
     "graph": plot_graph,
     "states": plot_trajectory,
     "sliding": plot_sliding,
-    "late": plot_late,
+    "late": plot_tracking,
     "tracking": plot_tracking,
     "spectrum": plot_spectrum,
     "motion": plot_motion,

@@ -375,7 +375,7 @@ def simulate_formation(graph: Any, protocol: Protocol, x0: Any, offsets: Any, **
     if len(rows[0]) != len(places[0]):
         raise ParameterError(f"offsets has {len(places[0])} numbers for each agent, x0 has {len(rows[0])}")
     less = [[x - h for x, h in zip(*pair, strict=True)] for pair in zip(rows, places, strict=True)]
-    return replace(simulate(graph, protocol, less, **options), offsets=_floats(places, graph, "offsets"))
+    return simulate(graph, protocol, less, **options).in_places(_floats(places, graph, "offsets"))
 
 
 def _sampling(given: Sampling) -> Sampling:

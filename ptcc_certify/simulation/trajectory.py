@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Hashable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -230,8 +230,8 @@ class Played(ByValue):
         return spent
 
 
-@dataclass(frozen=True)
-class Conditions:
+@dataclass(frozen=True, eq=False)
+class Conditions(ByValue):
     """What a run meets besides its graph, protocol and sliding variables.
 
     Attributes
@@ -244,12 +244,18 @@ class Conditions:
         How late messages are.
     leaders : MovingLeaders or None
         How leaders move.
+    places : (N,) array or None
+        Those of a formation; then the ``states`` of a run are less these, and tables and figures tell its positions.
     """
 
     actuator: GainLimits | None = None
     forcing: str | None = None
     messages: LateMessages | None = None
     leaders: MovingLeaders | None = None
+    places: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        self.lock()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -284,8 +290,6 @@ class Trajectory(ByAgent, ByValue, Shown):
         What else the run met.
     held_input : (N, M) or (N, S, M) array or None
         The input where it is not that of the states: under zero-order hold, of late messages, of leaders that move.
-    offsets : (N,) array or None
-        Places in a formation; then ``states`` are less these, and tables and figures tell :attr:`positions`.
     targets : (N, M) array or None
         Where leaders move, ``-L_F^-1 L_FL X_L`` of followers, of leaders their states.
 
@@ -316,7 +320,6 @@ class Trajectory(ByAgent, ByValue, Shown):
     played: Played | None = field(default=None, kw_only=True)
     conditions: Conditions = field(default=Conditions(), kw_only=True)
     held_input: np.ndarray | None = field(default=None, kw_only=True)
-    offsets: np.ndarray | None = field(default=None, kw_only=True)
     targets: np.ndarray | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
@@ -343,9 +346,24 @@ class Trajectory(ByAgent, ByValue, Shown):
         """Where agents are: in a formation ``states`` and their places."""
         return self._in_places(self.states)
 
+    def in_places(self, places: np.ndarray) -> Trajectory:
+        """Return the run of a formation, whose agents have places.
+
+        Parameters
+        ----------
+        places : (N,) array
+            In units of the states.
+
+        Returns
+        -------
+        Trajectory
+        """
+        return replace(self, conditions=replace(self.conditions, places=places))
+
     def _in_places(self, values: np.ndarray) -> np.ndarray:
         """Return values of the N agents with their places in the formation, if they are in one."""
-        return values if self.offsets is None else values + self.offsets[..., None]
+        places = self.conditions.places
+        return values if places is None else values + places[..., None]
 
     @property
     def deadline_resolved(self) -> bool:

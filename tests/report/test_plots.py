@@ -49,9 +49,9 @@ from ptcc_certify.report.plots.distributions import plot_final_states
 from ptcc_certify.report.plots.graph import GROUND, plot_graph, weight_ranges
 from ptcc_certify.report.plots.graph_layout import FREE_NODES, arc
 from ptcc_certify.report.plots.input import plot_effort, plot_input
-from ptcc_certify.report.plots.late import plot_late, plot_tracking
 from ptcc_certify.report.plots.spectrum import CLASS_MARKERS, plot_frontier, plot_spectrum
 from ptcc_certify.report.plots.style import DOUBLE_COLUMN, EDGE_STYLES, SINGLE_COLUMN, STYLE, save_figure
+from ptcc_certify.report.plots.tracking import plot_tracking
 from ptcc_certify.report.plots.trade_off import plot_trade_off
 from ptcc_certify.report.plots.trajectory import plot_run, plot_sliding, plot_trajectory
 from ptcc_certify.simulation.run import simulate
@@ -747,7 +747,7 @@ def gallery() -> dict[str, Figure]:
     figures["pair plot_trade_off"] = plot_trade_off(pair).figure
     for name, asked in MOVING.items():
         cert = certify(CHAIN, NominalProtocol(1, 1, 2, 1), [1, 3, -2, 4], method="perron", simulation=False, **asked)
-        plot = plot_late if "messages" in asked else plot_tracking
+        plot = plot_tracking
         figures[f"{name} {plot.__name__}"] = plot(cert, time_unit="s").figure
     for figure in figures.values():
         FigureCanvasAgg(figure).draw()
@@ -816,7 +816,7 @@ def test_every_figure_names_the_unit_of_time() -> None:
 
 def test_every_figure_has_one_signature() -> None:
     names = [name for name in ptcc_certify.__all__ if name.startswith("plot_")]
-    assert len(names) == 14
+    assert len(names) == 13
     for name in names:
         subject, *keywords = inspect.signature(getattr(ptcc_certify, name)).parameters.values()
         assert subject.name == "subject" and subject.default is inspect.Parameter.empty
@@ -830,8 +830,8 @@ def test_a_subject_that_leads_to_no_figure_is_refused_with_the_mend() -> None:
     with pytest.raises(ParameterError, match="drawn from a certificate, not from SignedDigraph; give certify"):
         plot_frontier(graph_of("fig1a"))
     with pytest.raises(ParameterError, match="drawn from a certificate, not from str; give certify"):
-        plot_late("fig1a")
-    with pytest.raises(ParameterError, match="says nothing of moving leaders; certify with leaders"):
+        plot_tracking("fig1a")
+    with pytest.raises(ParameterError, match="says nothing of late messages or of leaders that move"):
         plot_tracking(certified("fig1a"))
     with pytest.raises(ParameterError, match="no sliding variables; simulate under the sliding-mode protocol"):
         plot_sliding(certified("fig1a"))
