@@ -372,9 +372,10 @@ def run_keywords(protocol: Protocol, options: Options, graph: SignedDigraph) -> 
     from ptcc_certify.simulation.nominal import Bounded
 
     delta, disturbance = options["delta"], options["disturbance"]
-    if delta is not None and disturbance is None:
-        raise ParameterError("--delta is the bound of a disturbance; give --disturbance too, or leave it out")
-    met = disturbance if delta is None or disturbance is None else Bounded(disturbance, delta)
+    if (delta is None) != (disturbance is None):
+        given, other = ("--disturbance", "--delta") if delta is None else ("--delta", "--disturbance")
+        raise ParameterError(f"{given}: a disturbance of the nominal protocol has a bound; give {other} too")
+    met = None if delta is None else Bounded(disturbance, delta)
     return {"actuator": actuator_of(options), "disturbance": met}
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,6 +34,7 @@ from ptcc_certify.cli.scenario import BESIDE
 from ptcc_certify.cli.terminal import FIGURES, print_lines, refuse_output
 from ptcc_certify.errors import ExitCode, ParameterError
 from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.shown import rendered
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -123,7 +124,7 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
         if isinstance(signed, Family):
             refuse_agents_of_family(options, "simulate")
         motion = _run_agents(signed, protocol, options)
-        _write(motion, output, plot_of_agents, {"wide": wide, "time_unit": time_unit})
+        _write(motion, output, "agents_motion.plot_motion", {"wide": wide, "time_unit": time_unit})
         if protocol.reaching is not None:
             click.echo("note: u is without the sliding terms, which cancel the disturbance", err=True)
         return ExitCode.OK
@@ -131,7 +132,7 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
         raise ParameterError("--method: chooses the gains of agents of order n; leave it out, or add --agents")
     beside = None if isinstance(signed, Family) else _run_beside(graph[0], signed, protocol, options, places)
     trajectory = beside or _run(signed, protocol, options, places)
-    _write(trajectory, output, plot_of_run, {"wide": wide, "time_unit": time_unit})
+    _write(trajectory, output, "trajectory.plot_run", {"wide": wide, "time_unit": time_unit})
     if beside is not None:
         return ExitCode.OK
     if protocol.prescribed and trajectory.conditions.actuator is None and not trajectory.deadline_resolved:
@@ -139,14 +140,14 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
     return ExitCode.OK
 
 
-def _write(run: Any, output: str | None, draw: Callable[..., Any], look: dict[str, Any]) -> None:
+def _write(run: Any, output: str | None, drawn_by: str, look: dict[str, Any]) -> None:
     """Write a run as a figure or CSV, to a file or to standard output."""
     from ptcc_certify.graphs.io import write_atomically
 
     if output and Path(output).suffix.lower() in FIGURES:
         from ptcc_certify.report.plots.style import save_figure
 
-        save_figure(draw(run, **look), output)
+        save_figure(rendered(f"plots.{drawn_by}", run, **look), output)
     elif output:
         write_atomically(output, run.to_csv())
     else:
@@ -155,20 +156,6 @@ def _write(run: Any, output: str | None, draw: Callable[..., Any], look: dict[st
             click.echo("note: -o FILE.csv keeps the table, -o FILE.png draws the states", err=True)
     if output:
         print_lines(f"written    {output}")
-
-
-def plot_of_run(run: Any, **look: Any) -> Any:
-    """Draw the states of a run."""
-    from ptcc_certify.report.plots.trajectory import plot_run
-
-    return plot_run(run, **look)
-
-
-def plot_of_agents(run: Any, **look: Any) -> Any:
-    """Draw positions, velocities and so on of a run of agents of order n."""
-    from ptcc_certify.report.plots.agents_motion import plot_motion
-
-    return plot_motion(run, **look)
 
 
 def _run_agents(signed: SignedDigraph, protocol: Protocol, options: shared.Options) -> AgentsTrajectory:
