@@ -234,9 +234,11 @@ class Motion:
         """Let nothing but the graph move the agents meanwhile."""
         drives, self.drives = self.drives, []
         self._steps.clear()
-        yield
-        self.drives = drives
-        self._steps.clear()
+        try:
+            yield
+        finally:
+            self.drives = drives
+            self._steps.clear()
 
     def sample(
         self, phase: Phase, z: np.ndarray, end: float, begin: float = 0.0, events: Iterable[float] = ()

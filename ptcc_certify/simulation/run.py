@@ -186,7 +186,7 @@ def simulate(
         foreign |= {} if messages is not None else {"signal": signal}
         _refuse_beside(one, messages, leaders, sigma0, foreign)
         if messages is not None:
-            pattern, seed = signal if isinstance(signal, tuple) else ("oldest" if signal is None else signal, 0)
+            pattern, seed = signal if isinstance(signal, tuple) and len(signal) == 2 else (signal or "oldest", 0)
             return simulate_late(one, protocol, messages, x0, pattern=pattern, seed=seed, leaders=leaders)
         assert leaders is not None
         from ptcc_certify.simulation.moving_leaders import simulate_tracking  # it loads SciPy
@@ -283,6 +283,8 @@ class _Run:
         protocol, t = self.protocol.reaching, self.instants.t
         assert protocol is not None
         source, until = "worst-case" if disturbance is None else disturbance, float(t[-1])
+        if isinstance(disturbance, Bounded):
+            raise ParameterError("disturbance: the sliding-mode protocol has its bound, delta; give the signal alone")
         met = as_disturbance(source, self.graph.n_nodes, protocol.delta, until)
         if self.family is not None and isinstance(met, StateDependent):
             raise ParameterError("families take no disturbance that reads the states; give one of time")

@@ -13,6 +13,8 @@ from ptcc_certify.errors import FormatError, ParameterError, SimulationError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.protocols.gain_limits import GainLimits
+from ptcc_certify.protocols.late_messages import LateMessages
 from ptcc_certify.simulation.members import Members
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.signals import (
@@ -166,6 +168,9 @@ def test_random_members_act_longer_once_all_agents_rest(size):
         (lambda: simulate(PAIR, PROTOCOL.T, [1, 2, 3]), "rotocol"),
         (lambda: simulate(PAIR, PROTOCOL, [1, 2, 3], "dusk.csv"), "one of random, worst-case"),
         (lambda: simulate(PAIR, PROTOCOL, [1, 2, 3], [(0, "dusk")]), "no mode dusk; it has day, night"),
+        (lambda: simulate(PAIR, PROTOCOL, [1, 2, 3], actuator=GainLimits(gain_cap=9)), "actuator is not simulated of"),
+        (lambda: simulate(DAY, PROTOCOL, [1, 2, 3], ("fresh", 1, 2), messages=LateMessages(delay="0.1")), "pattern"),
+        (lambda: simulate(DAY, PROTOCOL, [1, 2, 3], sampels=9), "no parameter sampels; did you mean samples"),
         (lambda: simulate(PAIR, PROTOCOL, np.ones((3, 2))), "one initial state at a time"),
         (lambda: TableSignal([(1, "day")]), "ascend from 0, and it begins at 1"),
         (lambda: TableSignal([(0, 0), (0, 1)]), "0 follows 0"),

@@ -22,6 +22,7 @@ from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.protocols import SlidingModeProtocol
 from ptcc_certify.protocols.disturbance import SampledDisturbance, StateDependent, telegraph_noise
 from ptcc_certify.protocols.reaching_time import certified_reaching_times
+from ptcc_certify.simulation.nominal import Bounded
 from ptcc_certify.simulation.run import simulate
 
 F = Fraction
@@ -635,6 +636,7 @@ def test_a_boundary_layer_without_a_width_is_refused(width):
         ({"disturbance": lambda t, x, sigma: "a"}, "no array of numbers"),
         ({"disturbance": lambda t, x, sigma: math.nan}, "agent 1 at t = 0 is nan, not finite"),
         ({"disturbance": [0.1, 0.2]}, "2 disturbances for 6 agents"),
+        ({"disturbance": Bounded("sin(t)", 1)}, "has its bound, delta; give the signal alone"),
         ({"disturbance": "sin(q)"}, "unknown name"),
         ({"sigma0": [1, 2]}, "sigma0 has 2 values"),
         ({"sigma0": 1}, "sigma0 is 1; give one number"),
