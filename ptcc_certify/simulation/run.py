@@ -186,8 +186,8 @@ def simulate(
         foreign |= {} if messages is not None else {"signal": signal}
         _refuse_beside(one, messages, leaders, sigma0, foreign)
         if messages is not None:
-            pattern, seed = signal if isinstance(signal, tuple) and len(signal) == 2 else (signal or "oldest", 0)
-            return simulate_late(one, protocol, messages, x0, pattern=pattern, seed=seed, leaders=leaders)
+            heard: Any = signal if isinstance(signal, tuple) and len(signal) == 2 else (signal or "oldest", 0)
+            return simulate_late(one, protocol, messages, x0, pattern=heard[0], seed=heard[1], leaders=leaders)
         assert leaders is not None
         from ptcc_certify.simulation.moving_leaders import simulate_tracking  # it loads SciPy
 
