@@ -798,6 +798,6 @@ def test_an_envelope_is_compared_with_runs_it_speaks_of_only():
     cert = certify(graph, protocol, [1, 2, 3, 4, 5, 6], simulation=False)
     capped = simulate(graph, protocol, [1, 2, 3, 4, 5, 6], actuator=GainLimits(gain_cap=9))
     assert not cert.envelope.compare(capped).violated
-    for more in ({"actuator": GainLimits(sample_period="0.01")}, {"disturbance": "t", "delta": 2}):
+    for more in ({"actuator": GainLimits(sample_period="0.01")}, {"disturbance": Bounded("t", 2)}):
         with pytest.raises(ParameterError, match="undisturbed"):
             cert.envelope.compare(simulate(graph, protocol, [1, 2, 3, 4, 5, 6], **more))
