@@ -54,6 +54,7 @@ from ptcc_certify.report.plots.style import DOUBLE_COLUMN, EDGE_STYLES, SINGLE_C
 from ptcc_certify.report.plots.tracking import plot_tracking
 from ptcc_certify.report.plots.trade_off import plot_trade_off
 from ptcc_certify.report.plots.trajectory import plot_run, plot_sliding, plot_trajectory
+from ptcc_certify.simulation.nominal import Bounded
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
 
@@ -193,7 +194,7 @@ def test_the_peak_is_drawn_where_it_holds_only() -> None:
         ({"actuator": capped}, own),
         ({"actuator": GainLimits(gain_cap=50)}, peak),
         ({"actuator": GainLimits(sample_period="0.01", stop_before="0.05")}, None),
-        ({"disturbance": "sin(k*t)", "delta": 1, "actuator": capped}, None),
+        ({"disturbance": Bounded("sin(k*t)", 1), "actuator": capped}, None),
     ]
     assert 0 < own < peak
     for options, height in expected:
