@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from lmi.blas_threads import one_thread
 from ptcc_certify.errors import gated
 from ptcc_certify.graphs.io import as_graph, as_state
 from ptcc_certify.graphs.rationals import whole_number
@@ -35,6 +36,7 @@ MOST_STEPS = 20_000
 
 
 @gated
+@one_thread()
 def simulate_tracking(
     graph: Any,
     protocol: Protocol,
