@@ -139,7 +139,7 @@ def ours(graph: ptcc.SignedDigraph, exact: np.ndarray, options: Any) -> Run:
     seconds = time.perf_counter() - began
     after = (run.t > float(PROTOCOL.T_r)) & (run.t <= float(PROTOCOL.T))
     errors = np.abs(run.states[:, after] - exact[:, None]).max(axis=0)
-    sigma = float(np.abs(run.sigma[:, after]).max())
+    sigma = float(np.abs(run.sliding.sigma[:, after]).max())
     return Run(float(errors[-1]), float(errors.min()), sigma, run.stats["rhs"], seconds, "T")
 
 

@@ -15,14 +15,14 @@ The names at the top, by topic:
 - Protocols, disturbances, actuators: ``Agents``, ``companion_form``, ``NominalProtocol``, ``SlidingModeProtocol``,
   ``ExpressionDisturbance``, ``SampledDisturbance``, ``StateDependent``, ``telegraph_noise``, ``GainLimits``,
   ``LateMessages``, ``MovingLeaders``
-- Runs: ``simulate``, ``simulate_family``, ``simulate_late``, ``simulate_tracking``, ``Trajectory``
+- Runs: ``simulate``, ``Bounded``, ``simulate_late``, ``simulate_tracking``, ``Trajectory``
 - Certificates: ``certify``, ``Certificate``, ``Expectations``, ``read_certificate``, ``check``
 - Bounds and design: ``final_state``, ``influence``, ``formation_of_biases``, ``box``, ``ellipsoid``,
   ``worst_initial_state``, ``design``, ``design_agents``
 - Many graphs: ``Ensemble``, ``certify_many``
 - Figures: ``plot_trajectory``, ``plot_decay``, ``plot_run``, ``plot_sliding``, ``plot_trade_off``, ``plot_input``,
-  ``plot_effort``, ``plot_graph``, ``plot_spectrum``, ``plot_frontier``, ``plot_family``, ``plot_family_decay``,
-  ``plot_motion``, ``plot_formation``, ``plot_late``, ``plot_tracking``, ``save_figure``, ``SINGLE_COLUMN``,
+  ``plot_effort``, ``plot_graph``, ``plot_spectrum``, ``plot_frontier``,
+  ``plot_motion``, ``plot_formation``, ``plot_tracking``, ``save_figure``, ``SINGLE_COLUMN``,
   ``DOUBLE_COLUMN``
 - Reports: ``write_report``, ``explore``, ``cite``
 - Errors: ``PTCCError``
@@ -74,7 +74,7 @@ _EXPORTS = {
     "MovingLeaders": "protocols.moving_leaders",
     # Runs
     "simulate": "simulation.run",
-    "simulate_family": "simulation.family_run",
+    "Bounded": "simulation.nominal",
     "simulate_late": "simulation.late_messages",
     "simulate_tracking": "simulation.moving_leaders",
     "Trajectory": "simulation.trajectory",
@@ -109,10 +109,7 @@ _EXPORTS = {
     "plot_graph": "report.plots.graph",
     "plot_spectrum": "report.plots.spectrum",
     "plot_frontier": "report.plots.spectrum",
-    "plot_family": "report.plots.family",
-    "plot_family_decay": "report.plots.family",
-    "plot_late": "report.plots.late",
-    "plot_tracking": "report.plots.late",
+    "plot_tracking": "report.plots.tracking",
     "save_figure": "report.plots.style",
     "SINGLE_COLUMN": "report.plots.style",
     "DOUBLE_COLUMN": "report.plots.style",

@@ -178,6 +178,7 @@ def did_you_mean(name: str, names: Iterable[str]) -> str:
 #: Where a keyword belongs that a function does not have.
 _PLACES = dict.fromkeys(("T", "rho1", "rho2", "kappa"), "NominalProtocol")
 _PLACES |= dict.fromkeys(("T_r", "T_s", "mu1", "mu2", "mu3"), "SlidingModeProtocol")
+_PLACES["orientation"] = "as_graph"
 _PLACES |= dict.fromkeys(("gain_cap", "stop_before", "sample_period"), "GainLimits")
 _PLACES |= dict.fromkeys(("behaviour", "min_rate", "max_input"), "Expectations")
 _PLACES |= dict.fromkeys(("delay", "own_delay", "period", "losses", "value_error"), "LateMessages")

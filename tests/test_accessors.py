@@ -29,7 +29,7 @@ BY_PLACE_TOO: dict[str, Callable[[], Callable[[Any], Any]]] = {
 BY_LABEL: dict[str, Callable[[], Callable[[Any], Any]]] = {
     "final state": lambda: certify().final_state.__getitem__,
     "run": lambda: lambda agent: certify().trajectory[agent].tolist(),
-    "run of a family": lambda: lambda agent: ptcc.simulate_family(FAMILY, PROTOCOL, X0)[agent].tolist(),
+    "run of a family": lambda: lambda agent: ptcc.simulate(FAMILY, PROTOCOL, X0)[agent].tolist(),
     "run of agents of order n": lambda: (
         lambda agent: certify(agents=ptcc.Agents(order=2)).agents.simulate(samples=5)[agent].tolist()
     ),

@@ -437,7 +437,7 @@ class Envelope:
         """
         if not isinstance(trajectory, Trajectory):
             raise ParameterError(f"{shorten(repr(trajectory))} is no run; give what simulate returned")
-        if trajectory.forcing is not None or trajectory.held_input is not None:
+        if trajectory.conditions.forcing is not None or trajectory.held_input is not None:
             raise ParameterError("the bounds are for undisturbed runs whose input is not held over periods")
         if trajectory.graph.labels != self.structure.graph.labels or trajectory.graph != self.structure.graph:
             raise ParameterError("the run is of another graph, or has its agents in another order, than the envelope")

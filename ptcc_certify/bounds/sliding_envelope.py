@@ -102,7 +102,7 @@ class SlidingEnvelope(Envelope):
         run = trajectory.sliding
         assert run is not None
         with np.errstate(divide="ignore"):
-            return Instants(run.clock, -np.log(run.reaching_remaining))
+            return Instants(trajectory.clock, -np.log(run.reaching_remaining))
 
     def state_bound(self, remaining: np.ndarray | float, x0: Any) -> np.ndarray:
         """Bound of ``||z(x)||`` where ``1 - t/(T_r + T_s)`` is ``remaining``, from ``x0``, whatever the disturbance.
@@ -195,7 +195,7 @@ class SlidingEnvelope(Envelope):
         run = trajectory.sliding
         assert run is not None
         own, x0 = self._unit(trajectory.states[:, 0]), [Fraction(x) for x in trajectory.states[:, 0].tolist()]
-        x, y = trajectory.states / own, (run.states - run.sigma) / own
+        x, y = trajectory.states / own, (trajectory.states - run.sigma) / own
         size, result = max(float(np.abs(part).max()) for part in (x, y)), []
         for _, v, sliding in self._bounds([function], x0, own, self._of(trajectory)):
             unit = float((v + sliding).max()) or 1.0

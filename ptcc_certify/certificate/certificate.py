@@ -26,10 +26,10 @@ from ptcc_certify.certificate.section_writer import read_side_files
 from ptcc_certify.certificate.verdict import Assessment, assess, verdict_of
 from ptcc_certify.checker import CheckReport, VerifiedObligation
 from ptcc_certify.errors import FormatError, PTCCError, gated
-from ptcc_certify.graphs.display_hook import Shown, plot, summary
 from ptcc_certify.graphs.io.files import refuse_no_path
 from ptcc_certify.graphs.kinds_of_file import refuse_as_certificate
 from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.shown import Shown, rendered
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -259,7 +259,7 @@ class Certificate(Content, FromFile, Shown):
         ParameterError
             No figure is called so, or there is nothing to draw.
         """
-        return plot(self, what or self.main_figure, **keywords)
+        return rendered("figures.plot", self, what or self.main_figure, **keywords)
 
     @property
     def main_figure(self) -> str:
@@ -272,7 +272,8 @@ class Certificate(Content, FromFile, Shown):
 
     def summary(self) -> str:
         """Return what ``ptcc certify`` prints of it."""
-        return summary(self)
+        origins = self.request.origins
+        return "\n".join(rendered("screen.summary_lines", self, origins.get("graph", "graph"), origins))
 
     def __eq__(self, other: object) -> bool:
         """Two certificates are equal when they claim and prove the same; what was observed does not count."""

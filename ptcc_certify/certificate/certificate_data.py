@@ -164,7 +164,7 @@ class Content:
         """Return a run of ``initial_state`` that tells positions: in a formation with the places of its agents."""
         if self.offsets is None:
             return run
-        return replace(run, offsets=np.array([float(h) for h in self.offsets]))
+        return run.in_places(np.array([float(h) for h in self.offsets]))
 
     def changed(self, **values: Any) -> Self:
         """Return the certificate with other parts, in whichever group they are; what follows is computed anew.

@@ -47,7 +47,6 @@ from ptcc_certify.checker.matrix_products import LARGEST_ROWS
 from ptcc_certify.checker.reading import Interval
 from ptcc_certify.checker.restricted_signals import reachable_bounds
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.graphs.display_hook import Shown, family_summary, plot_of_family
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.size_limits import EXACT_NODES, ONE_THREAD_NODES
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY, analyse
@@ -59,6 +58,7 @@ from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.squares_function import SquaresFunction, squares_function
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.base import refuse_no_protocol
+from ptcc_certify.shown import Shown, rendered
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent, decide
 from ptcc_certify.theorems.joint_windows import refuse_impossible_windows
 from ptcc_certify.theorems.restricted_signals import ClockShares, JointWindows, SignalClass, read_signal
@@ -129,7 +129,8 @@ class FamilyCertificate(FamilyContent, FromFile, Shown):
 
     def summary(self) -> str:
         """Return what ``ptcc certify`` prints of it."""
-        return family_summary(self)
+        origins = self.origins
+        return "\n".join(rendered("family_screen.family_summary", self, origins.get("graph", ""), origins))
 
     @property
     def main_figure(self) -> str:
@@ -146,8 +147,8 @@ class FamilyCertificate(FamilyContent, FromFile, Shown):
             Runs under many signals within what is proved for every signal: their error, their inputs, their states; or
             the graphs. None: :attr:`main_figure`.
         **keywords : Any
-            ``ax`` and others of the function that draws it: ``plot_family_decay``, ``plot_input``, ``plot_graph`` or
-            ``plot_family``.
+            ``ax`` and others of the function that draws it: ``plot_decay``, ``plot_input``, ``plot_graph`` or
+            ``plot_trajectory``.
 
         Returns
         -------
@@ -158,7 +159,7 @@ class FamilyCertificate(FamilyContent, FromFile, Shown):
         ParameterError
             No figure is called so, or there is nothing to draw.
         """
-        return plot_of_family(self, what or self.main_figure, **keywords)
+        return rendered("figures.plot", self, what or self.main_figure, **keywords)
 
     # ------------------------------------------------------------------ the file
 

@@ -16,9 +16,9 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.quotient import Quotient
-from ptcc_certify.simulation.family_members import Members
-from ptcc_certify.simulation.family_run import FamilyTrajectory
+from ptcc_certify.simulation.members import Members
 from ptcc_certify.simulation.signals import WorstCaseSignal
+from ptcc_certify.simulation.trajectory import Trajectory
 
 #: A bound is exceeded by more than rounding from this ratio on.
 VIOLATION = 1 + 1e-6
@@ -77,14 +77,14 @@ class FamilyComparison:
         return self.worst_ratio > VIOLATION
 
 
-def compare(certificate: FamilyCertificate, run: FamilyTrajectory) -> FamilyComparison:
+def compare(certificate: FamilyCertificate, run: Trajectory) -> FamilyComparison:
     """Compare a run with the bounds for every signal.
 
     Parameters
     ----------
     certificate : FamilyCertificate
         With an initial state.
-    run : FamilyTrajectory
+    run : Trajectory
         Of the same family, protocol and initial state.
 
     Returns
@@ -102,7 +102,7 @@ def compare(certificate: FamilyCertificate, run: FamilyTrajectory) -> FamilyComp
     >>> from ptcc_certify.certificate.family_certificate import certify_family
     >>> unsure = Family.from_intervals([("a", "b", "0.8", "1.2"), ("b", "a", "-1.2", "-0.8")])
     >>> cert = certify_family(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2])
-    >>> seen = [compare(cert, simulate_family(unsure, cert.protocol, [1, 2], s)) for s in worst_case_signals(cert)]
+    >>> seen = [compare(cert, simulate(unsure, cert.protocol, [1, 2], s)) for s in worst_case_signals(cert)]
     >>> any(one.violated for one in seen), 0.9 < max(one.lyapunov_ratio for one in seen) < 1.000001
     (False, True)
     """
@@ -157,12 +157,12 @@ def functions_of(certificate: FamilyCertificate) -> Iterator[tuple[np.ndarray, Q
             yield part.component.nodes, quotient, V
 
 
-def _require_same(certificate: FamilyCertificate, run: FamilyTrajectory) -> None:
-    if not isinstance(run, FamilyTrajectory):
-        raise ParameterError(f"{shorten(repr(run))} is no run of a family; give what simulate_family returned")
+def _require_same(certificate: FamilyCertificate, run: Trajectory) -> None:
+    if not isinstance(run, Trajectory) or run.played is None:
+        raise ParameterError(f"{shorten(repr(run))} is no run of a family; give what simulate returned of one")
     if certificate.initial_state is None:
         raise ParameterError("the certificate has no initial state; certify the family with x0")
-    if run.family is not certificate.family and run.family != certificate.family:
+    if run.played.family is not certificate.family and run.played.family != certificate.family:
         raise ParameterError("the run is of another family than the certificate")
     for name, same in (
         ("protocol", _same_protocol(certificate, run)),
@@ -172,7 +172,7 @@ def _require_same(certificate: FamilyCertificate, run: FamilyTrajectory) -> None
             raise ParameterError(f"the run is of another {name} than the certificate")
 
 
-def _same_protocol(certificate: FamilyCertificate, run: FamilyTrajectory) -> bool:
+def _same_protocol(certificate: FamilyCertificate, run: Trajectory) -> bool:
     if run.sliding is None or certificate.sigma0 is None:
         return run.sliding is None and certificate.sigma0 is None and run.protocol.gain == certificate.protocol.gain
     return run.protocol == certificate.protocol and _close(run.sliding.sigma0, certificate.sigma0)
@@ -190,7 +190,7 @@ def _worst(values: np.ndarray, bounds: np.ndarray) -> float | None:
         return float(np.where(values > 0, values / bounds, 0.0).max(initial=0.0))
 
 
-def _final_ratio(certificate: FamilyCertificate, run: FamilyTrajectory, floor: float) -> float | None:
+def _final_ratio(certificate: FamilyCertificate, run: Trajectory, floor: float) -> float | None:
     ends = certificate.final_states
     if run.deadline_index is None or not run.deadline_resolved or ends is None:
         return None
@@ -202,17 +202,17 @@ def _final_ratio(certificate: FamilyCertificate, run: FamilyTrajectory, floor: f
     return _worst(away, (high - low) / 2)
 
 
-def _input_ratio(certificate: FamilyCertificate, run: FamilyTrajectory, floor: float) -> float | None:
+def _input_ratio(certificate: FamilyCertificate, run: Trajectory, floor: float) -> float | None:
     """Return the worst ratio of inputs, and of their nominal parts, to their peaks."""
     gain = run.protocol.gain.value_at_remaining(run.remaining)
-    error, ratios = np.multiply.outer(2 * Members(run.family).in_weight * floor, gain), []
+    error, ratios = np.multiply.outer(2 * Members(certificate.family).in_weight * floor, gain), []
     for values, peaks in ((run.input, certificate.input_peaks), (gain * run.error, certificate.nominal_peaks)):
         if peaks is not None:
             ratios.append(_worst(np.abs(values) - error, np.array([[float(peak)] for peak in peaks])))
     return max((ratio for ratio in ratios if ratio is not None), default=None)
 
 
-def _sliding_ratio(certificate: FamilyCertificate, run: FamilyTrajectory) -> float | None:
+def _sliding_ratio(certificate: FamilyCertificate, run: Trajectory) -> float | None:
     """Return the worst ratio of sliding variables to ``psi |sigma_k(0)|``."""
     sliding, reaching, protocol = run.sliding, certificate.reaching, certificate.protocol.reaching
     if sliding is None or reaching is None or protocol is None or certificate.direct:
@@ -225,7 +225,7 @@ def _sliding_ratio(certificate: FamilyCertificate, run: FamilyTrajectory) -> flo
     return _worst(np.abs(sliding.sigma), np.multiply.outer(np.abs(sliding.sigma0), share))
 
 
-def _driven_ratios(certificate: FamilyCertificate, run: FamilyTrajectory, floor: float) -> Iterator[float]:
+def _driven_ratios(certificate: FamilyCertificate, run: Trajectory, floor: float) -> Iterator[float]:
     """Yield the worst ratio of ``sqrt(V(x - sigma))`` to its bound, of every quadratic function that decays."""
     assert run.sliding is not None
     before = np.isfinite(run.clock)
@@ -250,11 +250,12 @@ def _roots(
 
 
 def _lyapunov_ratios(
-    nodes: np.ndarray, quotient: Quotient, V: FamilyFunction, run: FamilyTrajectory, floor: float
+    nodes: np.ndarray, quotient: Quotient, V: FamilyFunction, run: Trajectory, floor: float
 ) -> tuple[float, float]:
     """Return the worst ratios of ``sqrt(V)`` to its bounds by one rate, and by those of the modes."""
     root, size = _roots(nodes, quotient, V, run.states[:, np.isfinite(run.clock)], floor)
-    clock, spent = run.clock[: root.size], run.clock_of_modes()[:, : root.size]
+    assert run.played is not None
+    clock, spent = run.clock[: root.size], run.played.clock_of_modes(run.clock)[:, : root.size]
     rates = np.array([float(rate) for rate in V.rates])
     excess, result = np.maximum(root - size, 0.0)[1:], []
     for decay in (float(V.rate) * clock, rates @ spent):

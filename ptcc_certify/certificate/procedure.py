@@ -88,9 +88,9 @@ from ptcc_certify.protocols.disturbance import as_disturbance
 from ptcc_certify.protocols.late_messages import LateMessages
 from ptcc_certify.protocols.moving_leaders import MovingLeaders
 from ptcc_certify.protocols.reaching_time import ReachingTime
-from ptcc_certify.simulation.filippov import rounding_slack
 from ptcc_certify.simulation.instants import PAST
 from ptcc_certify.simulation.run import simulate
+from ptcc_certify.simulation.sliding import rounding_slack
 from ptcc_certify.simulation.trajectory import Trajectory
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
 from ptcc_certify.theorems.restricted_signals import SignalClass

@@ -369,7 +369,14 @@ def run_keywords(protocol: Protocol, options: Options, graph: SignedDigraph) -> 
     """Return what acts on a simulated run, as the library takes it."""
     if protocol.reaching is not None:
         return sliding_keywords(protocol, options, graph)
-    return {"actuator": actuator_of(options)} | {name: options[name] for name in ("delta", "disturbance")}
+    from ptcc_certify.simulation.nominal import Bounded
+
+    delta, disturbance = options["delta"], options["disturbance"]
+    if (delta is None) != (disturbance is None):
+        given, other = ("--disturbance", "--delta") if delta is None else ("--delta", "--disturbance")
+        raise ParameterError(f"{given}: a disturbance of the nominal protocol has a bound; give {other} too")
+    met = None if delta is None else Bounded(disturbance, delta)
+    return {"actuator": actuator_of(options), "disturbance": met}
 
 
 def actuator_of(options: Options) -> GainLimits | None:

@@ -259,14 +259,8 @@ def _of_agents(signed: SignedDigraph, protocol: Protocol, what: str, options: sh
 def _draw(what: str, subject: Any, wide: bool, time_unit: str) -> Any:
     """Draw a figure of a certificate, a run, a family, or a graph with its protocol."""
     from ptcc_certify.certificate.family_certificate import FamilyCertificate
-    from ptcc_certify.graphs.display_hook import plot_of_family
     from ptcc_certify.graphs.family import Family
-    from ptcc_certify.report.plots.agents_motion import plot_formation, plot_motion
-    from ptcc_certify.report.plots.decay import plot_decay
-    from ptcc_certify.report.plots.graph import plot_graph
-    from ptcc_certify.report.plots.input import plot_input
-    from ptcc_certify.report.plots.late import plot_late, plot_tracking
-    from ptcc_certify.report.plots.spectrum import plot_spectrum
+    from ptcc_certify.report.figures import plot as plot_of
     from ptcc_certify.report.plots.trajectory import plot_run
     from ptcc_certify.simulation.trajectory import Trajectory
 
@@ -274,18 +268,12 @@ def _draw(what: str, subject: Any, wide: bool, time_unit: str) -> Any:
         if what in OF_A_CERTIFICATE:
             raise ParameterError(f"--what {what} is of the certificate of one graph; this one is of a family")
         if wide:
-            raise ParameterError(
-                "--wide is for the states of one graph; figures of families are one column wide: leave it out"
-            )
-        return plot_of_family(subject, what, **({"time_unit": time_unit} if what in OF_A_RUN else {}))
-    subject, protocol = subject if isinstance(subject, tuple) else (subject, None)
-    if what == "states" or (what == "motion" and isinstance(subject, Trajectory)):
+            mend = "figures of families are one column wide: leave it out"
+            raise ParameterError(f"--wide is for the states of one graph; {mend}")
+    elif what == "states" or (what == "motion" and isinstance(subject, Trajectory)):
         return plot_run(subject, wide=wide, time_unit=time_unit)
-    if what in OF_AGENTS:
-        return plot_motion(subject, wide=wide, time_unit=time_unit) if what == "motion" else plot_formation(subject)
-    if what == "graph":
-        return plot_graph(subject)
-    if what == "spectrum":
-        return plot_spectrum(subject, protocol=protocol)
-    figures = {"input": plot_input, "decay": plot_decay, "late": plot_late, "tracking": plot_tracking}
-    return figures[what](subject, time_unit=time_unit)
+    more: dict[str, Any] = {} if what in ("graph", "spectrum", "formation") else {"time_unit": time_unit}
+    if isinstance(subject, tuple):
+        subject, protocol = subject
+        more |= {"protocol": protocol} if what == "spectrum" else {}
+    return plot_of(subject, what, **more, **({"wide": wide} if what == "motion" else {}))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,6 +34,7 @@ from ptcc_certify.cli.scenario import BESIDE
 from ptcc_certify.cli.terminal import FIGURES, print_lines, refuse_output
 from ptcc_certify.errors import ExitCode, ParameterError
 from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.shown import rendered
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -42,7 +43,6 @@ if TYPE_CHECKING:
     from ptcc_certify.graphs.family import Family
     from ptcc_certify.protocols import Protocol
     from ptcc_certify.simulation.agents import AgentsTrajectory
-    from ptcc_certify.simulation.family_run import FamilyTrajectory
     from ptcc_certify.simulation.trajectory import Trajectory
 
 _TABLES = ("", ".csv", ".txt")
@@ -124,7 +124,7 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
         if isinstance(signed, Family):
             refuse_agents_of_family(options, "simulate")
         motion = _run_agents(signed, protocol, options)
-        _write(motion, output, plot_of_agents, {"wide": wide, "time_unit": time_unit})
+        _write(motion, output, "agents_motion.plot_motion", {"wide": wide, "time_unit": time_unit})
         if protocol.reaching is not None:
             click.echo("note: u is without the sliding terms, which cancel the disturbance", err=True)
         return ExitCode.OK
@@ -132,22 +132,22 @@ def simulate(graph: tuple[str, ...], wide: bool, time_unit: str, output: str | N
         raise ParameterError("--method: chooses the gains of agents of order n; leave it out, or add --agents")
     beside = None if isinstance(signed, Family) else _run_beside(graph[0], signed, protocol, options, places)
     trajectory = beside or _run(signed, protocol, options, places)
-    _write(trajectory, output, plot_of_run, {"wide": wide, "time_unit": time_unit})
+    _write(trajectory, output, "trajectory.plot_run", {"wide": wide, "time_unit": time_unit})
     if beside is not None:
         return ExitCode.OK
-    if protocol.prescribed and trajectory.actuator is None and not trajectory.deadline_resolved:
+    if protocol.prescribed and trajectory.conditions.actuator is None and not trajectory.deadline_resolved:
         click.echo("note: the run had not settled at the deadline; raise rho2 * kappa", err=True)
     return ExitCode.OK
 
 
-def _write(run: Any, output: str | None, draw: Callable[..., Any], look: dict[str, Any]) -> None:
+def _write(run: Any, output: str | None, drawn_by: str, look: dict[str, Any]) -> None:
     """Write a run as a figure or CSV, to a file or to standard output."""
     from ptcc_certify.graphs.io import write_atomically
 
     if output and Path(output).suffix.lower() in FIGURES:
         from ptcc_certify.report.plots.style import save_figure
 
-        save_figure(draw(run, **look), output)
+        save_figure(rendered(f"plots.{drawn_by}", run, **look), output)
     elif output:
         write_atomically(output, run.to_csv())
     else:
@@ -156,20 +156,6 @@ def _write(run: Any, output: str | None, draw: Callable[..., Any], look: dict[st
             click.echo("note: -o FILE.csv keeps the table, -o FILE.png draws the states", err=True)
     if output:
         print_lines(f"written    {output}")
-
-
-def plot_of_run(run: Any, **look: Any) -> Any:
-    """Draw the states of a run."""
-    from ptcc_certify.report.plots.trajectory import plot_run
-
-    return plot_run(run, **look)
-
-
-def plot_of_agents(run: Any, **look: Any) -> Any:
-    """Draw positions, velocities and so on of a run of agents of order n."""
-    from ptcc_certify.report.plots.agents_motion import plot_motion
-
-    return plot_motion(run, **look)
 
 
 def _run_agents(signed: SignedDigraph, protocol: Protocol, options: shared.Options) -> AgentsTrajectory:
@@ -219,7 +205,8 @@ def _run_beside(
     refuse_restricted(options)
     sigma0 = shared.sliding_keywords(protocol, options, signed).get("sigma0")
     x0 = shared.read_initial_state(options["x0"], options["seed"], signed)
-    more: Any = {"messages": messages, "leaders": leaders, "pattern": options["age_pattern"], "seed": options["seed"]}
+    more: Any = {"messages": messages, "leaders": leaders}
+    more |= {} if messages is None else {"signal": (options["age_pattern"], options["seed"])}
     return run_in_places(signed, protocol, x0, places, sigma0=sigma0, **more)
 
 
@@ -238,16 +225,18 @@ def _run(
     refuse_restricted(options)
     more = shared.run_keywords(protocol, options, signed) | {n: options[n] for n in ("samples", "boundary_layer")}
     if options["noise"] is not None:
-        more |= {"noise": "telegraph", "noise_bound": options["noise"]}
+        from ptcc_certify.simulation.nominal import Bounded
+
+        more["noise"] = Bounded("telegraph", options["noise"])
     x0 = shared.read_initial_states(options, signed)
     return run_in_places(signed, protocol, x0, places, times=times, **more)
 
 
 def _run_family(
     family: Family, protocol: Protocol, times: list[Fraction] | None, options: shared.Options
-) -> FamilyTrajectory:
+) -> Trajectory:
     """Return the run of a family under a signal."""
-    from ptcc_certify.simulation.family_run import simulate_family
+    from ptcc_certify.simulation.run import simulate
     from ptcc_certify.simulation.signals import RandomDwellSignal, as_signal
 
     refuse_options(options)
@@ -262,4 +251,4 @@ def _run_family(
         raise ParameterError(f"{flag} is of random signals; leave it out, or leave out --signal {shorten(signal)}")
     played = as_signal(signal, options["seed"]) if promise is None else RandomDwellSignal(promise, options["seed"])
     more = shared.sliding_keywords(protocol, options, family.modes[0].mandatory)
-    return simulate_family(family, protocol, x0, played, times=times, samples=options["samples"], **more)
+    return simulate(family, protocol, x0, played, times=times, samples=options["samples"], **more)

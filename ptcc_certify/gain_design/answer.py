@@ -17,10 +17,10 @@ from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.verdict import CERTIFIED
 from ptcc_certify.checker.input_formulas import Limits
 from ptcc_certify.gain_design.request import DesignRequest, Request, fit_of
-from ptcc_certify.graphs.display_hook import Shown
 from ptcc_certify.graphs.rationals import format_exact, nearest_float, short_exact
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.parameters import parameter
+from ptcc_certify.shown import Shown
 
 MET, INFEASIBLE, UNPROVED = "met", "infeasible", "not with this certificate"
 #: Significant decimal digits of the gains and deadlines that are found.

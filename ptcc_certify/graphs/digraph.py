@@ -21,11 +21,11 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar
 import numpy as np
 
 from ptcc_certify.errors import GraphError, NumberError, gated
-from ptcc_certify.graphs.display_hook import Shown
 from ptcc_certify.graphs.equality import ReadOnly
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, nearest_float, shorten, writable
 from ptcc_certify.graphs.reading import Reading
 from ptcc_certify.graphs.tables import first_five, import_pandas, place_of
+from ptcc_certify.shown import Shown
 
 if TYPE_CHECKING:
     import networkx as nx

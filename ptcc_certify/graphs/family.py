@@ -28,9 +28,9 @@ from ptcc_certify.graphs.digraph import (
     ordered_labels,
     refuse_unknown_orientation,
 )
-from ptcc_certify.graphs.display_hook import Shown
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, shorten
 from ptcc_certify.graphs.tables import import_pandas
+from ptcc_certify.shown import Shown
 
 if TYPE_CHECKING:
     import pandas as pd

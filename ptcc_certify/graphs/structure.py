@@ -21,10 +21,10 @@ import numpy as np
 
 from ptcc_certify.errors import ParameterError, did_you_mean
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.graphs.display_hook import Shown
 from ptcc_certify.graphs.equality import ReadOnly
 from ptcc_certify.graphs.io import as_graph
 from ptcc_certify.graphs.tables import import_pandas
+from ptcc_certify.shown import Shown
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -33,16 +33,15 @@ from ptcc_certify.report.family_screen import (
     sharpest,
     told_ranges,
 )
+from ptcc_certify.report.figures import plot
 from ptcc_certify.report.notation import above, rational
 from ptcc_certify.report.plots.counterexample import plot_counterexample
-from ptcc_certify.report.plots.family import keeps_promise, plot_family, plot_family_decay
-from ptcc_certify.report.plots.family_graph import plot_family_graph
-from ptcc_certify.report.plots.family_input import plot_family_input
+from ptcc_certify.report.plots.runs import keeps_promise
 from ptcc_certify.report.restricted_screen import agreement_text, restricted_entries, rests, signal_text
 from ptcc_certify.report.structure_text import structure_text
 from ptcc_certify.report.text_layout import arithmetic
 from ptcc_certify.report.told_instants import FEW, told_instants
-from ptcc_certify.simulation.family_run import FamilyTrajectory
+from ptcc_certify.simulation.trajectory import Trajectory
 from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_name
 from ptcc_certify.theorems.family_behaviour import DEPENDS, Counterexample, FamilyComponent
 from ptcc_certify.theorems.family_claims import camps, component_holds, component_refutation
@@ -53,7 +52,6 @@ from ptcc_certify.theorems.restricted_signals import DwellTime
 MODES, WEIGHTS = 12, 8
 #: How sentences begin that do not begin with a label.
 _BEGINNINGS = ("the state ", "the leader ", "the signs ", "the graph ", "a state ", "no limit ", "held ")
-_PLOTS = {"states": plot_family, "decay": plot_family_decay, "input": plot_family_input}
 #: The theorem, as page and statement give it.
 THEOREM = (
     "If the mandatory graphs of all modes have one kernel K, and every uncertain edge joins agents whose rows of a"
@@ -96,7 +94,7 @@ def _restricted(saved: FamilyCertificate) -> list[str]:
     return entries
 
 
-def family_view(saved: FamilyCertificate, runs: Sequence[FamilyTrajectory]) -> dict[str, Any]:
+def family_view(saved: FamilyCertificate, runs: Sequence[Trajectory]) -> dict[str, Any]:
     """Return everything that the template of a page shows of a family, beside its obligations."""
     why = _counterexamples(saved)
     figures = _figures(saved, runs, why)
@@ -381,24 +379,20 @@ def _sentence(text: str) -> str:
 
 
 def draw_family(
-    saved: FamilyCertificate, runs: Sequence[FamilyTrajectory], wanted: Sequence[str] = ("graph", "decay")
+    saved: FamilyCertificate, runs: Sequence[Trajectory], wanted: Sequence[str] = ("graph", "decay")
 ) -> dict[str, Any]:
     """Draw those of the wanted figures for which there is something to draw."""
     small = bool(runs) and saved.family.n_nodes <= INPUT_NODES
     there = {"graph": saved.family.n_nodes <= DRAWN_NODES, "states": small, "input": small}
     moves = bool(runs) and saved.common and saved.rate is not None
     there["decay"] = moves and bool(saved.deviation_bound([1.0]).max() > 0)
-    axes = {
-        name: plot_family_graph(saved) if name == "graph" else _PLOTS[name](saved, runs=runs)
-        for name in wanted
-        if there[name]
-    }
+    axes = {name: plot(saved, name, **({} if name == "graph" else {"runs": runs})) for name in wanted if there[name]}
     return {name: ax.figure for name, ax in axes.items()}
 
 
 def _figures(
     saved: FamilyCertificate,
-    runs: Sequence[FamilyTrajectory],
+    runs: Sequence[Trajectory],
     why: Sequence[tuple[str, Markup, FamilyComponent, Counterexample]],
 ) -> dict[str, Any]:
     """Draw the graphs, runs within what is proved, and counterexamples: as far as there are any."""

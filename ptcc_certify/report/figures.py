@@ -7,31 +7,61 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from markupsafe import Markup
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ptcc_certify.bounds.late_messages import LateBounds
 from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.family_certificate import FamilyCertificate
+from ptcc_certify.errors import ParameterError, gated
+from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.size_limits import DRAWN_NODES, EXACT_NODES, INPUT_NODES
 from ptcc_certify.protocols.base import Protocol
+from ptcc_certify.report.plots.agents_motion import plot_formation, plot_motion
 from ptcc_certify.report.plots.decay import plot_decay
 from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.plots.input import plot_input
-from ptcc_certify.report.plots.late import plot_late, plot_tracking
+from ptcc_certify.report.plots.spectrum import plot_spectrum
 from ptcc_certify.report.plots.style import figure_bytes
+from ptcc_certify.report.plots.tracking import plot_tracking
 from ptcc_certify.report.plots.trajectory import plot_sliding, plot_trajectory
 from ptcc_certify.simulation.late_messages import can_run
 
 #: What draws each figure of a certificate, on given axes or its own; all but the graph show its simulated run.
-PLOTS: dict[str, Callable[..., Axes]] = {
+PLOTS: dict[str, Callable[..., Any]] = {
+    "decay": plot_decay,
+    "input": plot_input,
     "graph": plot_graph,
     "states": plot_trajectory,
     "sliding": plot_sliding,
-    "decay": plot_decay,
-    "input": plot_input,
-    "late": plot_late,
+    "late": plot_tracking,
     "tracking": plot_tracking,
+    "spectrum": plot_spectrum,
+    "motion": plot_motion,
+    "formation": plot_formation,
 }
+
+
+def plot(subject: Any, what: str, **keywords: Any) -> Any:
+    """Draw a figure of an object.
+
+    Raises
+    ------
+    ParameterError
+        No figure is called so.
+
+    Examples
+    --------
+    >>> from ptcc_certify.report.figures import plot
+    >>> plot(None, "picture")
+    Traceback (most recent call last):
+    ptcc_certify.errors.ParameterError: what = 'picture' is unknown; one of decay, input, graph, states, ...
+    """
+    if what not in PLOTS:
+        raise ParameterError(f"what = {what!r} is unknown; one of {', '.join(PLOTS)}")
+    if what == "spectrum" and isinstance(subject, Family | FamilyCertificate):
+        why = "eigenvalues of single graphs do not tell what switching among them does"
+        raise ParameterError(f"{why}; draw those of one graph, or the decay of the family")
+    return gated(PLOTS[what])(subject, **keywords)
 
 
 def draw(saved: Certificate, wanted: Sequence[str]) -> dict[str, Any]:

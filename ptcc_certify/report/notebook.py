@@ -1,8 +1,7 @@
 """What a notebook shows of a graph, a family, a structure, a certificate, a trajectory, a design: a table, a figure.
 
-Registered with :mod:`ptcc_certify.graphs.display_hook`, which calls them for ``_repr_html_``; elsewhere the plain
-``repr`` is shown. Labels are escaped, figures are inline SVG images with a text in their place for those who
-do not see them.
+What :class:`ptcc_certify.shown.Shown` calls for ``_repr_html_``; elsewhere the plain ``repr`` is shown. Labels are
+escaped, figures are inline SVG images with a text in their place for those who do not see them.
 """
 
 from __future__ import annotations
@@ -11,6 +10,7 @@ import base64
 import html
 from collections.abc import Iterable
 from contextlib import suppress
+from functools import singledispatch
 from typing import Any
 
 from ptcc_certify.certificate.certificate import Certificate
@@ -19,14 +19,12 @@ from ptcc_certify.errors import PTCCError
 from ptcc_certify.gain_design.agents_answer import AgentsDesign
 from ptcc_certify.gain_design.answer import Design
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.graphs.display_hook import shows
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.size_limits import SHOWN_NODES
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.report.family_screen import decision_lines, family_lines, family_text
 from ptcc_certify.report.figures import draw
 from ptcc_certify.report.plots.agents_motion import plot_motion
-from ptcc_certify.report.plots.family_graph import plot_family_graph
 from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.plots.style import figure_bytes
 from ptcc_certify.report.plots.trade_off import plot_trade_off
@@ -39,7 +37,13 @@ from ptcc_certify.theorems.family_behaviour import FamilyComponent, decide
 _HEAD = 11
 
 
-@shows(SignedDigraph)
+@singledispatch
+def html_of(shown: Any) -> str | None:
+    """Return what notebooks show of an object; nothing of one that nobody draws: they then take the plain text."""
+    return None
+
+
+@html_of.register(SignedDigraph)
 def graph_html(graph: SignedDigraph) -> str:
     """Show a graph: its size, how it was read, its nodes, and a drawing of up to 120 of them."""
     structure = analyse(graph)
@@ -47,13 +51,13 @@ def graph_html(graph: SignedDigraph) -> str:
     return _structure_page([line for line in lines if line.startswith(("graph", "read", "nodes"))], structure)
 
 
-@shows(Structure)
+@html_of.register(Structure)
 def structure_html(structure: Structure) -> str:
     """Show a structure: the screen of ``ptcc classify``, and a drawing of up to 120 nodes."""
     return _structure_page(structure_lines(structure, "signed digraph"), structure)
 
 
-@shows(Certificate)
+@html_of.register(Certificate)
 def certificate_html(certificate: Certificate) -> str:
     """Show a certificate: the screen of ``ptcc certify``, and the simulated decay under its proved bound.
 
@@ -81,7 +85,7 @@ def _with_run(certificate: Certificate) -> Certificate:
     return certificate
 
 
-@shows(FamilyCertificate)
+@html_of.register(FamilyCertificate)
 def family_certificate_html(certificate: FamilyCertificate) -> str:
     """Show the certificate of a family: the screen of ``ptcc certify``, and a drawing of up to 120 nodes."""
     origins = certificate.origins
@@ -89,7 +93,7 @@ def family_certificate_html(certificate: FamilyCertificate) -> str:
     return _page(lines, *_family_figure(certificate.family))
 
 
-@shows(Family)
+@html_of.register(Family)
 def family_html(family: Family) -> str:
     """Show a family: the screen of ``ptcc classify``, and a drawing, up to 120 nodes; of more its size alone."""
     if family.n_nodes > SHOWN_NODES:
@@ -97,7 +101,7 @@ def family_html(family: Family) -> str:
     return _page(decision_lines(decide(family), family, ""), *_family_figure(family))
 
 
-@shows(FamilyComponent)
+@html_of.register(FamilyComponent)
 def component_html(component: FamilyComponent) -> str:
     """Show what a component of a family does: the screen of ``ptcc classify``, and a drawing, up to 120 nodes."""
     return _page(decision_lines([component], component.family, ""), *_family_figure(component.family))
@@ -107,10 +111,10 @@ def _family_figure(family: Family) -> tuple[Any, str]:
     """Return a drawing of a family, unless it is large, and a text in its place."""
     if family.n_nodes > SHOWN_NODES:
         return None, ""
-    return plot_family_graph(family).figure, f"drawing of the family: {family_text(family, '')}"
+    return plot_graph(family).figure, f"drawing of the family: {family_text(family, '')}"
 
 
-@shows(Trajectory)
+@html_of.register(Trajectory)
 def trajectory_html(trajectory: Trajectory) -> str:
     """Show a trajectory: what its ``repr`` says, and states (and sliding variables) over time."""
     drawable = trajectory.states.ndim == 2 and trajectory.t.size > 1 and len(trajectory.labels) <= SHOWN_NODES
@@ -121,14 +125,14 @@ def trajectory_html(trajectory: Trajectory) -> str:
     return _page([f"{'trajectory':<{_HEAD}}{trajectory!r}"], figure, alt)
 
 
-@shows(Design)
+@html_of.register(Design)
 def design_html(answer: Design) -> str:
     """Show a design: the screen of ``ptcc design``, and its peak input against the deadline."""
     alt = "certified peak input against the deadline, and what no gains can stay below"
     return _page(answer.lines(), plot_trade_off(answer).figure, alt)
 
 
-@shows(AgentsDesign)
+@html_of.register(AgentsDesign)
 def agents_design_html(answer: AgentsDesign) -> str:
     """Show a design of agents of order n: the screen of ``ptcc design``."""
     return _page(answer.lines(), None, "")

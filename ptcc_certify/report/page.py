@@ -40,7 +40,7 @@ from ptcc_certify.report.plots.subject import ideal_text, limits_text
 from ptcc_certify.report.structure_text import camps, remarks_on
 from ptcc_certify.report.told_instants import FEW as FEW_INSTANTS
 from ptcc_certify.report.told_instants import told_instants
-from ptcc_certify.simulation.family_run import FamilyTrajectory
+from ptcc_certify.simulation.trajectory import Trajectory
 from ptcc_certify.theorems.table import THEOREMS
 
 #: Agents up to which each has a row, and how many there are of either extreme above; leader groups that have a row.
@@ -53,7 +53,7 @@ def report_html(
     saved: Certificate | FamilyCertificate,
     *,
     no_run: str = "no run was asked for",
-    runs: Sequence[FamilyTrajectory] = (),
+    runs: Sequence[Trajectory] = (),
     day: date | None = None,
 ) -> str:
     """Return a certificate as one page of HTML that loads nothing and runs no script.
@@ -67,7 +67,7 @@ def report_html(
         (:meth:`Certificate.with_simulation`) there are figures of bound and input. One of a family may be undecided.
     no_run : str
         Why there is no trajectory, for the page.
-    runs : sequence of FamilyTrajectory
+    runs : sequence of Trajectory
         Of a family, for figures of bound and input.
     day : date, optional
         The day that the page gives as that of its writing; today by default.

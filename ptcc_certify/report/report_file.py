@@ -19,10 +19,10 @@ from ptcc_certify.graphs.size_limits import INPUT_NODES, REPEATED_NODES
 from ptcc_certify.report.family_page import draw_family
 from ptcc_certify.report.figures import draw
 from ptcc_certify.report.page import rejected_html, report_html
-from ptcc_certify.report.plots.family import sample_runs
+from ptcc_certify.report.plots.runs import sample_runs
 from ptcc_certify.report.plots.style import figure_bytes
 from ptcc_certify.report.statement import family_latex, report_latex
-from ptcc_certify.simulation.family_run import FamilyTrajectory
+from ptcc_certify.simulation.trajectory import Trajectory
 
 #: What a report is written as.
 SUFFIXES = (".html", ".htm", ".tex")
@@ -157,7 +157,7 @@ def _write_statement(path: Path, drawn: Mapping[str, Any], latex: Callable[[dict
     write_atomically(path, text)
 
 
-def _runs(saved: FamilyCertificate, simulation: bool | None) -> tuple[list[FamilyTrajectory], str]:
+def _runs(saved: FamilyCertificate, simulation: bool | None) -> tuple[list[Trajectory], str]:
     """Simulate a family under many signals, if there is an initial state; return why there is no run."""
     if simulation is False:
         return [], "it was left out (--no-simulation)"

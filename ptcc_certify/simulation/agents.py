@@ -11,10 +11,7 @@ near to ``T``. The common motion is that of one agent without neighbours.
 
 from __future__ import annotations
 
-import csv
-import io
 import math
-from collections.abc import Hashable, Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -22,9 +19,10 @@ import numpy as np
 
 from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.graphs.rationals import shorten, whole_number
-from ptcc_certify.graphs.tables import position
 from ptcc_certify.protocols.agents import AgentsProtocol
 from ptcc_certify.simulation.cvodes import Motion, Phase, Tolerances
+from ptcc_certify.simulation.members import Members
+from ptcc_certify.simulation.trajectory import ByAgent, csv_text
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -40,7 +38,7 @@ _NEXT = 1e-17
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class AgentsTrajectory:
+class AgentsTrajectory(ByAgent):
     """A run of agents of order n.
 
     Attributes
@@ -50,7 +48,7 @@ class AgentsTrajectory:
     t, remaining, clock : (M,) arrays
         Instants, ``1 - t/T``, and ``s``, infinite at ``T`` unless the gain is capped.
     states : (N, d, n, M) array
-        Positions, velocities and so on, in every coordinate.
+        Positions, velocities and so on, in every coordinate; ``run[label]`` are those of one agent.
     scaled : (N, d, n, M) array
         ``e^(rate s/2)`` times the deviations from the common motion in the coordinates ``y``; NaN at ``T`` without a
         cap, where the clock is infinite.
@@ -74,11 +72,6 @@ class AgentsTrajectory:
     rate: float
 
     @property
-    def labels(self) -> tuple[str, ...]:
-        """The N agents, in the order of the rows of ``states``."""
-        return self.graph.labels
-
-    @property
     def positions(self) -> np.ndarray:
         """(N, d, M) array."""
         return self.states[:, :, 0]
@@ -92,16 +85,6 @@ class AgentsTrajectory:
     def final_state(self) -> np.ndarray:
         """(N, d, n) array: at the last instant, ``T`` or next to it."""
         return self.states[..., -1]
-
-    def __getitem__(self, label: Hashable) -> np.ndarray:
-        """(d, n, M) array: position, velocity and so on of one agent, in every coordinate."""
-        return self.states[position(label, self.labels)]
-
-    def __len__(self) -> int:
-        return len(self.labels)
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.labels)
 
     def to_csv(self) -> str:
         r"""Return ``t,remaining,<label>,..,v(<label>),..,u(<label>),..`` as text, one row per instant, floats in full.
@@ -125,11 +108,7 @@ class AgentsTrajectory:
         heads = [*names, *(f"{letter}({name})" for letter in (*letters, "u") for name in names)]
         parts = [self.states[:, :, i].reshape(N * d, -1) for i in range(n)]
         table = np.vstack([self.t, self.remaining, *parts, self.input.reshape(N * d, -1) + 0.0])
-        text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(["t", "remaining", *heads])
-        writer.writerows(table.T.tolist())
-        return text.getvalue()
+        return csv_text(["t", "remaining", *heads], table)
 
     def __repr__(self) -> str:
         N, d, n, M = self.states.shape
@@ -143,18 +122,19 @@ class _Deviations(Motion):
     def __init__(
         self, graph: SignedDigraph, state: np.ndarray, block: np.ndarray, of: AgentsProtocol, rate: float, rtol: float
     ):
-        super().__init__(graph, state, 1, Tolerances(rtol, rtol * max(float(np.abs(state).max(initial=0)), 1e-300)))
+        largest = max(float(np.abs(state).max(initial=0)), 1e-300)
+        super().__init__(Members(graph), state, Tolerances(rtol, rtol * largest))
         self._block, self._of, self._rate = block, of, rate
         self._options |= {"max_num_steps": 200_000}
         for key in ("newton_scheme", "use_preconditioner", "max_krylov"):
             self._options.pop(key, None)
 
-    def slope(self, x: ca.MX, phase: Phase, clock: ca.MX, ends: tuple[float, float]) -> ca.MX:
-        """Return ``dz/dclock``."""
+    def slope(self, x: ca.MX, phase: Phase, z: ca.MX) -> ca.MX:
+        """Return the slope of the deviations on the clock of the phase."""
         import casadi as ca
 
         n, rho1, k = self._of.order, float(self._of.gain.rho1), float(self._of.gain.pole)
-        R = phase.rate(clock, ca.exp)
+        R = phase.rate(z, ca.exp)
         g = phase.nominal(R)
         zeta = R / g
         theta = ca.MX(0) if phase.past else (1 - rho1 * zeta) ** 2 / k

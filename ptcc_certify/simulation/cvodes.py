@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import re
-from abc import ABC, abstractmethod
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -14,13 +15,12 @@ import numpy as np
 
 from ptcc_certify.errors import SimulationError
 from ptcc_certify.graphs.rationals import number_within
+from ptcc_certify.protocols.disturbance import Disturbance, ExpressionDisturbance, WorstCaseDisturbance
 from ptcc_certify.simulation.interrupt import interruptible
+from ptcc_certify.simulation.members import Choice, Members
 
 if TYPE_CHECKING:
     import casadi as ca
-
-    from ptcc_certify.graphs.digraph import SignedDigraph
-    from ptcc_certify.protocols.disturbance import Disturbance
 
 # Beyond this many agents the Newton steps are solved by GMRES: a sparse factor of a random graph fills up
 # (N = 1,000: 3.4 s against 0.05 s), whereas below it a factor copes with weights over many decades.
@@ -28,6 +28,16 @@ DIRECT_UP_TO = 200
 # With CasADi's 10, GMRES fails where in-weights span three decades, and the steps shrink (Bitcoin OTC: 30 s, not 3 s).
 _KRYLOV = 30
 _MAX_STEPS = 5000
+# A disturbance may be fast: so many steps between two instants.
+MANY_STEPS = 500_000
+# The length of a stretch for CasADi, which takes instants for equal that are less than 1e-9 apart.
+_FINE = 1e3
+# Instants of a stretch of a signal up to which each is a step of an integrator that is kept.
+_FEW = 12
+# Beyond this product of in-weights and the length of such a step implicit steps are cheaper.
+_STIFF = 10.0
+# No tolerance is made finer than this on the way to the state at T.
+_FINEST = 1e-13
 # Beyond this the steps' linear systems are singular in float64.
 _MAX_STIFFNESS = 1e15
 _TOO_LARGE = "the weights or gains are too large"
@@ -98,26 +108,95 @@ class Phase:
         return share if self.past else -np.log1p(-share)
 
 
-class Motion(ABC):
-    """Columns of agents moved by CVODES from stop to stop of a phase; the jumps of what drives them are stops, too.
+#: The stretched clock ``s``, on which nothing but a graph is at work: ``t`` stands for it.
+ON_CLOCK = Phase(0.0, 1.0, 1.0, past=True)
+
+
+class Forcing(NamedTuple):
+    """What is added to ``x'`` and to every measurement, in words, how large it gets, and whether there is noise."""
+
+    disturbance: Disturbance
+    noise: Disturbance
+    text: str
+    size: float
+    noisy: bool
+
+
+class Drive:
+    """A disturbance of N agents as the integrator has it: between two of its jumps a function of time and sign.
+
+    The line between two samples is a parameter of the integrator.
+    """
+
+    def __init__(self, source: Disturbance, n: int):
+        import casadi as ca
+
+        self.source, self._agents = source, np.arange(n)
+        self._worst, self._function = isinstance(source, WorstCaseDisturbance), None
+        if isinstance(source, ExpressionDisturbance):
+            instant = ca.SX.sym("t")
+            values = ca.vertcat(*(source.casadi(instant, k) for k in range(n)))  # type: ignore[arg-type]
+            self._function = ca.Function("d", [instant], [values])
+        self.symbols = ca.MX.sym("line", 0 if self._worst or self._function else n, 2)
+
+    def numbers(self, begin: float, end: float) -> list[float]:
+        """Return the parameters between two instants."""
+        if not self.symbols.numel():
+            return []
+        linear = self.source.linear(begin, end, self._agents, np.zeros(self._agents.size))
+        assert linear is not None
+        return np.concatenate(linear).tolist()
+
+    def __call__(self, t: Any, sign: Any) -> Any:
+        """Return the disturbances at an instant, where sliding variables have a sign."""
+        if self._worst:
+            return float(self.source.delta) * sign  # type: ignore[attr-defined]
+        return self.symbols[:, 0] + self.symbols[:, 1] * t if self._function is None else self._function(t)
+
+
+class Motion:
+    """Columns of agents moved by CVODES from stop to stop of a phase, along ``dX/dz = -(gain R) L (X + n) + R d``.
+
+    ``R = dt/dz`` is that of the phase, ``L`` that of the member of a family that acts. The jumps of ``d`` and ``n`` are
+    stops.
+
+    Parameters
+    ----------
+    members : Members
+    state : (N, S) array
+        In units of ``unit``.
+    tolerances : Tolerances
+    forcing : Forcing or None
+        ``d`` and ``n``; None: 0.
+    unit : float or (S,) array
+        Size of the initial states.
 
     Attributes
     ----------
     state : (N, S) array
         The present states.
-    sources : tuple of Disturbance
+    drives : list of Drive
         What drives the agents.
     """
 
-    sources: tuple[Disturbance, ...] = ()
+    #: Columns of the state that graphs move.
+    moved: int | None = None
 
-    def __init__(self, graph: SignedDigraph, state: np.ndarray, columns: int, tolerances: Tolerances):
+    def __init__(
+        self,
+        members: Members,
+        state: np.ndarray,
+        tolerances: Tolerances,
+        forcing: Forcing | None = None,
+        unit: float | np.ndarray = 1.0,
+    ):
         import casadi as ca
 
-        self.state = state
-        self.laplacian = graph.laplacian()
-        self.in_weight = graph.in_weight()
+        self.members, self.state, self.unit, self.in_weight = members, state, unit, members.in_weight
+        sources = () if forcing is None else (forcing.disturbance, forcing.noise)
+        self.drives = [Drive(source, len(state)) for source in sources]
         self.stats = {"steps": 0, "rhs": 0}
+        self._largest = float(self.in_weight.max(initial=0.0))
         self._options: dict[str, Any] = {
             "reltol": tolerances.rtol,
             "abstol": tolerances.atol,
@@ -126,17 +205,40 @@ class Motion(ABC):
             "disable_internal_warnings": True,
             "show_eval_warnings": False,
         }
-        if large := graph.n_nodes > DIRECT_UP_TO:
+        n = members.graph.n_nodes
+        if large := n > DIRECT_UP_TO:
             self._options |= {"newton_scheme": "gmres", "use_preconditioner": False, "max_krylov": _KRYLOV}
-        part, n = self.laplacian.tocsc(), graph.n_nodes
-        laplacian = ca.DM(ca.Sparsity(n, n, part.indptr.tolist(), part.indices.tolist()), part.data)
-        self._product = (_product_without_pattern if large else _product)(laplacian, columns)
+        self._steps: dict[tuple[Phase, bool], Any] = {}
+        self._data: list[float] = []
+        indptr, indices = members.pattern
+        pattern = ca.Sparsity(n, n, indptr.tolist(), indices.tolist())
+        columns = self.moved or state.shape[1]
+        if members.alone:
+            self._weights = ca.MX(0, 1)
+            data = members.laplacian(Choice(0)).data
+            self._product = (_product_without_pattern if large else _product)(ca.DM(pattern, data), columns)
+        else:
+            self._weights = ca.MX.sym("weights", indices.size)
+            self._product = functools.partial(ca.mtimes, ca.MX(pattern, self._weights))
 
-    def imbalance(self, states: np.ndarray) -> float:
-        """Return ``max_k |e_k| / (2 D_k)``; nobody moves the agents with ``D_k = 0``."""
-        listeners = self.in_weight > 0
-        pull = np.abs(self.laplacian @ states)[listeners] / (2 * self.in_weight[listeners, None])
-        return float(pull.max(initial=0.0))
+    def choose(self, choice: Choice) -> None:
+        """Let a member act from now on."""
+        self._data = [] if self.members.alone else self.members.data(choice).tolist()
+
+    def agents(self) -> np.ndarray:
+        """Return the (N,) present states of the first column, in units of ``unit``."""
+        return self.state[:, 0]
+
+    @contextmanager
+    def at_rest(self) -> Iterator[None]:
+        """Let nothing but the graph move the agents meanwhile."""
+        drives, self.drives = self.drives, []
+        self._steps.clear()
+        try:
+            yield
+        finally:
+            self.drives = drives
+            self._steps.clear()
 
     def sample(
         self, phase: Phase, z: np.ndarray, end: float, begin: float = 0.0, events: Iterable[float] = ()
@@ -145,7 +247,7 @@ class Motion(ABC):
 
         The state at ``begin`` is the present one; that at ``end`` becomes it.
         """
-        jumps = np.concatenate([np.empty(0), *(source.breaks(phase.end) for source in self.sources)])
+        jumps = np.concatenate([np.empty(0), *(drive.source.breaks(phase.end) for drive in self.drives)])
         inner = np.concatenate([phase.clock(jumps[jumps > phase.start]), list(events)])
         stops = np.unique([begin, *inner[(inner > begin) & (inner < end)], end])
         z, states = np.minimum(z, end), np.empty((z.size, *self.state.shape))
@@ -158,25 +260,77 @@ class Motion(ABC):
             self.state = later_states[-1]
         return states
 
-    @abstractmethod
-    def slope(self, x: ca.MX, phase: Phase, clock: ca.MX, ends: tuple[float, float]) -> ca.MX:
+    def slope(self, x: ca.MX, phase: Phase, z: ca.MX) -> ca.MX:
         """Return ``dX/dz`` between two neighbouring stops."""
+        import casadi as ca
+
+        R, t = phase.rate(z, ca.exp), phase.time(z, ca.exp)
+        if not self.drives:
+            return -phase.nominal(R) * self._product(x)
+        per_unit = ca.DM(1 / np.broadcast_to(self.unit, x.shape[1])).T
+        d, noise = (ca.mtimes(drive(t, 0), per_unit) for drive in self.drives)
+        return R * d - phase.nominal(R) * self._product(x + noise)
+
+    def symbols(self) -> list[ca.MX]:
+        """Return the parameters of an integrator: the weights of the member that acts, and what drives the agents."""
+        return [self._weights, *(drive.symbols for drive in self.drives)]
+
+    def numbers(self, phase: Phase, start: float, end: float) -> list[float]:
+        """Return these parameters between two neighbouring stops."""
+        begin, last = (float(phase.time(z, math.exp)) for z in (start, end))
+        return [*self._data, *(number for drive in self.drives for number in drive.numbers(begin, last))]
 
     def _advance(self, phase: Phase, z: np.ndarray, start: float) -> np.ndarray:
-        """Return the (len(z), N, S) states at increasing instants ``z > start``."""
-        import casadi as ca
+        """Return the (len(z), N, S) states at increasing instants ``z > start``.
 
-        x, clock = ca.MX.sym("x", self.state.size), ca.MX.sym("z")
-        ode = self.slope(ca.reshape(x, *self.state.shape), phase, clock, (start, float(z[-1])))
-        integrator = self._integrator({"x": x, "t": clock, "ode": ca.vec(ode)}, start, z)
-        return self._call(integrator, (z[-1] - start) * phase.stiffness(self.in_weight.max()))
+        Short stretches are steps of one integrator that is kept; one integrator for all instants of a long one costs
+        less than a step for each.
+        """
+        if self.members.alone or z.size > _FEW:
+            return self._over(phase, start, float(z[-1]), (z - start) / (z[-1] - start))
+        states = np.empty((z.size, *self.state.shape))
+        for k, (a, b) in enumerate(pairwise([start, *z.tolist()])):
+            states[k] = self.state = self._over(phase, a, b, np.ones(1))[0]
+        return states
+
+    def _over(self, phase: Phase, start: float, end: float, shares: np.ndarray) -> np.ndarray:
+        """Return the states at shares of the way from the present state at ``start`` to ``end``."""
+        stiffness = (end - start) * phase.stiffness(self._largest)
+        explicit = not self.members.alone and shares.size == 1 and stiffness <= _STIFF
+        key = phase, explicit
+        integrator = self._steps.get(key) if shares.size == 1 else None
+        if integrator is None:
+            length = 1.0 if shares.size == 1 else _FINE * max(1.0, stiffness)
+            integrator = self._integrator(phase, shares * length, explicit)
+            if shares.size == 1:
+                self._steps[key] = integrator
+        return self._call(integrator, stiffness, [*self.numbers(phase, start, end), start, end - start])
 
     @interruptible()
-    def _integrator(self, problem: dict[str, Any], start: float, z: np.ndarray, **options: Any) -> Any:
-        """Return CVODES for a problem on its clock, to report at increasing instants ``z > start``."""
+    def _integrator(self, phase: Phase, outputs: np.ndarray, explicit: bool) -> Any:
+        """Return CVODES for a stretch of a phase that ends at the last of the outputs."""
         import casadi as ca
 
-        return ca.integrator("run", "cvodes", problem, start, z.tolist(), self._options | options)
+        x, at, begin, span = (ca.MX.sym(*one) for one in (("x", self.state.size), ("at",), ("begin",), ("span",)))
+        rate = span / float(outputs[-1])
+        slope = self.slope(ca.reshape(x, *self.state.shape), phase, begin + rate * at)
+        p = ca.vertcat(*map(ca.vec, self.symbols()), begin, span)
+        problem = {"x": x, "t": at, "p": p, "ode": rate * ca.vec(slope)}
+        more: dict[str, Any] = {"max_num_steps": MANY_STEPS} if self.drives else {}
+        if explicit:
+            more |= {"linear_multistep_method": "adams", "nonlinear_solver_iteration": "functional"}
+        return ca.integrator("run", "cvodes", problem, 0.0, outputs.tolist(), self._options | more)
+
+    def refine(self) -> None:
+        """Take tolerances under which a run settles to within them in every agent of a large graph.
+
+        CVODES bounds the root of the mean square of the errors; that of one agent can be sqrt(N) times as large.
+        """
+        if len(self.state) > DIRECT_UP_TO:
+            share = math.sqrt(len(self.state))
+            for name in ("reltol", "abstol"):
+                self._options[name] = min(self._options[name], max(self._options[name] / share, _FINEST))
+            self._steps.clear()
 
     def _call(self, integrator: Any, stiffness: float, parameters: Sequence[float] = ()) -> np.ndarray:
         """Return the (instants, N, S) states that an integrator reaches from the present one."""

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -25,8 +24,7 @@ _PAST_SAMPLES = 5
 _MARKS = (0.5, 0.1, 0.01)
 
 
-@dataclass(frozen=True)
-class Instants:
+class Instants(NamedTuple):
     """Where a run is sampled: ``t``, ``1 - t/T`` and ``1 - t/T_r``, each (M,); the last is 0 without a ``T_r``."""
 
     t: np.ndarray
@@ -37,11 +35,6 @@ class Instants:
     def z(self) -> np.ndarray:
         """``ln(T_r/(T_r - t))``, infinite from ``T_r`` on."""
         return minus_log(self.reaching_remaining, 1 - self.reaching_remaining)
-
-    def deadline(self, protocol: Protocol) -> int | None:
-        """Return which instant is ``T``; None if none is, or if there is no deadline."""
-        at = np.flatnonzero((self.remaining == 0) & (self.t == float(protocol.T)) & protocol.prescribed)
-        return int(at[0]) if at.size else None
 
 
 def default_instants(protocol: Protocol, remaining: float, samples: int, past: float) -> Instants:
@@ -78,6 +71,17 @@ def default_instants(protocol: Protocol, remaining: float, samples: int, past: f
     table = table[:, np.lexsort((table[0], -table[1], -table[2]))]
     fresh = np.append(True, np.diff(table, axis=1).any(axis=0))
     return Instants(*table[:, fresh])
+
+
+def steps_towards(T: float, longest: float, share: float, nearest: float) -> np.ndarray:
+    """Return what is left until ``T`` after steps at most so long, each at most a share of what is left, from 0 on.
+
+    The last but one instant is as near to ``T`` as ``nearest`` times ``T``.
+    """
+    left = [0.0, nearest * T]
+    while left[-1] < T:
+        left.append(left[-1] + min(longest, left[-1] * share))
+    return np.array([*left[:-1], T])[::-1]
 
 
 def wanted_instants(protocol: Protocol, times: Iterable[Exact]) -> Instants:

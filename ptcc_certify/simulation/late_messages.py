@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any, Literal
 
@@ -32,7 +32,10 @@ from ptcc_certify.protocols.gain import Gain
 from ptcc_certify.protocols.gain_limits import GainLimits, LimitedGain
 from ptcc_certify.protocols.late_messages import LateMessages
 from ptcc_certify.protocols.moving_leaders import MovingLeaders, refuse_together
-from ptcc_certify.simulation.trajectory import Trajectory
+from ptcc_certify.simulation.cvodes import Tolerances
+from ptcc_certify.simulation.instants import steps_towards
+from ptcc_certify.simulation.members import Choice, Members
+from ptcc_certify.simulation.trajectory import Conditions, Trajectory
 
 Pattern = Literal["oldest", "fresh", "varying", "square"]
 PATTERNS = ("oldest", "fresh", "varying", "square")
@@ -54,30 +57,6 @@ _ROUNDING = 2.0**-50
 IN_DELAY, _MOST_FOR_LEAST = 6, 5000
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class LateRun(Trajectory):
-    """A run with late messages, up to ``T``: its input is of what agents hear, ``gain sum_l w_kl (y_kl -+ x_k)``.
-
-    Attributes
-    ----------
-    messages : LateMessages
-    pattern : str
-        How old is what agents hear.
-    leaders : MovingLeaders or None
-        How leaders move.
-    targets : (N, M) array or None
-        ``-L_F^-1 L_FL X_L`` of followers, of leaders their states; None where leaders rest.
-    """
-
-    messages: LateMessages
-    pattern: str
-    leaders: MovingLeaders | None = None
-    targets: np.ndarray | None = None
-
-    def _more_columns(self) -> list[tuple[str, np.ndarray]]:
-        return [] if self.targets is None else target_columns(self.labels, self._in_places(self.targets))
-
-
 @gated
 def simulate_late(
     graph: Any,
@@ -90,7 +69,7 @@ def simulate_late(
     steps: int = STEPS,
     deadlines: Sequence[Fraction] | None = None,
     leaders: MovingLeaders | None = None,
-) -> LateRun:
+) -> Trajectory:
     """Run a protocol with late messages up to its deadline.
 
     Parameters
@@ -118,7 +97,8 @@ def simulate_late(
 
     Returns
     -------
-    LateRun
+    Trajectory
+        Its input is of what agents hear, ``gain sum_l w_kl (y_kl -+ x_k)``.
 
     Raises
     ------
@@ -181,46 +161,43 @@ def simulate_late(
         leading.move(states[i], states[i + 1], step)
         hearing.correct(states[i], states[i + 1], step, left)
     errors[-1] = heard - (own if messages.own_delay else D * states[-1])
-    run = _run(graph, protocol, messages, pattern, t, states.T, errors.T, time.perf_counter() - begin)
-    return run if fleeing is None else fleeing.added(run)
+    limits = GainLimits(gain_cap=messages.gain_cap)
+    inputs = limits.limit(protocol.gain).value(t, np.maximum(1 - t / t[-1], 0)) * errors.T
+    conditions = Conditions(None if limits.ideal else limits, messages=messages, leaders=leaders)
+    if fleeing is not None:
+        inputs[fleeing.worst.heads] = fleeing.inputs.T
+    seconds = time.perf_counter() - begin
+    run = stepped_run(graph, protocol, t, states.T, inputs, conditions, _ROUNDING, seconds)
+    return run if fleeing is None else replace(run, targets=fleeing.worst.targets(run.states))
 
 
-def _run(
+def stepped_run(
     graph: SignedDigraph,
     protocol: Protocol,
-    messages: LateMessages,
-    pattern: str,
     t: np.ndarray,
     states: np.ndarray,
-    errors: np.ndarray,
+    inputs: np.ndarray,
+    conditions: Conditions,
+    tolerance: float,
     seconds: float,
-) -> LateRun:
-    """Return what was run as a trajectory; ``errors`` are those that agents hear of."""
-    limits, remaining = GainLimits(gain_cap=messages.gain_cap), np.maximum(1 - t / t[-1], 0)
-    gain = limits.limit(protocol.gain)
-    return LateRun(
+) -> Trajectory:
+    """Return what was run in steps of closed form as a trajectory, from (N, M) states and inputs."""
+    remaining = np.maximum(1 - t / float(protocol.T), 0)
+    end, gain = int(np.argmax(remaining == 0)), (conditions.actuator or GainLimits()).limit(protocol.gain)
+    size = max(float(np.abs(states[:, 0]).max()), 1e-300)
+    return Trajectory(
         graph=graph,
         protocol=protocol,
         t=t,
         remaining=remaining,
         clock=gain.clock(t, remaining=remaining),
         states=states,
-        rtol=_ROUNDING,
-        atol=_ROUNDING,
-        deadline_index=t.size - 1,
-        deadline_residual=residual_at_end(graph, states),
+        tolerances=Tolerances(tolerance, tolerance),
+        deadline_residual=Members(graph).imbalance(states[:, end], Choice(0)) / size,
         stats={"steps": t.size - 1, "rhs": t.size - 1, "seconds": seconds},
-        actuator=None if limits.ideal else limits,
-        held_input=gain.value(t, remaining) * errors,
-        messages=messages,
-        pattern=pattern,
+        conditions=conditions,
+        held_input=inputs,
     )
-
-
-def residual_at_end(graph: SignedDigraph, states: np.ndarray) -> float:
-    """Return ``max_k |e_k|/(2 D_k)`` at the last of ``(N, M)`` states, relative to the largest entry at first."""
-    D, error = graph.in_weight(), np.abs(graph.laplacian() @ states[:, -1])
-    return float((error / np.maximum(2 * D, 1e-300)).max() / max(float(np.abs(states[:, 0]).max()), 1e-300))
 
 
 def can_run(protocol: Protocol, messages: LateMessages) -> bool:
@@ -259,12 +236,7 @@ def _grid(T: float, age: float, least: float, steps: int, share: float) -> np.nd
         raise ParameterError(
             f"a delay of {age:.3g} in a run of {T:.6g} takes more than {MOST_STEPS:,} steps; the bound needs no run"
         )
-    left, each = [0.0, NEAREST * T], NEAREST * T
-    while left[-1] < T:
-        each = min(longest, left[-1] * share)
-        left.append(left[-1] + each)
-    left[-1] = T
-    return T - np.array(left[::-1])
+    return T - steps_towards(T, longest, share, NEAREST)
 
 
 def _clocks(
@@ -296,11 +268,8 @@ class _Fleeing:
     ):
         from ptcc_certify.simulation.worst_leaders import WorstLeaders  # it loads SciPy
 
-        if not isinstance(leaders, MovingLeaders) or protocol.reaching:
-            mend = "give it, and MovingLeaders(speed=1), say"
-            raise ParameterError(f"leaders that move run under the nominal protocol; {mend}")
         refuse_together(messages, leaders)
-        self.leaders, self.worst, self.t = leaders, WorstLeaders(analyse(graph), leaders), t
+        self.worst, self.t = WorstLeaders(analyse(graph), protocol, leaders), t
         gain = GainLimits(gain_cap=messages.gain_cap).limit(protocol.gain).value(t, np.maximum(1 - t / t[-1], 0))
         gain[-1] = np.inf if messages.gain_cap is None else float(messages.gain_cap)
         self.pull = graph.in_weight()[self.worst.followers] * gain[:, None]
@@ -313,18 +282,6 @@ class _Fleeing:
         self.inputs[i:] = velocity = worst.velocities(eps)
         states[i + 1, worst.heads] += velocity * (self.t[i + 1] - self.t[i])
         states[i + 1, F] += worst.pushes(eps) * (1 - left[F]) / self.pull[i + 1]
-
-    def added(self, run: LateRun) -> LateRun:
-        """Return a run with leaders, whose inputs are their velocities, and with targets."""
-        assert run.held_input is not None
-        inputs = run.held_input.copy()
-        inputs[self.worst.heads] = self.inputs.T
-        return replace(run, held_input=inputs, leaders=self.leaders, targets=self.worst.targets(run.states))
-
-
-def target_columns(labels: Sequence[str], targets: np.ndarray) -> list[tuple[str, np.ndarray]]:
-    """Return the columns of a table that tell the targets, ``(N, M)``, by label."""
-    return [(f"target({label})", row) for label, row in zip(labels, targets, strict=True)]
 
 
 class _Leading:

@@ -12,19 +12,21 @@ steps.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from ptcc_certify.errors import ParameterError, gated
+from lmi.blas_threads import one_thread
+from ptcc_certify.errors import gated
 from ptcc_certify.graphs.io import as_graph, as_state
 from ptcc_certify.graphs.rationals import whole_number
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.protocols.base import Protocol, refuse_no_protocol
 from ptcc_certify.protocols.moving_leaders import MovingLeaders
-from ptcc_certify.simulation.late_messages import residual_at_end, target_columns
-from ptcc_certify.simulation.trajectory import Trajectory
+from ptcc_certify.simulation.instants import steps_towards
+from ptcc_certify.simulation.late_messages import stepped_run
+from ptcc_certify.simulation.trajectory import Conditions, Trajectory
 from ptcc_certify.simulation.worst_leaders import WorstLeaders
 
 #: Steps up to T; the share of what is left of T that a step takes; how near they come; where a run with sign term ends.
@@ -33,25 +35,8 @@ STEPS, SHARE, NEAREST, PAST = 800, 0.02, 1e-7, 0.5
 MOST_STEPS = 20_000
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class TrackingRun(Trajectory):
-    """A run with moving leaders, from 0 beyond ``T``; the input of a leader is its velocity.
-
-    Attributes
-    ----------
-    leaders : MovingLeaders
-    targets : (N, M) array
-        ``-L_F^-1 L_FL X_L`` of followers; of leaders their states.
-    """
-
-    leaders: MovingLeaders
-    targets: np.ndarray
-
-    def _more_columns(self) -> list[tuple[str, np.ndarray]]:
-        return target_columns(self.labels, self._in_places(self.targets))
-
-
 @gated
+@one_thread()
 def simulate_tracking(
     graph: Any,
     protocol: Protocol,
@@ -60,7 +45,7 @@ def simulate_tracking(
     *,
     u: np.ndarray | None = None,
     steps: int = STEPS,
-) -> TrackingRun:
+) -> Trajectory:
     """Run followers of leaders that move away from the follower that is farthest off, as fast as they may.
 
     Parameters
@@ -79,7 +64,8 @@ def simulate_tracking(
 
     Returns
     -------
-    TrackingRun
+    Trajectory
+        From 0 beyond ``T``; the input of a leader is its velocity.
 
     Raises
     ------
@@ -103,12 +89,8 @@ def simulate_tracking(
     np.True_
     """
     refuse_no_protocol(protocol)
-    if not isinstance(leaders, MovingLeaders) or protocol.reaching:
-        raise ParameterError(
-            "leaders that move run under the nominal protocol; give it, and MovingLeaders(speed=1), say"
-        )
     structure, steps = analyse(as_graph(graph)), whole_number(steps, "steps", 2, MOST_STEPS)
-    worst = WorstLeaders(structure, leaders, u)
+    worst = WorstLeaders(structure, protocol, leaders, u)
     F, heads, L_F, Q = worst.followers, worst.heads, worst.L_F, worst.Q
     x = np.array([float(value) for value in as_state(x0, structure.graph, "x0")])
     t, clock, last = _grid(protocol, steps)
@@ -126,34 +108,15 @@ def simulate_tracking(
         if i + 1 < t.size:
             moved, eps = step_of(eps, clock[i], last[i], t[i + 1] - t[i])
             lead, inputs[i, heads] = lead + moved, moved / (t[i + 1] - t[i])
-    end = int(np.argmax(remaining == 0))
-    return TrackingRun(
-        graph=structure.graph,
-        protocol=protocol,
-        t=t,
-        remaining=remaining,
-        clock=protocol.gain.clock_at_remaining(remaining),
-        states=states.T,
-        rtol=NEAREST,
-        atol=NEAREST,
-        deadline_index=end,
-        deadline_residual=residual_at_end(structure.graph, states[: end + 1].T),
-        stats={"steps": t.size - 1, "rhs": t.size - 1, "seconds": time.perf_counter() - begin},
-        held_input=inputs.T,
-        leaders=leaders,
-        targets=targets.T,
-    )
+    conditions, seconds = Conditions(leaders=leaders), time.perf_counter() - begin
+    run = stepped_run(structure.graph, protocol, t, states.T, inputs.T, conditions, NEAREST, seconds)
+    return replace(run, targets=targets.T)
 
 
 def _grid(protocol: Protocol, steps: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return instants, and of every step the clock that passes and the largest gain."""
     T, gain = float(protocol.T), protocol.gain
-    left, each = [0.0, NEAREST * T], NEAREST * T
-    while left[-1] < T:
-        each = min(T / steps, left[-1] * SHARE)
-        left.append(left[-1] + each)
-    left[-1] = T
-    remaining = np.array(left[::-1]) / T
+    remaining = steps_towards(T, T / steps, SHARE, NEAREST) / T
     later = np.linspace(0, PAST * T, max(steps // 4, 2))[1:]
     clock = gain.clock_at_remaining(np.maximum(remaining, NEAREST * 1e-3))
     values = np.append(gain.value_at_remaining(remaining[1:-1]), np.inf)

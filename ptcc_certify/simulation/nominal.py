@@ -1,149 +1,132 @@
-"""The nominal protocol, alone or under limits of the gain, disturbances and measurement noise.
+"""What a run under the nominal protocol meets besides its graph: disturbances and noise, and a gain that is held.
 
-Without a hold and without forcing,
-
-    X(t) = exp(-L s_eff(t)) X(0),      s_eff(t) = integral of the gain that acts
-
-A disturbance ``d`` and noise ``n`` give ``X' = -gain L (X + n) + d``.
+A disturbance ``d`` and noise ``n`` give ``X' = -gain L (X + n) + d``; where nothing drives the agents any more their
+course is on the stretched clock again.
 """
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ptcc_certify.errors import ParameterError, SimulationError
+from ptcc_certify.errors import ParameterError, SimulationError, gated
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.protocols.disturbance import ExpressionDisturbance, SampledDisturbance, as_disturbance
-from ptcc_certify.protocols.gain_limits import GainLimits, Periods
 from ptcc_certify.protocols.parameters import parameter, readable
-from ptcc_certify.simulation.cvodes import Phase, Tolerances
-from ptcc_certify.simulation.cvodes_nominal import Forcing, NominalMotion
+from ptcc_certify.simulation.cvodes import Forcing, Phase
 from ptcc_certify.simulation.instants import Instants
-from ptcc_certify.simulation.trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from ptcc_certify.graphs.digraph import Exact, SignedDigraph
-    from ptcc_certify.protocols import Protocol
+    from ptcc_certify.graphs.digraph import SignedDigraph
+    from ptcc_certify.protocols.gain_limits import LimitedGain, Periods
+    from ptcc_certify.simulation.course import Course
 
 MAX_JUMPS = 10**4
+# From 1 - t/T = e^-40 on, what a disturbance still moves is beyond a float's last digit; noise times a gain that grows
+# further is not, but without limits of the gain nothing is asked of noise.
+_LAST_TAU = 40.0
 # Up to so many agents a dense product with ``L`` is faster than a sparse one.
 _DENSE_UP_TO = 64
 
 
-def simulate_nominal(
-    graph: SignedDigraph,
-    protocol: Protocol,
-    initial_state: np.ndarray,
-    instants: Instants,
-    actuator: GainLimits | None,
-    forcing: Forcing | None,
-    tolerances: Tolerances,
-) -> Trajectory:
-    """Move the nominal protocol, under limits of the gain; see :func:`ptcc_certify.simulation.run.simulate`.
+@gated
+@dataclass(frozen=True)
+class Bounded:
+    """A disturbance or measurement noise of the nominal protocol, with its bound.
 
     Parameters
     ----------
-    graph : SignedDigraph
-    protocol : Protocol
-    initial_state : (N,) or (N, S) array
-    instants : Instants
-    actuator : GainLimits or None
-    forcing : Forcing or None
-    tolerances : Tolerances
+    signal : Disturbance, str, number or sequence
+        Whatever :func:`ptcc_certify.protocols.disturbance.as_disturbance` takes, such as ``"sin(2*k*t)"``.
+    bound : int, float, str or Fraction
+        In units of the input, of noise in those of the states.
 
-    Raises
-    ------
-    ParameterError
-        An option is outside its domain, or the options do not fit together.
-    SimulationError
-        The integrator failed, or a sampled run grew beyond the range of floats.
+    References
+    ----------
+    The network (2) of [Zhu]_, whose disturbances the nominal protocol meets too; docs/theory/disturbances.md.
+
+    Examples
+    --------
+    >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
+    >>> run = simulate(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1], disturbance=Bounded("sin(t)", 1))
+    >>> run.conditions.forcing
+    'disturbance sin(t) within 1'
     """
-    limited = (actuator or GainLimits()).limit(protocol.gain)
-    t, remaining = instants.t, instants.remaining
-    sampled = limited.limits.sample_period is not None
-    if forcing is not None and sampled:
-        raise ParameterError("a run with a sample period takes no disturbance and no noise; leave one of them out")
-    if forcing is not None and forcing.noisy and not limited.bounded:
-        raise ParameterError(
-            "noise times a gain that becomes infinite at T is no input; give a gain cap or stop before T"
-        )
-    columns = initial_state.reshape(graph.n_nodes, -1)
-    unit = np.maximum(np.abs(columns).max(axis=0), forcing.size if forcing else 0.0)
-    unit[unit == 0] = 1
-    inputs = residual = None
-    run = NominalMotion(graph, columns / unit, tolerances, forcing, unit)
-    if sampled:
-        periods = limited.periods(float(t[-1]))
-        clock = periods.clock(t)
-        states, inputs = _sample_and_hold(graph, periods, run.state, t)
-        run.stats["steps"] = int(periods.locate(t[-1:])[0][0])
-    elif forcing is None and limited.bounded:
-        clock = limited.clock(t, remaining)
-        span = float(clock[-1]) or 1.0
-        states = run.sample(Phase(0.0, 1.0, span, past=True), clock / span, float(clock[-1]) / span)
-    else:
-        clock = limited.clock(t, remaining)
-        states, residual = run.follow(limited, t, remaining)
-    late = np.flatnonzero(remaining == 0)
-    if residual is None and protocol.prescribed and late.size:
-        residual = run.imbalance(states[late[0]])
 
-    def restore(values: np.ndarray) -> np.ndarray:
-        return (np.moveaxis(values, 0, -1) * unit[:, None]).reshape(*initial_state.shape, t.size)
+    signal: Any
+    bound: int | float | str | Fraction
 
-    return Trajectory(
-        graph=graph,
-        protocol=protocol,
-        t=t,
-        remaining=remaining,
-        clock=clock,
-        states=restore(states),
-        rtol=tolerances.rtol,
-        atol=tolerances.atol,
-        deadline_index=instants.deadline(protocol),
-        deadline_residual=residual,
-        stats=run.stats,
-        actuator=None if actuator is None or actuator.ideal else actuator,
-        forcing=None if forcing is None else forcing.text,
-        held_input=None if inputs is None else restore(inputs),
-    )
+
+def forced(course: Course, limited: LimitedGain, instants: Instants, goal: float) -> tuple[np.ndarray, float | None]:
+    """Return the (M, N, S) states of a driven motion under a gain, and the residual at ``T`` if it has its pole there.
+
+    Parameters
+    ----------
+    course : Course
+        Of one graph.
+    limited : LimitedGain
+        The gain that acts, not held over periods.
+    instants : Instants
+    goal : float
+        Of the residual.
+    """
+    (t, remaining, _), motion = instants, course.motion
+    T, rho1, pole = (float(value) for value in (limited.gain.T, limited.gain.rho1, limited.gain.pole))
+    states, residual = np.empty((t.size, *motion.state.shape)), None
+    for stretch in limited.stretches:
+        here = (remaining <= stretch.begin) & (remaining > stretch.end)
+        beyond = bool((remaining <= stretch.end).any())
+        if not here.any() and not beyond:
+            break
+        if stretch.level is None:
+            phase, z = Phase(0.0, T, rho1, pole), limited.tau(stretch, t, remaining)[here]
+            end = -math.log(stretch.end) if stretch.end else max(_LAST_TAU, float(z.max(initial=0.0)))
+        else:
+            span = T * (stretch.begin - stretch.end) if stretch.end >= 0 else T
+            phase = Phase(T * (1 - stretch.begin), span, stretch.level, past=True)
+            z, end = limited.elapsed(stretch, t, remaining)[here] / span, 1.0 if stretch.end >= 0 else math.inf
+        last = end if beyond else min(float(z[-1]), end)
+        to_pole = stretch.level is None and not stretch.end
+        driven = min(last, _LAST_TAU) if to_pole else last
+        states[here] = motion.sample(phase, z, driven)
+        if to_pole and last >= _LAST_TAU:
+            with motion.at_rest():
+                course.clock = float(limited.gain.clock_at_tau(driven))
+                free, clock = z > driven, limited.gain.clock_at_tau(z)
+                if free.any():
+                    states[np.flatnonzero(here)[free]] = course.sample(clock[free], float(clock[-1]))
+                residual = course.settle(goal) if beyond else None
+    return states, residual
 
 
 def as_forcing(
     graph: SignedDigraph,
     T: Fraction,
-    disturbance: Any,
-    delta: Exact | None,
-    noise: Any,
-    noise_bound: Exact | None,
+    disturbance: Bounded | None,
+    noise: Bounded | None,
     until: float,
 ) -> Forcing | None:
-    """Read a disturbance and measurement noise with their bounds; None if there is neither.
+    """Read a disturbance and measurement noise; None if there is neither.
 
     Raises
     ------
     ParameterError
-        A bound is missing, outside its domain, exceeded or without a signal; or a signal reads the states, or jumps
-        more than 10,000 times.
+        A bound is missing, outside its domain or exceeded; or a signal reads the states, or jumps more than 10,000
+        times.
     """
-    if disturbance is not None and delta is None:
-        raise ParameterError(
-            "disturbance belongs to the sliding-mode protocol; under the nominal protocol give its bound delta too"
-        )
-    if noise is not None and noise_bound is None:
-        raise ParameterError("noise needs a bound; give noise_bound too")
     sources, bounds, words = [], [], []
-    signals = (("disturbance", disturbance, "delta", delta), ("noise", noise, "noise_bound", noise_bound))
     # Telegraph signals of the two differ by their seeds.
-    for seed, (name, value, bound_name, bound) in enumerate(signals):
-        if value is None and bound is not None:
-            raise ParameterError(f"{bound_name} is the bound of a {name}; give the {name} too, or leave it out")
-        limit = parameter(bound_name, 0 if bound is None else bound, zero_allowed=True)
-        source = as_disturbance("none" if value is None else value, graph.n_nodes, limit, until, seed)
+    for seed, (name, given) in enumerate((("disturbance", disturbance), ("noise", noise))):
+        if given is not None and not isinstance(given, Bounded):
+            raise ParameterError(f"{name} needs a bound; give Bounded({name}, bound)")
+        value, bound = ("none", 0) if given is None else (given.signal, given.bound)
+        limit = parameter("delta" if name == "disturbance" else "the bound of the noise", bound, zero_allowed=True)
+        source = as_disturbance(value, graph.n_nodes, limit, until, seed)
         if not isinstance(source, ExpressionDisturbance | SampledDisturbance):
             domain = "the nominal protocol takes expressions of k and t, numbers and samples"
             raise ParameterError(f"{name} ({shorten(source.text)}) reads the states or sliding variables; {domain}")
@@ -152,7 +135,7 @@ def as_forcing(
             raise ParameterError(f"{name} has more than {MAX_JUMPS:,} samples until t = {until:.6g}; give fewer")
         sources.append(source)
         bounds.append(limit)
-        if value is not None:
+        if given is not None:
             words.append(f"{name} {shorten(source.text)} within {readable(limit)}")
     if not words:
         return None
@@ -160,9 +143,7 @@ def as_forcing(
     return Forcing(sources[0], sources[1], ", ".join(words), size, noisy=bounds[1] > 0)
 
 
-def _sample_and_hold(
-    graph: SignedDigraph, periods: Periods, state: np.ndarray, t: np.ndarray
-) -> tuple[np.ndarray, ...]:
+def sample_and_hold(graph: SignedDigraph, periods: Periods, state: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, ...]:
     """Return the (M, N, S) states and held inputs of ``X_(j+1) = X_j - step_j L X_j``, linear in between."""
     L = graph.laplacian() if graph.n_nodes > _DENSE_UP_TO else graph.laplacian().toarray()
     index, share = periods.locate(t)

@@ -1,41 +1,80 @@
 """Trajectories of a coordination protocol, integrated by CasADi's CVODES.
 
-Before the deadline the integrator runs in ``tau = -ln(1 - t/T)``, where the pole of the gain at ``T`` is gone:
+Before the deadline the integrator runs on the stretched clock, where the pole of the gain at ``T`` is gone,
 
-    dX/dtau = -(rho1 T e^-tau + rho2 kappa) L X,      t = T (1 - e^-tau)
+    dX/ds = -L(s) X,
 
-The state at ``T`` is the limit for ``tau`` to infinity, and from ``T`` on ``X' = -rho1 L X``. A simulation
-corroborates a certificate; it proves nothing.
+from switch to switch of the signal that chooses ``L``; that of one graph is constant. The state at ``T`` is the limit
+for ``s`` to infinity, and from ``T`` on ``X' = -rho1 L X``. A simulation corroborates a certificate; it proves nothing.
 """
 
 from __future__ import annotations
 
+import inspect
 import time
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
 
-from ptcc_certify.errors import ParameterError, gated
-from ptcc_certify.graphs.io import as_graph, as_states
+from ptcc_certify.errors import ParameterError, gated, unknown_parameter
+from ptcc_certify.graphs.family import Family
+from ptcc_certify.graphs.io import as_family, as_graph, as_states
+from ptcc_certify.graphs.io.family_conversion import is_family
 from ptcc_certify.graphs.rationals import number_within, shorten
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.base import refuse_no_protocol
-from ptcc_certify.protocols.disturbance import as_disturbance
+from ptcc_certify.protocols.disturbance import StateDependent, as_disturbance
 from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.protocols.late_messages import LateMessages
 from ptcc_certify.protocols.moving_leaders import MovingLeaders, refuse_together
-from ptcc_certify.simulation.cvodes import Tolerances
-from ptcc_certify.simulation.filippov import simulate_sliding
-from ptcc_certify.simulation.instants import PAST, default_instants, wanted_instants
+from ptcc_certify.simulation.course import Course
+from ptcc_certify.simulation.cvodes import Motion, Tolerances
+from ptcc_certify.simulation.instants import PAST, Instants, default_instants, wanted_instants
 from ptcc_certify.simulation.interrupt import interruptible
-from ptcc_certify.simulation.late_messages import Pattern, simulate_late
-from ptcc_certify.simulation.nominal import as_forcing, simulate_nominal
-from ptcc_certify.simulation.trajectory import Trajectory
+from ptcc_certify.simulation.late_messages import simulate_late
+from ptcc_certify.simulation.members import Choice, Members
+from ptcc_certify.simulation.nominal import Bounded, as_forcing, forced, sample_and_hold
+from ptcc_certify.simulation.signals import ConstantSignal, Signal, as_signal
+from ptcc_certify.simulation.sliding import SlidingMotion, rounding_slack
+from ptcc_certify.simulation.trajectory import RESOLVED, Conditions, Played, Trajectory
 
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import Exact, SignedDigraph
+
+
+class Sampling(TypedDict, total=False):
+    """Where a run is sampled, and how it is integrated.
+
+    Attributes
+    ----------
+    times : increasing numbers >= 0
+        The instants wanted, in units of time. One that a float cannot tell from ``T`` counts as ``T``.
+    remaining : float
+        Without ``times``: instants uniform in ``tau`` go from ``1 - t/T = 1`` to this, 1e-8 by default; dimensionless.
+    samples : int
+        Without ``times``: so many of these instants, 201 by default, and half as many uniform in t (with ``rho2 = 0``:
+        so many uniform in t over [0, T]), and 0.5 T, 0.9 T, 0.99 T, T.
+    past : float
+        Without ``times``: go on to ``T (1 + past)``, by default a quarter of ``T``; dimensionless.
+    rtol, atol : float
+        Tolerances of CVODES, 1e-11 by default; ``atol`` is relative to the largest entry of each column of ``x0``, or
+        to the bound of the disturbance times ``T`` or of the noise under the nominal protocol if that is larger.
+    boundary_layer : float
+        Sliding mode, for comparison only: integrate ``tanh(sigma/boundary_layer)`` instead of the sign.
+    """
+
+    times: Iterable[Exact] | None
+    remaining: float
+    samples: int
+    past: float
+    rtol: float
+    atol: float
+    boundary_layer: float | None
+
+
+_DEFAULTS = Sampling(times=None, remaining=1e-8, samples=201, past=PAST, rtol=1e-11, atol=1e-11, boundary_layer=None)
 
 
 @gated
@@ -43,25 +82,15 @@ def simulate(
     graph: Any,
     protocol: Protocol,
     x0: Any,
+    signal: Any = None,
     *,
-    orientation: str | None = None,
     sigma0: Any = None,
     disturbance: Any = None,
-    boundary_layer: float | None = None,
+    noise: Bounded | None = None,
     actuator: GainLimits | None = None,
-    delta: Exact | None = None,
-    noise: Any = None,
-    noise_bound: Exact | None = None,
     messages: LateMessages | None = None,
     leaders: MovingLeaders | None = None,
-    pattern: Pattern = "oldest",
-    seed: int = 0,
-    times: Iterable[Exact] | None = None,
-    remaining: float = 1e-8,
-    samples: int = 201,
-    past: float = PAST,
-    rtol: float = 1e-11,
-    atol: float = 1e-11,
+    **sampling: Unpack[Sampling],
 ) -> Trajectory:
     """Integrate the closed loop of a protocol from ``X(0) = x0`` to the deadline and past it.
 
@@ -73,60 +102,46 @@ def simulate(
 
     Parameters
     ----------
-    graph : graph-like
-        N agents, in whatever form :func:`ptcc_certify.as_graph` takes.
+    graph : graph-like or family-like
+        N agents, in whatever form :func:`ptcc_certify.as_graph` takes; or a family of graphs, as
+        :func:`ptcc_certify.as_family` takes it: graphs by name, edges with intervals. What is one graph is a family,
+        too, where a signal is given.
     protocol : Protocol
         With ``rho2 = 0`` the run is on the plain clock ``t``, without a deadline.
     x0 : state-like, or N rows of S numbers
         The initial state in the order of ``graph.labels``, or by label where there are labels: whatever
         :func:`ptcc_certify.as_state` takes. S > 1 columns are S initial states, or the S components of vector-valued
-        agents: the protocol acts as ``L kron I_S``, so both evolve alike. Sliding mode: one column.
-    orientation : {"information", "listens"}, optional
-        Of an edge, or of the rows of a matrix; see :func:`ptcc_certify.as_graph`.
+        agents: the protocol acts as ``L kron I_S``, so both evolve alike. Sliding mode, families: one column.
+    signal : Signal, str, path, file object or sequence of rows, optional
+        Of a family: ``"random"``, the default, ``"worst-case"``, ``"constant"``, a table of instants and modes, or a
+        :class:`~ptcc_certify.simulation.signals.Signal`: see :func:`~ptcc_certify.simulation.signals.as_signal`.
+        ``X' = -gain(t) L(t) X``, the signal choosing ``L(t)``. With ``messages`` how old is what agents hear: a pattern
+        of :func:`ptcc_certify.simulate_late`, or that and a seed, ``("varying", 3)``.
     sigma0 : state-like, optional
         Sliding mode: ``sigma(0)``, like ``x0``; without it 0, which leaves no reaching phase.
     disturbance : Disturbance, str, number, callable or sequence, optional
         Sliding mode: whatever :func:`ptcc_certify.protocols.disturbance.as_disturbance` takes, such as
         ``"sin(2*k*t)"``; by default the worst case, ``d_k = delta sign(sigma_k)``. It is refused where it exceeds
-        ``delta``. Nominal protocol: one that reads neither states nor sliding variables, by default none.
-    boundary_layer : float, optional
-        Sliding mode, for comparison only: integrate ``tanh(sigma/boundary_layer)`` instead of the sign.
+        ``delta``, and of families where it reads the states. Nominal protocol: :class:`Bounded`, one that reads neither
+        states nor sliding variables; by default none.
+    noise : Bounded, optional
+        Nominal protocol: what is added to every measurement, with an actuator that bounds the gain.
     actuator : GainLimits, optional
         Nominal protocol: limits of the input; without sampling if there is a disturbance or noise.
-    delta : int, float, str or Fraction, optional
-        Nominal protocol: the bound of the disturbance, needed with it; in units of the input.
-    noise : Disturbance, str, number or sequence, optional
-        Nominal protocol: what is added to every measurement, like ``disturbance``; with an actuator that bounds the
-        gain.
-    noise_bound : int, float, str or Fraction, optional
-        The bound of ``noise``, needed with it; in units of the states.
     messages : LateMessages, optional
-        The run of :func:`ptcc_certify.simulate_late`, with ``pattern`` and ``seed``, at instants of its own up to
-        ``T``; nothing else acts on it, and sliding variables are 0.
+        The run of :func:`ptcc_certify.simulate_late`, at instants of its own up to ``T``; nothing else acts on it, and
+        sliding variables are 0.
     leaders : MovingLeaders, optional
         The run of :func:`ptcc_certify.simulate_tracking`, at instants of its own; nothing else acts on it. With
         ``messages`` that of :func:`ptcc_certify.simulate_late`.
-    pattern : {"oldest", "fresh", "varying", "square"}
-        Of ``messages``: how old is what agents hear.
-    seed : int
-        Of what is random in ``pattern``.
-    times : increasing numbers >= 0, optional
-        The instants wanted, in units of time. One that a float cannot tell from ``T`` counts as ``T``.
-    remaining : float
-        Without ``times``: instants uniform in ``tau`` go from ``1 - t/T = 1`` to this; dimensionless.
-    samples : int
-        Without ``times``: so many of these instants and half as many uniform in t (with ``rho2 = 0``: so many uniform
-        in t over [0, T]), and 0.5 T, 0.9 T, 0.99 T, T.
-    past : float
-        Without ``times``: go on to ``T (1 + past)``; dimensionless.
-    rtol, atol : float
-        Tolerances of CVODES; ``atol`` is relative to the largest entry of each column of ``x0``, or to ``delta T`` or
-        ``noise_bound`` of the nominal protocol if that is larger.
+    **sampling : Sampling
+        Where the run is sampled, and how it is integrated: ``times``, ``remaining``, ``samples``, ``past``, ``rtol``,
+        ``atol``, ``boundary_layer``, see :class:`Sampling`.
 
     Returns
     -------
     Trajectory
-        A :class:`~ptcc_certify.simulation.trajectory.SlidingTrajectory` where sliding variables are reached first.
+        With its ``sliding`` variables under the sliding-mode protocol, of families with the members ``played``.
 
     Raises
     ------
@@ -134,7 +149,8 @@ def simulate(
         ``x0`` has a wrong shape, labels other than those of the nodes or an entry that is not finite, or an option is
         outside its domain.
     SimulationError
-        The integrator failed, or a sampled run outgrew floats; the message names the cause.
+        The integrator failed, a signal switches too often, or a sampled run outgrew floats; the message names the
+        cause.
 
     References
     ----------
@@ -149,59 +165,187 @@ def simulate(
     >>> run = simulate(foes, run.protocol, [3, 1], actuator=GainLimits(gain_cap=11))  # e^(-2 s_eff(T)) = 0.00018
     >>> run.final_state.round(5)
     array([ 1.00037, -0.99963])
+    >>> unsure = [("a", "b", "0.8", "1.2"), ("b", "a", "-1.2", "-0.8")]
+    >>> run = simulate(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2], "worst-case")
+    >>> run.signal, run.deadline_resolved, run.final_state.round(9) + 0
+    ('worst case', True, array([0., 0.]))
     >>> robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3=1, delta=1)
     >>> run = simulate(foes, robust, [3, 1], sigma0=[1, 0], disturbance="sin(9*k*t)")
-    >>> run.final_state.round(9), bool((run.reaching_times < 1).all())
+    >>> run.final_state.round(9), bool((run.sliding.reaching_times < 1).all())
     (array([ 0.5, -0.5]), True)
     """
     begin = time.perf_counter()
-    graph = as_graph(graph, orientation)
     refuse_no_protocol(protocol)
-    if messages is not None or leaders is not None:
-        beside = {"boundary_layer": boundary_layer, "delta": delta, "noise": noise, "noise_bound": noise_bound}
-        beside |= {"disturbance": disturbance, "actuator": actuator, "times": times}
-        _refuse_beside(graph, messages, leaders, sigma0, beside)
+    how, beside = _sampling(sampling), messages is not None or leaders is not None
+    family = as_family(graph) if not beside and (signal is not None or is_family(graph)) else None
+    one = as_graph(graph) if family is None else family.modes[0].mandatory
+    layer = how["boundary_layer"]
+    only: dict[str, Any] = {"actuator": actuator, "noise": noise, "boundary_layer": layer}
+    if beside:
+        foreign = only | {"disturbance": disturbance, "times": how["times"]}
+        foreign |= {} if messages is not None else {"signal": signal}
+        _refuse_beside(one, messages, leaders, sigma0, foreign)
         if messages is not None:
-            return simulate_late(graph, protocol, messages, x0, pattern=pattern, seed=seed, leaders=leaders)
+            heard: Any = signal if isinstance(signal, tuple) and len(signal) == 2 else (signal or "oldest", 0)
+            return simulate_late(one, protocol, messages, x0, pattern=heard[0], seed=heard[1], leaders=leaders)
         assert leaders is not None
         from ptcc_certify.simulation.moving_leaders import simulate_tracking  # it loads SciPy
 
-        return simulate_tracking(graph, protocol, leaders, x0)
-    initial_state = _floats(x0, graph, "x0")
-    manifold = None if sigma0 is None else _floats(sigma0, graph, "sigma0")
-    tolerances = Tolerances.within(rtol, atol)
-    other = "sliding-mode"
-    foreign: dict[str, Any] = {"sigma0": manifold, "boundary_layer": boundary_layer}
-    if protocol.reaching is not None:
-        other, foreign = "nominal", {"actuator": actuator, "delta": delta, "noise": noise, "noise_bound": noise_bound}
-    for name, value in foreign.items():
-        if value is not None:
-            raise ParameterError(f"{name} belongs to the {other} protocol; leave it out or change the protocol")
-    if protocol.reaching is not None and (initial_state.ndim > 1 or (manifold is not None and manifold.ndim > 1)):
-        raise ParameterError(
-            "the sliding mode is simulated from one initial state at a time; give N numbers x0 and sigma0"
-        )
+        return simulate_tracking(one, protocol, leaders, x0)
+    initial_state, tolerances = _floats(x0, one, "x0"), Tolerances.within(how["rtol"], how["atol"])
+    manifold = None if sigma0 is None else _floats(sigma0, one, "sigma0")
+    _refuse_foreign(protocol, family, only | {"sigma0": sigma0, "disturbance": disturbance})
+    if (protocol.reaching or family) and any(x is not None and x.ndim > 1 for x in (initial_state, manifold)):
+        who = "families run" if family else "the sliding mode is simulated"
+        raise ParameterError(f"{who} from one initial state at a time; give N numbers x0 and sigma0")
     if actuator is not None and not isinstance(actuator, GainLimits):
         raise ParameterError(f"actuator = {shorten(repr(actuator))} is none; give GainLimits(gain_cap=50), say")
-    if boundary_layer is not None:
-        boundary_layer = number_within(boundary_layer, "boundary_layer", 1e-12, 1e12)
-    if times is None:
-        instants = default_instants(protocol, remaining, samples, past)
+    if how["times"] is None:
+        instants = default_instants(protocol, how["remaining"], how["samples"], how["past"])
     else:
-        instants = wanted_instants(protocol, times)
-    until = float(instants.t[-1])
+        instants = wanted_instants(protocol, how["times"])
+    played = ConstantSignal() if family is None else as_signal("random" if signal is None else signal)
+    run = _Run(one, family, played, protocol, instants, tolerances)
     with interruptible():
-        if (sliding := protocol.reaching) is not None:
-            source = "worst-case" if disturbance is None else disturbance
-            signal = as_disturbance(source, graph.n_nodes, sliding.delta, until)
-            manifold = np.zeros(graph.n_nodes) if manifold is None else manifold
-            run: Trajectory = simulate_sliding(
-                graph, sliding, initial_state, manifold, signal, instants, tolerances, boundary_layer
-            )
+        if protocol.reaching is None:
+            result = run.nominal(initial_state, actuator, disturbance, noise)
         else:
-            forcing = as_forcing(graph, protocol.T, disturbance, delta, noise, noise_bound, until)
-            run = simulate_nominal(graph, protocol, initial_state, instants, actuator, forcing, tolerances)
-    return replace(run, stats=dict(run.stats) | {"seconds": time.perf_counter() - begin})
+            manifold = np.zeros(one.n_nodes) if manifold is None else manifold
+            result = run.sliding(initial_state, manifold, disturbance, layer)
+    return replace(result, stats=dict(result.stats) | {"seconds": time.perf_counter() - begin})
+
+
+@dataclass(frozen=True)
+class _Run:
+    """What is run: a graph, or a family under a signal, with a protocol, sampled at instants."""
+
+    graph: SignedDigraph
+    family: Family | None
+    signal: Signal
+    protocol: Protocol
+    instants: Instants
+    tolerances: Tolerances
+
+    @property
+    def goal(self) -> float:
+        """Of the residual at ``T``."""
+        return RESOLVED / 10 * max(self.tolerances)
+
+    def members(self) -> Members:
+        return Members(self.graph if self.family is None else self.family)
+
+    def course(self, motion: Motion) -> Course:
+        return Course(motion, lambda state: self.signal.play(motion.members, self.protocol.gain, state))
+
+    def nominal(self, x: np.ndarray, actuator: GainLimits | None, disturbance: Any, noise: Any) -> Trajectory:
+        """Return the run under the nominal protocol, whose gain may be limited, with what drives the agents."""
+        limited = (actuator or GainLimits()).limit(self.protocol.gain)
+        t, remaining, _ = self.instants
+        until = float(t[-1])
+        forcing = as_forcing(self.graph, self.protocol.T, disturbance, noise, until) if self.family is None else None
+        held = limited.limits.sample_period is not None
+        if forcing is not None and held:
+            raise ParameterError("a run with a sample period takes no disturbance and no noise; leave one of them out")
+        if forcing is not None and forcing.noisy and not limited.bounded:
+            mend = "give a gain cap or stop before T"
+            raise ParameterError(f"noise times a gain that becomes infinite at T is no input; {mend}")
+        columns = x.reshape(self.graph.n_nodes, -1)
+        unit = np.maximum(np.abs(columns).max(axis=0), forcing.size if forcing else 0.0)
+        unit[unit == 0] = 1
+        motion = Motion(self.members(), columns / unit, self.tolerances, forcing, unit)
+        inputs = residual = course = None
+        if held:
+            periods = limited.periods(until)
+            clock = periods.clock(t)
+            states, inputs = sample_and_hold(self.graph, periods, motion.state, t)
+            motion.stats["steps"] = int(periods.locate(t[-1:])[0][0])
+        else:
+            clock, course = limited.clock(t, remaining), self.course(motion)
+            if forcing is None:
+                states, residual = self.on_the_clock(course, clock)
+            else:
+                states, residual = forced(course, limited, self.instants, self.goal)
+        late = np.flatnonzero(remaining == 0)
+        if residual is None and self.protocol.prescribed and late.size:
+            residual = motion.members.imbalance(states[late[0]], Choice(0) if self.family is None else None)
+
+        def restore(values: np.ndarray) -> np.ndarray:
+            return (np.moveaxis(values, 0, -1) * unit[:, None]).reshape(*x.shape, t.size)
+
+        conditions = Conditions(
+            None if actuator is None or actuator.ideal else actuator, None if forcing is None else forcing.text
+        )
+        more = {"conditions": conditions, "held_input": None if inputs is None else restore(inputs)}
+        return self.trajectory(motion, course, clock, restore(states), residual, **more)
+
+    def sliding(self, x: np.ndarray, sigma0: np.ndarray, disturbance: Any, layer: float | None) -> Trajectory:
+        """Return the run under the sliding-mode protocol, the Filippov solution or its imitation."""
+        protocol, t = self.protocol.reaching, self.instants.t
+        assert protocol is not None
+        source, until = "worst-case" if disturbance is None else disturbance, float(t[-1])
+        if isinstance(disturbance, Bounded):
+            raise ParameterError("disturbance: the sliding-mode protocol has its bound, delta; give the signal alone")
+        met = as_disturbance(source, self.graph.n_nodes, protocol.delta, until)
+        if self.family is not None and isinstance(met, StateDependent):
+            raise ParameterError("families take no disturbance that reads the states; give one of time")
+        bounded_by = met.check(protocol.delta, self.graph.labels, until, rounding_slack(protocol))
+        layer = None if layer is None else number_within(layer, "boundary_layer", 1e-12, 1e12)
+        motion = SlidingMotion(self.members(), protocol, met, (x, sigma0), self.tolerances, layer)
+        clock = np.asarray(GainLimits().limit(protocol.gain).clock(t, self.instants.remaining))
+        course = self.course(motion)
+        if layer is not None:
+            states, residual = motion.imitation(self.instants)
+        else:
+            later, states = motion.reach(course, self.instants.z)
+            nominal, residual = self.on_the_clock(course, clock[later], t[later])
+            states[later, :, 0] = nominal[:, :, 0]
+        y, sigma = states.T * motion.unit
+        part = motion.part(self.instants, y + sigma, sigma, bounded_by)
+        return self.trajectory(motion, course, clock, y + sigma, residual, sliding=part)
+
+    def on_the_clock(
+        self, course: Course, clock: np.ndarray, t: np.ndarray | None = None
+    ) -> tuple[np.ndarray, float | None]:
+        """Return the (M, N, S) states where nothing but the graph acts, and the residual at ``T`` if it is a pole."""
+        before, t = np.isfinite(clock), self.instants.t if t is None else t
+        states = [np.empty((0, *course.motion.state.shape))]
+        if before.any():
+            states.append(course.sample(clock[before], float(clock[before][-1])))
+        residual = None
+        if not before.all():
+            residual = course.settle(self.goal)
+            T, rho1 = float(self.protocol.T), float(self.protocol.gain.rho1)
+            changes = self.signal.past(course.motion.members, T)
+            states.append(course.past(t[~before], T, rho1, changes))
+        return np.concatenate(states), residual
+
+    def trajectory(
+        self,
+        motion: Motion,
+        course: Course | None,
+        clock: np.ndarray,
+        states: np.ndarray,
+        residual: float | None,
+        **more: Any,
+    ) -> Trajectory:
+        """Return what was run."""
+        played = None
+        if self.family is not None and course is not None:
+            told = tuple(course.choices), np.array(course.switches), np.array(course.acting, dtype=np.int64)
+            played = Played(self.family, self.signal.text, *told)
+        return Trajectory(
+            graph=self.graph,
+            protocol=self.protocol,
+            t=self.instants.t,
+            remaining=self.instants.remaining,
+            clock=clock,
+            states=states,
+            tolerances=self.tolerances,
+            deadline_residual=residual,
+            stats=motion.stats,
+            played=played,
+            **more,
+        )
 
 
 def simulate_formation(graph: Any, protocol: Protocol, x0: Any, offsets: Any, **options: Any) -> Trajectory:
@@ -228,12 +372,37 @@ def simulate_formation(graph: Any, protocol: Protocol, x0: Any, offsets: Any, **
     array([[ 3. , -0.5],
            [ 1. ,  4.5]])
     """
-    graph = as_graph(graph, options.pop("orientation", None))
+    graph = as_graph(graph)
     rows, places = as_states(x0, graph, "x0"), as_states(offsets, graph, "offsets")
     if len(rows[0]) != len(places[0]):
         raise ParameterError(f"offsets has {len(places[0])} numbers for each agent, x0 has {len(rows[0])}")
     less = [[x - h for x, h in zip(*pair, strict=True)] for pair in zip(rows, places, strict=True)]
-    return replace(simulate(graph, protocol, less, **options), offsets=_floats(places, graph, "offsets"))
+    return simulate(graph, protocol, less, **options).in_places(_floats(places, graph, "offsets"))
+
+
+def _sampling(given: Sampling) -> Sampling:
+    """Return all of what a run is sampled and integrated by, or refuse a keyword that is none of it."""
+    for name in given:
+        if name not in _DEFAULTS:
+            parameters = [*inspect.signature(simulate).parameters][:-1]
+            raise ParameterError(unknown_parameter("simulate", name, [*parameters, *_DEFAULTS]))
+    return {**_DEFAULTS, **given}
+
+
+def _refuse_foreign(protocol: Protocol, family: Family | None, given: Mapping[str, Any]) -> None:
+    """Refuse what belongs to the other protocol, or is of one graph alone."""
+    of_nominal, of_sliding = ("actuator", "noise"), ("sigma0", "boundary_layer", "disturbance")
+    forced_nominal = isinstance(given["disturbance"], Bounded) and family is None
+    for name in of_nominal if protocol.reaching is not None else of_sliding:
+        if given[name] is not None and not (name == "disturbance" and forced_nominal):
+            other = "nominal" if name in of_nominal else "sliding-mode"
+            mend = "leave it out or change the protocol"
+            if name == "disturbance" and family is None:
+                mend = "under the nominal protocol give Bounded(disturbance, delta)"
+            raise ParameterError(f"{name} belongs to the {other} protocol; {mend}")
+    for name in (*of_nominal, "boundary_layer") if family is not None else ():
+        if given[name] is not None:
+            raise ParameterError(f"{name} is not simulated of families yet; leave it out")
 
 
 def _refuse_beside(

@@ -12,6 +12,7 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.follower_rows import refuse_leader_groups
+from ptcc_certify.protocols.base import Protocol
 from ptcc_certify.protocols.moving_leaders import MovingLeaders
 
 
@@ -21,6 +22,8 @@ class WorstLeaders:
     Parameters
     ----------
     structure : Structure
+    protocol : Protocol
+        The nominal one.
     leaders : MovingLeaders
     u : (F,) array, optional
         By which distances are compared, positive; dimensionless.
@@ -30,16 +33,20 @@ class WorstLeaders:
     HypothesisError
         A leader belongs to a group.
     ParameterError
-        There are more than 120 agents, nobody listens, or ``u`` does not fit.
+        There are more than 120 agents, nobody listens, the protocol is another one, or ``u`` does not fit.
 
     Examples
     --------
-    >>> worst = WorstLeaders(analyse(SignedDigraph.from_edges([(1, 2, -1)])), MovingLeaders(speed=3, disturbance=1))
+    >>> pair = analyse(SignedDigraph.from_edges([(1, 2, -1)]))
+    >>> worst = WorstLeaders(pair, NominalProtocol(1, 1, 1, 1), MovingLeaders(speed=3, disturbance=1))
     >>> worst.velocities(np.array([0.5])), worst.pushes(np.array([0.5]))
     (array([3.]), array([1.]))
     """
 
-    def __init__(self, structure: Structure, leaders: MovingLeaders, u: np.ndarray | None = None):
+    def __init__(self, structure: Structure, protocol: Protocol, leaders: MovingLeaders, u: np.ndarray | None = None):
+        if not isinstance(leaders, MovingLeaders) or protocol.reaching:
+            mend = "give it, and MovingLeaders(speed=1), say"
+            raise ParameterError(f"leaders that move run under the nominal protocol; {mend}")
         refuse_leader_groups(structure, "leaders that move as they like: a run")
         n, F = structure.graph.n_nodes, structure.followers
         if n > EXACT_NODES:

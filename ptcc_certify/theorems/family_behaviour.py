@@ -24,7 +24,6 @@ from typing import Any
 import numpy as np
 
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.graphs.display_hook import Shown, plot_of_counterexample
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.io import as_family
 from ptcc_certify.graphs.rationals import shorten
@@ -39,6 +38,7 @@ from ptcc_certify.graphs.structure import (
     find_camps,
     weak_components,
 )
+from ptcc_certify.shown import Shown, rendered
 from ptcc_certify.theorems.family_kernel import Kernel, StateEnclosure, TooLarge, first_answer
 
 __all__ = ["DEPENDS", "SIGNALS", "Counterexample", "FamilyComponent", "Kernel", "TooLarge", "decide"]
@@ -210,7 +210,7 @@ class FamilyComponent(Shown):
         'state $x_k$'
         """
         why = self.counterexample if behaviour is None else self.refutation(behaviour)
-        return plot_of_counterexample(self, why=why, **keywords)
+        return rendered("plots.counterexample.plot_counterexample", self, why=why, **keywords)
 
     def _balanced_closed_set(self) -> Counterexample | None:
         for number, structure in enumerate(self.structures):

@@ -33,8 +33,8 @@ from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.disturbance import as_disturbance
 from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.report.screen import certificate_lines
+from ptcc_certify.simulation.nominal import Bounded
 from ptcc_certify.simulation.run import simulate
-from ptcc_certify.simulation.trajectory import SlidingTrajectory
 
 F = Fraction
 CLASSES = dict(all_classes())
@@ -272,7 +272,7 @@ def test_no_input_of_the_sliding_mode_is_above_its_bounds(name: str, power: Frac
                 x = floats(begin) if initial_set is None else draw(rng, initial_set, 1)[:, 0]
                 s = floats(sigma0)
                 run = simulate(graph, protocol, x, sigma0=s, disturbance=disturbance, samples=401, remaining=1e-6)
-                assert isinstance(run, SlidingTrajectory)
+                assert run.sliding is not None
                 before = run.remaining > 0
                 t, gain = run.t[before], protocol.gain.value_at_remaining(run.remaining[before])
                 nominal = np.linalg.norm(gain * run.error[:, before], axis=0)
@@ -281,7 +281,7 @@ def test_no_input_of_the_sliding_mode_is_above_its_bounds(name: str, power: Frac
                 assert trapezoid(nominal, t) <= float(effort.path_length.value) * 1.001
                 if effort.sliding.agents is not None:
                     own = np.abs(run.input - run.error * protocol.gain.value_at_remaining(run.remaining))[:, before]
-                    moving = run.sigma[:, before] != 0
+                    moving = run.sliding.sigma[:, before] != 0
                     assert (np.where(moving, own, 0).max(axis=1) <= floats(effort.sliding.agents) * SLACK).all()
                 if effort.peak is not None:
                     u = np.abs(run.input[:, before])
@@ -570,8 +570,8 @@ def test_disturbances_add_no_more_than_certified(name: str):
             (0.75 * np.sign(L[0])).tolist(),
             (0.75 * rng.choice([-1, 1], n)).tolist(),
         ):
-            run = simulate(graph, protocol, floats(x0), disturbance=d, delta=delta, remaining=1e-5, past=0)
-            still = simulate(graph, protocol, [0] * n, disturbance=d, delta=delta, remaining=1e-5, past=0)
+            run = simulate(graph, protocol, floats(x0), disturbance=Bounded(d, delta), remaining=1e-5, past=0)
+            still = simulate(graph, protocol, [0] * n, disturbance=Bounded(d, delta), remaining=1e-5, past=0)
             moved = np.abs(run.final_state - np.asarray(cert.final_state))
             assert (moved <= drift + 1e-7).all()
             if isinstance(d, list) and d == (0.75 * signs).tolist():
@@ -776,7 +776,7 @@ def test_noise_under_a_limit_leaves_no_more_than_is_proved(name: str, actuator: 
     assert entry.noisy_norm is not None and entry.noisy_largest is not None
     L = graph.dense_laplacian()
     for text in ("0.05*sin(40*t+k)", "0.05*sign(sin(7*t*k))", "0.05"):
-        run = simulate(graph, protocol, x0, actuator=actuator, noise=text, noise_bound="1/20", past=0, remaining=1e-6)
+        run = simulate(graph, protocol, x0, actuator=actuator, noise=Bounded(text, "1/20"), past=0, remaining=1e-6)
         before = run.t < 1
         agents = np.arange(graph.n_nodes)
         n = as_disturbance(text, graph.n_nodes, "1/20", 1.0).values(run.t, agents, np.zeros(agents.size))
@@ -798,6 +798,6 @@ def test_an_envelope_is_compared_with_runs_it_speaks_of_only():
     cert = certify(graph, protocol, [1, 2, 3, 4, 5, 6], simulation=False)
     capped = simulate(graph, protocol, [1, 2, 3, 4, 5, 6], actuator=GainLimits(gain_cap=9))
     assert not cert.envelope.compare(capped).violated
-    for more in ({"actuator": GainLimits(sample_period="0.01")}, {"disturbance": "t", "delta": 2}):
+    for more in ({"actuator": GainLimits(sample_period="0.01")}, {"disturbance": Bounded("t", 2)}):
         with pytest.raises(ParameterError, match="undisturbed"):
             cert.envelope.compare(simulate(graph, protocol, [1, 2, 3, 4, 5, 6], **more))

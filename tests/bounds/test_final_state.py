@@ -153,7 +153,7 @@ def test_labels_of_a_series_count_wherever_a_state_is_taken():
     robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
     slid = certify(team, robust, x0, sigma0=x0, simulation=False)
     assert slid.sigma0 == slid.initial_state == cert.initial_state
-    assert simulate(team, robust, x0, sigma0=x0).sigma[:, 0].tolist() == plain
+    assert simulate(team, robust, x0, sigma0=x0).sliding.sigma[:, 0].tolist() == plain
     row, other = certify_many(team, protocol, x0=x0)[0], certify_many(team, protocol, x0=plain)[0]
     assert row | {"seconds": 0} == other | {"seconds": 0}
     assert box(x0 - 1, x0, team) == box([2.5, 1.5, 0.5], plain, team)

@@ -13,8 +13,8 @@ from ptcc_certify.certificate.family_comparison import compare, functions_of, wo
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.protocols import NominalProtocol
-from ptcc_certify.simulation.family_members import Members
-from ptcc_certify.simulation.family_run import simulate_family
+from ptcc_certify.simulation.members import Members
+from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.signals import ConstantSignal, PeriodicSignal, RandomSignal
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
@@ -45,7 +45,7 @@ def worst_ratios(rng, families, count, steps=(3,), **options):
         n = family.n_nodes
         certificate = certify_family(family, PROTOCOL, rng.integers(-9, 10, n).tolist(), time_limit=10)
         for signal in played_signals(rng, certificate, count, steps):
-            run = simulate_family(family, PROTOCOL, certificate.initial_state, signal, past=0, **options)
+            run = simulate(family, PROTOCOL, certificate.initial_state, signal, past=0, **options)
             seen, runs = compare(certificate, run), runs + 1
             assert not seen.violated, (family, signal, seen)
             for name in RATIOS:
@@ -79,11 +79,11 @@ def test_a_certificate_that_claims_too_much_is_found_out():
     boast = [replace(V, rates=tuple(r * Fraction(11, 10) for r in V.rates)) for V in part.functions]
     wrong = replace(certificate, parts=(replace(part, functions=tuple(boast)),))
     assert any(
-        compare(wrong, simulate_family(family, PROTOCOL, [1, 2], s, samples=20, remaining=1e-4)).violated
+        compare(wrong, simulate(family, PROTOCOL, [1, 2], s, samples=20, remaining=1e-4)).violated
         for s in worst_case_signals(wrong)
     )
     assert not any(
-        compare(certificate, simulate_family(family, PROTOCOL, [1, 2], s, samples=20, remaining=1e-4)).violated
+        compare(certificate, simulate(family, PROTOCOL, [1, 2], s, samples=20, remaining=1e-4)).violated
         for s in worst_case_signals(certificate)
     )
 
@@ -95,7 +95,7 @@ def test_the_worst_case_falls_more_slowly_than_random_signals():
     worst = worst_case_signals(certificate)[0]
     V_end = []
     for signal in (worst, *map(RandomSignal, range(5))):
-        x = simulate_family(family, PROTOCOL, [1, -2, 3], signal, times=[0.9]).states[:, 0]
+        x = simulate(family, PROTOCOL, [1, -2, 3], signal, times=[0.9]).states[:, 0]
         V_end.append(x @ worst.form @ x)
     assert V_end[0] > max(V_end[1:])
 
@@ -103,8 +103,8 @@ def test_the_worst_case_falls_more_slowly_than_random_signals():
 def test_the_ratio_of_a_lyapunov_function_is_that_of_exponentials():
     family = Family.from_intervals([("a", "b", 1, 2), ("b", "a", -2, -1)])
     certificate = certify_family(family, PROTOCOL, [1, 2])
-    run = simulate_family(family, PROTOCOL, [1, 2], ConstantSignal(0, 1.0), times=[0, "1/2"])
-    A = Members(family).laplacian(run.choices[0]).toarray()
+    run = simulate(family, PROTOCOL, [1, 2], ConstantSignal(0, 1.0), times=[0, "1/2"])
+    A = Members(family).laplacian(run.played.choices[0]).toarray()
     x, ratios = expm(-A * run.clock[1]) @ [1, 2], []
     for signal, (_, _, V) in zip(worst_case_signals(certificate), functions_of(certificate), strict=False):
         start = np.array([1, 2]) @ signal.form @ [1, 2]
@@ -117,8 +117,8 @@ def test_runs_of_something_else_are_refused():
     certificate, start = certify_family(family, PROTOCOL, [1, 2]), [1, 2]
     other = Family.from_intervals([("a", "b", 1, 2), ("b", "a", -2, -1), ("c", "a", 1, 1)])
     with pytest.raises(ParameterError, match="another family"):
-        compare(certificate, simulate_family(other, PROTOCOL, [1, 2, 3], times=[0]))
+        compare(certificate, simulate(other, PROTOCOL, [1, 2, 3], times=[0]))
     with pytest.raises(ParameterError, match="another protocol"):
-        compare(certificate, simulate_family(family, NominalProtocol(T=2), start, times=[0]))
+        compare(certificate, simulate(family, NominalProtocol(T=2), start, times=[0]))
     with pytest.raises(ParameterError, match="another initial state"):
-        compare(certificate, simulate_family(family, PROTOCOL, [1, 3], times=[0]))
+        compare(certificate, simulate(family, PROTOCOL, [1, 3], times=[0]))

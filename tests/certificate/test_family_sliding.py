@@ -25,8 +25,7 @@ from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.follower_function import follower_functions
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.reaching_time import certified_reaching_times
-from ptcc_certify.simulation.family_members import Members
-from ptcc_certify.simulation.family_run import simulate_family
+from ptcc_certify.simulation.members import Members
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.signals import ConstantSignal, PeriodicSignal, RandomSignal, Signal, Stretch
 from ptcc_certify.theorems.family_behaviour import decide
@@ -110,7 +109,7 @@ def worst_ratios(rng, families, played=4, **options):
         for k in rng.choice(len(choices), min(played, len(choices)), replace=False):
             signal, disturbance = choices[int(k)]
             more = {"sigma0": sigma0, "disturbance": disturbance, "past": 0, **options}
-            run = simulate_family(family, protocol, x0, signal, **more)
+            run = simulate(family, protocol, x0, signal, **more)
             seen, runs = compare(certificate, run), runs + 1
             assert not seen.violated, (family, signal, disturbance, protocol, x0, sigma0, seen)
             for name in RATIOS:
@@ -196,7 +195,7 @@ def test_a_run_exceeds_what_cancelled_entries_would_prove():
     certificate, quotient, cancelled, _, _ = trap()
     mode = certificate.family.modes[0]
     levels = [float(mode.source[e] == 5 and mode.target[e] > 0) for e in mode.parameters.tolist()]
-    run = simulate_family(
+    run = simulate(
         certificate.family,
         certificate.protocol,
         certificate.initial_state,
@@ -282,10 +281,11 @@ def test_a_family_of_one_graph_runs_as_the_graph_does():
         times = np.linspace(0, float(protocol.T) * 1.2, 25).tolist()
         more = {"sigma0": sigma0, "disturbance": disturbance, "times": times}
         one = simulate(graph, protocol, x0, **more)
-        own = simulate_family(family, protocol, x0, ConstantSignal(0), **more)
+        own = simulate(family, protocol, x0, ConstantSignal(0), **more)
         assert np.abs(one.states - own.states).max() < 1e-7
-        assert np.allclose(one.sigma, own.sigma, rtol=1e-12, atol=1e-14) and (one.reaching_z == own.reaching_z).all()
-        assert np.abs(one.disturbance - own.disturbance).max() < 1e-12
+        assert np.allclose(one.sliding.sigma, own.sliding.sigma, rtol=1e-12, atol=1e-14)
+        assert (one.sliding.reaching_z == own.sliding.reaching_z).all()
+        assert np.abs(one.sliding.disturbance - own.sliding.disturbance).max() < 1e-12
         assert own.to_csv().startswith("t,remaining,0,1,2,3,mode,sigma(0)")
 
 
@@ -303,7 +303,7 @@ def test_functions_of_rows_are_driven_too(kind):
     assert certificate.checked.accepted, certificate.checked
     more = {"sigma0": sigma0, "samples": 25, "past": 0, "remaining": 1e-3}
     for signal in (RandomSignal(1, 2.0), ConstantSignal(0, 0.0), ConstantSignal(0, 1.0)):
-        assert not compare(certificate, simulate_family(family, PROTOCOL, x0, signal, **more)).violated
+        assert not compare(certificate, simulate(family, PROTOCOL, x0, signal, **more)).violated
 
 
 # ---------------------------------------------------------------------- files, and what is refused
@@ -327,11 +327,11 @@ def test_what_does_not_fit_is_refused():
         certify_family(family, nominal, [1, 2, 3], sigma0=[1, 0, 0])
     for more in ({"sigma0": [1, 0, 0]}, {"disturbance": "sin(t)"}):
         with pytest.raises(ParameterError, match="belongs to the sliding-mode protocol"):
-            simulate_family(family, nominal, [1, 2, 3], **more)
+            simulate(family, nominal, [1, 2, 3], **more)
     with pytest.raises(ParameterError, match="beyond delta"):
-        simulate_family(family, PROTOCOL, [1, 2, 3], disturbance="2*sin(t)")
+        simulate(family, PROTOCOL, [1, 2, 3], disturbance="2*sin(t)")
     with pytest.raises(ParameterError, match="reads the states"):
-        simulate_family(family, PROTOCOL, [1, 2, 3], disturbance=lambda t, x, sigma: np.sin(x))
+        simulate(family, PROTOCOL, [1, 2, 3], disturbance=lambda t, x, sigma: np.sin(x))
 
 
 def test_where_the_sliding_part_may_grow_no_peak_is_claimed():

@@ -17,9 +17,9 @@ from ptcc_certify.graphs.family import Family
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.report.family_screen import family_lines
 from ptcc_certify.report.page import report_html
-from ptcc_certify.report.plots.family_input import plot_family_input
+from ptcc_certify.report.plots.input import plot_input
 from ptcc_certify.report.statement import family_latex
-from ptcc_certify.simulation.family_run import simulate_family
+from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.signals import RandomSignal
 from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows
 
@@ -37,7 +37,7 @@ def runs(certificate, played=3, **options):
     start, sigma0 = ([float(x) for x in state] for state in (certificate.initial_state, certificate.sigma0))
     for k in range(played):
         more = {"sigma0": sigma0, "disturbance": DISTURBANCES[k % 3], "past": 0, **options}
-        yield simulate_family(certificate.family, certificate.protocol, start, RandomSignal(k), **more)
+        yield simulate(certificate.family, certificate.protocol, start, RandomSignal(k), **more)
 
 
 def test_means_that_every_signal_keeps_are_those_of_x_minus_sigma():
@@ -101,7 +101,7 @@ def test_inputs_are_below_their_curve(sigma0):
         assert (np.abs(run.input[:, own]) <= bound * (1 + 1e-6) + 1e-6).all()
     first = certificate.input_bound([1.0])[:, 0]
     assert (first <= [float(x) * (1 + 1e-9) for x in certificate.input_peaks]).all()
-    assert "certified peak" in plot_family_input(certificate, runs=played).texts[0].get_text()
+    assert "certified peak" in plot_input(certificate, runs=played).texts[0].get_text()
 
 
 def test_where_the_sliding_part_may_grow_there_is_no_curve_of_the_input():

@@ -237,7 +237,9 @@ def test_a_disturbance_that_is_no_expression_within_delta_gives_way_to_the_worst
     (tmp_path / "c.json").write_text(json.dumps(data))
     saved = read_certificate(tmp_path / "c.json").with_simulation()
     assert saved.trajectory is not None and saved.comparison is not None and not saved.comparison.violated
-    assert saved.trajectory.source == ("none" if said == "none" else "worst-case disturbance: delta sign(sigma_k)")
+    assert saved.trajectory.sliding.source == (
+        "none" if said == "none" else "worst-case disturbance: delta sign(sigma_k)"
+    )
 
 
 def test_a_byte_order_mark_does_not_matter(tmp_path: Path):

@@ -29,7 +29,7 @@ from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.disturbance import SampledDisturbance, StateDependent, telegraph_noise
 from ptcc_certify.report.screen import certificate_lines
 from ptcc_certify.simulation.run import simulate
-from ptcc_certify.simulation.trajectory import SlidingTrajectory
+from ptcc_certify.simulation.trajectory import Trajectory
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
 
 RUNS = [(number, name) for number in "456" for _, name, _ in select(number)]
@@ -44,8 +44,8 @@ def example(number: str, name: str) -> Certificate:
     return certify(load_graph(name), run.protocol(), run.x0.split(","), sigma0=sigma0, disturbance=run.disturbance)
 
 
-def sliding_run(certificate: Certificate) -> SlidingTrajectory:
-    assert isinstance(certificate.trajectory, SlidingTrajectory)
+def sliding_run(certificate: Certificate) -> Trajectory:
+    assert certificate.trajectory is not None and certificate.trajectory.sliding is not None
     return certificate.trajectory
 
 
@@ -65,11 +65,11 @@ def test_the_examples_behave_as_the_paper_reports(number: str, name: str):
     assert cert.claim.theorem == cert.theorem.number == f"{number}.{1 if reported != 'stability' else 2}"
     assert cert.verdict == "certified"
     T_r = float(protocol.T_r)
-    for reached, proved in zip(run.reaching_times, cert.reaching, strict=True):
+    for reached, proved in zip(run.sliding.reaching_times, cert.reaching, strict=True):
         assert proved.z is not None
         assert reached <= proved.time < T_r
-    for row, z in zip(run.sigma, run.reaching_z, strict=True):
-        at = -np.log(np.where(run.reaching_remaining > 0, run.reaching_remaining, 1e-300))
+    for row, z in zip(run.sliding.sigma, run.sliding.reaching_z, strict=True):
+        at = -np.log(np.where(run.sliding.reaching_remaining > 0, run.sliding.reaching_remaining, 1e-300))
         assert (row[at >= z] == 0).all() and (row[at < z] != 0).all()
     assert not cert.comparison.violated and cert.comparison.reaching_kept
     # The end state is Q (X(0) - sigma(0)), not Q X(0), up to what the clock leaves at the last sample before T.
@@ -296,14 +296,14 @@ def test_a_reaching_time_or_a_bound_of_sigma_that_is_missed_is_seen():
     early = tuple(replace(r, z=r.z / 2) for r in envelope.reaching if r.z is not None)
     assert replace(envelope, reaching=early).compare(run).reaching_kept is False
     assert replace(envelope, reaching=early).compare(run).violated
-    swollen = replace(run, sigma=run.sigma * 1.5)
+    swollen = replace(run, sliding=replace(run.sliding, sigma=run.sliding.sigma * 1.5))
     assert envelope.compare(swollen).sliding_ratio == pytest.approx(1.5, rel=1e-3)
 
 
 def test_only_runs_of_which_something_was_proved_are_compared():
     cert = example("4", "fig1a")
     run, envelope, protocol = sliding_run(cert), cert.envelope, cert.protocol
-    x0, sigma0 = run.states[:, 0], run.sigma0
+    x0, sigma0 = run.states[:, 0], run.sliding.sigma0
     with pytest.raises(ParameterError, match="boundary-layer"):
         envelope.compare(simulate(cert.graph, protocol, x0, sigma0=sigma0, disturbance="t/9", boundary_layer=0.1))
     with pytest.raises(ParameterError, match=r"another sigma\(0\)"):
@@ -367,11 +367,11 @@ def check(cert: Certificate, power: Fraction) -> None:
     late = [r.z is None for r in cert.reaching]
     if power >= 1:
         assert not any(late)
-        assert np.isfinite(run.reaching_z).all()
+        assert np.isfinite(run.sliding.reaching_z).all()
     shown = "\n".join(certificate_lines(cert, "graph"))
     assert ("reaching time T_r for" in shown) == any(late)
     # sigma is certain to be 0 at T_r in any case.
-    assert (run.sigma[:, run.reaching_remaining == 0] == 0).all()
+    assert (run.sliding.sigma[:, run.sliding.reaching_remaining == 0] == 0).all()
 
 
 POWERS = (Fraction(1, 3), Fraction(1), Fraction(9, 5))
@@ -437,7 +437,7 @@ def test_a_function_that_is_the_worst_case_is_not_taken_for_a_violation(mu1: Any
     assert cert.comparison is not None and cert.comparison.reaching_kept and not cert.comparison.violated
     assert cert.reaching is not None
     certain = [float(r.z) for r in cert.reaching if r.z is not None]
-    np.testing.assert_allclose(sliding_run(cert).reaching_z, certain, rtol=1e-5)
+    np.testing.assert_allclose(sliding_run(cert).sliding.reaching_z, certain, rtol=1e-5)
 
 
 def test_two_agents_that_arrive_together_are_found_under_a_function_too():
@@ -446,9 +446,8 @@ def test_two_agents_that_arrive_together_are_found_under_a_function_too():
         simulate(PATH, path_protocol(), x0, sigma0=sigma0, disturbance=d)
         for d in (lambda t, x, sigma: np.sign(sigma), "worst-case")
     )
-    assert isinstance(run, SlidingTrajectory) and isinstance(own, SlidingTrajectory)
-    np.testing.assert_allclose(run.reaching_z, own.reaching_z, rtol=1e-8)
-    assert own.reaching_z[0] == own.reaching_z[1]
+    np.testing.assert_allclose(run.sliding.reaching_z, own.sliding.reaching_z, rtol=1e-8)
+    assert own.sliding.reaching_z[0] == own.sliding.reaching_z[1]
 
 
 def test_a_trial_beyond_a_root_shows_the_function_no_sign_that_never_occurs():
@@ -465,7 +464,7 @@ def test_what_rounding_allows_beyond_delta_never_reaches_mu1():
     with pytest.raises(ParameterError, match="beyond delta"):
         simulate(PATH, tight, [5, 2, -4], sigma0=[1e-16, 2, 3], disturbance=1.0000000000005)
     run = simulate(PATH, tight, [5, 2, -4], sigma0=[1e-16, 2, 3], disturbance="sin(9*t)")
-    assert isinstance(run, SlidingTrajectory) and (run.reaching_z > 0).all()
+    assert (run.sliding.reaching_z > 0).all()
 
 
 @pytest.mark.parametrize("text", thinned(["3*sin(pi*2**20*19999*t)", "1.9*abs(sin(pi*2**18*19999*t/1.25))"], 2))

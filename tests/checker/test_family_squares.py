@@ -24,7 +24,7 @@ from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.family_search import FamilySearch
 from ptcc_certify.lyapunov.squares_function import SquaresFunction
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.simulation.family_run import simulate_family
+from ptcc_certify.simulation.run import simulate
 from ptcc_certify.theorems.family_behaviour import decide
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
@@ -72,7 +72,7 @@ def test_random_unbalanced_families_of_hundreds_of_agents_are_certified_with_a_r
 @pytest.mark.parametrize("signal", ["random", "worst-case"])
 def test_runs_of_hundreds_of_agents_stay_below_the_bounds(signal):
     cert = certificate(1)
-    run = simulate_family(cert.family, PROTOCOL, state(200), signal, remaining=1e-2, samples=11)
+    run = simulate(cert.family, PROTOCOL, state(200), signal, remaining=1e-2, samples=11)
     assert not compare(cert, run).violated
 
 

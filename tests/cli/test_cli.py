@@ -753,7 +753,7 @@ def test_simulate_agents_of_two_dimensions():
 
 
 def test_simulate_says_when_the_run_has_not_settled():
-    run = ptcc("simulate", save("slow.csv", [(1, 2, "1e-300"), (2, 1, "1e-300")]))
+    run = ptcc("simulate", save("slow.csv", [(1, 2, 1), (2, 3, "1e-16"), (3, 2, 10000)]), "--x0", "1,0,0")
     assert run.code == 0
     assert run.err.startswith("note: ")
     assert "note" not in run.out

@@ -16,6 +16,7 @@ from ptcc_certify.cli import cli
 from ptcc_certify.cli.new import template
 from ptcc_certify.cli.scenario import MAX_BYTES, SECTIONS, read_scenario
 from ptcc_certify.errors import PTCCError
+from ptcc_certify.report.figures import PLOTS
 
 TEAM = "ann,bob,1\nbob,ann,1\nbob,eve,-2\neve,dan,1\ndan,eve,1\n"
 SCENARIO = """
@@ -261,6 +262,6 @@ def test_a_random_state_of_a_scenario_begins_within_its_initial_bound(monkeypatc
     first = [float(cell) for cell in rows[1].split(",")[2:8]]
     assert 0.1 < max(map(abs, first)) <= 1
     drawn: list[Any] = []
-    monkeypatch.setattr("ptcc_certify.report.plots.input.plot_input", lambda run, **_: drawn.append(run) or Figure())
+    monkeypatch.setitem(PLOTS, "input", lambda run, **_: drawn.append(run) or Figure())
     assert ptcc("plot", "s.toml", "--what", "input", "-o", "u.png").code == 0
     assert drawn[0].states[:, 0].tolist() == first

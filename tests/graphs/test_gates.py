@@ -123,7 +123,7 @@ def test_every_function_takes_a_graph_in_every_form():
     W, x0 = TEAM.adjacency().toarray(), [5, 2, -4]
     cert = ptcc.certify(W, PROTOCOL, x0, orientation="listens", simulation=False)
     assert cert.graph.sha256 == as_graph(W, "listens").sha256
-    assert ptcc.simulate(W, PROTOCOL, x0, orientation="listens", samples=3).graph == cert.graph
+    assert ptcc.simulate(ptcc.as_graph(W, "listens"), PROTOCOL, x0, samples=3).graph == cert.graph
     assert ptcc.analyse(W, "listens").claim == cert.claim
     assert ptcc.final_state(EDGES, x0).states == ptcc.final_state(W, x0, orientation="listens").states
     assert ptcc.influence(EDGES).row(0) == ptcc.influence(W, orientation="listens").row(0)
@@ -151,7 +151,7 @@ def test_a_state_is_the_same_in_whatever_form_it_is_given(form):
     assert as_state(STATES[form], TEAM) == [5, 2, -4]
     assert ptcc.simulate(TEAM, PROTOCOL, STATES[form], samples=3).states[:, 0].tolist() == [5, 2, -4]
     sliding = ptcc.simulate(TEAM, ptcc.SlidingModeProtocol(), STATES[form], sigma0=STATES[form], times=[0])
-    assert sliding.states[:, 0].tolist() == sliding.sigma0.tolist() == [5, 2, -4]
+    assert sliding.states[:, 0].tolist() == sliding.sliding.sigma0.tolist() == [5, 2, -4]
 
 
 def test_a_state_is_read_from_series_frames_and_files(tmp_path):

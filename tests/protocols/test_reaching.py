@@ -406,25 +406,25 @@ def test_an_agent_may_reach_closer_to_the_deadline_than_a_float_of_time_tells(po
     p = protocol(power)
     run = simulate(PAIR, p, [1, 2], sigma0=[1.0, size])
     (found,) = certified_reaching_times(p, [F(size)])
-    z = run.reaching_z[1]
+    z = run.sliding.reaching_z[1]
     assert 40 < z < math.inf
     assert z == pytest.approx(float(found.z), rel=1e-11)
-    assert run.reaching_times[1] == 1.0
+    assert run.sliding.reaching_times[1] == 1.0
     # What a relative error 1e-11 of z makes of it.
-    assert run.reaching_left[1] == pytest.approx(float((-ball(found.z)).exp()), rel=1e-10 * z)
+    assert run.sliding.reaching_left[1] == pytest.approx(float((-ball(found.z)).exp()), rel=1e-10 * z)
     assert 0 < found.remaining < 1e-17
-    assert found.remaining == pytest.approx(run.reaching_left[1], rel=1e-10 * z)
-    assert run.reaching_times[0] < 1
+    assert found.remaining == pytest.approx(run.sliding.reaching_left[1], rel=1e-10 * z)
+    assert run.sliding.reaching_times[0] < 1
 
 
 def test_what_is_left_before_the_deadline_underflows_to_zero():
     p = protocol(F(1))
     run = simulate(PAIR, p, [1, 2], sigma0=[1.0, 2.5e6])
-    assert run.reaching_z[1] == pytest.approx(2.5e6 / math.e, rel=1e-3)
-    assert (run.reaching_times[1], run.reaching_left[1]) == (1.0, 0.0)
+    assert run.sliding.reaching_z[1] == pytest.approx(2.5e6 / math.e, rel=1e-3)
+    assert (run.sliding.reaching_times[1], run.sliding.reaching_left[1]) == (1.0, 0.0)
     (found,) = certified_reaching_times(p, [F(2500000)])
     assert (found.time, found.remaining) == (1.0, 0.0)
-    assert float(found.z) == pytest.approx(run.reaching_z[1], rel=1e-11)
+    assert float(found.z) == pytest.approx(run.sliding.reaching_z[1], rel=1e-11)
 
 
 def test_below_one_the_worst_case_keeps_a_large_sliding_variable_until_the_deadline():
@@ -495,11 +495,11 @@ def test_the_bound_holds_along_simulated_runs():
         sigma0 = [F(1), F(-2), F(0), F(1, 3)]
         run = simulate(graph, p, [5, 2, -4, 3], sigma0=sigma0, disturbance=d)
         with np.errstate(divide="ignore"):
-            bound = sliding_bound(p, sigma0, -np.log(run.reaching_remaining))
-        assert (np.abs(run.sigma) <= bound + 1e-9).all()
+            bound = sliding_bound(p, sigma0, -np.log(run.sliding.reaching_remaining))
+        assert (np.abs(run.sliding.sigma) <= bound + 1e-9).all()
         assert (bound > 0).sum() > 100
         for k, r in enumerate(certified_reaching_times(p, sigma0)):
-            assert (run.sigma[k, run.t >= r.time] == 0).all()
+            assert (run.sliding.sigma[k, run.t >= r.time] == 0).all()
 
 
 # ---------------------------------------------------------------------- refusals

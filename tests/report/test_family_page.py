@@ -24,11 +24,13 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.io import as_family
 from ptcc_certify.report.family_screen import family_lines, family_summary, groups_text
 from ptcc_certify.report.page import report_html
-from ptcc_certify.report.plots.family import plot_family, plot_family_decay, sample_runs
-from ptcc_certify.report.plots.family_input import plot_family_input
+from ptcc_certify.report.plots.decay import plot_decay
+from ptcc_certify.report.plots.input import plot_input
+from ptcc_certify.report.plots.runs import sample_runs
+from ptcc_certify.report.plots.trajectory import plot_trajectory
 from ptcc_certify.report.report_file import write_report
 from ptcc_certify.report.statement import family_latex
-from ptcc_certify.simulation.family_run import simulate_family
+from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.signals import RandomSignal
 from ptcc_certify.theorems.family_behaviour import decide
 from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows
@@ -101,8 +103,8 @@ def test_ends_under_the_last_mode_stand_on_page_and_statement():
     assert "State at the deadline, all at one |x(T)|, for these signals" in page
     assert "& -- & $2$ & $[-1, 2]$" in statement and "U+2013" not in statement
     assert "(at least 0.2 of time between switches) more is proved: the last mode decides, bip" in statement
-    runs = [simulate_family(saved.family, PROTOCOL, [1, 2, 3], RandomSignal(1), times=[0, 0.5])]
-    axes = [plot_family(saved, runs=runs), plot_family_input(saved, runs=runs)]
+    runs = [simulate(saved.family, PROTOCOL, [1, 2, 3], RandomSignal(1), times=[0, 0.5])]
+    axes = [plot_trajectory(saved, runs=runs), plot_input(saved, runs=runs)]
     assert all("of any kind" in ax.get_legend().get_title().get_text() for ax in axes)
 
 
@@ -205,16 +207,16 @@ def test_under_a_dwell_time_the_page_shows_signals_that_keep_it(clock: str):
     saved = read_certificate(certify(SWITCHING, PROTOCOL, [1, 2, 3], signal=promise).to_dict())
     runs = sample_runs(saved)
     for run in runs:
-        instants = [x for x in run.switches.tolist() if math.isfinite(x)]
+        instants = [x for x in run.played.switches.tolist() if math.isfinite(x)]
         grid = np.linspace(0, 1, 200_000, endpoint=False)
         times = instants if clock == "s" else np.interp(instants, run.protocol.gain.clock(grid), grid).tolist()
         assert all(b - a >= 0.2999 for a, b in pairwise(times))
-    assert sum(len(run.switches) > 1 for run in runs) > 2
+    assert sum(len(run.played.switches) > 1 for run in runs) > 2
     page = words(report_html(saved, runs=runs))
     assert "8 runs from the initial state of the certificate under signals that keep the promise." in page
     assert f"under 8 signals, which keep the promise: at least 0.3 of {'time' if clock == 't' else 'the clock'}" in page
     assert "need not keep" not in page
-    for drawn in (plot_family(saved, runs=runs), plot_family_input(saved, runs=runs)):
+    for drawn in (plot_trajectory(saved, runs=runs), plot_input(saved, runs=runs)):
         assert drawn.get_legend().get_title().get_text() == "8 signals of the kind asked for"
 
 
@@ -224,7 +226,7 @@ def test_the_runs_of_a_family_are_under_signals_of_the_kind_that_was_asked(signa
     cert = certify(Family.switching([DAY, other]), PROTOCOL, [1, 2, 3], signal=signal)
     runs = sample_runs(cert)
     for run in runs:
-        switches = run.switches[np.isfinite(run.switches)]
+        switches = run.played.switches[np.isfinite(run.played.switches)]
         if signal == "constant":
             assert switches.tolist() == [0]
         elif isinstance(signal, ClockShares):
@@ -233,7 +235,7 @@ def test_the_runs_of_a_family_are_under_signals_of_the_kind_that_was_asked(signa
             assert lengths[: 2 * n : 2].sum() == pytest.approx(3 * lengths[1 : 2 * n : 2].sum())
         else:
             assert np.diff(switches) == pytest.approx(1)
-    assert "of the kind asked for" in plot_family(cert, runs=runs).get_legend().get_title().get_text()
+    assert "of the kind asked for" in plot_trajectory(cert, runs=runs).get_legend().get_title().get_text()
 
 
 def test_the_statement_defines_the_clock_and_what_windows_leave_less_of():
@@ -275,7 +277,7 @@ def test_the_bound_of_a_family_through_a_reaching_phase_is_called_numerical_ever
     assert ("Thick line: the proved bound for every signal" in outside) == proved != ("bound (numerical)" in outside)
     assert ("final state at most (numerical)" in page) == ("(Numerical, rounded up.)" in page) == (not proved)
     runs = sample_runs(made, [RandomSignal(1)])
-    for plot in (plot_family, plot_family_decay, plot_family_input):
+    for plot in (plot_trajectory, plot_decay, plot_input):
         labels = [text.get_text() for text in plot(made, runs=runs).figure.axes[0].get_legend().get_texts()]
         assert ("proved for every signal" in labels) == proved != ("bound for every signal (numerical)" in labels)
     assert all(("numerical" in " ".join(told(made, "f"))) != proved for told in (family_summary, family_lines))
@@ -309,6 +311,6 @@ def test_agents_that_listen_to_nobody_end_where_sliding_variables_bring_them(sig
     page, screen = words(report_html(read_certificate(made.to_dict()))), "\n".join(family_summary(made, "moved"))
     for text in (page, screen):
         assert ("a, b keep their value" in text) == made.direct != ("a, b end at x(0) - sigma(0)" in text)
-    run = simulate_family(moved, SLIDING, [0, 4, 100], RandomSignal(1), sigma0=sigma0)
+    run = simulate(moved, SLIDING, [0, 4, 100], RandomSignal(1), sigma0=sigma0)
     leaders = [run.labels.index(label) for label in "ab"]
     assert np.allclose(run.states[leaders, -1], [[0, 4, 100][v] - sigma0[v] for v in leaders])

@@ -11,11 +11,12 @@ from ptcc_certify.protocols import NominalProtocol
 from ptcc_certify.report.family_screen import family_lines
 from ptcc_certify.report.plots.agents import CAMP_STYLES
 from ptcc_certify.report.plots.counterexample import plot_counterexample
-from ptcc_certify.report.plots.family import plot_family, plot_family_decay, sample_runs
-from ptcc_certify.report.plots.family_graph import plot_family_graph
-from ptcc_certify.report.plots.family_input import plot_family_input
+from ptcc_certify.report.plots.decay import plot_decay
+from ptcc_certify.report.plots.graph import plot_graph
+from ptcc_certify.report.plots.input import plot_input
+from ptcc_certify.report.plots.runs import sample_runs
 from ptcc_certify.report.plots.trajectory import plot_trajectory
-from ptcc_certify.simulation.family_run import simulate_family
+from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.signals import RandomSignal, WorstCaseSignal
 from ptcc_certify.theorems.family_behaviour import decide
 
@@ -32,7 +33,7 @@ def drawn():
 
 def test_every_run_lies_within_what_is_shaded(drawn):
     certificate, runs = drawn
-    ax = plot_family(certificate, runs=runs)
+    ax = plot_trajectory(certificate, runs=runs)
     tubes = [shade.get_paths()[0] for shade in ax.collections]
     assert tubes
     for run in runs:
@@ -42,13 +43,13 @@ def test_every_run_lies_within_what_is_shaded(drawn):
 
 
 def test_the_bars_of_final_states_are_named(drawn):
-    names = [text.get_text() for text in plot_family(drawn[0], runs=drawn[1]).get_legend().get_texts()]
+    names = [text.get_text() for text in plot_trajectory(drawn[0], runs=drawn[1]).get_legend().get_texts()]
     assert names[-3:] == ["proved for every signal", "final states, proved", "deadline $T$"]
 
 
 def test_the_decay_of_every_run_lies_below_the_bound(drawn):
     certificate, runs = drawn
-    ax = plot_family_decay(certificate, runs=runs, axis="clock")
+    ax = plot_decay(certificate, runs=runs, axis="clock")
     lines = {line.get_label(): line for line in ax.lines}
     bound = lines["proved for every signal"].get_ydata()
     gaps = [line.get_ydata() for line in ax.lines if len(line.get_ydata()) == len(bound)]
@@ -58,12 +59,13 @@ def test_the_decay_of_every_run_lies_below_the_bound(drawn):
 
 def test_what_cannot_be_drawn_is_refused(drawn):
     certificate, _ = drawn
-    other = simulate_family(DAY, PROTOCOL, [1, 4, -3], times=[0, 1])
+    other = simulate(DAY, PROTOCOL, [1, 4, -3], times=[0, 1])
     for call, told in (
-        (lambda: plot_family(other), "certificate of a family"),
-        (lambda: plot_family(certificate, runs=[other]), "of the certificate"),
-        (lambda: plot_family_decay(certificate, axis="up"), "is unknown"),
-        (lambda: plot_family(certify_family(DAY, PROTOCOL)), "no initial state"),
+        (lambda: plot_trajectory(other, runs=[other]), "certificate of a family"),
+        (lambda: plot_trajectory(DAY), "of their certificates"),
+        (lambda: plot_trajectory(certificate, runs=[other]), "of the certificate"),
+        (lambda: plot_decay(certificate, axis="up"), "is unknown"),
+        (lambda: plot_trajectory(certify_family(DAY, PROTOCOL)), "no initial state"),
     ):
         with pytest.raises(ParameterError, match=told):
             call()
@@ -71,7 +73,7 @@ def test_what_cannot_be_drawn_is_refused(drawn):
 
 def test_the_input_of_every_run_lies_below_its_bound(drawn):
     certificate, runs = drawn
-    ax = plot_family_input(certificate, runs=runs)
+    ax = plot_input(certificate, runs=runs)
     lines = {line.get_label(): line for line in ax.lines}
     bound = lines["proved for every signal"]
     for line in ax.lines:
@@ -87,21 +89,21 @@ def test_no_agent_has_a_role_that_it_has_in_one_mode_alone():
     for other, names in ((night, {"first camp", "second camp"}), (spoiled, {"agents"})):
         family = Family.switching([day, other])
         for ax in (
-            plot_trajectory(simulate_family(family, PROTOCOL, [1, 4, -3], RandomSignal(1), times=[0, 0.5])),
-            plot_family_graph(family),
+            plot_trajectory(simulate(family, PROTOCOL, [1, 4, -3], RandomSignal(1), times=[0, 0.5])),
+            plot_graph(family),
         ):
             assert {t.get_text() for t in ax.get_legend().get_texts()} & set(CAMP_STYLES) == names
 
 
 def test_modes_are_drawn_side_by_side_with_nodes_in_the_same_places():
-    ax = plot_family_graph(Family.switching({"day": DAY, "night": NIGHT}))
+    ax = plot_graph(Family.switching({"day": DAY, "night": NIGHT}))
     titles = [panel.get_title() for panel in ax.child_axes]
     places = [[text.get_position() for text in panel.texts if text.get_text() in "abc"] for panel in ax.child_axes]
     assert titles == ["day", "night"] and places[0] == places[1]
 
 
 def test_ranges_of_uncertain_weights_are_written_at_their_edges_and_edges_that_may_fail_are_named():
-    ax = plot_family_graph(Family.from_intervals([("a", "b", -2, -1), ("b", "c", 0, 3), ("c", "a", -1, 1)]))
+    ax = plot_graph(Family.from_intervals([("a", "b", -2, -1), ("b", "c", 0, 3), ("c", "a", -1, 1)]))
     assert {"1\N{EN DASH}2", "0\N{EN DASH}3"} <= {text.get_text() for text in ax.texts}
     assert {"uncertain weight", "may fail"} <= {text.get_text() for text in ax.get_legend().get_texts()}
 
@@ -111,7 +113,7 @@ def test_graphs_of_all_sizes_are_drawn(n):
     edges = [(k, (k + 1) % n, 0, 1 + k % 2) for k in range(n)] if n > 1 else []
     mode = Family.from_intervals(edges, nodes=range(n))
     for family in (mode, Family.switching([mode] * 8)):
-        plot_family_graph(family).figure.canvas.draw()
+        plot_graph(family).figure.canvas.draw()
 
 
 DECIDED = {
@@ -151,10 +153,10 @@ def test_a_behaviour_that_holds_has_no_counterexample():
 def test_states_are_drawn_where_no_limit_is_claimed():
     certificate = certify_family(DECIDED["edge"], PROTOCOL, [1, 2, 3])
     runs = sample_runs(certificate, [RandomSignal(1)])
-    assert not plot_family(certificate, runs=runs).collections
-    plot_family_input(certificate, runs=runs)
+    assert not plot_trajectory(certificate, runs=runs).collections
+    plot_input(certificate, runs=runs)
     with pytest.raises(ParameterError, match="no proved bound"):
-        plot_family_decay(certificate, runs=runs)
+        plot_decay(certificate, runs=runs)
 
 
 def test_states_come_first_where_no_bound_of_a_decay_is_proved():
@@ -177,6 +179,6 @@ def test_a_certificate_draws_its_figures_by_name(drawn):
 
 def test_the_certified_peak_has_the_digits_of_the_screen(drawn):
     certificate, runs = drawn
-    peak = plot_family_input(certificate, runs=runs).texts[0].get_text().removeprefix("certified peak ")
+    peak = plot_input(certificate, runs=runs).texts[0].get_text().removeprefix("certified peak ")
     assert f"|u_k| <= {peak}, " in "\n".join(family_lines(certificate, "day"))
     assert len(peak.replace(".", "").lstrip("0")) == 4

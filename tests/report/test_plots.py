@@ -33,6 +33,7 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import EXAMPLES, load_graph, select
 from ptcc_certify.gain_design.search import design
 from ptcc_certify.graphs.digraph import SignedDigraph, Weights
+from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.size_limits import LABELLED_NODES
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.protocols.gain_limits import GainLimits
@@ -45,16 +46,16 @@ from ptcc_certify.report.page import report_html
 from ptcc_certify.report.plots.agents import CAMP_STYLES, NAME_SIZE, NAMED_AGENTS, NAMED_OF_PART
 from ptcc_certify.report.plots.decay import plot_decay
 from ptcc_certify.report.plots.distributions import plot_final_states
-from ptcc_certify.report.plots.graph import GROUND, plot_graph
-from ptcc_certify.report.plots.graph_layout import FREE_NODES, arc, arrows_of
+from ptcc_certify.report.plots.graph import GROUND, plot_graph, weight_ranges
+from ptcc_certify.report.plots.graph_layout import FREE_NODES, arc
 from ptcc_certify.report.plots.input import plot_effort, plot_input
-from ptcc_certify.report.plots.late import plot_late, plot_tracking
 from ptcc_certify.report.plots.spectrum import CLASS_MARKERS, plot_frontier, plot_spectrum
 from ptcc_certify.report.plots.style import DOUBLE_COLUMN, EDGE_STYLES, SINGLE_COLUMN, STYLE, save_figure
+from ptcc_certify.report.plots.tracking import plot_tracking
 from ptcc_certify.report.plots.trade_off import plot_trade_off
 from ptcc_certify.report.plots.trajectory import plot_run, plot_sliding, plot_trajectory
+from ptcc_certify.simulation.nominal import Bounded
 from ptcc_certify.simulation.run import simulate
-from ptcc_certify.simulation.trajectory import SlidingTrajectory
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
 
 pytestmark = pytest.mark.filterwarnings(
@@ -193,7 +194,7 @@ def test_the_peak_is_drawn_where_it_holds_only() -> None:
         ({"actuator": capped}, own),
         ({"actuator": GainLimits(gain_cap=50)}, peak),
         ({"actuator": GainLimits(sample_period="0.01", stop_before="0.05")}, None),
-        ({"disturbance": "sin(k*t)", "delta": 1, "actuator": capped}, None),
+        ({"disturbance": Bounded("sin(k*t)", 1), "actuator": capped}, None),
     ]
     assert 0 < own < peak
     for options, height in expected:
@@ -318,10 +319,10 @@ def test_the_input_of_the_sliding_mode() -> None:
     peak = cert.effort and cert.effort.peak
     assert (peak_of(ax) is not None) == (peak is not None)
     run = cert.trajectory
-    assert isinstance(run, SlidingTrajectory)
+    assert run.sliding is not None
     late = run.t > float(run.protocol.T)  # there the input answers the disturbance alone
     answers = {line.get_ydata()[late].round(6).tobytes() for line in agent_lines(ax)}
-    assert answers == {row.round(6).tobytes() for row in np.abs(run.disturbance[:, late])}
+    assert answers == {row.round(6).tobytes() for row in np.abs(run.sliding.disturbance[:, late])}
     other = certify(graph, example.protocol(), start, sigma0=[1.0] * 6, simulation=False)
     with pytest.raises(ValueError, match=r"another sigma\(0\) than"):
         plot_input(cert.trajectory, certificate=other)
@@ -371,7 +372,8 @@ def test_graphs_have_a_node_for_every_agent_and_an_arrow_for_every_edge(name: st
         assert all((line.get_markeredgecolor() == "black") == (camp != "followers") for line in own)
     heads = [patch.get_arrowstyle() for patch in arrows_in(ax)]
     assert sum(1 + (type(head).__name__ == "CurveFilledAB") for head in heads) == graph.n_edges
-    for patch, arrow in zip(arrows_in(ax), arrows_of(graph), strict=True):
+    arrows = [edge.arrow for edge in weight_ranges(Family.from_graph(graph).modes[0])]
+    for patch, arrow in zip(arrows_in(ax), arrows, strict=True):
         colour, line, _ = EDGE_STYLES[arrow.sign]
         assert same_color(patch.get_edgecolor(), colour) and patch.get_linestyle() == line
     signs = {EDGE_STYLES[int(sign)][2] for sign in graph.sign}
@@ -746,7 +748,7 @@ def gallery() -> dict[str, Figure]:
     figures["pair plot_trade_off"] = plot_trade_off(pair).figure
     for name, asked in MOVING.items():
         cert = certify(CHAIN, NominalProtocol(1, 1, 2, 1), [1, 3, -2, 4], method="perron", simulation=False, **asked)
-        plot = plot_late if "messages" in asked else plot_tracking
+        plot = plot_tracking
         figures[f"{name} {plot.__name__}"] = plot(cert, time_unit="s").figure
     for figure in figures.values():
         FigureCanvasAgg(figure).draw()
@@ -815,7 +817,7 @@ def test_every_figure_names_the_unit_of_time() -> None:
 
 def test_every_figure_has_one_signature() -> None:
     names = [name for name in ptcc_certify.__all__ if name.startswith("plot_")]
-    assert len(names) == 16
+    assert len(names) == 13
     for name in names:
         subject, *keywords = inspect.signature(getattr(ptcc_certify, name)).parameters.values()
         assert subject.name == "subject" and subject.default is inspect.Parameter.empty
@@ -829,8 +831,8 @@ def test_a_subject_that_leads_to_no_figure_is_refused_with_the_mend() -> None:
     with pytest.raises(ParameterError, match="drawn from a certificate, not from SignedDigraph; give certify"):
         plot_frontier(graph_of("fig1a"))
     with pytest.raises(ParameterError, match="drawn from a certificate, not from str; give certify"):
-        plot_late("fig1a")
-    with pytest.raises(ParameterError, match="says nothing of moving leaders; certify with leaders"):
+        plot_tracking("fig1a")
+    with pytest.raises(ParameterError, match="says nothing of late messages or of leaders that move"):
         plot_tracking(certified("fig1a"))
     with pytest.raises(ParameterError, match="no sliding variables; simulate under the sliding-mode protocol"):
         plot_sliding(certified("fig1a"))

@@ -21,7 +21,7 @@ from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.disturbance import SampledDisturbance
 from ptcc_certify.protocols.gain import Gain
 from ptcc_certify.protocols.gain_limits import GainLimits, LimitedGain
-from ptcc_certify.simulation.nominal import as_forcing
+from ptcc_certify.simulation.nominal import Bounded, as_forcing
 from ptcc_certify.simulation.run import simulate
 
 PROTOCOL = NominalProtocol("0.6", "0.1", "0.3", 1)
@@ -161,7 +161,7 @@ def test_the_input_is_the_effective_one_and_the_run_names_its_actuator():
     actuator = GainLimits(gain_cap=20, stop_before="0.01")
     run = simulate(TRIO, PROTOCOL, X0, actuator=actuator, times=[0, "0.3", "0.588", "0.59", "0.6", 1])
     np.testing.assert_allclose(run.input, np.array([0.6, 1.1, 20, 0, 0, 0]) * run.error, rtol=1e-12)
-    assert run.actuator == actuator
+    assert run.conditions.actuator == actuator
     assert "GainLimits(gain_cap=20, stop_before=1/100)" in repr(run)
     assert not run.deadline_resolved
     np.testing.assert_array_equal(run.states[:, 3:], run.states[:, [3]] * [1, 1, 1])
@@ -191,7 +191,7 @@ def test_a_proved_envelope_holds_on_the_clock_that_acts(limits):
 def test_an_ideal_actuator_changes_nothing():
     ideal, run = simulate(TRIO, PROTOCOL, X0, actuator=GainLimits()), simulate(TRIO, PROTOCOL, X0)
     np.testing.assert_array_equal(ideal.states, run.states)
-    assert ideal.actuator is None and "GainLimits" not in repr(ideal)
+    assert ideal.conditions.actuator is None and "GainLimits" not in repr(ideal)
 
 
 # ---------------------------------------------------------------------- sampled runs
@@ -317,7 +317,7 @@ K = np.arange(1, 4)
     ],
 )
 def test_a_disturbed_run_is_that_of_another_integrator(text, delta, function):
-    run = simulate(TRIO, PROTOCOL, X0, disturbance=text, delta=delta, times=UP_TO)
+    run = simulate(TRIO, PROTOCOL, X0, disturbance=Bounded(text, delta), times=UP_TO)
     expected = reference(TRIO, X0, UP_TO, plain_gain, function, nothing)
     assert np.abs(run.states - expected).max() < 1e-8
     np.testing.assert_allclose(run.clock, GAIN.clock_at_remaining(run.remaining))
@@ -327,9 +327,9 @@ def test_a_disturbed_run_is_that_of_another_integrator(text, delta, function):
 @pytest.mark.parametrize("limits", LIMITS, ids=str)
 @pytest.mark.parametrize("noisy", [False, True])
 def test_a_disturbed_and_noisy_run_behind_limits_is_that_of_another_integrator(limits, noisy):
-    more = {"noise": "0.1*cos(20*t + k)", "noise_bound": "0.1"} if noisy else {}
+    more = {"noise": Bounded("0.1*cos(20*t + k)", "0.1")} if noisy else {}
     run = simulate(
-        TRIO, PROTOCOL, X0, actuator=GainLimits(**limits), disturbance="sin(9*k*t)", delta=1, times=PAST, **more
+        TRIO, PROTOCOL, X0, actuator=GainLimits(**limits), disturbance=Bounded("sin(9*k*t)", 1), times=PAST, **more
     )
     cap, stop = (float(limits[name]) if name in limits else None for name in ("gain_cap", "stop_before"))
     cuts = [0.6, 0.6 - (stop or 0)] + ([0.6 - 0.3 / (cap - 0.1)] if cap and cap > 0.1 else [])
@@ -350,7 +350,7 @@ def test_jumping_signals_are_met_at_their_jumps():
     rng = np.random.default_rng(8)
     d, n = (SampledDisturbance(times, rng.uniform(-1, 1, (3, 6)), hold=hold) for hold in (True, False))
     run = simulate(
-        TRIO, PROTOCOL, X0, actuator=GainLimits(9), disturbance=d, delta=1, noise=n, noise_bound=1, times=PAST
+        TRIO, PROTOCOL, X0, actuator=GainLimits(9), disturbance=Bounded(d, 1), noise=Bounded(n, 1), times=PAST
     )
     expected = reference(
         TRIO,
@@ -368,16 +368,16 @@ def test_jumping_signals_are_met_at_their_jumps():
 def test_noise_moves_agents_as_long_as_the_gain_acts(limits: GainLimits):
     """Long after a disturbance has ceased to matter: the states follow the noise, ``x -> Q (x + n) - n``."""
     times = [0, 0.5, 1 - 1e-6, 1]
-    run = simulate(TRIO, PROTOCOL, X0, actuator=limits, noise="10*(k-2)", noise_bound=10, times=times)
+    run = simulate(TRIO, PROTOCOL, X0, actuator=limits, noise=Bounded("10*(k-2)", 10), times=times)
     n = np.array([-10.0, 0.0, 10.0])
     modes = expm(-40 * TRIO.laplacian().toarray())  # of an unbalanced graph nothing remains
     assert run.states[:, -1] == pytest.approx(modes @ (X0 + n) - n, abs=5e-3)
 
 
 def test_telegraph_signals_of_disturbance_and_noise_differ():
-    forcing = as_forcing(TRIO, PROTOCOL.T, "telegraph", 1, "telegraph", "0.1", 1.0)
+    forcing = as_forcing(TRIO, PROTOCOL.T, Bounded("telegraph", 1), Bounded("telegraph", "0.1"), 1.0)
     assert not set(forcing.disturbance.breaks(1.0)) & set(forcing.noise.breaks(1.0))
-    options = {"disturbance": forcing.disturbance, "delta": 1, "noise": forcing.noise, "noise_bound": "0.1"}
+    options = {"disturbance": Bounded(forcing.disturbance, 1), "noise": Bounded(forcing.noise, "0.1")}
     run = simulate(TRIO, PROTOCOL, X0, actuator=GainLimits(9), times=UP_TO, **options)
     expected = reference(
         TRIO,
@@ -394,7 +394,7 @@ def test_telegraph_signals_of_disturbance_and_noise_differ():
 def test_a_disturbed_run_reaches_the_deadline_and_goes_on(times):
     """One agent hears nobody and drifts by d; the other follows it and is there at T."""
     graph, protocol = SignedDigraph.from_edges([("a", "b", 1)]), NominalProtocol("0.6", 1, 3, 1)
-    run = simulate(graph, protocol, [0, 1], disturbance=["0.5", "0"], delta="0.5", times=times)
+    run = simulate(graph, protocol, [0, 1], disturbance=Bounded(["0.5", "0"], "0.5"), times=times)
     np.testing.assert_allclose(run.states[0], run.t / 2, atol=1e-8)
     assert run.deadline_resolved
     if run.deadline_index is not None:
@@ -403,12 +403,12 @@ def test_a_disturbed_run_reaches_the_deadline_and_goes_on(times):
 
 def test_the_deadline_is_reached_continuously_under_a_disturbance():
     run = simulate(
-        TRIO, NominalProtocol("0.6", "0.1", 3, 1), X0, disturbance="0.2*sin(9*k*t)", delta=1, remaining=1e-12
+        TRIO, NominalProtocol("0.6", "0.1", 3, 1), X0, disturbance=Bounded("0.2*sin(9*k*t)", 1), remaining=1e-12
     )
     i = run.deadline_index
     assert np.abs(run.states[:, i] - run.states[:, i - 1]).max() < 1e-9
     fine = simulate(
-        TRIO, run.protocol, X0, disturbance="0.2*sin(9*k*t)", delta=1, times=[Fraction("0.6") - Fraction(1, 10**25)]
+        TRIO, run.protocol, X0, disturbance=Bounded("0.2*sin(9*k*t)", 1), times=[Fraction("0.6") - Fraction(1, 10**25)]
     )
     assert np.abs(fine.states[:, 0] - run.final_state).max() < 1e-9
 
@@ -416,7 +416,7 @@ def test_the_deadline_is_reached_continuously_under_a_disturbance():
 def test_a_large_disturbed_graph_and_its_columns():
     rng = np.random.default_rng(5)
     graph, start = random_graph(rng, 250), rng.normal(size=(250, 2))
-    run = simulate(graph, PROTOCOL, start, disturbance="sin(k*t)", delta=1, times=["0.3", "0.59"])
+    run = simulate(graph, PROTOCOL, start, disturbance=Bounded("sin(k*t)", 1), times=["0.3", "0.59"])
     times, numbers = np.array([0, 0.3, 0.59]), np.arange(1, 251)
     for column in range(2):
         expected = reference(graph, start[:, column], times, plain_gain, lambda t: np.sin(numbers * t), nothing)
@@ -424,12 +424,12 @@ def test_a_large_disturbed_graph_and_its_columns():
 
 
 def test_a_disturbance_moves_a_start_at_rest_and_the_baseline():
-    run = simulate(TRIO, NominalProtocol(1, 1, 0, 1), [0, 0, 0], disturbance=1e-9, delta="1e-9", times=[0, "0.5", 2])
-    lone = simulate(SignedDigraph.from_edges([], ["a"]), PROTOCOL, [0], disturbance="cos(t)", delta=1, times=[0, 3])
+    run = simulate(TRIO, NominalProtocol(1, 1, 0, 1), [0, 0, 0], disturbance=Bounded(1e-9, "1e-9"), times=[0, "0.5", 2])
+    lone = simulate(SignedDigraph.from_edges([], ["a"]), PROTOCOL, [0], disturbance=Bounded("cos(t)", 1), times=[0, 3])
     assert 0 < np.abs(run.states[:, 2]).max() <= 2e-9 * (1 + 1e-9)
     assert run.deadline_index is None and "no deadline" in repr(run)
     assert lone.states[0, 1] == pytest.approx(math.sin(3), abs=1e-8)
-    assert simulate(TRIO, NominalProtocol(1, 1, 0, 1), X0, noise="0.1", noise_bound="0.1").states.shape[0] == 3
+    assert simulate(TRIO, NominalProtocol(1, 1, 0, 1), X0, noise=Bounded("0.1", "0.1")).states.shape[0] == 3
 
 
 # ---------------------------------------------------------------------- refusals
@@ -465,24 +465,22 @@ CAP, SAMPLED = GainLimits(gain_cap=9), GainLimits(sample_period="0.1")
     ("options", "words"),
     [
         ({"disturbance": "t"}, "delta"),
-        ({"delta": 1}, "delta is the bound of a disturbance"),
-        ({"disturbance": "2*t", "delta": 1}, "beyond delta"),
-        ({"disturbance": "t", "delta": -1}, "delta = -1"),
-        ({"disturbance": "t", "delta": float("nan")}, "delta"),
-        ({"disturbance": "worst-case", "delta": 1}, "sliding variables"),
-        ({"disturbance": lambda t, x, s: x, "delta": 1}, "states"),
-        ({"disturbance": ["0"] * 2, "delta": 1}, "2 disturbances for 3 agents"),
-        ({"noise": "t", "actuator": CAP}, "noise_bound"),
-        ({"noise_bound": 1, "actuator": CAP}, "noise_bound is the bound of a noise"),
-        ({"noise": "2*t", "noise_bound": 1, "actuator": CAP}, "beyond"),
-        ({"noise": "t", "noise_bound": 1}, "infinite.*gain cap or stop"),
-        ({"noise": "t", "noise_bound": 1, "actuator": SAMPLED}, "sample period"),
-        ({"disturbance": "t", "delta": 1, "actuator": SAMPLED}, "sample period"),
+        ({"disturbance": Bounded("2*t", 1)}, "beyond delta"),
+        ({"disturbance": Bounded("t", -1)}, "delta = -1"),
+        ({"disturbance": Bounded("t", float("nan"))}, "delta"),
+        ({"disturbance": Bounded("worst-case", 1)}, "sliding variables"),
+        ({"disturbance": Bounded(lambda t, x, s: x, 1)}, "states"),
+        ({"disturbance": Bounded(["0"] * 2, 1)}, "2 disturbances for 3 agents"),
+        ({"noise": "t", "actuator": CAP}, "noise needs a bound"),
+        ({"noise": Bounded("2*t", 1), "actuator": CAP}, "beyond"),
+        ({"noise": Bounded("t", 1)}, "infinite.*gain cap or stop"),
+        ({"noise": Bounded("t", 1), "actuator": SAMPLED}, "sample period"),
+        ({"disturbance": Bounded("t", 1), "actuator": SAMPLED}, "sample period"),
         ({"actuator": GainLimits(sample_period="1e-7")}, "more than 1,000,000 periods"),
         ({"actuator": CAP, "sigma0": [0, 0, 0]}, "sliding-mode"),
         ({"actuator": CAP, "boundary_layer": 0.1}, "sliding-mode"),
         (
-            {"disturbance": SampledDisturbance(np.linspace(0, 0.5, 10_002), np.zeros(10_002)), "delta": 1},
+            {"disturbance": Bounded(SampledDisturbance(np.linspace(0, 0.5, 10_002), np.zeros(10_002)), 1)},
             "10,000 samples",
         ),
     ],
@@ -493,7 +491,7 @@ def test_what_cannot_be_simulated_is_refused_in_one_line(options, words):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("options", [{"actuator": CAP}, {"delta": 1}, {"noise": 0}, {"noise_bound": 0}])
+@pytest.mark.parametrize("options", [{"actuator": CAP}, {"noise": Bounded(0, 0)}])
 def test_the_sliding_mode_takes_no_actuator(options):
     protocol = SlidingModeProtocol(1, 1, 1, 1, 2, 2, 1, 1, 1)
     with pytest.raises(ParameterError, match=f"{next(iter(options))} belongs to the nominal protocol"):

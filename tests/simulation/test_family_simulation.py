@@ -13,8 +13,9 @@ from ptcc_certify.errors import FormatError, ParameterError, SimulationError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.protocols import NominalProtocol
-from ptcc_certify.simulation.family_members import Members
-from ptcc_certify.simulation.family_run import simulate_family
+from ptcc_certify.protocols.gain_limits import GainLimits
+from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.simulation.members import Members
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.signals import (
     ConstantSignal,
@@ -56,12 +57,12 @@ def signals(family):
 def test_a_run_is_a_product_of_exponentials_of_its_members(family):
     members, x0 = Members(family), np.random.default_rng(0).normal(size=family.n_nodes)
     for signal in signals(family):
-        run = simulate_family(family, PROTOCOL, x0, signal, samples=7)
+        run = simulate(family, PROTOCOL, x0, signal, samples=7)
         x, last = x0, float(run.clock[np.isfinite(run.clock)][-1])
-        ends = np.append(run.switches[1:], np.inf)
+        ends = np.append(run.played.switches[1:], np.inf)
         product, at = [], 0.0
         for s in run.clock[np.isfinite(run.clock)].tolist():
-            for choice, begin, end in zip(run.choices, run.switches.tolist(), ends.tolist(), strict=True):
+            for choice, begin, end in zip(run.played.choices, run.played.switches.tolist(), ends.tolist(), strict=True):
                 span = min(end, s) - max(begin, at)
                 if span > 0:
                     x = expm(-members.laplacian(choice).toarray() * span) @ x
@@ -73,8 +74,8 @@ def test_a_run_is_a_product_of_exponentials_of_its_members(family):
 
 def test_a_family_of_one_graph_runs_like_the_graph():
     one, x0 = Family.from_graph(DAY), [3, -1, 2]
-    run, known = simulate_family(one, PROTOCOL, x0, ConstantSignal()), simulate(DAY, PROTOCOL, x0)
-    assert simulate_family(DAY, PROTOCOL, x0) == simulate_family(one, PROTOCOL, x0)
+    run, known = simulate(one, PROTOCOL, x0, ConstantSignal()), simulate(DAY, PROTOCOL, x0)
+    assert simulate(DAY, PROTOCOL, x0) == simulate(one, PROTOCOL, x0)
     assert np.abs(run.states - known.states).max() < 1e-8
     assert run.deadline_resolved
     shown = run.remaining > 1e-4
@@ -86,9 +87,9 @@ def test_weights_lie_in_their_intervals_and_tied_ones_are_equal_and_pairs_of_sig
     for tied in (False, True):
         family = Family.from_intervals(rows, undirected=tied)
         members, mode = Members(family), family.modes[0]
-        run = simulate_family(family, PROTOCOL, [1, -2, 4], RandomSignal(4), times=[0, "9/5"])
-        assert len({choice.levels for choice in run.choices}) > 20
-        for choice in run.choices:
+        run = simulate(family, PROTOCOL, [1, -2, 4], RandomSignal(4), times=[0, "9/5"])
+        assert len({choice.levels for choice in run.played.choices}) > 20
+        for choice in run.played.choices:
             sizes = members.arrays[0].sizes(choice.levels)
             assert (sizes >= mode.lower.as_float()).all()
             assert (sizes <= mode.upper.as_float()).all()
@@ -124,29 +125,29 @@ def test_a_table_in_time_acts_at_its_instants_and_beyond_the_deadline():
     stable, free = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", -1)]), SignedDigraph.from_edges([], nodes="ab")
     family = Family.switching({"free": free, "stable": stable})
     table = TableSignal.read(StringIO("t,mode\n0,free\n3,stable\n"))
-    run = simulate_family(family, PROTOCOL, [1, 2], table, times=[0, 1, 2, 3, 5])
+    run = simulate(family, PROTOCOL, [1, 2], table, times=[0, 1, 2, 3, 5])
     A = stable.laplacian().toarray()
     assert np.array_equal(run.states[:, 3], [1, 2])
     assert np.abs(run.states[:, 4] - expm(-A * 0.5 * 2) @ [1, 2]).max() < 1e-8  # rho1 = 1/2
-    run = simulate_family(family, PROTOCOL, [1, 2], [(0, "free"), (1, "2")], times=[0, 1, "3/2"])
+    run = simulate(family, PROTOCOL, [1, 2], [(0, "free"), (1, "2")], times=[0, 1, "3/2"])
     span = float(PROTOCOL.gain.clock(1.5) - PROTOCOL.gain.clock(1))
     assert np.abs(run.states[:, 2] - expm(-A * span) @ [1, 2]).max() < 1e-8
 
 
 def test_the_clock_is_shared_among_the_modes():
-    run = simulate_family(PAIR, PROTOCOL, [1, 2, 3], RandomSignal(9), samples=9)
+    run = simulate(PAIR, PROTOCOL, [1, 2, 3], RandomSignal(9), samples=9)
     finite = np.isfinite(run.clock)
-    assert np.abs(run.clock_of_modes().sum(axis=0)[finite] - run.clock[finite]).max() < 1e-9
+    assert np.abs(run.played.clock_of_modes(run.clock).sum(axis=0)[finite] - run.clock[finite]).max() < 1e-9
 
 
 def test_the_table_of_a_run_tells_the_mode():
-    text = simulate_family(PAIR, PROTOCOL, [1, 2, 3], PeriodicSignal([("night", 1), ("day", 1)]), times=[0, 1]).to_csv()
+    text = simulate(PAIR, PROTOCOL, [1, 2, 3], PeriodicSignal([("night", 1), ("day", 1)]), times=[0, 1]).to_csv()
     assert text.splitlines()[0] == "t,remaining,a,b,c,mode,u(a),u(b),u(c)"
     assert float(text.splitlines()[1].split(",")[5]) == 2
 
 
 def test_equal_seeds_give_equal_runs_and_others_do_not():
-    runs = [simulate_family(PAIR, PROTOCOL, [1, 2, 3], RandomSignal(seed), times=[0, 1]).states for seed in (1, 1, 2)]
+    runs = [simulate(PAIR, PROTOCOL, [1, 2, 3], RandomSignal(seed), times=[0, 1]).states for seed in (1, 1, 2)]
     assert np.array_equal(runs[0], runs[1])
     assert not np.array_equal(runs[0], runs[2])
 
@@ -155,19 +156,22 @@ def test_equal_seeds_give_equal_runs_and_others_do_not():
 def test_random_members_act_longer_once_all_agents_rest(size):
     """At weights of 10^4 the clock of a run holds more stretches of the agents' own time than any run may have."""
     family = Family.from_intervals([("a", "b", size, 2 * size), ("b", "c", -2 * size, -size), ("c", "a", size, size)])
-    run = simulate_family(family, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2, 3], RandomSignal(1))
-    assert run.deadline_resolved and len(run.choices) < 500
-    before = np.searchsorted(run.switches, 5 / size)
+    run = simulate(family, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2, 3], RandomSignal(1))
+    assert run.deadline_resolved and len(run.played.choices) < 500
+    before = np.searchsorted(run.played.switches, 5 / size)
     assert before > 3 and np.abs(run.final_state).max() < 1e-9
 
 
 @pytest.mark.parametrize(
     ("call", "told"),
     [
-        (lambda: simulate_family(PAIR, PROTOCOL.T, [1, 2, 3]), "rotocol"),
-        (lambda: simulate_family(PAIR, PROTOCOL, [1, 2, 3], "dusk.csv"), "one of random, worst-case"),
-        (lambda: simulate_family(PAIR, PROTOCOL, [1, 2, 3], [(0, "dusk")]), "no mode dusk; it has day, night"),
-        (lambda: simulate_family(PAIR, PROTOCOL, np.ones((3, 2))), "one initial state at a time"),
+        (lambda: simulate(PAIR, PROTOCOL.T, [1, 2, 3]), "rotocol"),
+        (lambda: simulate(PAIR, PROTOCOL, [1, 2, 3], "dusk.csv"), "one of random, worst-case"),
+        (lambda: simulate(PAIR, PROTOCOL, [1, 2, 3], [(0, "dusk")]), "no mode dusk; it has day, night"),
+        (lambda: simulate(PAIR, PROTOCOL, [1, 2, 3], actuator=GainLimits(gain_cap=9)), "actuator is not simulated of"),
+        (lambda: simulate(DAY, PROTOCOL, [1, 2, 3], ("fresh", 1, 2), messages=LateMessages(delay="0.1")), "pattern"),
+        (lambda: simulate(DAY, PROTOCOL, [1, 2, 3], sampels=9), "no parameter sampels; did you mean samples"),
+        (lambda: simulate(PAIR, PROTOCOL, np.ones((3, 2))), "one initial state at a time"),
         (lambda: TableSignal([(1, "day")]), "ascend from 0, and it begins at 1"),
         (lambda: TableSignal([(0, 0), (0, 1)]), "0 follows 0"),
         (lambda: PeriodicSignal([]), "a list of"),
@@ -197,17 +201,17 @@ def test_bad_tables_are_refused_by_line():
 
 
 def test_a_signal_that_switches_too_often_is_refused_in_time(monkeypatch):
-    monkeypatch.setattr("ptcc_certify.simulation.family_run.MOST_STRETCHES", 50)
+    monkeypatch.setattr("ptcc_certify.simulation.course.MOST_STRETCHES", 50)
     with pytest.raises(SimulationError, match="let each member act longer"):
-        simulate_family(PAIR, PROTOCOL, [1, 2, 3], RandomSignal(dwell=1e-3))
+        simulate(PAIR, PROTOCOL, [1, 2, 3], RandomSignal(dwell=1e-3))
 
 
 def test_where_no_limit_exists_a_run_does_not_claim_to_have_settled():
     plus = SignedDigraph.from_edges([("a", "c", 1)], nodes="abc")
     minus = SignedDigraph.from_edges([("b", "c", 1)], nodes="abc")
-    run = simulate_family(Family.switching([plus, minus]), PROTOCOL, [1, -1, 0], PeriodicSignal([(0, 0.2), (1, 0.2)]))
+    run = simulate(Family.switching([plus, minus]), PROTOCOL, [1, -1, 0], PeriodicSignal([(0, 0.2), (1, 0.2)]))
     assert not run.deadline_resolved
     assert np.array_equal(run.final_state[:2], [1, -1])
-    last = simulate_family(Family.switching([plus, minus]), PROTOCOL, [1, -1, 0], [(0, 0), (1, 1)])
+    last = simulate(Family.switching([plus, minus]), PROTOCOL, [1, -1, 0], [(0, 0), (1, 1)])
     assert last.deadline_resolved  # the second graph stays
     assert np.abs(last.final_state - [1, -1, -1]).max() < 1e-9

@@ -195,6 +195,12 @@ def test_a_deadline_that_cannot_be_resolved_is_said_to_be_so():
     assert "NOT settled" in repr(run)
 
 
+def test_weights_as_small_as_floats_go_settle_on_the_clock():
+    graph = SignedDigraph.from_edges([("a", "b", "1e-300"), ("b", "a", "3e-300")])
+    run = simulate(graph, EXAMPLE_1, [1, 5])
+    assert run.deadline_resolved and spread(run.final_state, [4, 4]) < 1e-9
+
+
 def test_the_asymptotic_baseline_runs_on_the_plain_clock_without_a_deadline():
     graph = example("fig1b")
     run = simulate(graph, NominalProtocol("0.6", "0.1", 0, 1), X0)

@@ -22,6 +22,7 @@ from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.protocols import SlidingModeProtocol
 from ptcc_certify.protocols.disturbance import SampledDisturbance, StateDependent, telegraph_noise
 from ptcc_certify.protocols.reaching_time import certified_reaching_times
+from ptcc_certify.simulation.nominal import Bounded
 from ptcc_certify.simulation.run import simulate
 
 F = Fraction
@@ -146,7 +147,7 @@ def campaign(cases, steps, rng):
         times = [p.T_r * F(i, MARKS) for i in range(1, MARKS + 1)]
         times += [p.T_r + p.T_s * F(i, 2 * MARKS) for i in range(1, MARKS + 1)]
         run = simulate(graph, p, x0, sigma0=sigma0, disturbance=ours, times=times)
-        exact = np.stack([run.states, run.sigma])
+        exact = np.stack([run.states, run.sliding.sigma])
         found = [implicit_euler(graph, p, x0, sigma0, theirs, count, MARKS) for count in steps]
         errors = [np.abs(values - exact).max() for values in found]
         extrapolated = np.abs(2 * found[-1] - found[-2] - exact).max()
@@ -235,12 +236,12 @@ def test_an_explicit_integration_between_the_reaching_times_agrees(kind, power):
         ours, theirs = disturbances(kind, rng, n, p)
         times = [*np.sort(rng.uniform(0, T_r, 30)).tolist(), p.T_r + p.T_s / 4, p.T_r + p.T_s * F(9, 10)]
         run = simulate(graph, p, x0, sigma0=sigma0, disturbance=ours, times=times)
-        assert np.isfinite(run.reaching_z).all()
+        assert np.isfinite(run.sliding.reaching_z).all()
         z = -np.log1p(-run.t[:30] / T_r)
-        end = max(run.reaching_z.max(), z[-1])
-        values, left_over, y = between_events(graph, p, x0, sigma0, theirs, run.reaching_z, np.append(z, end))
+        end = max(run.sliding.reaching_z.max(), z[-1])
+        values, left_over, y = between_events(graph, p, x0, sigma0, theirs, run.sliding.reaching_z, np.append(z, end))
         worst[0] = max(worst[0], np.abs(values[0, :, :-1] - run.states[:, :30]).max())
-        worst[1] = max(worst[1], np.abs(values[1, :, :-1] - run.sigma[:, :30]).max())
+        worst[1] = max(worst[1], np.abs(values[1, :, :-1] - run.sliding.sigma[:, :30]).max())
         worst[2] = max(worst[2], np.abs(left_over).max())
         # From the last reaching time on the motion is the matrix exponential of the clock.
         last = (float(p.T_s) + T_r * math.exp(-end)) / float(p.T)
@@ -294,10 +295,10 @@ def test_a_sliding_variable_that_starts_at_zero_stays_there():
     sigma0 = [0, 1, 0, -2, 0, 0.5]
     for d in ("worst-case", "sin(7*k*t)", lambda t, x, sigma: np.cos(x)):
         run = simulate(six(), protocol(), X0, sigma0=sigma0, disturbance=d)
-        np.testing.assert_array_equal(run.reaching_z[[0, 2, 4]], 0)
-        np.testing.assert_array_equal(run.reaching_times[[0, 2, 4]], 0)
-        np.testing.assert_array_equal(run.sigma[[0, 2, 4]], 0)
-        assert (run.reaching_z[[1, 3, 5]] > 0).all()
+        np.testing.assert_array_equal(run.sliding.reaching_z[[0, 2, 4]], 0)
+        np.testing.assert_array_equal(run.sliding.reaching_times[[0, 2, 4]], 0)
+        np.testing.assert_array_equal(run.sliding.sigma[[0, 2, 4]], 0)
+        assert (run.sliding.reaching_z[[1, 3, 5]] > 0).all()
 
 
 def test_without_any_sliding_variable_the_run_is_the_nominal_one():
@@ -307,7 +308,7 @@ def test_without_any_sliding_variable_the_run_is_the_nominal_one():
     for sigma0, d in ((None, None), ([0] * 6, "sin(7*k*t)"), ([0] * 6, lambda t, x, sigma: np.cos(x))):
         run = simulate(graph, p, X0, sigma0=sigma0, disturbance=d, times=times)
         assert np.abs(run.states - nominal.states).max() < 1e-9
-        np.testing.assert_array_equal(run.sigma, 0)
+        np.testing.assert_array_equal(run.sliding.sigma, 0)
         np.testing.assert_array_equal(run.remaining, nominal.remaining)
         np.testing.assert_allclose(run.clock, nominal.clock, rtol=1e-14)
 
@@ -315,20 +316,26 @@ def test_without_any_sliding_variable_the_run_is_the_nominal_one():
 def test_two_agents_may_reach_at_the_same_time():
     sigma0 = [1, -1, 0.5, 1, 0, -0.5]
     run = simulate(six(), protocol(), X0, sigma0=sigma0)
-    assert run.reaching_z[0] == run.reaching_z[1] == run.reaching_z[3] > run.reaching_z[2] == run.reaching_z[5]
+    assert (
+        run.sliding.reaching_z[0]
+        == run.sliding.reaching_z[1]
+        == run.sliding.reaching_z[3]
+        > run.sliding.reaching_z[2]
+        == run.sliding.reaching_z[5]
+    )
     assert np.abs(run.final_state - final_state_of(six(), X0, sigma0)).max() < 1e-9
     together = simulate(six(), protocol(), X0, sigma0=sigma0, disturbance=lambda t, x, sigma: np.sign(sigma))
-    np.testing.assert_allclose(together.reaching_z, run.reaching_z, rtol=1e-8)
+    np.testing.assert_allclose(together.sliding.reaching_z, run.sliding.reaching_z, rtol=1e-8)
 
 
 @pytest.mark.parametrize("power", [F(1), F(6, 5)])
 def test_an_agent_that_reaches_closer_to_the_deadline_than_a_float_tells_ends_right(power):
     sigma0 = [1, -0.5, 1e5, -2, 0.75, 1.5]
     run = simulate(six(), protocol(power), X0, sigma0=sigma0)
-    assert 40 < run.reaching_z[2] < math.inf
-    assert run.reaching_times[2] == 1
-    np.testing.assert_array_equal(run.sigma[:, run.t >= 1], 0)
-    assert (run.sigma[2, (run.reaching_remaining > 0) & (run.t < 1)] > 0).all()
+    assert 40 < run.sliding.reaching_z[2] < math.inf
+    assert run.sliding.reaching_times[2] == 1
+    np.testing.assert_array_equal(run.sliding.sigma[:, run.t >= 1], 0)
+    assert (run.sliding.sigma[2, (run.sliding.reaching_remaining > 0) & (run.t < 1)] > 0).all()
     assert np.abs(run.final_state - final_state_of(six(), X0, sigma0)).max() < 1e-8 * 1e5
 
 
@@ -338,8 +345,8 @@ def test_without_disturbances_and_with_a_gain_just_above_delta_the_final_state_i
         run = simulate(six(), p, X0, sigma0=SIGMA0)
         assert np.abs(run.final_state - expected).max() < 1e-9
         certain = certified_reaching_times(p, list(map(F, SIGMA0)))
-        np.testing.assert_allclose(run.reaching_z, [float(r.z) for r in certain], rtol=1e-11)
-    assert run.reaching_z.min() > 40
+        np.testing.assert_allclose(run.sliding.reaching_z, [float(r.z) for r in certain], rtol=1e-11)
+    assert run.sliding.reaching_z.min() > 40
 
 
 def test_a_single_leader_ends_where_it_started_less_its_sliding_variable():
@@ -350,7 +357,7 @@ def test_a_single_leader_ends_where_it_started_less_its_sliding_variable():
     assert run.final_state[lead] == pytest.approx(x0[lead] - sigma0[lead], abs=1e-9)
     assert np.abs(run.final_state - final_state_of(star, x0, sigma0)).max() < 1e-9
     # While its sliding variable lasts nobody but the disturbance and its own input moves it.
-    np.testing.assert_allclose(run.states[lead] - run.sigma[lead], x0[lead] - sigma0[lead], atol=1e-12)
+    np.testing.assert_allclose(run.states[lead] - run.sliding.sigma[lead], x0[lead] - sigma0[lead], atol=1e-12)
 
 
 def test_several_single_leaders_end_apart_and_their_follower_between():
@@ -374,24 +381,24 @@ def test_isolated_agents_lose_their_sliding_variables_only(d):
     np.testing.assert_allclose(run.final_state[order], [6.5, 0.5, -0.5, 1, 1], atol=1e-9)
     alone = simulate(SignedDigraph.from_edges([], ["lone"]), protocol(), [7], sigma0=[0.5], disturbance=d)
     assert alone.final_state == pytest.approx([6.5], abs=1e-11)
-    np.testing.assert_allclose(alone.states[0], 6.5 + alone.sigma[0], atol=1e-11)
+    np.testing.assert_allclose(alone.states[0], 6.5 + alone.sliding.sigma[0], atol=1e-11)
     if not callable(d):
-        assert alone.reaching_z[0] == pytest.approx(run.reaching_z[order[0]], rel=1e-14)
+        assert alone.sliding.reaching_z[0] == pytest.approx(run.sliding.reaching_z[order[0]], rel=1e-14)
 
 
 def test_below_one_the_worst_case_is_beaten_at_the_deadline_only_and_the_end_is_still_right():
     p, sigma0 = protocol(F(1, 2)), [100.0, -0.5, 0.25, -200.0, 0.75, 1.5]
     run = simulate(six(), p, X0, sigma0=sigma0)
-    np.testing.assert_array_equal(np.isinf(run.reaching_z), [True, False, False, True, False, False])
-    np.testing.assert_array_equal(run.reaching_times[[0, 3]], 1)
-    np.testing.assert_array_equal(run.reaching_left[[0, 3]], 0)
+    np.testing.assert_array_equal(np.isinf(run.sliding.reaching_z), [True, False, False, True, False, False])
+    np.testing.assert_array_equal(run.sliding.reaching_times[[0, 3]], 1)
+    np.testing.assert_array_equal(run.sliding.reaching_left[[0, 3]], 0)
     at = int(np.flatnonzero(run.t == 1)[0])
-    np.testing.assert_array_equal(run.sigma[:, at:], 0)
-    assert (np.abs(run.sigma[[0, 3], :at]) > 0).all()
+    np.testing.assert_array_equal(run.sliding.sigma[:, at:], 0)
+    assert (np.abs(run.sliding.sigma[[0, 3], :at]) > 0).all()
     assert np.abs(run.final_state - final_state_of(six(), X0, sigma0)).max() < 1e-9 * 200
     # As sqrt(T_r - t) at last: so continuous, although never 0 before.
-    last = np.abs(run.sigma[[0, 3], at - 1]) / np.sqrt(run.reaching_remaining[at - 1])
-    earlier = np.abs(run.sigma[[0, 3], at - 30]) / np.sqrt(run.reaching_remaining[at - 30])
+    last = np.abs(run.sliding.sigma[[0, 3], at - 1]) / np.sqrt(run.sliding.reaching_remaining[at - 1])
+    earlier = np.abs(run.sliding.sigma[[0, 3], at - 30]) / np.sqrt(run.sliding.reaching_remaining[at - 30])
     np.testing.assert_allclose(last, earlier, rtol=1e-2)
 
 
@@ -403,17 +410,17 @@ def test_below_one_the_worst_case_is_beaten_at_the_deadline_only_and_the_end_is_
 )
 def test_sliding_variables_keep_their_sign_until_they_are_exactly_zero_for_good(d):
     run = simulate(six(), protocol(), X0, sigma0=SIGMA0, disturbance=d)
-    for array in (run.states, run.sigma, run.disturbance, run.input, run.switching_input, run.error):
+    for array in (run.states, run.sliding.sigma, run.sliding.disturbance, run.input, run.switching_input, run.error):
         assert np.isfinite(array).all()
-    z = -np.log(np.maximum(run.reaching_remaining, 1e-300))
+    z = -np.log(np.maximum(run.sliding.reaching_remaining, 1e-300))
     for k in range(6):
-        before = z < run.reaching_z[k] * (1 - 1e-12)
-        after = z > run.reaching_z[k] * (1 + 1e-12)
-        assert (np.sign(run.sigma[k, before]) == np.sign(SIGMA0[k])).all()
-        assert (run.sigma[k, after] == 0).all()
+        before = z < run.sliding.reaching_z[k] * (1 - 1e-12)
+        after = z > run.sliding.reaching_z[k] * (1 + 1e-12)
+        assert (np.sign(run.sliding.sigma[k, before]) == np.sign(SIGMA0[k])).all()
+        assert (run.sliding.sigma[k, after] == 0).all()
         assert before.sum() > 10
         assert after.sum() > 10
-    assert (np.abs(run.disturbance) <= 1).all()
+    assert (np.abs(run.sliding.disturbance) <= 1).all()
 
 
 @pytest.mark.parametrize("d", ["worst-case", "sin(9*k*t)", lambda t, x, sigma: np.sin(x)])
@@ -426,13 +433,13 @@ def test_the_inputs_are_those_of_the_protocols_expression_and_the_equivalent_con
     switching, equivalent = run.switching_input, run.input
     checked = 0
     for i in range(run.t.size):
-        state, sigma, instant = run.states[:, i], run.sigma[:, i], run.t[i]
+        state, sigma, instant = run.states[:, i], run.sliding.sigma[:, i], run.t[i]
         # sigma - x + x returns to sigma up to a rounding of x, whose sign would decide where sigma is smaller still.
         if (np.abs(sigma[sigma != 0]) < 1e-12).any():
             continue
         by_hand = np.array(input_(state, sigma - state, instant)).ravel()
         np.testing.assert_allclose(switching[:, i], by_hand, rtol=1e-9, atol=1e-9)
-        freely = np.array(nominal(state, instant)).ravel() - run.disturbance[:, i]
+        freely = np.array(nominal(state, instant)).ravel() - run.sliding.disturbance[:, i]
         sliding = sigma == 0
         np.testing.assert_allclose(equivalent[sliding, i], freely[sliding], rtol=1e-9, atol=1e-9)
         np.testing.assert_array_equal(equivalent[~sliding, i], switching[~sliding, i])
@@ -449,20 +456,20 @@ def test_the_derivative_of_the_states_is_input_plus_disturbance(d):
     x = run.states.reshape(6, -1, 5)
     slope = (x[:, :, 0] - 8 * x[:, :, 1] + 8 * x[:, :, 3] - x[:, :, 4]) / (12 * float(h))
     middle = run.t.reshape(-1, 5)[:, 2]
-    motion = (run.input + run.disturbance).reshape(6, -1, 5)[:, :, 2]
-    smooth = np.abs(run.reaching_times[:, None] - middle).min(axis=0) > 3 * float(h)
+    motion = (run.input + run.sliding.disturbance).reshape(6, -1, 5)[:, :, 2]
+    smooth = np.abs(run.sliding.reaching_times[:, None] - middle).min(axis=0) > 3 * float(h)
     assert smooth.sum() > 55
     np.testing.assert_allclose(slope[:, smooth], motion[:, smooth], rtol=1e-6, atol=1e-6)
     loop = p.closed_loop(graph)
     ode = ca.Function("ode", [loop["x"], loop["p"], loop["t"]], [loop["ode"]])
-    before = np.flatnonzero(smooth & (middle < run.reaching_times.min()))
+    before = np.flatnonzero(smooth & (middle < run.sliding.reaching_times.min()))
     assert before.size >= 2
     for i in before:
         at = 5 * i + 2
-        state = np.concatenate([run.states[:, at], run.sigma[:, at] - run.states[:, at]])
-        whole = np.array(ode(state, run.disturbance[:, at], run.t[at])).ravel()
+        state = np.concatenate([run.states[:, at], run.sliding.sigma[:, at] - run.states[:, at]])
+        whole = np.array(ode(state, run.sliding.disturbance[:, at], run.t[at])).ravel()
         np.testing.assert_allclose(slope[:, i], whole[:6], rtol=1e-6, atol=1e-6)
-        sigma = run.sigma.reshape(6, -1, 5)[:, i]
+        sigma = run.sliding.sigma.reshape(6, -1, 5)[:, i]
         fall = (sigma[:, 0] - 8 * sigma[:, 1] + 8 * sigma[:, 3] - sigma[:, 4]) / (12 * float(h))
         np.testing.assert_allclose(fall, whole[:6] + whole[6:], rtol=1e-6, atol=1e-6)
 
@@ -472,17 +479,21 @@ def test_the_table_has_a_column_for_every_sliding_variable():
     header, *rows = csv.reader(io.StringIO(run.to_csv()))
     labels = list(six().labels)
     assert header == ["t", "remaining", *labels, *(f"{name}({label})" for name in ("sigma", "u") for label in labels)]
-    columns = [run.t, run.remaining, *run.states, *run.sigma, *run.input]
+    columns = [run.t, run.remaining, *run.states, *run.sliding.sigma, *run.input]
     np.testing.assert_array_equal(np.array(rows, dtype=float).T, columns)
 
 
 def test_a_run_says_what_it_is():
     run = simulate(six(), protocol(), X0, sigma0=SIGMA0, disturbance="sin(k*t)", times=[0, 1, F(5, 2)])
     assert repr(run).startswith("Trajectory(6 agents, 3 instants, t = 0 .. 2.5, settled at T = 2.5")
-    assert (run.source, run.bounded_by, run.boundary_layer) == ("sin(k*t)", "interval arithmetic", None)
+    assert (run.sliding.source, run.sliding.bounded_by, run.sliding.boundary_layer) == (
+        "sin(k*t)",
+        "interval arithmetic",
+        None,
+    )
     assert run.stats["steps"] > 0
     with pytest.raises(ValueError, match="read-only"):
-        run.sigma[0, 0] = 1
+        run.sliding.sigma[0, 0] = 1
     early = simulate(six(), protocol(), X0, sigma0=SIGMA0, times=[0, 1])
     assert "deadline not reached" in repr(early)
     with pytest.raises(ParameterError, match="T is not among"):
@@ -499,10 +510,10 @@ def test_instants_given_as_rationals_are_met_exactly_around_both_deadlines():
     run = simulate(six(), p, X0, sigma0=SIGMA0, times=times)
     np.testing.assert_array_equal(run.t, [float(F(t)) for t in times])
     np.testing.assert_array_equal(run.states[:, 0], X0)
-    np.testing.assert_array_equal(run.sigma[:, 0], SIGMA0)
-    assert run.reaching_remaining[2] == pytest.approx(3e-12, rel=1e-12)
-    np.testing.assert_array_equal(run.reaching_remaining[3:], 0)
-    np.testing.assert_array_equal(run.sigma[:, 3:], 0)
+    np.testing.assert_array_equal(run.sliding.sigma[:, 0], SIGMA0)
+    assert run.sliding.reaching_remaining[2] == pytest.approx(3e-12, rel=1e-12)
+    np.testing.assert_array_equal(run.sliding.reaching_remaining[3:], 0)
+    np.testing.assert_array_equal(run.sliding.sigma[:, 3:], 0)
     assert run.remaining[6] == pytest.approx(1e-13, rel=1e-12)
     assert run.deadline_index == 7
     np.testing.assert_array_equal(run.clock[7:], math.inf)
@@ -532,8 +543,8 @@ def test_the_solution_does_not_depend_on_where_it_is_sampled(d):
     sparse = simulate(six(), p, X0, sigma0=SIGMA0, disturbance=d, times=dense.t[picked].tolist())
     # Near T_r, T the float t stands for slightly other instants; a sliding variable moves by at most 10 an ulp there.
     assert np.abs(sparse.states - dense.states[:, picked]).max() < 1e-8
-    assert np.abs(sparse.sigma - dense.sigma[:, picked]).max() < 1e-8
-    np.testing.assert_allclose(sparse.reaching_z, dense.reaching_z, rtol=1e-8)
+    assert np.abs(sparse.sliding.sigma - dense.sliding.sigma[:, picked]).max() < 1e-8
+    np.testing.assert_allclose(sparse.sliding.reaching_z, dense.sliding.reaching_z, rtol=1e-8)
     other = simulate(six(), p, X0, sigma0=SIGMA0, disturbance=d, samples=7, past=0)
     assert np.abs(other.final_state - dense.final_state).max() < 1e-8
     assert other.at(0.5) == pytest.approx(dense.at(0.5), abs=1e-8)
@@ -548,19 +559,19 @@ def test_the_units_of_the_states_scale_the_solution(unit):
         again = simulate(
             six(), scaled, np.multiply(X0, unit), sigma0=np.multiply(SIGMA0, unit), disturbance=other, samples=21
         )
-        np.testing.assert_allclose(again.reaching_z, run.reaching_z, rtol=1e-12)
+        np.testing.assert_allclose(again.sliding.reaching_z, run.sliding.reaching_z, rtol=1e-12)
         np.testing.assert_allclose(again.states / unit, run.states, atol=1e-9)
-        np.testing.assert_allclose(again.sigma / unit, run.sigma, atol=1e-11)
+        np.testing.assert_allclose(again.sliding.sigma / unit, run.sliding.sigma, atol=1e-11)
 
 
 @pytest.mark.parametrize("remaining", [1e-8, 1e-15, 1e-30, 1e-200])
 def test_however_fine_the_default_instants_both_deadlines_are_among_them(remaining):
     run = simulate(six(), protocol(1), X0, sigma0=[1, -0.5, 1e5, -2, 0.75, 1.5], remaining=remaining)
-    assert (run.reaching_remaining[run.t == 1] == 0).any()
-    np.testing.assert_array_equal(run.sigma[:, run.reaching_remaining == 0], 0)
+    assert (run.sliding.reaching_remaining[run.t == 1] == 0).any()
+    np.testing.assert_array_equal(run.sliding.sigma[:, run.sliding.reaching_remaining == 0], 0)
     assert (run.remaining[run.t == 2.5] == 0).any()
     assert run.deadline_index is not None
-    assert run.final_state == pytest.approx(final_state_of(six(), X0, run.sigma0), abs=1e-8 * 1e5)
+    assert run.final_state == pytest.approx(final_state_of(six(), X0, run.sliding.sigma0), abs=1e-8 * 1e5)
 
 
 def test_the_unit_of_time_scales_the_solution():
@@ -568,7 +579,7 @@ def test_the_unit_of_time_scales_the_solution():
     fast = protocol(T_r=F(1, 1000), T_s=F(3, 2000), rho1=500, mu1=2000, delta=1000, mu2=1000)
     run = simulate(six(), p, X0, sigma0=SIGMA0, disturbance="sin(9*k*t)", samples=21)
     again = simulate(six(), fast, X0, sigma0=SIGMA0, disturbance="1000*sin(9000*k*t)", samples=21)
-    np.testing.assert_allclose(again.reaching_z, run.reaching_z, rtol=1e-12)
+    np.testing.assert_allclose(again.sliding.reaching_z, run.sliding.reaching_z, rtol=1e-12)
     np.testing.assert_allclose(again.states, run.states, atol=1e-9)
 
 
@@ -582,13 +593,13 @@ def test_the_boundary_layer_approaches_the_true_solution_as_it_gets_thinner(d):
     errors = []
     for width in (0.1, 0.01, 0.001):
         layer = simulate(six(), p, X0, sigma0=SIGMA0, disturbance=d, times=times, boundary_layer=width)
-        assert layer.boundary_layer == width
-        assert np.isnan(layer.reaching_z).all()
+        assert layer.sliding.boundary_layer == width
+        assert np.isnan(layer.sliding.reaching_z).all()
         errors.append(np.abs(layer.states - true.states).max())
-        assert (layer.sigma[:, layer.t < 1] != 0).all()
-        np.testing.assert_allclose(
-            layer.input, layer.switching_input + 2 * (np.sign(layer.sigma) - np.tanh(layer.sigma / width)), atol=1e-9
-        )
+        assert (layer.sliding.sigma[:, layer.t < 1] != 0).all()
+        sigma = layer.sliding.sigma
+        switching = layer.switching_input + 2 * (np.sign(sigma) - np.tanh(sigma / width))
+        np.testing.assert_allclose(layer.input, switching, atol=1e-9)
     print(f"\nboundary layer, {d}: {errors}")
     assert errors[0] > 3 * errors[1] > 9 * errors[2]
     assert errors[2] < 0.01
@@ -625,6 +636,7 @@ def test_a_boundary_layer_without_a_width_is_refused(width):
         ({"disturbance": lambda t, x, sigma: "a"}, "no array of numbers"),
         ({"disturbance": lambda t, x, sigma: math.nan}, "agent 1 at t = 0 is nan, not finite"),
         ({"disturbance": [0.1, 0.2]}, "2 disturbances for 6 agents"),
+        ({"disturbance": Bounded("sin(t)", 1)}, "has its bound, delta; give the signal alone"),
         ({"disturbance": "sin(q)"}, "unknown name"),
         ({"sigma0": [1, 2]}, "sigma0 has 2 values"),
         ({"sigma0": 1}, "sigma0 is 1; give one number"),

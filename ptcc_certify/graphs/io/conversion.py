@@ -79,7 +79,7 @@ def as_graph(graph: Any, orientation: str | None = None, **reading: Any) -> Sign
         return own
     if isinstance(graph, Family):
         raise GraphError(
-            f"{graph!r} is several graphs, and one is asked for; certify, decide and simulate_family take families"
+            f"{graph!r} is several graphs, and one is asked for; certify, decide and simulate take families"
         )
     if orientation is not None:
         refuse_unknown_orientation(orientation)

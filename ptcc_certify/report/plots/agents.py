@@ -16,7 +16,6 @@ from ptcc_certify.graphs.structure import Structure, analyse, find_camps
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, STEPS, tick_count
 from ptcc_certify.report.text_layout import columns, printable, shorten_text
 from ptcc_certify.simulation.agents import AgentsTrajectory
-from ptcc_certify.simulation.family_run import FamilyTrajectory
 from ptcc_certify.simulation.trajectory import Trajectory
 
 #: Colour and line of the parts of a graph, which differ without colours too.
@@ -47,6 +46,19 @@ def camp_groups(structure: Structure) -> np.ndarray:
     return group
 
 
+def family_camps(family: Family) -> np.ndarray | None:
+    """Return the camp, of ``CAMP_STYLES``, of every node that all edges of all modes keep; None if there are none.
+
+    Examples
+    --------
+    >>> from ptcc_certify.report.plots.agents import family_camps
+    >>> family_camps(ptcc.as_family([("a", "b", -2, -1)])).tolist()
+    ['first camp', 'second camp']
+    """
+    gauge, violated, _ = find_camps(family.n_nodes, *family.union)
+    return None if violated.size else np.where(gauge > 0, "first camp", "second camp").astype(object)
+
+
 def family_groups(family: Family) -> np.ndarray:
     """Return the part of ``CAMP_STYLES`` that every node has in all modes; else the camps of all edges; else "agents".
 
@@ -60,9 +72,8 @@ def family_groups(family: Family) -> np.ndarray:
     own = [camp_groups(analyse(mode.mandatory)) for mode in family.modes]
     if all((one == own[0]).all() for one in own):
         return own[0]
-    gauge, violated, _ = find_camps(family.n_nodes, *family.union)
-    camps = np.where(gauge > 0, "first camp", "second camp").astype(object)
-    return np.full(family.n_nodes, "agents", dtype=object) if violated.size else camps
+    camps = family_camps(family)
+    return np.full(family.n_nodes, "agents", dtype=object) if camps is None else camps
 
 
 def text_width(text: str) -> float:
@@ -85,7 +96,8 @@ def draw_agents(
     range and median, with a line for the agent whose quantity is the largest at first, and for that with the least;
     of a ``size``, which is never negative, the largest is drawn instead, and what is below it.
     """
-    group = family_groups(run.family) if isinstance(run, FamilyTrajectory) else camp_groups(structure)
+    played = run.played if isinstance(run, Trajectory) else None
+    group = camp_groups(structure) if played is None else family_groups(played.family)
     single: dict[int, str] = {}
     ranges = False
     step: Any = "post" if style.get("drawstyle") == "steps-post" else None
@@ -109,13 +121,14 @@ def draw_agents(
     return single
 
 
-def draw_deadlines(ax: Axes, run: Trajectory) -> None:
+def draw_deadlines(ax: Axes, run: Trajectory | AgentsTrajectory) -> None:
     """Draw the deadline, and where sliding variables move that of theirs, as vertical lines."""
-    if run.protocol.prescribed:
-        ax.axvline(float(run.protocol.T), color="black", linewidth=0.8, linestyle=":", label="deadline $T$")
-    sliding = run.protocol.reaching
-    if sliding is not None and run.sliding is not None and run.sliding.sigma0.any():
-        ax.axvline(float(sliding.T_r), color="black", linewidth=0.8, linestyle=(0, (5, 2, 1, 2)), label="$T_r$")
+    if isinstance(run, AgentsTrajectory) or run.protocol.prescribed:
+        ax.axvline(float(run.protocol.gain.T), color="black", linewidth=0.8, linestyle=":", label="deadline $T$")
+    sliding = run.sliding if isinstance(run, Trajectory) else None
+    if sliding is not None and sliding.sigma0.any():
+        reached = float(sliding.protocol.T_r)
+        ax.axvline(reached, color="black", linewidth=0.8, linestyle=(0, (5, 2, 1, 2)), label="$T_r$")
 
 
 def name_agents(

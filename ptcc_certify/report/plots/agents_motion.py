@@ -20,6 +20,7 @@ from ptcc_certify.report.plots.agents import (
     NAMED_AGENTS,
     camp_groups,
     draw_agents,
+    draw_deadlines,
     name_agents,
 )
 from ptcc_certify.report.plots.style import SINGLE_COLUMN, axes_of, finished, new_axes, shown, styled, time_label
@@ -97,8 +98,7 @@ def plot_motion(subject: Any, *, wide: bool = False, time_unit: str = "") -> Fig
                 place = i * d + q if wide else q * n + i
                 ax = new_axes(figure, (rows, columns, 1 + place))
                 lines = draw_agents(ax, run, run.states[:, q, i], structure)
-                deadline = float(run.protocol.gain.T)
-                ax.axvline(deadline, color="black", linewidth=0.8, linestyle=":", label="deadline $T$")
+                draw_deadlines(ax, run)
                 name = _NAMES[i] if i < len(_NAMES) else f"derivative {i}"
                 label = f"{name} {q + 1}" if d > 1 else name
                 finished(ax, time_label("time $t$", time_unit) if place // columns == rows - 1 else "", label)

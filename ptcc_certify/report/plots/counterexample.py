@@ -15,7 +15,7 @@ from ptcc_certify.report.plots.agents import CAMP_STYLES, NAME_SIZE, NAMED_AGENT
 from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.plots.style import axes_of, finished, styled, time_label
 from ptcc_certify.report.text_layout import printable, shorten_text
-from ptcc_certify.simulation.family_run import simulate_family
+from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.signals import TableSignal
 from ptcc_certify.theorems.counterexample_text import mode_name
 from ptcc_certify.theorems.family_behaviour import (
@@ -86,7 +86,7 @@ def plot_counterexample(
     protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3) if protocol is None else protocol
     T = float(protocol.T)
     table = [(share * T, mode, level) for share, mode, level in rows]
-    run = simulate_family(subject.family, protocol, state, TableSignal(table))
+    run = simulate(subject.family, protocol, state, TableSignal(table))
     ax, groups = axes_of(ax), camp_groups(subject.structures[why.mode])
     moved = np.ptp(run.states, axis=1)
     agents = sorted(np.argsort(-moved, kind="stable")[:NAMED_AGENTS].tolist())

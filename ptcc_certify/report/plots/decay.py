@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,8 +12,10 @@ from matplotlib.axes import Axes
 
 from ptcc_certify.bounds.envelope import FLOOR_FACTOR
 from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.protocols.gain import Gain
+from ptcc_certify.report.plots.runs import bound_label, is_worst, keeps_promise, line_of, runs_of
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled, time_label
 from ptcc_certify.report.plots.subject import ideal_run_of, ideal_text, limits_text, require_same
 from ptcc_certify.simulation.trajectory import Trajectory
@@ -33,6 +36,7 @@ def plot_decay(
     *,
     ax: Axes | None = None,
     certificate: Certificate | None = None,
+    runs: Sequence[Trajectory] | None = None,
     axis: str = "left",
     each: bool = True,
     time_unit: str = "",
@@ -46,14 +50,19 @@ def plot_decay(
     multiplies them by: below, a run says nothing. Where limits of the gain, late messages or moving leaders were asked,
     that run is drawn besides; the bounds, and the run with circles, are without these.
 
+    Of the certificate of a family ``max_k |x_k(t) - x_k(T)|`` under many signals is drawn below its bound for every
+    signal, of those runs that have settled at ``T``, or of which it is proved where they end.
+
     Parameters
     ----------
-    subject : Certificate, its path, or Trajectory
+    subject : Certificate, its path, Trajectory or FamilyCertificate
         A certificate with an initial state and a proved rate; without a run its bounds alone are drawn
         (``certificate.with_simulation()`` adds one). A trajectory without ``certificate`` is drawn alone.
     ax : Axes, optional
     certificate : Certificate, optional
         Of the graph, protocol and initial state of a trajectory, whose bounds are drawn over it.
+    runs : sequence of Trajectory, optional
+        Of a family, by default under eight random signals and worst cases.
     axis : {"left", "time", "clock"}
         Horizontally the time left ``1 - t/T``, logarithmic, running towards the deadline; or the time ``t``; or the
         stretched clock ``s(t)``, on which each bound is a straight line where nothing but a rate is at work.
@@ -82,6 +91,8 @@ def plot_decay(
     """
     if axis not in _DECAY_AXES:
         raise ParameterError(f'axis "{axis}" is unknown; one of {", ".join(_DECAY_AXES)}')
+    if isinstance(subject, FamilyCertificate):
+        return _draw_signals(axes_of(ax), subject, runs_of(subject, runs), axis, time_unit)
     proved = subject if isinstance(subject, Certificate) else certificate
     run = None if isinstance(subject, Certificate) and subject.trajectory is None else ideal_run_of(subject)
     asked = subject.asked_trajectory if isinstance(subject, Certificate) and run is not None else None
@@ -112,18 +123,67 @@ def plot_decay(
         top = max(top, float(np.nan_to_num(seen).max()))
         where = _places(asked.protocol.gain, None, asked.remaining[asked.remaining > 0])[axis]
         ax.plot(where, seen / scale, color=RUN, linewidth=1.1, label="simulated, as asked")
-    ax.set_yscale("log")
-    ax.set_ylim(bottom / scale, 3 * top / scale)
-    ax.set_xscale("log" if axis == "left" else "linear")
-    ax.set_xlim(place[0], place[max(last, 1)])
+    _scale(ax, axis, place[[0, max(last, 1)]], (bottom / scale, 3 * top / scale))
     p = subject.protocol
     if p.reaching is not None and (proved is None or not proved.direct):
         (at,) = _places(p.gain, None, np.array([float(p.span / p.T)]))[axis]
         ax.axvline(at, color="black", linewidth=0.8, linestyle=(0, (5, 2, 1, 2)), label="$T_r$")
     name = r"\varepsilon" if proved is not None and proved.envelope.coordinates == "eps" else "E"
-    label = time_label(_DECAY_AXES[axis], time_unit) if axis == "time" else _DECAY_AXES[axis]
     title = "" if run is None else limits_text(run if asked is None else asked, proved)
-    return finished(ax, label, rf"$\|{name}(t)\| \,/\, \|{name}(0)\|$", title)
+    return finished(ax, _label(axis, time_unit), rf"$\|{name}(t)\| \,/\, \|{name}(0)\|$", title)
+
+
+def _draw_signals(
+    ax: Axes, certificate: FamilyCertificate, runs: Sequence[Trajectory], axis: str, time_unit: str
+) -> Axes:
+    """Draw how far agents are from their final states under many signals below the bound for every signal."""
+    first = runs[0]
+    before = first.remaining > 0
+    bound = certificate.deviation_bound(first.remaining[before]).max(axis=0)
+    if not np.isfinite(bound).any():
+        raise ParameterError("the certificate holds no proved bound of a decay; draw its states")
+    place = {"left": first.remaining, "time": first.t, "clock": first.clock}[axis][before]
+    floor = FLOOR_FACTOR * first.rtol * (float(np.abs(first.states[:, 0]).max()) or 1.0)
+    if not (bound >= floor).any():
+        raise ParameterError("every agent begins where it ends: there is no decay to draw")
+    own = certificate.signal == "any" or keeps_promise(certificate, runs)
+    names = {False: "random signals" if own else "any signal (random)", True: "worst cases found"}
+    known = _known_end(certificate)
+    for run in sorted(runs, key=is_worst):
+        end = run.final_state if run.deadline_resolved else known
+        if end is not None and np.array_equal(run.t, first.t):
+            gap = np.abs(run.states[:, before] - end[:, None]).max(axis=0)
+            ax.plot(place, np.where(gap > floor, gap, np.nan), label=names.pop(is_worst(run), None), **line_of(run))
+    ax.plot(place, bound, color=BOUND, linewidth=1.8, label=bound_label(certificate), zorder=4)
+    _draw_floor(ax, floor, floor / 10)
+    last = int(np.flatnonzero(bound >= floor / 10)[-1])
+    _scale(ax, axis, place[[0, max(last, 1)]], (floor / 10, 3 * float(bound[np.isfinite(bound)].max())))
+    return finished(ax, _label(axis, time_unit), r"$\max_k |x_k(t) - x_k(T)|$")
+
+
+def _known_end(certificate: FamilyCertificate) -> np.ndarray | None:
+    """Return the state at ``T`` if it is proved to be the same for every signal."""
+    ends = [] if certificate.final_states is None else [one for one in certificate.final_states if one is not None]
+    same = len(ends) == certificate.family.n_nodes and all(low == high for low, high in ends)
+    return np.array([float(low) for low, _ in ends]) if same else None
+
+
+def _scale(ax: Axes, axis: str, ends: np.ndarray, limits: tuple[float, float]) -> None:
+    """Set the scales and limits of both axes."""
+    ax.set_yscale("log")
+    ax.set_ylim(*limits)
+    ax.set_xscale("log" if axis == "left" else "linear")
+    ax.set_xlim(*ends)
+
+
+def _label(axis: str, time_unit: str) -> str:
+    return time_label(_DECAY_AXES[axis], time_unit) if axis == "time" else _DECAY_AXES[axis]
+
+
+def _draw_floor(ax: Axes, floor: float, bottom: float) -> None:
+    """Draw the floor below which a run says nothing."""
+    ax.axhspan(bottom, floor, color=BEHIND, alpha=0.12, linewidth=0)
+    ax.axhline(floor, color=BEHIND, linewidth=0.9, linestyle=":", label="integrator's floor")
 
 
 def error_norm(subject: Certificate | Trajectory, certificate: Certificate | None) -> tuple[np.ndarray, float, float]:
@@ -202,5 +262,4 @@ def _draw_run(ax: Axes, place: np.ndarray, seen: np.ndarray, floor: float, botto
         colour, label = (BEHIND, f"simulated, {without}") if without else (RUN, "simulated (CVODES)")
         ax.plot(place, seen, color=colour, linewidth=1.1, label=label, **marks)
     if bottom < floor:
-        ax.axhspan(bottom, floor, color=BEHIND, alpha=0.12, linewidth=0)
-        ax.axhline(floor, color=BEHIND, linewidth=0.9, linestyle=":", label="integrator's floor")
+        _draw_floor(ax, floor, bottom)

@@ -1,9 +1,10 @@
-"""The signed digraph: nodes in the colours of their camps, arrows in the direction of information."""
+"""Signed digraphs: nodes in the colours of their camps, arrows in the direction of information, modes side by side."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,22 +12,54 @@ from matplotlib.patches import FancyArrowPatch, Polygon
 
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.graphs.family import Family
+from ptcc_certify.graphs.family import Family, Mode
+from ptcc_certify.graphs.io.family_conversion import as_family, is_family
 from ptcc_certify.graphs.size_limits import LABELLED_NODES
-from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.report.plots.adjacency import draw_adjacency
-from ptcc_certify.report.plots.agents import CAMP_STYLES, camp_groups
-from ptcc_certify.report.plots.family_graph import plot_family_graph
+from ptcc_certify.report.plots.agents import CAMP_STYLES, camp_groups, family_camps, family_groups
 from ptcc_certify.report.plots.graph_labels import INSIDE, boxes_along, draw_labels, draw_sizes
-from ptcc_certify.report.plots.graph_layout import FREE_NODES, Arrow, arrows_of, places_and_bends, triangles_of
+from ptcc_certify.report.plots.graph_layout import FREE_NODES, Arrow, places_and_bends, triangles_of
 from ptcc_certify.report.plots.style import EDGE_STYLES, SINGLE_COLUMN, axes_of, finished, styled
 from ptcc_certify.report.plots.subject import structure_of
-from ptcc_certify.report.text_layout import columns
+from ptcc_certify.report.text_layout import columns, printable, shorten_text
+from ptcc_certify.theorems.counterexample_text import mode_name
 
 #: Colour of the ground under a leader group, and how far it reaches beyond its nodes, in radii.
 GROUND, REACH = "#E2E2E2", 1.5
-#: Height of the drawing in inches.
+#: Height of the drawing of one graph in inches.
 _HEIGHT = 3.4
+#: Modes that are drawn, and nodes of which two modes have room side by side.
+PANELS, BESIDE_NODES = 6, 8
+#: Height of a panel in inches, as a share of its width; of its name, and of the legend.
+_SHAPE, _TITLE, _LEGEND = 0.72, 0.2, 0.72
+#: Widths of arrows in points: of the least weight that is drawn, what the largest adds, and where all are equal.
+_WIDTHS, _EQUAL = (0.6, 1.0), 0.9
+#: Columns of a panel's name.
+_NAME = 24
+#: Bends of an arrow that is alone between its ends, and of those that are not.
+_ALONE, _APART = 0.12, 0.25
+
+
+class WeightRange(NamedTuple):
+    """An edge of a drawing, or two opposite ones, with the range of its size.
+
+    Attributes
+    ----------
+    arrow : Arrow
+        Its size is the largest.
+    least : float
+        0 of an edge that may fail.
+    """
+
+    arrow: Arrow
+    least: float
+
+    @property
+    def text(self) -> str:
+        """The size, or its range."""
+        ends = dict.fromkeys(f"{x:.3g}" for x in (self.least, self.arrow.size))
+        return "\N{EN DASH}".join(ends)
 
 
 @styled
@@ -41,14 +74,18 @@ def plot_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
     Graphs of more than 40 nodes are drawn as their matrix ``W``: row ``k`` holds whom ``k`` listens to, camps and
     followers stand together.
 
-    Of a family the modes stand side by side, nodes in the same places. An uncertain weight is a line as wide as its
-    least size on a pale band as wide as its largest; an edge that may fail is a dotted line on the band.
+    Of a family up to six modes stand side by side, nodes in the same places. An uncertain weight is a line as wide as
+    its least size on a pale band as wide as its largest; an edge that may fail is a dotted line on the band; the range
+    stands beside. Nodes have the colours of the camps that all edges keep, or of what they are in every mode; outlined
+    are the leaders by mandatory edges.
 
     Parameters
     ----------
-    subject : Structure, Certificate, Trajectory, Family, FamilyCertificate or graph-like
-        As :func:`ptcc_certify.as_graph` takes it: a path, a networkx graph, the name of a packaged graph.
+    subject : Structure, Certificate, Trajectory, Family, FamilyCertificate, graph-like or family-like
+        As :func:`ptcc_certify.as_graph` or :func:`ptcc_certify.as_family` takes it: a path, a networkx graph, the name
+        of a packaged graph.
     ax : Axes, optional
+        Several modes are drawn on parts of it.
 
     Returns
     -------
@@ -59,44 +96,198 @@ def plot_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
     >>> ax = plot_graph([("a", "b", 1), ("b", "a", 1), ("b", "c", -2)])
     >>> [text.get_text() for text in ax.texts]
     ['a', 'b', 'c', '1', '2']
+    >>> ax = plot_graph([("a", "b", 1, 2), ("b", "c", -1, 0)])
+    >>> [text.get_text() for text in ax.texts][:3], len(ax.texts)
+    (['a', 'b', 'c'], 5)
     """
-    if isinstance(subject, Family | FamilyCertificate):
-        return plot_family_graph(subject, ax=ax)
+    if isinstance(subject, Family | FamilyCertificate) or is_family(subject):
+        return _draw_family(as_family(getattr(subject, "family", subject)), ax)
     structure = structure_of(subject)
     graph, own, ax = structure.graph, ax is None, axes_of(ax, (SINGLE_COLUMN[0], _HEIGHT))
     if graph.n_nodes > LABELLED_NODES:
         return draw_adjacency(ax, structure)
-    width, height = np.array(ax.get_window_extent().size) / ax.figure.dpi * 72 * [1.05, 0.95]  # points, of own axes
-    inside = max(map(columns, graph.labels)) <= INSIDE
-    radius = float(np.clip(32 / np.sqrt(graph.n_nodes), 7.5 if graph.n_nodes <= FREE_NODES else 6.3, 10))
-    radius = radius if inside else 4.5
+    room = np.array(ax.get_window_extent().size) / ax.figure.dpi * 72 * [1.05, 0.95]  # points, of own axes
     part = np.full(graph.n_nodes, -1)
     for number, component in enumerate(structure.closed_components):
         part[list(component.nodes)] = number
-    margin = 4 * radius if inside else 60  # for labels
-    arrows = arrows_of(graph)
-    place, bends = places_and_bends(arrows, part, radius, (width - margin, height - 4 * radius))
-    if structure.followers.size:
-        groups = [c.nodes for c in structure.closed_components if len(c.nodes) > 1]
-        for nodes in groups:
-            draw_ground(ax, graph, place, nodes, radius)
-        if groups:
-            ax.fill([], [], color=GROUND, label="leader group")
-    draw_nodes(ax, structure, place, radius)
-    _draw_arrows(ax, arrows, place, bends, radius)
-    lines = boxes_along(arrows, place, bends)
-    written = draw_labels(ax, graph.labels, place, radius, None if inside else [box for line in lines for box in line])
-    sizes = [f"{arrow.size:.3g}" for arrow in arrows]
-    if len(set(sizes)) > 1:
-        draw_sizes(ax, arrows, sizes, place, bends, written, lines)
-    ax.set_aspect("equal")
-    ax.set_xlim(-width / 2, width / 2)
-    ax.set_ylim(-height / 2, height / 2)
-    ax.set_axis_off()
+    edges = weight_ranges(Family.from_graph(graph).modes[0])
+    layout, bends = _layout(graph.labels, [edge.arrow for edge in edges], part, room)
+    groups = [c.nodes for c in structure.closed_components if len(c.nodes) > 1 and structure.followers.size]
+    for nodes in groups:
+        draw_ground(ax, graph, layout.place, nodes, layout.radius)
+    if groups:
+        ax.fill([], [], color=GROUND, label="leader group")
+    boxes = _draw_mode(ax, structure, camp_groups(structure), edges, bends, layout)
     finished(ax, "", "")
     if own:
-        fit_height(ax, np.concatenate([written, *lines]), radius)
+        fit_height(ax, boxes, layout.radius)
     return ax
+
+
+def _draw_family(family: Family, ax: Axes | None) -> Axes:
+    """Draw the modes of a family side by side; as matrices where they are large."""
+    modes = family.modes[:PANELS]
+    side = 2 if len(modes) > 1 and family.n_nodes <= BESIDE_NODES else 1
+    rows, title = math.ceil(len(modes) / side), _TITLE if len(modes) > 1 else 0.0
+    width = SINGLE_COLUMN[0] / side if ax is None else ax.get_window_extent().width / ax.figure.dpi / side
+    high, layout, edges = width * _SHAPE, None, [weight_ranges(mode) for mode in modes]
+    if family.n_nodes <= LABELLED_NODES:
+        every = {edge.arrow[:3]: edge.arrow for some in edges for edge in some}
+        room, part = 72 * width * np.array([1.0, _SHAPE]), np.full(family.n_nodes, -1)
+        layout, _ = _layout(family.labels, list(every.values()), part, room)
+        high = layout.size[1] / 72
+    else:
+        title *= 2  # matrices name their axes
+    ax = axes_of(ax, (SINGLE_COLUMN[0], _LEGEND + rows * (high + title)))
+    ax.set_axis_off()
+    panels = [ax]
+    if len(modes) > 1:
+        share, places = high / (high + title), (divmod(number, side) for number in range(len(modes)))
+        panels = [ax.inset_axes((c / side, 1 - (r + 1) / rows, 1 / side, share / rows)) for r, c in places]
+    camps, seen = family_camps(family), dict[str, Any]()
+    groups = family_groups(family) if camps is None else camps
+    for number, (panel, mode, some) in enumerate(zip(panels, modes, edges, strict=True)):
+        if layout is None:
+            draw_adjacency(panel, analyse(mode.mandatory))
+            if len(panels) > 1 and (legend := panel.get_legend()) is not None:
+                legend.remove()
+        else:
+            every_size = [edge for own in edges for edge in own]
+            _draw_mode(panel, analyse(mode.mandatory), groups, some, _bends(some), layout, every_size)
+        for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
+            seen.setdefault(label, handle)
+        if len(modes) > 1:
+            panel.set_title(shorten_text(printable(mode_name(family, number)), _NAME), pad=2, parse_math=False)
+    left = len(family.modes) - len(modes)
+    style: dict[str, Any] = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "frameon": False, "ncols": 2}
+    more = f"{left:,} more mode{'s' if left > 1 else ''}" if left else ""
+    ax.legend(seen.values(), seen.keys(), borderaxespad=0.2, title=more, **style)
+    return ax
+
+
+class _Layout(NamedTuple):
+    """Where nodes lie in points, how large they are, and whether their labels are in them; the size of a panel."""
+
+    labels: Sequence[str]
+    place: np.ndarray
+    radius: float
+    inside: bool
+    size: np.ndarray
+
+
+def _layout(
+    labels: Sequence[str], arrows: Sequence[Arrow], part: np.ndarray, room: np.ndarray
+) -> tuple[_Layout, np.ndarray]:
+    """Lay out arrows in a room in points, and bend them; a flat drawing takes less height."""
+    n, inside = len(labels), max(map(columns, labels)) <= INSIDE
+    radius = float(np.clip(32 / np.sqrt(n), 7.5 if n <= FREE_NODES else 6.3, 10)) if inside else 4.5
+    margin = np.array([4 * radius if inside else 60, 4 * radius])  # for labels
+    place, bends = places_and_bends(arrows, part, radius, tuple(room - margin))
+    high = min(room[1], float(np.ptp(place[:, 1])) + margin[1] + 20)  # for bent arrows, and labels
+    return _Layout(labels, place, radius, inside, np.array([room[0], high])), bends
+
+
+def _draw_mode(
+    ax: Axes,
+    structure: Structure,
+    groups: np.ndarray,
+    edges: Sequence[WeightRange],
+    bends: np.ndarray,
+    layout: _Layout,
+    among: Sequence[WeightRange] = (),
+) -> np.ndarray:
+    """Draw nodes, arrows, labels and sizes of one mode ``among`` others; return the boxes of what is drawn."""
+    place, radius = layout.place, layout.radius
+    _draw_nodes(ax, place, radius, groups, structure.leaders, outlined=bool(among))
+    among = among or edges
+    differ, largest = len({edge.text for edge in among}) > 1, max((edge.arrow.size for edge in among), default=1.0)
+    _draw_arrows(ax, edges, place, bends, radius, largest if differ else None)
+    arrows = [arrow for arrow, _ in edges]
+    lines = boxes_along(arrows, place, bends)
+    written = draw_labels(
+        ax, layout.labels, place, radius, None if layout.inside else [b for line in lines for b in line]
+    )
+    if differ:
+        draw_sizes(ax, arrows, [edge.text for edge in edges], place, bends, written, lines)
+    ax.set_aspect("equal")
+    ax.set_xlim(-layout.size[0] / 2, layout.size[0] / 2)
+    ax.set_ylim(-layout.size[1] / 2, layout.size[1] / 2)
+    ax.set_axis_off()
+    return np.concatenate([written, *lines])
+
+
+def weight_ranges(mode: Mode) -> list[WeightRange]:
+    """Return the edges of a mode; two opposite ones of the same range are one with two heads."""
+    lower, upper = mode.lower.as_float().tolist(), mode.upper.as_float().tolist()
+    keys = list(zip(mode.source.tolist(), mode.target.tolist(), mode.sign.tolist(), strict=True))
+    ranges = dict(zip(keys, zip(lower, upper, strict=True), strict=True))
+    result = []
+    for (a, b, sign), (least, most) in ranges.items():
+        mutual = ranges.get((b, a, sign)) == (least, most)
+        if not (mutual and b < a):
+            result.append(WeightRange(Arrow(a, b, sign, most, mutual), least))
+    return result
+
+
+def _bends(edges: Sequence[WeightRange]) -> np.ndarray:
+    """Bend arrows that share their ends apart."""
+    count: dict[frozenset[int], int] = {}
+    for arrow, _ in edges:
+        pair = frozenset((arrow.source, arrow.target))
+        count[pair] = count.get(pair, 0) + 1
+    seen: dict[tuple[int, int], int] = {}
+    bends = []
+    for arrow, _ in edges:
+        ends = arrow.source, arrow.target
+        alone = count[frozenset(ends)] == 1
+        seen[ends] = seen.get(ends, -1) + 1
+        bends.append(_ALONE if alone else _APART * (1 + seen[ends]))
+    return np.array(bends)
+
+
+def _draw_nodes(
+    ax: Axes, place: np.ndarray, radius: float, groups: np.ndarray, leaders: np.ndarray, *, outlined: bool
+) -> None:
+    """Draw the nodes, those of leaders outlined, and say so where a camp may hold others."""
+    leads = np.isin(np.arange(len(groups)), leaders)
+    for name, (colour, _) in CAMP_STYLES.items():
+        for lead in (False, True):
+            own = (groups == name) & (leads == lead)
+            if own.any():
+                edge: dict[str, Any] = {"markeredgecolor": "black" if lead else colour, "color": colour, "zorder": 3}
+                edge["markeredgewidth"] = 1.2 if lead else 0.5
+                ax.plot(*place[own].T, "o", markersize=2 * radius, **edge)
+                label = None if outlined and lead and ((groups == name) & ~leads).any() else name
+                ax.plot([], [], "o", markersize=6, label=label, **({"color": colour} if outlined else edge))
+    if outlined:
+        ax.plot([], [], "o", color="white", markersize=6, markeredgecolor="black", markeredgewidth=1.2, label="leads")
+
+
+def _draw_arrows(
+    ax: Axes, edges: Sequence[WeightRange], place: np.ndarray, bends: np.ndarray, radius: float, largest: float | None
+) -> None:
+    """Draw arrows as wide as the least sizes on bands as wide as the largest; all are alike without a largest one."""
+    style: dict[str, Any] = {"shrinkA": radius + 1, "shrinkB": radius + 1}
+    for (arrow, least), bend in zip(edges, bends, strict=True):
+        colour, line, _ = EDGE_STYLES[arrow.sign]
+        start, end, curve = place[arrow.source], place[arrow.target], f"arc3,rad={bend}"
+        sizes = [0.0 if largest is None else _WIDTHS[1] * size / largest for size in (least, arrow.size)]
+        width, band = (_EQUAL if largest is None else _WIDTHS[0] + size for size in sizes)
+        if least < arrow.size:
+            pale: dict[str, Any] = {"arrowstyle": "-", "color": colour, "alpha": 0.3, "capstyle": "butt", "zorder": 1}
+            ax.add_artist(FancyArrowPatch(start, end, connectionstyle=curve, linewidth=2 + band, **pale, **style))
+        drawn: dict[str, Any] = {"mutation_scale": 7, "zorder": 2, "color": colour, "linewidth": width}
+        drawn |= {"arrowstyle": "<|-|>" if arrow.mutual else "-|>", "linestyle": line if least else ":"}
+        ax.add_artist(FancyArrowPatch(start, end, connectionstyle=curve, **drawn, **style))
+    for sign, (colour, line, name) in EDGE_STYLES.items():
+        if any(arrow.sign == sign for arrow, _ in edges):
+            ax.plot([], [], color=colour, linestyle=line, linewidth=1.1, label=name)
+    uncertain = {edge.text for edge in edges if edge.least < edge.arrow.size}
+    if uncertain:
+        alone = f": {uncertain.pop()}" if len({edge.text for edge in edges}) == 1 else ""
+        ax.plot([], [], color="black", alpha=0.3, linewidth=4, label=f"uncertain weight{alone}")
+    if any(not least for _, least in edges):
+        ax.plot([], [], color="black", linestyle=":", linewidth=1.1, label="may fail")
 
 
 def fit_height(ax: Axes, boxes: np.ndarray, radius: float) -> None:
@@ -107,35 +298,6 @@ def fit_height(ax: Axes, boxes: np.ndarray, radius: float) -> None:
     room = 0.1 + (0 if legend is None else legend.get_window_extent().height / figure.dpi)
     ax.set_ylim(low, high)
     figure.set_figheight(min(_HEIGHT, room + scale * (high - low)))
-
-
-def draw_nodes(ax: Axes, structure: Structure, place: np.ndarray, radius: float) -> None:
-    """Draw the nodes, those of leaders outlined."""
-    group = camp_groups(structure)
-    for name, (colour, _) in CAMP_STYLES.items():
-        own = group == name
-        if own.any():
-            edge, width = (colour, 0.5) if name == "followers" else ("black", 1.2)
-            style: dict[str, Any] = {"color": colour, "markeredgecolor": edge, "markeredgewidth": width, "zorder": 3}
-            x, y = place[own].T
-            ax.plot(x, y, "o", markersize=2 * radius, **style)
-            ax.plot([], [], "o", markersize=6, label=name, **style)
-
-
-def _draw_arrows(ax: Axes, arrows: Sequence[Arrow], place: np.ndarray, bends: np.ndarray, radius: float) -> None:
-    """Draw the arrows, wide where the weight is large."""
-    largest = max((a.size for a in arrows), default=1.0)
-    differ = min((a.size for a in arrows), default=1.0) < largest
-    style: dict[str, Any] = {"shrinkA": radius + 1, "shrinkB": radius + 1, "mutation_scale": 7, "zorder": 2}
-    for arrow, bend in zip(arrows, bends, strict=True):
-        colour, line, _ = EDGE_STYLES[arrow.sign]
-        style |= {"color": colour, "linestyle": line, "arrowstyle": "<|-|>" if arrow.mutual else "-|>"}
-        width = 0.6 + 1.0 * arrow.size / largest if differ else 0.9
-        ends = place[arrow.source], place[arrow.target]
-        ax.add_artist(FancyArrowPatch(*ends, connectionstyle=f"arc3,rad={bend}", linewidth=width, **style))
-    for sign, (colour, line, name) in EDGE_STYLES.items():
-        if any(arrow.sign == sign for arrow in arrows):
-            ax.plot([], [], color=colour, linestyle=line, linewidth=1.1, label=name)
 
 
 def draw_ground(ax: Axes, graph: SignedDigraph, place: np.ndarray, nodes: Sequence[int], radius: float) -> None:

@@ -9,8 +9,6 @@ import networkx as nx
 import numpy as np
 from scipy.spatial import Delaunay, QhullError
 
-from ptcc_certify.graphs.digraph import SignedDigraph
-
 #: Bends of an arrow that are tried, as shares of its length; two arrows of opposite directions need a large one.
 BENDS, OPPOSITE_BENDS = (0.0, 0.12, -0.12, 0.22, -0.22, 0.4, -0.4, 0.6, -0.6), (0.22, 0.32, 0.45, 0.6)
 #: Points on an arrow at which its distance from nodes is measured, as shares of its length.
@@ -27,25 +25,6 @@ class Arrow(NamedTuple):
     sign: int
     size: float
     mutual: bool
-
-
-def arrows_of(graph: SignedDigraph) -> list[Arrow]:
-    """Return the arrows of a graph, in the order of its edges.
-
-    Examples
-    --------
-    >>> from ptcc_certify.report.plots.graph_layout import arrows_of
-    >>> arrows_of(SignedDigraph.from_edges([("a", "b", -2), ("b", "a", -2)]))
-    [Arrow(source=0, target=1, sign=-1, size=2.0, mutual=True)]
-    """
-    pairs = zip(graph.source.tolist(), graph.target.tolist(), strict=True)
-    weights = dict(zip(pairs, graph.weights.tolist(), strict=True))
-    mutual = {(a, b): weights.get((b, a)) == w for (a, b), w in weights.items()}
-    return [
-        Arrow(a, b, 1 if w > 0 else -1, abs(w), mutual[a, b])
-        for (a, b), w in weights.items()
-        if not (mutual[a, b] and b < a)
-    ]
 
 
 def places_and_bends(

@@ -2,27 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 
 from lmi.exact.decimal_rounding import up
+from ptcc_certify.bounds.envelope import FLOOR_FACTOR
 from ptcc_certify.bounds.input.effort import Effort
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.certificate.late_answers import largest_late_input
 from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.report.input_lines import initial_states_text
 from ptcc_certify.report.plots.agents import draw_agents, draw_deadlines, name_agents
-from ptcc_certify.report.plots.agents_input import plot_agents_input
-from ptcc_certify.report.plots.family_input import plot_family_input
+from ptcc_certify.report.plots.agents_motion import agents_run
 from ptcc_certify.report.plots.peaks import Peak, draw_peaks
+from ptcc_certify.report.plots.runs import bound_label, count_of_signals, is_worst, line_of, runs_of
 from ptcc_certify.report.plots.style import BOUND, RUN, axes_of, finished, styled, time_label
 from ptcc_certify.report.plots.subject import limits_text, require_same, structure_of, trajectory_of
 from ptcc_certify.simulation.agents import AgentsTrajectory
-from ptcc_certify.simulation.late_messages import LateRun
-from ptcc_certify.simulation.moving_leaders import TrackingRun
+from ptcc_certify.simulation.members import Members
 from ptcc_certify.simulation.trajectory import Trajectory
 
 #: An error ``|e_k|`` below so many tolerances of the integrator, in units of what it is made of, is not resolved.
@@ -31,7 +33,12 @@ RESOLVED_ERROR = 10
 
 @styled
 def plot_input(
-    subject: Any, *, ax: Axes | None = None, certificate: Certificate | None = None, time_unit: str = ""
+    subject: Any,
+    *,
+    ax: Axes | None = None,
+    certificate: Certificate | None = None,
+    runs: Sequence[Trajectory] | None = None,
+    time_unit: str = "",
 ) -> Axes:
     """Draw ``|u_k(t)|`` of one run in the colours and lines of the camps, and the peak that a certificate proves.
 
@@ -42,9 +49,11 @@ def plot_input(
     is drawn where none holds: for runs that begin later than 0, sampled inputs, disturbance or noise of the nominal
     protocol, boundary layers. Of a certificate with one set of limits of the gain the run under these is drawn, and
     their peak; with late messages or moving leaders the run with these, and what bounds its input, if anything does;
-    the legend names them. A held input is drawn in steps if every period is sampled. Of a family the largest input
-    under each of many signals is drawn, below its bound for every signal; of agents of order n the size of each
-    agent's input.
+    the legend names them. A held input is drawn in steps if every period is sampled.
+
+    Of a family the largest input under each of many signals is drawn, below its bound for every signal; signals of a
+    search for worst cases keep the error large, and their inputs need not be: "slowest found". Of agents of order n it
+    is the size of each agent's input, under the sliding-mode protocol of its nominal part; the peak is of the whole.
 
     Parameters
     ----------
@@ -54,6 +63,8 @@ def plot_input(
     certificate : Certificate, optional
         Of the same graph, protocol and initial state as a trajectory. Beside the peak of one of a set of initial
         states the set is named.
+    runs : sequence of Trajectory, optional
+        Of a family, by default under eight random signals and worst cases.
     time_unit : str
         Of the deadline, for the label of the axis.
 
@@ -74,27 +85,73 @@ def plot_input(
     >>> ax.get_ylabel(), ax.texts[0].get_text()
     ('input $|u_k|$', 'certified peak 16.01')
     """
+    ax, x = axes_of(ax), time_label("time $t$", time_unit)
     if isinstance(subject, FamilyCertificate):
-        return plot_family_input(subject, ax=ax, time_unit=time_unit)
-    if isinstance(subject, AgentsTrajectory) or (isinstance(subject, Certificate) and subject.agents is not None):
-        return plot_agents_input(subject, ax=ax, time_unit=time_unit)
-    run, structure = trajectory_of(subject), structure_of(subject)
+        runs = runs_of(subject, runs)
+        _draw_signals(ax, subject, runs)
+        draw_deadlines(ax, runs[0])
+        return finished(ax, x, r"$\max_k |u_k|$", count_of_signals(subject, runs))
     certificate = subject if isinstance(subject, Certificate) else certificate
-    ax, size = axes_of(ax), np.abs(_resolved_input(run))
-    steps = "steps-post" if _every_period_sampled(run) else "default"
+    if isinstance(subject, AgentsTrajectory) or (certificate is not None and certificate.agents is not None):
+        moved = agents_run(subject)
+        run: Trajectory | AgentsTrajectory = moved
+        sliding = moved.protocol.base.reaching is not None
+        name = "nominal input" if sliding else "input"
+        name += " $|u_k|$" if run.input.shape[1] == 1 else r" $\|u_k\|$"
+        size, steps, title = np.sqrt((run.input**2).sum(axis=1)), "default", ""
+        peaks = [] if certificate is None else _agents_peaks(certificate, sliding)
+    else:
+        run, name = trajectory_of(subject), "input $|u_k|$"
+        size, steps = np.abs(_resolved_input(run)), "steps-post" if _every_period_sampled(run) else "default"
+        peaks = [] if certificate is None else _peaks(run, certificate)
+        title = limits_text(run, certificate)
+    structure = analyse(run.graph) if isinstance(run, AgentsTrajectory) else structure_of(subject)
     named = draw_agents(ax, run, size, structure, size=True, drawstyle=steps)
-    draw_peaks(ax, run.t, size, [] if certificate is None else _peaks(run, certificate))
+    draw_peaks(ax, run.t, size, peaks)
     draw_deadlines(ax, run)
     name_agents(ax, run, size, named)
-    return finished(ax, time_label("time $t$", time_unit), "input $|u_k|$", limits_text(run, certificate))
+    return finished(ax, x, name, title)
+
+
+def _draw_signals(ax: Axes, certificate: FamilyCertificate, runs: Sequence[Trajectory]) -> None:
+    """Draw the largest input under many signals below its bound for every signal, and the proved peak."""
+    first, gain = runs[0], certificate.protocol.gain
+    before = first.remaining > 0
+    t, left = first.t[before], first.remaining[before]
+    floor = FLOOR_FACTOR * first.rtol * (float(np.abs(first.states[:, 0]).max()) or 1.0)
+    noise = 2 * float(Members(certificate.family).in_weight.max(initial=0.0)) * floor
+    others = "other signals" if any(map(is_worst, runs)) else "random signals"
+    names, sizes = {False: others, True: "slowest found"}, []
+    for run in runs:
+        own = run.remaining > 0
+        size = np.abs(run.input[:, own]).max(axis=0)
+        resolved = np.where(size > noise * gain.value_at_remaining(run.remaining[own]), size, np.nan)
+        ax.plot(run.t[own], resolved, label=names.pop(is_worst(run), None), **line_of(run))
+        sizes.append(np.interp(first.t, run.t[own], np.nan_to_num(resolved), right=0.0))
+    bound = certificate.input_bound(left).max(axis=0)
+    if np.isfinite(bound).all():
+        ax.plot(t, bound, color=BOUND, linewidth=1.8, label=bound_label(certificate))
+        sizes.append(np.interp(first.t, t, bound, right=0.0))
+    peaks = [Peak(float(peak), f"certified peak {up(peak, 4)}") for peak in sorted(certificate.input_peaks or ())[-1:]]
+    draw_peaks(ax, first.t, np.array(sizes), peaks)
+    ax.set_xlim(0, float(first.t[-1]))
+
+
+def _agents_peaks(certificate: Certificate, sliding: bool) -> list[Peak]:
+    """Return the proved peak of agents of order n, of the whole input."""
+    part = certificate.agents
+    if part is None or part.input is None:
+        return []
+    largest = max(part.input)
+    return [Peak(float(largest), f"certified peak {up(largest, 4)}{', sliding terms included' if sliding else ''}")]
 
 
 def _every_period_sampled(run: Trajectory) -> bool:
     """Whether the input is held, and known in each period up to the deadline."""
-    if run.actuator is None or run.actuator.sample_period is None:
+    if run.conditions.actuator is None or run.conditions.actuator.sample_period is None:
         return False
     longest = np.diff(run.t[run.t <= float(run.protocol.T)]).max(initial=0)
-    return bool(longest <= (1 + 1e-9) * float(run.actuator.sample_period))
+    return bool(longest <= (1 + 1e-9) * float(run.conditions.actuator.sample_period))
 
 
 def _peaks(run: Trajectory, certificate: Certificate) -> list[Peak]:
@@ -104,7 +161,8 @@ def _peaks(run: Trajectory, certificate: Certificate) -> list[Peak]:
     if late is not None and (largest := largest_late_input(late, certificate.protocol)) is not None:
         whole = ", from within 1 of the final states" * late.relative
         found.append(Peak(float(largest), f"late messages: at most {up(largest, 4)}{whole}", BOUND))
-    tracking = certificate.tracking if isinstance(run, TrackingRun) else None
+    leads = run.conditions.leaders is not None and run.conditions.messages is None
+    tracking = certificate.tracking if leads else None
     if tracking is not None and tracking.input is not None:
         most = float(tracking.input.max())
         found.append(Peak(most, f"moving leaders: at most {up(most, 4)}", BOUND))
@@ -164,7 +222,7 @@ def plot_effort(
     run = trajectory_of(subject)
     certificate = subject if isinstance(subject, Certificate) else certificate
     effort, bound = None if certificate is None else _certified_effort(run, certificate), None
-    if effort and effort.energy and not (effort.initial_set or run.actuator or run.sliding):
+    if effort and effort.energy and not (effort.initial_set or run.conditions.actuator or run.sliding):
         bound = float(effort.energy.value)
     ax, energy = axes_of(ax), _energy(run)
     ax.plot(run.t, energy, color=RUN, label="simulated (CVODES)")
@@ -262,7 +320,7 @@ def _certified_peak(trajectory: Trajectory, certificate: Certificate) -> float |
     ParameterError
         The certificate is of another graph, protocol or initial state.
     """
-    effort, actuator = _certified_effort(trajectory, certificate), trajectory.actuator
+    effort, actuator = _certified_effort(trajectory, certificate), trajectory.conditions.actuator
     if effort is None or (actuator is not None and actuator.sample_period is not None):
         return None
     acts = None if actuator is None else (actuator.gain_cap, actuator.stop_before, actuator.sample_period)
@@ -284,7 +342,8 @@ def _certified_effort(trajectory: Trajectory, certificate: Certificate) -> Effor
     """
     require_same(trajectory, certificate)
     effort, slid = certificate.effort, trajectory.sliding
-    unknown = trajectory.forcing is not None or 0.0 not in trajectory.t[:1]
+    met = trajectory.conditions
+    unknown = met.forcing is not None or 0.0 not in trajectory.t[:1]
     unknown = unknown or (slid is not None and slid.boundary_layer is not None)
-    unknown = unknown or isinstance(trajectory, LateRun | TrackingRun)
+    unknown = unknown or met.messages is not None or met.leaders is not None
     return None if unknown else effort

@@ -56,7 +56,7 @@ def refuse_family(subject: Any) -> None:
     ptcc_certify.errors.ParameterError: this figure is of one graph; of families draw plot_graph, and of their ...
     """
     if isinstance(subject, Family | FamilyCertificate):
-        others = "of their certificates plot_family, plot_family_decay and plot_input"
+        others = "of their certificates plot_trajectory, plot_decay and plot_input"
         raise ParameterError(f"this figure is of one graph; of families draw plot_graph, and {others}")
 
 
@@ -144,7 +144,8 @@ def ideal_text(certificate: Certificate) -> str:
 
 def limits_text(run: Trajectory, certificate: Certificate | None) -> str:
     """Name limits of the gain, late messages, moving leaders of a run; say what of a certificate it is without."""
-    limits, messages, leaders = run.actuator, getattr(run, "messages", None), getattr(run, "leaders", None)
+    met = run.conditions
+    limits, messages, leaders = met.actuator, met.messages, met.leaders
     numbers: dict[str, Any] = {}
     if limits is not None:
         numbers = dict(zip(_LIMITS, (limits.gain_cap, limits.stop_before, limits.sample_period), strict=True))
@@ -152,7 +153,7 @@ def limits_text(run: Trajectory, certificate: Certificate | None) -> str:
     named = [f"{name} {near(number)}" for name, number in numbers.items() if number]
     named += [] if leaders is None else [f"leaders move at up to {near(leaders.speed)}"]
     if certificate is not None:
-        forced = certificate.sigma0 is None and run.forcing is None and leaders is None
+        forced = certificate.sigma0 is None and met.forcing is None and leaders is None
         absent = {
             "without the limits of the gain": limits is None and certificate.limits,
             "without late messages": messages is None and certificate.late,

@@ -10,10 +10,22 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS
 from ptcc_certify.protocols.reaching_time import ReachingTime
-from ptcc_certify.report.plots.agents import draw_agents, draw_deadlines, name_agents
+from ptcc_certify.report.plots.agents import (
+    CAMP_STYLES,
+    NAMED_AGENTS,
+    draw_agents,
+    draw_deadlines,
+    family_camps,
+    family_groups,
+    name_agents,
+)
+from ptcc_certify.report.plots.runs import bound_label, count_of_signals, is_worst, runs_of
 from ptcc_certify.report.plots.style import (
+    BEHIND,
     BOUND,
     DOUBLE_COLUMN,
     SINGLE_COLUMN,
@@ -25,21 +37,35 @@ from ptcc_certify.report.plots.style import (
     time_label,
 )
 from ptcc_certify.report.plots.subject import limits_text, structure_of, trajectory_of
+from ptcc_certify.simulation.trajectory import Trajectory
+
+#: The bar of a final interval.
+BAR: dict[str, Any] = {"linewidth": 2.5, "marker": "_", "markersize": 5}
 
 
 @styled
-def plot_trajectory(subject: Any, *, ax: Axes | None = None, time_unit: str = "") -> Axes:
+def plot_trajectory(
+    subject: Any, *, ax: Axes | None = None, runs: Sequence[Trajectory] | None = None, time_unit: str = ""
+) -> Axes:
     """Draw the states ``x_k(t)`` of one run, in the colours and lines of the camps, and the deadline ``T``.
 
     In a formation these are positions, the places added.
     Of up to eight agents each has a line with its name. Of more, parts of the graph with more than three agents are
     drawn as their range and median, and the agents that begin highest and lowest by name.
 
+    Of the certificate of a family thin lines are runs under random signals, thicker ones under worst cases, in the
+    colours and lines of the camps: those of the consensus, or what agents are in every mode. Shaded: where those of a
+    camp are for every signal, the final interval of each widened by the bound of ``|x_k(t) - x_k(T)|``, and never
+    beyond the largest state. Bars behind ``T``: the final intervals. Of more than eight agents those are drawn that
+    begin highest and lowest.
+
     Parameters
     ----------
-    subject : Trajectory or Certificate
+    subject : Trajectory, Certificate or FamilyCertificate
         Of one initial state. The run of a certificate that holds none is simulated.
     ax : Axes, optional
+    runs : sequence of Trajectory, optional
+        Of a family, by default under eight random signals and worst cases.
     time_unit : str
         Of the deadline, for the label of the axis: ``"s"``.
 
@@ -50,7 +76,7 @@ def plot_trajectory(subject: Any, *, ax: Axes | None = None, time_unit: str = ""
     Raises
     ------
     ParameterError
-        The subject leads to no run of one initial state.
+        The subject leads to no run of one initial state, or runs are not of its family.
 
     Examples
     --------
@@ -60,12 +86,89 @@ def plot_trajectory(subject: Any, *, ax: Axes | None = None, time_unit: str = ""
     >>> ax.get_xlabel(), [text.get_text() for text in ax.texts]
     ('time $t$ (s)', ['ann', 'bob', 'ann', 'bob'])
     """
-    run, structure, ax = trajectory_of(subject), structure_of(subject), axes_of(ax)
-    named = draw_agents(ax, run, run.positions, structure)
+    every, ax = runs_of(subject, runs), axes_of(ax)
+    run, values = every[0], every[0].positions
+    if isinstance(subject, FamilyCertificate):
+        named, limits = _draw_signals(ax, subject, every)
+        title = count_of_signals(subject, every)
+    else:
+        named, limits = draw_agents(ax, run, values, structure_of(subject)), None
+        title = limits_text(run, subject if isinstance(subject, Certificate) else None)
     draw_deadlines(ax, run)
-    name_agents(ax, run, run.positions, named, ends=True)
-    title = limits_text(run, subject if isinstance(subject, Certificate) else None)
+    name_agents(ax, run, values, named, ends=limits is None)
+    if limits is not None:
+        ax.set_ylim(limits)
     return finished(ax, time_label("time $t$", time_unit), "state $x_k$", title)
+
+
+def _draw_signals(
+    ax: Axes, certificate: FamilyCertificate, runs: Sequence[Trajectory]
+) -> tuple[dict[int, str], tuple[float, float]]:
+    """Draw runs of a family within what is proved for every signal; return the colours of agents, and the limits."""
+    groups = family_camps(certificate.family)
+    if groups is None or not all(part.component.behaviour == BIPARTITE_CONSENSUS for part in certificate.parts):
+        groups = family_groups(certificate.family)
+    agents, labels = _extreme_agents(runs[0].states[:, 0]), set()
+    for k in agents:
+        for run in runs:
+            worst, (color, line) = is_worst(run), CAMP_STYLES[groups[k]]
+            style: dict[str, Any] = {"linewidth": 1.1 if worst else 0.5, "alpha": 1.0 if worst else 0.7}
+            style |= {"color": color, "linestyle": line, "label": None if groups[k] in labels else groups[k]}
+            ax.plot(run.t, run.states[k], **style)
+            labels.add(groups[k])
+    bars = _draw_tubes(ax, certificate, runs[0], agents, groups)
+    values = np.concatenate([bars, *(run.states[agents].ravel() for run in runs)])
+    low, high = float(values.min()), float(values.max())
+    low, high = (low, high) if low < high else (low - 1, high + 1)
+    room = 0.08 * (high - low)
+    return {k: CAMP_STYLES[groups[k]][0] for k in agents}, (low - room, high + room)
+
+
+def _extreme_agents(x: np.ndarray) -> list[int]:
+    """Return all agents, or those that begin highest and lowest."""
+    order = np.argsort(x, kind="stable").tolist()
+    if len(order) <= NAMED_AGENTS:
+        return sorted(order)
+    half = NAMED_AGENTS // 2
+    return sorted([*order[:half], *order[-half:]])
+
+
+def _draw_tubes(
+    ax: Axes, certificate: FamilyCertificate, run: Trajectory, agents: list[int], groups: np.ndarray
+) -> list[float]:
+    """Shade where the agents of each camp are for every signal; draw the final intervals beyond ``T``, return ends."""
+    before = run.remaining > 0
+    moves = certificate.deviation_bound(run.remaining[before])
+    finals = certificate.final_states or ()
+    largest = np.zeros(len(groups))  # what the states of a component never exceed
+    for part in certificate.parts:
+        nodes = part.component.nodes
+        largest[nodes] = np.abs(run.states[nodes, 0]).max()
+        if run.sliding is not None:
+            largest[nodes] += np.abs(run.sliding.sigma0[nodes]).sum()
+    T = float(certificate.protocol.T)
+    places: dict[tuple[float, float, str], None] = {}
+    for name in dict.fromkeys(groups[agents]):
+        tubes = []
+        for k in (k for k in agents if groups[k] == name):
+            if (interval := finals[k]) is not None:
+                low, high = (float(end) for end in interval)
+                places[low, high, CAMP_STYLES[name][0]] = None
+                tubes.append((np.maximum(low - moves[k], -largest[k]), np.minimum(high + moves[k], largest[k])))
+        if name != "single leaders" and tubes:
+            tubes = [(np.min([low for low, _ in tubes], axis=0), np.max([high for _, high in tubes], axis=0))]
+        for least, most in tubes:
+            colour = CAMP_STYLES[name][0]
+            ax.fill_between(run.t[before], least, most, color=colour, alpha=0.07, linewidth=0)
+            for rim in (least, most):  # told apart where two overlap
+                ax.plot(run.t[before], rim, color=colour, alpha=0.6, linewidth=0.6)
+    for number, (low, high, colour) in enumerate(places, 1):
+        place = T + number * (float(run.t[-1]) - T) / (len(places) + 1)
+        ax.plot([place, place], [low, high], color=colour, zorder=4, **BAR)
+    if places:
+        ax.fill([], [], facecolor=BEHIND, alpha=0.3, edgecolor=BEHIND, label=bound_label(certificate))
+        ax.plot([], [], color=BEHIND, **BAR, label="final states, proved")
+    return [end for low, high, _ in places for end in (low, high)]
 
 
 @styled
@@ -121,7 +224,7 @@ def plot_sliding(
 
     Parameters
     ----------
-    subject : SlidingTrajectory or Certificate
+    subject : Trajectory or Certificate
         Of the sliding-mode protocol.
     ax : Axes, optional
     reaching : sequence of N ReachingTime, optional
@@ -147,13 +250,13 @@ def plot_sliding(
     >>> [text.get_text() for text in ax.get_legend().get_texts()][-3:]
     ['$\\sigma_k$ reaches 0', 'reaching time at most', '$T_r$']
     """
-    run, structure, ax = trajectory_of(subject).sliding, structure_of(subject), axes_of(ax)
-    if run is None:
+    run, structure, ax = trajectory_of(subject), structure_of(subject), axes_of(ax)
+    if (sliding := run.sliding) is None:
         raise ParameterError("the run has no sliding variables; simulate under the sliding-mode protocol")
     reaching = subject.reaching if reaching is None and isinstance(subject, Certificate) else reaching
-    T_r = float(run.protocol.T_r)
-    named = draw_agents(ax, run, run.sigma, structure)
-    reached = run.reaching_times[run.sigma0 != 0]
+    T_r = float(sliding.protocol.T_r)
+    named = draw_agents(ax, run, sliding.sigma, structure)
+    reached = sliding.reaching_times[sliding.sigma0 != 0]
     if np.isfinite(reached).any():
         marked: dict[str, Any] = {"color": "black", "markerfacecolor": "white", "markersize": 3.5, "zorder": 4}
         ax.plot(reached, np.zeros(reached.size), "o", **marked, label="$\\sigma_k$ reaches 0")
@@ -161,5 +264,5 @@ def plot_sliding(
         proved = [r.time for r in reaching if r.z is None or r.z > 0]
         ax.plot(proved, [0.0] * len(proved), "|", color=BOUND, markersize=12, zorder=3, label="reaching time at most")
     ax.axvline(T_r, color="black", linewidth=0.8, linestyle=(0, (5, 2, 1, 2)), label="$T_r$")
-    name_agents(ax, run, run.sigma, named, until=min(1.1 * T_r, float(run.t[-1])))
+    name_agents(ax, run, sliding.sigma, named, until=min(1.1 * T_r, float(run.t[-1])))
     return finished(ax, time_label("time $t$", time_unit), "sliding variable $\\sigma_k$")

@@ -1,97 +1,45 @@
-"""Trajectories under the sliding-mode protocol: the Filippov solution, event by event.
+"""Motions under the sliding-mode protocol: the Filippov solution, event by event.
 
 While no sliding variable changes its sign the motion is as smooth as the disturbance. With ``y = x - sigma``,
 
     y' = -gain(t) L (y + sigma),      gain with the pole at T = T_r + T_s,
 
 and ``sigma_k`` stays at 0 once it is there, whatever the disturbance. So every reaching time is found first, as the
-root of a scalar equation, the integrator runs from event to event in ``z = ln(T_r/(T_r - t))``, where the pole at
-``T_r`` is gone, and the rest is the nominal motion. No integrator ever meets a pole or a jump of the sign.
+root of a scalar equation that knows no graph, the integrator runs from event to event, and from switch to switch of a
+signal, in ``z = ln(T_r/(T_r - t))``, where the pole at ``T_r`` is gone, and the rest is the nominal motion. No
+integrator ever meets a pole or a jump of the sign.
 """
 
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.protocols.disturbance import TOLERANCE, Disturbance, StateDependent, WorstCaseDisturbance
-from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.protocols.reaching_time import LAST_Z, ReachingProblem, worst_case
-from ptcc_certify.simulation.cvodes import Motion, Phase, Tolerances
-from ptcc_certify.simulation.cvodes_nominal import MANY_STEPS, NominalMotion, signal
+from ptcc_certify.simulation.course import Course, Leg
+from ptcc_certify.simulation.cvodes import Drive, Motion, Phase, Tolerances
 from ptcc_certify.simulation.instants import Instants, tau_before
-from ptcc_certify.simulation.trajectory import SlidingTrajectory
+from ptcc_certify.simulation.members import Choice
+from ptcc_certify.simulation.trajectory import Sliding
 
 if TYPE_CHECKING:
     import casadi as ca
 
-    from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.protocols import ReachingProtocol
+    from ptcc_certify.simulation.members import Members
 
 # The imitation with a boundary layer goes so far towards each pole: 1 - t/T = 1e-13.
 _LAYER_Z = 30.0
+# Steps of Newton's method that finds an instant from the clock.
+_NEWTON = 60
 
 
-def simulate_sliding(
-    graph: SignedDigraph,
-    protocol: ReachingProtocol,
-    initial_state: np.ndarray,
-    sigma0: np.ndarray,
-    disturbance: Disturbance,
-    instants: Instants,
-    tolerances: Tolerances,
-    boundary_layer: float | None,
-) -> SlidingTrajectory:
-    """Integrate ``x_k' = u_k + d_k`` with (48); see :func:`ptcc_certify.simulation.run.simulate`.
-
-    Parameters
-    ----------
-    graph : SignedDigraph
-    protocol : ReachingProtocol
-    initial_state, sigma0 : (N,) array
-    disturbance : Disturbance
-    instants : Instants
-    tolerances : Tolerances
-    boundary_layer : float or None
-    """
-    bounded_by = disturbance.check(protocol.delta, graph.labels, float(instants.t[-1]), rounding_slack(protocol))
-    motion = _SlidingMotion(graph, protocol, disturbance, initial_state, sigma0, tolerances, boundary_layer)
-    z = np.full(initial_state.size, np.nan)
-    if boundary_layer is None:
-        z, states, residual = motion.filippov(instants)
-    else:
-        states, residual = motion.imitation(instants)
-    y, sigma = states.T * motion.unit
-    with np.errstate(divide="ignore"):
-        clock = np.where(instants.remaining > 0, protocol.gain.clock_at_remaining(instants.remaining) + 0.0, np.inf)
-    return SlidingTrajectory(
-        graph=graph,
-        protocol=protocol,
-        t=instants.t,
-        remaining=instants.remaining,
-        clock=clock,
-        states=y + sigma,
-        rtol=tolerances.rtol,
-        atol=tolerances.atol,
-        deadline_index=instants.deadline(protocol),
-        deadline_residual=residual,
-        stats=motion.stats,
-        sigma=sigma,
-        disturbance=motion.disturbances(instants.t, y + sigma, sigma),
-        sigma0=sigma0,
-        reaching_remaining=instants.reaching_remaining,
-        reaching_z=z,
-        source=disturbance.text,
-        bounded_by=bounded_by,
-        boundary_layer=boundary_layer,
-        reads_states=isinstance(disturbance, StateDependent),
-    )
-
-
-class _SlidingMotion(Motion):
+class SlidingMotion(Motion):
     """Agents moved along ``y' = -gain L (y + sigma)`` with their sliding variables, ``y = x - sigma``.
 
         sigma' = -mu1 s - (reaching gain) sigma + d    until sigma is 0, and 0 from there on
@@ -106,23 +54,26 @@ class _SlidingMotion(Motion):
         ``s`` is ``tanh(sigma/layer)`` instead.
     """
 
+    moved = 1
+
     def __init__(
         self,
-        graph: SignedDigraph,
+        members: Members,
         protocol: ReachingProtocol,
         disturbance: Disturbance,
-        initial_state: np.ndarray,
-        sigma0: np.ndarray,
+        starts: tuple[np.ndarray, np.ndarray],
         tolerances: Tolerances,
         boundary_layer: float | None,
     ):
-        state = np.stack([initial_state - sigma0, sigma0], axis=1)
-        self.unit = float(max(np.abs(initial_state).max(), np.abs(state).max())) or 1.0
-        super().__init__(graph, state / self.unit, 1, tolerances)
-        self._options["max_num_steps"] = MANY_STEPS
-        self.graph, self.protocol, self.tolerances, self.slack = graph, protocol, tolerances, rounding_slack(protocol)
-        self.sigma0, self.disturbance = sigma0, disturbance
-        self.sources, self._signal = (disturbance,), signal(disturbance, graph.n_nodes)
+        import casadi as ca
+
+        initial_state, self.sigma0 = starts
+        state = np.stack([initial_state - self.sigma0, self.sigma0], axis=1)
+        unit = float(max(np.abs(initial_state).max(), np.abs(state).max())) or 1.0
+        super().__init__(members, state / unit, tolerances, unit=unit)
+        self.protocol, self.tolerances, self.slack = protocol, tolerances, rounding_slack(protocol)
+        self.disturbance, self.drives = disturbance, [Drive(disturbance, len(state))]
+        self._moving = ca.MX.sym("moving", len(state))
         self.reaching_z, self.layer = np.full(len(state), np.inf), boundary_layer
         self.T_r, self.T_s, self.T = float(protocol.T_r), float(protocol.T_s), float(protocol.T)
         self.rho1, self.pole = float(protocol.rho1), float(protocol.gain.pole)
@@ -130,40 +81,61 @@ class _SlidingMotion(Motion):
         reaching_pole = float(protocol.reaching_gain.pole)
         self.reaching = Phase(0.0, self.T_r, self.rho1, self.pole, self.T_s, self.mu2, reaching_pole)
 
-    def slope(self, x: ca.MX, phase: Phase, clock: ca.MX, ends: tuple[float, float]) -> ca.MX:
+    def agents(self) -> np.ndarray:
+        """Return the (N,) present states ``y + sigma``, in units of ``unit``."""
+        return self.state.sum(axis=1)
+
+    def slope(self, x: ca.MX, phase: Phase, z: ca.MX) -> ca.MX:
         """Return ``dy/dz`` and ``dsigma/dz``, with 0 for a sliding variable that is 0."""
         import casadi as ca
 
-        R, t = phase.rate(clock, ca.exp), phase.time(clock, ca.exp)
+        R, t = phase.rate(z, ca.exp), phase.time(z, ca.exp)
         y, sigma = ca.horzsplit(x)
         s = ca.tanh(sigma * (self.unit / self.layer)) if self.layer else ca.DM(np.sign(self.sigma0))
-        push = R / self.unit * ca.DM(self.reaching_z > ends[0]) * (self.mu1 * s - self._signal(phase, ends, t, s))
+        push = R / self.unit * self._moving * (self.mu1 * s - self.drives[0](t, s))
         sigma_slope = -push - (phase.mu2 * R + phase.reaching_pole) * sigma
         return ca.horzcat(-phase.nominal(R) * self._product(y + sigma), sigma_slope)
+
+    def symbols(self) -> list[ca.MX]:
+        """Return the parameters of an integrator; besides which sliding variables move."""
+        return [*super().symbols(), self._moving]
+
+    def numbers(self, phase: Phase, start: float, end: float) -> list[float]:
+        """Return these parameters between two neighbouring stops."""
+        return [*super().numbers(phase, start, end), *(self.reaching_z > start).astype(float).tolist()]
 
     def _advance(self, phase: Phase, z: np.ndarray, start: float) -> np.ndarray:
         self.state[self.reaching_z <= start, 1] = 0
         return super()._advance(phase, z, start)
 
+    def nominal(self, y: np.ndarray) -> Motion:
+        """Return the motion of the agents from ``y`` on, where no sliding variable moves."""
+        motion = Motion(self.members, y[:, None], self.tolerances, unit=self.unit)
+        motion.stats = self.stats
+        return motion
+
     # ------------------------------------------------------------------ the true solution
 
-    def filippov(self, instants: Instants) -> tuple[np.ndarray, np.ndarray, float | None]:
-        """Return reaching times ``z``, the (M, N, 2) ``y`` and sliding variables, and the residual at the deadline."""
-        z, t = instants.z, instants.t
+    def reach(self, course: Course, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Lead the course until all sliding variables are 0, at the end of the reaching phase at the latest.
+
+        Those that are 0 at ``T_r`` only move nobody for the last of it. Return which instants come later, and the
+        (M, N, 2) ``y`` and sliding variables; there ``y`` is left out.
+        """
         out = np.zeros((z.size, *self.state.shape))
         reads_states = isinstance(self.disturbance, StateDependent) and bool(self.sigma0.any())
-        reaching_z, end, y_end = (self._solve_coupled if reads_states else self._solve_decoupled)(z, out)
-        # Sliding variables that are 0 at T_r only: from ``end`` on they move nobody.
-        early = end < self._last_z
-        out[(z >= end) & (z < np.inf), :, 0] = y_end
-        later = z >= end if early else np.isinf(z)
-        remaining = self.T_s + (self.T_r * math.exp(-end) if early else 0.0)
-        motion = NominalMotion(self.graph, y_end[:, None], self.tolerances)
-        motion.stats = self.stats
-        limited, begin = GainLimits().limit(self.protocol.gain), math.log(self.T / remaining)
-        nominal, residual = motion.follow(limited, t[later], instants.remaining[later], begin)
-        out[later, :, 0] = nominal[:, :, 0]
-        return reaching_z, out, residual
+        if reads_states:
+            end, y = self._solve_coupled(z, out)
+            course.stay(int((z < end).sum()), float(self.protocol.clock_while_reaching(np.array(end))))
+        else:
+            end, y = self._solve_decoupled(course, z, out)
+        course.lead(self.nominal(y))
+        if end < self._last_z:
+            return z >= end, out
+        late = (z >= end) & (z < np.inf)
+        out[late, :, 0] = y
+        course.stay(int(late.sum()), float(self.protocol.clock_while_reaching(np.array(np.inf))))
+        return np.isinf(z), out
 
     @property
     def _last_z(self) -> float:
@@ -171,24 +143,43 @@ class _SlidingMotion(Motion):
         gain = (self.rho1 + self.pole / self.T_s) * self.T_r * 2 * float(self.in_weight.max())
         return LAST_Z + max(0.0, math.log(max(gain, 1.0)))
 
-    def _solve_decoupled(self, z: np.ndarray, out: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
-        """Fill ``out`` until all sliding variables are 0; return the reaching times, the last of them, ``y`` there."""
+    def _solve_decoupled(self, course: Course, z: np.ndarray, out: np.ndarray) -> tuple[float, np.ndarray]:
+        """Fill ``out`` until all sliding variables are 0; return the last reaching time, and ``y`` there."""
         if self.disturbance == WorstCaseDisturbance(self.protocol.delta):
             scalar = worst_case(self.protocol, tuple(self.sigma0.tolist()))
         else:
             scalar = ReachingProblem(self.protocol, self.sigma0, self.disturbance)
         end = min(float(scalar.z.max(initial=0.0)), self._last_z)
         self.reaching_z, early = scalar.z, z < end
-        out[early] = self.sample(self.reaching, z[early], end, events=scalar.z)
+        out[early] = course.sample(z[early], end, self._leg, events=scalar.z)
         # The scalar equations are solved to near machine precision.
         out[:, :, 1] = scalar.sigma(z).T / self.unit
-        return scalar.z, end, self.state[:, 0]
+        return end, self.state[:, 0]
 
-    def _solve_coupled(self, z: np.ndarray, out: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
+    @cached_property
+    def _leg(self) -> Leg:
+        """The reaching phase as a stretch of the clock."""
+        T, T_r, rho, pole = self.T, self.T_r, self.rho1 * self.T, self.pole
+
+        def place(clock: float) -> float:
+            """Return ``z`` at a value of the clock."""
+            tau = clock / (rho + pole)
+            for _ in range(_NEWTON if math.isfinite(clock) else 0):  # from below, where the clock is concave
+                step = (rho * -math.expm1(-tau) + pole * tau - clock) / (rho * math.exp(-tau) + pole)
+                tau -= step
+                if abs(step) <= 1e-15 * abs(tau):
+                    break
+            left = 1 + math.expm1(-tau) * (T / T_r)  # (T_r - t) / T_r
+            return -math.log(left) if left > 0 else math.inf
+
+        return Leg(self.reaching, lambda z: float(self.protocol.clock_while_reaching(np.array(z))), place)
+
+    def _solve_coupled(self, z: np.ndarray, out: np.ndarray) -> tuple[float, np.ndarray]:
         """Do the same under a disturbance that reads the states: all agents at once, events by bracketing."""
         from scipy.integrate import LSODA
 
         n, end, now, phase = len(self.state), self._last_z, 0.0, self.reaching
+        laplacian = self.members.graph.laplacian()
         state, signs = self.state.T.ravel(), np.sign(self.sigma0)
         reaching_z = np.where(signs == 0, 0.0, np.inf)
         # Each sliding variable to a tolerance of its own size: its root depends on nothing else.
@@ -202,7 +193,7 @@ class _SlidingMotion(Motion):
             d = self._evaluate_disturbance(t, (y + sigma) * self.unit, sigma * self.unit)
             push = R * (self.mu1 * signs - np.abs(signs) * d) / self.unit
             rate = -push - (phase.mu2 * R + phase.reaching_pole) * np.where(signs != 0, v[n:], 0.0)
-            return np.concatenate([-phase.nominal(R) * (self.laplacian @ (y + sigma)), rate])
+            return np.concatenate([-phase.nominal(R) * (laplacian @ (y + sigma)), rate])
 
         while signs.any() and now < end:
             solver = LSODA(motion, now, state, end, rtol=self.tolerances.rtol, atol=atol)
@@ -228,7 +219,8 @@ class _SlidingMotion(Motion):
             arrivals = (signs * state[n:] < 0) | np.isin(np.arange(n), events)
             reaching_z[arrivals], signs[arrivals] = now, 0.0
             state[n:][signs == 0] = 0
-        return reaching_z, now, state[:n]
+        self.reaching_z = reaching_z
+        return now, state[:n]
 
     # ------------------------------------------------------------------ the imitation
 
@@ -252,7 +244,7 @@ class _SlidingMotion(Motion):
         )
         for phase, here, clock, end in clocks:
             if phase is past and after.any():
-                residual = self.imbalance(self.state.sum(axis=1, keepdims=True))
+                residual = self.members.imbalance(self.agents(), Choice(0))
             if (t >= phase.start).any():
                 out[here] = self.sample(phase, clock[here], end)
         return out, residual
@@ -260,7 +252,7 @@ class _SlidingMotion(Motion):
     def _evaluate_disturbance(self, t: float, x: np.ndarray, sigma: np.ndarray) -> np.ndarray:
         """Return the (N,) disturbances at one instant and state, within the bound."""
         assert isinstance(self.disturbance, StateDependent)
-        return self.disturbance.at(t, x, sigma, self.protocol.delta, self.graph.labels, self.slack)
+        return self.disturbance.at(t, x, sigma, self.protocol.delta, self.members.graph.labels, self.slack)
 
     def disturbances(self, t: np.ndarray, x: np.ndarray, sigma: np.ndarray) -> np.ndarray:
         """Return the (N, M) disturbances along a run; one that reads the states is checked at every sample."""
@@ -273,6 +265,21 @@ class _SlidingMotion(Motion):
             return float(disturbance.delta) * (np.tanh(sigma / self.layer) if self.layer else np.sign(sigma))
         agents = np.arange(len(x))
         return disturbance.values(t, agents, np.zeros_like(agents))
+
+    def part(self, instants: Instants, x: np.ndarray, sigma: np.ndarray, bounded_by: str) -> Sliding:
+        """Return what a trajectory keeps of the sliding variables, (N, M)."""
+        return Sliding(
+            protocol=self.protocol,
+            sigma=sigma,
+            disturbance=self.disturbances(instants.t, x, sigma),
+            sigma0=self.sigma0,
+            reaching_remaining=instants.reaching_remaining,
+            reaching_z=self.reaching_z if self.layer is None else np.full(len(x), np.nan),
+            source=self.disturbance.text,
+            bounded_by=bounded_by,
+            boundary_layer=self.layer,
+            reads_states=isinstance(self.disturbance, StateDependent),
+        )
 
 
 def rounding_slack(protocol: ReachingProtocol) -> float:

@@ -1,4 +1,4 @@
-"""Members of a family in floating point: which one a signal chooses, and its Laplacian."""
+"""Members of a family in floating point: which one a signal chooses, and its Laplacian; one graph has one member."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from scipy import sparse
 
 from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.rationals import shorten
 
@@ -42,10 +43,9 @@ class _ModeArrays:
         self.lower = mode.lower.as_float()
         self.upper = mode.upper.as_float()
         self.q = mode.parameters.size
-        ends = [self._ends(mode, edge) for edge in range(mode.n_edges)]
-        number = {ends[edge]: p for p, edge in enumerate(mode.parameters.tolist())}
-        self.uncertain = np.array([e for e in range(mode.n_edges) if not mode.known[e]], dtype=np.int64)
-        self.parameter = np.array([number[ends[e]] for e in self.uncertain.tolist()], dtype=np.int64)
+        number = {self._ends(mode, edge): p for p, edge in enumerate(mode.parameters.tolist())}
+        self.uncertain = np.flatnonzero(~mode.known)
+        self.parameter = np.array([number[self._ends(mode, e)] for e in self.uncertain.tolist()], dtype=np.int64)
         self.gap = (self.upper - self.lower)[self.uncertain]
         self.rivals = [
             (p, number[source, target, -sign])
@@ -70,12 +70,14 @@ class Members:
 
     Parameters
     ----------
-    family : Family
+    members_of : Family or SignedDigraph
 
     Attributes
     ----------
-    indptr, indices : int arrays
-        The pattern of all Laplacians, by columns, with the whole diagonal.
+    graph : SignedDigraph
+        The only member, if there is one alone, else that of mandatory edges in the first mode.
+    alone : bool
+        Whether there is one member.
     in_weight : (N,) array
         The largest in-weight of each node over all members.
 
@@ -88,18 +90,32 @@ class Members:
            [ 3.,  3.]])
     """
 
-    def __init__(self, family: Family):
-        self.family = family
-        self.arrays = [_ModeArrays(mode) for mode in family.modes]
-        n = family.n_nodes
-        source, target, _ = family.union
-        keys = np.unique(np.concatenate([source * n + target, np.arange(n) * (n + 1)]))
-        self.indices = keys % n
-        self.indptr = np.searchsorted(keys // n, np.arange(n + 1))
-        self._diagonal = np.searchsorted(keys, np.arange(n) * (n + 1))
-        self._places = [np.searchsorted(keys, a.source * n + a.target) for a in self.arrays]
-        heaviest = [np.bincount(a.target, a.upper, minlength=n) for a in self.arrays]
-        self.in_weight = np.max(heaviest, axis=0)
+    def __init__(self, members_of: Family | SignedDigraph):
+        self.alone = isinstance(members_of, SignedDigraph)
+        self.family = Family.from_graph(members_of) if isinstance(members_of, SignedDigraph) else members_of
+        self.graph = members_of if isinstance(members_of, SignedDigraph) else members_of.modes[0].mandatory
+        if self.alone:
+            self.in_weight = self.graph.in_weight()
+        else:
+            heaviest = [np.bincount(a.target, a.upper, minlength=self.graph.n_nodes) for a in self.arrays]
+            self.in_weight = np.max(heaviest, axis=0)
+
+    @cached_property
+    def arrays(self) -> list[_ModeArrays]:
+        """The edges of every mode."""
+        return [_ModeArrays(mode) for mode in self.family.modes]
+
+    @cached_property
+    def _keys(self) -> np.ndarray:
+        """The pattern of all Laplacians, by columns, with the whole diagonal: column times N plus row."""
+        n, (source, target, _) = self.family.n_nodes, self.family.union
+        return np.unique(np.concatenate([source * n + target, np.arange(n) * (n + 1)]))
+
+    @cached_property
+    def _places(self) -> list[np.ndarray]:
+        """Where the edges of every mode lie in the pattern."""
+        n = self.family.n_nodes
+        return [np.searchsorted(self._keys, a.source * n + a.target) for a in self.arrays]
 
     @cached_property
     def unit(self) -> float:
@@ -145,7 +161,7 @@ class Members:
         ParameterError
             There is none.
         """
-        count = len(self.arrays)
+        count = len(self.family.modes)
         names = [m.name for m in self.family.modes]
         if isinstance(mode, str) and mode in names and mode:
             return names.index(mode)
@@ -158,22 +174,37 @@ class Members:
 
     def data(self, choice: Choice) -> np.ndarray:
         """Return the entries of the Laplacian of a member over the pattern."""
-        own = self.arrays[choice.mode]
+        own, n = self.arrays[choice.mode], self.family.n_nodes
         sizes = own.sizes(choice.levels)
-        entries = np.bincount(self._places[choice.mode], -own.sign * sizes, minlength=self.indices.size)
-        entries[self._diagonal] += np.bincount(own.target, sizes, minlength=self.family.n_nodes)
+        entries = np.bincount(self._places[choice.mode], -own.sign * sizes, minlength=self._keys.size)
+        diagonal = np.searchsorted(self._keys, np.arange(n) * (n + 1))
+        entries[diagonal] += np.bincount(own.target, sizes, minlength=n)
         return entries
+
+    @cached_property
+    def pattern(self) -> tuple[np.ndarray, np.ndarray]:
+        """``indptr`` and ``indices`` of all Laplacians, by columns; of several members with the whole diagonal."""
+        if self.alone:
+            laplacian = self.graph.laplacian().tocsc()
+            return laplacian.indptr, laplacian.indices
+        n = self.family.n_nodes
+        return np.searchsorted(self._keys // n, np.arange(n + 1)), self._keys % n
 
     def laplacian(self, choice: Choice) -> sparse.csc_array:
         """Return the Laplacian of a member."""
-        n = self.family.n_nodes
-        return sparse.csc_array((self.data(choice), self.indices, self.indptr), shape=(n, n))
+        if self.alone:
+            return self.graph.laplacian().tocsc()
+        n, (indptr, indices) = self.family.n_nodes, self.pattern
+        return sparse.csc_array((self.data(choice), indices, indptr), shape=(n, n))
 
     def imbalance(self, x: np.ndarray, choice: Choice | None = None) -> float:
-        """Bound ``max_k |(L x)_k| / (2 D_k)`` over all members, or of one; nobody moves the agents with ``D_k = 0``."""
+        """Bound ``max_k |(L x)_k| / (2 D_k)`` over all members, or of one; nobody moves the agents with ``D_k = 0``.
+
+        Of one member, ``x`` may have several columns.
+        """
         if choice is not None:
             listens = self.in_weight > 0
-            motion = np.abs(self.laplacian(choice) @ x)[listens]
+            motion = np.abs(self.laplacian(choice) @ x)[listens].T
             return float((motion / (2 * self.in_weight[listens])).max(initial=0.0))
         worst = 0.0
         for own in self.arrays:

@@ -1,0 +1,123 @@
+"""Runs that are drawn of a family: under many signals, of the kind that its certificate is about."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from ptcc_certify.certificate.family_certificate import FamilyCertificate
+from ptcc_certify.certificate.family_comparison import worst_case_signals
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.family import Family
+from ptcc_certify.report.plots.style import RUN
+from ptcc_certify.report.plots.subject import trajectory_of
+from ptcc_certify.simulation.run import simulate
+from ptcc_certify.simulation.signals import ConstantSignal, PeriodicSignal, RandomDwellSignal, RandomSignal, Signal
+from ptcc_certify.simulation.trajectory import Trajectory
+from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows
+
+#: Random signals that are drawn beside the worst cases.
+_RANDOM = 8
+#: Periods of the clock in which modes have their shares.
+_PERIODS = (0.25, 0.5, 1.0, 2.0, 4.0)
+#: Samples of runs that begin off the sliding manifold: half as many, since there are as many again before ``T_r``.
+_SAMPLES = 101
+
+
+def sample_runs(certificate: FamilyCertificate, signals: Iterable[Signal] | None = None) -> list[Trajectory]:
+    """Return runs from a certificate's initial state.
+
+    Parameters
+    ----------
+    certificate : FamilyCertificate
+    signals : iterable of Signal, optional
+        By default eight random ones, and worst cases; of a certificate for constant signals, a dwell time, shares or
+        windows signals of that kind.
+
+    Raises
+    ------
+    ParameterError
+        The certificate has no initial state.
+    """
+    if certificate.initial_state is None:
+        raise ParameterError("the certificate has no initial state; certify the family with x0")
+    chosen = _signals(certificate) if signals is None else signals
+    start = [float(x) for x in certificate.initial_state]
+    more: dict[str, Any] = {}
+    if certificate.sigma0 is not None:
+        more = {"sigma0": [float(s) for s in certificate.sigma0], "samples": _SAMPLES}
+    return [simulate(certificate.family, certificate.protocol, start, signal, **more) for signal in chosen]
+
+
+def _signals(certificate: FamilyCertificate) -> list[Signal]:
+    """Return signals of the kind that was asked for; where that is any random ones, and worst cases."""
+    return _of_the_kind(certificate) or [*map(RandomSignal, range(_RANDOM)), *worst_case_signals(certificate)]
+
+
+def _of_the_kind(certificate: FamilyCertificate) -> list[Signal]:
+    """Return signals that keep what a certificate was asked of; none where that is any, or where none is known."""
+    signal, modes = certificate.signal, certificate.family.modes
+    if isinstance(signal, DwellTime):
+        return [RandomDwellSignal(signal, seed) for seed in range(_RANDOM)]
+    if signal == "constant":
+        levels = (0.0, 0.5, 1.0) if not all(mode.known.all() for mode in modes) else (0.5,)
+        members = [ConstantSignal(i, level) for i in range(len(modes)) for level in levels]
+        return list(members[:: math.ceil(len(members) / _RANDOM)])
+    if isinstance(signal, ClockShares):
+        shares = [(i, float(share)) for i, share in enumerate(signal.shares) if share]
+        return [PeriodicSignal([(i, share * period) for i, share in shares]) for period in _PERIODS]
+    if isinstance(signal, JointWindows) and len(modes) * signal.on <= signal.length:
+        word = [(i, float(signal.length) / len(modes)) for i in range(len(modes))]
+        return [PeriodicSignal(word[k:] + word[:k]) for k in range(min(len(word), _RANDOM))]
+    return []
+
+
+def keeps_promise(certificate: FamilyCertificate, runs: Sequence[Trajectory]) -> bool:
+    """Tell whether runs are those under signals of the kind that a certificate was asked of."""
+    own = {signal.text for signal in _of_the_kind(certificate)}
+    return all(run.signal in own for run in runs)
+
+
+def runs_of(subject: Any, runs: Sequence[Trajectory] | None = None) -> list[Trajectory]:
+    """Return runs that are given, or those that are drawn by default: of a family under many signals, else one.
+
+    Raises
+    ------
+    ParameterError
+        The subject leads to no run, or runs are given that are not of its family.
+    """
+    if not isinstance(subject, FamilyCertificate):
+        if runs is not None:
+            raise ParameterError("runs are of the certificate of a family; leave them out")
+        return [trajectory_of(subject)]
+    result = sample_runs(subject) if runs is None else list(runs)
+    if not result or not all(_is_of(run, subject.family) for run in result):
+        raise ParameterError("runs are what simulate returned for the family of the certificate")
+    return result
+
+
+def _is_of(run: Any, family: Family) -> bool:
+    return isinstance(run, Trajectory) and run.played is not None and run.played.family == family
+
+
+def bound_label(certificate: FamilyCertificate) -> str:
+    """Name bounds for every signal; while sliding variables move they are integrated in floats: numerical."""
+    return "proved for every signal" if certificate.direct else "bound for every signal (numerical)"
+
+
+def count_of_signals(certificate: FamilyCertificate, runs: Sequence[Trajectory]) -> str:
+    """Tell how many signals are drawn, and where some are promised, whether these keep the promise or are any."""
+    kept = " of the kind asked for" if keeps_promise(certificate, runs) else " of any kind"
+    return f"{len(runs)} signals" + kept * (certificate.signal != "any")
+
+
+def is_worst(run: Trajectory) -> bool:
+    """Tell whether a run is under a worst case."""
+    return run.signal.startswith("worst")
+
+
+def line_of(run: Trajectory) -> dict[str, Any]:
+    """Return how the one quantity of a run is drawn among others."""
+    worst = is_worst(run)
+    return {"color": "black" if worst else RUN, "linewidth": 0.9 if worst else 0.6, "zorder": 3 if worst else 2}

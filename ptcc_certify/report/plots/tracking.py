@@ -1,0 +1,127 @@
+"""How far agents are from where they should be, with late messages or leaders that move, under what is proved of it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from ptcc_certify.bounds.late_messages import LateBounds
+from ptcc_certify.bounds.tracking import Tracking
+from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled, time_label
+from ptcc_certify.report.plots.subject import certificate_of
+from ptcc_certify.simulation.late_messages import can_run, simulate_late
+from ptcc_certify.simulation.moving_leaders import simulate_tracking
+from ptcc_certify.simulation.trajectory import Trajectory
+
+#: How runs with late messages are drawn, by how old is what agents hear.
+_RUNS: dict[str, dict[str, Any]] = {
+    "oldest": {"color": RUN, "linewidth": 1.1, "label": "as late as allowed"},
+    "square": {"color": BEHIND, "linewidth": 0.8, "linestyle": "--", "label": "now late, now not"},
+}
+#: A lower bound at ``T`` is drawn from this share of the upper one on.
+_SEEN = 1e-3
+
+
+@styled
+def plot_tracking(subject: Any, *, ax: Axes | None = None, time_unit: str = "") -> Axes:
+    """Draw how far the farthest agent is from where it should be, under the proved bound.
+
+    While messages are late that is its final state, in the runs the farther off, the later messages are; where delays
+    are too short for runs the bound is drawn alone. Where leaders move, in the runs away from the farthest follower as
+    fast as they may, it is the target of the follower.
+
+    Parameters
+    ----------
+    subject : Certificate
+        With late messages or moving leaders, and an initial state.
+    ax : Axes, optional
+    time_unit : str
+        Of time on the axis.
+
+    Returns
+    -------
+    Axes
+
+    Raises
+    ------
+    ParameterError
+        No certificate, or one that says nothing of late messages or moving leaders, or has no initial state.
+
+    Examples
+    --------
+    >>> graph = SignedDigraph.from_edges([(1, 2, 1), (2, 3, -1)])
+    >>> p = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
+    >>> cert = certify(graph, p, [1, 0, 2], messages=LateMessages(delay="0.05"), simulation=False)
+    >>> [line.get_label() for line in plot_tracking(cert).lines]
+    ['as late as allowed', 'now late, now not', 'proved bound', 'at least, if as late as allowed']
+    >>> cert = certify(graph, p, [1, 0, 2], leaders=MovingLeaders(speed=1), simulation=False)
+    >>> [line.get_label() for line in plot_tracking(cert).lines]
+    ['worst leaders', 'proved bound', '$T$']
+    """
+    certificate = certificate_of(subject)
+    late, tracking, x0 = certificate.late, certificate.tracking, certificate.initial_state
+    late = late if late is not None and late.says_something else None
+    if late is None and tracking is None:
+        mend = "certify with messages or leaders, or --delay or --leader-speed"
+        raise ParameterError(f"the certificate says nothing of late messages or of leaders that move; {mend}")
+    ends = certificate.final_state
+    if x0 is None or (late is not None and ends is None):
+        raise ParameterError("the certificate has no initial state to run from; certify with x0")
+    ax, nodes, T = axes_of(ax), certificate.structure.followers, float(certificate.protocol.T)
+    if not nodes.size or (late is not None and (late.settling is not None or late.lmi is not None)):
+        nodes = np.arange(certificate.graph.n_nodes)
+    t = np.linspace(0, T, 401)
+    for run, style in _runs(certificate, late, tracking, [float(x) for x in x0]):
+        aims = np.asarray(ends, dtype=float)[:, None] if run.targets is None else run.targets
+        ax.plot(run.t, np.abs(run.states - aims)[nodes].max(axis=0), **style)
+        t = run.t
+    if late is not None:
+        _draw_late_bound(ax, late, t)
+    elif tracking is not None:
+        ax.plot(t, _tracking_bound(tracking, t, T), color=BOUND, linewidth=1.8, label="proved bound")
+        ax.axvline(T, color=BEHIND, linewidth=0.8, linestyle=":", label="$T$")
+        ax.set_ylim(bottom=0)
+    ax.set_xlim(0, t[-1])
+    moving = "" if late is not None and late.leaders is None else "(t)"
+    return finished(ax, time_label("time $t$", time_unit), rf"$\max_k |x_k(t) - x_k^*{moving}|$")
+
+
+def _runs(
+    certificate: Certificate, late: LateBounds | None, tracking: Tracking | None, start: list[float]
+) -> list[tuple[Trajectory, dict[str, Any]]]:
+    """Return the runs that are drawn, and how."""
+    graph, protocol = certificate.graph, certificate.protocol
+    if late is not None:
+        drawn = _RUNS if can_run(protocol, late.messages) else {}
+        more = {"leaders": late.leaders}
+        return [
+            (simulate_late(graph, protocol, late.messages, start, pattern=pattern, **more), style)  # type: ignore[arg-type]
+            for pattern, style in drawn.items()
+        ]
+    assert tracking is not None
+    run = simulate_tracking(graph, protocol, tracking.leaders, start, u=tracking.witness.u, steps=400)
+    return [(run, {"color": RUN, "linewidth": 1.1, "label": "worst leaders"})]
+
+
+def _draw_late_bound(ax: Axes, late: LateBounds, t: np.ndarray) -> None:
+    """Draw what is proved with late messages, and what is the least that a bound can be."""
+    ax.set_yscale("log")
+    if late.rows or late.steps is not None or late.settling is not None or late.lmi is not None:
+        ax.plot(t, late.largest_bound(t), color=BOUND, linewidth=1.8, label="proved bound")
+    elif late.form is not None:
+        ax.plot(t[-1:], [late.largest], marker="_", color=BOUND, markersize=12, label="proved at $T$", linestyle="none")
+    if late.missed is not None and late.missed.bound >= _SEEN * late.largest:
+        marks: dict[str, Any] = {"marker": "v", "color": BOUND, "linestyle": "none", "markersize": 4, "clip_on": False}
+        ax.plot(t[-1:], [float(late.missed.bound)], label="at least, if as late as allowed", **marks)
+
+
+def _tracking_bound(tracking: Tracking, t: np.ndarray, T: float) -> np.ndarray:
+    """Return the bound before T, and from there on."""
+    before = tracking.distance_bound(np.maximum(1 - t / T, 0)).max(axis=0)
+    rate = float(tracking.witness.b * tracking.protocol.gain.rho1)
+    later = -np.expm1(-rate * np.maximum(t - T, 0))  # m' <= -a rho1 m + c from m(T) = 0
+    return np.where(t <= T, before, tracking.distance_after * later)
