@@ -19,7 +19,7 @@ from ptcc_certify.bounds.envelope import FRACTIONS, LAST_INSTANTS
 from ptcc_certify.bounds.input.effort import EnergyIntegral, Peak
 from ptcc_certify.certificate.certificate_data import Content, Observations, Source
 from ptcc_certify.certificate.checking import record
-from ptcc_certify.certificate.format_agents import agents_section, phases_section, read_agents
+from ptcc_certify.certificate.format_agents import agents_section, instants_section, phases_section, read_agents
 from ptcc_certify.certificate.format_effort import LIMITS, effort_section, energy_witness, peak_witness, read_effort
 from ptcc_certify.certificate.format_final_state import final_state_sections, formation_section, read_final_state
 from ptcc_certify.certificate.format_graph import certificate_graph, claim_sections, graph_section, structure_section
@@ -88,6 +88,8 @@ def certificate_document(
         document["agents"] = agents_section(content.agents, out)
         if phases := phases_section(content.agents):
             document["phases"] = phases
+        if instants := instants_section(content.agents):
+            document["instants"] = instants
     if content.offsets is not None:
         document["formation"] = formation_section(content, content.offsets, final, out)
     if content.late is not None and content.late.says_something:

@@ -106,7 +106,8 @@ def read_agents(
     if "cascade" in section:
         return _read_cascade(section, structure, base, functions)
     phases = tuple(map(_read_phase, document.get("phases", ())))
-    return replace(_read_matrix(section, structure, base, functions), phases=phases)
+    instants = tuple(tuple(map(number, row)) for row in document.get("instants", ()))
+    return replace(_read_matrix(section, structure, base, functions), phases=phases, instants=instants)
 
 
 def phases_section(part: AgentsAnswer | None) -> list[dict[str, Any]]:
@@ -121,6 +122,11 @@ def phases_section(part: AgentsAnswer | None) -> list[dict[str, Any]]:
         }
         for phase in getattr(part, "phases", ())
     ]
+
+
+def instants_section(part: AgentsAnswer | None) -> list[list[str | None]]:
+    """Return the section ``instants``; empty without instants."""
+    return [list(map(text, values)) for values in getattr(part, "instants", ())]
 
 
 def _read_phase(entry: Section) -> Phase:

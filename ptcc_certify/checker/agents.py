@@ -10,6 +10,7 @@ from lmi.exact.work import spend
 from ptcc_certify.checker.agent_bounds import Begin, Used, check_input, check_residual, read_used
 from ptcc_certify.checker.agent_cascade import check_cascade
 from ptcc_certify.checker.agent_decrease import check_decrease, check_phases
+from ptcc_certify.checker.agent_instants import check_instants
 from ptcc_certify.checker.agent_model import Agents, read_agents
 from ptcc_certify.checker.agent_motion import check_final_states, check_motion, read_offsets, read_states
 from ptcc_certify.checker.input import Verified
@@ -29,7 +30,7 @@ def check_agents(doc: Document, verified: Verified) -> bool:
     """
     _check_document(doc, verified)
     if isinstance(doc.data["agents"], dict) and "cascade" in doc.data["agents"]:
-        need("phases" not in doc.data, "phases of the cascade")
+        need("phases" not in doc.data and "instants" not in doc.data, "phases or instants of the cascade")
         return check_cascade(doc, verified)
     section, graph = fields(doc.section("agents"), KEYS, "agents"), verified.structure.graph
     agents = read_agents(section, verified.gain)
@@ -55,6 +56,7 @@ def check_agents(doc: Document, verified: Verified) -> bool:
         check_final_states(doc, agents, final, M, begin.states, offsets)
     _bounds(doc, verified, agents, begin, used)
     check_phases(doc, agents, used)
+    check_instants(doc, begin, used)
     return proved
 
 
