@@ -190,6 +190,7 @@ let certificate json : t =
         need (Number.equal (number "largest" (get "largest")) (largest tops)) "the largest input is another"; tops in
   List.iteri (fun i _ -> skipped proof "agent-phase" (Printf.sprintf "phases[%d]" i))
     (match json with Obj l -> (match List.assoc_opt "phases" l with Some v -> entries "phases" v | None -> []) | _ -> []);
+  (match json with Obj l when List.mem_assoc "instants" l -> skipped proof "agent-instants" "instants" | _ -> ());
   need (proof.rest = []) "an obligation that nothing asks for";
   let slope = r.cert.rho1 in
   let cert = { r.cert with funcs; rho1 = if Z.sign slope.qnum = 0 then Number.one else slope } in

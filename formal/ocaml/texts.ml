@@ -86,6 +86,8 @@ let obligations = [
     "error constants, Lyapunov decrease");
   "agent-phase", ("from this zeta on a function decays at this rate, by a matrix that is not below the former",
     "Lyapunov decrease of a Kronecker product");
+  "agent-instants", ("where so many halves of the time are left, no function exceeds these values",
+    "Lyapunov decrease, variation of constants");
 ]
 (* and of section 13 *)
 let sliding_bound = "||sigma(t)|| <= phi(t,T_r)^(-mu3) e^(-mu2 t) ||sigma(0)||"

@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from lmi.exact.decimal_rounding import down, float_down, float_up, near, up
+from ptcc_certify.bounds.agent_instants import Values, instant_values
 from ptcc_certify.bounds.agent_motion import Interval, common_motion
 from ptcc_certify.bounds.agents import (
     States,
@@ -84,6 +85,9 @@ class AgentsPart(AgentsAnswer):
         Bounds of the Euclidean norm of every agent's input.
     phases : tuple of Phase
         Faster decrease of single functions, nearer to the deadline.
+    instants : tuple of tuples of Fraction or None
+        Bounds of ``V`` of functions used, at ``1 - t/T = 1/2, 1/4, ..``; none larger at later instants than its decay
+        tells.
     """
 
     structure: Structure
@@ -97,6 +101,7 @@ class AgentsPart(AgentsAnswer):
     residual: Residual | None = None
     input: tuple[Fraction, ...] | None = None
     phases: tuple[Phase, ...] = ()
+    instants: tuple[Values, ...] = ()
 
     @property
     def decay(self) -> Fraction:
@@ -161,23 +166,29 @@ class AgentsPart(AgentsAnswer):
         q = np.atleast_1d(np.asarray(remaining, dtype=float))
         bounds = np.full((self.structure.graph.n_nodes, self.order, len(q)), np.inf)
         powers = np.outer(np.arange(self.order), np.log([self.protocol.value(x) for x in q]))
-        for one, V, value in zip(self.used, self.functions, self.initial_values, strict=False):
-            if V.deviation is None:
-                continue
-            for W, falls in self._courses(one.number, q):
-                rows = [
-                    [float_up(root_product(c, W[i][i], value)) for i in range(self.order)] for c in V.deviation.agents
-                ]
-                with np.errstate(over="ignore", invalid="ignore"):
-                    own = np.array(rows)[:, :, None] * np.exp(powers - falls / 2 + 1e-9)
-                bounds = np.where(np.isfinite(falls), np.minimum(bounds, own), bounds)
+        known = list(enumerate((self.initial_values, *self.instants))) if self.initial_values else []
+        for i, values in known:
+            for one, V, value in zip(self.used, self.functions, values, strict=True):
+                if V.deviation is None or value is None:
+                    continue
+                for W, falls in self._courses(one.number, q, 2.0**-i):
+                    rows = [
+                        [float_up(root_product(c, W[j][j], value)) for j in range(self.order)]
+                        for c in V.deviation.agents
+                    ]
+                    with np.errstate(over="ignore", invalid="ignore"):
+                        own = np.array(rows)[:, :, None] * np.exp(powers - falls / 2 + 1e-9)
+                    bounds = np.where(np.isfinite(falls), np.minimum(bounds, own), bounds)
         return bounds
 
-    def _courses(self, function: int, q: np.ndarray) -> Iterator[tuple[Matrix, np.ndarray]]:
-        """Yield matrices of a function, and by which exponent it has fallen by these; minus infinity before."""
-        s, gain, former, since = self.protocol.clock(q), self.protocol.gain, self.matrix.rate, 1.0
-        yield self.matrix.W, float_down(former) * s
-        fallen, begun = 0.0, 0.0
+    def _courses(self, function: int, q: np.ndarray, since: float) -> Iterator[tuple[Matrix, np.ndarray]]:
+        """Yield matrices of a function, and by which exponent it has fallen by these since ``1 - t/T = since``.
+
+        Minus infinity before.
+        """
+        s, gain, former = self.protocol.clock(q), self.protocol.gain, self.matrix.rate
+        fallen, begun = 0.0, float(self.protocol.clock(np.array([since]))[0])
+        yield self.matrix.W, np.where(q <= since, float_down(former) * (s - begun), -np.inf)
         for phase in self.phases:
             if phase.function == function:
                 since = min(since, phase.begins(gain.rho1, gain.pole, gain.T))
@@ -320,6 +331,14 @@ def with_phases(part: AgentsPart) -> AgentsPart:
         for k, (_, number, V) in enumerate(known):
             found += find_phases(agent, part.matrix, number, V.proved_rate, later=k == 0)
     return replace(part, phases=tuple(found))
+
+
+def with_instants(part: AgentsPart) -> AgentsPart:
+    """Add what functions are worth at instants nearer to the deadline."""
+    if part.order < 2 or part.initial_state is None or not any(part.initial_values):
+        return part
+    values = instant_values(part.structure, part.protocol, part.matrix, part.functions, part.initial_state)
+    return replace(part, instants=values)
 
 
 def _coupling(rate: Fraction) -> Fraction:

@@ -54,6 +54,7 @@ from ptcc_certify.certificate.unverified import (
 from ptcc_certify.checker import NOT_OF_FAMILIES, SCHEMA, SLIDING_BOUND, SLIDING_CLOCK
 from ptcc_certify.checker.agent_cascade import CascadeSection
 from ptcc_certify.checker.agent_decrease import PhaseSection
+from ptcc_certify.checker.agent_instants import InstantsSection
 from ptcc_certify.checker.agents import AgentsSection
 from ptcc_certify.checker.family_bounds import FamilyInput
 from ptcc_certify.checker.family_limits import EQUAL
@@ -100,7 +101,8 @@ def read_agents(
         Phase(p.function, rows_of(p.lower_triangle), p.rate, p.coupling, tuple(p.points))
         for p in report.sections.get("phases", ())
     )
-    return replace(read_matrix(section, structure, base, functions), phases=phases)
+    instants = rows_of(report.sections.get("instants", ()))
+    return replace(read_matrix(section, structure, base, functions), phases=phases, instants=instants)
 
 
 def certificate_document(
@@ -138,6 +140,8 @@ def certificate_document(
         document["agents"] = write(type(section), section, out)
         if phases := phases_section(content.agents):
             document["phases"] = write(Several[PhaseSection], phases, out)
+        if instants := getattr(content.agents, "instants", ()):
+            document["instants"] = write(InstantsSection, instants, out)
     if content.offsets is not None:
         document["formation"] = write(FormationSection, formation_section(content, content.offsets, final), out)
     if content.late is not None and content.late.says_something:

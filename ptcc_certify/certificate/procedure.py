@@ -37,7 +37,7 @@ from ptcc_certify.bounds.final_state import (
 from ptcc_certify.bounds.late_messages import LateBounds, bound_late
 from ptcc_certify.bounds.longest_delay import LateCase
 from ptcc_certify.bounds.tracking import Tracking, bound_tracking
-from ptcc_certify.certificate.agents_part import AgentsPart, prove_agents, with_phases
+from ptcc_certify.certificate.agents_part import AgentsPart, prove_agents, with_instants, with_phases
 from ptcc_certify.certificate.agents_request import (
     Chains,
     formation_on_a_line,
@@ -339,7 +339,7 @@ def _with_agents(certificate: Certificate, agents: Agents, chains: Chains, run: 
         )
     except NoCertificate as error:
         raise ParameterError(f"agents: {error}; ask for a smaller decay or a lower order") from None
-    part = with_phases(part) if isinstance(part, AgentsPart) else part
+    part = with_instants(with_phases(part)) if isinstance(part, AgentsPart) else part
     notes, cut_off, motion = [*certificate.notes, *chains.notes], list(certificate.cut_off), None
     if run and part.initial_state is not None:
         limit = SEARCHING * certificate.time_limit

@@ -60,9 +60,10 @@ KEYS = (
     *("schema", "producer", "graph", "structure", "claim", "components", "protocol", "paper", "lyapunov", "rates"),
     *("overshoot", "initial_state", "sliding_variable", "influence", "final_state", "reaching_time", "input", "proof"),
     *("verdict", "digest", "unverified", "boxes", "restricted", "agents", "messages", "leaders", "formation", "phases"),
+    "instants",
 )
 #: Parts that need not be there.
-OPTIONAL = ("components", "boxes", "restricted", "agents", "messages", "leaders", "formation", "phases")
+OPTIONAL = ("components", "boxes", "restricted", "agents", "messages", "leaders", "formation", "phases", "instants")
 
 #: Parts that are null in a certificate of a family.
 NOT_OF_FAMILIES = ("paper", "rates", "overshoot", "influence")
@@ -223,7 +224,7 @@ def _verdict(doc: Document) -> str:
     if "agents" in data:
         need("messages" not in data and "leaders" not in data, "agents of order n with late messages or moving leaders")
         return doc.close(check_agents(doc, verified))
-    need("phases" not in data, "phases of agents that are not of order n")
+    need("phases" not in data and "instants" not in data, "phases or instants of agents that are not of order n")
     check_input(doc, verified)
     check_messages(doc, verified)
     check_leaders(doc, verified)
@@ -235,7 +236,7 @@ def _family_verdict(doc: Document, protocol: Protocol) -> str:
     need("agents" not in doc.data, "agents of order n on a family")
     need("messages" not in doc.data, "late messages of a family")
     need("leaders" not in doc.data, "leaders of a family that move")
-    need("formation" not in doc.data and "phases" not in doc.data, "a formation or phases of a family")
+    need(not doc.data.keys() & {"formation", "phases", "instants"}, "a formation, phases or instants of a family")
     family = check_family(doc)
     begin = check_begin(doc, protocol)
     functions = check_family_functions(doc, family)

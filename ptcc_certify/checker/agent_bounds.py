@@ -124,9 +124,12 @@ class Begin:
         adjugate, determinant = _adjugate(W)
         return adjugate, Fraction(determinant, scale)
 
-    def value(self, function: Function) -> Fraction:
-        """Bound ``V(0) = sum_kl Om_kl z_k'P z_l``, summed over the coordinates of space, from above, to many bits."""
-        n, (P, times), (columns, scale) = self.agents.n, self.inverse, self.columns
+    def value(self, function: Function, at: tuple[list[list[list[int]]], Fraction] | None = None) -> Fraction:
+        """Bound ``V = sum_kl Om_kl z_k'P z_l``, summed over the coordinates of space, from above, to many bits.
+
+        At time 0, or of other columns over a scale.
+        """
+        n, (P, times), (columns, scale) = self.agents.n, self.inverse, at or self.columns
         form, total, unit = Weights.of(function), 0, 1
         for each in columns:
             Z: list[list[int]] = []

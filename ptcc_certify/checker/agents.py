@@ -19,6 +19,7 @@ from ptcc_certify.checker.agent_bounds import (
 )
 from ptcc_certify.checker.agent_cascade import check_cascade
 from ptcc_certify.checker.agent_decrease import check_decrease, check_phases
+from ptcc_certify.checker.agent_instants import check_instants
 from ptcc_certify.checker.agent_model import Agents, OneAgent, agents_of
 from ptcc_certify.checker.agent_motion import check_final_states, check_motion, need_shape, sized_offsets
 from ptcc_certify.checker.input import Verified
@@ -47,7 +48,7 @@ def check_agents(doc: Document, verified: Verified) -> bool:
     """
     _check_document(doc, verified)
     if isinstance(doc.data["agents"], dict) and "cascade" in doc.data["agents"]:
-        need("phases" not in doc.data, "phases of the cascade")
+        need("phases" not in doc.data and "instants" not in doc.data, "phases or instants of the cascade")
         return check_cascade(doc, verified)
     section, graph = doc.section("agents", AgentsSection), verified.structure.graph
     agents = agents_of(section, verified.gain)
@@ -75,6 +76,7 @@ def check_agents(doc: Document, verified: Verified) -> bool:
         check_final_states(doc, agents, final, M, begin.states, offsets, section.final_state)
     _bounds(doc, verified, section, agents, begin, used)
     check_phases(doc, agents, used)
+    check_instants(doc, begin, used)
     return proved
 
 

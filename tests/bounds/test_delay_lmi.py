@@ -94,6 +94,16 @@ def test_leaders_that_rest_are_forgiven_any_delay() -> None:
     assert 0 < bounds(star, "0.001", True).longest_delay() < math.inf
 
 
+def test_of_a_larger_team_the_first_function_is_taken_and_forgives_longer_delays_than_those_of_the_graph() -> None:
+    edges = [(k, (k + step) % 23, sign) for k in range(23) for step, sign in ((1, 1), (5, 2), (7, -1))]
+    graph, x0 = SignedDigraph.from_edges(edges), [k % 7 - 3 for k in range(23)]
+    probe = LateMessages("0.001", gain_cap=CAP)
+    cert = certify(graph, PROTOCOL, x0, messages=probe, simulation=False, method="paper")
+    small = SmallDelayBounds(cert.structure, PROTOCOL.gain, probe, cert.influence, cert.initial_state or ())
+    assert cert.late is not None and cert.late.lmi is not None and cert.verdict == "certified"
+    assert (cert.late.longest_delay or 0) > 5 * small.longest_delay(cert.decaying_forms)
+
+
 def test_nothing_is_searched_of_large_graphs() -> None:
     ring = SignedDigraph.from_edges([(k, (k + 1) % 40, 1) for k in range(40)])
     assert bounds(ring, "0.0001", False).best() is None and bounds(ring, "0.0001", False).longest_delay() == 0

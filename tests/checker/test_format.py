@@ -107,7 +107,7 @@ def test_the_schema_is_a_strict_schema():
         assert found["additionalProperties"] is False
         if "minProperties" not in found:
             graph, family = (
-                {"components", "agents", "messages", "leaders", "formation", "phases"},
+                {"components", "agents", "messages", "leaders", "formation", "phases", "instants"},
                 {"components", "boxes", "restricted"},
             )
             left_open = graph if found == GRAPH else family if found == FAMILY else set()
@@ -285,7 +285,7 @@ def test_words_and_sections_that_do_not_fit_are_not_valid():
 def test_every_key_is_described():
     rows = set(re.findall(r"^\| `(\w+)` \|", FORMAT.partition("## 4.")[2].partition("## 5.")[0], re.MULTILINE))
     assert rows - {"boxes", "restricted"} == set(GRAPH["properties"])
-    assert rows - {"agents", "messages", "leaders", "formation", "phases"} == set(FAMILY["properties"])
+    assert rows - {"agents", "messages", "leaders", "formation", "phases", "instants"} == set(FAMILY["properties"])
     for found in objects(SCHEMA):
         for key in found["properties"]:
             assert re.search(rf"[`\"]{re.escape(key)}[`\"]|`rates\.{key}`|`influence\.{key}`", FORMAT), key

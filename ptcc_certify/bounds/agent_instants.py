@@ -1,0 +1,67 @@
+"""Lyapunov functions of agents of order n where halves of the time are left, as the check encloses them.
+
+What a function is worth there, of the motion from one initial state, is far less than its decay says: most of it is of
+motions that die sooner.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from fractions import Fraction
+from itertools import islice
+
+from lmi.exact.elementary_enclosures import rounded
+from lmi.exact.work import WorkError, limited
+from ptcc_certify.bounds.agents import States
+from ptcc_certify.checker.agent_bounds import Begin
+from ptcc_certify.checker.agent_instants import halvings, value_above
+from ptcc_certify.checker.agent_model import Agents
+from ptcc_certify.checker.digraph import Digraph
+from ptcc_certify.checker.lyapunov import Function
+from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.lyapunov.function import LyapunovFunction
+from ptcc_certify.protocols.agents import AgentsProtocol
+from ptcc_certify.theorems.agent_decrease import AgentMatrix
+
+Values = tuple[Fraction | None, ...]
+#: Instants at most; GB whose share of work they may take, a small part of what a check may.
+INSTANTS, WORK = 10, 0.1
+#: Bits of values.
+BITS = 64
+
+
+def instant_values(
+    structure: Structure,
+    protocol: AgentsProtocol,
+    matrix: AgentMatrix,
+    functions: Sequence[LyapunovFunction],
+    states: States,
+) -> tuple[Values, ...]:
+    """Return bounds of ``V`` at ``T (1 - 2^-i)``, ``i = 1, 2, ..``, of those functions that bound a deviation best.
+
+    Empty where the gain is capped; as many as little work allows.
+    """
+    known = {k: V for k, V in enumerate(functions) if V.deviation is not None and V.form is not None}
+    if protocol.gain_cap is not None or not known:
+        return ()
+    numbers = (protocol.gains, matrix.coupling, matrix.W, matrix.rate, matrix.points)
+    agents = Agents(protocol.order, len(states[0]), protocol.plant, protocol.own, None, protocol.gain.exact, *numbers)
+    nodes, found = range(structure.graph.n_nodes), list[Values]()
+    with suppress(WorkError), limited(WORK):
+        begin = Begin(agents, _checked(structure), states, protocol.offsets)
+        read = {k: Function("", V.proved_rate, Fraction(1), V.form, None, None) for k, V in known.items()}
+        graph, deviations = begin.graph, {k: V.deviation.agents for k, V in known.items() if V.deviation is not None}
+        for at in islice(halvings(agents, graph.laplacian_product, graph.unit, states, protocol.offsets), INSTANTS):
+            values = {k: rounded(value_above(begin, V, at), BITS, up=True) for k, V in read.items()}
+            best = {min(known, key=lambda k: deviations[k][v] * values[k]) for v in nodes}
+            found.append(tuple(values[k] if k in best else None for k in range(len(functions))))
+    return tuple(found)
+
+
+def _checked(structure: Structure) -> Digraph:
+    """Return a graph as the check reads it."""
+    rows = structure.graph.exact_rows(range(structure.graph.n_nodes))
+    edges = [(s, t, -row[s]) for t, row in enumerate(rows) for s in sorted(row) if s != t]
+    source, target, weights = zip(*edges, strict=True) if edges else ((), (), ())
+    return Digraph(structure.graph.labels, source, target, weights, 1)
