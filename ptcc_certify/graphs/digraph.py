@@ -408,7 +408,7 @@ class SignedDigraph(ReadOnly, Shown):
                     place = f"row {shorten(names[k])}, column {shorten(names[m])}"
                     raise GraphError(f"{place} of the matrix: {error}") from None
             weights = values.tolist()
-        else:
+        elif values.dtype.kind == "b":
             weights = values.tolist()
         how = Reading(
             orientation=orientation,

@@ -66,8 +66,8 @@ def read_graph(
     An **edge list** has one edge ``source,target,weight`` per line. Commas, tabs, semicolons or blanks separate the
     fields, whichever the first row uses; ``#`` and ``%`` begin comment lines; fields may be quoted; a row with one
     field declares a node. A first row of known names (source, from, src, fromnodeid; target, to, dst, tonodeid;
-    weight, sign, rating, value, w) is a header, and columns are then found by name; so is a first row such as
-    ``Gene1,Gene2,Type`` above numbers or signs. Words for signs (``+``, ``-``, activates, inhibits, ..) are 1 and -1
+    weight, sign, rating, value, w, strength, magnitude) is a header, and columns are then found by name; so is a first
+    row such as ``Gene1,Gene2,Type`` above numbers or signs. Words for signs (``+``, ``-``, activates, inhibits, ..) are 1 and -1
     where a column holds nothing else; a column ``sign`` or ``type`` beside ``weight`` is its factor, as is another of
     signs beside weights that are all positive. Columns that are not read are told by ``graph.read["notes"]``. A table
     may be a **matrix**, plain, with labels, or in brackets.

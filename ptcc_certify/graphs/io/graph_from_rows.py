@@ -29,6 +29,8 @@ from ptcc_certify.graphs.reading import Reading
 HEADER_MEND = "; if this row is a header, name its columns source, target, weight"
 #: What is said at once of a table with such a row and decimal commas.
 DECIMALS = "; write decimals with a point, too"
+#: The note of a file whose nodes and edges come and go.
+TIMES = "times ignored: all edges are there at once"
 #: Whole weights from 0 to this, and no other, look like codes.
 _LARGEST_CODE = 9
 
@@ -156,6 +158,9 @@ class _Draft:
                 self.refuse(odd[0], f"{weight} is not a finite number; remove the entry or give a weight")
         else:
             self.values = [Fraction(value) for value in rows.weights.tolist()]
+            if rows.weights.dtype.kind == "u" and (wrapped := np.iinfo(rows.weights.dtype).max) in self.values:
+                what = f"{wrapped} is what -1 becomes in {rows.weights.dtype}"
+                self.fail(name, f"{what}; store the matrix as int64 or float64")
 
     def keep(self, which: np.ndarray) -> None:
         self.source, self.target = self.source[which], self.target[which]
@@ -293,7 +298,11 @@ class _Draft:
                 continue
             positive = not any(value < 0 for value in self.values)
             codes = column.codes or []
-            if what.kind == "directions":
+            if what.kind == "turned":
+                place = self.place(codes.index(column.values[what.value])) if codes else self.name
+                mend = "turn such rows round, write what goes both ways as two, and leave the column out"
+                self.fail(place, f'column "{title}" holds {shorten(what.value)}, another direction; {mend}')
+            elif what.kind == "directions":
                 self.multiply(Signs(directions(column.title, values), codes, column.title))
             elif what.kind == "words" or (
                 what.kind == "numbers" and (positive or self.read_too or is_signed(column.title))

@@ -32,7 +32,7 @@ def graph_in_memory(
 
 
 def distinct(values: Any) -> tuple[Any, Any]:
-    """Return the different values, an array as it is, and which of these each value is.
+    """Return the different values, of an array as one, and which of these each value is.
 
     Examples
     --------
@@ -40,7 +40,7 @@ def distinct(values: Any) -> tuple[Any, Any]:
     ([2, 1], [0, 1, 0])
     """
     if isinstance(values, np.ndarray):
-        return values, np.arange(values.size)
+        return np.unique(values, return_inverse=True)
     table: dict[tuple[type, Any], int] = {}
     try:
         codes = [table.setdefault((type(value), value), len(table)) for value in values]
