@@ -34,10 +34,10 @@ from ptcc_certify.checker.family import THEOREM
 from ptcc_certify.checker.family_limits import EQUAL
 from ptcc_certify.checker.reading import exact
 from ptcc_certify.checker.side_files import SideFiles
-from ptcc_certify.graphs.digraph import Weights
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import BIPARTITE_CONTAINMENT, INTERVAL_BIPARTITE_CONSENSUS, analyse
+from ptcc_certify.graphs.weights import Weights
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
 

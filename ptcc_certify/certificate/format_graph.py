@@ -13,9 +13,10 @@ from ptcc_certify.certificate.format_vectors import Writer
 from ptcc_certify.checker import MANY_COMPONENTS
 from ptcc_certify.checker.reading import exact
 from ptcc_certify.checker.side_files import SideFiles
-from ptcc_certify.graphs.digraph import SignedDigraph, Weights
+from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.reading import RECORDED
 from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.graphs.weights import Weights
 from ptcc_certify.theorems.claims import Claim
 
 

@@ -9,14 +9,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 from ptcc_certify.errors import FormatError, GraphError, ParameterError
-from ptcc_certify.graphs.digraph import WAY, SignedDigraph
+from ptcc_certify.graphs.digraph import WAY, SignedDigraph, graph_of
 from ptcc_certify.graphs.io.edge_list import edge_list, read_edge_list
 from ptcc_certify.graphs.io.files import Source, name_and_ending, read_bytes, refuse_no_path, write_atomically
-from ptcc_certify.graphs.io.graph_from_rows import Rows, graph_of
 from ptcc_certify.graphs.io.json_graphs import read_json
 from ptcc_certify.graphs.io.matrix_files import read_mat, read_mtx, read_npy, read_npz
 from ptcc_certify.graphs.io.networkx_formats import read_gexf, read_gml, read_graphml
 from ptcc_certify.graphs.io.pajek import read_pajek
+from ptcc_certify.graphs.io.rows import Rows
 from ptcc_certify.graphs.io.sif import read_sif
 from ptcc_certify.graphs.io.table_columns import RATERS
 from ptcc_certify.graphs.io.ucinet import read_dl

@@ -26,6 +26,8 @@ SIGN = (
     *("sign", "type", "edgetype", "effect", "relation", "relationship", "interaction", "interactiontype"),
     *("regulation", "polarity", "valence", "attitude", "mor"),
 )
+#: Attributes of edges that make a family of a graph.
+OF_EDGES = frozenset({"weight_min", "weight_max", "optional"})
 #: What Gephi writes as the type of edges.
 DIRECTIONS = {"directed": False, "undirected": True}
 #: What is said of a word that is none for a sign.

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ptcc_certify.errors import FormatError
-from ptcc_certify.graphs.digraph import OF_EDGES
-from ptcc_certify.graphs.io.signs import SIGN, WEIGHT, find, is_sign, plain, sign_of_word, weight_and_sign
+from ptcc_certify.graphs.io.signs import OF_EDGES, SIGN, WEIGHT, find, is_sign, plain, sign_of_word, weight_and_sign
 from ptcc_certify.graphs.io.text_matrices import is_entry
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading
