@@ -19,8 +19,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from ptcc_certify.certificate.family_certificate import certify_family
-from ptcc_certify.graphs.digraph import SignedDigraph, Weights
+from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
+from ptcc_certify.graphs.weights import Weights
 from ptcc_certify.lyapunov.family_rows import follower_decay, least_rate
 from ptcc_certify.lyapunov.interval_rows import IntervalRows
 from ptcc_certify.protocols import NominalProtocol

@@ -22,7 +22,8 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
-from ptcc_certify.graphs.digraph import SignedDigraph, Weights
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.weights import Weights
 
 Rng = np.random.Generator
 Pair = tuple[int, int]  # (source, target)

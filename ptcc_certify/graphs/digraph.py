@@ -8,11 +8,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 import re
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from copy import copy
 from dataclasses import FrozenInstanceError
 from fractions import Fraction
 from functools import cached_property
@@ -20,11 +18,12 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import numpy as np
 
-from ptcc_certify.errors import GraphError, NumberError, gated
+from ptcc_certify.errors import FormatError, GraphError, NumberError, gated
 from ptcc_certify.graphs.equality import ReadOnly
-from ptcc_certify.graphs.rationals import as_fraction, format_exact, nearest_float, shorten, writable
+from ptcc_certify.graphs.rationals import as_fraction, shorten, writable
 from ptcc_certify.graphs.reading import Reading
-from ptcc_certify.graphs.tables import first_five, import_pandas, place_of
+from ptcc_certify.graphs.tables import first_five, import_pandas, in_all, labels_beside, place_of, refuse_unnamed
+from ptcc_certify.graphs.weights import LARGEST_WEIGHT, SMALLEST_WEIGHT, Weights
 from ptcc_certify.shown import Shown
 
 if TYPE_CHECKING:
@@ -32,84 +31,11 @@ if TYPE_CHECKING:
     import pandas as pd
     from scipy import sparse
 
-#: Attributes of edges in networkx graphs and their files that make a family of a graph.
-OF_EDGES = frozenset({"weight_min", "weight_max", "optional"})
-_INT64_LIMIT = 2**62
-SMALLEST_WEIGHT, LARGEST_WEIGHT = 2.3e-308, 1.7e308
+    from ptcc_certify.graphs.io.rows import Rows
+
 _SURROGATE_PAIR = re.compile("[\ud800-\udbff][\udc00-\udfff]")
-_INTEGER_LABEL = re.compile(r"-?[0-9]{1,18}", re.ASCII)
 
 Exact = Fraction | int | float | str
-
-
-class Weights(ReadOnly):
-    """Exact weights, stored as int64 numerators over one scale, as float64, or as rationals where neither fits."""
-
-    def __init__(self, values: Sequence[Fraction] | np.ndarray, codes: np.ndarray | None = None):
-        """Pack ``values[codes]`` (all of ``values`` when ``codes`` is None); an array is one of floats."""
-        self.scale = 1
-        if isinstance(values, np.ndarray):
-            table: np.ndarray = values.astype(np.float64)
-        elif (scale := _common_scale(values)) is not None:
-            table, self.scale = np.array([int(v * scale) for v in values], dtype=np.int64), scale
-        elif all(math.isfinite(nearest := nearest_float(v)) and Fraction(nearest) == v for v in values):
-            table = np.array([float(v) for v in values])
-        else:
-            table = np.array(values, dtype=object)
-        self.table = table if codes is None else table[codes]
-
-    def take(self, index: np.ndarray) -> Weights:
-        """Return the weights at ``index``, in that order."""
-        new = copy(self)
-        new.table = self.table[index]
-        return new
-
-    def as_float(self) -> np.ndarray:
-        """Return the weights rounded to float64."""
-        if self.table.dtype == np.int64:
-            # One rounding only: int64 / scale in float64 would round the numerator first.
-            if self.scale == 1 or (int(np.abs(self.table).max(initial=0)) < 2**53 and self.scale < 2**53):
-                return self.table / float(self.scale)
-            return np.array([float(Fraction(v, self.scale)) for v in self.table.tolist()])
-        return np.array([nearest_float(v) for v in self.table]) if self.table.dtype == object else self.table
-
-    def fraction(self, i: int) -> Fraction:
-        """Return weight ``i`` exactly."""
-        value = self.table.item(i)
-        return Fraction(value, self.scale) if isinstance(value, int) else Fraction(value)
-
-    def texts(self) -> list[str]:
-        """Return the weights as exact texts."""
-        if self.table.dtype == object:
-            return [format_exact(self.fraction(i)) for i in range(self.table.size)]
-        _, first, which = np.unique(self.table, return_index=True, return_inverse=True)
-        texts = [format_exact(self.fraction(int(i))) for i in first]
-        return [texts[k] for k in which.tolist()]
-
-    def signs(self) -> np.ndarray:
-        """Return +1 or -1 for each weight."""
-        return np.where(self.table > 0, 1, -1).astype(np.int8)
-
-
-def _common_scale(values: Sequence[Fraction]) -> int | None:
-    """Return the common denominator of rationals that are int64 numerators over it; None if they are not."""
-    scale = 1
-    for value in values:
-        scale = math.lcm(scale, value.denominator)
-        if scale > _INT64_LIMIT:
-            return None
-    return scale if all(abs(v * scale) <= _INT64_LIMIT for v in values) else None
-
-
-def in_all(count: int) -> str:
-    """Tell how many there are of which a refusal names one.
-
-    Examples
-    --------
-    >>> in_all(1), in_all(2)
-    ('', ' (2 in all)')
-    """
-    return f" ({count} in all)" if count > 1 else ""
 
 
 _T = TypeVar("_T")
@@ -267,33 +193,22 @@ class SignedDigraph(ReadOnly, Shown):
         >>> SignedDigraph.from_edges([("a", "b", 1)], orientation="listens").edges[0]
         ('b', 'a', Fraction(1, 1))
         """
-        from ptcc_certify.graphs.io.graph_in_memory import graph_in_memory
+        from ptcc_certify.graphs.io.rows import Nodes, rows_of
 
-        refuse_unknown_orientation(orientation)
         if not isinstance(edges, Iterable):
             raise GraphError(f"{shorten(repr(edges))} is no list of edges; give triples (source, target, weight)")
-        known: dict[str, tuple[int, Hashable]] = {}
-
-        def number(node: Hashable) -> int:
-            label = str(node)
-            if label not in known:
-                refuse_unnamed(node, "an edge")
-            place, first = known.setdefault(label, (len(known), node))
-            if first is not node and first != node:
-                raise GraphError(f"two different nodes are both written {shorten(label)}; rename one of them")
-            return place
-
+        known = Nodes()
         for node in nodes:
-            number(node)
+            known.number(node, "an edge")
         heads, tails, values = [], [], []
         for edge in edges:
             try:
                 first, second, weight = edge
             except (TypeError, ValueError):
-                mend = "; as_graph takes tables of pandas" * hasattr(edges, "columns")
+                mend = "; as_graph takes tables of pandas" if hasattr(edges, "columns") else ""
                 raise GraphError(f"edge {shorten(repr(edge))} is not a triple (source, target, weight){mend}") from None
-            heads.append(number(first))
-            tails.append(number(second))
+            heads.append(known.number(first, "an edge"))
+            tails.append(known.number(second, "an edge"))
             values.append(weight)
         how = Reading(
             orientation=orientation,
@@ -302,7 +217,7 @@ class SignedDigraph(ReadOnly, Shown):
             drop_zeros=drop_zeros,
             undirected=undirected,
         )
-        return graph_in_memory(how, list(known), heads, tails, values)
+        return graph_of(rows_of([*known], heads, tails, values), "", how)
 
     @classmethod
     @gated
@@ -357,59 +272,31 @@ class SignedDigraph(ReadOnly, Shown):
         >>> SignedDigraph.from_matrix([[0, -1], [0, 0]], orientation="information").edges
         (('1', '2', Fraction(-1, 1)),)
         """
-        from ptcc_certify.graphs.io.graph_in_memory import graph_in_memory
+        from ptcc_certify.graphs.io.rows import rows_of
 
         if hasattr(matrix, "is_multigraph"):
             raise GraphError("a networkx graph is no matrix; it is read by SignedDigraph.from_networkx")
         if orientation is None:
             raise GraphError(f"a matrix {WAY}")
-        refuse_unknown_orientation(orientation)
         if hasattr(matrix, "columns") and (rows := labels_beside(matrix)) is not None:
             if labels is not None:
                 raise GraphError("the DataFrame has labels of its own; leave out labels=, or give matrix.to_numpy()")
             labels, matrix = matrix.index, _aligned_frame(matrix, rows)
-        dense = not hasattr(matrix, "tocoo")
-        if np.ma.is_masked(matrix):
-            raise GraphError("an entry of the adjacency matrix is masked; write 0 where there is no edge: filled(0)")
-        try:
-            entries: Any = np.asarray(matrix) if dense else matrix.tocoo()
-        except ValueError:
-            raise GraphError("the adjacency matrix has rows of different lengths") from None
-        shape = entries.shape
-        if len(shape) != 2:
-            raise GraphError(f"an adjacency matrix has two dimensions, not {len(shape)}")
-        if dense and entries.dtype.kind in "UO":
-            entries = _without_texts(np.array(matrix, dtype=object))
-        if entries.dtype.kind not in "biufO":
-            raise GraphError(f"an adjacency matrix holds real numbers, not {entries.dtype}")
-        if shape[0] != shape[1]:
-            raise GraphError(f"an adjacency matrix is square, not {shape[0]} x {shape[1]}")
-        try:
-            row, column = entries.nonzero()
-        except (TypeError, ValueError):  # pandas' NA is neither zero nor not
-            raise GraphError("an entry of the adjacency matrix is missing; write 0 where there is no edge") from None
-        values = entries[row, column] if dense else entries.data[entries.data != 0]
-        own: list[Hashable] = list(range(1, shape[0] + 1)) if labels is None else list(labels)
-        for label in own:
+        row, column, values, n = _entries(matrix)
+        nodes: list[Hashable] = list(range(1, n + 1)) if labels is None else list(labels)
+        for label in nodes:
             refuse_unnamed(label, "the matrix")
-        names = [str(label) for label in own]
-        if len(names) != shape[0]:
-            raise GraphError(f"{len(names)} labels for {shape[0]} rows")
-        weights: Any = values
-        if values.dtype.kind == "f":
-            if (odd := np.flatnonzero(~np.isfinite(values))).size:
-                place = f"row {shorten(names[row[odd[0]]])}, column {shorten(names[column[odd[0]]])}"
-                raise GraphError(f"{place} of the matrix is {values[odd[0]]}; write 0 where there is no edge")
-        elif values.dtype.kind == "O":
-            for k, m, value in zip(row.tolist(), column.tolist(), values.tolist(), strict=True):
-                try:
-                    as_fraction(value, "the entry")
-                except NumberError as error:
-                    place = f"row {shorten(names[k])}, column {shorten(names[m])}"
-                    raise GraphError(f"{place} of the matrix: {error}") from None
-            weights = values.tolist()
-        else:
-            weights = values.tolist()
+        if len(nodes) != n:
+            raise GraphError(f"{len(nodes)} labels for {n} rows")
+        names = [str(label) for label in nodes]
+        place = lambda k: f"row {shorten(names[row[k]])}, column {shorten(names[column[k]])} of the matrix"  # noqa: E731
+        if values.dtype.kind == "f" and (odd := np.flatnonzero(~np.isfinite(values))).size:
+            raise GraphError(f"{place(odd[0])} is {values[odd[0]]}; write 0 where there is no edge")
+        for k, value in enumerate(values.tolist() if values.dtype.kind == "O" else ()):
+            try:
+                as_fraction(value, "the entry")
+            except NumberError as error:
+                raise GraphError(f"{place(k)}: {error}") from None
         how = Reading(
             orientation=orientation,
             duplicates=duplicates,
@@ -417,7 +304,8 @@ class SignedDigraph(ReadOnly, Shown):
             undirected=undirected,
             laplacian=laplacian,
         )
-        return graph_in_memory(how, names, row, column, weights, matrix=True)
+        weights = values.tolist() if values.dtype.kind in "bO" else values
+        return graph_of(rows_of(names, row, column, weights, matrix=True), "", how)
 
     @classmethod
     @gated
@@ -462,20 +350,15 @@ class SignedDigraph(ReadOnly, Shown):
         >>> SignedDigraph.from_networkx(team).edges, SignedDigraph.from_networkx(team, orientation="listens").edges
         ((('ann', 'bob', Fraction(-2, 1)),), (('bob', 'ann', Fraction(-2, 1)),))
         """
-        refuse_unknown_orientation(orientation)
-        refuse_networkx(graph, undirected=undirected, multigraph=duplicates != "refuse")
         from ptcc_certify.graphs.io.attributes import values_of_edges
-        from ptcc_certify.graphs.io.graph_in_memory import graph_in_memory
+        from ptcc_certify.graphs.io.rows import Nodes, rows_of
 
+        refuse_networkx(graph, undirected=undirected, multigraph=duplicates != "refuse")
         ends, data = [edge[:2] for edge in graph.edges], [more for *_, more in graph.edges(data=True)]
         edge = lambda k: f"{shorten(str(ends[k][0]))} -> {shorten(str(ends[k][1]))}"  # noqa: E731
-        values = values_of_edges(data, edge, "", weight)
-        known: dict[str, Hashable] = {}
-        for node in graph:
-            refuse_unnamed(node, "the graph")
-            if known.setdefault(str(node), node) != node:
-                raise GraphError(f"two different nodes are both written {shorten(str(node))}; rename one of them")
-        place = {node: k for k, node in enumerate(graph)}
+        weights, beside = values_of_edges(data, edge, "", weight)
+        known = Nodes()
+        place = {node: known.number(node, "the graph") for node in graph}
         how = Reading(
             orientation=orientation,
             duplicates=duplicates,
@@ -484,7 +367,7 @@ class SignedDigraph(ReadOnly, Shown):
             undirected=undirected,
         )
         heads, tails = [place[u] for u, _ in ends], [place[v] for _, v in ends]
-        return graph_in_memory(how, list(known), heads, tails, values)
+        return graph_of(rows_of([*known], heads, tails, weights, beside), "", how)
 
     # ------------------------------------------------------------------ reading
 
@@ -714,47 +597,50 @@ _READ_DEFAULT: dict[str, Any] = {
 }
 
 
-def refuse_unknown_orientation(orientation: str) -> None:
-    """Refuse an orientation that is neither "information" nor "listens".
+def graph_of(rows: Rows, name: str, how: Reading) -> SignedDigraph:
+    """Build the graph of rows, or refuse them.
 
-    Raises
-    ------
-    GraphError
-        It is another.
-
-    Examples
-    --------
-    >>> refuse_unknown_orientation("listens")
+    Parameters
+    ----------
+    rows : Rows
+    name : str
+        Of the file; "" of data in memory, where mends are parameters instead of flags.
+    how : Reading
     """
-    if orientation not in ("information", "listens"):
-        raise GraphError(f'orientation "{shorten(str(orientation))}" is unknown; use "information" or "listens"')
+    from ptcc_certify.graphs.io.graph_from_rows import edges_of
+
+    parts = edges_of(rows, name, how)
+    try:
+        return SignedDigraph(*parts)
+    except GraphError as error:
+        if not name:
+            raise
+        raise FormatError(f"{name}: {error}") from None
 
 
-def refuse_unnamed(node: Any, where: str) -> None:
-    """Refuse what stands where a node has no name: None, NaN, and NA or NaT of pandas.
-
-    Examples
-    --------
-    >>> refuse_unnamed(None, "row 2")
-    Traceback (most recent call last):
-    ptcc_certify.errors.GraphError: row 2 names no node (None); leave it out or name the node
-    """
-    if node is None or (str(node) in ("nan", "<NA>", "NaT") and not isinstance(node, str)):
-        raise GraphError(f"{where} names no node ({node}); leave it out or name the node")
-
-
-def labels_beside(values: Any) -> list[str] | None:
-    """Return the labels of a pandas Series, or of the rows of a DataFrame, as nodes are written; None of other data.
-
-    Examples
-    --------
-    >>> labels_beside([3, 5]) is None
-    True
-    """
-    index = getattr(values, "index", None)  # a method of lists and texts
-    if index is None or callable(index) or not hasattr(values, "to_numpy"):
-        return None
-    return [str(label) for label in index]
+def _entries(matrix: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+    """Return row, column and value of the entries of a square matrix that are not 0, and how many rows it has."""
+    dense = not hasattr(matrix, "tocoo")
+    if np.ma.is_masked(matrix):
+        raise GraphError("an entry of the adjacency matrix is masked; write 0 where there is no edge: filled(0)")
+    try:
+        entries: Any = np.asarray(matrix) if dense else matrix.tocoo()
+    except ValueError:
+        raise GraphError("the adjacency matrix has rows of different lengths") from None
+    shape = entries.shape
+    if len(shape) != 2:
+        raise GraphError(f"an adjacency matrix has two dimensions, not {len(shape)}")
+    if dense and entries.dtype.kind in "UO":
+        entries = _without_texts(np.array(matrix, dtype=object))
+    if entries.dtype.kind not in "biufO":
+        raise GraphError(f"an adjacency matrix holds real numbers, not {entries.dtype}")
+    if shape[0] != shape[1]:
+        raise GraphError(f"an adjacency matrix is square, not {shape[0]} x {shape[1]}")
+    try:
+        row, column = entries.nonzero()
+    except (TypeError, ValueError):  # pandas' NA is neither zero nor not
+        raise GraphError("an entry of the adjacency matrix is missing; write 0 where there is no edge") from None
+    return row, column, entries[row, column] if dense else entries.data[entries.data != 0], shape[0]
 
 
 def _aligned_frame(frame: Any, rows: list[str]) -> np.ndarray:
@@ -777,20 +663,6 @@ def _without_texts(entries: np.ndarray) -> np.ndarray:
             with suppress(NumberError):
                 entries[place] = as_fraction(entry)
     return entries
-
-
-def ordered_labels(labels: list[str]) -> tuple[list[str], np.ndarray]:
-    """Order labels by value if all are integers, else as they came; also return the rank of each old position.
-
-    Examples
-    --------
-    >>> ordered_labels(["10", "2"])
-    (['2', '10'], array([1, 0]))
-    """
-    order: Sequence[int] = range(len(labels))
-    if all(_INTEGER_LABEL.fullmatch(label) for label in labels):
-        order = sorted(order, key=lambda i: (int(labels[i]), labels[i]))
-    return [labels[i] for i in order], np.argsort(order)
 
 
 def refuse_networkx(graph: Any, undirected: bool = False, multigraph: bool = False) -> None:

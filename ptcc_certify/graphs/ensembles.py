@@ -20,9 +20,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ptcc_certify.errors import NumberError, ParameterError, gated
-from ptcc_certify.graphs.digraph import SignedDigraph, Weights
+from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io.files import parse_toml, read_bytes
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, given, parse_exact, shorten, whole_number
+from ptcc_certify.graphs.weights import Weights
 
 CONNECTIVITIES = ("strong", "quasi-strong", "weak", "disconnected")
 LARGEST_COUNT, LARGEST_SEED, LARGEST_ORDER = 10**6, 2**32 - 1, 10**6

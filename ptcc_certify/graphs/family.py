@@ -24,12 +24,11 @@ from ptcc_certify.graphs.digraph import (
     CallableTuple,
     Exact,
     SignedDigraph,
-    Weights,
-    ordered_labels,
-    refuse_unknown_orientation,
 )
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, shorten
-from ptcc_certify.graphs.tables import import_pandas
+from ptcc_certify.graphs.reading import Reading
+from ptcc_certify.graphs.tables import import_pandas, ordered_labels
+from ptcc_certify.graphs.weights import Weights
 from ptcc_certify.shown import Shown
 
 if TYPE_CHECKING:
@@ -352,7 +351,7 @@ class Family(Shown):
         Raises
         ------
         GraphError
-            ``least > largest``, both are 0, an edge occurs twice or is a loop, or the orientation is unknown.
+            ``least > largest``, both are 0, or an edge occurs twice or is a loop.
 
         Examples
         --------
@@ -362,7 +361,7 @@ class Family(Shown):
         >>> print(unsure.notes[0])
         1 weight of unknown sign was read as two edges that may fail, one of each sign
         """
-        refuse_unknown_orientation(orientation)
+        Reading(orientation=orientation)  # refuses an unknown one
         rows: list[tuple[Hashable, Hashable, Fraction, Fraction]] = []
         unsure = 0
         for edge in edges:

@@ -42,6 +42,7 @@ _SIGNATURES = {
     b"\x28\xb5\x2f\xfd": "packed by zstd",
     b"7z\xbc\xaf": "packed by 7-Zip",
     b"Rar!": "packed by RAR",
+    b"version https://git-lfs": "a pointer of Git LFS",
 }
 #: What in a zip archive says what it is.
 _ARCHIVES = {
@@ -62,6 +63,7 @@ _MENDS = {
     "Feather (Arrow)": "in Python as_graph(pandas.read_feather(FILE)), or save it as CSV",
     "a pickle": "a pickle may run code, so it is not read; save the graph as GraphML, or the matrix as .npy",
     "a page": "fetch the file itself, not the page that offers it",
+    "a pointer of Git LFS": "fetch the file itself: git lfs pull",
     **dict.fromkeys(("an SQLite database", "Stata data", "SPSS data"), "save the table as CSV"),
     **{f"packed by {how}": "unpack it, or pack it with gzip" for how in ("bzip2", "xz", "zstd", "7-Zip", "RAR")},
 }

@@ -1,16 +1,21 @@
-"""Entries by label, and tables for pandas, which is optional: imported here, and named where it is missing."""
+"""Labels and entries by label, and tables for pandas, which is optional: imported here, and named where missing."""
 
 from __future__ import annotations
 
 import operator
+import re
 from collections.abc import Hashable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from ptcc_certify.errors import ParameterError, UnknownAgentError
+import numpy as np
+
+from ptcc_certify.errors import GraphError, ParameterError, UnknownAgentError
 from ptcc_certify.graphs.rationals import shorten
 
 if TYPE_CHECKING:
     import pandas as pd
+
+_INTEGER_LABEL = re.compile(r"-?[0-9]{1,18}", re.ASCII)
 
 
 def position(label: Hashable, labels: Sequence[str]) -> int:
@@ -56,9 +61,61 @@ def place_of(agent: Any, labels: Sequence[str]) -> int:
     return place
 
 
+def ordered_labels(labels: list[str]) -> tuple[list[str], np.ndarray]:
+    """Order labels by value if all are integers, else as they came; also return the rank of each old position.
+
+    Examples
+    --------
+    >>> ordered_labels(["10", "2"])
+    (['2', '10'], array([1, 0]))
+    """
+    order: Sequence[int] = range(len(labels))
+    if all(_INTEGER_LABEL.fullmatch(label) for label in labels):
+        order = sorted(order, key=lambda i: (int(labels[i]), labels[i]))
+    return [labels[i] for i in order], np.argsort(order)
+
+
+def refuse_unnamed(node: Any, where: str) -> None:
+    """Refuse what stands where a node has no name: None, NaN, and NA or NaT of pandas.
+
+    Examples
+    --------
+    >>> refuse_unnamed(None, "row 2")
+    Traceback (most recent call last):
+    ptcc_certify.errors.GraphError: row 2 names no node (None); leave it out or name the node
+    """
+    if node is None or (str(node) in ("nan", "<NA>", "NaT") and not isinstance(node, str)):
+        raise GraphError(f"{where} names no node ({node}); leave it out or name the node")
+
+
+def labels_beside(values: Any) -> list[str] | None:
+    """Return the labels of a pandas Series, or of the rows of a DataFrame, as nodes are written; None of other data.
+
+    Examples
+    --------
+    >>> labels_beside([3, 5]) is None
+    True
+    """
+    index = getattr(values, "index", None)  # a method of lists and texts
+    if index is None or callable(index) or not hasattr(values, "to_numpy"):
+        return None
+    return [str(label) for label in index]
+
+
 def first_five(labels: Sequence[str]) -> str:
     """Return the first five labels, for a message."""
     return ", ".join(map(shorten, labels[:5])) + (", ..." if len(labels) > 5 else "")
+
+
+def in_all(count: int) -> str:
+    """Tell how many there are of which a refusal names one.
+
+    Examples
+    --------
+    >>> in_all(1), in_all(2)
+    ('', ' (2 in all)')
+    """
+    return f" ({count} in all)" if count > 1 else ""
 
 
 def import_pandas() -> Any:

@@ -18,9 +18,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import sparse
 
-from ptcc_certify.errors import GraphError, PTCCError
-from ptcc_certify.graphs.digraph import SignedDigraph, Weights, ordered_labels
+from ptcc_certify.errors import GraphError, ParameterError, PTCCError
+from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
+from ptcc_certify.graphs.tables import ordered_labels
+from ptcc_certify.graphs.weights import Weights
 
 weight = st.one_of(
     st.integers(-(10**20), 10**20),
@@ -266,7 +268,7 @@ def test_a_matrix_without_a_direction_is_refused_with_both():
     with pytest.raises(GraphError, match="networkx") as caught:
         SignedDigraph.from_matrix([[0, 1], [0, 0]])
     assert 'orientation="listens"' in str(caught.value) and '"information"' in str(caught.value)
-    with pytest.raises(GraphError, match='"sideways" is unknown'):
+    with pytest.raises(ParameterError, match='"sideways" is unknown'):
         SignedDigraph.from_matrix([[0, 1], [0, 0]], orientation="sideways")
     with pytest.raises(GraphError, match="it is read by SignedDigraph"):
         SignedDigraph.from_matrix(nx.DiGraph([(1, 2)]), orientation="information")
@@ -398,7 +400,7 @@ def test_what_is_no_signed_digraph_is_refused_with_one_line(make, data, reason):
 
 
 def test_wrong_options_are_refused():
-    with pytest.raises(GraphError, match="orientation"):
+    with pytest.raises(ParameterError, match="orientation"):
         SignedDigraph.from_edges([("a", "b", 1)], orientation="sideways")
     with pytest.raises(GraphError, match="3 labels for 2 rows"):
         SignedDigraph.from_matrix([[0, 1], [0, 0]], labels="abc", orientation="listens")

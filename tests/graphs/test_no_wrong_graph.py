@@ -35,9 +35,9 @@ class Input:
     how: dict[str, Any] = field(default_factory=dict)
 
 
-def npy(matrix: Any) -> bytes:
+def npy(matrix: Any, kind: str = "f8") -> bytes:
     file = io.BytesIO()
-    np.save(file, np.array(matrix, dtype=float))
+    np.save(file, np.array(matrix).astype(kind))
     return file.getvalue()
 
 
@@ -451,7 +451,45 @@ FORMATS = [
         ]
     ),
 ]
-INPUTS = SIGNS + UNKNOWN_SIGNS + DIRECTIONS + SIGNS_BESIDE + ORDINARY + LAPLACIANS + ROWS + MATRICES + FORMATS
+#: Sizes beside signs, rows that go the other way, numbers of nodes, and numbers that wrapped round.
+OTHERS = [
+    Input("g.csv", "source,target,sign,strength\na,b,-1,1.5\nb,a,1,2\n", "a>b=-3/2 b>a=2"),
+    Input("g.csv", "Influencer,Influenced,Valence,Magnitude\na,b,-1,4\nb,a,1,2\n", "a>b=-4 b>a=2"),
+    Input("g.csv", "source,target,type,magnitude\na,b,inhibits,3\nb,a,activates,4\n", "a>b=-3 b>a=4"),
+    Input("g.csv", "source,target,weight,vote\na,b,2,against\nb,a,1,for\n", "a>b=-2 b>a=1"),
+    Input("g.csv", "source,target,weight,direction\na,b,2,->\nb,c,-1,->\n", "a>b=2 b>c=-1"),
+    *(
+        Input(
+            "g.csv", f"node1,node2,weight,{title}\na,b,2,{one}\nb,c,-1,{other}\n", says=("line 3", other, "turn such")
+        )
+        for title, one, other in [
+            ("direction", "->", "<-"),
+            ("arrows", "->", "<->"),
+            ("x", "->", "<-"),
+            ("Dir", "forward", "both"),
+            ("edge_direction", "out", "in"),
+        ]
+    ),
+    Input("g.csv", "node1,node2,weight,group\na,b,2,out\nb,c,-1,in\n", "a>b=2 b>c=-1"),
+    Input("g.csv", "i,j,a_ij\n1,2,3\n2,1,-1\n", says=("line 1", "--edges listens if i listens to j")),
+    Input("g.csv", "i,j,a_ij\n1,2,3\n2,1,-1\n", "2>1=3 1>2=-1", how={"orientation": "listens"}),
+    Input("g.csv", '"k","l","w(k,l)"\n1,2,3\n2,1,-1\n', says=("line 1", "--edges listens if k listens to l")),
+    Input("g.csv", "listens,to,weight\n1,2,3\n2,1,-1\n", says=("line 1", "--edges listens")),
+    Input("g.txt", "4\n0 1 1\n1 2 -1\n2 3 1\n3 0 1\n", says=("4 is the number of nodes or edges",)),
+    Input("g.txt", "2\na b 1\nb c -1\n", says=("2 is the number of nodes or edges",)),
+    Input("g.txt", "3\n1 2 1\n2 3 -1\n3 1 1\n", "1>2=1 2>3=-1 3>1=1"),
+    Input("g.csv", "source,target,weight\n2\na,b,1\nb,a,-1\n", "a>b=1 b>a=-1"),
+    Input("out.a", "% asym positive\n1 2 3\n2 3 1\n3 1 2\n", "1>2=3 2>3=1 3>1=2"),
+    *(
+        Input("g.npy", npy([[0, 1], [-1, 0]], kind), says=("is what -1 becomes in uint", "int64"))
+        for kind in ("u1", "u2", "u4", "u8")
+    ),
+    Input("g.npy", npy([[0, 1], [200, 0]], "u1"), "2>1=1 1>2=200"),
+    Input(
+        "g.csv", "version https://git-lfs.github.com/spec/v1\noid sha256:1\nsize 9\n", says=("Git LFS", "git lfs pull")
+    ),
+]
+INPUTS = SIGNS + UNKNOWN_SIGNS + DIRECTIONS + SIGNS_BESIDE + ORDINARY + LAPLACIANS + ROWS + MATRICES + FORMATS + OTHERS
 
 
 def put(folder: Path, name: str, content: str | bytes) -> Path:
@@ -485,7 +523,34 @@ def test_a_file_is_the_graph_that_it_says_or_is_refused(tmp_path, one):
         assert word in message
 
 
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("g.net", NET + "*Arcs\n1 2 1 [1-3]\n"),
+        ("g.net", NET.replace('"eve"', '"eve" [2-*]') + "*Arcs\n1 2 1\n"),
+        ("g.net", NET + "*Arcs\n1 2 1\n*Events\nTI 1\nAA 1 2\n"),
+        ("g.gexf", gexf(edge='weight="1" start="2"')),
+        ("g.gexf", gexf(edge='weight="1"', values='<spells><spell start="1" end="2"/></spells>')),
+    ],
+)
+def test_a_graph_that_changes_in_time_says_that_times_are_ignored(tmp_path, name, content):
+    notes = read_graph(put(tmp_path, name, content)).read["notes"]
+    assert "times ignored: all edges are there at once" in notes
+
+
+@pytest.mark.parametrize(
+    "content", [NET.replace('"eve"', '"eve [2]"') + "*Arcs\n1 2 1\n", NET + "*Arcs\n1 2 1 c Red\n"]
+)
+def test_a_graph_without_times_says_nothing_of_them(tmp_path, content):
+    assert not read_graph(put(tmp_path, "g.net", content)).read["notes"]
+
+
 # ---------------------------------------------------------------------------------------------- in memory
+
+
+def test_numbers_that_wrapped_round_are_refused_in_memory():
+    with pytest.raises(GraphError, match="255 is what -1 becomes in uint8"):
+        ptcc.as_graph(np.array([[0, 1], [-1, 0]]).astype("u1"), "listens")
 
 
 def test_signs_beside_weights_of_networkx_edges_are_their_factors():

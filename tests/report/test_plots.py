@@ -32,10 +32,11 @@ from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import EXAMPLES, load_graph, select
 from ptcc_certify.gain_design.search import design
-from ptcc_certify.graphs.digraph import SignedDigraph, Weights
+from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.size_limits import LABELLED_NODES
 from ptcc_certify.graphs.structure import Structure, analyse
+from ptcc_certify.graphs.weights import Weights
 from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.protocols.late_messages import LateMessages
 from ptcc_certify.protocols.moving_leaders import MovingLeaders

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any, NoReturn
 
 import numpy as np
 
 from ptcc_certify.errors import FormatError, GraphError
-from ptcc_certify.graphs.digraph import OF_EDGES
-from ptcc_certify.graphs.io.columns_beside import Column, column_of
-from ptcc_certify.graphs.io.graph_from_rows import Numbers, Rows, Signs
-from ptcc_certify.graphs.io.signs import is_sign, weight_and_sign
+from ptcc_certify.graphs.io.columns_beside import column_of
+from ptcc_certify.graphs.io.rows import Beside, Rows, Signs, distinct, rows_of
+from ptcc_certify.graphs.io.signs import OF_EDGES, is_sign, weight_and_sign
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading
 
@@ -43,20 +42,10 @@ def names_or_identifiers(identifiers: Sequence[str], nodes: Sequence[Attributes]
     return list(identifiers)
 
 
-@dataclass(frozen=True)
-class Values:
-    """Weights of edges, their signs if these stand beside them, and the titles of both."""
-
-    weights: Any
-    signs: list[Any] = field(default_factory=list)
-    weight: str = ""
-    sign: str = ""
-    beside: list[Column] = field(default_factory=list)  # attributes that are not read
-    told: bool = False
-
-
-def values_of_edges(data: Sequence[Attributes], edge: Callable[[int], str], name: str, told: str | None) -> Values:
-    """Return what edges say of their weights; ``told`` is the attribute that holds them, and it alone.
+def values_of_edges(
+    data: Sequence[Attributes], edge: Callable[[int], str], name: str, told: str | None
+) -> tuple[list[Any], Beside]:
+    """Return the weights of edges and what stands beside them; ``told`` is the attribute that holds them, and it alone.
 
     Raises
     ------
@@ -86,8 +75,12 @@ def values_of_edges(data: Sequence[Attributes], edge: Callable[[int], str], name
         if signs and not _has(data[k], str(sign)):
             _fail(name, f'edge {edge(k)} has no "{sign}", and others have; give each one')
     others = [title for title in titles if title not in (*either, sign, "id")]
-    beside = [column_of(title, [one.get(title, "") for one in data]) for title in others]
-    return Values(weights, signs, "" if told else either[0], sign or "", beside, told is not None)
+    return weights, Beside(
+        title=either[0] if not told and is_sign(either[0]) else "",
+        signs=Signs(*distinct(signs), str(sign)) if signs else None,
+        columns=[column_of(title, [one.get(title, "") for one in data]) for title in others],
+        told=told is not None,
+    )
 
 
 def _has(attributes: Attributes, *titles: str) -> bool:
@@ -105,17 +98,11 @@ def attribute_rows(
 ) -> Rows:
     """Turn edges with attributes, which are texts, into rows."""
     how.refuse("variable", name, "a file of one graph")
-    data = [lower_case(one) for one in data]
+    data = [{key: str(value).strip() for key, value in lower_case(one).items()} for one in data]
     edge = lambda k: " -> ".join(shorten(labels[end]) for end in ends[k])  # noqa: E731
     told = how.titles[2].lower() if how.titles else None
-    values = values_of_edges(data, edge, name, told)
-    weights, signs = Numbers(), Numbers()
-    codes, sign_codes = [weights[str(one)] for one in values.weights], [signs[str(one)] for one in values.signs]
-    rows = Rows(labels, [a for a, _ in ends], [b for _, b in ends], list(weights.texts), codes, lambda row: "")
-    rows.signs = Signs(list(signs.texts), sign_codes, values.sign) if values.signs else None
-    rows.beside, rows.told = values.beside, values.told
-    rows.weight_title = values.weight if is_sign(values.weight) else ""
-    return rows
+    weights, beside = values_of_edges(data, edge, name, told)
+    return rows_of(labels, [one for one, _ in ends], [other for _, other in ends], weights, beside)
 
 
 def both_ways(rows: Rows, undirected: Sequence[bool], what: str, how: Reading) -> Rows:
@@ -129,9 +116,9 @@ def both_ways(rows: Rows, undirected: Sequence[bool], what: str, how: Reading) -
         place = np.append(np.arange(last), some)
         rows.first, rows.second = np.append(first, second[some]), np.append(second, first[some])
         rows.codes = np.asarray(rows.codes)[place]
-        if rows.signs is not None:
-            rows.signs = replace(rows.signs, codes=np.asarray(rows.signs.codes)[place])
-        for column in rows.beside:
+        if (signs := rows.beside.signs) is not None:
+            rows.beside.signs = replace(signs, codes=np.asarray(signs.codes)[place])
+        for column in rows.beside.columns:
             column.codes = None if column.codes is None else np.asarray(column.codes)[place].tolist()
         rows.where = lambda row: where(int(place[row]))
         rows.notes += (f"{what} go both ways ({some.size})",)

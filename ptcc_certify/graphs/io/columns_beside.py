@@ -15,6 +15,9 @@ from ptcc_certify.graphs.rationals import MINUS, parse_exact, shorten
 _MOST = 1000
 _NO, _YES = ("false", "no", "0", "f", "n", "0.0"), ("true", "yes", "1", "t", "y", "1.0")
 _UNKNOWN = ("", "?", "na", "n/a", "nan", "none", "null", "unknown", "neutral", "0")
+#: What says that a row goes the other way, or both: arrows in any column, words where the title speaks of directions.
+_BACK = ("<-", "<--", "<->", "<-->", "<=", "<=>")
+_BACK_WORDS = ("back", "backward", "backwards", "reverse", "reversed", "both", "bidirectional", "mutual", "in", "left")
 #: Titles of columns whose yes is a minus, whose no is one, and of columns with signed numbers.
 _MINUS = (
     r"neg(?!oti)|inhib|repress|suppress|antagon|enem[iy]|foe|oppos|opponent|hostil|(?<!ar)rival|distrust|dislike|minus|"
@@ -63,7 +66,7 @@ def column_of(title: str, values: Iterable[Any]) -> Column:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a column may be: ``words`` or ``numbers`` that are signs, ``directions``, ``doubt``, or nothing."""
+    """What a column may be: ``words`` or ``numbers`` that are signs, ``directions``, ``turned``, ``doubt``, or none."""
 
     kind: str = ""
     value: str = ""  # that makes it so
@@ -84,6 +87,9 @@ def verdict(title: str, values: Sequence[str]) -> Verdict:
     signed = re.search(rf"{_MINUS}|{_PLUS}|{_SIGNED}", written) is not None
     if (one := _undirected(written, texts)) is not None:
         return Verdict("directions", values[one], True)
+    back = (*_BACK, *_BACK_WORDS) if re.fullmatch(r"(edge)?(dir(ection)?|arrow)s?(type|mode)?", written) else _BACK
+    if turned := [text for text in values if text.lower() in back]:
+        return Verdict("turned", turned[0], True)
     words = {text: sign_of_word(text) for text in texts}
     if minus := [text for text in values if words[text.lower()] == -1]:
         letters = [text for text in minus if text[:1].isalpha()]
@@ -119,7 +125,7 @@ def signs_beside_intervals(columns: Iterable[Column], weights: Iterable[Any]) ->
     positive = not any(str(weight).strip()[:1] in ("-", MINUS) for weight in weights if str(weight).strip())
     for column in columns:
         what = verdict(column.title, [*column.values])
-        if what.kind and (positive or what.kind == "directions"):
+        if what.kind and (positive or what.kind in ("directions", "turned")):
             mend = "write signs into the weights or both ends of the intervals, and leave the column out"
             return f'column "{shorten(column.title)}" holds {shorten(what.value)} beside the weights; {mend}'
     return ""

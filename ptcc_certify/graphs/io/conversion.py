@@ -10,17 +10,16 @@ from typing import Any
 import numpy as np
 
 from ptcc_certify.errors import FormatError, GraphError, ParameterError, did_you_mean
-from ptcc_certify.graphs.digraph import SignedDigraph, labels_beside, refuse_unknown_orientation, refuse_unnamed
+from ptcc_certify.graphs.digraph import SignedDigraph, graph_of
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io.columns_beside import column_of
 from ptcc_certify.graphs.io.graph_files import read_as
-from ptcc_certify.graphs.io.graph_from_rows import Rows, Signs, graph_of
-from ptcc_certify.graphs.io.graph_in_memory import distinct
 from ptcc_certify.graphs.io.packaged import GRAPHS, file_or_packaged
+from ptcc_certify.graphs.io.rows import Beside, Nodes, Rows, Signs, distinct, rows_of
 from ptcc_certify.graphs.io.table_columns import BY_HEADER, RATERS, columns_of, edge_columns
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading
-from ptcc_certify.graphs.tables import first_five
+from ptcc_certify.graphs.tables import first_five, labels_beside
 
 TAKEN = (
     "a SignedDigraph, a path, the name of a packaged graph, a networkx.DiGraph, an adjacency matrix with orientation=, "
@@ -81,8 +80,6 @@ def as_graph(graph: Any, orientation: str | None = None, **reading: Any) -> Sign
         raise GraphError(
             f"{graph!r} is several graphs, and one is asked for; certify, decide and simulate take families"
         )
-    if orientation is not None:
-        refuse_unknown_orientation(orientation)
     how = Reading(orientation=orientation, **reading)
     if isinstance(graph, str) and not os.path.exists(graph) and graph not in GRAPHS and "." not in graph:  # noqa: PTH110
         names = f"({', '.join(GRAPHS)}); check the path{did_you_mean(graph, GRAPHS)}"
@@ -137,20 +134,22 @@ def _rows_of_table(table: Any, how: Reading) -> Rows | None:
     columns = columns_of(names, [], "the DataFrame", how)
     if not columns.titles:
         columns = replace(columns, titles=tuple(names))
-    ends, known = [], dict[str, tuple[int, Any]]()
-    for what, k in (("source", columns.source), ("target", columns.target)):
-        ends.append(list(table[table.columns[k]]))
-        for row, node in enumerate(ends[-1], 1):
-            refuse_unnamed(node, f"row {row}, {what} of the DataFrame")
-    for node in (node for pair in zip(*ends, strict=True) for node in pair):
-        if known.setdefault(str(node), (len(known), node))[1] != node:
-            raise GraphError(f"two different nodes are both written {shorten(str(node))}; rename one of them")
-    first, second = ([known[str(node)][0] for node in end] for end in ends)
-    rows = Rows([*known], first, second, *distinct(table[table.columns[columns.weight]]), lambda row: "")
-    rows.weight_title = columns.codes
+    nodes, ends = Nodes(), []
+    pairs = zip(*(table[table.columns[k]] for k in (columns.source, columns.target)), strict=True)
+    for row, (source, target) in enumerate(pairs, 1):
+        first = nodes.number(source, f"row {row}, source of the DataFrame")
+        ends.append((first, nodes.number(target, f"row {row}, target of the DataFrame")))
+    beside = Beside(columns.codes, told=columns.told)
     if columns.sign is not None:
-        rows.signs = Signs(*distinct(table[table.columns[columns.sign]]), names[columns.sign])
-    rows.beside, rows.told = [column_of(names[k], table[table.columns[k]]) for k in columns.ignored], columns.told
+        beside.signs = Signs(*distinct(table[table.columns[columns.sign]]), names[columns.sign])
+    beside.columns = [column_of(names[k], table[table.columns[k]]) for k in columns.ignored]
+    rows = rows_of(
+        [*nodes],
+        [one for one, _ in ends],
+        [other for _, other in ends],
+        [*table[table.columns[columns.weight]]],
+        beside,
+    )
     rows.notes = tuple(note for note in columns.notes if note not in (BY_HEADER, RATERS))
     return rows
 

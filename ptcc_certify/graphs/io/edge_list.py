@@ -11,16 +11,17 @@ from itertools import chain, islice
 import numpy as np
 
 from ptcc_certify.errors import FormatError, NumberError
-from ptcc_certify.graphs.digraph import SignedDigraph, ordered_labels
+from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io.columns_beside import Column
 from ptcc_certify.graphs.io.files import lines_of
-from ptcc_certify.graphs.io.graph_from_rows import DECIMALS, HEADER_MEND, Numbers, Rows, Signs
+from ptcc_certify.graphs.io.rows import DECIMALS, HEADER_MEND, Beside, Draft, Numbers, Rows, Signs
 from ptcc_certify.graphs.io.signs import WEIGHT, plain, sign_of_word
 from ptcc_certify.graphs.io.table_columns import Columns, columns_of, names_edges
 from ptcc_certify.graphs.io.text_matrices import bracketed_matrix, is_entry, table_as_matrix
 from ptcc_certify.graphs.rationals import parse_exact, shorten
 from ptcc_certify.graphs.reading import Reading
 from ptcc_certify.graphs.size_limits import MAX_LINE
+from ptcc_certify.graphs.tables import ordered_labels
 
 _SEPARATORS = ("\t", ",", ";", None)  # None: blanks
 #: Rows that are looked at before columns are told; different fields after the third that are; where signs are first.
@@ -136,21 +137,20 @@ def direction_of_comments(data: bytes, name: str) -> str:
     return ""
 
 
-class _EdgeList:
+class _EdgeList(Draft):
     """The rows of a table, as they come."""
 
     def __init__(self, name: str, columns: Columns, started: int):
+        super().__init__()
         self.name, self.columns, self.started = name, columns, started
-        self.nodes, self.weights, self.signs = Numbers(), Numbers(), Numbers()
-        self.first, self.second, self.codes = list[int](), list[int](), list[int]()
-        self.sign_codes, self.numbers = list[int](), list[int]()
+        self.signs, self.sign_codes = Numbers(), list[int]()
         self.beside = [(k, Column(columns.titles[k])) for k in columns.ignored]
         self.extra: dict[str, int] = {}  # fields after the third of a table without header, and the line of each
 
     def read(self, rows: Iterable[tuple[int, list[str]]]) -> None:
         """Read all rows but for a header."""
         columns, nodes, weights, signs = self.columns, self.nodes, self.weights, self.signs
-        first, second, codes, numbers = self.first, self.second, self.codes, self.numbers
+        first, second, codes, lines = self.first, self.second, self.codes, self.lines
         s, t, w, sign = columns.source, columns.target, columns.weight, columns.sign
         width = len(columns.titles) or (10**9 if columns.told else 3)
         for number, row in rows:
@@ -166,7 +166,7 @@ class _EdgeList:
             first.append(source)
             second.append(target)
             codes.append(code)
-            numbers.append(number)
+            lines.append(number)
             for k, column in self.beside:
                 column.add(row[k] if k < len(row) else "")
 
@@ -195,15 +195,12 @@ class _EdgeList:
 
     def rows(self) -> Rows:
         """Return what was read; refuse titles that are nodes, too."""
-        columns, numbers = self.columns, self.numbers
-        where = lambda row: f"line {numbers[row]}"  # noqa: E731
-        rows = Rows(list(self.nodes.texts), self.first, self.second, list(self.weights.texts), self.codes, where)
+        columns, rows = self.columns, super().rows()
         rows.headerless, rows.notes, rows.asks = not columns.titles, columns.notes, columns.asks
         rows.notes += ("columns ignored: after the third",) if self.extra else ()
-        rows.beside, rows.told = [column for _, column in self.beside], columns.told
-        rows.weight_title = columns.codes
+        rows.beside = Beside(columns.codes, None, [column for _, column in self.beside], columns.told)
         if columns.sign is not None:
-            rows.signs = Signs(list(self.signs.texts), self.sign_codes, columns.titles[columns.sign])
+            rows.beside.signs = Signs(list(self.signs.texts), self.sign_codes, columns.titles[columns.sign])
         ends = [columns.titles[k] for k in (columns.source, columns.target)] if columns.guessed else []
         if again := [title for title in ends if title in self.nodes.texts]:
             what = f"{shorten(again[0])} is a title, and a node in another row"
@@ -231,6 +228,11 @@ def _refuse_ambiguous(draft: _EdgeList, rows: Rows, data: bytes, konect: bool) -
     if commas and b'"' not in data:
         which = "nodes, or a matrix, with decimal commas? Write decimals with a point, or quote the names of nodes"
         raise FormatError(f"{name}: {commas[0]} among {which}")
+    met = {*draft.first, *draft.second}
+    lone = [label for k, label in enumerate(rows.labels) if k not in met]
+    if met and lone == rows.labels[:1] and lone[0] in (str(len(met)), str(len(draft.first))):
+        what = f"{lone[0]} is the number of nodes or edges, or a node without edges? Leave the first row out"
+        raise FormatError(f"{name}: {what}, or begin with a header source,target,weight")
     extra = dict[str, int]() if konect else draft.extra
     if extra:
         _refuse_decimal_commas(data, name)
@@ -250,7 +252,7 @@ def _refuse_ambiguous(draft: _EdgeList, rows: Rows, data: bytes, konect: bool) -
         what = f"a node called {shorten(odd[0])}: a matrix, or edges?"
         raise FormatError(f"{name}: {what} Save a matrix as .npy or .mtx; of edges, {tell}")
     nodes = len(weights) > 1 and all(text.isdigit() and text in labels for text in weights)
-    alone = nodes and len(set(draft.first)) == len(draft.first) > 2
+    alone = nodes and not konect and len(set(draft.first)) == len(draft.first) > 2
     if alone and all(rows.labels[t] != rows.weights[w] for t, w in zip(draft.second, draft.codes, strict=True)):
         raise FormatError(f"{name}: a list of neighbours, or edges with weights that are nodes? Of edges, {tell}")
 

@@ -8,12 +8,13 @@ from fractions import Fraction
 from typing import Any, NamedTuple
 
 from ptcc_certify.errors import GraphError, NumberError, ParameterError
-from ptcc_certify.graphs.digraph import OF_EDGES, SignedDigraph, refuse_networkx
+from ptcc_certify.graphs.digraph import SignedDigraph, refuse_networkx
 from ptcc_certify.graphs.family import Family, read_share
 from ptcc_certify.graphs.io.columns_beside import column_of, signs_beside_intervals
 from ptcc_certify.graphs.io.conversion import as_graph
 from ptcc_certify.graphs.io.family_files import interval_columns, is_family_file, read_family, refuse_outside, truth
 from ptcc_certify.graphs.io.packaged import GRAPHS, file_or_packaged
+from ptcc_certify.graphs.io.signs import OF_EDGES
 from ptcc_certify.graphs.io.table_columns import edge_columns
 from ptcc_certify.graphs.rationals import as_fraction, shorten
 

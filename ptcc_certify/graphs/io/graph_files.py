@@ -9,14 +9,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 from ptcc_certify.errors import FormatError, GraphError, ParameterError
-from ptcc_certify.graphs.digraph import WAY, SignedDigraph
+from ptcc_certify.graphs.digraph import WAY, SignedDigraph, graph_of
 from ptcc_certify.graphs.io.edge_list import edge_list, read_edge_list
 from ptcc_certify.graphs.io.files import Source, name_and_ending, read_bytes, refuse_no_path, write_atomically
-from ptcc_certify.graphs.io.graph_from_rows import Rows, graph_of
 from ptcc_certify.graphs.io.json_graphs import read_json
 from ptcc_certify.graphs.io.matrix_files import read_mat, read_mtx, read_npy, read_npz
 from ptcc_certify.graphs.io.networkx_formats import read_gexf, read_gml, read_graphml
 from ptcc_certify.graphs.io.pajek import read_pajek
+from ptcc_certify.graphs.io.rows import Rows
 from ptcc_certify.graphs.io.sif import read_sif
 from ptcc_certify.graphs.io.table_columns import RATERS
 from ptcc_certify.graphs.io.ucinet import read_dl
@@ -66,11 +66,11 @@ def read_graph(
     An **edge list** has one edge ``source,target,weight`` per line. Commas, tabs, semicolons or blanks separate the
     fields, whichever the first row uses; ``#`` and ``%`` begin comment lines; fields may be quoted; a row with one
     field declares a node. A first row of known names (source, from, src, fromnodeid; target, to, dst, tonodeid;
-    weight, sign, rating, value, w) is a header, and columns are then found by name; so is a first row such as
-    ``Gene1,Gene2,Type`` above numbers or signs. Words for signs (``+``, ``-``, activates, inhibits, ..) are 1 and -1
-    where a column holds nothing else; a column ``sign`` or ``type`` beside ``weight`` is its factor, as is another of
-    signs beside weights that are all positive. Columns that are not read are told by ``graph.read["notes"]``. A table
-    may be a **matrix**, plain, with labels, or in brackets.
+    weight, sign, rating, value, w, strength, magnitude) is a header, and columns are then found by name; so is a first
+    row such as ``Gene1,Gene2,Type`` above numbers or signs. Words for signs (``+``, ``-``, activates, inhibits, ..) are
+    1 and -1 where a column holds nothing else; a column ``sign`` or ``type`` beside ``weight`` is its factor, as is
+    another of signs beside weights that are all positive. Columns that are not read are told by
+    ``graph.read["notes"]``. A table may be a **matrix**, plain, with labels, or in brackets.
 
     **GraphML, GML, GEXF, node-link JSON** edges need an attribute ``weight`` (or ``sign``, or both), **Pajek** and
     **UCINET DL** a third column; **SIF** has rows ``a activates b c``. A **matrix** (Matrix Market, ``.npz``, ``.npy``,

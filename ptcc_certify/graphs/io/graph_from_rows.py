@@ -1,9 +1,9 @@
-"""The rows of a graph, whatever its format, and the rules that turn them into a graph or refuse them."""
+"""The rules that turn rows, whatever their format, into the edges of a graph or refuse them."""
 
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, NoReturn
@@ -11,74 +11,26 @@ from typing import Any, NoReturn
 import numpy as np
 
 from ptcc_certify.errors import FormatError, GraphError, NumberError
-from ptcc_certify.graphs.digraph import (
-    LARGEST_WEIGHT,
-    SMALLEST_WEIGHT,
-    SignedDigraph,
-    Weights,
-    in_all,
-    ordered_labels,
-)
-from ptcc_certify.graphs.io.columns_beside import Column, directions, is_signed, verdict
+from ptcc_certify.graphs.io.columns_beside import directions, is_signed, verdict
 from ptcc_certify.graphs.io.laplacian import Diagonal, diagonal_of, fits_one_node
+from ptcc_certify.graphs.io.rows import DECIMALS, HEADER_MEND, Rows, Signs
 from ptcc_certify.graphs.io.signs import DIRECTIONS, NO_SIGN, sign_of_word
 from ptcc_certify.graphs.rationals import MINUS, as_fraction, nearest_float, parse_exact, shorten
 from ptcc_certify.graphs.reading import Reading
+from ptcc_certify.graphs.tables import in_all, ordered_labels
+from ptcc_certify.graphs.weights import LARGEST_WEIGHT, SMALLEST_WEIGHT, Weights
 
-#: What the first row of a table without a header may be.
-HEADER_MEND = "; if this row is a header, name its columns source, target, weight"
-#: What is said at once of a table with such a row and decimal commas.
-DECIMALS = "; write decimals with a point, too"
 #: Whole weights from 0 to this, and no other, look like codes.
 _LARGEST_CODE = 9
 
 
-@dataclass(frozen=True)
-class Signs:
-    """Signs beside weights: that of row r is ``values[codes[r]]``, in the column or attribute ``title``."""
-
-    values: Sequence[Any]
-    codes: Sequence[int] | np.ndarray
-    title: str
+Edges = tuple[list[str], np.ndarray, np.ndarray, Weights, dict[str, Any]]
 
 
-@dataclass
-class Rows:
-    """What a source says, before any rule is applied: ``labels[first[r]], labels[second[r]], weights[codes[r]]``."""
+def edges_of(rows: Rows, name: str, how: Reading) -> Edges:
+    """Return labels, source, target, weights and ``read`` of a graph, or tell all rules that its rows break.
 
-    labels: list[str]
-    first: Sequence[int] | np.ndarray
-    second: Sequence[int] | np.ndarray
-    weights: Sequence[Any] | np.ndarray  # distinct: texts of the exact grammar, or numbers, or an array of numbers
-    codes: Sequence[int] | np.ndarray
-    where: Callable[[int], str]  # "line 14" of row 13; "" where the format does not tell
-    undirected: str = ""  # what in the file says that its edges have no direction
-    in_order: bool = True  # do the rows come as they stand in the file?
-    headerless: bool = False
-    matrix: bool = False  # entries of a matrix, whose rows listen unless it is said that they inform
-    notes: tuple[str, ...] = ()
-    signs: Signs | None = None
-    weight_title: str = ""  # of a column whose numbers are codes of relations, unless they are 1 and -1
-    asks: str = ""  # why the direction must be told
-    beside: Sequence[Column] = ()  # what is not read
-    told: bool = False  # were the columns told, so that those beside them say nothing?
-    columns: bool = True  # may columns, or the attribute of weights, be told?
-
-
-class Numbers(dict[str, int]):
-    """Numbers texts as they come; blanks around a text do not count, and nothing but blanks is a KeyError."""
-
-    def __init__(self) -> None:
-        self.texts: dict[str, int] = {}
-
-    def __missing__(self, text: str) -> int:
-        if not (stripped := text.strip()):
-            raise KeyError(text)
-        return self.setdefault(text, self.texts.setdefault(stripped, len(self.texts)))
-
-
-def graph_of(rows: Rows, name: str, how: Reading) -> SignedDigraph:
-    """Build the graph, or tell all rules that it breaks; see :func:`ptcc_certify.graphs.io.read_graph`.
+    See :func:`ptcc_certify.graphs.io.read_graph`.
 
     Parameters
     ----------
@@ -115,12 +67,7 @@ def graph_of(rows: Rows, name: str, how: Reading) -> SignedDigraph:
     labels, rank = ordered_labels(rows.labels)
     read = how.record(rows.matrix, loops.size, zeros.size + draft.cancelled)
     read["notes"] = (*draft.notes, *rows.notes, *notes, *draft.ignored())
-    try:
-        return SignedDigraph(labels, rank[source], rank[target], Weights(draft.values, codes), read)
-    except GraphError as error:
-        if not name:
-            raise
-        raise FormatError(f"{name}: {error}") from None
+    return labels, rank[source], rank[target], Weights(draft.values, codes), read
 
 
 @dataclass(frozen=True)
@@ -156,6 +103,9 @@ class _Draft:
                 self.refuse(odd[0], f"{weight} is not a finite number; remove the entry or give a weight")
         else:
             self.values = [Fraction(value) for value in rows.weights.tolist()]
+            if rows.weights.dtype.kind == "u" and (wrapped := np.iinfo(rows.weights.dtype).max) in self.values:
+                what = f"{wrapped} is what -1 becomes in {rows.weights.dtype}"
+                self.fail(name, f"{what}; store the matrix as int64 or float64")
 
     def keep(self, which: np.ndarray) -> None:
         self.source, self.target = self.source[which], self.target[which]
@@ -233,7 +183,7 @@ class _Draft:
             order = sorted(range(len(weights)), key=lambda code: words[code] is not None)
             by_code = {code: self.parsed(weights[code], code) for code in order}  # what is neither is told first
             values = [by_code[code] for code in range(len(weights))]
-        if (title := self.rows.weight_title) and (odd := _codes(values, title)) is not None:
+        if (title := self.rows.beside.title) and (odd := _codes(values, title)) is not None:
             what = f'column "{shorten(title)}" holds {odd}: codes of relations, not signs'
             self.refuse(int(np.argmax(self.codes == values.index(odd))), f"{what}; {self.columns_mend()}")
         return values
@@ -282,18 +232,22 @@ class _Draft:
 
     def multiply_signs(self) -> None:
         """Multiply weights by the signs of a column that is named so."""
-        if (signs := self.rows.signs) is not None and len(signs.values):
+        if (signs := self.rows.beside.signs) is not None and len(signs.values):
             self.multiply(signs)
 
     def read_beside(self) -> None:
         """Multiply weights that are all positive by signs in another column; refuse what may be signs."""
-        for column in () if self.rows.told else self.rows.beside:
+        for column in () if self.rows.beside.told else self.rows.beside.columns:
             what, values, title = verdict(column.title, [*column.values]), [*column.values], shorten(column.title)
             if not what.kind or not len(self.codes):
                 continue
             positive = not any(value < 0 for value in self.values)
             codes = column.codes or []
-            if what.kind == "directions":
+            if what.kind == "turned":
+                place = self.place(codes.index(column.values[what.value])) if codes else self.name
+                mend = "turn such rows round, write what goes both ways as two, and leave the column out"
+                self.fail(place, f'column "{title}" holds {shorten(what.value)}, another direction; {mend}')
+            elif what.kind == "directions":
                 self.multiply(Signs(directions(column.title, values), codes, column.title))
             elif what.kind == "words" or (
                 what.kind == "numbers" and (positive or self.read_too or is_signed(column.title))
@@ -309,7 +263,7 @@ class _Draft:
 
     def ignored(self) -> tuple[str, ...]:
         """Note the columns that are not read: first, in full, those that hold or name what may be signs."""
-        left = [column for column in self.rows.beside if column.title not in self.read_too]
+        left = [column for column in self.rows.beside.columns if column.title not in self.read_too]
         named = [column for column in left if verdict(column.title, [*column.values]).named]
         others = [f'"{shorten(column.title)}"' for column in left if column not in named]
         told = [f'"{shorten(column.title)}"' for column in named]

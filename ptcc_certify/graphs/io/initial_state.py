@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 
 from ptcc_certify.errors import FormatError, NumberError, ParameterError, PTCCError, did_you_mean
-from ptcc_certify.graphs.digraph import SignedDigraph, labels_beside
+from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io.conversion import as_graph
 from ptcc_certify.graphs.io.edge_list import records
 from ptcc_certify.graphs.io.files import name_and_ending, read_bytes
 from ptcc_certify.graphs.io.signs import find
 from ptcc_certify.graphs.rationals import MINUS, as_fraction, parse_exact, shorten
-from ptcc_certify.graphs.tables import first_five
+from ptcc_certify.graphs.tables import first_five, labels_beside
 
 _NODE = ("node", "label", "name", "id")
 _VALUE = ("value", "state", "x", "x0", "sigma0")

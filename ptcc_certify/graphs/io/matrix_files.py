@@ -18,7 +18,7 @@ import numpy as np
 
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.io import files
-from ptcc_certify.graphs.io.graph_from_rows import Rows
+from ptcc_certify.graphs.io.rows import Rows, rows_of
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading
 from ptcc_certify.graphs.size_limits import MAX_NODES
@@ -59,9 +59,9 @@ def _entries(row: Array, column: Array, entries: Array, n: int, labels: Array | 
     elif labels.dtype.kind not in "USiu" or labels.shape != (n,):
         raise FormatError(f"{name}: labels must be {n} texts or integers")
     names = [label.decode("utf-8") if isinstance(label, bytes) else str(label) for label in labels.tolist()]
-    weights, codes = np.unique(entries, return_inverse=True)
-    where = lambda e: f"row {row[e] + 1}, column {column[e] + 1}"  # noqa: E731
-    return Rows(names, row, column, weights, codes, where, matrix=True)
+    rows = rows_of(names, row, column, entries, matrix=True)
+    rows.where = lambda e: f"row {row[e] + 1}, column {column[e] + 1}"
+    return rows
 
 
 def _uncompressed(start: Array, index: Array, entries: Array, n: int) -> tuple[Array, Array, Array]:

@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.io.attributes import attribute_rows, both_ways, lower_case, names_or_identifiers
 from ptcc_certify.graphs.io.files import decoded, lines_of, one_line_errors
-from ptcc_certify.graphs.io.graph_from_rows import Rows
+from ptcc_certify.graphs.io.rows import TIMES, Rows
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading
 
@@ -120,6 +120,7 @@ def read_gexf(data: bytes, name: str, how: Reading) -> Rows:
             own = {"weight": edge.get("weight", "")} if "weight" in edge.keys() else {}  # noqa: SIM118
             attributes.append(default | values | own)
             undirected.append(edge.get("type", kind) != "directed")
-        return both_ways(
-            attribute_rows(labels, ends, attributes, name, how), undirected, 'edges of type "undirected"', how
-        )
+        rows = attribute_rows(labels, ends, attributes, name, how)
+        timed = any({"start", "end", "startopen", "endopen", "timestamp"} & {*one.keys()} for one in graphs[0].iter())
+        rows.notes = (TIMES,) if timed or graphs[0].find(".//spells") is not None else ()
+        return both_ways(rows, undirected, 'edges of type "undirected"', how)

@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import TypeVar
 
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.io.attributes import both_ways
 from ptcc_certify.graphs.io.files import lines_of
-from ptcc_certify.graphs.io.graph_from_rows import Numbers, Rows
+from ptcc_certify.graphs.io.rows import TIMES, Draft, Rows
 from ptcc_certify.graphs.io.text_matrices import is_zero
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading
@@ -40,6 +41,11 @@ class _Network:
     nodes: list[Line] = field(default_factory=list)
     vertices: str | None = None
     sections: list[_Section] = field(default_factory=list)
+    events: bool = False  # a list of times
+
+    def rows(self) -> Iterator[Line]:
+        """Yield all rows."""
+        return chain(self.nodes, *(section.lines for section in self.sections))
 
 
 def read_pajek(data: bytes, name: str, how: Reading) -> Rows:
@@ -61,9 +67,10 @@ def read_pajek(data: bytes, name: str, how: Reading) -> Rows:
     draft = _Rows(labels, name)
     for section in network.sections:
         draft.read(section)
-    where = lambda row: f"line {draft.lines[row]}"  # noqa: E731
-    rows = Rows(labels, draft.first, draft.second, list(draft.weights.texts), draft.codes, where)
+    rows = draft.rows()
     rows.notes = ("lists without weights: each is 1",) if draft.lists else ()
+    timed = any(re.search(r'(^|\s)\[[\d*,\s-]+\](?=[^"]*$)', row) for _, row in network.rows())
+    rows.notes += (TIMES,) if timed or network.events else ()
     return both_ways(rows, draft.undirected, "*Edges", how)
 
 
@@ -105,6 +112,7 @@ def _networks(lines: Sequence[str], name: str) -> Iterator[_Network]:
             rows, read = section.lines, True
         elif kind in _BESIDE:
             rows, read = [], False
+            network.events = network.events or kind == "events"
         else:
             raise FormatError(f'{name}, line {number}: "{shorten(line)}": {_FORM}')
     if network.vertices is not None:
@@ -147,17 +155,13 @@ def _is_node(text: str, n: int) -> bool:
     return text.isascii() and text.isdigit() and text == str(int(text)) and 1 <= int(text) <= n
 
 
-class _Rows:
+class _Rows(Draft):
     """The rows of all sections."""
 
     def __init__(self, labels: list[str], name: str):
+        super().__init__(labels)
         self.labels, self.n, self.name = labels, len(labels), name
-        self.first: list[int] = []
-        self.second: list[int] = []
-        self.codes: list[int] = []
-        self.lines: list[int] = []
-        self.undirected: list[bool] = []
-        self.weights, self.lists = Numbers(), False
+        self.undirected, self.lists = list[bool](), False
 
     def read(self, section: _Section) -> None:
         """Read a section."""
@@ -185,10 +189,7 @@ class _Rows:
                 edges = [(int(nodes[0]) - 1, int(other) - 1, weight) for other in nodes[1:]]
                 self.lists = self.lists or lists
             for first, second, weight in edges:
-                self.first.append(first)
-                self.second.append(second)
-                self.codes.append(self.weights[weight])
-                self.lines.append(line)
+                self.add(first, second, weight, line)
                 self.undirected.append(undirected)
 
 

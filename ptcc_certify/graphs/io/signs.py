@@ -11,21 +11,23 @@ from ptcc_certify.graphs.rationals import MINUS, shorten
 _POSITIVE = (
     "+ positive pos plus up activate activates activated activating activation activator act induce induces induction "
     "stimulate stimulates stimulation upregulate upregulates upregulation promote promotes enhance enhances "
-    "ally allies friend friends trust trusts like likes support supports agree agrees alliance --> ->"
+    "ally allies friend friends trust trusts like likes support supports agree agrees alliance for --> ->"
 )
 _NEGATIVE = (
     f"- {MINUS} negative neg minus down inhibit inhibits inhibited inhibiting inhibition inhibitor inh repress "
     "represses repressed repressing repression repressor suppress suppresses suppression downregulate downregulates "
     "downregulation block blocks enemy enemies foe foes opponent opponents rival rivals distrust distrusts dislike "
-    "dislikes oppose opposes disagree disagrees hostility --| -| |"
+    "dislikes oppose opposes disagree disagrees hostility against --| -| |"
 )
 _SIGNS = dict.fromkeys(_POSITIVE.split(), 1) | dict.fromkeys(_NEGATIVE.split(), -1)
 #: Titles of weights, and of what is a sign beside a weight: of both the first that occurs counts.
-WEIGHT = ("weight", "rating", "value", "w")
+WEIGHT = ("weight", "rating", "value", "w", "strength", "magnitude", "intensity")
 SIGN = (
     *("sign", "type", "edgetype", "effect", "relation", "relationship", "interaction", "interactiontype"),
     *("regulation", "polarity", "valence", "attitude", "mor"),
 )
+#: Attributes of edges that make a family of a graph.
+OF_EDGES = frozenset({"weight_min", "weight_max", "optional"})
 #: What Gephi writes as the type of edges.
 DIRECTIONS = {"directed": False, "undirected": True}
 #: What is said of a word that is none for a sign.

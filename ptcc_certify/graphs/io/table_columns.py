@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ptcc_certify.errors import FormatError
-from ptcc_certify.graphs.digraph import OF_EDGES
-from ptcc_certify.graphs.io.signs import SIGN, WEIGHT, find, is_sign, plain, sign_of_word, weight_and_sign
+from ptcc_certify.graphs.io.signs import OF_EDGES, SIGN, WEIGHT, find, is_sign, plain, sign_of_word, weight_and_sign
 from ptcc_certify.graphs.io.text_matrices import is_entry
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading
@@ -16,8 +15,8 @@ from ptcc_certify.graphs.reading import Reading
 _SOURCE = ("source", "from", "fromnodeid", "fromnode", "fromid", "sourcenode", "sourceid", "src", "rater")
 _TARGET = ("target", "to", "tonodeid", "tonode", "toid", "targetnode", "targetid", "dst", "rated", "ratee")
 #: Titles of who listens in the first column, and of who is heard in the second: they turn the direction round.
-_LISTENERS = r"listener|follower|rater|trust[eo]r|voter|receiver|hearer|reader|subscriber"
-_HEARD = r"speaker|heard|followee|followed|rated|trustee|trusted|sender|leader"
+_LISTENERS = r"listen|follower|rater|trust[eo]r|voter|receiver|hear(s|er|ing)|reader|subscriber|observer"
+_HEARD = r"listens|hears|speaker|heard|followee|followed|rated|trustee|trusted|sender|leader"
 #: What follows the name of an end in a title, and words for either end: the first count in any column, the others,
 #: which may tell times or places, only in the first two.
 _REST = r"(node|vertex|gene|protein|agent|id|name|label|index)*"
@@ -27,6 +26,8 @@ _ENDS = (rf"(target|tgt|dst|to){_REST}", rf"(end|dest|destination|influenced|reg
 _NO_END = r"|\W*|\d+|no|nr|id|idx|index|row|key|x|unnamed.*|(edge|link|row)(id|nr|no)?|.*(time|date|year|stamp|count)"
 #: Two titles that say nothing of a direction, the first is then who is heard: Gene1 and Gene2, a and b.
 _NEUTRAL = r"(?P<what>.*?)(1.(?P=what)2|a.(?P=what)b|i.(?P=what)j|u.(?P=what)v|s.(?P=what)t|0.(?P=what)1)(?P<rest>\w*)"
+#: Titles of weights that are entries of a matrix, where k may listen to l: a_kl, w(i,j).
+_OF_MATRIX = r"[alw]\W?(ij|i,j|kl|k,l|uv|u,v)\W?"
 _NO_TITLE = re.compile(r"nan|na|n/?a|none|null|inf|infinity|true|false|unknown|x|\?*", re.IGNORECASE)
 #: The note of a file whose header puts source and target elsewhere than source first.
 BY_HEADER = "columns by header"
@@ -106,7 +107,7 @@ def columns_of(first: Sequence[str], others: Sequence[Sequence[str]], place: str
     source, target, known = _ends(titles, place)
     if not {source, target}.isdisjoint({weight, sign}):
         raise FormatError(f"{place}: {_no_ends(titles)}")
-    asks = _direction(titles[source], titles[target], known, place)
+    asks = _direction(titles[source], titles[target], titles[weight], known, place)
     return Columns(source, target, weight, sign, titles, False, (_note(titles, source, target, weight),), asks, True)
 
 
@@ -199,12 +200,11 @@ def _note(titles: Sequence[str], *columns: int) -> str:
     return f"columns {', '.join(shorten(titles[k]) for k in columns)}"
 
 
-def _direction(source: str, target: str, known: bool, place: str) -> str:
+def _direction(source: str, target: str, weight: str, known: bool, place: str) -> str:
     """Return why the direction must be told; "" where titles tell it, or say as little as Gene1 and Gene2."""
     ends = plain(source), plain(target)
-    if not (re.match(_LISTENERS, ends[0]) or re.match(_HEARD, ends[1])) and (
-        known or re.fullmatch(_NEUTRAL, " ".join(ends))
-    ):
+    turned = re.match(_LISTENERS, ends[0]) or re.match(_HEARD, ends[1]) or re.fullmatch(_OF_MATRIX, plain(weight))
+    if not turned and (known or re.fullmatch(_NEUTRAL, " ".join(ends))):
         return ""
     what = f"the header {shorten(source)}, {shorten(target)}, .. names no source and target"
     line = place.rpartition(", ")[2]

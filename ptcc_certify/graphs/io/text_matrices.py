@@ -9,8 +9,8 @@ import numpy as np
 
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.io.files import decoded
-from ptcc_certify.graphs.io.graph_from_rows import Numbers, Rows
 from ptcc_certify.graphs.io.laplacian import diagonal_of
+from ptcc_certify.graphs.io.rows import Rows, rows_of
 from ptcc_certify.graphs.io.signs import sign_of_word
 from ptcc_certify.graphs.rationals import shorten
 
@@ -53,18 +53,16 @@ def matrix_rows(labels: list[str], entries: Sequence[Line]) -> Rows:
     >>> matrix_rows(["a", "b"], [["0", "-0.5"], ["0.0", "0"]]).weights
     ['-0.5']
     """
-    weights, zeros = Numbers(), dict[str, bool]()
-    first, second, codes = [], [], []
+    zeros, found = dict[str, bool](), []
     for k, line in enumerate(entries):
         for m, text in enumerate(line):
             if text not in zeros:
                 zeros[text] = is_zero(text)
             if not zeros[text]:
-                first.append(k)
-                second.append(m)
-                codes.append(weights[text])
-    where = lambda row: f"row {shorten(labels[first[row]])}, column {shorten(labels[second[row]])}"  # noqa: E731
-    return Rows(labels, first, second, list(weights.texts), codes, where, matrix=True)
+                found.append((k, m, text))
+    rows = rows_of(labels, [k for k, *_ in found], [m for _, m, _ in found], [text for *_, text in found], matrix=True)
+    rows.where = lambda row: f"row {shorten(labels[found[row][0]])}, column {shorten(labels[found[row][1]])}"
+    return rows
 
 
 def bracketed_matrix(data: bytes, name: str) -> Rows | None:

@@ -7,7 +7,7 @@ from typing import NoReturn
 
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.io.files import lines_of
-from ptcc_certify.graphs.io.graph_from_rows import Numbers, Rows
+from ptcc_certify.graphs.io.rows import Draft, Rows
 from ptcc_certify.graphs.io.text_matrices import matrix_rows
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import Reading
@@ -79,12 +79,12 @@ class _Dl:
 
     def edges(self, body: list[list[str]], lists: bool) -> Rows:
         """Read rows ``a b w``, or ``a b c ..`` of a node and those that it is tied to, each with weight 1."""
-        first, second, codes = list[int](), list[int](), list[int]()
-        weights, labels = Numbers(), dict.fromkeys(self.labels)
+        labels = dict.fromkeys(self.labels)
         ends = [line if lists else line[:2] for line in body]
         if self.embedded:
             labels = dict.fromkeys(text for line in ends for text in line)
         number = {label: i for i, label in enumerate(labels)}
+        draft = Draft(labels)
         number |= {} if self.embedded else {str(i): i - 1 for i in range(1, self.n + 1)}
         for line, nodes in zip(body, ends, strict=True):
             if len(nodes) < 2 or (not lists and len(line) != 3) or not all(text in number for text in nodes):
@@ -92,11 +92,9 @@ class _Dl:
                     f'row "{shorten(" ".join(line))}" is no edge of the n={self.n} nodes with a weight; mend it'
                 )
             for other in nodes[1:]:
-                first.append(number[nodes[0]])
-                second.append(number[other])
-                codes.append(weights["1" if lists else line[2]])
+                draft.add(number[nodes[0]], number[other], "1" if lists else line[2])
         if len(labels) > self.n:
             self.refuse(f"{len(labels)} nodes, and n={self.n}; mend n")
-        rows = Rows(list(labels), first, second, list(weights.texts), codes, lambda row: "")
+        rows = draft.rows()
         rows.notes = ("lists without weights: each is 1",) if lists else ()
         return rows
