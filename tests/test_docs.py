@@ -32,7 +32,7 @@ IN_ROOMS = {
     "graphs.io": ("read_state",),
     "graphs.structure": ("ClosedComponent", "WeakComponent"),
     "theorems.claims": ("Claim",),
-    "theorems.restricted_signals": ("DwellTime", "JointWindows", "ClockShares"),
+    "protocols.restricted_signals": ("DwellTime", "JointWindows", "ClockShares"),
     "theorems.table": ("THEOREMS", "theorem_for"),
     "theorems.lemmas": (
         "gauge",

@@ -20,7 +20,7 @@ ROOMS = {
     ),
     "certificate": (
         "Certificates",
-        "certificate.certificate certificate.request certificate.verdict",
+        "certificate.certificate certificate.verdict",
     ),
     "checker": ("The independent check", "certificate.checking checker"),
     "bounds": (

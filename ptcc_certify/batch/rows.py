@@ -60,10 +60,10 @@ from lmi.exact.decimal_rounding import float_down, float_up
 from ptcc_certify.batch.settings import InitialState, Settings
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
-from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.errors import PTCCError, explain, one_line
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import random_states, read_graph, read_state
+from ptcc_certify.model.asks import Expectations
 
 #: A row: column by column, None where an entry is empty.
 Row = dict[str, Any]

@@ -30,8 +30,8 @@ from ptcc_certify.checker.late_input import gain_above
 from ptcc_certify.checker.late_messages import PARTS
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.protocols.gain import Gain
-from ptcc_certify.protocols.gain_limits import LimitedGain
 from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.protocols.limited_gain import LimitedGain
 
 #: Above so many free agents nothing is searched.
 LARGEST = 20

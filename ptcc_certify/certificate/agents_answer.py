@@ -22,7 +22,7 @@ from ptcc_certify.certificate.format_vectors import agents_ends, weighted_sum
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
-from ptcc_certify.protocols.agents import AgentsProtocol
+from ptcc_certify.protocols.agents_protocol import AgentsProtocol
 from ptcc_certify.simulation.agents import AgentsTrajectory, simulate_agents
 from ptcc_certify.theorems.theorem import Obligation
 

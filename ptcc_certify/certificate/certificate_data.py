@@ -30,7 +30,7 @@ from ptcc_certify.certificate.agents_answer import AgentsAnswer
 from ptcc_certify.certificate.format_leaders import tracking_obligations
 from ptcc_certify.certificate.format_messages import late_obligations
 from ptcc_certify.certificate.format_vectors import final_state_witness
-from ptcc_certify.certificate.request import Expectations, Request
+from ptcc_certify.certificate.request import Request
 from ptcc_certify.checker import INPUT_NODES, CheckReport
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
 from ptcc_certify.checker.quadratic_form import Form
@@ -41,6 +41,7 @@ from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.lyapunov.rate_upper_bound import RateBound, optimality_ratio
 from ptcc_certify.lyapunov.search import DIAGONAL, Search
+from ptcc_certify.model.asks import Expectations
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.disturbance import ExpressionDisturbance
 from ptcc_certify.protocols.gain_limits import GainLimits

@@ -58,9 +58,9 @@ from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.squares_function import SquaresFunction, squares_function
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.base import refuse_no_protocol
+from ptcc_certify.protocols.restricted_signals import ClockShares, JointWindows, SignalClass, read_signal
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent, decide
 from ptcc_certify.theorems.joint_windows import refuse_impossible_windows
-from ptcc_certify.theorems.restricted_signals import ClockShares, JointWindows, SignalClass, read_signal
 
 if TYPE_CHECKING:
     import pandas as pd

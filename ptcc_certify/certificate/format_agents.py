@@ -17,7 +17,7 @@ from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.protocols import Protocol
-from ptcc_certify.protocols.agents import AgentsProtocol
+from ptcc_certify.protocols.agents_protocol import AgentsProtocol
 from ptcc_certify.protocols.cascade import CascadeProtocol
 from ptcc_certify.theorems.agent_decrease import AgentMatrix, Phase
 

@@ -88,12 +88,12 @@ from ptcc_certify.protocols.disturbance import as_disturbance
 from ptcc_certify.protocols.late_messages import LateMessages
 from ptcc_certify.protocols.moving_leaders import MovingLeaders
 from ptcc_certify.protocols.reaching_time import ReachingTime
+from ptcc_certify.protocols.restricted_signals import SignalClass
 from ptcc_certify.simulation.filippov import rounding_slack
 from ptcc_certify.simulation.instants import PAST
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.trajectory import Trajectory
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
-from ptcc_certify.theorems.restricted_signals import SignalClass
 from ptcc_certify.theorems.table import theorem_for
 from ptcc_certify.theorems.theorem import RateProof, Theorem
 
@@ -201,7 +201,7 @@ def certify(
         without a sign term; what is left at the deadline is then bounded.
     signal : {"any", "constant"}, DwellTime, JointWindows or ClockShares
         Of a family: restricted signals of which more is claimed, beside what holds for every signal; the three classes
-        are in :mod:`ptcc_certify.theorems.restricted_signals`.
+        are in :mod:`ptcc_certify.protocols.restricted_signals`.
     time_limit : float, optional
         Seconds of wall time. Simulation and searches may take 40 % together, each its share of what is left; what is
         proved by then stands and is checked, and ``cut_off`` names what was ended. Without it they have 60 s, and 1 s

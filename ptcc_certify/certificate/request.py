@@ -15,14 +15,14 @@ import numpy as np
 from lmi.exact.numbers import MAX_SCALE_BITS
 from ptcc_certify.bounds.input.initial_set import read_initial_set
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
-from ptcc_certify.errors import NumberError, ParameterError, gated
+from ptcc_certify.errors import NumberError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import as_state
 from ptcc_certify.graphs.rationals import as_fraction, shorten, writable
 from ptcc_certify.graphs.size_limits import EXACT_NODES
-from ptcc_certify.graphs.structure import Structure, behaviour_name
+from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.follower_rows import refuse_leader_groups
-from ptcc_certify.lyapunov.search import METHODS
+from ptcc_certify.model.asks import METHODS, Expectations, read_expectations
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.base import refuse_no_protocol
 from ptcc_certify.protocols.gain_limits import GainLimits
@@ -33,56 +33,6 @@ from ptcc_certify.protocols.reaching_time import ReachingTime, certified_reachin
 
 #: Longest weights and initial states, over a common denominator: so many bits over ``N^(5/4)``, for seconds of work.
 LONGEST_BITS = 470_000
-
-
-@gated
-@dataclass(frozen=True)
-class Expectations:
-    """What is asked of a certificate besides.
-
-    Attributes
-    ----------
-    behaviour : str or None
-        As :attr:`ptcc_certify.theorems.claims.Claim.behaviour` or one of its special cases.
-    min_rate : Fraction or None
-        A proved rate of at least so much, per unit of the stretched clock.
-    max_input : Fraction or None
-        A proved peak of every ``|u_k|`` of at most so much, in units of the input.
-    max_residual : Fraction or None
-        With late messages: every agent proved within so much of its final state at ``T``.
-
-    Raises
-    ------
-    ParameterError
-        No behaviour is called so, or a number is negative.
-
-    References
-    ----------
-    Theorems 1 to 6 of [Zhu]_ say which behaviour follows.
-
-    Examples
-    --------
-    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
-    >>> protocol = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
-    >>> asked = Expectations("bipartite consensus", min_rate=Fraction(5))
-    >>> print(certify(pair, protocol, expectations=asked).assessment.text)
-    refuted: rate >= 5 (upper bound 4, proved); met: bipartite consensus; the rest is certified
-    """
-
-    behaviour: str | None = None
-    min_rate: Fraction | None = None
-    max_input: Fraction | None = None
-    max_residual: Fraction | None = None
-
-    def __post_init__(self) -> None:
-        try:
-            behaviour = None if self.behaviour is None else behaviour_name(str(self.behaviour))
-        except ValueError as error:
-            raise ParameterError(f"expected behaviour: {error}") from None
-        object.__setattr__(self, "behaviour", behaviour)
-        for name in ("min_rate", "max_input", "max_residual"):
-            if (value := getattr(self, name)) is not None:
-                object.__setattr__(self, name, parameter(name, value, zero_allowed=True))
 
 
 @dataclass(frozen=True)
@@ -279,21 +229,6 @@ def read_seconds(time_limit: Any, graph: Sized) -> float:
     if not seconds > 0:
         raise ParameterError(f"time_limit = {seconds} is outside its domain; it must be > 0, in seconds")
     return seconds
-
-
-def read_expectations(asked: Any) -> Expectations:
-    """Return what is asked besides; a text names a behaviour.
-
-    Examples
-    --------
-    >>> read_expectations("bipartite-consensus").behaviour
-    'bipartite consensus'
-    """
-    if asked is None or isinstance(asked, str):
-        return Expectations(asked)
-    if not isinstance(asked, Expectations):
-        raise ParameterError(f"expectations = {shorten(repr(asked))} is none; give Expectations('stability'), say")
-    return asked
 
 
 def _one_of(kind: type, name: str, value: Any, example: str) -> Any:

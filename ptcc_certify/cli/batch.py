@@ -11,10 +11,12 @@ from typing import Any
 import click
 
 from ptcc_certify.cli import options as shared
+from ptcc_certify.cli.declared import one_of
 from ptcc_certify.cli.options import READING
 from ptcc_certify.cli.terminal import counting, print_lines
 from ptcc_certify.errors import ExitCode, ParameterError
 from ptcc_certify.graphs.kinds_of_file import kind_of
+from ptcc_certify.model.asks import Asks, Expectations
 
 #: Options that are settings of a row by the same name.
 _SETTINGS = ("x0", "seed", "sigma0", "disturbance", "method", "simulation", "time_limit", "min_rate", "initial_bound")
@@ -33,10 +35,10 @@ def _refuse_scenarios(context: click.Context, parameter: click.Parameter, patter
 @shared.reading_options
 @shared.protocol_options
 @shared.expect_option("E.g. stability; exit code 3 if it does not follow for some graph.")
-@shared.number_option("--min-rate", metavar="R", help="Ask for a proved rate of at least R of every graph.")
+@one_of(Expectations, "min_rate", help="Ask for a proved rate of at least R of every graph.")
 @shared.method_option
 @shared.initial_bound_option
-@click.option("--simulation/--no-simulation", default=False, help="Compare with CVODES runs.")
+@one_of(Asks, "simulation", default=False, shown="no-simulation", help="Compare with CVODES runs.")
 @shared.time_limit_option
 @click.option("--workers", type=click.IntRange(1, 1024), help="Processes on this machine.  [default: one per core]")
 @click.option("--scheduler", metavar="ADDRESS", help="Compute on the workers of this Dask scheduler instead.")

@@ -18,6 +18,7 @@ from ptcc_certify.cli.agents import (
     refuse_agents_of_family,
     refuse_dimension,
 )
+from ptcc_certify.cli.declared import one_of
 from ptcc_certify.cli.families import (
     certify_family,
     family_options,
@@ -29,6 +30,7 @@ from ptcc_certify.cli.messages import leader_options, leaders_of, message_option
 from ptcc_certify.cli.scenario import scenario_record
 from ptcc_certify.cli.terminal import LOG, Screen, print_json, progress, refuse_output, screen_options
 from ptcc_certify.errors import ParameterError, one_line
+from ptcc_certify.model.asks import Asks, Expectations
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate
@@ -46,29 +48,19 @@ if TYPE_CHECKING:
 @family_options
 @restricted_options
 @shared.expect_option("E.g. bipartite-consensus; exit code 3 if it does not follow.")
-@shared.number_option(
-    "--min-rate", metavar="R", help="Ask for a proved decay rate of at least R per unit of the stretched clock."
-)
-@shared.number_option("--max-input", metavar="U", help="Ask for a proved peak of every |u_k| of at most U.")
-@shared.number_option(
-    "--at", metavar="t", help="Optimise the bound at this instant, and print it; -v: for every agent."
-)
+@one_of(Expectations, "min_rate")
+@one_of(Expectations, "max_input")
+@one_of(Asks, "at")
 @shared.method_option
 @shared.limit_options
 @agents_options
 @message_options
 @leader_options
-@shared.number_option(
-    "--max-residual", metavar="R", help="With late messages: ask for every agent within R of its final state at T."
-)
+@one_of(Expectations, "max_residual")
 @dimension_option
 @shared.initial_bound_option
-@shared.number_option(
-    "--noise", metavar="NU", help="Nominal: bound the effect of measurement noise |n_k| <= NU under a limit."
-)
-@click.option(
-    "--simulation/--no-simulation", default=None, help="Compare with a CVODES run.  [default: up to 10,000 agents]"
-)
+@one_of(Asks, "noise")
+@one_of(Asks, "simulation")
 @shared.time_limit_option
 def certify(graph: tuple[str, ...], output: str | None, as_json: bool, screen: Screen, **options: Any) -> int:
     """Certify what the protocol does on GRAPH: behaviour, final state, error bound, input.
@@ -148,8 +140,6 @@ def _with_agents(more: dict[str, Any], of_agents: dict[str, Any]) -> dict[str, A
 
 def _requests(options: shared.Options) -> dict[str, Any]:
     """Return what is asked besides graph, protocol and initial state, as the library takes it."""
-    from ptcc_certify.certificate.request import Expectations
-
     most = options["max_input"]
     if most is not None and most <= 0:
         raise ParameterError("--max-input is outside its domain; it must be > 0")

@@ -12,21 +12,33 @@ import click
 from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
+from ptcc_certify.cli.declared import SIGNAL, click_option, flag_of, names_of, options_for, together
 from ptcc_certify.cli.scenario import scenario_record
 from ptcc_certify.cli.terminal import LOG, Screen, print_json, progress
 from ptcc_certify.errors import ExitCode, ParameterError, one_line
+from ptcc_certify.graphs.option import options_of
 from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.reading import OPTIONAL, UNCERTAINTY
+from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.protocols.moving_leaders import MovingLeaders
+from ptcc_certify.protocols.restricted_signals import (
+    CLOCK_DWELL,
+    WINDOWS_OF_TIME,
+    ClockShares,
+    DwellTime,
+    JointWindows,
+)
 
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.family import Family
+    from ptcc_certify.protocols.restricted_signals import SignalClass
     from ptcc_certify.theorems.family_behaviour import FamilyComponent
-    from ptcc_certify.theorems.restricted_signals import DwellTime, SignalClass
 
 #: Options of certify that families do not take.
 _NOT_OF_FAMILIES = (
     *("noise", *shared.LIMITS, "method", "at", "initial_bound", "simulation", "max_residual"),
-    *("delay", "period", "packet_loss", "quantisation", "own_delay", "leader_speed", "sign_gain"),
+    *names_of(LateMessages, MovingLeaders),
 )
 
 
@@ -45,78 +57,30 @@ def _pairs(texts: Sequence[str]) -> tuple[tuple[str, str], ...]:
     return tuple(pairs)
 
 
-def family_options(command: Any) -> Any:
-    """Add the options that make a family of graphs, and tell for which signals it is asked."""
-    signal = click.option(
-        "--signal",
-        type=click.Choice(["any", "constant"]),
-        default="any",
-        help="Families: mode and weights change at any instants, or are fixed and unknown.",
-    )
-    return mode_options(signal(command))
-
-
-def mode_options(command: Any) -> Any:
-    """Add the options that make a family of graphs."""
-    for option in (
-        click.option(
-            "--optional",
-            multiple=True,
-            metavar="SOURCE,TARGET",
-            callback=_pair,
-            help="Family: this edge may fail, on which TARGET hears SOURCE; repeat it for more.",
-        ),
-        click.option(
-            "--uncertainty", metavar="SHARE", help="Family: every weight is known up to this share of it, such as 10%."
-        ),
-        click.option(
-            "--switching", is_flag=True, help="Family: the graphs are modes, of which any may act at any time."
-        ),
-    ):
-        command = option(command)
-    return command
-
-
-#: Of ptcc simulate, in the words of ptcc certify, which claims more for such signals.
-dwell_options = shared.options_of(
-    shared.number_option("--dwell", metavar="THETA", help="Families: at least so much time between switches."),
-    shared.number_option(
-        "--clock-dwell", metavar="TAU", help="Families: the same on the stretched clock, which is infinite at T."
-    ),
+_DWELL = options_of(DwellTime)["least"]
+#: Options that make a family of graphs; and those that tell for which signals it is asked, too.
+mode_options = together(
+    click.option("--switching", is_flag=True, help="Family: the graphs are modes, of which any may act at any time."),
+    click_option(UNCERTAINTY),
+    click_option(OPTIONAL, callback=_pair),
 )
-restricted_options = shared.options_of(
-    shared.number_option(
-        "--dwell",
-        metavar="THETA",
-        help="Families, nominal: at least so much time between switches; claim more for these.",
-    ),
-    shared.number_option(
-        "--clock-dwell",
-        metavar="TAU",
-        help="Families, nominal: the same on the stretched clock, which is infinite at T.",
-    ),
-    shared.number_option(
-        "--clock-window",
-        metavar="H",
-        help="Families, nominal: the length of windows of stretched clock; every edge is on in each.",
-    ),
-    shared.number_option(
-        "--window-on", metavar="DELTA", help="Families: for how much of every window an edge is on, at least."
-    ),
-    shared.number_option("--window", metavar="H", hidden=True),
-    click.option(
-        "--share",
-        multiple=True,
-        metavar="NU",
-        help="Families, nominal: the share of the stretched clock that a mode acts, an outage too; one for each graph.",
-    ),
+family_options = together(mode_options, click_option(SIGNAL))
+#: Of ptcc simulate, in the words of ptcc certify, which claims more for such signals.
+dwell_options = together(
+    click_option(_DWELL, help="Families: at least so much time between switches."),
+    click_option(CLOCK_DWELL, help="Families: the same on the stretched clock, which is infinite at T."),
+)
+restricted_options = together(
+    click_option(_DWELL),
+    click_option(CLOCK_DWELL),
+    options_for(JointWindows),
+    click.option("--window", metavar="H", hidden=True),
+    options_for(ClockShares),
 )
 
 
 def dwell_of(options: shared.Options) -> DwellTime | None:
     """Return the dwell time of time or of the clock, or refuse both at once; None if there is none."""
-    from ptcc_certify.theorems.restricted_signals import DwellTime
-
     dwells = {"t": options["dwell"], "s": options["clock_dwell"]}
     given = [DwellTime(least, clock=clock) for clock, least in dwells.items() if least is not None]
     if len(given) > 1:
@@ -126,8 +90,6 @@ def dwell_of(options: shared.Options) -> DwellTime | None:
 
 def signals_of(options: shared.Options) -> SignalClass:
     """Return the signals of which more is asked, or refuse two kinds of them at once."""
-    from ptcc_certify.theorems.restricted_signals import WINDOWS_OF_TIME, ClockShares, JointWindows
-
     if options["window"] is not None:
         raise ParameterError(f"--window: {WINDOWS_OF_TIME}: --clock-window with --window-on instead")
     dwell = dwell_of(options)
@@ -150,7 +112,7 @@ def refuse_restricted(options: shared.Options) -> None:
     """Refuse restricted signals where one graph acts for ever."""
     for name in ("dwell", "clock_dwell", "window", "clock_window", "window_on", "share"):
         if options.get(name):
-            raise ParameterError(f"{shared.flag_of(name)} is for families of graphs; this is one graph: leave it out")
+            raise ParameterError(f"{flag_of(name)} is for families of graphs; this is one graph: leave it out")
 
 
 def read_graph_or_family(graphs: tuple[str, ...], options: shared.Options) -> SignedDigraph | Family:
@@ -268,9 +230,9 @@ def certify_family(
     """Certify what the protocol does on a family, whatever the signal."""
     from ptcc_certify.certificate.family_certificate import STEPS
     from ptcc_certify.certificate.family_certificate import certify_family as run
-    from ptcc_certify.certificate.request import Expectations
     from ptcc_certify.certificate.restricted_search import require_nominal
     from ptcc_certify.certificate.verdict import CERTIFIED
+    from ptcc_certify.model.asks import Expectations
     from ptcc_certify.report.family_screen import family_lines, family_summary
     from ptcc_certify.theorems.family_behaviour import decide
 
@@ -348,7 +310,7 @@ def refuse_options(options: shared.Options) -> None:
     for name in foreign:
         given = source(name) in (ParameterSource.COMMANDLINE, ParameterSource.DEFAULT_MAP)
         if given and options[name] not in (None, False):
-            raise ParameterError(f"{shared.flag_of(name)} is for one graph, not for families yet; leave it out")
+            raise ParameterError(f"{flag_of(name)} is for one graph, not for families yet; leave it out")
 
 
 def _constant_alone(constant: Sequence[FamilyComponent], every: Sequence[FamilyComponent]) -> Sequence[FamilyComponent]:

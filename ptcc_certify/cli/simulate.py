@@ -21,6 +21,7 @@ from ptcc_certify.cli.agents import (
     run_in_places,
     run_of_agents,
 )
+from ptcc_certify.cli.declared import DIMENSION, SIGNAL, STEPS, click_option, flag_of, one_of
 from ptcc_certify.cli.families import (
     dwell_of,
     dwell_options,
@@ -34,6 +35,8 @@ from ptcc_certify.cli.scenario import BESIDE
 from ptcc_certify.cli.terminal import FIGURES, print_lines, refuse_output
 from ptcc_certify.errors import ExitCode, ParameterError
 from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.run import Run
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -56,8 +59,9 @@ _TABLES = ("", ".csv", ".txt")
 @shared.random_within_option
 @mode_options
 @dwell_options
-@click.option(
-    "--signal",
+@click_option(
+    SIGNAL,
+    kind="text",
     metavar="SIGNAL",
     default="random",
     help="Family: random (with --seed), worst-case, constant, or FILE.csv with columns t (or clock), mode, level.",
@@ -65,19 +69,13 @@ _TABLES = ("", ".csv", ".txt")
 @agents_options
 @shared.method_option
 @message_options
-@click.option(
-    "--pattern",
-    "age_pattern",
-    type=click.Choice(["oldest", "fresh", "varying", "square"]),
-    default="oldest",
-    help="With late messages: as old as allowed, fresh, between the two, or now this, now that (with --seed).",
-)
+@one_of(Run, "pattern")
 @leader_options
-@click.option("--dimension", type=click.IntRange(1, 1000), default=1, help="State components per agent.")
-@click.option("--samples", type=click.IntRange(2, 100_000), default=201, help="Instants up to T, dense towards it.")
-@click.option("--steps", type=click.IntRange(1, 100_000), help="Instead: so many equal steps of t from 0 to T.")
-@click.option("--boundary-layer", type=float, metavar="W", help="Sliding mode: tanh(sigma/W) for the sign, to compare.")
-@shared.number_option("--noise", metavar="NU", help="Nominal: telegraph noise of size NU on every measurement.")
+@click_option(DIMENSION, default=1, help="State components per agent.")
+@one_of(Run, "samples")
+@click_option(STEPS)
+@one_of(Run, "boundary_layer")
+@one_of(Asks, "noise", help="Nominal: telegraph noise of size NU on every measurement.")
 @click.option("--wide", is_flag=True, help="A figure as wide as two columns of a journal, instead of one.")
 @shared.time_unit_option
 @click.option("-o", "--output", type=click.Path(dir_okay=False), help="FILE.csv, or a figure: .png, .pdf, .svg")
@@ -177,7 +175,7 @@ def _run_agents(signed: SignedDigraph, protocol: Protocol, options: shared.Optio
     for name in ("steps", "boundary_layer"):
         if options[name] is not None:
             mend = f"leave it out, or leave out {agents_flags(options)}"
-            raise ParameterError(f"{shared.flag_of(name)}: is for single integrators; {mend}")
+            raise ParameterError(f"{flag_of(name)}: is for single integrators; {mend}")
     source = click.get_current_context().get_parameter_source
     if options["kind"] == "nominal" and options["disturbance"] is not None:
         raise ParameterError("--disturbance: agents of order n run without, or under --protocol sliding-mode")
@@ -194,7 +192,7 @@ def _refuse_messages(options: shared.Options, what: str) -> None:
     """Refuse late messages and moving leaders where they are not simulated."""
     for name in BESIDE:
         if options[name] not in (None, False):
-            raise ParameterError(f"{shared.flag_of(name)}: is not simulated of {what}; leave it out")
+            raise ParameterError(f"{flag_of(name)}: is not simulated of {what}; leave it out")
 
 
 def _run_beside(
@@ -215,7 +213,7 @@ def _run_beside(
     given += [option for option in ("samples", "signal") if source(option) == ParameterSource.COMMANDLINE]
     given += ["dimension"] * (options["dimension"] > 1)
     if given:
-        raise ParameterError(f"{shared.flag_of(given[0])}: is not simulated with {name}; leave it out")
+        raise ParameterError(f"{flag_of(given[0])}: is not simulated with {name}; leave it out")
     refuse_restricted(options)
     sigma0 = shared.sliding_keywords(protocol, options, signed).get("sigma0")
     x0 = shared.read_initial_state(options["x0"], options["seed"], signed)

@@ -23,13 +23,13 @@ from ptcc_certify.certificate.agents_answer import AgentsAnswer
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.format_vectors import agents_ends
 from ptcc_certify.certificate.procedure import certify
-from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.gain_design.agents_answer import AgentsDesign
 from ptcc_certify.gain_design.agents_deadlines import Candidate, Search, at_deadline, longest
 from ptcc_certify.gain_design.answer import INFEASIBLE, MET, UNPROVED, refusal
 from ptcc_certify.gain_design.request import Request
 from ptcc_certify.graphs.rationals import short_exact, shorten
+from ptcc_certify.model.asks import Expectations
 from ptcc_certify.protocols import NominalProtocol, Protocol
 from ptcc_certify.protocols.agents import Agents
 from ptcc_certify.protocols.parameters import parameter
@@ -105,9 +105,9 @@ def design_agents(
     'infeasible'
     """
     request = Request(
-        parameter("max_input", max_input),
-        None if deadline is None else parameter("deadline", deadline),
-        None if residual is None else parameter("residual", residual),
+        max_input=parameter("max_input", max_input),
+        deadline=None if deadline is None else parameter("deadline", deadline),
+        residual=None if residual is None else parameter("residual", residual),
     )
     _refuse(agents, request)
     agents = agents if agents.cascade is not None else replace(agents, decay=agents.decay_rate)

@@ -47,7 +47,6 @@ from lmi.exact.decimal_rounding import up
 from ptcc_certify.bounds.input.initial_set import initial_set_within
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
-from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.checker import INPUT_NODES
 from ptcc_certify.checker.input_formulas import InitialSet
 from ptcc_certify.errors import ParameterError
@@ -57,6 +56,7 @@ from ptcc_certify.gain_design.request import DesignRequest, Fit, fit_of
 from ptcc_certify.gain_design.shortest_possible import lower_product
 from ptcc_certify.graphs.rationals import nearest_float, shorten
 from ptcc_certify.graphs.structure import Structure, analyse
+from ptcc_certify.model.asks import Expectations
 from ptcc_certify.protocols import NominalProtocol
 from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.protocols.parameters import parameter
@@ -142,7 +142,7 @@ one asked for)
     initial_set = (
         initial_bound if isinstance(initial_bound, InitialSet) else initial_set_within(structure, initial_bound)
     )
-    request = DesignRequest(U, T, r, input_norm, initial_set)
+    request = DesignRequest(max_input=U, deadline=T, residual=r, input_norm=input_norm, initial_set=initial_set)
     begin: dict[str, Any] = {"x0": initial_set.center} if initial_set.point else {"initial_set": initial_set}
     base = certify(graph, _first_protocol(structure), **begin, simulation=False)
     lower, why = lower_product(base, request)

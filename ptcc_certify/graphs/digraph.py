@@ -23,7 +23,7 @@ import numpy as np
 from ptcc_certify.errors import GraphError, NumberError, gated
 from ptcc_certify.graphs.display_hook import Shown
 from ptcc_certify.graphs.equality import ReadOnly
-from ptcc_certify.graphs.rationals import as_fraction, format_exact, nearest_float, shorten, writable
+from ptcc_certify.graphs.rationals import Exact, as_fraction, format_exact, nearest_float, shorten, writable
 from ptcc_certify.graphs.reading import Reading
 from ptcc_certify.graphs.tables import first_five, import_pandas, place_of
 
@@ -38,8 +38,6 @@ _INT64_LIMIT = 2**62
 SMALLEST_WEIGHT, LARGEST_WEIGHT = 2.3e-308, 1.7e308
 _SURROGATE_PAIR = re.compile("[\ud800-\udbff][\udc00-\udfff]")
 _INTEGER_LABEL = re.compile(r"-?[0-9]{1,18}", re.ASCII)
-
-Exact = Fraction | int | float | str
 
 
 class Weights(ReadOnly):

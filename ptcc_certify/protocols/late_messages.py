@@ -12,13 +12,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from numbers import Integral
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ptcc_certify.errors import ParameterError, gated
-from ptcc_certify.graphs.digraph import Exact, SignedDigraph
-from ptcc_certify.graphs.rationals import shorten
-from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.graphs.option import option
+from ptcc_certify.graphs.rationals import Exact, shorten
 from ptcc_certify.protocols.parameters import Given, NotNegative, parameter, readable
+
+if TYPE_CHECKING:
+    from ptcc_certify.graphs.digraph import SignedDigraph
+    from ptcc_certify.graphs.structure import Structure
 
 #: Most losses in a row.
 MOST_LOSSES = 10**6
@@ -69,11 +72,51 @@ without limit before T; add a gain_cap, below (pi/2 - |arg lambda|)/(delay |lamb
 lambda of L, or measure the own state without delay
     """
 
-    delay: Exact | Mapping[tuple[str, str], Exact] = 0
-    period: Given = Given()
-    losses: int = 0
-    value_error: NotNegative = NotNegative(0)
-    own_delay: bool = False
+    delay: Exact | Mapping[tuple[str, str], Exact] = option(
+        "--delay",
+        "What agents hear is up to D late; or the column of the edge list that tells the delay of every edge.",
+        default=0,
+        key="messages.delay",
+        example="0.02",
+        metavar="D|COLUMN",
+        kind="text",
+        unit="time",
+    )
+    period: Given = option(
+        "--period",
+        "Messages are sent every H; the last one that came is held.",
+        Given(),
+        key="messages.period",
+        example="0.01",
+        metavar="H",
+    )
+    losses: int = option(
+        "--packet-loss",
+        "Up to so many messages in a row get lost; asks for --period.",
+        default=0,
+        key="messages.packet_loss",
+        example="3",
+        metavar="COUNT",
+        kind="count",
+        least=0,
+        most=MOST_LOSSES,
+    )
+    value_error: NotNegative = option(
+        "--quantisation",
+        "What is heard is rounded to multiples of STEP.",
+        NotNegative(0),
+        key="messages.quantisation",
+        example="0.1",
+        metavar="STEP",
+    )
+    own_delay: bool = option(
+        "--own-delay/--no-own-delay",
+        "The own state is as late as what is heard; asks for --gain-cap.",
+        default=False,
+        key="messages.own_delay",
+        example="false",
+        kind="switch",
+    )
     gain_cap: Given = Given()
     _of_graph: tuple[SignedDigraph, tuple[Fraction, ...]] | None = field(
         default=None, init=False, repr=False, compare=False

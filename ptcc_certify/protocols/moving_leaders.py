@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from lmi.exact.decimal_rounding import near
 from ptcc_certify.errors import ParameterError, gated
+from ptcc_certify.graphs.option import option
 from ptcc_certify.protocols.parameters import Given, NotNegative, Parameters
 
 if TYPE_CHECKING:
@@ -52,9 +53,24 @@ class MovingLeaders(Parameters):
 give 2 or more
     """
 
-    speed: NotNegative = NotNegative()
+    speed: NotNegative = option(
+        "--leader-speed",
+        "Leaders move, as fast as V: how followers track them.",
+        NotNegative(),
+        key="leaders.speed",
+        example="0.5",
+        metavar="V",
+        unit="state/time",
+    )
     disturbance: NotNegative = NotNegative(0)
-    sign_gain: Given = Given()
+    sign_gain: Given = option(
+        "--sign-gain",
+        "With --leader-speed: followers add MU sign(e_k), and stay on their targets.",
+        Given(),
+        key="leaders.sign_gain",
+        metavar="MU",
+        unit="state/time",
+    )
 
     def __post_init__(self) -> None:
         if self.sign_gain is not None and self.sign_gain < self.total:

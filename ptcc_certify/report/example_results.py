@@ -11,8 +11,8 @@ from typing import NamedTuple
 from lmi.exact.decimal_rounding import down, float_down, near, up
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
-from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.examples import Example, load_graph
+from ptcc_certify.model.asks import Expectations
 
 #: The head of the table that ``ptcc examples`` prints; its rows are of :func:`result_lines`.
 RESULTS_HEAD = (

@@ -23,7 +23,7 @@ import numpy as np
 from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.graphs.rationals import shorten, whole_number
 from ptcc_certify.graphs.tables import position
-from ptcc_certify.protocols.agents import AgentsProtocol
+from ptcc_certify.protocols.agents_protocol import AgentsProtocol
 from ptcc_certify.simulation.cvodes import Motion, Phase, Tolerances
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import casadi as ca
 
     from ptcc_certify.graphs.digraph import SignedDigraph
-    from ptcc_certify.protocols.gain_limits import LimitedGain
+    from ptcc_certify.protocols.limited_gain import LimitedGain
 
 # A disturbance may be fast: so many steps between two instants.
 MANY_STEPS = 500_000

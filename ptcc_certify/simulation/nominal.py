@@ -18,7 +18,8 @@ import numpy as np
 from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.protocols.disturbance import ExpressionDisturbance, SampledDisturbance, as_disturbance
-from ptcc_certify.protocols.gain_limits import GainLimits, Periods
+from ptcc_certify.protocols.gain_limits import GainLimits
+from ptcc_certify.protocols.limited_gain import Periods
 from ptcc_certify.protocols.parameters import parameter, readable
 from ptcc_certify.simulation.cvodes import Phase, Tolerances
 from ptcc_certify.simulation.cvodes_nominal import Forcing, NominalMotion

@@ -28,7 +28,6 @@ from ptcc_certify.bounds.staged_deadlines import levels
 from ptcc_certify.bounds.tracking import bound_tracking, drift_integral
 from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.procedure import certify
-from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.checker.input_formulas import PrescribedGain
 from ptcc_certify.checker.late_drift import drift_above
 from ptcc_certify.checker.late_input import gain_above
@@ -36,6 +35,7 @@ from ptcc_certify.errors import HypothesisError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.lyapunov.follower_rows import FollowerRows
+from ptcc_certify.model.asks import Expectations
 from ptcc_certify.protocols import NominalProtocol
 from ptcc_certify.protocols.late_messages import LateMessages
 from ptcc_certify.protocols.moving_leaders import MovingLeaders

@@ -30,7 +30,6 @@ from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.format_graph import structure_document
 from ptcc_certify.certificate.format_vectors import exact_or_ball
 from ptcc_certify.certificate.procedure import certify
-from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.checker import OBLIGATIONS, CheckReport, UnreadableError, check, digest, read
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import GRAPHS, load_graph, select
@@ -41,6 +40,7 @@ from ptcc_certify.graphs.size_limits import SEARCH_NODES
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.lyapunov import dominance
 from ptcc_certify.lyapunov.search import METHODS
+from ptcc_certify.model.asks import Expectations
 from ptcc_certify.protocols import NominalProtocol
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)

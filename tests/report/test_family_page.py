@@ -22,6 +22,7 @@ from ptcc_certify import (
 )
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.io import as_family
+from ptcc_certify.protocols.restricted_signals import ClockShares, DwellTime, JointWindows
 from ptcc_certify.report.family_screen import family_lines, family_summary, groups_text
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.plots.family import plot_family, plot_family_decay, sample_runs
@@ -31,7 +32,6 @@ from ptcc_certify.report.statement import family_latex
 from ptcc_certify.simulation.family_run import simulate_family
 from ptcc_certify.simulation.signals import RandomSignal
 from ptcc_certify.theorems.family_behaviour import decide
-from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
 SLIDING = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=3, mu1=2, mu2=1, mu3=1, delta=1)

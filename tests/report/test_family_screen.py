@@ -15,9 +15,10 @@ from selection import thinned
 import ptcc_certify as ptcc
 from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
 from ptcc_certify.certificate.family_verdict import first_input
-from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family, Mode
+from ptcc_certify.model.asks import Expectations
+from ptcc_certify.protocols.restricted_signals import DwellTime
 from ptcc_certify.report.family_screen import (
     decision_lines,
     decision_summary,
@@ -28,7 +29,6 @@ from ptcc_certify.report.family_screen import (
 from ptcc_certify.report.page import report_html
 from ptcc_certify.theorems.counterexample_text import counterexample_text
 from ptcc_certify.theorems.family_behaviour import FamilyComponent
-from ptcc_certify.theorems.restricted_signals import DwellTime
 
 PROTOCOL = ptcc.NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
 LONG = "agent number {} of a rather long list of agents"

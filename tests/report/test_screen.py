@@ -18,12 +18,12 @@ import ptcc_certify as ptcc
 from ptcc_certify.bounds.final_state import extremes
 from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.procedure import STEPS
-from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.certificate.verdict import NO_SEARCHES
 from ptcc_certify.errors import ExitCode
 from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import analyse
+from ptcc_certify.model.asks import Expectations
 from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.screen import certificate_lines, check_summary, structure_summary, summary_lines

@@ -20,7 +20,8 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.disturbance import SampledDisturbance
 from ptcc_certify.protocols.gain import Gain
-from ptcc_certify.protocols.gain_limits import GainLimits, LimitedGain
+from ptcc_certify.protocols.gain_limits import GainLimits
+from ptcc_certify.protocols.limited_gain import LimitedGain
 from ptcc_certify.simulation.nominal import as_forcing
 from ptcc_certify.simulation.run import simulate
 

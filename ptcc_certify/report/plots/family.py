@@ -15,11 +15,11 @@ from ptcc_certify.certificate.family_comparison import worst_case_signals
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, find_camps
+from ptcc_certify.protocols.restricted_signals import ClockShares, DwellTime, JointWindows
 from ptcc_certify.report.plots.agents import CAMP_STYLES, NAMED_AGENTS, draw_deadlines, family_groups, name_agents
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled, time_label
 from ptcc_certify.simulation.family_run import FamilyTrajectory, simulate_family
 from ptcc_certify.simulation.signals import ConstantSignal, PeriodicSignal, RandomDwellSignal, RandomSignal, Signal
-from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows
 
 #: Random signals that are drawn beside the worst cases.
 _RANDOM = 8

@@ -12,9 +12,19 @@ from fractions import Fraction
 from typing import Any
 
 from ptcc_certify.errors import ParameterError, gated
+from ptcc_certify.graphs.option import Option, option
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.protocols.parameters import parameter, readable
 
+#: What a dwell time of the clock is called.
+CLOCK_DWELL = Option(
+    flag="--clock-dwell",
+    help="Families, nominal: the same on the stretched clock, which is infinite at T.",
+    key="graph.clock_dwell",
+    example='"0.1"',
+    metavar="TAU",
+    unit="clock",
+)
 #: ``t`` is the user's time, ``s`` the stretched clock.
 CLOCKS = ("t", "s")
 #: Why windows of time are refused.
@@ -52,7 +62,15 @@ class DwellTime:
     4
     """
 
-    least: Fraction
+    least: Fraction = option(
+        "--dwell",
+        "Families, nominal: at least so much time between switches; claim more for these.",
+        required=True,
+        key="graph.dwell",
+        example='"0.1"',
+        metavar="THETA",
+        unit="time",
+    )
     clock: str = "t"
 
     def __post_init__(self) -> None:
@@ -104,8 +122,24 @@ class JointWindows:
     JointWindows(2, on=0.5, clock='s')
     """
 
-    length: Fraction
-    on: Fraction
+    length: Fraction = option(
+        "--clock-window",
+        "Families, nominal: the length of windows of stretched clock; every edge is on in each.",
+        required=True,
+        key="graph.clock_window",
+        example='"2"',
+        metavar="H",
+        unit="clock",
+    )
+    on: Fraction = option(
+        "--window-on",
+        "Families: for how much of every window an edge is on, at least.",
+        required=True,
+        key="graph.window_on",
+        example='"0.5"',
+        metavar="DELTA",
+        unit="clock",
+    )
     clock: str = "s"
 
     def __post_init__(self) -> None:
@@ -150,7 +184,16 @@ class ClockShares:
     ClockShares(0.75, 0.25)
     """
 
-    shares: tuple[Fraction, ...]
+    shares: tuple[Fraction, ...] = option(
+        "--share",
+        "Families, nominal: the share of the stretched clock that a mode acts, an outage too; one for each graph.",
+        required=True,
+        key="graph.share",
+        example='["0.7", "0.3"]',
+        metavar="NU",
+        kind="text",
+        many=True,
+    )
 
     def __post_init__(self) -> None:
         shares = tuple(_share(share) for share in self.shares)

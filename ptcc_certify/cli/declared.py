@@ -1,0 +1,197 @@
+"""Options of click, and keys of scenarios, from the fields that declare them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any
+
+import click
+
+from ptcc_certify.errors import ParameterError, PTCCError
+from ptcc_certify.gain_design.request import DesignRequest
+from ptcc_certify.graphs.option import Option, options_of
+from ptcc_certify.graphs.reading import OPTIONAL, UNCERTAINTY, Reading
+from ptcc_certify.model.asks import Asks, Expectations
+from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.run import Run
+from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.protocols.agents import Agents
+from ptcc_certify.protocols.gain_limits import GainLimits
+from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.protocols.moving_leaders import MovingLeaders
+from ptcc_certify.protocols.restricted_signals import CLOCK_DWELL, ClockShares, DwellTime, JointWindows
+
+Decorator = Callable[[Any], Any]
+
+#: What the command line and scenarios alone have.
+FILE = Option(flag="", help="", key="graph.file", example='"fig1b"', name="graph")
+SIGNAL = Option(
+    flag="--signal",
+    help="Families: mode and weights change at any instants, or are fixed and unknown.",
+    key="graph.signal",
+    example='"any"',
+    kind="choice",
+    choices=("any", "constant"),
+    default="any",
+)
+KIND = Option(
+    flag="--protocol",
+    help="Nominal, or sliding mode, which disturbances within delta do not move.",
+    key="protocol.kind",
+    example='"nominal"',
+    name="kind",
+    kind="choice",
+    choices=("nominal", "sliding-mode"),
+    default="nominal",
+)
+DIMENSION = Option(
+    flag="--dimension",
+    help="Agents: coordinates of space; --x0 agent after agent.",
+    key="initial_state.dimension",
+    kind="count",
+    least=1,
+    most=1000,
+)
+A0 = Option(
+    flag="--a0",
+    help="Agents of order 3: initial accelerations.",
+    key="agents.a0",
+    example='"0"',
+    metavar="STATE",
+    kind="state",
+    shown="0",
+)
+STEPS = Option(
+    flag="--steps",
+    help="Instead: so many equal steps of t from 0 to T.",
+    key="simulation.steps",
+    example="100",
+    kind="count",
+    least=1,
+    most=100_000,
+)
+SHORTEST = Option(
+    flag="--shortest-deadline",
+    help=".. or for the shortest one.",
+    key="design.shortest_deadline",
+    example="true",
+    kind="flag",
+)
+#: Everything that is declared, in the order of the sections and keys of a scenario.
+DECLARED = (
+    FILE,
+    *options_of(Reading).values(),
+    UNCERTAINTY,
+    OPTIONAL,
+    SIGNAL,
+    options_of(DwellTime)["least"],
+    CLOCK_DWELL,
+    *options_of(JointWindows, ClockShares).values(),
+    KIND,
+    *options_of(NominalProtocol, SlidingModeProtocol, Agents, InitialState).values(),
+    A0,
+    *options_of(Run, Asks).values(),
+    DIMENSION,
+    *options_of(GainLimits, LateMessages, MovingLeaders, Expectations, DesignRequest).values(),
+    STEPS,
+    SHORTEST,
+)
+#: Options of one protocol alone, by its kind: a flag that chooses the other one leaves such keys out.
+OF_PROTOCOL = {
+    kind: tuple(told.name for told in DECLARED if told.protocol == kind) for kind in ("nominal", "sliding-mode")
+}
+_FLAGS = {told.name: told.flag.partition("/")[0] for told in DECLARED}
+
+
+def names_of(*kinds: type) -> tuple[str, ...]:
+    """Return what commands call the options of dataclasses.
+
+    Examples
+    --------
+    >>> names_of(MovingLeaders)
+    ('leader_speed', 'sign_gain')
+    """
+    return tuple(told.name for told in options_of(*kinds).values())
+
+
+def flag_of(name: str) -> str:
+    """Return the flag of an option.
+
+    Examples
+    --------
+    >>> flag_of("leader_speed"), flag_of("kind"), flag_of("workers")
+    ('--leader-speed', '--protocol', '--workers')
+    """
+    return _FLAGS.get(name) or f"--{name.replace('_', '-')}"
+
+
+def exact_number(text: str, flag: str) -> Fraction:
+    """Return the exact number that a text of an option stands for."""
+    from ptcc_certify.graphs.rationals import parse_exact
+
+    try:
+        return parse_exact(text)
+    except PTCCError as error:
+        times = {told.flag for told in DECLARED if told.unit == "time"}
+        mend = "; give a number in your unit of time, such as 0.001" if flag in times else ""
+        raise ParameterError(f"{flag}: {error}{mend}") from None
+
+
+def _exact(context: click.Context, parameter: click.Parameter, text: str | None) -> Fraction | None:
+    """Return the exact number that an option gives, None if it was not given."""
+    return None if text is None or context.resilient_parsing else exact_number(text, parameter.opts[0])
+
+
+def click_option(told: Option, **changes: Any) -> Decorator:
+    """Return the option of click that is declared, with the changes that one command makes."""
+    changes = dict(changes)
+    callback, hidden = changes.pop("callback", None), changes.pop("hidden", False)
+    told = replace(told, **changes)
+    more: dict[str, Any] = {"help": told.help, "hidden": hidden, "callback": callback, "metavar": told.metavar}
+    if told.shown:
+        more["help"] += f"  [default: {told.shown}]"
+    elif not told.many and not isinstance(told.default, bool) and told.default is not None:
+        more["default"] = told.default if told.kind in ("count", "choice") else str(told.default)
+    if told.many:
+        more["multiple"] = True
+    if told.kind == "number":
+        more["callback"] = callback or _exact
+    elif told.kind == "parameter":
+        more["metavar"] = "NUMBER"
+    elif told.kind == "choice":
+        more["type"] = click.Choice(list(told.choices))
+    elif told.kind == "count":
+        more["type"] = click.IntRange(told.least, told.most)
+    elif told.kind == "float":
+        more["type"] = float
+    elif told.kind == "switch":
+        more |= {"default": told.default, "show_default": False}
+    elif told.kind == "flag":
+        more["is_flag"] = True
+    return click.option(told.flag, told.name, **more)
+
+
+def options_for(*kinds: type, without: Iterable[str] = (), asked: bool = False, **changes: Any) -> Decorator:
+    """Return one decorator for the options of dataclasses; nothing is given by default where something is ``asked``."""
+    declared = [told for name, told in options_of(*kinds).items() if name not in without]
+    if asked:
+        declared = [told if told.kind == "switch" else replace(told, default=None) for told in declared]
+    return together(*(click_option(told, **changes) for told in declared))
+
+
+def one_of(kind: type, name: str, **changes: Any) -> Decorator:
+    """Return the option of one field."""
+    return click_option(options_of(kind)[name], **changes)
+
+
+def together(*decorators: Decorator) -> Decorator:
+    """Return one decorator of several, which adds their options in this order."""
+
+    def apply(function: Any) -> Any:
+        for decorator in reversed(decorators):
+            function = decorator(function)
+        return function
+
+    return apply

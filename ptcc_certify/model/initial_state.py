@@ -1,0 +1,67 @@
+"""Where the agents begin: their states, sliding variables, velocities and so on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from ptcc_certify.errors import gated
+from ptcc_certify.graphs.option import option
+
+
+@gated
+@dataclass(frozen=True)
+class InitialState:
+    """Where the agents begin, where their states alone do not tell it.
+
+    Parameters
+    ----------
+    x0 : state-like, optional
+        The initial state, in node order, or by label where there are labels: whatever :func:`ptcc_certify.as_state`
+        takes; of agents of order n N rows of coordinates, too.
+    sigma0 : state-like, optional
+        Sliding mode: ``sigma(0)``, like ``x0``; without it 0, which leaves no reaching phase.
+    v0 : state-like, optional
+        Of agents of order n: initial velocities, like ``x0``; without them 0.
+    derivatives : sequence of state-like, optional
+        Instead of ``v0``: velocities, accelerations and so on.
+
+    Examples
+    --------
+    >>> InitialState([3, 5], sigma0=[1, 0]).sigma0
+    [1, 0]
+    """
+
+    x0: Any = option(
+        "--x0",
+        "Initial state: 5,2,-4 | label=value,... | FILE.csv | random",
+        key="initial_state.x0",
+        example='"random"',
+        metavar="STATE",
+        kind="state",
+    )
+    sigma0: Any = option(
+        "--sigma0",
+        "Sliding mode: like --x0; 0 leaves no reaching phase.",
+        key="initial_state.sigma0",
+        example="0",
+        metavar="STATE",
+        kind="state",
+        shown="0",
+        protocol="sliding-mode",
+    )
+    v0: Any = option(
+        "--v0",
+        "Agents: initial velocities, like --x0.",
+        key="agents.v0",
+        example='"0"',
+        metavar="STATE",
+        kind="state",
+        shown="0",
+    )
+    derivatives: Any = None
+
+
+def read_initial(x0: Any) -> InitialState:
+    """Return where agents begin, of whom the states alone may be given."""
+    return x0 if isinstance(x0, InitialState) else InitialState(x0)
