@@ -32,7 +32,6 @@ SIGNAL = Option(
     help="Families: mode and weights change at any instants, or are fixed and unknown.",
     key="graph.signal",
     example='"any"',
-    kind="choice",
     choices=("any", "constant"),
     default="any",
 )
@@ -42,7 +41,6 @@ KIND = Option(
     key="protocol.kind",
     example='"nominal"',
     name="kind",
-    kind="choice",
     choices=("nominal", "sliding-mode"),
     default="nominal",
 )
@@ -50,25 +48,17 @@ DIMENSION = Option(
     flag="--dimension",
     help="Agents: coordinates of space; --x0 agent after agent.",
     key="initial_state.dimension",
-    kind="count",
     least=1,
     most=1000,
 )
 A0 = Option(
-    flag="--a0",
-    help="Agents of order 3: initial accelerations.",
-    key="agents.a0",
-    example='"0"',
-    metavar="STATE",
-    kind="state",
-    shown="0",
+    flag="--a0 STATE", help="Agents of order 3: initial accelerations.", key="agents.a0", example='"0"', shown="0"
 )
 STEPS = Option(
     flag="--steps",
     help="Instead: so many equal steps of t from 0 to T.",
     key="simulation.steps",
     example="100",
-    kind="count",
     least=1,
     most=100_000,
 )
@@ -100,9 +90,10 @@ DECLARED = (
 )
 #: Options of one protocol alone, by its kind: a flag that chooses the other one leaves such keys out.
 OF_PROTOCOL = {
-    kind: tuple(told.name for told in DECLARED if told.protocol == kind) for kind in ("nominal", "sliding-mode")
+    "nominal": ("T", *(told.name for told in options_of(GainLimits).values()), "noise"),
+    "sliding-mode": ("T_r", "T_s", "mu1", "mu2", "mu3", "sigma0", "disturbance", "boundary_layer"),
 }
-_FLAGS = {told.name: told.flag.partition("/")[0] for told in DECLARED}
+_FLAGS = {told.name: told.word for told in DECLARED}
 
 
 def names_of(*kinds: type) -> tuple[str, ...]:
@@ -134,7 +125,7 @@ def exact_number(text: str, flag: str) -> Fraction:
     try:
         return parse_exact(text)
     except PTCCError as error:
-        times = {told.flag for told in DECLARED if told.unit == "time"}
+        times = {told.word for told in DECLARED if told.unit == "time"}
         mend = "; give a number in your unit of time, such as 0.001" if flag in times else ""
         raise ParameterError(f"{flag}: {error}{mend}") from None
 
@@ -146,16 +137,15 @@ def _exact(context: click.Context, parameter: click.Parameter, text: str | None)
 
 def click_option(told: Option, **changes: Any) -> Decorator:
     """Return the option of click that is declared, with the changes that one command makes."""
-    changes = dict(changes)
     callback, hidden = changes.pop("callback", None), changes.pop("hidden", False)
     told = replace(told, **changes)
+    of_one = any(told.name in names for names in OF_PROTOCOL.values())
+    shown = told.shown or (str(told.default) if told.kind == "parameter" and of_one else "")
     more: dict[str, Any] = {"help": told.help, "hidden": hidden, "callback": callback, "metavar": told.metavar}
-    if told.shown:
-        more["help"] += f"  [default: {told.shown}]"
-    elif not told.many and not isinstance(told.default, bool) and told.default is not None:
-        more["default"] = told.default if told.kind in ("count", "choice") else str(told.default)
-    if told.many:
-        more["multiple"] = True
+    if shown:
+        more["help"] += f"  [default: {shown}]"
+    elif not told.many and told.default is not None:
+        more["default"] = told.default if told.kind in ("count", "choice", "switch") else str(told.default)
     if told.kind == "number":
         more["callback"] = callback or _exact
     elif told.kind == "parameter":
@@ -168,9 +158,13 @@ def click_option(told: Option, **changes: Any) -> Decorator:
         more["type"] = float
     elif told.kind == "switch":
         more |= {"default": told.default, "show_default": False}
-    elif told.kind == "flag":
-        more["is_flag"] = True
-    return click.option(told.flag, told.name, **more)
+    return click.option(
+        told.flag.partition(" ")[0],
+        told.name,
+        multiple=told.many,
+        is_flag=True if told.kind == "flag" else None,
+        **more,
+    )
 
 
 def options_for(*kinds: type, without: Iterable[str] = (), asked: bool = False, **changes: Any) -> Decorator:

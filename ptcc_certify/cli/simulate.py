@@ -61,8 +61,8 @@ _TABLES = ("", ".csv", ".txt")
 @dwell_options
 @click_option(
     SIGNAL,
+    flag="--signal SIGNAL",
     kind="text",
-    metavar="SIGNAL",
     default="random",
     help="Family: random (with --seed), worst-case, constant, or FILE.csv with columns t (or clock), mode, level.",
 )

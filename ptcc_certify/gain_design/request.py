@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 from ptcc_certify.checker.input_formulas import InitialSet, InputBounds
 from ptcc_certify.graphs.option import option
@@ -26,17 +26,14 @@ class Request:
         deadline, of agents of order n that of positions.
     """
 
+    section: ClassVar = "design"
     max_input: Fraction
-    deadline: Fraction | None = option(
-        "--deadline", "Ask for this deadline ..", required=True, key="design.deadline", metavar="T", unit="time"
-    )
+    deadline: Fraction | None = option("--deadline T", "Ask for this deadline ..", required=True, unit="time")
     residual: Fraction | None = option(
-        "--residual",
+        "--residual r",
         "Every agent may be so far from its final state at the deadline.",
         required=True,
-        key="design.residual",
         example="0.01",
-        metavar="r",
         unit="state",
     )
 
@@ -53,14 +50,9 @@ class DesignRequest(Request):
         For all of which it is to hold.
     """
 
+    section: ClassVar = "design"
     input_norm: int | None = option(
-        "--input-norm",
-        "2: U bounds ||u||, not each |u_k|.",
-        required=True,
-        key="design.input_norm",
-        example='"2"',
-        kind="choice",
-        choices=("2",),
+        "--input-norm", "2: U bounds ||u||, not each |u_k|.", required=True, example='"2"', choices=("2",)
     )
     initial_set: InitialSet
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Mapping
-from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields, replace
 from typing import Any
 
 
@@ -15,19 +15,18 @@ class Option:
     Attributes
     ----------
     flag : str
-        ``--leader-speed``; of a switch with both, ``--simulation/--no-simulation``.
+        With what stands for its value: ``--leader-speed V``; of a switch both, ``--simulation/--no-simulation``.
     help : str
         What it means, in one or two sentences.
     key : str
-        Section and key of a scenario, ``leaders.speed``; none where no scenario has it.
+        Section and key of a scenario, ``leaders.speed``; of a field the key alone, where it is called otherwise there.
     example : str
         Its value in a scenario, as TOML, which tells the kind of value, too.
     name : str
-        What commands call it; that of the flag, ``leader_speed``, where nothing else is told.
-    metavar : str
-        What stands for its value.
-    kind : {"number", "text", "state", "numbers", "switch", "choice", "count", "float"}
-        What its value is: a number is exact, a state is one of all agents, a count a whole number.
+        What commands call it; where nothing is told as the flag, ``leader_speed``.
+    kind : {"number", "parameter", "text", "state", "numbers", "switch", "flag", "choice", "count", "float"}
+        What its value is: a number is exact, the field itself reads a parameter, a state is one of all agents, a count
+        a whole number. Where nothing is told it follows from the others.
     unit : str
         Of a number: ``time``, say.
     default : Any
@@ -39,8 +38,6 @@ class Option:
         Of a count.
     many : bool
         Whether it may be repeated.
-    protocol : str
-        The only protocol that has it; none of both have.
     """
 
     flag: str
@@ -48,8 +45,7 @@ class Option:
     key: str = ""
     example: str = "1"
     name: str = ""
-    metavar: str | None = None
-    kind: str = "number"
+    kind: str = ""
     unit: str = ""
     default: Any = None
     shown: str = ""
@@ -57,11 +53,26 @@ class Option:
     least: int | None = None
     most: int | None = None
     many: bool = False
-    protocol: str = ""
 
     def __post_init__(self) -> None:
-        name = self.name or self.flag.partition("/")[0].lstrip("-").replace("-", "_")
-        object.__setattr__(self, "name", name)
+        switch = self.flag.partition("/")[1]
+        if not self.name:
+            object.__setattr__(self, "name", self.word.lstrip("-").replace("-", "_"))
+        if not self.kind:
+            told = {"switch": switch, "choice": self.choices, "count": self.least is not None}
+            kinds = {"": "parameter", "STATE": "state", "LIST": "numbers"}
+            kind = next((kind for kind, true in told.items() if true), kinds.get(self.metavar or "", "number"))
+            object.__setattr__(self, "kind", kind)
+
+    @property
+    def word(self) -> str:
+        """The flag alone, ``--leader-speed``; of a switch the first of both."""
+        return self.flag.partition(" ")[0].partition("/")[0]
+
+    @property
+    def metavar(self) -> str | None:
+        """What stands for its value."""
+        return self.flag.partition(" ")[2] or None
 
 
 def option(
@@ -73,7 +84,7 @@ def option(
     required: bool = False,
     **told: Any,
 ) -> Any:
-    """Return a field of a dataclass that stands for an option.
+    """Return a field of a dataclass that stands for an option; ``section`` of the class is that of its scenario.
 
     Parameters
     ----------
@@ -88,9 +99,11 @@ def option(
     --------
     >>> @dataclass(frozen=True)
     ... class Wind:
-    ...     speed: float = option("--wind-speed", "How fast it blows.", default=0.0, unit="m/s")
-    >>> Wind().speed, options_of(Wind)["speed"].name
-    (0.0, 'wind_speed')
+    ...     section = "weather"
+    ...     speed: float = option("--wind-speed V", "How fast it blows.", default=0.0, unit="m/s")
+    >>> told = options_of(Wind)["speed"]
+    >>> Wind().speed, told.word, told.name, told.key, told.metavar
+    (0.0, '--wind-speed', 'wind_speed', 'weather.speed', 'V')
     """
     if of is None:
         declared = Option(flag=flag, help=help, default=default, **told)
@@ -99,20 +112,20 @@ def option(
     return of
 
 
-def options_of(*kinds: type) -> Mapping[str, Option]:
+def options_of(*kinds: Any) -> Mapping[str, Option]:
     """Return the options of the fields of dataclasses, by the names of the fields.
 
     Examples
     --------
     >>> from ptcc_certify.protocols.moving_leaders import MovingLeaders
-    >>> {name: told.flag for name, told in options_of(MovingLeaders).items()}
-    {'speed': '--leader-speed', 'sign_gain': '--sign-gain'}
+    >>> {name: told.key for name, told in options_of(MovingLeaders).items()}
+    {'speed': 'leaders.speed', 'sign_gain': 'leaders.sign_gain'}
     """
     found = {}
     for kind in kinds:
         for one in fields(kind):
-            own = inspect.getattr_static(kind, one.name, MISSING)
-            told = getattr(own, "option", None) or one.metadata.get("option")
+            told = getattr(inspect.getattr_static(kind, one.name, None), "option", one.metadata.get("option"))
             if told is not None:
-                found[one.name] = told
+                key = told.key if "." in told.key else f"{kind.section}.{told.key or one.name}"
+                found[one.name] = replace(told, key=key)
     return found

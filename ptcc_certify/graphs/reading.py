@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, ClassVar
 
 from ptcc_certify.errors import FormatError, ParameterError, gated
 from ptcc_certify.graphs.option import Option, option
@@ -43,12 +43,12 @@ class Reading:
         Which matrix or relation of a file that holds several.
     """
 
+    section: ClassVar = "graph"
     orientation: str | None = option(
         "--edges",
         "Row a,b (or entry a,b of a matrix): flows a -> b, or a listens.",
-        key="graph.edges",
+        key="edges",
         example='"information"',
-        kind="choice",
         choices=("information", "listens"),
         shown="information; matrix: listens",
     )
@@ -56,57 +56,31 @@ class Reading:
         "--duplicates",
         "What becomes of two rows for one ordered pair.",
         default="refuse",
-        key="graph.duplicates",
         example='"refuse"',
-        kind="choice",
         choices=("refuse", "sum", "last"),
     )
     drop_self_loops: bool = option(
-        "--drop-self-loops/--no-drop-self-loops",
-        "Ignore edges of a node to itself.",
-        default=False,
-        key="graph.drop_self_loops",
-        example="false",
-        kind="switch",
+        "--drop-self-loops/--no-drop-self-loops", "Ignore edges of a node to itself.", default=False, example="false"
     )
     drop_zeros: bool = option(
-        "--drop-zeros/--no-drop-zeros",
-        "Ignore edges of weight 0.",
-        default=False,
-        key="graph.drop_zeros",
-        example="false",
-        kind="switch",
+        "--drop-zeros/--no-drop-zeros", "Ignore edges of weight 0.", default=False, example="false"
     )
     undirected: bool = option(
-        "--undirected/--no-undirected",
-        "Every row counts in both directions.",
-        default=False,
-        key="graph.undirected",
-        example="false",
-        kind="switch",
+        "--undirected/--no-undirected", "Every row counts in both directions.", default=False, example="false"
     )
     laplacian: bool | None = option(
         "--laplacian/--no-laplacian",
         "The matrix is a signed Laplacian D - W, or none though its diagonal holds the sums.",
-        key="graph.laplacian",
         example="false",
-        kind="switch",
     )
     columns: str | Sequence[str] | None = option(
-        "--columns",
+        "--columns A,B,W",
         "Source, target and weight of a table: titles, or numbers from 1.",
-        key="graph.columns",
         example='"source,target,weight"',
-        metavar="A,B,W",
         kind="text",
     )
     variable: str | None = option(
-        "--variable",
-        "Which matrix, network or relation of a file with several.",
-        key="graph.variable",
-        example='"W"',
-        metavar="NAME",
-        kind="text",
+        "--variable NAME", "Which matrix, network or relation of a file with several.", example='"W"', kind="text"
     )
 
     def __post_init__(self) -> None:
@@ -153,19 +127,17 @@ class Reading:
 
 #: What makes a family of a graph: weights in intervals, edges that may fail.
 UNCERTAINTY = Option(
-    flag="--uncertainty",
+    flag="--uncertainty SHARE",
     help="Family: every weight is known up to this share of it, such as 10%.",
     key="graph.uncertainty",
     example='"10%"',
-    metavar="SHARE",
     kind="text",
 )
 OPTIONAL = Option(
-    flag="--optional",
+    flag="--optional SOURCE,TARGET",
     help="Family: this edge may fail, on which TARGET hears SOURCE; repeat it for more.",
     key="graph.optional",
     example='["a,b"]',
-    metavar="SOURCE,TARGET",
     kind="text",
     many=True,
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any
+from typing import Any, ClassVar
 
 from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.graphs.option import option
@@ -49,35 +49,23 @@ class Expectations:
     refuted: rate >= 5 (upper bound 4, proved); met: bipartite consensus; the rest is certified
     """
 
+    section: ClassVar = "expectations"
     behaviour: str | None = option(
-        "--expect",
+        "--expect BEHAVIOUR",
         "E.g. bipartite-consensus; exit code 3 if it does not follow.",
-        key="expectations.behaviour",
         example='"bipartite-consensus"',
-        metavar="BEHAVIOUR",
         kind="text",
     )
     min_rate: Fraction | None = option(
-        "--min-rate",
-        "Ask for a proved decay rate of at least R per unit of the stretched clock.",
-        key="expectations.min_rate",
-        metavar="R",
-        unit="1/clock",
+        "--min-rate R", "Ask for a proved decay rate of at least R per unit of the stretched clock.", unit="1/clock"
     )
     max_input: Fraction | None = option(
-        "--max-input",
-        "Ask for a proved peak of every |u_k| of at most U.",
-        key="expectations.max_input",
-        example="100",
-        metavar="U",
-        unit="input",
+        "--max-input U", "Ask for a proved peak of every |u_k| of at most U.", example="100", unit="input"
     )
     max_residual: Fraction | None = option(
-        "--max-residual",
+        "--max-residual R",
         "With late messages: ask for every agent within R of its final state at T.",
-        key="expectations.max_residual",
         example="0.05",
-        metavar="R",
         unit="state",
     )
 
@@ -150,66 +138,48 @@ class Asks:
     'bipartite consensus'
     """
 
+    section: ClassVar = "certificate"
     method: str = option(
         "--method",
         "Lyapunov functions searched beside the paper's.",
         default="best",
-        key="certificate.method",
         example='"best"',
-        kind="choice",
         choices=("best", *METHODS[:-1]),
     )
     at: Any = option(
-        "--at",
-        "Optimise the bound at this instant, and print it; -v: for every agent.",
-        key="certificate.at",
-        example="0.5",
-        metavar="t",
-        unit="time",
+        "--at t", "Optimise the bound at this instant, and print it; -v: for every agent.", example="0.5", unit="time"
     )
     initial_set: Any = option(
-        "--initial-bound",
+        "--initial-bound R",
         "Bound the input for all initial states within |x_k(0)| <= R, not --x0.",
         key="initial_state.initial_bound",
         example="10",
-        metavar="R",
         unit="state",
     )
     delta: Any = None
     noise: Any = option(
-        "--noise",
+        "--noise NU",
         "Nominal: bound the effect of measurement noise |n_k| <= NU under a limit.",
         key="disturbance.noise",
         example="0.01",
-        metavar="NU",
         unit="state",
-        protocol="nominal",
     )
     disturbance: Any = option(
-        "--disturbance",
+        "--disturbance EXPR",
         "Of the simulated run: an expression of k and t, worst-case (sliding mode), telegraph or none.",
         key="disturbance.signal",
         example='"worst-case"',
-        metavar="EXPR",
         kind="text",
         shown="worst-case",
-        protocol="sliding-mode",
     )
     simulation: bool | None = option(
-        "--simulation/--no-simulation",
-        "Compare with a CVODES run.",
-        key="certificate.simulation",
-        example="true",
-        kind="switch",
-        shown="up to 10,000 agents",
+        "--simulation/--no-simulation", "Compare with a CVODES run.", example="true", shown="up to 10,000 agents"
     )
     time_limit: float | None = option(
-        "--time-limit",
+        "--time-limit SECONDS",
         "Of wall time, for simulation and searches of a graph together, not for decisions and checks; near it what is "
         "found may differ from run to run.",
-        key="certificate.time_limit",
         example="60",
-        metavar="SECONDS",
         kind="float",
         shown="the work of 60 s, and of 1 s more for every 1,000 nodes, which does not depend on how busy the machine "
         "is",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from ptcc_certify.errors import gated
 from ptcc_certify.graphs.option import option
@@ -32,33 +32,12 @@ class InitialState:
     [1, 0]
     """
 
-    x0: Any = option(
-        "--x0",
-        "Initial state: 5,2,-4 | label=value,... | FILE.csv | random",
-        key="initial_state.x0",
-        example='"random"',
-        metavar="STATE",
-        kind="state",
-    )
+    section: ClassVar = "initial_state"
+    x0: Any = option("--x0 STATE", "Initial state: 5,2,-4 | label=value,... | FILE.csv | random", example='"random"')
     sigma0: Any = option(
-        "--sigma0",
-        "Sliding mode: like --x0; 0 leaves no reaching phase.",
-        key="initial_state.sigma0",
-        example="0",
-        metavar="STATE",
-        kind="state",
-        shown="0",
-        protocol="sliding-mode",
+        "--sigma0 STATE", "Sliding mode: like --x0; 0 leaves no reaching phase.", example="0", shown="0"
     )
-    v0: Any = option(
-        "--v0",
-        "Agents: initial velocities, like --x0.",
-        key="agents.v0",
-        example='"0"',
-        metavar="STATE",
-        kind="state",
-        shown="0",
-    )
+    v0: Any = option("--v0 STATE", "Agents: initial velocities, like --x0.", key="agents.v0", example='"0"', shown="0")
     derivatives: Any = None
 
 

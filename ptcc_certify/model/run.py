@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from ptcc_certify.errors import gated
 from ptcc_certify.graphs.option import option
@@ -48,46 +48,26 @@ class Run:
     201
     """
 
+    section: ClassVar = "simulation"
     times: Iterable[Exact] | None = None
     remaining: float = 1e-8
     samples: int = option(
-        "--samples",
-        "Instants up to T, dense towards it.",
-        default=201,
-        key="simulation.samples",
-        example="201",
-        kind="count",
-        least=2,
-        most=100_000,
+        "--samples", "Instants up to T, dense towards it.", default=201, example="201", least=2, most=100_000
     )
     past: float = PAST
     rtol: float = 1e-11
     atol: float = 1e-11
     boundary_layer: Any = option(
-        "--boundary-layer",
-        "Sliding mode: tanh(sigma/W) for the sign, to compare.",
-        key="simulation.boundary_layer",
-        example="0.01",
-        metavar="W",
-        kind="float",
-        protocol="sliding-mode",
+        "--boundary-layer W", "Sliding mode: tanh(sigma/W) for the sign, to compare.", example="0.01", kind="float"
     )
     pattern: Any = option(
         "--pattern",
         "With late messages: as old as allowed, fresh, between the two, or now this, now that (with --seed).",
         default="oldest",
         name="age_pattern",
-        key="simulation.pattern",
         example='"oldest"',
-        kind="choice",
         choices=PATTERNS,
     )
     seed: int = option(
-        "--seed",
-        "Seed of random initial states.",
-        default=0,
-        key="initial_state.seed",
-        example="0",
-        kind="count",
-        least=0,
+        "--seed", "Seed of random initial states.", default=0, key="initial_state.seed", example="0", least=0
     )

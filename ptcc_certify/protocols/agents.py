@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Any, ClassVar
 
 from ptcc_certify.errors import NumberError, ParameterError, gated
 from ptcc_certify.graphs.option import option
@@ -68,66 +68,29 @@ class Agents:
 give 4, from which on the input is bounded
     """
 
+    section: ClassVar = "agents"
     order: int | None = option(
-        "--agents",
+        "--agents KIND",
         "Agents of order n: double-integrator, triple-integrator, or n.",
-        key="agents.kind",
+        key="kind",
         example='"double-integrator"',
-        metavar="KIND",
         kind="text",
         shown="integrator",
     )
     plant: Sequence[Exact] | None = option(
-        "--plant",
-        "Agents: a_1,..,a_n of x^(n) + a_n x^(n-1) + .. + a_1 x = u.",
-        key="agents.plant",
-        example='"0,0.1"',
-        metavar="LIST",
-        kind="numbers",
+        "--plant LIST", "Agents: a_1,..,a_n of x^(n) + a_n x^(n-1) + .. + a_1 x = u.", example='"0,0.1"'
     )
     drag: Exact | None = option(
-        "--drag",
-        "Agents: the force -drag times the highest velocity.",
-        key="agents.drag",
-        example="0.1",
-        metavar="NUMBER",
-        shown="0",
+        "--drag NUMBER", "Agents: the force -drag times the highest velocity.", example="0.1", shown="0"
     )
-    rest: Exact | None = option(
-        "--rest",
-        "Double integrators meet at rest: damping of their own velocity.",
-        key="agents.rest",
-        metavar="ALPHA",
-    )
+    rest: Exact | None = option("--rest ALPHA", "Double integrators meet at rest: damping of their own velocity.")
     cascade: Exact | None = option(
-        "--cascade",
-        "Double integrators track the plain protocol's velocity, at this rate.",
-        key="agents.cascade",
-        metavar="ALPHA",
+        "--cascade ALPHA", "Double integrators track the plain protocol's velocity, at this rate."
     )
-    decay: Exact | None = option(
-        "--decay",
-        "Agents: deviations fall like (1 - t/T)^(R/2).",
-        key="agents.decay",
-        example="4",
-        metavar="R",
-        shown="2 n",
-    )
-    offsets: Any = option(
-        "--offsets",
-        "Agents: their places in a formation, like --x0.",
-        key="agents.offsets",
-        example='"offsets.csv"',
-        metavar="STATE",
-        kind="state",
-    )
+    decay: Exact | None = option("--decay R", "Agents: deviations fall like (1 - t/T)^(R/2).", example="4", shown="2 n")
+    offsets: Any = option("--offsets STATE", "Agents: their places in a formation, like --x0.", example='"offsets.csv"')
     biases: Any = option(
-        "--biases",
-        "Agents: what is added to their relative positions, like --x0.",
-        key="agents.biases",
-        example='"biases.csv"',
-        metavar="STATE",
-        kind="state",
+        "--biases STATE", "Agents: what is added to their relative positions, like --x0.", example='"biases.csv"'
     )
     gain_cap: Exact | None = None
 

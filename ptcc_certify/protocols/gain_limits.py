@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from ptcc_certify.checker.input_formulas import Limits
 from ptcc_certify.errors import gated
@@ -47,34 +47,13 @@ class GainLimits(Parameters, Limits):
     array([ 2., 11., 11.,  0.])
     """
 
-    gain_cap: Given = option(
-        "--gain-cap",
-        "Nominal: the gain is at most G.",
-        Given(),
-        key="limits.gain_cap",
-        example="100",
-        metavar="G",
-        protocol="nominal",
-    )
+    section: ClassVar = "limits"
+    gain_cap: Given = option("--gain-cap G", "Nominal: the gain is at most G.", Given(), example="100")
     stop_before: Given = option(
-        "--stop-before",
-        "Nominal: the input is 0 from T - EPS on.",
-        Given(),
-        key="limits.stop_before",
-        example="0.01",
-        metavar="EPS",
-        unit="time",
-        protocol="nominal",
+        "--stop-before EPS", "Nominal: the input is 0 from T - EPS on.", Given(), example="0.01", unit="time"
     )
     sample_period: Given = option(
-        "--sample-period",
-        "Nominal: gain and input are held over periods H.",
-        Given(),
-        key="limits.sample_period",
-        example="0.001",
-        metavar="H",
-        unit="time",
-        protocol="nominal",
+        "--sample-period H", "Nominal: gain and input are held over periods H.", Given(), example="0.001", unit="time"
     )
 
     @property

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from numbers import Integral
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.graphs.option import option
@@ -72,50 +72,39 @@ without limit before T; add a gain_cap, below (pi/2 - |arg lambda|)/(delay |lamb
 lambda of L, or measure the own state without delay
     """
 
+    section: ClassVar = "messages"
     delay: Exact | Mapping[tuple[str, str], Exact] = option(
-        "--delay",
+        "--delay D|COLUMN",
         "What agents hear is up to D late; or the column of the edge list that tells the delay of every edge.",
         default=0,
-        key="messages.delay",
         example="0.02",
-        metavar="D|COLUMN",
         kind="text",
         unit="time",
     )
     period: Given = option(
-        "--period",
-        "Messages are sent every H; the last one that came is held.",
-        Given(),
-        key="messages.period",
-        example="0.01",
-        metavar="H",
+        "--period H", "Messages are sent every H; the last one that came is held.", Given(), example="0.01"
     )
     losses: int = option(
-        "--packet-loss",
+        "--packet-loss COUNT",
         "Up to so many messages in a row get lost; asks for --period.",
         default=0,
-        key="messages.packet_loss",
+        key="packet_loss",
         example="3",
-        metavar="COUNT",
-        kind="count",
         least=0,
         most=MOST_LOSSES,
     )
     value_error: NotNegative = option(
-        "--quantisation",
+        "--quantisation STEP",
         "What is heard is rounded to multiples of STEP.",
         NotNegative(0),
-        key="messages.quantisation",
+        key="quantisation",
         example="0.1",
-        metavar="STEP",
     )
     own_delay: bool = option(
         "--own-delay/--no-own-delay",
         "The own state is as late as what is heard; asks for --gain-cap.",
         default=False,
-        key="messages.own_delay",
         example="false",
-        kind="switch",
     )
     gain_cap: Given = Given()
     _of_graph: tuple[SignedDigraph, tuple[Fraction, ...]] | None = field(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from lmi.exact.decimal_rounding import near
 from ptcc_certify.errors import ParameterError, gated
@@ -53,22 +53,19 @@ class MovingLeaders(Parameters):
 give 2 or more
     """
 
+    section: ClassVar = "leaders"
     speed: NotNegative = option(
-        "--leader-speed",
+        "--leader-speed V",
         "Leaders move, as fast as V: how followers track them.",
         NotNegative(),
-        key="leaders.speed",
         example="0.5",
-        metavar="V",
         unit="state/time",
     )
     disturbance: NotNegative = NotNegative(0)
     sign_gain: Given = option(
-        "--sign-gain",
+        "--sign-gain MU",
         "With --leader-speed: followers add MU sign(e_k), and stay on their targets.",
         Given(),
-        key="leaders.sign_gain",
-        metavar="MU",
         unit="state/time",
     )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.graphs.option import option
@@ -52,30 +52,12 @@ class NominalProtocol(Protocol):
     {'kind': 'nominal', 'T': '3/5', 'rho1': '1/10', 'rho2': '3/10', 'kappa': '1'}
     """
 
+    section: ClassVar = "protocol"
     kind = "nominal"
-    T: Positive = option(
-        "--T",
-        "Nominal: the deadline.",
-        Positive(1),
-        key="protocol.T",
-        kind="parameter",
-        unit="time",
-        shown="1",
-        protocol=kind,
-    )
-    rho1: Positive = option(
-        "--rho1",
-        "Constant part of the gain.",
-        Positive(1),
-        key="protocol.rho1",
-        kind="parameter",
-    )
-    rho2: NotNegative = option(
-        "--rho2", "Factor of the growing part of the gain.", NotNegative(1), key="protocol.rho2", kind="parameter"
-    )
-    kappa: Positive = option(
-        "--kappa", "Exponent of the time scaling.", Positive(2), key="protocol.kappa", kind="parameter", example="2"
-    )
+    T: Positive = option("--T", "Nominal: the deadline.", Positive(1), unit="time")
+    rho1: Positive = option("--rho1", "Constant part of the gain.", Positive(1))
+    rho2: NotNegative = option("--rho2", "Factor of the growing part of the gain.", NotNegative(1))
+    kappa: Positive = option("--kappa", "Exponent of the time scaling.", Positive(2), example="2")
 
     def __post_init__(self) -> None:
         _ = self.gain  # refuses what is beyond float64

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Any, ClassVar
 
 from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.graphs.option import Option, option
@@ -18,11 +18,10 @@ from ptcc_certify.protocols.parameters import parameter, readable
 
 #: What a dwell time of the clock is called.
 CLOCK_DWELL = Option(
-    flag="--clock-dwell",
+    flag="--clock-dwell TAU",
     help="Families, nominal: the same on the stretched clock, which is infinite at T.",
     key="graph.clock_dwell",
     example='"0.1"',
-    metavar="TAU",
     unit="clock",
 )
 #: ``t`` is the user's time, ``s`` the stretched clock.
@@ -62,13 +61,13 @@ class DwellTime:
     4
     """
 
+    section: ClassVar = "graph"
     least: Fraction = option(
-        "--dwell",
+        "--dwell THETA",
         "Families, nominal: at least so much time between switches; claim more for these.",
         required=True,
-        key="graph.dwell",
+        key="dwell",
         example='"0.1"',
-        metavar="THETA",
         unit="time",
     )
     clock: str = "t"
@@ -122,22 +121,21 @@ class JointWindows:
     JointWindows(2, on=0.5, clock='s')
     """
 
+    section: ClassVar = "graph"
     length: Fraction = option(
-        "--clock-window",
+        "--clock-window H",
         "Families, nominal: the length of windows of stretched clock; every edge is on in each.",
         required=True,
-        key="graph.clock_window",
+        key="clock_window",
         example='"2"',
-        metavar="H",
         unit="clock",
     )
     on: Fraction = option(
-        "--window-on",
+        "--window-on DELTA",
         "Families: for how much of every window an edge is on, at least.",
         required=True,
-        key="graph.window_on",
+        key="window_on",
         example='"0.5"',
-        metavar="DELTA",
         unit="clock",
     )
     clock: str = "s"
@@ -184,13 +182,13 @@ class ClockShares:
     ClockShares(0.75, 0.25)
     """
 
+    section: ClassVar = "graph"
     shares: tuple[Fraction, ...] = option(
-        "--share",
+        "--share NU",
         "Families, nominal: the share of the stretched clock that a mode acts, an outage too; one for each graph.",
         required=True,
-        key="graph.share",
+        key="share",
         example='["0.7", "0.3"]',
-        metavar="NU",
         kind="text",
         many=True,
     )

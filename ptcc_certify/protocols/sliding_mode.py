@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from lmi.exact.decimal_rounding import near
 from ptcc_certify.errors import ParameterError, gated
@@ -57,66 +57,25 @@ class SlidingModeProtocol(ReachingProtocol):
     ptcc_certify.errors.ParameterError: mu1 = 1 does not exceed delta = 1; a disturbance could outweigh it: give mu1 > 1
     """
 
+    section: ClassVar = "protocol"
     kind = "sliding-mode"
     T_r: Positive = option(
-        "--T-r",
-        "Sliding mode: time to reach the manifold.",
-        Positive("0.5"),
-        key="protocol.T_r",
-        kind="parameter",
-        example="0.5",
-        unit="time",
-        shown="0.5",
-        protocol=kind,
+        "--T-r", "Sliding mode: time to reach the manifold.", Positive("0.5"), example="0.5", unit="time"
     )
     T_s: Positive = option(
-        "--T-s",
-        "Sliding mode: time on it; the deadline is T_r + T_s.",
-        Positive("0.5"),
-        key="protocol.T_s",
-        kind="parameter",
-        example="0.5",
-        unit="time",
-        shown="0.5",
-        protocol=kind,
+        "--T-s", "Sliding mode: time on it; the deadline is T_r + T_s.", Positive("0.5"), example="0.5", unit="time"
     )
     rho1: Positive = Positive(1)
     rho2: Positive = Positive(1)
     kappa: Positive = Positive(2)
-    mu1: Positive = option(
-        "--mu1",
-        "Sliding mode: switching gain, above delta.",
-        Positive(2),
-        key="protocol.mu1",
-        kind="parameter",
-        example="2",
-        shown="2",
-        protocol=kind,
-    )
-    mu2: Positive = option(
-        "--mu2",
-        "Sliding mode: constant part of the reaching gain.",
-        Positive(1),
-        key="protocol.mu2",
-        kind="parameter",
-        shown="1",
-        protocol=kind,
-    )
-    mu3: Positive = option(
-        "--mu3",
-        "Sliding mode: factor of its growing part.",
-        Positive(1),
-        key="protocol.mu3",
-        kind="parameter",
-        shown="1",
-        protocol=kind,
-    )
+    mu1: Positive = option("--mu1", "Sliding mode: switching gain, above delta.", Positive(2), example="2")
+    mu2: Positive = option("--mu2", "Sliding mode: constant part of the reaching gain.", Positive(1))
+    mu3: Positive = option("--mu3", "Sliding mode: factor of its growing part.", Positive(1))
     delta: NotNegative = option(
         "--delta",
         "Bound of every disturbance.",
         NotNegative(1),
         key="disturbance.delta",
-        kind="parameter",
         shown="sliding mode: 1; nominal: none",
     )
 
