@@ -20,7 +20,8 @@ import numpy as np
 from lmi.errors import LMIError, NoCertificate
 from lmi.exact.decimal_rounding import float_up, up
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness, refuse_leader_groups
+from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness
+from ptcc_certify.model.refusals import refuse_leader_groups
 from ptcc_certify.protocols.base import Protocol
 from ptcc_certify.protocols.gain import Gain
 from ptcc_certify.protocols.moving_leaders import MovingLeaders

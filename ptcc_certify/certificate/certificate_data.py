@@ -30,7 +30,7 @@ from ptcc_certify.certificate.agents_answer import AgentsAnswer
 from ptcc_certify.certificate.format_leaders import tracking_obligations
 from ptcc_certify.certificate.format_messages import late_obligations
 from ptcc_certify.certificate.format_vectors import final_state_witness
-from ptcc_certify.certificate.request import Request
+from ptcc_certify.certificate.request import Expectations, Request
 from ptcc_certify.checker import INPUT_NODES, CheckReport
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
 from ptcc_certify.checker.quadratic_form import Form
@@ -41,7 +41,6 @@ from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.lyapunov.rate_upper_bound import RateBound, optimality_ratio
 from ptcc_certify.lyapunov.search import DIAGONAL, Search
-from ptcc_certify.model.asks import Expectations
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.disturbance import ExpressionDisturbance
 from ptcc_certify.protocols.gain_limits import GainLimits
@@ -183,7 +182,7 @@ class Content:
         Examples
         --------
         >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
-        >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1], simulation=False)
+        >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1], asks=Asks(simulation=False))
         >>> cert.changed(protocol=NominalProtocol(T=2, rho1=1, rho2=1, kappa=1), noise=Fraction(1)).request.noise
         Fraction(1, 1)
         """

@@ -28,10 +28,8 @@ from ptcc_certify.certificate.family_table import family_table
 from ptcc_certify.certificate.family_verdict import assess_family
 from ptcc_certify.certificate.format_family import family_document
 from ptcc_certify.certificate.request import (
-    Expectations,
     listener,
     origins_of,
-    read_expectations,
     read_initial_state,
     read_seconds,
     read_sliding_variable,
@@ -56,6 +54,8 @@ from ptcc_certify.lyapunov.family_search import CLOSED_ROWS, FamilySearch, searc
 from ptcc_certify.lyapunov.follower_function import follower_functions
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.squares_function import SquaresFunction, squares_function
+from ptcc_certify.model.asks import Expectations, read_expectations
+from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.base import refuse_no_protocol
 from ptcc_certify.protocols.restricted_signals import ClockShares, JointWindows, SignalClass, read_signal
@@ -359,7 +359,7 @@ def certify_family(
     progress(STEPS[-1])
     notes = [f"{note}: cut off by the time limit" if note in (*STEPS, BOXES) else note for note in notes]
     kept |= {"expectations": asked, "notes": tuple(dict.fromkeys(notes)), "scenario": scenario}
-    kept["origins"] = origins_of(None, x0, sigma0) | dict(origins or {})
+    kept["origins"] = origins_of(None, InitialState(x0, sigma0)) | dict(origins or {})
     return _fewer_functions(FamilyCertificate(family, protocol, tuple(parts), initial_state, sigma, reaching, **kept))
 
 

@@ -27,6 +27,7 @@ from ptcc_certify.bounds.final_ends import FinalEnds
 from ptcc_certify.bounds.kept_means import LeadingGroup, leading_groups
 from ptcc_certify.bounds.reaching_phase import ReachingPhase
 from ptcc_certify.certificate.certificate_data import Source
+from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.certificate.restricted_claims import (
     Claim,
     FinalValueClaim,
@@ -51,7 +52,6 @@ from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound
 from ptcc_certify.lyapunov.follower_function import FollowerFunction
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.squares_function import SquaresFunction
-from ptcc_certify.model.asks import Expectations
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.reaching_time import ReachingTime
 from ptcc_certify.protocols.restricted_signals import SignalClass

@@ -51,7 +51,7 @@ def assess_family(certificate: FamilyContent, report: CheckReport | None) -> Ass
     --------
     >>> unsure = Family.from_intervals([("a", "b", "0.8", "1.2"), ("b", "a", "-1.2", "-0.8")])
     >>> asked = Expectations("bipartite consensus", min_rate=100)
-    >>> cert = certify(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), expectations=asked)
+    >>> cert = certify(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), asks=Asks(expectations=asked))
     >>> cert.assessment.asked, int(cert.assessment.exit_code)
     ('refuted', 3)
     """

@@ -19,6 +19,7 @@ from ptcc_certify.certificate.format_family_rows import read_box, read_range
 from ptcc_certify.certificate.format_restricted import read_claim
 from ptcc_certify.certificate.format_upper_bound import read_upper_bound
 from ptcc_certify.certificate.format_vectors import Reader
+from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.checker.reading import exact, triangle
 from ptcc_certify.checker.side_files import SideFiles
 from ptcc_certify.errors import FormatError, ParameterError
@@ -28,7 +29,6 @@ from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound
 from ptcc_certify.lyapunov.follower_function import FollowerFunction, LeadingPart
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.squares_function import FormTable, SquaresFunction
-from ptcc_certify.model.asks import Expectations
 from ptcc_certify.theorems.family_behaviour import FamilyComponent, decide
 
 

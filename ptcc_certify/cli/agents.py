@@ -20,6 +20,7 @@ from ptcc_certify.cli.declared import (
 from ptcc_certify.cli.options import Options, read_initial_state
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.model.case import Case
 from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.protocols.agents import Agents
 from ptcc_certify.protocols.late_messages import LateMessages
@@ -92,14 +93,16 @@ def _named_agents(options: Options) -> Agents | None:
     )
 
 
-def agents_keywords(options: Options, graph: SignedDigraph, certified: bool = False) -> dict[str, Any]:
-    """Return agents and their initial states as the library takes them; nothing for single integrators.
+def agents_and_states(
+    options: Options, graph: SignedDigraph, certified: bool = False
+) -> tuple[Agents, InitialState] | tuple[None, None]:
+    """Return agents and where they begin; nothing for single integrators.
 
     What is certified of single integrators is certified of their formations on a line, too.
     """
     agents = agents_of(options)
     if agents is None:
-        return {}
+        return None, None
     d = options["dimension"] or 1
     if not (certified and agents.of_paper and d == 1):
         _refuse_unproved(options)
@@ -112,8 +115,8 @@ def agents_keywords(options: Options, graph: SignedDigraph, certified: bool = Fa
     while later and later[-1] is None:
         later.pop()
     x0 = read_vectors(options["x0"], options["seed"], graph, d, "--x0")
-    more: dict[str, Any] = {"agents": agents, "x0": x0}
-    return more | ({"derivatives": later} if later or any(text is not None for text in given) else {})
+    told = later or any(text is not None for text in given)
+    return agents, InitialState(x0, derivatives=later if told else None)
 
 
 def places_of(options: Options, graph: SignedDigraph, protocol: Protocol) -> Sequence[Fraction] | None:
@@ -185,12 +188,13 @@ def refuse_dimension(options: Options, command: str) -> None:
         raise ParameterError(f"--dimension: {why}; {mend}")
 
 
-def run_of_agents(graph: SignedDigraph, protocol: Protocol, keywords: dict[str, Any], samples: int) -> AgentsTrajectory:
+def run_of_agents(case: Case, samples: int) -> AgentsTrajectory:
     """Run agents of order n with the gains that ``ptcc certify`` proves, from their initial states to the deadline."""
-    from ptcc_certify.certificate.procedure import certify
+    from ptcc_certify.certificate.procedure import certify_case
 
-    part = certify(graph, protocol, simulation=False, **keywords).agents
-    if part is None or (graph.n_edges and not part.functions):
+    certificate: Any = certify_case(case)
+    part = certificate.agents
+    if part is None or (case.graph.n_edges and not part.functions):
         raise ParameterError("no gains of these agents are proved; ptcc certify tells why")
     return part.simulate(samples=samples)
 

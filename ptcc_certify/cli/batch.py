@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from ptcc_certify.cli import options as shared
-from ptcc_certify.cli.declared import one_of
+from ptcc_certify.cli.declared import Command, one_of
 from ptcc_certify.cli.options import READING
 from ptcc_certify.cli.terminal import counting, print_lines
 from ptcc_certify.errors import ExitCode, ParameterError
@@ -30,7 +30,7 @@ def _refuse_scenarios(context: click.Context, parameter: click.Parameter, patter
     return pattern
 
 
-@click.command()
+@click.command(cls=Command)
 @click.argument("pattern", nargs=-1, required=True, callback=_refuse_scenarios, type=click.Path())
 @shared.reading_options
 @shared.protocol_options

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from fractions import Fraction
-from typing import Any
+from typing import Any, ClassVar
 
 import click
 
@@ -93,6 +93,9 @@ OF_PROTOCOL = {
     "nominal": ("T", *(told.name for told in options_of(GainLimits).values()), "noise"),
     "sliding-mode": ("T_r", "T_s", "mu1", "mu2", "mu3", "sigma0", "disturbance", "boundary_layer"),
 }
+#: What commands call the fields of the library that they call otherwise.
+IN_LIBRARY = {"initial_state": "x0", "initial": "x0"}
+IN_LIBRARY |= {field: told.name for field, told in options_of(MovingLeaders, LateMessages, Expectations, Asks).items()}
 _FLAGS = {told.name: told.word for told in DECLARED}
 
 
@@ -105,6 +108,18 @@ def names_of(*kinds: type) -> tuple[str, ...]:
     ('leader_speed', 'sign_gain')
     """
     return tuple(told.name for told in options_of(*kinds).values())
+
+
+def given_of(kind: type, options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what the options give of a dataclass, by its fields.
+
+    Examples
+    --------
+    >>> given_of(MovingLeaders, {"leader_speed": "1/2", "sign_gain": None, "T": "1"})
+    {'speed': '1/2'}
+    """
+    given = {field: options.get(told.name) for field, told in options_of(kind).items()}
+    return {field: value for field, value in given.items() if value is not None}
 
 
 def flag_of(name: str) -> str:
@@ -189,3 +204,42 @@ def together(*decorators: Decorator) -> Decorator:
         return function
 
     return apply
+
+
+# ---------------------------------------------------------------------- help
+
+
+#: What the sections of a scenario, and of the help, are about.
+TITLES = {
+    "graph": "Who listens to whom.",
+    "protocol": "The protocol and its parameters; exact: 0.1 is 1/10, and 1/3 is written as a text.",
+    "initial_state": "Where the agents begin: a list in node order, { label = value }, a CSV file, or random.",
+    "agents": "Agents of order n, their first velocities, and a formation.",
+    "disturbance": "What disturbs the agents.",
+    "limits": "Limits of the gain (nominal protocol).",
+    "messages": "Messages that arrive late, get lost or are rounded.",
+    "leaders": "Leaders that move (nominal protocol).",
+    "expectations": "What is asked: exit code 3 if it is refuted, 4 if it is left open.",
+    "certificate": "How it is proved.",
+    "simulation": "How ptcc simulate runs it.",
+    "design": "What ptcc design asks, beside max_input and initial_bound.",
+}
+
+
+class Command(click.Command):
+    """A command whose help shows few options first, and the others by the sections of a scenario."""
+
+    first: ClassVar[tuple[str, ...]] = ("kind", "T", "rho1", "rho2", "kappa", "x0", "seed", "edges", "expect")
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the options: few first, the others by their sections."""
+        sections = {told.name: told.key.partition(".")[0] for told in DECLARED if told.name not in self.first}
+        rows: dict[str, list[tuple[str, str]]] = {}
+        for parameter in self.get_params(ctx):
+            row = parameter.get_help_record(ctx) if isinstance(parameter, click.Option) else None
+            if row is not None:
+                rows.setdefault(sections.get(parameter.name or "", ""), []).append(row)
+        for section, title in {"": "Options", **TITLES}.items():
+            if section in rows:
+                with formatter.section(title.rstrip(".")):
+                    formatter.write_dl(rows[section])

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
-from ptcc_certify.cli.agents import agents_keywords
+from ptcc_certify.cli.agents import agents_and_states
 from ptcc_certify.cli.declared import flag_of, one_of, together
 from ptcc_certify.cli.options import Options, kind_option, protocol_of
 from ptcc_certify.errors import ParameterError
@@ -67,7 +67,9 @@ def design_of_agents(signed: SignedDigraph, options: Options) -> AgentsDesign:
         raise ParameterError("--input-norm: is of single integrators; of agents in space U bounds ||u_k|| as it is")
     request: Any = {name: options[name] for name in ("max_input", "deadline", "residual")}
     protocol = protocol_of({**options, **_TEMPLATE})
-    return design_agents(signed, protocol=protocol, **agents_keywords(options, signed), **request)
+    agents, initial = agents_and_states(options, signed)
+    assert agents is not None
+    return design_agents(signed, agents, initial, protocol=protocol, **request)
 
 
 def command_of_agents(answer: AgentsDesign, options: Options) -> list[str] | None:

@@ -232,15 +232,12 @@ def certify_family(
     from ptcc_certify.certificate.family_certificate import certify_family as run
     from ptcc_certify.certificate.restricted_search import require_nominal
     from ptcc_certify.certificate.verdict import CERTIFIED
-    from ptcc_certify.model.asks import Expectations
     from ptcc_certify.report.family_screen import family_lines, family_summary
     from ptcc_certify.theorems.family_behaviour import decide
 
     refuse_options(options)
     _refuse_disturbance(options)
-    most = options["max_input"]
-    if most is not None and most <= 0:
-        raise ParameterError("--max-input is outside its domain; it must be > 0")
+    expected = shared.asks_of(options).expectations
     given, modes = len(options["share"]), len(family.modes)
     if given not in (0, modes):
         raise ParameterError(f"--share: {given} given, and {modes} modes; give one for each, outages too")
@@ -248,20 +245,19 @@ def certify_family(
     protocol = shared.protocol_of(options)
     require_nominal(signal, protocol)
     x0 = shared.read_initial_state(options["x0"], options["seed"], family.modes[0].mandatory)
-    sigma0 = shared.sliding_keywords(protocol, options, family.modes[0].mandatory).get("sigma0")
+    sigma0 = shared.sigma0_of(protocol, options, family.modes[0].mandatory)
     LOG.info("%s", one_line(f"read {', '.join(graphs)}: {family!r}"))
     if signal == "constant" and (left := _constant_alone(decide(family, "constant"), decide(family))):
-        if most is not None or options["min_rate"] is not None:
+        if expected.max_input is not None or expected.min_rate is not None:
             raise ParameterError("--min-rate and --max-input: no rate is certified of members that end differently")
         _show_decision(graphs, family, left, as_json, screen, options)
         return _judged_alone(left, options["expect"], output)
     name, read = _names(graphs, family, options)
     states = {"x(0)": options["x0"], "sigma(0)": options["sigma0"]}
     random_states = {what: f"random, seed {options['seed']}" for what, text in states.items() if text == "random"}
-    asked = Expectations(options["expect"], options["min_rate"], most)
     with progress(STEPS, screen.quiet) as begin:
         origins = {"graph": Path(name).name, "read": read, **random_states}
-        limit = {"time_limit": options["time_limit"], "expectations": asked, "scenario": scenario_record()}
+        limit = {"time_limit": options["time_limit"], "expectations": expected, "scenario": scenario_record()}
         limit |= {"signal": signal, "sigma0": sigma0}
         certificate = run(family, protocol, x0, origins=origins, progress=begin, **limit)
         assessment = certificate.assessment

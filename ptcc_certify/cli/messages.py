@@ -7,7 +7,7 @@ from dataclasses import replace
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
-from ptcc_certify.cli.declared import flag_of, options_for
+from ptcc_certify.cli.declared import flag_of, given_of, names_of, options_for
 from ptcc_certify.cli.options import Options, graph_file
 from ptcc_certify.errors import NumberError, ParameterError
 from ptcc_certify.protocols.late_messages import LateMessages
@@ -69,7 +69,7 @@ def _needs_cap(signed: SignedDigraph, messages: LateMessages) -> str:
 
 def refuse_unheard(signed: SignedDigraph, options: Options) -> None:
     """Refuse messages and leaders of a graph in which nobody listens to anybody, by the flag that asks for them."""
-    given = next((name for name in (*_ASKING, "leader_speed") if options[name] is not None), None)
+    given = next((name for name in (*_ASKING, *names_of(MovingLeaders)) if options[name] is not None), None)
     if given is not None and not signed.n_edges:
         raise ParameterError(f"{flag_of(given)}: nobody listens to anybody; leave it out, or add edges")
 
@@ -110,9 +110,7 @@ def _without(notes: Iterable[str], title: str) -> Iterator[str]:
 
 def leaders_of(options: Options) -> MovingLeaders | None:
     """Return how leaders move; None if nothing is asked of that. ``--delta`` is what disturbs the followers."""
-    speed, sign = options["leader_speed"], options["sign_gain"]
-    if speed is None:
-        if sign is not None:
-            raise ParameterError("--sign-gain belongs to leaders that move; give --leader-speed")
-        return None
-    return MovingLeaders(speed=speed, disturbance=options["delta"] or 0, sign_gain=sign)
+    given = given_of(MovingLeaders, options)
+    if given and "speed" not in given:
+        raise ParameterError(f"{flag_of('sign_gain')} belongs to leaders that move; give {flag_of('leader_speed')}")
+    return MovingLeaders(**given, disturbance=options["delta"] or 0) if given else None

@@ -16,18 +16,20 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ptcc_certify.cli.declared import (
+    IN_LIBRARY,
     KIND,
     OF_PROTOCOL,
+    Command,
     Decorator,
     exact_number,
     flag_of,
+    given_of,
     names_of,
     one_of,
     options_for,
     together,
 )
 from ptcc_certify.cli.scenario import (
-    IN_LIBRARY,
     graph_of,
     is_scenario,
     kind_of_protocol,
@@ -176,8 +178,10 @@ output_option = click.option(
 )
 
 
-class OneGraph(click.Command):
+class OneGraph(Command):
     """A command about one graph, which says so if it is given several."""
+
+    first = (*Command.first, "max_input", "initial_bound", "deadline", "shortest_deadline", "residual")
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Return what is left of the arguments: nothing."""
@@ -250,24 +254,40 @@ def protocol_of(options: Options, disturbed: tuple[str, ...] = ("delta",)) -> Pr
     return kind(**{name: value for name, value in given.items() if value is not None})
 
 
-def sliding_keywords(protocol: Protocol, options: Options, graph: SignedDigraph) -> dict[str, Any]:
-    """Return ``sigma0`` and ``disturbance`` as the library takes them; nothing for the nominal protocol."""
+def asks_of(options: Options) -> Asks:
+    """Return what is asked of single graphs and families, beside disturbances and noise."""
+    most = options["max_input"]
+    if most is not None and most <= 0:
+        raise ParameterError("--max-input is outside its domain; it must be > 0")
+    asks = {field: value for field, value in given_of(Asks, options).items() if field not in ("noise", "disturbance")}
+    return Asks(**asks, expectations=Expectations(**given_of(Expectations, options)))
+
+
+def sigma0_of(protocol: Protocol, options: Options, graph: SignedDigraph) -> list[Fraction] | None:
+    """Return ``sigma(0)``; None under the nominal protocol."""
+    if protocol.reaching is None:
+        return None
+    text = options["sigma0"]
+    if text is None or ("0" in text and not text.strip("0. ")):
+        return [Fraction(0)] * graph.n_nodes
+    return read_initial_state(text, [options["seed"], 1], graph, "--sigma0: sigma(0)")
+
+
+def disturbance_of(protocol: Protocol, options: Options, graph: SignedDigraph) -> Any:
+    """Return what a run meets under the sliding-mode protocol, by default the worst; None under the nominal one."""
     from ptcc_certify.protocols.disturbance import as_disturbance
 
     if (sliding := protocol.reaching) is None:
-        return {}
+        return None
     source = "worst-case" if options["disturbance"] is None else options["disturbance"]
-    horizon, seed = 2 * float(protocol.T), options["seed"]
-    return {
-        "sigma0": _sigma0(options["sigma0"], seed, graph),
-        "disturbance": as_disturbance(source, graph.n_nodes, sliding.delta, horizon, seed),
-    }
+    return as_disturbance(source, graph.n_nodes, sliding.delta, 2 * float(protocol.T), options["seed"])
 
 
 def run_keywords(protocol: Protocol, options: Options, graph: SignedDigraph) -> dict[str, Any]:
     """Return what acts on a simulated run, as the library takes it."""
     if protocol.reaching is not None:
-        return sliding_keywords(protocol, options, graph)
+        sigma0 = sigma0_of(protocol, options, graph)
+        return {"sigma0": sigma0, "disturbance": disturbance_of(protocol, options, graph)}
     return {"actuator": actuator_of(options)} | {name: options[name] for name in ("delta", "disturbance")}
 
 
@@ -277,10 +297,10 @@ def actuator_of(options: Options) -> GainLimits | None:
     return None if actuator.ideal else actuator
 
 
-def _sigma0(text: str | None, seed: int, graph: SignedDigraph) -> list[Fraction]:
-    if text is None or ("0" in text and not text.strip("0. ")):
-        return [Fraction(0)] * graph.n_nodes
-    return read_initial_state(text, [seed, 1], graph, "--sigma0: sigma(0)")
+def limits_of(options: Options) -> tuple[GainLimits, ...]:
+    """Return the limits of the gain; none if there are none."""
+    actuator = actuator_of(options)
+    return () if actuator is None else (actuator,)
 
 
 def read_initial_state(

@@ -18,7 +18,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from ptcc_certify.cli.declared import DECLARED, FILE, OF_PROTOCOL, names_of
+from ptcc_certify.cli.declared import DECLARED, FILE, IN_LIBRARY, OF_PROTOCOL, TITLES, names_of
 from ptcc_certify.cli.terminal import SCENARIO
 from ptcc_certify.errors import FormatError, ParameterError, PTCCError, did_you_mean
 from ptcc_certify.graphs.kinds_of_file import TOML, kind_of, refuse_as_graph
@@ -36,23 +36,6 @@ MEMORY = "ptcc_certify.scenario"
 _OF_THE_GRAPH_ALONE = ("classify", "check")
 #: Where the context of its command is kept.
 COMMAND = "ptcc_certify.command"
-#: What the library calls some options.
-IN_LIBRARY = {"initial_state": "x0", "initial": "x0", "behaviour": "expect", "speed": "leader_speed"}
-#: The sections, and what they are about.
-_TITLES = {
-    "graph": "Who listens to whom.",
-    "protocol": "The protocol and its parameters; exact: 0.1 is 1/10, and 1/3 is written as a text.",
-    "initial_state": "Where the agents begin: a list in node order, { label = value }, a CSV file, or random.",
-    "agents": "Agents of order n, their first velocities, and a formation.",
-    "disturbance": "What disturbs the agents.",
-    "limits": "Limits of the gain (nominal protocol).",
-    "messages": "Messages that arrive late, get lost or are rounded.",
-    "leaders": "Leaders that move (nominal protocol).",
-    "expectations": "What is asked: exit code 3 if it is refuted, 4 if it is left open.",
-    "certificate": "How it is proved.",
-    "simulation": "How ptcc simulate runs it.",
-    "design": "What ptcc design asks, beside max_input and initial_bound.",
-}
 
 
 def _keys(section: str) -> dict[str, Option]:
@@ -62,7 +45,7 @@ def _keys(section: str) -> dict[str, Option]:
 
 
 #: The sections: what they are about, and of each key the option that it stands for.
-SECTIONS = {section: (title, _keys(section)) for section, title in _TITLES.items()}
+SECTIONS = {section: (title, _keys(section)) for section, title in TITLES.items()}
 #: Keys that make a family of a graph.
 OF_FAMILIES = (UNCERTAINTY.name, OPTIONAL.name)
 #: Options of late messages and moving leaders.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,8 +13,8 @@ from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
 from ptcc_certify.cli.agents import (
+    agents_and_states,
     agents_flags,
-    agents_keywords,
     agents_of,
     agents_options,
     places_of,
@@ -21,7 +22,7 @@ from ptcc_certify.cli.agents import (
     run_in_places,
     run_of_agents,
 )
-from ptcc_certify.cli.declared import DIMENSION, SIGNAL, STEPS, click_option, flag_of, one_of
+from ptcc_certify.cli.declared import DIMENSION, SIGNAL, STEPS, Command, click_option, flag_of, one_of
 from ptcc_certify.cli.families import (
     dwell_of,
     dwell_options,
@@ -36,6 +37,8 @@ from ptcc_certify.cli.terminal import FIGURES, print_lines, refuse_output
 from ptcc_certify.errors import ExitCode, ParameterError
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.case import Case
+from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.model.run import Run
 
 if TYPE_CHECKING:
@@ -51,7 +54,7 @@ if TYPE_CHECKING:
 _TABLES = ("", ".csv", ".txt")
 
 
-@click.command()
+@click.command(cls=Command)
 @shared.graphs_argument
 @shared.reading_options
 @shared.protocol_options
@@ -182,10 +185,10 @@ def _run_agents(signed: SignedDigraph, protocol: Protocol, options: shared.Optio
     if source("signal") == ParameterSource.COMMANDLINE:
         raise ParameterError("--signal: is for families of graphs; this is one graph: leave it out")
     refuse_restricted(options)
-    more = agents_keywords(options, signed)
-    if protocol.reaching is not None:
-        more |= {"sigma0": shared.sliding_keywords(protocol, options, signed)["sigma0"]}
-    return run_of_agents(signed, protocol, more | {"method": options["method"]}, options["samples"])
+    agents, initial = agents_and_states(options, signed)
+    asks = Asks(method=options["method"], simulation=False)
+    begin = replace(initial or InitialState(), sigma0=shared.sigma0_of(protocol, options, signed))
+    return run_of_agents(Case(signed, protocol, begin, agents=agents, asks=asks), options["samples"])
 
 
 def _refuse_messages(options: shared.Options, what: str) -> None:
@@ -215,7 +218,7 @@ def _run_beside(
     if given:
         raise ParameterError(f"{flag_of(given[0])}: is not simulated with {name}; leave it out")
     refuse_restricted(options)
-    sigma0 = shared.sliding_keywords(protocol, options, signed).get("sigma0")
+    sigma0 = shared.sigma0_of(protocol, options, signed)
     x0 = shared.read_initial_state(options["x0"], options["seed"], signed)
     more: Any = {"messages": messages, "leaders": leaders, "pattern": options["age_pattern"], "seed": options["seed"]}
     return run_in_places(signed, protocol, x0, places, sigma0=sigma0, **more)
@@ -259,5 +262,8 @@ def _run_family(
         flag = "--dwell" if options["dwell"] is not None else "--clock-dwell"
         raise ParameterError(f"{flag} is of random signals; leave it out, or leave out --signal {shorten(signal)}")
     played = as_signal(signal, options["seed"]) if promise is None else RandomDwellSignal(promise, options["seed"])
-    more = shared.sliding_keywords(protocol, options, family.modes[0].mandatory)
-    return simulate_family(family, protocol, x0, played, times=times, samples=options["samples"], **more)
+    one = family.modes[0].mandatory
+    more = {"sigma0": shared.sigma0_of(protocol, options, one), "samples": options["samples"], "times": times}
+    return simulate_family(
+        family, protocol, x0, played, disturbance=shared.disturbance_of(protocol, options, one), **more
+    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, ClassVar
 
@@ -45,7 +45,7 @@ class Expectations:
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> protocol = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
     >>> asked = Expectations("bipartite consensus", min_rate=Fraction(5))
-    >>> print(certify(pair, protocol, expectations=asked).assessment.text)
+    >>> print(certify(pair, protocol, asks=Asks(expectations=asked)).assessment.text)
     refuted: rate >= 5 (upper bound 4, proved); met: bipartite consensus; the rest is certified
     """
 
@@ -134,8 +134,9 @@ class Asks:
 
     Examples
     --------
-    >>> Asks(method="perron", expectations="bipartite-consensus").expectations.behaviour
-    'bipartite consensus'
+    >>> pair, p = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)]), NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
+    >>> certify(pair, p, asks=Asks(method="perron", expectations="bipartite-consensus")).assessment.asked
+    'met'
     """
 
     section: ClassVar = "certificate"
@@ -184,7 +185,7 @@ class Asks:
         shown="the work of 60 s, and of 1 s more for every 1,000 nodes, which does not depend on how busy the machine "
         "is",
     )
-    expectations: Expectations = field(default_factory=Expectations)
+    expectations: Any = None
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ptcc_certify.checker.input_formulas import Limits
@@ -42,20 +41,20 @@ class Case:
     Examples
     --------
     >>> case = Case("fig1a", NominalProtocol(), [1, 2, 3], limits=GainLimits(gain_cap=50))
-    >>> case.limits, case.given("gain_cap"), case.given("noise")
-    ((GainLimits(gain_cap=50),), 50, None)
+    >>> case.limits, float(case.given("gain_cap")), case.given("noise")
+    ((GainLimits(gain_cap=50),), 50.0, None)
     """
 
     graph: Any
     protocol: Protocol
-    initial: InitialState = field(default_factory=InitialState)
+    initial: Any = None
     uncertainty: Any = 0
     signal: SignalClass = "any"
     agents: Agents | None = None
     messages: LateMessages | None = None
     leaders: MovingLeaders | None = None
-    limits: Sequence[Limits] = ()
-    asks: Asks = field(default_factory=Asks)
+    limits: Any = ()
+    asks: Any = None
 
     def __post_init__(self) -> None:
         initial = self.initial if isinstance(self.initial, InitialState) else InitialState(self.initial)

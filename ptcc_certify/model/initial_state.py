@@ -28,8 +28,10 @@ class InitialState:
 
     Examples
     --------
-    >>> InitialState([3, 5], sigma0=[1, 0]).sigma0
-    [1, 0]
+    >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
+    >>> robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
+    >>> certify(pair, robust, InitialState([3, 5], sigma0=[1, 0])).final_state
+    FinalState(1=-1.5, 2=1.5)
     """
 
     section: ClassVar = "initial_state"

@@ -40,6 +40,7 @@ class GainLimits(Parameters, Limits):
 
     Examples
     --------
+    >>> from ptcc_certify.protocols.gain import Gain
     >>> limits = GainLimits(gain_cap=11, stop_before="0.01")
     >>> limits
     GainLimits(gain_cap=11, stop_before=1/100)

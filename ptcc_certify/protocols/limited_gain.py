@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ptcc_certify.checker.input_formulas import Limits
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.protocols.gain import Gain
 from ptcc_certify.protocols.parameters import readable
@@ -27,7 +28,6 @@ from ptcc_certify.protocols.parameters import readable
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from ptcc_certify.protocols.gain_limits import GainLimits
 
 MAX_PERIODS = 10**6
 # 1 - t/T below which nothing can act any more.
@@ -80,7 +80,7 @@ class LimitedGain:
     """
 
     gain: Gain
-    limits: GainLimits
+    limits: Limits
 
     def __post_init__(self) -> None:
         stop, T = self.limits.stop_before, self.gain.T

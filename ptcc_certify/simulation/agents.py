@@ -114,7 +114,7 @@ class AgentsTrajectory:
         --------
         >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
         >>> protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
-        >>> run = certify(foes, protocol, [3, 1], agents=Agents(order=2), method="paper").agents.simulate()
+        >>> run = certify(foes, protocol, [3, 1], agents=Agents(order=2), asks=Asks(method="paper")).agents.simulate()
         >>> run.to_csv().partition("\n")[0]
         't,remaining,a,b,v(a),v(b),u(a),u(b)'
         """

@@ -20,12 +20,13 @@ import numpy as np
 from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.graphs.io import as_graph, as_states
 from ptcc_certify.graphs.rationals import number_within, shorten
+from ptcc_certify.model.refusals import refuse_together
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.base import refuse_no_protocol
 from ptcc_certify.protocols.disturbance import as_disturbance
 from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.protocols.late_messages import LateMessages
-from ptcc_certify.protocols.moving_leaders import MovingLeaders, refuse_together
+from ptcc_certify.protocols.moving_leaders import MovingLeaders
 from ptcc_certify.simulation.cvodes import Tolerances
 from ptcc_certify.simulation.filippov import simulate_sliding
 from ptcc_certify.simulation.instants import PAST, default_instants, wanted_instants

@@ -278,9 +278,9 @@ def test_python_takes_a_family_in_many_forms():
     forms = [{"day": day, "night": night}, [day, night], Family.switching({"day": day, "night": night})]
     made = {ptcc.certify(form, PROTOCOL) for form in forms}
     assert all(repr(one) == repr(next(iter(made))) for one in made)
-    asked = ptcc.certify(forms[0], PROTOCOL, [1, 2], expectations=Expectations("stability"))
+    asked = ptcc.certify(forms[0], PROTOCOL, [1, 2], asks=ptcc.Asks(expectations=Expectations("stability")))
     assert asked.assessment.asked == "refuted" and int(asked.assessment.exit_code) == 3
-    known = ptcc.certify(Family.from_graph(day), PROTOCOL, simulation=False)
+    known = ptcc.certify(Family.from_graph(day), PROTOCOL, asks=ptcc.Asks(simulation=False))
     assert isinstance(known, ptcc.Certificate)
 
 
@@ -288,10 +288,13 @@ def test_python_takes_a_family_in_many_forms():
     ("call", "says"),
     [
         (
-            lambda: ptcc.certify(Family.from_intervals([("a", "b", 1, 2)]), PROTOCOL, delta=1),
+            lambda: ptcc.certify(Family.from_intervals([("a", "b", 1, 2)]), PROTOCOL, asks=ptcc.Asks(delta=1)),
             "delta is not for families",
         ),
-        (lambda: ptcc.certify("fig1a", PROTOCOL, uncertainty="10%", method="lmi"), "method is not for families"),
+        (
+            lambda: ptcc.certify("fig1a", PROTOCOL, uncertainty="10%", asks=ptcc.Asks(method="lmi")),
+            "method is not for families",
+        ),
         (lambda: ptcc.certify("fig1a", PROTOCOL, uncertainty=3), "not from 0 to 1"),
         (lambda: ptcc.certify({}, PROTOCOL), "at least one mode"),
         (lambda: ptcc.certify(Family.from_intervals([("a", "b", 1, 2)]), 5), "protocol = 5 is none"),

@@ -43,7 +43,7 @@ def plot_agents_input(subject: Any, *, ax: Axes | None = None, time_unit: str = 
     --------
     >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
     >>> protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
-    >>> ax = plot_agents_input(certify(foes, protocol, [3, 1], agents=Agents(order=2), method="paper"))
+    >>> ax = plot_agents_input(certify(foes, protocol, [3, 1], agents=Agents(order=2), asks=Asks(method="paper")))
     >>> ax.get_ylabel(), ax.texts[0].get_text()
     ('input $|u_k|$', 'certified peak 46.96')
     """
