@@ -18,6 +18,7 @@ ROOMS = {
         "Protocols and disturbances",
         "protocols protocols.gain protocols.gain_limits protocols.disturbance protocols.reaching_time",
     ),
+    "model": ("What is asked of what", "model.case model.asks model.initial_state"),
     "certificate": (
         "Certificates",
         "certificate.certificate certificate.verdict",

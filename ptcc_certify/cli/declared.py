@@ -54,14 +54,6 @@ DIMENSION = Option(
 A0 = Option(
     flag="--a0 STATE", help="Agents of order 3: initial accelerations.", key="agents.a0", example='"0"', shown="0"
 )
-STEPS = Option(
-    flag="--steps",
-    help="Instead: so many equal steps of t from 0 to T.",
-    key="simulation.steps",
-    example="100",
-    least=1,
-    most=100_000,
-)
 SHORTEST = Option(
     flag="--shortest-deadline",
     help=".. or for the shortest one.",
@@ -85,7 +77,6 @@ DECLARED = (
     *options_of(Run, Asks).values(),
     DIMENSION,
     *options_of(GainLimits, LateMessages, MovingLeaders, Expectations, DesignRequest).values(),
-    STEPS,
     SHORTEST,
 )
 #: Options of one protocol alone, by its kind: a flag that chooses the other one leaves such keys out.

@@ -22,7 +22,7 @@ from ptcc_certify.cli.agents import (
     run_in_places,
     run_of_agents,
 )
-from ptcc_certify.cli.declared import DIMENSION, SIGNAL, STEPS, Command, click_option, flag_of, one_of
+from ptcc_certify.cli.declared import DIMENSION, SIGNAL, Command, click_option, flag_of, one_of
 from ptcc_certify.cli.families import (
     dwell_of,
     dwell_options,
@@ -76,7 +76,7 @@ _TABLES = ("", ".csv", ".txt")
 @leader_options
 @click_option(DIMENSION, default=1, help="State components per agent.")
 @one_of(Run, "samples")
-@click_option(STEPS)
+@one_of(Run, "steps")
 @one_of(Run, "boundary_layer")
 @one_of(Asks, "noise", help="Nominal: telegraph noise of size NU on every measurement.")
 @click.option("--wide", is_flag=True, help="A figure as wide as two columns of a journal, instead of one.")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -58,7 +59,7 @@ class Case:
 
     def __post_init__(self) -> None:
         initial = self.initial if isinstance(self.initial, InitialState) else InitialState(self.initial)
-        limits = tuple(self.limits) if isinstance(self.limits, list | tuple) else (self.limits,)
+        limits = tuple(self.limits) if isinstance(self.limits, Iterable) else (self.limits,)
         asks = Asks() if self.asks is None else self.asks
         for name, value in {"initial": initial, "limits": limits, "asks": asks}.items():
             object.__setattr__(self, name, value)
