@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from fractions import Fraction
 from typing import Any, ClassVar
@@ -173,9 +173,9 @@ def click_option(told: Option, **changes: Any) -> Decorator:
     )
 
 
-def options_for(*kinds: type, without: Iterable[str] = (), asked: bool = False, **changes: Any) -> Decorator:
+def options_for(*kinds: type, asked: bool = False, **changes: Any) -> Decorator:
     """Return one decorator for the options of dataclasses; nothing is given by default where something is ``asked``."""
-    declared = [told for name, told in options_of(*kinds).items() if name not in without]
+    declared = list(options_of(*kinds).values())
     if asked:
         declared = [told if told.kind == "switch" else replace(told, default=None) for told in declared]
     return together(*(click_option(told, **changes) for told in declared))

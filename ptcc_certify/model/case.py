@@ -82,7 +82,7 @@ class Case:
         for holder in (self, self.asks, self.initial):
             if hasattr(holder, name):
                 value = getattr(holder, name)
-                return None if value == () else value
+                return None if isinstance(value, tuple) and not value else value
         return next((value for limit in self.limits if (value := getattr(limit, name, None)) is not None), None)
 
     def with_plain_agents(self) -> Case:

@@ -24,6 +24,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from asked import certify_words
 from cpu_time import at_most
 from generators import KINDS, all_classes, random_graph
 from mutations import Json, changed, mutants, resealed, same_claim
@@ -128,7 +129,7 @@ def test_certificates_of_hundreds_of_graphs_are_accepted(real_data: Path):
     runs: list[tuple[str, Callable[[], Certificate]]] = []
     for example, name, _ in select("all"):
         more = {"sigma0": example.sigma0 and example.sigma0.split(","), "disturbance": example.disturbance}
-        runs.append((name, partial(certify, load_graph(name), example.protocol(), example.x0.split(","), **more)))
+        runs.append((name, partial(certify_words, load_graph(name), example.protocol(), example.x0.split(","), **more)))
     for k in range(7):
         for i, (name, kwargs) in enumerate(CLASSES.items()):
             rng = np.random.default_rng(50_000 + 1000 * i + k)
