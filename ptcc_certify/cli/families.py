@@ -19,6 +19,9 @@ from ptcc_certify.errors import ExitCode, ParameterError, one_line
 from ptcc_certify.graphs.option import options_of
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.reading import OPTIONAL, UNCERTAINTY
+from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.case import Case
+from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.protocols.late_messages import LateMessages
 from ptcc_certify.protocols.moving_leaders import MovingLeaders
 from ptcc_certify.protocols.restricted_signals import (
@@ -229,7 +232,7 @@ def certify_family(
 ) -> int:
     """Certify what the protocol does on a family, whatever the signal."""
     from ptcc_certify.certificate.family_certificate import STEPS
-    from ptcc_certify.certificate.family_certificate import certify_family as run
+    from ptcc_certify.certificate.procedure import certify_case
     from ptcc_certify.certificate.restricted_search import require_nominal
     from ptcc_certify.certificate.verdict import CERTIFIED
     from ptcc_certify.report.family_screen import family_lines, family_summary
@@ -257,9 +260,9 @@ def certify_family(
     random_states = {what: f"random, seed {options['seed']}" for what, text in states.items() if text == "random"}
     with progress(STEPS, screen.quiet) as begin:
         origins = {"graph": Path(name).name, "read": read, **random_states}
-        limit = {"time_limit": options["time_limit"], "expectations": expected, "scenario": scenario_record()}
-        limit |= {"signal": signal, "sigma0": sigma0}
-        certificate = run(family, protocol, x0, origins=origins, progress=begin, **limit)
+        asks = Asks(time_limit=options["time_limit"], expectations=expected)
+        case = Case(family, protocol, InitialState(x0, sigma0), signal=signal, asks=asks)
+        certificate: Any = certify_case(case, progress=begin, scenario=scenario_record(), origins=origins)
         assessment = certificate.assessment
     LOG.info("verdict %s; exit code %d", one_line(assessment.text), assessment.exit_code)
     saved = output is not None and assessment.verdict == CERTIFIED
