@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from fractions import Fraction
@@ -232,5 +233,5 @@ class Command(click.Command):
                 rows.setdefault(sections.get(parameter.name or "", ""), []).append(row)
         for section, title in {"": "Options", **TITLES}.items():
             if section in rows:
-                with formatter.section(title.rstrip(".")):
+                with formatter.section(re.split("[.:;]", title)[0]):
                     formatter.write_dl(rows[section])
