@@ -203,7 +203,7 @@ def test_what_is_proved_before_the_limit_stands(monkeypatch: pytest.MonkeyPatch)
 
 HOLDS = """
 import ctypes, os, sys
-from ptcc_certify import NominalProtocol, SignedDigraph, certify
+from ptcc_certify import Asks, NominalProtocol, SignedDigraph, certify
 from ptcc_certify.lyapunov import search as sharpen
 
 def holds(system, thorough):
