@@ -194,6 +194,7 @@ MISTAKES = {
     "ptcc.certify(G)": "ParameterError: certify asks for protocol; write certify(graph, protocol)",
     "ptcc.certify_many(G, p, progress=True)": "ParameterError: progress = True is no function; give print, say",
     "ptcc.certify(G, p, x0, method='perron')": "... certify has no parameter method; give it to Asks(method",
+    "ptcc.certify(G, p, x0, noise=1)": "... certify has no parameter noise; give it to Asks(noise=...)",
     "ptcc.certify(G, p, x0, sigma0=x0)": "... certify has no parameter sigma0; give it to InitialState(sigma0=...)",
     "ptcc.certify(G, p, asks='stability')": "ParameterError: asks = 'stability' is none; give Asks(method=",
     "ptcc.certify(G, p, asks=ptcc.Asks(method='best of all'))": 'ParameterError: method "best of all" is unknown; one',
