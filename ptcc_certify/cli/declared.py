@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from fractions import Fraction
+from itertools import chain
 from typing import Any, ClassVar
 
 import click
@@ -100,6 +101,19 @@ def names_of(*kinds: type) -> tuple[str, ...]:
     ('leader_speed', 'sign_gain')
     """
     return tuple(told.name for told in options_of(*kinds).values())
+
+
+def options_asking(names: Iterable[str]) -> tuple[str, ...]:
+    """Return what commands call the options by which parts of a case, or what it asks, are given.
+
+    Examples
+    --------
+    >>> options_asking(["initial_set", "leaders"])
+    ('initial_bound', 'leader_speed', 'sign_gain')
+    """
+    parts = {"messages": LateMessages, "leaders": MovingLeaders, "limits": GainLimits}
+    given = (names_of(parts[name]) if name in parts else (IN_LIBRARY.get(name, name),) for name in names)
+    return tuple(chain.from_iterable(given))
 
 
 def given_of(kind: type, options: Mapping[str, Any]) -> dict[str, Any]:

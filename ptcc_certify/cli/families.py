@@ -12,7 +12,7 @@ import click
 from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
-from ptcc_certify.cli.declared import SIGNAL, click_option, flag_of, names_of, options_for, together
+from ptcc_certify.cli.declared import SIGNAL, click_option, flag_of, options_asking, options_for, together
 from ptcc_certify.cli.scenario import scenario_record
 from ptcc_certify.cli.terminal import LOG, Screen, print_json, progress
 from ptcc_certify.errors import ExitCode, ParameterError, one_line
@@ -22,8 +22,7 @@ from ptcc_certify.graphs.reading import OPTIONAL, UNCERTAINTY
 from ptcc_certify.model.asks import Asks
 from ptcc_certify.model.case import Case
 from ptcc_certify.model.initial_state import InitialState
-from ptcc_certify.protocols.late_messages import LateMessages
-from ptcc_certify.protocols.moving_leaders import MovingLeaders
+from ptcc_certify.model.refusals import NOT_OF_FAMILIES
 from ptcc_certify.protocols.restricted_signals import (
     CLOCK_DWELL,
     WINDOWS_OF_TIME,
@@ -38,10 +37,11 @@ if TYPE_CHECKING:
     from ptcc_certify.protocols.restricted_signals import SignalClass
     from ptcc_certify.theorems.family_behaviour import FamilyComponent
 
-#: Options of certify that families do not take.
-_NOT_OF_FAMILIES = (
-    *("noise", *shared.LIMITS, "method", "at", "initial_bound", "simulation", "max_residual"),
-    *names_of(LateMessages, MovingLeaders),
+#: Options of certify that families do not take; agents are refused by themselves, disturbances by the protocol.
+_NOT_OF_FAMILIES = tuple(
+    name
+    for name in options_asking(["method", "max_residual", *NOT_OF_FAMILIES])
+    if name not in ("agents", "disturbance", "delta")
 )
 
 

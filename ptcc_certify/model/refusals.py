@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ptcc_certify.protocols.moving_leaders import MovingLeaders
 
 #: What is asked of one graph alone.
-_NOT_OF_FAMILIES = (
+NOT_OF_FAMILIES = (
     *("at", "initial_set", "limits", "delta", "noise", "messages", "leaders", "agents", "simulation", "disturbance"),
 )
 #: What is asked of single integrators alone.
@@ -82,7 +82,7 @@ def refuse_before_the_graph(case: Case) -> None:
 def refuse_of_families(case: Case) -> None:
     """Refuse what is asked of one graph alone, where a family is given."""
     given = [] if case.asks.method == "best" else ["method"]
-    given += [name for name in _NOT_OF_FAMILIES if (value := case.given(name)) is not None and value is not False]
+    given += [name for name in NOT_OF_FAMILIES if (value := case.given(name)) is not None and value is not False]
     if given:
         raise ParameterError(f"{given[0]} is not for families of graphs yet; leave it out, or certify one graph")
     if case.asks.expectations.max_residual is not None:
