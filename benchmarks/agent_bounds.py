@@ -19,6 +19,8 @@ from agent_cases import agent_case
 
 from ptcc_certify.certificate.agents_part import AgentsPart
 from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.initial_state import InitialState
 
 
 def spectral_ratio(part: AgentsPart) -> float | None:
@@ -42,8 +44,8 @@ def main() -> None:
     accepted, begin = 0, time.perf_counter()
     for seed in range(first, last):
         case = agent_case(seed)
-        options = {"agents": case.agents, "derivatives": case.derivatives, "method": "paper"}
-        certificate = certify(case.graph, case.protocol, case.x0, **options)
+        initial, asks = InitialState(case.x0, derivatives=case.derivatives), Asks(method="paper")
+        certificate = certify(case.graph, case.protocol, initial, agents=case.agents, asks=asks)
         part, seen = certificate.agents, certificate.agents_comparison
         accepted += certificate.verdict == "certified"
         if part is None or seen is None:

@@ -24,6 +24,7 @@ from ptcc_certify.bounds.input.initial_set import initial_set_within
 from ptcc_certify.bounds.input.worst_initial_state import worst_initial_state
 from ptcc_certify.errors import PTCCError
 from ptcc_certify.examples import EXAMPLES, GRAPHS, load_graph
+from ptcc_certify.model.asks import Asks
 
 LARGEST, STARTS, OVER = 105, 20, Fraction(3, 2)
 #: Cells that grow by 7% up to ``z = ln(T/(T - t)) = 20``, ten Gauss nodes in each.
@@ -70,7 +71,7 @@ def ratios(effort: Effort, seen: tuple[np.ndarray, ...]) -> Ratios:
 def examine(name: str, graph: SignedDigraph) -> tuple[Ratios, Ratios] | None:
     """Ratios for single initial states, and for the box with the worst initial state among those tried."""
     began = time.perf_counter()
-    proved = certify(graph, NominalProtocol(1, 1, 1, 1), [0] * graph.n_nodes, simulation=False)
+    proved = certify(graph, NominalProtocol(1, 1, 1, 1), [0] * graph.n_nodes, asks=Asks(simulation=False))
     if proved.rate is None:
         print(f"{name:<26} N {graph.n_nodes:>3}  nothing decays, or nothing was proved")
         return None
@@ -132,7 +133,7 @@ def main() -> None:
     for number in (1, 2, 3):
         for name in EXAMPLES[number].graphs:
             protocol = EXAMPLES[number].protocol()
-            effort = certify(load_graph(name), protocol, simulation=False).effort
+            effort = certify(load_graph(name), protocol, asks=Asks(simulation=False)).effort
             assert effort is not None
             low, high = (float("nan") if x is None else float(x) for x in effort.threshold)
             print(f"{number} {name:<8}{'bounded' if effort.bounded else 'UNBOUNDED':<10} {low:.6f} .. {high:.6f}")

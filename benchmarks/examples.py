@@ -17,19 +17,19 @@ from pathlib import Path
 
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.examples import Example, load_graph, select
+from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.initial_state import InitialState
 
 
 def one(example: Example, name: str) -> dict[str, float | str]:
     protocol, graph = example.protocol(), load_graph(name)
     start = [Fraction(x) for x in example.x0.split(",")]
-    more = {}
-    if example.sigma0 is not None:
-        more["sigma0"] = [Fraction(x) for x in example.sigma0.split(",")]
-        more["disturbance"] = example.disturbance
+    sigma0 = None if example.sigma0 is None else [Fraction(x) for x in example.sigma0.split(",")]
+    initial, asks = InitialState(start, sigma0=sigma0), Asks(disturbance=example.disturbance)
     seconds = []
     for _ in range(5):
         begin = time.process_time()
-        cert = certify(graph, protocol, start, **more)
+        cert = certify(graph, protocol, initial, asks=asks)
         verdict = cert.verdict
         seconds.append(time.process_time() - begin)
     assert cert.rate is not None and cert.overshoot is not None and cert.proof.rate is not None

@@ -29,6 +29,7 @@ from ptcc_certify.bounds.late_messages import LateBounds, bound_late
 from ptcc_certify.bounds.small_delays import SmallDelayBounds, delay_threshold
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.graphs.structure import analyse
+from ptcc_certify.model.asks import Asks
 from ptcc_certify.protocols import NominalProtocol
 from ptcc_certify.protocols.late_messages import LateMessages
 from ptcc_certify.simulation.late_messages import simulate_late
@@ -88,7 +89,7 @@ def whole_shares(seed: int) -> tuple[float, float]:
     x0 = [Fraction(int(x), 10) for x in rng.integers(-100, 100, graph.n_nodes)]
     protocol = NominalProtocol(T=1, rho1=1, rho2=3, kappa=1)
     messages = LateMessages("0.001", own_delay=True, gain_cap=20)
-    cert = certify(graph, protocol, x0, simulation=False)
+    cert = certify(graph, protocol, x0, asks=Asks(simulation=False))
     asked = cert.structure, protocol.gain, messages, cert.influence, x0
     by_functions = SmallDelayBounds(*asked).longest_delay(cert.decaying_forms)
     does = delay_threshold(cert.structure, 20)

@@ -27,6 +27,7 @@ from ptcc_certify import NominalProtocol, SignedDigraph, analyse, certify, read_
 from ptcc_certify.errors import PTCCError
 from ptcc_certify.lyapunov.error_system import ErrorSystem
 from ptcc_certify.lyapunov.search import LARGEST_OVERSHOOT, search_functions
+from ptcc_certify.model.asks import Asks
 
 CASES = ("1.1", "1.2", "2.1 one leader", "2.1 several", "2.2", "3.1 single leaders", "3.1 mixed", "3.2")
 DECADES = (1, 6)
@@ -172,7 +173,7 @@ def examine(name: str, graph: SignedDigraph) -> dict[str, Any]:
     rng = np.random.default_rng(len(graph.labels))
     x0 = [Fraction(int(v), 100) for v in rng.integers(-1000, 1001, graph.n_nodes)]
     started = time.perf_counter()
-    best = certify(graph, PROTOCOL, x0, simulation=False)
+    best = certify(graph, PROTOCOL, x0, asks=Asks(simulation=False))
     seconds = time.perf_counter() - started
     if best.constant or best.spectral_rate is None:
         return {"name": name, "n": graph.n_nodes, "skipped": "nothing decays or no spectral rate"}

@@ -34,6 +34,7 @@ import numpy as np
 import ptcc_certify as ptcc
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
+from ptcc_certify.model.asks import Asks
 
 REAL = ("wiki-elec.txt.gz", "soc-sign-bitcoinotc.csv.gz", "soc-sign-epinions.txt.gz")
 CORES = REAL[:2]
@@ -109,7 +110,7 @@ def one(name: str) -> dict[str, Any]:
     graph = generated(int(name))
     made = time.perf_counter()
     start = np.random.default_rng(0).uniform(-10, 10, graph.n_nodes).round(3).tolist()
-    cert = certify(graph, ptcc.NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), start, simulation=False)
+    cert = certify(graph, ptcc.NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), start, asks=Asks(simulation=False))
     certified = time.perf_counter()
     with tempfile.TemporaryDirectory() as place:
         path = Path(place) / "c.json"
@@ -157,7 +158,7 @@ def late(n: int, by_edge: bool) -> None:
         delay = {(s, t): x for (s, t, _), x in zip(graph.edges, which, strict=True)}
     messages, protocol = ptcc.LateMessages(delay=delay), ptcc.NominalProtocol(T=1, rho1=1, rho2=1, kappa=4)
     times = [time.process_time()]
-    cert = certify(graph, protocol, start, simulation=False, messages=messages)
+    cert = certify(graph, protocol, start, messages=messages, asks=Asks(simulation=False))
     times.append(time.process_time())
     assert cert.late is not None and cert.checked is not None and cert.checked.accepted, cert.notes
     within, edges = cert.late.largest, graph.n_edges
@@ -208,7 +209,7 @@ def core(path: Path) -> dict[str, Any]:
     times.append(time.perf_counter())
     proof = prove_group(graph, structure.balanced)
     times.append(time.perf_counter())
-    cert = certify(graph, ptcc.NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), simulation=False)
+    cert = certify(graph, ptcc.NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), asks=Asks(simulation=False))
     times.append(time.perf_counter())
     report = check(cert.to_dict(), memory=MEMORY)
     times.append(time.perf_counter())

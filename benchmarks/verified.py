@@ -31,6 +31,7 @@ import ptcc_certify as ptcc
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.cli.verified import executable
 from ptcc_certify.examples import load_graph
+from ptcc_certify.model.asks import Asks
 
 PROTOCOL = ptcc.NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
 
@@ -68,7 +69,7 @@ def main() -> None:
         for name, graph in graphs(options.largest):
             start = np.random.default_rng(0).integers(-9, 10, graph.n_nodes).tolist()
             file = Path(folder) / "c.json"
-            certify(graph, PROTOCOL, start, simulation=False).save(file)
+            certify(graph, PROTOCOL, start, asks=Asks(simulation=False)).save(file)
             check = [sys.executable, "-m", "ptcc_certify.checker", str(file)]
             commands = ([str(executable()), str(file)], check, [*check, "--stdlib"])
             least = [math.inf] * len(commands)

@@ -16,7 +16,8 @@ The names at the top, by topic:
   ``ExpressionDisturbance``, ``SampledDisturbance``, ``StateDependent``, ``telegraph_noise``, ``GainLimits``,
   ``LateMessages``, ``MovingLeaders``
 - Runs: ``simulate``, ``Bounded``, ``simulate_late``, ``simulate_tracking``, ``Trajectory``
-- Certificates: ``certify``, ``Certificate``, ``Expectations``, ``read_certificate``, ``check``
+- Certificates: ``certify``, ``Certificate``, ``Asks``, ``InitialState``, ``Expectations``, ``read_certificate``,
+  ``check``
 - Bounds and design: ``final_state``, ``influence``, ``formation_of_biases``, ``box``, ``ellipsoid``,
   ``worst_initial_state``, ``design``, ``design_agents``
 - Many graphs: ``Ensemble``, ``certify_many``
@@ -57,9 +58,9 @@ _EXPORTS = {
     "as_family": "graphs.io",
     "read_family": "graphs.io",
     "decide": "theorems.family_behaviour",
-    "DwellTime": "theorems.restricted_signals",
-    "JointWindows": "theorems.restricted_signals",
-    "ClockShares": "theorems.restricted_signals",
+    "DwellTime": "protocols.restricted_signals",
+    "JointWindows": "protocols.restricted_signals",
+    "ClockShares": "protocols.restricted_signals",
     # Protocols, disturbances, actuators
     "Agents": "protocols.agents",
     "companion_form": "protocols.companion",
@@ -81,7 +82,9 @@ _EXPORTS = {
     # Certificates
     "certify": "certificate.procedure",
     "Certificate": "certificate.certificate",
-    "Expectations": "certificate.request",
+    "Asks": "model.asks",
+    "Expectations": "model.asks",
+    "InitialState": "model.initial_state",
     "read_certificate": "certificate.certificate",
     "check": "certificate.checking",
     # Bounds and design

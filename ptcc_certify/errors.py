@@ -181,6 +181,9 @@ _PLACES |= dict.fromkeys(("T_r", "T_s", "mu1", "mu2", "mu3"), "SlidingModeProtoc
 _PLACES["orientation"] = "as_graph"
 _PLACES |= dict.fromkeys(("gain_cap", "stop_before", "sample_period"), "GainLimits")
 _PLACES |= dict.fromkeys(("behaviour", "min_rate", "max_input"), "Expectations")
+_PLACES |= dict.fromkeys(("method", "at", "initial_set", "simulation", "time_limit", "expectations"), "Asks")
+_PLACES |= dict.fromkeys(("delta", "noise", "disturbance"), "Asks")
+_PLACES |= {"sigma0": "InitialState", "v0": "InitialState", "derivatives": "InitialState", "orientation": "as_graph"}
 _PLACES |= dict.fromkeys(("delay", "own_delay", "period", "losses", "value_error"), "LateMessages")
 #: How many parameters are listed.
 _FEW = 12

@@ -18,10 +18,10 @@ from typing import Any
 import cvxpy as cp
 import flint
 import numpy as np
+from asked import certify_words
 from mutations import Json, resealed
 from oracle import Oracle, inverse, number
 
-from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import OBLIGATIONS
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
@@ -212,7 +212,7 @@ def of_graph(graph: SignedDigraph, s: Setting) -> Json:
         protocol = SlidingModeProtocol(T_r=s.T / 4, T_s=s.T * 3 / 4, rho1=rho1, rho2=rho2, kappa=kappa, **more)
         options["sigma0"] = [0] * graph.n_nodes
         options["x0"] = [0] * graph.n_nodes
-    data = json.loads(certify(graph, protocol, simulation=False, method=s.method, **options).to_json())
+    data = json.loads(certify_words(graph, protocol, simulation=False, method=s.method, **options).to_json())
     data["protocol"]["rho1"] = str(s.rho1)
     of_input = lambda step: step["kind"].startswith("input-") or step["of"].startswith("input")  # noqa: E731
     data["proof"] = [step for step in data["proof"] if not of_input(step)]

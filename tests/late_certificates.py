@@ -12,12 +12,12 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from asked import certify_words
 from mutations import Json, resealed
 from oracle import number
 from scipy.integrate import trapezoid
 
 from lmi.exact.elementary_enclosures import exp, log, sqrt
-from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import OBLIGATIONS
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.protocols import NominalProtocol
@@ -87,7 +87,7 @@ def whole(seed: int, own_delay: bool, apart: bool = True) -> Json:
 
 def plain(graph: SignedDigraph, protocol: Any, x0: Any, **options: Any) -> Json:
     """The certificate of the graph as it stands."""
-    return {**json.loads(certify(graph, protocol, x0, simulation=False, **options).to_json()), "unverified": {}}
+    return {**json.loads(certify_words(graph, protocol, x0, simulation=False, **options).to_json()), "unverified": {}}
 
 
 def nominal(T: Any = 1, rho1: Any = 1, k: Any = 3) -> NominalProtocol:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from functools import cache
 
-from ptcc_certify.certificate.procedure import certify
+from asked import certify_words
+
 from ptcc_certify.examples import load_graph, select
 
 
@@ -15,7 +16,7 @@ def paper_examples() -> tuple[str, ...]:
     for example, name, _ in select("all"):
         x0, sigma0, push = example.x0.split(","), example.sigma0 and example.sigma0.split(","), example.disturbance
         more = {"sigma0": sigma0, "disturbance": push, "simulation": push is not None}
-        cert = certify(load_graph(name), example.protocol(), x0, **more)
+        cert = certify_words(load_graph(name), example.protocol(), x0, **more)
         assert cert.verdict == "certified" and cert.checked is not None and cert.checked.accepted
         found.append(cert.to_json())
     return tuple(found)

@@ -18,13 +18,14 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from asked import certify_words
 from bad_inputs import Run, ptcc
 from families import KINDS as FAMILY_KINDS
 from families import random_family
 from generators import WEIGHTS, all_classes, random_graph, smallest
 from late_certificates import grouped_graph, led_graph
 
-from ptcc_certify import Expectations, GainLimits, NominalProtocol, box, certify, ellipsoid
+from ptcc_certify import Expectations, GainLimits, NominalProtocol, box, ellipsoid
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Mode
@@ -382,7 +383,7 @@ def run_set(seed: int, folder: Path) -> Outcome:
     options = {"initial_set": initial_set, "limits": caps, "expectations": asked, "time_limit": 4}
     path.unlink(missing_ok=True)
     try:
-        made = certify(graph, protocol, center, simulation=False, **options)
+        made = certify_words(graph, protocol, center, simulation=False, **options)
         made.save(path)
         run = Run(int(made.assessment.exit_code), made.summary(), "")
     except ParameterError as error:  # weights that are too long for exact proofs

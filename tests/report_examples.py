@@ -8,9 +8,13 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from asked import certify_words
+
 from ptcc_certify import Agents, Certificate, GainLimits, NominalProtocol, SignedDigraph, SlidingModeProtocol, certify
 from ptcc_certify.checker import digest
 from ptcc_certify.examples import EXAMPLES, load_graph
+from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.initial_state import InitialState
 
 NOMINAL = NominalProtocol(T="0.6", rho1="0.2", rho2="0.5", kappa=1)
 SLIDING = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
@@ -43,7 +47,7 @@ def forged(folder: Path, **changes: Any) -> Path:
 
 def undecided(folder: Path) -> Path:
     """Take the final state out of a certificate: the decay is proved, where it ends is not stated."""
-    certify(load_graph("fig3a"), NOMINAL, [-4, 3, -1, 2, -2, 5], simulation=False).save(folder / "c.json")
+    certify(load_graph("fig3a"), NOMINAL, [-4, 3, -1, 2, -2, 5], asks=Asks(simulation=False)).save(folder / "c.json")
     data = json.loads((folder / "c.json").read_text())
     functions = [{**m, "deviation": None} for m in data["lyapunov"]["functions"]]
     proof = [s for s in data["proof"] if s["kind"] not in ("final-state", "deviation")]
@@ -63,18 +67,21 @@ def sliding_mode() -> Certificate:
     example = EXAMPLES[4]
     start, sigma0 = example.x0.split(","), (example.sigma0 or "").split(",")
     return certify(
-        load_graph("fig1b"), example.protocol(), start, sigma0=sigma0, disturbance=example.disturbance, simulation=False
+        load_graph("fig1b"),
+        example.protocol(),
+        InitialState(start, sigma0=sigma0),
+        asks=Asks(disturbance=example.disturbance, simulation=False),
     )
 
 
 def nominal(**options: Any) -> Certificate:
     protocol = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
-    return certify(load_graph("fig3a"), protocol, [-4, 3, -1, 2, -2, 5], simulation=False, **options)
+    return certify_words(load_graph("fig3a"), protocol, [-4, 3, -1, 2, -2, 5], simulation=False, **options)
 
 
 def disconnected() -> Certificate:
     edges = [("a", "b", 1), ("b", "a", 1), ("b", "c", -2), ("x", "y", -1), ("y", "x", 3)]
-    return certify(SignedDigraph.from_edges(edges, ["z"]), NOMINAL, [1, 2, 3, 4, -5, 6], simulation=False)
+    return certify(SignedDigraph.from_edges(edges, ["z"]), NOMINAL, [1, 2, 3, 4, -5, 6], asks=Asks(simulation=False))
 
 
 def hostile() -> Certificate:
@@ -82,7 +89,7 @@ def hostile() -> Certificate:
         SignedDigraph.from_edges([(HOSTILE[i - 1], HOSTILE[i], -1) for i in range(len(HOSTILE))]),
         NominalProtocol(T="1/3", rho1=Fraction(10**20 + 1, 7**30), rho2=1, kappa=1),
         [Fraction(k, 7) for k in range(len(HOSTILE))],
-        simulation=False,
+        asks=Asks(simulation=False),
     )
 
 
@@ -94,7 +101,7 @@ MADE = {
     "no start": lambda: certify(load_graph("fig1a"), NOMINAL),
     "sliding": sliding_mode,
     "disconnected": disconnected,
-    "single": lambda: certify(SignedDigraph.from_edges([], ["alone"]), NOMINAL, [3], simulation=False),
+    "single": lambda: certify(SignedDigraph.from_edges([], ["alone"]), NOMINAL, [3], asks=Asks(simulation=False)),
     "hostile": hostile,
     "formation": lambda: nominal(agents=Agents(order=1, offsets=["1/3", -2, 0, 4, 7, -5])),
 }

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from asked import certify_words
 
 import ptcc_certify as ptcc
 from ptcc_certify.errors import UnknownAgentError
@@ -16,7 +17,7 @@ FAMILY = ptcc.as_family([("ann", "bob", -1, -1), ("bob", "ann", -1, -1), ("ann",
 
 
 def certify(**options: Any) -> Any:
-    return ptcc.certify(GRAPH, PROTOCOL, X0, method="paper", **options)
+    return certify_words(GRAPH, PROTOCOL, X0, method="paper", **options)
 
 
 BY_PLACE_TOO: dict[str, Callable[[], Callable[[Any], Any]]] = {

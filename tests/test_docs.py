@@ -32,7 +32,7 @@ IN_ROOMS = {
     "graphs.io": ("read_state",),
     "graphs.structure": ("ClosedComponent", "WeakComponent"),
     "theorems.claims": ("Claim",),
-    "theorems.restricted_signals": ("DwellTime", "JointWindows", "ClockShares"),
+    "protocols.restricted_signals": ("DwellTime", "JointWindows", "ClockShares"),
     "theorems.table": ("THEOREMS", "theorem_for"),
     "theorems.lemmas": (
         "gauge",
@@ -82,6 +82,7 @@ NO_SOURCE = {
         *("LMIError", "MatrixError", "NoCertificate", "NotAnHMatrix", "NotAnMMatrix", "OutOfTime"),
     },
     "a time limit is what its definition says": {"time_limit"},
+    "what is asked, and where agents begin, is what their definitions say": {"Asks", "InitialState"},
     "BibTeX is the source": {"cite"},
     "families are new here: their page is docs/theory/families.md": {
         *("Family", "decide", "DwellTime", "JointWindows", "ClockShares")

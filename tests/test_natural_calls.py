@@ -30,9 +30,10 @@ CONTROL_RESEARCHER = {
     "p.replace(rho=3)": "ParameterError: NominalProtocol has no parameter rho; did you mean rho2 or rho1?",
     "ptcc.SlidingModeProtocol(mu1=1, delta=2)": "ParameterError: mu1 = 1 does not exceed delta = 2",
     "ptcc.certify(W, p)": 'GraphError: a matrix does not tell its direction: say orientation="listens"',
-    "ptcc.certify(W, p, orientation='listens', **fast)": "Certificate(bipartite consensus, Theorem 1.1",
-    "ptcc.certify(W, p, orientation='rows')": "GraphError: orientation",
-    "ptcc.certify(sparse.csr_matrix(W), p, orientation='information', **fast)": "Certificate(bipartite consensus",
+    "ptcc.certify(ptcc.as_graph(W, 'listens'), p, asks=fast)": "Certificate(bipartite consensus, Theorem 1.1",
+    "ptcc.as_graph(W, 'rows')": "GraphError: orientation",
+    "ptcc.certify(W, p, orientation='listens')": "... certify has no parameter orientation; give it to as_graph(",
+    "ptcc.certify(ptcc.as_graph(sparse.csr_matrix(W), 'information'), p, asks=fast)": "Certificate(bipartite consensus",
     "ptcc.analyse(W, 'listens')": "Structure(2 nodes, strong",
     "ptcc.simulate(ptcc.as_graph(W, 'listens'), p, [3, 1], times=[0, 1])": "Trajectory(2 agents, 2 instants",
     "ptcc.simulate(g, p, [1, 2])": "ParameterError: the initial state x0 has 2 values for 3 agents; give one number",
@@ -61,7 +62,7 @@ CONTROL_RESEARCHER = {
     "ptcc.theorems.lemmas.laplacian_spectrum(g).kernel_dimension": "1",
 }
 NETWORK_SCIENTIST = {
-    "ptcc.certify(G, p, **fast)": "Certificate(bipartite consensus",
+    "ptcc.certify(G, p, asks=fast)": "Certificate(bipartite consensus",
     "ptcc.analyse(G)": "Structure(3 nodes, quasi-strong, 1 closed component,",
     "ptcc.analyse(G).to_pandas().loc['bob'].astype(str).tolist()": "['leader', '1', '-1', '1']",
     "ptcc.analyse(G).to_pandas().loc['eve', 'role']": "follower",
@@ -75,7 +76,7 @@ NETWORK_SCIENTIST = {
     "ptcc.analyse(nx.MultiDiGraph(G))": "GraphError: the networkx graph is a multigraph",
     "ptcc.analyse(nx.DiGraph([(1, 2)]))": 'GraphError: edge 1 -> 2 has no attribute "weight"; give each edge',
     "ptcc.SignedDigraph.from_networkx(df)": "GraphError: a DataFrame is no networkx graph",
-    "ptcc.certify(df, p, **fast)": "Certificate(bipartite consensus",
+    "ptcc.certify(df, p, asks=fast)": "Certificate(bipartite consensus",
     "ptcc.analyse(df.assign(year=1999)).graph.read['notes']": 'columns ignored: "year"',
     "ptcc.analyse(df.rename(columns={'source': 'who'}))": "GraphError: a DataFrame with the columns who",
     "ptcc.analyse(df[['source', 'target']])": "FormatError: the DataFrame: the header names no weight",
@@ -120,10 +121,10 @@ ENGINEER = {
     "ptcc.design(g, max_input=10, initial_bound=x0)": "ParameterError: the bound of initial states",
     "ptcc.GainLimits(gain_cap=50)": "GainLimits(gain_cap=50)",
     "ptcc.simulate(g, p, x0, actuator=ptcc.GainLimits(gain_cap=50), times=[0, 1])": "Trajectory(3 agents",
-    "ptcc.certify(g, p, x0, limits=[ptcc.GainLimits(gain_cap=50)], **fast).effort.residual[0].agents is None": "False",
-    "ptcc.certify(g, p, x0, limits=ptcc.GainLimits(gain_cap=50), **fast).effort.residual[0].agents is None": "False",
-    "ptcc.certify(g, p, initial_set=3, **fast).effort.bounded": "True",
-    "ptcc.certify(g, p, initial_set=ptcc.box([0] * 3, [1] * 3), **fast).effort.bounded": "True",
+    "ptcc.certify(g, p, x0, limits=[ptcc.GainLimits(50)], asks=fast).effort.residual[0].agents is None": "False",
+    "ptcc.certify(g, p, x0, limits=ptcc.GainLimits(gain_cap=50), asks=fast).effort.residual[0].agents is None": "False",
+    "ptcc.certify(g, p, asks=ptcc.Asks(initial_set=3, simulation=False)).effort.bounded": "True",
+    "ptcc.certify(g, p, asks=ptcc.Asks(initial_set=ptcc.box([0] * 3, [1] * 3))).effort.bounded": "True",
     "ptcc.box({'ann': 0, 'bob': 0, 'eve': 0}, {'ann': 1, 'bob': 1, 'eve': 1}, g).radius[0]": "1/2",
     "ptcc.box({'ann': 0}, {'ann': 1})": "ParameterError: low has labels",
     "ptcc.box(0, 1)": "ParameterError: low is 0; give one number for each agent",
@@ -135,10 +136,10 @@ ENGINEER = {
     "ptcc.simulate(g, robust, x0, disturbance='2', times=[0, 1])": "... beyond delta = 1.0; lower it or raise delta",
 }
 STUDENT = {
-    "ptcc.certify('fig1b', p, 'random', **fast)": "Certificate(bipartite consensus",
+    "ptcc.certify('fig1b', p, 'random', asks=fast)": "Certificate(bipartite consensus",
     "pd.Series(cert.final_state).index.tolist()": "['ann', 'bob', 'eve']",
     "'joe' in cert.final_state, cert.final_state.get('joe')": "(False, None)",
-    "ptcc.certify('fig1b', p, '5,2,-4,3,-2,1', **fast).final_state": "FinalState(1=",
+    "ptcc.certify('fig1b', p, '5,2,-4,3,-2,1', asks=fast).final_state": "FinalState(1=",
     "ptcc.certify('fig9', p)": "FormatError: fig9: no such file, and no packaged graph (fig1a, fig1b",
     "ptcc.certify(None, p)": "GraphError: None is not read as a graph; give a SignedDigraph, a path",
     "ptcc.analyse('fig1a').claim.behaviour": "stability",
@@ -191,16 +192,19 @@ MISTAKES = {
     "ptcc.certify(G, p, x0, 'listens')": "ParameterError: certify takes graph, protocol, x0 without a name; write any",
     "ptcc.certify(G, p, x0, x0=x0)": "ParameterError: certify takes graph, protocol, x0 without a name, each once",
     "ptcc.certify(G)": "ParameterError: certify asks for protocol; write certify(graph, protocol)",
-    "ptcc.certify(G, p, progress=None, **fast)": "Certificate(bipartite consensus",
-    "ptcc.certify(G, p, progress=True, **fast)": "ParameterError: progress = True is no function; give print, say",
-    "ptcc.certify(G, p, scenario='s.toml')": "ParameterError: scenario = 's.toml' is none; give the mapping that",
+    "ptcc.certify_many(G, p, progress=True)": "ParameterError: progress = True is no function; give print, say",
+    "ptcc.certify(G, p, x0, method='perron')": "... certify has no parameter method; give it to Asks(method",
+    "ptcc.certify(G, p, x0, noise=1)": "... certify has no parameter noise; give it to Asks(noise=...)",
+    "ptcc.certify(G, p, x0, sigma0=x0)": "... certify has no parameter sigma0; give it to InitialState(sigma0=...)",
+    "ptcc.certify(G, p, asks='stability')": "ParameterError: asks = 'stability' is none; give Asks(method=",
+    "ptcc.certify(G, p, asks=ptcc.Asks(method='best of all'))": 'ParameterError: method "best of all" is unknown; one',
     "ptcc.certify_many(G, p, methd='perron')": "ParameterError: certify_many has no parameter methd; did you mean meth",
     "ptcc.certify_many(G, p, uncertainty='20%')": "ParameterError: certify_many has no parameter uncertainty, which ma",
     "ptcc.certify(pd.DataFrame({'from': list('aa'), 'to': list('aa'), 'w': 1}), p)": "... drop_self_loops=True)",
     "ptcc.certify([('a', 'a', 1), ('b', 'b', 1)], p)": "GraphError: self-loop at node a (2 in all); remove them",
     "ptcc.certify(p, G)": "ParameterError: graph and protocol are exchanged; write certify(graph, protocol)",
-    "ptcc.theorems.restricted_signals.DwellTime(0.5)": "DwellTime(0.5, clock='t')",
-    "ptcc.theorems.restricted_signals.JointWindows(2, on=0.5)": "JointWindows(2, on=0.5, clock='s')",
+    "ptcc.protocols.restricted_signals.DwellTime(0.5)": "DwellTime(0.5, clock='t')",
+    "ptcc.protocols.restricted_signals.JointWindows(2, on=0.5)": "JointWindows(2, on=0.5, clock='s')",
     "ptcc.DwellTime(0.5)": "DwellTime(0.5, clock='t')",
     "ptcc.certify({'ann': ['bob'], 'bob': ['eve']}, p)": "... a dict is a family of graphs by name; give the edges",
     "ptcc.certify({'ann': {'bob': 1}}, p)": "... a dict is a family of graphs by name; give the edges",
@@ -212,8 +216,8 @@ MISTAKES = {
     "ptcc.read_graph(G)": "... a DiGraph is no file; ptcc_certify.as_graph takes other data",
     "ptcc.read_graph('fig1a')": "FormatError: fig1a: no such file; ptcc_certify.as_graph takes the packaged graph",
     "ptcc.SignedDigraph.from_edges(df)": "... is not a triple (source, target, weight); as_graph takes tables",
-    "ptcc.certify(G, p, ptcc.graphs.io.random_states(3, 3), **fast)": "Certificate(bipartite consensus",
-    "ptcc.certify(G, p, colour='red')": "ParameterError: certify has no parameter colour; help(certify) lists what",
+    "ptcc.certify(G, p, ptcc.graphs.io.random_states(3, 3), asks=fast)": "Certificate(bipartite consensus",
+    "ptcc.certify(G, p, colour='red')": "ParameterError: certify has no parameter colour; it has graph, protocol",
     "ptcc.plot_decay(G, p, x0)": "... without a name; write any other as name=value",
     "ptcc.plot_decay(G)": "... not from DiGraph; give certify(graph, protocol, x0)",
     "ptcc.write_report(g, 'c.html')": "... is a graph, no certificate; give certify(graph, protocol, x0)",
@@ -307,7 +311,7 @@ def names(tmp_path_factory) -> dict[str, Any]:
     digraph.add_weighted_edges_from(edges)
     g, p, x0 = ptcc.as_graph(edges), ptcc.NominalProtocol(T=1, rho1=1, rho2=2, kappa=1), [5, 2, -4]
     folder = tmp_path_factory.mktemp("notebook")
-    cert = ptcc.certify(g, p, x0, method="perron")
+    cert = ptcc.certify(g, p, x0, asks=ptcc.Asks(method="perron"))
     cert.save(folder / "c.json")
     return {
         **{"ptcc": ptcc, "np": np, "nx": nx, "pd": pd, "sparse": sparse, "Fraction": Fraction, "StringIO": StringIO},
@@ -326,7 +330,7 @@ def names(tmp_path_factory) -> dict[str, Any]:
         "day": ptcc.as_family([("ann", "bob", -2, -1), ("bob", "ann", -1, -1)]),
         "W": np.array([[0, -2.0], [-1, 0]]),
         "robust": ptcc.SlidingModeProtocol(T_r="0.5", T_s="0.5", kappa=1),
-        "fast": {"method": "perron", "simulation": False},
+        "fast": ptcc.Asks(method="perron", simulation=False),
     }
 
 

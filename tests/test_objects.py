@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 import ptcc_certify as ptcc
+from ptcc_certify.certificate.procedure import certify_case
 from ptcc_certify.errors import FormatError, ParameterError
+from ptcc_certify.model.case import Case
 from ptcc_certify.protocols.disturbance import as_disturbance
 from ptcc_certify.protocols.gain import Gain
 from ptcc_certify.protocols.gain_limits import GainLimits
@@ -25,7 +27,7 @@ FAMILY = ptcc.as_family([("a", "b", 1, 2)])
 
 @pytest.fixture(scope="module")
 def cert():
-    return ptcc.certify(TEAM, PROTOCOL, [5, 2, -4], method="perron")
+    return ptcc.certify(TEAM, PROTOCOL, [5, 2, -4], asks=ptcc.Asks(method="perron"))
 
 
 @pytest.fixture(scope="module")
@@ -91,18 +93,20 @@ def test_another_initial_state_has_its_own_final_state_and_no_run(cert):
 
 
 def test_a_certificate_tells_what_its_graph_is_called_and_where_its_initial_state_comes_from():
-    fast = {"method": "perron", "simulation": False}
-    cert = ptcc.certify("fig1b", PROTOCOL, "random", **fast)
+    fast = ptcc.Asks(method="perron", simulation=False)
+    cert = ptcc.certify("fig1b", PROTOCOL, "random", asks=fast)
     for one in (cert, ptcc.read_certificate(cert)):
         assert one.request.origins == {"graph": "fig1b", "x(0)": "random, seed 0"}
         assert one.summary().startswith("graph      fig1b: 6 nodes") and "; x(0) random, seed 0" in one.summary()
-    named = ptcc.certify(TEAM, PROTOCOL, [5, 2, -4], origins={"graph": "team"}, **fast)
+    named = certify_case(Case(TEAM, PROTOCOL, [5, 2, -4], asks=fast), origins={"graph": "team"})
     assert "team: 3 nodes" in named.summary() and "x(0) given" in named.summary()
-    assert named == ptcc.certify(TEAM, PROTOCOL, [5, 2, -4], **fast)
+    assert named == ptcc.certify(TEAM, PROTOCOL, [5, 2, -4], asks=fast)
 
 
 def test_results_that_differ_are_not_equal(cert):
-    assert cert != ptcc.certify(TEAM, PROTOCOL.replace(T=2), [5, 2, -4], method="perron", simulation=False)
+    assert cert != ptcc.certify(
+        TEAM, PROTOCOL.replace(T=2), [5, 2, -4], asks=ptcc.Asks(method="perron", simulation=False)
+    )
     run = ptcc.simulate(TEAM, PROTOCOL, [5, 2, -4], times=[0, 1])
     assert run != ptcc.simulate(TEAM, PROTOCOL, [5, 2, -3], times=[0, 1])
     assert run == ptcc.simulate(TEAM, PROTOCOL, [5, 2, -4], times=[0, 1])
@@ -177,7 +181,9 @@ def test_a_certificate_is_a_table_of_agents_whose_types_do_not_depend_on_what_wa
     alone = ptcc.certify(ptcc.SignedDigraph.from_edges([], nodes="ab"), PROTOCOL, [1, 2]).to_pandas()
     assert alone["x(T)"].tolist() == [1, 2] and (alone.dtypes == bare.dtypes).all()
     robust = ptcc.SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
-    slid = ptcc.certify(TEAM, robust, [5, 2, -4], sigma0=[1, 0, -3], simulation=False)
+    slid = ptcc.certify(
+        TEAM, robust, ptcc.InitialState([5, 2, -4], sigma0=[1, 0, -3]), asks=ptcc.Asks(simulation=False)
+    )
     assert (slid.to_pandas()["deviation"] == slid.deviation_bound([0.005])[:, 0]).all()
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from asked import certify_words
 from generators import all_classes, random_graph, smallest
 from mutations import Json
 from side_files import with_factors, with_side_files
@@ -20,6 +21,7 @@ from ptcc_certify.certificate.family_certificate import certify_family
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
+from ptcc_certify.model.asks import Asks
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.agents import Agents
 from ptcc_certify.protocols.gain_limits import GainLimits
@@ -50,7 +52,7 @@ def made(name: str, seed: int, slides: bool = False, large: bool = False, **opti
         if large:
             patch.setattr(procedure, "EXACT_NODES", 0)
             patch.setattr(final_states, "EXACT_NODES", 0)
-        certificate = certify(graph, protocol, start, simulation=False, **options)
+        certificate = certify_words(graph, protocol, start, simulation=False, **options)
         return {**json.loads(certificate.to_json()), "unverified": {}}
 
 
@@ -77,7 +79,7 @@ def cases() -> list[Case]:
         if "disconnected" not in name:
             found.append((f"{name}, factors", *with_side_files(with_factors(large))))
     ring = SignedDigraph.from_edges([(1, 2, 1), (2, 3, 1), (3, 1, 1)])
-    line = certify(ring, NominalProtocol(T=1, rho1=1, rho2="1/3", kappa=2), [1, 5, -2], simulation=False)
+    line = certify(ring, NominalProtocol(T=1, rho1=1, rho2="1/3", kappa=2), [1, 5, -2], asks=Asks(simulation=False))
     found.append(("spectrum on the line", {**json.loads(line.to_json()), "unverified": {}}, {}))
     found.append(("undecided", made("1.1", 5, large=True, method="full"), {}))
     kinds = {data["verdict"] for _, data, _ in found}
@@ -102,9 +104,11 @@ def more_cases() -> list[Case]:
         ("cascade", ring, {"agents": Agents(order=2, cascade=1)}),
         ("late", led, {"messages": LateMessages(delay="0.01")}),
     ):
-        found.append((name, certify(edges, strong, [1, 2, 3], simulation=False, **more).to_json()))
+        found.append((name, certify_words(edges, strong, [1, 2, 3], simulation=False, **more).to_json()))
     for n, method in ((40, "full"), (90, "best")):
         graph = random_graph(np.random.default_rng(n), "weak", "mixed", n=n).graph
         plain = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
-        found.append((f"{n} nodes", certify(graph, plain, list(range(n)), simulation=False, method=method).to_json()))
+        found.append(
+            (f"{n} nodes", certify(graph, plain, list(range(n)), asks=Asks(simulation=False, method=method)).to_json())
+        )
     return [(name, {**json.loads(text), "unverified": {}}, {}) for name, text in found]

@@ -18,9 +18,10 @@ ROOMS = {
         "Protocols and disturbances",
         "protocols protocols.gain protocols.gain_limits protocols.disturbance protocols.reaching_time",
     ),
+    "model": ("What is asked of what", "model.case model.asks model.initial_state"),
     "certificate": (
         "Certificates",
-        "certificate.certificate certificate.request certificate.verdict",
+        "certificate.certificate certificate.verdict",
     ),
     "checker": ("The independent check", "certificate.checking checker"),
     "bounds": (

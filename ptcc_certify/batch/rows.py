@@ -57,13 +57,14 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from lmi.exact.decimal_rounding import float_down, float_up
-from ptcc_certify.batch.settings import InitialState, Settings
+from ptcc_certify.batch.settings import Settings, StateLike
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
-from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.errors import PTCCError, explain, one_line
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import random_states, read_graph, read_state
+from ptcc_certify.model.asks import Asks, Expectations
+from ptcc_certify.model.initial_state import InitialState
 
 #: A row: column by column, None where an entry is empty.
 Row = dict[str, Any]
@@ -158,19 +159,22 @@ def _certificate(graph: SignedDigraph, settings: Settings, seed: int) -> Certifi
     return certify(
         graph,
         settings.protocol,
-        _read_initial_state(settings.x0, seed, graph),
-        method=settings.method,
-        simulation=settings.simulation,
-        initial_set=settings.initial_bound,
-        time_limit=None if settings.time_limit is None else float(settings.time_limit),
-        expectations=Expectations(settings.expect, settings.min_rate),
         # The seeds are those of `ptcc certify --x0 random --sigma0 random --seed SEED`.
-        sigma0=_read_initial_state(settings.sigma0, [seed, 1], graph),
-        disturbance=settings.disturbance_of(graph.n_nodes, seed),
+        InitialState(
+            _read_initial_state(settings.x0, seed, graph), _read_initial_state(settings.sigma0, [seed, 1], graph)
+        ),
+        asks=Asks(
+            method=settings.method,
+            simulation=settings.simulation,
+            initial_set=settings.initial_bound,
+            time_limit=None if settings.time_limit is None else float(settings.time_limit),
+            expectations=Expectations(settings.expect, settings.min_rate),
+            disturbance=settings.disturbance_of(graph.n_nodes, seed),
+        ),
     )
 
 
-def _read_initial_state(initial_state: InitialState, seed: Any, graph: SignedDigraph) -> Any:
+def _read_initial_state(initial_state: StateLike, seed: Any, graph: SignedDigraph) -> Any:
     if not isinstance(initial_state, str):
         return initial_state
     if initial_state != "random":

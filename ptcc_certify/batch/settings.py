@@ -9,20 +9,23 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
-from ptcc_certify.certificate.request import refuse
 from ptcc_certify.errors import NumberError, ParameterError, gated, unknown_parameter
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import by_label
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, shorten, whole_number
 from ptcc_certify.graphs.reading import Reading
 from ptcc_certify.graphs.structure import behaviour_name
+from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.case import Case
+from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.refusals import refuse_before_the_graph
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.base import refuse_no_protocol
 from ptcc_certify.protocols.disturbance import as_disturbance
 from ptcc_certify.protocols.parameters import parameter
 
 #: What an initial state may be given as.
-InitialState = str | Sequence[Any] | Mapping[Any, Any] | None
+StateLike = str | Sequence[Any] | Mapping[Any, Any] | None
 #: Seeds and numbers of workers are at most this.
 LARGEST_SETTING = 2**64 - 1
 #: How to get the packages that several workers, Dask and Parquet need.
@@ -75,9 +78,9 @@ class Settings:
     """
 
     protocol: Protocol
-    x0: InitialState = "random"
+    x0: StateLike = "random"
     seed: int = 0
-    sigma0: InitialState = None
+    sigma0: StateLike = None
     disturbance: str | None = None
     method: str = "best"
     simulation: bool | None = False
@@ -103,8 +106,8 @@ class Settings:
     def __post_init__(self) -> None:
         refuse_no_protocol(self.protocol)
         one_node = SignedDigraph.from_edges([], nodes=["1"])  # what certify refuses of it, it refuses of every graph
-        sliding = {"sigma0": self.sigma0, "disturbance": self.disturbance}
-        refuse(one_node, self.protocol, self.method, sliding, ())
+        asks = Asks(method=self.method, disturbance=self.disturbance)
+        refuse_before_the_graph(Case(one_node, self.protocol, InitialState(sigma0=self.sigma0), asks=asks))
         self.disturbance_of(1)  # refuses an expression that cannot be read, before the work
         values: dict[str, Any] = {
             "seed": whole_number(self.seed, "seed", 0, LARGEST_SETTING),
@@ -141,7 +144,7 @@ class Settings:
         return as_disturbance(text, n, self.protocol.reaching.delta, 2 * float(self.protocol.T), seed)
 
 
-def _as_initial_state(initial_state: InitialState, name: str) -> InitialState:
+def _as_initial_state(initial_state: StateLike, name: str) -> StateLike:
     """Return an initial state as a row takes it; refuse a file, and what is no number."""
     if (by_node := by_label(initial_state, name)) is not None:
         initial_state = by_node

@@ -22,7 +22,7 @@ from ptcc_certify.bounds.input.effort_bounds import full_constants
 from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
-from ptcc_certify.protocols.agents import AgentsProtocol
+from ptcc_certify.protocols.agents_protocol import AgentsProtocol
 from ptcc_certify.theorems.agent_decrease import Matrix
 
 #: Of every agent, in every coordinate of space, its position, velocity and so on.

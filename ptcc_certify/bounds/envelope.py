@@ -178,7 +178,7 @@ class Envelope:
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=1)
 
-    >>> envelope = certify(pair, protocol, [3, 1], simulation=False).envelope
+    >>> envelope = certify(pair, protocol, [3, 1], asks=Asks(simulation=False)).envelope
     >>> 0 < envelope.residual(0.01) < 0.01  # what may be left at 0.99 T
     True
     >>> bool(envelope.deviation(envelope.gain.clock(0.99), [3, 1]).max() < 0.01)

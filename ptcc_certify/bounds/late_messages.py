@@ -51,8 +51,9 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness
 from ptcc_certify.protocols.base import Protocol
-from ptcc_certify.protocols.gain_limits import GainLimits, LimitedGain
+from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.protocols.limited_gain import LimitedGain
 from ptcc_certify.protocols.moving_leaders import MovingLeaders
 from ptcc_certify.theorems.theorem import Obligation
 

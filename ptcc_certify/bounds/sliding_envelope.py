@@ -68,7 +68,7 @@ class SlidingEnvelope(Envelope):
     --------
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
-    >>> envelope = certify(pair, robust, [3, 1], sigma0=[1, 0], simulation=False).envelope
+    >>> envelope = certify(pair, robust, InitialState([3, 1], sigma0=[1, 0]), asks=Asks(simulation=False)).envelope
     >>> bool(envelope.deviation_bound(0.01, [3, 1]).max() < 0.01)  # of every agent at 0.99 (T_r + T_s)
     True
     >>> bool(envelope.sliding_norm(0.0) >= 1)  # ||sigma(0)|| = 1

@@ -25,7 +25,8 @@ from ptcc_certify.checker.obligations import CheckReport
 from ptcc_certify.checker.sections import RowVector
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness, refuse_leader_groups
+from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness
+from ptcc_certify.model.refusals import refuse_leader_groups
 from ptcc_certify.protocols.base import Protocol
 from ptcc_certify.protocols.gain import Gain
 from ptcc_certify.protocols.moving_leaders import MovingLeaders

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from typing import Any, NamedTuple
@@ -16,23 +16,12 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io.initial_state import as_states, random_states
 from ptcc_certify.graphs.rationals import shorten, writable
 from ptcc_certify.graphs.size_limits import EXACT_NODES
-from ptcc_certify.protocols import Protocol
+from ptcc_certify.model.case import Case
+from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.refusals import asked_of_single_integrators, refuse_agents
 from ptcc_certify.protocols.agents import DERIVATIVES, MOST_DIMENSION, PLURALS, Agents
 from ptcc_certify.protocols.gain import Gain
-from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.protocols.parameters import readable
-
-#: What is asked of single integrators alone.
-_NOT_OF_AGENTS = {
-    "at": "leave it out",
-    "initial_set": "give x0 instead",
-    "limits": "give Agents(gain_cap=..) instead of a gain cap; a stop and sampling are not proved for them",
-    "delta": "take the sliding-mode protocol, which disturbances within delta do not move",
-    "noise": "leave it out",
-    "messages": "leave it out, or leave out agents; with late messages nothing is proved of them",
-    "leaders": "leave it out; their leaders move as their plant does",
-    "disturbance": "leave it out: what holds holds for every disturbance within delta",
-}
 
 
 class Chains(NamedTuple):
@@ -44,28 +33,16 @@ class Chains(NamedTuple):
     notes: tuple[str, ...] = ()
 
 
-def single_integrators(agents: Any, protocol: Any, limits: Any) -> tuple[Any, Any]:
-    """Return None for agents that are the paper's, and the limits of the gain with their cap, if they have one.
-
-    Under the sliding-mode protocol limits of the gain are those of agents of order n alone.
-    """
-    limits = tuple(limits) if isinstance(limits, Iterable) else (limits,)
-    if not isinstance(agents, Agents) or not agents.plain:
-        return agents, limits
-    if agents.cap is None:
-        return None, limits
-    if getattr(protocol, "reaching", None) is not None:
-        return agents, limits
-    own = GainLimits(gain_cap=agents.cap)
-    return None, limits if own in limits else (own, *limits)
-
-
 class Formation(NamedTuple):
     """Single integrators on a line: the initial state less the places ``h``, these, and limits of the gain."""
 
     initial_state: list[Fraction] | None
     offsets: tuple[Fraction, ...]
     limits: tuple[Any, ...]
+
+    def case_of(self, case: Case) -> Case:
+        """Return the case of the agents less their places."""
+        return replace(case, initial=replace(case.initial, x0=self.initial_state), limits=self.limits)
 
     def shift(self, initial_set: InitialSet | None) -> InitialSet | None:
         """Return a set of initial states less the places."""
@@ -74,64 +51,22 @@ class Formation(NamedTuple):
         return replace(initial_set, center=[x - h for x, h in zip(initial_set.center, self.offsets, strict=True)])
 
 
-def formation_on_a_line(
-    agents: Agents, chains: Chains, protocol: Protocol, asked: Mapping[str, Any]
-) -> Formation | None:
+def formation_on_a_line(case: Case, agents: Agents, chains: Chains) -> Formation | None:
     """Return single integrators of the paper's protocol about places: ``x - h`` has the plain certificate.
 
     None for other agents, refused beside what is not asked of them: of order n, in several dimensions, and under a cap
     the sliding-mode protocol, which limits nothing of single integrators. Of large graphs the plain certificate has
     Lyapunov functions that bound no input: formations that ask for nothing but their agents keep that of order n.
     """
-    more, capped = [name for name in _NOT_OF_AGENTS if _given(asked.get(name))], agents.cap is not None
-    large = len(chains.offsets) > EXACT_NODES and not more
-    if not agents.of_paper or chains.dimension > 1 or large or (capped and protocol.reaching is not None):
-        refuse_agents(agents, protocol, asked)
+    large = len(chains.offsets) > EXACT_NODES and not asked_of_single_integrators(case)
+    if not agents.of_paper or chains.dimension > 1 or large or (agents.cap is not None and case.sliding):
+        refuse_agents(case)
         return None
-    _, limits = single_integrators(replace(agents, offsets=None, biases=None), protocol, asked["limits"])
     places = tuple(h for (h,) in chains.offsets)
     begin = None
     if chains.states is not None:
         begin = [x - h for ((x,),), h in zip(chains.states, places, strict=True)]
-    return Formation(begin, places, limits)
-
-
-def refuse_agents(agents: Any, protocol: Protocol, asked: Mapping[str, Any]) -> None:
-    """Refuse what is not asked of agents of order n, or not proved of them.
-
-    Raises
-    ------
-    ParameterError
-        Says what, and what to do instead.
-    """
-    if not isinstance(agents, Agents):
-        raise ParameterError(f"agents = {shorten(repr(agents))}: give Agents(order=2) for double integrators")
-    for name, value in asked.items():
-        if name in _NOT_OF_AGENTS and _given(value):
-            raise ParameterError(f"{name} is for single integrators; of agents of order n: {_NOT_OF_AGENTS[name]}")
-    sigma0 = asked.get("sigma0")
-    if sigma0 is not None and any(_entries(sigma0)):
-        raise ParameterError(
-            "sigma0: agents of order n start with sigma(0) = 0 (their auxiliary variables at minus the highest "
-            "derivative); otherwise their final positions depend on the disturbance: leave it out"
-        )
-    agents.refuse_motion(protocol.T)
-
-
-def _given(value: Any) -> bool:
-    """Tell whether something is asked: no None, and no list of these."""
-    return value is not None and not (isinstance(value, list | tuple) and not any(one is not None for one in value))
-
-
-def _entries(values: Any) -> list[Any]:
-    """Return the numbers of a state as far as they are seen without its graph."""
-    if isinstance(values, str):
-        return [values] if values.strip() not in ("0", "") else []
-    values = values.values() if hasattr(values, "values") and callable(values.values) else values
-    try:
-        return [float(x) for x in values]
-    except (TypeError, ValueError):
-        return [values]
+    return Formation(begin, places, case.limits_with(agents))
 
 
 def read_offsets(agents: Agents, graph: SignedDigraph, dimension: int, gain: Gain) -> tuple[tuple[Fraction, ...], ...]:
@@ -178,14 +113,12 @@ def _drift_text(groups: Sequence[GroupDrift], agents: Agents, gain: Gain) -> str
     return text + " (K_1 is the gain of relative positions, g the gain)" * designed
 
 
-def read_chains(
-    agents: Agents, graph: SignedDigraph, gain: Gain, x0: Any = None, v0: Any = None, derivatives: Any = None
-) -> Chains:
+def read_chains(agents: Agents, graph: SignedDigraph, gain: Gain, initial: InitialState) -> Chains:
     """Return position, velocity and so on of every agent, the dimension of space, places, and remarks.
 
     Velocities that are not given are 0.
     """
-    n = agents.degree
+    n, x0, v0, derivatives = agents.degree, initial.x0, initial.v0, initial.derivatives
     if v0 is not None and derivatives is not None:
         raise ParameterError("v0 is the first of derivatives; give one of them")
     if isinstance(derivatives, str) or not isinstance(derivatives, Iterable | None):

@@ -120,7 +120,7 @@ class Certificate(Content, FromFile, Shown):
     Examples
     --------
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
-    >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1], simulation=False)
+    >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1], asks=Asks(simulation=False))
     >>> cert.verdict, cert.claim.behaviour, cert.claim.theorem
     ('certified', 'bipartite consensus', '1.1')
     >>> cert.final_state, bool(cert.rate <= cert.upper_bound), cert.checked.accepted

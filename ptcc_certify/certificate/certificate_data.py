@@ -182,7 +182,7 @@ class Content:
         Examples
         --------
         >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
-        >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1], simulation=False)
+        >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1], asks=Asks(simulation=False))
         >>> cert.changed(protocol=NominalProtocol(T=2, rho1=1, rho2=1, kappa=1), noise=Fraction(1)).request.noise
         Fraction(1, 1)
         """

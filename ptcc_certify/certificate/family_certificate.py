@@ -29,10 +29,8 @@ from ptcc_certify.certificate.family_table import family_table
 from ptcc_certify.certificate.family_verdict import assess_family
 from ptcc_certify.certificate.functions import ProvedFunction
 from ptcc_certify.certificate.request import (
-    Expectations,
     listener,
     origins_of,
-    read_expectations,
     read_initial_state,
     read_seconds,
     read_sliding_variable,
@@ -56,12 +54,14 @@ from ptcc_certify.lyapunov.family_search import CLOSED_ROWS, FamilySearch, searc
 from ptcc_certify.lyapunov.follower_function import follower_functions
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.squares_function import SquaresFunction, squares_function
+from ptcc_certify.model.asks import Expectations, read_expectations
+from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.base import refuse_no_protocol
+from ptcc_certify.protocols.restricted_signals import ClockShares, JointWindows, SignalClass, read_signal
 from ptcc_certify.shown import Shown, rendered
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent, decide
 from ptcc_certify.theorems.joint_windows import refuse_impossible_windows
-from ptcc_certify.theorems.restricted_signals import ClockShares, JointWindows, SignalClass, read_signal
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -361,7 +361,7 @@ def certify_family(
     progress(STEPS[-1])
     notes = [f"{note}: cut off by the time limit" if note in (*STEPS, BOXES) else note for note in notes]
     kept |= {"expectations": asked, "notes": tuple(dict.fromkeys(notes)), "scenario": scenario}
-    kept["origins"] = origins_of(None, x0, sigma0) | dict(origins or {})
+    kept["origins"] = origins_of(None, InitialState(x0, sigma0)) | dict(origins or {})
     return _fewer_functions(FamilyCertificate(family, protocol, tuple(parts), initial_state, sigma, reaching, **kept))
 
 

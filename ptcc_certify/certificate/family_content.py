@@ -55,9 +55,9 @@ from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.squares_function import SquaresFunction
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.reaching_time import ReachingTime
+from ptcc_certify.protocols.restricted_signals import SignalClass
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
 from ptcc_certify.theorems.family_kernel import UNKNOWN
-from ptcc_certify.theorems.restricted_signals import SignalClass
 
 
 @dataclass(frozen=True, eq=False)

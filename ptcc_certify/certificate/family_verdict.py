@@ -22,11 +22,11 @@ from ptcc_certify.certificate.restricted_reasons import reasons_for_none
 from ptcc_certify.certificate.verdict import CERTIFIED, LAST, MET, OPEN, REFUTED, UNDECIDED, Answer, Assessment
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.graphs.family import Mode
+from ptcc_certify.protocols.restricted_signals import ClockShares, JointWindows
 from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_name
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
 from ptcc_certify.theorems.family_claims import component_holds, component_refutation
 from ptcc_certify.theorems.last_mode import last_mode_shows
-from ptcc_certify.theorems.restricted_signals import ClockShares, JointWindows
 
 #: Up to which multiple of ``rho2`` one is looked for that makes the bound useful.
 _LARGEST = 2e4
@@ -51,7 +51,7 @@ def assess_family(certificate: FamilyContent, report: CheckReport | None) -> Ass
     --------
     >>> unsure = Family.from_intervals([("a", "b", "0.8", "1.2"), ("b", "a", "-1.2", "-0.8")])
     >>> asked = Expectations("bipartite consensus", min_rate=100)
-    >>> cert = certify(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), expectations=asked)
+    >>> cert = certify(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), asks=Asks(expectations=asked))
     >>> cert.assessment.asked, int(cert.assessment.exit_code)
     ('refuted', 3)
     """

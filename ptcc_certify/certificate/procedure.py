@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import partial
-from typing import Any, cast, overload
+from typing import Any, overload
 
 import numpy as np
 
@@ -42,8 +42,6 @@ from ptcc_certify.certificate.agents_request import (
     Chains,
     formation_on_a_line,
     read_chains,
-    refuse_agents,
-    single_integrators,
 )
 from ptcc_certify.certificate.cascade_part import prove_cascade
 from ptcc_certify.certificate.certificate import Certificate
@@ -51,16 +49,13 @@ from ptcc_certify.certificate.certificate_data import Observations
 from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
 from ptcc_certify.certificate.final_state_sections import stated_ends
 from ptcc_certify.certificate.request import (
-    Expectations,
     Request,
     listener,
     origins_of,
-    read_expectations,
     read_initial_state,
     read_request,
     read_sliding_variable,
-    refuse,
-    refuse_beside,
+    refuse_long_weights,
 )
 from ptcc_certify.certificate.verdict import MANY_DECADES
 from ptcc_certify.checker.input_formulas import Limits
@@ -81,6 +76,15 @@ from ptcc_certify.lyapunov.error_system import ErrorSystem
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.lyapunov.rate_upper_bound import RateBound, mean_bound, prove_rate_bound
 from ptcc_certify.lyapunov.search import APART_NODES, Search, search_functions, search_large
+from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.case import Case
+from ptcc_certify.model.refusals import (
+    refuse_agents,
+    refuse_before_the_graph,
+    refuse_beside,
+    refuse_exchanged,
+    refuse_of_families,
+)
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.agents import Agents
 from ptcc_certify.protocols.base import ReachingProtocol
@@ -88,12 +92,12 @@ from ptcc_certify.protocols.disturbance import as_disturbance
 from ptcc_certify.protocols.late_messages import LateMessages
 from ptcc_certify.protocols.moving_leaders import MovingLeaders
 from ptcc_certify.protocols.reaching_time import ReachingTime
+from ptcc_certify.protocols.restricted_signals import SignalClass
 from ptcc_certify.simulation.instants import PAST
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.sliding import rounding_slack
 from ptcc_certify.simulation.trajectory import Trajectory
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
-from ptcc_certify.theorems.restricted_signals import SignalClass
 from ptcc_certify.theorems.table import theorem_for
 from ptcc_certify.theorems.theorem import RateProof, Theorem
 
@@ -111,8 +115,6 @@ ENDING = 0.3
 #: The share of a time limit after which the searches end, so that what they found is checked within it, and the shares
 #: of the time then left that the first of the steps may take.
 SEARCHING, SHARES = 0.4, (0.3, 0.3, 0.8, 1.0)
-#: Options of :func:`certify` that families take, too.
-_OF_FAMILIES = ("sigma0", "signal", "time_limit", "expectations", "scenario", "origins", "progress")
 #: Instants of a simulated run where the graph is large.
 FEW_SAMPLES = 51
 #: A simulated end state is settled when it is this near to the final state, relative to the initial state.
@@ -120,39 +122,24 @@ SETTLED = 1e-6
 
 
 @overload
-def certify(graph: Family, protocol: Protocol, x0: Any = None, **options: Any) -> FamilyCertificate: ...
+def certify(graph: Family, protocol: Protocol, x0: Any = None, **parts: Any) -> FamilyCertificate: ...
 @overload
-def certify(graph: Any, protocol: Protocol, x0: Any = None, **options: Any) -> Certificate: ...
+def certify(graph: Any, protocol: Protocol, x0: Any = None, **parts: Any) -> Certificate: ...
 
 
-@gated  # type: ignore[misc]  # it takes the options below, no others
+@gated  # type: ignore[misc]  # it takes the parts below, no others
 def certify(
     graph: Any,
     protocol: Protocol,
     x0: Any = None,
     *,
-    orientation: str | None = None,
     uncertainty: Any = 0,
-    sigma0: Any = None,
-    disturbance: Any = None,
-    simulation: bool | None = None,
-    method: str = "best",
-    at: Any = None,
-    initial_set: Any = None,
-    limits: Limits | Sequence[Limits] = (),
-    delta: Any = None,
-    noise: Any = None,
+    signal: SignalClass = "any",
+    agents: Agents | None = None,
     messages: LateMessages | None = None,
     leaders: MovingLeaders | None = None,
-    signal: SignalClass = "any",
-    time_limit: float | None = None,
-    expectations: Expectations | str | None = None,
-    scenario: Mapping[str, Any] | None = None,
-    origins: Mapping[str, str] | None = None,
-    progress: Callable[[str], None] | None = None,
-    agents: Agents | None = None,
-    v0: Any = None,
-    derivatives: Any = None,
+    limits: Limits | Sequence[Limits] = (),
+    asks: Asks | None = None,
 ) -> Certificate | FamilyCertificate:
     """Certify what a protocol does on a signed digraph, or on a family of these whatever the signal.
 
@@ -163,35 +150,17 @@ def certify(
         family, as :func:`ptcc_certify.as_family` takes it, such as ``{"day": day, "night": night}``.
     protocol : NominalProtocol or SlidingModeProtocol
         With ``rho2 > 0``. Under the sliding-mode protocol everything is claimed for all disturbances within ``delta``.
-    x0 : state-like, optional
+    x0 : state-like or InitialState, optional
         The initial state, in node order, or by label where there are labels: whatever :func:`ptcc_certify.as_state`
-        takes. Without it there is no final state and no simulation.
-    orientation : {"information", "listens"}, optional
-        Of an edge, or of the rows of a matrix; see :func:`ptcc_certify.as_graph`.
+        takes. An :class:`~ptcc_certify.InitialState` tells sliding variables, velocities and so on, too. Without it
+        there is no final state and no simulation.
     uncertainty : number or str
         Of every weight, as a share of it, such as "10%": then the graph is a family.
-    sigma0 : state-like, optional
-        Sliding mode: ``sigma(0)``, like ``x0``; without it 0, which leaves no reaching phase and ``Q X(0)`` as the
-        final state.
-    disturbance : Disturbance, str, number, callable or sequence, optional
-        Sliding mode: what the simulated run meets; see :func:`ptcc_certify.simulation.run.simulate`.
-    simulation : bool, optional
-        Whether to compare the proved bound with a CVODES run; by default up to 10,000 agents.
-    method : {"best", "paper", "perron", "lmi", "full"}
-        Which Lyapunov functions are searched beside the paper's; see :mod:`ptcc_certify.lyapunov.search`.
-    at : number, optional
-        An instant before the deadline, in units of time, at which the bound should be smallest.
-    initial_set : InitialSet or positive number, optional
-        The set of initial states for which the input is bounded, instead of ``x0`` alone; a number ``R`` stands for
-        ``||X(0)||_inf <= R``.
-    limits : GainLimits or sequence of GainLimits
-        Nominal protocol: caps, stops and sampling of the gain, under which what is left at the deadline is bounded.
-        With sampling, which may drive agents apart, it is certified if ``||E||`` is no larger there than at first.
-    delta : number, optional
-        Nominal protocol: bound of the disturbances ``|d_k|`` whose effect is bounded, in units of the input.
-    noise : number, optional
-        Nominal protocol: bound of the measurement noise ``|n_k|``, ``u = -gain L (X + n)``, whose effect is bounded
-        under each of ``limits`` but sampling. Noise times an infinite gain is bounded by nothing.
+    signal : {"any", "constant"}, DwellTime, JointWindows or ClockShares
+        Of a family: restricted signals of which more is claimed, beside what holds for every signal; the three classes
+        are in :mod:`ptcc_certify.protocols.restricted_signals`.
+    agents : Agents, optional
+        Agents of order n, or in a formation; without them ``x' = u``. Then ``x0`` may be N rows of coordinates.
     messages : LateMessages, optional
         How late, how often lost and how inexact is what agents hear; what is left at the deadline then is bounded. With
         single leaders, leader groups that hear each other at once, or a cap; ``sigma(0) = 0`` under the sliding-mode
@@ -199,40 +168,23 @@ def certify(
     leaders : MovingLeaders, optional
         Nominal protocol, single leaders: how fast these move; how followers track them is bounded. With ``messages``
         without a sign term; what is left at the deadline is then bounded.
-    signal : {"any", "constant"}, DwellTime, JointWindows or ClockShares
-        Of a family: restricted signals of which more is claimed, beside what holds for every signal; the three classes
-        are in :mod:`ptcc_certify.theorems.restricted_signals`.
-    time_limit : float, optional
-        Seconds of wall time. Simulation and searches may take 40 % together, each its share of what is left; what is
-        proved by then stands and is checked, and ``cut_off`` names what was ended. Without it they have 60 s, and 1 s
-        more for every 1,000 nodes, of work: what is found then does not depend on how busy the machine is.
-    expectations : Expectations or str, optional
-        What is asked besides: a behaviour (a text names one), a rate, a bound of the input. It decides nothing but the
-        ``assessment``.
-    scenario : mapping, optional
-        The scenario file of ``ptcc certify``, as JSON: kept in the certificate under ``unverified.scenario``.
-    origins : mapping of str to str, optional
-        What ``"graph"`` is called, and where ``"x(0)"`` and ``"sigma(0)"`` come from, where the arguments do not tell:
-        kept under ``unverified.origins``, and told by ``summary``.
-    progress : callable, optional
-        Is told each of :data:`STEPS` as it begins.
-    agents : Agents, optional
-        Agents of order n, or in a formation; without them ``x' = u``. Then ``x0`` may be N rows of coordinates.
-    v0 : state-like, optional
-        Of agents of order n: initial velocities, like ``x0``; without them 0.
-    derivatives : sequence of state-like, optional
-        Instead of ``v0``: velocities, accelerations and so on.
+    limits : GainLimits or sequence of GainLimits
+        Nominal protocol: caps, stops and sampling of the gain, under which what is left at the deadline is bounded.
+        With sampling, which may drive agents apart, it is certified if ``||E||`` is no larger there than at first.
+    asks : Asks, optional
+        How it is searched, for which initial states the input is bounded, under which disturbances and noise, whether
+        it is simulated, in which time, and what is expected of it.
 
     Returns
     -------
     Certificate or FamilyCertificate
-        Of a family the latter: it takes ``x0``, ``sigma0``, ``signal`` (under the nominal protocol), ``time_limit``,
-        ``expectations``, ``scenario``, ``origins`` and ``progress``.
+        Of a family the latter: it takes ``x0``, ``signal`` (under the nominal protocol), and of ``asks`` time limit and
+        expectations.
 
     Raises
     ------
     ParameterError
-        An option that families do not take, no protocol, ``rho2 = 0`` (no deadline), a time limit that is not positive,
+        A part that families do not take, no protocol, ``rho2 = 0`` (no deadline), a time limit that is not positive,
         an initial state of the wrong length, with other labels than the nodes, beyond 1e300 or of thousands of digits,
         or a disturbance beyond ``delta``.
 
@@ -249,7 +201,7 @@ def certify(
     >>> cert.final_state
     FinalState(1=-1, 2=1)
     >>> robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
-    >>> cert = certify(g, robust, [3, 5], sigma0=[1, 0], disturbance="sin(5*k*t)")
+    >>> cert = certify(g, robust, InitialState([3, 5], sigma0=[1, 0]), asks=Asks(disturbance="sin(5*k*t)"))
     >>> cert
     Certificate(signed-average consensus, Theorem 4.1, rate 3.99999, certified)
     >>> cert.reaching
@@ -259,68 +211,99 @@ def certify(
     >>> certify(g, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), uncertainty="10%")
     FamilyCertificate(bipartite consensus for every signal, rate 3.59999, certified)
     """
-    options: dict[str, Any] = {"method": method, "at": at, "initial_set": initial_set, "limits": limits, "delta": delta}
-    options |= {
-        "noise": noise,
-        "messages": messages,
-        "leaders": leaders,
-        "signal": signal,
-        "time_limit": time_limit,
-        "expectations": expectations,
-        "scenario": scenario,
-    }
-    options["origins"] = origins_of(graph, x0, sigma0) | dict(origins or {})
-    agents, options["limits"] = single_integrators(agents, protocol, limits)
-    asked = {**options, "sigma0": sigma0, "disturbance": disturbance}
-    of_agents = _agents_options(agents, protocol, asked, v0, derivatives)
-    if isinstance(graph, Protocol):
-        raise ParameterError("graph and protocol are exchanged; write certify(graph, protocol)")
-    if uncertainty or is_family(graph):
-        options |= {"agents": of_agents}
-        options |= {"simulation": simulation, "sigma0": sigma0, "disturbance": disturbance, "progress": progress}
-        family = _family(graph, orientation, uncertainty, options)
-        return certify_family(family, protocol, x0, **{name: options[name] for name in _OF_FAMILIES})
-    if options.pop("signal") != "any":
+    return certify_case(Case(graph, protocol, x0, uncertainty, signal, agents, messages, leaders, limits, asks))
+
+
+def certify_case(
+    case: Case,
+    *,
+    progress: Callable[[str], None] | None = None,
+    scenario: Mapping[str, Any] | None = None,
+    origins: Mapping[str, str] | None = None,
+) -> Certificate | FamilyCertificate:
+    """Certify a case, and keep where it comes from.
+
+    Parameters
+    ----------
+    case : Case
+    progress : callable, optional
+        Is told each of :data:`STEPS` as it begins.
+    scenario : mapping, optional
+        The scenario file that asked for it, as JSON: kept in the certificate under ``unverified.scenario``.
+    origins : mapping of str to str, optional
+        What ``"graph"`` is called, and where ``"x(0)"`` and ``"sigma(0)"`` come from, where the case does not tell:
+        kept under ``unverified.origins``, and told by ``summary``.
+
+    Returns
+    -------
+    Certificate or FamilyCertificate
+    """
+    origins = origins_of(case.graph, case.initial) | dict(origins or {})
+    case = case.with_plain_agents()
+    _refuse_before_reading(case)
+    if case.uncertainty or is_family(case.graph):
+        return _certify_family(case, progress, scenario, origins)
+    if case.signal != "any":
         raise ParameterError("signal is for families of graphs, which change; this is one graph: leave it out")
-    progress, graph = listener(progress), as_graph(graph, orientation)
-    refuse(graph, protocol, method, {"sigma0": sigma0, "disturbance": disturbance}, [*options["limits"], delta, noise])
-    structure, chains, formation = analyse(graph), None, None
-    if of_agents is not None:
-        chains = read_chains(of_agents, graph, protocol.gain, x0, v0, derivatives)
-        formation = formation_on_a_line(of_agents, chains, protocol, asked)
+    progress, graph = listener(progress), as_graph(case.graph)
+    refuse_before_the_graph(case)
+    refuse_long_weights(graph)
+    structure, protocol, agents, chains, formation = analyse(graph), case.protocol, case.agents, None, None
+    if agents is not None:
+        chains = read_chains(agents, graph, protocol.gain, case.initial)
+        formation = formation_on_a_line(case, agents, chains)
     if formation is not None:
-        x0, chains, options["limits"] = formation.initial_state, None, formation.limits
-    request = read_request(structure, protocol, options)
+        case, chains = formation.case_of(case), None
+    request = read_request(structure, case, scenario, origins)
     if formation is not None:
         request = replace(request, initial_set=formation.shift(request.initial_set))
-    refuse_beside(structure, protocol, request)
-    initial_state = None if x0 is None or chains else read_initial_state(structure, x0, "x0")
-    manifold, reaching = read_sliding_variable(structure, protocol, sigma0)
-    case = Case(structure, protocol, request, initial_state, manifold, progress)
-    wanted = case.needs_run(simulation)
-    runs = wanted and initial_state is not None
+    refuse_beside(structure, case)
+    initial, disturbance = case.initial, case.asks.disturbance
+    state = None if initial.x0 is None or chains else read_initial_state(structure, initial.x0, "x0")
+    manifold, reaching = read_sliding_variable(structure, protocol, initial.sigma0)
+    search = CertificateSearch(structure, protocol, request, state, manifold, progress)
+    wanted = search.needs_run(case.asks.simulation)
+    runs = wanted and state is not None
     if not runs and disturbance is not None and protocol.reaching is not None:
         _check_disturbance(disturbance, protocol.reaching, graph)
     with one_thread(graph.n_nodes <= ONE_THREAD_NODES):
-        certificate = case.certificate(disturbance, runs, reaching)
+        certificate = search.certificate(disturbance, runs, reaching)
         if formation is not None:
             certificate = certificate.changed(offsets=formation.offsets)
-        if of_agents is not None and chains is not None:
-            certificate = _with_agents(certificate, of_agents, chains, wanted)
+        if agents is not None and chains is not None:
+            certificate = _with_agents(certificate, agents, chains, wanted)
         certificate = _with_small_delays(certificate)
         progress(STEPS[5])
         return _with_word_of_check(certificate)
 
 
-def _agents_options(agents: Any, protocol: Protocol, asked: dict[str, Any], v0: Any, derivatives: Any) -> Agents | None:
-    """Return agents of order n, None for single integrators, or refuse what is asked of them."""
-    if agents is None:
-        if v0 is not None or derivatives is not None:
-            raise ParameterError("v0: single integrators have no velocity to begin with; give agents=Agents(order=2)")
-        return None
-    if isinstance(protocol, Protocol) and not getattr(agents, "of_paper", False):  # others when their states are read
-        refuse_agents(agents, protocol, asked)
-    return cast(Agents, agents)
+def _refuse_before_reading(case: Case) -> None:
+    """Refuse what is asked of agents of order n, velocities where there are none, and a graph that is none."""
+    if case.agents is None and (case.initial.v0 is not None or case.initial.derivatives is not None):
+        raise ParameterError("v0: single integrators have no velocity to begin with; give agents=Agents(order=2)")
+    others = case.agents is not None and not getattr(case.agents, "of_paper", False)
+    if others and isinstance(case.protocol, Protocol):  # the paper's when their states are read
+        refuse_agents(case)
+    refuse_exchanged(case.graph)
+
+
+def _certify_family(
+    case: Case, progress: Any, scenario: Mapping[str, Any] | None, origins: Mapping[str, str]
+) -> FamilyCertificate:
+    """Certify a family, or refuse what it does not take."""
+    refuse_of_families(case)
+    return certify_family(
+        as_family(case.graph, uncertainty=case.uncertainty),
+        case.protocol,
+        case.initial.x0,
+        sigma0=case.initial.sigma0,
+        signal=case.signal,
+        time_limit=case.asks.time_limit,
+        expectations=case.asks.expectations,
+        scenario=scenario,
+        origins=origins,
+        progress=progress,
+    )
 
 
 def _with_agents(certificate: Certificate, agents: Agents, chains: Chains, run: bool) -> Certificate:
@@ -388,25 +371,6 @@ def _check_disturbance(disturbance: Any, protocol: ReachingProtocol, graph: Sign
     source.check(protocol.delta, graph.labels, horizon, rounding_slack(protocol))
 
 
-def _family(graph: Any, orientation: str | None, uncertainty: Any, options: Mapping[str, Any]) -> Family:
-    """Return a family, or refuse what it does not take: what is set, but for ``simulation=False``."""
-    unset = {None, False, "best", ()}
-    for name, value in options.items():
-        if name not in _OF_FAMILIES and not _among(unset, value):
-            raise ParameterError(f"{name} is not for families of graphs yet; leave it out, or certify one graph")
-    if read_expectations(options["expectations"]).max_residual is not None:
-        raise ParameterError("max_residual: is asked of late messages, which families do not take yet; leave it out")
-    return as_family(graph, orientation, uncertainty=uncertainty)
-
-
-def _among(values: set[Any], value: Any) -> bool:
-    """Tell whether a value, hashable or not, is among some."""
-    try:
-        return value in values
-    except TypeError:
-        return False
-
-
 def _with_word_of_check(certificate: Certificate) -> Certificate:
     """Check a certificate, and note what the check has to say besides."""
     report = certificate.checked
@@ -423,7 +387,7 @@ def _with_word_of_check(certificate: Certificate) -> Certificate:
 
 
 @dataclass
-class Case:
+class CertificateSearch:
     """A graph, a protocol and what is asked, on the way to a certificate: the steps, in their order.
 
     Attributes

@@ -29,10 +29,10 @@ from ptcc_certify.graphs.family import Mode
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY, find_camps
 from ptcc_certify.lyapunov.family_function import FamilyFunction, prove_ends
+from ptcc_certify.protocols.restricted_signals import ClockShares, DwellTime, JointWindows, SignalClass
 from ptcc_certify.theorems.family_behaviour import FamilyComponent
 from ptcc_certify.theorems.family_rate import ExplicitRate
 from ptcc_certify.theorems.joint_windows import contraction
-from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows, SignalClass
 from ptcc_certify.theorems.theorem import Obligation
 
 if TYPE_CHECKING:  # classes of signals are told without the solvers

@@ -90,7 +90,7 @@ class Assessment:
     --------
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> protocol = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
-    >>> assessment = certify(pair, protocol, simulation=False).assessment
+    >>> assessment = certify(pair, protocol, asks=Asks(simulation=False)).assessment
     >>> assessment.verdict, assessment.useful, int(assessment.exit_code)
     ('certified', True, 0)
     """
@@ -209,10 +209,10 @@ def assess(certificate: Content, report: CheckReport | None) -> Assessment:
     --------
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> weak, strong = (NominalProtocol(T=1, rho1=1, rho2=k, kappa=1) for k in ("0.1", 2))
-    >>> print(certify(pair, weak, [3, 1], simulation=False).assessment.text)
+    >>> print(certify(pair, weak, [3, 1], asks=Asks(simulation=False)).assessment.text)
     certified, but with these gains the bound says little by T: ||E|| <= 0.055 ||E(0)|| at 0.99 T; \
 the input is not bounded; --rho2 0.501 (rho2 kappa 0.501) leaves 1 % and bounds the input
-    >>> assessment = certify(pair, strong, [3, 1], simulation=False).assessment
+    >>> assessment = certify(pair, strong, [3, 1], asks=Asks(simulation=False)).assessment
     >>> assessment.useful, int(assessment.exit_code)
     (True, 0)
     """

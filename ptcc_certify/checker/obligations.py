@@ -66,7 +66,7 @@ class CheckReport:
     Examples
     --------
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
-    >>> document = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), simulation=False).to_dict()
+    >>> document = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), asks=Asks(simulation=False)).to_dict()
     >>> check(document).accepted, check(document | {"verdict": "undecided"}).rejected
     (True, 'verdict')
     """

@@ -46,7 +46,7 @@ _OF_DESIGN = {"--T": "--deadline", "--x0": "--initial-bound", "--seed": "--initi
 
 
 #: The commands, and what the help says of each, in this order.
-GROUPS = {
+GROUPS: dict[str, dict[click.Command, str]] = {
     "Ask about a graph": {
         classify.classify: "Tell its structure and the theorem that applies.",
         certify.certify: "Prove what the protocol does on it; write a certificate.",

@@ -6,18 +6,31 @@ import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NoReturn
 
-import click
-
-from ptcc_certify.cli.options import Options, exact_number, flag_of, options_of, read_initial_state
+from ptcc_certify.cli.declared import (
+    A0,
+    DIMENSION,
+    click_option,
+    exact_number,
+    flag_of,
+    names_of,
+    one_of,
+    options_for,
+    together,
+)
+from ptcc_certify.cli.options import Options, read_initial_state
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.model.case import Case
+from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.protocols.agents import Agents
+from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.protocols.moving_leaders import MovingLeaders
 
 if TYPE_CHECKING:
     from fractions import Fraction
 
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.protocols import Protocol
-    from ptcc_certify.protocols.agents import Agents
     from ptcc_certify.simulation.agents import AgentsTrajectory
     from ptcc_certify.simulation.trajectory import Trajectory
 
@@ -27,7 +40,7 @@ NAMES = {"integrator": 1, "double-integrator": 2, "triple-integrator": 3}
 #: The largest order, which the library refuses to exceed.
 _MOST_ORDER = 8
 #: Options that need ``--agents``.
-_OWN = ("cascade", "rest", "decay", "drag", "plant", "v0", "a0", "offsets", "biases")
+_OWN = (*names_of(Agents)[1:], "v0", "a0")
 
 #: What is said where late messages are asked of agents of order n; then what makes them such is named.
 _MESSAGES = "late messages are proved of single integrators alone: leave it out, or leave out"
@@ -38,33 +51,13 @@ _OF_SINGLE_INTEGRATORS = {
     "noise": "leave it out",
     "at": "leave it out; -v tells bounds at several instants",
     "initial_bound": "give the initial state with --x0 instead",
-    **dict.fromkeys(("delay", "period", "packet_loss", "quantisation"), _MESSAGES),
-    **dict.fromkeys(("leader_speed", "sign_gain"), "leave it out; their leaders move as their plant does"),
+    **dict.fromkeys([name for name in names_of(LateMessages) if name != "own_delay"], _MESSAGES),
+    **dict.fromkeys(names_of(MovingLeaders), "leave it out; their leaders move as their plant does"),
 }
 
-agents_options = options_of(
-    click.option(
-        "--agents",
-        "agents",
-        metavar="KIND",
-        help="Agents of order n: double-integrator, triple-integrator, or n.  [default: integrator]",
-    ),
-    click.option("--v0", "v0", metavar="STATE", help="Agents: initial velocities, like --x0.  [default: 0]"),
-    click.option("--a0", "a0", metavar="STATE", help="Agents of order 3: initial accelerations.  [default: 0]"),
-    click.option("--drag", metavar="NUMBER", help="Agents: the force -drag times the highest velocity.  [default: 0]"),
-    click.option("--plant", metavar="LIST", help="Agents: a_1,..,a_n of x^(n) + a_n x^(n-1) + .. + a_1 x = u."),
-    click.option("--offsets", metavar="STATE", help="Agents: their places in a formation, like --x0."),
-    click.option("--biases", metavar="STATE", help="Agents: what is added to their relative positions, like --x0."),
-    click.option("--rest", metavar="ALPHA", help="Double integrators meet at rest: damping of their own velocity."),
-    click.option(
-        "--cascade", metavar="ALPHA", help="Double integrators track the plain protocol's velocity, at this rate."
-    ),
-    click.option("--decay", metavar="R", help="Agents: deviations fall like (1 - t/T)^(R/2).  [default: 2 n]"),
-)
+agents_options = together(options_for(Agents, asked=True), one_of(InitialState, "v0"), click_option(A0))
 #: Of commands that take vectors of agents of order n alone.
-dimension_option = click.option(
-    "--dimension", type=click.IntRange(1, 1000), help="Agents: coordinates of space; --x0 agent after agent."
-)
+dimension_option = click_option(DIMENSION)
 
 
 def agents_of(options: Options) -> Agents | None:
@@ -75,8 +68,6 @@ def agents_of(options: Options) -> Agents | None:
 
 def _named_agents(options: Options) -> Agents | None:
     """Return the agents that the options name, single integrators among them; None if they name none."""
-    from ptcc_certify.protocols.agents import Agents
-
     kind = options["agents"]
     if kind is None:
         given = [name for name in _OWN if options[name] is not None]
@@ -92,10 +83,7 @@ def _named_agents(options: Options) -> Agents | None:
     plant = None
     if options["plant"] is not None:
         plant = [exact_number(text, "--plant") for text in options["plant"].split(",")]
-    numbers = {
-        name: None if options[name] is None else exact_number(options[name], flag_of(name))
-        for name in ("drag", "rest", "cascade", "decay")
-    }
+    numbers = {name: options[name] for name in ("drag", "rest", "cascade", "decay")}
     for least, (name, quantity) in enumerate((("v0", "velocity"), ("a0", "acceleration")), start=2):
         if options[name] is not None and options[name].strip() != "0" and int(order) < least:
             why = f"agents of order {order} have no {quantity} to begin with"
@@ -105,14 +93,16 @@ def _named_agents(options: Options) -> Agents | None:
     )
 
 
-def agents_keywords(options: Options, graph: SignedDigraph, certified: bool = False) -> dict[str, Any]:
-    """Return agents and their initial states as the library takes them; nothing for single integrators.
+def agents_and_states(
+    options: Options, graph: SignedDigraph, certified: bool = False
+) -> tuple[Agents, InitialState] | tuple[None, None]:
+    """Return agents and where they begin; nothing for single integrators.
 
     What is certified of single integrators is certified of their formations on a line, too.
     """
     agents = agents_of(options)
     if agents is None:
-        return {}
+        return None, None
     d = options["dimension"] or 1
     if not (certified and agents.of_paper and d == 1):
         _refuse_unproved(options)
@@ -125,8 +115,8 @@ def agents_keywords(options: Options, graph: SignedDigraph, certified: bool = Fa
     while later and later[-1] is None:
         later.pop()
     x0 = read_vectors(options["x0"], options["seed"], graph, d, "--x0")
-    more: dict[str, Any] = {"agents": agents, "x0": x0}
-    return more | ({"derivatives": later} if later or any(text is not None for text in given) else {})
+    told = later or any(text is not None for text in given)
+    return agents, InitialState(x0, derivatives=later if told else None)
 
 
 def places_of(options: Options, graph: SignedDigraph, protocol: Protocol) -> Sequence[Fraction] | None:
@@ -198,12 +188,13 @@ def refuse_dimension(options: Options, command: str) -> None:
         raise ParameterError(f"--dimension: {why}; {mend}")
 
 
-def run_of_agents(graph: SignedDigraph, protocol: Protocol, keywords: dict[str, Any], samples: int) -> AgentsTrajectory:
+def run_of_agents(case: Case, samples: int) -> AgentsTrajectory:
     """Run agents of order n with the gains that ``ptcc certify`` proves, from their initial states to the deadline."""
-    from ptcc_certify.certificate.procedure import certify
+    from ptcc_certify.certificate.procedure import certify_case
 
-    part = certify(graph, protocol, simulation=False, **keywords).agents
-    if part is None or (graph.n_edges and not part.functions):
+    certificate: Any = certify_case(case)
+    part = certificate.agents
+    if part is None or (case.graph.n_edges and not part.functions):
         raise ParameterError("no gains of these agents are proved; ptcc certify tells why")
     return part.simulate(samples=samples)
 

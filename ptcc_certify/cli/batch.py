@@ -6,18 +6,17 @@ import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import fields
 from typing import Any
 
 import click
 
 from ptcc_certify.cli import options as shared
-from ptcc_certify.cli.options import READING
+from ptcc_certify.cli.declared import Command, one_of
 from ptcc_certify.cli.terminal import counting, print_lines
 from ptcc_certify.errors import ExitCode, ParameterError
 from ptcc_certify.graphs.kinds_of_file import kind_of
-
-#: Options that are settings of a row by the same name.
-_SETTINGS = ("x0", "seed", "sigma0", "disturbance", "method", "simulation", "time_limit", "min_rate", "initial_bound")
+from ptcc_certify.model.asks import Asks, Expectations
 
 
 def _refuse_scenarios(context: click.Context, parameter: click.Parameter, pattern: tuple[str, ...]) -> tuple[str, ...]:
@@ -28,15 +27,15 @@ def _refuse_scenarios(context: click.Context, parameter: click.Parameter, patter
     return pattern
 
 
-@click.command()
+@click.command(cls=Command)
 @click.argument("pattern", nargs=-1, required=True, callback=_refuse_scenarios, type=click.Path())
 @shared.reading_options
 @shared.protocol_options
 @shared.expect_option("E.g. stability; exit code 3 if it does not follow for some graph.")
-@shared.number_option("--min-rate", metavar="R", help="Ask for a proved rate of at least R of every graph.")
+@one_of(Expectations, "min_rate", help="Ask for a proved rate of at least R of every graph.")
 @shared.method_option
 @shared.initial_bound_option
-@click.option("--simulation/--no-simulation", default=False, help="Compare with CVODES runs.")
+@one_of(Asks, "simulation", default=False, shown="no-simulation", help="Compare with CVODES runs.")
 @shared.time_limit_option
 @click.option("--workers", type=click.IntRange(1, 1024), help="Processes on this machine.  [default: one per core]")
 @click.option("--scheduler", metavar="ADDRESS", help="Compute on the workers of this Dask scheduler instead.")
@@ -65,8 +64,8 @@ def batch(pattern: tuple[str, ...], output: str | None, restart: bool, write_gra
     """
     from ptcc_certify import batch as many
 
-    settings = {name: options[name] for name in (*_SETTINGS, "expect", *READING[1:])}
-    settings["orientation"] = options["edges"]
+    settings = {field.name: options[field.name] for field in fields(many.Settings) if field.name in options}
+    settings |= shared.reading_of(options)
     workers, scheduler = options["workers"], options["scheduler"]
     if write_graphs is not None:
         for flag, value in (("-o", output), ("--scheduler", scheduler), ("--workers", workers)):

@@ -11,13 +11,14 @@ import click
 from lmi.exact.decimal_rounding import down
 from ptcc_certify.cli import options as shared
 from ptcc_certify.cli.agents import (
-    agents_keywords,
+    agents_and_states,
     agents_of,
     agents_options,
     dimension_option,
     refuse_agents_of_family,
     refuse_dimension,
 )
+from ptcc_certify.cli.declared import Command, one_of
 from ptcc_certify.cli.families import (
     certify_family,
     family_options,
@@ -28,7 +29,10 @@ from ptcc_certify.cli.families import (
 from ptcc_certify.cli.messages import leader_options, leaders_of, message_options, messages_of, refuse_unheard
 from ptcc_certify.cli.scenario import scenario_record
 from ptcc_certify.cli.terminal import LOG, Screen, print_json, progress, refuse_output, screen_options
-from ptcc_certify.errors import ParameterError, one_line
+from ptcc_certify.errors import one_line
+from ptcc_certify.model.asks import Asks, Expectations
+from ptcc_certify.model.case import Case
+from ptcc_certify.model.initial_state import InitialState
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate
@@ -36,7 +40,7 @@ if TYPE_CHECKING:
     from ptcc_certify.protocols import Protocol
 
 
-@click.command()
+@click.command(cls=Command)
 @shared.graphs_argument
 @shared.protocol_options
 @shared.output_option
@@ -46,29 +50,19 @@ if TYPE_CHECKING:
 @family_options
 @restricted_options
 @shared.expect_option("E.g. bipartite-consensus; exit code 3 if it does not follow.")
-@shared.number_option(
-    "--min-rate", metavar="R", help="Ask for a proved decay rate of at least R per unit of the stretched clock."
-)
-@shared.number_option("--max-input", metavar="U", help="Ask for a proved peak of every |u_k| of at most U.")
-@shared.number_option(
-    "--at", metavar="t", help="Optimise the bound at this instant, and print it; -v: for every agent."
-)
+@one_of(Expectations, "min_rate")
+@one_of(Expectations, "max_input")
+@one_of(Asks, "at")
 @shared.method_option
 @shared.limit_options
 @agents_options
 @message_options
 @leader_options
-@shared.number_option(
-    "--max-residual", metavar="R", help="With late messages: ask for every agent within R of its final state at T."
-)
+@one_of(Expectations, "max_residual")
 @dimension_option
 @shared.initial_bound_option
-@shared.number_option(
-    "--noise", metavar="NU", help="Nominal: bound the effect of measurement noise |n_k| <= NU under a limit."
-)
-@click.option(
-    "--simulation/--no-simulation", default=None, help="Compare with a CVODES run.  [default: up to 10,000 agents]"
-)
+@one_of(Asks, "noise")
+@one_of(Asks, "simulation")
 @shared.time_limit_option
 def certify(graph: tuple[str, ...], output: str | None, as_json: bool, screen: Screen, **options: Any) -> int:
     """Certify what the protocol does on GRAPH: behaviour, final state, error bound, input.
@@ -103,22 +97,14 @@ def _certify_graph(
 ) -> int:
     """Certify what the protocol does on one graph."""
     from ptcc_certify.certificate.answer import rejects
-    from ptcc_certify.certificate.procedure import STEPS
-    from ptcc_certify.certificate.procedure import certify as run
+    from ptcc_certify.certificate.procedure import STEPS, certify_case
     from ptcc_certify.report.screen import certificate_lines, summary_lines
 
     LOG.info("%s", one_line(f"read {graph}: {signed.n_nodes} nodes, {signed.n_edges} edges"))
-    more = shared.sliding_keywords(protocol, options, signed) | _requests(options)
-    of_agents = agents_keywords(options, signed, certified=True)
-    x0 = of_agents.pop("x0", None) or shared.read_initial_state(options["x0"], options["seed"], signed)
-    if of_agents:
-        more = _with_agents(more, of_agents)
-    refuse_unheard(signed, options)
-    more |= {"messages": messages_of(graph, signed, options), "leaders": leaders_of(options)}
-    origins = _origins(options)
+    case, origins = _case_of(graph, signed, protocol, options), _origins(options)
     with progress(STEPS, screen.quiet) as begin:
         named = {"graph": Path(graph).name, **origins}
-        certificate = run(signed, protocol, x0, origins=named, progress=begin, **more)
+        certificate: Any = certify_case(case, progress=begin, scenario=scenario_record(), origins=named)
     _log_result(certificate)
     saved = output is not None and not rejects(certificate.checked)
     if output and saved:
@@ -130,40 +116,34 @@ def _certify_graph(
         if assessment.exit_code and not screen.quiet:
             click.echo(f"verdict    {one_line(assessment.text)}", err=True)
         return assessment.exit_code
-    case = certificate, graph, origins
-    screen.show(lambda: summary_lines(*case), lambda: certificate_lines(*case))
+    told = certificate, graph, origins
+    screen.show(lambda: summary_lines(*told), lambda: certificate_lines(*told))
     if output:
         screen.note(shared.written(certificate, output) if saved else shared.NOTHING_WRITTEN)
     return assessment.exit_code
 
 
-def _with_agents(more: dict[str, Any], of_agents: dict[str, Any]) -> dict[str, Any]:
-    """Add agents of order n to what is asked: a cap of the gain is theirs, unless a formation has more limits."""
-    agents, limits = of_agents["agents"], more.pop("limits", [])
-    if any(limit.stop_before is not None or limit.sample_period is not None for limit in limits):
-        return more | of_agents | {"agents": replace(agents, gain_cap=None), "limits": limits}
-    unasked = () if agents.of_paper else ("disturbance",)
-    return {name: value for name, value in more.items() if name not in unasked} | of_agents
+def _case_of(graph: str, signed: SignedDigraph, protocol: Protocol, options: shared.Options) -> Case:
+    """Return what the options ask of a graph; a cap of the gain is that of agents, unless a formation has more limits.
 
-
-def _requests(options: shared.Options) -> dict[str, Any]:
-    """Return what is asked besides graph, protocol and initial state, as the library takes it."""
-    from ptcc_certify.certificate.request import Expectations
-
-    most = options["max_input"]
-    if most is not None and most <= 0:
-        raise ParameterError("--max-input is outside its domain; it must be > 0")
-    more: dict[str, Any] = {name: options[name] for name in ("method", "simulation", "time_limit", "at")}
-    more |= {"initial_set": options["initial_bound"]}
-    more |= {
-        "expectations": Expectations(options["expect"], options["min_rate"], most, options["max_residual"]),
-        "scenario": scenario_record(),
-    }
+    Under ``--leader-speed`` it is the followers that ``--delta`` disturbs.
+    """
+    disturbance, asks = shared.disturbance_of(protocol, options, signed), shared.asks_of(options)
+    sigma0 = shared.sigma0_of(protocol, options, signed)
+    agents, initial = agents_and_states(options, signed, certified=True)
+    limits = shared.limits_of(options) if options["kind"] == "nominal" else ()
+    if initial is None:
+        initial = InitialState(shared.read_initial_state(options["x0"], options["seed"], signed))
+    if agents is not None:
+        more = any(limit.stop_before is not None or limit.sample_period is not None for limit in limits)
+        agents, limits = (replace(agents, gain_cap=None), limits) if more else (agents, ())
+        disturbance = disturbance if more or agents.of_paper else None
+    refuse_unheard(signed, options)
+    messages, leaders = messages_of(graph, signed, options), leaders_of(options)
     if options["kind"] == "nominal":
-        own = {"noise": options["noise"]}
-        own |= {"delta": options["delta"]} if options["leader_speed"] is None else {}  # else it disturbs the followers
-        return more | own | {"limits": [*filter(None, [shared.actuator_of(options)])]}
-    return more
+        asks = replace(asks, noise=options["noise"], delta=options["delta"] if leaders is None else None)
+    asks, initial = replace(asks, disturbance=disturbance), replace(initial, sigma0=sigma0)
+    return Case(signed, protocol, initial, agents=agents, messages=messages, leaders=leaders, limits=limits, asks=asks)
 
 
 def _origins(options: shared.Options) -> dict[str, str]:

@@ -89,7 +89,7 @@ def _own_graph(document: dict[str, Any], report: CheckReport) -> list[str]:
 
     Examples
     --------
-    >>> cert = certify([("a", "b", -1)], NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), simulation=False)
+    >>> cert = certify([("a", "b", -1)], NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), asks=Asks(simulation=False))
     >>> [text.partition(" SHA")[0] for text in _own_graph(cert.to_dict(), cert.checked)]
     ['2 nodes, 1 edge, as in the file; name yours to compare;']
     """

@@ -6,13 +6,14 @@ from typing import Any
 
 import click
 
+from ptcc_certify.cli.declared import Command
 from ptcc_certify.cli.families import classify_family, family_options, read_graph_or_family
 from ptcc_certify.cli.options import expect_option, graphs_argument, json_option, reading_options
 from ptcc_certify.cli.terminal import Screen, print_json, print_lines, screen_options
 from ptcc_certify.errors import ExitCode
 
 
-@click.command()
+@click.command(cls=Command)
 @graphs_argument
 @expect_option("E.g. bipartite-consensus; exit code 3 if it does not follow.")
 @json_option

@@ -10,13 +10,13 @@ import click
 from click.core import ParameterSource
 
 from ptcc_certify.cli.agents import agents_of, agents_options, dimension_option
+from ptcc_certify.cli.declared import SHORTEST, click_option, one_of
 from ptcc_certify.cli.design_of_agents import command_of_agents, design_of_agents, refuse_of_agents, template_options
 from ptcc_certify.cli.options import (
     OneGraph,
     Options,
     graph_argument,
     json_option,
-    number_option,
     output_option,
     read,
     reading_options,
@@ -25,6 +25,8 @@ from ptcc_certify.cli.options import (
 from ptcc_certify.cli.scenario import places_of, scenario_record
 from ptcc_certify.cli.terminal import FIGURES, LOG, Screen, print_json, progress, refuse_output, screen_options
 from ptcc_certify.errors import ExitCode, ParameterError, one_line
+from ptcc_certify.gain_design.request import DesignRequest
+from ptcc_certify.model.asks import Asks, Expectations
 from ptcc_certify.report.text_layout import wrap_command
 
 if TYPE_CHECKING:
@@ -40,12 +42,12 @@ _EXAMPLE_OF_AGENTS = "ptcc design fig1a --agents double-integrator --max-input 3
 
 @click.command(cls=OneGraph)
 @graph_argument
-@number_option("--max-input", metavar="U", help="Needed. Every |u_k| is to be at most U, from all initial states.")
-@number_option("--initial-bound", metavar="R", help="Needed without --agents. All |x_k(0)| <= R.")
-@number_option("--deadline", metavar="T", help="Ask for this deadline ..")
-@click.option("--shortest-deadline", is_flag=True, help=".. or for the shortest one.")
-@number_option("--residual", metavar="r", help="Every agent may be so far from its final state at the deadline.")
-@click.option("--input-norm", type=click.Choice(["2"]), help="2: U bounds ||u||, not each |u_k|.")
+@one_of(Expectations, "max_input", help="Needed. Every |u_k| is to be at most U, from all initial states.")
+@one_of(Asks, "initial_set", help="Needed without --agents. All |x_k(0)| <= R.")
+@one_of(DesignRequest, "deadline")
+@click_option(SHORTEST)
+@one_of(DesignRequest, "residual")
+@one_of(DesignRequest, "input_norm")
 @output_option
 @json_option
 @click.option("--curve", type=click.Path(dir_okay=False), help="Deadline against peak input: FILE.csv, or a figure.")

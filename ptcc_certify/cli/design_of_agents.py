@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 import click
 from click.core import ParameterSource
 
-from ptcc_certify.cli.agents import agents_keywords
-from ptcc_certify.cli.options import Options, flag_of, kind_option, number_option, options_of, protocol_of
+from ptcc_certify.cli.agents import agents_and_states
+from ptcc_certify.cli.declared import flag_of, one_of, together
+from ptcc_certify.cli.options import Options, kind_option, protocol_of
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import short_exact
+from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.run import Run
+from ptcc_certify.protocols import SlidingModeProtocol
+from ptcc_certify.protocols.gain_limits import GainLimits
 
 if TYPE_CHECKING:
     from ptcc_certify.gain_design.agents_answer import AgentsDesign
@@ -24,20 +30,20 @@ _OF_STATES = ("plant", "drag", "rest", "cascade", "x0", "v0", "a0", "offsets", "
 #: What is searched: the gains that a deadline ``T = 1`` would have, whose deadline is then sought.
 _TEMPLATE = {"T": None, "T_r": None, "T_s": None, "rho1": "0.001", "rho2": "1", "kappa": "1"}
 
-template_options = options_of(
+template_options = together(
     kind_option("Agents: nominal, or sliding mode, which disturbances within --delta do not move."),
-    click.option("--x0", metavar="STATE", default="random", help="Agents: initial positions, as of ptcc certify."),
-    click.option("--seed", type=click.IntRange(min=0), default=0, help="Agents: seed of random initial states."),
+    one_of(InitialState, "x0", default="random", help="Agents: initial positions, as of ptcc certify."),
+    one_of(Run, "seed", help="Agents: seed of random initial states."),
     *(
-        click.option(flag_of(name), name, metavar="NUMBER", help=f"Agents, sliding mode: {text}")
-        for name, text in {
-            "delta": "bound of every disturbance.  [default: 1]",
-            "mu1": "switching gain, above delta.  [default: 2]",
-            "mu2": "constant part of the reaching gain.  [default: 1]",
-            "mu3": "factor of its growing part.  [default: 1]",
-        }.items()
+        one_of(SlidingModeProtocol, name, shown=default, help=f"Agents, sliding mode: {text}")
+        for name, default, text in (
+            ("delta", "1", "bound of every disturbance."),
+            ("mu1", "2", "switching gain, above delta."),
+            ("mu2", "1", "constant part of the reaching gain."),
+            ("mu3", "1", "factor of its growing part."),
+        )
     ),
-    number_option("--gain-cap", metavar="G", help="Agents: the gain is at most G; with --residual."),
+    one_of(GainLimits, "gain_cap", help="Agents: the gain is at most G; with --residual."),
 )
 
 
@@ -46,7 +52,7 @@ def refuse_of_agents() -> None:
     context = click.get_current_context()
     for name in _OWN:
         if context.get_parameter_source(name) is ParameterSource.COMMANDLINE:
-            flag = flag_of("protocol" if name == "kind" else name)
+            flag = flag_of(name)
             says = "is not searched for single integrators; give it to ptcc certify, or add --agents double-integrator"
             if name == "x0":
                 says = "single integrators are designed for all states within a bound; give --initial-bound R instead"
@@ -61,7 +67,9 @@ def design_of_agents(signed: SignedDigraph, options: Options) -> AgentsDesign:
         raise ParameterError("--input-norm: is of single integrators; of agents in space U bounds ||u_k|| as it is")
     request: Any = {name: options[name] for name in ("max_input", "deadline", "residual")}
     protocol = protocol_of({**options, **_TEMPLATE})
-    return design_agents(signed, protocol=protocol, **agents_keywords(options, signed), **request)
+    agents, initial = agents_and_states(options, signed)
+    assert agents is not None
+    return design_agents(signed, agents, initial, protocol=protocol, **request)
 
 
 def command_of_agents(answer: AgentsDesign, options: Options) -> list[str] | None:
@@ -81,4 +89,5 @@ def command_of_agents(answer: AgentsDesign, options: Options) -> list[str] | Non
         given["protocol"] = protocol.kind
     given |= {name: short_exact(value) for name, value in protocol.parameters.items()}
     given["max_input"] = short_exact(answer.asked.max_input)
-    return [text for name, value in given.items() for text in (flag_of(name), str(value))]
+    words = {name: short_exact(value) if isinstance(value, Fraction) else str(value) for name, value in given.items()}
+    return [text for name, value in words.items() for text in (flag_of(name), value)]

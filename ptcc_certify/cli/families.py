@@ -12,21 +12,36 @@ import click
 from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
+from ptcc_certify.cli.declared import SIGNAL, click_option, flag_of, options_asking, options_for, together
 from ptcc_certify.cli.scenario import scenario_record
 from ptcc_certify.cli.terminal import LOG, Screen, print_json, progress
 from ptcc_certify.errors import ExitCode, ParameterError, one_line
+from ptcc_certify.graphs.option import options_of
 from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.reading import OPTIONAL, UNCERTAINTY
+from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.case import Case
+from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.refusals import NOT_OF_FAMILIES
+from ptcc_certify.protocols.restricted_signals import (
+    CLOCK_DWELL,
+    WINDOWS_OF_TIME,
+    ClockShares,
+    DwellTime,
+    JointWindows,
+)
 
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.family import Family
+    from ptcc_certify.protocols.restricted_signals import SignalClass
     from ptcc_certify.theorems.family_behaviour import FamilyComponent
-    from ptcc_certify.theorems.restricted_signals import DwellTime, SignalClass
 
-#: Options of certify that families do not take.
-_NOT_OF_FAMILIES = (
-    *("noise", *shared.LIMITS, "method", "at", "initial_bound", "simulation", "max_residual"),
-    *("delay", "period", "packet_loss", "quantisation", "own_delay", "leader_speed", "sign_gain"),
+#: Options of certify that families do not take; agents are refused by themselves, disturbances by the protocol.
+_NOT_OF_FAMILIES = tuple(
+    name
+    for name in options_asking(["method", "max_residual", *NOT_OF_FAMILIES])
+    if name not in ("agents", "disturbance", "delta")
 )
 
 
@@ -45,78 +60,30 @@ def _pairs(texts: Sequence[str]) -> tuple[tuple[str, str], ...]:
     return tuple(pairs)
 
 
-def family_options(command: Any) -> Any:
-    """Add the options that make a family of graphs, and tell for which signals it is asked."""
-    signal = click.option(
-        "--signal",
-        type=click.Choice(["any", "constant"]),
-        default="any",
-        help="Families: mode and weights change at any instants, or are fixed and unknown.",
-    )
-    return mode_options(signal(command))
-
-
-def mode_options(command: Any) -> Any:
-    """Add the options that make a family of graphs."""
-    for option in (
-        click.option(
-            "--optional",
-            multiple=True,
-            metavar="SOURCE,TARGET",
-            callback=_pair,
-            help="Family: this edge may fail, on which TARGET hears SOURCE; repeat it for more.",
-        ),
-        click.option(
-            "--uncertainty", metavar="SHARE", help="Family: every weight is known up to this share of it, such as 10%."
-        ),
-        click.option(
-            "--switching", is_flag=True, help="Family: the graphs are modes, of which any may act at any time."
-        ),
-    ):
-        command = option(command)
-    return command
-
-
-#: Of ptcc simulate, in the words of ptcc certify, which claims more for such signals.
-dwell_options = shared.options_of(
-    shared.number_option("--dwell", metavar="THETA", help="Families: at least so much time between switches."),
-    shared.number_option(
-        "--clock-dwell", metavar="TAU", help="Families: the same on the stretched clock, which is infinite at T."
-    ),
+_DWELL = options_of(DwellTime)["least"]
+#: Options that make a family of graphs; and those that tell for which signals it is asked, too.
+mode_options = together(
+    click.option("--switching", is_flag=True, help="Family: the graphs are modes, of which any may act at any time."),
+    click_option(UNCERTAINTY),
+    click_option(OPTIONAL, callback=_pair),
 )
-restricted_options = shared.options_of(
-    shared.number_option(
-        "--dwell",
-        metavar="THETA",
-        help="Families, nominal: at least so much time between switches; claim more for these.",
-    ),
-    shared.number_option(
-        "--clock-dwell",
-        metavar="TAU",
-        help="Families, nominal: the same on the stretched clock, which is infinite at T.",
-    ),
-    shared.number_option(
-        "--clock-window",
-        metavar="H",
-        help="Families, nominal: the length of windows of stretched clock; every edge is on in each.",
-    ),
-    shared.number_option(
-        "--window-on", metavar="DELTA", help="Families: for how much of every window an edge is on, at least."
-    ),
-    shared.number_option("--window", metavar="H", hidden=True),
-    click.option(
-        "--share",
-        multiple=True,
-        metavar="NU",
-        help="Families, nominal: the share of the stretched clock that a mode acts, an outage too; one for each graph.",
-    ),
+family_options = together(mode_options, click_option(SIGNAL))
+#: Of ptcc simulate, in the words of ptcc certify, which claims more for such signals.
+dwell_options = together(
+    click_option(_DWELL, help="Families: at least so much time between switches."),
+    click_option(CLOCK_DWELL, help="Families: the same on the stretched clock, which is infinite at T."),
+)
+restricted_options = together(
+    click_option(_DWELL),
+    click_option(CLOCK_DWELL),
+    options_for(JointWindows),
+    click.option("--window", metavar="H", hidden=True),
+    options_for(ClockShares),
 )
 
 
 def dwell_of(options: shared.Options) -> DwellTime | None:
     """Return the dwell time of time or of the clock, or refuse both at once; None if there is none."""
-    from ptcc_certify.theorems.restricted_signals import DwellTime
-
     dwells = {"t": options["dwell"], "s": options["clock_dwell"]}
     given = [DwellTime(least, clock=clock) for clock, least in dwells.items() if least is not None]
     if len(given) > 1:
@@ -126,8 +93,6 @@ def dwell_of(options: shared.Options) -> DwellTime | None:
 
 def signals_of(options: shared.Options) -> SignalClass:
     """Return the signals of which more is asked, or refuse two kinds of them at once."""
-    from ptcc_certify.theorems.restricted_signals import WINDOWS_OF_TIME, ClockShares, JointWindows
-
     if options["window"] is not None:
         raise ParameterError(f"--window: {WINDOWS_OF_TIME}: --clock-window with --window-on instead")
     dwell = dwell_of(options)
@@ -150,7 +115,7 @@ def refuse_restricted(options: shared.Options) -> None:
     """Refuse restricted signals where one graph acts for ever."""
     for name in ("dwell", "clock_dwell", "window", "clock_window", "window_on", "share"):
         if options.get(name):
-            raise ParameterError(f"{shared.flag_of(name)} is for families of graphs; this is one graph: leave it out")
+            raise ParameterError(f"{flag_of(name)} is for families of graphs; this is one graph: leave it out")
 
 
 def read_graph_or_family(graphs: tuple[str, ...], options: shared.Options) -> SignedDigraph | Family:
@@ -267,8 +232,7 @@ def certify_family(
 ) -> int:
     """Certify what the protocol does on a family, whatever the signal."""
     from ptcc_certify.certificate.family_certificate import STEPS
-    from ptcc_certify.certificate.family_certificate import certify_family as run
-    from ptcc_certify.certificate.request import Expectations
+    from ptcc_certify.certificate.procedure import certify_case
     from ptcc_certify.certificate.restricted_search import require_nominal
     from ptcc_certify.certificate.verdict import CERTIFIED
     from ptcc_certify.report.family_screen import family_lines, family_summary
@@ -276,9 +240,7 @@ def certify_family(
 
     refuse_options(options)
     _refuse_disturbance(options)
-    most = options["max_input"]
-    if most is not None and most <= 0:
-        raise ParameterError("--max-input is outside its domain; it must be > 0")
+    expected = shared.asks_of(options).expectations
     given, modes = len(options["share"]), len(family.modes)
     if given not in (0, modes):
         raise ParameterError(f"--share: {given} given, and {modes} modes; give one for each, outages too")
@@ -286,22 +248,21 @@ def certify_family(
     protocol = shared.protocol_of(options)
     require_nominal(signal, protocol)
     x0 = shared.read_initial_state(options["x0"], options["seed"], family.modes[0].mandatory)
-    sigma0 = shared.sliding_keywords(protocol, options, family.modes[0].mandatory).get("sigma0")
+    sigma0 = shared.sigma0_of(protocol, options, family.modes[0].mandatory)
     LOG.info("%s", one_line(f"read {', '.join(graphs)}: {family!r}"))
     if signal == "constant" and (left := _constant_alone(decide(family, "constant"), decide(family))):
-        if most is not None or options["min_rate"] is not None:
+        if expected.max_input is not None or expected.min_rate is not None:
             raise ParameterError("--min-rate and --max-input: no rate is certified of members that end differently")
         _show_decision(graphs, family, left, as_json, screen, options)
         return _judged_alone(left, options["expect"], output)
     name, read = _names(graphs, family, options)
     states = {"x(0)": options["x0"], "sigma(0)": options["sigma0"]}
     random_states = {what: f"random, seed {options['seed']}" for what, text in states.items() if text == "random"}
-    asked = Expectations(options["expect"], options["min_rate"], most)
     with progress(STEPS, screen.quiet) as begin:
         origins = {"graph": Path(name).name, "read": read, **random_states}
-        limit = {"time_limit": options["time_limit"], "expectations": asked, "scenario": scenario_record()}
-        limit |= {"signal": signal, "sigma0": sigma0}
-        certificate = run(family, protocol, x0, origins=origins, progress=begin, **limit)
+        asks = Asks(time_limit=options["time_limit"], expectations=expected)
+        case = Case(family, protocol, InitialState(x0, sigma0), signal=signal, asks=asks)
+        certificate: Any = certify_case(case, progress=begin, scenario=scenario_record(), origins=origins)
         assessment = certificate.assessment
     LOG.info("verdict %s; exit code %d", one_line(assessment.text), assessment.exit_code)
     saved = output is not None and assessment.verdict == CERTIFIED
@@ -348,7 +309,7 @@ def refuse_options(options: shared.Options) -> None:
     for name in foreign:
         given = source(name) in (ParameterSource.COMMANDLINE, ParameterSource.DEFAULT_MAP)
         if given and options[name] not in (None, False):
-            raise ParameterError(f"{shared.flag_of(name)} is for one graph, not for families yet; leave it out")
+            raise ParameterError(f"{flag_of(name)} is for one graph, not for families yet; leave it out")
 
 
 def _constant_alone(constant: Sequence[FamilyComponent], every: Sequence[FamilyComponent]) -> Sequence[FamilyComponent]:

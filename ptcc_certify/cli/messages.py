@@ -7,51 +7,22 @@ from dataclasses import replace
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
-import click
-
-from ptcc_certify.cli.options import Options, flag_of, graph_file, number_option, options_of
+from ptcc_certify.cli.declared import flag_of, given_of, names_of, options_for
+from ptcc_certify.cli.options import Options, graph_file
 from ptcc_certify.errors import NumberError, ParameterError
+from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.protocols.moving_leaders import MovingLeaders
 
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
-    from ptcc_certify.protocols.late_messages import LateMessages
-    from ptcc_certify.protocols.moving_leaders import MovingLeaders
 
-message_options = options_of(
-    click.option(
-        "--delay",
-        metavar="D|COLUMN",
-        help="What agents hear is up to D late; or the column of the edge list that tells the delay of every edge.",
-    ),
-    number_option("--period", metavar="H", help="Messages are sent every H; the last one that came is held."),
-    click.option(
-        "--packet-loss",
-        type=click.IntRange(min=0, max=10**6),
-        metavar="COUNT",
-        help="Up to so many messages in a row get lost; asks for --period.",
-    ),
-    number_option("--quantisation", metavar="STEP", help="What is heard is rounded to multiples of STEP."),
-    click.option(
-        "--own-delay/--no-own-delay",
-        default=False,
-        show_default=False,
-        help="The own state is as late as what is heard; asks for --gain-cap.",
-    ),
-)
-leader_options = options_of(
-    number_option("--leader-speed", metavar="V", help="Leaders move, as fast as V: how followers track them."),
-    number_option(
-        "--sign-gain", metavar="MU", help="With --leader-speed: followers add MU sign(e_k), and stay on their targets."
-    ),
-)
+message_options, leader_options = options_for(LateMessages, asked=True), options_for(MovingLeaders, asked=True)
 #: What asks for bounds with late messages; --own-delay belongs to these.
 _ASKING = ("delay", "period", "quantisation")
 
 
 def messages_of(graph: str, signed: SignedDigraph, options: Options) -> LateMessages | None:
     """Return how late messages are; None if nothing is asked of them."""
-    from ptcc_certify.protocols.late_messages import LateMessages
-
     if options["packet_loss"] and options["period"] is None:
         raise ParameterError("--packet-loss says nothing by itself; give --period, the time between two messages")
     if all(options[name] is None for name in _ASKING):
@@ -98,7 +69,7 @@ def _needs_cap(signed: SignedDigraph, messages: LateMessages) -> str:
 
 def refuse_unheard(signed: SignedDigraph, options: Options) -> None:
     """Refuse messages and leaders of a graph in which nobody listens to anybody, by the flag that asks for them."""
-    given = next((name for name in (*_ASKING, "leader_speed") if options[name] is not None), None)
+    given = next((name for name in (*_ASKING, *names_of(MovingLeaders)) if options[name] is not None), None)
     if given is not None and not signed.n_edges:
         raise ParameterError(f"{flag_of(given)}: nobody listens to anybody; leave it out, or add edges")
 
@@ -139,11 +110,7 @@ def _without(notes: Iterable[str], title: str) -> Iterator[str]:
 
 def leaders_of(options: Options) -> MovingLeaders | None:
     """Return how leaders move; None if nothing is asked of that. ``--delta`` is what disturbs the followers."""
-    from ptcc_certify.protocols.moving_leaders import MovingLeaders
-
-    speed, sign = options["leader_speed"], options["sign_gain"]
-    if speed is None:
-        if sign is not None:
-            raise ParameterError("--sign-gain belongs to leaders that move; give --leader-speed")
-        return None
-    return MovingLeaders(speed=speed, disturbance=options["delta"] or 0, sign_gain=sign)
+    given = given_of(MovingLeaders, options)
+    if given and "speed" not in given:
+        raise ParameterError(f"{flag_of('sign_gain')} belongs to leaders that move; give {flag_of('leader_speed')}")
+    return MovingLeaders(**given, disturbance=options["delta"] or 0) if given else None

@@ -77,12 +77,13 @@ def template(options: Mapping[str, click.Parameter], files: Sequence[str] = (), 
     lines += ["# Lines that begin with # are left out; remove the # to give the key a value. Flags override it."]
     for section, (title, keys) in SECTIONS.items():
         lines += ["", *_commented(f"[{section}]", title)]
-        for key, (option, example) in keys.items():
+        for key, told in keys.items():
+            example = told.example
             if key == "file" and files:
                 quoted = [_quoted(file) for file in files]
                 example = quoted[0] if len(files) == 1 else f"[{', '.join(quoted)}]"
-            line = f"{'' if option in _WRITTEN else '# '}{key} = {example}"
-            lines += _commented(f"{line:<32}", _meaning(options.get(option)))
+            line = f"{'' if told.name in _WRITTEN else '# '}{key} = {example}"
+            lines += _commented(f"{line:<32}", _meaning(options.get(told.name)))
             if key == "x0" and 0 < len(labels) <= 12:
                 values = ", ".join(f"{_quoted(label)} = 1" for label in labels)
                 lines.append(f"# x0 = {{ {values} }}")

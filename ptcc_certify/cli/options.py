@@ -7,57 +7,57 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from dataclasses import fields, replace
 from fractions import Fraction
-from functools import partial
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from ptcc_certify.cli.scenario import (
-    FOREIGN,
+from ptcc_certify.cli.declared import (
     IN_LIBRARY,
+    KIND,
+    OF_PROTOCOL,
+    Command,
+    Decorator,
+    exact_number,
+    flag_of,
+    given_of,
+    names_of,
+    one_of,
+    options_for,
+    together,
+)
+from ptcc_certify.cli.scenario import (
     graph_of,
     is_scenario,
     kind_of_protocol,
     read_scenario,
     takes_one_graph,
 )
-from ptcc_certify.errors import ParameterError, PTCCError
+from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.kinds_of_file import TOML, kind_of, refuse_as_certificate, refuse_as_graph, shell_word
-from ptcc_certify.graphs.reading import OPTIONS, option_flags
+from ptcc_certify.graphs.option import options_of
+from ptcc_certify.graphs.reading import Reading, option_flags
+from ptcc_certify.model.asks import Asks, Expectations
+from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.run import Run
+from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.protocols.gain_limits import GainLimits
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.protocols import Protocol
-    from ptcc_certify.protocols.gain_limits import GainLimits
 
 #: What the commands are given, by the names of their parameters.
 Options = Mapping[str, Any]
 
-#: Options that tell how a graph is read, by the names of their parameters; ``edges`` is the orientation.
-READING = ("edges", *OPTIONS[1:])
-LIMITS = ("gain_cap", "stop_before", "sample_period")
-#: Parameters of the sliding-mode protocol: what they are by default, and what they are.
-_SLIDING = {
-    "T_r": ("0.5", "Sliding mode: time to reach the manifold."),
-    "T_s": ("0.5", "Sliding mode: time on it; the deadline is T_r + T_s."),
-    "mu1": ("2", "Sliding mode: switching gain, above delta."),
-    "mu2": ("1", "Sliding mode: constant part of the reaching gain."),
-    "mu3": ("1", "Sliding mode: factor of its growing part."),
-    "delta": ("sliding mode: 1; nominal: none", "Bound of every disturbance."),
-}
+#: Options that tell how a graph is read, and limits of the gain, by the names of their parameters.
+READING, LIMITS = names_of(Reading), names_of(GainLimits)
 #: What is told of a file that was asked for where nothing is certified.
 NOTHING_WRITTEN = "note       nothing is certified, and nothing was written"
-#: Options that are times.
-_TIMES = ("--sample-period", "--stop-before", "--deadline", "--at")
-
-
-def flag_of(name: str) -> str:
-    """Return the flag of a parameter."""
-    return f"--{name.replace('_', '-')}"
 
 
 def with_flags(command: click.Command, error: ParameterError) -> ParameterError:
@@ -75,22 +75,6 @@ def with_flags(command: click.Command, error: ParameterError) -> ParameterError:
         return flags.get(IN_LIBRARY.get(match[0], match[0]), match[0])
 
     return ParameterError(re.sub(r"^\w+(?= = |: )|(?<=leave )\w+(?= out)|(?<=give )\w+(?=[,;]|$)", flag, str(error)))
-
-
-def _exact(context: click.Context, parameter: click.Parameter, text: str | None) -> Fraction | None:
-    """Return the exact number that an option gives, None if it was not given."""
-    return None if text is None or context.resilient_parsing else exact_number(text, parameter.opts[0])
-
-
-def exact_number(text: str, flag: str) -> Fraction:
-    """Return the exact number that a text of an option stands for."""
-    from ptcc_certify.graphs.rationals import parse_exact
-
-    try:
-        return parse_exact(text)
-    except PTCCError as error:
-        mend = "; give a number in your unit of time, such as 0.001" if flag in _TIMES else ""
-        raise ParameterError(f"{flag}: {error}{mend}") from None
 
 
 def _behaviour(context: click.Context, parameter: click.Parameter, text: str | None) -> str | None:
@@ -130,51 +114,12 @@ def _certificate_output(context: click.Context, parameter: click.Parameter, outp
     return output
 
 
-def options_of(*decorators: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Return one decorator of several, which adds their options in this order."""
-
-    def apply(function: Any) -> Any:
-        for decorator in reversed(decorators):
-            function = decorator(function)
-        return function
-
-    return apply
-
-
-#: Options whose value is an exact number.
-number_option = partial(click.option, callback=_exact)
-#: Options that are true or false, also where a scenario has the other.
-_switch = partial(click.option, default=False, show_default=False)
-
-
-def expect_option(text: str) -> Callable[[Any], Any]:
+def expect_option(text: str) -> Decorator:
     """Return the option that names the behaviour that is asked for."""
-    return click.option("--expect", metavar="BEHAVIOUR", callback=_behaviour, help=text)
+    return one_of(Expectations, "behaviour", callback=_behaviour, help=text)
 
 
-reading_options = options_of(
-    click.option(
-        "--edges",
-        type=click.Choice(["information", "listens"]),
-        help="Row a,b (or entry a,b of a matrix): flows a -> b, or a listens.  [default: information; matrix: listens]",
-    ),
-    click.option(
-        "--duplicates",
-        type=click.Choice(["refuse", "sum", "last"]),
-        default="refuse",
-        help="What becomes of two rows for one ordered pair.",
-    ),
-    _switch("--drop-self-loops/--no-drop-self-loops", help="Ignore edges of a node to itself."),
-    _switch("--drop-zeros/--no-drop-zeros", help="Ignore edges of weight 0."),
-    _switch("--undirected/--no-undirected", help="Every row counts in both directions."),
-    click.option(
-        "--laplacian/--no-laplacian",
-        default=None,
-        help="The matrix is a signed Laplacian D - W, or none though its diagonal holds the sums.",
-    ),
-    click.option("--columns", metavar="A,B,W", help="Source, target and weight of a table: titles, or numbers from 1."),
-    click.option("--variable", metavar="NAME", help="Which matrix, network or relation of a file with several."),
-)
+reading_options = options_for(Reading)
 #: GRAPH, or SCENARIO.toml, whose other keys become defaults of the options; hence it is read before these.
 graph_argument = click.argument(
     "graph", metavar="GRAPH|SCENARIO.toml", is_eager=True, callback=graph_of, type=click.Path()
@@ -192,59 +137,27 @@ graphs_argument = click.argument(
 certificate_argument = click.argument("certificate", callback=_certificate, type=click.Path())
 
 
-def kind_option(text: str) -> Callable[[Any], Any]:
+def kind_option(text: str) -> Decorator:
     """Return the option that tells the protocol; it comes before the others, which may be of one protocol alone."""
-    return click.option(
-        "--protocol",
-        "kind",
-        type=click.Choice(["nominal", "sliding-mode"]),
-        default="nominal",
-        is_eager=True,
-        callback=kind_of_protocol,
-        help=text,
-    )
+    told = replace(KIND, help=text)
+    more: dict[str, Any] = {"type": click.Choice(list(told.choices)), "default": told.default, "help": told.help}
+    return click.option(told.flag, told.name, is_eager=True, callback=kind_of_protocol, **more)
 
 
-protocol_options = options_of(
-    kind_option("Nominal, or sliding mode, which disturbances within delta do not move."),
-    click.option("--T", "T", metavar="NUMBER", help="Nominal: the deadline.  [default: 1]"),
-    click.option("--rho1", metavar="NUMBER", default="1", help="Constant part of the gain."),
-    click.option("--rho2", metavar="NUMBER", default="1", help="Factor of the growing part of the gain."),
-    click.option("--kappa", metavar="NUMBER", default="2", help="Exponent of the time scaling."),
-    click.option(
-        "--x0", metavar="STATE", default="random", help="Initial state: 5,2,-4 | label=value,... | FILE.csv | random"
-    ),
-    click.option("--seed", type=click.IntRange(min=0), default=0, help="Seed of random initial states."),
-    *(
-        click.option(flag_of(name), name, metavar="NUMBER", help=f"{text}  [default: {value}]")
-        for name, (value, text) in _SLIDING.items()
-    ),
-    click.option(
-        "--disturbance",
-        metavar="EXPR",
-        help="Of the simulated run: an expression of k and t, worst-case (sliding mode), telegraph or none."
-        "  [default: worst-case]",
-    ),
-    click.option(
-        "--sigma0", metavar="STATE", help="Sliding mode: like --x0; 0 leaves no reaching phase.  [default: 0]"
-    ),
+protocol_options = together(
+    kind_option(KIND.help),
+    options_for(NominalProtocol),
+    one_of(InitialState, "x0", default="random"),
+    one_of(Run, "seed"),
+    options_for(SlidingModeProtocol),
+    one_of(Asks, "disturbance"),
+    one_of(InitialState, "sigma0"),
 )
-limit_options = options_of(
-    number_option("--gain-cap", metavar="G", help="Nominal: the gain is at most G."),
-    number_option("--stop-before", metavar="EPS", help="Nominal: the input is 0 from T - EPS on."),
-    number_option("--sample-period", metavar="H", help="Nominal: gain and input are held over periods H."),
-)
-method_option = click.option(
-    "--method",
-    type=click.Choice(["best", "paper", "perron", "lmi", "full"]),
-    default="best",
-    help="Lyapunov functions searched beside the paper's.",
-)
-initial_bound_option = number_option(
-    "--initial-bound", metavar="R", help="Bound the input for all initial states within |x_k(0)| <= R, not --x0."
-)
+limit_options = options_for(GainLimits)
+method_option = one_of(Asks, "method")
+initial_bound_option = one_of(Asks, "initial_set")
 #: Of a scenario, for commands that only draw x(0): where it is random, it begins within the set.
-random_within_option = number_option("--initial-bound", hidden=True)
+random_within_option = one_of(Asks, "initial_set", hidden=True)
 memory_option = click.option(
     "--memory",
     type=click.FloatRange(min=0, min_open=True, max=1000),
@@ -255,14 +168,7 @@ memory_option = click.option(
 time_unit_option = click.option(
     "--time-unit", metavar="UNIT", default="", show_default=False, help="Of time on the axes of figures, such as s."
 )
-time_limit_option = click.option(
-    "--time-limit",
-    type=float,
-    metavar="SECONDS",
-    help="Of wall time, for simulation and searches of a graph together, not for decisions and checks; near it what is "
-    "found may differ from run to run.  [default: the work of 60 s, and of 1 s more for every 1,000 nodes, which does "
-    "not depend on how busy the machine is]",
-)
+time_limit_option = one_of(Asks, "time_limit")
 output_option = click.option(
     "-o",
     "--output",
@@ -272,8 +178,10 @@ output_option = click.option(
 )
 
 
-class OneGraph(click.Command):
+class OneGraph(Command):
     """A command about one graph, which says so if it is given several."""
+
+    first = (*Command.first, "max_input", "initial_bound", "deadline", "shortest_deadline", "residual")
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Return what is left of the arguments: nothing."""
@@ -324,7 +232,7 @@ def reading_of(options: Options) -> dict[str, Any]:
     >>> reading_of({"edges": "listens", "undirected": False, "T": "1"})
     {'orientation': 'listens', 'undirected': False}
     """
-    return {"orientation" if name == "edges" else name: options[name] for name in READING if name in options}
+    return {field: options[told.name] for field, told in options_of(Reading).items() if told.name in options}
 
 
 def reading_words(options: Options) -> list[str]:
@@ -335,40 +243,51 @@ def reading_words(options: Options) -> list[str]:
 
 def protocol_of(options: Options, disturbed: tuple[str, ...] = ("delta",)) -> Protocol:
     """Return the protocol; ``disturbed`` are the options about disturbances that the nominal one takes too."""
-    from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
-
-    shared = {name: options[name] for name in ("rho1", "rho2", "kappa")}
     nominal = options["kind"] == "nominal"
     other = "sliding-mode" if nominal else "nominal"
-    for name in (*FOREIGN[options["kind"]], *["delta"] * nominal):
+    for name in (*OF_PROTOCOL["sliding-mode" if nominal else "nominal"], *["delta"] * nominal):
         if options.get(name) is not None and name not in disturbed:
             mend = "the deadline is --T-r plus --T-s" if name == "T" else "leave it out or change the protocol"
             raise ParameterError(f"{flag_of(name)} belongs to --protocol {other}; {mend}")
-    if nominal:
-        return NominalProtocol(T="1" if options["T"] is None else options["T"], **shared)
-    defaults = {name: default for name, (default, _) in _SLIDING.items()} | {"delta": "1"}
-    own = {name: default if options[name] is None else options[name] for name, default in defaults.items()}
-    return SlidingModeProtocol(**own, **shared)
+    kind = NominalProtocol if nominal else SlidingModeProtocol
+    given = {field.name: options[field.name] for field in fields(kind)}
+    return kind(**{name: value for name, value in given.items() if value is not None})
 
 
-def sliding_keywords(protocol: Protocol, options: Options, graph: SignedDigraph) -> dict[str, Any]:
-    """Return ``sigma0`` and ``disturbance`` as the library takes them; nothing for the nominal protocol."""
+def asks_of(options: Options) -> Asks:
+    """Return what is asked of single graphs and families, beside disturbances and noise."""
+    most = options["max_input"]
+    if most is not None and most <= 0:
+        raise ParameterError("--max-input is outside its domain; it must be > 0")
+    asks = {field: value for field, value in given_of(Asks, options).items() if field not in ("noise", "disturbance")}
+    return Asks(**asks, expectations=Expectations(**given_of(Expectations, options)))
+
+
+def sigma0_of(protocol: Protocol, options: Options, graph: SignedDigraph) -> list[Fraction] | None:
+    """Return ``sigma(0)``; None under the nominal protocol."""
+    if protocol.reaching is None:
+        return None
+    text = options["sigma0"]
+    if text is None or ("0" in text and not text.strip("0. ")):
+        return [Fraction(0)] * graph.n_nodes
+    return read_initial_state(text, [options["seed"], 1], graph, "--sigma0: sigma(0)")
+
+
+def disturbance_of(protocol: Protocol, options: Options, graph: SignedDigraph) -> Any:
+    """Return what a run meets under the sliding-mode protocol, by default the worst; None under the nominal one."""
     from ptcc_certify.protocols.disturbance import as_disturbance
 
     if (sliding := protocol.reaching) is None:
-        return {}
+        return None
     source = "worst-case" if options["disturbance"] is None else options["disturbance"]
-    horizon, seed = 2 * float(protocol.T), options["seed"]
-    return {
-        "sigma0": _sigma0(options["sigma0"], seed, graph),
-        "disturbance": as_disturbance(source, graph.n_nodes, sliding.delta, horizon, seed),
-    }
+    return as_disturbance(source, graph.n_nodes, sliding.delta, 2 * float(protocol.T), options["seed"])
 
 
 def run_keywords(protocol: Protocol, options: Options, graph: SignedDigraph) -> dict[str, Any]:
     """Return what acts on a simulated run, as the library takes it."""
     if protocol.reaching is not None:
-        return sliding_keywords(protocol, options, graph)
+        sigma0 = sigma0_of(protocol, options, graph)
+        return {"sigma0": sigma0, "disturbance": disturbance_of(protocol, options, graph)}
     from ptcc_certify.simulation.nominal import Bounded
 
     delta, disturbance = options["delta"], options["disturbance"]
@@ -381,16 +300,14 @@ def run_keywords(protocol: Protocol, options: Options, graph: SignedDigraph) -> 
 
 def actuator_of(options: Options) -> GainLimits | None:
     """Return the limits of the gain; None if there are none."""
-    from ptcc_certify.protocols.gain_limits import GainLimits
-
     actuator = GainLimits(**{name: options[name] for name in LIMITS})
     return None if actuator.ideal else actuator
 
 
-def _sigma0(text: str | None, seed: int, graph: SignedDigraph) -> list[Fraction]:
-    if text is None or ("0" in text and not text.strip("0. ")):
-        return [Fraction(0)] * graph.n_nodes
-    return read_initial_state(text, [seed, 1], graph, "--sigma0: sigma(0)")
+def limits_of(options: Options) -> tuple[GainLimits, ...]:
+    """Return the limits of the gain; none if there are none."""
+    actuator = actuator_of(options)
+    return () if actuator is None else (actuator,)
 
 
 def read_initial_state(

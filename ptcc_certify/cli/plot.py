@@ -11,7 +11,7 @@ from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
 from ptcc_certify.cli.agents import (
-    agents_keywords,
+    agents_and_states,
     agents_of,
     agents_options,
     dimension_option,
@@ -20,11 +20,15 @@ from ptcc_certify.cli.agents import (
     refuse_dimension,
     run_in_places,
 )
+from ptcc_certify.cli.declared import Command
 from ptcc_certify.cli.families import mode_options, read_graph_or_family, refuse_options
 from ptcc_certify.cli.scenario import MEMORY, graph_of, refuse_beside
 from ptcc_certify.cli.terminal import FIGURES, print_lines, progress, refuse_output
 from ptcc_certify.errors import ExitCode, ParameterError
 from ptcc_certify.graphs.kinds_of_file import kind_of
+from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.case import Case
+from ptcc_certify.model.initial_state import InitialState
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate
@@ -56,7 +60,7 @@ class _Figure(click.Choice):  # type: ignore[type-arg]  # no generic class befor
         return str(super().convert(value, param, ctx))
 
 
-@click.command()
+@click.command(cls=Command)
 @click.argument(
     "graph",
     nargs=-1,
@@ -204,7 +208,7 @@ def _of_family(family: Family, what: str, options: shared.Options) -> Family | F
     x0 = shared.read_initial_state(options["x0"], options["seed"], family.modes[0].mandatory)
     if x0 is None:
         raise ParameterError(f"{what} is drawn from an initial state; give one with --x0")
-    sigma0 = shared.sliding_keywords(protocol, options, family.modes[0].mandatory).get("sigma0")
+    sigma0 = shared.sigma0_of(protocol, options, family.modes[0].mandatory)
     with progress(STEPS) as begin:
         return certify_family(family, protocol, x0, sigma0=sigma0, time_limit=options["time_limit"], progress=begin)
 
@@ -213,7 +217,7 @@ def _of_graph(
     signed: SignedDigraph, what: str, options: shared.Options
 ) -> Certificate | Trajectory | tuple[SignedDigraph, Any]:
     """Return what the figure of a graph is drawn from: itself, a run, or for its decay a certificate."""
-    from ptcc_certify.certificate.procedure import STEPS, certify
+    from ptcc_certify.certificate.procedure import STEPS, certify_case
     from ptcc_certify.protocols.agents import Agents
 
     protocol = shared.protocol_of(options, () if what == "decay" else ("delta", "disturbance"))
@@ -227,11 +231,16 @@ def _of_graph(
     if what == "decay":
         if shared.actuator_of(options) is not None:
             raise ParameterError("decay is drawn without limits of the gain; leave them out, or ask for --what states")
-        more = shared.sliding_keywords(protocol, options, signed)
-        more |= {} if places is None else {"agents": Agents(1, offsets=places)}
-        search = {name: options[name] for name in ("method", "time_limit")}
+        initial = InitialState(x0, sigma0=shared.sigma0_of(protocol, options, signed))
+        asks = Asks(
+            method=options["method"],
+            time_limit=options["time_limit"],
+            simulation=True,
+            disturbance=shared.disturbance_of(protocol, options, signed),
+        )
+        agents = None if places is None else Agents(1, offsets=places)
         with progress(STEPS) as begin:
-            return certify(signed, protocol, x0, simulation=True, progress=begin, **more, **search)
+            return certify_case(Case(signed, protocol, initial, agents=agents, asks=asks), progress=begin)  # type: ignore[return-value]
     with progress(("simulation",)) as begin:
         begin("simulation")
         return run_in_places(signed, protocol, x0, places, **shared.run_keywords(protocol, options, signed))
@@ -239,21 +248,20 @@ def _of_graph(
 
 def _of_agents(signed: SignedDigraph, protocol: Protocol, what: str, options: shared.Options) -> Certificate:
     """Return what the figure of agents of order n is drawn from: a certificate of theirs."""
-    from ptcc_certify.certificate.procedure import STEPS, certify
+    from ptcc_certify.certificate.procedure import STEPS, certify_case
 
-    of_agents = agents_keywords(options, signed)
-    if not of_agents:
+    agents, initial = agents_and_states(options, signed)
+    if initial is None:
         raise ParameterError(f"--what {what}: is of agents of order n; add --agents double-integrator, say")
     drawn = (*OF_AGENTS, *_SHARED)
     if what not in drawn:
         raise ParameterError(f"--what {what}: is not drawn of agents of order n; ask for --what {' or '.join(drawn)}")
     if what == "formation" and options["dimension"] != 2:
         raise ParameterError("--what formation: is drawn in the plane; add --dimension 2")
-    search = {name: options[name] for name in ("method", "time_limit")}
-    if protocol.reaching is not None:
-        search |= {"sigma0": shared.sliding_keywords(protocol, options, signed)["sigma0"]}
+    asks = Asks(method=options["method"], time_limit=options["time_limit"], simulation=False)
+    initial = replace(initial, sigma0=shared.sigma0_of(protocol, options, signed))
     with progress(STEPS) as begin:
-        return certify(signed, protocol, simulation=False, progress=begin, **of_agents, **search)
+        return certify_case(Case(signed, protocol, initial, agents=agents, asks=asks), progress=begin)  # type: ignore[return-value]
 
 
 def _draw(what: str, subject: Any, wide: bool, time_unit: str) -> Any:

@@ -18,10 +18,15 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
+from ptcc_certify.cli.declared import DECLARED, FILE, IN_LIBRARY, OF_PROTOCOL, TITLES, names_of
 from ptcc_certify.cli.terminal import SCENARIO
 from ptcc_certify.errors import FormatError, ParameterError, PTCCError, did_you_mean
 from ptcc_certify.graphs.kinds_of_file import TOML, kind_of, refuse_as_graph
+from ptcc_certify.graphs.option import Option
 from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.reading import OPTIONAL, UNCERTAINTY
+from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.protocols.moving_leaders import MovingLeaders
 
 #: Largest file, in bytes.
 MAX_BYTES = 1_000_000
@@ -29,148 +34,22 @@ MAX_BYTES = 1_000_000
 MEMORY = "ptcc_certify.scenario"
 #: Commands for which it does not matter what the agents are.
 _OF_THE_GRAPH_ALONE = ("classify", "check")
-#: Options of late messages and moving leaders.
-BESIDE = ("delay", "period", "packet_loss", "quantisation", "own_delay", "leader_speed", "sign_gain")
 #: Where the context of its command is kept.
 COMMAND = "ptcc_certify.command"
-#: What the library calls some options.
-IN_LIBRARY = {"initial_state": "x0", "initial": "x0", "behaviour": "expect", "speed": "leader_speed"}
 
-#: The sections: what they are about, and of each key the option that it stands for, and an example of its value.
-SECTIONS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
-    "graph": (
-        "Who listens to whom.",
-        {
-            "file": ("graph", '"fig1b"'),
-            "edges": ("edges", '"information"'),
-            "duplicates": ("duplicates", '"refuse"'),
-            "drop_self_loops": ("drop_self_loops", "false"),
-            "drop_zeros": ("drop_zeros", "false"),
-            "undirected": ("undirected", "false"),
-            "laplacian": ("laplacian", "false"),
-            "columns": ("columns", '"source,target,weight"'),
-            "variable": ("variable", '"W"'),
-            "uncertainty": ("uncertainty", '"10%"'),
-            "optional": ("optional", '["a,b"]'),
-            "signal": ("signal", '"any"'),
-            "dwell": ("dwell", '"0.1"'),
-            "clock_dwell": ("clock_dwell", '"0.1"'),
-            "clock_window": ("clock_window", '"2"'),
-            "window_on": ("window_on", '"0.5"'),
-            "share": ("share", '["0.7", "0.3"]'),
-        },
-    ),
-    "protocol": (
-        "The protocol and its parameters; exact: 0.1 is 1/10, and 1/3 is written as a text.",
-        {
-            "kind": ("kind", '"nominal"'),
-            "T": ("T", "1"),
-            "rho1": ("rho1", "1"),
-            "rho2": ("rho2", "1"),
-            "kappa": ("kappa", "2"),
-            "T_r": ("T_r", "0.5"),
-            "T_s": ("T_s", "0.5"),
-            "mu1": ("mu1", "2"),
-            "mu2": ("mu2", "1"),
-            "mu3": ("mu3", "1"),
-        },
-    ),
-    "initial_state": (
-        "Where the agents begin: a list in node order, { label = value }, a CSV file, or random.",
-        {
-            "x0": ("x0", '"random"'),
-            "sigma0": ("sigma0", "0"),
-            "seed": ("seed", "0"),
-            "initial_bound": ("initial_bound", "10"),
-            "dimension": ("dimension", "1"),
-        },
-    ),
-    "agents": (
-        "Agents of order n, their first velocities, and a formation.",
-        {
-            "kind": ("agents", '"double-integrator"'),
-            "v0": ("v0", '"0"'),
-            "a0": ("a0", '"0"'),
-            "drag": ("drag", "0.1"),
-            "plant": ("plant", '"0,0.1"'),
-            "offsets": ("offsets", '"offsets.csv"'),
-            "biases": ("biases", '"biases.csv"'),
-            "rest": ("rest", "1"),
-            "cascade": ("cascade", "1"),
-            "decay": ("decay", "4"),
-        },
-    ),
-    "disturbance": (
-        "What disturbs the agents.",
-        {"delta": ("delta", "1"), "signal": ("disturbance", '"worst-case"'), "noise": ("noise", "0.01")},
-    ),
-    "limits": (
-        "Limits of the gain (nominal protocol).",
-        {
-            "gain_cap": ("gain_cap", "100"),
-            "stop_before": ("stop_before", "0.01"),
-            "sample_period": ("sample_period", "0.001"),
-        },
-    ),
-    "messages": (
-        "Messages that arrive late, get lost or are rounded.",
-        {
-            "delay": ("delay", "0.02"),
-            "period": ("period", "0.01"),
-            "packet_loss": ("packet_loss", "3"),
-            "quantisation": ("quantisation", "0.1"),
-            "own_delay": ("own_delay", "false"),
-        },
-    ),
-    "leaders": (
-        "Leaders that move (nominal protocol).",
-        {"speed": ("leader_speed", "0.5"), "sign_gain": ("sign_gain", "1")},
-    ),
-    "expectations": (
-        "What is asked: exit code 3 if it is refuted, 4 if it is left open.",
-        {
-            "behaviour": ("expect", '"bipartite-consensus"'),
-            "min_rate": ("min_rate", "1"),
-            "max_input": ("max_input", "100"),
-            "max_residual": ("max_residual", "0.05"),
-        },
-    ),
-    "certificate": (
-        "How it is proved.",
-        {
-            "method": ("method", '"best"'),
-            "at": ("at", "0.5"),
-            "time_limit": ("time_limit", "60"),
-            "simulation": ("simulation", "true"),
-        },
-    ),
-    "simulation": (
-        "How ptcc simulate runs it.",
-        {
-            "samples": ("samples", "201"),
-            "steps": ("steps", "100"),
-            "boundary_layer": ("boundary_layer", "0.01"),
-            "pattern": ("age_pattern", '"oldest"'),
-        },
-    ),
-    "design": (
-        "What ptcc design asks, beside max_input and initial_bound.",
-        {
-            "deadline": ("deadline", "1"),
-            "shortest_deadline": ("shortest_deadline", "true"),
-            "residual": ("residual", "0.01"),
-            "input_norm": ("input_norm", '"2"'),
-        },
-    ),
-}
-_STATES = ("x0", "sigma0", "v0", "a0", "offsets", "biases")
+
+def _keys(section: str) -> dict[str, Option]:
+    """Return the options of a section by their keys."""
+    declared = (told for told in DECLARED if told.key.partition(".")[0] == section)
+    return {told.key.partition(".")[2]: told for told in declared}
+
+
+#: The sections: what they are about, and of each key the option that it stands for.
+SECTIONS = {section: (title, _keys(section)) for section, title in TITLES.items()}
 #: Keys that make a family of a graph.
-OF_FAMILIES = ("uncertainty", "optional")
-#: Options of the other protocol: a flag that chooses the protocol leaves such keys out.
-FOREIGN = {
-    "nominal": ("T_r", "T_s", "mu1", "mu2", "mu3", "sigma0", "disturbance", "boundary_layer"),
-    "sliding-mode": ("T", "gain_cap", "stop_before", "sample_period", "noise"),
-}
+OF_FAMILIES = (UNCERTAINTY.name, OPTIONAL.name)
+#: Options of late messages and moving leaders.
+BESIDE = names_of(LateMessages, MovingLeaders)
 
 
 @dataclass(frozen=True)
@@ -205,8 +84,8 @@ class Scenario:
     def place(self, option: str) -> str:
         """Return where an option stands in the file: ``scenario.toml: [protocol] T``."""
         for section, (_, keys) in SECTIONS.items():
-            for key, (name, _) in keys.items():
-                if name == option:
+            for key, told in keys.items():
+                if told.name == option:
                     return f"{self.path}: [{section}] {key}"
         return self.path
 
@@ -253,15 +132,15 @@ def read_scenario(path: str) -> Scenario:
             if key not in known:
                 hint = _where(key) or did_you_mean(key, known) or f"; there are {', '.join(known)}"
                 raise ParameterError(f"{place}: no such key{hint}")
-            option = known[key][0]
-            if option == "plant":
-                options[option] = _numbers(value if isinstance(value, list) else [value], place)
-            elif option in _STATES:
-                options[option] = _state(value, folder, place)
-            elif option == "graph" and isinstance(value, list):
-                options[option] = _texts_of(value, place, '["day.csv", "night.csv"]') or None
+            told = known[key]
+            if told.kind == "numbers":
+                options[told.name] = _numbers(value if isinstance(value, list) else [value], place)
+            elif told.kind == "state":
+                options[told.name] = _state(value, folder, place)
+            elif told is FILE and isinstance(value, list):
+                options[told.name] = _texts_of(value, place, '["day.csv", "night.csv"]') or None
             else:
-                options[option] = _value(value, known[key][1], place)
+                options[told.name] = _value(value, told.example, place)
     files = options.get("graph")
     if not isinstance(files, str | list):
         raise ParameterError(
@@ -431,8 +310,8 @@ def refuse_beside(scenario: Scenario | None, command: str) -> None:
         return
     for option in BESIDE:
         if scenario.options.get(option) not in (None, False):
-            what = "leaders that move" if option in ("leader_speed", "sign_gain") else "late messages"
-            figure = "tracking" if option in ("leader_speed", "sign_gain") else "late"
+            of_leaders = option in names_of(MovingLeaders)
+            what, figure = ("leaders that move", "tracking") if of_leaders else ("late messages", "late")
             mend = f"ptcc certify -o c.json proves it, ptcc plot c.json --what {figure} runs it"
             raise ParameterError(f"{scenario.place(option)}: ptcc {command} does not take {what}; {mend}")
 
@@ -455,7 +334,8 @@ def kind_of_protocol(context: click.Context, parameter: click.Parameter | None, 
     The callback of ``--protocol``; eager, as GRAPH is, in whichever order they are given.
     """
     if kind is not None and context.get_parameter_source("kind") is ParameterSource.COMMANDLINE:
-        context.default_map = {k: v for k, v in (context.default_map or {}).items() if k not in FOREIGN[kind]}
+        left_out = {name for other, names in OF_PROTOCOL.items() for name in names if other != kind}
+        context.default_map = {k: v for k, v in (context.default_map or {}).items() if k not in left_out}
     return kind
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,8 +13,8 @@ from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
 from ptcc_certify.cli.agents import (
+    agents_and_states,
     agents_flags,
-    agents_keywords,
     agents_of,
     agents_options,
     places_of,
@@ -21,6 +22,7 @@ from ptcc_certify.cli.agents import (
     run_in_places,
     run_of_agents,
 )
+from ptcc_certify.cli.declared import DIMENSION, SIGNAL, Command, click_option, flag_of, one_of
 from ptcc_certify.cli.families import (
     dwell_of,
     dwell_options,
@@ -34,6 +36,10 @@ from ptcc_certify.cli.scenario import BESIDE
 from ptcc_certify.cli.terminal import FIGURES, print_lines, refuse_output
 from ptcc_certify.errors import ExitCode, ParameterError
 from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.case import Case
+from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.run import Run
 from ptcc_certify.shown import rendered
 
 if TYPE_CHECKING:
@@ -48,7 +54,7 @@ if TYPE_CHECKING:
 _TABLES = ("", ".csv", ".txt")
 
 
-@click.command()
+@click.command(cls=Command)
 @shared.graphs_argument
 @shared.reading_options
 @shared.protocol_options
@@ -56,28 +62,23 @@ _TABLES = ("", ".csv", ".txt")
 @shared.random_within_option
 @mode_options
 @dwell_options
-@click.option(
-    "--signal",
-    metavar="SIGNAL",
+@click_option(
+    SIGNAL,
+    flag="--signal SIGNAL",
+    kind="text",
     default="random",
     help="Family: random (with --seed), worst-case, constant, or FILE.csv with columns t (or clock), mode, level.",
 )
 @agents_options
 @shared.method_option
 @message_options
-@click.option(
-    "--pattern",
-    "age_pattern",
-    type=click.Choice(["oldest", "fresh", "varying", "square"]),
-    default="oldest",
-    help="With late messages: as old as allowed, fresh, between the two, or now this, now that (with --seed).",
-)
+@one_of(Run, "pattern")
 @leader_options
-@click.option("--dimension", type=click.IntRange(1, 1000), default=1, help="State components per agent.")
-@click.option("--samples", type=click.IntRange(2, 100_000), default=201, help="Instants up to T, dense towards it.")
-@click.option("--steps", type=click.IntRange(1, 100_000), help="Instead: so many equal steps of t from 0 to T.")
-@click.option("--boundary-layer", type=float, metavar="W", help="Sliding mode: tanh(sigma/W) for the sign, to compare.")
-@shared.number_option("--noise", metavar="NU", help="Nominal: telegraph noise of size NU on every measurement.")
+@click_option(DIMENSION, default=1, help="State components per agent.")
+@one_of(Run, "samples")
+@one_of(Run, "steps")
+@one_of(Run, "boundary_layer")
+@one_of(Asks, "noise", help="Nominal: telegraph noise of size NU on every measurement.")
 @click.option("--wide", is_flag=True, help="A figure as wide as two columns of a journal, instead of one.")
 @shared.time_unit_option
 @click.option("-o", "--output", type=click.Path(dir_okay=False), help="FILE.csv, or a figure: .png, .pdf, .svg")
@@ -163,24 +164,24 @@ def _run_agents(signed: SignedDigraph, protocol: Protocol, options: shared.Optio
     for name in ("steps", "boundary_layer"):
         if options[name] is not None:
             mend = f"leave it out, or leave out {agents_flags(options)}"
-            raise ParameterError(f"{shared.flag_of(name)}: is for single integrators; {mend}")
+            raise ParameterError(f"{flag_of(name)}: is for single integrators; {mend}")
     source = click.get_current_context().get_parameter_source
     if options["kind"] == "nominal" and options["disturbance"] is not None:
         raise ParameterError("--disturbance: agents of order n run without, or under --protocol sliding-mode")
     if source("signal") == ParameterSource.COMMANDLINE:
         raise ParameterError("--signal: is for families of graphs; this is one graph: leave it out")
     refuse_restricted(options)
-    more = agents_keywords(options, signed)
-    if protocol.reaching is not None:
-        more |= {"sigma0": shared.sliding_keywords(protocol, options, signed)["sigma0"]}
-    return run_of_agents(signed, protocol, more | {"method": options["method"]}, options["samples"])
+    agents, initial = agents_and_states(options, signed)
+    asks = Asks(method=options["method"], simulation=False)
+    begin = replace(initial or InitialState(), sigma0=shared.sigma0_of(protocol, options, signed))
+    return run_of_agents(Case(signed, protocol, begin, agents=agents, asks=asks), options["samples"])
 
 
 def _refuse_messages(options: shared.Options, what: str) -> None:
     """Refuse late messages and moving leaders where they are not simulated."""
     for name in BESIDE:
         if options[name] not in (None, False):
-            raise ParameterError(f"{shared.flag_of(name)}: is not simulated of {what}; leave it out")
+            raise ParameterError(f"{flag_of(name)}: is not simulated of {what}; leave it out")
 
 
 def _run_beside(
@@ -201,9 +202,9 @@ def _run_beside(
     given += [option for option in ("samples", "signal") if source(option) == ParameterSource.COMMANDLINE]
     given += ["dimension"] * (options["dimension"] > 1)
     if given:
-        raise ParameterError(f"{shared.flag_of(given[0])}: is not simulated with {name}; leave it out")
+        raise ParameterError(f"{flag_of(given[0])}: is not simulated with {name}; leave it out")
     refuse_restricted(options)
-    sigma0 = shared.sliding_keywords(protocol, options, signed).get("sigma0")
+    sigma0 = shared.sigma0_of(protocol, options, signed)
     x0 = shared.read_initial_state(options["x0"], options["seed"], signed)
     more: Any = {"messages": messages, "leaders": leaders}
     more |= {} if messages is None else {"signal": (options["age_pattern"], options["seed"])}
@@ -250,5 +251,6 @@ def _run_family(
         flag = "--dwell" if options["dwell"] is not None else "--clock-dwell"
         raise ParameterError(f"{flag} is of random signals; leave it out, or leave out --signal {shorten(signal)}")
     played = as_signal(signal, options["seed"]) if promise is None else RandomDwellSignal(promise, options["seed"])
-    more = shared.sliding_keywords(protocol, options, family.modes[0].mandatory)
-    return simulate(family, protocol, x0, played, times=times, samples=options["samples"], **more)
+    one = family.modes[0].mandatory
+    more = {"sigma0": shared.sigma0_of(protocol, options, one), "samples": options["samples"], "times": times}
+    return simulate(family, protocol, x0, played, disturbance=shared.disturbance_of(protocol, options, one), **more)

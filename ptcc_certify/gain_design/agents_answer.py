@@ -30,7 +30,7 @@ class AgentsDesign(DesignAnswer):
     Examples
     --------
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -3)])
-    >>> answer = design_agents(pair, Agents(order=2), [1, 1], v0=[0, 1], max_input=10)
+    >>> answer = design_agents(pair, Agents(order=2), InitialState([1, 1], v0=[0, 1]), max_input=10)
     >>> answer.verdict, answer.certificate.verdict, bool(answer.peak <= 10)
     ('met', 'certified', True)
     >>> bool(answer.shortest_possible <= answer.too_short < answer.deadline)

@@ -23,13 +23,14 @@ from ptcc_certify.bounds.shortest_time import shortest_time
 from ptcc_certify.certificate.agents_answer import AgentsAnswer
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
-from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.gain_design.agents_answer import AgentsDesign
 from ptcc_certify.gain_design.agents_deadlines import Candidate, Search, at_deadline, longest
 from ptcc_certify.gain_design.answer import INFEASIBLE, MET, UNPROVED, refusal
 from ptcc_certify.gain_design.request import Request
+from ptcc_certify.graphs.io import as_graph
 from ptcc_certify.graphs.rationals import short_exact, shorten
+from ptcc_certify.model.asks import Asks, Expectations
 from ptcc_certify.protocols import NominalProtocol, Protocol
 from ptcc_certify.protocols.agents import Agents
 from ptcc_certify.protocols.parameters import parameter
@@ -45,8 +46,6 @@ def design_agents(
     x0: Any,
     *,
     max_input: Exact,
-    v0: Any = None,
-    derivatives: Any = None,
     deadline: Exact | None = None,
     residual: Exact | None = None,
     protocol: Protocol | None = None,
@@ -61,12 +60,9 @@ def design_agents(
     agents : Agents
         Of order n, or in a formation; their ``decay`` is ``2 n`` unless it is given. Of the cascade, and of agents that
         meet at rest, ``rho2`` is raised where that of ``protocol`` does not bound the input.
-    x0 : state-like, or N rows of coordinates
-        Initial positions, in node order or by label, in units of length.
-    v0 : state-like, optional
-        Initial velocities, like ``x0``; without them 0.
-    derivatives : sequence of state-like, optional
-        Instead of ``v0``: velocities, accelerations and so on.
+    x0 : state-like, N rows of coordinates, or InitialState
+        Initial positions, in node order or by label, in units of length; an :class:`~ptcc_certify.InitialState` tells
+        velocities and so on, too, which are 0 without it.
     max_input : int, float, str or Fraction
         Positive: bound of the Euclidean norm of every agent's input at all times, sliding terms included.
     deadline : int, float, str or Fraction, optional
@@ -105,19 +101,19 @@ def design_agents(
     'infeasible'
     """
     request = Request(
-        parameter("max_input", max_input),
-        None if deadline is None else parameter("deadline", deadline),
-        None if residual is None else parameter("residual", residual),
+        max_input=parameter("max_input", max_input),
+        deadline=None if deadline is None else parameter("deadline", deadline),
+        residual=None if residual is None else parameter("residual", residual),
     )
     _refuse(agents, request)
     agents = agents if agents.cascade is not None else replace(agents, decay=agents.decay_rate)
     template = NominalProtocol(T=1, rho1="0.001", rho2=1, kappa=1) if protocol is None else protocol
-    given = {"agents": agents, "v0": v0, "derivatives": derivatives, "orientation": orientation, "simulation": False}
+    graph, asks = graph if orientation is None else as_graph(graph, orientation), Asks(simulation=False)
     first = request.deadline or min(Fraction(1), longest(agents) / 2)
-    base = certify(graph, at_deadline(template, first), x0, **given)
+    base = certify(graph, at_deadline(template, first), x0, agents=agents, asks=asks)
     if base.agents is not None and base.agents.bounding_rho2 is not None:
         template = template.replace(rho2=base.agents.bounding_rho2)
-        base = certify(graph, at_deadline(template, first), x0, **given)
+        base = certify(graph, at_deadline(template, first), x0, agents=agents, asks=asks)
     part = base.agents
     if part is None or part.initial_state is None:
         raise ParameterError("design of agents of order n starts from an initial state; give x0")
@@ -135,8 +131,8 @@ def design_agents(
         candidate = search.best
         if candidate is None:
             return _without(blank, search, search.nearest)
-    asked = Expectations(max_input=request.max_input)
-    again = certify(graph, candidate.protocol, x0, **given, expectations=asked)
+    asks = replace(asks, expectations=Expectations(max_input=request.max_input))
+    again = certify(graph, candidate.protocol, x0, agents=agents, asks=asks)
     return _with(replace(blank, too_short=search.too_short), candidate, base, again)
 
 

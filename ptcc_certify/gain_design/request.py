@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
-from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.checker.input_formulas import InitialSet, InputBounds
+from ptcc_certify.graphs.option import option
+
+if TYPE_CHECKING:
+    from ptcc_certify.certificate.certificate import Certificate
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Request:
     """What is asked of an input from a given initial state.
 
@@ -23,12 +26,19 @@ class Request:
         deadline, of agents of order n that of positions.
     """
 
+    section: ClassVar = "design"
     max_input: Fraction
-    deadline: Fraction | None
-    residual: Fraction | None
+    deadline: Fraction | None = option("--deadline T", "Ask for this deadline ..", required=True, unit="time")
+    residual: Fraction | None = option(
+        "--residual r",
+        "Every agent may be so far from its final state at the deadline.",
+        required=True,
+        example="0.01",
+        unit="state",
+    )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class DesignRequest(Request):
     """What is asked of an input from all initial states of a set.
 
@@ -40,7 +50,10 @@ class DesignRequest(Request):
         For all of which it is to hold.
     """
 
-    input_norm: int | None
+    section: ClassVar = "design"
+    input_norm: int | None = option(
+        "--input-norm", "2: U bounds ||u||, not each |u_k|.", required=True, example='"2"', choices=("2",)
+    )
     initial_set: InitialSet
 
     def met_by(self, fit: Fit) -> bool:

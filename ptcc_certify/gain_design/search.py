@@ -47,7 +47,6 @@ from lmi.exact.decimal_rounding import up
 from ptcc_certify.bounds.input.initial_set import initial_set_within
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
-from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.checker import INPUT_NODES
 from ptcc_certify.checker.input_formulas import InitialSet
 from ptcc_certify.errors import ParameterError
@@ -57,6 +56,7 @@ from ptcc_certify.gain_design.request import DesignRequest, Fit, fit_of
 from ptcc_certify.gain_design.shortest_possible import lower_product
 from ptcc_certify.graphs.rationals import nearest_float, shorten
 from ptcc_certify.graphs.structure import Structure, analyse
+from ptcc_certify.model.asks import Asks, Expectations
 from ptcc_certify.protocols import NominalProtocol
 from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.protocols.parameters import parameter
@@ -142,9 +142,10 @@ one asked for)
     initial_set = (
         initial_bound if isinstance(initial_bound, InitialSet) else initial_set_within(structure, initial_bound)
     )
-    request = DesignRequest(U, T, r, input_norm, initial_set)
-    begin: dict[str, Any] = {"x0": initial_set.center} if initial_set.point else {"initial_set": initial_set}
-    base = certify(graph, _first_protocol(structure), **begin, simulation=False)
+    request = DesignRequest(max_input=U, deadline=T, residual=r, input_norm=input_norm, initial_set=initial_set)
+    x0, region = (initial_set.center, None) if initial_set.point else (None, initial_set)
+    asks = Asks(initial_set=region, simulation=False)
+    base = certify(graph, _first_protocol(structure), x0, asks=asks)
     lower, why = lower_product(base, request)
     blank = Design(UNPROVED, "", request, T, shortest_possible=None if lower is None else lower / U, lower_by=why)
     first: list[Fit] = []
@@ -158,7 +159,7 @@ one asked for)
             break
         candidate = candidate or fits[-1]
         own = fits[-1].certificate
-        base = certify(graph, own.protocol, **begin, limits=own.limits, simulation=False)
+        base = certify(graph, own.protocol, x0, limits=own.limits, asks=asks)
         again = fit_of(base, request)
         if request.met_by(again) and base.verdict == "certified":
             if again.deadline > candidate.deadline * _LONGER and not refusal(candidate.certificate):

@@ -20,7 +20,7 @@ import numpy as np
 
 from ptcc_certify.errors import FormatError, GraphError, NumberError, gated
 from ptcc_certify.graphs.equality import ReadOnly
-from ptcc_certify.graphs.rationals import as_fraction, shorten, writable
+from ptcc_certify.graphs.rationals import Exact, as_fraction, shorten, writable
 from ptcc_certify.graphs.reading import Reading
 from ptcc_certify.graphs.tables import first_five, import_pandas, in_all, labels_beside, place_of, refuse_unnamed
 from ptcc_certify.graphs.weights import LARGEST_WEIGHT, SMALLEST_WEIGHT, Weights
@@ -34,8 +34,6 @@ if TYPE_CHECKING:
     from ptcc_certify.graphs.io.rows import Rows
 
 _SURROGATE_PAIR = re.compile("[\ud800-\udbff][\udc00-\udfff]")
-
-Exact = Fraction | int | float | str
 
 
 _T = TypeVar("_T")

@@ -17,6 +17,7 @@ from lmi.exact import numbers
 from lmi.exact.numbers import MAX_CHARACTERS, shorten
 from ptcc_certify.errors import NumberError, ParameterError
 
+Exact = Fraction | int | float | str
 #: The sign that typesetting and spreadsheets write, which is no hyphen.
 MINUS = "\N{MINUS SIGN}"
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, ClassVar
 
 from ptcc_certify.errors import FormatError, ParameterError, gated
+from ptcc_certify.graphs.option import Option, option
 from ptcc_certify.graphs.rationals import shorten
 
 _CHOICES = {"orientation": (None, "information", "listens"), "duplicates": ("refuse", "sum", "last")}
@@ -42,23 +43,54 @@ class Reading:
         Which matrix or relation of a file that holds several.
     """
 
-    orientation: str | None = None
-    duplicates: str = "refuse"
-    drop_self_loops: bool = False
-    drop_zeros: bool = False
-    undirected: bool = False
-    laplacian: bool | None = None
-    columns: str | Sequence[str] | None = None
-    variable: str | None = None
+    section: ClassVar = "graph"
+    orientation: str | None = option(
+        "--edges",
+        "Row a,b (or entry a,b of a matrix): flows a -> b, or a listens.",
+        key="edges",
+        example='"information"',
+        choices=("information", "listens"),
+        shown="information; matrix: listens",
+    )
+    duplicates: str = option(
+        "--duplicates",
+        "What becomes of two rows for one ordered pair.",
+        default="refuse",
+        example='"refuse"',
+        choices=("refuse", "sum", "last"),
+    )
+    drop_self_loops: bool = option(
+        "--drop-self-loops/--no-drop-self-loops", "Ignore edges of a node to itself.", default=False, example="false"
+    )
+    drop_zeros: bool = option(
+        "--drop-zeros/--no-drop-zeros", "Ignore edges of weight 0.", default=False, example="false"
+    )
+    undirected: bool = option(
+        "--undirected/--no-undirected", "Every row counts in both directions.", default=False, example="false"
+    )
+    laplacian: bool | None = option(
+        "--laplacian/--no-laplacian",
+        "The matrix is a signed Laplacian D - W, or none though its diagonal holds the sums.",
+        example="false",
+    )
+    columns: str | Sequence[str] | None = option(
+        "--columns A,B,W",
+        "Source, target and weight of a table: titles, or numbers from 1.",
+        example='"source,target,weight"',
+        kind="text",
+    )
+    variable: str | None = option(
+        "--variable NAME", "Which matrix, network or relation of a file with several.", example='"W"', kind="text"
+    )
 
     def __post_init__(self) -> None:
         """Refuse what no option is."""
-        for option, choices in _CHOICES.items():
-            if (value := getattr(self, option)) not in choices:
+        for name, choices in _CHOICES.items():
+            if (value := getattr(self, name)) not in choices:
                 names = ", ".join(filter(None, choices))
-                raise ParameterError(f'{option} "{shorten(str(value))}" is unknown; use one of {names}')
-        for option in _SWITCHES:
-            object.__setattr__(self, option, bool(getattr(self, option)))
+                raise ParameterError(f'{name} "{shorten(str(value))}" is unknown; use one of {names}')
+        for name in _SWITCHES:
+            object.__setattr__(self, name, bool(getattr(self, name)))
         if self.columns is not None:
             object.__setattr__(self, "columns", joined(self.titles))
 
@@ -93,6 +125,22 @@ class Reading:
         return read | {key: value for key, value in more.items() if value is not None}
 
 
+#: What makes a family of a graph: weights in intervals, edges that may fail.
+UNCERTAINTY = Option(
+    flag="--uncertainty SHARE",
+    help="Family: every weight is known up to this share of it, such as 10%.",
+    key="graph.uncertainty",
+    example='"10%"',
+    kind="text",
+)
+OPTIONAL = Option(
+    flag="--optional SOURCE,TARGET",
+    help="Family: this edge may fail, on which TARGET hears SOURCE; repeat it for more.",
+    key="graph.optional",
+    example='["a,b"]',
+    kind="text",
+    many=True,
+)
 #: The options, in the order of their declaration.
 OPTIONS = tuple(field.name for field in fields(Reading))
 

@@ -22,9 +22,9 @@ from lmi.dyadic import round_to_bits
 from lmi.errors import NoCertificate
 from lmi.sparse_h_matrix import DIRECT_ROWS, SparseHMatrix, solve
 from ptcc_certify.errors import HypothesisError
-from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.dominance import round_array
+from ptcc_certify.model.refusals import refuse_leader_groups
 
 #: What floats may have lost in a row: a share of ``b``, and of the terms that cancel. The check forms rows exactly.
 _SLACK, _ROUNDING = 1e-9, 1e-13
@@ -206,29 +206,6 @@ class FollowerRows:
         if not b > 0:
             raise NoCertificate(f"no positive b for q = {float(q):.6g}")
         return RowWitness(q, Fraction(round_to_bits(b * (1 - _SLACK), 53)), u)
-
-
-def refuse_leader_groups(structure: Structure, what: str) -> None:
-    """Refuse a graph some of whose leaders form a group, by the labels of one.
-
-    Raises
-    ------
-    HypothesisError
-        Names two leaders of the group.
-
-    Examples
-    --------
-    >>> refuse_leader_groups(analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1), (2, 3, 1)])), "this")
-    Traceback (most recent call last):
-    ptcc_certify.errors.HypothesisError: this needs leaders that listen to nobody; 1 and 2 are leaders of \
-one group
-    """
-    group = next((c for c in structure.closed_components if len(c.nodes) > 1), None)
-    if group is not None:
-        first, second = (shorten(structure.graph.labels[v]) for v in group.nodes[:2])
-        raise HypothesisError(
-            f"{what} needs leaders that listen to nobody; {first} and {second} are leaders of one group"
-        )
 
 
 def _entries(graph: Any, values: np.ndarray) -> Any:

@@ -32,10 +32,10 @@ from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.dominance import dominant_functions
 from ptcc_certify.lyapunov.error_system import ErrorSystem, rounded_diagonal, rounded_matrix
 from ptcc_certify.lyapunov.function import LyapunovBlock, LyapunovFunction
+from ptcc_certify.model.asks import METHODS
 from ptcc_certify.theorems.lemmas import EXACT_NODES, laplacian_spectrum, left_vector
 from ptcc_certify.theorems.matrix_arithmetic import BITS, diagonal_matrix
 
-METHODS = ("paper", "perron", "lmi", "full", "best")
 DIAGONAL = ("perron", "lmi")
 #: Largest leader group of a large graph whose best diagonal matrix is searched, and where that is asked for.
 SEARCHED_GROUP = (300, 2000)

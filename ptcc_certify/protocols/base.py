@@ -12,17 +12,16 @@ from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
-import numpy as np
-
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import format_exact, shorten
-from ptcc_certify.protocols.gain import Gain
 from ptcc_certify.protocols.parameters import Parameters
 
 if TYPE_CHECKING:
     import casadi as ca
+    import numpy as np
 
     from ptcc_certify.graphs.digraph import SignedDigraph
+    from ptcc_certify.protocols.gain import Gain
 
 
 class Protocol(Parameters, ABC):
@@ -52,6 +51,8 @@ class Protocol(Parameters, ABC):
     @cached_property
     def gain(self) -> Gain:
         """The gain of the nominal input and its clock; its pole is at ``T``."""
+        from ptcc_certify.protocols.gain import Gain
+
         return Gain(self.T, self.rho1, self.rho2, self.kappa)
 
     @property
@@ -156,10 +157,14 @@ class ReachingProtocol(Protocol):
     @cached_property
     def reaching_gain(self) -> Gain:
         """``mu2 + mu3 kappa/(T_r - t)``; by its clock ``c``, ``||sigma|| <= e^-c ||sigma(0)||`` (Proposition 1)."""
+        from ptcc_certify.protocols.gain import Gain
+
         return Gain(self.T_r, self.mu2, self.mu3, self.kappa)
 
     def clock_while_reaching(self, z: np.ndarray) -> np.ndarray:
         """Return the stretched clock at instants ``z = ln(T_r/(T_r - t))``; an infinite one is ``T_r``."""
+        import numpy as np
+
         T, T_r, T_s = float(self.T), float(self.T_r), float(self.T_s)
         return self.gain.clock_at_remaining((T_s + T_r * np.exp(-z)) / T)
 

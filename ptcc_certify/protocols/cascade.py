@@ -7,7 +7,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from lmi.exact.decimal_rounding import near
-from ptcc_certify.protocols.agents import AgentsProtocol
+from ptcc_certify.protocols.agents_protocol import AgentsProtocol
 from ptcc_certify.protocols.base import Protocol, aligned
 from ptcc_certify.protocols.casadi_latex import to_latex
 

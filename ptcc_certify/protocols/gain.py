@@ -20,8 +20,7 @@ import numpy as np
 
 from ptcc_certify.checker.input_formulas import PrescribedGain
 from ptcc_certify.errors import ParameterError, gated
-from ptcc_certify.graphs.digraph import Exact
-from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.rationals import Exact, shorten
 from ptcc_certify.protocols.casadi_latex import to_latex
 from ptcc_certify.protocols.parameters import NotNegative, Parameters, Positive, parameter, refuse_out_of_range
 

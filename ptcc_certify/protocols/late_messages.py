@@ -12,13 +12,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from numbers import Integral
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from ptcc_certify.errors import ParameterError, gated
-from ptcc_certify.graphs.digraph import Exact, SignedDigraph
-from ptcc_certify.graphs.rationals import shorten
-from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.graphs.option import option
+from ptcc_certify.graphs.rationals import Exact, shorten
 from ptcc_certify.protocols.parameters import Given, NotNegative, parameter, readable
+
+if TYPE_CHECKING:
+    from ptcc_certify.graphs.digraph import SignedDigraph
+    from ptcc_certify.graphs.structure import Structure
 
 #: Most losses in a row.
 MOST_LOSSES = 10**6
@@ -69,11 +72,40 @@ without limit before T; add a gain_cap, below (pi/2 - |arg lambda|)/(delay |lamb
 lambda of L, or measure the own state without delay
     """
 
-    delay: Exact | Mapping[tuple[str, str], Exact] = 0
-    period: Given = Given()
-    losses: int = 0
-    value_error: NotNegative = NotNegative(0)
-    own_delay: bool = False
+    section: ClassVar = "messages"
+    delay: Exact | Mapping[tuple[str, str], Exact] = option(
+        "--delay D|COLUMN",
+        "What agents hear is up to D late; or the column of the edge list that tells the delay of every edge.",
+        default=0,
+        example="0.02",
+        kind="text",
+        unit="time",
+    )
+    period: Given = option(
+        "--period H", "Messages are sent every H; the last one that came is held.", Given(), example="0.01"
+    )
+    losses: int = option(
+        "--packet-loss COUNT",
+        "Up to so many messages in a row get lost; asks for --period.",
+        default=0,
+        key="packet_loss",
+        example="3",
+        least=0,
+        most=MOST_LOSSES,
+    )
+    value_error: NotNegative = option(
+        "--quantisation STEP",
+        "What is heard is rounded to multiples of STEP.",
+        NotNegative(0),
+        key="quantisation",
+        example="0.1",
+    )
+    own_delay: bool = option(
+        "--own-delay/--no-own-delay",
+        "The own state is as late as what is heard; asks for --gain-cap.",
+        default=False,
+        example="false",
+    )
     gain_cap: Given = Given()
     _of_graph: tuple[SignedDigraph, tuple[Fraction, ...]] | None = field(
         default=None, init=False, repr=False, compare=False

@@ -8,14 +8,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from lmi.exact.decimal_rounding import near
 from ptcc_certify.errors import ParameterError, gated
+from ptcc_certify.graphs.option import option
 from ptcc_certify.protocols.parameters import Given, NotNegative, Parameters
 
 if TYPE_CHECKING:
-    from ptcc_certify.protocols.late_messages import LateMessages
+    pass
 
 
 @gated
@@ -52,9 +53,21 @@ class MovingLeaders(Parameters):
 give 2 or more
     """
 
-    speed: NotNegative = NotNegative()
+    section: ClassVar = "leaders"
+    speed: NotNegative = option(
+        "--leader-speed V",
+        "Leaders move, as fast as V: how followers track them.",
+        NotNegative(),
+        example="0.5",
+        unit="state/time",
+    )
     disturbance: NotNegative = NotNegative(0)
-    sign_gain: Given = Given()
+    sign_gain: Given = option(
+        "--sign-gain MU",
+        "With --leader-speed: followers add MU sign(e_k), and stay on their targets.",
+        Given(),
+        unit="state/time",
+    )
 
     def __post_init__(self) -> None:
         if self.sign_gain is not None and self.sign_gain < self.total:
@@ -68,28 +81,3 @@ give 2 or more
     def total(self) -> Fraction:
         """``speed + disturbance``: how fast a follower and its target may part."""
         return self.speed + self.disturbance
-
-
-def refuse_together(messages: LateMessages | None, leaders: MovingLeaders | None) -> None:
-    """Refuse late messages and moving leaders of which nothing is proved at once.
-
-    Raises
-    ------
-    ParameterError
-        Followers have a sign term, or their own states are late.
-
-    Examples
-    --------
-    >>> refuse_together(LateMessages(delay=1), MovingLeaders(speed=1, sign_gain=1))
-    Traceback (most recent call last):
-    ptcc_certify.errors.ParameterError: sign_gain: nothing is proved of a sign term where messages are late; leave it \
-out
-    """
-    if messages is None or leaders is None:
-        return
-    if leaders.sign_gain is not None:
-        raise ParameterError("sign_gain: nothing is proved of a sign term where messages are late; leave it out")
-    if messages.own_delay:
-        raise ParameterError(
-            "own_delay: an own state that is late is certified of leaders at rest alone; leave one of the two out"
-        )

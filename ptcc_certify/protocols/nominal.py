@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from ptcc_certify.errors import ParameterError, gated
-from ptcc_certify.graphs.io import as_graph
+from ptcc_certify.graphs.option import option
 from ptcc_certify.protocols.base import Protocol, aligned, position_latex, symbols
 from ptcc_certify.protocols.casadi_latex import to_latex
 from ptcc_certify.protocols.parameters import NotNegative, Positive
@@ -52,11 +52,12 @@ class NominalProtocol(Protocol):
     {'kind': 'nominal', 'T': '3/5', 'rho1': '1/10', 'rho2': '3/10', 'kappa': '1'}
     """
 
+    section: ClassVar = "protocol"
     kind = "nominal"
-    T: Positive = Positive(1)
-    rho1: Positive = Positive(1)
-    rho2: NotNegative = NotNegative(1)
-    kappa: Positive = Positive(2)
+    T: Positive = option("--T", "Nominal: the deadline.", Positive(1), unit="time")
+    rho1: Positive = option("--rho1", "Constant part of the gain.", Positive(1))
+    rho2: NotNegative = option("--rho2", "Factor of the growing part of the gain.", NotNegative(1))
+    kappa: Positive = option("--kappa", "Exponent of the time scaling.", Positive(2), example="2")
 
     def __post_init__(self) -> None:
         _ = self.gain  # refuses what is beyond float64
@@ -85,6 +86,8 @@ class NominalProtocol(Protocol):
         """
         import casadi as ca
 
+        from ptcc_certify.graphs.io import as_graph
+
         graph = as_graph(graph)
         x, t = symbols("x", graph) if x is None else x, ca.SX.sym("t") if t is None else t
         return self.gain.expression(t) * coupling(graph, x)
@@ -99,6 +102,8 @@ class NominalProtocol(Protocol):
         (SX([x1, x2]), SX([0, (6*(x1-x2))]))
         """
         import casadi as ca
+
+        from ptcc_certify.graphs.io import as_graph
 
         graph = as_graph(graph)
         x, t = symbols("x", graph), ca.SX.sym("t")
@@ -135,19 +140,22 @@ class NominalProtocol(Protocol):
         g &= \begin{cases} 2 + \frac{3}{1 - t}, & t < 1 \\ 2, & t \ge 1 \end{cases}
         \end{aligned}
         """
-        rows = nominal_rows(None if graph is None else as_graph(graph), places=places)
+        rows = nominal_rows(graph, places=places)
         return aligned([*rows, f"g &= {self.gain.latex(numbers=graph is not None)}"])
 
 
-def nominal_rows(graph: SignedDigraph | None, mark: str = "", places: bool = False) -> list[str]:
+def nominal_rows(graph: Any, mark: str = "", places: bool = False) -> list[str]:
     """Return the rows of the nominal input, of an agent k or of every agent; ``mark`` is put behind each ``u``."""
     import casadi as ca
+
+    from ptcc_certify.graphs.io import as_graph
 
     g = ca.SX.sym("g")
     if graph is None:
         names = ("w_kl", position_latex("k", places), position_latex("l", places))
         summand = g * _pull(*map(ca.SX.sym, names))
         return [rf"u_{{k}}{mark} &= \sum_{{l=1}}^{{N}} {to_latex(summand)}"]
+    graph = as_graph(graph)
     if graph.n_nodes > _LATEX_NODES:
         raise ParameterError(f"LaTeX of {graph.n_nodes} agents is too long; the limit is {_LATEX_NODES} nodes")
     states = ca.vertcat(*(ca.SX.sym(position_latex(k + 1, places)) for k in range(graph.n_nodes)))

@@ -8,8 +8,8 @@ from fractions import Fraction
 from typing import Any, Self, overload
 
 from ptcc_certify.errors import NumberError, ParameterError, gated
-from ptcc_certify.graphs.digraph import Exact
-from ptcc_certify.graphs.rationals import as_fraction, no_number, shorten
+from ptcc_certify.graphs.option import Option
+from ptcc_certify.graphs.rationals import Exact, as_fraction, no_number, shorten
 
 _SMALLEST, _LARGEST = Fraction(1, 10**300), Fraction(10**300)
 #: Bits of the longest parameter, whose products are written in certificates.
@@ -21,6 +21,7 @@ class Positive:
     """A field of a frozen dataclass that takes any exact number and keeps it as a positive rational."""
 
     zero_allowed = False
+    option: Option | None = None
 
     def __init__(self, default: Exact | None = None):
         self.default = default
@@ -52,6 +53,9 @@ class NotNegative(Positive):
 
 class Given:
     """The same where nothing may be given: then it is None."""
+
+    default = None
+    option: Option | None = None
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from lmi.exact.decimal_rounding import near
 from ptcc_certify.errors import ParameterError, gated
-from ptcc_certify.graphs.io import as_graph
+from ptcc_certify.graphs.option import option
 from ptcc_certify.protocols.base import ReachingProtocol, aligned, position_latex, symbols
 from ptcc_certify.protocols.casadi_latex import to_latex
 from ptcc_certify.protocols.nominal import NominalProtocol, nominal_rows
@@ -57,16 +57,27 @@ class SlidingModeProtocol(ReachingProtocol):
     ptcc_certify.errors.ParameterError: mu1 = 1 does not exceed delta = 1; a disturbance could outweigh it: give mu1 > 1
     """
 
+    section: ClassVar = "protocol"
     kind = "sliding-mode"
-    T_r: Positive = Positive("0.5")
-    T_s: Positive = Positive("0.5")
+    T_r: Positive = option(
+        "--T-r", "Sliding mode: time to reach the manifold.", Positive("0.5"), example="0.5", unit="time"
+    )
+    T_s: Positive = option(
+        "--T-s", "Sliding mode: time on it; the deadline is T_r + T_s.", Positive("0.5"), example="0.5", unit="time"
+    )
     rho1: Positive = Positive(1)
     rho2: Positive = Positive(1)
     kappa: Positive = Positive(2)
-    mu1: Positive = Positive(2)
-    mu2: Positive = Positive(1)
-    mu3: Positive = Positive(1)
-    delta: NotNegative = NotNegative(1)
+    mu1: Positive = option("--mu1", "Sliding mode: switching gain, above delta.", Positive(2), example="2")
+    mu2: Positive = option("--mu2", "Sliding mode: constant part of the reaching gain.", Positive(1))
+    mu3: Positive = option("--mu3", "Sliding mode: factor of its growing part.", Positive(1))
+    delta: NotNegative = option(
+        "--delta",
+        "Bound of every disturbance.",
+        NotNegative(1),
+        key="disturbance.delta",
+        shown="sliding mode: 1; nominal: none",
+    )
 
     def __post_init__(self) -> None:
         if self.mu1 <= self.delta:
@@ -105,6 +116,8 @@ class SlidingModeProtocol(ReachingProtocol):
         """
         import casadi as ca
 
+        from ptcc_certify.graphs.io import as_graph
+
         graph = as_graph(graph)
         x, t = symbols("x", graph) if x is None else x, ca.SX.sym("t") if t is None else t
         sigma = x + (symbols("varsigma", graph) if varsigma is None else varsigma)
@@ -126,6 +139,8 @@ class SlidingModeProtocol(ReachingProtocol):
         (SX([x1, x2, varsigma1, varsigma2]), SX([d1, d2]))
         """
         import casadi as ca
+
+        from ptcc_certify.graphs.io import as_graph
 
         graph = as_graph(graph)
         x, varsigma, d, t = *(symbols(name, graph) for name in ("x", "varsigma", "d")), ca.SX.sym("t")
@@ -181,7 +196,7 @@ class SlidingModeProtocol(ReachingProtocol):
             [
                 f"u_{{k}} &= {to_latex(expression)}",
                 rf"\sigma_{{k}} &= {to_latex(sigma)}, \quad \dot\varsigma_{{k}} = -{nominal}",
-                *nominal_rows(None if graph is None else as_graph(graph), r"^{\mathrm{nom}}", places),
+                *nominal_rows(graph, r"^{\mathrm{nom}}", places),
                 f"g &= {gain}",
                 f"h &= {reaching}",
             ]

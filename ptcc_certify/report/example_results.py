@@ -11,8 +11,9 @@ from typing import NamedTuple
 from lmi.exact.decimal_rounding import down, float_down, near, up
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
-from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.examples import Example, load_graph
+from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.initial_state import InitialState
 
 #: The head of the table that ``ptcc examples`` prints; its rows are of :func:`result_lines`.
 RESULTS_HEAD = (
@@ -35,10 +36,8 @@ def certify_example(entry: tuple[Example, str, str]) -> Run:
     certificate = certify(
         load_graph(graph),
         example.protocol(),
-        example.x0.split(","),
-        sigma0=example.sigma0 and example.sigma0.split(","),
-        disturbance=example.disturbance,
-        expectations=Expectations(reported),
+        InitialState(example.x0.split(","), sigma0=example.sigma0 and example.sigma0.split(",")),
+        asks=Asks(disturbance=example.disturbance, expectations=reported),
     )
     return Run(example, graph, certificate)
 

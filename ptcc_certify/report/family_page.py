@@ -23,6 +23,7 @@ from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.graphs.family import Mode
 from ptcc_certify.graphs.size_limits import DRAWN_NODES, INPUT_NODES
 from ptcc_certify.protocols.reaching_time import ReachingTime
+from ptcc_certify.protocols.restricted_signals import DwellTime
 from ptcc_certify.report import notation as texts
 from ptcc_certify.report.family_screen import (
     BOUND_KINDS,
@@ -46,7 +47,6 @@ from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_
 from ptcc_certify.theorems.family_behaviour import DEPENDS, Counterexample, FamilyComponent
 from ptcc_certify.theorems.family_claims import camps, component_holds, component_refutation
 from ptcc_certify.theorems.family_rate import explicit_rate
-from ptcc_certify.theorems.restricted_signals import DwellTime
 
 #: Modes, uncertain weights and parts of a proof that are listed.
 MODES, WEIGHTS = 12, 8

@@ -17,11 +17,11 @@ from ptcc_certify.certificate.restricted_claims import (
 from ptcc_certify.certificate.restricted_reasons import TOO_SMALL, reasons_for_none
 from ptcc_certify.graphs.family import Mode
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, CONSENSUS, CONTAINMENT
+from ptcc_certify.protocols.restricted_signals import ClockShares, DwellTime, JointWindows, SignalClass
 from ptcc_certify.report.text_layout import printable, shorten_label
 from ptcc_certify.theorems.counterexample_text import mode_name
 from ptcc_certify.theorems.family_behaviour import DEPENDS
 from ptcc_certify.theorems.family_claims import GENERAL
-from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows, SignalClass
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.family_content import FamilyContent

@@ -85,7 +85,7 @@ def summary_lines(certificate: Certificate, name: str, origins: Mapping[str, str
     Examples
     --------
     >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
-    >>> cert = certify(foes, NominalProtocol(T=1, rho1=1, rho2=2, kappa=1), [3, 5], simulation=False)
+    >>> cert = certify(foes, NominalProtocol(T=1, rho1=1, rho2=2, kappa=1), [3, 5], asks=Asks(simulation=False))
     >>> print("\n".join(summary_lines(cert, "foes")))
     graph      foes: 2 nodes, 2 edges (2 negative), strongly connected
     read       row a,b: information flows a -> b; undirected

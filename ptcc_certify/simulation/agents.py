@@ -19,7 +19,7 @@ import numpy as np
 
 from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.graphs.rationals import shorten, whole_number
-from ptcc_certify.protocols.agents import AgentsProtocol
+from ptcc_certify.protocols.agents_protocol import AgentsProtocol
 from ptcc_certify.simulation.cvodes import Motion, Phase, Tolerances
 from ptcc_certify.simulation.members import Members
 from ptcc_certify.simulation.trajectory import ByAgent, csv_text
@@ -97,7 +97,7 @@ class AgentsTrajectory(ByAgent):
         --------
         >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
         >>> protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
-        >>> run = certify(foes, protocol, [3, 1], agents=Agents(order=2), method="paper").agents.simulate()
+        >>> run = certify(foes, protocol, [3, 1], agents=Agents(order=2), asks=Asks(method="paper")).agents.simulate()
         >>> run.to_csv().partition("\n")[0]
         't,remaining,a,b,v(a),v(b),u(a),u(b)'
         """

@@ -17,13 +17,15 @@ import numpy as np
 from ptcc_certify.errors import ParameterError, SimulationError, gated
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.protocols.disturbance import ExpressionDisturbance, SampledDisturbance, as_disturbance
+from ptcc_certify.protocols.limited_gain import Periods
 from ptcc_certify.protocols.parameters import parameter, readable
 from ptcc_certify.simulation.cvodes import Forcing, Phase
 from ptcc_certify.simulation.instants import Instants
 
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
-    from ptcc_certify.protocols.gain_limits import LimitedGain, Periods
+    from ptcc_certify.protocols.gain_limits import LimitedGain
+    from ptcc_certify.protocols.limited_gain import Periods
     from ptcc_certify.simulation.course import Course
 
 MAX_JUMPS = 10**4

@@ -23,12 +23,13 @@ from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io import as_family, as_graph, as_states
 from ptcc_certify.graphs.io.family_conversion import is_family
 from ptcc_certify.graphs.rationals import number_within, shorten
+from ptcc_certify.model.refusals import refuse_together
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.base import refuse_no_protocol
 from ptcc_certify.protocols.disturbance import StateDependent, as_disturbance
 from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.protocols.late_messages import LateMessages
-from ptcc_certify.protocols.moving_leaders import MovingLeaders, refuse_together
+from ptcc_certify.protocols.moving_leaders import MovingLeaders
 from ptcc_certify.simulation.course import Course
 from ptcc_certify.simulation.cvodes import Motion, Tolerances
 from ptcc_certify.simulation.instants import PAST, Instants, default_instants, wanted_instants

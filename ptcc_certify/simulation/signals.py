@@ -22,9 +22,9 @@ from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS
 from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.protocols.gain import Gain
+from ptcc_certify.protocols.restricted_signals import DwellTime
 from ptcc_certify.simulation.members import MIDDLE, Choice, Members
 from ptcc_certify.theorems.family_behaviour import decide
-from ptcc_certify.theorems.restricted_signals import DwellTime
 
 #: How random weights lie in their intervals.
 WEIGHTS = ("both", "ends", "between")

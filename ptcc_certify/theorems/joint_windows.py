@@ -17,9 +17,9 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
 from ptcc_certify.protocols.parameters import readable
+from ptcc_certify.protocols.restricted_signals import JointWindows
 from ptcc_certify.theorems.family_behaviour import FamilyComponent
 from ptcc_certify.theorems.family_rate import ExplicitRate, largest_sum, least_mandatory
-from ptcc_certify.theorems.restricted_signals import JointWindows
 
 _BITS = 53
 

@@ -38,6 +38,7 @@ from ptcc_certify.errors import FormatError, GraphError, ParameterError, PTCCErr
 from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.ensembles import CONNECTIVITIES
 from ptcc_certify.graphs.io import random_states, read_graph, write_graph
+from ptcc_certify.model.asks import Asks
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
 TRIANGLE = SignedDigraph.from_edges([(1, 2, 1), (2, 3, -1), (3, 1, 2)])
@@ -323,7 +324,7 @@ def test_the_peak_of_the_input_is_for_the_start_or_for_all_starts():
         start = None if bound else [x for (x,) in random_states(row["seed"], load_graph("fig1b").n_nodes)]
         initial_set = Fraction(1, 3) if bound else None
         effort = certify(
-            load_graph("fig1b"), PROTOCOL, start, method="perron", simulation=False, initial_set=initial_set
+            load_graph("fig1b"), PROTOCOL, start, asks=Asks(method="perron", simulation=False, initial_set=initial_set)
         ).effort
         assert effort is not None and effort.peak is not None and row["input_bounded"] is effort.bounded
         assert Fraction(row["peak_input"]) >= effort.peak.largest > Fraction(math.nextafter(row["peak_input"], 0))

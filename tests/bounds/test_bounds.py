@@ -18,6 +18,8 @@ from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.simulation.run import simulate
 
@@ -68,7 +70,7 @@ def judge(name: str, kwargs: dict, seed: int, method: str = "best") -> Judged:
     graph = random_graph(rng, **dict(kwargs, weights=weights)).graph
     protocol = random_protocol(rng)
     x0 = [Fraction(int(v), 100) for v in rng.integers(-1000, 1001, graph.n_nodes)]
-    cert = certify(graph, protocol, x0, method=method)
+    cert = certify(graph, protocol, x0, asks=Asks(method=method))
     assert cert.verdict == "certified", (name, seed, cert.notes)
     assert all("needs an overshoot constant above" in note for note in cert.search.notes), (
         name,
@@ -179,7 +181,7 @@ def test_vector_valued_agents():
 def pair_envelope(rate: float) -> tuple[Envelope, NominalProtocol, SignedDigraph]:
     graph = SignedDigraph.from_edges([(1, 2, 1), (2, 1, -1)])
     protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
-    cert = certify(graph, protocol, [3, 1], simulation=False)
+    cert = certify(graph, protocol, [3, 1], asks=Asks(simulation=False))
     assert cert.lyapunov is not None
     function = replace(cert.lyapunov, rate=rate)
     return Envelope(cert.structure, protocol.gain, (function,)), protocol, graph
@@ -200,8 +202,8 @@ ROBUST = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1
 @pytest.fixture(scope="module")
 def asked(tmp_path_factory) -> dict[str, Callable[[object], object]]:
     """Everything that takes an instant, by what it is called and whose it is."""
-    cert = certify(PAIR, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1], simulation=False)
-    slid = certify(PAIR, ROBUST, [3, 1], sigma0=[1, 0], simulation=False)
+    cert = certify(PAIR, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1], asks=Asks(simulation=False))
+    slid = certify(PAIR, ROBUST, InitialState([3, 1], sigma0=[1, 0]), asks=Asks(simulation=False))
     cert.save(path := tmp_path_factory.mktemp("saved") / "c.json")
     saved, x0 = read_certificate(path), [3, 1]
     return {
@@ -265,9 +267,9 @@ def test_the_clock_alone_bounds_nothing_in_a_reaching_phase(name: str):
     robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
     pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     start = () if name == "norm_factor" else ([3, 1],)
-    direct = certify(pair, robust, [3, 1], simulation=False).envelope
+    direct = certify(pair, robust, [3, 1], asks=Asks(simulation=False)).envelope
     assert np.isfinite(getattr(direct, name)(1.0, *start)).all()
-    reaching = certify(pair, robust, [3, 1], sigma0=[8, -2], simulation=False).envelope
+    reaching = certify(pair, robust, InitialState([3, 1], sigma0=[8, -2]), asks=Asks(simulation=False)).envelope
     with pytest.raises(ParameterError, match="reaching phase"):
         getattr(reaching, name)(1.0, *start)
 
@@ -309,7 +311,7 @@ def test_margins_below_the_sight_of_the_solver_are_proved_from_closed_forms():
     nearly = [(1, 2, 1), (2, 3, 1), (3, 1, 1), (3, 2, "-1e-11")]
     weak = [(0, 1, 1), (1, 0, -2), (1, 2, "1.5e-11"), (2, 3, 1), (3, 2, "0.7"), (0, 4, 1), (3, 4, -2)]
     for edges in (nearly, weak):
-        cert = certify(SignedDigraph.from_edges(edges), protocol, simulation=False)
+        cert = certify(SignedDigraph.from_edges(edges), protocol, asks=Asks(simulation=False))
         assert cert.verdict == "certified", cert.notes
         assert cert.rate is not None and cert.rate > 0
 
@@ -324,5 +326,5 @@ def test_the_floor_of_a_run_is_that_of_the_largest_state_of_all():
 def test_a_rate_that_is_not_positive_is_none(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr("ptcc_certify.theorems.strong._prove_weighted_deviation", lambda *_: Fraction(-1, 10**14))
     graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1), ("c", "a", -1)])
-    made = certify(graph, NominalProtocol(), simulation=False, method="paper")
+    made = certify(graph, NominalProtocol(), asks=Asks(simulation=False, method="paper"))
     assert made.checked.accepted and made.paper_rate is None

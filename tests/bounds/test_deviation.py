@@ -27,6 +27,8 @@ from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import random_states, read_graph
 from ptcc_certify.lyapunov import search as search_functions
+from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.gain_limits import GainLimits
 
@@ -54,7 +56,9 @@ def sparse(n: int, seed: int) -> SignedDigraph:
 def slow() -> Certificate:
     """A graph of more nodes than the exact polynomial decides."""
     graph = sparse(SMALL_ROWS + 12, 3)
-    return certify(graph, NOMINAL, numbers(np.random.default_rng(1), graph.n_nodes), method="full", simulation=False)
+    return certify(
+        graph, NOMINAL, numbers(np.random.default_rng(1), graph.n_nodes), asks=Asks(method="full", simulation=False)
+    )
 
 
 def largest_at_start(cert: Certificate) -> Fraction:
@@ -70,7 +74,7 @@ def largest_at_start(cert: Certificate) -> Fraction:
 def test_no_deviation_bound_exceeds_the_largest_deviation_at_the_start(name: str, kwargs: dict, tmp_path: Path):
     rng = np.random.default_rng(5)
     graph = random_graph(rng, **{"weights": "small ints", **kwargs}).graph
-    cert = certify(graph, NOMINAL, numbers(rng, graph.n_nodes), method="perron", simulation=False)
+    cert = certify(graph, NOMINAL, numbers(rng, graph.n_nodes), asks=Asks(method="perron", simulation=False))
     bounds = cert.deviation_bound(REMAINING)
     assert (bounds <= float(largest_at_start(cert)) * (1 + 1e-14)).all()
     assert cert.initial_state is not None
@@ -102,7 +106,9 @@ def test_sliding_variables_move_no_agent_farther_than_they_are_large_together(di
     for name, kwargs in [c for c in all_classes() if c[0] in ("1.1", "1.2", "2.1", "3.1 mixed no single")]:
         graph = random_graph(rng, **kwargs).graph
         x0, sigma0 = numbers(rng, graph.n_nodes), numbers(rng, graph.n_nodes, 200)
-        cert = certify(graph, SLIDING, x0, sigma0=sigma0, disturbance=disturbance, method="perron")
+        cert = certify(
+            graph, SLIDING, InitialState(x0, sigma0=sigma0), asks=Asks(disturbance=disturbance, method="perron")
+        )
         assert cert.trajectory is not None and cert.final_state is not None and cert.comparison is not None
         most = float(largest_at_start(cert) + sum(map(abs, sigma0)))
         assert (cert.deviation_bound(REMAINING) <= most * (1 + 1e-12)).all(), name
@@ -125,7 +131,7 @@ def test_the_vector_norm_of_deviations_is_bounded_by_their_largest_entry():
 def test_a_function_for_deviations_changes_no_rate_and_improves_their_bound(monkeypatch: pytest.MonkeyPatch):
     cert = slow()
     monkeypatch.setattr(search_functions, "_for_deviations", lambda *args: None)
-    plain = certify(cert.graph, NOMINAL, cert.initial_state, method="full", simulation=False)
+    plain = certify(cert.graph, NOMINAL, cert.initial_state, asks=Asks(method="full", simulation=False))
     assert (cert.rate, cert.overshoot, cert.diagonal_rate) == (plain.rate, plain.overshoot, plain.diagonal_rate)
     more, fewer = cert.envelope.functions, plain.envelope.functions
     assert len(more) == len(fewer) + 1
@@ -136,9 +142,9 @@ def test_a_function_for_deviations_changes_no_rate_and_improves_their_bound(monk
 
 def test_the_packaged_graphs_keep_their_rates(monkeypatch: pytest.MonkeyPatch):
     graphs = [load_graph(name) for name in ("fig1a", "fig1b", "fig3a", "fig5b")]
-    with_it = [certify(g, NOMINAL, method="full", simulation=False) for g in graphs]
+    with_it = [certify(g, NOMINAL, asks=Asks(method="full", simulation=False)) for g in graphs]
     monkeypatch.setattr(search_functions, "_for_deviations", lambda *args: None)
-    without = [certify(g, NOMINAL, method="full", simulation=False) for g in graphs]
+    without = [certify(g, NOMINAL, asks=Asks(method="full", simulation=False)) for g in graphs]
     for a, b in zip(with_it, without, strict=True):
         assert (a.rate, a.overshoot) == (b.rate, b.overshoot)
 
@@ -152,7 +158,7 @@ def test_real_graphs_are_bounded_within_five_times_the_motion_in_the_median(real
     for name in names:
         graph = read_graph(real_data / f"{name}.csv")
         x0 = [x for (x,) in random_states(0, graph.n_nodes)]
-        cert = certify(graph, NOMINAL, x0, method="full", simulation=False)
+        cert = certify(graph, NOMINAL, x0, asks=Asks(method="full", simulation=False))
         assert cert.final_state is not None
         d = np.array([float(x - Fraction(end)) for x, end in zip(x0, cert.final_state.states, strict=True)])
         true = np.abs(expm(-float(NOMINAL.gain.clock_at_remaining(0.5)) * graph.dense_laplacian()) @ d).max()
@@ -173,7 +179,7 @@ def signed(document: dict[str, Any]) -> dict[str, Any]:
 def test_a_constant_lowered_by_a_millionth_is_rejected(large: bool, stdlib: bool):
     """Of the agent, and of the norm, of every member; in a small graph and, one of the two, in one beyond it."""
     graph = load_graph("fig3a")
-    told = json.loads((slow() if large else certify(graph, NOMINAL, range(6), simulation=False)).to_json())
+    told = json.loads((slow() if large else certify(graph, NOMINAL, range(6), asks=Asks(simulation=False))).to_json())
     assert check(told, stdlib=stdlib).accepted
     for k, function in enumerate(told["lyapunov"]["functions"]):
         assert function["deviation"] is not None
@@ -238,7 +244,9 @@ def test_nothing_is_bounded_by_a_matrix_that_is_not_definite():
 def test_what_a_limited_gain_leaves_is_capped_by_the_start_and_the_check_knows_it(actuator: GainLimits):
     """A gain that hardly acts: every agent is as far from its final state as it was, and no farther."""
     cert = slow()
-    limited = certify(cert.graph, NOMINAL, cert.initial_state, method="full", simulation=False, limits=[actuator])
+    limited = certify(
+        cert.graph, NOMINAL, cert.initial_state, limits=[actuator], asks=Asks(method="full", simulation=False)
+    )
     assert limited.effort is not None and limited.verdict == "certified"
     (entry,) = limited.effort.residual
     assert entry.agents is not None
@@ -258,7 +266,11 @@ def test_a_held_input_may_leave_more_than_the_start():
     graph = SignedDigraph.from_edges([(1, 2, 1), (2, 1, -1), (2, 3, 1)])
     protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=1)
     cert = certify(
-        graph, protocol, [3, -1, 2], simulation=False, limits=[GainLimits(gain_cap=3, sample_period=Fraction(1, 200))]
+        graph,
+        protocol,
+        [3, -1, 2],
+        limits=[GainLimits(gain_cap=3, sample_period=Fraction(1, 200))],
+        asks=Asks(simulation=False),
     )
     assert cert.effort is not None and cert.effort.residual
     told = json.loads(cert.to_json())
@@ -279,5 +291,5 @@ def test_constants_are_accepted_where_weights_of_eighteen_orders_make_floats_see
         ("5", "6", "-0.0000000086"),
     ]
     graph = SignedDigraph.from_edges(edges, [str(v) for v in range(7)])
-    cert = certify(graph, NominalProtocol(T=1, rho1=180, rho2="3.4", kappa=1), [1] * 7, simulation=False)
+    cert = certify(graph, NominalProtocol(T=1, rho1=180, rho2="3.4", kappa=1), [1] * 7, asks=Asks(simulation=False))
     assert cert.checked is not None and cert.checked.accepted, cert.checked

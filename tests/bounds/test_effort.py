@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from asked import certify_words
 from generators import KINDS, all_classes, class_cases, random_graph, smallest
 from mutations import at, changed, resealed
 from scipy.integrate import trapezoid
@@ -29,6 +30,8 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import EXAMPLES, GRAPHS, load_graph
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import analyse
+from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.disturbance import as_disturbance
 from ptcc_certify.protocols.gain_limits import GainLimits
@@ -158,7 +161,7 @@ def judge(graph: SignedDigraph, seed: int, overs: Sequence[Fraction] = OVER) -> 
     """One graph, several protocols, a start alone and sets of starts: every bound against exact motions."""
     rng, ratios = np.random.default_rng(seed), []  # type: ignore[var-annotated]
     x0 = rationals(rng, graph.n_nodes)
-    proved = certify(graph, protocol_at(rng, graph, F(2)), x0, simulation=False)
+    proved = certify(graph, protocol_at(rng, graph, F(2)), x0, asks=Asks(simulation=False))
     assert proved.verdict == "certified", proved.notes
     for over in overs:
         protocol = protocol_at(rng, graph, over)
@@ -254,7 +257,7 @@ def test_no_input_of_the_sliding_mode_is_above_its_bounds(name: str, power: Frac
     protocol = sliding(rng, graph, F(5, 4), power)
     n, x0 = graph.n_nodes, rationals(rng, graph.n_nodes)
     push = [F(int(x), 10) * (rng.random() < 0.7) for x in rng.integers(-9, 10, n)]
-    proved = certify(graph, protocol, x0, sigma0=push, simulation=False)
+    proved = certify(graph, protocol, InitialState(x0, sigma0=push), asks=Asks(simulation=False))
     assert proved.verdict == "certified", proved.notes
     # From x(0) = sigma(0) it is the sliding variables alone that move the agents.
     for sigma0, begin in ((push, x0), (push, push), ([F(0)] * n, x0)):
@@ -306,7 +309,7 @@ def test_the_energy_of_one_start_is_at_most_twice_what_is_spent(name: str):
     rng = np.random.default_rng(11 + len(name))
     graph = random_graph(rng, **dict(CLASSES[name], n=max(6, smallest(**CLASSES[name])))).graph
     x0 = rationals(rng, graph.n_nodes)
-    proved = certify(graph, NominalProtocol(1, 1, 1, 1), x0, simulation=False)
+    proved = certify(graph, NominalProtocol(1, 1, 1, 1), x0, asks=Asks(simulation=False))
     for over, share in zip((F(3, 5), F(1), F(3)), rng.permutation([F(1, 100), F(1), F(10)]).tolist(), strict=True):
         k = over / F(slowest(graph)).limit_denominator(10**6)
         cert = proved.changed(protocol=NominalProtocol(1, share * k, k, 1))
@@ -320,7 +323,7 @@ def test_the_energy_of_one_start_is_at_most_twice_what_is_spent(name: str):
 
 def test_the_energy_is_infinite_up_to_half_the_threshold():
     for k, finite in ((F(1, 4), False), (F(251, 1000), True)):  # the nonzero eigenvalue is 2
-        cert = certify(edges((1, 2, -1), (2, 1, -1)), NominalProtocol(1, 1, k, 1), [3, 1], simulation=False)
+        cert = certify(edges((1, 2, -1), (2, 1, -1)), NominalProtocol(1, 1, k, 1), [3, 1], asks=Asks(simulation=False))
         assert cert.effort is not None and (cert.effort.energy is not None) == finite
 
 
@@ -330,7 +333,7 @@ def test_a_forged_integral_of_the_energy_is_rejected(slides: bool):
     protocol = NominalProtocol(1, 1, 1, 2)
     if slides:
         protocol = SlidingModeProtocol(1, 1, 1, 1, 2, 2, 1, 1, 1)  # type: ignore[assignment]
-    data = written(certify(graph, protocol, [1, 2, 3, 4, 5, 6], simulation=False))
+    data = written(certify(graph, protocol, [1, 2, 3, 4, 5, 6], asks=Asks(simulation=False)))
     (i,) = [i for i, step in enumerate(data["proof"]) if step["kind"] == "input-energy"]
     numbers = {key: F(x) for key, x in data["proof"][i]["numbers"].items()}
     at_step = ("proof", i, "numbers")
@@ -362,13 +365,13 @@ def test_every_short_period_is_certified_and_a_longer_one_is_told_which_is():
     size = float(np.linalg.norm(graph.laplacian() @ floats(x0)))
     left = []
     for period in ("0.001", "0.0001"):
-        cert = certify(graph, protocol, x0, limits=[Limits(None, None, F(period))], simulation=False)
+        cert = certify(graph, protocol, x0, limits=[Limits(None, None, F(period))], asks=Asks(simulation=False))
         assert cert.verdict == "certified" and cert.effort is not None and cert.effort.longest_period is None
         left.append(float(cert.effort.residual[0].norm))
         run = simulate(graph, protocol, x0, actuator=GainLimits(sample_period=period), past=0)
         assert np.linalg.norm(graph.laplacian() @ run.final_state) <= left[-1]
     assert size > left[0] > 100 * left[1]
-    proved = certify(graph, protocol, x0, limits=[Limits(None, None, F(1, 10))], simulation=False)
+    proved = certify(graph, protocol, x0, limits=[Limits(None, None, F(1, 10))], asks=Asks(simulation=False))
     assert proved.effort is not None and proved.effort.residual == ()
     longest = proved.effort.longest_period
     assert longest is not None and F(1, 1000) < longest < F(1, 10)
@@ -427,7 +430,7 @@ def test_the_input_stays_bounded_from_the_threshold_on():
 def test_certificates_tell_the_threshold_too(seed: int):
     graph = small_graphs(seed + 1)[-1]
     least = slowest(graph)
-    proved = certify(graph, NominalProtocol(1, 1, 1, 1), simulation=False)
+    proved = certify(graph, NominalProtocol(1, 1, 1, 1), asks=Asks(simulation=False))
     for over, bounded in ((0.9, False), (1.1, True)):
         protocol = NominalProtocol(1, 1, F(over / least).limit_denominator(10**6), 1)
         effort = proved.changed(protocol=protocol).effort
@@ -455,7 +458,7 @@ def test_on_the_threshold_it_is_the_jordan_block_that_decides(graph: SignedDigra
     assert decides(graph, k) == (bounded, "spectrum")
     assert decides(graph, k + near) == (True, "spectrum")
     assert decides(graph, k - near) == (False, "spectrum")
-    cert = certify(graph, NominalProtocol(1, 1, k, 1), simulation=False)
+    cert = certify(graph, NominalProtocol(1, 1, k, 1), asks=Asks(simulation=False))
     assert cert.effort is not None and cert.verdict == "certified"
     assert cert.effort.bounded is bounded
     assert cert.effort.by == "spectrum" or bounded
@@ -481,7 +484,7 @@ def judge_limits(graph: SignedDigraph, seed: int) -> list[tuple[str, float]]:
     rng, ratios = np.random.default_rng(seed), []  # type: ignore[var-annotated]
     protocol, x0 = protocol_at(rng, graph, OVER[seed % 4]), rationals(rng, graph.n_nodes)
     box = initial_set_within(analyse(graph), 5)
-    proved = certify(graph, protocol, x0, simulation=False, limits=some_limits(rng, protocol))
+    proved = certify(graph, protocol, x0, limits=some_limits(rng, protocol), asks=Asks(simulation=False))
     assert proved.verdict == "certified", proved.notes
     L = graph.laplacian().toarray()
     for cert, x in ((proved, floats(x0)), (proved.changed(initial_set=box), draw(rng, box, 2)[:, seed % 2])):
@@ -547,7 +550,7 @@ def test_disturbances_add_no_more_than_certified(name: str):
     rng = np.random.default_rng(3 + len(name))
     graph = random_graph(rng, **dict(CLASSES[name], n=max(6, smallest(**CLASSES[name])))).graph
     n, delta, x0 = graph.n_nodes, F(3, 4), rationals(rng, graph.n_nodes)
-    proved = certify(graph, protocol_at(rng, graph, F(2)), x0, simulation=False, delta=delta)
+    proved = certify(graph, protocol_at(rng, graph, F(2)), x0, asks=Asks(simulation=False, delta=delta))
     for over in (F(5, 4), F(5, 2)):
         protocol = protocol_at(rng, graph, over)
         cert = proved.changed(protocol=protocol)
@@ -604,7 +607,11 @@ def nominal_certificate(name: str) -> Certificate:
         InitialSet(rationals(rng, n), [F(1, 3)] * n),
     ][len(name) % 3]
     return certify(
-        graph, protocol, rationals(rng, n), simulation=False, initial_set=initial_set, limits=limits, delta="0.7"
+        graph,
+        protocol,
+        rationals(rng, n),
+        limits=limits,
+        asks=Asks(simulation=False, initial_set=initial_set, delta="0.7"),
     )
 
 
@@ -613,7 +620,9 @@ def sliding_certificate(push: Fraction) -> Certificate:
     graph = random_graph(rng, **dict(CLASSES["2.2"], n=6)).graph
     x0, sigma0 = rationals(rng, 6), [push * x for x in rationals(rng, 6)]
     protocol = sliding(rng, graph, F(5, 4), F(3, 2))
-    return certify(graph, protocol, x0, sigma0=sigma0, simulation=False, initial_set=4 if push else None)
+    return certify(
+        graph, protocol, InitialState(x0, sigma0=sigma0), asks=Asks(simulation=False, initial_set=4 if push else None)
+    )
 
 
 #: By how much a forger improves what is claimed.
@@ -688,7 +697,7 @@ def test_certificates_of_the_sliding_input_are_checked(push: Fraction):
 def test_growing_inputs_are_checked_by_every_proof():
     """Bounded by a rate, not by a upper bound on the decay rate, and either by the spectrum."""
     for graph, k, by in ((RING, F(1), "rate"), (RING, F(1, 2), "upper_bound"), (CHAIN, F(1), "spectrum")):
-        cert = certify(graph, NominalProtocol(1, 1, k, 1), [1, 2, 4], simulation=False)
+        cert = certify(graph, NominalProtocol(1, 1, k, 1), [1, 2, 4], asks=Asks(simulation=False))
         assert cert.effort is not None and cert.effort.by == by
         assert_no_forgery_passes(written(cert))
 
@@ -698,7 +707,7 @@ def test_a_set_of_one_start_is_that_start(name: str):
     rng = np.random.default_rng(8)
     graph = random_graph(rng, **CLASSES[name]).graph
     x0, protocol = rationals(rng, graph.n_nodes), protocol_at(rng, graph, F(2))
-    alone = certify(graph, protocol, x0, simulation=False)
+    alone = certify(graph, protocol, x0, asks=Asks(simulation=False))
     assert alone.effort is not None and alone.effort.peak is not None
     for initial_set in (InitialSet(x0), InitialSet(x0, [F(0)] * graph.n_nodes), ellipsoid(x0, [[0] * graph.n_nodes])):
         cert = alone.changed(initial_set=initial_set)
@@ -711,7 +720,7 @@ def test_a_set_of_one_start_is_that_start(name: str):
 @pytest.mark.parametrize("weight", [10, 10**4, 10**30])
 def test_what_is_next_to_nothing_is_written(weight: int):
     graph = edges((1, 2, weight), (2, 3, -weight), (3, 1, weight))
-    cert = certify(graph, NominalProtocol(1, 1, 1, 2), [1, 2, 3], limits=[Limits(F(1000))], simulation=False)
+    cert = certify(graph, NominalProtocol(1, 1, 1, 2), [1, 2, 3], limits=[Limits(F(1000))], asks=Asks(simulation=False))
     assert cert.verdict == "certified" and cert.effort is not None
     assert 0 < cert.effort.residual[0].norm < F(1, 10**30)
 
@@ -742,7 +751,7 @@ N3 = [F(1), F(2), F(3)]
 )
 def test_odd_sets_limits_and_disturbances_are_refused(given: dict[str, Any]):
     with pytest.raises(ParameterError):
-        certify(RING, NominalProtocol(1, 1, 1, 2), N3, simulation=False, **given)
+        certify_words(RING, NominalProtocol(1, 1, 1, 2), N3, simulation=False, **given)
 
 
 @pytest.mark.parametrize("number", thinned(EXAMPLES))
@@ -750,7 +759,12 @@ def test_every_example_has_its_effort(number: int):
     example = EXAMPLES[number]
     for name in example.graphs:
         sigma0 = None if example.sigma0 is None else example.sigma0.split(",")
-        cert = certify(load_graph(name), example.protocol(), example.x0.split(","), sigma0=sigma0, simulation=False)
+        cert = certify(
+            load_graph(name),
+            example.protocol(),
+            InitialState(example.x0.split(","), sigma0=sigma0),
+            asks=Asks(simulation=False),
+        )
         assert cert.effort is not None and cert.verdict == "certified"
         assert cert.effort.bounded == (float(cert.protocol.gain.pole) * slowest(cert.graph) >= 1)
 
@@ -770,7 +784,9 @@ def test_every_example_has_its_effort(number: int):
 def test_noise_under_a_limit_leaves_no_more_than_is_proved(name: str, actuator: GainLimits):
     graph, protocol, nu = load_graph(name), NominalProtocol(1, 1, 1, 2), 0.05
     x0 = np.random.default_rng(1).uniform(-1, 1, graph.n_nodes)
-    cert = certify(graph, protocol, [Fraction(x) for x in x0], limits=[actuator], noise="1/20", simulation=False)
+    cert = certify(
+        graph, protocol, [Fraction(x) for x in x0], limits=[actuator], asks=Asks(noise="1/20", simulation=False)
+    )
     assert cert.verdict == "certified" and cert.effort is not None
     (entry,) = cert.effort.residual
     assert entry.noisy_norm is not None and entry.noisy_largest is not None
@@ -788,14 +804,14 @@ def test_noise_under_a_limit_leaves_no_more_than_is_proved(name: str, actuator: 
 
 
 def test_noise_times_an_infinite_gain_is_not_certified():
-    cert = certify(load_graph("fig1a"), NominalProtocol(1, 1, 1, 2), [1] * 6, noise=1, simulation=False)
+    cert = certify(load_graph("fig1a"), NominalProtocol(1, 1, 1, 2), [1] * 6, asks=Asks(noise=1, simulation=False))
     assert cert.effort is not None and cert.effort.residual == ()
     assert any("left open: noise (without a limit" in line for line in certificate_lines(cert, "fig1a"))
 
 
 def test_an_envelope_is_compared_with_runs_it_speaks_of_only():
     graph, protocol = load_graph("fig1a"), NominalProtocol(1, 1, 1, 2)
-    cert = certify(graph, protocol, [1, 2, 3, 4, 5, 6], simulation=False)
+    cert = certify(graph, protocol, [1, 2, 3, 4, 5, 6], asks=Asks(simulation=False))
     capped = simulate(graph, protocol, [1, 2, 3, 4, 5, 6], actuator=GainLimits(gain_cap=9))
     assert not cert.envelope.compare(capped).violated
     for more in ({"actuator": GainLimits(sample_period="0.01")}, {"disturbance": Bounded("t", 2)}):

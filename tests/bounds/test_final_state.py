@@ -26,6 +26,8 @@ from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import analyse
+from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
@@ -142,7 +144,7 @@ def test_labels_of_a_series_count_wherever_a_state_is_taken():
     team = SignedDigraph.from_edges([("ann", "bob", 2), ("bob", "ann", -1), ("bob", "eve", 1)])
     protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=1)
     plain, x0 = [3.5, 2.5, 1.5], pd.Series({"eve": 1.5, "bob": 2.5, "ann": 3.5})
-    cert = certify(team, protocol, x0, simulation=False)
+    cert = certify(team, protocol, x0, asks=Asks(simulation=False))
     assert [float(x) for x in cert.initial_state] == plain
     assert cert.envelope.norm_bound([0.5], x0) == cert.norm_bound([0.5])
     assert (cert.envelope.deviation_bound([0.5], x0) == cert.deviation_bound([0.5])).all()
@@ -151,7 +153,7 @@ def test_labels_of_a_series_count_wherever_a_state_is_taken():
     run = simulate(team, protocol, pd.DataFrame({"x": x0, "y": 2 * x0}))
     assert run.states[:, :, 0].tolist() == [[x, 2 * x] for x in plain]
     robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
-    slid = certify(team, robust, x0, sigma0=x0, simulation=False)
+    slid = certify(team, robust, InitialState(x0, sigma0=x0), asks=Asks(simulation=False))
     assert slid.sigma0 == slid.initial_state == cert.initial_state
     assert simulate(team, robust, x0, sigma0=x0).sliding.sigma[:, 0].tolist() == plain
     row, other = certify_many(team, protocol, x0=x0)[0], certify_many(team, protocol, x0=plain)[0]

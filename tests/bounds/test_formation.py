@@ -18,6 +18,7 @@ from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import analyse
+from ptcc_certify.model.asks import Asks
 from ptcc_certify.protocols import NominalProtocol
 from ptcc_certify.protocols.agents import Agents
 from ptcc_certify.protocols.gain import Gain
@@ -53,7 +54,9 @@ def test_biases_move_the_agents_as_told(seed: int):
 def test_a_certificate_takes_biases_that_fit_and_names_who_drifts():
     graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("a", "c", -1)])
     protocol = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
-    part = certify(graph, protocol, [1, 3, 0], agents=Agents(order=2, biases=[1, -1, 5]), method="perron").agents
+    part = certify(
+        graph, protocol, [1, 3, 0], agents=Agents(order=2, biases=[1, -1, 5]), asks=Asks(method="perron")
+    ).agents
     assert part is not None and part.final_state is not None
     ends = [chain[0][0] for (chain,) in part.final_state]
     assert ends == [Fraction(5, 2), Fraction(3, 2), Fraction(5, 2)]  # c = 5 - a

@@ -13,6 +13,7 @@ from typing import Any
 import networkx as nx
 import numpy as np
 import pytest
+from asked import certify_words
 from late_certificates import grouped_graph, led_graph
 from late_motion import Flight, Gain, LateMotion, by_chance, instants, oldest_of_all, square_wave, worst, worst_errors
 from scipy.linalg import expm
@@ -28,7 +29,6 @@ from ptcc_certify.bounds.staged_deadlines import levels
 from ptcc_certify.bounds.tracking import bound_tracking, drift_integral
 from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.procedure import certify
-from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.checker.input_formulas import PrescribedGain
 from ptcc_certify.checker.late_drift import drift_above
 from ptcc_certify.checker.late_input import gain_above
@@ -36,6 +36,7 @@ from ptcc_certify.errors import HypothesisError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.lyapunov.follower_rows import FollowerRows
+from ptcc_certify.model.asks import Asks, Expectations
 from ptcc_certify.protocols import NominalProtocol
 from ptcc_certify.protocols.late_messages import LateMessages
 from ptcc_certify.protocols.moving_leaders import MovingLeaders
@@ -135,7 +136,7 @@ def test_messages_of_leaders_at_rest_may_be_as_old_as_they_like() -> None:
     single = bound_late(structure, protocol, LateMessages(delay=each))
     among = bound_late(structure, protocol, LateMessages(delay="0.009375"))
     assert single.largest <= among.largest * 1.05
-    cert = certify(graph, protocol, messages=LateMessages(delay=each), simulation=False, method="paper")
+    cert = certify(graph, protocol, messages=LateMessages(delay=each), asks=Asks(simulation=False, method="paper"))
     assert cert.checked is not None and cert.checked.accepted, cert.checked
     assert cert.late is not None and cert.late.largest <= among.largest * 1.05
 
@@ -152,7 +153,7 @@ def _judge_settling(seed: int, patterns: tuple[str, ...] = PATTERNS) -> float:
     )
     x0 = [Fraction(int(x), 10) for x in rng.integers(-100, 100, graph.n_nodes)]
     messages = LateMessages(delays, gain_cap=int(rng.integers(5, 80)) if seed % 3 == 0 else None)
-    cert = certify(graph, protocol, x0, messages=messages, simulation=False, method="paper")
+    cert = certify(graph, protocol, x0, messages=messages, asks=Asks(simulation=False, method="paper"))
     assert cert.verdict == "certified" and cert.late is not None and cert.late.settling is not None, (seed, cert.notes)
     end, worst = np.asarray(cert.final_state, dtype=float), 0.0
     for pattern in patterns:
@@ -244,7 +245,7 @@ def test_a_bound_that_no_longer_falls_leaves_room_for_how_the_check_rounds() -> 
     rng = np.random.default_rng(7)
     graph, x0 = led_graph(rng, 2, 4), [Fraction(int(v), 10) for v in rng.integers(-100, 100, 6)]
     protocol, messages = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1), LateMessages(delay=1)
-    cert = certify(graph, protocol, x0, messages=messages, simulation=False, method="paper")
+    cert = certify(graph, protocol, x0, messages=messages, asks=Asks(simulation=False, method="paper"))
     assert cert.checked is not None
     assert cert.checked.accepted, cert.checked.reason
 
@@ -489,11 +490,11 @@ def test_runs_refuse_what_they_cannot_run_by_name() -> None:
 def test_certificates_show_and_draw_late_messages_and_moving_leaders() -> None:
     chain, p = SignedDigraph.from_edges([(1, 2, 1), (2, 3, -1)]), NominalProtocol(1, 1, 2, 1)
     for name, asked in (("late", {"messages": LateMessages(delay="0.1")}), ("tracking", {"leaders": MovingLeaders(1)})):
-        cert = certify(chain, p, [1, 0, 2], method="perron", simulation=False, **asked)
+        cert = certify_words(chain, p, [1, 0, 2], method="perron", simulation=False, **asked)
         assert cert.plot(name).lines
         assert len(repr(getattr(cert, name))) < 120
         assert "<svg" in cert._repr_html_() or "<img" in cert._repr_html_()
-    assert certify(chain, p, method="perron", messages=LateMessages(delay="0.1")).late.relative
+    assert certify(chain, p, messages=LateMessages(delay="0.1"), asks=Asks(method="perron")).late.relative
 
 
 def _input_bound(seed: int) -> tuple[Structure, NominalProtocol, LateMessages, list[Fraction], np.ndarray | None]:
@@ -505,7 +506,7 @@ def _input_bound(seed: int) -> tuple[Structure, NominalProtocol, LateMessages, l
     cap = protocol.gain.first * (min(share, Fraction(6, 10)) if own else share)
     messages = LateMessages(delay=delay, value_error=error, own_delay=own, gain_cap=cap)
     if own:
-        cert = certify(structure, protocol, x0, messages=messages, simulation=False, method="paper")
+        cert = certify(structure, protocol, x0, messages=messages, asks=Asks(simulation=False, method="paper"))
         assert cert.checked is not None and cert.checked.accepted, cert.notes
         return structure, protocol, messages, x0, None if cert.late is None else cert.late.input
     return structure, protocol, messages, x0, bound_late(structure, protocol, messages, x0, end.intervals).input
@@ -555,7 +556,7 @@ def test_the_largest_gain_under_a_decay_is_where_it_comes_to_a_cap() -> None:
 def test_without_a_cap_no_input_is_bounded() -> None:
     _, structure, protocol, x0, _ = _case(4)
     for messages in (LateMessages(delay="0.01"), LateMessages(value_error="0.1")):
-        late = certify(structure, protocol, x0, messages=messages, simulation=False, method="paper").late
+        late = certify(structure, protocol, x0, messages=messages, asks=Asks(simulation=False, method="paper")).late
         assert late is not None and late.rows and late.input is None
 
 
@@ -709,7 +710,9 @@ def test_late_messages_and_leaders_that_move_are_saved_and_read() -> None:
     protocol, leaders = NominalProtocol(T=1, rho1=1, rho2=3, kappa=1), MovingLeaders("1/2", "1/5")
     for x0, cap in (([1, 2, 3], None), (None, 9)):
         messages = LateMessages("0.03", value_error="0.01", gain_cap=cap)
-        made = certify(graph, protocol, x0, messages=messages, leaders=leaders, simulation=False, method="paper")
+        made = certify(
+            graph, protocol, x0, messages=messages, leaders=leaders, asks=Asks(simulation=False, method="paper")
+        )
         with TemporaryDirectory() as folder:
             made.save(Path(folder) / "c.json")
             saved = read_certificate(Path(folder) / "c.json")
@@ -726,7 +729,9 @@ def test_late_messages_and_leaders_of_which_nothing_is_proved_are_read_back(monk
     monkeypatch.setattr("ptcc_certify.certificate.procedure.bound_late", _nothing)
     graph, leaders = SignedDigraph.from_edges([("a", "b", 1)]), MovingLeaders("1/2")
     protocol, messages = NominalProtocol(T=1, rho1=1, rho2=3, kappa=1), LateMessages("0.03")
-    made = certify(graph, protocol, [1, 2], messages=messages, leaders=leaders, simulation=False, method="paper")
+    made = certify(
+        graph, protocol, [1, 2], messages=messages, leaders=leaders, asks=Asks(simulation=False, method="paper")
+    )
     with TemporaryDirectory() as folder:
         made.save(Path(folder) / "c.json")
         saved = read_certificate(Path(folder) / "c.json")
@@ -746,7 +751,7 @@ def test_the_longest_delay_behind_leaders_that_move_is_certified() -> None:
     asked = Expectations(max_residual=Fraction(1, 20))
     messages = LateMessages("0.2")
     options: dict[str, Any] = {"leaders": leaders, "expectations": asked, "simulation": False, "method": "paper"}
-    made = certify(graph, protocol, [1, 2, 3], messages=messages, **options)
+    made = certify_words(graph, protocol, [1, 2, 3], messages=messages, **options)
     assert made.late is not None and made.late.enough is not None and 0 < made.late.enough < Fraction(1, 5)
     structure, x0, again = made.structure, [Fraction(x) for x in (1, 2, 3)], replace(messages, delay=made.late.enough)
     ends = final_state(structure, x0).intervals
@@ -761,7 +766,9 @@ def test_a_clock_that_goes_very_far_leaves_what_can_be_written(speed: str | None
         None if speed is None else MovingLeaders(speed),
     )
     messages = LateMessages("1e-6", gain_cap=cap)
-    made = certify(graph, protocol, [1, 2, 3], messages=messages, leaders=leaders, simulation=False, method="paper")
+    made = certify(
+        graph, protocol, [1, 2, 3], messages=messages, leaders=leaders, asks=Asks(simulation=False, method="paper")
+    )
     assert made.verdict == "certified" and made.late is not None
     assert 0 < min(row.left for row in made.late.rows) <= Fraction(1, 2**1000)
     assert made.late.largest < (1e-6 if leaders is None else 0.05)
@@ -771,7 +778,7 @@ def test_values_that_are_off_by_less_than_floats_hold_are_certified() -> None:
     """Targets move by ``1e-600`` while messages come, which floats call 0, and the check does not."""
     graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 1), ("c", "b", 2)])
     messages, leaders = LateMessages("1e-300"), MovingLeaders("1e-300")
-    made = certify(graph, NominalProtocol(), [1, 2, 3], messages=messages, leaders=leaders, simulation=False)
+    made = certify(graph, NominalProtocol(), [1, 2, 3], messages=messages, leaders=leaders, asks=Asks(simulation=False))
     assert made.verdict == "certified" and made.late is not None and made.late.largest < 1e-6
 
 

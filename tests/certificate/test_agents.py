@@ -10,17 +10,19 @@ from typing import Any
 import numpy as np
 import pytest
 from agent_cases import agent_case
+from asked import certify_words
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from ptcc_certify.certificate.answer import MET, OPEN, REFUTED
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.procedure import certify
-from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.checker import check
 from ptcc_certify.checker.input_formulas import InitialSet
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.model.asks import Asks, Expectations
+from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.agents import Agents
 from ptcc_certify.protocols.gain_limits import GainLimits
@@ -37,7 +39,7 @@ SLIDING = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=
 
 
 def made(graph: Any, protocol: Any, x0: Any, agents: Agents, **options: Any) -> Certificate:
-    return certify(graph, protocol, x0, agents=agents, method="perron", **options)
+    return certify_words(graph, protocol, x0, agents=agents, method="perron", **options)
 
 
 def seen(seed: int, order: int | None = None) -> tuple[Certificate, Any]:
@@ -128,25 +130,31 @@ def test_agents_meet_at_rest_where_their_own_velocity_is_damped():
 
 
 def test_one_integrator_is_the_plain_certificate():
-    plain, same = (certify(PAIR, NOMINAL, [3, 1], simulation=False, **more) for more in ({}, {"agents": Agents(1)}))
+    plain, same = (
+        certify_words(PAIR, NOMINAL, [3, 1], simulation=False, **more) for more in ({}, {"agents": Agents(1)})
+    )
     assert same == plain and same.agents is None and "agents" not in same.document
 
 
 def test_one_integrator_under_a_gain_cap_is_the_plain_certificate_under_this_limit():
-    plain = certify(TEAM, NOMINAL, [5, 2, 4, -1], simulation=False, limits=GainLimits(gain_cap=4))
-    same = certify(TEAM, NOMINAL, [5, 2, 4, -1], simulation=False, agents=Agents(1, gain_cap=4))
+    plain = certify(TEAM, NOMINAL, [5, 2, 4, -1], limits=GainLimits(gain_cap=4), asks=Asks(simulation=False))
+    same = certify(TEAM, NOMINAL, [5, 2, 4, -1], agents=Agents(1, gain_cap=4), asks=Asks(simulation=False))
     assert same == plain and same.agents is None and same.to_dict()["digest"] == plain.to_dict()["digest"]
-    both = certify(TEAM, NOMINAL, [5, 2, 4, -1], simulation=False, agents=Agents(1, gain_cap=4), limits=GainLimits(9))
+    both = certify(
+        TEAM, NOMINAL, [5, 2, 4, -1], agents=Agents(1, gain_cap=4), limits=GainLimits(9), asks=Asks(simulation=False)
+    )
     assert [limit.gain_cap for limit in both.limits] == [4, 9]
-    twice = certify(TEAM, NOMINAL, [5, 2, 4, -1], simulation=False, agents=Agents(1, gain_cap=9), limits=GainLimits(9))
+    twice = certify(
+        TEAM, NOMINAL, [5, 2, 4, -1], agents=Agents(1, gain_cap=9), limits=GainLimits(9), asks=Asks(simulation=False)
+    )
     assert [limit.gain_cap for limit in twice.limits] == [9]
     with pytest.raises(ParameterError, match="no velocity"):
-        certify(TEAM, NOMINAL, [5, 2, 4, -1], agents=Agents(1, gain_cap=4), v0=[1, 0, 0, 0])
+        certify(TEAM, NOMINAL, InitialState([5, 2, 4, -1], v0=[1, 0, 0, 0]), agents=Agents(1, gain_cap=4))
 
 
 def test_one_integrator_under_a_gain_cap_and_disturbances_is_still_one_of_order_one():
     robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
-    part = certify(TEAM, robust, [5, 2, 4, -1], simulation=False, agents=Agents(1, gain_cap=40)).agents
+    part = certify(TEAM, robust, [5, 2, 4, -1], agents=Agents(1, gain_cap=40), asks=Asks(simulation=False)).agents
     assert part is not None and part.protocol.gain_cap == 40
 
 
@@ -172,9 +180,9 @@ def test_single_integrators_in_a_formation_have_the_plain_certificate_of_their_p
     if name == "moving leaders":
         graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1), ("c", "d", 1), ("d", "b", "0.5")])
     x0, h = [5, 2, 4, -1], [1, -3, "2/3", 2]
-    ours = certify(graph, protocol, x0, simulation=False, agents=Agents(order=1, offsets=h), **beside)
+    ours = certify_words(graph, protocol, x0, simulation=False, agents=Agents(order=1, offsets=h), **beside)
     less = [x - Fraction(y) for x, y in zip(x0, h, strict=True)]
-    plain = certify(graph, protocol, less, simulation=False, **beside)
+    plain = certify_words(graph, protocol, less, simulation=False, **beside)
     assert ours.verdict == "certified" and ours.agents is None and ours.offsets == tuple(map(Fraction, h))
     own, other = (
         {key: part for key, part in one.to_dict().items() if key not in ("digest", "unverified", "formation")}
@@ -198,9 +206,9 @@ def test_single_integrators_in_a_formation_have_the_plain_certificate_of_their_p
 def test_bounds_of_a_formation_under_a_cap_hold_on_the_motion_that_agents_of_order_1_make():
     """The motion, in the plane, is that of agents in their places; the bound of the input is no weaker than theirs."""
     agents = Agents(order=1, offsets=[1, -3, 2, 2], gain_cap=4)
-    ours = certify(TEAM, NOMINAL, [5, 2, 4, -1], simulation=False, agents=agents)
+    ours = certify(TEAM, NOMINAL, [5, 2, 4, -1], agents=agents, asks=Asks(simulation=False))
     in_plane = Agents(order=1, offsets=[[1, 0], [-3, 0], [2, 0], [2, 0]], gain_cap=4)
-    part = certify(TEAM, NOMINAL, [[x, 0] for x in (5, 2, 4, -1)], simulation=False, agents=in_plane).agents
+    part = certify(TEAM, NOMINAL, [[x, 0] for x in (5, 2, 4, -1)], agents=in_plane, asks=Asks(simulation=False)).agents
     assert part is not None and part.input is not None and ours.effort is not None
     (left,) = ours.effort.residual
     run = part.simulate()
@@ -219,8 +227,8 @@ def test_runs_of_a_formation_tell_positions(name: str):
     if name == "moving leaders":
         graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1), ("c", "d", 1), ("d", "b", "0.5")])
     x0, h = [5, 2, 4, -1], [1, -3, Fraction(2, 3), 2]
-    ours = certify(graph, protocol, x0, simulation=True, agents=Agents(order=1, offsets=h), **beside)
-    plain = certify(graph, protocol, [x - y for x, y in zip(x0, h, strict=True)], simulation=True, **beside)
+    ours = certify_words(graph, protocol, x0, simulation=True, agents=Agents(order=1, offsets=h), **beside)
+    plain = certify_words(graph, protocol, [x - y for x, y in zip(x0, h, strict=True)], simulation=True, **beside)
     runs = [(ours.trajectory, plain.trajectory), (ours.asked_trajectory, plain.asked_trajectory)]
     assert ours.comparison is not None and not ours.comparison.violated
     for run, less in runs:
@@ -239,13 +247,15 @@ def test_runs_of_a_formation_tell_positions(name: str):
 def test_a_behaviour_under_a_cap_is_not_told_to_be_met_in_a_formation(expected: str):
     agents = Agents(order=1, offsets=[1, -3, 2, 2], gain_cap=4)
     asked = Expectations(behaviour=expected)
-    found = certify(TEAM, NOMINAL, [5, 2, 4, -1], simulation=False, agents=agents, expectations=asked)
+    found = certify(TEAM, NOMINAL, [5, 2, 4, -1], agents=agents, asks=Asks(simulation=False, expectations=asked))
     assert found.assessment.answers[0].status == OPEN
 
 
 def test_biases_under_a_cap_make_the_same_certificate_as_the_places_that_they_make():
     biases = [0, 0, 0, 1]
-    ours = certify(TEAM, NOMINAL, [5, 2, 4, -1], simulation=False, agents=Agents(order=1, biases=[0] * 4, gain_cap=4))
+    ours = certify(
+        TEAM, NOMINAL, [5, 2, 4, -1], agents=Agents(order=1, biases=[0] * 4, gain_cap=4), asks=Asks(simulation=False)
+    )
     assert ours.offsets == (0, 0, 0, 0)
     with pytest.raises(ParameterError, match="biases fit no formation"):
         certify(TEAM, NOMINAL, [5, 2, 4, -1], agents=Agents(order=1, biases=biases, gain_cap=4))
@@ -253,16 +263,16 @@ def test_biases_under_a_cap_make_the_same_certificate_as_the_places_that_they_ma
 
 def test_in_the_plane_single_integrators_under_a_cap_keep_the_proof_of_agents_of_order_n():
     agents = Agents(order=1, offsets=[[1, 0], [0, 0], [2, 1], [0, 3]], gain_cap=4)
-    part = certify(TEAM, NOMINAL, [[5, 1], [2, 0], [4, 1], [-1, 2]], simulation=False, agents=agents).agents
+    part = certify(TEAM, NOMINAL, [[5, 1], [2, 0], [4, 1], [-1, 2]], agents=agents, asks=Asks(simulation=False)).agents
     assert part is not None and part.residual is not None and part.dimension == 2
 
 
 def test_the_initial_set_of_a_formation_is_that_of_positions():
     """All ``|x_k(0)| <= 10`` are a box about ``-h`` of what agents steer by."""
     h = [1, -3, 2, 2]
-    ours = certify(TEAM, NOMINAL, simulation=False, agents=Agents(order=1, offsets=h), initial_set=10)
+    ours = certify(TEAM, NOMINAL, agents=Agents(order=1, offsets=h), asks=Asks(simulation=False, initial_set=10))
     box = InitialSet([Fraction(-x) for x in h], [Fraction(10)] * 4)
-    plain = certify(TEAM, NOMINAL, simulation=False, initial_set=box)
+    plain = certify(TEAM, NOMINAL, asks=Asks(simulation=False, initial_set=box))
     assert ours.verdict == "certified" and ours.to_dict()["input"] == plain.to_dict()["input"]
 
 
@@ -284,15 +294,17 @@ def test_the_initial_set_of_a_formation_is_that_of_positions():
 )
 def test_places_and_positions_that_do_not_follow_are_rejected(change: Any, reason: str):
     agents = Agents(order=1, offsets=[1, -3, 2, 2], gain_cap=4)
-    data = certify(TEAM, NOMINAL, [5, 2, 4, -1], simulation=False, agents=agents).to_dict()
+    data = certify(TEAM, NOMINAL, [5, 2, 4, -1], agents=agents, asks=Asks(simulation=False)).to_dict()
     assert check(data).accepted
     report = check({**data, "formation": change and {**data["formation"], **change}})
     assert not report.accepted and reason in (report.reason or "")
 
 
 def test_no_agents_of_order_n_stand_beside_a_formation():
-    of_order_two = certify(TEAM, NOMINAL, [5, 2, 4, -1], simulation=False, agents=Agents(order=2)).to_dict()
-    formation = certify(TEAM, NOMINAL, [5, 2, 4, -1], simulation=False, agents=Agents(order=1, offsets=[1, 0, 0, 0]))
+    of_order_two = certify(TEAM, NOMINAL, [5, 2, 4, -1], agents=Agents(order=2), asks=Asks(simulation=False)).to_dict()
+    formation = certify(
+        TEAM, NOMINAL, [5, 2, 4, -1], agents=Agents(order=1, offsets=[1, 0, 0, 0]), asks=Asks(simulation=False)
+    )
     report = check({**of_order_two, "formation": formation.to_dict()["formation"]})
     assert report.reason == "a formation beside that of agents of order n"
 
@@ -302,7 +314,7 @@ def test_a_formation_in_the_plane_is_bounded_by_the_function_that_needs_least_in
     graph = SignedDigraph.from_edges([("ann", "bob", 1), ("bob", "eve", -1)])
     x0, h = [[7, 3], [5, -9], [6, 8]], [[1, 2], [3, 4], [5, 6]]
     protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
-    part = certify(graph, protocol, x0, simulation=False, agents=Agents(order=1, offsets=h)).agents
+    part = certify(graph, protocol, x0, agents=Agents(order=1, offsets=h), asks=Asks(simulation=False)).agents
     assert part is not None and part.input is not None
     run = part.simulate()
     most = np.nanmax(np.sqrt((run.input**2).sum(axis=1)))
@@ -313,7 +325,9 @@ def test_in_the_plane_a_rate_too_slow_for_a_bounded_input_is_told_as_a_rate():
     graph = SignedDigraph.from_edges([("ann", "bob", 1), ("bob", "eve", -1)])
     agents = Agents(order=1, offsets=[[1, 2], [3, 4], [5, 6]])
     protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
-    part = certify(graph, protocol, [[7, 3], [5, -9], [6, 8]], simulation=False, agents=agents, method="paper").agents
+    part = certify(
+        graph, protocol, [[7, 3], [5, -9], [6, 8]], agents=agents, asks=Asks(simulation=False, method="paper")
+    ).agents
     assert part is not None and part.unbounded == (("rate 0.999999 is below 2/(rho2 kappa) = 1", "--rho2 1.001"),)
 
 
@@ -351,7 +365,9 @@ def test_a_limit_below_the_input_at_time_0_is_refuted_and_one_above_it_is_not(ki
 
     agents, base = STARTED[kind]
     x0, more = [[5, 2], [2, 1], [4, -1], [-1, 3]], [[[1, 0], [0, 2], [0, 1], [-2, 1]]] * (agents.degree - 1)
-    certificate = certify(TEAM, base, x0, agents=agents, derivatives=more, simulation=False, method="paper")
+    certificate = certify(
+        TEAM, base, InitialState(x0, derivatives=more), agents=agents, asks=Asks(simulation=False, method="paper")
+    )
     part, t = certificate.agents, ca.SX.sym("t")
     assert part is not None
     columns = []
@@ -386,7 +402,7 @@ ALONE = SignedDigraph.from_edges([], ["p", "q"])
 )
 def test_the_input_of_agents_that_listen_to_nobody_is_known(agents: Agents, status: str, exact: int | None):
     base = NominalProtocol(T=2, rho1=1, rho2=1, kappa=2)
-    part = certify(ALONE, base, [5, 2], agents=agents, v0=[3, -2], simulation=False).agents
+    part = certify(ALONE, base, InitialState([5, 2], v0=[3, -2]), agents=agents, asks=Asks(simulation=False)).agents
     assert part is not None
     assert part.judge_input(Fraction(10**9 if exact is None else exact)).status == status
     assert part.inputs is None or max(part.inputs) == exact
@@ -505,7 +521,7 @@ def test_the_coupling_is_not_that_of_a_fast_function_with_a_huge_overshoot_const
     protocol = NominalProtocol(T=3)
     bounds = {}
     for method in ("paper", "perron"):
-        part = certify(graph, protocol, x0, agents=Agents(order=2), method=method, simulation=False).agents
+        part = certify(graph, protocol, x0, agents=Agents(order=2), asks=Asks(method=method, simulation=False)).agents
         assert part is not None
         bounds[method] = part.deviation_bound(np.array([0.01])).max()
     assert bounds["perron"] < 10 * bounds["paper"]
@@ -594,7 +610,7 @@ def test_sliding_variables_that_begin_elsewhere_are_refused():
     with pytest.raises(ParameterError, match=r"sigma\(0\) = 0"):
         made(TEAM, SLIDING, [5, 2, 4, -1], Agents(order=2), sigma0=[1, 0, 0, 0])
     with pytest.raises(ParameterError, match="velocity to begin with"):
-        certify(TEAM, NOMINAL, [5, 2, 4, -1], v0=[1, 1, 1, 1])
+        certify(TEAM, NOMINAL, InitialState([5, 2, 4, -1], v0=[1, 1, 1, 1]))
 
 
 def test_a_faster_function_with_a_huge_constant_does_not_decide_the_coupling():
@@ -602,10 +618,10 @@ def test_a_faster_function_with_a_huge_constant_does_not_decide_the_coupling():
     agents, begin = Agents(order=2), {"x0": [5, 2, 4, -1], "v0": [1, 0, 0, -2]}
     sizes = {}
     for method in ("paper", "lmi"):  # the latter finds a rate near its supremum, where the follower counts for little
-        part = certify(follower, NOMINAL, agents=agents, method=method, simulation=False, **begin).agents
+        part = certify_words(follower, NOMINAL, agents=agents, method=method, simulation=False, **begin).agents
         assert part is not None and part.input is not None
         assert len(part.used) == sum(V.proved_rate * part.matrix.coupling >= 1 for V in part.functions)
         sizes[method] = max(part.input)
     assert sizes["lmi"] <= sizes["paper"] * Fraction(1001, 1000)
-    without = certify(follower, NOMINAL, agents=agents, method="lmi", simulation=False).agents
+    without = certify(follower, NOMINAL, agents=agents, asks=Asks(method="lmi", simulation=False)).agents
     assert without is not None and without.matrix.coupling <= Fraction(1001, 1000)

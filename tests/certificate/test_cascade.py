@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from asked import certify_words
 from generators import all_classes, random_graph
 from oracle_cascade import false_claims_of_cascade, moved
 from scipy.integrate import solve_ivp
@@ -23,6 +24,7 @@ from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.model.asks import Asks
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.agents import Agents
 
@@ -35,7 +37,7 @@ FAST = NominalProtocol(T=2, rho1=1, rho2=6, kappa=1)
 
 
 def made(graph: Any, protocol: Any, x0: Any, agents: Agents, **options: Any) -> Certificate:
-    return certify(graph, protocol, x0, agents=agents, **{"method": "paper", "simulation": False, **options})
+    return certify_words(graph, protocol, x0, agents=agents, **{"method": "paper", "simulation": False, **options})
 
 
 def part_of(certificate: Certificate) -> CascadePart:
@@ -200,7 +202,7 @@ def test_positions_settle_where_velocities_do_not():
 
 def test_without_velocities_allies_end_where_single_integrators_do():
     """``q(0) = -eta(0) e(0)``, whose mean is 0: the same place, whatever alpha."""
-    plain = certify(TEAM, FAST, [5, 2, 4, -1], method="paper", simulation=False)
+    plain = certify(TEAM, FAST, [5, 2, 4, -1], asks=Asks(method="paper", simulation=False))
     assert isinstance(plain, Certificate) and plain.final_state is not None
     for alpha in (1, 7):
         certificate = made(TEAM, FAST, [5, 2, 4, -1], Agents(order=2, cascade=alpha))
@@ -213,10 +215,10 @@ def test_agents_that_begin_with_the_commanded_velocity_move_as_single_integrator
     certificate = made(TEAM, FAST, x0, Agents(order=2, cascade="0.7"), v0=v0)
     part = part_of(certificate)
     assert all(root.drive == 0 for root in part.roots)
-    plain = certify(TEAM, FAST, x0, method="paper", simulation=False)
+    plain = certify(TEAM, FAST, x0, asks=Asks(method="paper", simulation=False))
     late = np.array([0.01, 1e-6])
     assert np.allclose(part.deviation_bound(late)[:, 0], plain.deviation_bound(late), rtol=1e-7, atol=0)
-    run, single = part.simulate(), certify(TEAM, FAST, x0, method="paper").simulate()
+    run, single = part.simulate(), certify(TEAM, FAST, x0, asks=Asks(method="paper")).simulate()
     same = np.interp(single.t[single.t < 1.9], run.t, run.positions[0, 0])
     assert np.allclose(same, single.states[0][single.t < 1.9], atol=2e-2)
     holds(certificate)

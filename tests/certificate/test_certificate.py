@@ -15,6 +15,7 @@ from typing import Any
 import flint
 import numpy as np
 import pytest
+from asked import certify_words
 from bad_inputs import ptcc
 from balls import BITS, ball, clock, states
 from generators import KINDS, Made, all_classes, class_cases, made_graphs, random_graph, smallest
@@ -29,7 +30,6 @@ from ptcc_certify.certificate import procedure
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.graph_sections import structure_document
 from ptcc_certify.certificate.procedure import certify
-from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.certificate.section_writer import exact_or_ball
 from ptcc_certify.checker import OBLIGATIONS, CheckReport, UnreadableError, check, digest, read
 from ptcc_certify.errors import ParameterError
@@ -41,6 +41,7 @@ from ptcc_certify.graphs.size_limits import SEARCH_NODES
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.lyapunov import dominance
 from ptcc_certify.lyapunov.search import METHODS
+from ptcc_certify.model.asks import Asks, Expectations
 from ptcc_certify.protocols import NominalProtocol
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
@@ -71,7 +72,7 @@ def of_class(name: str, seed: int = 3, method: str = "best") -> dict[str, Any]:
     weights = "small ints" if seed % 2 else "decimals"
     made = random_graph(np.random.default_rng(seed), **{"weights": weights, **dict(CLASSES)[name]})
     start = random_start(made.graph.n_nodes, seed)
-    return through_json(certify(made.graph, PROTOCOL, start, simulation=False, method=method))
+    return through_json(certify(made.graph, PROTOCOL, start, asks=Asks(simulation=False, method=method)))
 
 
 # ---------------------------------------------------------------------- the paper's examples
@@ -445,7 +446,7 @@ def test_the_recheck_sees_what_is_wrong_with_the_limit_of_rates(name: str):
 def test_only_what_the_independent_check_accepts_is_certified(monkeypatch: pytest.MonkeyPatch):
     """A search or a proof that is wrong leaves the verdict undecided, and the step is named."""
     graph, search = load_graph("fig3a"), procedure._search_and_prove
-    assert certify(graph, PROTOCOL, simulation=False, method="paper").verdict == "certified"
+    assert certify(graph, PROTOCOL, asks=Asks(simulation=False, method="paper")).verdict == "certified"
 
     def too_fast(*args: Any) -> Any:
         V, proof, numerical = search(*args)
@@ -458,7 +459,7 @@ def test_only_what_the_independent_check_accepts_is_certified(monkeypatch: pytes
         return V, replace(proof, rate=proof.rate * more, obligations=tuple(steps)), numerical
 
     monkeypatch.setattr(procedure, "_search_and_prove", too_fast)
-    cert = certify(graph, PROTOCOL, simulation=False, method="paper")
+    cert = certify(graph, PROTOCOL, asks=Asks(simulation=False, method="paper"))
     assert cert.verdict == cert.to_dict()["verdict"] == "undecided"
     assert not cert.checked.accepted and cert.checked.rejected == "margin of paper"
     assert cert.to_dict() == {"verdict": "undecided", "rejected": "margin of paper", "reason": cert.checked.reason}
@@ -555,7 +556,9 @@ def test_a_degenerate_start_is_named_in_json_and_on_screen(tmp_path: Path):
     Recheck(data).everything()
     screen = " ".join(ptcc("certify", str(path), "--x0", special, "-v").out.split())
     assert "of this x(0) leader group 1 happens to meet at 0, although it is balanced" in screen
-    unbalanced = certify(SignedDigraph.from_edges([(1, 2, 1), (2, 1, -1)]), PROTOCOL, [1, 1], simulation=False)
+    unbalanced = certify(
+        SignedDigraph.from_edges([(1, 2, 1), (2, 1, -1)]), PROTOCOL, [1, 1], asks=Asks(simulation=False)
+    )
     assert unbalanced.to_dict()["influence"]["degenerate"] == []  # 0 is what an unbalanced group is for
 
 
@@ -595,7 +598,9 @@ def test_a_disconnected_graph_has_components_and_no_claim():
 @pytest.mark.parametrize("edges", [[], [(1, 2, -1), (2, 1, -1)]])
 def test_more_than_a_hundred_components_are_grouped_in_arrays(edges: list[tuple]):
     few, many = (
-        through_json(certify(SignedDigraph.from_edges(edges, range(1, n)), PROTOCOL, range(1, n), simulation=False))
+        through_json(
+            certify(SignedDigraph.from_edges(edges, range(1, n)), PROTOCOL, range(1, n), asks=Asks(simulation=False))
+        )
         for n in (100, 110)
     )
     assert isinstance(few["components"], list)
@@ -633,7 +638,7 @@ def test_beyond_120_nodes_the_paper_s_rate_is_floating_point_and_the_certified_o
     n: int, last: int, searched: bool
 ):
     """A ring: rate 2 (1 - cos(2 pi/n)) if balanced, 2 (1 - cos(pi/n)) if not, which weights of 1 attain."""
-    cert = certify(ring(n, last), PROTOCOL, list(range(n)), simulation=False)
+    cert = certify(ring(n, last), PROTOCOL, list(range(n)), asks=Asks(simulation=False))
     data = through_json(cert)
     assert data["verdict"] == "certified" and check(data).accepted
     assert data["rates"]["paper"] is None and cert.upper_bound == Fraction(2 * n, n - 1 if last > 0 else n)
@@ -699,8 +704,8 @@ def test_relabelling_permutes_the_certificate_and_changes_nothing_else(made: Mad
     labels = sorted(names.values(), key=lambda label: int(label.split()[1]))
     moved = SignedDigraph.from_edges([(names[s], names[t], w) for s, t, w in graph.edges], labels)
     values = dict(zip(names.values(), start, strict=True))
-    first = through_json(certify(graph, PROTOCOL, start, simulation=False))
-    second = through_json(certify(moved, PROTOCOL, [values[label] for label in labels], simulation=False))
+    first = through_json(certify(graph, PROTOCOL, start, asks=Asks(simulation=False)))
+    second = through_json(certify(moved, PROTOCOL, [values[label] for label in labels], asks=Asks(simulation=False)))
     Recheck(second).everything()
     for key in ("claim", "protocol", "verdict"):
         assert first[key] == second[key]
@@ -750,7 +755,7 @@ def of_size(name: str, n: int = 7, seed: int = 5, weights: str = "small ints") -
 
 
 def functions_of(graph: SignedDigraph, protocol: NominalProtocol = PROTOCOL, **more: Any) -> Certificate:
-    cert = certify(graph, protocol, simulation=False, **more)
+    cert = certify_words(graph, protocol, simulation=False, **more)
     assert cert.verdict == "certified"
     return cert
 
@@ -890,13 +895,13 @@ def test_an_instant_of_interest_is_served():
 )
 def test_no_other_instant(at: object, says: str):
     with pytest.raises(ParameterError, match=says):
-        certify(of_size("1.1"), PROTOCOL, simulation=False, at=at)
+        certify(of_size("1.1"), PROTOCOL, asks=Asks(simulation=False, at=at))
 
 
 @pytest.mark.parametrize("method", ["", "PERRON", "sdp", None])
 def test_an_unknown_method_is_refused(method: Any):
     with pytest.raises(ParameterError, match="one of paper, perron, lmi, full, best"):
-        certify(of_size("1.1"), PROTOCOL, simulation=False, method=method)
+        certify(of_size("1.1"), PROTOCOL, asks=Asks(simulation=False, method=method))
 
 
 @pytest.mark.parametrize(
@@ -951,7 +956,9 @@ def test_an_final_state_too_long_to_write_is_enclosed_and_proved():
 
     edges = [*ring(0, "-"), (2, 0, weight("-")), *ring(n, ""), (1, n, weight("-")), (2 * n, n + 1, weight())]
     edges += [(n + i, n + (i + 3) % n, weight()) for i in range(n)]
-    cert = certify(SignedDigraph.from_edges(edges), PROTOCOL, range(2 * n + 1), simulation=False, method="perron")
+    cert = certify(
+        SignedDigraph.from_edges(edges), PROTOCOL, range(2 * n + 1), asks=Asks(simulation=False, method="perron")
+    )
     data = through_json(cert)
     assert cert.verdict == data["verdict"] == "certified" and cert.final_state is not None
     step = Recheck(data).steps["final-state", "graph"]
@@ -997,7 +1004,7 @@ def test_there_is_one_upper_bound_on_the_rate_and_one_optimality_ratio(seed: int
     """In the object, its file, what is read back, the table of a batch, and what ``--min-rate`` is refuted by."""
     edges = [(1, 2, -1), (2, 1, -3)] if seed == 0 else exact_edges(of_size(SOME[seed], 6, seed))
     graph = SignedDigraph.from_edges(edges)
-    cert = certify(graph, PROTOCOL, simulation=False)
+    cert = certify(graph, PROTOCOL, asks=Asks(simulation=False))
     assert cert.upper_bound is not None and cert.rate is not None
     cert.save(tmp_path / "c.json")
     saved = read_certificate(tmp_path / "c.json")
@@ -1015,7 +1022,7 @@ def test_of_one_mode_the_mean_eigenvalue_is_the_upper_bound():
     """Two agents; a follower alone; a group that is slower than another one."""
     two = [(1, 2, -1), (2, 1, -3)]
     for edges, bound in ((two, 8), ([*two, (2, 3, Fraction(1, 3))], Fraction(2, 3)), ([*two, (2, 3, 7)], 8)):
-        cert = certify(SignedDigraph.from_edges(edges), PROTOCOL, simulation=False)
+        cert = certify(SignedDigraph.from_edges(edges), PROTOCOL, asks=Asks(simulation=False))
         assert cert.limit is not None and cert.limit.kind == "rate-mean" and cert.verdict == "certified"
         assert cert.rate is not None and cert.rate < cert.upper_bound == bound
     still = certify(SignedDigraph.from_edges([], ["a", "b"]), PROTOCOL)
@@ -1026,7 +1033,7 @@ def test_a_mean_that_is_not_that_of_a_strong_component_is_rejected():
     """Another node, a smaller or larger number, a leader alone, of whom no eigenvalue is left."""
     graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 2), ("c", "b", 2)])
     strong = NominalProtocol(T=1, rho1=1, rho2=3, kappa=1)
-    data = through_json(certify(graph, strong, simulation=False, method="paper"))
+    data = through_json(certify(graph, strong, asks=Asks(simulation=False, method="paper")))
     place = [step["kind"] for step in data["proof"]].index("rate-upper-bound")
     told = {
         "kind": "rate-mean",

@@ -15,13 +15,13 @@ from ptcc_certify.checker import check, digest
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.protocols.restricted_signals import ClockShares, DwellTime, JointWindows
 from ptcc_certify.report.family_screen import family_lines
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.plots.input import plot_input
 from ptcc_certify.report.statement import family_latex
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.signals import RandomSignal
-from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows
 
 PROTOCOL = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=3, mu1=2, mu2=1, mu3=1, delta=1)
 PATH = Family.from_intervals([("a", "b", 1, 2), ("b", "c", -3, -1)], undirected=True)

@@ -10,7 +10,7 @@ import pytest
 import ptcc_certify as ptcc
 from ptcc_certify.bounds.attracting_box import AttractingBox
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.theorems.restricted_signals import DwellTime
+from ptcc_certify.protocols.restricted_signals import DwellTime
 
 pytest.importorskip("pandas")
 PROTOCOL = ptcc.NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
@@ -90,5 +90,7 @@ def test_who_hears_somebody_in_one_mode_or_at_an_optional_edge_does_not_keep_its
 @pytest.mark.parametrize("sigma0", [[0, 0], [1, 0]])
 def test_while_a_sliding_variable_moves_nobody_is_said_to_keep_its_value(sigma0):
     sliding = ptcc.SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=3, mu1=2, mu2=1, mu3=1, delta=1)
-    table = both_ways(ptcc.certify(Family.from_intervals([("a", "b", 0, 1)]), sliding, [1, 2], sigma0=sigma0))
+    table = both_ways(
+        ptcc.certify(Family.from_intervals([("a", "b", 0, 1)]), sliding, ptcc.InitialState([1, 2], sigma0=sigma0))
+    )
     assert table["keeps"].tolist() == [not any(sigma0), False]

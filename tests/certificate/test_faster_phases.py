@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from asked import certify_words
 from mutations import resealed
 
 from ptcc_certify.certificate.agents_part import AgentsPart
@@ -18,6 +19,8 @@ from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.protocols import NominalProtocol
 from ptcc_certify.protocols.agents import Agents
 
@@ -36,7 +39,9 @@ KINDS = {
 def made(name: str) -> Certificate:
     agents = KINDS[name]
     later = [[1, -2, 0, 3], [0, 1, 1, -1], [2, 0, 0, 1]][: agents.degree - 1]
-    return certify(TEAM, PROTOCOL, [5, 2, -4, 1], agents=agents, derivatives=later, simulation=False)
+    return certify(
+        TEAM, PROTOCOL, InitialState([5, 2, -4, 1], derivatives=later), agents=agents, asks=Asks(simulation=False)
+    )
 
 
 def part_of(certificate: Certificate) -> AgentsPart:
@@ -117,9 +122,9 @@ def test_forged_phases_are_rejected(path: tuple[Any, ...], change: Callable[[Any
 def test_phases_stand_beside_agents_of_order_n_without_a_cap_alone():
     phases = made("order 4").to_dict()["phases"]
     options: dict[str, Any] = {"simulation": False, "method": "paper"}
-    plain = certify(TEAM, PROTOCOL, [5, 2, -4, 1], **options)
-    capped = certify(TEAM, PROTOCOL, [5, 2, -4, 1], agents=Agents(order=3, gain_cap=50), **options)
-    cascade = certify(TEAM, PROTOCOL, [5, 2, -4, 1], agents=Agents(order=2, cascade=1), **options)
+    plain = certify_words(TEAM, PROTOCOL, [5, 2, -4, 1], **options)
+    capped = certify_words(TEAM, PROTOCOL, [5, 2, -4, 1], agents=Agents(order=3, gain_cap=50), **options)
+    cascade = certify_words(TEAM, PROTOCOL, [5, 2, -4, 1], agents=Agents(order=2, cascade=1), **options)
     for certificate, reason in (
         (plain, "not of order n"),
         (capped, "capped"),

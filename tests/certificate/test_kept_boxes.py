@@ -21,10 +21,10 @@ from ptcc_certify import Family, NominalProtocol, SlidingModeProtocol
 from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
 from ptcc_certify.checker import check
+from ptcc_certify.protocols.restricted_signals import DwellTime
 from ptcc_certify.report.family_screen import family_lines, family_summary
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.statement import family_latex
-from ptcc_certify.theorems.restricted_signals import DwellTime
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
 GAINS = {"T_r": 1, "T_s": 1, "rho1": 1, "rho2": 1, "kappa": 3, "mu1": 2, "mu2": 1, "mu3": 1, "delta": 1}

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from asked import certify_words
 from generators import KINDS, all_classes, class_cases, random_graph
 from mutations import Json, changed, resealed
 from scipy.linalg import expm
@@ -32,6 +33,7 @@ from ptcc_certify.graphs.io import read_graph
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.lyapunov import dominance
 from ptcc_certify.lyapunov.dominance import dominant_functions
+from ptcc_certify.model.asks import Asks
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.report.screen import certificate_lines
 from ptcc_certify.simulation.interrupt import interruptible
@@ -52,7 +54,7 @@ def made(name: str, seed: int = 3) -> tuple[Certificate, Json]:
     rng = np.random.default_rng(seed)
     graph = random_graph(rng, **{"weights": "decimals", **CLASSES[name]}).graph
     start = [Fraction(int(v), 100) for v in rng.integers(-1000, 1001, graph.n_nodes)]
-    found = certify(graph, NOMINAL, start, simulation=False)
+    found = certify(graph, NOMINAL, start, asks=Asks(simulation=False))
     return found, json.loads(found.to_json())
 
 
@@ -147,7 +149,7 @@ def test_sparse_graphs_of_hundreds_of_nodes(n: int, slides: bool, tmp_path: Path
     if slides:
         protocol = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
         more = {"sigma0": ([1, 0, "-0.5", 2] * (n // 4))}
-    cert = certify(graph, protocol, start, simulation=False, **more)
+    cert = certify_words(graph, protocol, start, simulation=False, **more)
     assert cert.verdict == "certified"
     cert.save(tmp_path / "c.json")
     assert check(tmp_path / "c.json").accepted
@@ -179,7 +181,7 @@ def strong_graph(n: int, balanced: bool, seed: int, followers: int = 0) -> Signe
 def test_large_leader_groups_are_proved_by_a_sparse_factor(balanced: bool, followers: int):
     graph = strong_graph(150, balanced, 7 + followers, followers)
     start = np.random.default_rng(0).uniform(-10, 10, graph.n_nodes).round(3).tolist()
-    cert = certify(graph, NOMINAL, start, simulation=False, method="perron")
+    cert = certify(graph, NOMINAL, start, asks=Asks(simulation=False, method="perron"))
     assert cert.verdict == "certified", cert.notes
     for stdlib in (True, False):
         report = check(cert.to_dict(), stdlib=stdlib)
@@ -209,14 +211,15 @@ def test_a_factor_is_of_the_matrix_that_the_checker_forms():
     edges = {(s, t): w for s, t, w in zip(source.tolist(), target.tolist(), weights.tolist(), strict=True) if s != t}
     edges |= {(t, s): w for (s, t), w in edges.items()}
     graph = SignedDigraph.from_edges([(s, t, w) for (s, t), w in edges.items()])
-    assert certify(graph, NOMINAL, simulation=False).verdict == "certified"
+    assert certify(graph, NOMINAL, asks=Asks(simulation=False)).verdict == "certified"
 
 
 @pytest.mark.parametrize("balanced", thinned([True, False], 2))
 def test_leader_groups_of_hundreds_take_the_best_diagonal_matrix(balanced: bool):
     graph = strong_graph(125, balanced, 1)
     found = {
-        method: certify(graph, NOMINAL, simulation=False, method=method) for method in ("perron", "lmi", "best", "full")
+        method: certify(graph, NOMINAL, asks=Asks(simulation=False, method=method))
+        for method in ("perron", "lmi", "best", "full")
     }
     assert [c.verdict for c in found.values()] == ["certified"] * 3 + ["undecided"]
     assert any("only the classes perron and lmi are proved" in note for note in found["full"].notes)
@@ -230,7 +233,7 @@ def test_leader_groups_of_hundreds_take_the_best_diagonal_matrix(balanced: bool)
 @pytest.mark.parametrize("balanced", thinned([True, False], 2))
 def test_forged_rates_of_large_groups_are_rejected(balanced: bool):
     graph = strong_graph(130, balanced, 3)
-    data = json.loads(certify(graph, NOMINAL, [1, *[0] * 129], simulation=False).to_json())
+    data = json.loads(certify(graph, NOMINAL, [1, *[0] * 129], asks=Asks(simulation=False)).to_json())
     step = next(i for i, s in enumerate(data["proof"]) if s["kind"] == "dominance")
     where = ("proof", step, "witness", "groups", 0)
     said = data["proof"][step]["witness"]["groups"][0]
@@ -256,7 +259,7 @@ def test_forged_rates_of_large_groups_are_rejected(balanced: bool):
 def test_a_leader_group_beyond_the_limit_is_undecided_with_a_note(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(dominance, "FILL_ROWS", 100)
     graph = strong_graph(125, False, 5)
-    cert = certify(graph, NOMINAL, simulation=False)
+    cert = certify(graph, NOMINAL, asks=Asks(simulation=False))
     assert cert.verdict == "undecided"
     assert any("of a leader group of 125 nodes is numerical" in note for note in cert.notes)
 
@@ -287,7 +290,7 @@ def test_frontier_of_rate_and_overshoot_is_monotone():
 def test_real_networks_of_thousands_are_certified(name: str, ratio: float, real_data: Path, tmp_path: Path):
     graph = read_graph(real_data / name, orientation="listens")
     start = np.random.default_rng(0).uniform(-10, 10, graph.n_nodes).round(3).tolist()
-    cert = certify(graph, NOMINAL, start, simulation=False)
+    cert = certify(graph, NOMINAL, start, asks=Asks(simulation=False))
     assert cert.verdict == "certified" and cert.rate is not None
     cert.save(tmp_path / "c.json")
     assert check(tmp_path / "c.json").accepted
@@ -299,7 +302,7 @@ def test_real_networks_of_thousands_are_certified(name: str, ratio: float, real_
 
 def test_the_screen_tells_how_near_the_final_state_is_known():
     graph = random_sparse(150, 4)
-    cert = certify(graph, NOMINAL, [1] * 150, simulation=False)
+    cert = certify(graph, NOMINAL, [1] * 150, asks=Asks(simulation=False))
     lines = certificate_lines(cert, "g")
     (said,) = [line for line in lines if line.startswith("x(T)")]
     assert said.endswith("proved; here to 5 digits)") and "to within" in said
@@ -342,7 +345,7 @@ def fan() -> SignedDigraph:
     ),
 )
 def test_weights_and_starts_of_any_size_are_certified(graph: SignedDigraph, start: str):
-    cert = certify(graph, NOMINAL, [start] * graph.n_nodes, simulation=False)
+    cert = certify(graph, NOMINAL, [start] * graph.n_nodes, asks=Asks(simulation=False))
     assert cert.verdict == "certified", cert.notes
 
 
@@ -370,7 +373,7 @@ def test_a_final_state_that_floats_cannot_compute_is_none(monkeypatch: pytest.Mo
     monkeypatch.setattr(
         final_states, "follower_state", lambda structure, state: np.full(structure.followers.size, np.nan)
     )
-    cert = certify(chain([1] * 130), NOMINAL, [1] * 131, simulation=False)
+    cert = certify(chain([1] * 130), NOMINAL, [1] * 131, asks=Asks(simulation=False))
     assert cert.final_state is None and cert.verdict == "undecided" and cert.checked.accepted
     assert "x(T)" not in cert.summary() and "nan" not in cert.summary()
     assert any("too ill-conditioned for floats" in note for note in cert.notes)
@@ -381,13 +384,15 @@ def test_a_leader_group_over_many_decades():
     rng = np.random.default_rng(0)
     edges = {(i, (i + 1) % 40): float(10 ** rng.uniform(-4, 4)) for i in range(40)}
     edges |= {(int(rng.integers(0, 40)), 40 + k): 1.0 for k in range(130)}
-    cert = certify(SignedDigraph.from_edges([(i, j, w) for (i, j), w in edges.items()]), NOMINAL, simulation=False)
+    cert = certify(
+        SignedDigraph.from_edges([(i, j, w) for (i, j), w in edges.items()]), NOMINAL, asks=Asks(simulation=False)
+    )
     assert cert.verdict == "certified", cert.notes
 
 
 def test_long_chains_have_a_bound_that_says_something():
     """The fastest member has an astronomical prefactor; the slowest one bounds the first instants."""
-    found = certify(chain([1] * 141), NOMINAL, simulation=False).search.functions
+    found = certify(chain([1] * 141), NOMINAL, asks=Asks(simulation=False)).search.functions
     assert min(m.overshoot for m in found) < 10**5
 
 
@@ -421,7 +426,7 @@ def test_undirected_groups_that_mix_slowly_are_certified(name: str):
     """Their left vector is exact, so that the proof needs no cube of the Laplacian, and the end is exact too."""
     graph = SLOW[name]
     n = graph.n_nodes
-    cert = certify(graph, NOMINAL, list(range(n)), simulation=False)
+    cert = certify(graph, NOMINAL, list(range(n)), asks=Asks(simulation=False))
     assert cert.verdict == "certified", cert.notes
     assert check(cert.to_dict(), stdlib=True).accepted
     symmetric = graph.dense_laplacian()
@@ -438,13 +443,13 @@ def test_undirected_groups_that_mix_slowly_are_certified(name: str):
 )
 def test_starts_that_meet_at_zero_and_tiny_ones(start: list[Any]):
     graph = undirected([(i, (i + 1) % 130, 1) for i in range(130)])
-    cert = certify(graph, NOMINAL, start, simulation=False, method="perron")
+    cert = certify(graph, NOMINAL, start, asks=Asks(simulation=False, method="perron"))
     assert cert.verdict == "certified", cert.notes
     assert cert.final_state is not None and cert.final_state.degenerate == (() if start[-1] == "1e-320" else (1,))
 
 
 def test_a_directed_group_that_starts_at_zero_meets_there():
-    directed = certify(strong_graph(125, True, 2), NOMINAL, [0] * 125, simulation=False, method="perron")
+    directed = certify(strong_graph(125, True, 2), NOMINAL, [0] * 125, asks=Asks(simulation=False, method="perron"))
     assert (
         directed.verdict == "certified" and directed.final_state is not None and directed.final_state.degenerate == (1,)
     )
@@ -453,7 +458,7 @@ def test_a_directed_group_that_starts_at_zero_meets_there():
 def test_what_is_printed_lies_in_the_intervals_of_the_certificate():
     edges = [(0, 1, 1), (1, 2, 1), (2, 0, 1), *((i, i + 1, 1) for i in range(2, 132))]
     start = [Fraction(1, 10), Fraction(2, 10), Fraction(-3, 10) + Fraction(1, 10**17), *[1] * 130]
-    cert = certify(SignedDigraph.from_edges(edges), NOMINAL, start, simulation=False, method="perron")
+    cert = certify(SignedDigraph.from_edges(edges), NOMINAL, start, asks=Asks(simulation=False, method="perron"))
     data = cert.to_dict()
     assert data["influence"]["degenerate"] == [] and cert.final_state is not None and cert.final_state.degenerate == ()
     for seen, said in zip(cert.final_state.states, data["final_state"].values(), strict=True):
@@ -463,7 +468,7 @@ def test_what_is_printed_lies_in_the_intervals_of_the_certificate():
 
 
 def test_a_forged_tree_is_rejected():
-    data = json.loads(certify(SLOW["directed ring"], NOMINAL, simulation=False, method="perron").to_json())
+    data = json.loads(certify(SLOW["directed ring"], NOMINAL, asks=Asks(simulation=False, method="perron")).to_json())
     step = next(i for i, s in enumerate(data["proof"]) if s["kind"] == "dominance")
     where = ("proof", step, "witness", "groups", 0, "factor", "parents")
     tree = data["proof"][step]["witness"]["groups"][0]["factor"]["parents"]
@@ -491,7 +496,7 @@ def test_long_undirected_groups_have_an_exact_left_vector(closed: bool):
     n = 1500
     graph = undirected([(i, (i + 1) % n, Fraction((-1) ** i, 3)) for i in range(n - 1 + closed)])
     assert left_vector(graph).tolist() == [1 / n] * n
-    cert = certify(graph, NOMINAL, list(range(n)), simulation=False, method="perron")
+    cert = certify(graph, NOMINAL, list(range(n)), asks=Asks(simulation=False, method="perron"))
     assert cert.verdict == "certified" and cert.rate is not None, cert.notes
     best = 4 / 3 * (1 - np.cos((2 if closed else 1) * np.pi / n))
     assert 0.7 * best <= float(cert.rate) <= best * (1 + 1e-6)
@@ -523,14 +528,14 @@ def test_the_vector_of_ones_belongs_to_connected_graphs_of_equal_flows_only():
 def test_weights_near_the_largest_float_are_undecided(weight: float, method: str):
     star = undirected([(0, i, weight) for i in range(1, 130)])
     for graph in (star, SignedDigraph.from_edges([(i, (i + 1) % 130, 1.7e308) for i in range(130)])):
-        cert = certify(graph, NOMINAL, simulation=False, method=method)
+        cert = certify(graph, NOMINAL, asks=Asks(simulation=False, method=method))
         assert cert.verdict == "undecided"
         assert any("too near to the largest float" in note for note in cert.notes)
 
 
 def test_ends_below_the_floats_are_kept():
     graph = SignedDigraph.from_edges([(i, (i + 1) % 130, Fraction(1, 1 + i % 3)) for i in range(130)])
-    cert = certify(graph, NOMINAL, ["1e-400"] * 130, simulation=False, method="perron")
+    cert = certify(graph, NOMINAL, ["1e-400"] * 130, asks=Asks(simulation=False, method="perron"))
     assert cert.final_state is not None and cert.final_state.degenerate == ()
     for value in (*cert.final_state.states, *cert.final_state.consensus_values):
         assert abs(Fraction(value) * 10**400 - 1) < 1e-9

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from asked import certify_words
 from cpu_time import at_most
 from mutations import Json, at, changed, judged_mutants, leaves, nudged, resealed
 from oracle_agents import false_claims_of_agents
@@ -23,6 +24,8 @@ from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.protocols import NominalProtocol
 from ptcc_certify.protocols.agents import Agents
 
@@ -72,7 +75,7 @@ def made(graph: SignedDigraph, kind: str, d: int = 1, method: str = "perron") ->
     agents = Agents(**words)
     x0, more = rows(rng, N, d), [rows(rng, N, d) for _ in range(agents.degree - 1)]
     options: dict[str, Any] = {"derivatives": more} if more else {}
-    return certify(graph, STRONG, x0, agents=agents, simulation=False, method=method, **options)
+    return certify_words(graph, STRONG, x0, agents=agents, simulation=False, method=method, **options)
 
 
 def as_large(graph: SignedDigraph, kind: str, d: int = 1) -> Certificate:
@@ -174,8 +177,16 @@ def test_numbers_of_any_size_are_enclosed():
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(procedure, "EXACT_NODES", 0)
             patch.setattr(final_states, "EXACT_NODES", 0)
-            large = certify(graph, STRONG, x0, v0=v0, agents=Agents(order=2), simulation=False, method="perron")
-        exact = certify(graph, STRONG, x0, v0=v0, agents=Agents(order=2), simulation=False, method="perron")
+            large = certify(
+                graph,
+                STRONG,
+                InitialState(x0, v0=v0),
+                agents=Agents(order=2),
+                asks=Asks(simulation=False, method="perron"),
+            )
+        exact = certify(
+            graph, STRONG, InitialState(x0, v0=v0), agents=Agents(order=2), asks=Asks(simulation=False, method="perron")
+        )
         assert large.verdict == "certified", large.checked
         for (m, r), (x, _) in zip(ends(large), ends(exact), strict=True):
             assert abs(m - x) <= r <= F(size) / 10**6
@@ -187,7 +198,9 @@ def test_agents_that_begin_in_rest_at_their_places_end_there_exactly():
         patch.setattr(procedure, "EXACT_NODES", 0)
         patch.setattr(final_states, "EXACT_NODES", 0)
         h = rows(np.random.default_rng(1), graph.n_nodes, 1)
-        found = certify(graph, STRONG, h, agents=Agents(order=2, offsets=h), simulation=False, method="perron")
+        found = certify(
+            graph, STRONG, h, agents=Agents(order=2, offsets=h), asks=Asks(simulation=False, method="perron")
+        )
     assert found.verdict == "certified" and found.agents is not None and found.agents.final_state is not None
     assert [agent[0] for agent in found.agents.final_state] == [((x, F(0)), (F(0), F(0))) for (x,) in h]
 

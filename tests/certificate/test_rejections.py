@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from asked import certify_words
 from bad_inputs import ptcc
 from late_certificates import led_graph
 from selection import thinned
@@ -37,6 +38,7 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.lyapunov import dominance
 from ptcc_certify.lyapunov.rate_upper_bound import mean_bound
+from ptcc_certify.model.asks import Asks
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
 LATE = LateMessages(delay="0.01")
@@ -54,7 +56,7 @@ def test_who_misses_the_deadline_is_proved_of_final_states_that_are_enclosed(see
     rng = np.random.default_rng(seed)
     graph = led_graph(rng, 3, 120, acyclic=True, signs="gauge")
     x0 = [Fraction(int(x), 100) for x in rng.integers(-500, 500, graph.n_nodes)]
-    made = certify(graph, PROTOCOL, x0, messages=LATE, simulation=False, method="perron")
+    made = certify(graph, PROTOCOL, x0, messages=LATE, asks=Asks(simulation=False, method="perron"))
     assert made.late is not None and made.late.missed is not None and made.influence.enclosure is not None
     assert made.checked.accepted, made.checked.reason
 
@@ -72,7 +74,7 @@ def test_agents_that_begin_at_a_final_state_that_is_too_long_to_be_written(how: 
     edges = [("a", "f0", weight()), ("b", "f1", weight())]
     edges += [(s, t, weight()) for s, t in pairs] + [(t, s, weight()) for s, t in pairs]
     graph = SignedDigraph.from_edges(edges)
-    made = certify(graph, PROTOCOL, [1] * graph.n_nodes, simulation=False, method="perron", **how)
+    made = certify_words(graph, PROTOCOL, [1] * graph.n_nodes, simulation=False, method="perron", **how)
     assert isinstance(made.to_dict()["final_state"]["f3"], dict)
     assert made.checked.accepted, made.checked.reason
 
@@ -89,7 +91,7 @@ def test_followers_of_ill_conditioned_equations_are_as_wide_as_is_proved(decades
     edges += [(k, k + 1, weight()) for k in range(n - 1)] + [(k + 1, k, weight()) for k in range(n - 1)]
     graph = SignedDigraph.from_edges(edges)
     x0 = [k % 4 - 1 for k in range(n + 2)]
-    made = certify(graph, PROTOCOL, x0, simulation=False, method="perron")
+    made = certify(graph, PROTOCOL, x0, asks=Asks(simulation=False, method="perron"))
     assert made.checked.accepted, made.checked.reason
     assert made.final_state is not None and made.final_state.radius is not None
     assert max(made.final_state.radius) > WIDEST * max(x0)  # the check lets no interval be much wider than is proved
@@ -101,7 +103,7 @@ def test_an_upper_bound_that_is_too_long_to_be_written_is_left_out():
     weights = [Fraction(int(rng.integers(1, 2**60)), int(rng.integers(2**59, 2**60)) | 1) for _ in range(n)]
     graph = SignedDigraph.from_edges([(k, (k + 1) % n, w) for k, w in enumerate(weights)])
     assert mean_bound(analyse(graph)) is None
-    made = certify(graph, PROTOCOL, simulation=False, time_limit=5)
+    made = certify(graph, PROTOCOL, asks=Asks(simulation=False, time_limit=5))
     assert made.checked.accepted and made.upper_bound is None
 
 
@@ -159,7 +161,7 @@ def test_where_the_check_rejects_json_tells_that_alone(options: list[str], rejec
 
 def test_where_the_check_rejects_nothing_is_saved(rejecting: Path):
     graph, other = (read_graph(name) for name in ("chain.csv", "other.csv"))
-    made = certify(graph, PROTOCOL, simulation=False)
+    made = certify(graph, PROTOCOL, asks=Asks(simulation=False))
     with pytest.raises(RejectedCertificate, match=r"rejects rates: because this test says so; .* nothing was written"):
         made.save("c.json")
     family = certify_family(Family.switching([graph, other]), PROTOCOL)
@@ -180,11 +182,15 @@ def test_a_refutation_rests_on_what_the_check_accepts(monkeypatch: pytest.Monkey
 
     monkeypatch.setattr("ptcc_certify.bounds.late_messages.find_missed", more)
     graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1)])
-    made = certify(graph, PROTOCOL, [1, 3, 4], messages=LATE, simulation=False, expectations="bipartite consensus")
+    made = certify(
+        graph, PROTOCOL, [1, 3, 4], messages=LATE, asks=Asks(simulation=False, expectations="bipartite consensus")
+    )
     assert made.checked.rejected == "late-missed of messages.missed"
     assert made.assessment.exit_code == 4 and made.assessment.asked == "left open"
     monkeypatch.undo()
-    true = certify(graph, PROTOCOL, [1, 3, 4], messages=LATE, simulation=False, expectations="bipartite consensus")
+    true = certify(
+        graph, PROTOCOL, [1, 3, 4], messages=LATE, asks=Asks(simulation=False, expectations="bipartite consensus")
+    )
     assert true.checked.accepted and true.assessment.asked == "refuted" and true.assessment.exit_code == 3
 
 
@@ -192,7 +198,7 @@ def test_a_certificate_without_a_rate_is_checked_and_its_answers_rest_on_that(mo
     """The upper bound is all that is proved of this ring, and refutes what is above it."""
     monkeypatch.setattr(dominance, "FILL_ROWS", -1)
     ring = SignedDigraph.from_edges([(k, (k + 1) % 121, 1) for k in range(121)])
-    made = certify(ring, PROTOCOL, simulation=False, expectations=Expectations(min_rate=1000))
+    made = certify(ring, PROTOCOL, asks=Asks(simulation=False, expectations=Expectations(min_rate=1000)))
     assert made.rate is None and made.checked.accepted and made.verdict == "undecided"
     assert made.assessment.asked == "refuted" and made.assessment.exit_code == 3
     reject(monkeypatch)
@@ -213,5 +219,7 @@ def test_a_left_null_vector_that_is_too_long_to_be_written_is_enclosed():
     pairs = list(zip(names, [*names[1:], names[0]], strict=True))
     edges = [(s, t, int(rng.integers(2**61, 2**62)) * 2**40 + 1) for s, t in [*pairs, *((t, s) for s, t in pairs)]]
     followers = [("a0", "f0", 1), *((f"f{k}", f"f{k + 1}", 1) for k in range(40)), ("f40", "f20", -1)]
-    made = certify(SignedDigraph.from_edges([*edges, *followers]), PROTOCOL, simulation=False, method="perron")
+    made = certify(
+        SignedDigraph.from_edges([*edges, *followers]), PROTOCOL, asks=Asks(simulation=False, method="perron")
+    )
     assert made.graph.n_nodes > 120 and made.checked.accepted, made.checked.reason

@@ -23,7 +23,6 @@ from ptcc_certify import Family, NominalProtocol, SignedDigraph, certify
 from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
 from ptcc_certify.certificate.family_verdict import assess_family
-from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.certificate.restricted_bounds import deviation_of_signal
 from ptcc_certify.certificate.restricted_claims import LastModeClaim, RateClaim, ShareClaim
 from ptcc_certify.checker import check, digest
@@ -31,13 +30,14 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.lyapunov.clock_shares import search_share_form
 from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.model.asks import Expectations
+from ptcc_certify.protocols.restricted_signals import ClockShares, DwellTime, JointWindows
 from ptcc_certify.report.family_screen import family_lines, family_summary
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.restricted_screen import restricted_entries
 from ptcc_certify.report.statement import family_latex
 from ptcc_certify.theorems.family_behaviour import decide
 from ptcc_certify.theorems.joint_windows import clock_for_all_edges
-from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
 IN_TIME, ON_CLOCK = DwellTime("0.2", clock="t"), DwellTime(3, clock="s")

@@ -12,6 +12,7 @@ from typing import Any
 import flint
 import numpy as np
 import pytest
+from asked import certify_words
 from generators import all_classes, random_graph, sparse_digraph
 from selection import thinned
 
@@ -54,7 +55,7 @@ def certified(name: str, **options: Any) -> ptcc.Certificate:
     start = [Fraction(k * k - 7, 3) for k in range(graph.n_nodes)]
     if isinstance(protocol, ptcc.SlidingModeProtocol):
         options["sigma0"] = [Fraction(k - 2, 2) for k in range(graph.n_nodes)]
-    return ptcc.certify(graph, protocol, start, simulation=False, **options)
+    return certify_words(graph, protocol, start, simulation=False, **options)
 
 
 def written(certificate: ptcc.Certificate, folder: Path) -> Certificate:
@@ -129,7 +130,7 @@ def test_a_sliding_mode_certificate_comes_back_as_it_was(name: str, tmp_path: Pa
 )
 def test_sets_of_starts_limits_and_noise_come_back(options: dict[str, Any], tmp_path: Path):
     protocol = ptcc.NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
-    made = ptcc.certify(load_graph("fig3a"), protocol, [-4, 3, -1, 2, -2, 5], simulation=False, **options)
+    made = certify_words(load_graph("fig3a"), protocol, [-4, 3, -1, 2, -2, 5], simulation=False, **options)
     agree(written(made, tmp_path), made)
 
 
@@ -182,7 +183,7 @@ def float_ball(x: Fraction) -> flint.arb:
 def test_side_files_are_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(vectors, "LONG", 50)
     graph = sparse_digraph(np.random.default_rng(4), 200, 3.0)
-    made = ptcc.certify(graph, NOMINAL, [Fraction(k, 8) for k in range(200)], simulation=False)
+    made = ptcc.certify(graph, NOMINAL, [Fraction(k, 8) for k in range(200)], asks=ptcc.Asks(simulation=False))
     saved = written(made, tmp_path)
     assert list(tmp_path.glob("*-source.npy")) and list(tmp_path.glob("*-diagonal.npy"))
     agree(saved, made)
@@ -195,7 +196,9 @@ def test_side_files_are_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
 def test_side_files_go_with_a_certificate_that_was_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(vectors, "LONG", 3)
     weights = [("file", "sha256", -1), ("sha256", "file", -1), ("file", "c", 1), ("c", "d", 1)]
-    made = ptcc.certify(ptcc.as_graph(weights), NOMINAL, [3, 1, 2, 4], method="perron", simulation=False)
+    made = ptcc.certify(
+        ptcc.as_graph(weights), NOMINAL, [3, 1, 2, 4], asks=ptcc.Asks(method="perron", simulation=False)
+    )
     first, second = tmp_path / "first", tmp_path / "second"
     first.mkdir(), second.mkdir()
     saved = written(made, first)
@@ -216,9 +219,8 @@ def test_a_run_repeated_from_the_file_keeps_the_bounds(number: int, tmp_path: Pa
     made = ptcc.certify(
         load_graph(example.graphs[0]),
         example.protocol(),
-        example.x0.split(","),
-        sigma0=example.sigma0 and example.sigma0.split(","),
-        disturbance=example.disturbance,
+        ptcc.InitialState(example.x0.split(","), sigma0=example.sigma0 and example.sigma0.split(",")),
+        asks=ptcc.Asks(disturbance=example.disturbance),
     )
     saved = written(made, tmp_path).with_simulation()
     assert saved.disturbance == example.disturbance
@@ -230,7 +232,9 @@ def test_a_run_repeated_from_the_file_keeps_the_bounds(number: int, tmp_path: Pa
 @pytest.mark.parametrize("said", [None, "worst-case", "telegraph", "none", "no such", "9*sin(t)", "__import__('os')"])
 def test_a_disturbance_that_is_no_expression_within_delta_gives_way_to_the_worst_case(said: str | None, tmp_path: Path):
     pair = ptcc.SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
-    ptcc.certify(pair, SLIDING, [3, 5], sigma0=[1, 0], simulation=False).save(tmp_path / "c.json")
+    ptcc.certify(pair, SLIDING, ptcc.InitialState([3, 5], sigma0=[1, 0]), asks=ptcc.Asks(simulation=False)).save(
+        tmp_path / "c.json"
+    )
     data = json.loads((tmp_path / "c.json").read_text())
     data["protocol"]["disturbance"] = said
     data["digest"] = digest(data)
@@ -301,7 +305,7 @@ def test_without_a_start_there_is_no_bound_from_it(tmp_path: Path):
     "part", [{"protocol": ptcc.NominalProtocol(T=100)}, {"initial_state": (Fraction(1),) * 6}, {"final_state": None}]
 )
 def test_a_certificate_that_was_read_is_what_its_file_says(tmp_path: Path, part: dict[str, Any]):
-    ptcc.certify("fig3a", NOMINAL, [-4, 3, -1, 2, -2, 5], simulation=False).save(tmp_path / "c.json")
+    ptcc.certify("fig3a", NOMINAL, [-4, 3, -1, 2, -2, 5], asks=ptcc.Asks(simulation=False)).save(tmp_path / "c.json")
     saved = read_certificate(tmp_path / "c.json")
     with pytest.raises(ParameterError, match="certify the graph again"):
         saved.changed(**part)
@@ -310,7 +314,7 @@ def test_a_certificate_that_was_read_is_what_its_file_says(tmp_path: Path, part:
 
 @pytest.mark.parametrize("value", [math.nan, {1}, 10**5000], ids=["nan", "set", "long"])
 def test_a_mapping_that_is_no_json_is_refused(value: Any):
-    document = json.loads(ptcc.certify("fig1a", NOMINAL, simulation=False).to_json())
+    document = json.loads(ptcc.certify("fig1a", NOMINAL, asks=ptcc.Asks(simulation=False)).to_json())
     document["unverified"]["value"] = value
     with pytest.raises(FormatError, match="JSON"):
         read_certificate(document)
@@ -318,7 +322,7 @@ def test_a_mapping_that_is_no_json_is_refused(value: Any):
 
 def test_a_run_whose_agents_stand_in_another_order_is_refused():
     edges = [("a", "b", 1), ("b", "c", -2), ("c", "a", 1), ("c", "d", 3)]
-    certificate = ptcc.certify(edges, NOMINAL, [1, 2, 3, 4], simulation=False)
+    certificate = ptcc.certify(edges, NOMINAL, [1, 2, 3, 4], asks=ptcc.Asks(simulation=False))
     run = ptcc.simulate(edges[::-1], NOMINAL, dict(zip("abcd", [1, 2, 3, 4], strict=True)))
     assert run.graph == certificate.graph and run.graph.labels != certificate.graph.labels
     with pytest.raises(ParameterError, match="another order"):

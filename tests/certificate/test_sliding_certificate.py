@@ -12,6 +12,7 @@ from typing import Any
 import flint
 import numpy as np
 import pytest
+from asked import certify_words
 from balls import inverse_decay_integral
 from generators import all_classes, class_cases, random_graph
 from selection import thinned
@@ -25,6 +26,8 @@ from ptcc_certify.checker import check as independent_check
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import load_graph, select
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.disturbance import SampledDisturbance, StateDependent, telegraph_noise
 from ptcc_certify.report.screen import certificate_lines
@@ -41,7 +44,12 @@ def example(number: str, name: str) -> Certificate:
     run = next(run for run, graph, _ in select(number) if graph == name)
     assert run.sigma0 is not None
     sigma0 = run.sigma0.split(",")
-    return certify(load_graph(name), run.protocol(), run.x0.split(","), sigma0=sigma0, disturbance=run.disturbance)
+    return certify(
+        load_graph(name),
+        run.protocol(),
+        InitialState(run.x0.split(","), sigma0=sigma0),
+        asks=Asks(disturbance=run.disturbance),
+    )
 
 
 def sliding_run(certificate: Certificate) -> Trajectory:
@@ -104,7 +112,7 @@ def test_the_corollaries_are_those_of_the_sliding_mode():
 def test_undirected_agents_meet_at_the_signed_average_of_start_minus_sigma():
     graph = SignedDigraph.from_edges([(1, 2, -2), (2, 1, -2), (2, 3, 1), (3, 2, 1)])
     protocol = SlidingModeProtocol(1, 1, 1, 1, 2, 2, 1, 1, 1)
-    cert = certify(graph, protocol, [6, 1, 2], sigma0=[3, 0, 1])
+    cert = certify(graph, protocol, InitialState([6, 1, 2], sigma0=[3, 0, 1]))
     assert cert.final_state is not None
     assert cert.final_state.states == (Fraction(1, 3), Fraction(-1, 3), Fraction(-1, 3))
 
@@ -112,7 +120,7 @@ def test_undirected_agents_meet_at_the_signed_average_of_start_minus_sigma():
 def test_a_start_that_meets_at_zero_because_of_sigma_is_degenerate():
     graph = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     protocol = SlidingModeProtocol(1, 1, 1, 1, 2, 2, 1, 1, 1)
-    cert = certify(graph, protocol, [3, 1], sigma0=[2, 0])
+    cert = certify(graph, protocol, InitialState([3, 1], sigma0=[2, 0]))
     assert cert.final_state is not None and cert.final_state.degenerate == (1,)
 
 
@@ -146,12 +154,14 @@ def test_a_reaching_time_is_part_of_the_proof_only_where_one_is_proved():
     """``mu3 kappa < 1`` and a large ``sigma(0)``: certain at ``T_r`` only, and ``z`` is null."""
     graph = SignedDigraph.from_edges([(1, 2, 1), (2, 1, -1)])
     weak = SlidingModeProtocol(1, 1, 1, 1, 1, 2, 1, "1/2", 1)
-    late = certify(graph, weak, sigma0=["1e9", "-1e9"], simulation=False)
+    late = certify(graph, weak, InitialState(sigma0=["1e9", "-1e9"]), asks=Asks(simulation=False))
     assert late.reaching is not None and [r.z for r in late.reaching] == [None, None]
-    both = certify(graph, weak, sigma0=["1e9", "1/100"], simulation=False)
+    both = certify(graph, weak, InitialState(sigma0=["1e9", "1/100"]), asks=Asks(simulation=False))
     assert both.reaching is not None and [r.z is None for r in both.reaching] == [True, False]
-    still = certify(graph, weak, sigma0=[0, 0], simulation=False)
-    half = certify(graph, weak, sigma0=["1e9", 0], simulation=False)  # the other is 0 from the start, which is no step
+    still = certify(graph, weak, InitialState(sigma0=[0, 0]), asks=Asks(simulation=False))
+    half = certify(
+        graph, weak, InitialState(sigma0=["1e9", 0]), asks=Asks(simulation=False)
+    )  # the other is 0 from the start, which is no step
     ends = {"late": late, "both": both, "still": still, "half": half}
     proved = {
         name: [o.kind for o in cert.obligations if o.of in ("protocol", "reaching_time")] for name, cert in ends.items()
@@ -210,7 +220,7 @@ def test_certified_reaching_times_hold_in_balls():
 
 def test_without_a_start_the_reaching_times_are_proved_all_the_same():
     protocol = SlidingModeProtocol(1, 1, 1, 1, 2, 2, 1, 1, 1)
-    cert = certify(SignedDigraph.from_edges([("a", "b", 1)]), protocol, sigma0={"b": 2, "a": 0})
+    cert = certify(SignedDigraph.from_edges([("a", "b", 1)]), protocol, InitialState(sigma0={"b": 2, "a": 0}))
     assert cert.reaching is not None and [r.z is not None and r.z > 0 for r in cert.reaching] == [False, True]
     assert cert.final_state is None and cert.trajectory is None
     assert cert.verdict == "certified" and "reaching-time" in [o.kind for o in cert.obligations]
@@ -241,12 +251,12 @@ def test_what_belongs_to_the_sliding_mode_is_refused_elsewhere():
     graph, nominal = load_graph("fig1a"), NominalProtocol(1, 1, 1, 2)
     for more in ({"sigma0": [0] * 6}, {"disturbance": "t"}):
         with pytest.raises(ParameterError, match="sliding-mode"):
-            certify(graph, nominal, [1] * 6, **more)
+            certify_words(graph, nominal, [1] * 6, **more)
     protocol = SlidingModeProtocol(1, 1, 1, 1, 2, 2, 1, 1, 1)
     with pytest.raises(ParameterError, match="sigma0 of agent 2"):
-        certify(graph, protocol, [1] * 6, sigma0=[0, "x", 0, 0, 0, 0])
+        certify(graph, protocol, InitialState([1] * 6, sigma0=[0, "x", 0, 0, 0, 0]))
     with pytest.raises(ParameterError, match="beyond delta"):
-        certify(graph, protocol, [1] * 6, disturbance="2")
+        certify(graph, protocol, [1] * 6, asks=Asks(disturbance="2"))
 
 
 # ---------------------------------------------------------------------- bounds
@@ -281,7 +291,7 @@ def test_a_rate_that_is_too_high_is_seen_as_violated():
 
     graph = SignedDigraph.from_edges([(1, 2, 1), (2, 1, -1)])
     protocol = SlidingModeProtocol("0.1", 1, 1, 1, 2, 200, 1, 1, 0)
-    cert = certify(graph, protocol, [3, 1], sigma0=["0.01", 0])
+    cert = certify(graph, protocol, InitialState([3, 1], sigma0=["0.01", 0]))
     assert cert.comparison is not None and not cert.comparison.violated and cert.trajectory is not None
     wrong = replace(cert.envelope, functions=(replace(cert.envelope.functions[0], rate=Fraction(6)),))
     assert wrong.compare(cert.trajectory).violated
@@ -355,7 +365,9 @@ def judged(name: str, kwargs: dict, kind: str, power: Fraction, seed: int) -> Ce
     x0, sigma0 = ([Fraction(int(v), 100) for v in rng.integers(-500, 501, n)] for _ in range(2))
     if n > 2:
         sigma0[0] = Fraction(0)
-    return certify(graph, protocol, x0, sigma0=sigma0, disturbance=disturbance(kind, n, protocol, rng))
+    return certify(
+        graph, protocol, InitialState(x0, sigma0=sigma0), asks=Asks(disturbance=disturbance(kind, n, protocol, rng))
+    )
 
 
 def check(cert: Certificate, power: Fraction) -> None:
@@ -433,7 +445,12 @@ def test_a_function_that_is_the_worst_case_is_not_taken_for_a_violation(mu1: Any
     rng = np.random.default_rng(seed)
     sigma0 = rng.uniform(-1, 1, 3) * 10.0 ** rng.uniform(-6, 1, 3)
     x0 = rng.normal(size=3) * 10.0 ** rng.uniform(-2, 3)
-    cert = certify(PATH, path_protocol(mu1=mu1), x0, sigma0=sigma0, disturbance=lambda t, x, sigma: np.sign(sigma))
+    cert = certify(
+        PATH,
+        path_protocol(mu1=mu1),
+        InitialState(x0, sigma0=sigma0),
+        asks=Asks(disturbance=lambda t, x, sigma: np.sign(sigma)),
+    )
     assert cert.comparison is not None and cert.comparison.reaching_kept and not cert.comparison.violated
     assert cert.reaching is not None
     certain = [float(r.z) for r in cert.reaching if r.z is not None]
@@ -477,6 +494,6 @@ def test_a_fast_signal_does_not_hide_between_the_samples(text: str):
 def test_starts_of_any_size_keep_their_bounds(mu1: str):
     protocol = path_protocol(mu1=mu1, delta=0, mu3="0.5")
     with np.errstate(all="raise", under="ignore"):
-        cert = certify(PATH, protocol, [5, 2, -4], sigma0=["1e300", 1, 2])
+        cert = certify(PATH, protocol, InitialState([5, 2, -4], sigma0=["1e300", 1, 2]))
     assert cert.comparison is not None and not cert.comparison.violated
     assert math.isfinite(cert.comparison.worst_ratio)

@@ -34,6 +34,7 @@ from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov import search as search_functions
 from ptcc_certify.lyapunov.error_system import ErrorSystem
 from ptcc_certify.lyapunov.search import Candidate
+from ptcc_certify.model.asks import Asks
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="processes are copied on Linux only")
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
@@ -85,7 +86,7 @@ def test_every_search_ends_at_a_limit():
 
 @pytest.mark.parametrize("name", ["fig1a", "fig1b", "fig3a", "fig5a", "fig5b"])
 def test_without_time_nothing_is_claimed_and_everything_is_named(name: str):
-    cert = certify(load_graph(name), PROTOCOL, [1] * load_graph(name).n_nodes, time_limit=1e-9)
+    cert = certify(load_graph(name), PROTOCOL, [1] * load_graph(name).n_nodes, asks=Asks(time_limit=1e-9))
     assert cert.verdict == "undecided" and cert.rate is None and cert.trajectory is None
     assert {STEPS[0], STEPS[1]} <= set(cert.cut_off) and cert.upper_bound is not None  # which needs no search
     assert "raise --time-limit" in cert.assessment.text and cert.assessment.exit_code == 4
@@ -106,7 +107,9 @@ def test_without_a_limit_asked_for_no_wall_time_changes_what_is_found_of_a_graph
     leaping(monkeypatch)
     busy = certify(load_graph("fig1a"), PROTOCOL, [1] * 6)
     assert busy == at_leisure and not busy.cut_off
-    assert certify(load_graph("fig1a"), PROTOCOL, [1] * 6, time_limit=3600).cut_off  # a limit that is asked for
+    assert certify(
+        load_graph("fig1a"), PROTOCOL, [1] * 6, asks=Asks(time_limit=3600)
+    ).cut_off  # a limit that is asked for
 
 
 def test_without_a_limit_asked_for_no_wall_time_changes_what_is_found_of_a_family(monkeypatch: pytest.MonkeyPatch):
@@ -192,7 +195,7 @@ def test_what_is_proved_before_the_limit_stands(monkeypatch: pytest.MonkeyPatch)
 
     monkeypatch.setattr(search_functions, "_lmi_candidates", without_end)
     monkeypatch.setattr(search_time, "_now", lambda: now[0])
-    cert = certify(load_graph("fig1a"), PROTOCOL, [1] * 6, time_limit=8)
+    cert = certify(load_graph("fig1a"), PROTOCOL, [1] * 6, asks=Asks(time_limit=8))
     assert cert.cut_off == ("class lmi",)
     assert cert.verdict == "certified" and {"perron", "full", "lmi"} == set(cert.search.searched)
     assert check(cert.to_dict()).accepted
@@ -200,7 +203,7 @@ def test_what_is_proved_before_the_limit_stands(monkeypatch: pytest.MonkeyPatch)
 
 HOLDS = """
 import ctypes, os, sys
-from ptcc_certify import NominalProtocol, SignedDigraph, certify
+from ptcc_certify import Asks, NominalProtocol, SignedDigraph, certify
 from ptcc_certify.lyapunov import search as sharpen
 
 def holds(system, thorough):
@@ -210,7 +213,7 @@ def holds(system, thorough):
 
 sharpen._lmi_candidates = holds
 ring = SignedDigraph.from_edges([(i, (i + 1) % 50, 1 if i else -1) for i in range(50)])
-cert = certify(ring, NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), [1] * 50, time_limit=float(sys.argv[1]))
+cert = certify(ring, NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), [1] * 50, asks=Asks(time_limit=float(sys.argv[1])))
 print(cert.verdict, cert.cut_off)
 """
 
@@ -345,19 +348,19 @@ def test_what_came_before_the_limit_is_kept():
 
 
 def test_without_a_limit_nothing_is_cut_off():
-    cert = certify(load_graph("fig3a"), PROTOCOL, [1] * 6, time_limit=math.inf)
+    cert = certify(load_graph("fig3a"), PROTOCOL, [1] * 6, asks=Asks(time_limit=math.inf))
     assert cert.cut_off == () and cert.verdict == "certified"
     assert cert.to_dict()["unverified"]["time_limit"] is None
 
 
 def test_the_default_grows_with_the_graph():
-    assert certify(ring(3), PROTOCOL, simulation=False).time_limit == 60
+    assert certify(ring(3), PROTOCOL, asks=Asks(simulation=False)).time_limit == 60
 
 
 @pytest.mark.parametrize("seconds", [0, -1, math.nan])
 def test_a_limit_that_is_not_positive_is_refused(seconds: float):
     with pytest.raises(ParameterError, match="time_limit"):
-        certify(ring(3), PROTOCOL, time_limit=seconds)
+        certify(ring(3), PROTOCOL, asks=Asks(time_limit=seconds))
     run = ptcc("certify", "fig1a", "--time-limit", str(seconds))
     assert run.code == 2 and run.err.count("\n") == 1 and "--time-limit" in run.err
 
@@ -387,7 +390,7 @@ def test_the_time_limit_ends_an_exact_final_state_and_an_enclosed_one_is_proved(
 
     monkeypatch.setattr("ptcc_certify.certificate.procedure.influence", too_long)
     graph = SignedDigraph.from_edges([("lead", "a", 3), ("other", "a", 1), ("a", "b", -1)])
-    cert = certify(graph, PROTOCOL, [2, -2, 1, 5], time_limit=60, method="perron", simulation=False)
+    cert = certify(graph, PROTOCOL, [2, -2, 1, 5], asks=Asks(time_limit=60, method="perron", simulation=False))
     assert cert.cut_off == ("exact final state",) and cert.final_state is not None and cert.verdict == "certified"
     assert cert.final_state.radius is not None
     x0 = dict(zip(graph.labels, [2, -2, 1, 5], strict=True))
@@ -400,6 +403,10 @@ def test_the_time_limit_ends_an_exact_final_state_and_an_enclosed_one_is_proved(
 def test_the_run_of_agents_of_order_n_ends_at_its_share_of_the_time_limit():
     team = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1), ("c", "a", -1)])
     made = certify(
-        team, NominalProtocol(T=1, rho1=1, rho2=8, kappa=1), [3, 1, 2], agents=Agents(order=2), time_limit=1e-6
+        team,
+        NominalProtocol(T=1, rho1=1, rho2=8, kappa=1),
+        [3, 1, 2],
+        agents=Agents(order=2),
+        asks=Asks(time_limit=1e-6),
     )
     assert "simulation" in made.cut_off and made.observed.agents_run is None

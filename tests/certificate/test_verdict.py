@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from asked import certify_words
 from bad_inputs import detailed, ptcc
 from generators import all_classes, random_graph
 from selection import thinned
@@ -31,6 +32,8 @@ from ptcc_certify.bounds.input.initial_set import initial_set_within
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.verdict import LAST, exit_code, worst_code
 from ptcc_certify.examples import load_graph
+from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.screen import certificate_lines
 from ptcc_certify.report.statement import report_latex
@@ -47,8 +50,8 @@ def weak(k: int, sliding: bool = False) -> Certificate:
     x0 = rng.integers(-9, 9, graph.n_nodes).tolist()
     if sliding:
         robust = SlidingModeProtocol(T_r=1, T_s="0.5", mu1=2, mu2=1, mu3=1, delta=1, **WEAK)
-        return certify(graph, robust, x0, sigma0=[1] * graph.n_nodes, simulation=False)
-    return certify(graph, NominalProtocol(T=1, **WEAK), x0, simulation=False)
+        return certify(graph, robust, InitialState(x0, sigma0=[1] * graph.n_nodes), asks=Asks(simulation=False))
+    return certify(graph, NominalProtocol(T=1, **WEAK), x0, asks=Asks(simulation=False))
 
 
 # ---------------------------------------------------------------------- usefulness
@@ -67,7 +70,9 @@ def test_the_gains_that_are_named_leave_one_percent_and_bound_the_input(k: int, 
     assert product == rho2 * cert.protocol.kappa and rho2 > cert.protocol.rho2
     p = {name: getattr(cert.protocol, name) for name in cert.protocol.to_dict() if name not in ("kind", "disturbance")}
     protocol = type(cert.protocol)(**{**p, "rho2": said[1]})
-    again = certify(cert.graph, protocol, cert.initial_state, sigma0=cert.sigma0, simulation=False)
+    again = certify(
+        cert.graph, protocol, InitialState(cert.initial_state, sigma0=cert.sigma0), asks=Asks(simulation=False)
+    )
     assert again.assessment.useful and again.assessment.exit_code == 0
     assert again.effort.bounded and not again.assessment.caveat + again.assessment.advice
     left = re.search(r"\|\| <= (\S+) \|\|", again.assessment.text)
@@ -77,7 +82,9 @@ def test_the_gains_that_are_named_leave_one_percent_and_bound_the_input(k: int, 
 def test_a_sliding_part_that_is_not_bounded_is_told_with_the_gain_that_bounds_it():
     def found(mu3: str) -> Any:
         p = {"T_r": 1, "T_s": 1, "rho1": 1, "rho2": 2, "kappa": 3, "mu1": 2, "mu2": 1, "mu3": mu3, "delta": 1}
-        return certify(PAIR, SlidingModeProtocol(**p), [1, 3], sigma0=[5, -5], simulation=False).assessment
+        return certify(
+            PAIR, SlidingModeProtocol(**p), InitialState([1, 3], sigma0=[5, -5]), asks=Asks(simulation=False)
+        ).assessment
 
     weak_gain = found("0.3")
     assert weak_gain.text.endswith("; the input is not proved bounded; --mu3 0.334 bounds the input")
@@ -86,7 +93,9 @@ def test_a_sliding_part_that_is_not_bounded_is_told_with_the_gain_that_bounds_it
 
 def test_a_bound_that_is_certified_and_says_nothing_is_not_called_certified_alone():
     """The bound of the error at T(1 - 1e-9) is above the error at the start, and the verdict was `certified`."""
-    slow = certify(load_graph("fig5b"), NominalProtocol(T=1, rho1="0.01", rho2="0.001", kappa=1), simulation=False)
+    slow = certify(
+        load_graph("fig5b"), NominalProtocol(T=1, rho1="0.01", rho2="0.001", kappa=1), asks=Asks(simulation=False)
+    )
     assert slow.verdict == "certified" and slow.envelope.residual(1e-9) > 0.9
     assert slow.assessment.text.startswith("certified, but with these gains the bound says little by T: ||E|| <= ")
     assert slow.assessment.exit_code == 0 and slow.to_dict()["verdict"] == "certified"
@@ -94,7 +103,7 @@ def test_a_bound_that_is_certified_and_says_nothing_is_not_called_certified_alon
 
 
 def test_what_is_useful_is_stated_and_true():
-    cert = certify(load_graph("fig1a"), NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), simulation=False)
+    cert = certify(load_graph("fig1a"), NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), asks=Asks(simulation=False))
     said = re.fullmatch(r"certified; \|\|E\|\| <= (\S+) \|\|E\(0\)\|\| at 0.99 T", cert.assessment.text)
     assert said is not None and cert.envelope.residual(float(LAST)) <= float(said[1]) <= 0.01
 
@@ -104,7 +113,9 @@ def test_a_bound_is_useful_too_if_no_agent_has_more_than_a_hundredth_of_the_long
     graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 1), ("c", "d", 1)])
     found = []
     for rho2 in ("0.6", 1, 2):
-        cert = certify(graph, NominalProtocol(T=1, rho1=1, rho2=rho2, kappa=1), [0, 0, 0, 1], simulation=False)
+        cert = certify(
+            graph, NominalProtocol(T=1, rho1=1, rho2=rho2, kappa=1), [0, 0, 0, 1], asks=Asks(simulation=False)
+        )
         way, left = cert.longest_way, float(cert.deviation_bound([float(LAST)]).max())
         assert way is not None
         assert cert.assessment.useful == (cert.envelope.residual(float(LAST)) <= 0.01 or left <= 0.01 * way)
@@ -131,7 +142,7 @@ ASKED = {
 @cache
 def strong() -> Certificate:
     protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
-    return certify(load_graph("fig1a"), protocol, [9, -8, 7, -6, 5, 4], simulation=False)
+    return certify(load_graph("fig1a"), protocol, [9, -8, 7, -6, 5, 4], asks=Asks(simulation=False))
 
 
 @pytest.mark.few(6)
@@ -224,7 +235,7 @@ FAR = [("a", "b", "1e300"), ("b", "a", "1e300"), ("b", "c", "1e-300"), ("c", "d"
     ],
 )
 def test_where_nothing_is_decided_it_says_what_to_try(graph: Any, method: str, says: str):
-    cert = certify(SignedDigraph.from_edges(graph), strong().protocol, method=method, simulation=False)
+    cert = certify(SignedDigraph.from_edges(graph), strong().protocol, asks=Asks(method=method, simulation=False))
     assert cert.assessment.text == f"undecided: {says}"
     assert cert.assessment.exit_code == 4 and cert.assessment.useful is None
 
@@ -236,7 +247,7 @@ def test_page_statement_and_notebook_say_the_same(tmp_path: Path):
     """With what was asked; the page of a bound that says little is not green."""
     asked = Expectations("stability", Fraction(10), Fraction(10**6))
     protocol = NominalProtocol(T="0.6", rho1="0.1", rho2="0.01", kappa=1)
-    weak = certify(load_graph("fig1a"), protocol, [1] * 6, noise=1, expectations=asked, simulation=False)
+    weak = certify(load_graph("fig1a"), protocol, [1] * 6, asks=Asks(noise=1, expectations=asked, simulation=False))
     weak.save(tmp_path / "c.json")
     saved = read_certificate(tmp_path / "c.json")
     assert saved.expectations == asked and saved.assessment == weak.assessment
@@ -272,7 +283,7 @@ GAINS = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
 
 
 def limited(x0: Any = None, graph: SignedDigraph = PAIR, protocol: NominalProtocol = GAINS, **more: Any) -> Any:
-    return certify(graph, protocol, x0, simulation=False, **more).assessment
+    return certify_words(graph, protocol, x0, simulation=False, **more).assessment
 
 
 def test_what_is_left_of_states_beyond_the_squares_of_floats_is_right():

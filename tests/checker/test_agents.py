@@ -21,6 +21,7 @@ import numpy as np
 import pytest
 from agent_cases import agent_case
 from agent_documents import Setting, damping_bound, document, final_state, obligations, of_graph
+from asked import certify_words
 from cpu_time import at_most
 from generators import all_classes, random_graph
 from jsonschema import Draft202012Validator  # type: ignore[import-untyped]
@@ -574,7 +575,7 @@ def made_by_the_program(seed: int, method: str) -> Json:
     """A certificate of a random case."""
     case = agent_case(seed)
     options: Json = {"agents": case.agents, "derivatives": case.derivatives, "method": method, "simulation": False}
-    return json.loads(certify(case.graph, case.protocol, case.x0, **options).to_json())
+    return json.loads(certify_words(case.graph, case.protocol, case.x0, **options).to_json())
 
 
 @pytest.mark.parametrize("seed", [3, 13])

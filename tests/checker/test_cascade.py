@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from asked import certify_words
 from generators import all_classes, random_graph
 from jsonschema import Draft202012Validator  # type: ignore[import-untyped]
 from mutations import Json, changed, judged_mutants, mutants, nudged, resealed
@@ -22,7 +23,6 @@ from oracle_cascade import false_claims_of_cascade
 
 from ptcc_certify import checker
 from ptcc_certify.certificate.family_certificate import certify_family
-from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
@@ -61,7 +61,7 @@ def made(name: str = "plain", kind: str = "camps") -> Json:
     }
     agents = Agents(**{"order": 2, "cascade": 2, **of_agents})
     asked: Json = {"method": "paper", "simulation": False, "agents": agents, **begin, **options}
-    return {**json.loads(certify(graph, protocol, **asked).to_json()), "unverified": {}}
+    return {**json.loads(certify_words(graph, protocol, **asked).to_json()), "unverified": {}}
 
 
 def accepted(data: Json) -> None:
@@ -310,7 +310,7 @@ def test_without_rho1_it_holds_as_well():
     same = NominalProtocol(T=2, rho1="1e-300", rho2=4, kappa=2)
     graph = SignedDigraph.from_edges(CAMPS)
     begin = {key: {label: rows[label] for label in graph.labels} for key, rows in (("x0", X), ("v0", V))}
-    made_here = certify(graph, same, agents=Agents(order=2, cascade=2), method="paper", simulation=False, **begin)
+    made_here = certify_words(graph, same, agents=Agents(order=2, cascade=2), method="paper", simulation=False, **begin)
     data = {**json.loads(made_here.to_json()), "unverified": {}}
     exact = {"motion": [["1", str(F(2, 17))], ["0", "0"]]}  # T/(alpha k + 1)
     ends = copy.deepcopy(data["agents"]["final_state"])
@@ -369,7 +369,7 @@ def test_the_cascade_on_every_class_of_graphs_is_accepted_and_stays_true(name: s
     x0, v0 = rng.integers(-5, 6, (2, graph.n_nodes)).tolist()
     protocol = NominalProtocol(T=1, rho1="1/2", rho2=3, kappa=2)
     asked: Json = {"agents": Agents(order=2, cascade=1), "v0": v0, "simulation": False}
-    data = {**json.loads(certify(graph, protocol, x0, **asked).to_json()), "unverified": {}}
+    data = {**json.loads(certify_words(graph, protocol, x0, **asked).to_json()), "unverified": {}}
     accepted(data)
     assert false_claims_of_cascade(data) == []
     judged(data, nudges(data, 7, 25))

@@ -24,6 +24,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from asked import certify_words
 from cpu_time import at_most
 from generators import KINDS, all_classes, random_graph
 from mutations import Json, changed, mutants, resealed, same_claim
@@ -53,6 +54,8 @@ from ptcc_certify.errors import FormatError
 from ptcc_certify.examples import load_graph, select
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import read_graph
+from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.gain_limits import GainLimits
 
@@ -74,7 +77,7 @@ def made(name: str, seed: int = 3, slides: bool = False, simulation: bool = Fals
     start = [Fraction(int(v), 100) for v in rng.integers(-1000, 1001, graph.n_nodes)]
     sigma0 = [Fraction(int(v), 100) for v in rng.integers(-200, 201, graph.n_nodes)] if slides else None
     protocol = sliding(Fraction(int(rng.integers(1, 6)), 2)) if slides else NOMINAL
-    certificate = certify(graph, protocol, start, sigma0=sigma0, simulation=simulation)
+    certificate = certify(graph, protocol, InitialState(start, sigma0=sigma0), asks=Asks(simulation=simulation))
     return json.loads(certificate.to_json())
 
 
@@ -127,7 +130,7 @@ def test_certificates_of_hundreds_of_graphs_are_accepted(real_data: Path):
     runs: list[tuple[str, Callable[[], Certificate]]] = []
     for example, name, _ in select("all"):
         more = {"sigma0": example.sigma0 and example.sigma0.split(","), "disturbance": example.disturbance}
-        runs.append((name, partial(certify, load_graph(name), example.protocol(), example.x0.split(","), **more)))
+        runs.append((name, partial(certify_words, load_graph(name), example.protocol(), example.x0.split(","), **more)))
     for k in range(7):
         for i, (name, kwargs) in enumerate(CLASSES.items()):
             rng = np.random.default_rng(50_000 + 1000 * i + k)
@@ -171,7 +174,7 @@ def judged(graph: SignedDigraph, rng: np.random.Generator, slides: bool) -> Cert
     if not slides:
         return certify(graph, NOMINAL, start)
     sigma0 = [Fraction(int(v), 100) for v in rng.integers(-200, 201, graph.n_nodes)]
-    return certify(graph, sliding(Fraction(int(rng.integers(1, 6)), 2)), start, sigma0=sigma0)
+    return certify(graph, sliding(Fraction(int(rng.integers(1, 6)), 2)), InitialState(start, sigma0=sigma0))
 
 
 def test_what_the_checker_rejects_is_never_called_certified(monkeypatch: pytest.MonkeyPatch):
@@ -182,7 +185,7 @@ def test_what_the_checker_rejects_is_never_called_certified(monkeypatch: pytest.
         return record({**sections, "rates": {**sections["rates"], "proved": str(rate)}}, *others)
 
     monkeypatch.setattr("ptcc_certify.certificate.document.record", lying)
-    cert = certify(load_graph("fig1a"), NOMINAL, simulation=False)
+    cert = certify(load_graph("fig1a"), NOMINAL, asks=Asks(simulation=False))
     assert cert.verdict == "undecided"
     assert "does not accept" in cert.notes[0] and "rates" in cert.notes[0]
 
@@ -190,7 +193,7 @@ def test_what_the_checker_rejects_is_never_called_certified(monkeypatch: pytest.
 def test_a_graph_that_floats_cannot_solve_is_undecided_and_accepted_as_such():
     pair = [("a", "x", "1e-17"), ("x", "y", 1), ("y", "x", 1)]
     graph = SignedDigraph.from_edges([*pair, *(("x", f"f{i}", 1) for i in range(130))])
-    data = json.loads(certify(graph, NOMINAL, simulation=False).to_json())
+    data = json.loads(certify(graph, NOMINAL, asks=Asks(simulation=False)).to_json())
     assert data["verdict"] == "undecided"
     accepted(data)
     rejected({**data, "verdict": "certified"}, "verdict")
@@ -249,7 +252,7 @@ def test_edges_beside_the_certificate(tmp_path: Path, monkeypatch: pytest.Monkey
         graph = load_graph(name)
         if k:  # floats
             graph = SignedDigraph.from_edges([(s, t, float(w) / 3) for s, t, w in graph.edges])
-        cert = certify(graph, NOMINAL, simulation=False)
+        cert = certify(graph, NOMINAL, asks=Asks(simulation=False))
         cert.save(tmp_path / "c.json")
         for stdlib in (True, False):
             assert check(tmp_path / "c.json", stdlib=stdlib).accepted
@@ -325,7 +328,9 @@ def limited(name: str, ball: bool) -> Json:
     initial_set = ellipsoid([1] * n, axes) if ball else box([-1] * n, [2] * n)
     step = Fraction(1, 10**7)
     limits = [GainLimits(gain_cap=9), GainLimits(stop_before="0.01"), GainLimits(gain_cap=9, sample_period=step)]
-    made = certify(graph, STRONG, initial_set=initial_set, limits=limits, delta="0.1", noise="0.01", simulation=False)
+    made = certify(
+        graph, STRONG, limits=limits, asks=Asks(initial_set=initial_set, delta="0.1", noise="0.01", simulation=False)
+    )
     assert made.effort is not None and len(made.effort.residual) == 3 and made.effort.disturbed is not None
     assert [entry.noise is None for entry in made.effort.residual] == [False, False, True]
     return json.loads(made.to_json())
@@ -591,7 +596,9 @@ def test_a_matrix_that_is_not_definite():
 
 def test_nothing_is_claimed_of_decay_where_nothing_moves():
     """With no rows every matrix is definite, and its ends could be written in any order."""
-    data = json.loads(certify(SignedDigraph.from_edges([], nodes=["a"]), NOMINAL, simulation=False).to_json())
+    data = json.loads(
+        certify(SignedDigraph.from_edges([], nodes=["a"]), NOMINAL, asks=Asks(simulation=False)).to_json()
+    )
     block = {"name": "P", "nodes": [], "lower_triangle": [], "times_rho": False}
     function = {
         "class": "full",
@@ -622,7 +629,9 @@ def test_nothing_is_claimed_of_decay_where_nothing_moves():
 def test_both_arithmetics_reject_a_constant_that_is_only_reached():
     """``c_k = d'V^-1 d`` exactly: strictly more is asked for, by both."""
     data = json.loads(
-        certify(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)]), NOMINAL, method="paper", simulation=False).to_json()
+        certify(
+            SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)]), NOMINAL, asks=Asks(method="paper", simulation=False)
+        ).to_json()
     )
     for label in ("1", "2"):
         rejected(changed(data, ("lyapunov", "functions", 0, "deviation", "agents", label), "1"), "deviation of lyap")
@@ -663,7 +672,7 @@ def test_odd_gains_leave_the_rest_certified(gains: dict[str, Any], size: Any):
     whole = {"T_r": 1, "T_s": 1, "rho1": 1, "rho2": 1, "kappa": 2, "mu1": 2, "mu2": 1, "mu3": 1, "delta": 1, **gains}
     protocol = SlidingModeProtocol(**whole)
     graph = SignedDigraph.from_edges([(1, 2, 1), (2, 1, -1), (2, 3, 1)])
-    cert = certify(graph, protocol, [1, 2, 3], sigma0=[size, 0, 0], simulation=False)
+    cert = certify(graph, protocol, InitialState([1, 2, 3], sigma0=[size, 0, 0]), asks=Asks(simulation=False))
     assert cert.verdict == "certified", cert.notes
     assert cert.reaching is not None
     provable = (
@@ -786,14 +795,14 @@ def test_labels_that_are_the_keys_of_a_side_vector():
     """Agents named "file", "sha256", "count", "mid" and "radius" have their numbers all the same."""
     names = ["file", "sha256", "count", "mid", "radius", "scale"]
     graph = SignedDigraph.from_edges([(names[i], names[i + 1], 1 - 2 * (i % 2)) for i in range(5)])
-    data = json.loads(certify(graph, NOMINAL, [1, 2, 3, 4, 5, 6], simulation=False).to_json())
+    data = json.loads(certify(graph, NOMINAL, [1, 2, 3, 4, 5, 6], asks=Asks(simulation=False)).to_json())
     accepted(data)
     accepted_beside(*with_side_files(data))
 
 
 def test_many_components_are_numbered(tmp_path: Path):
     pairs = [(f"a{i}", f"b{i}", -1) for i in range(checker.MANY_COMPONENTS + 5)]
-    data = json.loads(certify(SignedDigraph.from_edges(pairs), NOMINAL, simulation=False).to_json())
+    data = json.loads(certify(SignedDigraph.from_edges(pairs), NOMINAL, asks=Asks(simulation=False)).to_json())
     data, files = with_side_files(data)
     accepted_beside(data, files)
     path = ("components", "nodes")
@@ -1002,7 +1011,9 @@ def test_long_numbers_and_many_rows_take_bounded_time():
         timed(changed(data, ("lyapunov", "functions", k, "blocks", 0, "lower_triangle"), long), 20, stdlib=stdlib)
     n = 3000
     ring = [(i, (i + 1) % n, 1) for i in range(n)] + [(i, n + i, 1) for i in range(n)]
-    wide = json.loads(certify(SignedDigraph.from_edges(ring), NOMINAL, method="paper", simulation=False).to_json())
+    wide = json.loads(
+        certify(SignedDigraph.from_edges(ring), NOMINAL, asks=Asks(method="paper", simulation=False)).to_json()
+    )
     timed(wide, 10)
     nodes = wide["graph"]["nodes"]
     block = {"name": "P", "nodes": nodes, "diagonal": ["1"] * len(nodes), "times_rho": False}
@@ -1020,7 +1031,9 @@ def test_few_long_entries_of_a_large_matrix_are_refused_before_it_is_formed():
     """A star of 300 nodes: eight of 45,000 entries have denominators of 12,000 bits without a common factor."""
     n = 300
     star = [("0", str(i), 1) for i in range(1, n)] + [("1", "0", 1), ("2", "0", 1)]
-    data = json.loads(certify(SignedDigraph.from_edges(star), NOMINAL, method="paper", simulation=False).to_json())
+    data = json.loads(
+        certify(SignedDigraph.from_edges(star), NOMINAL, asks=Asks(method="paper", simulation=False)).to_json()
+    )
     nodes = data["graph"]["nodes"]
     lower = [["1"] * (i + 1) for i in range(n)]
     for k in range(8):
@@ -1070,7 +1083,7 @@ def test_a_check_tells_the_memory_that_it_needs(tmp_path: Path, capsys: pytest.C
 
 def test_a_label_that_the_terminal_cannot_show(tmp_path: Path):
     graph = SignedDigraph.from_edges([("\U0001f600", "b", 1), ("b", "\U0001f600", 1)])
-    data = json.loads(certify(graph, NOMINAL, [1, 2], simulation=False).to_json())
+    data = json.loads(certify(graph, NOMINAL, [1, 2], asks=Asks(simulation=False)).to_json())
     (tmp_path / "c.json").write_text(json.dumps(changed(data, ("initial_state", "\U0001f600"), "nan")))
     done = subprocess.run(
         [sys.executable, "-m", "ptcc_certify.checker", str(tmp_path / "c.json")],
@@ -1104,7 +1117,7 @@ def test_texts_of_obligations_are_those_of_the_checker():
 
 def test_a_cycle_through_a_follower_does_not_unbalance_its_leaders():
     g = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("a", "f", 1), ("b", "f", -1)])
-    d = json.loads(certify(g, NOMINAL, [3, 5, 1], simulation=False).to_json())
+    d = json.loads(certify(g, NOMINAL, [3, 5, 1], asks=Asks(simulation=False)).to_json())
     cycle = [["a", "f"], ["b", "f"], ["b", "a"]]
     d["structure"]["closed_components"][0] = {"nodes": ["a", "b"], "balanced": False, "negative_cycle": cycle}
     d["claim"] = {"theorem": "2.2", "behaviour": "stability", "corollaries": []}

@@ -24,6 +24,7 @@ from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError
 from ptcc_certify.checker.side_files import SideFiles
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.model.asks import Asks
 from ptcc_certify.protocols.nominal import NominalProtocol
 
 KINDS = (Digraph, ArrayDigraph)
@@ -196,7 +197,7 @@ def test_what_is_no_graph_is_refused(kind: type[Digraph]):
 
 def test_arrays_are_taken_where_edges_are_many(monkeypatch: pytest.MonkeyPatch):
     pair = SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1)])
-    certificate = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), simulation=False)
+    certificate = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), asks=Asks(simulation=False))
     data = json.loads(certificate.to_json())
     for many, stdlib, kind in ((10_000, False, Digraph), (1, False, ArrayDigraph), (1, True, Digraph)):
         monkeypatch.setattr("ptcc_certify.checker.graph.MANY_EDGES", many)

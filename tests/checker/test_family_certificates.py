@@ -37,8 +37,8 @@ from ptcc_certify.lyapunov.follower_function import follower_functions
 from ptcc_certify.lyapunov.squares_function import SquaresFunction, squares_function
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.reaching_time import certified_reaching_times
+from ptcc_certify.protocols.restricted_signals import ClockShares, DwellTime, JointWindows
 from ptcc_certify.theorems.family_behaviour import FamilyComponent, decide
-from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows
 
 SEED = int(os.environ.get("PTCC_FUZZ_SEED", "0"))
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)

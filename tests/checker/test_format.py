@@ -29,6 +29,8 @@ from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import MANY_COMPONENTS, OBLIGATIONS, check
 from ptcc_certify.checker.reading import RejectedError, exact
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 
 FOLDER = Path(checker.__file__).parent
@@ -62,7 +64,11 @@ def made(name: str, slides: bool = False, method: str = "paper") -> Json:
     start = [Fraction(int(v), 100) for v in rng.integers(-1000, 1001, graph.n_nodes)]
     sigma0 = [Fraction(int(v), 100) for v in rng.integers(-200, 201, graph.n_nodes)] if slides else None
     protocol = SLIDING if slides else NOMINAL
-    return json.loads(certify(graph, protocol, start, sigma0=sigma0, simulation=False, method=method).to_json())
+    return json.loads(
+        certify(
+            graph, protocol, InitialState(start, sigma0=sigma0), asks=Asks(simulation=False, method=method)
+        ).to_json()
+    )
 
 
 def valid(data: Any) -> bool:
@@ -138,7 +144,7 @@ def test_certificates_with_every_lyapunov_function_are_valid(name: str, slides: 
 
 def test_many_components_and_nothing_proved_are_valid(monkeypatch: pytest.MonkeyPatch):
     pairs = [(f"a{i}", f"b{i}", -1) for i in range(MANY_COMPONENTS + 5)]
-    data = json.loads(certify(SignedDigraph.from_edges(pairs), NOMINAL, simulation=False).to_json())
+    data = json.loads(certify(SignedDigraph.from_edges(pairs), NOMINAL, asks=Asks(simulation=False)).to_json())
     VALIDATOR.validate(data)
     assert isinstance(data["components"], dict) and data["influence"]["containment_weights"] is None
     for key in data["components"]:
@@ -152,7 +158,9 @@ def test_many_components_and_nothing_proved_are_valid(monkeypatch: pytest.Monkey
 
 def test_edges_in_side_files_are_valid(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(vectors, "LONG", 1)
-    certify(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)]), NOMINAL, simulation=False).save(tmp_path / "c.json")
+    certify(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)]), NOMINAL, asks=Asks(simulation=False)).save(
+        tmp_path / "c.json"
+    )
     data = checker.read(tmp_path / "c.json")
     VALIDATOR.validate(data)
     assert isinstance(data["graph"]["edges"], dict)
@@ -355,7 +363,7 @@ def test_the_example_is_the_file_that_is_made_and_is_accepted(tmp_path: Path):
         assert report.accepted and report.verdict == "certified", (report.rejected, report.reason)
     graph = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     protocol = NominalProtocol(T="0.6", rho1="0.1", rho2="0.3", kappa=1)
-    now = json.loads(certify(graph, protocol, [3, 5], simulation=False, method="paper").to_json())
+    now = json.loads(certify(graph, protocol, [3, 5], asks=Asks(simulation=False, method="paper")).to_json())
     # Where the search's floats end, and so the last digits of rates and witnesses, is for the platform.
     exactly = ("schema", "graph", "structure", "claim", "protocol", "initial_state", "sliding_variable", "influence")
     exactly += ("final_state", "verdict")
@@ -406,7 +414,9 @@ def written(value: Any) -> str:
 def test_both_hashes_are_those_that_the_text_describes():
     names = ["\x00\x1f\x7f\x80", 'quote" back\\ slash/', "tab\t line\n\r\b\f", "é\u2028", "\U0001f600", "\uffff", "z"]
     edges = [(names[i - 1], name, Fraction(i - 3 or 9, 2)) for i, name in enumerate(names)]
-    data = json.loads(certify(SignedDigraph.from_edges(edges), NOMINAL, simulation=False, method="paper").to_json())
+    data = json.loads(
+        certify(SignedDigraph.from_edges(edges), NOMINAL, asks=Asks(simulation=False, method="paper")).to_json()
+    )
     assert check(data).accepted
     said = {key: value for key, value in data.items() if key not in ("digest", "unverified")}
     assert hashlib.sha256(written(said).encode("ascii")).hexdigest() == data["digest"]

@@ -22,6 +22,7 @@ from ptcc_certify.certificate.family_certificate import certify_family
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
+from ptcc_certify.model.asks import Asks
 from ptcc_certify.protocols import NominalProtocol
 from ptcc_certify.protocols.late_messages import LateMessages
 from ptcc_certify.protocols.moving_leaders import MovingLeaders
@@ -216,11 +217,16 @@ def of_messages() -> list[str]:
     chain = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1), ("a", "c", 2)])
     protocol, x0 = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 3, 4]
     late = LateMessages(delay="0.02"), LateMessages(delay="0.001", gain_cap=4, own_delay=True)
-    made = [certify(chain, protocol, x0, simulation=False, method="paper", messages=messages) for messages in late]
-    made.append(certify(chain, protocol, x0, simulation=False, method="paper", leaders=MovingLeaders(speed=1)))
+    made = [
+        certify(chain, protocol, x0, messages=messages, asks=Asks(simulation=False, method="paper"))
+        for messages in late
+    ]
+    made.append(
+        certify(chain, protocol, x0, leaders=MovingLeaders(speed=1), asks=Asks(simulation=False, method="paper"))
+    )
     group = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", -1), ("b", "c", 2), ("c", "d", 1), ("d", "c", 1)])
     apart = LateMessages({("b", "c"): "0.01", ("c", "d"): "0.02", ("d", "c"): "0.02"})
-    made.append(certify(group, protocol, [1, 3, 4, 2], simulation=False, method="paper", messages=apart))
+    made.append(certify(group, protocol, [1, 3, 4, 2], messages=apart, asks=Asks(simulation=False, method="paper")))
     kinds = {step["kind"] for one in made for step in json.loads(one.to_json())["proof"]}
     assert {
         "late-rows",

@@ -232,7 +232,9 @@ def test_a_report_is_written_of_a_certificate_from_standard_input(certificate: s
 
 def test_a_side_file_that_is_missing_is_no_rejection():
     protocol = ptcc_certify.NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
-    document, files = with_side_files(ptcc_certify.certify("team.csv", protocol, simulation=False).to_dict())
+    document, files = with_side_files(
+        ptcc_certify.certify("team.csv", protocol, asks=ptcc_certify.Asks(simulation=False)).to_dict()
+    )
     Path("c.json").write_text(json.dumps(document))
     for name, content in files.items():
         Path(name).write_bytes(content)
@@ -277,7 +279,7 @@ def test_every_figure_of_a_certificate_a_graph_and_a_scenario_is_drawn(certifica
 
 def test_a_certificate_without_an_initial_state_is_drawn_from_the_one_that_is_given(certificate: str):
     protocol = ptcc_certify.NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
-    ptcc_certify.certify("team.csv", protocol, simulation=False).save("none.json")
+    ptcc_certify.certify("team.csv", protocol, asks=ptcc_certify.Asks(simulation=False)).save("none.json")
     for what in ("input", "decay", "states"):
         assert ptcc("plot", "none.json", "--what", what, "--x0", "1,2,3,4").out == f"written    none-{what}.png\n"
     assert "give one with --x0" in ptcc("plot", "none.json", "--what", "input").err

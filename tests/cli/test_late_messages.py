@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from asked import certify_words
 from bad_inputs import ptcc
 from selection import thinned
 
@@ -31,6 +32,7 @@ from ptcc_certify import (
 from ptcc_certify.bounds.longest_delay import LateCase
 from ptcc_certify.certificate import section_writer
 from ptcc_certify.errors import ParameterError
+from ptcc_certify.model.asks import Asks
 from ptcc_certify.simulation.late_messages import simulate_late
 
 TEAM = "source,target,weight,delay\na,b,1,0.01\nb,c,1,0.02\nc,b,1,0.01\nc,d,-2,0.005\n"
@@ -274,13 +276,19 @@ def test_a_delay_of_a_row_that_is_no_number_is_named_by_its_line() -> None:
 def test_small_delays_of_a_leader_group_are_certified_under_a_cap_up_to_a_limit_that_is_told() -> None:
     group, protocol = SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1), (2, 3, -1)]), NominalProtocol(1, 1, 2, 1)
     cert = certify(
-        group, protocol, [3, 1, 2], messages=LateMessages(delay="0.0002", own_delay=True, gain_cap=20), simulation=False
+        group,
+        protocol,
+        [3, 1, 2],
+        messages=LateMessages(delay="0.0002", own_delay=True, gain_cap=20),
+        asks=Asks(simulation=False),
     )
     assert cert.verdict == "certified"
     assert cert.late is not None
     assert cert.late.form is not None
     assert 0.0002 < (cert.late.longest_delay or 0) < 0.1
-    long = certify(group, protocol, [3, 1, 2], messages=LateMessages(delay="0.5", gain_cap=20), simulation=False)
+    long = certify(
+        group, protocol, [3, 1, 2], messages=LateMessages(delay="0.5", gain_cap=20), asks=Asks(simulation=False)
+    )
     assert int(long.assessment.exit_code) == 4
     assert "this certificate's limit is a delay of" in long.assessment.text
 
@@ -308,7 +316,9 @@ def test_followers_of_a_leader_group_are_certified_without_a_cap_where_the_leade
 def test_a_leader_group_without_an_initial_state_is_told_that_it_needs_one() -> None:
     group = [("p", "q", 1), ("q", "p", 2), ("p", "f", -1)]
     late = LateMessages({("p", "f"): "0.01"})
-    open_ = certify(group, NominalProtocol(T=1, rho1=1, rho2=4, kappa=1), messages=late, simulation=False).assessment
+    open_ = certify(
+        group, NominalProtocol(T=1, rho1=1, rho2=4, kappa=1), messages=late, asks=Asks(simulation=False)
+    ).assessment
     assert "nothing is proved of what is left at T; give an initial state" in open_.text
 
 
@@ -577,15 +587,15 @@ def test_families_and_other_limits_are_refused_in_python_too() -> None:
     alone = SignedDigraph.from_matrix([[0, 0], [0, 0]], orientation="listens")
     for asked, said in (({"messages": LateMessages("0.1")}, "messages"), ({"leaders": MovingLeaders(1)}, "leaders")):
         with pytest.raises(ParameterError, match=f"{said}: nobody listens to anybody, so .*; leave it out"):
-            certify(alone, protocol, **asked)
+            certify_words(alone, protocol, **asked)
     with pytest.raises(ParameterError, match="messages is not for families of graphs yet"):
         certify(pair, protocol, uncertainty="10%", messages=each)
     with pytest.raises(ParameterError, match="max_residual: is asked of late messages, which families"):
-        certify(pair, protocol, uncertainty="10%", expectations=Expectations(max_residual=1))
+        certify(pair, protocol, uncertainty="10%", asks=Asks(expectations=Expectations(max_residual=1)))
     with pytest.raises(ParameterError, match="gain_cap: limits and late messages have two"):
         certify(pair, protocol, messages=each, limits=same)
     with pytest.raises(ParameterError, match=r"MovingLeaders\(disturbance=..\)"):
-        certify(pair, protocol, leaders=MovingLeaders(speed=1), delta=1)
+        certify(pair, protocol, leaders=MovingLeaders(speed=1), asks=Asks(delta=1))
 
 
 def test_late_messages_ask_for_sliding_variables_at_0() -> None:
@@ -628,7 +638,9 @@ def test_a_file_without_anything_proved_of_late_messages_still_says_that_they_we
 def test_a_file_without_anything_proved_of_moving_leaders_still_says_that_they_were_asked_for() -> None:
     graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 1)])
     leaders = MovingLeaders(speed=1, disturbance="1/3", sign_gain=2)
-    made = certify(graph, NominalProtocol(T=1, rho1=1, rho2=4, kappa=1), [1, 2, 3], leaders=leaders, method="paper")
+    made = certify(
+        graph, NominalProtocol(T=1, rho1=1, rho2=4, kappa=1), [1, 2, 3], leaders=leaders, asks=Asks(method="paper")
+    )
     made.changed(tracking=None).save("c.json")
     saved = read_certificate("c.json")
     assert saved.request.leaders == leaders and saved.tracking is None
@@ -647,7 +659,7 @@ def test_what_a_file_says_of_messages_that_were_asked_for_may_be_of_any_content(
 def test_gains_that_are_changed_leave_late_messages_undecided() -> None:
     graph, protocol = SignedDigraph.from_edges([("a", "b", 1)]), NominalProtocol(T=1, rho1=1, rho2=4, kappa=1)
     late, asked = LateMessages(delay="0.1"), Expectations("bipartite containment")
-    made = certify(graph, protocol, [1, 2], messages=late, expectations=asked, method="paper")
+    made = certify(graph, protocol, [1, 2], messages=late, asks=Asks(expectations=asked, method="paper"))
     assert int(made.assessment.exit_code) == 0
     other = made.changed(protocol=NominalProtocol(T=2, rho1=1, rho2=4, kappa=1))
     assert int(other.assessment.exit_code) == 4

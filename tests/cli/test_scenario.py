@@ -227,7 +227,8 @@ def test_new_replaces_nothing_unless_told_to():
 def test_every_key_is_an_option_with_a_meaning_and_an_example_that_is_read():
     text = template(PARAMETERS)
     for section, (_, keys) in SECTIONS.items():
-        for key, (option, example) in keys.items():
+        for key, told in keys.items():
+            option, example = told.name, told.example
             assert option in PARAMETERS
             (line,) = (line for line in text.splitlines() if line.removeprefix("# ").startswith(f"{key} = {example} "))
             explained = line + text.partition(line)[2].partition("=")[0]

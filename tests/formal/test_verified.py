@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from asked import certify_words
 from bad_inputs import ptcc
 from generators import all_classes, random_graph, smallest
 from mutations import changed, mutants, resealed
@@ -29,6 +30,8 @@ from ptcc_certify.cli.verified import VARIABLE, executable, verified_check
 from ptcc_certify.errors import FormatError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
+from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.protocols.late_messages import LateMessages
@@ -152,7 +155,9 @@ def test_a_claim_that_is_not_checked_stands_in_the_last_line_with_exit_code_4(tm
     """Late messages are claimed, and not spoken of by the theorem; what all else says is told as by the other check."""
     program()
     edges = [("l", "a", 1), ("a", "b", 1), ("b", "a", 1)]
-    cert = certify(edges, NominalProtocol(1, 1, 1, 2), [1, 2, 3], simulation=False, messages=LateMessages(delay="0.02"))
+    cert = certify(
+        edges, NominalProtocol(1, 1, 1, 2), [1, 2, 3], messages=LateMessages(delay="0.02"), asks=Asks(simulation=False)
+    )
     cert.save(tmp_path / "c.json")
     file = str(tmp_path / "c.json")
     plain, run = (ptcc("check", file, *words) for words in ((), ("--verified",)))
@@ -182,7 +187,7 @@ def test_what_is_said_of_an_obligation_is_what_the_theorem_says(tmp_path: Path) 
     texts = [said(json.loads(text), tmp_path).text for text in paper_examples()]
     assert any("verified    rate-mean of rates: upper_bound >= 2 trace(A)/r" in text for text in texts)
     edges = [("a", "b", 1), ("b", "a", -1), ("b", "c", -2), ("c", "d", 1)]
-    cert = certify(edges, NominalProtocol(2, 3, 1, 2), [1, 2, 3, -4], simulation=False, method="full")
+    cert = certify(edges, NominalProtocol(2, 3, 1, 2), [1, 2, 3, -4], asks=Asks(simulation=False, method="full"))
     text = said(json.loads(cert.to_json()), tmp_path).text
     assert re.search(r"verified    overshoot of lyapunov\.functions\[\d\]: lowest I <= P <= highest I", text)
     modes = [[("a", "b", w), ("b", "a", w)] for w in (1, 5)]
@@ -207,7 +212,7 @@ def test_late_messages_of_leaders_that_move_are_named_with_all_their_obligations
     program()
     edges, late = [("l", "a", 1), ("a", "b", 1), ("b", "a", 1), ("m", "b", 2)], LateMessages(delay="0.02")
     for more in ({"messages": late}, {"messages": late, "leaders": MovingLeaders("0.5")}):
-        cert = certify(edges, NominalProtocol(1, 1, 1, 2), [1, 2, 3, 4], simulation=False, **more)
+        cert = certify_words(edges, NominalProtocol(1, 1, 1, 2), [1, 2, 3, 4], simulation=False, **more)
         document = json.loads(cert.to_json())
         assert check(document).accepted and (document["messages"]["leaders"] is None) == (len(more) == 1)
         code, text = said(document, tmp_path)
@@ -221,7 +226,7 @@ def test_late_messages_of_leaders_that_move_are_named_with_all_their_obligations
 def test_the_claim_of_every_weak_component_is_verified(tmp_path: Path) -> None:
     program()
     edges = [("a", "b", 1), ("b", "a", 1), ("b", "f", -1), ("c", "d", -1), ("d", "c", 2), ("c", "d2", 1)]
-    cert = certify(edges, NominalProtocol(1, 1, 1, 1), [1, 2, 3, 4, 5, 6], simulation=False)
+    cert = certify(edges, NominalProtocol(1, 1, 1, 1), [1, 2, 3, 4, 5, 6], asks=Asks(simulation=False))
     document = json.loads(cert.to_json())
     code, text = said(document, tmp_path)
     assert code == 0 and "verified    claim of graph" in text and len(document["components"]) == 2
@@ -250,7 +255,7 @@ def many_components() -> dict:
         edges += [(f"a{k}", f"b{k}", 1), (f"b{k}", f"a{k}", 2)]  # balanced
         edges += [(f"c{k}", f"d{k}", 1), (f"d{k}", f"c{k}", -1)]  # not balanced
         edges += [(f"e{k}", f"f{k}", 1), (f"g{k}", f"f{k}", -2)]  # two leaders
-    return json.loads(certify(edges, NominalProtocol(1, 1, 1, 2), simulation=False).to_json())
+    return json.loads(certify(edges, NominalProtocol(1, 1, 1, 2), asks=Asks(simulation=False)).to_json())
 
 
 def test_the_claims_of_more_than_100_weak_components_are_verified(tmp_path: Path) -> None:
@@ -326,7 +331,9 @@ def test_reaching_times_are_verified_and_shorter_ones_are_rejected(tmp_path: Pat
     for mu3 in ("0.2", "0.5", "3"):  # the exponent mu3 kappa of psi below, at and above 1
         protocol = SlidingModeProtocol(**gains, mu3=mu3)
         sigma = [0, "-0.2", "0.3"]
-        document = json.loads(certify(edges, protocol, [1, 2, 3], sigma0=sigma, simulation=False).to_json())
+        document = json.loads(
+            certify(edges, protocol, InitialState([1, 2, 3], sigma0=sigma), asks=Asks(simulation=False)).to_json()
+        )
         code, text = said(document, tmp_path)
         assert code == 0 and f"verified    {listed}" in text
         for label in "bc":  # stated to a part in 10^12
@@ -346,7 +353,9 @@ def test_reaching_times_far_away_are_named(tmp_path: Path) -> None:
     gains = {"T_r": "0.5", "T_s": 1, "rho1": 1, "rho2": 1, "kappa": 2, "mu1": 2, "mu2": 1, "mu3": 3, "delta": 1}
     edges = [("a", "b", 1), ("b", "a", -1)]
     document = json.loads(
-        certify(edges, SlidingModeProtocol(**gains), [1, 2], sigma0=[0, 1], simulation=False).to_json()
+        certify(
+            edges, SlidingModeProtocol(**gains), InitialState([1, 2], sigma0=[0, 1]), asks=Asks(simulation=False)
+        ).to_json()
     )
     far = resealed(changed(document, ("reaching_time", "z", "b"), "26"))
     code, text = said(far, tmp_path)
@@ -359,7 +368,9 @@ def test_what_the_sliding_mode_adds_to_the_input_is_verified(tmp_path: Path) -> 
     edges, start = [("a", "b", 1), ("b", "a", -1), ("b", "c", -2)], [1, 2, 3]
     for mu3, sigma, stated in (("0.5", [0, -1, 2], True), ("0.4", [0, -1, 2], False), ("0.4", [0, 0, 0], True)):
         protocol = SlidingModeProtocol(**gains, mu3=mu3)
-        document = json.loads(certify(edges, protocol, start, sigma0=sigma, simulation=False).to_json())
+        document = json.loads(
+            certify(edges, protocol, InitialState(start, sigma0=sigma), asks=Asks(simulation=False)).to_json()
+        )
         code, text = said(document, tmp_path)
         assert code == 0 and "verified    sliding-bound of protocol" in text
         assert ("verified    input-sliding of input" in text) == stated
@@ -398,7 +409,7 @@ def test_which_balanced_components_end_at_0_is_verified(every: int, tmp_path: Pa
         (NominalProtocol(1, 1, 1, 2), {}, [1]),
         (SlidingModeProtocol(**gains), {"sigma0": sigma}, [1, 2]),
     ):
-        document = json.loads(certify(edges, protocol, start, simulation=False, **more).to_json())
+        document = json.loads(certify_words(edges, protocol, start, simulation=False, **more).to_json())
         code, text = said(document, tmp_path)
         assert code == 0 and "influence.degenerate" not in named(text)
         assert document["influence"]["degenerate"] == listed
@@ -415,7 +426,9 @@ def test_a_shorter_path_or_a_lower_energy_than_is_proved_is_rejected(tmp_path: P
     gains = {"T_r": "0.5", "T_s": 1, "mu1": 2, "mu2": 1, "mu3": 1, "delta": 1, "rho1": 3, "rho2": 1, "kappa": 2}
     edges, start = [("a", "b", 1), ("b", "a", -1), ("b", "c", -2), ("c", "d", 1)], [1, 2, 3, -4]
     for protocol, sigma in ((NominalProtocol(2, 3, 1, 2), None), (SlidingModeProtocol(**gains), [0, 0, 0, 0])):
-        document = json.loads(certify(edges, protocol, start, sigma0=sigma, simulation=False).to_json())
+        document = json.loads(
+            certify(edges, protocol, InitialState(start, sigma0=sigma), asks=Asks(simulation=False)).to_json()
+        )
         code, text = said(document, tmp_path)
         assert code == 0
         for key, kind in (("energy", "input-energy"), ("path_length", "input-length")):
@@ -442,7 +455,7 @@ def test_a_shorter_path_or_a_lower_energy_than_is_proved_is_rejected(tmp_path: P
 def test_a_lower_peak_than_is_proved_is_rejected(tmp_path: Path) -> None:
     program()
     edges, start = [("a", "b", 1), ("b", "a", -1), ("b", "c", -2), ("c", "d", 1)], [1, 2, 3, -4]
-    document = json.loads(certify(edges, NominalProtocol(2, 3, 1, 2), start, simulation=False).to_json())
+    document = json.loads(certify(edges, NominalProtocol(2, 3, 1, 2), start, asks=Asks(simulation=False)).to_json())
     code, text = said(document, tmp_path)
     assert code == 0 and "verified    input-peak of input" in text and not any("input" in part for part in named(text))
     place = next(i for i, o in enumerate(document["proof"]) if o["kind"] == "input-peak")
@@ -484,7 +497,11 @@ EDGES = [("a", "b", 1), ("b", "a", -1), ("b", "c", -2), ("c", "d", 1)]
 def moving_document(**gains: float | str) -> dict[str, Any]:
     """A certificate under the sliding-mode protocol whose sliding variables move."""
     protocol = SlidingModeProtocol(**{**MOVING, **gains})
-    return json.loads(certify(EDGES, protocol, [1, 2, 3, -4], sigma0=[0, 1, "-0.5", 0], simulation=False).to_json())
+    return json.loads(
+        certify(
+            EDGES, protocol, InitialState([1, 2, 3, -4], sigma0=[0, 1, "-0.5", 0]), asks=Asks(simulation=False)
+        ).to_json()
+    )
 
 
 def scaled(document: dict[str, Any], key: str, share: Fraction, label: str | None = None) -> dict[str, Any]:
@@ -561,7 +578,9 @@ def test_of_mutants_of_what_the_input_takes_none_is_accepted_unless_true_or_name
 def test_of_sliding_variables_that_are_0_the_peak_has_what_the_sliding_mode_adds(tmp_path: Path) -> None:
     program()
     protocol = SlidingModeProtocol(**MOVING)
-    document = json.loads(certify(EDGES, protocol, [1, 2, 3, -4], sigma0=[0] * 4, simulation=False).to_json())
+    document = json.loads(
+        certify(EDGES, protocol, InitialState([1, 2, 3, -4], sigma0=[0] * 4), asks=Asks(simulation=False)).to_json()
+    )
     code, text = said(document, tmp_path)
     assert code == 0 and "verified    input-peak of input" in text
     for label in (*"abcd", None):
@@ -580,7 +599,12 @@ BOXES = {
 def of_box(name: str, protocol: Any, sigma0: Any = None) -> dict[str, Any]:
     """A certificate of the input over a box of initial states."""
     center, radius = ([Fraction(x) for x in values] for values in BOXES[name])
-    made = certify(EDGES, protocol, sigma0=sigma0, simulation=False, initial_set=InitialSet(center, radius))
+    made = certify(
+        EDGES,
+        protocol,
+        InitialState(sigma0=sigma0),
+        asks=Asks(simulation=False, initial_set=InitialSet(center, radius)),
+    )
     return json.loads(made.to_json())
 
 
@@ -613,7 +637,9 @@ def test_efforts_of_other_sets_of_initial_states_are_named(tmp_path: Path) -> No
     program()
     center = [Fraction(x) for x in (1, 2, 3, -4)]
     axes = InitialSet(center, (), (tuple(map(Fraction, (1, 1, 0, 0))),))
-    ellipsoid = json.loads(certify(EDGES, NominalProtocol(2, 3, 1, 2), simulation=False, initial_set=axes).to_json())
+    ellipsoid = json.loads(
+        certify(EDGES, NominalProtocol(2, 3, 1, 2), asks=Asks(simulation=False, initial_set=axes)).to_json()
+    )
     moving = of_box("narrow", SlidingModeProtocol(**MOVING), [0, 1, "-0.5", 0])
     for document in (ellipsoid, moving):
         assert check(document).accepted
@@ -638,7 +664,7 @@ def test_limits_disturbance_and_noise_are_named_and_none_can_be_added(tmp_path: 
     program()
     limits = [GainLimits(gain_cap=10), GainLimits(stop_before="0.1"), GainLimits(sample_period="0.001")]
     edges, protocol = [("a", "b", 1), ("b", "a", 1), ("b", "c", -2)], NominalProtocol(1, 1, 1, 3)
-    cert = certify(edges, protocol, [1, 2, 3], limits=limits, delta=1, simulation=False)
+    cert = certify(edges, protocol, [1, 2, 3], limits=limits, asks=Asks(delta=1, simulation=False))
     document = json.loads(cert.to_json())
     kinds = [o["kind"] for o in document["proof"]]
     assert kinds.count("limited-gain") == 3 and "nominal-disturbed" in kinds
@@ -660,7 +686,7 @@ def test_no_text_of_the_file_is_printed_as_a_line_of_its_own(tmp_path: Path) -> 
     _, report = verified_check(str(tmp_path / "c.json"))
     assert not report.accepted and not report.obligations
     label = "a\u2028verified    rate of lyapunov.functions[99]\u0085"
-    named = certify([(label, "b", 1), ("b", label, 1)], NominalProtocol(1, 1, 1, 1), simulation=False)
+    named = certify([(label, "b", 1), ("b", label, 1)], NominalProtocol(1, 1, 1, 1), asks=Asks(simulation=False))
     (tmp_path / "c.json").write_text(named.to_json(), encoding="utf-8")
     _, report = verified_check(str(tmp_path / "c.json"))
     assert report.accepted and "lyapunov.functions[99]" not in {o.of for o in report.obligations}
@@ -702,7 +728,9 @@ def test_what_the_checker_accepts_of_random_graphs_the_verified_one_accepts(
             more = {"sigma0": [int(v) for v in rng.integers(-2, 3, graph.n_nodes)]}
         start = [int(v) for v in rng.integers(-9, 10, graph.n_nodes)]
         # a search that a slow machine cuts short can leave a certificate without a rate, which this checker rejects
-        document = json.loads(certify(graph, protocol, start, simulation=False, time_limit=3600, **more).to_json())
+        document = json.loads(
+            certify_words(graph, protocol, start, simulation=False, time_limit=3600, **more).to_json()
+        )
         code, text = said(document, tmp_path)
         assert check(document).accepted
         assert code == 0 or (code == 2 and any(word in text for word in UNREAD)), (name, seed, text)

@@ -20,6 +20,7 @@ from verified import compare, named, program, said
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.model.asks import Asks
 from ptcc_certify.protocols import NominalProtocol
 from ptcc_certify.protocols.agents import Agents
 
@@ -78,7 +79,9 @@ def test_the_statement_is_one_more_file_of_as_many_lines_as_is_said() -> None:
 def test_a_formation_of_single_integrators_is_told_in_one_line(tmp_path: Path) -> None:
     program()
     places = Agents(order=1, offsets=[1, 2, 3, 4])
-    formation = certify(CAMPS, NominalProtocol(1, 1, 1, 4), [1, 2, 3, 5], agents=places, simulation=False).to_dict()
+    formation = certify(
+        CAMPS, NominalProtocol(1, 1, 1, 4), [1, 2, 3, 5], agents=places, asks=Asks(simulation=False)
+    ).to_dict()
     assert check(formation).accepted
     code, text = said(formation, tmp_path)
     assert code == 2 and "formation" in text and "use ptcc check" in text and text.count("\n") == 1
@@ -87,7 +90,9 @@ def test_a_formation_of_single_integrators_is_told_in_one_line(tmp_path: Path) -
 def test_phases_are_named_as_not_checked_and_the_rest_is_verified(tmp_path: Path) -> None:
     program()
     agents = Agents(order=3, drag="1/3")
-    document = certify(CAMPS, NominalProtocol(1, 1, 1, 4), [1, 2, 3, 5], agents=agents, simulation=False).to_dict()
+    document = certify(
+        CAMPS, NominalProtocol(1, 1, 1, 4), [1, 2, 3, 5], agents=agents, asks=Asks(simulation=False)
+    ).to_dict()
     assert check(document).accepted and document["phases"]
     code, text = said(document, tmp_path)
     assert code == 0, text

@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from asked import certify_words
 from generators import all_classes, random_graph
 from mutations import Json, at, changed, mutants, nudged, resealed
 from verified import compare, named, program, said
 
 from ptcc_certify.bounds import final_state as final_states
 from ptcc_certify.certificate import procedure
-from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
@@ -58,7 +58,7 @@ def document(graph: SignedDigraph, protocol: Any, of_agents: Json, dimension: in
         options["offsets"] = rows()
     if dimension:
         asked |= {"x0": rows(), "v0": rows()}
-    text = certify(graph, protocol, agents=Agents(order=2, **options), **asked).to_json()
+    text = certify_words(graph, protocol, agents=Agents(order=2, **options), **asked).to_json()
     return {**json.loads(text), "unverified": {}}
 
 

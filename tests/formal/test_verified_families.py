@@ -27,8 +27,8 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.follower_function import follower_functions
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.protocols.restricted_signals import ClockShares, JointWindows
 from ptcc_certify.theorems.family_behaviour import decide
-from ptcc_certify.theorems.restricted_signals import ClockShares, JointWindows
 
 Json = dict[str, Any]
 NOMINAL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from asked import certify_words
 from generators import all_classes, random_graph, smallest, sparse_digraph
 from mutations import Json, changed, mutants, resealed
 from verified import UNREAD, named, program, said, unchecked
@@ -23,6 +24,7 @@ from ptcc_certify.certificate import procedure
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
 from ptcc_certify.lyapunov import dominance
+from ptcc_certify.model.asks import Asks
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 
 NOMINAL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
@@ -44,7 +46,7 @@ def made(name: str, seed: int = 3, sliding: bool = False) -> Json:
     graph = random_graph(rng, **{"n": smallest(**kwargs) + (0 if fixed else seed % 5), **kwargs}).graph
     start = [int(v) for v in rng.integers(-9, 10, graph.n_nodes)]
     more = {"sigma0": [int(v) for v in rng.integers(-2, 3, graph.n_nodes)]} if sliding else {}
-    cert = certify(graph, SLIDING if sliding else NOMINAL, start, simulation=False, time_limit=3600, **more)
+    cert = certify_words(graph, SLIDING if sliding else NOMINAL, start, simulation=False, time_limit=3600, **more)
     return {**json.loads(cert.to_json()), "unverified": {}}
 
 
@@ -146,7 +148,9 @@ def with_factor(monkeypatch: pytest.MonkeyPatch, kind: str) -> Json:
         edges += [(j, i, w) for i, j, w in edges]
     edges += [(0, 8, 2), (8, 9, -1), (3, 9, 1)]
     graph = SignedDigraph.from_edges(edges)
-    cert = certify(graph, NOMINAL, [int(v) for v in rng.integers(-9, 10, 10)], simulation=False, time_limit=3600)
+    cert = certify(
+        graph, NOMINAL, [int(v) for v in rng.integers(-9, 10, 10)], asks=Asks(simulation=False, time_limit=3600)
+    )
     document = {**json.loads(cert.to_json()), "unverified": {}}
     factor = next(factors(document))[1]
     assert (factor["parents"] is not None) == (kind == "tree")
@@ -252,7 +256,7 @@ def test_strong_leader_groups_of_many_nodes_are_accepted(
     for n in sizes:
         graph = strong(n, kind, n)
         start = [int(v) for v in np.random.default_rng(n).integers(-9, 10, graph.n_nodes)]
-        cert = certify(graph, NOMINAL, start, simulation=False, time_limit=3600)
+        cert = certify(graph, NOMINAL, start, asks=Asks(simulation=False, time_limit=3600))
         if cert.verdict != "certified":
             continue
         accepted += 1
@@ -266,14 +270,14 @@ def test_strong_leader_groups_of_many_nodes_are_accepted(
 
 def test_where_nothing_is_told_of_the_end_it_is_not_called_verified(tmp_path: Path) -> None:
     graph = random_graph(np.random.default_rng(3), **{"n": 5, **CLASSES["3.1 all single"]}).graph
-    document = json.loads(certify(graph, NOMINAL, simulation=False).to_json())
+    document = json.loads(certify(graph, NOMINAL, asks=Asks(simulation=False)).to_json())
     code, text = said(document, tmp_path)
     assert code == 0 and "not checked final-state of graph" in text and "verified    final-state" not in text
 
 
 def test_an_undecided_certificate_is_not_read(tmp_path: Path) -> None:
     graph = random_graph(np.random.default_rng(3), **{"n": 5, **CLASSES["1.1"]}).graph
-    document = json.loads(certify(graph, NOMINAL, simulation=False, method="full").to_json())
+    document = json.loads(certify(graph, NOMINAL, asks=Asks(simulation=False, method="full")).to_json())
     assert document["verdict"] == "undecided" and check(document).accepted
     code, text = said(document, tmp_path)
     assert code == 2 and "undecided" in text
@@ -311,6 +315,6 @@ def test_large_forms_of_random_graphs_are_accepted(name: str, tmp_path: Path) ->
 def test_ten_thousand_nodes_are_accepted(tmp_path: Path) -> None:
     graph = sparse_digraph(np.random.default_rng(1), 10_000, 3)
     start = [int(v) for v in np.random.default_rng(2).integers(-9, 10, graph.n_nodes)]
-    document = json.loads(certify(graph, NOMINAL, start, simulation=False).to_json())
+    document = json.loads(certify(graph, NOMINAL, start, asks=Asks(simulation=False)).to_json())
     code, text = said(document, tmp_path)
     assert code == 0 or (code == 2 and any(word in text for word in UNREAD)), text

@@ -22,6 +22,8 @@ from ptcc_certify.gain_design.agents_deadlines import TOLERANCE, Candidate, at_d
 from ptcc_certify.gain_design.agents_search import design_agents
 from ptcc_certify.gain_design.answer import INFEASIBLE, MET, UNPROVED
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.agents import Agents
 
@@ -51,20 +53,23 @@ CASES: dict[str, tuple[Agents, Any, Fraction, dict[str, Any]]] = {
 @pytest.fixture(autouse=True)
 def _paper_functions(monkeypatch):
     """One Lyapunov function is enough for facts about deadlines; the command line's tests and the campaign use more."""
-    monkeypatch.setattr(agents_search, "certify", functools.partial(certify, method="paper"))
+    monkeypatch.setattr(agents_search, "Asks", functools.partial(Asks, method="paper"))
 
 
 @functools.cache
 def designed(name: str) -> AgentsDesign:
     agents, protocol, limit, more = CASES[name]
-    return design_agents(TRIO, agents, X0, max_input=limit, protocol=protocol, **more)
+    asked = {key: value for key, value in more.items() if key != "v0"}
+    return design_agents(TRIO, agents, InitialState(X0, v0=more.get("v0")), max_input=limit, protocol=protocol, **asked)
 
 
 def fresh(answer: AgentsDesign, T: Fraction, x0: Any, v0: Any, graph: Any = TRIO) -> Candidate:
     """What certify itself proves at another deadline."""
     assert answer.protocol is not None
     protocol = at_deadline(answer.protocol, T)
-    part = certify(graph, protocol, x0, v0=v0, agents=answer.agents, simulation=False, method="paper").agents
+    part = certify(
+        graph, protocol, InitialState(x0, v0=v0), agents=answer.agents, asks=Asks(simulation=False, method="paper")
+    ).agents
     assert part is not None
     return Candidate(T, protocol, part)
 
@@ -141,7 +146,9 @@ def test_the_shortest_time_in_space_is_that_of_the_straight_way():
 def test_a_deadline_below_the_shortest_possible_one_is_infeasible():
     possible = designed("double").shortest_possible
     assert possible is not None and possible < designed("double").too_short
-    answer = design_agents(TRIO, Agents(order=2), X0, v0=V0, max_input=5, deadline=possible * Fraction(99, 100))
+    answer = design_agents(
+        TRIO, Agents(order=2), InitialState(X0, v0=V0), max_input=5, deadline=possible * Fraction(99, 100)
+    )
     assert answer.verdict == INFEASIBLE and "no gains meet a deadline below" in answer.binding
     assert answer.certificate is None and answer.protocol is None
 
@@ -149,11 +156,13 @@ def test_a_deadline_below_the_shortest_possible_one_is_infeasible():
 def test_a_deadline_that_is_too_short_for_the_bounds_names_the_one_that_is_not():
     found = designed("double")
     assert found.deadline is not None and found.peak is not None
-    answer = design_agents(TRIO, Agents(order=2), X0, v0=V0, max_input=5, deadline=found.deadline * Fraction(9, 10))
+    answer = design_agents(
+        TRIO, Agents(order=2), InitialState(X0, v0=V0), max_input=5, deadline=found.deadline * Fraction(9, 10)
+    )
     assert answer.verdict == UNPROVED and "times the limit; T = " in answer.binding
     named = Fraction(answer.binding.split("T = ")[-1].split()[0])
     assert abs(named / found.deadline - 1) < 2 * TOLERANCE
-    longer = design_agents(TRIO, Agents(order=2), X0, v0=V0, max_input=5, deadline=found.deadline * 2)
+    longer = design_agents(TRIO, Agents(order=2), InitialState(X0, v0=V0), max_input=5, deadline=found.deadline * 2)
     assert longer.verdict == MET and longer.deadline == found.deadline * 2 and longer.peak < found.peak
 
 
@@ -162,7 +171,7 @@ def test_what_is_missing_whatever_the_deadline_is_named():
     assert answer.verdict == UNPROVED and "the limit is taken by the sliding terms 3:" in answer.binding
     alone = SignedDigraph.from_edges([], nodes=["a", "b", "c"])
     assert "no agent listens" in design_agents(alone, Agents(order=2), X0, max_input=3).binding
-    unstable = design_agents(TRIO, Agents(plant=[0, -9]), X0, v0=V0, max_input="0.001")
+    unstable = design_agents(TRIO, Agents(plant=[0, -9]), InitialState(X0, v0=V0), max_input="0.001")
     assert unstable.verdict == UNPROVED and "no deadline that was tried keeps the limit" in unstable.binding
 
 
@@ -175,7 +184,7 @@ def test_agents_in_place_need_no_input(cascade: int | None):
 
 def test_agents_in_agreement_that_must_come_to_rest_need_an_input():
     together = {"a": [1, 1], "b": [1, 1], "c": [-1, -1]}
-    answer = design_agents(TRIO, Agents(order=2, rest=2), together, v0=together, max_input=3)
+    answer = design_agents(TRIO, Agents(order=2, rest=2), InitialState(together, v0=together), max_input=3)
     assert answer.verdict == MET and answer.peak > 0 and answer.too_short is not None
 
 
@@ -214,14 +223,14 @@ def test_a_protocol_with_another_deadline_keeps_its_shares():
 @pytest.mark.campaign
 @pytest.mark.parametrize("seed", range(0, 36, 3))
 def test_designs_on_random_graphs_are_accepted_minimal_and_kept_by_runs(seed: int, monkeypatch):
-    monkeypatch.setattr(agents_search, "certify", certify)
+    monkeypatch.setattr(agents_search, "Asks", Asks)
     _, kwargs = all_classes()[seed % len(all_classes())]
     rng = np.random.default_rng(seed)
     graph = random_graph(rng, n=6, **{k: v for k, v in kwargs.items() if k != "n"}).graph
     order = 2 + seed % 2
     agents = Agents(order=order, drag=Fraction(int(rng.integers(-2, 3)), 10) if seed % 4 else None)
     x0, later = rng.integers(-9, 10, (6, 2)).tolist(), [rng.integers(-2, 3, (6, 2)).tolist() for _ in range(order - 1)]
-    answer = design_agents(graph, agents, x0, derivatives=later, max_input=40)
+    answer = design_agents(graph, agents, InitialState(x0, derivatives=later), max_input=40)
     assert answer.verdict == MET and answer.certificate is not None and answer.deadline is not None
     assert answer.certificate.verdict == "certified" and answer.peak <= 40
     assert answer.too_short is not None and answer.deadline <= answer.too_short * (1 + TOLERANCE)
@@ -233,7 +242,7 @@ def test_designs_on_random_graphs_are_accepted_minimal_and_kept_by_runs(seed: in
 @pytest.mark.campaign
 @pytest.mark.parametrize("first", range(0, 78, 13))
 def test_designs_of_the_cascade_on_every_class_are_accepted_and_kept_by_runs(first: int, monkeypatch):
-    monkeypatch.setattr(agents_search, "certify", certify)
+    monkeypatch.setattr(agents_search, "Asks", Asks)
     for seed in range(first, min(first + 13, len(all_classes()))):
         _, kwargs = all_classes()[seed]
         rng = np.random.default_rng([35, seed])
@@ -242,7 +251,7 @@ def test_designs_of_the_cascade_on_every_class_are_accepted_and_kept_by_runs(fir
             continue
         x0, v0 = rng.integers(-9, 10, (2, graph.n_nodes)).tolist()
         agents = Agents(order=2, cascade=Fraction(int(rng.integers(1, 60)), 10))
-        answer = design_agents(graph, agents, x0, v0=v0, max_input=40)
+        answer = design_agents(graph, agents, InitialState(x0, v0=v0), max_input=40)
         assert answer.verdict == MET and answer.certificate is not None and answer.peak <= 40, (seed, answer)
         assert answer.certificate.verdict == "certified" and answer.shortest_possible is None
         part = answer.certificate.agents
@@ -261,7 +270,7 @@ def test_designs_of_the_cascade_on_every_class_are_accepted_and_kept_by_runs(fir
 def test_agents_that_listen_to_nobody_have_a_deadline(agents: Agents, verdict: str, says: str):
     alone = SignedDigraph.from_edges([], ["a"])
     residual = None if agents.cap is None else 1
-    answer = design_agents(alone, agents, [3], v0=[1], max_input=3, residual=residual)
+    answer = design_agents(alone, agents, InitialState([3], v0=[1]), max_input=3, residual=residual)
     assert answer.verdict == verdict and says in answer.binding
     if answer.certificate is not None:
         assert answer.certificate.verdict == "certified" and answer.peak <= 3

@@ -7,6 +7,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from asked import certify_words
 from generators import all_classes, random_graph
 from scipy.linalg import expm
 from selection import thinned
@@ -14,7 +15,6 @@ from selection import thinned
 from ptcc_certify.bounds.final_state import influence
 from ptcc_certify.bounds.input.initial_set import box, ellipsoid
 from ptcc_certify.bounds.input.tightest_bound import usable_functions
-from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker.input_formulas import InitialSet
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import GRAPHS, load_graph
@@ -51,14 +51,15 @@ def designed(name, U, R, **asked):
 @functools.cache
 def certified(graph, protocol, x0, initial_set):
     options = {"x0": x0} if initial_set is None else {"initial_set": InitialSet(*initial_set)}
-    return certify(graph, protocol, **options, simulation=False)
+    return certify_words(graph, protocol, **options, simulation=False)
 
 
 @pytest.fixture(autouse=True)
 def _certify_once(monkeypatch):
     """Lyapunov functions are searched once for all designs on a graph with the same starts."""
 
-    def again(graph, protocol, x0=None, initial_set=None, simulation=None, limits=()):
+    def again(graph, protocol, x0=None, limits=(), asks=None):
+        initial_set = asks.initial_set
         if initial_set is not None:
             initial_set = tuple(map(tuple, (initial_set.center, initial_set.radius, initial_set.axes)))
         first = search._first_protocol(analyse(graph))
@@ -164,8 +165,8 @@ def test_a_shorter_deadline_is_worth_more_than_gains_that_certify_proves_again(m
     first, shortest = search._first_protocol(analyse(graph)), designed("fig1a", 10, 1)
     usual = search.certify
 
-    def weaker(graph, protocol, **more):  # proves twice the deadline
-        made = usual(graph, protocol, **more)
+    def weaker(graph, protocol, x0, **more):  # proves twice the deadline
+        made = usual(graph, protocol, x0, **more)
         return made if protocol == first else made.changed(protocol=protocol.replace(T=2 * protocol.T))
 
     monkeypatch.setattr(search, "certify", weaker)

@@ -121,7 +121,7 @@ def test_a_graph_that_has_its_orientation_takes_no_other():
 
 def test_every_function_takes_a_graph_in_every_form():
     W, x0 = TEAM.adjacency().toarray(), [5, 2, -4]
-    cert = ptcc.certify(W, PROTOCOL, x0, orientation="listens", simulation=False)
+    cert = ptcc.certify(ptcc.as_graph(W, "listens"), PROTOCOL, x0, asks=ptcc.Asks(simulation=False))
     assert cert.graph.sha256 == as_graph(W, "listens").sha256
     assert ptcc.simulate(ptcc.as_graph(W, "listens"), PROTOCOL, x0, samples=3).graph == cert.graph
     assert ptcc.analyse(W, "listens").claim == cert.claim

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from asked import certify_words
 from generators import all_classes, random_graph
 from hypothesis import given
 from hypothesis import strategies as st
@@ -20,6 +21,8 @@ from ptcc_certify import GainLimits, NominalProtocol, SlidingModeProtocol, certi
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.examples import load_graph
 from ptcc_certify.gain_design.search import design
+from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.protocols.reaching_time import ReachingTime
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.screen import certificate_lines
@@ -77,11 +80,11 @@ def made(k: int) -> Certificate:
     x0 = [Fraction(int(p), int(q)) for p, q in zip(rng.integers(-99, 99, n), rng.integers(1, 9, n), strict=True)]
     if k % 4 == 3:
         robust = SlidingModeProtocol(T_r=1, T_s=1, rho1="1/3", rho2="5/7", kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
-        return certify(graph, robust, x0, sigma0=[x / 3 for x in x0], simulation=False)
+        return certify(graph, robust, InitialState(x0, sigma0=[x / 3 for x in x0]), asks=Asks(simulation=False))
     protocol = NominalProtocol(T="7/3", rho1="1/3", rho2=["1/7", "3/2", 9][k % 3], kappa=1)
     more: dict[str, Any] = {"initial_set": "1/3"} if k % 5 == 1 else {}
     limits = [GainLimits(gain_cap="100/3"), GainLimits(stop_before="1/7")]
-    return certify(graph, protocol, x0, limits=limits, delta="1/3", noise="1/7", simulation=False, **more)
+    return certify_words(graph, protocol, x0, limits=limits, delta="1/3", noise="1/7", simulation=False, **more)
 
 
 #: By default one of each protocol, each gain, and with a set of starts.
@@ -221,7 +224,9 @@ def test_page_and_statement_round_to_the_safe_side(k: int, tmp_path: Path):
 
 def test_the_rate_of_the_readme_is_not_rounded_up():
     """13.9985999972 is proved, where 13.9986 was printed."""
-    cert = certify(load_graph("fig3a"), NominalProtocol(T="0.6", rho1="0.2", rho2="0.5", kappa=1), simulation=False)
+    cert = certify(
+        load_graph("fig3a"), NominalProtocol(T="0.6", rho1="0.2", rho2="0.5", kappa=1), asks=Asks(simulation=False)
+    )
     assert cert.rate is not None and cert.checked is not None and cert.rate < Fraction("13.9986")
     best = [step.detail for step in cert.checked.obligations if step.detail.startswith("b = 13.9")]
     assert best and all(detail.startswith("b = 13.9985") for detail in best)

@@ -7,6 +7,7 @@ from fractions import Fraction
 import flint
 import numpy as np
 import pytest
+from asked import certify_words
 from balls import ball, clock, form_value, states
 from generators import KINDS, all_classes, class_cases, random_graph
 from selection import thinned
@@ -17,6 +18,8 @@ from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.lyapunov.error_system import ErrorSystem
 from ptcc_certify.lyapunov.function import root_above
 from ptcc_certify.lyapunov.search import LARGEST_OVERSHOOT, Candidate, choose, prove_function, search_functions
+from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.initial_state import InitialState
 
 P = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
 CLOCKS = [float(P.gain.clock_at_remaining(1 - fraction)) for fraction in FRACTIONS]
@@ -85,7 +88,7 @@ def test_a_composite_reaches_its_slowest_block(name: str, kwargs: dict):
     if system.nodes:
         found = search_functions(system, "best", CLOCKS)
         assert all("needs an overshoot constant above" in note for note in found.notes), (name, found.notes)
-        spectral = certify(structure.graph, P, simulation=False, method="paper").spectral_rate
+        spectral = certify(structure.graph, P, asks=Asks(simulation=False, method="paper")).spectral_rate
         useful = [float(m.rate) for m in found.functions if m.overshoot <= LARGEST_OVERSHOOT]
         assert spectral is not None and max(useful) >= 0.95 * spectral, name
         assert found.diagonal_limit is not None
@@ -99,8 +102,8 @@ def test_a_composite_reaches_its_slowest_block(name: str, kwargs: dict):
 )
 def test_the_instant_asked_for_is_bounded_best(name: str, at: str):
     graph, q = of_class(name), float(1 - Fraction(at))
-    plain = certify(graph, P, simulation=False).envelope.residual(q)
-    asked = certify(graph, P, simulation=False, at=at).envelope.residual(q)
+    plain = certify(graph, P, asks=Asks(simulation=False)).envelope.residual(q)
+    asked = certify(graph, P, asks=Asks(simulation=False, at=at)).envelope.residual(q)
     assert asked <= plain * (1 + 1e-9)
 
 
@@ -114,7 +117,7 @@ def test_choice_prefers_the_smaller_overshoot_among_equal_rates():
 def test_the_envelope_lies_below_each_function_and_above_the_motion(name: str):
     rng = np.random.default_rng(2)
     graph = of_class(name, weights="log6")
-    cert = certify(graph, P, simulation=False)
+    cert = certify(graph, P, asks=Asks(simulation=False))
     envelope, s = cert.envelope, np.linspace(0, 20, 41)
     whole = envelope.norm_factor(s)
     for function in envelope.functions:
@@ -129,7 +132,7 @@ def test_the_envelope_lies_below_each_function_and_above_the_motion(name: str):
 def test_vector_norm_of_the_deviation_is_bounded():
     graph = of_class("3.1 mixed")
     x0 = [Fraction(k % 7 - 3) for k in range(graph.n_nodes)]
-    cert = certify(graph, P, x0, simulation=False)
+    cert = certify(graph, P, x0, asks=Asks(simulation=False))
     assert cert.final_state is not None
     final = [ball(Fraction(x)) for x in cert.final_state.states]
     for q in (Fraction(1, 2), Fraction(1, 10), Fraction(1, 1000)):
@@ -164,12 +167,12 @@ def test_a_start_that_cancels_is_taken_exactly():
     for x0 in ([10**16 + 1, 10**16], ["1", "1.00000000000000000001"], ["123456763.948942", "61728381975471/500000"]):
         half = abs(Fraction(x0[0]) - Fraction(x0[1])) / 2
         for method in ("paper", "best"):
-            cert = certify(graph, P, x0, method=method, simulation=False)
+            cert = certify(graph, P, x0, asks=Asks(method=method, simulation=False))
             assert Fraction(cert.deviation_bound([1.0]).max()) >= half
             assert cert.deviation_bound([1.0]).max() <= float(half) * (1 + 1e-9)
             assert Fraction(cert.norm_bound([1.0])[0]) ** 2 >= (2 * half**2 if method == "paper" else 8 * half**2)
         robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3=1, delta=1)
-        slid = certify(graph, robust, x0, sigma0=[0, 0], simulation=False)
+        slid = certify(graph, robust, InitialState(x0, sigma0=[0, 0]), asks=Asks(simulation=False))
         assert Fraction(slid.deviation_bound([1.0]).max()) >= half
 
 
@@ -180,7 +183,7 @@ def test_a_start_that_cancels_is_taken_exactly():
 def test_weights_of_any_size_keep_their_bounds_in_sliding_mode(size: str, method: str):
     graph = SignedDigraph.from_edges([(1, 2, size), (2, 1, size), (2, 3, f"-{size}")])
     robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3=1, delta=1)
-    cert = certify(graph, robust, [1, 2, 3], sigma0=[1, 0, 0], method=method)
+    cert = certify(graph, robust, InitialState([1, 2, 3], sigma0=[1, 0, 0]), asks=Asks(method=method))
     assert cert.comparison is None or not cert.comparison.violated
     if cert.verdict == "certified" and size == "1e-300":
         assert (cert.deviation_bound([0.9, 0.4, 0.01]) > 0.1).all()  # nothing has moved yet
@@ -191,7 +194,7 @@ def test_stiff_graphs_give_no_nan(far: int):
     graph = SignedDigraph.from_edges([(1, 2, f"1e{far}"), (2, 3, f"1e-{far}"), (3, 1, -1), (1, 3, f"1e-{far}")])
     robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3=1, delta=1)
     for protocol, more in ((P, {}), (robust, {"sigma0": [1, 0, 0]})):
-        cert = certify(graph, protocol, [1, 2, 3], method="lmi", **more)
+        cert = certify_words(graph, protocol, [1, 2, 3], method="lmi", **more)
         assert cert.verdict == "certified"
         assert not np.isnan(cert.deviation_bound([0.9, 0.1, 1e-9])).any()
         assert not np.isnan(cert.norm_bound([0.9, 0.1, 1e-9])).any()
@@ -202,14 +205,14 @@ def test_agents_that_keep_their_state_are_where_they_end():
     graph = SignedDigraph.from_edges([], ["a", "b"])
     assert not certify(graph, P, [3, 4]).deviation_bound([1.0, 0.5]).any()
     robust = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3=1, delta=1)
-    slid = certify(graph, robust, [3, 4], sigma0=[1, 0]).deviation_bound([1.0, 0.1])
+    slid = certify(graph, robust, InitialState([3, 4], sigma0=[1, 0])).deviation_bound([1.0, 0.1])
     assert slid[0, 0] >= 1 and not slid[1].any() and not slid[:, 1].any()
 
 
 @pytest.mark.parametrize(("name", "kwargs"), thinned(all_classes()[1:24:3], 8))
 def test_the_reported_overshoot_is_not_decided_by_rounding(name: str, kwargs: dict):
     """Members whose rates differ by less than 1e-6 share the smaller one, so that the smaller prefactor is reported."""
-    cert = certify(random_graph(np.random.default_rng(6), **kwargs).graph, P, simulation=False)
+    cert = certify(random_graph(np.random.default_rng(6), **kwargs).graph, P, asks=Asks(simulation=False))
     rates = [(m.rate, m.overshoot) for m in cert.search.functions]
     for rate, overshoot in rates:
         if cert.rate is not None and rate >= cert.rate * (1 - Fraction(1, 10**6)):

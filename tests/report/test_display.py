@@ -19,6 +19,8 @@ from ptcc_certify.gain_design.search import design
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.size_limits import SHOWN_NODES
 from ptcc_certify.graphs.structure import analyse
+from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.simulation.run import simulate
 
@@ -76,7 +78,7 @@ def test_each_is_shown_with_what_it_says_and_a_figure() -> None:
         (cert.trajectory, "6 agents"),
         (design(graph, max_input=10, initial_bound=1, deadline=5), "|u_k| <= 10 from all |x_k(0)| <= 1"),
         (simulate(graph, SLIDING, x0, sigma0=[1, 2, 3, 4, 5, 6]), "6 agents"),
-        (certify(graph, SLIDING, x0, sigma0=[1, 2, 3, 4, 5, 6]), "sliding"),
+        (certify(graph, SLIDING, InitialState(x0, sigma0=[1, 2, 3, 4, 5, 6])), "sliding"),
     ):
         page = shown(value)
         assert said in page.text, (type(value), page.text)
@@ -107,7 +109,7 @@ def test_what_cannot_be_drawn_is_told_in_words() -> None:
     pair = load_graph("fig1b")
     still = SignedDigraph.from_edges([], nodes=["alone"])
     columns = simulate(pair, PROTOCOL, np.eye(6)[:, :2])
-    for value in (many, analyse(many), certify(pair, PROTOCOL, simulation=False), columns):
+    for value in (many, analyse(many), certify(pair, PROTOCOL, asks=Asks(simulation=False)), columns):
         page = shown(value)
         assert not page.images and page.text.strip()
     assert "1 node, 0 edges" in shown(certify(still, PROTOCOL, [3])).text

@@ -160,7 +160,9 @@ def test_a_class_of_bounds_shows_its_own_rate(explorer: Explorer):
         assert view.certificate is not None and view.certificate.rate is not None
         rates[method] = view.certificate.rate
         assert view.facts["rate"].startswith(str(float(rates[method]))[:5])
-    assert rates["paper"] == ptcc.certify(load_graph("fig1a"), Settings().protocol(), method="paper").rate
+    assert (
+        rates["paper"] == ptcc.certify(load_graph("fig1a"), Settings().protocol(), asks=ptcc.Asks(method="paper")).rate
+    )
     limit = view.certificate.upper_bound
     assert limit is not None
     assert max(rates.values()) == rates["best"] <= limit
@@ -171,7 +173,10 @@ def test_what_is_shown_is_what_certify_certifies(explorer: Explorer):
     settings = SLIDING.changed(method="paper", disturbance="sin", seed=3)
     start, sigma0 = np.random.default_rng(3).integers(-9, 10, size=(2, 6)).tolist()
     whole = ptcc.certify(
-        load_graph("fig3a"), settings.protocol(), start, sigma0=sigma0, disturbance="1*sin(2*k*t)", method="paper"
+        load_graph("fig3a"),
+        settings.protocol(),
+        ptcc.InitialState(start, sigma0=sigma0),
+        asks=ptcc.Asks(disturbance="1*sin(2*k*t)", method="paper"),
     )
     shown = certificate_of(explorer.view(settings))
     for part in ("rate", "overshoot", "initial_state", "sigma0", "reaching", "claim", "verdict"):

@@ -22,6 +22,9 @@ from ptcc_certify import (
 )
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.io import as_family
+from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.protocols.restricted_signals import ClockShares, DwellTime, JointWindows
 from ptcc_certify.report.family_screen import family_lines, family_summary, groups_text
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.plots.decay import plot_decay
@@ -33,7 +36,6 @@ from ptcc_certify.report.statement import family_latex
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.signals import RandomSignal
 from ptcc_certify.theorems.family_behaviour import decide
-from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
 SLIDING = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=3, mu1=2, mu2=1, mu3=1, delta=1)
@@ -109,7 +111,7 @@ def test_ends_under_the_last_mode_stand_on_page_and_statement():
 
 
 def test_an_expectation_that_is_refuted_is_told_and_its_counterexample_is_drawn():
-    saved = read_certificate(certify(SWITCHING, PROTOCOL, expectations=Expectations("stability")).to_dict())
+    saved = read_certificate(certify(SWITCHING, PROTOCOL, asks=Asks(expectations=Expectations("stability"))).to_dict())
     page = report_html(saved)
     assert "REFUTED" in page and 'id="figure-why0"' in page
     assert "Refuted: stability (held in day, ann hears nobody else and keeps its value)" in words(page)
@@ -267,7 +269,7 @@ def test_groups_without_negative_edges_agree_and_others_up_to_camps():
 @pytest.mark.parametrize("sigma0", thinned([[1, 0, "-1/2"], [0, 0, 0]], 2))
 def test_the_bound_of_a_family_through_a_reaching_phase_is_called_numerical_everywhere(sigma0):
     unsure = Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 1), ("b", "c", -2, -1)])
-    made = certify(unsure, SLIDING, [1, 2, 3], sigma0=sigma0)
+    made = certify(unsure, SLIDING, InitialState([1, 2, 3], sigma0=sigma0))
     saved = read_certificate(made.to_dict())
     page, statement = words(report_html(saved)), family_latex(saved, {"decay": "d.pdf"})
     inside, outside = " ".join(statement.split()).split(r"\end{proposition}")
@@ -287,7 +289,7 @@ def test_ends_of_constant_weights_under_disturbances_stand_on_screen_page_and_st
     one, other = ([("a", "b", g, g * 2), ("b", "a", g, g)] for g in (1, -1))
     other = [(s, t, *sorted((low, high))) for s, t, low, high in other]
     family = Family.switching({"m1": Family.from_intervals(one), "m2": Family.from_intervals(other)})
-    made = certify(family, SLIDING, [0, 6], sigma0=[0, 0], signal="constant")
+    made = certify(family, SLIDING, InitialState([0, 6], sigma0=[0, 0]), signal="constant")
     saved = read_certificate(made.to_dict())
     screen, told = " ".join(" ".join(family_summary(saved, "f")).split()), "m1: consensus; m2: bipartite consensus"
     assert f"constant if mode and weights never change: {told}" in screen
@@ -307,7 +309,7 @@ def test_a_statement_that_speaks_of_the_stretched_clock_defines_it():
 @pytest.mark.parametrize("sigma0", thinned([[1, 0, 2], [0, 0, 0]], 2))
 def test_agents_that_listen_to_nobody_end_where_sliding_variables_bring_them(sigma0):
     moved = Family.from_intervals([("a", "c", 1, 3), ("b", "c", 1, 1)])
-    made = certify(moved, SLIDING, [0, 4, 100], sigma0=sigma0)
+    made = certify(moved, SLIDING, InitialState([0, 4, 100], sigma0=sigma0))
     page, screen = words(report_html(read_certificate(made.to_dict()))), "\n".join(family_summary(made, "moved"))
     for text in (page, screen):
         assert ("a, b keep their value" in text) == made.direct != ("a, b end at x(0) - sigma(0)" in text)

@@ -15,9 +15,10 @@ from selection import thinned
 import ptcc_certify as ptcc
 from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
 from ptcc_certify.certificate.family_verdict import first_input
-from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family, Mode
+from ptcc_certify.model.asks import Expectations
+from ptcc_certify.protocols.restricted_signals import DwellTime
 from ptcc_certify.report.family_screen import (
     decision_lines,
     decision_summary,
@@ -28,7 +29,6 @@ from ptcc_certify.report.family_screen import (
 from ptcc_certify.report.page import report_html
 from ptcc_certify.theorems.counterexample_text import counterexample_text
 from ptcc_certify.theorems.family_behaviour import FamilyComponent
-from ptcc_certify.theorems.restricted_signals import DwellTime
 
 PROTOCOL = ptcc.NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
 LONG = "agent number {} of a rather long list of agents"
@@ -278,9 +278,9 @@ def test_python_takes_a_family_in_many_forms():
     forms = [{"day": day, "night": night}, [day, night], Family.switching({"day": day, "night": night})]
     made = {ptcc.certify(form, PROTOCOL) for form in forms}
     assert all(repr(one) == repr(next(iter(made))) for one in made)
-    asked = ptcc.certify(forms[0], PROTOCOL, [1, 2], expectations=Expectations("stability"))
+    asked = ptcc.certify(forms[0], PROTOCOL, [1, 2], asks=ptcc.Asks(expectations=Expectations("stability")))
     assert asked.assessment.asked == "refuted" and int(asked.assessment.exit_code) == 3
-    known = ptcc.certify(Family.from_graph(day), PROTOCOL, simulation=False)
+    known = ptcc.certify(Family.from_graph(day), PROTOCOL, asks=ptcc.Asks(simulation=False))
     assert isinstance(known, ptcc.Certificate)
 
 
@@ -288,10 +288,13 @@ def test_python_takes_a_family_in_many_forms():
     ("call", "says"),
     [
         (
-            lambda: ptcc.certify(Family.from_intervals([("a", "b", 1, 2)]), PROTOCOL, delta=1),
+            lambda: ptcc.certify(Family.from_intervals([("a", "b", 1, 2)]), PROTOCOL, asks=ptcc.Asks(delta=1)),
             "delta is not for families",
         ),
-        (lambda: ptcc.certify("fig1a", PROTOCOL, uncertainty="10%", method="lmi"), "method is not for families"),
+        (
+            lambda: ptcc.certify("fig1a", PROTOCOL, uncertainty="10%", asks=ptcc.Asks(method="lmi")),
+            "method is not for families",
+        ),
         (lambda: ptcc.certify("fig1a", PROTOCOL, uncertainty=3), "not from 0 to 1"),
         (lambda: ptcc.certify({}, PROTOCOL), "at least one mode"),
         (lambda: ptcc.certify(Family.from_intervals([("a", "b", 1, 2)]), 5), "protocol = 5 is none"),

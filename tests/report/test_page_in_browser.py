@@ -13,6 +13,7 @@ from generators import sparse_digraph
 from report_examples import MADE, NOMINAL, forged, nominal, undecided
 
 from ptcc_certify import Expectations, Family, NominalProtocol, SignedDigraph, certify
+from ptcc_certify.model.asks import Asks
 from ptcc_certify.report.report_file import write_report
 
 pytestmark = pytest.mark.browser
@@ -54,18 +55,20 @@ def long_labels() -> Any:
     names = ["alpha" + "x" * 80, "a long name of an agent that says what it does", "b" * 300, "c", "d e f " * 40]
     edges = [(names[k - 1], names[k], -1) for k in range(5)]
     protocol = NominalProtocol(T="1/3", rho1="100000000000000000001/22539340290692258087863249", rho2=1, kappa=2)
-    return certify(SignedDigraph.from_edges(edges), protocol, [f"{k}00001/700003" for k in range(5)], simulation=False)
+    return certify(
+        SignedDigraph.from_edges(edges), protocol, [f"{k}00001/700003" for k in range(5)], asks=Asks(simulation=False)
+    )
 
 
 def right_to_left() -> Any:
     names = ["\u05e9\u05dc\u05d5\u05dd", "\u05e2\u05d5\u05dc\u05dd", "\u0645\u0631\u062d\u0628\u0627", "(1)", "a"]
     edges = [(names[k - 1], names[k], 1 - 2 * (k % 2)) for k in range(5)]
-    return certify(SignedDigraph.from_edges(edges), NOMINAL, [1, 2, 3, 4, 5], simulation=False)
+    return certify(SignedDigraph.from_edges(edges), NOMINAL, [1, 2, 3, 4, 5], asks=Asks(simulation=False))
 
 
 def large() -> Any:
     graph = sparse_digraph(np.random.default_rng(2), 2_000, 1.2)
-    return certify(graph, NOMINAL, list(range(2_000)), simulation=False, method="perron")
+    return certify(graph, NOMINAL, list(range(2_000)), asks=Asks(simulation=False, method="perron"))
 
 
 def family() -> Any:
@@ -77,7 +80,7 @@ def family() -> Any:
 
 def refuted_family() -> Any:
     unsure = Family.from_graph(SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1)]), optional=[("b", "c")])
-    return certify(unsure, NOMINAL, [1, 2, 3], expectations=Expectations("stability"))
+    return certify(unsure, NOMINAL, [1, 2, 3], asks=Asks(expectations=Expectations("stability")))
 
 
 def rejected(folder: Path) -> Path:

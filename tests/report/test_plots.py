@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from asked import certify_words
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import same_color
@@ -37,6 +38,8 @@ from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.size_limits import LABELLED_NODES
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.graphs.weights import Weights
+from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.protocols.late_messages import LateMessages
 from ptcc_certify.protocols.moving_leaders import MovingLeaders
@@ -86,7 +89,12 @@ def certified(name: str) -> Certificate:
     if name == "sliding":
         example = EXAMPLES[5]
         start, sigma0 = (list(map(float, text.split(","))) for text in (example.x0, example.sigma0 or ""))
-        return certify(graph_of("fig3b"), example.protocol(), start, sigma0=sigma0, disturbance=example.disturbance)
+        return certify(
+            graph_of("fig3b"),
+            example.protocol(),
+            InitialState(start, sigma0=sigma0),
+            asks=Asks(disturbance=example.disturbance),
+        )
     graph = graph_of(name)
     if name.startswith("fig"):
         example = select(name)[0][0]
@@ -186,7 +194,7 @@ def test_of_many_agents_the_parts_are_drawn_and_few_agents_named() -> None:
 def test_the_peak_is_drawn_where_it_holds_only() -> None:
     graph, start = graph_of("fig3b"), [-4, 3, -1, 2, -2, 5]
     protocol, capped = EXAMPLES[2].protocol(), GainLimits(gain_cap="0.5")
-    cert = certify(graph, protocol, start, limits=[capped], simulation=False)
+    cert = certify(graph, protocol, start, limits=[capped], asks=Asks(simulation=False))
     assert cert.effort is not None and cert.effort.peak is not None
     own = float(cert.effort.residual[0].largest or 0)
     peak = float(cert.effort.peak.largest)
@@ -212,7 +220,7 @@ def test_the_peak_is_drawn_where_it_holds_only() -> None:
 @pytest.mark.parametrize("radius", [5, 1])
 def test_beside_the_peak_of_a_set_the_set_is_named(radius: int) -> None:
     graph, start = graph_of("fig3b"), [-4, 3, -1, 2, -2, 5]
-    region = certify(graph, EXAMPLES[2].protocol(), start, initial_set=radius)
+    region = certify(graph, EXAMPLES[2].protocol(), start, asks=Asks(initial_set=radius))
     assert region.effort is not None and region.effort.peak is not None
     text = peak_of(drawn(plot_input(region)))
     assert text is not None and f"(all $|x_k(0)| \\leq$ {radius}" in text.get_text()
@@ -268,7 +276,7 @@ CAPPED = ptcc_certify.LateMessages(delay="0.01", gain_cap=40)
 )
 def test_inputs_of_agents_of_order_n_are_drawn_below_their_proved_peak(agents: Any, x0: Any) -> None:
     protocol = NominalProtocol(T=1, rho1=1, rho2=4, kappa=1)
-    cert = certify(graph_of("fig3a"), protocol, x0, agents=agents, method="perron", simulation=False)
+    cert = certify(graph_of("fig3a"), protocol, x0, agents=agents, asks=Asks(method="perron", simulation=False))
     assert cert.agents is not None and cert.agents.input is not None
     ax, run = drawn(cert.plot("input")), cert.agents.simulate()
     peak = peak_of(ax)
@@ -281,7 +289,7 @@ def test_inputs_of_agents_of_order_n_are_drawn_below_their_proved_peak(agents: A
 def test_with_late_messages_their_bound_of_the_input_is_drawn_and_not_that_of_messages_at_once() -> None:
     graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1), ("a", "c", 2)])
     protocol = NominalProtocol(T=1, rho1=1, rho2=3, kappa=1)
-    cert = certify(graph, protocol, [1, 2, 3], messages=CAPPED, method="perron")
+    cert = certify(graph, protocol, [1, 2, 3], messages=CAPPED, asks=Asks(method="perron"))
     assert cert.late is not None and cert.late.input is not None
     texts = [text.get_text() for text in drawn(plot_input(cert)).texts]
     (told,) = [text for text in texts if text.startswith("late messages: at most ")]
@@ -313,7 +321,9 @@ def test_the_input_of_the_sliding_mode() -> None:
     example = EXAMPLES[5]
     start, sigma0 = (list(map(float, text.split(","))) for text in (example.x0, example.sigma0 or ""))
     graph = graph_of("fig3b")
-    cert = certify(graph, example.protocol(), start, sigma0=sigma0, disturbance=example.disturbance)
+    cert = certify(
+        graph, example.protocol(), InitialState(start, sigma0=sigma0), asks=Asks(disturbance=example.disturbance)
+    )
     assert cert.trajectory is not None
     ax = drawn(plot_input(cert))
     assert {"deadline $T$", "$T_r$"} <= set(labelled(ax))
@@ -324,7 +334,7 @@ def test_the_input_of_the_sliding_mode() -> None:
     late = run.t > float(run.protocol.T)  # there the input answers the disturbance alone
     answers = {line.get_ydata()[late].round(6).tobytes() for line in agent_lines(ax)}
     assert answers == {row.round(6).tobytes() for row in np.abs(run.sliding.disturbance[:, late])}
-    other = certify(graph, example.protocol(), start, sigma0=[1.0] * 6, simulation=False)
+    other = certify(graph, example.protocol(), InitialState(start, sigma0=[1.0] * 6), asks=Asks(simulation=False))
     with pytest.raises(ValueError, match=r"another sigma\(0\) than"):
         plot_input(cert.trajectory, certificate=other)
 
@@ -337,10 +347,10 @@ def test_a_certificate_of_something_else_is_refused() -> None:
     with pytest.raises(ValueError, match="another graph than"):
         plot_input(run, certificate=other)
     with pytest.raises(ValueError, match="another protocol than"):
-        plot_input(run, certificate=certify(cert.graph, PROTOCOL, cert.initial_state, simulation=False))
+        plot_input(run, certificate=certify(cert.graph, PROTOCOL, cert.initial_state, asks=Asks(simulation=False)))
     with pytest.raises(ValueError, match="another initial state than"):
-        plot_input(run, certificate=certify(cert.graph, cert.protocol, [1] * 6, simulation=False))
-    without = certify(cert.graph, cert.protocol, simulation=False)
+        plot_input(run, certificate=certify(cert.graph, cert.protocol, [1] * 6, asks=Asks(simulation=False)))
+    without = certify(cert.graph, cert.protocol, asks=Asks(simulation=False))
     assert peak_of(plot_input(run, certificate=without)) is None
     columns = simulate(cert.graph, cert.protocol, np.eye(6)[:, :2], times=[0])
     with pytest.raises(ValueError, match="holds 2 initial states; draw a run of one"):
@@ -511,7 +521,12 @@ def test_the_axis_of_an_input_that_is_large_for_a_short_time_alone_is_logarithmi
     for name, scale in (("fig1a", "log"), ("fig3a", "linear")):
         example, _, _ = select(name)[name == "fig1a"]
         sigma0 = example.sigma0 and example.sigma0.split(",")
-        cert = certify(load_graph(name), example.protocol(), example.x0.split(","), sigma0=sigma0, method="paper")
+        cert = certify(
+            load_graph(name),
+            example.protocol(),
+            InitialState(example.x0.split(","), sigma0=sigma0),
+            asks=Asks(method="paper"),
+        )
         ax = drawn(plot_input(cert))
         assert ax.get_yscale() == scale and ax.spines["bottom"].get_bounds()[0] == 0
         end = plot_decay(cert, axis="time")
@@ -551,7 +566,7 @@ ASKED: dict[str, dict[str, Any]] = {
 def test_the_run_that_is_drawn_is_the_one_that_was_asked(title: str) -> None:
     graph = SignedDigraph.from_edges([(1, 2, 1), (2, 3, -1), (1, 4, 1), (3, 4, -1)])
     protocol, x0 = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1), [1, 0, 2, -1]
-    cert = certify(graph, protocol, x0, method="paper", **ASKED[title])
+    cert = certify_words(graph, protocol, x0, method="paper", **ASKED[title])
     (states,) = plot_run(cert).axes
     drawn_axes = states, plot_decay(cert), plot_input(cert)
     assert {ax.get_legend().get_title().get_text() for ax in drawn_axes} == {title}  # type: ignore[union-attr]
@@ -565,7 +580,7 @@ def test_the_run_that_is_drawn_is_the_one_that_was_asked(title: str) -> None:
 
 def test_where_delays_are_too_short_for_a_run_the_states_say_that_they_are_without() -> None:
     graph = SignedDigraph.from_edges([(1, 2, 1), (2, 3, -1)])
-    cert = certify(graph, PROTOCOL, [1, 0, 2], messages=LateMessages(delay="1e-9"), method="paper")
+    cert = certify(graph, PROTOCOL, [1, 0, 2], messages=LateMessages(delay="1e-9"), asks=Asks(method="paper"))
     (ax,) = plot_run(cert).axes
     assert ax.get_legend().get_title().get_text() == "without late messages"  # type: ignore[union-attr]
 
@@ -700,11 +715,13 @@ def test_the_decay_needs_a_proved_bound_and_a_known_axis() -> None:
     with pytest.raises(ParameterError, match='axis "days" is unknown; one of left, time, clock'):
         plot_decay(cert, axis="days")
     with pytest.raises(ParameterError, match="has no initial state"):
-        plot_decay(certify(cert.graph, cert.protocol, simulation=False))
+        plot_decay(certify(cert.graph, cert.protocol, asks=Asks(simulation=False)))
     with pytest.raises(ParameterError, match="holds no proved bound"):
         plot_decay(certified("single"))
     with pytest.raises(ParameterError, match="another initial state"):
-        plot_decay(cert.trajectory, certificate=certify(cert.graph, cert.protocol, [1] * 6, simulation=False))
+        plot_decay(
+            cert.trajectory, certificate=certify(cert.graph, cert.protocol, [1] * 6, asks=Asks(simulation=False))
+        )
 
 
 def test_of_a_certificate_without_a_run_the_bounds_are_drawn_and_states_simulated(tmp_path: Path) -> None:
@@ -748,7 +765,9 @@ def gallery() -> dict[str, Figure]:
     pair = design(SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)]), max_input=10, initial_bound=1)
     figures["pair plot_trade_off"] = plot_trade_off(pair).figure
     for name, asked in MOVING.items():
-        cert = certify(CHAIN, NominalProtocol(1, 1, 2, 1), [1, 3, -2, 4], method="perron", simulation=False, **asked)
+        cert = certify_words(
+            CHAIN, NominalProtocol(1, 1, 2, 1), [1, 3, -2, 4], method="perron", simulation=False, **asked
+        )
         plot = plot_tracking
         figures[f"{name} {plot.__name__}"] = plot(cert, time_unit="s").figure
     for figure in figures.values():
@@ -927,13 +946,13 @@ def test_an_energy_beyond_floats_is_refused_without_a_warning(size: float, actua
 
 def test_no_certified_line_for_a_run_from_elsewhere() -> None:
     pair = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)])
-    cert = certify(pair, PROTOCOL, [3, 5], simulation=False)
+    cert = certify(pair, PROTOCOL, [3, 5], asks=Asks(simulation=False))
     late = simulate(pair, PROTOCOL, [300, -500], times=[0.01, 0.1, 0.5, 0.9, 1])
     for draw in (plot_input(late, certificate=cert), plot_effort(simulate(pair, PROTOCOL, [3, 5]), certificate=cert)):
         labels = set(labelled(draw))
         assert ("certified bound" in labels) == draw.get_ylabel().startswith("energy")
         assert peak_of(draw) is None
-    near = certify(pair, PROTOCOL, [10**13, 10**13 + 1], simulation=False)
+    near = certify(pair, PROTOCOL, [10**13, 10**13 + 1], asks=Asks(simulation=False))
     with pytest.raises(ValueError, match="another initial state than"):
         plot_input(simulate(pair, PROTOCOL, [1e13, 1e13 + 8]), certificate=near)
 
@@ -984,7 +1003,11 @@ def test_names_of_agents_that_end_at_one_place_do_not_cover_each_other():
     pair = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)])
     protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
     cert = ptcc_certify.certify(
-        pair, protocol, [[3, 1], [1, 0]], agents=ptcc_certify.Agents(order=2), method="paper", simulation=False
+        pair,
+        protocol,
+        [[3, 1], [1, 0]],
+        agents=ptcc_certify.Agents(order=2),
+        asks=ptcc_certify.Asks(method="paper", simulation=False),
     )
     first, second = (np.array(text.xyann) for text in ptcc_certify.plot_formation(cert).texts)
     assert np.hypot(*(first - second)) > NAME_SIZE
@@ -994,7 +1017,11 @@ def test_coordinates_of_agents_stand_below_each_other_and_side_by_side_in_a_wide
     pair = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1)])
     protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
     cert = ptcc_certify.certify(
-        pair, protocol, [[3, 1], [1, 0]], agents=ptcc_certify.Agents(order=2), method="paper", simulation=False
+        pair,
+        protocol,
+        [[3, 1], [1, 0]],
+        agents=ptcc_certify.Agents(order=2),
+        asks=ptcc_certify.Asks(method="paper", simulation=False),
     )
     for wide, shape in ((False, (4, 1)), (True, (2, 2))):
         axes = ptcc_certify.plot_motion(cert, wide=wide).axes
@@ -1009,7 +1036,7 @@ def test_coordinates_of_agents_stand_below_each_other_and_side_by_side_in_a_wide
 def test_a_motion_names_its_agents_and_all_panels_have_the_same_times():
     pair = SignedDigraph.from_edges([("ann", "bob", 1), ("bob", "ann", 1)])
     agents, x0 = ptcc_certify.Agents(order=2), {"ann": [0, 1], "bob": [3, 1]}
-    cert = certify(pair, NominalProtocol(T=1), x0, agents=agents, method="paper", simulation=False)
+    cert = certify(pair, NominalProtocol(T=1), x0, agents=agents, asks=Asks(method="paper", simulation=False))
     panels = ptcc_certify.plot_motion(cert).axes
     assert [sorted(text.get_text() for text in ax.texts) for ax in panels[:2]] == [["ann", "bob"], ["ann, bob"]]
     assert len(panels) == 4 and {ax.get_xlim() for ax in panels} == {panels[1].get_xlim()}
@@ -1020,7 +1047,7 @@ def test_where_sliding_variables_are_0_neither_they_nor_their_deadline_are_annou
     graph, x0 = SignedDigraph.from_edges([(1, 2, 1), (2, 1, -1)]), [1, 2]
     p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
     for sigma0, moves in (([0, 0], False), ([1, 0], True)):
-        cert = certify(graph, p, x0, sigma0=sigma0, method="paper")
+        cert = certify(graph, p, InitialState(x0, sigma0=sigma0), asks=Asks(method="paper"))
         assert cert.trajectory is not None
         for ax in (plot_trajectory(cert), plot_input(cert), plot_decay(cert)):
             assert ("$T_r$" in labelled(ax)) == moves
@@ -1034,7 +1061,7 @@ def test_where_sliding_variables_are_0_neither_they_nor_their_deadline_are_annou
 def test_bars_of_final_states_that_agree_but_for_last_digits_are_drawn(ends: tuple[float, ...]) -> None:
     graph = SignedDigraph.from_edges([("a", "b", 1), ("c", "d", 1), ("e", "f", 1)])
     states = [x for end in ends for x in (end, 0)]
-    ax = drawn(plot_final_states(certify(graph, PROTOCOL, states, simulation=False, method="paper")))
+    ax = drawn(plot_final_states(certify(graph, PROTOCOL, states, asks=Asks(simulation=False, method="paper"))))
     assert sum(bar.get_height() for bar in ax.patches) == 6  # type: ignore[attr-defined]
     low, high = ax.get_xlim()
     assert all(low <= x <= high for x in ends)

@@ -25,6 +25,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from asked import certify_words
 from bad_inputs import ptcc
 from generators import sparse_digraph
 from jinja2 import UndefinedError
@@ -48,6 +49,8 @@ from ptcc_certify.certificate.certificate import RejectedCertificate, read_certi
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.io import read_graph
+from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.report.notation import LISTED, formula_svg, printable, typeset
 from ptcc_certify.report.page import EXTREMES, _environment, report_html
 from ptcc_certify.report.plots.decay import plot_decay
@@ -188,7 +191,7 @@ def test_the_commands_of_a_page_work(tmp_path: Path):
     """As they stand, in the folder of the certificate; with the graph added to the first."""
     (tmp_path / "g.csv").write_text("a,b,1\nb,a,-2\nb,c,1\n")
     graph = read_graph(tmp_path / "g.csv", orientation="listens")
-    certify(graph, NOMINAL, simulation=False).save(tmp_path / "my c.json")
+    certify(graph, NOMINAL, asks=Asks(simulation=False)).save(tmp_path / "my c.json")
     write_report(tmp_path / "my c.json", tmp_path / "c.html", simulation=False)
     source = (tmp_path / "c.html").read_text()
     page = sound(source).text
@@ -271,7 +274,7 @@ def test_final_states_are_the_proved_ones(tmp_path: Path):
     assert [Fraction(row[3]) for row in said] == list(made.final_state.states)
     assert [row[0] for row in said] == list(made.graph.labels)
     graph = sparse_digraph(np.random.default_rng(7), 150, 2.5)
-    reported(certify(graph, NOMINAL, list(range(150)), simulation=False), tmp_path, simulation=False)
+    reported(certify(graph, NOMINAL, list(range(150)), asks=Asks(simulation=False)), tmp_path, simulation=False)
     saved = read_certificate(tmp_path / "c.json")
     said = rows((tmp_path / "c.html").read_text(), "Where the agents end, proved in intervals: the 10 highest")
     assert saved.final_state is not None and saved.final_state.intervals is not None and len(said) == 2 * EXTREMES
@@ -353,7 +356,7 @@ def test_the_page_of_a_design_says_what_was_asked_and_of_which_states_its_bounds
 
 def test_hostile_texts_are_shown_as_texts(tmp_path: Path):
     ring = [(HOSTILE[i], HOSTILE[(i + 1) % len(HOSTILE)], (-1) ** i) for i in range(len(HOSTILE))]
-    certify(SignedDigraph.from_edges(ring), SLIDING, list(range(len(HOSTILE))), simulation=False).save(
+    certify(SignedDigraph.from_edges(ring), SLIDING, list(range(len(HOSTILE))), asks=Asks(simulation=False)).save(
         tmp_path / "c.json"
     )
     evil = '<svg onload="alert(1)">\u202e\x1b http://evil.example'
@@ -437,7 +440,9 @@ def test_without_a_proved_rate_little_is_said(tmp_path: Path):
 
 def test_isolated_agents_under_the_sliding_mode_keep_the_difference(tmp_path: Path):
     graph = SignedDigraph.from_edges([], ["a", "b"])
-    page = sound(reported(certify(graph, SLIDING, [1, 2], sigma0=[3, 0], simulation=False), tmp_path))
+    page = sound(
+        reported(certify(graph, SLIDING, InitialState([1, 2], sigma0=[3, 0]), asks=Asks(simulation=False)), tmp_path)
+    )
     assert "Every agent keeps x \u2212 \u03c3" in page.text and "keeps its state" not in page.text
     assert [row[4] for row in rows((tmp_path / "c.html").read_text(), "Where the agents end")] == ["-2", "2"]
 
@@ -446,7 +451,7 @@ def test_the_heading_names_the_sharpest_claim(tmp_path: Path):
     allies = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("b", "c", 1)])
     protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
     for agents, told in ((None, "Consensus at T"), (Agents(order=2), "Consensus of double integrators")):
-        made = certify(allies, protocol, [1, 2, 3], agents=agents, method="paper", simulation=False)
+        made = certify(allies, protocol, [1, 2, 3], agents=agents, asks=Asks(method="paper", simulation=False))
         assert f"<h1>{told}" in reported(made, tmp_path)
 
 
@@ -471,7 +476,7 @@ def test_numbers_beyond_floats_are_shown(tmp_path: Path):
 def test_the_page_of_a_large_graph_stays_small(tmp_path: Path):
     n = 4_000
     graph = sparse_digraph(np.random.default_rng(2), n, 1.2)
-    made = certify(graph, NOMINAL, list(range(n)), simulation=False, method="perron")
+    made = certify(graph, NOMINAL, list(range(n)), asks=Asks(simulation=False, method="perron"))
     source = reported(made, tmp_path)
     page = sound(source)
     assert len(source.encode()) < 2_000_000
@@ -572,7 +577,7 @@ def test_a_statement_fits_a_column_of_two(n: int, size: Any, sliding: bool, tmp_
     protocol: Any = SLIDING if sliding else NOMINAL
     more: Any = {"sigma0": [Fraction(2 * k - 9, 7) for k in range(n)]} if sliding else {}
     start = [Fraction(10 * k - 31, 7) for k in range(n)]
-    made = certify(dense_digraph(n, size), protocol, start, simulation=False, **more)
+    made = certify_words(dense_digraph(n, size), protocol, start, simulation=False, **more)
     write_report(made, tmp_path / "s.tex", simulation=False)
     begin = r"\documentclass[twocolumn]{article}\usepackage{amsmath,graphicx}\begin{document}"
     (tmp_path / "main.tex").write_text(begin + r"\input{s}\end{document}")
@@ -586,7 +591,7 @@ def test_a_statement_fits_a_column_of_two(n: int, size: Any, sliding: bool, tmp_
 def test_a_statement_tells_the_input_with_late_messages(x0: Any):
     graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1), ("a", "c", 2)])
     messages = LateMessages(delay="0.01", gain_cap=40)
-    certificate = certify(graph, NOMINAL, x0, messages=messages, method="perron", simulation=False)
+    certificate = certify(graph, NOMINAL, x0, messages=messages, asks=Asks(method="perron", simulation=False))
     text = report_latex(read_certificate(certificate.to_dict()))
     largest = up(Fraction(float(certificate.late.input.max())), 4)
     told = f"The input then satisfies $|u_{{k}}| \\le {largest}$ up to $T$"
@@ -597,7 +602,9 @@ def test_the_answer_of_late_messages_tells_whose_speed_it_names():
     graph = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", -1)])
     leaders = MovingLeaders(speed="0.5", disturbance="0.2")
     for messages in (LateMessages(delay="0.01"), None):
-        made = certify(graph, NOMINAL, [1, 2, 3], messages=messages, leaders=leaders, method="perron", simulation=False)
+        made = certify(
+            graph, NOMINAL, [1, 2, 3], messages=messages, leaders=leaders, asks=Asks(method="perron", simulation=False)
+        )
         page = " ".join(re.sub("<[^>]*>", "", report_html(read_certificate(made.to_dict()))).split())
         assert re.search(r"Leaders: speed \|xj&#39;\| ≤ 0.5; any \|dk\| ≤ 0.2\.", page) and "Speed |x" not in page
 
@@ -605,7 +612,7 @@ def test_the_answer_of_late_messages_tells_whose_speed_it_names():
 def test_a_matrix_too_wide_for_a_column_of_two_is_a_list_of_weights(tmp_path: Path):
     for size, fits in ((1, True), ("1.25", False)):
         graph = dense_digraph(10, Fraction(size))
-        text = report_latex(read_certificate(certify(graph, NOMINAL, simulation=False).to_dict()))
+        text = report_latex(read_certificate(certify(graph, NOMINAL, asks=Asks(simulation=False)).to_dict()))
         assert (r"\begin{bmatrix}" in text) == fits == (r"\footnotesize\setlength\arraycolsep" in text)
         assert ("$w_{2,1} = 1.25$" in text) != fits
 
@@ -613,7 +620,7 @@ def test_a_matrix_too_wide_for_a_column_of_two_is_a_list_of_weights(tmp_path: Pa
 @pytest.mark.skipif(shutil.which("pdflatex") is None, reason="no pdflatex to compile with")
 def test_a_label_in_brackets_is_no_argument_of_latex(tmp_path: Path):
     graph = SignedDigraph.from_edges([("a", "[2cm]", 1), ("[2cm]", "[br]", -1), ("[br]", "*", 1)])
-    certify(graph, NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), [1, 2, 3, 4], simulation=False).save(
+    certify(graph, NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), [1, 2, 3, 4], asks=Asks(simulation=False)).save(
         tmp_path / "c.json"
     )
     write_report(tmp_path / "c.json", tmp_path / "s.tex", simulation=False)
@@ -626,7 +633,9 @@ def test_a_label_in_brackets_is_no_argument_of_latex(tmp_path: Path):
 
 def test_every_row_of_the_table_begins_with_a_label_and_not_with_an_argument(tmp_path: Path):
     graph = SignedDigraph.from_edges([("a", "[2cm]", 1), ("[2cm]", "*", -1)])
-    certify(graph, NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), [1, 2, 3], simulation=False).save(tmp_path / "c.json")
+    certify(graph, NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), [1, 2, 3], asks=Asks(simulation=False)).save(
+        tmp_path / "c.json"
+    )
     text = report_latex(read_certificate(tmp_path / "c.json"))
     after = re.findall(r"\\\\\n(?:\\hline\n)?(.)", text)
     assert after and not set(after) & set("[*")
@@ -697,9 +706,9 @@ def test_a_statement_of_a_formation_is_that_of_states_less_places_but_for_where_
     graph, h, x0 = "fig3a", [Fraction(1, 3), -2, 0, 4, 7, -5], [-4, 3, -1, 2, -2, 5]
     protocol: Any = NOMINAL if sigma0 is None else SLIDING
     options: dict[str, Any] = {"simulation": False, "sigma0": sigma0}
-    ours = read_certificate(certify(graph, protocol, x0, agents=Agents(order=1, offsets=h), **options).to_dict())
+    ours = read_certificate(certify_words(graph, protocol, x0, agents=Agents(order=1, offsets=h), **options).to_dict())
     less = [x - y for x, y in zip(x0, h, strict=True)]
-    plain = read_certificate(certify(graph, protocol, less, **options).to_dict())
+    plain = read_certificate(certify_words(graph, protocol, less, **options).to_dict())
     text, other = report_latex(ours), report_latex(plain)
     assert protocol.latex(places=True) in text and protocol.latex() not in text
     assert "x_{k}(t)" not in text and "$E = -L Z$" in text and "$z_{k} = x_{k} - h_{k}$" in text
@@ -715,7 +724,7 @@ def test_a_statement_of_a_formation_is_that_of_states_less_places_but_for_where_
 
 
 def test_a_statement_of_a_formation_without_an_initial_state_tells_the_places():
-    made = certify("fig3a", NOMINAL, agents=Agents(order=1, offsets=[1, -2, 0, 4, 7, -5]), simulation=False)
+    made = certify("fig3a", NOMINAL, agents=Agents(order=1, offsets=[1, -2, 0, 4, 7, -5]), asks=Asks(simulation=False))
     text = report_latex(read_certificate(made.to_dict()))
     assert "Agent & Part & $h_{k}$ \\\\" in text and "positions where agents" not in text
 
@@ -751,14 +760,14 @@ def test_the_bound_through_a_reaching_phase_is_called_numerical_everywhere(tmp_p
 def test_a_statement_holds_the_weights_and_says_that_it_is_without_disturbances(tmp_path: Path):
     graph = SignedDigraph.from_edges([("ann", "bob", 2), ("bob", "ann", -1), ("bob", "eve", 1)])
     protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
-    certify(graph, protocol, [1, 2, 3], delta=1, simulation=False).save(tmp_path / "c.json")
+    certify(graph, protocol, [1, 2, 3], asks=Asks(delta=1, simulation=False)).save(tmp_path / "c.json")
     saved = read_certificate(tmp_path / "c.json")
     text, page = report_latex(saved), sound(report_html(saved)).text
     assert "0 & -1 & 0 \\\\\n2 & 0 & 0 \\\\\n0 & 1 & 0\n\\end{bmatrix}" in text and "(labelled ann, bob, eve)" in text
     assert "All this is without disturbances." in text and r"u_{k} + d_{k}" in text
     assert "without disturbances" in page and "All of this is for agents without disturbances" in page
     assert "agents end where they would" in text and "agents end where they would" in page
-    certify(graph, protocol, [1, 2, 3], delta=1, simulation=False, limits=[GainLimits(gain_cap=30)]).save(
+    certify(graph, protocol, [1, 2, 3], limits=[GainLimits(gain_cap=30)], asks=Asks(delta=1, simulation=False)).save(
         tmp_path / "l.json"
     )
     limited = read_certificate(tmp_path / "l.json")
@@ -769,7 +778,7 @@ def test_a_statement_holds_the_weights_and_says_that_it_is_without_disturbances(
 def test_the_page_says_in_words_why_a_bound_says_little(tmp_path: Path):
     graph = SignedDigraph.from_edges([("ann", "bob", 2), ("bob", "ann", -1), ("bob", "eve", 1)])
     protocol = NominalProtocol(T="1/5", rho1="1/10", rho2="1/10", kappa=1)
-    certify(graph, protocol, simulation=False).save(tmp_path / "c.json")
+    certify(graph, protocol, asks=Asks(simulation=False)).save(tmp_path / "c.json")
     page = sound(report_html(read_certificate(tmp_path / "c.json"))).text
     assert "Why that says little" in page and "in place of 0.1, at most 1 % would be left then" in page
     assert "--rho2" not in page
@@ -778,7 +787,9 @@ def test_the_page_says_in_words_why_a_bound_says_little(tmp_path: Path):
 @pytest.mark.parametrize("more", [{}, {"sample_period": "0.1"}])
 def test_bounds_without_the_limits_of_the_gain_are_told_so(more: dict[str, Any], tmp_path: Path):
     limits = GainLimits(gain_cap=3, **more)
-    certify("fig3a", NOMINAL, [-4, 3, -1, 2, -2, 5], simulation=False, limits=[limits]).save(tmp_path / "c.json")
+    certify("fig3a", NOMINAL, [-4, 3, -1, 2, -2, 5], limits=[limits], asks=Asks(simulation=False)).save(
+        tmp_path / "c.json"
+    )
     page = sound(report_html(read_certificate(tmp_path / "c.json"))).text
     assert page.count("Without the limits of the gain:") == 3
     assert ("Nothing is certified with gain \u2264 3, zero-order hold of 0.1" in page) == bool(more)
@@ -787,16 +798,18 @@ def test_bounds_without_the_limits_of_the_gain_are_told_so(more: dict[str, Any],
 
 def test_a_page_needs_neither_an_instant_after_the_reaching_time_nor_an_edge(tmp_path: Path):
     short = ptcc_certify.SlidingModeProtocol(T_r=1, T_s="1/100", rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
-    certify("fig1b", short, [5, 1, 2, 3, 4, 6], sigma0="random", simulation=False).save(tmp_path / "c.json")
+    certify("fig1b", short, InitialState([5, 1, 2, 3, 4, 6], sigma0="random"), asks=Asks(simulation=False)).save(
+        tmp_path / "c.json"
+    )
     assert "of its final state at T" in sound(report_html(read_certificate(tmp_path / "c.json"))).text
     alone = SignedDigraph.from_edges([], [f"n{k}" for k in range(301)])
-    certify(alone, NOMINAL, [*range(301)], simulation=False).save(tmp_path / "alone.json")
+    certify(alone, NOMINAL, [*range(301)], asks=Asks(simulation=False)).save(tmp_path / "alone.json")
     assert "301 agents" in sound(report_html(read_certificate(tmp_path / "alone.json"))).text
 
 
 def test_long_tables_are_cut(tmp_path: Path):
     graph = SignedDigraph.from_edges([(k, k + 1, 1) for k in range(LISTED + 9)])
-    certify(graph, NOMINAL, [1] * (LISTED + 10), simulation=False, method="paper").save(tmp_path / "c.json")
+    certify(graph, NOMINAL, [1] * (LISTED + 10), asks=Asks(simulation=False, method="paper")).save(tmp_path / "c.json")
     text = report_latex(read_certificate(tmp_path / "c.json"))
     assert text.count(r" \\") < LISTED + 10 and "leaves out $10$ more agents" in text
 

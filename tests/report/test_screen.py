@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from asked import certify_words
 from generators import KINDS, all_classes, random_graph, smallest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -18,12 +19,12 @@ import ptcc_certify as ptcc
 from ptcc_certify.bounds.final_state import extremes
 from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.procedure import STEPS
-from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.certificate.verdict import NO_SEARCHES
 from ptcc_certify.errors import ExitCode
 from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import analyse
+from ptcc_certify.model.asks import Expectations
 from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.screen import certificate_lines, check_summary, structure_summary, summary_lines
@@ -74,7 +75,7 @@ def test_of_every_class_the_screens_fit_8_lines_of_80_columns(kind: str):
     x0 = [Fraction(int(x), 7) for x in rng.integers(-9_999, 10_000, n)]
     assert_short(structure_summary(analyse(graph), "a graph of a long name" * 4), 8 if len(made.parts) == 1 else 12)
     for protocol, sigma in ((NOMINAL, {}), (SLIDING, {"sigma0": x0[::-1]})):
-        certificate = ptcc.certify(graph, protocol, x0, simulation=False, method="paper", **sigma)
+        certificate = certify_words(graph, protocol, x0, simulation=False, method="paper", **sigma)
         assert_screen(certificate, "/a/long/path/of/some/folders/to/the/file/of/the/graph/graph_5.csv")
         for line in wrap_lines(certificate_lines(certificate, "g" * 100)):
             assert cell_len(line) <= 80
@@ -130,21 +131,23 @@ REQUESTS: list[tuple[Any, dict[str, Any], int, str]] = [
 
 @pytest.mark.parametrize(("protocol", "request_", "code", "says"), REQUESTS, ids=str)
 def test_whatever_is_asked_the_screen_is_short_and_agrees_with_the_exit_code(protocol, request_, code, says):
-    certificate = ptcc.certify(PAIR, protocol, [5, 1], simulation=False, **request_)
+    certificate = certify_words(PAIR, protocol, [5, 1], simulation=False, **request_)
     assert certificate.assessment.exit_code == code
     lines = assert_screen(certificate)
     assert says in " ".join(line.strip() for line in lines), lines
 
 
 def test_without_particulars_there_is_one_line_for_each_thing():
-    lines = assert_screen(ptcc.certify(PAIR, NOMINAL, [5, 1], simulation=False))
+    lines = assert_screen(ptcc.certify(PAIR, NOMINAL, [5, 1], asks=ptcc.Asks(simulation=False)))
     assert [line.split()[0] for line in lines] == HEADS
     assert [line.split()[0] for line in assert_screen(ptcc.certify(PAIR, NOMINAL))] == [h for h in HEADS if h != "x(T)"]
 
 
 def test_what_disturbances_add_has_a_line_and_the_verdict_is_of_none():
     for limits in ([], [GainLimits(gain_cap=30)]):
-        lines = assert_screen(ptcc.certify(PAIR, NOMINAL, [5, 1], simulation=False, delta=1, limits=limits))
+        lines = assert_screen(
+            ptcc.certify(PAIR, NOMINAL, [5, 1], limits=limits, asks=ptcc.Asks(simulation=False, delta=1))
+        )
         (line,) = [line for line in lines if line.startswith("disturbed  |d_k| <= 1 adds at most ")]
         assert ("x_k(T)" in line) == (not limits), "where they move the agents is proved without limits alone"
         assert ("; of x(T) nothing is proved" in " ".join(map(str.strip, lines))) == bool(limits)
@@ -154,16 +157,16 @@ def test_what_disturbances_add_has_a_line_and_the_verdict_is_of_none():
 def test_noise_that_is_left_open_has_its_reason():
     sampled = [GainLimits(gain_cap=30, sample_period="0.001")]
     for limits, why in (([], "--gain-cap or --stop-before"), (sampled, "ask for each alone")):
-        certificate = ptcc.certify(PAIR, NOMINAL, [5, 1], simulation=False, noise="0.01", limits=limits)
+        certificate = ptcc.certify(PAIR, NOMINAL, [5, 1], limits=limits, asks=ptcc.Asks(simulation=False, noise="0.01"))
         text = " ".join(line.strip() for line in assert_screen(certificate))
         assert f"{why}); the rest is certified" in text
 
 
 def test_a_drawn_state_is_not_told_where_a_set_is_asked_about():
-    certificate = ptcc.certify(PAIR, NOMINAL, [5, 1], simulation=False, initial_set=1)
+    certificate = ptcc.certify(PAIR, NOMINAL, [5, 1], asks=ptcc.Asks(simulation=False, initial_set=1))
     assert any(line.startswith("x(T)") for line in assert_screen(certificate))
     assert "x(T)" in "\n".join(summary_lines(certificate, "g", {"x(0)": "as in the file"}))
-    certificate = ptcc.certify(PAIR, NOMINAL, "random", simulation=False, initial_set=1)
+    certificate = ptcc.certify(PAIR, NOMINAL, "random", asks=ptcc.Asks(simulation=False, initial_set=1))
     for show in (summary_lines, certificate_lines):
         text = "\n".join(show(certificate, "g", {"x(0)": "random, seed 0"}))
         assert "x(T)" not in text and "every agent" not in text and "all |x_k(0)| <= 1" in text
@@ -171,7 +174,7 @@ def test_a_drawn_state_is_not_told_where_a_set_is_asked_about():
 
 def test_final_states_are_exact_or_called_rounded_and_of_many_there_are_the_ends():
     def line(x0: list[Any], graph: SignedDigraph = PAIR) -> str:
-        lines = assert_screen(ptcc.certify(graph, NOMINAL, x0, simulation=False, method="paper"))
+        lines = assert_screen(ptcc.certify(graph, NOMINAL, x0, asks=ptcc.Asks(simulation=False, method="paper")))
         return " ".join(lines).partition("x(T)")[2].partition("error")[0]
 
     assert "a=1/6, b=-1/6 (exact)" in line(["1/3", 0])
@@ -194,21 +197,25 @@ def test_the_claim_says_that_it_is_without_limits_of_the_gain():
     several = SignedDigraph.from_edges([("a", "b", 1), ("c", "d", 1)])
     for limits in (GainLimits(gain_cap=50), GainLimits(stop_before="0.1"), GainLimits(1000, sample_period="0.001")):
         more: dict[str, Any] = {"simulation": False, "method": "paper", "limits": limits}
-        (claim,) = (line for line in assert_screen(ptcc.certify(PAIR, NOMINAL, [1, 2], **more)) if "claim " in line)
+        (claim,) = (line for line in assert_screen(certify_words(PAIR, NOMINAL, [1, 2], **more)) if "claim " in line)
         assert ", without limits (Theorem" in claim
-        assert " " * 11 + "without limits" in summary_lines(ptcc.certify(several, NOMINAL, **more), "several")
+        assert " " * 11 + "without limits" in summary_lines(certify_words(several, NOMINAL, **more), "several")
 
 
 def test_agents_that_end_at_the_same_state_are_told_together_where_one_line_is_enough():
     graph, x0 = load_graph("fig1b"), ["7.013", "2.739", "0.223", "-4.604", "-3.844", "-9.181"]
-    lines = assert_screen(ptcc.certify(graph, NOMINAL, x0, simulation=False))
+    lines = assert_screen(ptcc.certify(graph, NOMINAL, x0, asks=ptcc.Asks(simulation=False)))
     assert len(lines) == 8 and lines[4] == "x(T)       1, 2, 5, 6 at 1.3001; 3, 4 at -1.3001 (rounded)"
 
 
 def test_a_long_label_keeps_the_end_that_tells_it_apart():
     labels = [f"department of network science, room {k}" for k in range(2)]
     graph = SignedDigraph.from_edges([(*labels, 1), (*labels[::-1], -1)])
-    (line,) = [x for x in assert_screen(ptcc.certify(graph, STRONG, [5, 1], simulation=False)) if x.startswith("input")]
+    (line,) = [
+        x
+        for x in assert_screen(ptcc.certify(graph, STRONG, [5, 1], asks=ptcc.Asks(simulation=False)))
+        if x.startswith("input")
+    ]
     assert line.endswith(("room 0", "room 1"))
 
 
@@ -234,7 +241,9 @@ def test_a_header_that_swaps_the_columns_is_told(tmp_path):
 
 def test_of_many_components_the_largest_four_are_told():
     edges = [(f"{k}a{i}", f"{k}a{i + 1}", 1) for k in range(6) for i in range(k)]
-    lines = assert_screen(ptcc.certify(SignedDigraph.from_edges(edges, ["0a0"]), NOMINAL, [1] * 21, simulation=False))
+    lines = assert_screen(
+        ptcc.certify(SignedDigraph.from_edges(edges, ["0a0"]), NOMINAL, [1] * 21, asks=ptcc.Asks(simulation=False))
+    )
     claims = [line for line in lines if "at T = 0.6" in line]
     assert len(claims) == 4 and claims[0].startswith("claim      5a0, 5a1")
     assert any("... 6 components in all" in line for line in lines)
@@ -250,7 +259,7 @@ def test_agents_without_edges_keep_their_state():
 @pytest.mark.parametrize("rho2", ["0.3", "2/3", "5/7"])
 def test_bounds_are_rounded_up(rho2: str):
     protocol = ptcc.NominalProtocol(T="0.6", rho1="1/3", rho2=rho2, kappa=1)
-    certificate = ptcc.certify(PAIR, protocol, ["5/3", 1], simulation=False, initial_set="7/3")
+    certificate = ptcc.certify(PAIR, protocol, ["5/3", 1], asks=ptcc.Asks(simulation=False, initial_set="7/3"))
     text = " ".join(summary_lines(certificate, "pair"))
     (error,) = re.findall(r"\|\|E\|\| <= (\S+) \|\|E\(0\)\|\|", text)
     assert Fraction(error) >= certificate.envelope.residual(0.01)
@@ -264,7 +273,7 @@ def test_bounds_are_rounded_up(rho2: str):
 
 
 def test_a_certificate_read_back_shows_the_same_screen(tmp_path):
-    certificate = ptcc.certify(PAIR, NOMINAL, [5, 1], simulation=False)
+    certificate = ptcc.certify(PAIR, NOMINAL, [5, 1], asks=ptcc.Asks(simulation=False))
     certificate.save(tmp_path / "c.json")
     assert summary_lines(ptcc.read_certificate(tmp_path / "c.json"), "pair") == summary_lines(certificate, "pair")
 
@@ -290,11 +299,13 @@ def test_a_delta_of_0_is_called_no_disturbances():
     pair = [("a", "b", -1), ("b", "a", -1)]
     for delta, told in (("0", "at T = 2, without disturbances"), ("1", "at T = 2, any |d_k| <= 1")):
         protocol = ptcc.SlidingModeProtocol(T_r=1, T_s=1, mu1=2, delta=delta)
-        assert told in ptcc.certify(pair, protocol, [3, 5], simulation=False).summary()
+        assert told in ptcc.certify(pair, protocol, [3, 5], asks=ptcc.Asks(simulation=False)).summary()
 
 
 def test_certify_and_check_tell_the_same_of_single_agents(tmp_path):
-    certificate = ptcc.certify(load_graph("fig1b"), SLIDING, "random", sigma0="random", simulation=False)
+    certificate = ptcc.certify(
+        load_graph("fig1b"), SLIDING, ptcc.InitialState("random", sigma0="random"), asks=ptcc.Asks(simulation=False)
+    )
     certificate.save(tmp_path / "c.json")
     report = ptcc.check(tmp_path / "c.json")
     told = summary_lines(certificate, "fig1b", {"x(0)": "random, seed 0", "sigma(0)": "random, seed 0"})
@@ -305,7 +316,9 @@ def test_certify_and_check_tell_the_same_of_single_agents(tmp_path):
 
 
 def test_instants_of_the_page_are_those_of_the_screen():
-    certificate = ptcc.certify(PAIR, SLIDING, [5, 1], sigma0=[1, 0], simulation=False)
+    certificate = ptcc.certify(
+        PAIR, SLIDING, ptcc.InitialState([5, 1], sigma0=[1, 0]), asks=ptcc.Asks(simulation=False)
+    )
     bounds = certificate.norm_bound([left for left, _ in told_instants(SLIDING, certificate.direct)])
     assert np.all(np.diff(bounds) < 0)
     (line,) = [line for line in summary_lines(certificate, "g") if line.startswith("error")]
@@ -316,24 +329,28 @@ def test_instants_of_the_page_are_those_of_the_screen():
 
 def test_undecided_for_want_of_time_names_the_search():
     assert set(NO_SEARCHES) - {"exact final state"} <= set(STEPS)  # which gives way to an enclosed one
-    text = ptcc.certify(PAIR, NOMINAL, [5, 1], time_limit=1e-9).assessment.text
+    text = ptcc.certify(PAIR, NOMINAL, [5, 1], asks=ptcc.Asks(time_limit=1e-9)).assessment.text
     assert text == "undecided: no rate is proved, the search took its share of 1e-09 s; raise --time-limit"
 
 
 def test_no_claim_hypothesis_or_parameter_is_cut_short():
     fine = ptcc.SlidingModeProtocol(T_r="0.123456789", T_s="0.987654321", mu1="0.2234567891", delta="0.123456789012")
-    text = " ".join(" ".join(assert_screen(ptcc.certify(PAIR, fine, [3, 5], simulation=False))).split())
+    text = " ".join(" ".join(assert_screen(ptcc.certify(PAIR, fine, [3, 5], asks=ptcc.Asks(simulation=False)))).split())
     assert "any |d_k| <= 0.123456789012 (Theorem 4.1)" in text and "sigma(0) 0" in text and "..." not in text
     apart = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("c", "d", -1), ("d", "c", -1)])
-    assert "           any |d_k| <= 1" in assert_screen(ptcc.certify(apart, SLIDING, [1, 2, 3, 4], simulation=False))
+    assert "           any |d_k| <= 1" in assert_screen(
+        ptcc.certify(apart, SLIDING, [1, 2, 3, 4], asks=ptcc.Asks(simulation=False))
+    )
     capped = ptcc.Agents(order=1, offsets=[1, 2], gain_cap=4)
-    lines = summary_lines(ptcc.certify(PAIR, NOMINAL, [3, 5], agents=capped, simulation=False), "pair")
+    lines = summary_lines(ptcc.certify(PAIR, NOMINAL, [3, 5], agents=capped, asks=ptcc.Asks(simulation=False)), "pair")
     text = " ".join(" ".join(lines).split())
     assert "consensus of x - offsets at T = 0.6, without limits (Theorem 1.1" in text
 
 
 def test_a_protocol_is_broken_between_terms_only():
-    cascade = ptcc.certify(PAIR, STRONG, [3, 5], agents=ptcc.Agents(order=2, cascade=3), simulation=False)
+    cascade = ptcc.certify(
+        PAIR, STRONG, [3, 5], agents=ptcc.Agents(order=2, cascade=3), asks=ptcc.Asks(simulation=False)
+    )
     for lines in (summary_lines(cascade, "pair"), wrap_lines(certificate_lines(cascade, "pair"))):
         first = next(k for k, line in enumerate(lines) if line.startswith("agents "))
         assert lines[first + 1].startswith("           - 3 g x'") and lines[first].endswith("g e'")
@@ -343,9 +360,9 @@ def test_a_protocol_is_broken_between_terms_only():
 def test_of_many_agents_of_order_n_the_least_and_the_largest_final_state_are_told():
     star = SignedDigraph.from_edges([(0, k, 1 if k % 2 else -1) for k in range(1, 121)])
     options = {"agents": ptcc.Agents(order=2), "simulation": False, "method": "perron"}
-    made = ptcc.certify(star, STRONG, [3] * 121, v0=[1] * 121, **options)
+    made = certify_words(star, STRONG, [3] * 121, v0=[1] * 121, **options)
     lines = summary_lines(made, "star")
     assert any(line.startswith("x(T)       least 2=-4, largest 0=4, of 121 agents (") for line in lines), lines
     assert any(line.startswith("v(T)       least 2=-1, largest 0=1, of 121 agents (") for line in lines), lines
-    made = ptcc.certify(star, STRONG, [Fraction(1, 3)] * 121, v0=[1] * 121, **options)
+    made = certify_words(star, STRONG, [Fraction(1, 3)] * 121, v0=[1] * 121, **options)
     assert "proved; rounded)" in " ".join(" ".join(summary_lines(made, "star")).split())

@@ -17,10 +17,12 @@ from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.model.asks import Asks
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.disturbance import SampledDisturbance
 from ptcc_certify.protocols.gain import Gain
-from ptcc_certify.protocols.gain_limits import GainLimits, LimitedGain
+from ptcc_certify.protocols.gain_limits import GainLimits
+from ptcc_certify.protocols.limited_gain import LimitedGain
 from ptcc_certify.simulation.nominal import Bounded, as_forcing
 from ptcc_certify.simulation.run import simulate
 
@@ -177,7 +179,7 @@ def test_a_run_long_enough_is_settled_and_a_stopped_start_is_still():
 
 @cache
 def certified():
-    return certify(load_graph("fig1a"), PROTOCOL, simulation=False)
+    return certify(load_graph("fig1a"), PROTOCOL, asks=Asks(simulation=False))
 
 
 @pytest.mark.parametrize("limits", LIMITS, ids=str)

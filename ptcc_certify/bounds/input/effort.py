@@ -162,7 +162,8 @@ class Effort:
     Examples
     --------
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
-    >>> effort = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 1], simulation=False).effort
+    >>> protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=1)
+    >>> effort = certify(pair, protocol, [3, 1], asks=Asks(simulation=False)).effort
     >>> effort.bounded, [float(bound) >= 1 for bound in effort.threshold], float(effort.first)
     (True, [True, True], 8.0)
     """

@@ -19,14 +19,18 @@ from matplotlib.figure import Figure
 from ptcc_certify.bounds.final_state import final_state
 from ptcc_certify.certificate.answer import rejects
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.procedure import certify
-from ptcc_certify.certificate.request import refuse
+from ptcc_certify.certificate.procedure import certify, certify_case
+from ptcc_certify.certificate.request import refuse_long_weights
 from ptcc_certify.certificate.verdict import CERTIFIED
 from ptcc_certify.errors import ParameterError, PTCCError, SimulationError
 from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io.packaged import GRAPHS
 from ptcc_certify.graphs.size_limits import EXPLORED_NODES
+from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.case import Case
+from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.refusals import refuse_before_the_graph
 from ptcc_certify.protocols.disturbance import as_disturbance
 from ptcc_certify.protocols.reaching_time import certified_reaching_times
 from ptcc_certify.report.explorer.facts import UNCHECKED, facts_of, run_of, without_flags
@@ -236,24 +240,20 @@ class Explorer:
 
     def _certificate(self, question: Question, progress: Callable[[str], None]) -> Certificate:
         settings = question.settings
-        certificate = certify(
-            question.graph,
-            question.protocol,
-            question.x0,
-            **question.sliding,
-            method=settings.method,
-            progress=progress,
-        )
+        initial = InitialState(question.x0, sigma0=question.sigma0)
+        asks = Asks(method=settings.method, disturbance=question.disturbance)
+        certificate: Any = certify_case(Case(question.graph, question.protocol, initial, asks=asks), progress=progress)
         self._latest[settings.graph, settings.method] = certificate
         return certificate
 
     def _preview(self, question: Question) -> Certificate:
         """Return a certificate of Lyapunov functions found before: the latest of the class, or else the paper's."""
         settings, graph, protocol = question.settings, question.graph, question.protocol
-        refuse(graph, protocol, settings.method, {}, [])
+        refuse_before_the_graph(Case(graph, protocol))
+        refuse_long_weights(graph)
         base = self._latest.get((settings.graph, settings.method)) or self._latest.get((settings.graph, "paper"))
         if base is None:
-            base = certify(graph, Settings().protocol(), simulation=False, method="paper")
+            base = certify(graph, Settings().protocol(), asks=Asks(simulation=False, method="paper"))
             self._latest[settings.graph, "paper"] = base
         run = None
         with suppress(SimulationError):  # the panels tell that there is none

@@ -26,11 +26,13 @@ def python_of(question: Question) -> str:
     kind = "SlidingModeProtocol" if settings.kind == "sliding-mode" else "NominalProtocol"
     parameters = ", ".join(f"{key}={value!r}" for key, value in _texts(question).items())
     lines += fill(f"p = ptcc.{kind}({parameters})", 80, subsequent_indent="    ").split("\n")
+    asks = [] if settings.method == "best" else [f'method="{settings.method}"']
     arguments = [f"x0={question.x0}"]
     if question.sigma0 is not None:
-        arguments += [f"sigma0={question.sigma0}", f"disturbance={_disturbance(question)}"]
-    if settings.method != "best":
-        arguments.append(f'method="{settings.method}"')
+        arguments = [f"x0=ptcc.InitialState({question.x0}, sigma0={question.sigma0})"]
+        asks.append(f"disturbance={_disturbance(question)}")
+    if asks:
+        arguments.append(f"asks=ptcc.Asks({', '.join(asks)})")
     lines += ["cert = ptcc.certify(", "    g,", "    p,", *(f"    {argument}," for argument in arguments), ")"]
     lines += ["print(cert)", 'ptcc.save_figure(ptcc.plot_decay(cert), "decay.png")']
     return "\n".join(lines)

@@ -78,7 +78,7 @@ def plot_motion(subject: Any, *, wide: bool = False, time_unit: str = "") -> Fig
     --------
     >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
     >>> protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
-    >>> cert = certify(foes, protocol, [3, 1], agents=Agents(order=2), method="paper")
+    >>> cert = certify(foes, protocol, [3, 1], agents=Agents(order=2), asks=Asks(method="paper"))
     >>> [ax.get_ylabel() for ax in plot_motion(cert).axes]
     ['position', 'velocity']
     """
@@ -155,7 +155,7 @@ def plot_formation(subject: Any, *, ax: Axes | None = None) -> Axes:
     --------
     >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
     >>> protocol = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
-    >>> cert = certify(foes, protocol, [[3, 1], [1, 0]], agents=Agents(order=2), method="paper")
+    >>> cert = certify(foes, protocol, [[3, 1], [1, 0]], agents=Agents(order=2), asks=Asks(method="paper"))
     >>> plot_formation(cert).get_xlabel()
     '$x$'
     """

@@ -38,7 +38,7 @@ def plot_final_states(certificate: Content, *, ax: Axes | None = None) -> Axes:
     Examples
     --------
     >>> path = SignedDigraph.from_edges([("a", "b", -1), ("b", "c", 1)])
-    >>> cert = certify(path, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [2, 0, 0], simulation=False)
+    >>> cert = certify(path, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [2, 0, 0], asks=Asks(simulation=False))
     >>> ax = plot_final_states(cert)
     >>> int(sum(bar.get_height() for bar in ax.patches))
     3

@@ -10,12 +10,12 @@ from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.certificate.family_comparison import worst_case_signals
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
+from ptcc_certify.protocols.restricted_signals import ClockShares, DwellTime, JointWindows
 from ptcc_certify.report.plots.style import RUN
 from ptcc_certify.report.plots.subject import trajectory_of
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.signals import ConstantSignal, PeriodicSignal, RandomDwellSignal, RandomSignal, Signal
 from ptcc_certify.simulation.trajectory import Trajectory
-from ptcc_certify.theorems.restricted_signals import ClockShares, DwellTime, JointWindows
 
 #: Random signals that are drawn beside the worst cases.
 _RANDOM = 8

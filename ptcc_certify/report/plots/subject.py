@@ -80,7 +80,7 @@ def ideal_run_of(subject: Any) -> Trajectory:
     --------
     >>> from ptcc_certify.report.plots.subject import ideal_run_of
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
-    >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5], simulation=False)
+    >>> cert = certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5], asks=Asks(simulation=False))
     >>> ideal_run_of(cert).states[:, 0]
     array([3., 5.])
     """

@@ -9,12 +9,21 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Any, ClassVar
 
 from ptcc_certify.errors import ParameterError, gated
+from ptcc_certify.graphs.option import Option, option
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.protocols.parameters import parameter, readable
 
+#: What a dwell time of the clock is called.
+CLOCK_DWELL = Option(
+    flag="--clock-dwell TAU",
+    help="Families, nominal: the same on the stretched clock, which is infinite at T.",
+    key="graph.clock_dwell",
+    example='"0.1"',
+    unit="clock",
+)
 #: ``t`` is the user's time, ``s`` the stretched clock.
 CLOCKS = ("t", "s")
 #: Why windows of time are refused.
@@ -52,7 +61,15 @@ class DwellTime:
     4
     """
 
-    least: Fraction
+    section: ClassVar = "graph"
+    least: Fraction = option(
+        "--dwell THETA",
+        "Families, nominal: at least so much time between switches; claim more for these.",
+        required=True,
+        key="dwell",
+        example='"0.1"',
+        unit="time",
+    )
     clock: str = "t"
 
     def __post_init__(self) -> None:
@@ -104,8 +121,23 @@ class JointWindows:
     JointWindows(2, on=0.5, clock='s')
     """
 
-    length: Fraction
-    on: Fraction
+    section: ClassVar = "graph"
+    length: Fraction = option(
+        "--clock-window H",
+        "Families, nominal: the length of windows of stretched clock; every edge is on in each.",
+        required=True,
+        key="clock_window",
+        example='"2"',
+        unit="clock",
+    )
+    on: Fraction = option(
+        "--window-on DELTA",
+        "Families: for how much of every window an edge is on, at least.",
+        required=True,
+        key="window_on",
+        example='"0.5"',
+        unit="clock",
+    )
     clock: str = "s"
 
     def __post_init__(self) -> None:
@@ -150,7 +182,16 @@ class ClockShares:
     ClockShares(0.75, 0.25)
     """
 
-    shares: tuple[Fraction, ...]
+    section: ClassVar = "graph"
+    shares: tuple[Fraction, ...] = option(
+        "--share NU",
+        "Families, nominal: the share of the stretched clock that a mode acts, an outage too; one for each graph.",
+        required=True,
+        key="share",
+        example='["0.7", "0.3"]',
+        kind="text",
+        many=True,
+    )
 
     def __post_init__(self) -> None:
         shares = tuple(_share(share) for share in self.shares)

@@ -1,0 +1,251 @@
+"""Options of click, and keys of scenarios, from the fields that declare them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from fractions import Fraction
+from itertools import chain
+from typing import Any, ClassVar
+
+import click
+
+from ptcc_certify.errors import ParameterError, PTCCError
+from ptcc_certify.gain_design.request import DesignRequest
+from ptcc_certify.graphs.option import Option, options_of
+from ptcc_certify.graphs.reading import OPTIONAL, UNCERTAINTY, Reading
+from ptcc_certify.model.asks import Asks, Expectations
+from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.run import Run
+from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.protocols.agents import Agents
+from ptcc_certify.protocols.gain_limits import GainLimits
+from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.protocols.moving_leaders import MovingLeaders
+from ptcc_certify.protocols.restricted_signals import CLOCK_DWELL, ClockShares, DwellTime, JointWindows
+
+Decorator = Callable[[Any], Any]
+
+#: What the command line and scenarios alone have.
+FILE = Option(flag="", help="", key="graph.file", example='"fig1b"', name="graph")
+SIGNAL = Option(
+    flag="--signal",
+    help="Families: mode and weights change at any instants, or are fixed and unknown.",
+    key="graph.signal",
+    example='"any"',
+    choices=("any", "constant"),
+    default="any",
+)
+KIND = Option(
+    flag="--protocol",
+    help="Nominal, or sliding mode, which disturbances within delta do not move.",
+    key="protocol.kind",
+    example='"nominal"',
+    name="kind",
+    choices=("nominal", "sliding-mode"),
+    default="nominal",
+)
+DIMENSION = Option(
+    flag="--dimension",
+    help="Agents: coordinates of space; --x0 agent after agent.",
+    key="initial_state.dimension",
+    least=1,
+    most=1000,
+)
+A0 = Option(
+    flag="--a0 STATE", help="Agents of order 3: initial accelerations.", key="agents.a0", example='"0"', shown="0"
+)
+SHORTEST = Option(
+    flag="--shortest-deadline",
+    help=".. or for the shortest one.",
+    key="design.shortest_deadline",
+    example="true",
+    kind="flag",
+)
+#: Everything that is declared, in the order of the sections and keys of a scenario.
+DECLARED = (
+    FILE,
+    *options_of(Reading).values(),
+    UNCERTAINTY,
+    OPTIONAL,
+    SIGNAL,
+    options_of(DwellTime)["least"],
+    CLOCK_DWELL,
+    *options_of(JointWindows, ClockShares).values(),
+    KIND,
+    *options_of(NominalProtocol, SlidingModeProtocol, Agents, InitialState).values(),
+    A0,
+    *options_of(Run, Asks).values(),
+    DIMENSION,
+    *options_of(GainLimits, LateMessages, MovingLeaders, Expectations, DesignRequest).values(),
+    SHORTEST,
+)
+#: Options of one protocol alone, by its kind: a flag that chooses the other one leaves such keys out.
+OF_PROTOCOL = {
+    "nominal": ("T", *(told.name for told in options_of(GainLimits).values()), "noise"),
+    "sliding-mode": ("T_r", "T_s", "mu1", "mu2", "mu3", "sigma0", "disturbance", "boundary_layer"),
+}
+#: What commands call the fields of the library that they call otherwise.
+IN_LIBRARY = {"initial_state": "x0", "initial": "x0"}
+IN_LIBRARY |= {field: told.name for field, told in options_of(MovingLeaders, LateMessages, Expectations, Asks).items()}
+_FLAGS = {told.name: told.word for told in DECLARED}
+
+
+def names_of(*kinds: type) -> tuple[str, ...]:
+    """Return what commands call the options of dataclasses.
+
+    Examples
+    --------
+    >>> names_of(MovingLeaders)
+    ('leader_speed', 'sign_gain')
+    """
+    return tuple(told.name for told in options_of(*kinds).values())
+
+
+def options_asking(names: Iterable[str]) -> tuple[str, ...]:
+    """Return what commands call the options by which parts of a case, or what it asks, are given.
+
+    Examples
+    --------
+    >>> options_asking(["initial_set", "leaders"])
+    ('initial_bound', 'leader_speed', 'sign_gain')
+    """
+    parts = {"messages": LateMessages, "leaders": MovingLeaders, "limits": GainLimits}
+    given = (names_of(parts[name]) if name in parts else (IN_LIBRARY.get(name, name),) for name in names)
+    return tuple(chain.from_iterable(given))
+
+
+def given_of(kind: type, options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what the options give of a dataclass, by its fields.
+
+    Examples
+    --------
+    >>> given_of(MovingLeaders, {"leader_speed": "1/2", "sign_gain": None, "T": "1"})
+    {'speed': '1/2'}
+    """
+    given = {field: options.get(told.name) for field, told in options_of(kind).items()}
+    return {field: value for field, value in given.items() if value is not None}
+
+
+def flag_of(name: str) -> str:
+    """Return the flag of an option.
+
+    Examples
+    --------
+    >>> flag_of("leader_speed"), flag_of("kind"), flag_of("workers")
+    ('--leader-speed', '--protocol', '--workers')
+    """
+    return _FLAGS.get(name) or f"--{name.replace('_', '-')}"
+
+
+def exact_number(text: str, flag: str) -> Fraction:
+    """Return the exact number that a text of an option stands for."""
+    from ptcc_certify.graphs.rationals import parse_exact
+
+    try:
+        return parse_exact(text)
+    except PTCCError as error:
+        times = {told.word for told in DECLARED if told.unit == "time"}
+        mend = "; give a number in your unit of time, such as 0.001" if flag in times else ""
+        raise ParameterError(f"{flag}: {error}{mend}") from None
+
+
+def _exact(context: click.Context, parameter: click.Parameter, text: str | None) -> Fraction | None:
+    """Return the exact number that an option gives, None if it was not given."""
+    return None if text is None or context.resilient_parsing else exact_number(text, parameter.opts[0])
+
+
+def click_option(told: Option, **changes: Any) -> Decorator:
+    """Return the option of click that is declared, with the changes that one command makes."""
+    callback, hidden = changes.pop("callback", None), changes.pop("hidden", False)
+    told = replace(told, **changes)
+    of_one = any(told.name in names for names in OF_PROTOCOL.values())
+    shown = told.shown or (str(told.default) if told.kind == "parameter" and of_one else "")
+    more: dict[str, Any] = {"help": told.help, "hidden": hidden, "callback": callback, "metavar": told.metavar}
+    if shown:
+        more["help"] += f"  [default: {shown}]"
+    elif not told.many and told.default is not None:
+        more["default"] = told.default if told.kind in ("count", "choice", "switch") else str(told.default)
+    if told.kind == "number":
+        more["callback"] = callback or _exact
+    elif told.kind == "parameter":
+        more["metavar"] = "NUMBER"
+    elif told.kind == "choice":
+        more["type"] = click.Choice(list(told.choices))
+    elif told.kind == "count":
+        more["type"] = click.IntRange(told.least, told.most)
+    elif told.kind == "float":
+        more["type"] = float
+    elif told.kind == "switch":
+        more |= {"default": told.default, "show_default": False}
+    return click.option(
+        told.flag.partition(" ")[0],
+        told.name,
+        multiple=told.many,
+        is_flag=True if told.kind == "flag" else None,
+        **more,
+    )
+
+
+def options_for(*kinds: type, asked: bool = False, **changes: Any) -> Decorator:
+    """Return one decorator for the options of dataclasses; nothing is given by default where something is ``asked``."""
+    declared = list(options_of(*kinds).values())
+    if asked:
+        declared = [told if told.kind == "switch" else replace(told, default=None) for told in declared]
+    return together(*(click_option(told, **changes) for told in declared))
+
+
+def one_of(kind: type, name: str, **changes: Any) -> Decorator:
+    """Return the option of one field."""
+    return click_option(options_of(kind)[name], **changes)
+
+
+def together(*decorators: Decorator) -> Decorator:
+    """Return one decorator of several, which adds their options in this order."""
+
+    def apply(function: Any) -> Any:
+        for decorator in reversed(decorators):
+            function = decorator(function)
+        return function
+
+    return apply
+
+
+# ---------------------------------------------------------------------- help
+
+
+#: What the sections of a scenario, and of the help, are about.
+TITLES = {
+    "graph": "Who listens to whom.",
+    "protocol": "The protocol and its parameters; exact: 0.1 is 1/10, and 1/3 is written as a text.",
+    "initial_state": "Where the agents begin: a list in node order, { label = value }, a CSV file, or random.",
+    "agents": "Agents of order n, their first velocities, and a formation.",
+    "disturbance": "What disturbs the agents.",
+    "limits": "Limits of the gain (nominal protocol).",
+    "messages": "Messages that arrive late, get lost or are rounded.",
+    "leaders": "Leaders that move (nominal protocol).",
+    "expectations": "What is asked: exit code 3 if it is refuted, 4 if it is left open.",
+    "certificate": "How it is proved.",
+    "simulation": "How ptcc simulate runs it.",
+    "design": "What ptcc design asks, beside max_input and initial_bound.",
+}
+
+
+class Command(click.Command):
+    """A command whose help shows few options first, and the others by the sections of a scenario."""
+
+    first: ClassVar[tuple[str, ...]] = ("kind", "T", "rho1", "rho2", "kappa", "x0", "seed", "edges", "expect")
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the options: few first, the others by their sections."""
+        sections = {told.name: told.key.partition(".")[0] for told in DECLARED if told.name not in self.first}
+        rows: dict[str, list[tuple[str, str]]] = {}
+        for parameter in self.get_params(ctx):
+            row = parameter.get_help_record(ctx) if isinstance(parameter, click.Option) else None
+            if row is not None:
+                rows.setdefault(sections.get(parameter.name or "", ""), []).append(row)
+        for section, title in {"": "Options", **TITLES}.items():
+            if section in rows:
+                with formatter.section(re.split("[.:;]", title)[0]):
+                    formatter.write_dl(rows[section])

@@ -1,0 +1,103 @@
+"""What is asked of what: a graph or a family, a protocol, where the agents begin, and all that is told beside."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from ptcc_certify.checker.input_formulas import Limits
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.protocols.agents import Agents
+from ptcc_certify.protocols.base import Protocol
+from ptcc_certify.protocols.gain_limits import GainLimits
+from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.protocols.moving_leaders import MovingLeaders
+from ptcc_certify.protocols.restricted_signals import SignalClass
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """What is asked of what, as :func:`ptcc_certify.certify` takes it.
+
+    Attributes
+    ----------
+    graph : graph-like or family-like
+    protocol : NominalProtocol or SlidingModeProtocol
+    initial : InitialState
+        States alone are read as one.
+    uncertainty : number or str
+        Of every weight, as a share of it; 0 if they are known.
+    signal : {"any", "constant"}, DwellTime, JointWindows or ClockShares
+    agents : Agents or None
+        None for single integrators.
+    messages : LateMessages or None
+    leaders : MovingLeaders or None
+    limits : tuple of Limits
+    asks : Asks
+
+    Examples
+    --------
+    >>> case = Case("fig1a", NominalProtocol(), [1, 2, 3], limits=GainLimits(gain_cap=50))
+    >>> case.limits, float(case.given("gain_cap")), case.given("noise")
+    ((GainLimits(gain_cap=50),), 50.0, None)
+    """
+
+    graph: Any
+    protocol: Protocol
+    initial: Any = None
+    uncertainty: Any = 0
+    signal: SignalClass = "any"
+    agents: Agents | None = None
+    messages: LateMessages | None = None
+    leaders: MovingLeaders | None = None
+    limits: Any = ()
+    asks: Any = None
+
+    def __post_init__(self) -> None:
+        initial = self.initial if isinstance(self.initial, InitialState) else InitialState(self.initial)
+        limits = tuple(self.limits) if isinstance(self.limits, Iterable) else (self.limits,)
+        asks = Asks() if self.asks is None else self.asks
+        for name, value in {"initial": initial, "limits": limits, "asks": asks}.items():
+            object.__setattr__(self, name, value)
+        for name, kind, example in (
+            ("asks", Asks, 'method="perron"'),
+            ("messages", LateMessages, "delay='0.01'"),
+            ("leaders", MovingLeaders, "speed=1"),
+        ):
+            if (value := getattr(self, name)) is not None and not isinstance(value, kind):
+                mend = f"give {kind.__name__}({example}), say"
+                raise ParameterError(f"{name} = {shorten(repr(value))} is none; {mend}")
+
+    @property
+    def sliding(self) -> bool:
+        """Whether sliding variables reach 0 before the nominal phase."""
+        return getattr(self.protocol, "reaching", None) is not None
+
+    def given(self, name: str) -> Any:
+        """Return what is given by a name: of the case, of what is asked, of where agents begin, or of a limit."""
+        for holder in (self, self.asks, self.initial):
+            if hasattr(holder, name):
+                value = getattr(holder, name)
+                return None if isinstance(value, tuple) and not value else value
+        return next((value for limit in self.limits if (value := getattr(limit, name, None)) is not None), None)
+
+    def with_plain_agents(self) -> Case:
+        """Return the case without agents that are the paper's; a cap of their gain is one of the limits then.
+
+        Under the sliding-mode protocol limits of the gain are those of agents of order n alone.
+        """
+        if not isinstance(self.agents, Agents) or not self.agents.plain:
+            return self
+        if self.agents.cap is None:
+            return replace(self, agents=None)
+        return self if self.sliding else replace(self, agents=None, limits=self.limits_with(self.agents))
+
+    def limits_with(self, agents: Agents) -> tuple[Limits, ...]:
+        """Return the limits of the gain with the cap of agents, if they have one."""
+        if agents.cap is None or (own := GainLimits(gain_cap=agents.cap)) in self.limits:
+            return tuple(self.limits)
+        return own, *self.limits

@@ -1,0 +1,224 @@
+"""What is refused, in one place: each for a reason of nature, or since nothing is proved of it yet."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+from ptcc_certify.errors import HypothesisError, ParameterError
+from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.protocols.agents import Agents
+from ptcc_certify.protocols.base import Protocol, refuse_no_protocol
+
+if TYPE_CHECKING:
+    from ptcc_certify.graphs.structure import Structure
+    from ptcc_certify.model.case import Case
+    from ptcc_certify.protocols.late_messages import LateMessages
+    from ptcc_certify.protocols.moving_leaders import MovingLeaders
+
+#: What is asked of one graph alone.
+NOT_OF_FAMILIES = (
+    *("at", "initial_set", "limits", "delta", "noise", "messages", "leaders", "agents", "simulation", "disturbance"),
+)
+#: What is asked of single integrators alone.
+_NOT_OF_AGENTS = {
+    "at": "leave it out",
+    "initial_set": "give x0 instead",
+    "limits": "give Agents(gain_cap=..) instead of a gain cap; a stop and sampling are not proved for them",
+    "delta": "take the sliding-mode protocol, which disturbances within delta do not move",
+    "noise": "leave it out",
+    "messages": "leave it out, or leave out agents; with late messages nothing is proved of them",
+    "leaders": "leave it out; their leaders move as their plant does",
+    "disturbance": "leave it out: what holds holds for every disturbance within delta",
+}
+_NO_SET = "(--initial-bound) is not taken up here, bounds are from one initial state; leave it out, and give x0"
+#: What is not certified beside late messages, and what to do instead.
+_NOT_LATE = {
+    "initial_set": _NO_SET,
+    "stop_before": "late messages are certified under a gain cap alone; leave it out",
+    "sample_period": "of late messages a period tells how often they are sent; give that instead",
+    "noise": "of late messages an error of values tells it: noise within NU is one of 2 NU, a quantisation of 4 NU; "
+    "give that instead",
+    "delta": "is not proved of late messages under the nominal protocol by itself; give leaders with it, of speed 0 if "
+    "they rest, or take the sliding-mode protocol, under which disturbances within delta move nothing",
+}
+_UNLIMITED = "leaders that move are tracked at T by a gain without limits; leave it out"
+#: What is not certified beside leaders that move.
+_NOT_TRACKING = {
+    "initial_set": _NO_SET,
+    **dict.fromkeys(("gain_cap", "stop_before", "sample_period"), _UNLIMITED),
+    "noise": "is not proved while leaders move; leave it out",
+    "delta": "of leaders that move MovingLeaders(disturbance=..) tells what disturbs the followers; give that instead",
+}
+_NOT_TOGETHER = _NOT_LATE | {"delta": _NOT_TRACKING["delta"]}
+
+
+def refuse_before_the_graph(case: Case) -> None:
+    """Refuse what does not fit together on any graph.
+
+    Raises
+    ------
+    ParameterError
+        Names what does not fit, and the mend.
+
+    Examples
+    --------
+    >>> from ptcc_certify.model.case import Case
+    >>> refuse_before_the_graph(Case("fig1a", NominalProtocol(rho2=0)))
+    Traceback (most recent call last):
+    ptcc_certify.errors.ParameterError: rho2 = 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0
+    """
+    refuse_no_protocol(case.protocol)
+    if not case.protocol.prescribed:
+        raise ParameterError("rho2 = 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
+    for name in ("sigma0", "disturbance"):
+        if case.given(name) is not None and not case.sliding:
+            raise ParameterError(f"{name} belongs to the sliding-mode protocol; leave it out or change the protocol")
+    if case.sliding and any(case.given(name) is not None for name in ("limits", "delta", "noise")):
+        raise ParameterError("limits, delta and noise are for the nominal protocol; the sliding mode has its own delta")
+
+
+def refuse_of_families(case: Case) -> None:
+    """Refuse what is asked of one graph alone, where a family is given."""
+    given = [] if case.asks.method == "best" else ["method"]
+    given += [name for name in NOT_OF_FAMILIES if (value := case.given(name)) is not None and value is not False]
+    if given:
+        raise ParameterError(f"{given[0]} is not for families of graphs yet; leave it out, or certify one graph")
+    if case.asks.expectations.max_residual is not None:
+        raise ParameterError("max_residual: is asked of late messages, which families do not take yet; leave it out")
+
+
+def refuse_agents(case: Case) -> None:
+    """Refuse what is not asked of agents of order n, or not proved of them.
+
+    Raises
+    ------
+    ParameterError
+        Says what, and what to do instead.
+    """
+    if not isinstance(case.agents, Agents):
+        raise ParameterError(f"agents = {shorten(repr(case.agents))}: give Agents(order=2) for double integrators")
+    for name in asked_of_single_integrators(case):
+        raise ParameterError(f"{name} is for single integrators; of agents of order n: {_NOT_OF_AGENTS[name]}")
+    if case.initial.sigma0 is not None and any(_entries(case.initial.sigma0)):
+        raise ParameterError(
+            "sigma0: agents of order n start with sigma(0) = 0 (their auxiliary variables at minus the highest "
+            "derivative); otherwise their final positions depend on the disturbance: leave it out"
+        )
+    case.agents.refuse_motion(case.protocol.T)
+
+
+def asked_of_single_integrators(case: Case) -> list[str]:
+    """Return what is asked of single integrators alone."""
+    return [name for name in _NOT_OF_AGENTS if case.given(name) is not None]
+
+
+def _entries(values: Any) -> list[Any]:
+    """Return the numbers of a state as far as they are seen without its graph."""
+    if isinstance(values, str):
+        return [values] if values.strip() not in ("0", "") else []
+    values = values.values() if hasattr(values, "values") and callable(values.values) else values
+    try:
+        return [float(x) for x in values]
+    except (TypeError, ValueError):
+        return [values]
+
+
+def refuse_beside(structure: Structure, case: Case) -> None:
+    """Refuse late messages and moving leaders where nothing could be certified, before anything is searched."""
+    messages, leaders = case.messages, case.leaders
+    if messages is None and case.asks.expectations.max_residual is not None:
+        raise ParameterError("max_residual: is asked of late messages; tell how late they are, or leave it out")
+    if messages is None and leaders is None:
+        return
+    refuse_together(messages, leaders)
+    together = messages is not None and leaders is not None
+    _refuse_more(_NOT_TOGETHER if together else _NOT_TRACKING if messages is None else _NOT_LATE, case)
+    if leaders is not None:
+        if case.sliding:
+            raise ParameterError(
+                "leaders that move are certified under the nominal protocol; change it, or leave them out"
+            )
+        refuse_leader_groups(structure, "leaders that move as they like: a bound")
+    if messages is not None:
+        _refuse_messages(structure, messages, [limit.gain_cap for limit in case.limits])
+    if structure.graph.n_edges == 0:
+        name, why = ("leaders", "nobody tracks") if messages is None else ("messages", "nothing is late")
+        raise ParameterError(f"{name}: nobody listens to anybody, so {why}; leave it out")
+
+
+def _refuse_more(refused: Mapping[str, str], case: Case) -> None:
+    """Refuse limits of the gain, noise and disturbances of which nothing is certified beside."""
+    for name, mend in refused.items():
+        if case.given(name) is not None:
+            raise ParameterError(f"{name}{' ' if mend is _NO_SET else ': '}{mend}")
+
+
+def _refuse_messages(structure: Structure, messages: LateMessages, caps: Sequence[Fraction | None]) -> None:
+    """Refuse late messages that do not fit the graph, or a cap of the gain that is another than theirs."""
+    messages.latencies(structure.graph)
+    if any(cap != messages.gain_cap for cap in caps):
+        raise ParameterError("gain_cap: limits and late messages have two; give both the same, or messages alone")
+    if messages.value_error and messages.own_delay:
+        raise ParameterError("values that are off are not certified where the own state is late; leave one of them out")
+    if messages.value_error:
+        refuse_leader_groups(structure, "what values that are off add: a bound")
+    if messages.gain_cap is None and not messages.leaders_hear_at_once(structure):
+        at_once = f"delays of 0 within their group{', and no period' if messages.held else ''}"
+        mend = f"add a gain cap, or let leaders hear each other at once ({at_once})"
+        refuse_leader_groups(structure, f"late messages: {mend}; otherwise a bound")
+
+
+def refuse_together(messages: LateMessages | None, leaders: MovingLeaders | None) -> None:
+    """Refuse late messages and moving leaders of which nothing is proved at once.
+
+    Raises
+    ------
+    ParameterError
+        Followers have a sign term, or their own states are late.
+
+    Examples
+    --------
+    >>> refuse_together(LateMessages(delay=1), MovingLeaders(speed=1, sign_gain=1))
+    Traceback (most recent call last):
+    ptcc_certify.errors.ParameterError: sign_gain: nothing is proved of a sign term where messages are late; leave it \
+out
+    """
+    if messages is None or leaders is None:
+        return
+    if leaders.sign_gain is not None:
+        raise ParameterError("sign_gain: nothing is proved of a sign term where messages are late; leave it out")
+    if messages.own_delay:
+        raise ParameterError(
+            "own_delay: an own state that is late is certified of leaders at rest alone; leave one of the two out"
+        )
+
+
+def refuse_leader_groups(structure: Structure, what: str) -> None:
+    """Refuse a graph some of whose leaders form a group, by the labels of one.
+
+    Raises
+    ------
+    HypothesisError
+        Names two leaders of the group.
+
+    Examples
+    --------
+    >>> refuse_leader_groups(analyse(SignedDigraph.from_edges([(1, 2, 1), (2, 1, 1), (2, 3, 1)])), "this")
+    Traceback (most recent call last):
+    ptcc_certify.errors.HypothesisError: this needs leaders that listen to nobody; 1 and 2 are leaders of \
+one group
+    """
+    group = next((c for c in structure.closed_components if len(c.nodes) > 1), None)
+    if group is not None:
+        first, second = (shorten(structure.graph.labels[v]) for v in group.nodes[:2])
+        raise HypothesisError(
+            f"{what} needs leaders that listen to nobody; {first} and {second} are leaders of one group"
+        )
+
+
+def refuse_exchanged(graph: Any) -> None:
+    """Refuse a protocol where the graph stands."""
+    if isinstance(graph, Protocol):
+        raise ParameterError("graph and protocol are exchanged; write certify(graph, protocol)")
