@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from asked import certify_words
 from mutations import resealed
 from scipy.integrate import solve_ivp
 
@@ -46,7 +47,7 @@ CASES = [(graph, kind) for graph in GRAPHS for kind in KINDS]
 def made(graph: str, kind: str) -> Certificate:
     agents = KINDS[kind]
     later = [[1, -2, 0, 3], [0, 1, 1, -1]][: agents.degree - 1]
-    return certify(GRAPHS[graph], PROTOCOL, [5, 2, -4, 1], agents=agents, derivatives=later, simulation=False)
+    return certify_words(GRAPHS[graph], PROTOCOL, [5, 2, -4, 1], agents=agents, derivatives=later, simulation=False)
 
 
 def part_of(certificate: Certificate) -> AgentsPart:
@@ -156,17 +157,17 @@ def test_instants_stand_beside_agents_of_order_n_without_a_cap_alone():
 
 
 def test_agents_in_agreement_have_none_and_large_teams_as_many_as_little_work_allows():
-    together = certify(CAMPS, PROTOCOL, [1, 1, -1, 1], agents=Agents(order=2), simulation=False)
+    together = certify_words(CAMPS, PROTOCOL, [1, 1, -1, 1], agents=Agents(order=2), simulation=False)
     assert together.verdict == "certified" and not part_of(together).instants
     graph = Ensemble(count=1, nodes=40).graph(0)
-    large = certify(graph, PROTOCOL, list(range(40)), agents=Agents(order=8), simulation=False, method="paper")
+    large = certify_words(graph, PROTOCOL, list(range(40)), agents=Agents(order=8), simulation=False, method="paper")
     assert large.verdict == "certified" and len(part_of(large).instants) < 10
 
 
 def test_under_the_sliding_mode_protocol_and_in_the_plane():
     protocol = SlidingModeProtocol(T_r="1/2", T_s="3/2", rho1=1, rho2=1, kappa=2)
     places = [[1, 0], [2, 5], [-4, 1], [0, 3]]
-    certificate = certify(CAMPS, protocol, places, agents=Agents(order=2, drag=1), simulation=False)
+    certificate = certify_words(CAMPS, protocol, places, agents=Agents(order=2, drag=1), simulation=False)
     part = part_of(certificate)
     assert check(certificate.to_dict()).accepted and part.instants
     q, true = deviations(part)
