@@ -146,10 +146,10 @@ def test_instants_are_accepted_and_read_back_whole_or_in_part():
 def test_instants_stand_beside_agents_of_order_n_without_a_cap_alone():
     instants = made("camps", "plain").to_dict()["instants"]
     options: dict[str, Any] = {"simulation": False, "method": "paper"}
-    plain = certify(CAMPS, PROTOCOL, [5, 2, -4, 1], **options)
-    capped = certify(CAMPS, PROTOCOL, [5, 2, -4, 1], agents=Agents(order=3, gain_cap=50), **options)
-    cascade = certify(CAMPS, PROTOCOL, [5, 2, -4, 1], agents=Agents(order=2, cascade=1), **options)
-    nowhere = certify(CAMPS, PROTOCOL, agents=Agents(order=2), **options)
+    plain = certify_words(CAMPS, PROTOCOL, [5, 2, -4, 1], **options)
+    capped = certify_words(CAMPS, PROTOCOL, [5, 2, -4, 1], agents=Agents(order=3, gain_cap=50), **options)
+    cascade = certify_words(CAMPS, PROTOCOL, [5, 2, -4, 1], agents=Agents(order=2, cascade=1), **options)
+    nowhere = certify_words(CAMPS, PROTOCOL, agents=Agents(order=2), **options)
     for certificate in (plain, capped, cascade, nowhere):
         document = certificate.to_dict()
         assert "instants" not in document
