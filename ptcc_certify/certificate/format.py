@@ -29,7 +29,7 @@ from ptcc_certify.certificate.format_unproved import nothing_proved, read_unprov
 from ptcc_certify.certificate.format_vectors import (
     Reader,
     Writer,
-    factor_entry,
+    factor_section,
     finite,
     fractions,
     text,
@@ -38,6 +38,7 @@ from ptcc_certify.certificate.request import Expectations, Request
 from ptcc_certify.certificate.write_sections import write
 from ptcc_certify.checker import SCHEMA, SLIDING_BOUND, SLIDING_CLOCK, CheckReport
 from ptcc_certify.checker.agent_decrease import PhaseSection
+from ptcc_certify.checker.dominance import FactorSection
 from ptcc_certify.checker.final_state import FormationSection, InfluenceSection
 from ptcc_certify.checker.input import EnergyWitness, InputSection
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
@@ -260,7 +261,7 @@ def _read_function(
         section.rate,
         None if full is None else (full["lowest"], full["highest"]),
         gauge or (),
-        dominance=None if rows is None else Dominance(data.floats(rows["witness"]["vector"], len(blocks[0].nodes))),
+        dominance=None if rows is None else Dominance(data.floats(rows["witness"].vector, len(blocks[0].nodes))),
         deviation=None if bound is None else DeviationBound(tuple(bound.agents), bound.norm),
         name=name,
     )
@@ -325,7 +326,7 @@ def _dominance_witness(proof: Dominance, out: Writer) -> dict[str, Any]:
         else:
             # The factor is that of the group's own weights, of which those of the function are a power of two.
             power = group.power + 1 - math.frexp(scale)[1]
-            factor = factor_entry(group.factor, power, out, group.parents)
+            factor = write(FactorSection, factor_section(group.factor, power, group.parents), out)
             groups.append({"rate": rate, "factor": factor})
         first += group.weights.size
     return {"vector": out.floats("vector", proof.vector), "groups": groups}

@@ -11,7 +11,7 @@ import numpy as np
 
 from ptcc_certify.bounds.attracting_box import AttractingBox
 from ptcc_certify.certificate.family_content import ProvedFunction
-from ptcc_certify.certificate.format_vectors import Writer, factor_entry
+from ptcc_certify.certificate.format_vectors import Writer, factor_section
 from ptcc_certify.checker import attracting_boxes
 from ptcc_certify.checker.attracting_boxes import KeptBox
 from ptcc_certify.checker.family_function import FormSection, MeanSection, Multipliers
@@ -118,7 +118,7 @@ def function_steps(of: str, V: ProvedFunction, out: Writer) -> Iterator[Obligati
             yield Obligation("family-rate", f"{of}.modes[{mode}]", {"b": rate}, told)
     elif isinstance(V, SquaresFunction):
         for mode, factor in enumerate(V.factors):
-            sparse = FactorWitness(factor=factor_entry(factor, V.power, out))
+            sparse = FactorWitness(factor=factor_section(factor, V.power))
             yield Obligation("family-squares", f"{of}.modes[{mode}]", {"b": V.rate}, sparse)
     else:
         for j, part in enumerate(V.parts):

@@ -16,6 +16,7 @@ import numpy as np
 from lmi.exact.decimal_rounding import float_up
 from lmi.exact.definite import SparseFactor
 from ptcc_certify.bounds.final_state import Influence, enclosed_ends
+from ptcc_certify.checker.dominance import FactorSection
 from ptcc_certify.checker.reading import RejectedError, exact
 from ptcc_certify.checker.side_files import Numbers, SideFiles, beside
 from ptcc_certify.errors import FormatError
@@ -200,16 +201,19 @@ def _side_files(value: Any) -> Iterator[tuple[str, str]]:
         yield from _side_files(part)
 
 
-def factor_entry(factor: SparseFactor, power: int, out: Writer, parents: np.ndarray | None = None) -> dict[str, Any]:
-    """Write a sparse factor of ``2^power`` times a matrix."""
-    keys = ("order", "indptr", "indices", "data", "exponents")
-    weights = None if factor.weights is None else out.integers("weights", factor.weights)
-    return {key: out.integers(key, getattr(factor, key)) for key in keys} | {
-        "bits": factor.bits,
-        "power": power,
-        "weights": weights,
-        "parents": None if parents is None else out.integers("parents", parents),
-    }
+def factor_section(factor: SparseFactor, power: int, parents: np.ndarray | None = None) -> FactorSection:
+    """Return what is written of a sparse factor of ``2^power`` times a matrix."""
+    return FactorSection(
+        order=factor.order,
+        indptr=factor.indptr,
+        indices=factor.indices,
+        data=factor.data,
+        exponents=factor.exponents,
+        bits=factor.bits,
+        power=power,
+        weights=factor.weights,
+        parents=parents,
+    )
 
 
 def text(value: Fraction | None) -> str | None:

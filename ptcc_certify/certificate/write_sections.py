@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 import numpy as np
 
 from ptcc_certify.certificate.format_vectors import Writer, interval_text
-from ptcc_certify.checker.sections import Rule, declared
+from ptcc_certify.checker.sections import Pattern, Rule, declared
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.graphs.rationals import format_exact
 
@@ -37,6 +37,8 @@ def write(kind: Any, value: Any, out: Writer, key: str = "a vector") -> Any:
     value = value.values if isinstance(value, Numbers) else value
     if get_origin(kind) is Annotated:
         return _annotated(*get_args(kind), value=value, out=out, key=key)
+    if get_origin(kind) is tuple:
+        return [write(inner, one, out, key) for inner, one in zip(get_args(kind), value, strict=True)]
     if kind is Fraction:
         return _text(value)
     if isinstance(kind, type) and is_dataclass(kind):
@@ -63,7 +65,7 @@ def _text(value: Fraction | float) -> str:
 
 
 def _annotated(inner: Any, note: Any, *rest: str, value: Any, out: Writer, key: str) -> Any:
-    if isinstance(note, Rule):
+    if isinstance(note, Rule | Pattern):
         return write(inner, value, out, key)
     if note == "a ball":
         return interval_text(value)
@@ -78,9 +80,11 @@ def _annotated(inner: Any, note: Any, *rest: str, value: Any, out: Writer, key: 
     if note == "a label":
         return out.labels[value]
     if note == "nodes":
-        return out.nodes(value)
-    if note == "integers of followers":
+        return [out.labels[v] for v in value] if rest else out.nodes(value)
+    if note in ("integers", "integers of followers"):
         return out.integers(key, np.asarray(value))
+    if note == "numbers" and not isinstance(value, np.ndarray):  # whose length the file does not tell
+        return list(map(format_exact, value))
     if note.startswith("numbers"):
         return _numbers(value, out, key)
     if inner is Numbers and not rest and isinstance(value, np.ndarray) and out.aside(value.size):
