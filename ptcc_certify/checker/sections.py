@@ -194,10 +194,13 @@ def _alternative(kinds: Sequence[Any], value: Any, at: Context, what: str) -> An
     return read(fitting[0] if fitting else max(rest, key=lambda kind: _common(kind, value)), value, at, what)
 
 
-def _common(kind: Any, value: Any) -> int:
-    """Return how many keys of a section are there."""
-    section = isinstance(kind, type) and is_dataclass(kind) and isinstance(value, dict)
-    return sum(f.key in value for f in declared(kind)) if section else 0
+def _common(kind: Any, value: Any) -> tuple[int, int]:
+    """Return how many words that are declared of a section are there, and how many of its keys."""
+    if not (isinstance(kind, type) and is_dataclass(kind) and isinstance(value, dict)):
+        return 0, 0
+    here = [f for f in declared(kind) if f.key in value]
+    words = (value[f.key] in get_args(f.kind) for f in here if get_origin(f.kind) is Literal)
+    return sum(words), len(here)
 
 
 def _may_be(kind: Any, value: Any) -> bool:

@@ -186,7 +186,7 @@ def test_no_other_number_of_a_final_value_is_accepted_unless_it_is_true():
 @pytest.mark.parametrize(
     ("path", "new", "reason"),
     [
-        (("signals",), {"dwell": "1", "clock": "t"}, 'the key "forms" is missing'),
+        (("signals",), {"dwell": "1", "clock": "t"}, "signals is not one of constant"),
         (("component",), 1, "an unknown component"),
         (("modes",), [None], "no final value of any mode"),
         (("modes",), [], "modes has not 1 entries"),
