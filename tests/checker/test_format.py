@@ -339,6 +339,17 @@ def test_obligations_are_described_with_their_texts():
         assert f"- **{kind}**: " in FORMAT, kind
 
 
+def test_the_lists_of_keys_are_those_that_are_declared():
+    known = [(set(found["required"]), set(found["properties"])) for found in objects(SCHEMA)]
+    text = re.sub(r"```json\n.*?```", "", FORMAT, flags=re.DOTALL)
+    lists = [re.sub(r': (?:"[^"]*"|\w+)', "", entry) for entry in re.findall(r'`\{("[^`]*)\}`', text)]
+    # the hash of undirected modes, and two of what nobody checks
+    outside = [{"undirected"}, {"value", "kind", "members", "durations"}, {"mode", "name", "weights"}]
+    told = [keys for entry in lists if (keys := set(re.findall(r'"(\w+)"', entry))) not in outside]
+    assert len(told) > 50
+    assert [keys for keys in told if not any(least <= keys <= most for least, most in known)] == []
+
+
 def test_the_tables_of_obligations_tell_the_numbers_that_are_declared():
     rows = re.findall(r"^\| `([a-z-]+)` \| `[a-z][^|]*\|([^|]*)\|", FORMAT, re.MULTILINE)
     assert {kind for kind, _ in rows} == set(OBLIGATIONS)
