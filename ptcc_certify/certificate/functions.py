@@ -16,6 +16,7 @@ from ptcc_certify.certificate.certificate_data import Content
 from ptcc_certify.certificate.section_writer import Reader, Writer, write
 from ptcc_certify.checker import attracting_boxes
 from ptcc_certify.checker.attracting_boxes import KeptBox
+from ptcc_certify.checker.dominance import FactorSection
 from ptcc_certify.checker.family_function import FormSection, MeanSection, Multipliers
 from ptcc_certify.checker.family_rows import PartSection, RowsSection
 from ptcc_certify.checker.family_squares import FactorWitness, SquaresSection
@@ -126,7 +127,7 @@ def function_steps(of: str, V: ProvedFunction, out: Writer) -> Iterator[Obligati
             yield Obligation("family-rate", f"{of}.modes[{mode}]", {"b": rate}, told)
     elif isinstance(V, SquaresFunction):
         for mode, factor in enumerate(V.factors):
-            sparse = FactorWitness(factor=factor_entry(factor, V.power, out))
+            sparse = FactorWitness(factor=factor_section(factor, V.power))
             yield Obligation("family-squares", f"{of}.modes[{mode}]", {"b": V.rate}, sparse)
     else:
         for j, part in enumerate(V.parts):
@@ -270,7 +271,7 @@ def _read_function(
         section.rate,
         None if full is None else (full["lowest"], full["highest"]),
         gauge or (),
-        dominance=None if rows is None else Dominance(data.floats(rows["witness"]["vector"], len(blocks[0].nodes))),
+        dominance=None if rows is None else Dominance(data.floats(rows["witness"].vector, len(blocks[0].nodes))),
         deviation=None if bound is None else DeviationBound(tuple(bound.agents), bound.norm),
         name=name,
     )
@@ -318,22 +319,25 @@ def _dominance_witness(proof: Dominance, out: Writer) -> dict[str, Any]:
         else:
             # The factor is that of the group's own weights, of which those of the function are a power of two.
             power = group.power + 1 - math.frexp(scale)[1]
-            factor = factor_entry(group.factor, power, out, group.parents)
+            factor = write(FactorSection, factor_section(group.factor, power, group.parents), out)
             groups.append({"rate": rate, "factor": factor})
         first += group.weights.size
     return {"vector": out.floats("vector", proof.vector), "groups": groups}
 
 
-def factor_entry(factor: SparseFactor, power: int, out: Writer, parents: np.ndarray | None = None) -> dict[str, Any]:
-    """Write a sparse factor of ``2^power`` times a matrix."""
-    keys = ("order", "indptr", "indices", "data", "exponents")
-    weights = None if factor.weights is None else out.integers("weights", factor.weights)
-    return {key: out.integers(key, getattr(factor, key)) for key in keys} | {
-        "bits": factor.bits,
-        "power": power,
-        "weights": weights,
-        "parents": None if parents is None else out.integers("parents", parents),
-    }
+def factor_section(factor: SparseFactor, power: int, parents: np.ndarray | None = None) -> FactorSection:
+    """Return what is written of a sparse factor of ``2^power`` times a matrix."""
+    return FactorSection(
+        order=factor.order,
+        indptr=factor.indptr,
+        indices=factor.indices,
+        data=factor.data,
+        exponents=factor.exponents,
+        bits=factor.bits,
+        power=power,
+        weights=factor.weights,
+        parents=parents,
+    )
 
 
 ProvedFunction = FamilyFunction | FollowerFunction | SquaresFunction

@@ -16,8 +16,8 @@ from ptcc_certify.checker.constant_weights import FinalValue, FinalValueSection
 from ptcc_certify.checker.family_function import Multipliers
 from ptcc_certify.checker.restricted_signals import (
     Dwell,
+    KeptMean,
     LastModeSection,
-    MeanWitness,
     RateSection,
     Section,
     Shares,
@@ -26,7 +26,6 @@ from ptcc_certify.checker.restricted_signals import (
     WindowsSection,
 )
 from ptcc_certify.graphs.family import Mode
-from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY, find_camps
 from ptcc_certify.lyapunov.family_function import FamilyFunction, prove_ends
 from ptcc_certify.protocols.restricted_signals import ClockShares, DwellTime, JointWindows, SignalClass
@@ -269,8 +268,8 @@ def claim_steps(of: str, claim: Claim, labels: Sequence[str]) -> Iterator[Obliga
             witness = None if rests else Multipliers(multipliers=tau)
             yield Obligation("family-rate", f"{of}.modes[{mode}]", {"b": rate}, witness)
         if claim.mean is not None:
-            q = {label: format_exact(x) for label, x in zip(labels, claim.mean, strict=True) if x}
-            yield Obligation("clock-shares", of, witness=MeanWitness(mean=q))
+            q = {label: x for label, x in zip(labels, claim.mean, strict=True) if x}
+            yield Obligation("clock-shares", of, witness=KeptMean(mean=q))
     elif isinstance(claim, RateClaim) and claim.forms is not None:
         for mode, (rate, tau) in enumerate(zip(claim.forms.rates, claim.forms.multipliers, strict=True)):
             yield Obligation("family-rate", f"{of}.modes[{mode}]", {"b": rate}, Multipliers(multipliers=tau))
@@ -316,7 +315,7 @@ def read_claim(of: str, entry: Section, proved: Proved, components: Sequence[Fam
     assert isinstance(signal, ClockShares), "the check has verified what a claim is about"
     witness = proved["clock-shares", of]["witness"]
     labels = component.family.labels
-    mean = None if witness is None else tuple(Fraction(witness.mean.get(label, "0")) for label in labels)
+    mean = None if witness is None else tuple(witness.mean.get(label, Fraction(0)) for label in labels)
     return ShareClaim(number, signal, _read_share_form(entry, steps, component), entry.rate, ends, mean)
 
 

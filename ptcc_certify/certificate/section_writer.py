@@ -18,7 +18,7 @@ import numpy as np
 from ptcc_certify.bounds.enclosed_ends import DECIMALS, RADIUS
 from ptcc_certify.bounds.section_numbers import floats
 from ptcc_certify.checker.reading import Interval, RejectedError
-from ptcc_certify.checker.sections import Rule, declared
+from ptcc_certify.checker.sections import Pattern, Rule, declared
 from ptcc_certify.checker.side_files import Numbers, SideFiles, beside
 from ptcc_certify.errors import FormatError
 from ptcc_certify.graphs.io.files import read_bytes
@@ -242,6 +242,8 @@ def write(kind: Any, value: Any, out: Writer, key: str = "a vector") -> Any:
     value = value.values if isinstance(value, Numbers) else value
     if get_origin(kind) is Annotated:
         return _annotated(*get_args(kind), value=value, out=out, key=key)
+    if get_origin(kind) is tuple:
+        return [write(inner, one, out, key) for inner, one in zip(get_args(kind), value, strict=True)]
     if kind is Fraction:
         return _text(value)
     if isinstance(kind, type) and is_dataclass(kind):
@@ -268,7 +270,7 @@ def _text(value: Fraction | float) -> str:
 
 
 def _annotated(inner: Any, note: Any, *rest: str, value: Any, out: Writer, key: str) -> Any:
-    if isinstance(note, Rule):
+    if isinstance(note, Rule | Pattern):
         return write(inner, value, out, key)
     if note == "a ball":
         return interval_text(value)
@@ -283,10 +285,8 @@ def _annotated(inner: Any, note: Any, *rest: str, value: Any, out: Writer, key: 
     if note == "a label":
         return out.labels[value]
     if note == "nodes":
-        return [out.labels[v] for v in np.asarray(value).tolist()]
-    if note == "many nodes":
-        return out.nodes(value)
-    if note == "integers of followers":
+        return [out.labels[v] for v in np.asarray(value).tolist()] if rest else out.nodes(value)
+    if note in ("integers", "integers of followers"):
         return out.integers(key, np.asarray(value))
     if note == "numbers" and not isinstance(value, np.ndarray):  # whose length the file does not tell
         return list(map(format_exact, value))

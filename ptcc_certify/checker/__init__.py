@@ -25,6 +25,7 @@ from lmi.exact import arithmetic
 from lmi.exact.work import Account, WorkError, limited
 from ptcc_certify.checker.agents import check_agents
 from ptcc_certify.checker.attracting_boxes import check_boxes
+from ptcc_certify.checker.contents import BRINGS, FamilyCertificate, GraphCertificate
 from ptcc_certify.checker.family import check_family
 from ptcc_certify.checker.family_bounds import check_family_bounds
 from ptcc_certify.checker.family_rows import check_family_functions
@@ -47,8 +48,9 @@ from ptcc_certify.checker.protocol import (
     check_sliding,
 )
 from ptcc_certify.checker.rates import check_rate_bound, check_rates
-from ptcc_certify.checker.reading import SCHEMA, RejectedError, UnreadableError, digest, entries, fields, need, read
+from ptcc_certify.checker.reading import SCHEMA, RejectedError, UnreadableError, digest, need, read
 from ptcc_certify.checker.restricted_signals import check_restricted
+from ptcc_certify.checker.sections import declared
 from ptcc_certify.checker.side_files import SideFiles
 from ptcc_certify.checker.structure import MANY_COMPONENTS, check_claim, check_structure
 from ptcc_certify.checker.theorem_function import check_paper
@@ -56,17 +58,8 @@ from ptcc_certify.checker.theorem_function import check_paper
 USAGE = "usage: python -m ptcc_certify.checker CERTIFICATE|- [--stdlib] [--memory GB]"
 GRAPH = "a graph file is not read: compare the SHA-256 that is printed, or use ptcc check CERTIFICATE GRAPH"
 
-KEYS = (
-    *("schema", "producer", "graph", "structure", "claim", "components", "protocol", "paper", "lyapunov", "rates"),
-    *("overshoot", "initial_state", "sliding_variable", "influence", "final_state", "reaching_time", "input", "proof"),
-    *("verdict", "digest", "unverified", "boxes", "restricted", "agents", "messages", "leaders", "formation", "phases"),
-    "instants",
-)
-#: Parts that need not be there.
-OPTIONAL = ("components", "boxes", "restricted", "agents", "messages", "leaders", "formation", "phases", "instants")
-
 #: Parts that are null in a certificate of a family.
-NOT_OF_FAMILIES = ("paper", "rates", "overshoot", "influence")
+NOT_OF_FAMILIES = tuple(f.key for f in declared(FamilyCertificate) if f.kind is type(None))
 
 #: What values of another type, or too deep, raise where they are used.
 MALFORMED = (ArithmeticError, LookupError, TypeError, ValueError, AttributeError, RecursionError, MemoryError)
@@ -198,19 +191,20 @@ def _verdict(doc: Document) -> str:
     RejectedError
         Something does not follow; ``doc.at`` tells where.
     """
-    data = doc.data
-    fields(data, [key for key in KEYS if key not in OPTIONAL or key in data], "the certificate")
-    need(data["schema"] == SCHEMA, "an unknown schema")
-    need(isinstance(data["producer"], str), "producer is not a text")
-    need(isinstance(data["unverified"], dict), "unverified is not an object")
-    entries(data["proof"], "proof")
+    data, graph_section = doc.data, doc.data.get("graph")
+    of_family = isinstance(graph_section, dict) and "modes" in graph_section
+    own, other = (FamilyCertificate, GraphCertificate) if of_family else (GraphCertificate, FamilyCertificate)
+    known, foreign = ({f.key for f in declared(kind)} for kind in (own, other))
+    for key in data:
+        need(key in known or key not in foreign, f"{key} has no place for {'a family' if of_family else 'one graph'}")
+    doc.begin(own, BRINGS)
+    for key in ("schema", "producer", "unverified", "proof"):
+        doc.section(key)
     protocol = check_protocol(doc)
-    if isinstance(data["graph"], dict) and "modes" in data["graph"]:
+    if of_family:
         return _family_verdict(doc, protocol)
-    need("restricted" not in data, "restricted signals of one graph")
-    need("boxes" not in data, "boxes of one graph")
     graph = check_graph(doc)
-    structure = check_structure(doc, graph, data["structure"])
+    structure = check_structure(doc, graph, doc.section("structure"))
     claim = check_claim(doc, structure, protocol.sliding)
     begin = check_begin(doc, protocol)
     final = check_final_state(doc, structure, claim, begin)
@@ -233,10 +227,6 @@ def _verdict(doc: Document) -> str:
 
 def _family_verdict(doc: Document, protocol: Protocol) -> str:
     """Verify a certificate of a family, part after part; return its verdict."""
-    need("agents" not in doc.data, "agents of order n on a family")
-    need("messages" not in doc.data, "late messages of a family")
-    need("leaders" not in doc.data, "leaders of a family that move")
-    need(not doc.data.keys() & {"formation", "phases", "instants"}, "a formation, phases or instants of a family")
     family = check_family(doc)
     begin = check_begin(doc, protocol)
     functions = check_family_functions(doc, family)
@@ -245,7 +235,7 @@ def _family_verdict(doc: Document, protocol: Protocol) -> str:
     check_boxes(doc, family, begin)
     check_restricted(doc, family, functions, protocol, begin)
     for key in NOT_OF_FAMILIES:
-        need(doc.section(key) is None, "a part that certificates of families do not have")
+        doc.section(key)
     return doc.close(True)
 
 

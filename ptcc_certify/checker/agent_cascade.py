@@ -93,7 +93,7 @@ class Tracked(NamedTuple):
 
 def check_cascade(doc: Document, verified: Verified) -> bool:
     """Verify the section ``agents`` of the cascade; return whether agreement and where it happens were proved."""
-    section, graph = doc.section("agents", CascadeSection), verified.structure.graph
+    section, graph = doc.section("agents"), verified.structure.graph
     alpha, d = section.cascade, within("dimension", section.dimension, LARGEST_DIMENSION)
     gain = verified.gain
     longest_number = length((alpha, gain.T, gain.rho1, gain.k))
@@ -143,7 +143,7 @@ def _functions(doc: Document, verified: Verified, section: CascadeSection, drive
     for entry in section.functions:
         before = read[-1][0].number if read else -1
         read.append((verify_used(doc, verified, entry, before), entry))
-    numbers = doc.open("agent-cascade", "agents", ["alpha"])
+    numbers = doc.open("agent-cascade", "agents")
     need(numbers["alpha"] == section.cascade, "alpha is another than that of the cascade")
     used = list[Tracked]()
     for use, entry in read:

@@ -29,7 +29,7 @@ def check_decrease(doc: Document, agents: Agents, used: Sequence[Function]) -> N
     doc.open("agent-positive", "agents")
     need(doc.exact.definite(agents.scaled_W[0]), "W is not proved positive definite")
     doc.done(f"{agents.n} rows")
-    numbers = doc.open("agent-decrease", "agents", ["rate"])
+    numbers = doc.open("agent-decrease", "agents")
     need(numbers["rate"] == agents.rate, "the rate is another than that of the agents")
     _check_points(agents)
     F = _form(agents, _uncapped(agents))
@@ -39,7 +39,7 @@ def check_decrease(doc: Document, agents: Agents, used: Sequence[Function]) -> N
         (at_cap,) = _form(agents, [_constant(agents, 1 / agents.cap)])
         need(semidefinite(at_cap), "the decrease is not proved at the cap of the gain")
     doc.done(f"r = {down(agents.rate)}, {max(len(agents.points) - 1, 0)} intervals")
-    numbers = doc.open("agent-coupling", "agents", ["coupling"])
+    numbers = doc.open("agent-coupling", "agents")
     need(numbers["coupling"] == agents.coupling, "the coupling is another than that of the agents")
     _check_gains(agents)
     need(all(agents.coupling * f.rate >= 1 for f in used), "the coupling is too weak for a Lyapunov function")
@@ -64,14 +64,14 @@ def check_phases(doc: Document, agents: Agents, used: Sequence[Used]) -> None:
     need(agents.cap is None, "phases of a gain that is capped")
     former = {use.number: (agents.W, 1 / agents.first_gain) for use in used}
     rates = {use.number: use.function.rate for use in used}
-    section = doc.section("phases", Several[PhaseSection])
+    section = doc.section("phases")
     need(len(section) <= MANY_PHASES, f"more than {MANY_PHASES} phases")
     for k, entry in enumerate(section):
         doc.at = f"phases[{k}]"
         number, rate, coupling = entry.function, entry.rate, entry.coupling
         W, points = entry.lower_triangle, entry.points
         need(number in former, "a phase of a function that is not used")
-        numbers = doc.open("agent-phase", f"phases[{k}]", ["rate"])
+        numbers = doc.open("agent-phase", f"phases[{k}]")
         need(len(W) == agents.n, f"lower_triangle has not {agents.n} entries")
         need(len(points) <= MANY_POINTS, f"more than {MANY_POINTS} points")
         bits = length((coupling, rate, *points, *chain.from_iterable(W)))

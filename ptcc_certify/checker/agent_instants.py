@@ -202,7 +202,7 @@ def check_instants(doc: Document, begin: Begin | None, used: Sequence[Used]) -> 
         return
     if begin is None or begin.agents.cap is not None:
         raise RejectedError("instants without initial states, or of a gain that is capped")
-    section = doc.section("instants", InstantsSection)
+    section = doc.section("instants")
     need(1 <= len(section) <= MANY_INSTANTS, f"no instants, or more than {MANY_INSTANTS}")
     doc.open("agent-instants", "instants")
     graph, agents = begin.graph, begin.agents

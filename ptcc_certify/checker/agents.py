@@ -50,7 +50,7 @@ def check_agents(doc: Document, verified: Verified) -> bool:
     if isinstance(doc.data["agents"], dict) and "cascade" in doc.data["agents"]:
         need("phases" not in doc.data and "instants" not in doc.data, "phases or instants of the cascade")
         return check_cascade(doc, verified)
-    section, graph = doc.section("agents", AgentsSection), verified.structure.graph
+    section, graph = doc.section("agents"), verified.structure.graph
     agents = agents_of(section, verified.gain)
     offsets, states = sized_offsets(section.offsets, agents), section.initial_state
     need_shape(states, "initial_state", agents)

@@ -222,7 +222,7 @@ def check_delay_lmi(
         raise RejectedError("lmi without a cap of the gain, or without an initial state")
     need(messages.value_error == 0, "lmi of values that are off")
     need(verified.final.exact, "lmi without an exact influence of the leaders")
-    obligation = doc.open("late-lmi", "messages.lmi", ["b"], witness=LateLMIWitness)
+    obligation = doc.open("late-lmi", "messages.lmi")
     P, tau, b = obligation["witness"].matrix, obligation["witness"].tau, obligation["b"]
     loop, free = loop_of(messages, verified, cap), verified.structure.free_nodes
     need_rows(2 * graph.n)

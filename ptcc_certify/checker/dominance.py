@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from itertools import chain, pairwise
 from operator import mul
@@ -17,7 +18,8 @@ from lmi.exact.polynomials import row_sum
 from lmi.exact.work import fits, spend
 from ptcc_certify.checker.matrix_products import Sparse, block
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import entries, exact, fields, need
+from ptcc_certify.checker.reading import need
+from ptcc_certify.checker.sections import Integers, Several, Vector
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.checker.structure import Structure
 from ptcc_certify.checker.theorem_function import group_decrease
@@ -28,6 +30,37 @@ LARGEST_PRODUCT, LARGEST_KEPT = 50_000_000, 3_000_000
 LARGEST_FACTOR, LARGEST_FORM = 2_000_000, 700_000
 #: The groups that were proved: number, rate, and weights without common factor.
 Proved = set[tuple[int, Fraction, tuple[int, ...]]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FactorSection:
+    """A rounded sparse factor of a matrix, and what it is of."""
+
+    order: Integers
+    indptr: Integers
+    indices: Integers
+    data: Integers
+    exponents: Integers
+    bits: int
+    power: int
+    weights: Integers | None
+    parents: Integers | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class GroupWitness:
+    """The rate of a leader group by itself, and the factor that proves it."""
+
+    rate: Fraction
+    factor: FactorSection
+
+
+@dataclass(frozen=True, kw_only=True)
+class DominanceWitness:
+    """A vector by which rows are dominated, and of each leader group its rate; a factor where one is needed."""
+
+    vector: Vector
+    groups: Several[Fraction | GroupWitness]
 
 
 def check_dominance(
@@ -41,10 +74,10 @@ def check_dominance(
 ) -> None:
     """Verify ``S_ii d_i > sum_j |S_ij| d_j`` for all rows, after each leader group by itself."""
     graph, number = structure.graph, structure.number
-    obligation = doc.open("dominance", of, ["b"], witness=Any)
+    obligation = doc.open("dominance", of)
     need(obligation["b"] == rate, "b is not the rate")
-    witness = fields(obligation["witness"], ("vector", "groups"), "the witness")
-    vector = doc.files.numbers(witness["vector"], "vector", len(nodes))
+    witness: DominanceWitness = obligation["witness"]
+    vector = doc.files.numbers(witness.vector, "vector", len(nodes))
     need(vector.positive(), "the vector is not positive")
     (own, scale), (each, _) = (numbers.over(range(len(nodes))) for numbers in (weights, vector))
     W, D = [0] * graph.n, [0] * graph.n
@@ -52,7 +85,8 @@ def check_dominance(
         W[v], D[v] = w, d
     groups = [k for k, group in enumerate(structure.closed) if len(group) > 1]
     spare = {}  # of leader groups, by which g_k exceeds the rate
-    for k, entry in zip(groups, entries(witness["groups"], "groups", len(groups)), strict=True):
+    need(len(witness.groups) == len(groups), f"groups has not {len(groups)} entries")
+    for k, entry in zip(groups, witness.groups, strict=True):
         g = _group(doc, structure, k, [W[v] for v in structure.closed[k]], scale, entry, proofs)
         spare[k] = ((g - rate) * graph.unit).as_integer_ratio()
     # w_i d_i times rate, less what the others push, times q and unit
@@ -76,15 +110,13 @@ def _group(
     doc: Document, structure: Structure, k: int, weights: Sequence[int], scale: int, entry: Any, proofs: Proved
 ) -> Fraction:
     """Verify the decay of a leader group by itself, once for all multiples of its weights; return its rate."""
-    has_factor = isinstance(entry, dict)
-    if has_factor:
-        fields(entry, ("rate", "factor"), "a leader group")
-    g, common = exact(entry["rate"] if has_factor else entry), math.gcd(*weights)
+    factor = entry.factor if isinstance(entry, GroupWitness) else None
+    g, common = entry.rate if isinstance(entry, GroupWitness) else entry, math.gcd(*weights)
     key = k, g, tuple(w // common for w in weights)
     if key in proofs:
-        need(not has_factor, "a factor of a leader group that is proved already")
-    elif has_factor:
-        _factor(doc, structure, k, Fraction(common, scale), key[2], g, entry["factor"])
+        need(factor is None, "a factor of a leader group that is proved already")
+    elif factor is not None:
+        _factor(doc, structure, k, Fraction(common, scale), key[2], g, factor)
     else:
         need(group_decrease(doc, structure, k, key[2], g), "a leader group is not proved")
     proofs.add(key)
@@ -92,7 +124,13 @@ def _group(
 
 
 def _factor(
-    doc: Document, structure: Structure, k: int, times: Fraction, ratios: Sequence[int], g: Fraction, section: Any
+    doc: Document,
+    structure: Structure,
+    k: int,
+    times: Fraction,
+    ratios: Sequence[int],
+    g: Fraction,
+    section: FactorSection,
 ) -> None:
     """Verify the decay of a leader group, of weights ``times ratios``, by the sparse factor of its form."""
     gauge, unit = structure.gauges[k], structure.graph.unit
@@ -100,33 +138,31 @@ def _factor(
     factor, power = read_factor(doc, section, len(group) - (gauge is not None))
     n = len(factor.exponents)
     A, basis = block(structure.graph, group), None
-    if section["parents"] is not None:
+    if section.parents is not None:
         need(gauge is not None, "parents of a group that is not balanced")
-        basis = _differences(A, ratios, gauge or (), doc.files.integers(section["parents"], "parents", len(group)))
+        basis = _differences(A, ratios, gauge or (), doc.files.integers(section.parents, "parents", len(group)))
     elif gauge is not None:
         basis = [{j - 1: x for j, x in row.items() if j} for row in A]
     lower, scale = _form(A, [times.numerator * w for w in ratios], g, unit, basis)
-    if gauge is not None and section["parents"] is None:
+    if gauge is not None and section.parents is None:
         scale *= unit**2
     definite = doc.exact.residual_definite(n, lower, factor, power, scale * times.denominator)
     need(definite, "a leader group is not proved by its factor")
 
 
-def read_factor(doc: Document, section: Any, n: int) -> tuple[SparseFactor, int]:
+def read_factor(doc: Document, section: FactorSection, n: int) -> tuple[SparseFactor, int]:
     """Return the factor of a matrix of ``n`` rows as a certificate has it, and its power; refuse a large one."""
-    keys = ("order", "indptr", "indices", "data", "exponents", "bits", "power", "weights", "parents")
-    section, read, arithmetic = fields(section, keys, "factor"), doc.files.integers, doc.exact
-    order, exponents, indptr = (
-        read(section[key], key, m) for key, m in (("order", n), ("exponents", n), ("indptr", n + 1))
-    )
-    vector = None if section["weights"] is None else read(section["weights"], "weights", n)
+    read, arithmetic = doc.files.integers, doc.exact
+    order, exponents = read(section.order, "order", n), read(section.exponents, "exponents", n)
+    indptr = read(section.indptr, "indptr", n + 1)
+    vector = None if section.weights is None else read(section.weights, "weights", n)
     few = 0 <= indptr[-1] <= n * (n + 1) // 2 and fits(indptr[-1], LARGEST_FACTOR)
     need(few, "the factor has too many entries")
     need(all(0 <= b - a <= n for a, b in pairwise(indptr)), "indptr has no columns of a factor")
     work, most = sum((b - a) ** 2 for a, b in pairwise(indptr)), arithmetic.products
     need(work <= most, f"a factor of {work} products; {arithmetic.name} takes {most}")
-    indices, data = (read(section[key], key, indptr[-1]) for key in ("indices", "data"))
-    return SparseFactor(order, indptr, indices, data, exponents, section["bits"], vector), section["power"]
+    indices, data = (read(getattr(section, key), key, indptr[-1]) for key in ("indices", "data"))
+    return SparseFactor(order, indptr, indices, data, exponents, section.bits, vector), section.power
 
 
 def _differences(A: Sparse, w: Sequence[int], gauge: Sequence[int], parents: Sequence[int]) -> Sparse:

@@ -15,21 +15,35 @@ from functools import cached_property
 from itertools import chain, groupby, pairwise
 from math import gcd
 from operator import itemgetter
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 from lmi.exact.numbers import integers, longest, sized
 from lmi.exact.work import keeps, spend
-from ptcc_certify.checker.graph import NODE_BYTES, digraph, positions, read_nodes
+from ptcc_certify.checker.graph import NODE_BYTES, digraph
+from ptcc_certify.checker.graph import Edge as KnownEdge
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import RejectedError, entries, exact, fields, interval, need, same
+from ptcc_certify.checker.reading import Interval, RejectedError, entries, exact, need
+from ptcc_certify.checker.sections import (
+    Ball,
+    ByNumber,
+    Integers,
+    Labels,
+    Node,
+    Several,
+    Sha256,
+    Some,
+    Unread,
+    Vector,
+    read,
+)
 from ptcc_certify.checker.side_files import Numbers, beside
-from ptcc_certify.checker.structure import CONNECTIVITY, Structure, check_structure
+from ptcc_certify.checker.structure import CONNECTIVITY, Structure, StructureSection, check_structure
 
 #: Modes that are read.
 MANY_MODES = 1000
 #: Bytes that an edge takes beside its text, at most about.
 EDGE_BYTES = 500
-THEOREM = "common kernel"
+THEOREM: Literal["common kernel"] = "common kernel"
 TOO_LARGE = "a family that may take more memory than is allowed; allow more by --memory"
 STABILITY, CONSENSUS, DEPENDS = "stability", "bipartite consensus", "depends on the signal"
 INTERVAL, CONTAINMENT = "interval bipartite consensus", "bipartite containment"
@@ -37,6 +51,86 @@ INTERVAL, CONTAINMENT = "interval bipartite consensus", "bipartite containment"
 Row = dict[int, Fraction]
 #: Source, target, sign, least and largest size of an edge, times the unit of its mode.
 Edge = tuple[int, int, int, int, int]
+
+
+#: Source, target, least and largest weight.
+UncertainEdge: TypeAlias = tuple[Node, Node, Fraction, Fraction]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModeEdgesAside:
+    """The edges of a mode in side files."""
+
+    count: int
+    source: Integers
+    target: Integers
+    least: Vector
+    largest: Vector
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModeSection:
+    """A mode: whether both directions of its edges change together, and its edges."""
+
+    name: str
+    undirected: bool
+    edges: Unread[Several[KnownEdge | UncertainEdge] | ModeEdgesAside]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FamilySection:
+    """The agents of a family, and its modes."""
+
+    nodes: Labels
+    modes: Several[ModeSection]
+    sha256: Sha256
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModeStructures:
+    """What the file says of the structure of every mode."""
+
+    modes: Several[StructureSection]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FamilyClaim:
+    """What a component does for every signal."""
+
+    theorem: Literal["common kernel"]
+    behaviour: Literal[
+        "stability",
+        "bipartite consensus",
+        "interval bipartite consensus",
+        "bipartite containment",
+        "depends on the signal",
+    ]
+    signal: Literal["any"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FamilyComponent:
+    """A component of a family, and its claim."""
+
+    nodes: Several[Node]
+    claim: FamilyClaim
+
+
+@dataclass(frozen=True, kw_only=True)
+class KernelWitness:
+    """The rows of followers of the basis of a common kernel, by closed component."""
+
+    rows: Some[ByNumber[Fraction]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Counterexample:
+    """A state that is at rest in one mode, and moves in another, or where the weight of an edge changes."""
+
+    mode: int
+    other: int
+    edge: tuple[Node, Node, Literal[1, -1]] | None
+    state: Some[Ball]
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +255,8 @@ class Component:
 def check_family(doc: Document) -> Family:
     """Verify modes, structures and what is claimed of every component."""
     labels, drafts = _read_modes(doc)
-    sections = entries(fields(doc.section("structure"), ("modes",), "structure")["modes"], "modes", len(drafts))
+    sections: Sequence[StructureSection] = doc.section("structure").modes
+    need(len(sections) == len(drafts), f"modes has not {len(drafts)} entries")
     modes = []
     for number, ((edges, unit, tied), section) in enumerate(zip(drafts, sections, strict=True)):
         on = [edge for edge in edges if edge[3]]
@@ -169,7 +264,7 @@ def check_family(doc: Document) -> Family:
         need(keeps(NODE_BYTES * len(labels)), TOO_LARGE)
         graph = digraph(doc, labels, source, target, [sign * low for _, _, sign, low, _ in on], unit)
         structure = check_structure(doc, graph, section, f"graph.modes[{number}]")
-        need(section["connectivity"] == _connectivity(structure), "another connectivity of a mode")
+        need(section.connectivity == _connectivity(structure), "another connectivity of a mode")
         modes.append(Mode(edges, unit, tied, structure))
     return Family(labels, modes, _check_claims(doc, labels, modes))
 
@@ -185,31 +280,27 @@ def _connectivity(structure: Structure) -> str:
 
 
 def _read_modes(doc: Document) -> tuple[list[str], list[tuple[list[Edge], int, bool]]]:
-    section = fields(doc.section("graph"), ("nodes", "modes", "sha256"), "graph")
-    labels, index = read_nodes(section)
-    doc.context.labels, doc.context.index = labels, index
-    items = entries(section["modes"], "modes")
-    need(0 < len(items) <= MANY_MODES, f"no mode, or more than {MANY_MODES}")
+    section: FamilySection = doc.section("graph")
+    labels, index = section.nodes, doc.context.know(section.nodes)
+    need(0 < len(section.modes) <= MANY_MODES, f"no mode, or more than {MANY_MODES}")
     drafts = []
-    for item in items:
-        fields(item, ("name", "undirected", "edges"), "a mode")
-        need(isinstance(item["name"], str) and type(item["undirected"]) is bool, "name or undirected of a mode")
-        edges, unit = _edges(doc, item["edges"], index)
-        _check_edges(edges, item["undirected"])
-        drafts.append((edges, unit, item["undirected"]))
+    for mode in section.modes:
+        edges, unit = _edges(doc, mode.edges, index)
+        _check_edges(edges, mode.undirected)
+        drafts.append((edges, unit, mode.undirected))
     doc.sha256 = _hash(labels, drafts)
-    need(section["sha256"] == doc.sha256, "the SHA-256 of the modes is another")
+    need(section.sha256 == doc.sha256, "the SHA-256 of the modes is another")
     return labels, drafts
 
 
-def _edges(doc: Document, section: Any, index: dict[str, int]) -> tuple[list[Edge], int]:
+def _edges(doc: Document, section: Any, index: Mapping[str, int]) -> tuple[list[Edge], int]:
     """Return the edges of a mode, and what divides their sizes."""
     least: Numbers
     largest: Numbers
     if isinstance(section, dict):
-        section = fields(section, ("count", "source", "target", "least", "largest"), "edges")
-        count = section["count"]
-        need(type(count) is int and 0 < count <= 2 * len(index) ** 2, "edges: count is no number of edges")
+        aside: ModeEdgesAside = read(ModeEdgesAside, section, doc.context, "edges")
+        count = aside.count
+        need(0 < count <= 2 * len(index) ** 2, "edges: count is no number of edges")
         need(keeps(EDGE_BYTES * count), TOO_LARGE)
         need(all(beside(section[key]) for key in section if key != "count"), "edges: not in side files")
         source, target = (doc.files.integers(section[key], key, count) for key in ("source", "target"))
@@ -291,20 +382,25 @@ def _weight(edge: Edge, unit: int) -> str:
 
 def _check_claims(doc: Document, labels: list[str], modes: list[Mode]) -> list[Component]:
     """Verify the behaviour of every component; the one with a common kernel by its basis, one without by a witness."""
-    numbers = doc.open("family-claim", "graph", witness=Any)
+    witnesses = doc.open("family-claim", "graph")["witness"]
     parts = _parts(len(labels), modes)
-    names = [[labels[v] for v in part.nodes] for part in parts]
     single = len(parts) == 1
-    section = [doc.data["claim"]] if single else entries(doc.data.get("components"), "components", len(parts))
+    section = [doc.section("claim")]
+    need(single or section[0] is None, "the family is disconnected")
+    if not single:
+        need("components" in doc.data, 'the key "components" is missing')
+        section = doc.section("components")
+        need(len(section) == len(parts), f"components has not {len(parts)} entries")
     need(not single or "components" not in doc.data, "components of a connected family")
-    need(single or doc.data["claim"] is None, "the family is disconnected")
-    witnesses = entries(numbers["witness"], "the witness", len(parts))
+    doc.at = "family-claim of graph"
+    need(len(witnesses) == len(parts), f"the witness has not {len(parts)} entries")
     result = []
-    for entry, part, nodes, witness in zip(section, parts, names, witnesses, strict=True):
-        component = _component(doc, modes, part, witness)
-        claim = {"theorem": THEOREM, "behaviour": component.behaviour, "signal": "any"}
-        expected = claim if single else {"nodes": nodes, "claim": claim}
-        need(same(entry, expected), f"what follows is {component.behaviour}")
+    for entry, part, witness in zip(section, parts, witnesses, strict=True):
+        component = _component(modes, part, witness)
+        behaviour: Any = component.behaviour
+        claim = FamilyClaim(theorem=THEOREM, behaviour=behaviour, signal="any")
+        expected = claim if single else FamilyComponent(nodes=part.nodes, claim=claim)
+        need(entry == expected, f"what follows is {component.behaviour}")
         result.append(component)
     doc.done(", ".join(dict.fromkeys(component.behaviour for component in result)))
     return result
@@ -331,7 +427,7 @@ def _parts(n: int, modes: Sequence[Mode]) -> list[Part]:
     return parts
 
 
-def _component(doc: Document, modes: Sequence[Mode], part: Part, witness: Any) -> Component:
+def _component(modes: Sequence[Mode], part: Part, witness: KernelWitness | Counterexample | None) -> Component:
     first, camps = modes[0].structure, part.camps
     pairs = zip(modes, part.closed, strict=True)
     balanced = [sum(m.structure.gauges[k] is not None for k in numbers) for m, numbers in pairs]
@@ -342,7 +438,7 @@ def _component(doc: Document, modes: Sequence[Mode], part: Part, witness: Any) -
         ((number, pivot),) = pivots.items()
         behaviour, kernel = CONSENSUS, {v: {number: Fraction(camps[v] * camps[pivot])} for v in part.nodes}
     elif len(set(balanced)) == 1 and any(balanced):
-        kernel = _check_kernel(doc, modes, part, witness)
+        kernel = _check_kernel(modes, part, witness)
         return Component(part, DEPENDS if not kernel else INTERVAL if one_group else CONTAINMENT, kernel, pivots)
     else:
         behaviour, kernel = (DEPENDS, {}) if any(balanced) else (STABILITY, {v: {} for v in part.nodes})
@@ -350,7 +446,7 @@ def _component(doc: Document, modes: Sequence[Mode], part: Part, witness: Any) -
     return Component(part, behaviour, kernel, pivots)
 
 
-def _check_kernel(doc: Document, modes: Sequence[Mode], part: Part, witness: Any) -> dict[int, Row]:
+def _check_kernel(modes: Sequence[Mode], part: Part, witness: KernelWitness | Counterexample | None) -> dict[int, Row]:
     """Verify that all members share a kernel, by the rows of its basis, or that they do not, by a state at rest.
 
     Returns
@@ -358,10 +454,12 @@ def _check_kernel(doc: Document, modes: Sequence[Mode], part: Part, witness: Any
     dict of int to Row
         The basis; empty if they do not.
     """
-    if not (isinstance(witness, dict) and "rows" in witness):
-        _check_counterexample(doc, modes, part, witness)
+    if isinstance(witness, Counterexample):
+        _check_counterexample(modes, part, witness)
         return {}
-    rows = _basis(doc, modes[0].structure, part, fields(witness, ("rows",), "a kernel")["rows"])
+    if witness is None:
+        raise RejectedError("a kernel without a witness")
+    rows = _basis(modes[0].structure, part, witness.rows)
     whole, _ = _whole(rows)
     bits = longest(x for row in whole.values() for x in row.values())
     for mode, edges in zip(modes, part.edges, strict=True):
@@ -384,7 +482,7 @@ def _whole(rows: dict[int, Row]) -> tuple[dict[int, dict[int, int]], int]:
     return {v: dict(zip(row, some, strict=True)) for (v, row), some in pairs}, scale
 
 
-def _check_counterexample(doc: Document, modes: Sequence[Mode], part: Part, witness: Any) -> None:
+def _check_counterexample(modes: Sequence[Mode], part: Part, witness: Counterexample) -> None:
     """Verify that a state is at rest in the mandatory graph of one mode, and moves in a member of another.
 
     The state is enclosed: of every agent its middle is told, and a radius, which is 0 but for followers. A state at
@@ -392,12 +490,11 @@ def _check_counterexample(doc: Document, modes: Sequence[Mode], part: Part, witn
 
         sum_l |w_kl| (radius_k - radius_l)  >=  |sum_l |w_kl| (middle_k - sgn(w_kl) middle_l)|.
     """
-    fields(witness, ("mode", "other", "edge", "state"), "a counterexample")
-    numbers = witness["mode"], witness["other"]
-    need(all(type(k) is int and 0 <= k < len(modes) for k in numbers), "an unknown mode")
+    numbers = witness.mode, witness.other
+    need(all(0 <= k < len(modes) for k in numbers), "an unknown mode")
     mode, other = (modes[k] for k in numbers)
     inside = set(part.nodes)
-    middle, radius = _state(doc, mode.structure, inside, witness["state"])
+    middle, radius = _state(mode.structure, inside, witness.state)
     bits = longest([*middle.values(), *radius.values()])
     for m in (mode, other):
         graph = m.structure.graph
@@ -406,13 +503,12 @@ def _check_counterexample(doc: Document, modes: Sequence[Mode], part: Part, witn
         row = mode.structure.graph.row(v)
         spare = sum(x * radius[u] if u == v else -abs(x) * radius[u] for u, x in row.items())
         need(abs(_dot(row, middle)) <= spare, "the state is not at rest")
-    if (edge := witness["edge"]) is None:
+    if (edge := witness.edge) is None:
         rows = (other.structure.graph.row(v) for v in inside)
         need(any(_moves(row, middle, radius) for row in rows), "the state is at rest in both")
         return
-    s, t = positions(doc, other.structure.graph, entries(edge, "an edge", 3)[:2], "an edge")
-    sign, uncertain = edge[2], {e[:3] for e in part.edges[numbers[1]] if e[3] < e[4]}
-    need(type(sign) is int and (s, t, sign) in uncertain, "a known edge")
+    s, t, sign = edge
+    need(edge in {e[:3] for e in part.edges[numbers[1]] if e[3] < e[4]}, "a known edge")
     need(_moves({t: 1, s: -sign}, middle, radius), "the state is at rest in both")
     # Row t of one of two members differs: with this edge at w-, and at w+.
 
@@ -426,7 +522,7 @@ def _moves(row: dict[int, int], middle: dict[int, int], radius: dict[int, int]) 
     return abs(_dot(row, middle)) > _dot({u: abs(x) for u, x in row.items()}, radius)
 
 
-def _basis(doc: Document, structure: Structure, part: Part, entry: Any) -> dict[int, Row]:
+def _basis(structure: Structure, part: Part, entry: Mapping[str, Mapping[str, Fraction]]) -> dict[int, Row]:
     """Return the rows of the basis, without zeros: camps of leaders, and what is told of followers."""
     rows: dict[int, Row] = {v: {} for v in part.nodes}
     numbers = set()
@@ -434,24 +530,22 @@ def _basis(doc: Document, structure: Structure, part: Part, entry: Any) -> dict[
         if (gauge := structure.gauges[k]) is not None:
             numbers.add(k + 1)
             rows |= {v: {k + 1: Fraction(g)} for v, g in zip(structure.closed[k], gauge, strict=True)}
-    need(isinstance(entry, dict), "rows of a kernel are no object")
     followers = {v for v in part.nodes if structure.number[v] < 0}
-    nodes = positions(doc, structure.graph, list(entry), "rows of a kernel")
     keys = set(map(str, numbers))
-    for v, row in zip(nodes, entry.values(), strict=True):
+    for label, row in entry.items():
+        v = structure.graph.index[label]
         need(v in followers, "a row of a node that is no follower")
-        need(isinstance(row, dict) and keys.issuperset(row), "a row of a kernel")
-        rows[v] = {int(key): value for key, x in row.items() if (value := exact(x))}
+        need(keys.issuperset(row), "a row of a kernel")
+        rows[v] = {int(key): value for key, value in row.items() if value}
     return rows
 
 
-def _state(doc: Document, structure: Structure, inside: set[int], entry: Any) -> tuple[dict[int, int], dict[int, int]]:
+def _state(
+    structure: Structure, inside: set[int], entry: Mapping[str, Interval]
+) -> tuple[dict[int, int], dict[int, int]]:
     """Return middles and radii of a state of all agents of a component, over one scale; those not told are 0."""
-    if not isinstance(entry, dict):
-        raise RejectedError("a state is no object")
-    nodes = positions(doc, structure.graph, list(entry), "a state")
+    nodes, ends = [structure.graph.index[label] for label in entry], list(entry.values())
     need(set(nodes) <= inside, "a state outside the component")
-    ends = [interval(x) for x in entry.values()]
     exact_leaders = all(structure.number[v] < 0 or not radius for v, (_, radius) in zip(nodes, ends, strict=True))
     need(exact_leaders, "the state of a leader is not exact")
     (middles, radii), _ = integers([[x for x, _ in ends], [r for _, r in ends]])

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Protocol
+from typing import Protocol
 
 from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.numbers import integers, longest, sized
@@ -29,7 +29,7 @@ from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.protocol import Begin, SlidingPart, check_sliding_part, sliding_part
 from ptcc_certify.checker.protocol import Protocol as Parameters
 from ptcc_certify.checker.reading import Interval, RejectedError, length, need
-from ptcc_certify.checker.sections import Ball, ByAgent, FewAgents
+from ptcc_certify.checker.sections import FewAgents
 
 Gains = Mapping[str, Fraction]
 #: Products of short integers that a root costs, about.
@@ -185,12 +185,12 @@ def check_family_bounds(
     x = None if begin.state is None else list(begin.state)
     if x is not None and drive is not None:
         x = [value - drive.sigma0[v] for v, value in enumerate(x)]
-    final = doc.section("final_state", ByAgent[Ball | None] | None)
+    final = doc.section("final_state")
     need((final is None) == (x is None), "final states are claimed iff there is an initial state")
     if x is not None:
-        witness = doc.open("family-final-state", "final_state", witness=Any)["witness"]
+        witness = doc.open("family-final-state", "final_state")["witness"]
         known: dict[int, Interval | None] = {}
-        for component, kept in zip(family.components, check_means(doc, family, witness, x), strict=True):
+        for component, kept in zip(family.components, check_means(family, witness, x), strict=True):
             known |= final_states(component, [V for V in functions if V.component is component], kept, x, drive)
         for v, entry in enumerate(final):
             need((known[v] is None) == (entry is None), "a final state that is not claimed, or one that is")
@@ -219,7 +219,7 @@ def _check_input(
     x: Sequence[Fraction] | None,
 ) -> None:
     protocol, begin, drive = sliding
-    section = doc.section("input", FamilyInput)
+    section = doc.section("input")
     check_sliding_part(doc, family.modes[0].structure.graph, protocol, begin, section.sliding)
     doc.at = "input"
     if section.bounded is None:

@@ -33,7 +33,7 @@ from ptcc_certify.checker.matrix_products import (
 )
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError, need
-from ptcc_certify.checker.sections import Nodes, Several, Some, Triangle
+from ptcc_certify.checker.sections import FewNodes, Several, Some, Triangle
 
 Vector = dict[int, Fraction]
 #: Integers by node, and a number by which all are multiplied.
@@ -55,7 +55,7 @@ class FormSection:
 
     class_: Literal["full", "diagonal", "undirected"]
     component: int
-    nodes: Nodes
+    nodes: FewNodes
     lower_triangle: Triangle
     rate: Fraction
     inputs: Some[Fraction]
@@ -168,7 +168,7 @@ def check_form(doc: Document, family: Family, component: Component, entry: FormS
     rates = []
     modes = []
     for k in range(len(family.modes)):
-        numbers = doc.open("family-rate", f"{of}.modes[{k}]", ["b"], witness=Multipliers | None)
+        numbers = doc.open("family-rate", f"{of}.modes[{k}]")
         modes.append(quotient_of(family, k, component, nodes))
         decreases(doc.exact, modes[k], (P, scale), component.whole[1], numbers["b"], numbers["witness"])
         rates.append(numbers["b"])

@@ -19,16 +19,17 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import Any, Literal
 
 from lmi.exact.numbers import integers, longest, sized
 from lmi.exact.work import spend
 from ptcc_certify.checker.family import Component, Family
-from ptcc_certify.checker.graph import positions
-from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import Interval, entries, exact, need
+from ptcc_certify.checker.reading import Interval, need
+from ptcc_certify.checker.sections import Some
 
-#: What a witness says of a vector that is the camps.
+#: A mean that a signal keeps: weights of agents, or that all are equal up to camps.
+Mean = Literal["equal"] | Some[Fraction]
+#: What is said of a vector that is the camps.
 EQUAL = "equal"
 
 
@@ -138,33 +139,34 @@ def _together(
 
 
 def check_means(
-    doc: Document, family: Family, witness: Any, x: Sequence[Fraction]
+    family: Family, witness: Sequence[Mapping[str, Any] | None] | None, x: Sequence[Fraction]
 ) -> list[tuple[dict[int, list[int]], dict[int, Fraction]]]:
     """Return of every component the sets ``A_j`` and, where a witness proves them, the ``c_j``."""
-    given = [None] * len(family.components) if witness is None else entries(witness, "means", len(family.components))
+    given = witness or [None] * len(family.components)
+    need(len(given) == len(family.components), f"means has not {len(family.components)} entries")
     result = []
     for component, entry in zip(family.components, given, strict=True):
         pairs = ((s, t) for edges in component.part.edges for s, t, _, _, _ in edges)
         groups = agents_heard(pairs, component.pivots) if component.kernel else {}
-        need(entry is None or (isinstance(entry, dict) and set(entry) <= set(map(str, groups))), "means of a component")
+        need(entry is None or set(entry) <= set(map(str, groups)), "means of a component")
         numbered = ((int(j), q) for j, q in (entry or {}).items())
-        means = {j: check_mean(doc, family, component, groups[j], j, q, x) for j, q in numbered}
+        means = {j: check_mean(family, component, groups[j], j, q, x) for j, q in numbered}
         result.append((groups, means))
     return result
 
 
 def check_mean(
-    doc: Document, family: Family, component: Component, group: Sequence[int], j: int, entry: Any, x: Sequence[Fraction]
+    family: Family, component: Component, group: Sequence[int], j: int, entry: Any, x: Sequence[Fraction]
 ) -> Fraction:
     """Verify that every member keeps ``q' X``, and return ``c_j``."""
     camps = {v: int(component.kernel[v][j]) for v in group}
     if entry == EQUAL:
         q = camps
     else:
-        need(isinstance(entry, dict), "a mean is no object")
-        nodes = positions(doc, family.modes[0].structure.graph, list(entry), "a mean")
+        index = family.modes[0].structure.graph.index
+        nodes = [index[label] for label in entry]
         need(set(nodes) <= set(group), "a mean of agents that a pivot does not hear")
-        (whole,), _ = integers([[exact(text) for text in entry.values()]])
+        (whole,), _ = integers([list(entry.values())])
         q = dict(zip(nodes, whole, strict=True))
     bits = longest(q.values())
     for mode, edges in zip(family.modes, component.part.edges, strict=True):

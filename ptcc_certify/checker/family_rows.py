@@ -29,7 +29,7 @@ from ptcc_certify.checker.family_squares import SquaresFunction, SquaresSection,
 from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import need
-from ptcc_certify.checker.sections import Nodes, NotNegative, Positive, Several, Vector
+from ptcc_certify.checker.sections import FewNodes, NotNegative, Positive, Several, Vector
 
 #: Lyapunov functions that are read.
 MANY_FUNCTIONS = 1000
@@ -41,7 +41,7 @@ BITS = 64
 class PartSection:
     """A part that followers hear: its form, by what it is divided, and bounds of its agents."""
 
-    nodes: Nodes
+    nodes: FewNodes
     function: FormSection
     times: Positive
     bounds: Several[NotNegative]
@@ -132,7 +132,7 @@ Function = FamilyFunction | FollowerFunction | SquaresFunction
 
 def check_family_functions(doc: Document, family: Family) -> list[Function]:
     """Verify every function, its rates and constants."""
-    items = doc.section("lyapunov", FamilyFunctionsSection).functions
+    items = doc.section("lyapunov").functions
     need(len(items) <= MANY_FUNCTIONS, f"more than {MANY_FUNCTIONS} Lyapunov functions")
     result: list[Function] = []
     for k, entry in enumerate(items):
@@ -160,7 +160,7 @@ def check_rows(doc: Document, family: Family, component: Component, entry: RowsS
     followers = [v for v in component.nodes if v not in outside]
     need(bool(followers), "no followers")
     _closed(component, [set(part.bounds) for part in parts], resting)
-    numbers = doc.open("family-rows", of, ["b"])
+    numbers = doc.open("family-rows", of)
     rate = entry.rate
     need(numbers["b"] == rate, "b is not the rate")
     need(all(rate <= part.function.rate for part in parts), "a part that the followers hear is slower")

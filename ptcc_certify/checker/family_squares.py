@@ -14,12 +14,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import Any, Literal
+from typing import Literal
 
 from lmi.exact.decimal_rounding import down
 from lmi.exact.numbers import common_denominator, integers, longest, sized
 from lmi.exact.work import fits, spend
-from ptcc_certify.checker.dominance import LARGEST_FORM, read_factor
+from ptcc_certify.checker.dominance import LARGEST_FORM, FactorSection, read_factor
 from ptcc_certify.checker.family import STABILITY, Component, Edge, Family
 from ptcc_certify.checker.family_function import Scaled
 from ptcc_certify.checker.family_limits import WeightedMean
@@ -43,7 +43,7 @@ class SquaresSection:
 class FactorWitness:
     """A sparse factor."""
 
-    factor: Any
+    factor: FactorSection
 
 
 #: Bits of ``1/p``, which are rounded up, and products of short integers that a root costs, about.
@@ -159,11 +159,11 @@ def check_squares(
     modes = [(edges, mode.unit) for edges, mode in zip(component.part.edges, family.modes, strict=True)]
     V = SquaresFunction(dict(zip(nodes, own, strict=True)), scale, rate, modes, component)
     for number, (edges, _) in enumerate(modes):
-        obligation = doc.open("family-squares", f"{of}.modes[{number}]", ["b"], witness=FactorWitness)
+        obligation = doc.open("family-squares", f"{of}.modes[{number}]")
         need(obligation["b"] == rate, "b is not the rate")
         section = obligation["witness"].factor
         factor, power = read_factor(doc, section, len(nodes))
-        need(section["parents"] is None, "parents of no leader group")
+        need(section.parents is None, "parents of no leader group")
         need(fits(len(edges) + len(nodes), LARGEST_FORM), "a component of too many edges")
         lower, over = V.form(number)
         definite = doc.exact.residual_definite(len(nodes), lower, factor, power, over)

@@ -15,12 +15,11 @@ from lmi.exact.decimal_rounding import up
 from lmi.exact.numbers import integers, longest, shorten, sized
 from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph
-from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.matrix_products import Matrix, need_rows
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.protocol import Begin
 from ptcc_certify.checker.reading import Interval, RejectedError, length, need, same
-from ptcc_certify.checker.sections import Agents, Ball, ByFollower, Ends, Nodes, Several
+from ptcc_certify.checker.sections import Agents, Ball, ByFollower, Ends, Node, Several
 from ptcc_certify.checker.side_files import Numbers, beside
 from ptcc_certify.checker.structure import MANY_COMPONENTS, Claim, Structure
 
@@ -181,7 +180,7 @@ class FinalState:
 class LeftNullVector:
     """The left null vector of a balanced leader group."""
 
-    nodes: Nodes
+    nodes: Several[Node]
     left_null_vector: Several[Ball]
 
 
@@ -212,15 +211,15 @@ class FormationSection:
 
 def check_final_state(doc: Document, structure: Structure, claim: Claim, begin: Begin) -> FinalState:
     """Verify ``Q``, and the final state as ``Q (X(0) - sigma(0))``."""
-    graph, final_state = structure.graph, doc.section("final_state", Ends | None)
-    influence = doc.section("influence", InfluenceSection | None)
+    graph, final_state = structure.graph, doc.section("final_state")
+    influence = doc.section("influence")
     if influence is None or begin.state is None:
         without = "the influence of the leaders" if influence is None else "an initial state"
         need(final_state is None, f"a final state without {without}")
         need(all(state is None for _, state in claim.components), "a final state of a component without one of all")
     if influence is None:
         return FinalState(structure, {})
-    witness = doc.open("final-state", "graph", witness=AgentsVector | None)["witness"]
+    witness = doc.open("final-state", "graph")["witness"]
     u = None if witness is None else witness.u
     need(u is None or u.positive(), "u is not positive")
     weights = influence.containment_weights
@@ -272,7 +271,7 @@ def _left_null_vectors(
     groups, vectors = [b for b in structure.balanced if len(b[1]) > 1 or not large], {}
     need(len(section) == len(groups), f"components has not {len(groups)} entries")
     for entry, (k, group, gauge) in zip(section, groups, strict=True):
-        need(positions(doc, structure.graph, entry.nodes, "a component") == group, "another component")
+        need(entry.nodes == group, "another component")
         need(len(entry.left_null_vector) == len(group), f"left_null_vector has not {len(group)} entries")
         vectors[k] = list(entry.left_null_vector)
         _left_null_vector(structure.graph, group, [(g * x, r) for g, (x, r) in zip(gauge, vectors[k], strict=True)], u)
@@ -356,7 +355,7 @@ def check_formation(doc: Document, graph: Digraph, begin: Begin) -> None:
     if "formation" not in doc.data:
         return
     need("agents" not in doc.data, "a formation beside that of agents of order n")
-    section, end = doc.section("formation", FormationSection), doc.sections["final_state"]
+    section, end = doc.section("formation"), doc.sections["final_state"]
     told = (section.initial_state, begin.state), (section.final_state, end)
     need(all((x is None) == (y is None) for x, y in told), "positions are told iff states are")
     none = Numbers([])

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Annotated, Any, Literal, TypeAlias
 
 from lmi.exact.work import keeps
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import entries, exact, fields, need
+from ptcc_certify.checker.sections import Column, Labels, Node, Pattern, Several, Sha256, Unread, read
 from ptcc_certify.checker.side_files import Numbers, beside
 
 #: From this number of edges on NumPy is used, where it is there.
@@ -18,40 +20,54 @@ MANY_EDGES = 10_000
 NODE_BYTES, EDGE_BYTES = 700, (100, 300)
 
 
+#: Source, target, and weight.
+Edge: TypeAlias = tuple[Node, Node, Fraction]
+
+
+@dataclass(frozen=True, kw_only=True)
+class EdgesAside:
+    """Edges in side files: ends as integers, and what divides the weights."""
+
+    count: int
+    source: Column
+    target: Column
+    weight: Column
+    scale: Fraction
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReadSection:
+    """How a file was read: four keys, and others where they were asked for."""
+
+    orientation: Literal["information", "listens", "matrix"]
+    duplicates: Literal["refused", "sum", "last"]
+    self_loops: Annotated[str, Pattern("refused|dropped [0-9]{1,12}")]
+    undirected: bool
+    zeros: Annotated[str, Pattern("dropped [0-9]{1,12}")] | None = None
+    laplacian: bool | None = None
+    columns: str | None = None
+    variable: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class GraphSection:
+    """The graph: agents, and who listens to whom."""
+
+    nodes: Labels
+    edges: Unread[Several[Edge] | EdgesAside]
+    read: ReadSection
+    sha256: Sha256
+
+
 def check_graph(doc: Document) -> Digraph:
     """Read nodes and edges; verify their order and their hash."""
-    section = fields(doc.section("graph"), ("nodes", "edges", "read", "sha256"), "graph")
-    check_read(section["read"])
-    labels, index = read_nodes(section)
+    section: GraphSection = doc.section("graph")
+    labels, index = section.nodes, doc.context.know(section.nodes)
     _fit(NODE_BYTES * len(labels))
-    doc.context.labels, doc.context.index = labels, index
-    graph = digraph(doc, labels, *_edges(doc, section["edges"], index))
+    graph = digraph(doc, labels, *_edges(doc, section.edges, index))
     doc.sha256, doc.context.edges = graph.sha256(), graph.n_edges
-    need(section["sha256"] == doc.sha256, "the SHA-256 of the edge list is another")
+    need(section.sha256 == doc.sha256, "the SHA-256 of the edge list is another")
     return graph
-
-
-def check_read(read: Any) -> None:
-    """Verify the form of what is told of the reading of a file: four keys, and others where they were asked for."""
-    need(isinstance(read, dict), "read is not an object")
-    asked = tuple(key for key in ("zeros", "laplacian", "columns", "variable") if key in read)
-    how = fields(read, ("orientation", "duplicates", "self_loops", "undirected", *asked), "read")
-    need(how["orientation"] in ("information", "listens", "matrix"), "read: an unknown orientation")
-    need(how["duplicates"] in ("refused", "sum", "last"), "read: duplicates")
-    for key, pattern in (("self_loops", r"refused|dropped [0-9]{1,12}"), ("zeros", r"dropped [0-9]{1,12}")):
-        text = how.get(key, "dropped 0")
-        need(isinstance(text, str) and bool(re.fullmatch(pattern, text)), f"read: {key}")
-    for key, kind in (("undirected", bool), ("laplacian", bool), ("columns", str), ("variable", str)):
-        need(isinstance(how.get(key, kind()), kind), f"read: {key}")
-
-
-def read_nodes(section: dict[str, Any]) -> tuple[list[str], dict[str, int]]:
-    """Return the labels of the nodes, and their positions."""
-    labels = entries(section["nodes"], "nodes")
-    need(bool(labels) and all(isinstance(x, str) for x in labels), "nodes are not texts, or there is none")
-    index = {label: v for v, label in enumerate(labels)}
-    need(len(index) == len(labels), "a node occurs twice")
-    return labels, index
 
 
 def digraph(doc: Document, labels: Sequence[str], source: Any, target: Any, weights: Any, scale: int) -> Digraph:
@@ -67,15 +83,15 @@ def _fit(size: int) -> None:
     need(keeps(size), "a graph that may take more memory than is allowed; allow more by --memory")
 
 
-def _edges(doc: Document, section: Any, index: dict[str, int]) -> tuple[Any, Any, Any, int]:
+def _edges(doc: Document, section: Any, index: Mapping[str, int]) -> tuple[Any, Any, Any, int]:
     """Return sources, targets, weights and what divides the weights."""
     if isinstance(section, dict):
-        section = fields(section, ("count", "source", "target", "weight", "scale"), "edges")
-        count, scale = section["count"], exact(section["scale"])
-        need(type(count) is int and 0 < count <= len(index) ** 2, "edges: count is no number of edges")
+        aside: EdgesAside = read(EdgesAside, section, doc.context, "edges")
+        count, scale = aside.count, aside.scale
+        need(0 < count <= len(index) ** 2, "edges: count is no number of edges")
         need(scale > 0 and scale.denominator == 1, "scale is not a positive integer")
         _fit(EDGE_BYTES[0] * count)
-        source, target, weight = (doc.files.column(section[key], count) for key in ("source", "target", "weight"))
+        source, target, weight = (doc.files.column(part, count) for part in (aside.source, aside.target, aside.weight))
         need(source.typecode == target.typecode == "q", "ends of edges are not integers")
         return source, target, weight, int(scale)
     _fit(EDGE_BYTES[1] * len(entries(section, "edges")))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from itertools import chain
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from lmi.exact.decimal_rounding import down, up
 from lmi.exact.numbers import integers, longest, shorten, sized
@@ -20,7 +20,7 @@ from ptcc_certify.checker.lyapunov import Function
 from ptcc_certify.checker.matrix_products import Matrix, block, congruence, decrease, less, need_rows, only
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.protocol import Begin, Protocol, SlidingPart, check_sliding_part, sliding_part
-from ptcc_certify.checker.reading import RejectedError, entries, exact, length, need
+from ptcc_certify.checker.reading import RejectedError, length, need
 from ptcc_certify.checker.sections import ByAgent, FewAgents, Positive, Rule, Several, Triangle
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.checker.structure import Structure
@@ -68,8 +68,8 @@ class PeakSection:
 class PeakWitness:
     """A Lyapunov function and an instant ``z`` for every agent, and a function for the norm."""
 
-    agents: ByAgent[Any]
-    norm: Any
+    agents: ByAgent[tuple[int, Fraction]]
+    norm: int
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -164,7 +164,7 @@ class Verified:
 
 def check_input(doc: Document, verified: Verified) -> None:
     """Verify the section ``input``."""
-    section = doc.section("input", InputSection | None)
+    section = doc.section("input")
     decays = verified.rate is not None or not verified.structure.graph.listening
     need((section is not None) == decays, "the input is spoken of iff the decay is proved")
     if section is None:
@@ -208,7 +208,7 @@ def _threshold(doc: Document, verified: Verified, section: InputSection) -> None
         need(getattr(section.threshold, key) == value, f"the {key} end is not the proved one")
     if bounded is None:
         return
-    by = doc.open("input-threshold", "input", witness=Literal["rate", "upper_bound", "spectrum"])["witness"]
+    by = doc.open("input-threshold", "input")["witness"]
     if by == "rate":
         holds = not verified.structure.graph.listening or (verified.rate is not None and verified.rate * k >= 2)
         need(bounded and holds, "no rate proves that the input stays bounded")
@@ -303,12 +303,12 @@ def _bounds(
 def _peak(doc: Document, verified: Verified, section: InputSection, bounds: formulas.InputBounds) -> None:
     """Verify the peak of every agent's input and of their norm."""
     peak: Any = section.peak
-    obligation = doc.open("input-peak", "input", ["z"], witness=PeakWitness)
+    obligation = doc.open("input-peak", "input")
     witness = obligation["witness"]
     own = verified.sliding_part() if verified.protocol.sliding else [Fraction(0)] * len(bounds.rows)
     least = []
-    for v, (k, z) in enumerate(entries(how, "an agent", 2) for how in witness.agents):
-        least.append(bounds.bound(formulas.peak_above, v, k, exact(z)) + own[v])
+    for v, (k, z) in enumerate(witness.agents):
+        least.append(bounds.bound(formulas.peak_above, v, k, z) + own[v])
     peaks = proved_above(verified.structure.graph, peak.agents, "the peak", least)
     need(peak.largest == max(peaks), "the largest peak is another")
     norm = bounds.bound(formulas.peak_above, None, witness.norm, obligation["z"])
@@ -322,7 +322,7 @@ def _energy(doc: Document, verified: Verified, section: InputSection, bounds: fo
     if not isinstance(doc.following("input-energy", "input").get("witness"), dict):
         _by_function(doc, section.energy, "input-energy", formulas.energy_above, bounds)
         return
-    obligation = doc.open("input-energy", "input", ["p", "m0", "m1"], witness=EnergyWitness)
+    obligation = doc.open("input-energy", "input")
     matrices = obligation["witness"]
     need(bounds.reaching is None, "sliding variables move")
     even = _remainder(doc, verified, matrices.W0, Fraction(0), obligation["m0"], bounds)
@@ -337,7 +337,7 @@ def _path_length(doc: Document, verified: Verified, section: InputSection, bound
 
 def _by_function(doc: Document, bound: Any, kind: str, of: formulas.Of, bounds: formulas.InputBounds) -> None:
     """Verify a bound for the norm that follows from one function and an instant."""
-    obligation = doc.open(kind, "input", ["z"], witness=Any)
+    obligation = doc.open(kind, "input")
     _at_most(doc, bound, bounds.bound(of, None, obligation["witness"], obligation["z"]))
 
 
@@ -400,8 +400,9 @@ def _under_limits(
     need(period is None or period <= verified.gain.T, "a period beyond the deadline")
     limits, clock = formulas.Limits(cap, stop, period), entry.clock
     top = limits.largest_gain(verified.gain)
-    obligation = doc.open("limited-gain", of, ["growth"], witness=Any)
-    chosen = [obligation["witness"]] if entry.noise is None else entries(obligation["witness"], "the witness", 2)
+    obligation = doc.open("limited-gain", of)
+    chosen = obligation["witness"] if entry.noise is not None else [obligation["witness"]]
+    need(isinstance(chosen, list) and type(chosen[0]) is int, "two functions iff there is noise")
     k = chosen[0]
     form = bounds.form(k)
     need(period is not None or obligation["growth"] == 0, "growth belongs to a held gain")
@@ -470,7 +471,7 @@ def _disturbance(doc: Document, verified: Verified, section: InputSection, bound
     """Verify what disturbances within ``delta`` add under the nominal protocol."""
     need(not verified.protocol.sliding, "the sliding-mode protocol has its own claims")
     disturbed: Any = section.disturbed
-    obligation, graph = doc.open("nominal-disturbed", "input", ["delta"], witness=Any), verified.structure.graph
+    obligation, graph = doc.open("nominal-disturbed", "input"), verified.structure.graph
     delta = disturbed.delta
     need(delta == obligation["delta"], "another delta")
     proved_above(graph, disturbed.inputs, "the input", bounds.disturbed(obligation["witness"], delta))

@@ -63,7 +63,7 @@ def check_form(
     if cap is None:
         raise RejectedError("form without a cap of the gain")
     need(messages.value_error == 0, "form of values that are off")
-    obligation = doc.open("late-form", "messages.form", ["q", "b", "kap"], witness=LateFormWitness)
+    obligation = doc.open("late-form", "messages.form")
     q, b, kap = (obligation[key] for key in ("q", "b", "kap"))
     known = function_of(doc, verified, obligation["witness"].function)
     phi, left = obligation["witness"].phi, section.left

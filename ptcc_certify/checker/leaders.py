@@ -12,7 +12,7 @@ from ptcc_certify.checker.follower_rows import Followers, Rows, followers_of
 from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import length, need
-from ptcc_certify.checker.sections import Agents, NotNegative, RowVector
+from ptcc_certify.checker.sections import Agents, NotNegative
 from ptcc_certify.checker.side_files import Numbers
 
 
@@ -38,13 +38,13 @@ def check_leaders(doc: Document, verified: Verified) -> None:
     """Verify everything that is said of leaders that move, if there is something."""
     if "leaders" not in doc.data:
         return
-    section = doc.section("leaders", LeadersSection)
+    section = doc.section("leaders")
     need(not verified.protocol.sliding, "leaders that move under the sliding-mode protocol")
     initial, after, sign, push = section.initial, section.after, section.sign_gain, section.speed + section.disturbance
     need(sign is None or sign >= push, "sign_gain is below speed + disturbance")
     followers = followers_of(doc, verified.structure, verified.begin)
     doc.at = "leaders"
-    obligation = doc.open("tracking", "leaders", ["a"], witness=RowVector)
+    obligation = doc.open("tracking", "leaders")
     a = obligation["a"]
     rows = Rows(followers, obligation["witness"].u)
     rows.decay(Fraction(1), a)

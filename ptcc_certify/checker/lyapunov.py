@@ -84,7 +84,7 @@ class Function:
 
 def check_functions(doc: Document, structure: Structure, final: FinalState, paper: Paper | None) -> list[Function]:
     """Verify every Lyapunov function."""
-    items, of_paper = doc.section("lyapunov", FunctionsSection).functions, paper is not None and paper.rate is not None
+    items, of_paper = doc.section("lyapunov").functions, paper is not None and paper.rate is not None
     need(len(items) <= MANY_FUNCTIONS, f"more than {MANY_FUNCTIONS} Lyapunov functions")
     need(not of_paper or bool(items), "the paper's certificate is not among the Lyapunov functions")
     need(bool(structure.graph.listening) or not items, "a Lyapunov function where nothing moves")
@@ -157,7 +157,7 @@ def _searched(
         low, high = min(weights), max(weights)
         need(low > 0, "a weight is not positive")
         form = Form(rate, "E", nodes, weights, None, low)
-    need(doc.open("rate", of, ["b"])["b"] == rate, "b is not the rate")
+    need(doc.open("rate", of)["b"] == rate, "b is not the rate")
     F, times = form.of_state(doc.exact, graph)
     definite = decays(doc.exact, F, block(graph, range(graph.n)), rate, graph.unit, structure.free_nodes)
     need(definite, "not proved definite")
@@ -171,7 +171,7 @@ def _searched(
 
 def _ends(doc: Document, rows: Sequence[Sequence[Fraction]], of: str) -> tuple[Fraction, Fraction]:
     """Verify ``lowest I < P < highest I``; return both."""
-    ends, (P, scale) = doc.open("overshoot", of, ["lowest", "highest"]), integers(rows)
+    ends, (P, scale) = doc.open("overshoot", of), integers(rows)
     low, high = ends["lowest"], ends["highest"]
     need(low > 0 and doc.exact.definite(less(P, low * scale)), "the lower end is not proved")
     need(doc.exact.definite(less([[-x for x in row] for row in P], -high * scale)), "the upper end is not proved")

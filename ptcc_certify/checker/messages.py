@@ -24,7 +24,7 @@ from ptcc_certify.checker.late_steps import FIXED, Steps, clock_below
 from ptcc_certify.checker.missed_deadline import MissedDeadline, check_missed, check_staged
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import length, need
-from ptcc_certify.checker.sections import Agents, ByFollower, FollowerNumbers, Positive, RowVector, Several
+from ptcc_certify.checker.sections import Agents, ByFollower, FollowerNumbers, Positive, Several
 from ptcc_certify.checker.settling_leaders import SettlingSection, check_settling
 from ptcc_certify.checker.side_files import Numbers
 
@@ -103,7 +103,7 @@ def check_messages(doc: Document, verified: Verified) -> None:
     """Verify everything that is said of late messages, if there is something."""
     if "messages" not in doc.data:
         return
-    section, graph = doc.section("messages", MessagesSection), verified.structure.graph
+    section, graph = doc.section("messages"), verified.structure.graph
     need("leaders" not in doc.data, "leaders that move beside late messages stand under messages")
     sigma = verified.begin.sigma
     need(sigma is None or not any(sigma.values), "late messages while sliding variables move")
@@ -181,7 +181,7 @@ def _check_rows(
     cap, clock, left, initial, floor = entry.cap, entry.clock, entry.left, entry.initial, entry.floor
     for x in (entry.drift, entry.after):
         need((x is None) == (messages.leaders is None), "drift and after are told iff leaders move")
-    obligation = doc.open("late-rows", of, ["q", "b"], witness=RowVector)
+    obligation = doc.open("late-rows", of)
     q, b = obligation["q"], obligation["b"]
     need(q > 1 or (q == 1 and messages.delay == 0), "q is not above 1")
     need((cap is None) == (messages.delay == 0), "cap is null iff nothing is late")
@@ -237,7 +237,7 @@ def _check_steps(
     need(all(a < b for a, b in pairwise(instants)), "instants do not ascend")
     need(instants[0] == 0 and instants[-1] == gain.T, "instants do not reach from 0 to the deadline")
     need(messages.delay > 0, "steps though nothing is late")
-    start = doc.open("late-steps", "messages.steps", witness=StepsStart)["witness"].start
+    start = doc.open("late-steps", "messages.steps")["witness"].start
     need(all(x >= 0 for x in start.values), "start is negative")
     values, scale = start.over(range(len(start)))
     error, limits = messages.wrong * scale, formulas.Limits(messages.gain_cap)

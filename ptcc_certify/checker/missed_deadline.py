@@ -52,7 +52,7 @@ def check_missed(
     need(final is not None and begin.state is not None, "missed without a final state")
     mid, radius = final
     state = begin.state or mid
-    signs = doc.open("late-missed", "messages.missed", witness=Signs)["witness"].gauge
+    signs = doc.open("late-missed", "messages.missed")["witness"].gauge
     need(all(g in (-1, 0, 1) for g in signs), "gauge: a sign is neither 1, -1 nor 0")
     gauge = dict(zip(nodes, signs, strict=True))
     need(gauge[agent] != 0, "gauge: no sign of the agent")

@@ -6,13 +6,13 @@ proof stands in the functions that verify it, and nowhere else.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from lmi.exact.definite import Arithmetic
 from ptcc_certify.checker.obligations import OBLIGATIONS, VerifiedObligation
 from ptcc_certify.checker.reading import digest, exact, fields, need
-from ptcc_certify.checker.sections import Context, read
+from ptcc_certify.checker.sections import Brings, Context, parts_of, read
 from ptcc_certify.checker.side_files import SideFiles
 
 
@@ -34,8 +34,12 @@ class Document:
         Of the graph.
     context : Context
         Labels of agents and of followers, as far as they are known.
+    parts : dict
+        How parts are declared, by key.
+    brings : mapping
+        What obligations bring, by kind.
     sections : dict
-        What sections say, by key.
+        What parts say, by key, as far as they were read.
     proved : dict
         Numbers and witnesses of obligations, by kind and place.
     """
@@ -46,14 +50,19 @@ class Document:
         self.at, self.sha256 = "format", ""
         self.context, self.sections = Context(files), dict[str, Any]()
         self.proved: dict[tuple[str, str], dict[str, Any]] = {}
+        self.parts: dict[str, Any] = {}
+        self.brings: Mapping[str, tuple[Brings, ...]] = {}
 
-    def section(self, key: str, kind: Any = Any) -> Any:
+    def begin(self, certificate: type, brings: Mapping[str, tuple[Brings, ...]]) -> None:
+        """Take what is declared of the parts, which must be there, and no other, and of the obligations."""
+        self.parts = {f.key: f.kind for f in parts_of(certificate, self.data, "the certificate")}
+        self.brings = brings
+
+    def section(self, key: str) -> Any:
         """Return a part of the document, as it is declared; it is what is verified next."""
         self.at = key
-        value = self.data[key]
-        if kind is not Any:
-            value = self.sections[key] = read(kind, value, self.context, key)
-        return value
+        self.sections[key] = read(self.parts[key], self.data[key], self.context, key)
+        return self.sections[key]
 
     def following(self, kind: str, of: str) -> Mapping[str, Any]:
         """Return the next obligation, not verified yet, if it is this one, else nothing."""
@@ -61,21 +70,21 @@ class Document:
         obligation = proof[k] if k < len(proof) and isinstance(proof[k], dict) else {}
         return obligation if (obligation.get("kind"), obligation.get("of")) == (kind, of) else {}
 
-    def open(self, kind: str, of: str, numbers: Sequence[str] = (), witness: Any = None) -> dict[str, Any]:
-        """Take the next obligation of the proof, which must be this one; return its numbers and its witness.
-
-        ``witness`` declares the witness: a section, or Any; None if there is none.
-        """
+    def open(self, kind: str, of: str) -> dict[str, Any]:
+        """Take the next obligation of the proof, which must be this one; return its numbers and its witness."""
         self.at = f"{kind} of {of}"
         need(len(self.obligations) < len(self.data["proof"]), "the proof does not list this obligation")
         keys = ("kind", "of", "proves", "lemma", "numbers", "witness")
         obligation = fields(self.data["proof"][len(self.obligations)], keys, "an obligation")
         texts = [obligation[key] for key in keys[:4]]
         need(texts == [kind, of, *OBLIGATIONS[kind]], "the proof lists another obligation here")
-        need(witness is not None or obligation["witness"] is None, "a witness that nothing asks for")
-        values = {key: exact(x) for key, x in fields(obligation["numbers"], numbers, "numbers").items()}
-        told = obligation["witness"]
-        values["witness"] = told if witness in (None, Any) else read(witness, told, self.context, "the witness")
+        numbers, told = obligation["numbers"], obligation["witness"]
+        declared = self.brings.get(kind, (Brings(),))
+        same = (one for one in declared if isinstance(numbers, dict) and set(numbers) == set(one.numbers.split()))
+        names, witness = next(same, declared[0])
+        need(witness is not None or told is None, "a witness that nothing asks for")
+        values = {key: exact(x) for key, x in fields(numbers, names.split(), "numbers").items()}
+        values["witness"] = read(witness, told, self.context, "the witness")
         self.proved[kind, of] = values
         return values
 
@@ -119,7 +128,7 @@ class Recorder(Document):
         """Return an obligation if it is given, else nothing."""
         return self.given.get((kind, of), {})
 
-    def open(self, kind: str, of: str, numbers: Sequence[str] = (), witness: Any = None) -> dict[str, Any]:
+    def open(self, kind: str, of: str) -> dict[str, Any]:
         """Lay down an obligation, and take it as any other."""
         proves, lemma = OBLIGATIONS[kind]
         obligation: dict[str, Any] = {
@@ -131,7 +140,7 @@ class Recorder(Document):
             "witness": None,
         }
         self.data["proof"].append({**obligation, **self.given.pop((kind, of), {})})
-        return super().open(kind, of, numbers, witness)
+        return super().open(kind, of)
 
     def close(self, proved: bool) -> str:
         """Verify that nothing was given in vain; lay down the verdict, and the digest of the whole."""

@@ -13,7 +13,7 @@ from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError, need
-from ptcc_certify.checker.sections import Agents, ByAgent, FewAgents, NotNegative, Positive
+from ptcc_certify.checker.sections import ByAgent, FewAgents, NotNegative, Positive
 from ptcc_certify.checker.side_files import Numbers
 
 SLIDING_BOUND = "||sigma(t)|| <= phi(t,T_r)^(-mu3) e^(-mu2 t) ||sigma(0)||"
@@ -87,7 +87,7 @@ class Begin:
 
 def check_protocol(doc: Document) -> Protocol:
     """Read the parameters, which are positive; mu1 is above delta."""
-    section = doc.section("protocol", NominalSection | SlidingSection)
+    section = doc.section("protocol")
     gains = {name: value for name, value in vars(section).items() if name not in ("kind", "disturbance")}
     need(section.rho1 > 0 or "agents" in doc.data, "rho1 is not positive")  # that of agents of order n may be 0
     if isinstance(section, SlidingSection):
@@ -97,14 +97,14 @@ def check_protocol(doc: Document) -> Protocol:
 
 def check_begin(doc: Document, protocol: Protocol) -> Begin:
     """Read ``X(0)`` and ``sigma(0)``."""
-    state, sigma = (doc.section(key, Agents | None) for key in ("initial_state", "sliding_variable"))
+    state, sigma = (doc.section(key) for key in ("initial_state", "sliding_variable"))
     need((sigma is not None) == protocol.sliding, "sigma(0) belongs to the sliding-mode protocol, and is part of it")
     return Begin(state, sigma)
 
 
 def check_sliding(doc: Document, graph: Digraph, protocol: Protocol, begin: Begin) -> None:
     """Verify Proposition 1 and every reaching time."""
-    section, sigma0, g = doc.section("reaching_time", ReachingTimes | None), begin.sigma, protocol.gains
+    section, sigma0, g = doc.section("reaching_time"), begin.sigma, protocol.gains
     if sigma0 is None or section is None:
         need(sigma0 is None and section is None, "reaching times are told iff there are sliding variables")
         return

@@ -13,7 +13,7 @@ from ptcc_certify.checker.lyapunov import Function
 from ptcc_certify.checker.matrix_products import block, congruence, decays, need_rows
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import need
-from ptcc_certify.checker.sections import Node, Nodes, Several, Triangle
+from ptcc_certify.checker.sections import FewNodes, Node, Several, Triangle
 from ptcc_certify.checker.structure import Structure
 from ptcc_certify.checker.theorem_function import Paper
 
@@ -47,14 +47,14 @@ class MeanWitness:
 class InertiaWitness:
     """The nodes of a strong component, a form, and vectors on which it is negative."""
 
-    nodes: Nodes
+    nodes: FewNodes
     lower_triangle: Triangle
     vectors: Several[Several[Fraction]]
 
 
 def check_rates(doc: Document, paper: Paper | None, functions: Sequence[Function]) -> Fraction | None:
     """Verify that the rates and the overshoot constant are those of the functions; return the largest rate."""
-    section = doc.section("rates", RatesSection)
+    section = doc.section("rates")
     decaying = [f for f in functions if f.rate > 0]
     best = max(decaying, key=lambda f: (f.rate, -f.overshoot), default=None)
     values = {
@@ -64,7 +64,7 @@ def check_rates(doc: Document, paper: Paper | None, functions: Sequence[Function
     }
     for key, value in values.items():
         need(getattr(section, key) == value, f"rates.{key} is not what was proved")
-    constant = doc.section("overshoot", OvershootSection | None)
+    constant = doc.section("overshoot")
     if best is None:
         need(constant is None, "an overshoot constant without a rate")
         return None
@@ -80,10 +80,10 @@ def check_rate_bound(doc: Document, structure: Structure) -> Fraction | None:
         return None
     mean = bool(doc.following("rate-mean", "rates"))
     if mean:
-        obligation = doc.open("rate-mean", "rates", ["upper_bound"], witness=MeanWitness)
+        obligation = doc.open("rate-mean", "rates")
         _mean(structure, bound, obligation["witness"].node)
     else:
-        obligation = doc.open("rate-upper-bound", "rates", ["upper_bound"], witness=InertiaWitness)
+        obligation = doc.open("rate-upper-bound", "rates")
         _inertia(doc, structure, bound, obligation["witness"])
     need(bound == obligation["upper_bound"], "the upper bound is another")
     doc.done(f"upper bound on the decay rate {up(bound)}")

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Literal
+from typing import Literal
 
 from lmi.exact.decimal_rounding import down
 from lmi.exact.definite import Arithmetic
@@ -18,15 +18,16 @@ from lmi.exact.numbers import integers
 from lmi.exact.work import spend
 from ptcc_certify.checker.constant_weights import FinalValueSection, check_final_value, fitting_camps
 from ptcc_certify.checker.family import CONSENSUS, CONTAINMENT, INTERVAL, STABILITY, Component, Family
-from ptcc_certify.checker.family_function import Multipliers, decreases, quotient_of
-from ptcc_certify.checker.family_limits import check_mean
+from ptcc_certify.checker.family_function import decreases, quotient_of
+from ptcc_certify.checker.family_limits import Mean, check_mean
 from ptcc_certify.checker.family_rows import Function
 from ptcc_certify.checker.graph import ordered, positions
 from ptcc_certify.checker.matrix_products import Matrix, combined, need_rows
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.protocol import Begin, Protocol
 from ptcc_certify.checker.reading import Interval, need
-from ptcc_certify.checker.sections import Ball, Nodes, NotNegative, Positive, Several, Some, Triangle
+from ptcc_certify.checker.sections import Ball, FewNodes, NotNegative, Positive, Several, Some, Triangle
+from ptcc_certify.checker.structure import Behaviour
 
 #: Claims that are read.
 MANY_CLAIMS = 100
@@ -81,7 +82,7 @@ class LastModeSection:
     claim: Literal["last mode"]
     signals: Dwell | Literal["constant"]
     component: int
-    modes: Several[str | None]
+    modes: Several[Behaviour | None]
     final_state: Some[Ball] | None
 
 
@@ -92,7 +93,7 @@ class WindowsSection:
     claim: Literal["windows"]
     signals: Windows
     component: int
-    behaviour: str
+    behaviour: Behaviour
     eta: Positive
     final_state: Some[Ball] | None
 
@@ -104,18 +105,18 @@ class SharesSection:
     claim: Literal["shares"]
     signals: Shares
     component: int
-    nodes: Nodes
+    nodes: FewNodes
     form: Triangle
     rate: Fraction
-    behaviour: str | None
+    behaviour: Behaviour | None
     final_state: Some[Ball] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
-class MeanWitness:
-    """A mean that is kept: weights, or "equal"."""
+class KeptMean:
+    """A mean that is kept: weights of agents, or that all are equal up to camps."""
 
-    mean: Any
+    mean: Mean
 
 
 Section = RateSection | LastModeSection | WindowsSection | SharesSection | FinalValueSection
@@ -131,7 +132,7 @@ def check_restricted(
     """Verify every claim for restricted signals."""
     if "restricted" not in doc.data:
         return
-    items: Sequence[Section] = doc.section("restricted", Several[Section])
+    items: Sequence[Section] = doc.section("restricted")
     need(0 < len(items) <= MANY_CLAIMS, f"no claim for restricted signals, or more than {MANY_CLAIMS}")
     gains, x = protocol.gains, None if begin.state is None else list(begin.state)
     need(not (begin.sigma and any(begin.sigma)), "restricted signals while sliding variables move")
@@ -199,7 +200,7 @@ def _forms(
         need(len(rows) == len(nodes), f"lower_triangle has not {len(nodes)} entries")
         form = integers(rows)
         need(doc.exact.definite(form[0]), "P is not proved definite")
-        numbers = doc.open("family-rate", f"{of}.modes[{k}]", ["b"], witness=Multipliers | None)
+        numbers = doc.open("family-rate", f"{of}.modes[{k}]")
         mode = quotient_of(family, k, component, nodes)
         decreases(doc.exact, mode, form, component.whole[1], numbers["b"], numbers["witness"])
         doc.done(f"b = {down(numbers['b'])}")
@@ -440,13 +441,14 @@ def _check_shares(doc: Document, family: Family, x: Sequence[Fraction] | None, e
     need(doc.exact.definite(form[0]), "P is not proved definite")
     mean = Fraction(0)
     for k, share in enumerate(shares):
-        numbers = doc.open("family-rate", f"{of}.modes[{k}]", ["b"], witness=Multipliers | None)
+        numbers = doc.open("family-rate", f"{of}.modes[{k}]")
         decreases(
             doc.exact, quotient_of(family, k, common, nodes), form, common.whole[1], numbers["b"], numbers["witness"]
         )
         mean += share * numbers["b"]
         doc.done(f"b = {down(numbers['b'])}" if numbers["b"] > 0 else "nothing decays")
-    witness = doc.open("clock-shares", of, witness=MeanWitness | None if told else None)["witness"]
+    witness: KeptMean | None = doc.open("clock-shares", of)["witness"]
+    need(told or witness is None, "a witness that nothing asks for")
     rate = entry.rate
     need(rate <= mean, "the rate is not proved")
     need(entry.behaviour == (common.behaviour if rate > 0 else None), "another behaviour")
@@ -462,7 +464,7 @@ def _check_share_ends(
     common: Component,
     x: Sequence[Fraction],
     section: Mapping[str, Interval] | None,
-    witness: MeanWitness | None,
+    witness: KeptMean | None,
 ) -> None:
     """Verify where agents end: at 0, at one value up to camps that a kept mean tells, or within all their bounds."""
     part = common.part
@@ -472,6 +474,6 @@ def _check_share_ends(
         bounds = agreed_bounds(part.nodes, every, x, part.camps if common.behaviour == CONSENSUS else None)
     else:
         need(common.behaviour == CONSENSUS, "a mean of agents that end at 0")
-        value = check_mean(doc, family, common, part.nodes, 1, witness.mean, x)
+        value = check_mean(family, common, part.nodes, 1, witness.mean, x)
         bounds = {v: (row[1] * value, row[1] * value) for v, row in common.kernel.items()}
     _check_intervals(family, common, section, bounds)

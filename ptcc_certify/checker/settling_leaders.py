@@ -55,7 +55,7 @@ def check_settling(
     need(bool(structure.followers), "no follower")
     _hear_at_once(messages, structure)
     cap, clock, left = section.cap, section.clock, section.left
-    obligation = doc.open("late-settling", "messages.settling", ["q", "b"], witness=SettlingWitness)
+    obligation = doc.open("late-settling", "messages.settling")
     q, b, u = obligation["q"], obligation["b"], obligation["witness"].u
     known = function_of(doc, verified, obligation["witness"].function)
     need(q > 1, "q is not above 1")

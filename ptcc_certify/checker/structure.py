@@ -7,12 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import Annotated, Any, Literal, TypeAlias
 
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError, entries, fields, need, same
+from ptcc_certify.checker.sections import Ball, FewNodes, Integers, Node, Nodes, Pattern, Several, Some, Unread
 from ptcc_certify.checker.side_files import beside
 
 #: Above this many weak components they are listed in arrays.
@@ -20,6 +21,71 @@ MANY_COMPONENTS = 100
 COROLLARIES = {"1.1": "6.1", "1.2": "6.2", "2": "7", "3": "8", "4": "9", "5": "10"}
 CONNECTIVITY = ("strong", "quasi-strong", "weak")
 BEHAVIOURS = ("bipartite consensus", "interval bipartite consensus", "bipartite containment")
+
+Connectivity = Literal["strong", "quasi-strong", "weak"]
+Theorem: TypeAlias = Annotated[str, Pattern("[1-6][.][12]")]
+Behaviour: TypeAlias = Annotated[str, Pattern("|".join((*BEHAVIOURS, "stability")))]
+Corollary = Literal["1.1", "1.2", "2", "3", "4", "5", "6.1", "6.2", "7", "8", "9", "10"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class BalancedComponent:
+    """A balanced closed component: its nodes, and the camp of each."""
+
+    nodes: FewNodes
+    balanced: Literal[True]
+    gauge: Several[Literal[1, -1]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class UnbalancedComponent:
+    """A closed component that is not balanced: its nodes, and a negative cycle."""
+
+    nodes: FewNodes
+    balanced: Literal[False]
+    negative_cycle: Several[tuple[Node, Node]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class StructureSection:
+    """What the file says of the structure of a graph."""
+
+    connectivity: Literal["strong", "quasi-strong", "weak", "disconnected"]
+    closed_components: Unread[Several[BalancedComponent | UnbalancedComponent]]
+    leaders: Nodes
+    followers: Nodes
+    balanced: bool
+    sign_symmetric: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClaimSection:
+    """The theorem that applies, what agents do by it, and the corollaries whose hypotheses hold."""
+
+    theorem: Theorem
+    behaviour: Behaviour
+    corollaries: Several[Corollary]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ComponentSection:
+    """A weak component, its claim, and where its agents end."""
+
+    nodes: Several[Node]
+    connectivity: Connectivity
+    claim: ClaimSection
+    final_state: Some[Ball] | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ManyComponents:
+    """Many weak components: labels of their nodes, or the number of every node's, and of each what is claimed."""
+
+    nodes: Several[Several[Node]] | Integers
+    connectivity: Several[Connectivity]
+    theorem: Several[Theorem]
+    behaviour: Several[Behaviour]
+    corollaries: Several[Several[Corollary]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,14 +147,12 @@ class Claim:
     components: list[tuple[list[int], Any]]
 
 
-def check_structure(doc: Document, graph: Digraph, section: Any, of: str = "graph") -> Structure:
+def check_structure(doc: Document, graph: Digraph, section: StructureSection, of: str = "graph") -> Structure:
     """Verify closed components, camps, leaders and followers, and every witness."""
     doc.open("structure", of)
-    keys = ("connectivity", "closed_components", "leaders", "followers", "balanced", "sign_symmetric")
     closed: list[list[int]] = []
     gauges: list[list[int] | None] = []
-    fields(section, keys, "structure")
-    for entry in entries(section["closed_components"], "closed_components"):
+    for entry in entries(section.closed_components, "closed_components"):
         balanced = isinstance(entry, dict) and entry.get("balanced") is True
         fields(entry, ("nodes", "balanced", "gauge" if balanced else "negative_cycle"), "a closed component")
         need(type(entry["balanced"]) is bool, "balance of a closed component")
@@ -107,9 +171,9 @@ def check_structure(doc: Document, graph: Digraph, section: Any, of: str = "grap
     signs = {v: g for _, nodes, gauge in structure.balanced for v, g in zip(nodes, gauge, strict=True)}
     need(graph.fits([signs.get(v, 0) for v in range(graph.n)]), "camps of a component")
     for key, expected in (("leaders", [v for nodes in closed for v in nodes]), ("followers", structure.followers)):
-        need(positions(doc, graph, section[key], key, len(expected)) == expected, f"other {key}")
-    need(section["balanced"] is (not graph.pieces[1]), "balance of the graph")
-    need(section["sign_symmetric"] is graph.mutual[0], "sign symmetry")
+        need(positions(doc, graph, getattr(section, key), key, len(expected)) == expected, f"other {key}")
+    need(section.balanced is (not graph.pieces[1]), "balance of the graph")
+    need(section.sign_symmetric is graph.mutual[0], "sign symmetry")
     doc.done(f"{graph.n} nodes, {graph.n_edges} edges, {len(closed)} closed component(s)")
     return structure
 
@@ -153,14 +217,15 @@ def _negative_cycle(doc: Document, graph: Digraph, entry: Any, group: set[int]) 
 def check_claim(doc: Document, structure: Structure, sliding: bool) -> Claim:
     """Verify theorem, behaviour and corollaries of every weak component."""
     doc.open("claim", "graph")
-    data, expected = doc.data, _expected(structure, sliding)
-    section, connectivity = data["claim"], data["structure"]["connectivity"]
+    connectivity, expected = doc.sections["structure"].connectivity, _expected(structure, sliding)
+    section: ClaimSection | None = doc.section("claim")
+    doc.at = "claim of graph"
     if len(expected) == 1:
         ((_, kind, claim),) = expected
-        need("components" not in data, "components of a connected graph")
+        need("components" not in doc.data, "components of a connected graph")
         need(connectivity == kind, f"the graph is {kind}")
-        need(same(section, claim), f"the claim is Theorem {claim['theorem']}")
-        verified = Claim(claim["theorem"], [])
+        need(section == claim, f"the claim is Theorem {claim.theorem}")
+        verified = Claim(claim.theorem, [])
     else:
         need(connectivity == "disconnected" and section is None, "the graph is disconnected")
         theorem = f"{6 if sliding else 3}.{1 if structure.balanced else 2}"
@@ -169,7 +234,7 @@ def check_claim(doc: Document, structure: Structure, sliding: bool) -> Claim:
     return verified
 
 
-def _expected(structure: Structure, sliding: bool) -> list[tuple[list[int], str, dict[str, Any]]]:
+def _expected(structure: Structure, sliding: bool) -> list[tuple[list[int], str, ClaimSection]]:
     """Return nodes, connectivity and claim of every weak component, by section 7 of the format."""
     (piece, torn), odd, negative = structure.graph.pieces, structure.graph.mutual[1], structure.graph.antagonistic()
     pieces: dict[int, list[int]] = {}
@@ -190,11 +255,10 @@ def _expected(structure: Structure, sliding: bool) -> list[tuple[list[int], str,
             "4": row == 1 and some and root not in negative,
             "5": row == 2 and some and root not in negative,
         }
-        claim = {
-            "theorem": f"{row + (4 if sliding else 1)}.{1 if some else 2}",
-            "behaviour": BEHAVIOURS[row] if some else "stability",
-            "corollaries": [COROLLARIES[key] if sliding else key for key in holds if holds[key]],
-        }
+        corollaries: list[Any] = [COROLLARIES[key] if sliding else key for key in holds if holds[key]]
+        theorem = f"{row + (4 if sliding else 1)}.{1 if some else 2}"
+        behaviour = BEHAVIOURS[row] if some else "stability"
+        claim = ClaimSection(theorem=theorem, behaviour=behaviour, corollaries=corollaries)
         expected.append((nodes, CONNECTIVITY[row], claim))
     return expected
 
@@ -209,12 +273,13 @@ def _components(doc: Document, graph: Digraph, expected: Sequence[Any]) -> list[
         items = entries(section, "components", len(groups))
         states = [entry.get("final_state") if isinstance(entry, dict) else None for entry in items]
         reference = [
-            {"nodes": nodes, "connectivity": kind, "claim": claim, "final_state": state}
+            {"nodes": nodes, "connectivity": kind, "claim": vars(claim), "final_state": state}
             for nodes, (_, kind, claim), state in zip(labels, expected, states, strict=True)
         ]
     else:
         reference = {"nodes": labels, "connectivity": [kind for _, kind, _ in expected]}
-        reference |= {key: [claim[key] for _, _, claim in expected] for key in ("theorem", "behaviour", "corollaries")}
+        keys = "theorem", "behaviour", "corollaries"
+        reference |= {key: [getattr(claim, key) for _, _, claim in expected] for key in keys}
         if isinstance(section, dict) and beside(section.get("nodes")):
             number = {v: k for k, nodes in enumerate(groups) for v in nodes}
             items = doc.files.integers(section["nodes"], "nodes", graph.n)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Literal, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple
 
 from lmi.exact.decimal_rounding import down
 from lmi.exact.numbers import integers
@@ -14,8 +14,8 @@ from ptcc_certify.checker.matrix_products import block, congruence, decays, decr
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.quadratic_form import Form
 from ptcc_certify.checker.reading import entries, exact, need
-from ptcc_certify.checker.sections import ManyNodes, Positive, Several, Triangle, Vector
-from ptcc_certify.checker.structure import Claim, Structure
+from ptcc_certify.checker.sections import Nodes, Positive, Several, Triangle, Vector
+from ptcc_certify.checker.structure import Claim, Structure, Theorem
 
 #: By how much weights may be off the left null vector of the comparison matrix: this part of each diagonal term.
 NEAR = 10**9
@@ -26,10 +26,11 @@ class BlockSection:
     """A block of a Lyapunov matrix: its diagonal, or a full matrix."""
 
     name: str
-    nodes: ManyNodes
+    nodes: Nodes
     diagonal: Vector | None = None
     lower_triangle: Triangle | None = None
     times_rho: bool
+    one_of: ClassVar[tuple[str, ...]] = ("diagonal", "lower_triangle")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +45,7 @@ class RhoInterval:
 class PaperSection:
     """What the file says of the Lyapunov function of the theorem's row."""
 
-    theorem: str
+    theorem: Theorem
     objective: str
     coordinates: Literal["E", "eps"]
     blocks: Several[BlockSection]
@@ -89,7 +90,7 @@ class Paper:
 
 def check_paper(doc: Document, structure: Structure, claim: Claim) -> Paper | None:
     """Verify the certificate of the theorem's row; None if there is none."""
-    section, graph = doc.section("paper", PaperSection | None), structure.graph
+    section, graph = doc.section("paper"), structure.graph
     if section is None:
         return None
     need_rows(graph.n)
@@ -156,7 +157,7 @@ def _near_null_vector(structure: Structure, nodes: Sequence[int], p: Sequence[Fr
 def _deviation_decrease(doc: Document, paper: Paper, rate: Fraction) -> None:
     """Verify ``Z L + L'Z - b Z > 0`` modulo ``G 1``."""
     graph, one = paper.structure.graph, paper.blocks[0]
-    b = doc.open("deviation-decrease", "paper", ["b"])["b"]
+    b = doc.open("deviation-decrease", "paper")["b"]
     need(b == rate, "b is not the rate")
     _near_null_vector(paper.structure, one.nodes, one.weights)
     Z, _ = paper.form.of_state(doc.exact, graph)
@@ -184,13 +185,13 @@ def _leaders(doc: Document, paper: Paper, theorem: str) -> dict[int, Fraction]:
             continue
         k = structure.closed.index(nodes)
         if structure.gauges[k] is None:
-            m = doc.open("leader-margin", f"paper.{name}", ["m"])["m"]
+            m = doc.open("leader-margin", f"paper.{name}")["m"]
             own = dict(zip(nodes, weights, strict=True))
             need(m > 0 and _exceeds(doc, structure, own, {}, m), "not proved definite")
             gamma |= dict.fromkeys(nodes, m)
             doc.done(f"m = {down(m)}")
         else:
-            b = doc.open("leader-decrease", f"paper.{name}", ["b"])["b"]
+            b = doc.open("leader-decrease", f"paper.{name}")["b"]
             multiple = _near_null_vector(structure, nodes, weights)
             need(b > 0 and group_decrease(doc, structure, k, multiple, b), "not proved definite")
             least = min(weights)
@@ -202,7 +203,8 @@ def _leaders(doc: Document, paper: Paper, theorem: str) -> dict[int, Fraction]:
 def _margin(doc: Document, paper: Paper, gamma: Mapping[int, Fraction], rate: Fraction) -> None:
     """Verify ``S - m I > 0``, and that the rate is ``m`` over the largest weight."""
     has_rho = doc.sections["paper"].rho is not None
-    numbers = doc.open("margin", "paper", ["m", "rho"] if has_rho else ["m"])
+    numbers = doc.open("margin", "paper")
+    need(("rho" in numbers) == has_rho, "rho is told iff there is one")
     need(numbers.get("rho", paper.rho) == paper.rho, "another rho")
     weights = paper.weights(paper.rho)
     need(_exceeds(doc, paper.structure, weights, gamma, numbers["m"]), "not proved definite")
@@ -239,7 +241,7 @@ def _interval(doc: Document, paper: Paper, gamma: Mapping[int, Fraction]) -> Non
         free = all(j not in leading for v in paper.structure.followers for j in paper.structure.graph.row(v))
         need(free, "rho is bounded, since followers listen to these leaders")
         return
-    numbers: dict[str, Any] = doc.open("rho-interval", "paper", list(ends))
+    numbers: dict[str, Any] = doc.open("rho-interval", "paper")
     need(numbers == {**ends, "witness": None}, "other ends")
     need(ends["printed"] <= ends["exact"], "the ends are in the wrong order")
     for end in ends.values():

@@ -17,7 +17,6 @@ from scipy.integrate import solve_ivp
 
 from ptcc_certify.certificate.agents_part import AgentsPart
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
-from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
 from ptcc_certify.checker.agent_instants import halvings
 from ptcc_certify.checker.agent_model import Agents as CheckedAgents

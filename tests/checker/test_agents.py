@@ -14,7 +14,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -28,8 +27,8 @@ from jsonschema import Draft202012Validator  # type: ignore[import-untyped]
 from mutations import Json, at, changed, judged_mutants, mutants, nudged, resealed
 from oracle_agents import false_claims_of_agents
 
-from ptcc_certify import checker
 from ptcc_certify.certificate.family_certificate import certify_family
+from ptcc_certify.certificate.json_schema import json_schema
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import agent_motion, check
 from ptcc_certify.graphs.digraph import SignedDigraph
@@ -38,8 +37,7 @@ from ptcc_certify.protocols import NominalProtocol
 
 F = Fraction
 CLASSES = dict(all_classes())
-SCHEMA = Path(checker.__file__).with_name("certificate.schema.json")
-VALIDATOR = Draft202012Validator(json.loads(SCHEMA.read_text(encoding="utf-8")))
+VALIDATOR = Draft202012Validator(json_schema())
 #: Two camps of three that hear each other, and a follower that is an enemy of one.
 CAMPS = [("a", "b", 1), ("b", "c", -2), ("c", "a", "-1/2"), ("c", "f", -1), ("a", "f", 2)]
 #: Unbalanced: three that are all enemies.

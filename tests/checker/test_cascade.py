@@ -10,7 +10,6 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from fractions import Fraction
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,8 +20,8 @@ from jsonschema import Draft202012Validator  # type: ignore[import-untyped]
 from mutations import Json, changed, judged_mutants, mutants, nudged, resealed
 from oracle_cascade import false_claims_of_cascade
 
-from ptcc_certify import checker
 from ptcc_certify.certificate.family_certificate import certify_family
+from ptcc_certify.certificate.json_schema import json_schema
 from ptcc_certify.checker import check
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
@@ -31,8 +30,7 @@ from ptcc_certify.protocols.agents import Agents
 
 F = Fraction
 CLASSES = dict(all_classes())
-SCHEMA = Path(checker.__file__).with_name("certificate.schema.json")
-VALIDATOR = Draft202012Validator(json.loads(SCHEMA.read_text(encoding="utf-8")))
+VALIDATOR = Draft202012Validator(json_schema())
 CAMPS = [("a", "b", 1), ("b", "c", -2), ("c", "a", "-1/2"), ("c", "f", -1), ("a", "f", 2)]
 ENEMIES = [("a", "b", -1), ("b", "c", -2), ("c", "a", -1), ("b", "a", -1)]
 SINGLES = [("a", "f", 1), ("b", "f", -2), ("f", "g", 1)]

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import copy
-import json
 from fractions import Fraction
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -15,13 +13,13 @@ from mutations import Json, changed, resealed
 from oracle import number
 from oracle_messages import late_claims
 
-from ptcc_certify import checker
+from ptcc_certify.certificate.json_schema import json_schema
 from ptcc_certify.checker import check
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.protocols import NominalProtocol
 from ptcc_certify.protocols.late_messages import LateMessages
 
-SCHEMA = json.loads((Path(checker.__file__).parent / "certificate.schema.json").read_text(encoding="utf-8"))
+SCHEMA = json_schema()
 TOP = ("messages", "lmi")
 CASES = [(1, False), (2, True), (3, True)]
 

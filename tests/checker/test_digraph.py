@@ -18,6 +18,7 @@ from lmi.exact import arithmetic
 from lmi.exact.work import WorkError
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker.array_digraph import ArrayDigraph
+from ptcc_certify.checker.contents import GraphCertificate
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.graph import check_graph
 from ptcc_certify.checker.proof_cursor import Document
@@ -201,4 +202,6 @@ def test_arrays_are_taken_where_edges_are_many(monkeypatch: pytest.MonkeyPatch):
     data = json.loads(certificate.to_json())
     for many, stdlib, kind in ((10_000, False, Digraph), (1, False, ArrayDigraph), (1, True, Digraph)):
         monkeypatch.setattr("ptcc_certify.checker.graph.MANY_EDGES", many)
-        assert type(check_graph(Document(data, SideFiles(Path(), {}), arithmetic(stdlib)))) is kind
+        doc = Document(data, SideFiles(Path(), {}), arithmetic(stdlib))
+        doc.begin(GraphCertificate, {})
+        assert type(check_graph(doc)) is kind

@@ -30,6 +30,7 @@ from ptcc_certify.certificate import section_writer
 from ptcc_certify.certificate.certificate import RejectedCertificate, read_certificate
 from ptcc_certify.certificate.document import family_document
 from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate, certify_family
+from ptcc_certify.certificate.json_schema import json_schema
 from ptcc_certify.checker import check
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
@@ -492,9 +493,7 @@ def test_no_mutant_of_thousands_is_accepted_that_is_false(capsys: pytest.Capture
 # ---------------------------------------------------------------------- the shape
 
 
-VALIDATOR = Draft202012Validator(
-    json.loads((Path(checker.__file__).parent / "certificate.schema.json").read_text("utf-8"))
-)
+VALIDATOR = Draft202012Validator(json_schema())
 
 
 def test_certificates_of_families_are_valid():

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import copy
-import json
 import math
 from fractions import Fraction
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,8 +20,8 @@ from selection import thinned
 from side_files import Side
 
 from lmi.exact.work import WorkError, limited
-from ptcc_certify import checker
 from ptcc_certify.certificate.family_certificate import certify_family
+from ptcc_certify.certificate.json_schema import json_schema
 from ptcc_certify.checker import check, graph
 from ptcc_certify.checker.array_digraph import ArrayDigraph
 from ptcc_certify.checker.array_steps import ArraySteps
@@ -33,7 +31,7 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 
-SCHEMA = json.loads((Path(checker.__file__).parent / "certificate.schema.json").read_text(encoding="utf-8"))
+SCHEMA = json_schema()
 VALIDATOR = Draft202012Validator(SCHEMA)
 TOP = ("messages",)
 F = Fraction

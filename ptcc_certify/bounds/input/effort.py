@@ -25,9 +25,7 @@ from ptcc_certify.checker.input import (
 from ptcc_certify.checker.input_formulas import InitialSet, Limits, Rows
 from ptcc_certify.checker.obligations import CheckReport
 from ptcc_certify.checker.protocol import SlidingPart as SlidingSection
-from ptcc_certify.checker.reading import exact
 from ptcc_certify.checker.side_files import Numbers
-from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.protocols.base import Protocol
 from ptcc_certify.theorems.theorem import Obligation
@@ -261,7 +259,7 @@ def _limited(entry: Limited) -> LimitedSection:
 
 def peak_witness(peak: Peak) -> PeakWitness:
     """Return what proves the peaks: a Lyapunov function and an instant for every agent, and for the norm."""
-    return PeakWitness(agents=[[how.function, format_exact(how.z)] for how in peak.how], norm=peak.norm_how.function)
+    return PeakWitness(agents=[(how.function, how.z) for how in peak.how], norm=peak.norm_how.function)
 
 
 def read_effort(
@@ -317,7 +315,7 @@ def _read_energy(bound: Fraction | None, step: Step | None) -> Witness | EnergyI
 
 def _read_peak(section: PeakSection, step: Step) -> Peak:
     each = zip(section.agents, step["witness"].agents, strict=True)
-    how = tuple(Witness(bound, k, exact(z)) for bound, (k, z) in each)
+    how = tuple(Witness(bound, k, z) for bound, (k, z) in each)
     return Peak(tuple(section.agents), how, section.norm, Witness(section.norm, step["witness"].norm, step["z"]))
 
 

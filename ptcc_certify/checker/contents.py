@@ -1,0 +1,154 @@
+"""What a certificate consists of: its parts, of one graph and of a family, and what each obligation brings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from ptcc_certify.checker.agent_cascade import CascadeSection
+from ptcc_certify.checker.agent_decrease import PhaseSection
+from ptcc_certify.checker.agent_instants import InstantsSection
+from ptcc_certify.checker.agents import AgentsSection
+from ptcc_certify.checker.attracting_boxes import AttractingBox, KeptBox
+from ptcc_certify.checker.delay_lmi import LateLMIWitness
+from ptcc_certify.checker.dominance import DominanceWitness
+from ptcc_certify.checker.family import (
+    Counterexample,
+    FamilyClaim,
+    FamilyComponent,
+    FamilySection,
+    KernelWitness,
+    ModeStructures,
+)
+from ptcc_certify.checker.family_bounds import FamilyInput
+from ptcc_certify.checker.family_function import Multipliers
+from ptcc_certify.checker.family_limits import Mean
+from ptcc_certify.checker.family_rows import FamilyFunctionsSection
+from ptcc_certify.checker.family_squares import FactorWitness
+from ptcc_certify.checker.final_state import AgentsVector, FormationSection, InfluenceSection
+from ptcc_certify.checker.graph import GraphSection
+from ptcc_certify.checker.input import EnergyWitness, InputSection, PeakWitness
+from ptcc_certify.checker.late_form import LateFormWitness
+from ptcc_certify.checker.leaders import LeadersSection
+from ptcc_certify.checker.lyapunov import FunctionsSection
+from ptcc_certify.checker.messages import MessagesSection, StepsStart
+from ptcc_certify.checker.missed_deadline import Signs
+from ptcc_certify.checker.protocol import NominalSection, ReachingTimes, SlidingSection
+from ptcc_certify.checker.rates import InertiaWitness, MeanWitness, OvershootSection, RatesSection
+from ptcc_certify.checker.restricted_signals import KeptMean, Section
+from ptcc_certify.checker.sections import (
+    Agents,
+    Ball,
+    Brings,
+    ByAgent,
+    ByNumber,
+    Ends,
+    RowVector,
+    Several,
+    Sha256,
+    Unread,
+)
+from ptcc_certify.checker.settling_leaders import SettlingWitness
+from ptcc_certify.checker.structure import ClaimSection, ComponentSection, ManyComponents, StructureSection
+from ptcc_certify.checker.theorem_function import PaperSection
+
+
+@dataclass(frozen=True, kw_only=True)
+class GraphCertificate:
+    """A certificate of one graph."""
+
+    schema: Literal["ptcc-certificate/2"]
+    producer: str
+    graph: GraphSection
+    structure: StructureSection
+    claim: ClaimSection | None
+    components: Unread[Several[ComponentSection] | ManyComponents] | None = None
+    protocol: NominalSection | SlidingSection
+    paper: PaperSection | None
+    lyapunov: FunctionsSection
+    rates: RatesSection
+    overshoot: OvershootSection | None
+    initial_state: Agents | None
+    sliding_variable: Agents | None
+    influence: InfluenceSection | None
+    final_state: Ends | None
+    reaching_time: ReachingTimes | None
+    input: InputSection | None
+    proof: list[Any]
+    verdict: Literal["certified", "undecided"]
+    digest: Sha256
+    unverified: dict[str, Any]
+    agents: AgentsSection | CascadeSection | None = None
+    messages: MessagesSection | None = None
+    leaders: LeadersSection | None = None
+    formation: FormationSection | None = None
+    phases: Several[PhaseSection] | None = None
+    instants: InstantsSection | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class FamilyCertificate:
+    """A certificate of a family of graphs."""
+
+    schema: Literal["ptcc-certificate/2"]
+    producer: str
+    graph: FamilySection
+    structure: ModeStructures
+    claim: FamilyClaim | None
+    components: Several[FamilyComponent] | None = None
+    protocol: NominalSection | SlidingSection
+    paper: None
+    lyapunov: FamilyFunctionsSection
+    rates: None
+    overshoot: None
+    initial_state: Agents | None
+    sliding_variable: Agents | None
+    influence: None
+    final_state: ByAgent[Ball | None] | None
+    reaching_time: ReachingTimes | None
+    input: FamilyInput
+    proof: list[Any]
+    verdict: Literal["certified"]
+    digest: Sha256
+    unverified: dict[str, Any]
+    boxes: Several[AttractingBox | KeptBox] | None = None
+    restricted: Several[Section] | None = None
+
+
+#: What an obligation of each kind brings, if anything; where there are several, one of them, as its numbers tell.
+BRINGS: dict[str, tuple[Brings, ...]] = {
+    "deviation-decrease": (Brings("b"),),
+    "leader-decrease": (Brings("b"),),
+    "leader-margin": (Brings("m"),),
+    "margin": (Brings("m"), Brings("m rho")),
+    "rho-interval": (Brings("printed exact"),),
+    "rate": (Brings("b"),),
+    "dominance": (Brings("b", DominanceWitness),),
+    "overshoot": (Brings("lowest highest"),),
+    "rate-mean": (Brings("upper_bound", MeanWitness),),
+    "rate-upper-bound": (Brings("upper_bound", InertiaWitness),),
+    "final-state": (Brings("", AgentsVector | None),),
+    "input-threshold": (Brings("", Literal["rate", "upper_bound", "spectrum"]),),
+    "input-peak": (Brings("z", PeakWitness),),
+    "input-energy": (Brings("z", int), Brings("p m0 m1", EnergyWitness)),
+    "input-length": (Brings("z", int),),
+    "limited-gain": (Brings("growth", int | Several[int]),),
+    "nominal-disturbed": (Brings("delta", int),),
+    "late-rows": (Brings("q b", RowVector),),
+    "late-steps": (Brings("", StepsStart),),
+    "late-missed": (Brings("", Signs),),
+    "late-settling": (Brings("q b", SettlingWitness),),
+    "late-form": (Brings("q b kap", LateFormWitness),),
+    "late-lmi": (Brings("b", LateLMIWitness),),
+    "tracking": (Brings("a", RowVector),),
+    "agent-decrease": (Brings("rate"),),
+    "agent-coupling": (Brings("coupling"),),
+    "agent-cascade": (Brings("alpha"),),
+    "agent-phase": (Brings("rate"),),
+    "family-claim": (Brings("", Several[KernelWitness | Counterexample | None]),),
+    "family-rate": (Brings("b", Multipliers | None),),
+    "family-rows": (Brings("b"),),
+    "family-squares": (Brings("b", FactorWitness),),
+    "family-final-state": (Brings("", Several[ByNumber[Mean] | None] | None),),
+    "clock-shares": (Brings("", KeptMean | None),),
+}
