@@ -18,6 +18,7 @@ from ptcc_certify.bounds.agents import States, first_inputs
 from ptcc_certify.bounds.agents_comparison import AgentsComparison
 from ptcc_certify.bounds.final_state import Influence, NotEnclosedError
 from ptcc_certify.certificate.answer import MET, OPEN, REFUTED, Answer
+from ptcc_certify.certificate.facts import Change, Sentence
 from ptcc_certify.certificate.format_vectors import agents_ends, weighted_sum
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.structure import Structure
@@ -219,7 +220,7 @@ class AgentsAnswer(ABC):
 
     @property
     @abstractmethod
-    def unbounded(self) -> tuple[tuple[str, str], ...]:
+    def unbounded(self) -> tuple[tuple[str, Change], ...]:
         """What leaves the input without a bound, and what mends it; empty where nothing does."""
 
     @property
@@ -229,7 +230,7 @@ class AgentsAnswer(ABC):
 
     @property
     @abstractmethod
-    def nearer(self) -> str:
+    def nearer(self) -> Sentence:
         """What leaves less by ``T``."""
 
     @property

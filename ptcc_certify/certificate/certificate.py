@@ -17,16 +17,17 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 
 from lmi.exact.decimal_rounding import down
-from ptcc_certify.certificate.answer import rejection, rejects
+from ptcc_certify.certificate.answer import Assessment, rejection, rejects, verdict_of
 from ptcc_certify.certificate.certificate_data import Content, Source
 from ptcc_certify.certificate.certificate_file import FromFile, bytes_of, text_of, write_certificate
 from ptcc_certify.certificate.checking import read_and_check, refuse_no_certificate
+from ptcc_certify.certificate.facts import Fact
 from ptcc_certify.certificate.format import certificate_document, read_document
 from ptcc_certify.certificate.format_vectors import read_side_files
-from ptcc_certify.certificate.verdict import Assessment, assess, verdict_of
+from ptcc_certify.certificate.verdict import assess
 from ptcc_certify.checker import CheckReport, VerifiedObligation
 from ptcc_certify.errors import FormatError, PTCCError, gated
-from ptcc_certify.graphs.display_hook import Shown, plot, summary
+from ptcc_certify.graphs.display_hook import Shown, facts, plot, summary
 from ptcc_certify.graphs.io.files import refuse_no_path
 from ptcc_certify.graphs.kinds_of_file import refuse_as_certificate
 from ptcc_certify.graphs.rationals import shorten
@@ -273,6 +274,19 @@ class Certificate(Content, FromFile, Shown):
     def summary(self) -> str:
         """Return what ``ptcc certify`` prints of it."""
         return summary(self)
+
+    def facts(self) -> list[Fact]:
+        """Return everything that is told of it, as data: see :class:`~ptcc_certify.certificate.facts.Fact`.
+
+        Examples
+        --------
+        >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
+        >>> cert = certify(foes, NominalProtocol(T=1, rho1=1, rho2="0.1", kappa=1), [3, 5], simulation=False)
+        >>> verdict = cert.facts()[-1]
+        >>> verdict.head, [str(change) for change in verdict.changes]
+        ('verdict', ['rho2=0.501'])
+        """
+        return facts(self)
 
     def __eq__(self, other: object) -> bool:
         """Two certificates are equal when they claim and prove the same; what was observed does not count."""

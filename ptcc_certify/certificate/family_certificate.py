@@ -21,11 +21,11 @@ from lmi.exact.decimal_rounding import down
 from lmi.search_time import share_of_time
 from ptcc_certify.bounds.attracting_box import AttractingBox, box_of_family
 from ptcc_certify.bounds.kept_means import with_means
-from ptcc_certify.certificate.answer import rejection, rejects
+from ptcc_certify.certificate.answer import Assessment, rejection, rejects
 from ptcc_certify.certificate.certificate_file import FromFile, write_certificate
+from ptcc_certify.certificate.facts import Fact
 from ptcc_certify.certificate.family_content import ComponentProof, FamilyContent, ProvedFunction
 from ptcc_certify.certificate.family_table import family_table
-from ptcc_certify.certificate.family_verdict import assess_family
 from ptcc_certify.certificate.format_family import family_document
 from ptcc_certify.certificate.request import (
     Expectations,
@@ -38,7 +38,7 @@ from ptcc_certify.certificate.request import (
 )
 from ptcc_certify.certificate.restricted_claims import RateClaim
 from ptcc_certify.certificate.restricted_search import STEP, claims_for, require_nominal
-from ptcc_certify.certificate.verdict import Assessment
+from ptcc_certify.certificate.verdict import assess
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.family import MANY_MODES
 from ptcc_certify.checker.family_rows import MANY_FUNCTIONS
@@ -46,7 +46,7 @@ from ptcc_certify.checker.matrix_products import LARGEST_ROWS
 from ptcc_certify.checker.reading import Interval
 from ptcc_certify.checker.restricted_signals import reachable_bounds
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.graphs.display_hook import Shown, family_summary, plot_of_family
+from ptcc_certify.graphs.display_hook import Shown, facts, plot_of_family, summary
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.size_limits import EXACT_NODES, ONE_THREAD_NODES
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY, analyse
@@ -124,11 +124,20 @@ class FamilyCertificate(FamilyContent, FromFile, Shown):
     @cached_property
     def assessment(self) -> Assessment:
         """The graded verdict: what became of what was asked, whether the bound is useful, and the exit code."""
-        return assess_family(self, self.checked)
+        return assess(self, self.checked)
 
     def summary(self) -> str:
         """Return what ``ptcc certify`` prints of it."""
-        return family_summary(self)
+        return summary(self)
+
+    def facts(self) -> list[Fact]:
+        """Return everything that is told of it, as data: see :class:`~ptcc_certify.certificate.facts.Fact`."""
+        return facts(self)
+
+    @property
+    def refused(self) -> bool:
+        """Whether the check does not accept the functions that were found: nothing that follows from them is told."""
+        return self.verdict != "certified" and any(part.functions for part in self.parts)
 
     @property
     def main_figure(self) -> str:

@@ -119,13 +119,15 @@ def plot_of_counterexample(component: Any, **keywords: Any) -> Any:
 
 
 def summary(subject: Any) -> str:
-    """Return what the command line prints of a certificate."""
-    origins = subject.request.origins
-    lines = import_module("ptcc_certify.report.screen").summary_lines(subject, origins.get("graph", "graph"), origins)
-    return "\n".join(lines)
+    """Return the short screen of a certificate."""
+    return "\n".join(import_module("ptcc_certify.report.screen").summary_lines(subject))
 
 
-def family_summary(subject: Any) -> str:
-    """Return what the command line prints of a family's certificate."""
-    lines = import_module("ptcc_certify.report.family_screen").family_summary
-    return "\n".join(lines(subject, subject.origins.get("graph", ""), subject.origins))
+def facts(subject: Any) -> list[Any]:
+    """Return what is told of a certificate."""
+    return import_module("ptcc_certify.report.facts").facts_of(subject)  # type: ignore[no-any-return]
+
+
+def summary_of_design(subject: Any) -> str:
+    """Return the long screen of a design."""
+    return "\n".join(import_module("ptcc_certify.report.screen").long_screen(subject.facts()))

@@ -11,16 +11,31 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ptcc_certify.bounds.late_messages import LateBounds
+from ptcc_certify.certificate.answer import REFUTED
 from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.family_certificate import FamilyCertificate
+from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.graphs.size_limits import DRAWN_NODES, EXACT_NODES, INPUT_NODES
 from ptcc_certify.protocols.base import Protocol
+from ptcc_certify.report.notation import printable, signs
+from ptcc_certify.report.plots.agents_motion import plot_formation, plot_motion
+from ptcc_certify.report.plots.counterexample import plot_counterexample
 from ptcc_certify.report.plots.decay import plot_decay
+from ptcc_certify.report.plots.distributions import plot_degrees, plot_final_states
+from ptcc_certify.report.plots.family import plot_family, plot_family_decay
+from ptcc_certify.report.plots.family_graph import plot_family_graph
+from ptcc_certify.report.plots.family_input import plot_family_input
 from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.plots.input import plot_input
 from ptcc_certify.report.plots.late import plot_late, plot_tracking
 from ptcc_certify.report.plots.style import figure_bytes
 from ptcc_certify.report.plots.trajectory import plot_sliding, plot_trajectory
+from ptcc_certify.simulation.agents import AgentsTrajectory
+from ptcc_certify.simulation.family_run import FamilyTrajectory
 from ptcc_certify.simulation.late_messages import can_run
+from ptcc_certify.theorems.counterexample_text import counterexample_text
+from ptcc_certify.theorems.family_behaviour import DEPENDS, Counterexample, FamilyComponent
+from ptcc_certify.theorems.family_claims import component_holds, component_refutation
 
 #: What draws each figure of a certificate, on given axes or its own; all but the graph show its simulated run.
 PLOTS: dict[str, Callable[..., Axes]] = {
@@ -31,13 +46,51 @@ PLOTS: dict[str, Callable[..., Axes]] = {
     "input": plot_input,
     "late": plot_late,
     "tracking": plot_tracking,
+    "final": plot_final_states,
+    "degrees": lambda saved: plot_degrees(saved.graph),
 }
+#: The same of a family; all but the graph show its runs.
+_FAMILY_PLOTS: dict[str, Callable[..., Axes]] = {
+    "states": plot_family,
+    "decay": plot_family_decay,
+    "input": plot_family_input,
+}
+#: Agents of order n up to which a run is drawn.
+_RUN = 60
+#: What is refuted, the counterexample in words, its component, and itself.
+Counterexamples = list[tuple[str, Markup, FamilyComponent, Counterexample]]
 
 
-def draw(saved: Certificate, wanted: Sequence[str]) -> dict[str, Any]:
-    """Draw those of the wanted figures for which there is something to draw."""
+def draw(
+    saved: Certificate | FamilyCertificate,
+    wanted: Sequence[str] | None = None,
+    runs: Sequence[FamilyTrajectory] = (),
+    why: Counterexamples | None = None,
+    agents_run: AgentsTrajectory | None = None,
+) -> dict[str, Any]:
+    """Draw those of the wanted figures for which there is something to draw, and counterexamples ``why``.
+
+    Parameters
+    ----------
+    saved : Certificate or FamilyCertificate
+        With a trajectory, for figures of it.
+    wanted : sequence of str, optional
+        All there are by default.
+    runs : sequence of FamilyTrajectory
+        Of a family.
+    why : list
+        See :func:`counterexamples`.
+    agents_run : AgentsTrajectory, optional
+        Of agents of order n.
+    """
+    wanted = tuple(PLOTS) if wanted is None else wanted
+    if isinstance(saved, FamilyCertificate):
+        return _draw_family(saved, wanted, runs, why or [])
     run, n = saved.trajectory, saved.graph.n_nodes
     there = {"graph": n <= DRAWN_NODES}
+    if saved.agents is None:
+        there["final"] = n > DRAWN_NODES and saved.final_state is not None
+        there["degrees"] = n > DRAWN_NODES and saved.graph.n_edges > 0
     if saved.initial_state is not None and n <= EXACT_NODES:
         there["late"] = saved.late is not None and _late_is_drawn(saved.late, saved.protocol)
         there["tracking"] = saved.tracking is not None
@@ -47,9 +100,65 @@ def draw(saved: Certificate, wanted: Sequence[str]) -> dict[str, Any]:
         there["decay"] = saved.comparison is not None and bool(saved.envelope.functions) and bool(run.error.any())
         there["sliding"] = slid and not saved.direct and n <= INPUT_NODES
         there["input"] = n <= INPUT_NODES and (slid or not saved.constant)
-    drawn = [name for name in wanted if there.get(name)]
-    axes = (PLOTS[name](saved) for name in drawn)
-    return {name: ax.figure for name, ax in zip(drawn, axes, strict=True)}
+    figures = {name: PLOTS[name](saved).figure for name in wanted if there.get(name)}
+    if agents_run is not None and saved.agents is not None:
+        figures["motion"] = plot_motion(agents_run)
+        if saved.agents.dimension == 2:
+            figures["formation"] = plot_formation(agents_run).figure
+    return figures
+
+
+def run_of_agents(saved: Certificate) -> AgentsTrajectory | None:
+    """Return a run of a few agents of order n; None of others, and where it fails."""
+    if saved.agents is None or saved.agents.initial_state is None or saved.graph.n_nodes > _RUN:
+        return None
+    try:
+        return saved.agents.simulate()
+    except (SimulationError, ParameterError):
+        return None
+
+
+def _draw_family(
+    saved: FamilyCertificate, wanted: Sequence[str], runs: Sequence[FamilyTrajectory], why: Counterexamples
+) -> dict[str, Any]:
+    """Draw the graphs, runs within what is proved, and counterexamples: as far as there are any."""
+    small = bool(runs) and saved.family.n_nodes <= INPUT_NODES
+    there = {"graph": saved.family.n_nodes <= DRAWN_NODES, "states": small, "input": small}
+    moves = bool(runs) and saved.common and saved.rate is not None
+    there["decay"] = moves and bool(saved.deviation_bound([1.0]).max() > 0)
+    figures = {
+        name: plot_family_graph(saved).figure if name == "graph" else _FAMILY_PLOTS[name](saved, runs=runs).figure
+        for name in wanted
+        if there.get(name)
+    }
+    for number, (_, _, component, one) in enumerate(why):
+        try:
+            figures[f"why{number}"] = plot_counterexample(component, why=one, protocol=saved.protocol).figure
+        except (ParameterError, SimulationError):
+            continue  # no state of it is known; the words stand alone
+    return figures
+
+
+def counterexamples(saved: FamilyCertificate) -> Counterexamples:
+    """Return what is refuted, the counterexample in words, its component, and itself: for claim and expectation."""
+    result = []
+    for part in saved.parts:
+        component = part.component
+        if component.behaviour == DEPENDS and component.counterexample is not None:
+            result.append(("one behaviour for every signal", component, component.counterexample))
+            break
+    asked = saved.expectations.behaviour
+    if asked is not None and any(a.status == REFUTED for a in saved.assessment.answers):
+        for part in saved.parts:
+            if component_holds(part.component, asked) is False:
+                why = component_refutation(part.component, asked)
+                if why is not None and why not in [one for _, _, one in result]:
+                    result.append((asked, part.component, why))
+                break
+    return [
+        (what, Markup("{}").format(signs(printable(counterexample_text(c, why), 500))), c, why)
+        for what, c, why in result
+    ]
 
 
 def _late_is_drawn(late: LateBounds, protocol: Protocol) -> bool:

@@ -17,11 +17,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ptcc_certify.bounds.final_state import final_state
-from ptcc_certify.certificate.answer import rejects
+from ptcc_certify.certificate.answer import CERTIFIED, rejects
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.certificate.request import refuse
-from ptcc_certify.certificate.verdict import CERTIFIED
 from ptcc_certify.errors import ParameterError, PTCCError, SimulationError
 from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.digraph import SignedDigraph

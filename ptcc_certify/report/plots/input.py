@@ -11,9 +11,9 @@ from lmi.exact.decimal_rounding import up
 from ptcc_certify.bounds.input.effort import Effort
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
-from ptcc_certify.certificate.late_answers import largest_late_input
+from ptcc_certify.certificate.judgements import largest_late_input
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.report.input_lines import initial_states_text
+from ptcc_certify.report.facts.input import initial_states_text
 from ptcc_certify.report.plots.agents import draw_agents, draw_deadlines, name_agents
 from ptcc_certify.report.plots.agents_input import plot_agents_input
 from ptcc_certify.report.plots.family_input import plot_family_input
