@@ -18,9 +18,8 @@ from ptcc_certify.bounds.agents import States, first_inputs
 from ptcc_certify.bounds.agents_comparison import AgentsComparison
 from ptcc_certify.bounds.final_state import Influence, NotEnclosedError
 from ptcc_certify.certificate.answer import MET, OPEN, REFUTED, Answer
-from ptcc_certify.certificate.facts import Change, Sentence
 from ptcc_certify.certificate.format_vectors import agents_ends, weighted_sum
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.errors import Change, ParameterError, Sentence
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.protocols.agents import AgentsProtocol

@@ -25,9 +25,9 @@ from ptcc_certify.bounds.agents_comparison import AgentsComparison, compare_agen
 from ptcc_certify.bounds.final_state import Influence
 from ptcc_certify.bounds.input.tightest_bound import round_up
 from ptcc_certify.certificate.agents_answer import AgentsAnswer, Intervals, Residual, UsedFunction, final_states
-from ptcc_certify.certificate.facts import Change, Sentence
 from ptcc_certify.certificate.format_vectors import agents_ends
 from ptcc_certify.checker.input_formulas import Limits, decay_above
+from ptcc_certify.errors import Change, Sentence
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.protocols import Protocol

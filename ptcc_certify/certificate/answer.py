@@ -6,9 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ptcc_certify.certificate.facts import Sentence, joined, spell
 from ptcc_certify.checker import CheckReport
-from ptcc_certify.errors import ExitCode
+from ptcc_certify.errors import ExitCode, Sentence, joined, spell
 
 #: What became of an expectation.
 MET, REFUTED, OPEN = "met", "refuted", "left open"

@@ -24,8 +24,7 @@ from ptcc_certify.bounds.cascade import (
 )
 from ptcc_certify.bounds.final_state import Influence
 from ptcc_certify.certificate.agents_answer import AgentsAnswer, Intervals, Residual, UsedFunction, final_states
-from ptcc_certify.certificate.facts import Change, Sentence
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.errors import Change, ParameterError, Sentence
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.protocols import Protocol
@@ -265,8 +264,9 @@ def prove_cascade(
     falls = base.gain.rho1 * base.gain.T
     if agents.alpha * falls > LARGEST_DECAY:
         raise ParameterError(
-            f"cascade = {near(agents.alpha)} is too large to enclose the common motion: beyond "
-            f"{LARGEST_DECAY}/(rho1 T); take at most {down(LARGEST_DECAY / falls, 4)}"
+            "cascade",
+            f"= {near(agents.alpha)} is too large to enclose the common motion: beyond "
+            f"{LARGEST_DECAY}/(rho1 T); take at most {down(LARGEST_DECAY / falls, 4)}",
         )
     numbers = [k for k, V in enumerate(functions) if V.proved_rate > 0]
     used = tuple(functions[k] for k in numbers)

@@ -1,78 +1,16 @@
-"""What is told of a certificate, as data: facts, and changes that are advised. Media lay them out, and name fields."""
+"""What is told of a certificate, as data: facts, which media lay out."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Literal
 
-from lmi.exact.decimal_rounding import near
-
-
-@dataclass(frozen=True)
-class Change:
-    """Another value of a field, or the field alone.
-
-    Attributes
-    ----------
-    field : str
-        As Python names it.
-    value : Fraction, str or None
-
-    Examples
-    --------
-    >>> str(Change("rho2", Fraction(1, 2))), str(Change("time_limit"))
-    ('rho2=0.5', 'time_limit')
-    """
-
-    field: str
-    value: Fraction | str | None = None
-
-    @property
-    def number(self) -> str:
-        """The value in words; empty if there is none."""
-        return near(self.value) if isinstance(self.value, Fraction) else self.value or ""
-
-    def __str__(self) -> str:
-        return f"{self.field}={self.number}" if self.value is not None else self.field
-
+from ptcc_certify.errors import Change, Sentence, spell
 
 #: To which side a number may be rounded, and what a fact rests on.
 Side = Literal["up", "down", "exact"]
 Standing = Literal["proved", "observed", "unproved"]
-#: A sentence: a text, or texts and the changes that stand among them.
-Sentence = str | tuple[str | Change, ...]
-#: How a medium names a change.
-Spelling = Callable[[Change], str]
-
-
-def spell(sentence: Sentence, name: Spelling = str) -> str:
-    """Return a sentence as a text, its changes named as a medium names them.
-
-    Examples
-    --------
-    >>> spell(("no rate is proved; raise ", Change("time_limit"))), spell("proved")
-    ('no rate is proved; raise time_limit', 'proved')
-    """
-    parts = (sentence,) if isinstance(sentence, str) else sentence
-    return "".join(part if isinstance(part, str) else name(part) for part in parts)
-
-
-def joined(separator: str, sentences: Iterable[Sentence]) -> Sentence:
-    """Return sentences as one; those that are empty are left out.
-
-    Examples
-    --------
-    >>> joined("; ", ["certified", "", ("raise ", Change("rho2"))])
-    ('certified', '; ', 'raise ', Change(field='rho2', value=None))
-    """
-    parts: list[str | Change] = []
-    for sentence in sentences:
-        if sentence:
-            parts += [separator] if parts else []
-            parts += [sentence] if isinstance(sentence, str) else sentence
-    return tuple(parts)
 
 
 @dataclass(frozen=True, kw_only=True)

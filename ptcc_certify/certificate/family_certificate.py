@@ -329,9 +329,9 @@ def certify_family(
     """
     refuse_no_protocol(protocol)
     if sigma0 is not None and protocol.reaching is None:
-        raise ParameterError("sigma0 belongs to the sliding-mode protocol; leave it out or change the protocol")
+        raise ParameterError("sigma0", "belongs to the sliding-mode protocol; leave it out or change the protocol")
     if not protocol.prescribed:
-        raise ParameterError("rho2 = 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
+        raise ParameterError("rho2", "= 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
     if len(family.modes) > MANY_MODES:
         mend = "put modes whose edges have the same signs into one, with intervals that hold them all; ptcc classify"
         raise ParameterError(

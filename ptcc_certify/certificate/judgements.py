@@ -13,10 +13,10 @@ from ptcc_certify.bounds.missed_deadline import Missed
 from ptcc_certify.bounds.tracking import Tracking
 from ptcc_certify.certificate.answer import MET, OPEN, REFUTED, Answer
 from ptcc_certify.certificate.certificate_data import Content
-from ptcc_certify.certificate.facts import Change, Sentence, joined
 from ptcc_certify.certificate.family_content import FamilyContent
 from ptcc_certify.certificate.restricted_claims import LastModeClaim
 from ptcc_certify.certificate.restricted_reasons import reasons_for_none
+from ptcc_certify.errors import Change, Sentence, joined
 from ptcc_certify.graphs.family import Mode
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.protocols.base import Protocol

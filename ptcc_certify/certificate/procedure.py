@@ -64,7 +64,7 @@ from ptcc_certify.certificate.request import (
 )
 from ptcc_certify.certificate.verdict import MANY_DECADES
 from ptcc_certify.checker.input_formulas import Limits
-from ptcc_certify.errors import HypothesisError, ParameterError, SimulationError, gated
+from ptcc_certify.errors import Change, HypothesisError, ParameterError, SimulationError, gated
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io import as_family, as_graph
@@ -281,7 +281,7 @@ def certify(
         family = _family(graph, orientation, uncertainty, options)
         return certify_family(family, protocol, x0, **{name: options[name] for name in _OF_FAMILIES})
     if options.pop("signal") != "any":
-        raise ParameterError("signal is for families of graphs, which change; this is one graph: leave it out")
+        raise ParameterError("signal", "is for families of graphs, which change; this is one graph: leave it out")
     progress, graph = listener(progress), as_graph(graph, orientation)
     refuse(graph, protocol, method, {"sigma0": sigma0, "disturbance": disturbance}, [*options["limits"], delta, noise])
     structure, chains, formation = analyse(graph), None, None
@@ -316,7 +316,7 @@ def _agents_options(agents: Any, protocol: Protocol, asked: dict[str, Any], v0: 
     """Return agents of order n, None for single integrators, or refuse what is asked of them."""
     if agents is None:
         if v0 is not None or derivatives is not None:
-            raise ParameterError("v0: single integrators have no velocity to begin with; give agents=Agents(order=2)")
+            raise ParameterError("v0", "single integrators have no velocity to begin with; give agents=Agents(order=2)")
         return None
     if isinstance(protocol, Protocol) and not getattr(agents, "of_paper", False):  # others when their states are read
         refuse_agents(agents, protocol, asked)
@@ -338,7 +338,7 @@ def _with_agents(certificate: Certificate, agents: Agents, chains: Chains, run: 
             chains.states,
         )
     except NoCertificate as error:
-        raise ParameterError(f"agents: {error}; ask for a smaller decay or a lower order") from None
+        raise ParameterError("agents", f"{error}; ask for a smaller decay or a lower order") from None
     part = with_phases(part) if isinstance(part, AgentsPart) else part
     notes, cut_off, motion = [*certificate.notes, *chains.notes], list(certificate.cut_off), None
     if run and part.initial_state is not None:
@@ -393,9 +393,9 @@ def _family(graph: Any, orientation: str | None, uncertainty: Any, options: Mapp
     unset = {None, False, "best", ()}
     for name, value in options.items():
         if name not in _OF_FAMILIES and not _among(unset, value):
-            raise ParameterError(f"{name} is not for families of graphs yet; leave it out, or certify one graph")
+            raise ParameterError(name, "is not for families of graphs yet; leave it out, or certify one graph")
     if read_expectations(options["expectations"]).max_residual is not None:
-        raise ParameterError("max_residual: is asked of late messages, which families do not take yet; leave it out")
+        raise ParameterError("max_residual", "is asked of late messages, which families do not take yet; leave it out")
     return as_family(graph, orientation, uncertainty=uncertainty)
 
 
@@ -577,7 +577,11 @@ class Case:
             return None
         if any(self.sigma0 or ()):
             raise ParameterError(
-                "late messages ask for sigma(0) = 0, so that no sliding variable moves; leave sigma0 out"
+                (
+                    "late messages ask for sigma(0) = 0, so that no sliding variable moves; leave ",
+                    Change("sigma0"),
+                    " out",
+                )
             )
         return bound_late(self.structure, self.protocol, messages, self.initial_state, ends, self.request.leaders)
 

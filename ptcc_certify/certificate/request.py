@@ -15,7 +15,7 @@ import numpy as np
 from lmi.exact.numbers import MAX_SCALE_BITS
 from ptcc_certify.bounds.input.initial_set import read_initial_set
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
-from ptcc_certify.errors import NumberError, ParameterError, gated
+from ptcc_certify.errors import Change, NumberError, ParameterError, gated
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import as_state
 from ptcc_certify.graphs.rationals import as_fraction, shorten, writable
@@ -156,10 +156,10 @@ def refuse(
     """Refuse what does not fit together."""
     refuse_no_protocol(protocol)
     if not protocol.prescribed:
-        raise ParameterError("rho2 = 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
+        raise ParameterError("rho2", "= 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
     for name, value in sliding.items():
         if value is not None and not protocol.reaching:
-            raise ParameterError(f"{name} belongs to the sliding-mode protocol; leave it out or change the protocol")
+            raise ParameterError(name, "belongs to the sliding-mode protocol; leave it out or change the protocol")
     if method not in METHODS:
         raise ParameterError(f'method "{method}" is unknown; one of {", ".join(METHODS)}')
     if protocol.reaching and any(value is not None for value in nominal):
@@ -167,7 +167,7 @@ def refuse(
     _refuse_long(_distinct_weights(graph), graph.n_nodes, "the weights", lambda: f"edge {_longest_edge(graph)}")
 
 
-_NO_SET = "(--initial-bound) is not taken up here, bounds are from one initial state; leave it out, and give x0"
+_NO_SET = "is not taken up here, bounds are from one initial state; leave it out, and give x0"
 #: What is not certified beside late messages, and what to do instead.
 _NOT_LATE = {
     "initial_set": _NO_SET,
@@ -194,7 +194,7 @@ def refuse_beside(structure: Structure, protocol: Protocol, request: Request) ->
     """Refuse late messages and moving leaders where nothing could be certified, before anything is searched."""
     messages, leaders = request.messages, request.leaders
     if messages is None and request.expectations.max_residual is not None:
-        raise ParameterError("max_residual: is asked of late messages; tell how late they are, or leave it out")
+        raise ParameterError("max_residual", "is asked of late messages; tell how late they are, or leave it out")
     if messages is None and leaders is None:
         return
     refuse_together(messages, leaders)
@@ -210,21 +210,21 @@ def refuse_beside(structure: Structure, protocol: Protocol, request: Request) ->
         _refuse_messages(structure, messages, [limit.gain_cap for limit in request.limits])
     if structure.graph.n_edges == 0:
         name, why = ("leaders", "nobody tracks") if messages is None else ("messages", "nothing is late")
-        raise ParameterError(f"{name}: nobody listens to anybody, so {why}; leave it out")
+        raise ParameterError(name, f"nobody listens to anybody, so {why}; leave it out")
 
 
 def _refuse_more(refused: Mapping[str, str], request: Request) -> None:
     """Refuse limits of the gain, noise and disturbances of which nothing is certified beside."""
     for name, mend in refused.items():
         if any(getattr(one, name, None) is not None for one in (request, *request.limits)):
-            raise ParameterError(f"{name}{' ' if mend is _NO_SET else ': '}{mend}")
+            raise ParameterError(name, mend)
 
 
 def _refuse_messages(structure: Structure, messages: LateMessages, caps: Sequence[Fraction | None]) -> None:
     """Refuse late messages that do not fit the graph, or a cap of the gain that is another than theirs."""
     messages.latencies(structure.graph)
     if any(cap != messages.gain_cap for cap in caps):
-        raise ParameterError("gain_cap: limits and late messages have two; give both the same, or messages alone")
+        raise ParameterError("gain_cap", "limits and late messages have two; give both the same, or messages alone")
     if messages.value_error and messages.own_delay:
         raise ParameterError("values that are off are not certified where the own state is late; leave one of them out")
     if messages.value_error:
@@ -239,7 +239,7 @@ def read_request(structure: Structure, protocol: Protocol, arguments: Mapping[st
     """Return a request from the arguments of :func:`ptcc_certify.certify`, or refuse it."""
     if not isinstance(scenario := arguments["scenario"], Mapping | None):
         raise ParameterError(
-            f"scenario = {shorten(repr(scenario))} is none; give the mapping that tomllib.load returns"
+            "scenario", f"= {shorten(repr(scenario))} is none; give the mapping that tomllib.load returns"
         )
     return Request(
         method=arguments["method"],
@@ -260,7 +260,9 @@ def read_request(structure: Structure, protocol: Protocol, arguments: Mapping[st
 def listener(progress: Callable[..., None] | None) -> Callable[..., None]:
     """Return what is told how the work goes on; None: nobody is."""
     if progress is not None and not callable(progress):
-        raise ParameterError(f"progress = {shorten(repr(progress))} is no function; give print, say, or leave it out")
+        raise ParameterError(
+            "progress", f"= {shorten(repr(progress))} is no function; give print, say, or leave it out"
+        )
     return progress or (lambda *_: None)
 
 
@@ -275,9 +277,9 @@ def read_seconds(time_limit: Any, graph: Sized) -> float:
     try:
         seconds = float(60 + len(graph) // 1000 if time_limit is None else time_limit)
     except (TypeError, ValueError):
-        raise ParameterError(f"time_limit = {shorten(repr(time_limit))} is not a number of seconds") from None
+        raise ParameterError("time_limit", f"= {shorten(repr(time_limit))} is not a number of seconds") from None
     if not seconds > 0:
-        raise ParameterError(f"time_limit = {seconds} is outside its domain; it must be > 0, in seconds")
+        raise ParameterError("time_limit", f"= {seconds} is outside its domain; it must be > 0, in seconds")
     return seconds
 
 
@@ -292,14 +294,14 @@ def read_expectations(asked: Any) -> Expectations:
     if asked is None or isinstance(asked, str):
         return Expectations(asked)
     if not isinstance(asked, Expectations):
-        raise ParameterError(f"expectations = {shorten(repr(asked))} is none; give Expectations('stability'), say")
+        raise ParameterError("expectations", f"= {shorten(repr(asked))} is none; give Expectations('stability'), say")
     return asked
 
 
 def _one_of(kind: type, name: str, value: Any, example: str) -> Any:
     """Return what is of a kind, or None; refuse anything else."""
     if value is not None and not isinstance(value, kind):
-        raise ParameterError(f"{name} = {shorten(repr(value))} is none; give {kind.__name__}({example}), say")
+        raise ParameterError(name, f"= {shorten(repr(value))} is none; give {kind.__name__}({example}), say")
     return value
 
 
@@ -309,12 +311,21 @@ def _limits(entry: Any, protocol: Protocol) -> GainLimits:
         raise ParameterError(f"limits holds {shorten(repr(entry))}; give GainLimits(gain_cap=50), say")
     limits = GainLimits(entry.gain_cap, entry.stop_before, entry.sample_period)
     if limits.ideal:
-        raise ParameterError("limits that limit nothing; give gain_cap, stop_before or sample_period")
+        raise ParameterError(
+            (
+                "limits that limit nothing; give ",
+                *(Change("gain_cap"), ", ", Change("stop_before"), " or ", Change("sample_period")),
+            )
+        )
     T = protocol.T
     if limits.stop_before is not None and limits.stop_before >= T:
-        raise ParameterError(f"stop_before = {float(limits.stop_before):.6g} is not below the deadline {float(T):.6g}")
+        raise ParameterError(
+            "stop_before", f"= {float(limits.stop_before):.6g} is not below the deadline {float(T):.6g}"
+        )
     if limits.sample_period is not None and limits.sample_period > T:
-        raise ParameterError(f"sample_period = {float(limits.sample_period):.6g} is beyond the deadline {float(T):.6g}")
+        raise ParameterError(
+            "sample_period", f"= {float(limits.sample_period):.6g} is beyond the deadline {float(T):.6g}"
+        )
     return limits
 
 
@@ -381,10 +392,11 @@ def _instant(at: Any, protocol: Protocol) -> Fraction:
     try:
         instant = as_fraction(at, "at")
     except NumberError as error:
-        raise ParameterError(f"at: {error}") from None
+        raise ParameterError("at", f"{error}") from None
     if not 0 <= instant < protocol.T:
         raise ParameterError(
-            f"at = {float(instant):.12g} is not an instant before the deadline {float(protocol.T):.12g}; "
-            "give one from 0 on and below it"
+            "at",
+            f"= {float(instant):.12g} is not an instant before the deadline {float(protocol.T):.12g}; "
+            "give one from 0 on and below it",
         )
     return instant

@@ -25,10 +25,10 @@ from ptcc_certify.bounds.late_messages import LateBounds
 from ptcc_certify.bounds.tracking import Tracking
 from ptcc_certify.certificate.agents_answer import AgentsAnswer
 from ptcc_certify.certificate.certificate_data import Content
-from ptcc_certify.certificate.facts import Change, Sentence, joined
 from ptcc_certify.certificate.family_content import FamilyContent
 from ptcc_certify.certificate.restricted_bounds import deviation_of_signal
 from ptcc_certify.checker.input_formulas import InitialSet, root_above
+from ptcc_certify.errors import Change, Sentence, joined
 from ptcc_certify.lyapunov.search import USEFUL
 
 #: The share of the time that is left where the bound is judged.

@@ -18,11 +18,11 @@ from ptcc_certify.certificate.answer import (
     verdict_of,
 )
 from ptcc_certify.certificate.certificate_data import Content
-from ptcc_certify.certificate.facts import Change, Sentence
 from ptcc_certify.certificate.family_content import FamilyContent
 from ptcc_certify.certificate.judgements import judge, judge_family
 from ptcc_certify.certificate.usefulness import Use, use_of, use_of_family
 from ptcc_certify.checker import CheckReport
+from ptcc_certify.errors import Change, Sentence
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 
 #: Steps of :func:`certify` without which there may be a rate; the time limit may end the others, which seek one.

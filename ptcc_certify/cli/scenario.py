@@ -9,7 +9,6 @@ from __future__ import annotations
 import csv
 import io
 import os
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,7 +33,13 @@ BESIDE = ("delay", "period", "packet_loss", "quantisation", "own_delay", "leader
 #: Where the context of its command is kept.
 COMMAND = "ptcc_certify.command"
 #: What the library calls some options.
-IN_LIBRARY = {"initial_state": "x0", "initial": "x0", "behaviour": "expect", "speed": "leader_speed"}
+IN_LIBRARY = {
+    "initial_state": "x0",
+    "initial": "x0",
+    "behaviour": "expect",
+    "speed": "leader_speed",
+    "initial_set": "initial_bound",
+}
 
 #: The sections: what they are about, and of each key the option that it stands for, and an example of its value.
 SECTIONS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
@@ -484,12 +489,12 @@ def placed(context: click.Context, error: PTCCError | click.BadParameter) -> Exc
     if isinstance(error, click.BadParameter):
         option, text = (error.param.name if error.param else None) or "", error.message
     else:
-        text = str(error)
-        match = re.match(r"(?:--)?([A-Za-z][\w-]*)(: | = | )", text)
-        option = match[1].replace("-", "_") if match else ""
+        text, option = str(error), error.field if isinstance(error, ParameterError) else ""
         option = IN_LIBRARY.get(option, option)
-        if match and match[0].startswith("--"):
-            text = text[match.end() :]
+        if text.startswith("--"):  # of a command itself
+            flag, _, text = text.partition(" ")
+            option = flag.strip("-:").replace("-", "_")
+            text = text.removeprefix("= ")
     if context.meta[COMMAND].get_parameter_source(option) is ParameterSource.DEFAULT_MAP:
         return ParameterError(f"{scenario.place(option)}: {text}")
     return error

@@ -22,7 +22,8 @@ import click
 from ptcc_certify.errors import ParameterError, PTCCError, one_line
 
 if TYPE_CHECKING:
-    from ptcc_certify.certificate.facts import Change, Fact, Sentence
+    from ptcc_certify.certificate.facts import Fact
+    from ptcc_certify.errors import Change, Sentence
 
 #: What figures are written as; :mod:`ptcc_certify.report.plots.style` has them too.
 FIGURES = (".png", ".pdf", ".svg")
@@ -75,7 +76,7 @@ def flagged(change: Change) -> str:
 
     Examples
     --------
-    >>> from ptcc_certify.certificate.facts import Change
+    >>> from ptcc_certify.errors import Change
     >>> flagged(Change("rho2", "0.5")), flagged(Change("time_limit"))
     ('--rho2 0.5', '--time-limit')
     """
@@ -84,7 +85,7 @@ def flagged(change: Change) -> str:
 
 def in_flags(sentence: Sentence) -> str:
     """Return a sentence as one line, its changes named as options."""
-    from ptcc_certify.certificate.facts import spell
+    from ptcc_certify.errors import spell
 
     return one_line(spell(sentence, flagged))
 

@@ -60,8 +60,9 @@ give 2 or more
         if self.sign_gain is not None and self.sign_gain < self.total:
             total = near(self.total)
             raise ParameterError(
-                f"sign_gain = {near(self.sign_gain)} is below speed + disturbance = {total}, which pushes "
-                f"followers off; give {total} or more"
+                "sign_gain",
+                f"= {near(self.sign_gain)} is below speed + disturbance = {total}, which pushes "
+                f"followers off; give {total} or more",
             )
 
     @property
@@ -88,8 +89,8 @@ out
     if messages is None or leaders is None:
         return
     if leaders.sign_gain is not None:
-        raise ParameterError("sign_gain: nothing is proved of a sign term where messages are late; leave it out")
+        raise ParameterError("sign_gain", "nothing is proved of a sign term where messages are late; leave it out")
     if messages.own_delay:
         raise ParameterError(
-            "own_delay: an own state that is late is certified of leaders at rest alone; leave one of the two out"
+            "own_delay", "an own state that is late is certified of leaders at rest alone; leave one of the two out"
         )

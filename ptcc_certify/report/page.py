@@ -22,12 +22,13 @@ import jinja2
 from markupsafe import Markup
 
 from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate
-from ptcc_certify.certificate.facts import Change, Fact, spell
+from ptcc_certify.certificate.facts import Fact
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.certificate.family_comparison import compare
 from ptcc_certify.certificate.restricted_bounds import nearer_for_signal
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.obligations import VerifiedObligation
+from ptcc_certify.errors import Change, spell
 from ptcc_certify.graphs.io.graph_files import reading_flags
 from ptcc_certify.protocols.agents import plant_text
 from ptcc_certify.report import notation as texts

@@ -8,8 +8,8 @@ from itertools import dropwhile, takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ptcc_certify.certificate.facts import Fact, Spelling, spell
-from ptcc_certify.errors import PTCCError
+from ptcc_certify.certificate.facts import Fact
+from ptcc_certify.errors import PTCCError, Spelling, spell
 from ptcc_certify.report.facts import facts_of
 from ptcc_certify.report.facts.claim import WHATEVER
 from ptcc_certify.report.text_layout import TEXT, columns, format_lines, wrap_lines

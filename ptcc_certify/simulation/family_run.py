@@ -251,7 +251,7 @@ def simulate_family(
     refuse_no_protocol(protocol)
     for name, value in (("sigma0", sigma0), ("disturbance", disturbance)):
         if value is not None and protocol.reaching is None:
-            raise ParameterError(f"{name} belongs to the sliding-mode protocol; leave it out or change the protocol")
+            raise ParameterError(name, "belongs to the sliding-mode protocol; leave it out or change the protocol")
     x = _one_state(x0, family, "x0")
     played = as_signal(signal)
     if times is None:

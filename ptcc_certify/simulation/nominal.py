@@ -132,7 +132,7 @@ def as_forcing(
     """
     if disturbance is not None and delta is None:
         raise ParameterError(
-            "disturbance belongs to the sliding-mode protocol; under the nominal protocol give its bound delta too"
+            "disturbance", "belongs to the sliding-mode protocol; under the nominal protocol give its bound delta too"
         )
     if noise is not None and noise_bound is None:
         raise ParameterError("noise needs a bound; give noise_bound too")
@@ -141,7 +141,7 @@ def as_forcing(
     # Telegraph signals of the two differ by their seeds.
     for seed, (name, value, bound_name, bound) in enumerate(signals):
         if value is None and bound is not None:
-            raise ParameterError(f"{bound_name} is the bound of a {name}; give the {name} too, or leave it out")
+            raise ParameterError(bound_name, f"is the bound of a {name}; give the {name} too, or leave it out")
         limit = parameter(bound_name, 0 if bound is None else bound, zero_allowed=True)
         source = as_disturbance("none" if value is None else value, graph.n_nodes, limit, until, seed)
         if not isinstance(source, ExpressionDisturbance | SampledDisturbance):
@@ -149,7 +149,7 @@ def as_forcing(
             raise ParameterError(f"{name} ({shorten(source.text)}) reads the states or sliding variables; {domain}")
         source.check(limit, graph.labels, until)
         if source.breaks(until).size > MAX_JUMPS:
-            raise ParameterError(f"{name} has more than {MAX_JUMPS:,} samples until t = {until:.6g}; give fewer")
+            raise ParameterError(name, f"has more than {MAX_JUMPS:,} samples until t = {until:.6g}; give fewer")
         sources.append(source)
         bounds.append(limit)
         if value is not None:

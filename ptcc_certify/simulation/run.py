@@ -176,13 +176,13 @@ def simulate(
         other, foreign = "nominal", {"actuator": actuator, "delta": delta, "noise": noise, "noise_bound": noise_bound}
     for name, value in foreign.items():
         if value is not None:
-            raise ParameterError(f"{name} belongs to the {other} protocol; leave it out or change the protocol")
+            raise ParameterError(name, f"belongs to the {other} protocol; leave it out or change the protocol")
     if protocol.reaching is not None and (initial_state.ndim > 1 or (manifold is not None and manifold.ndim > 1)):
         raise ParameterError(
             "the sliding mode is simulated from one initial state at a time; give N numbers x0 and sigma0"
         )
     if actuator is not None and not isinstance(actuator, GainLimits):
-        raise ParameterError(f"actuator = {shorten(repr(actuator))} is none; give GainLimits(gain_cap=50), say")
+        raise ParameterError("actuator", f"= {shorten(repr(actuator))} is none; give GainLimits(gain_cap=50), say")
     if boundary_layer is not None:
         boundary_layer = number_within(boundary_layer, "boundary_layer", 1e-12, 1e12)
     if times is None:
@@ -231,7 +231,7 @@ def simulate_formation(graph: Any, protocol: Protocol, x0: Any, offsets: Any, **
     graph = as_graph(graph, options.pop("orientation", None))
     rows, places = as_states(x0, graph, "x0"), as_states(offsets, graph, "offsets")
     if len(rows[0]) != len(places[0]):
-        raise ParameterError(f"offsets has {len(places[0])} numbers for each agent, x0 has {len(rows[0])}")
+        raise ParameterError("offsets", f"has {len(places[0])} numbers for each agent, x0 has {len(rows[0])}")
     less = [[x - h for x, h in zip(*pair, strict=True)] for pair in zip(rows, places, strict=True)]
     return replace(simulate(graph, protocol, less, **options), offsets=_floats(places, graph, "offsets"))
 
@@ -253,7 +253,7 @@ def _refuse_beside(
             )
             raise ParameterError(f"{what}: is not simulated with {name}{mend}")
     if sigma0 is not None and _floats(sigma0, graph, "sigma0").any():
-        raise ParameterError(f"sigma0: {name} ask for sigma(0) = 0, so that no sliding variable moves; leave it out")
+        raise ParameterError("sigma0", f"{name} ask for sigma(0) = 0, so that no sliding variable moves; leave it out")
 
 
 def _floats(values: Any, graph: SignedDigraph, name: str) -> np.ndarray:

@@ -237,7 +237,7 @@ class Trajectory(ByValue, Shown):
         """
         there = ["states", "input", "error"] + ["sigma", "disturbance"] * (self.sliding is not None)
         if what not in there:
-            raise ParameterError(f"what = {shorten(repr(what))} is unknown; one of {', '.join(there)}")
+            raise ParameterError("what", f"= {shorten(repr(what))} is unknown; one of {', '.join(there)}")
         pandas, columns = import_pandas(), list(self.labels)
         names: Any = pandas.Index(columns, name="node")
         if self.states.ndim == 3:

@@ -15,12 +15,11 @@ from scipy.linalg import expm
 
 from ptcc_certify.certificate.answer import MET, OPEN, REFUTED
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
-from ptcc_certify.certificate.facts import Change, spell
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.checker import check
 from ptcc_certify.checker.input_formulas import InitialSet
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.errors import Change, ParameterError, spell
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.agents import Agents

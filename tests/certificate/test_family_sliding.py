@@ -14,13 +14,12 @@ from scipy.integrate import quad
 from selection import thinned
 
 from ptcc_certify.certificate.certificate import read_certificate
-from ptcc_certify.certificate.facts import Change, spell
 from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate, certify_family
 from ptcc_certify.certificate.family_comparison import compare, functions_of, worst_case_signals
 from ptcc_certify.checker import check, digest
 from ptcc_certify.checker.family_sliding import Drive, drive_sizes
 from ptcc_certify.checker.input_formulas import root_above
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.errors import Change, ParameterError, spell
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.follower_function import follower_functions

@@ -30,8 +30,8 @@ from ptcc_certify import (
 from ptcc_certify.bounds.input.initial_set import initial_set_within
 from ptcc_certify.certificate.answer import exit_code, worst_code
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.facts import Change
 from ptcc_certify.certificate.usefulness import LAST
+from ptcc_certify.errors import Change
 from ptcc_certify.examples import load_graph
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.screen import certificate_lines

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lmi.exact.decimal_rounding import down, near, up
-from ptcc_certify.certificate.facts import Change, Fact, Facts, Sentence, Standing, joined
+from ptcc_certify.certificate.facts import Fact, Facts, Standing
+from ptcc_certify.errors import Change, Sentence, joined
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
 from ptcc_certify.report.facts.input import limits_text

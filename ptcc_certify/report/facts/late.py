@@ -11,7 +11,8 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import down, float_up, near, up
 from ptcc_certify.bounds.small_delays import delay_threshold
-from ptcc_certify.certificate.facts import Change, Fact, Facts
+from ptcc_certify.certificate.facts import Fact, Facts
+from ptcc_certify.errors import Change
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.report.text_layout import shorten_label, shorten_list
 

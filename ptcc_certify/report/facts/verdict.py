@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from lmi.exact.decimal_rounding import near
 from ptcc_certify.certificate.answer import CERTIFIED, rejects
-from ptcc_certify.certificate.facts import Change, Fact, Facts, Sentence
+from ptcc_certify.certificate.facts import Fact, Facts
+from ptcc_certify.errors import Change, Sentence
 from ptcc_certify.report.facts.input import initial_states_text
 from ptcc_certify.report.text_layout import arithmetic
 
