@@ -21,14 +21,14 @@ from ptcc_certify.certificate.answer import CERTIFIED, rejects
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.certificate.request import refuse
-from ptcc_certify.errors import ParameterError, PTCCError, SimulationError
+from ptcc_certify.errors import ParameterError, PTCCError, SimulationError, spell
 from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io.packaged import GRAPHS
 from ptcc_certify.graphs.size_limits import EXPLORED_NODES
 from ptcc_certify.protocols.disturbance import as_disturbance
 from ptcc_certify.protocols.reaching_time import certified_reaching_times
-from ptcc_certify.report.explorer.facts import UNCHECKED, facts_of, run_of, without_flags
+from ptcc_certify.report.explorer.facts import UNCHECKED, facts_of, of_controls, run_of
 from ptcc_certify.report.explorer.panels import PANELS, draw_panels, message_figure, panel_svg, png, shown_in
 from ptcc_certify.report.explorer.question import Question
 from ptcc_certify.report.explorer.reproduction import command_of, python_of
@@ -73,7 +73,7 @@ class View:
         """The verdict line of ``certify``; before the check it says so."""
         if self.certificate is None:
             return self.refusal
-        return without_flags(self.certificate.assessment.text) if self.checked else UNCHECKED
+        return spell(self.certificate.assessment.sentence, of_controls) if self.checked else UNCHECKED
 
     @property
     def grade(self) -> str:

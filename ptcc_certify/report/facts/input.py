@@ -70,7 +70,8 @@ def _threshold_facts(certificate: Certificate, effort: Effort) -> Facts:
         text = f"rho2 kappa min Re lambda{below}, 1 is needed: raise rho2 * kappa{enough}"
     else:
         text = f"{product}, 1 is needed"
-    yield Fact(head="threshold", value=lower, side="down", note=text, detail=True)
+    told = None if effort.bounded is False or product not in text else lower
+    yield Fact(head="threshold", value=told, side="down", note=text, detail=True)
 
 
 def _size_facts(certificate: Certificate, effort: Effort) -> Facts:

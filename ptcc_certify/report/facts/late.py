@@ -32,11 +32,12 @@ def late_facts(certificate: Certificate) -> Facts:
     yield Fact(head="messages", note=messages_text(late.messages, certificate.protocol))
     if late.leaders is not None:
         yield Fact(head="leaders", note=leaders_text(late.leaders))
-    texts = [*_impossible(late), *([] if late.direct else _left(late)), *_stages(late), *_kept_off(late)]
+    left = [] if late.direct else _left(late)
+    texts = [*_impossible(late), *left, *_stages(late), *_kept_off(late)]
     if (at := certificate.at) is not None and (late.rows or late.steps or late.settling or late.lmi):
         texts.append(f"at t = {near(at)} every agent within {up(float(late.largest_bound([float(at)])[0]), 2)}")
-    size = None if math.isinf(late.largest) else late.largest
     for text in texts:
+        size = late.largest if text in left and not math.isinf(late.largest) else None
         yield Fact(head="late", value=size, side="up", note=text, loud=not late.says_something)
     from ptcc_certify.certificate.judgements import largest_late_input  # ``classify`` has no use for solvers
 
