@@ -118,10 +118,16 @@ class PTCCError(Exception):
 
     Parameters
     ----------
-    field : str, optional
-        The parameter, as Python names it, or the place that it is about.
+    *told : str, or tuple of str and Change
+        The field, if it is of one, and the reason: ``"= -1 is outside its domain; .."``, ``"belongs to .."``, or a
+        sentence.
+
+    Attributes
+    ----------
+    field : str
+        The parameter, as Python names it, or the place that it is about; empty if it is of none.
     reason : str, or tuple of str and Change
-        What is wrong, and how to mend it: ``"= -1 is outside its domain; .."``, ``"belongs to .."``, or a sentence.
+        What is wrong, and how to mend it.
 
     Examples
     --------
@@ -138,7 +144,13 @@ class PTCCError(Exception):
         super().__init__(self.told())
 
     def told(self, name: Spelling = str) -> str:
-        """Return the message, with fields as a medium names them."""
+        """Return the message, with fields as a medium names them.
+
+        Parameters
+        ----------
+        name : callable
+            Given a :class:`Change`, its name; by default the one in Python.
+        """
         reason = spell(self.reason, name)
         if not self.field:
             return reason
@@ -181,13 +193,6 @@ class FormatError(GraphError):
 
 class ParameterError(PTCCError, ValueError):
     r"""A protocol parameter, an initial state or an option is outside its domain.
-
-    Parameters
-    ----------
-    field : str, optional
-        The parameter, as Python names it.
-    reason : str, or tuple of str and Change
-        What is wrong, and how to mend it: ``"= -1 is outside its domain; .."``, ``"belongs to .."``, or a sentence.
 
     Examples
     --------

@@ -20,7 +20,7 @@ ROOMS = {
     ),
     "certificate": (
         "Certificates",
-        "certificate.certificate certificate.request certificate.verdict",
+        "certificate.certificate certificate.request certificate.answer certificate.facts",
     ),
     "checker": ("The independent check", "certificate.checking checker"),
     "bounds": (
