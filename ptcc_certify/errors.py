@@ -1,4 +1,4 @@
-"""Every exception this package raises on purpose, what is said of one that stops the work, and every exit code.
+"""Every exception this package raises on purpose, the changes it advises, and every exit code.
 
 Each class inherits :class:`PTCCError` and the built-in exception that fits, so that callers may catch either.
 A message is one line: what is wrong, where, and how to mend it.
@@ -7,8 +7,10 @@ A message is one line: what is wrong, where, and how to mend it.
 import inspect
 import traceback
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from difflib import get_close_matches
 from enum import IntEnum
+from fractions import Fraction
 from functools import wraps
 from itertools import islice
 from pathlib import Path
@@ -42,8 +44,90 @@ class ExitCode(IntEnum):
     """Ctrl-C, or SIGTERM."""
 
 
+@dataclass(frozen=True)
+class Change:
+    """Another value of a field, or the field alone.
+
+    Attributes
+    ----------
+    field : str
+        As Python names it.
+    value : Fraction, str or None
+
+    Examples
+    --------
+    >>> str(Change("rho2", Fraction(1, 2))), str(Change("time_limit"))
+    ('rho2=0.5', 'time_limit')
+    """
+
+    field: str
+    value: Fraction | str | None = None
+
+    @property
+    def number(self) -> str:
+        """The value in words; empty if there is none."""
+        if not isinstance(self.value, Fraction):
+            return self.value or ""
+        decimal = f"{float(self.value):.6g}"
+        return decimal if Fraction(decimal) == self.value else str(self.value)
+
+    def __str__(self) -> str:
+        return f"{self.field}={self.number}" if self.value is not None else self.field
+
+
+#: A sentence: a text, or texts and the changes that stand among them.
+Sentence = str | tuple[str | Change, ...]
+#: How a medium names a change.
+Spelling = Callable[[Change], str]
+
+
+def spell(sentence: Sentence, name: Spelling = str) -> str:
+    """Return a sentence as a text, its changes named as a medium names them.
+
+    Examples
+    --------
+    >>> spell(("no rate is proved; raise ", Change("time_limit"))), spell("proved")
+    ('no rate is proved; raise time_limit', 'proved')
+    """
+    parts = (sentence,) if isinstance(sentence, str) else sentence
+    return "".join(part if isinstance(part, str) else name(part) for part in parts)
+
+
+def joined(separator: str, sentences: Iterable[Sentence]) -> Sentence:
+    """Return sentences as one; those that are empty are left out.
+
+    Examples
+    --------
+    >>> joined("; ", ["certified", "", ("raise ", Change("rho2"))])
+    ('certified', '; ', 'raise ', Change(field='rho2', value=None))
+    """
+    parts: list[str | Change] = []
+    for sentence in sentences:
+        if sentence:
+            parts += [separator] if parts else []
+            parts += [sentence] if isinstance(sentence, str) else sentence
+    return tuple(parts)
+
+
+#: How a reason begins whose subject is the field.
+_PREDICATES = ("=", "is ", "has ", "acts ", "gives ", "belongs ")
+
+
 class PTCCError(Exception):
     """Root of all errors raised by ``ptcc_certify``.
+
+    Parameters
+    ----------
+    *told : str, or tuple of str and Change
+        The field, if it is of one, and the reason: ``"= -1 is outside its domain; .."``, ``"belongs to .."``, or a
+        sentence.
+
+    Attributes
+    ----------
+    field : str
+        The parameter, as Python names it, or the place that it is about; empty if it is of none.
+    reason : str, or tuple of str and Change
+        What is wrong, and how to mend it.
 
     Examples
     --------
@@ -53,6 +137,24 @@ class PTCCError(Exception):
     ...     print(type(error).__name__)
     ParameterError
     """
+
+    def __init__(self, *told: Sentence):
+        self.field = str(told[0]) if len(told) > 1 else ""
+        self.reason: Sentence = told[-1] if told else ""
+        super().__init__(self.told())
+
+    def told(self, name: Spelling = str) -> str:
+        """Return the message, with fields as a medium names them.
+
+        Parameters
+        ----------
+        name : callable
+            Given a :class:`Change`, its name; by default the one in Python.
+        """
+        reason = spell(self.reason, name)
+        if not self.field:
+            return reason
+        return f"{name(Change(self.field))}{' ' if reason.startswith(_PREDICATES) else ': '}{reason}"
 
 
 class NumberError(PTCCError, ValueError):
@@ -90,13 +192,17 @@ class FormatError(GraphError):
 
 
 class ParameterError(PTCCError, ValueError):
-    """A protocol parameter, an initial state or an option is outside its domain.
+    r"""A protocol parameter, an initial state or an option is outside its domain.
 
     Examples
     --------
     >>> NominalProtocol(T=-1, rho1=1, rho2=1, kappa=1)
     Traceback (most recent call last):
     ptcc_certify.errors.ParameterError: T = -1 is outside its domain; T must be > 0
+    >>> error = ParameterError("rest", ("is for an unlimited gain; leave ", Change("gain_cap"), " out"))
+    >>> print(error, error.told(lambda change: f"--{change.field}"), sep="\n")
+    rest is for an unlimited gain; leave gain_cap out
+    --rest is for an unlimited gain; leave --gain_cap out
     """
 
 

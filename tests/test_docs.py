@@ -56,7 +56,7 @@ IN_ROOMS = {
     "bounds.input.effort": ("Effort",),
     "bounds.input.initial_set": ("initial_set_within",),
     "bounds.input.worst_initial_state": ("WorstInitialState",),
-    "certificate.verdict": ("Assessment",),
+    "certificate.answer": ("Assessment",),
     "certificate.certificate": ("RejectedCertificate",),
     "checker": ("CheckReport",),
     "checker.input_formulas": ("InitialSet",),

@@ -21,7 +21,7 @@ ROOMS = {
     "model": ("What is asked of what", "model.case model.asks model.initial_state"),
     "certificate": (
         "Certificates",
-        "certificate.certificate certificate.verdict",
+        "certificate.certificate certificate.answer certificate.facts",
     ),
     "checker": ("The independent check", "certificate.checking checker"),
     "bounds": (

@@ -124,7 +124,7 @@ class Settings:
             try:
                 values["expect"] = behaviour_name(self.expect)
             except ValueError as error:
-                raise ParameterError(f"expect: {error}") from None
+                raise ParameterError("expect", f"{error}") from None
         vars(self).update(values)
 
     def to_dict(self) -> dict[str, Any]:
@@ -153,7 +153,7 @@ def _as_initial_state(initial_state: StateLike, name: str) -> StateLike:
     try:
         _plain(initial_state)
     except NumberError as error:
-        raise ParameterError(f"{name}: {error}") from None
+        raise ParameterError(name, f"{error}") from None
     return initial_state
 
 

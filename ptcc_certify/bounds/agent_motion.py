@@ -85,7 +85,7 @@ def decay_integral(w: Fraction, p: Fraction) -> Interval:
     """
     if abs(w) > LARGEST_DECAY:
         raise ParameterError(
-            f"rest: (a_2 + rest rho1) T = {float(w):.4g} is beyond {LARGEST_DECAY}; take a smaller rest, or rho1"
+            "rest", f"(a_2 + rest rho1) T = {float(w):.4g} is beyond {LARGEST_DECAY}; take a smaller rest, or rho1"
         )
     term, total = 1 / (p + 1), Fraction(0)
     for j in range(MOST_TERMS):

@@ -72,10 +72,10 @@ def _within(values: Any, name: str, most: float, domain: str) -> np.ndarray:
             raise TypeError("truth values and texts are no numbers")
         array = entries.astype(float)
     except (TypeError, ValueError):
-        raise ParameterError(f"{name} = {shorten(repr(values))} is not a number, nor an array of numbers") from None
+        raise ParameterError(name, f"= {shorten(repr(values))} is not a number, nor an array of numbers") from None
     outside = array[~((array >= 0) & (array <= most))]  # NaN is neither
     if outside.size:
-        raise ParameterError(f"{name} = {outside.flat[0]:.12g} is outside its domain; {domain}")
+        raise ParameterError(name, f"= {outside.flat[0]:.12g} is outside its domain; {domain}")
     return array
 
 

@@ -123,7 +123,7 @@ def formation_of_biases(graph: Any, biases: Any) -> Biases:
     """
     graph = as_graph(graph)
     if graph.n_nodes > MOST_NODES:
-        raise ParameterError(f"biases: exact places are found for up to {MOST_NODES} agents; give offsets instead")
+        raise ParameterError("biases", f"exact places are found for up to {MOST_NODES} agents; give offsets instead")
     rows = [list(map(Fraction, row)) for row in as_states(biases, graph, "biases")]
     who, d = influence(analyse(graph), exact=True), len(rows[0])
     columns = [[row[q] for row in rows] for q in range(d)]

@@ -23,7 +23,7 @@ from ptcc_certify.bounds.section_numbers import fractions
 from ptcc_certify.certificate.answer import MET, OPEN, REFUTED, Answer
 from ptcc_certify.checker.agent_bounds import AgentsInput, UsedSection
 from ptcc_certify.checker.side_files import Numbers
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.errors import Change, ParameterError, Sentence
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.protocols.agents_protocol import AgentsProtocol
@@ -223,7 +223,7 @@ class AgentsAnswer(ABC):
 
     @property
     @abstractmethod
-    def unbounded(self) -> tuple[tuple[str, str], ...]:
+    def unbounded(self) -> tuple[tuple[str, Change], ...]:
         """What leaves the input without a bound, and what mends it; empty where nothing does."""
 
     @property
@@ -233,7 +233,7 @@ class AgentsAnswer(ABC):
 
     @property
     @abstractmethod
-    def nearer(self) -> str:
+    def nearer(self) -> Sentence:
         """What leaves less by ``T``."""
 
     @property

@@ -43,6 +43,7 @@ from ptcc_certify.checker.agent_bounds import ResidualSection, UsedSection
 from ptcc_certify.checker.agent_decrease import PhaseSection
 from ptcc_certify.checker.agents import AgentsSection
 from ptcc_certify.checker.input_formulas import Limits, decay_above
+from ptcc_certify.errors import Change, Sentence
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.protocols import Protocol
@@ -118,7 +119,7 @@ class AgentsPart(AgentsAnswer):
         return self.structure.graph.n_edges == 0 or (bool(self.functions) and self.protocol.gain_cap is None)
 
     @property
-    def unbounded(self) -> tuple[tuple[str, str], ...]:
+    def unbounded(self) -> tuple[tuple[str, Change], ...]:
         """What leaves the input without a bound, and what mends it; empty where nothing does.
 
         The deviations' part is ``eta^n e^(-r s/2)`` of what it is at 0; that of the common velocity at rest
@@ -130,14 +131,14 @@ class AgentsPart(AgentsAnswer):
         found = []
         if self.decay < 2 * n and n == 1 and self.matrix.gains == (1,):  # the paper's: its decay follows from its rate
             k, kappa = self.protocol.gain.pole, self.protocol.base.kappa
-            mend = f"--rho2 {up(2 / (self.matrix.rate * kappa), 4)}"
+            mend = Change("rho2", up(2 / (self.matrix.rate * kappa), 4))
             found.append((f"rate {down(self.matrix.rate)} is below 2/(rho2 kappa) = {up(2 / k, 4)}", mend))
         elif self.decay < 2 * n:
-            found.append((f"decay {down(self.decay)} is below 2 n = {2 * n}", f"--decay {2 * n}"))
+            found.append((f"decay {down(self.decay)} is below 2 n = {2 * n}", Change("decay", str(2 * n))))
         if any(self.protocol.own):
             alpha, least = self.protocol.own[1], self.least_rest
             if alpha < least:
-                found.append((f"rest {down(alpha)} is below {up(least, 4)}", f"--rest {up(least, 4)}"))
+                found.append((f"rest {down(alpha)} is below {up(least, 4)}", Change("rest", up(least, 4))))
         return tuple(found)
 
     @cached_property
@@ -217,9 +218,9 @@ class AgentsPart(AgentsAnswer):
         return math.exp(-float(self.matrix.rate) * float(self.protocol.clock(np.array([remaining]))[0]) / 2)
 
     @property
-    def nearer(self) -> str:
+    def nearer(self) -> Sentence:
         """What leaves less by ``T``."""
-        return f"a larger --decay, such as {2 * math.ceil(self.decay)}, leaves less"
+        return "a larger ", Change("decay"), f", such as {2 * math.ceil(self.decay)}, leaves less"
 
     @property
     def in_place(self) -> bool:

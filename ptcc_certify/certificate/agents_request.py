@@ -120,9 +120,11 @@ def read_chains(agents: Agents, graph: SignedDigraph, gain: Gain, initial: Initi
     """
     n, x0, v0, derivatives = agents.degree, initial.x0, initial.v0, initial.derivatives
     if v0 is not None and derivatives is not None:
-        raise ParameterError("v0 is the first of derivatives; give one of them")
+        raise ParameterError("v0", "is the first of derivatives; give one of them")
     if isinstance(derivatives, str) or not isinstance(derivatives, Iterable | None):
-        raise ParameterError(f"derivatives = {shorten(repr(derivatives))} is no list; give [v0], or [v0, a0] and so on")
+        raise ParameterError(
+            "derivatives", f"= {shorten(repr(derivatives))} is no list; give [v0], or [v0, a0] and so on"
+        )
     given = [v0] if derivatives is None else list(derivatives)
     given = [None if isinstance(one, str) and one.strip() == "0" else one for one in given]
     if any(one is not None for one in given[n - 1 :]):
@@ -138,7 +140,7 @@ def read_chains(agents: Agents, graph: SignedDigraph, gain: Gain, initial: Initi
     positions = _states(x0, graph, "x0")
     d = len(positions[0])
     if d > MOST_DIMENSION:
-        raise ParameterError(f"x0 has {d} numbers for each agent; space has at most {MOST_DIMENSION} coordinates")
+        raise ParameterError("x0", f"has {d} numbers for each agent; space has at most {MOST_DIMENSION} coordinates")
     columns, notes = [positions], []
     for i in range(1, n):
         value = given[i - 1] if i <= len(given) else None
@@ -168,7 +170,7 @@ def _states(values: Any, graph: SignedDigraph, name: str, dimension: int | None 
         rows = as_states(values, graph, name)
     if dimension is not None and len(rows[0]) != dimension:
         raise ParameterError(
-            f"{name} has {len(rows[0])} numbers for each agent, x0 has {dimension}: give {graph.n_nodes} x {dimension}"
+            name, f"has {len(rows[0])} numbers for each agent, x0 has {dimension}: give {graph.n_nodes} x {dimension}"
         )
     for label, row in zip(graph.labels, rows, strict=True):
         if not all(map(writable, row)):

@@ -38,7 +38,7 @@ from ptcc_certify.certificate.agents_answer import (
     used_of,
 )
 from ptcc_certify.checker.agent_cascade import CascadeSection, TrackedSection
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.errors import Change, ParameterError, Sentence
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.protocols import Protocol
@@ -114,20 +114,20 @@ class CascadePart(AgentsAnswer):
         return not self.structure.graph.n_edges or self.best * self.protocol.gain.pole > 2
 
     @property
-    def unbounded(self) -> tuple[tuple[str, str], ...]:
+    def unbounded(self) -> tuple[tuple[str, Change], ...]:
         """What leaves the input without a bound, and what mends it; empty where nothing does."""
         k, best, found = self.protocol.gain.pole, self.best, []
         if not self.functions or any(input_is_bounded(k, V.proved_rate, self.alpha) for V in self.functions):
             return ()
         if best * k < 4:
             rho2 = up(4 / (best * self.protocol.base.kappa), 4)
-            found.append((f"rate {down(best)} is below 4/(rho2 kappa) = {up(4 / k, 4)}", f"--rho2 {rho2}"))
+            found.append((f"rate {down(best)} is below 4/(rho2 kappa) = {up(4 / k, 4)}", Change("rho2", rho2)))
             k = Fraction(rho2) * self.protocol.base.kappa
         if not input_is_bounded(k, best, self.alpha):
             least = up(1 / k, 4)
             mend = least if input_is_bounded(k, best, Fraction(least)) else up(2 / k, 4)
             limit = f"below 1/(rho2 kappa) = {least}" if self.alpha * k < 1 else "just 1/(rho2 kappa), as is rate/4"
-            found.append((f"cascade {down(self.alpha)} is {limit}", f"--cascade {mend}"))
+            found.append((f"cascade {down(self.alpha)} is {limit}", Change("cascade", mend)))
         return tuple(found)
 
     @property
@@ -138,9 +138,9 @@ class CascadePart(AgentsAnswer):
         return Fraction(up(Fraction(3, 2) * max(4 / self.best, 1 / self.alpha) / self.protocol.base.kappa, 4))
 
     @property
-    def nearer(self) -> str:
+    def nearer(self) -> Sentence:
         """What leaves less by ``T``."""
-        return f"a larger --rho2, such as {up(2 * self.protocol.base.rho2, 4)}, leaves less"
+        return "a larger ", Change("rho2"), f", such as {up(2 * self.protocol.base.rho2, 4)}, leaves less"
 
     @property
     def in_place(self) -> bool:
@@ -278,8 +278,9 @@ def prove_cascade(
     falls = base.gain.rho1 * base.gain.T
     if agents.alpha * falls > LARGEST_DECAY:
         raise ParameterError(
-            f"cascade = {near(agents.alpha)} is too large to enclose the common motion: beyond "
-            f"{LARGEST_DECAY}/(rho1 T); take at most {down(LARGEST_DECAY / falls, 4)}"
+            "cascade",
+            f"= {near(agents.alpha)} is too large to enclose the common motion: beyond "
+            f"{LARGEST_DECAY}/(rho1 T); take at most {down(LARGEST_DECAY / falls, 4)}",
         )
     numbers = [k for k, V in enumerate(functions) if V.proved_rate > 0]
     used = tuple(functions[k] for k in numbers)

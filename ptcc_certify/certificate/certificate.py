@@ -17,13 +17,14 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 
 from lmi.exact.decimal_rounding import down
-from ptcc_certify.certificate.answer import rejection, rejects
+from ptcc_certify.certificate.answer import Assessment, rejection, rejects, verdict_of
 from ptcc_certify.certificate.certificate_data import Content, Source
 from ptcc_certify.certificate.certificate_file import FromFile, bytes_of, text_of, write_certificate
 from ptcc_certify.certificate.checking import read_and_check, refuse_no_certificate
 from ptcc_certify.certificate.document import certificate_document, read_document
+from ptcc_certify.certificate.facts import Fact
 from ptcc_certify.certificate.section_writer import read_side_files
-from ptcc_certify.certificate.verdict import Assessment, assess, verdict_of
+from ptcc_certify.certificate.verdict import assess
 from ptcc_certify.checker import CheckReport, VerifiedObligation
 from ptcc_certify.errors import FormatError, PTCCError, gated
 from ptcc_certify.graphs.io.files import refuse_no_path
@@ -272,8 +273,20 @@ class Certificate(Content, FromFile, Shown):
 
     def summary(self) -> str:
         """Return what ``ptcc certify`` prints of it."""
-        origins = self.request.origins
-        return "\n".join(rendered("screen.summary_lines", self, origins.get("graph", "graph"), origins))
+        return "\n".join(rendered("screen.summary_lines", self))
+
+    def facts(self) -> list[Fact]:
+        """Return everything that is told of it, as data: see :class:`~ptcc_certify.certificate.facts.Fact`.
+
+        Examples
+        --------
+        >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
+        >>> cert = certify(foes, NominalProtocol(T=1, rho1=1, rho2="0.1", kappa=1), [3, 5], asks=Asks(simulation=False))
+        >>> verdict = cert.facts()[-1]
+        >>> verdict.head, [str(change) for change in verdict.changes]
+        ('verdict', ['rho2=0.501'])
+        """
+        return rendered("facts.facts_of", self)  # type: ignore[no-any-return]
 
     def __eq__(self, other: object) -> bool:
         """Two certificates are equal when they claim and prove the same; what was observed does not count."""

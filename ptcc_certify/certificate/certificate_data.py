@@ -212,6 +212,26 @@ class Content:
     # ------------------------------------------------------------------ parts by their short names
 
     @property
+    def labels(self) -> Sequence[str]:
+        """The names of the agents."""
+        return self.structure.graph.labels
+
+    @property
+    def origins(self) -> Mapping[str, str]:
+        """What the graph is called, and where initial states come from."""
+        return self.request.origins
+
+    @property
+    def reading_notes(self) -> tuple[str, ...]:
+        """Which of :attr:`notes` are of how the graph was read."""
+        return ()
+
+    @property
+    def only_drawn(self) -> bool:
+        """Whether the question is of a set of initial states, and the one at hand drawn for the simulated run."""
+        return self.initial_set is not None and "x(0)" in self.request.origins
+
+    @property
     def graph(self) -> SignedDigraph:
         """The graph."""
         return self.structure.graph

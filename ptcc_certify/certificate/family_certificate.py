@@ -21,12 +21,12 @@ from lmi.exact.decimal_rounding import down
 from lmi.search_time import share_of_time
 from ptcc_certify.bounds.attracting_box import AttractingBox, box_of_family
 from ptcc_certify.bounds.kept_means import with_means
-from ptcc_certify.certificate.answer import rejection, rejects
+from ptcc_certify.certificate.answer import Assessment, rejection, rejects
 from ptcc_certify.certificate.certificate_file import FromFile, write_certificate
 from ptcc_certify.certificate.document import family_document
+from ptcc_certify.certificate.facts import Fact
 from ptcc_certify.certificate.family_content import ComponentProof, FamilyContent
 from ptcc_certify.certificate.family_table import family_table
-from ptcc_certify.certificate.family_verdict import assess_family
 from ptcc_certify.certificate.functions import ProvedFunction
 from ptcc_certify.certificate.request import (
     listener,
@@ -37,7 +37,7 @@ from ptcc_certify.certificate.request import (
 )
 from ptcc_certify.certificate.restricted_claims import RateClaim
 from ptcc_certify.certificate.restricted_search import STEP, claims_for, require_nominal
-from ptcc_certify.certificate.verdict import Assessment
+from ptcc_certify.certificate.verdict import assess
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.family import MANY_MODES
 from ptcc_certify.checker.family_rows import MANY_FUNCTIONS
@@ -125,12 +125,20 @@ class FamilyCertificate(FamilyContent, FromFile, Shown):
     @cached_property
     def assessment(self) -> Assessment:
         """The graded verdict: what became of what was asked, whether the bound is useful, and the exit code."""
-        return assess_family(self, self.checked)
+        return assess(self, self.checked)
 
     def summary(self) -> str:
         """Return what ``ptcc certify`` prints of it."""
-        origins = self.origins
-        return "\n".join(rendered("family_screen.family_summary", self, origins.get("graph", ""), origins))
+        return "\n".join(rendered("screen.summary_lines", self))
+
+    def facts(self) -> list[Fact]:
+        """Return everything that is told of it, as data: see :class:`~ptcc_certify.certificate.facts.Fact`."""
+        return rendered("facts.facts_of", self)  # type: ignore[no-any-return]
+
+    @property
+    def refused(self) -> bool:
+        """Whether the check does not accept the functions that were found: nothing that follows from them is told."""
+        return self.verdict != "certified" and any(part.functions for part in self.parts)
 
     @property
     def main_figure(self) -> str:
@@ -322,9 +330,9 @@ def certify_family(
     """
     refuse_no_protocol(protocol)
     if sigma0 is not None and protocol.reaching is None:
-        raise ParameterError("sigma0 belongs to the sliding-mode protocol; leave it out or change the protocol")
+        raise ParameterError("sigma0", "belongs to the sliding-mode protocol; leave it out or change the protocol")
     if not protocol.prescribed:
-        raise ParameterError("rho2 = 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
+        raise ParameterError("rho2", "= 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
     if len(family.modes) > MANY_MODES:
         mend = "put modes whose edges have the same signs into one, with intervals that hold them all; ptcc classify"
         raise ParameterError(

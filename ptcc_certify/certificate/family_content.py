@@ -5,11 +5,12 @@ Nothing here writes, reads or checks.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -41,7 +42,7 @@ from ptcc_certify.checker.family_bounds import deviations, ends_near, peaks
 from ptcc_certify.checker.family_function import Scaled
 from ptcc_certify.checker.family_limits import WeightedMean, limits
 from ptcc_certify.checker.family_sliding import Drive, last_time
-from ptcc_certify.checker.input_formulas import root_above
+from ptcc_certify.checker.input_formulas import Limits, root_above
 from ptcc_certify.checker.protocol import sliding_bounded, sliding_part
 from ptcc_certify.checker.reading import Interval
 from ptcc_certify.errors import ParameterError
@@ -173,6 +174,33 @@ class FamilyContent:
     restricted: tuple[Claim, ...] = ()
     boxes: Mapping[int, AttractingBox] = field(default_factory=dict)
     ranges: Mapping[int, tuple[Interval, ...]] = field(default_factory=dict)
+
+    # What a certificate of one graph may have beside that, and none of a family has.
+    agents = late = tracking = offsets = initial_set = noise = delta = trajectory = None
+    limits: ClassVar[tuple[Limits, ...]] = ()
+    cut_off: ClassVar[tuple[str, ...]] = ()
+    time_limit: ClassVar[float] = math.inf
+    only_drawn = leaders_move = violated = False
+
+    @property
+    def labels(self) -> Sequence[str]:
+        """The names of the agents."""
+        return self.family.labels
+
+    @property
+    def constant(self) -> bool:
+        """Whether no agent listens to another in any graph, so that there is no decay to certify."""
+        return all(part.component.nodes.size == 1 for part in self.parts)
+
+    @property
+    def reading_notes(self) -> tuple[str, ...]:
+        """Which of :attr:`notes` are of how the family was read."""
+        return self.family.notes
+
+    @property
+    def initial_positions(self) -> tuple[Fraction, ...] | None:
+        """Where agents begin."""
+        return self.initial_state
 
     @property
     def common(self) -> bool:

@@ -59,7 +59,7 @@ from ptcc_certify.certificate.request import (
 )
 from ptcc_certify.certificate.verdict import MANY_DECADES
 from ptcc_certify.checker.input_formulas import Limits
-from ptcc_certify.errors import HypothesisError, ParameterError, SimulationError, gated
+from ptcc_certify.errors import Change, HypothesisError, ParameterError, SimulationError, gated
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io import as_family, as_graph
@@ -280,7 +280,7 @@ def certify_case(
 def _refuse_before_reading(case: Case) -> None:
     """Refuse what is asked of agents of order n, velocities where there are none, and a graph that is none."""
     if case.agents is None and (case.initial.v0 is not None or case.initial.derivatives is not None):
-        raise ParameterError("v0: single integrators have no velocity to begin with; give agents=Agents(order=2)")
+        raise ParameterError("v0", "single integrators have no velocity to begin with; give agents=Agents(order=2)")
     others = case.agents is not None and not getattr(case.agents, "of_paper", False)
     if others and isinstance(case.protocol, Protocol):  # the paper's when their states are read
         refuse_agents(case)
@@ -321,7 +321,7 @@ def _with_agents(certificate: Certificate, agents: Agents, chains: Chains, run: 
             chains.states,
         )
     except NoCertificate as error:
-        raise ParameterError(f"agents: {error}; ask for a smaller decay or a lower order") from None
+        raise ParameterError("agents", f"{error}; ask for a smaller decay or a lower order") from None
     part = with_instants(with_phases(part)) if isinstance(part, AgentsPart) else part
     notes, cut_off, motion = [*certificate.notes, *chains.notes], list(certificate.cut_off), None
     if run and part.initial_state is not None:
@@ -541,7 +541,11 @@ class CertificateSearch:
             return None
         if any(self.sigma0 or ()):
             raise ParameterError(
-                "late messages ask for sigma(0) = 0, so that no sliding variable moves; leave sigma0 out"
+                (
+                    "late messages ask for sigma(0) = 0, so that no sliding variable moves; leave ",
+                    Change("sigma0"),
+                    " out",
+                )
             )
         return bound_late(self.structure, self.protocol, messages, self.initial_state, ends, self.request.leaders)
 

@@ -15,7 +15,7 @@ import numpy as np
 from lmi.exact.numbers import MAX_SCALE_BITS
 from ptcc_certify.bounds.input.initial_set import read_initial_set
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
-from ptcc_certify.errors import NumberError, ParameterError
+from ptcc_certify.errors import Change, NumberError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import as_state
 from ptcc_certify.graphs.rationals import as_fraction, shorten, writable
@@ -111,7 +111,7 @@ def read_request(
     """Return what is asked, read; or refuse it."""
     if not isinstance(scenario, Mapping | None):
         raise ParameterError(
-            f"scenario = {shorten(repr(scenario))} is none; give the mapping that tomllib.load returns"
+            "scenario", f"= {shorten(repr(scenario))} is none; give the mapping that tomllib.load returns"
         )
     asks, protocol = case.asks, case.protocol
     return Request(
@@ -134,7 +134,9 @@ def read_request(
 def listener(progress: Callable[..., None] | None) -> Callable[..., None]:
     """Return what is told how the work goes on; None: nobody is."""
     if progress is not None and not callable(progress):
-        raise ParameterError(f"progress = {shorten(repr(progress))} is no function; give print, say, or leave it out")
+        raise ParameterError(
+            "progress", f"= {shorten(repr(progress))} is no function; give print, say, or leave it out"
+        )
     return progress or (lambda *_: None)
 
 
@@ -149,9 +151,9 @@ def read_seconds(time_limit: Any, graph: Sized) -> float:
     try:
         seconds = float(60 + len(graph) // 1000 if time_limit is None else time_limit)
     except (TypeError, ValueError):
-        raise ParameterError(f"time_limit = {shorten(repr(time_limit))} is not a number of seconds") from None
+        raise ParameterError("time_limit", f"= {shorten(repr(time_limit))} is not a number of seconds") from None
     if not seconds > 0:
-        raise ParameterError(f"time_limit = {seconds} is outside its domain; it must be > 0, in seconds")
+        raise ParameterError("time_limit", f"= {seconds} is outside its domain; it must be > 0, in seconds")
     return seconds
 
 
@@ -161,12 +163,21 @@ def _limits(entry: Any, protocol: Protocol) -> GainLimits:
         raise ParameterError(f"limits holds {shorten(repr(entry))}; give GainLimits(gain_cap=50), say")
     limits = GainLimits(entry.gain_cap, entry.stop_before, entry.sample_period)
     if limits.ideal:
-        raise ParameterError("limits that limit nothing; give gain_cap, stop_before or sample_period")
+        raise ParameterError(
+            (
+                "limits that limit nothing; give ",
+                *(Change("gain_cap"), ", ", Change("stop_before"), " or ", Change("sample_period")),
+            )
+        )
     T = protocol.T
     if limits.stop_before is not None and limits.stop_before >= T:
-        raise ParameterError(f"stop_before = {float(limits.stop_before):.6g} is not below the deadline {float(T):.6g}")
+        raise ParameterError(
+            "stop_before", f"= {float(limits.stop_before):.6g} is not below the deadline {float(T):.6g}"
+        )
     if limits.sample_period is not None and limits.sample_period > T:
-        raise ParameterError(f"sample_period = {float(limits.sample_period):.6g} is beyond the deadline {float(T):.6g}")
+        raise ParameterError(
+            "sample_period", f"= {float(limits.sample_period):.6g} is beyond the deadline {float(T):.6g}"
+        )
     return limits
 
 
@@ -233,10 +244,11 @@ def _instant(at: Any, protocol: Protocol) -> Fraction:
     try:
         instant = as_fraction(at, "at")
     except NumberError as error:
-        raise ParameterError(f"at: {error}") from None
+        raise ParameterError("at", f"{error}") from None
     if not 0 <= instant < protocol.T:
         raise ParameterError(
-            f"at = {float(instant):.12g} is not an instant before the deadline {float(protocol.T):.12g}; "
-            "give one from 0 on and below it"
+            "at",
+            f"= {float(instant):.12g} is not an instant before the deadline {float(protocol.T):.12g}; "
+            "give one from 0 on and below it",
         )
     return instant

@@ -25,7 +25,7 @@ from ptcc_certify.certificate.restricted_claims import (
     WindowClaim,
 )
 from ptcc_certify.checker.restricted_signals import MANY_CLAIMS, agreed_bounds, reachable_bounds
-from ptcc_certify.errors import HypothesisError, ParameterError
+from ptcc_certify.errors import Change, HypothesisError, ParameterError
 from ptcc_certify.graphs.family import Mode
 from ptcc_certify.graphs.rationals import writable
 from ptcc_certify.graphs.size_limits import EXACT_NODES
@@ -58,8 +58,11 @@ def require_nominal(signal: SignalClass, protocol: Protocol) -> None:
     """Refuse restricted signals under the sliding-mode protocol; of constant ones it is said where agents end."""
     if signal not in ("any", "constant") and protocol.reaching is not None:
         raise ParameterError(
-            "restricted signals are certified under the nominal protocol; leave out signal (--signal, --dwell, "
-            "--clock-dwell, --clock-window, --share), or take the nominal protocol, NominalProtocol(..)"
+            (
+                "restricted signals are certified under the nominal protocol; leave out ",
+                Change("signal"),
+                ", or take the nominal protocol, NominalProtocol(..)",
+            )
         )
 
 

@@ -28,7 +28,7 @@ from ptcc_certify.cli.families import (
 )
 from ptcc_certify.cli.messages import leader_options, leaders_of, message_options, messages_of, refuse_unheard
 from ptcc_certify.cli.scenario import scenario_record
-from ptcc_certify.cli.terminal import LOG, Screen, print_json, progress, refuse_output, screen_options
+from ptcc_certify.cli.terminal import LOG, Screen, in_flags, print_json, progress, refuse_output, screen_options
 from ptcc_certify.errors import one_line
 from ptcc_certify.model.asks import Asks, Expectations
 from ptcc_certify.model.case import Case
@@ -98,7 +98,7 @@ def _certify_graph(
     """Certify what the protocol does on one graph."""
     from ptcc_certify.certificate.answer import rejects
     from ptcc_certify.certificate.procedure import STEPS, certify_case
-    from ptcc_certify.report.screen import certificate_lines, summary_lines
+    from ptcc_certify.report.facts import facts_of
 
     LOG.info("%s", one_line(f"read {graph}: {signed.n_nodes} nodes, {signed.n_edges} edges"))
     case, origins = _case_of(graph, signed, protocol, options), _origins(options)
@@ -114,10 +114,9 @@ def _certify_graph(
     if as_json:
         print_json(certificate.to_dict())
         if assessment.exit_code and not screen.quiet:
-            click.echo(f"verdict    {one_line(assessment.text)}", err=True)
+            click.echo(f"verdict    {in_flags(assessment.sentence)}", err=True)
         return assessment.exit_code
-    told = certificate, graph, origins
-    screen.show(lambda: summary_lines(*told), lambda: certificate_lines(*told))
+    screen.show(lambda details: facts_of(certificate, graph, origins, details))
     if output:
         screen.note(shared.written(certificate, output) if saved else shared.NOTHING_WRITTEN)
     return assessment.exit_code
@@ -165,4 +164,4 @@ def _log_result(certificate: Certificate) -> None:
         LOG.warning("cut off by the time limit of %g s: %s", certificate.time_limit, part)
     for note in certificate.notes:
         LOG.info("note: %s", one_line(note))
-    LOG.info("verdict %s; exit code %d", one_line(certificate.assessment.text), certificate.assessment.exit_code)
+    LOG.info("verdict %s; exit code %d", in_flags(certificate.assessment.sentence), certificate.assessment.exit_code)

@@ -75,10 +75,10 @@ def check(
         print_json(report.to_dict() | how)
     else:
         lines = [f"graph      {text}" for text in how.values() or _own_graph(document, report)]
-        screen.show(
-            lambda: wrap_lines(lines) + check_summary("" if stdlib else certificate, document, report),
-            lambda: lines + report.lines(),
-        )
+        if screen.verbose:
+            screen.lines(lines + report.lines())
+        elif not screen.quiet:
+            print_lines(*wrap_lines(lines), *check_summary("" if stdlib else certificate, document, report))
     if not report.accepted:
         return ExitCode.VIOLATED
     return ExitCode.OK if report.verdict == "certified" else ExitCode.UNDECIDED

@@ -28,7 +28,7 @@ def classify(graph: tuple[str, ...], expect: str | None, as_json: bool, screen: 
     """
     from ptcc_certify.graphs.family import Family
     from ptcc_certify.graphs.structure import analyse
-    from ptcc_certify.report.screen import structure_lines, structure_summary
+    from ptcc_certify.report.facts import structure_facts
 
     given = read_graph_or_family(graph, options)
     if isinstance(given, Family):
@@ -39,10 +39,11 @@ def classify(graph: tuple[str, ...], expect: str | None, as_json: bool, screen: 
 
         print_json(structure_document(structure))
     else:
-        screen.show(lambda: structure_summary(structure, graph[0]), lambda: structure_lines(structure, graph[0]))
+        screen.show(lambda details: structure_facts(structure, graph[0]))
     if expect is None:
         return ExitCode.OK
-    from ptcc_certify.certificate.verdict import MET, judge_behaviour
+    from ptcc_certify.certificate.answer import MET
+    from ptcc_certify.certificate.judgements import judge_behaviour
 
     answer = judge_behaviour(structure, expect)
     if answer.status != MET:

@@ -127,12 +127,12 @@ def _show(
 ) -> int:
     """Print the answer, and the command that proves it again; return the exit code."""
     from ptcc_certify.gain_design.answer import INFEASIBLE, MET
-    from ptcc_certify.report.design_screen import design_lines, design_summary
+    from ptcc_certify.report.facts import design_facts
 
     if as_json:
         print_json(answer.to_dict() | {"command": None if command is None else " ".join(command)})
     else:
-        screen.show(lambda: design_summary(answer, signed, graph), lambda: design_lines(answer, signed, graph))
+        screen.show(lambda details: design_facts(answer, signed, graph))
         if output and answer.certificate is not None:
             screen.note(f"written    {output}")
         if ignored:

@@ -14,7 +14,7 @@ from click.core import ParameterSource
 from ptcc_certify.cli import options as shared
 from ptcc_certify.cli.declared import SIGNAL, click_option, flag_of, options_asking, options_for, together
 from ptcc_certify.cli.scenario import scenario_record
-from ptcc_certify.cli.terminal import LOG, Screen, print_json, progress
+from ptcc_certify.cli.terminal import LOG, Screen, in_flags, print_json, progress
 from ptcc_certify.errors import ExitCode, ParameterError, one_line
 from ptcc_certify.graphs.option import options_of
 from ptcc_certify.graphs.rationals import shorten
@@ -168,7 +168,7 @@ def _standard_input() -> BytesIO:
 def _names(graphs: tuple[str, ...], family: Family, options: shared.Options) -> tuple[str, str]:
     """Return what a family is called, and how its rows were read."""
     from ptcc_certify.graphs.io.graph_files import MATRICES
-    from ptcc_certify.report.structure_text import SHORT_ORIENTATION
+    from ptcc_certify.report.facts.graph import ORIENTATION
 
     way = (
         family.read.get("orientation")
@@ -176,7 +176,7 @@ def _names(graphs: tuple[str, ...], family: Family, options: shared.Options) -> 
         or ("matrix" if PurePath(graphs[0]).suffix[1:] in MATRICES else "information")
     )
     tied = "; undirected, both directions change together" * any(mode.tied for mode in family.modes)
-    return ", ".join(PurePath(graph).name for graph in graphs), SHORT_ORIENTATION[way] + tied
+    return ", ".join(PurePath(graph).name for graph in graphs), ORIENTATION[way] + tied
 
 
 def classify_family(
@@ -199,20 +199,20 @@ def _show_decision(
     options: shared.Options,
 ) -> None:
     from ptcc_certify.certificate.decision_document import decision_document
-    from ptcc_certify.report.family_screen import decision_lines, decision_summary
+    from ptcc_certify.report.facts import decision_facts
 
     if as_json:
         print_json(decision_document(family, components))
         return
     name, read = _names(graphs, family, options)
-    case = components, family, name, read
-    screen.show(lambda: decision_summary(*case), lambda: decision_lines(*case))
+    screen.show(lambda details: decision_facts(components, family, name, read, details))
 
 
 def _expected(components: Sequence[FamilyComponent], expect: str | None) -> int:
     """Tell on standard error what became of an expectation, and what is left undecided; return the exit code."""
-    from ptcc_certify.certificate.family_verdict import NEXT_STEP, judge_family_behaviour
-    from ptcc_certify.certificate.verdict import MET, REFUTED
+    from ptcc_certify.certificate.answer import MET, REFUTED
+    from ptcc_certify.certificate.judgements import judge_family_behaviour
+    from ptcc_certify.certificate.verdict import NEXT_STEP
 
     if expect is not None:
         answer = judge_family_behaviour(components, expect)
@@ -231,11 +231,11 @@ def certify_family(
     graphs: tuple[str, ...], family: Family, output: str | None, as_json: bool, screen: Screen, options: shared.Options
 ) -> int:
     """Certify what the protocol does on a family, whatever the signal."""
+    from ptcc_certify.certificate.answer import CERTIFIED
     from ptcc_certify.certificate.family_certificate import STEPS
     from ptcc_certify.certificate.procedure import certify_case
     from ptcc_certify.certificate.restricted_search import require_nominal
-    from ptcc_certify.certificate.verdict import CERTIFIED
-    from ptcc_certify.report.family_screen import family_lines, family_summary
+    from ptcc_certify.report.facts import facts_of
     from ptcc_certify.theorems.family_behaviour import decide
 
     refuse_options(options)
@@ -264,16 +264,16 @@ def certify_family(
         case = Case(family, protocol, InitialState(x0, sigma0), signal=signal, asks=asks)
         certificate: Any = certify_case(case, progress=begin, scenario=scenario_record(), origins=origins)
         assessment = certificate.assessment
-    LOG.info("verdict %s; exit code %d", one_line(assessment.text), assessment.exit_code)
+    LOG.info("verdict %s; exit code %d", in_flags(assessment.sentence), assessment.exit_code)
     saved = output is not None and assessment.verdict == CERTIFIED
     if output and saved:
         certificate.save(output)
     if as_json:
         print_json(certificate.to_dict() | {"verdict": assessment.verdict})
         if assessment.exit_code and not screen.quiet:
-            click.echo(f"verdict    {one_line(assessment.text)}", err=True)
+            click.echo(f"verdict    {in_flags(assessment.sentence)}", err=True)
         return assessment.exit_code
-    screen.show(lambda: family_summary(certificate, name, origins), lambda: family_lines(certificate, name, origins))
+    screen.show(lambda details: facts_of(certificate, name, origins, details))
     if output:
         screen.note(f"written    {output}" if saved else shared.NOTHING_WRITTEN)
     return assessment.exit_code
@@ -281,8 +281,8 @@ def certify_family(
 
 def _judged_alone(components: Sequence[FamilyComponent], expect: str | None, output: str | None) -> int:
     """Tell what became of an expectation of fixed weights, of which no certificate is made; return the exit code."""
-    from ptcc_certify.certificate.family_verdict import judge_family_behaviour
-    from ptcc_certify.certificate.verdict import MET
+    from ptcc_certify.certificate.answer import MET
+    from ptcc_certify.certificate.judgements import judge_family_behaviour
 
     code = _expected(components, expect)
     met = expect is not None and judge_family_behaviour(components, expect).status == MET and not output

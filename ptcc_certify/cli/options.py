@@ -5,7 +5,6 @@ Commands take theirs as keywords; the functions here take what they need from th
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Mapping
 from dataclasses import fields, replace
@@ -36,7 +35,7 @@ from ptcc_certify.cli.scenario import (
     read_scenario,
     takes_one_graph,
 )
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.errors import Change, ParameterError
 from ptcc_certify.graphs.kinds_of_file import TOML, kind_of, refuse_as_certificate, refuse_as_graph, shell_word
 from ptcc_certify.graphs.option import options_of
 from ptcc_certify.graphs.reading import Reading, option_flags
@@ -66,15 +65,17 @@ def with_flags(command: click.Command, error: ParameterError) -> ParameterError:
     Examples
     --------
     >>> command = click.Command("certify", params=[click.Option(["--gain-cap"]), click.Option(["--rest"])])
-    >>> print(with_flags(command, ParameterError("rest = 1: for an unlimited gain; leave gain_cap out")))
+    >>> error = ParameterError("rest", ("= 1: for an unlimited gain; leave ", Change("gain_cap"), " out"))
+    >>> print(with_flags(command, error))
     --rest = 1: for an unlimited gain; leave --gain-cap out
     """
     flags = {p.name: p.opts[0] for p in command.params if isinstance(p, click.Option)}
 
-    def flag(match: re.Match[str]) -> str:
-        return flags.get(IN_LIBRARY.get(match[0], match[0]), match[0])
+    def flag(change: Change) -> str:
+        name = IN_LIBRARY.get(change.field, change.field)
+        return f"{flags[name]} {change.number}".rstrip() if name in flags else str(change)
 
-    return ParameterError(re.sub(r"^\w+(?= = |: )|(?<=leave )\w+(?= out)|(?<=give )\w+(?=[,;]|$)", flag, str(error)))
+    return ParameterError(error.told(flag))
 
 
 def _behaviour(context: click.Context, parameter: click.Parameter, text: str | None) -> str | None:

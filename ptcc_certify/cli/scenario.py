@@ -9,7 +9,6 @@ from __future__ import annotations
 import csv
 import io
 import os
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -364,12 +363,12 @@ def placed(context: click.Context, error: PTCCError | click.BadParameter) -> Exc
     if isinstance(error, click.BadParameter):
         option, text = (error.param.name if error.param else None) or "", error.message
     else:
-        text = str(error)
-        match = re.match(r"(?:--)?([A-Za-z][\w-]*)(: | = | )", text)
-        option = match[1].replace("-", "_") if match else ""
+        text, option = str(error), error.field if isinstance(error, ParameterError) else ""
         option = IN_LIBRARY.get(option, option)
-        if match and match[0].startswith("--"):
-            text = text[match.end() :]
+        if text.startswith("--"):  # of a command itself
+            flag, _, text = text.partition(" ")
+            option = flag.strip("-:").replace("-", "_")
+            text = text.removeprefix("= ")
     if context.meta[COMMAND].get_parameter_source(option) is ParameterSource.DEFAULT_MAP:
         return ParameterError(f"{scenario.place(option)}: {text}")
     return error

@@ -10,16 +10,20 @@ import shutil
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ptcc_certify.errors import ParameterError, PTCCError, one_line
+
+if TYPE_CHECKING:
+    from ptcc_certify.certificate.facts import Fact
+    from ptcc_certify.errors import Change, Sentence
 
 #: What figures are written as; :mod:`ptcc_certify.report.plots.style` has them too.
 FIGURES = (".png", ".pdf", ".svg")
@@ -45,18 +49,45 @@ class Screen:
     verbose: bool = False
     quiet: bool = False
 
-    def show(self, short: Callable[[], Sequence[str]], long: Callable[[], Sequence[str]]) -> None:
-        """Print the short or the long lines; long ones are wrapped to the terminal, without one to 80 columns."""
+    def show(self, facts: Callable[[bool], Iterable[Fact]]) -> None:
+        """Print facts, with details or without; lines of all are wrapped to the terminal, without one to 80 columns."""
+        from ptcc_certify.report.screen import long_screen, short_screen
+
+        if self.verbose:
+            self.lines(long_screen(facts(True), flagged))
+        elif not self.quiet:
+            print_lines(*short_screen(facts(False), flagged))
+
+    def lines(self, lines: Iterable[str]) -> None:
+        """Print lines of any length, wrapped."""
         from ptcc_certify.report.text_layout import WIDTH, wrap_lines
 
-        if not self.quiet:
-            width = shutil.get_terminal_size((WIDTH, 24)).columns if _on_terminal(sys.stdout) else WIDTH
-            print_lines(*(wrap_lines(long(), width) if self.verbose else short()))
+        width = shutil.get_terminal_size((WIDTH, 24)).columns if _on_terminal(sys.stdout) else WIDTH
+        print_lines(*wrap_lines(lines, width))
 
     def note(self, text: str) -> None:
         """Print one more line on standard output."""
         if not self.quiet:
             print_lines(*text.split("\n"))
+
+
+def flagged(change: Change) -> str:
+    """Name a change as an option of a command.
+
+    Examples
+    --------
+    >>> from ptcc_certify.errors import Change
+    >>> flagged(Change("rho2", "0.5")), flagged(Change("time_limit"))
+    ('--rho2 0.5', '--time-limit')
+    """
+    return f"--{change.field.replace('_', '-')} {change.number}".rstrip()
+
+
+def in_flags(sentence: Sentence) -> str:
+    """Return a sentence as one line, its changes named as options."""
+    from ptcc_certify.errors import spell
+
+    return one_line(spell(sentence, flagged))
 
 
 def screen_options(command: Callable[..., Any]) -> Callable[..., Any]:

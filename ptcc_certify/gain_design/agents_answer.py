@@ -86,13 +86,12 @@ class AgentsDesign(DesignAnswer):
             parts.append(f"no gains meet one below {down(self.shortest_possible)}")
         return "; ".join(parts)
 
-    def lines(self) -> list[str]:
-        """Return everything as text: request, verdict, what binds, gains, bounds, deadlines."""
-        rows = [("asked", self.request_text), ("verdict", self.verdict), ("", self.binding)]
-        rows += [("gains", self.gains_text), ("proved", self.bounds_text), ("deadline", self.deadline_text)]
-        if self.ratio is not None and self.certificate is not None:
-            rows.append(("", f"the deadline is at most {up(self.ratio, 3)} times the shortest possible one"))
-        return [f"{name:<10} {text}" for name, text in rows if text]
+    @property
+    def ratio_text(self) -> str:
+        """How far the deadline is from the shortest possible one, in one line; empty where that is not known."""
+        if self.ratio is None or self.certificate is None:
+            return ""
+        return f"the deadline is at most {up(self.ratio, 3)} times the shortest possible one"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the design as JSON-ready data, exact numbers as texts, without the certificate."""

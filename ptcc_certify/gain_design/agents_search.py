@@ -23,7 +23,7 @@ from ptcc_certify.bounds.shortest_time import shortest_time
 from ptcc_certify.certificate.agents_answer import AgentsAnswer
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify
-from ptcc_certify.errors import ParameterError, gated
+from ptcc_certify.errors import Change, ParameterError, gated
 from ptcc_certify.gain_design.agents_answer import AgentsDesign
 from ptcc_certify.gain_design.agents_deadlines import Candidate, Search, at_deadline, longest
 from ptcc_certify.gain_design.answer import INFEASIBLE, MET, UNPROVED, refusal
@@ -116,7 +116,7 @@ def design_agents(
         base = certify(graph, at_deadline(template, first), x0, agents=agents, asks=asks)
     part = base.agents
     if part is None or part.initial_state is None:
-        raise ParameterError("design of agents of order n starts from an initial state; give x0")
+        raise ParameterError(("design of agents of order n starts from an initial state; give ", Change("x0")))
     least = _least_time(base, request)
     blank = AgentsDesign(UNPROVED, "", request, request.deadline, shortest_possible=least, agents=agents)
     if (reason := _unusable(base, part, request)) is not None:
@@ -139,20 +139,21 @@ def design_agents(
 def _refuse(agents: Any, request: Request) -> None:
     """Refuse what is not searched."""
     if not isinstance(agents, Agents):
-        raise ParameterError(f"agents = {shorten(repr(agents))}: give Agents(order=2) for double integrators")
+        raise ParameterError("agents", f"= {shorten(repr(agents))}: give Agents(order=2) for double integrators")
     if agents.plain:
-        raise ParameterError("agents: these are single integrators; design(graph, ..) finds their gains")
+        raise ParameterError("agents", "these are single integrators; design(graph, ..) finds their gains")
     if agents.cascade is None and agents.decay_rate < 2 * agents.degree and agents.cap is None:
         raise ParameterError(
-            f"decay: below 2 n = {2 * agents.degree} no input is proved to be bounded; leave it out, or cap the gain"
+            "decay", f"below 2 n = {2 * agents.degree} no input is proved to be bounded; leave it out, or cap the gain"
         )
     if request.residual is not None and agents.cap is None:
-        mend = "leave residual out" if agents.cascade is not None else "leave residual out, or give gain_cap"
-        raise ParameterError(
-            f"residual: nothing is left at T without a gain cap, and no cap is searched for agents of order n; {mend}"
-        )
+        mend = () if agents.cascade is not None else (", or give ", Change("gain_cap"))
+        why = "nothing is left at T without a gain cap, and no cap is searched for agents of order n; leave "
+        raise ParameterError("residual", (why, Change("residual"), " out", *mend))
     if agents.cap is not None and request.residual is None:
-        raise ParameterError("gain_cap: leaves something at every deadline; give residual, how far a position may be")
+        raise ParameterError(
+            "gain_cap", ("leaves something at every deadline; give ", Change("residual"), ", how far a position may be")
+        )
 
 
 def _least_time(base: Certificate, request: Request) -> Fraction | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -13,14 +14,15 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import down, float_up, up
 from ptcc_certify.bounds.input.worst_initial_state import WorstInitialState, worst_initial_state
+from ptcc_certify.certificate.answer import CERTIFIED
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.verdict import CERTIFIED
+from ptcc_certify.certificate.facts import Fact, Facts
 from ptcc_certify.checker.input_formulas import Limits
 from ptcc_certify.gain_design.request import DesignRequest, Request, fit_of
 from ptcc_certify.graphs.rationals import format_exact, nearest_float, short_exact
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.parameters import parameter
-from ptcc_certify.shown import Shown
+from ptcc_certify.shown import Shown, rendered
 
 MET, INFEASIBLE, UNPROVED = "met", "infeasible", "not with this certificate"
 #: Significant decimal digits of the gains and deadlines that are found.
@@ -100,6 +102,47 @@ class DesignAnswer(Shown):
         if T is None or least is None or least <= T:
             return ""
         return f"no gains meet a deadline below {down(least)}, {down(least / T)} times the one asked for"
+
+    @property
+    @abstractmethod
+    def request_text(self) -> str:
+        """What was asked, in one line."""
+
+    @property
+    @abstractmethod
+    def bounds_text(self) -> str:
+        """What is proved of input and deviation at the deadline, in one line; empty without gains."""
+
+    @property
+    @abstractmethod
+    def gains_text(self) -> str:
+        """The gains, exact, in one line; empty where there are none."""
+
+    @property
+    @abstractmethod
+    def deadline_text(self) -> str:
+        """What is proved of shorter deadlines, in one line; empty where nothing is."""
+
+    @property
+    @abstractmethod
+    def ratio_text(self) -> str:
+        """How far apart the deadlines are, in one line; empty where that is not known."""
+
+    def facts(self) -> Facts:
+        """Return what is told of it: request, verdict, what binds, gains, bounds, deadlines."""
+        yield Fact(head="asked", note=self.request_text)
+        why = self.bounds_text if self.protocol is not None else self.binding
+        yield Fact(head="verdict", value=self.verdict, note=self.verdict, brief=(f"{self.verdict}: {why}",))
+        texts = {"verdict": self.binding, "gains": self.gains_text, "proved": self.bounds_text}
+        for head, text in (texts | {"deadline": self.deadline_text}).items():
+            if text:
+                yield Fact(head=head, note=text, detail=head in ("verdict", "proved"))
+        if self.ratio_text:
+            yield Fact(head="deadline", note=self.ratio_text, detail=True)
+
+    def summary(self) -> str:
+        """Return all that is told of it, as lines."""
+        return "\n".join(rendered("screen.long_screen", self.facts()))
 
     def _summary(self) -> dict[str, Any]:
         """Return what all answers tell as JSON-ready data."""
@@ -292,15 +335,17 @@ class Design(DesignAnswer):
         parts += [] if least is None else [f"no gains meet one below {down(least)}"]
         return "; ".join(parts)
 
-    def lines(self) -> list[str]:
-        """Return everything as text: request, verdict, what binds, gains, bounds, deadlines, the largest input."""
-        rows = [("asked", self.request_text), ("verdict", self.verdict), ("", self.binding)]
-        rows += [("gains", self.gains_text), ("proved", self.bounds_text), ("deadline", self.deadline_text)]
-        if self.ratio is not None:
-            rows.append(("", f"ratio of the two at most {up(self.ratio, 3)}"))
+    @property
+    def ratio_text(self) -> str:
+        """How far apart the two deadlines are, in one line; empty where that is not known."""
+        return "" if self.ratio is None else f"ratio of the two at most {up(self.ratio, 3)}"
+
+    def facts(self) -> Facts:
+        """Return what is told of it, the largest input that was found last."""
+        yield from super().facts()
         if self.worst is not None and self.protocol is not None:
-            rows.append(("numerical", f"the largest input found is {self.worst.size:.4g}, at t = {self.worst.t:.4g}"))
-        return [f"{name:<10} {text}" for name, text in rows if text]
+            text = f"the largest input found is {self.worst.size:.4g}, at t = {self.worst.t:.4g}"
+            yield Fact(head="numerical", value=self.worst.size, standing="observed", note=text, detail=True)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the design as JSON-ready data, exact numbers as texts, without the certificate."""

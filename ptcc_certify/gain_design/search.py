@@ -136,7 +136,7 @@ one asked for)
     T = None if deadline is None else parameter("deadline", deadline)
     r = None if residual is None else parameter("residual", residual)
     if input_norm not in (None, 2):
-        raise ParameterError(f"input_norm = {input_norm!r} is unknown; leave it out for max |u_k|, or give 2")
+        raise ParameterError("input_norm", f"= {input_norm!r} is unknown; leave it out for max |u_k|, or give 2")
     structure = analyse(graph, orientation)
     graph = structure.graph
     initial_set = (

@@ -84,18 +84,18 @@ def as_fraction(value: Rational | Real | str, name: str = "value") -> Fraction:
     return Fraction(number)
 
 
-def no_number(name: str, value: Any, error: NumberError) -> str:
+def no_number(value: Any, error: NumberError) -> str:
     """Return what is said of a parameter that is no exact number: that, or which limit of the grammar it exceeds.
 
     Examples
     --------
-    >>> no_number("T", "fast", NumberError('"fast" is not a number'))
-    'T = fast is not a finite number'
-    >>> no_number("T", "1e500", NumberError('the exponent of "1e500" is beyond 400'))
-    'T: the exponent of "1e500" is beyond 400'
+    >>> no_number("fast", NumberError('"fast" is not a number'))
+    '= fast is not a finite number'
+    >>> no_number("1e500", NumberError('the exponent of "1e500" is beyond 400'))
+    'the exponent of "1e500" is beyond 400'
     """
     plain = str(error).endswith(("not a number", "not a finite number"))
-    return f"{name} = {shorten(str(value))} is not a finite number" if plain else f"{name}: {error}"
+    return f"= {shorten(str(value))} is not a finite number" if plain else str(error)
 
 
 def whole_number(value: Any, name: str, least: int, most: int) -> int:
@@ -117,7 +117,7 @@ def whole_number(value: Any, name: str, least: int, most: int) -> int:
         number = least - 1
     if not least <= number <= most:
         domain = f"an integer from {least} to {most}"
-        raise ParameterError(f"{name} = {given(value)} is outside its domain; it must be {domain}")
+        raise ParameterError(name, f"= {given(value)} is outside its domain; it must be {domain}")
     return number
 
 
@@ -139,7 +139,7 @@ def number_within(value: Any, name: str, least: float, most: float) -> float:
         if not isinstance(value, str) and least <= as_fraction(value) <= most:
             return float(value)
     domain = f"a number from {least:g} to {most:g}"
-    raise ParameterError(f"{name} = {given(value)} is outside its domain; it must be {domain}")
+    raise ParameterError(name, f"= {given(value)} is outside its domain; it must be {domain}")
 
 
 def given(value: Any) -> str:

@@ -103,7 +103,7 @@ class Reading:
         titles = tuple(str(part).strip() for part in parts)
         if len(titles) != 3 or not all(titles) or len(set(titles)) < 3:
             text = shorten(self.columns if isinstance(self.columns, str) else repr(self.columns))
-            raise ParameterError(f"columns = {text}: give those of source, target and weight, such as from,to,score")
+            raise ParameterError("columns", f"= {text}: give those of source, target and weight, such as from,to,score")
         return titles
 
     def refuse(self, option: str, name: str, what: str) -> None:

@@ -93,7 +93,9 @@ def read_expectations(expected: Any) -> Expectations:
     if expected is None or isinstance(expected, str):
         return Expectations(expected)
     if not isinstance(expected, Expectations):
-        raise ParameterError(f"expectations = {shorten(repr(expected))} is none; give Expectations('stability'), say")
+        raise ParameterError(
+            "expectations", f"= {shorten(repr(expected))} is none; give Expectations('stability'), say"
+        )
     return expected
 
 

@@ -70,7 +70,7 @@ class Case:
         ):
             if (value := getattr(self, name)) is not None and not isinstance(value, kind):
                 mend = f"give {kind.__name__}({example}), say"
-                raise ParameterError(f"{name} = {shorten(repr(value))} is none; {mend}")
+                raise ParameterError(name, f"= {shorten(repr(value))} is none; {mend}")
 
     @property
     def sliding(self) -> bool:

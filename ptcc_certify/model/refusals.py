@@ -71,10 +71,10 @@ def refuse_before_the_graph(case: Case) -> None:
     """
     refuse_no_protocol(case.protocol)
     if not case.protocol.prescribed:
-        raise ParameterError("rho2 = 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
+        raise ParameterError("rho2", "= 0 gives no deadline: nothing is prescribed to certify; give rho2 > 0")
     for name in ("sigma0", "disturbance"):
         if case.given(name) is not None and not case.sliding:
-            raise ParameterError(f"{name} belongs to the sliding-mode protocol; leave it out or change the protocol")
+            raise ParameterError(name, "belongs to the sliding-mode protocol; leave it out or change the protocol")
     if case.sliding and any(case.given(name) is not None for name in ("limits", "delta", "noise")):
         raise ParameterError("limits, delta and noise are for the nominal protocol; the sliding mode has its own delta")
 
@@ -84,9 +84,9 @@ def refuse_of_families(case: Case) -> None:
     given = [] if case.asks.method == "best" else ["method"]
     given += [name for name in NOT_OF_FAMILIES if (value := case.given(name)) is not None and value is not False]
     if given:
-        raise ParameterError(f"{given[0]} is not for families of graphs yet; leave it out, or certify one graph")
+        raise ParameterError(given[0], "is not for families of graphs yet; leave it out, or certify one graph")
     if case.asks.expectations.max_residual is not None:
-        raise ParameterError("max_residual: is asked of late messages, which families do not take yet; leave it out")
+        raise ParameterError("max_residual", "is asked of late messages, which families do not take yet; leave it out")
 
 
 def refuse_agents(case: Case) -> None:
@@ -98,13 +98,14 @@ def refuse_agents(case: Case) -> None:
         Says what, and what to do instead.
     """
     if not isinstance(case.agents, Agents):
-        raise ParameterError(f"agents = {shorten(repr(case.agents))}: give Agents(order=2) for double integrators")
+        raise ParameterError("agents", f"= {shorten(repr(case.agents))}: give Agents(order=2) for double integrators")
     for name in asked_of_single_integrators(case):
         raise ParameterError(f"{name} is for single integrators; of agents of order n: {_NOT_OF_AGENTS[name]}")
     if case.initial.sigma0 is not None and any(_entries(case.initial.sigma0)):
         raise ParameterError(
-            "sigma0: agents of order n start with sigma(0) = 0 (their auxiliary variables at minus the highest "
-            "derivative); otherwise their final positions depend on the disturbance: leave it out"
+            "sigma0",
+            "agents of order n start with sigma(0) = 0 (their auxiliary variables at minus the highest "
+            "derivative); otherwise their final positions depend on the disturbance: leave it out",
         )
     case.agents.refuse_motion(case.protocol.T)
 
@@ -129,7 +130,7 @@ def refuse_beside(structure: Structure, case: Case) -> None:
     """Refuse late messages and moving leaders where nothing could be certified, before anything is searched."""
     messages, leaders = case.messages, case.leaders
     if messages is None and case.asks.expectations.max_residual is not None:
-        raise ParameterError("max_residual: is asked of late messages; tell how late they are, or leave it out")
+        raise ParameterError("max_residual", "is asked of late messages; tell how late they are, or leave it out")
     if messages is None and leaders is None:
         return
     refuse_together(messages, leaders)
@@ -145,7 +146,7 @@ def refuse_beside(structure: Structure, case: Case) -> None:
         _refuse_messages(structure, messages, [limit.gain_cap for limit in case.limits])
     if structure.graph.n_edges == 0:
         name, why = ("leaders", "nobody tracks") if messages is None else ("messages", "nothing is late")
-        raise ParameterError(f"{name}: nobody listens to anybody, so {why}; leave it out")
+        raise ParameterError(name, f"nobody listens to anybody, so {why}; leave it out")
 
 
 def _refuse_more(refused: Mapping[str, str], case: Case) -> None:
@@ -159,7 +160,7 @@ def _refuse_messages(structure: Structure, messages: LateMessages, caps: Sequenc
     """Refuse late messages that do not fit the graph, or a cap of the gain that is another than theirs."""
     messages.latencies(structure.graph)
     if any(cap != messages.gain_cap for cap in caps):
-        raise ParameterError("gain_cap: limits and late messages have two; give both the same, or messages alone")
+        raise ParameterError("gain_cap", "limits and late messages have two; give both the same, or messages alone")
     if messages.value_error and messages.own_delay:
         raise ParameterError("values that are off are not certified where the own state is late; leave one of them out")
     if messages.value_error:
@@ -188,10 +189,10 @@ out
     if messages is None or leaders is None:
         return
     if leaders.sign_gain is not None:
-        raise ParameterError("sign_gain: nothing is proved of a sign term where messages are late; leave it out")
+        raise ParameterError("sign_gain", "nothing is proved of a sign term where messages are late; leave it out")
     if messages.own_delay:
         raise ParameterError(
-            "own_delay: an own state that is late is certified of leaders at rest alone; leave one of the two out"
+            "own_delay", "an own state that is late is certified of leaders at rest alone; leave one of the two out"
         )
 
 

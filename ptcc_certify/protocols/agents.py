@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, ClassVar
 
-from ptcc_certify.errors import NumberError, ParameterError, gated
+from ptcc_certify.errors import Change, NumberError, ParameterError, Sentence, gated, joined
 from ptcc_certify.graphs.option import option
 from ptcc_certify.graphs.rationals import Exact, as_fraction, no_number, shorten, whole_number
 from ptcc_certify.protocols.parameters import parameter, readable
@@ -97,19 +97,19 @@ give 4, from which on the input is bounded
     def __post_init__(self) -> None:
         listed = getattr(self.plant, "ndim", 1) == 1 and isinstance(self.plant, Collection)
         if self.plant is not None and (isinstance(self.plant, str | bytes) or not listed):
-            raise ParameterError(f"plant = {shorten(repr(self.plant))} is no list; give a_1 to a_n, [0, 0.1] say")
+            raise ParameterError("plant", f"= {shorten(repr(self.plant))} is no list; give a_1 to a_n, [0, 0.1] say")
         numbers = None if self.plant is None else list(self.plant)
         given = 2 if numbers is None else len(numbers)
         if not given:
-            raise ParameterError("plant is empty; give a_1 to a_n, or leave it out for chains of integrators")
+            raise ParameterError("plant", "is empty; give a_1 to a_n, or leave it out for chains of integrators")
         order = whole_number(given if self.order is None else self.order, "order", 1, MOST_ORDER)
         if given != order and numbers is not None:
             count = f"{given} number{'s' * (given > 1)}"
-            raise ParameterError(f"plant has {count} for agents of order {order}; give a_1 to a_{order}")
+            raise ParameterError("plant", f"has {count} for agents of order {order}; give a_1 to a_{order}")
         plant = [Fraction(0)] * order if numbers is None else [_number("plant", x) for x in numbers]
         if self.drag is not None:
             if plant[-1]:
-                raise ParameterError("drag is the last number of plant; give one of them")
+                raise ParameterError("drag", "is the last number of plant; give one of them")
             plant[-1] = _number("drag", self.drag)
         values: dict[str, Any] = {"order": order, "plant": tuple(plant), "drag": None}
         for name in ("rest", "cascade", "decay", "gain_cap"):
@@ -125,35 +125,44 @@ give 4, from which on the input is bounded
             self._refuse_beside_cascade()
         n, decay = self.degree, self.decay_rate
         if decay > MOST_DECAY:
-            raise ParameterError(f"decay = {float(decay):.6g} is above {MOST_DECAY}; no input follows such gains")
+            raise ParameterError("decay", f"= {float(decay):.6g} is above {MOST_DECAY}; no input follows such gains")
         if decay <= 2 * (n - 1) and self.gain_cap is None:
             plural = PLURALS[n - 1] if n <= len(PLURALS) else f"derivatives {n - 1}"
             raise ParameterError(
-                f"decay = {readable(decay)} is not above 2 (n - 1) = {2 * (n - 1)}: {plural} would not agree at T; "
-                f"give {2 * n}, from which on the input is bounded"
+                "decay",
+                f"= {readable(decay)} is not above 2 (n - 1) = {2 * (n - 1)}: {plural} would not agree at T; "
+                f"give {2 * n}, from which on the input is bounded",
             )
         if self.biases is not None and self.coefficients[0]:
-            raise ParameterError("biases: agents with a force towards 0 (a_1) take no formation by them; give offsets")
+            raise ParameterError(
+                "biases", ("agents with a force towards 0 (a_1) take no formation by them; give ", Change("offsets"))
+            )
         if self.rest is not None:
-            why = "" if n == 2 else f"agents of order 2; these are of order {n}"
-            why = why or "agents without a force towards 0 (a_1 = 0)" * bool(self.coefficients[0])
-            why = why or "an unlimited gain; leave gain_cap out" * (self.gain_cap is not None)
+            why: Sentence = ""
+            if n != 2:
+                why = f"agents of order 2; these are of order {n}"
+            elif self.coefficients[0]:
+                why = "agents without a force towards 0 (a_1 = 0)"
+            elif self.gain_cap is not None:
+                why = ("an unlimited gain; leave ", Change("gain_cap"), " out")
             if why:
-                raise ParameterError(f"rest = {readable(self.alpha)}: meeting at rest is proved for {why}")
+                begin = f"= {readable(self.alpha)}: meeting at rest is proved for "
+                raise ParameterError("rest", joined("", (begin, why)))
 
     def _refuse_beside_cascade(self) -> None:
         """Refuse what the cascade does not take."""
         own = "; its gains are its own" if self.decay is not None else "; it brings agents to rest by itself"
         given = next((name for name in ("rest", "decay", "gain_cap") if getattr(self, name) is not None), None)
-        why = ""
+        why: Sentence = ""
         if given is not None:
-            why = f"leave {given} out{own if given != 'gain_cap' else ': it is proved of an unlimited gain'}"
+            own = own if given != "gain_cap" else ": it is proved of an unlimited gain"
+            why = ("leave ", Change(given), f" out{own}")
         elif self.degree != 2:
             why = f"it is proved of agents of order 2; these are of order {self.degree}"
         elif any(self.coefficients):
             why = "it is proved of double integrators without drag or forces; cancel them by the input, or leave it out"
         if why:
-            raise ParameterError(f"cascade = {readable(self.alpha)}: {why}")
+            raise ParameterError("cascade", joined(": ", (f"= {readable(self.alpha)}", why)))
 
     @property
     def degree(self) -> int:
@@ -220,8 +229,9 @@ give 4, from which on the input is bounded
         size = T * (1 + max(map(abs, self.coefficients)))
         if any(self.coefficients) and size > MOST_MOTION:
             raise ParameterError(
-                f"plant: T (1 + max |a_i|) = {float(size):.4g} is above {MOST_MOTION}: by itself an agent may move by "
-                f"e^{MOST_MOTION}; take a shorter deadline or another unit of time"
+                "plant",
+                f"T (1 + max |a_i|) = {float(size):.4g} is above {MOST_MOTION}: by itself an agent may move by "
+                f"e^{MOST_MOTION}; take a shorter deadline or another unit of time",
             )
 
 
@@ -244,7 +254,7 @@ def _number(name: str, value: Any) -> Fraction:
     try:
         number = as_fraction(value, name)
     except NumberError as error:
-        raise ParameterError(no_number(name, value, error)) from None
+        raise ParameterError(name, no_number(value, error)) from None
     if number.numerator.bit_length() + number.denominator.bit_length() > LONGEST_BITS:
-        raise ParameterError(f"{name} has too many digits for exact proofs; round it, to 17 digits say")
+        raise ParameterError(name, "has too many digits for exact proofs; round it, to 17 digits say")
     return number

@@ -185,7 +185,7 @@ def refuse_no_protocol(protocol: Any) -> None:
     """
     if not isinstance(protocol, Protocol):
         given = shorten(repr(protocol))
-        raise ParameterError(f"protocol = {given} is none; give NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), say")
+        raise ParameterError("protocol", f"= {given} is none; give NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), say")
 
 
 # ---------------------------------------------------------------------- expressions

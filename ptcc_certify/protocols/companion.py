@@ -104,17 +104,17 @@ def _as_column(B: Any) -> Any:
     try:
         return [x if hasattr(x, "__len__") and not isinstance(x, str) else [x] for x in B]
     except TypeError:
-        raise ParameterError(f"B = {shorten(repr(B))} is no list; give n numbers") from None
+        raise ParameterError("B", f"= {shorten(repr(B))} is no list; give n numbers") from None
 
 
 def _rows(values: Any, name: str) -> list[list[Fraction]]:
     """Return rows of numbers, or refuse them."""
     if isinstance(values, str):
-        raise ParameterError(f"{name} = {shorten(repr(values))} is no list; give rows of numbers")
+        raise ParameterError(name, f"= {shorten(repr(values))} is no list; give rows of numbers")
     try:
         rows = [list(row) for row in values]
     except TypeError:
-        raise ParameterError(f"{name} = {shorten(repr(values))} is no matrix; give rows of numbers") from None
+        raise ParameterError(name, f"= {shorten(repr(values))} is no matrix; give rows of numbers") from None
     return [[_exact(x, f"an entry of {name}") for x in row] for row in rows]
 
 

@@ -649,7 +649,7 @@ def _chunks(agents: np.ndarray) -> Iterator[np.ndarray]:
 def _number(value: Any, name: str) -> float:
     number = nearest_float(_exact(value, name))
     if math.isinf(number):
-        raise ParameterError(f"{name} is beyond the range of floats; give a smaller number")
+        raise ParameterError(name, "is beyond the range of floats; give a smaller number")
     return number
 
 

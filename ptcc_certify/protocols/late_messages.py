@@ -123,13 +123,13 @@ lambda of L, or measure the own state without delay
             or not 0 <= self.losses <= MOST_LOSSES
         ):
             raise ParameterError(
-                f"losses = {shorten(repr(self.losses))} is not a number of messages, 0 to {MOST_LOSSES:,}"
+                "losses", f"= {shorten(repr(self.losses))} is not a number of messages, 0 to {MOST_LOSSES:,}"
             )
         put(self, "losses", int(self.losses))
         if self.losses and self.period is None:
             raise ParameterError("losses without a period: tell how long it is from one message to the next")
         if not isinstance(self.own_delay, bool):
-            raise ParameterError(f"own_delay = {shorten(repr(self.own_delay))} is neither True nor False")
+            raise ParameterError("own_delay", f"= {shorten(repr(self.own_delay))} is neither True nor False")
         if self.own_delay and self.gain_cap is None:
             raise ParameterError(
                 "an own state that is late makes the protocol diverge, for its gain grows without limit before T; "

@@ -86,11 +86,11 @@ class LimitedGain:
         stop, T = self.limits.stop_before, self.gain.T
         if stop is not None and stop >= T:
             raise ParameterError(
-                f"stop_before = {readable(stop)} is outside its domain; stop_before must be below T = {readable(T)}"
+                "stop_before", f"= {readable(stop)} is outside its domain; stop_before must be below T = {readable(T)}"
             )
         for name, share in (("gain_cap", self._capped_share), ("stop_before", self._stopped_share)):
             if 0 < share < _SMALLEST_SHARE:
-                raise ParameterError(f"{name} acts only where 1 - t/T is below 1e-300; leave it out")
+                raise ParameterError(name, "acts only where 1 - t/T is below 1e-300; leave it out")
 
     @cached_property
     def stretches(self) -> tuple[Stretch, ...]:
@@ -178,8 +178,9 @@ class LimitedGain:
         assert period is not None
         if Fraction(until) > MAX_PERIODS * period:
             raise ParameterError(
-                f"sample_period = {readable(period)} gives more than {MAX_PERIODS:,} periods until t = {until:.6g}; "
-                "take a longer period or end earlier"
+                "sample_period",
+                f"= {readable(period)} gives more than {MAX_PERIODS:,} periods until t = {until:.6g}; "
+                "take a longer period or end earlier",
             )
         stop = gain.T - (self.limits.stop_before or 0)
         unit = math.lcm(period.denominator, gain.T.denominator, stop.denominator)

@@ -73,8 +73,9 @@ give 2 or more
         if self.sign_gain is not None and self.sign_gain < self.total:
             total = near(self.total)
             raise ParameterError(
-                f"sign_gain = {near(self.sign_gain)} is below speed + disturbance = {total}, which pushes "
-                f"followers off; give {total} or more"
+                "sign_gain",
+                f"= {near(self.sign_gain)} is below speed + disturbance = {total}, which pushes "
+                f"followers off; give {total} or more",
             )
 
     @property

@@ -130,16 +130,16 @@ def parameter(name: str, number: Any, zero_allowed: bool = False) -> Fraction:
         text = shorten(str(number))
         comma = isinstance(number, str) and re.fullmatch(r"\s*[-+]?\d+,\d+\s*", number)
         mend = f"write {text.strip().replace(',', '.')}" if comma else f"{name} must be a number {domain}"
-        raise ParameterError(f"{no_number(name, number, error)}; {mend}") from None
+        raise ParameterError(name, f"{no_number(number, error)}; {mend}") from None
     refuse_out_of_range(name, value)
     if value.numerator.bit_length() + value.denominator.bit_length() > LONGEST_BITS:
-        raise ParameterError(f"{name} has too many digits for exact proofs; round it, to 17 digits say")
+        raise ParameterError(name, "has too many digits for exact proofs; round it, to 17 digits say")
     if value < 0 or (value == 0 and not zero_allowed):
-        raise ParameterError(f"{name} = {readable(value)} is outside its domain; {name} must be {domain}")
+        raise ParameterError(name, f"= {readable(value)} is outside its domain; {name} must be {domain}")
     return value
 
 
 def refuse_out_of_range(name: str, value: Fraction) -> None:
     """Refuse what leaves the range of float64 by far."""
     if value and not _SMALLEST <= abs(value) <= _LARGEST:
-        raise ParameterError(f"{name} is not between 1e-300 and 1e300 in size; choose other units of time or weight")
+        raise ParameterError(name, "is not between 1e-300 and 1e300 in size; choose other units of time or weight")

@@ -82,8 +82,9 @@ class SlidingModeProtocol(ReachingProtocol):
     def __post_init__(self) -> None:
         if self.mu1 <= self.delta:
             raise ParameterError(
-                f"mu1 = {near(self.mu1)} does not exceed delta = {near(self.delta)}; a disturbance could "
-                f"outweigh it: give mu1 > {near(self.delta)}"
+                "mu1",
+                f"= {near(self.mu1)} does not exceed delta = {near(self.delta)}; a disturbance could "
+                f"outweigh it: give mu1 > {near(self.delta)}",
             )
         _ = self.gain, self.reaching_gain  # refuses what is beyond float64
 

@@ -10,21 +10,30 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from ptcc_certify.bounds.late_messages import LateBounds
+from ptcc_certify.certificate.answer import REFUTED
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
-from ptcc_certify.errors import ParameterError, gated
+from ptcc_certify.errors import ParameterError, SimulationError, gated
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.size_limits import DRAWN_NODES, EXACT_NODES, INPUT_NODES
 from ptcc_certify.protocols.base import Protocol
+from ptcc_certify.report.notation import printable, signs
 from ptcc_certify.report.plots.agents_motion import plot_formation, plot_motion
+from ptcc_certify.report.plots.counterexample import plot_counterexample
 from ptcc_certify.report.plots.decay import plot_decay
+from ptcc_certify.report.plots.distributions import plot_degrees, plot_final_states
 from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.plots.input import plot_input
 from ptcc_certify.report.plots.spectrum import plot_spectrum
 from ptcc_certify.report.plots.style import figure_bytes
 from ptcc_certify.report.plots.tracking import plot_tracking
 from ptcc_certify.report.plots.trajectory import plot_sliding, plot_trajectory
+from ptcc_certify.simulation.agents import AgentsTrajectory
 from ptcc_certify.simulation.late_messages import can_run
+from ptcc_certify.simulation.trajectory import Trajectory
+from ptcc_certify.theorems.counterexample_text import counterexample_text
+from ptcc_certify.theorems.family_behaviour import DEPENDS, Counterexample, FamilyComponent
+from ptcc_certify.theorems.family_claims import component_holds, component_refutation
 
 #: What draws each figure of a certificate, on given axes or its own; all but the graph show its simulated run.
 PLOTS: dict[str, Callable[..., Any]] = {
@@ -38,7 +47,13 @@ PLOTS: dict[str, Callable[..., Any]] = {
     "spectrum": plot_spectrum,
     "motion": plot_motion,
     "formation": plot_formation,
+    "final": plot_final_states,
+    "degrees": lambda saved: plot_degrees(saved.graph),
 }
+#: Agents of order n up to which a run is drawn.
+_RUN = 60
+#: What is refuted, the counterexample in words, its component, and itself.
+Counterexamples = list[tuple[str, Markup, FamilyComponent, Counterexample]]
 
 
 def plot(subject: Any, what: str, **keywords: Any) -> Any:
@@ -57,17 +72,43 @@ def plot(subject: Any, what: str, **keywords: Any) -> Any:
     ptcc_certify.errors.ParameterError: what = 'picture' is unknown; one of decay, input, graph, states, ...
     """
     if what not in PLOTS:
-        raise ParameterError(f"what = {what!r} is unknown; one of {', '.join(PLOTS)}")
+        raise ParameterError("what", f"= {what!r} is unknown; one of {', '.join(PLOTS)}")
     if what == "spectrum" and isinstance(subject, Family | FamilyCertificate):
         why = "eigenvalues of single graphs do not tell what switching among them does"
         raise ParameterError(f"{why}; draw those of one graph, or the decay of the family")
     return gated(PLOTS[what])(subject, **keywords)
 
 
-def draw(saved: Certificate, wanted: Sequence[str]) -> dict[str, Any]:
-    """Draw those of the wanted figures for which there is something to draw."""
+def draw(
+    saved: Certificate | FamilyCertificate,
+    wanted: Sequence[str] | None = None,
+    runs: Sequence[Trajectory] = (),
+    why: Counterexamples | None = None,
+    agents_run: AgentsTrajectory | None = None,
+) -> dict[str, Any]:
+    """Draw those of the wanted figures for which there is something to draw, and counterexamples ``why``.
+
+    Parameters
+    ----------
+    saved : Certificate or FamilyCertificate
+        With a trajectory, for figures of it.
+    wanted : sequence of str, optional
+        All there are by default.
+    runs : sequence of Trajectory
+        Of a family.
+    why : list
+        See :func:`counterexamples`.
+    agents_run : AgentsTrajectory, optional
+        Of agents of order n.
+    """
+    wanted = tuple(PLOTS) if wanted is None else wanted
+    if isinstance(saved, FamilyCertificate):
+        return _draw_family(saved, wanted, runs, why or [])
     run, n = saved.trajectory, saved.graph.n_nodes
     there = {"graph": n <= DRAWN_NODES}
+    if saved.agents is None:
+        there["final"] = n > DRAWN_NODES and saved.final_state is not None
+        there["degrees"] = n > DRAWN_NODES and saved.graph.n_edges > 0
     if saved.initial_state is not None and n <= EXACT_NODES:
         there["late"] = saved.late is not None and _late_is_drawn(saved.late, saved.protocol)
         there["tracking"] = saved.tracking is not None
@@ -77,9 +118,65 @@ def draw(saved: Certificate, wanted: Sequence[str]) -> dict[str, Any]:
         there["decay"] = saved.comparison is not None and bool(saved.envelope.functions) and bool(run.error.any())
         there["sliding"] = slid and not saved.direct and n <= INPUT_NODES
         there["input"] = n <= INPUT_NODES and (slid or not saved.constant)
-    drawn = [name for name in wanted if there.get(name)]
-    axes = (PLOTS[name](saved) for name in drawn)
-    return {name: ax.figure for name, ax in zip(drawn, axes, strict=True)}
+    figures = {name: PLOTS[name](saved).figure for name in wanted if there.get(name)}
+    if agents_run is not None and saved.agents is not None:
+        figures["motion"] = plot_motion(agents_run)
+        if saved.agents.dimension == 2:
+            figures["formation"] = plot_formation(agents_run).figure
+    return figures
+
+
+def run_of_agents(saved: Certificate) -> AgentsTrajectory | None:
+    """Return a run of a few agents of order n; None of others, and where it fails."""
+    if saved.agents is None or saved.agents.initial_state is None or saved.graph.n_nodes > _RUN:
+        return None
+    try:
+        return saved.agents.simulate()
+    except (SimulationError, ParameterError):
+        return None
+
+
+def _draw_family(
+    saved: FamilyCertificate, wanted: Sequence[str], runs: Sequence[Trajectory], why: Counterexamples
+) -> dict[str, Any]:
+    """Draw the graphs, runs within what is proved, and counterexamples: as far as there are any."""
+    small = bool(runs) and saved.family.n_nodes <= INPUT_NODES
+    there = {"graph": saved.family.n_nodes <= DRAWN_NODES, "states": small, "input": small}
+    moves = bool(runs) and saved.common and saved.rate is not None
+    there["decay"] = moves and bool(saved.deviation_bound([1.0]).max() > 0)
+    figures = {
+        name: PLOTS[name](saved, **({} if name == "graph" else {"runs": runs})).figure
+        for name in wanted
+        if there.get(name)
+    }
+    for number, (_, _, component, one) in enumerate(why):
+        try:
+            figures[f"why{number}"] = plot_counterexample(component, why=one, protocol=saved.protocol).figure
+        except (ParameterError, SimulationError):
+            continue  # no state of it is known; the words stand alone
+    return figures
+
+
+def counterexamples(saved: FamilyCertificate) -> Counterexamples:
+    """Return what is refuted, the counterexample in words, its component, and itself: for claim and expectation."""
+    result = []
+    for part in saved.parts:
+        component = part.component
+        if component.behaviour == DEPENDS and component.counterexample is not None:
+            result.append(("one behaviour for every signal", component, component.counterexample))
+            break
+    asked = saved.expectations.behaviour
+    if asked is not None and any(a.status == REFUTED for a in saved.assessment.answers):
+        for part in saved.parts:
+            if component_holds(part.component, asked) is False:
+                why = component_refutation(part.component, asked)
+                if why is not None and why not in [one for _, _, one in result]:
+                    result.append((asked, part.component, why))
+                break
+    return [
+        (what, Markup("{}").format(signs(printable(counterexample_text(c, why), 500))), c, why)
+        for what, c, why in result
+    ]
 
 
 def _late_is_drawn(late: LateBounds, protocol: Protocol) -> bool:

@@ -24,7 +24,7 @@ from ptcc_certify.certificate.document import producer
 from ptcc_certify.checker.input_formulas import InitialSet
 from ptcc_certify.graphs.rationals import format_exact, nearest_float, writable
 from ptcc_certify.protocols import Protocol
-from ptcc_certify.report.structure_text import structure_text
+from ptcc_certify.report.facts.graph import structure_text
 from ptcc_certify.report.text_layout import arithmetic
 
 #: Labels of a list that are written out, and characters of a label.
@@ -35,7 +35,15 @@ TITLE = "Robust prescribed-time coordination control of cooperative-antagonistic
 _MINUS = "\N{MINUS SIGN}"
 #: Units of a formula's drawing in the size of its letters.
 _EM = 200
-_LETTERS = {"rho": "\u03c1", "kappa": "\u03ba", "mu": "\u03bc", "delta": "\u03b4", "Omega": "\u03a9", "Theta": "\u0398"}
+_LETTERS = {
+    "rho": "\u03c1",
+    "kappa": "\u03ba",
+    "mu": "\u03bc",
+    "delta": "\u03b4",
+    "Omega": "\u03a9",
+    "Theta": "\u0398",
+    "lambda": "\u03bb",
+}
 _LETTERS |= {"Xi": "\u039e", "Xit": "\u039e\u0303", "Phi": "\u03a6", "Psi": "\u03a8", "Pi": "\u03a0"}
 
 # ---------------------------------------------------------------------- texts of the file
@@ -128,11 +136,6 @@ def indexed(text: str) -> Markup:
     return Markup(re.sub(r"\b(\w)_(\w)\b", r"\1<sub>\2</sub>", str(escape(text))))
 
 
-def instant(name: str) -> Markup:
-    """Set the name of an instant, which is not broken before a letter: ``T_r + 0.99 T_s``."""
-    return indexed(re.sub(r"(?<=\d) (?=T)", "\u00a0", name))
-
-
 def symbol(name: str) -> Markup:
     """Return a parameter's letter with its index: ``rho1``."""
     letters, index = re.fullmatch(r"([A-Za-z]+?)_?([0-9rs]?)", name).groups()  # type: ignore[union-attr]
@@ -140,13 +143,19 @@ def symbol(name: str) -> Markup:
     return indexed(f"{letter}_{index}" if index else letter)
 
 
+def signs(text: str) -> str:
+    """Write minus signs of numbers, and arrows of edges, as such."""
+    return re.sub(r"(?<=[= \[])-(?=\d)", "\N{MINUS SIGN}", text).replace(" -> ", " \N{RIGHTWARDS ARROW} ")
+
+
 def typeset(text: str) -> Markup:
     """Set what a screen writes in ASCII: ``||E|| <= 2e-07``, ``lmin(Xi_F)``, ``rho2``."""
     text = re.sub(r"\b[A-Za-z]+(?![A-Za-z])", lambda word: _LETTERS.get(word[0], word[0]), text)
     text = re.sub(r"(?<=[\u03c1\u03bc])(?=\d)", "_", text)
     text = re.sub(r"(?<=L)'|(?<=L_F)'", "\u2032", text)
-    for plain, sign in (("<=", "\u2264"), (">=", "\u2265"), ("||", "\u2016")):
+    for plain, sign in ((" <= ", " \u2264 "), (" >= ", " \u2265 "), ("||", "\u2016")):  # a label may be ">"
         text = text.replace(plain, sign)
+    text = re.sub(r"(?<=\d) (?=T)", "\u00a0", text)  # the name of an instant is not broken
     shown = re.sub(r"\bl(min|max)(?=\()", "\u03bb<sub>\\1</sub>", str(indexed(text)))
     return Markup(re.sub(r"\b[\d.]+e[+-]?\d+\b", lambda number: str(power(number[0])), shown))
 

@@ -14,6 +14,7 @@ from functools import singledispatch
 from typing import Any
 
 from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.facts import Fact
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.errors import PTCCError
 from ptcc_certify.gain_design.agents_answer import AgentsDesign
@@ -22,19 +23,17 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.size_limits import SHOWN_NODES
 from ptcc_certify.graphs.structure import Structure, analyse
-from ptcc_certify.report.family_screen import decision_lines, family_lines, family_text
+from ptcc_certify.report.facts import decision_facts, design_facts, facts_of, structure_facts
+from ptcc_certify.report.facts.graph import family_text
 from ptcc_certify.report.figures import draw
 from ptcc_certify.report.plots.agents_motion import plot_motion
 from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.plots.style import figure_bytes
 from ptcc_certify.report.plots.trade_off import plot_trade_off
 from ptcc_certify.report.plots.trajectory import plot_run
-from ptcc_certify.report.screen import certificate_lines, structure_lines
+from ptcc_certify.report.screen import entries
 from ptcc_certify.simulation.trajectory import Trajectory
 from ptcc_certify.theorems.family_behaviour import FamilyComponent, decide
-
-# Where the text of a line of a screen begins, after its head.
-_HEAD = 11
 
 
 @singledispatch
@@ -47,14 +46,14 @@ def html_of(shown: Any) -> str | None:
 def graph_html(graph: SignedDigraph) -> str:
     """Show a graph: its size, how it was read, its nodes, and a drawing of up to 120 of them."""
     structure = analyse(graph)
-    lines = structure_lines(structure, "signed digraph")
-    return _structure_page([line for line in lines if line.startswith(("graph", "read", "nodes"))], structure)
+    facts = structure_facts(structure, "signed digraph")
+    return _structure_page([fact for fact in facts if fact.head in ("graph", "read", "nodes")], structure)
 
 
 @html_of.register(Structure)
 def structure_html(structure: Structure) -> str:
     """Show a structure: the screen of ``ptcc classify``, and a drawing of up to 120 nodes."""
-    return _structure_page(structure_lines(structure, "signed digraph"), structure)
+    return _structure_page(structure_facts(structure, "signed digraph"), structure)
 
 
 @html_of.register(Certificate)
@@ -63,17 +62,16 @@ def certificate_html(certificate: Certificate) -> str:
 
     Of one that was read, up to 120 nodes, the run is made for the figure.
     """
-    part = certificate.agents
+    part, facts = certificate.agents, facts_of(certificate, "signed digraph", {})
     if part is not None:
         drawn = part.initial_state is not None and certificate.graph.n_nodes <= SHOWN_NODES
         alt = "positions, velocities and so on over time"
-        return _page(certificate_lines(certificate, "signed digraph"), plot_motion(certificate) if drawn else None, alt)
-    lines = certificate_lines(certificate, "signed digraph")
+        return _page(facts, plot_motion(certificate) if drawn else None, alt)
     if figures := draw(certificate, ["late", "tracking"]):
         (figure,) = figures.values()
-        return _page(lines, figure, "distance of the farthest agent under its proved bound, over time")
+        return _page(facts, figure, "distance of the farthest agent under its proved bound, over time")
     alt = "simulated decay of the error under its proved bound, over the time left to the deadline"
-    return _page(lines, draw(_with_run(certificate), ["decay"]).get("decay"), alt)
+    return _page(facts, draw(_with_run(certificate), ["decay"]).get("decay"), alt)
 
 
 def _with_run(certificate: Certificate) -> Certificate:
@@ -88,23 +86,21 @@ def _with_run(certificate: Certificate) -> Certificate:
 @html_of.register(FamilyCertificate)
 def family_certificate_html(certificate: FamilyCertificate) -> str:
     """Show the certificate of a family: the screen of ``ptcc certify``, and a drawing of up to 120 nodes."""
-    origins = certificate.origins
-    lines = family_lines(certificate, origins.get("graph", ""), origins)
-    return _page(lines, *_family_figure(certificate.family))
+    return _page(facts_of(certificate), *_family_figure(certificate.family))
 
 
 @html_of.register(Family)
 def family_html(family: Family) -> str:
     """Show a family: the screen of ``ptcc classify``, and a drawing, up to 120 nodes; of more its size alone."""
     if family.n_nodes > SHOWN_NODES:
-        return _page([f"{'family':<{_HEAD}}{family_text(family, '')}"], None, "")
-    return _page(decision_lines(decide(family), family, ""), *_family_figure(family))
+        return _page([Fact(head="family", note=family_text(family, ""))], None, "")
+    return _page(decision_facts(decide(family), family, ""), *_family_figure(family))
 
 
 @html_of.register(FamilyComponent)
 def component_html(component: FamilyComponent) -> str:
     """Show what a component of a family does: the screen of ``ptcc classify``, and a drawing, up to 120 nodes."""
-    return _page(decision_lines([component], component.family, ""), *_family_figure(component.family))
+    return _page(decision_facts([component], component.family, ""), *_family_figure(component.family))
 
 
 def _family_figure(family: Family) -> tuple[Any, str]:
@@ -122,36 +118,36 @@ def trajectory_html(trajectory: Trajectory) -> str:
     alt = (
         f"states{' and sliding variables' if trajectory.sliding and trajectory.sliding.sigma0.any() else ''} over time"
     )
-    return _page([f"{'trajectory':<{_HEAD}}{trajectory!r}"], figure, alt)
+    return _page([Fact(head="trajectory", note=repr(trajectory))], figure, alt)
 
 
 @html_of.register(Design)
 def design_html(answer: Design) -> str:
     """Show a design: the screen of ``ptcc design``, and its peak input against the deadline."""
     alt = "certified peak input against the deadline, and what no gains can stay below"
-    return _page(answer.lines(), plot_trade_off(answer).figure, alt)
+    return _page(design_facts(answer), plot_trade_off(answer).figure, alt)
 
 
 @html_of.register(AgentsDesign)
 def agents_design_html(answer: AgentsDesign) -> str:
     """Show a design of agents of order n: the screen of ``ptcc design``."""
-    return _page(answer.lines(), None, "")
+    return _page(design_facts(answer), None, "")
 
 
-def _structure_page(lines: Iterable[str], structure: Structure) -> str:
+def _structure_page(facts: Iterable[Fact], structure: Structure) -> str:
     graph = structure.graph
     figure = plot_graph(structure).figure if graph.n_nodes <= SHOWN_NODES else None
     leaders = f"{structure.leaders.size} of them leaders"
-    return _page(lines, figure, f"drawing of the graph: {graph.n_nodes} nodes, {leaders}, {graph.n_edges} edges")
+    return _page(facts, figure, f"drawing of the graph: {graph.n_nodes} nodes, {leaders}, {graph.n_edges} edges")
 
 
-def _page(lines: Iterable[str], figure: Any, alt: str) -> str:
-    """Return lines, each with a head of ten characters, as a table beside a figure, if there is one."""
+def _page(facts: Iterable[Fact], figure: Any, alt: str) -> str:
+    """Return facts as a table beside a figure, if there is one."""
     head = "text-align:left;vertical-align:top;padding-right:0.8em"
     rows = "".join(
-        f'<tr><th scope="row" style="{head}">{html.escape(line[:_HEAD].strip())}</th>'
-        f'<td style="text-align:left">{html.escape(line[_HEAD:].strip())}</td></tr>'
-        for line in lines
+        f'<tr><th scope="row" style="{head}">{html.escape(name)}</th>'
+        f'<td style="text-align:left">{html.escape(text)}</td></tr>'
+        for name, text in entries(facts)
     )
     image = ""
     if figure is not None:

@@ -1,12 +1,12 @@
 """The page of a certificate: one file of HTML that loads nothing and runs no script.
 
-Its sentences are in ``templates/``, which Jinja2 fills: every text of the file is made printable, cut, and escaped.
+What it tells are the facts of the certificate, of a graph or a family; around them stand tables, figures and how to
+check the file, in ``templates/``, which Jinja2 fills: every text of the file is made printable, cut, and escaped.
 """
 
 from __future__ import annotations
 
 import math
-import re
 import shlex
 from collections import Counter
 from collections.abc import Sequence
@@ -14,39 +14,49 @@ from datetime import date
 from fractions import Fraction
 from functools import cache
 from importlib import resources
-from itertools import groupby, islice
+from itertools import islice
+from pathlib import PurePath
 from typing import Any
 
 import jinja2
 from markupsafe import Markup
 
-from ptcc_certify.bounds.final_state import extremes
 from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate
+from ptcc_certify.certificate.facts import Fact
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
+from ptcc_certify.certificate.family_comparison import compare
+from ptcc_certify.certificate.restricted_bounds import nearer_for_signal
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.obligations import VerifiedObligation
+from ptcc_certify.errors import Change, spell
 from ptcc_certify.graphs.io.graph_files import reading_flags
-from ptcc_certify.graphs.rationals import nearest_float
-from ptcc_certify.graphs.size_limits import DRAWN_NODES, LABELLED_NODES
+from ptcc_certify.protocols.agents import plant_text
 from ptcc_certify.report import notation as texts
-from ptcc_certify.report.agents_page import agents_view
-from ptcc_certify.report.family_page import family_view
-from ptcc_certify.report.figures import draw, inline_figure
-from ptcc_certify.report.late_lines import late_lines, tracking_lines
-from ptcc_certify.report.notation import above, agent_parts, enclosed, printable, rational
-from ptcc_certify.report.plots.agents import camp_groups
-from ptcc_certify.report.plots.distributions import plot_degrees, plot_final_states
+from ptcc_certify.report.facts import facts_of
+from ptcc_certify.report.facts.decay import BOUND_KINDS
+from ptcc_certify.report.facts.graph import leader_facts
+from ptcc_certify.report.facts.signals import signal_text
+from ptcc_certify.report.figures import Counterexamples, counterexamples, draw, inline_figure, run_of_agents
+from ptcc_certify.report.notation import rational
+from ptcc_certify.report.plots.runs import keeps_promise
 from ptcc_certify.report.plots.subject import ideal_text, limits_text
-from ptcc_certify.report.structure_text import camps, remarks_on
-from ptcc_certify.report.told_instants import FEW as FEW_INSTANTS
-from ptcc_certify.report.told_instants import told_instants
+from ptcc_certify.report.states_table import ROWS, states_table
+from ptcc_certify.simulation.agents import AgentsTrajectory
 from ptcc_certify.simulation.trajectory import Trajectory
+from ptcc_certify.theorems.family_behaviour import DEPENDS
 from ptcc_certify.theorems.table import THEOREMS
 
-#: Agents up to which each has a row, and how many there are of either extreme above; leader groups that have a row.
-ROWS, EXTREMES, GROUPS = 60, 10, 12
-#: Agents up to which the first screen tells where each of them ends, and labels of a list there.
-FEW = 8
+#: Weights of a member that are listed.
+_WEIGHTS = 8
+#: Facts of the question, and those that stand elsewhere on the page.
+_QUESTION = ["graph", "family", "read", "nodes", "mode", "structure", "protocol", "x(0)", "sigma(0)"]
+_ELSEWHERE = ("verdict", "proof")
+#: The theorem of families, as page and statement give it.
+THEOREM = (
+    "If the mandatory graphs of all modes have one kernel K, and every uncertain edge joins agents whose rows of a"
+    " basis of K agree up to its sign, then K is at rest in every graph of the family, and under every signal the"
+    " agents come to a state of K by the deadline."
+)
 
 
 def report_html(
@@ -86,15 +96,14 @@ def report_html(
     >>> "<h1>Signed-average consensus at T = 1</h1>" in page, "<bdi>&lt;b&gt;</bdi>" in page, "<b>" in page
     (True, True, False)
     """
-    template = "family_page.html" if isinstance(saved, FamilyCertificate) else "page.html"
-    part = None if isinstance(saved, FamilyCertificate) else saved.agents
+    why = counterexamples(saved) if isinstance(saved, FamilyCertificate) else []
     report = saved.checked
-    more = {"no_run": no_run, "obligations": [] if report is None else _obligations(report)}
-    if part is not None:
-        template, shown = "agents_page.html", agents_view(saved, part)  # type: ignore[arg-type]
-    else:
-        shown = family_view(saved, runs) if isinstance(saved, FamilyCertificate) else _view(saved)
-    return _environment().get_template(template).render(shown | _written(day) | more)
+    run = run_of_agents(saved) if isinstance(saved, Certificate) else None
+    own = _of_family(saved, why) if isinstance(saved, FamilyCertificate) else _of_graph(saved)
+    view = _view(saved) | own | _runs(saved, runs, run)
+    more: dict[str, Any] = {"no_run": no_run, "why": why, "obligations": [] if report is None else _obligations(report)}
+    more["figures"] = draw(saved, None, runs, why, run)
+    return _environment().get_template("page.html").render(view | _written(day) | more)
 
 
 def rejected_html(error: RejectedCertificate, *, day: date | None = None) -> str:
@@ -126,9 +135,9 @@ def rejected_html(error: RejectedCertificate, *, day: date | None = None) -> str
     >>> "REJECTED by the independent check" in page, "consensus" in page
     (True, False)
     """
-    name = printable(error.path.name, 200)
+    name = texts.printable(error.path.name, 200)
     title = f"REJECTED: {name}"
-    command = printable(shlex.quote(error.path.name), 200)
+    command = texts.printable(shlex.quote(error.path.name), 200)
     template = _environment().get_template("rejected.html")
     return template.render(title=title, name=name, quoted=command, report=error.report, **_written(day))
 
@@ -141,111 +150,177 @@ def _written(day: date | None) -> dict[str, str]:
 @cache
 def _environment() -> jinja2.Environment:
     """Return the templates with what they may use; what is printed is escaped, and an unknown name is an error."""
-    environment = texts.environment(lambda text: printable(text, 2000), autoescape=True)
+    environment = texts.environment(lambda text: texts.printable(text, 2000), autoescape=True)
     named = ("above", "below", "indexed", "label", "labels", "plural", "power", "printable", "rational", "symbol")
     environment.filters |= {name: getattr(texts, name) for name in named}
-    environment.filters |= {"camps": camps, "grouped": "{:,}".format, "flags": reading_flags, "typeset": texts.typeset}
+    environment.filters |= {"grouped": "{:,}".format, "flags": reading_flags, "merged": dict.__or__}
+    environment.filters |= {"capitalized": lambda text: text[:1].upper() + text[1:], "set": set_text}
     style = (resources.files("ptcc_certify.report") / "page.css").read_text(encoding="utf-8")
     environment.globals |= {"style": Markup(style), "inline_figure": inline_figure, "newline": Markup("\n")}
-    environment.globals |= {"ROWS": ROWS, "EXTREMES": EXTREMES, "GROUPS": GROUPS, "FEW": FEW}
-    environment.globals |= {"LABELLED_NODES": LABELLED_NODES}
-    environment.filters |= {"merged": dict.__or__, "capitalized": lambda text: text[:1].upper() + text[1:]}
     return environment
 
 
-def _view(saved: Certificate) -> dict[str, Any]:
-    """Return everything that the template shows."""
-    effort, report, labels = saved.effort, saved.report, saved.graph.labels
-    invariant = "its state" if saved.direct else "x \u2212 \u03c3"
-    title = _title(saved, invariant)
-    name = shlex.quote(saved.path.name)
-    name = f"./{name}" if name.startswith("-") else name
-    more = f" --memory {math.ceil(report.memory)}" if report.memory > 1 else ""
-    commands = [f"ptcc check {name}{more}", f"python -m ptcc_certify.checker {name}{more}"]
-    notes = saved.document["unverified"].get("notes")
-    peaks = effort.peak.agents if effort and effort.peak else ()
-    verdict_text, larger_rho2 = _in_words(saved)
-    asked = None if saved.trajectory is None else saved.asked_trajectory
-    return texts.facts(saved) | {
-        **{"verdict_text": verdict_text, "larger_rho2": larger_rho2},
-        **{"structure": saved.structure, "protocol": saved.protocol, "invariant": invariant},
-        **{"heading": texts.indexed(title), "title": title.replace("<sup>", "^").striptags()},
-        "remarks": remarks_on(saved.structure),
-        "equations": texts.formula_svg(saved.protocol.latex(places=saved.offsets is not None), inline=False),
+def set_text(fact: Fact) -> Markup:
+    """Return the sentence of a fact, set as formulas are; it has no options of the command line.
+
+    Examples
+    --------
+    >>> print(set_text(Fact(head="verdict", note=("says little; ", Change("rho2", "3"), " leaves 1 %"))))
+    says little; \u03c1<sub>2</sub> = 3 leaves 1 %
+    """
+    text = spell(fact.note, lambda change: f"{change.field} = {change.number}" if change.number else change.field)
+    return texts.typeset(texts.signs(texts.printable(text, 2000)))
+
+
+def _view(saved: Certificate | FamilyCertificate) -> dict[str, Any]:
+    """Return what the template shows of every certificate."""
+    facts, source, assessment = facts_of(saved), saved.source, saved.assessment
+    told = [fact for fact in facts if fact.head not in (*_QUESTION, *_ELSEWHERE)]
+    answers, details = ([fact for fact in told if fact.detail == wanted] for wanted in (False, True))
+    asked = [fact for fact in facts if fact.head in _QUESTION]
+    if isinstance(saved, Certificate):
+        asked += leader_facts(saved.structure)
+    pairs = zip(saved.labels, saved.sigma0 or (), saved.reaching or (), strict=False)
+    advised = next((part.number for part in assessment.advice if isinstance(part, Change)), "")
+    begins = saved.initial_state if saved.agents is None else saved.agents.initial_state
+    certified = saved.verdict == "certified"
+    lacks = [
+        text
+        for text, lacking in {
+            "no decay was proved": saved.rate is None and not saved.constant,
+            "no final state was proved": source is not None and source.document.get("influence", 0) is None,
+        }.items()
+        if lacking
+    ]
+    return {
+        **{"saved": saved, "certified": certified, "sliding": saved.protocol.reaching is not None},
+        "verdict_text": set_text(facts[-1]),
+        "larger_rho2": advised if "leaves 1 %" in spell(assessment.advice) else "",
+        "arithmetic": texts.arithmetic(saved.direct),
+        **{"answers": answers, "asked": asked, "details": details, "lacks": lacks},
+        "graph_text": set_text(facts[0]),
+        "equations": texts.formula_svg(_law(saved), inline=False),
         "parameters": [(name, getattr(saved.protocol, name)) for name in texts.parameter_names(saved.protocol)],
-        "statements": {theorem.number: theorem.statement for theorem in THEOREMS},
-        "states": _states(saved),
-        "endings": _endings(saved),
-        "group_sizes": sorted(Counter((len(c.nodes), c.balanced) for c in saved.structure.closed_components).items()),
-        "kinds": Counter(m.kind for m in saved.envelope.functions).items(),
-        "remaining": _remaining(saved),
-        "reaching": list(islice(zip(labels, saved.sigma0 or (), saved.reaching or (), strict=False), ROWS)),
-        "asked": "" if asked is None else limits_text(asked, saved),
-        "ideal": ideal_text(saved),
-        "figures": draw(saved, ("graph", "states", "sliding", "decay", "input", "late", "tracking"))
-        | _distributions(saved),
-        "camp_counts": Counter(camp_groups(saved.structure)[saved.structure.leaders]).items(),
-        "gap": _gap(saved),
-        "late_lines": [*late_lines(saved), *tracking_lines(saved)],
-        "peak_agent": labels[max(range(len(peaks)), key=peaks.__getitem__)] if peaks else None,
-        "commands": commands,
-        "notes": [note for note in notes[:5] if isinstance(note, str)] if isinstance(notes, list) else [],
+        "states": states_table(saved),
+        "reaching": [] if saved.direct else list(islice(pairs, ROWS)),
+        "begins": begins is not None,
+        "sampled": any(limits.sample_period is not None for limits in saved.limits),
+        "commands": _commands(saved),
+        "file_name": None if source is None else source.path.name,
+        "sha256": None if source is None else source.sha256,
+        "document": None if source is None else source.document,
+        **{"constant": saved.constant, "theorem": THEOREM},
     }
 
 
-def _in_words(saved: Certificate) -> tuple[Markup, str]:
-    """Return the verdict without options of the command line, and the ``rho2`` that leaves 1 %, empty if none."""
-    text = re.sub(r"--(rho2|mu3) (\S+)(?: \([^)]*\))?", r"\1 = \2", saved.assessment.text)
-    useful = re.match(r"--rho2 (\S+) .*leaves 1 %", saved.assessment.advice)
-    return texts.typeset(text), useful[1] if useful else ""
+def _law(saved: Certificate | FamilyCertificate) -> str:
+    """Return the protocol in LaTeX: that of agents of order n, or with places in a formation."""
+    if saved.agents is not None:
+        return saved.agents.protocol.latex()
+    return saved.protocol.latex(places=saved.offsets is not None)
 
 
-def _title(saved: Certificate, invariant: str) -> Markup:
+def _of_graph(saved: Certificate) -> dict[str, Any]:
+    """Return what the template shows of one graph alone."""
+    claims = sorted(Counter(saved.claims).items(), key=lambda item: item[0].theorem)
+    statements = {theorem.number: theorem.statement for theorem in THEOREMS}
+    rows = []
+    for claim, number in claims:
+        words = ", ".join((claim.behaviour[:1].upper() + claim.behaviour[1:], *claim.special))
+        corollaries = (
+            f" ({'Corollary' if len(claim.corollaries) == 1 else 'Corollaries'} {', '.join(claim.corollaries)})"
+        )
+        source = f"Theorem {claim.theorem}{corollaries if claim.corollaries else ''}"
+        rows.append((words, source, statements[claim.theorem] if saved.agents is None else "", number))
+    title = _title(saved)
+    return {
+        **{"family": None, "several": False, "depends": False, "promise": "", "promised": False, "of_the_kind": False},
+        **{"claims": rows, "claims_in_all": len(saved.claims), "bound_words": []},
+        "theorems": list(dict.fromkeys(claim.theorem for claim, _ in claims)),
+        **{"heading": texts.indexed(title), "title": title.replace("<sup>", "^").striptags()},
+        "unbounded": saved.effort is not None and saved.effort.bounded is False and saved.agents is None,
+    }
+
+
+def _title(saved: Certificate) -> Markup:
     """Say what the certificate is about."""
     claims, deadline = saved.claims, "T" if saved.protocol.reaching is None else "T_r + T_s"
     behaviour = claims[0].sharpest if len(claims) == 1 else f"{len(claims):,} components settle"
     text = Markup("{} at {} = {}").format(behaviour, deadline, rational(saved.protocol.T)).replace("= \u2248", "\u2248")
-    if saved.constant:
-        text = Markup("every agent keeps {}").format(invariant)
-    text += " of x \N{MINUS SIGN} offsets" * (saved.offsets is not None)
-    text += ", nothing late" * (saved.late is not None) + ", leaders at rest" * saved.leaders_move
+    if saved.agents is not None:
+        text = Markup("{} of {}").format(behaviour, plant_text(saved.agents.protocol.plant))
+    elif saved.constant:
+        text = Markup("every agent keeps {}").format("its state" if saved.direct else "x \u2212 \u03c3")
+    if saved.agents is None:
+        text += " of x \N{MINUS SIGN} offsets" * (saved.offsets is not None)
+        text += ", nothing late" * (saved.late is not None) + ", leaders at rest" * saved.leaders_move
     return text[:1].upper() + text[1:] if saved.verdict == "certified" else "Undecided: " + text
 
 
-def _states(saved: Certificate) -> tuple[list[str], list[list[str]]]:
-    """Return head and rows of the table of initial and final states: of all agents, or of those at the extremes."""
-    if saved.initial_state is None:
-        return [], []
-    heads = ("Initial state", "\u03c3(0)", "State at the deadline", "Limit, if it settles")
-    agents, parts = _tabled(saved), agent_parts(saved)
-    numbers = texts.state_columns(saved, heads, agents, enclosed)
-    if saved.offsets is not None:
-        numbers = {"Place h": [texts.rational(saved.offsets[k]) for k in agents], **numbers}
-    known = ([texts.label(saved.graph.labels[k]) for k in agents], [parts[k] for k in agents])
-    return ["Agent", "Part", *numbers], [list(row) for row in zip(*known, *numbers.values(), strict=True)]
+def _of_family(saved: FamilyCertificate, why: Counterexamples) -> dict[str, Any]:
+    """Return what the template shows of a family alone."""
+    components = [part.component for part in saved.parts]
+    depends, T = any(component.behaviour == DEPENDS for component in components), rational(saved.protocol.T)
+    counts = Counter(claim.value for claim in facts_of(saved, details=False) if claim.head == "claim" and claim.value)
+    behaviour = next(iter(counts)) if len(counts) == 1 else f"{len(components):,} components settle"
+    title = Markup("{} at T = {} for every signal").format(behaviour, T)
+    if depends:
+        title = Markup("where agents end depends on the signal")
+    elif saved.verdict != "certified":
+        title = Markup("what the agents do at T = {}").format(T)
+    title = title.replace("= \u2248", "\u2248")
+    title = title[:1].upper() + title[1:] if saved.verdict == "certified" else "Undecided: " + title
+    bound = min((p.upper_bound for p in saved.parts if p.upper_bound), key=lambda b: b.value, default=None)
+    claims = [(str(claim)[:1].upper() + str(claim)[1:], "", "", number) for claim, number in counts.items()]
+    return {
+        **{"family": saved.family, "several": len(saved.family.modes) > 1, "depends": depends, "why": why},
+        **{"claims": claims, "claims_in_all": len(components), "heading": title, "title": title.striptags()},
+        "promise": "" if saved.signal == "any" else signal_text(saved.signal)[1],
+        "promised": nearer_for_signal(saved) if saved.initial_state is not None else False,
+        "bound_words": _bound_words(saved),
+        "bound_kind": "" if bound is None else BOUND_KINDS[bound.kind],
+        "unbounded": saved.unbounded and saved.common,
+        "theorems": [],
+    }
 
 
-def _tabled(saved: Certificate) -> list[int]:
-    """Return the agents that have a row: all, or those that end highest and lowest, from the highest on."""
-    if saved.graph.n_nodes <= ROWS:
-        return list(range(saved.graph.n_nodes))
-    if (end := saved.final_positions) is None:
-        highest, lowest = extremes(saved.initial_positions or (), EXTREMES)
-    else:
-        highest, lowest = extremes(end.states, EXTREMES, end.radius)
-    return highest + lowest
-
-
-def _endings(saved: Certificate) -> list[tuple[Markup, str]]:
-    """Return agents and where they end, those together that end at the same; of many, the two extremes."""
-    if (end := saved.final_positions) is None or not (intervals := end.intervals):
-        return []
-    agents = sorted(range(len(intervals)), key=lambda k: intervals[k], reverse=True)
-    if len(agents) > FEW:
-        highest, lowest = extremes(end.states, 1, end.radius)
-        agents = highest + lowest
-    same = groupby(agents, key=intervals.__getitem__)
-    return [(texts.labels(list(nodes), saved.graph.labels, FEW), enclosed(value)) for value, nodes in same]
+def _runs(
+    saved: Certificate | FamilyCertificate, runs: Sequence[Trajectory], run: AgentsTrajectory | None
+) -> dict[str, Any]:
+    """Return what the template tells of simulated runs."""
+    view: dict[str, Any] = {"runs": runs, "asked_run": False, "of_the_kind": False}
+    if isinstance(saved, FamilyCertificate):
+        if not runs:
+            return view | {"run_text": ""}
+        ratios, kept = [compare(saved, run) for run in runs], saved.signal != "any" and keeps_promise(saved, runs)
+        worst = sum(run.signal.startswith("worst") for run in runs)
+        text = f"{texts.plural(len(runs), 'run')} from the initial state of the certificate"
+        text += " under signals that keep the promise" if kept else f", {worst} of them under the worst that was found"
+        text += "." if saved.direct else ", under the worst disturbance."
+        if any(ratio.judged for ratio in ratios) and saved.common:
+            largest = max(ratio.worst_ratio for ratio in ratios)
+            word = "VIOLATED" if any(ratio.violated for ratio in ratios) else "kept"
+            text += f" The bounds are {word}: the largest ratio of run to bound is {largest:.3g}."
+        return view | {"run_text": text, "of_the_kind": kept}
+    if saved.agents is not None:
+        seen = None if run is None else saved.agents.compare(run)
+        if seen is None:
+            return view | {"run_text": ""}
+        word = "exceeds a bound" if seen.violated else "keeps every bound"
+        text = (
+            f"A run by CVODES {word}: the largest ratio of V to its bound is {seen.decay:.4f}, of all {seen.worst:.4f}."
+        )
+        return view | {"run_text": text}
+    if saved.trajectory is None:
+        return view | {"run_text": ""}
+    asked, ideal = saved.asked_trajectory, ideal_text(saved)
+    text = "The run was repeated for this page with CVODES, from the initial state of the certificate"
+    if asked is not None:
+        told = limits_text(asked, saved).replace("$T$", "T")
+        text += f"; states and input are those of a run with what was asked: {told}"
+    elif ideal:
+        text += f", with {ideal}"
+    return view | {"run_text": f"{text}.", "asked_run": asked is not None}
 
 
 def _obligations(report: CheckReport) -> list[tuple[VerifiedObligation, list[VerifiedObligation]]]:
@@ -256,32 +331,42 @@ def _obligations(report: CheckReport) -> list[tuple[VerifiedObligation, list[Ver
     return [(same[0], same) for same in kinds.values()]
 
 
-def _distributions(saved: Certificate) -> dict[str, Any]:
-    """Draw where agents end and whom they listen to, of a graph that is too large to be drawn."""
-    if saved.graph.n_nodes <= DRAWN_NODES:
-        return {}
-    ends = {} if saved.final_state is None else {"final": plot_final_states(saved).figure}
-    return ends | ({"degrees": plot_degrees(saved.graph).figure} if saved.graph.n_edges else {})
-
-
-def _remaining(saved: Certificate) -> list[tuple[str, ...]]:
-    """Return the instants, what may be left then of the norm, and of the deviation from the final state, rounded up."""
-    if not saved.envelope.functions or saved.rate is None or (not saved.direct and saved.initial_state is None):
+def _bound_words(saved: FamilyCertificate) -> list[Markup]:
+    """Tell the members that prove the upper bound on the rate: modes, weights, durations or shares."""
+    parts = [part for part in saved.parts if part.upper_bound is not None]
+    if not parts:
         return []
-    p = saved.protocol
-    instants = [] if saved.direct else [(float(p.span / p.T), "T_r")]
-    instants += told_instants(p, saved.direct)[:FEW_INSTANTS]
-    remaining = [left for left, _ in instants]
-    bounds = map(saved.envelope.residual, remaining) if saved.direct else saved.norm_bound(remaining).tolist()
-    columns = [[above(x, 2) for x in bounds]]
-    if saved.initial_state is not None and any(m.deviation is not None for m in saved.envelope.functions):
-        columns.append([above(float(x), 2) for x in saved.deviation_bound(remaining).max(axis=0)])
-    return list(zip((texts.instant(name) for _, name in instants), *columns, strict=True))
+    part = min(parts, key=lambda p: p.upper_bound.value)  # type: ignore[union-attr]
+    bound, family = part.upper_bound, saved.family
+    assert bound is not None
+    from ptcc_certify.certificate.unverified import upper_bound_entry
+    from ptcc_certify.lyapunov.quotient import Quotient
+
+    lines = []
+    for member, duration in zip(
+        upper_bound_entry(Quotient.of(part.component), bound)["members"], bound.durations, strict=True
+    ):
+        name = texts.printable(member["name"]) if len(family.modes) > 1 else "the graph"
+        how = {
+            "word": Markup("for {} of the clock").format(rational(duration)),
+            "mixture": Markup("for a share {} of the time").format(rational(duration)),
+            "member": Markup("for ever"),
+        }[bound.kind]
+        some = [
+            Markup("{} \u2192 {}: {}").format(texts.label(s, 24), texts.label(t, 24), rational(Fraction(w)))
+            for s, t, w in member["weights"][:_WEIGHTS]
+        ]
+        more = ", ..." if len(member["weights"]) > _WEIGHTS else ""
+        weights = Markup(" with ") + Markup(", ").join(some) + more if some else Markup("")
+        lines.append(Markup("{} {}{}").format(name, how, weights))
+    return lines
 
 
-def _gap(saved: Certificate) -> Fraction | None:
-    """Return how far the end of the repeated run is from the proved final state."""
-    if saved.trajectory is None or saved.final_state is None:
-        return None
-    pairs = zip(saved.trajectory.final_state.tolist(), saved.final_state.intervals or (), strict=True)
-    return Fraction(max(abs(float(x) - nearest_float(middle)) for x, (middle, _) in pairs))
+def _commands(saved: Certificate | FamilyCertificate) -> list[str]:
+    if saved.source is None:
+        return []
+    name = shlex.quote(PurePath(saved.source.path).name)
+    name = f"./{name}" if name.startswith("-") else name
+    memory = saved.source.report.memory
+    more = f" --memory {math.ceil(memory)}" if memory > 1 else ""
+    return [f"ptcc check {name}{more}", f"python -m ptcc_certify.checker {name}{more}"]

@@ -16,7 +16,6 @@ from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.graphs.io import write_atomically
 from ptcc_certify.graphs.io.files import refuse_no_path
 from ptcc_certify.graphs.size_limits import INPUT_NODES, REPEATED_NODES
-from ptcc_certify.report.family_page import draw_family
 from ptcc_certify.report.figures import draw
 from ptcc_certify.report.page import rejected_html, report_html
 from ptcc_certify.report.plots.runs import sample_runs
@@ -140,7 +139,7 @@ def _write_family(
     runs, why = _runs(saved, simulation)
     progress("report")
     if suffix == ".tex":
-        _write_statement(path, draw_family(saved, runs), lambda names: family_latex(saved, names))
+        _write_statement(path, draw(saved, ("graph", "decay"), runs), lambda names: family_latex(saved, names))
     else:
         write_atomically(path, report_html(saved, runs=runs, no_run=why, day=day))
 

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Sequence
 from fractions import Fraction
 from functools import cache
+from typing import Any
 
 import jinja2
 from markupsafe import Markup
@@ -17,15 +19,23 @@ from markupsafe import Markup
 from ptcc_certify.bounds.envelope import FRACTIONS, Envelope
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
-from ptcc_certify.certificate.late_answers import largest_late_input
+from ptcc_certify.certificate.judgements import largest_late_input
+from ptcc_certify.certificate.restricted_bounds import deviation_of_signal, nearer_for_signal
 from ptcc_certify.certificate.restricted_claims import WindowClaim
+from ptcc_certify.certificate.restricted_states import states_of_signal
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import STABILITY
 from ptcc_certify.protocols.casadi_latex import symbol_latex
 from ptcc_certify.report import notation as texts
-from ptcc_certify.report.family_page import THEOREM, family_facts, remaining, state_rows
-from ptcc_certify.report.family_screen import BOUND_KINDS
+from ptcc_certify.report.facts.claim import box_text, range_text, sharpest, told_ranges
+from ptcc_certify.report.facts.decay import BOUND_KINDS, explicit_logs
+from ptcc_certify.report.facts.instants import FEW, told_instants
+from ptcc_certify.report.facts.signals import signal_facts, signal_text
+from ptcc_certify.report.facts.states import attained_text, constant_text
+from ptcc_certify.report.page import THEOREM
 from ptcc_certify.report.plots.subject import ideal_text
+from ptcc_certify.report.states_table import state_rows
+from ptcc_certify.report.text_layout import arithmetic
 from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_name
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
 
@@ -141,14 +151,14 @@ def family_latex(saved: FamilyCertificate, figures: dict[str, str] | None = None
         (_cut(label), Markup("--") if camp == "\N{EN DASH}" else camp, *ends)
         for label, camp, *ends in state_rows(saved)[: texts.LISTED]
     ]
-    facts = family_facts(saved)
+    facts = _family_facts(saved)
     view = facts | {
         "comment": _comment(saved.source.path.name),
         "parameters": [(Markup(symbol_latex(name)), getattr(saved.protocol, name)) for name in names],
         **{"named": _named(saved.family.labels), "listed": _intervals(saved), "rows": rows},
-        "remaining": [(_instant(saved, name), _number(bound)) for name, bound in remaining(saved)],
+        "remaining": [(_instant(saved, name), _number(bound)) for name, bound in _remaining(saved)],
         "remaining_promised": [
-            (_instant(saved, name), _number(bound)) for name, bound in remaining(saved, of_signal=True)
+            (_instant(saved, name), _number(bound)) for name, bound in _remaining(saved, of_signal=True)
         ],
         **{"sigma0": saved.sigma0, "last_time": _last_time(saved)},
         "why": [counterexample_text(c, c.counterexample) for c in _depending(saved) if c.counterexample is not None],
@@ -160,6 +170,60 @@ def family_latex(saved: FamilyCertificate, figures: dict[str, str] | None = None
         **{"bound_kinds": BOUND_KINDS, "theorem": THEOREM, "captions": _family_captions(saved)},
     }
     return _environment().get_template("family_statement.tex").render(view)
+
+
+def _family_facts(saved: FamilyCertificate) -> dict[str, Any]:
+    """Return what the template of a family shows."""
+    family, components = saved.family, [part.component for part in saved.parts]
+    certified = saved.verdict == "certified"
+    parameters = [(mode, mode.parameters) for mode in family.modes]  # both directions of an undirected edge are one
+    return {
+        **{"saved": saved, "family": family, "components": components, "certified": certified},
+        "claims": list(Counter(map(sharpest, components)).items()),
+        **{"claims_in_all": len(components), "several": len(family.modes) > 1},
+        "n_edges": sum(mode.n_edges for mode in family.modes),
+        "uncertain": sum(edges.size for _, edges in parameters),
+        "optional": sum(int(mode.optional[edges].sum()) for mode, edges in parameters),
+        "depends": any(c.behaviour == DEPENDS for c in components),
+        "mode_names": [texts.printable(mode_name(family, k)) for k in range(len(family.modes))],
+        "rate_bound": min((p.upper_bound for p in saved.parts if p.upper_bound), key=lambda b: b.value, default=None),
+        "constant": all(component.nodes.size == 1 for component in components),
+        "restricted": _restricted(saved) if certified else [],
+        "boxes": [box_text(components[k], box) for k, box in sorted(saved.boxes.items())] if certified else [],
+        "ranges": [range_text(components[k], ends) for k, ends in told_ranges(saved).items()] if certified else [],
+        "promise": "" if saved.signal == "any" else signal_text(saved.signal)[1],
+        "these": states_of_signal(saved) != list(saved.final_states or ()),
+        "explicit_power": _explicit_power(saved),
+        **{"sliding": saved.protocol.reaching is not None, "arithmetic": arithmetic(saved.direct)},
+    }
+
+
+def _restricted(saved: FamilyCertificate) -> list[str]:
+    """Tell what is proved of restricted signals, with the ends of constant weights."""
+    entries = [fact.text for fact in signal_facts(saved)]
+    if text := constant_text(saved):
+        entries.append(f"{signal_text('constant')[1]}: at the deadline {text}; {attained_text(saved)}")
+    return entries
+
+
+def _remaining(saved: FamilyCertificate, of_signal: bool = False) -> list[tuple[str, Markup]]:
+    """Return the names of instants and the bound of the deviation of any agent from its final state there.
+
+    For every signal, or for those that were asked for, where more is proved of these.
+    """
+    proved = nearer_for_signal(saved) if of_signal else saved.common and saved.rate is not None
+    if saved.initial_state is None or not proved:
+        return []
+    instants = told_instants(saved.protocol, saved.direct)[:FEW]
+    left = [share for share, _ in instants]
+    bounds = deviation_of_signal(saved, left) if of_signal else saved.deviation_bound(left)
+    return [(name, texts.above(float(x), 2)) for (_, name), x in zip(instants, bounds.max(axis=0), strict=True)]
+
+
+def _explicit_power(saved: FamilyCertificate) -> int | None:
+    """Return ``p`` with a rate above ``10^p`` in closed form; None if some component has none, or a better one."""
+    logs = explicit_logs(saved) if saved.rate is None and saved.common else []
+    return int(min(logs)) - 1 if logs else None
 
 
 def _powers(text: str) -> Markup:

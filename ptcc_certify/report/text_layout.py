@@ -7,6 +7,8 @@ import unicodedata
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
 
+from lmi.exact.decimal_rounding import near
+
 #: Columns of a screen, and of the head of a line on it, blank included.
 WIDTH, HEAD = 80, 11
 #: Columns of the text beside the head.
@@ -108,7 +110,10 @@ def short_number(value: object) -> str:
     >>> short_number(Fraction(-1, 3)), short_number(Fraction(1, 2)), short_number(Fraction(2, 3001))
     ('-1/3', '0.5', '0.00066644')
     """
-    decimal = f"{float(value):.5g}"  # type: ignore[arg-type]
+    try:
+        decimal = f"{float(value):.5g}"  # type: ignore[arg-type]
+    except OverflowError:
+        return near(Fraction(value), 5)  # type: ignore[call-overload]
     if not isinstance(value, Fraction) or Fraction(decimal) == value:
         return decimal
     short = abs(value.numerator) < 1000 and value.denominator < 1000

@@ -185,7 +185,7 @@ def simulate_agents(
     """
     samples = whole_number(samples, "samples", 2, 100_000)
     if not (isinstance(remaining, float | int) and 0 < remaining < 1):
-        raise ParameterError(f"remaining = {shorten(str(remaining))} is not between 0 and 1; give 1e-6, say")
+        raise ParameterError("remaining", f"= {shorten(str(remaining))} is not between 0 and 1; give 1e-6, say")
     xi = np.array(states, dtype=float)
     N, d, n = xi.shape
     if N * d * n > MOST_STATES:

@@ -96,7 +96,7 @@ def wanted_instants(protocol: Protocol, times: Iterable[Exact]) -> Instants:
         wanted = [as_fraction(t, "an instant") for t in times]  # type: ignore[arg-type]
         t = np.array([float(value) for value in wanted])
     except (NumberError, TypeError, OverflowError) as error:
-        raise ParameterError(f"times: {error}") from None
+        raise ParameterError("times", f"{error}") from None
     if not wanted:
         raise ParameterError("times is empty; give at least one instant")
     if wanted[0] < 0:

@@ -127,7 +127,7 @@ def simulate_late(
         raise ParameterError(f'pattern "{shorten(str(pattern))}" is unknown; one of {", ".join(PATTERNS)}')
     refuse_no_protocol(protocol)
     if not isinstance(messages, LateMessages):
-        raise ParameterError(f"messages = {shorten(repr(messages))} is none; give LateMessages(delay='0.01'), say")
+        raise ParameterError("messages", f"= {shorten(repr(messages))} is none; give LateMessages(delay='0.01'), say")
     graph = as_graph(graph)
     steps, seed = whole_number(steps, "steps", 2, MOST_STEPS), whole_number(seed, "seed", 0, 2**63)
     if deadlines is not None and len(deadlines) != graph.n_nodes:

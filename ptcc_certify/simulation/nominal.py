@@ -24,8 +24,7 @@ from ptcc_certify.simulation.instants import Instants
 
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
-    from ptcc_certify.protocols.gain_limits import LimitedGain
-    from ptcc_certify.protocols.limited_gain import Periods
+    from ptcc_certify.protocols.limited_gain import LimitedGain, Periods
     from ptcc_certify.simulation.course import Course
 
 MAX_JUMPS = 10**4
@@ -134,7 +133,7 @@ def as_forcing(
             raise ParameterError(f"{name} ({shorten(source.text)}) reads the states or sliding variables; {domain}")
         source.check(limit, graph.labels, until)
         if source.breaks(until).size > MAX_JUMPS:
-            raise ParameterError(f"{name} has more than {MAX_JUMPS:,} samples until t = {until:.6g}; give fewer")
+            raise ParameterError(name, f"has more than {MAX_JUMPS:,} samples until t = {until:.6g}; give fewer")
         sources.append(source)
         bounds.append(limit)
         if given is not None:

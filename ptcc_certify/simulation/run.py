@@ -200,7 +200,7 @@ def simulate(
         who = "families run" if family else "the sliding mode is simulated"
         raise ParameterError(f"{who} from one initial state at a time; give N numbers x0 and sigma0")
     if actuator is not None and not isinstance(actuator, GainLimits):
-        raise ParameterError(f"actuator = {shorten(repr(actuator))} is none; give GainLimits(gain_cap=50), say")
+        raise ParameterError("actuator", f"= {shorten(repr(actuator))} is none; give GainLimits(gain_cap=50), say")
     if how["times"] is None:
         instants = default_instants(protocol, how["remaining"], how["samples"], how["past"])
     else:
@@ -285,7 +285,7 @@ class _Run:
         assert protocol is not None
         source, until = "worst-case" if disturbance is None else disturbance, float(t[-1])
         if isinstance(disturbance, Bounded):
-            raise ParameterError("disturbance: the sliding-mode protocol has its bound, delta; give the signal alone")
+            raise ParameterError("disturbance", "the sliding-mode protocol has its bound, delta; give the signal alone")
         met = as_disturbance(source, self.graph.n_nodes, protocol.delta, until)
         if self.family is not None and isinstance(met, StateDependent):
             raise ParameterError("families take no disturbance that reads the states; give one of time")
@@ -376,7 +376,7 @@ def simulate_formation(graph: Any, protocol: Protocol, x0: Any, offsets: Any, **
     graph = as_graph(graph)
     rows, places = as_states(x0, graph, "x0"), as_states(offsets, graph, "offsets")
     if len(rows[0]) != len(places[0]):
-        raise ParameterError(f"offsets has {len(places[0])} numbers for each agent, x0 has {len(rows[0])}")
+        raise ParameterError("offsets", f"has {len(places[0])} numbers for each agent, x0 has {len(rows[0])}")
     less = [[x - h for x, h in zip(*pair, strict=True)] for pair in zip(rows, places, strict=True)]
     return simulate(graph, protocol, less, **options).in_places(_floats(places, graph, "offsets"))
 
@@ -400,7 +400,7 @@ def _refuse_foreign(protocol: Protocol, family: Family | None, given: Mapping[st
             mend = "leave it out or change the protocol"
             if name == "disturbance" and family is None:
                 mend = "under the nominal protocol give Bounded(disturbance, delta)"
-            raise ParameterError(f"{name} belongs to the {other} protocol; {mend}")
+            raise ParameterError(name, f"belongs to the {other} protocol; {mend}")
     for name in (*of_nominal, "boundary_layer") if family is not None else ():
         if given[name] is not None:
             raise ParameterError(f"{name} is not simulated of families yet; leave it out")
@@ -423,7 +423,7 @@ def _refuse_beside(
             )
             raise ParameterError(f"{what}: is not simulated with {name}{mend}")
     if sigma0 is not None and _floats(sigma0, graph, "sigma0").any():
-        raise ParameterError(f"sigma0: {name} ask for sigma(0) = 0, so that no sliding variable moves; leave it out")
+        raise ParameterError("sigma0", f"{name} ask for sigma(0) = 0, so that no sliding variable moves; leave it out")
 
 
 def _floats(values: Any, graph: SignedDigraph, name: str) -> np.ndarray:

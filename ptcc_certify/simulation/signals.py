@@ -243,7 +243,7 @@ class RandomSignal(Signal):
 
     def __init__(self, seed: int = 0, dwell: float | None = None, weights: str = "both"):
         if weights not in WEIGHTS:
-            raise ParameterError(f"weights = {shorten(repr(weights))} is unknown; one of {', '.join(WEIGHTS)}")
+            raise ParameterError("weights", f"= {shorten(repr(weights))} is unknown; one of {', '.join(WEIGHTS)}")
         self.seed, self.weights = whole_number(seed, "seed", 0, 2**63 - 1), weights
         self.dwell = None if dwell is None else number_within(dwell, "dwell", _SHORTEST, _LONGEST)
         self.text = f"random, seed {self.seed}" + (f", dwell {self.dwell:.4g}" if self.dwell else "")
@@ -426,5 +426,5 @@ def as_signal(signal: Any, seed: int = 0) -> Signal:
         return TableSignal.read(signal)
     except FormatError as error:
         if isinstance(signal, str):
-            raise ParameterError(f"signal: {error}; or one of {', '.join(WORDS)}") from None
+            raise ParameterError("signal", f"{error}; or one of {', '.join(WORDS)}") from None
         raise

@@ -489,7 +489,7 @@ class Trajectory(ByAgent, ByValue, Shown):
         slid = ["sigma", "disturbance"] if self.sliding is not None else []
         there = ["states", "input", "error", *slid]
         if what not in there:
-            raise ParameterError(f"what = {shorten(repr(what))} is unknown; one of {', '.join(there)}")
+            raise ParameterError("what", f"= {shorten(repr(what))} is unknown; one of {', '.join(there)}")
         pandas, columns = import_pandas(), list(self.labels)
         names: Any = pandas.Index(columns, name="node")
         if self.states.ndim == 3:

@@ -19,7 +19,7 @@ from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
 from ptcc_certify.checker.input_formulas import InitialSet
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.errors import Change, ParameterError, spell
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.model.asks import Asks, Expectations
 from ptcc_certify.model.initial_state import InitialState
@@ -328,7 +328,9 @@ def test_in_the_plane_a_rate_too_slow_for_a_bounded_input_is_told_as_a_rate():
     part = certify(
         graph, protocol, [[7, 3], [5, -9], [6, 8]], agents=agents, asks=Asks(simulation=False, method="paper")
     ).agents
-    assert part is not None and part.unbounded == (("rate 0.999999 is below 2/(rho2 kappa) = 1", "--rho2 1.001"),)
+    assert part is not None and part.unbounded == (
+        ("rate 0.999999 is below 2/(rho2 kappa) = 1", Change("rho2", "1.001")),
+    )
 
 
 def test_single_integrators_run_the_equation_of_the_plain_protocol():
@@ -472,18 +474,18 @@ def test_just_above_the_least_decay_the_input_is_told_not_to_be_certified_bounde
     certificate = made(TEAM, NOMINAL, [5, 2, 4, -1], Agents(order=2, decay="2.01"))
     assert certificate.verdict == "certified" and certificate.agents is not None and certificate.agents.input is None
     assert "INPUT NOT CERTIFIED BOUNDED: decay 2.01 is below 2 n = 4" in told(certificate)
-    assert "--decay 4 bounds it" in certificate.assessment.text
+    assert "decay=4 bounds it" in certificate.assessment.text
 
 
 @pytest.mark.parametrize(
     ("agents", "why", "mend"),
     [
-        ({"rest": "2/5"}, "rest 0.4 is below 0.5", "--rest 0.5 bounds it"),  # 1/k, k = 2
-        ({"rest": 1, "drag": -2}, "rest 1 is below 1.5", "--rest 1.5 bounds it"),  # 1/k + 2/eta(0), eta(0) = 2
+        ({"rest": "2/5"}, "rest 0.4 is below 0.5", "rest=0.5 bounds it"),  # 1/k, k = 2
+        ({"rest": 1, "drag": -2}, "rest 1 is below 1.5", "rest=1.5 bounds it"),  # 1/k + 2/eta(0), eta(0) = 2
         (
             {"rest": "2/5", "decay": 3},
             "decay 3 is below 2 n = 4, rest 0.4 is below 0.5",
-            "--decay 4 and --rest 0.5 bound it",
+            "decay=4 and rest=0.5 bound it",
         ),
     ],
 )
@@ -491,7 +493,7 @@ def test_the_input_at_rest_is_bounded_iff_the_common_velocity_falls_fast_enough(
     certificate = made(TEAM, NOMINAL, [5, 2, 4, -1], Agents(order=2, **agents), v0=[1, 0, 0, -2])
     assert certificate.agents is not None and certificate.agents.input is None
     assert f"INPUT NOT CERTIFIED BOUNDED: {why}" in told(certificate) and mend in certificate.assessment.text
-    words = mend.replace("--", "").split()
+    words = mend.replace("=", " ").split()
     mended = Agents(order=2, **{**agents, **{name: words[words.index(name) + 1] for name in agents if name in words}})
     certificate = made(TEAM, NOMINAL, [5, 2, 4, -1], mended, v0=[1, 0, 0, -2])
     assert certificate.agents is not None and certificate.agents.input is not None
@@ -500,11 +502,11 @@ def test_the_input_at_rest_is_bounded_iff_the_common_velocity_falls_fast_enough(
 
 def test_a_bound_that_is_larger_than_the_way_of_the_agents_says_little_by_t():
     little = made(TEAM, NOMINAL, [5, 2, 4, -1], Agents(order=2, decay="2.01")).assessment
-    assert little.useful is False and little.advice == "--decay 4 bounds it"
+    assert little.useful is False and spell(little.advice) == "decay=4 bounds it"
     certificate = made(TEAM, NOMINAL, [1, 2, -1, -1], Agents(order=2), v0=[10000, -10000, 0, 0])
     part, assessment = certificate.agents, certificate.assessment
     assert part is not None and part.deviation_bound(np.array([0.01]))[:, 0].max() > 0.01 * part.longest_way > 0
-    assert assessment.useful is False and "a larger --decay, such as 8, leaves less" in assessment.text
+    assert assessment.useful is False and "a larger decay, such as 8, leaves less" in assessment.text
 
 
 def test_the_coupling_is_not_that_of_a_fast_function_with_a_huge_overshoot_constant():

@@ -20,8 +20,8 @@ from ptcc_certify.bounds.attracting_box import box_of_family
 from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
 from ptcc_certify.checker import check
-from ptcc_certify.report.family_screen import family_lines, family_summary
 from ptcc_certify.report.page import report_html
+from ptcc_certify.report.screen import certificate_lines, summary_lines
 from ptcc_certify.report.statement import family_latex
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
@@ -103,7 +103,7 @@ def test_there_is_no_box_without_a_state_or_followers_or_where_all_come_to_rest_
 def test_what_is_read_back_says_the_same():
     certificate = moved()
     again = read_certificate(certificate.to_dict())
-    assert again == certificate and family_lines(again, "f")[2:] == family_lines(certificate, "f")[2:]
+    assert again == certificate and certificate_lines(again, "f")[2:] == certificate_lines(certificate, "f")[2:]
     assert again.boxes[0].excess([0, 4, 100, 3]) == certificate.boxes[0].excess([0, 4, 100, 3]) > 0
     assert certificate.final_states == (None,) * 4
 
@@ -111,10 +111,10 @@ def test_what_is_read_back_says_the_same():
 def test_screen_page_and_statement_tell_the_box_and_claim_no_limit():
     saved = read_certificate(moved().to_dict())
     told = "every signal draws c into [1, 2], d into [0.5, 2], at the rate 1.99004; no limit is claimed"
-    screen = re.sub(r"\s+", " ", "\n".join(family_summary(saved, "f")))
+    screen = re.sub(r"\s+", " ", "\n".join(summary_lines(saved, "f")))
     assert f"box {told}" in screen and "x(T)" not in screen
     page = " ".join(re.sub("<[^>]*>", " ", report_html(saved)).split())
-    assert f"Where they are drawn From the initial state below {told}." in page
+    assert f"Where they are drawn {told}." in page
     assert f"From the initial state below {told}; that is" in family_latex(saved)
 
 

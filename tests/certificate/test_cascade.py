@@ -248,17 +248,17 @@ def test_an_input_at_both_limits_is_not_claimed_to_be_bounded():
 @pytest.mark.parametrize(
     ("rho2", "alpha", "names"),
     [
-        (1, 3, ["--rho2"]),
-        (3, "1/5", ["--cascade"]),
-        (1, "1/5", ["--rho2", "--cascade"]),
-        (4 / RATE, RATE / 4, ["--cascade"]),
+        (1, 3, ["rho2"]),
+        (3, "1/5", ["cascade"]),
+        (1, "1/5", ["rho2", "cascade"]),
+        (4 / RATE, RATE / 4, ["cascade"]),
     ],
 )
 def test_what_keeps_the_input_from_being_bounded_is_told_with_its_mend(rho2: Any, alpha: Any, names: list[str]):
     part = part_of(pair(rho2, alpha))
-    mends = dict(mend.split() for _, mend in part.unbounded)
+    mends = {mend.field: mend.number for _, mend in part.unbounded}
     assert list(mends) == names and part.input is None
-    again = part_of(pair(mends.get("--rho2", rho2), mends.get("--cascade", alpha)))
+    again = part_of(pair(mends.get("rho2", rho2), mends.get("cascade", alpha)))
     assert again.input is not None
 
 

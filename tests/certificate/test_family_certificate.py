@@ -19,7 +19,7 @@ from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov import family_search
 from ptcc_certify.lyapunov.family_search import prove_certificate
 from ptcc_certify.lyapunov.quotient import Quotient
-from ptcc_certify.report.family_screen import family_lines, family_summary
+from ptcc_certify.report.screen import certificate_lines, summary_lines
 from ptcc_certify.theorems.family_behaviour import decide
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
@@ -47,7 +47,7 @@ def test_what_is_decided_on_edges_alone_is_told_and_not_certified():
     )
     assert certificate.final_states == (None,) * 302
     text = "\n".join(
-        [*family_summary(certificate, "net"), *family_lines(certificate, "net"), str(certificate.to_dict())]
+        [*summary_lines(certificate, "net"), *certificate_lines(certificate, "net"), str(certificate.to_dict())]
     )
     assert "containment at T = 1 for every signal" in text
 
@@ -116,7 +116,7 @@ def test_no_function_is_searched_whose_proof_has_more_rows_than_the_check_takes(
     monkeypatch.setattr(family_certificate, "squares_function", lambda *_: None)
     made = certify_family(_three_uncertain_edges(), PROTOCOL, [1, 2, 3])
     assert made.verdict == "certified" and made.rate is None
-    text = " ".join("\n".join(family_summary(made, "net")).split())
+    text = " ".join("\n".join(summary_lines(made, "net")).split())
     assert (
         "in closed form; no larger one was proved (6 agents and uncertain edges in one mode are above the rows" in text
     )
@@ -137,7 +137,7 @@ def test_functions_that_the_check_refuses_are_left_out(monkeypatch):
 
 def test_what_the_check_refuses_is_not_called_proved(monkeypatch):
     made = certify_family(_three_uncertain_edges(), PROTOCOL, [1, 2, 3])
-    text = " ".join("\n".join(family_summary(made, "net")).split())
+    text = " ".join("\n".join(summary_lines(made, "net")).split())
     assert "both proved" in text and made.verdict == "certified"
 
     def refuse(rows: int) -> None:
@@ -145,5 +145,5 @@ def test_what_the_check_refuses_is_not_called_proved(monkeypatch):
 
     monkeypatch.setattr(family_function, "need_rows_with_multipliers", refuse)
     made = certify_family(_three_uncertain_edges(), PROTOCOL, [1, 2, 3])
-    text = " ".join("\n".join(family_summary(made, "net")).split())
+    text = " ".join("\n".join(summary_lines(made, "net")).split())
     assert "proved" not in text and "undecided: the independent check rejects family-rate" in text

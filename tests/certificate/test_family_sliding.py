@@ -19,7 +19,7 @@ from ptcc_certify.certificate.family_comparison import compare, functions_of, wo
 from ptcc_certify.checker import check, digest
 from ptcc_certify.checker.family_sliding import Drive, drive_sizes
 from ptcc_certify.checker.input_formulas import root_above
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.errors import Change, ParameterError, spell
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.follower_function import follower_functions
@@ -339,7 +339,7 @@ def test_where_the_sliding_part_may_grow_no_peak_is_claimed():
     certificate = certify_family(Family.from_intervals(TRAP), slow, [1, 2, 3], sigma0=[1, 0, 0], time_limit=60)
     assert certificate.verdict == "certified" and certificate.bounded and not certificate.sliding_bounded
     assert certificate.nominal_peaks is not None and certificate.input_peaks is None
-    assert "--mu3 0.334" in certificate.assessment.advice
+    assert Change("mu3", Fraction("0.334")) in certificate.assessment.advice
 
 
 def test_the_gain_that_is_named_where_the_bound_says_little_is_enough():
@@ -348,6 +348,6 @@ def test_the_gain_that_is_named_where_the_bound_says_little_is_enough():
     gains = {"T_r": 1, "T_s": 1, "rho1": 1, "kappa": 1, "mu1": 2, "mu2": 1, "mu3": 1, "delta": 1}
     asked = {"x0": [1, 2, 3], "sigma0": ["0.1", 0, 0]}
     weak = certify_family(modes, SlidingModeProtocol(rho2="0.1", **gains), **asked)
-    assert weak.assessment.useful is False and "leaves 1 %" in weak.assessment.advice
-    rho2 = weak.assessment.advice.split()[1]
+    assert weak.assessment.useful is False and "leaves 1 %" in spell(weak.assessment.advice)
+    rho2 = weak.assessment.advice[0].number
     assert certify_family(modes, SlidingModeProtocol(rho2=rho2, **gains), **asked).assessment.useful

@@ -16,9 +16,9 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.restricted_signals import ClockShares, DwellTime, JointWindows
-from ptcc_certify.report.family_screen import family_lines
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.plots.input import plot_input
+from ptcc_certify.report.screen import certificate_lines
 from ptcc_certify.report.statement import family_latex
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.signals import RandomSignal
@@ -143,11 +143,11 @@ def test_pages_and_statements_say_what_slides(tmp_path):
     assert saved.sigma0 == made.sigma0 and saved.reaching == made.reaching
     page, statement = report_html(saved), family_latex(saved)
     assert "Sliding-mode protocol" in page and "Reaching times" in page and "nominal protocol," not in page
-    assert "every disturbance within δ" in page and "signed average of the initial states" not in page
+    assert "every signal and disturbance" in page and "signed average of the initial states" not in page
     assert r"\dot x_{k} = u_{k} + d_{k}$ with $|d_{k}| \le \delta$" in statement and "V(X(T_{r}))" in statement
     assert "whatever the disturbances" in statement and "all sliding variables are $0$ from" in statement
     assert "the mean of the initial states" not in statement
-    text = "\n".join(family_lines(saved, "path", {}))
+    text = "\n".join(certificate_lines(saved, "path", {}))
     assert "sigma(0)" in text and "for every signal and disturbance" in text
     certify_family(PATH, PROTOCOL, sigma0=[1, -2, 0], time_limit=60).save(tmp_path / "d.json")
     assert "V(T<sub>r</sub>)" in report_html(read_certificate(tmp_path / "d.json"))

@@ -22,8 +22,8 @@ from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
 from ptcc_certify.checker import check
 from ptcc_certify.protocols.restricted_signals import DwellTime
-from ptcc_certify.report.family_screen import family_lines, family_summary
 from ptcc_certify.report.page import report_html
+from ptcc_certify.report.screen import certificate_lines, summary_lines
 from ptcc_certify.report.statement import family_latex
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
@@ -183,11 +183,11 @@ def test_screen_page_statement_and_table_tell_them():
     certificate = made(MOVED, X0)
     saved = read_certificate(certificate.to_dict())
     assert saved == certificate and saved.ranges == certificate.ranges
-    assert family_lines(saved, "f")[2:] == family_lines(certificate, "f")[2:]
+    assert certificate_lines(saved, "f")[2:] == certificate_lines(certificate, "f")[2:]
     told = "every signal keeps a, b in [1, 2], c in [-2, 5], d at 5 at all times"
-    assert f"x(t) {told}" in re.sub(r"\s+", " ", "\n".join(family_summary(saved, "f")))
+    assert f"x(t) {told}" in re.sub(r"\s+", " ", "\n".join(summary_lines(saved, "f")))
     page = " ".join(re.sub("<[^>]*>", " ", report_html(saved)).split())
-    assert f"Where they stay From the initial state below {told}." in page
+    assert f"Where they stay {told}.".replace("-", "\N{MINUS SIGN}") in page
     assert f"From the initial state below {told}." in family_latex(saved)
     pytest.importorskip("pandas")
     table = saved.to_pandas()
@@ -196,4 +196,4 @@ def test_screen_page_statement_and_table_tell_them():
 
 def test_where_the_last_mode_tells_the_same_the_screen_does_not_repeat_it():
     dwell = made(MOVED, X0, signal=DwellTime("0.3", clock="t"))
-    assert dwell.ranges and "every signal keeps" not in "\n".join(family_summary(dwell, "f"))
+    assert dwell.ranges and "every signal keeps" not in "\n".join(summary_lines(dwell, "f"))

@@ -22,9 +22,9 @@ from lmi.exact.decimal_rounding import up
 from ptcc_certify import Family, NominalProtocol, SignedDigraph, certify
 from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
-from ptcc_certify.certificate.family_verdict import assess_family
 from ptcc_certify.certificate.restricted_bounds import deviation_of_signal
 from ptcc_certify.certificate.restricted_claims import LastModeClaim, RateClaim, ShareClaim
+from ptcc_certify.certificate.verdict import assess
 from ptcc_certify.checker import check, digest
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.lyapunov.clock_shares import search_share_form
@@ -32,9 +32,9 @@ from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.model.asks import Expectations
 from ptcc_certify.protocols.restricted_signals import ClockShares, DwellTime, JointWindows
-from ptcc_certify.report.family_screen import family_lines, family_summary
+from ptcc_certify.report.facts.signals import signal_facts
 from ptcc_certify.report.page import report_html
-from ptcc_certify.report.restricted_screen import restricted_entries
+from ptcc_certify.report.screen import certificate_lines, summary_lines
 from ptcc_certify.report.statement import family_latex
 from ptcc_certify.theorems.family_behaviour import decide
 from ptcc_certify.theorems.joint_windows import clock_for_all_edges
@@ -192,12 +192,12 @@ def test_the_error_bound_of_seldom_switches_is_told_beside_that_of_every_signal(
     every = float(certificate.deviation_bound([0.01]).max())
     these = float(deviation_of_signal(certificate, [0.01]).max())
     assert these < 1e-6 * every
-    short, long = "\n".join(family_summary(certificate, "f")), "\n".join(family_lines(certificate, "f"))
+    short, long = "\n".join(summary_lines(certificate, "f")), "\n".join(certificate_lines(certificate, "f"))
     for text in (short, long):
-        assert f"{up(these, 2)} " in text and text.count("(these signals)") == 1
+        assert f"{up(these, 2)} " in text and text.count("(these signals)") == (1 if text == short else 2)
     saved = read_certificate(certificate.to_dict())
     page, statement = report_html(saved), family_latex(saved)
-    assert "Bounds under the promise, rounded up" in page and "Nor are the error bounds under the promise" in page
+    assert "(these signals)" in page and "Nor are the error bounds under the promise" in page
     assert "Under these, from the initial state below, every agent differs" in statement
 
 
@@ -518,7 +518,7 @@ def test_a_rate_that_is_asked_for_is_met_by_that_for_every_signal_where_shares_p
     assert isinstance(claim, ShareClaim) and made.rate is not None and claim.rate > made.rate
     asked = Expectations(min_rate=made.rate)
     less = replace(made, restricted=(replace(claim, rate=made.rate / 2),), expectations=asked)
-    assert less.rate_of_signal == made.rate and assess_family(less, made.checked).asked == "met"
+    assert less.rate_of_signal == made.rate and assess(less, made.checked).asked == "met"
 
 
 def test_what_shares_prove_is_judged_and_read_back(tmp_path: Path):
@@ -681,5 +681,5 @@ def test_claims_of_several_components_name_theirs():
     first = SignedDigraph.from_edges([("a", "b", 1), ("x", "z", 1)], nodes="abcxyz")
     second = SignedDigraph.from_edges([("b", "c", 1), ("y", "z", 1)], nodes="abcxyz")
     certificate = certify_family(Family.switching([first, second]), PROTOCOL, signal=JointWindows(2, on=1, clock="s"))
-    lines = [text for head, text in restricted_entries(certificate) if head == "windows"]
+    lines = [fact.text for fact in signal_facts(certificate) if fact.head == "windows"]
     assert lines and all(line.startswith("component of ") for line in lines)

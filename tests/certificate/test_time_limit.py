@@ -89,7 +89,7 @@ def test_without_time_nothing_is_claimed_and_everything_is_named(name: str):
     cert = certify(load_graph(name), PROTOCOL, [1] * load_graph(name).n_nodes, asks=Asks(time_limit=1e-9))
     assert cert.verdict == "undecided" and cert.rate is None and cert.trajectory is None
     assert {STEPS[0], STEPS[1]} <= set(cert.cut_off) and cert.upper_bound is not None  # which needs no search
-    assert "raise --time-limit" in cert.assessment.text and cert.assessment.exit_code == 4
+    assert "raise time_limit" in cert.assessment.text and cert.assessment.exit_code == 4
     document = cert.to_dict()
     assert document["unverified"]["cut_off"] == list(cert.cut_off)
     report = check(document)

@@ -29,8 +29,10 @@ from ptcc_certify import (
     read_certificate,
 )
 from ptcc_certify.bounds.input.initial_set import initial_set_within
+from ptcc_certify.certificate.answer import exit_code, worst_code
 from ptcc_certify.certificate.certificate import Certificate
-from ptcc_certify.certificate.verdict import LAST, exit_code, worst_code
+from ptcc_certify.certificate.usefulness import LAST
+from ptcc_certify.errors import Change
 from ptcc_certify.examples import load_graph
 from ptcc_certify.model.asks import Asks
 from ptcc_certify.model.initial_state import InitialState
@@ -63,18 +65,17 @@ def test_the_gains_that_are_named_leave_one_percent_and_bound_the_input(k: int, 
     cert = weak(k, sliding)
     found = cert.assessment
     assert cert.verdict == "certified" and found.useful is False
-    said = re.search(r"--rho2 (\S+) \(rho2 kappa (\S+)\) leaves 1 %( and bounds the input)?$", found.text)
+    said = re.search(r"rho2=(\S+) leaves 1 %( and bounds the input)?$", found.text)
     assert said is not None, found.text
-    assert bool(said[3]) == ("; the input is not " in found.text) == (cert.effort.bounded is not True)
-    rho2, product = Fraction(said[1]), Fraction(said[2])
-    assert product == rho2 * cert.protocol.kappa and rho2 > cert.protocol.rho2
+    assert bool(said[2]) == ("; the input is not " in found.text) == (cert.effort.bounded is not True)
+    assert found.advice[0] == Change("rho2", Fraction(said[1])) and Fraction(said[1]) > cert.protocol.rho2
     p = {name: getattr(cert.protocol, name) for name in cert.protocol.to_dict() if name not in ("kind", "disturbance")}
     protocol = type(cert.protocol)(**{**p, "rho2": said[1]})
     again = certify(
         cert.graph, protocol, InitialState(cert.initial_state, sigma0=cert.sigma0), asks=Asks(simulation=False)
     )
     assert again.assessment.useful and again.assessment.exit_code == 0
-    assert again.effort.bounded and not again.assessment.caveat + again.assessment.advice
+    assert again.effort.bounded and not (again.assessment.caveat or again.assessment.advice)
     left = re.search(r"\|\| <= (\S+) \|\|", again.assessment.text)
     assert left is not None and float(left[1]) <= 0.01
 
@@ -87,7 +88,7 @@ def test_a_sliding_part_that_is_not_bounded_is_told_with_the_gain_that_bounds_it
         ).assessment
 
     weak_gain = found("0.3")
-    assert weak_gain.text.endswith("; the input is not proved bounded; --mu3 0.334 bounds the input")
+    assert weak_gain.text.endswith("; the input is not proved bounded; mu3=0.334 bounds the input")
     assert weak_gain.exit_code == 0 and not found("0.334").caveat
 
 
@@ -230,8 +231,8 @@ FAR = [("a", "b", "1e300"), ("b", "a", "1e300"), ("b", "c", "1e-300"), ("c", "d"
             "best",
             "no rate is proved, weights span 600 decades: rescale them, or leave out the smallest",
         ),
-        ([(i, (i + 1) % 130, 1) for i in range(130)], "full", "--method full proves no rate; try --method best"),
-        ([(i, (i + 1) % 130, 1) for i in range(130)], "paper", "--method paper proves no rate; try --method best"),
+        ([(i, (i + 1) % 130, 1) for i in range(130)], "full", "method=full proves no rate; try method=best"),
+        ([(i, (i + 1) % 130, 1) for i in range(130)], "paper", "method=paper proves no rate; try method=best"),
     ],
 )
 def test_where_nothing_is_decided_it_says_what_to_try(graph: Any, method: str, says: str):

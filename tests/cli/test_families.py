@@ -11,9 +11,9 @@ from bad_inputs import ptcc
 from selection import thinned
 
 from ptcc_certify import NominalProtocol, certify
-from ptcc_certify.certificate.verdict import CERTIFIED
+from ptcc_certify.certificate.answer import CERTIFIED
 from ptcc_certify.graphs.io import read_family
-from ptcc_certify.report.family_screen import _cut
+from ptcc_certify.report.facts.claim import _cut
 from ptcc_certify.report.text_layout import wrap_text
 
 INTERVALS = "source,target,weight_min,weight_max"
@@ -619,7 +619,7 @@ def test_what_is_cut_on_the_short_screen_ends_at_a_word():
     text = "end between these " * 20
     for start in range(18):
         whole = text[start:].strip()
-        cut = _cut(whole, every=False)
+        cut = _cut(whole)
         assert whole.startswith(cut.removesuffix("... (all with -v)")) and cut != whole, cut
         assert len(wrap_text(cut)) == 3
 

@@ -210,16 +210,16 @@ def test_followers_track_leaders_that_move_and_the_file_says_so() -> None:
         (("none.csv", "--quantisation", "1"), "--quantisation: nobody listens to anybody; leave it out"),
         (("none.csv", "--leader-speed", "1"), "--leader-speed: nobody listens to anybody; leave it out"),
         (("team.csv", "--delay", "0.1", "--packet-loss", "3"), "--packet-loss says nothing by itself; give --period"),
-        (("team.csv", "--max-residual", "1"), "--max-residual: is asked of late messages"),
-        (("team.csv", "--delay", "0.1", "--initial-bound", "1"), "--initial-bound) is not taken up"),
-        (("team.csv", "--leader-speed", "1", "--initial-bound", "1"), "--initial-bound) is not taken up"),
+        (("team.csv", "--max-residual", "1"), "--max-residual is asked of late messages"),
+        (("team.csv", "--delay", "0.1", "--initial-bound", "1"), "--initial-bound is not taken up"),
+        (("team.csv", "--leader-speed", "1", "--initial-bound", "1"), "--initial-bound is not taken up"),
         (("team.csv", "--delay", "0.1", "--stop-before", "0.1"), "--stop-before: late messages are certified under a"),
         (("team.csv", "--delay", "0.1", "--sample-period", "0.1"), "--sample-period: of late messages a period tells"),
         (("team.csv", "--delay", "0.1", "--gain-cap", "9", "--noise", "1"), "a quantisation of 4 NU"),
-        (("team.csv", "--delay", "0.1", "--delta", "1"), "delta: is not proved of late messages under the nominal"),
+        (("team.csv", "--delay", "0.1", "--delta", "1"), "delta is not proved of late messages under the nominal"),
         (("team.csv", "--leader-speed", "1", "--gain-cap", "9"), "--gain-cap: leaders that move are tracked at T by a"),
         (("team.csv", "--leader-speed", "1", "--stop-before", "0.1"), "--stop-before: leaders that move are tracked"),
-        (("team.csv", "--leader-speed", "1", "--noise", "1"), "noise: is not proved while leaders move"),
+        (("team.csv", "--leader-speed", "1", "--noise", "1"), "noise is not proved while leaders move"),
         (("team.csv", "--uncertainty", "1%", "--delay", "0.1"), "--delay is for one graph, not for families yet"),
         (("team.csv", "--uncertainty", "1%", "--leader-speed", "1"), "--leader-speed is for one graph, not for"),
         (("team.csv", "--uncertainty", "1%", "--max-residual", "1"), "--max-residual is for one graph, not for"),
@@ -368,7 +368,7 @@ def test_bounds_are_told_at_an_instant_that_is_asked_for() -> None:
 
 def test_an_input_that_is_not_bounded_while_leaders_move_is_told_with_the_gain_that_bounds_it() -> None:
     weak = ptcc("certify", "team.csv", "--leader-speed", "1", *START, *QUICK[4:], "--rho2", "0.1", "--kappa", "1")
-    least = re.search(r"INPUT      not proved bounded while leaders move; rho2 = (\S+) bounds it", weak.out)
+    least = re.search(r"INPUT      not proved bounded while leaders move; --rho2 (\S+) bounds it", weak.out)
     assert least is not None, weak
     strong = ptcc("certify", "team.csv", "--leader-speed", "1", *START, *QUICK[4:], "--rho2", least[1], "--kappa", "1")
     assert "input      bounded up to T" in strong.out, strong
@@ -507,9 +507,12 @@ def test_late_messages_and_leaders_that_move_from_certify_to_page() -> None:
     assert "nothing late, leaders at rest" in text and "x(T)" not in text and "met: within 9 at T" in text
     assert ptcc("check", "both.json").code == 0
     verbose = " ".join(ptcc("certify", "team.csv", *words, "-v").out.split())
-    assert "the lines below are of messages at once and leaders at rest" in verbose
+    assert "what follows is of messages at once and leaders at rest" in verbose
     assert "|u_k| <=" in " ".join(ptcc("certify", "team.csv", *words, "--gain-cap", "9").out.split())
-    for name, said in (("both.html", "leaders that rest. If messages are late"), ("both.tex", "leaders at rest. If")):
+    for name, said in (
+        ("both.html", "what follows is of messages at once and leaders at rest"),
+        ("both.tex", "leaders at rest. If"),
+    ):
         assert ptcc("report", "both.json", "-o", name).code == 0
         assert said in Path(name).read_text(encoding="utf-8")
     assert ptcc("plot", "both.json", "--what", "late", "-o", "both.svg").code == 0
@@ -590,7 +593,7 @@ def test_families_and_other_limits_are_refused_in_python_too() -> None:
             certify_words(alone, protocol, **asked)
     with pytest.raises(ParameterError, match="messages is not for families of graphs yet"):
         certify(pair, protocol, uncertainty="10%", messages=each)
-    with pytest.raises(ParameterError, match="max_residual: is asked of late messages, which families"):
+    with pytest.raises(ParameterError, match="max_residual is asked of late messages, which families"):
         certify(pair, protocol, uncertainty="10%", asks=Asks(expectations=Expectations(max_residual=1)))
     with pytest.raises(ParameterError, match="gain_cap: limits and late messages have two"):
         certify(pair, protocol, messages=each, limits=same)

@@ -28,10 +28,12 @@ def _path(word: str) -> str:
 def printed(path: Path) -> str:
     """Return what is printed of a stored certificate: its screen, and the lines of the check."""
     from ptcc_certify import check, read_certificate
+    from ptcc_certify.cli.terminal import flagged
+    from ptcc_certify.report.screen import summary_lines
 
     lines = check(path).lines()
     lines[-1] = lines[-1].split(" by ")[0]  # which packages computed it, of which versions
-    return "\n".join([read_certificate(path).summary(), "", *lines]) + "\n"
+    return "\n".join([*summary_lines(read_certificate(path), name=flagged), "", *lines]) + "\n"
 
 
 def make(name: str, arguments: list[str]) -> int:

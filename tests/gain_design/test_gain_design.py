@@ -252,7 +252,7 @@ def test_who_does_not_move_takes_any_gains():
     for asked in ({}, {"deadline": "0.1"}, {"residual": 1}):
         found = design(alone, max_input=1, initial_bound=1, **asked)
         assert found.verdict == MET and found.peak == 0 and found.certificate.verdict == "certified"
-        assert found.lines() and repr(found)
+        assert found.summary() and repr(found)
     settled = design(PAIR, max_input=1, initial_bound=InitialSet((Fraction(2), Fraction(-2))))
     assert settled.verdict == MET and settled.peak == 0
 
@@ -301,7 +301,7 @@ def test_what_is_shown_and_written():
     assert missed.verdict == UNPROVED and "times the limit" in missed.binding
     assert missed.peak > 10 and missed.protocol is None and missed.certificate is None and missed.worst is None
     for found in (met, missed, designed("pair", 20, 3, residual="2.9")):
-        assert all(len(line) <= 120 for line in found.lines())
+        assert all(len(line) <= 120 for line in found.summary().splitlines())
         assert found.verdict in repr(found)
         data = json.loads(json.dumps(found.to_dict()))
         assert data["verdict"] == found.verdict

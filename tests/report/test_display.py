@@ -72,7 +72,7 @@ def test_each_is_shown_with_what_it_says_and_a_figure() -> None:
     graph, x0 = load_graph("fig3a"), [-4, 3, -1, 2, -2, 5]
     cert = certify(graph, PROTOCOL, x0)
     for value, said in (
-        (graph, "6 nodes, 10 edges, 4 negative"),
+        (graph, "6 nodes, 10 edges (4 negative)"),
         (analyse(graph), "interval bipartite consensus"),
         (cert, "interval bipartite consensus at T = 2"),
         (cert.trajectory, "6 agents"),

@@ -25,13 +25,14 @@ from ptcc_certify.graphs.io import as_family
 from ptcc_certify.model.asks import Asks
 from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.protocols.restricted_signals import ClockShares, DwellTime, JointWindows
-from ptcc_certify.report.family_screen import family_lines, family_summary, groups_text
+from ptcc_certify.report.facts.claim import groups_text
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.plots.decay import plot_decay
 from ptcc_certify.report.plots.input import plot_input
 from ptcc_certify.report.plots.runs import sample_runs
 from ptcc_certify.report.plots.trajectory import plot_trajectory
 from ptcc_certify.report.report_file import write_report
+from ptcc_certify.report.screen import certificate_lines, summary_lines
 from ptcc_certify.report.statement import family_latex
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.signals import RandomSignal
@@ -61,12 +62,10 @@ def test_the_first_screen_tells_family_signal_end_rate_bound_ratio_and_input(mad
     page = (tmp_path / "c.html").read_text("utf-8")
     first = words(page.partition("<nav")[0])
     for told in (
-        "2 modes ( day , night ) on 3 agents, 4 edges in all",
-        "arbitrarily often, in whatever order is worst",
-        "ann , &lt;b&gt; in [−2, 3]; eve in [−3, 2]",
-        "By the deadline T = 1, for every signal and every initial state",
-        "because of a periodic signal",
-        "No agent needs an input of more than",
+        "bipartite consensus at T = 1 for every signal: camps {ann, &lt;b&gt;} against {eve}",
+        "ann, &lt;b&gt; in [−2, 3], eve in [−3, 2]",
+        "upper bound",
+        "bounded; |u k | ≤",
         "c.json ; this page was written on 2026-01-01",
     ):
         assert told in first, told
@@ -79,7 +78,7 @@ def test_what_is_proved_of_restricted_signals_is_told_too():
     saved = read_certificate(certify(SWITCHING, PROTOCOL, signal=DwellTime("0.2", clock="t")).to_dict())
     told = "t least 0.2 of time between switches"
     page = words(report_html(saved))
-    assert f"If signals are restricted A{told}: rate " in page and f"is for those that keep a promise: a{told}." in page
+    assert f"If signals are restricted a{told}: rate " in page and f"signals that keep a promise: a{told}" in page
     assert "holds for signals that keep the promise alone" in page
     assert f"Of signals that are restricted (a{told}) more is proved: rate " in family_latex(saved)
 
@@ -91,8 +90,8 @@ def test_agents_that_leave_where_they_begin_are_not_told_to_stay_where_they_end(
     )
     saved = read_certificate(certify(family, PROTOCOL, [1, 5], signal=signal).to_dict())
     page = words(report_html(saved)).replace("\N{NO-BREAK SPACE}", " ")
-    ends = "11/3" if isinstance(signal, ClockShares) else "[1, 5]"
-    assert f"each ends within: a , b {ends}." in page and "stays within" not in page
+    ends = "every agent at 11/3" if isinstance(signal, ClockShares) else "every agent in [1, 5]"
+    assert f"Where they end {ends} (these signals)" in page
     assert "every signal keeps a, b in [1, 5] at all times" in page
 
 
@@ -101,7 +100,7 @@ def test_ends_under_the_last_mode_stand_on_page_and_statement():
     signal = DwellTime("0.2", clock="t")
     saved = read_certificate(certify(Family.switching([DAY, other]), PROTOCOL, [1, 2, 3], signal=signal).to_dict())
     page, statement = words(report_html(saved)), family_latex(saved)
-    assert "each stays within: ann 1; &lt;b&gt; [−1, 2]; eve [−2, 3]." in page.replace("\N{NO-BREAK SPACE}", " ")
+    assert "ann at 1, &lt;b&gt; in [−1, 2], eve in [−2, 3], all at one |x(T)| (these signals)" in page
     assert "State at the deadline, all at one |x(T)|, for these signals" in page
     assert "& -- & $2$ & $[-1, 2]$" in statement and "U+2013" not in statement
     assert "(at least 0.2 of time between switches) more is proved: the last mode decides, bip" in statement
@@ -114,7 +113,7 @@ def test_an_expectation_that_is_refuted_is_told_and_its_counterexample_is_drawn(
     saved = read_certificate(certify(SWITCHING, PROTOCOL, asks=Asks(expectations=Expectations("stability"))).to_dict())
     page = report_html(saved)
     assert "REFUTED" in page and 'id="figure-why0"' in page
-    assert "Refuted: stability (held in day, ann hears nobody else and keeps its value)" in words(page)
+    assert "refuted: stability (held in day, ann hears nobody else and keeps its value)" in words(page)
 
 
 def test_of_a_behaviour_that_depends_on_the_signal_the_page_tells_why_and_what_holds_all_the_same():
@@ -122,11 +121,11 @@ def test_of_a_behaviour_that_depends_on_the_signal_the_page_tells_why_and_what_h
     page = report_html(saved)
     text = words(page)
     assert (
-        "Why The state ann=0, &lt;b&gt;=0, eve=1 rests at the least weights and moves with &lt;b&gt; → eve on" in text
+        "Why the state ann=0, &lt;b&gt;=0, eve=1 rests at the least weights and moves with &lt;b&gt; → eve on" in text
     )
     assert "no limit is claimed of eve" in text and 'id="figure-why0"' in page
     assert "no limit is claimed" not in text.partition("What was proved")[2].partition("What is refuted")[0]
-    assert "What holds all the same is not part of what the independent check verifies" in text
+    assert "What holds all the same where the signal decides, and what became of expectations, is not part of" in text
     assert "corroborate the bounds" not in text and "The theorem" not in family_latex(saved)
     assert r"b$>$ $\to$ eve on" in family_latex(saved)
     assert "for every signal and every initial state" not in text.partition("What was asked")[0]
@@ -142,7 +141,7 @@ def test_a_page_of_an_undecided_family_says_what_to_try_and_claims_nothing(made,
     assert repr(undecided) == "FamilyCertificate(not decided, rate none, undecided)"
     assert undecided.to_dict()["verdict"] == "undecided" and undecided.to_pandas()["least"].isna().all()
     text = words((tmp_path / "u.html").read_text("utf-8"))
-    assert "What to try" in text and "Undecided: what the agents do" in text and "It is not decided" in text
+    assert "Undecided refutes nothing" in text and "Undecided: what the agents do" in text and "not decided" in text
     assert "How to check it" not in text and "proof obligation" not in text.partition("What this does not say")[0]
     with pytest.raises(ParameterError, match="no statement"):
         write_report(undecided, tmp_path / "u.tex")
@@ -277,12 +276,12 @@ def test_the_bound_of_a_family_through_a_reaching_phase_is_called_numerical_ever
     assert ("every agent differs from its final state" in inside) == proved
     assert ("Numerical, by integration in floating point, and no part of the certificate" in outside) == (not proved)
     assert ("Thick line: the proved bound for every signal" in outside) == proved != ("bound (numerical)" in outside)
-    assert ("final state at most (numerical)" in page) == ("(Numerical, rounded up.)" in page) == (not proved)
+    assert ("of its final state (numerical): " in page) == ("0.99 T s , numerical: " in page) == (not proved)
     runs = sample_runs(made, [RandomSignal(1)])
     for plot in (plot_trajectory, plot_decay, plot_input):
         labels = [text.get_text() for text in plot(made, runs=runs).figure.axes[0].get_legend().get_texts()]
         assert ("proved for every signal" in labels) == proved != ("bound for every signal (numerical)" in labels)
-    assert all(("numerical" in " ".join(told(made, "f"))) != proved for told in (family_summary, family_lines))
+    assert all(("numerical" in " ".join(told(made, "f"))) != proved for told in (summary_lines, certificate_lines))
 
 
 def test_ends_of_constant_weights_under_disturbances_stand_on_screen_page_and_statement():
@@ -291,7 +290,7 @@ def test_ends_of_constant_weights_under_disturbances_stand_on_screen_page_and_st
     family = Family.switching({"m1": Family.from_intervals(one), "m2": Family.from_intervals(other)})
     made = certify(family, SLIDING, InitialState([0, 6], sigma0=[0, 0]), signal="constant")
     saved = read_certificate(made.to_dict())
-    screen, told = " ".join(" ".join(family_summary(saved, "f")).split()), "m1: consensus; m2: bipartite consensus"
+    screen, told = " ".join(" ".join(summary_lines(saved, "f")).split()), "m1: consensus; m2: bipartite consensus"
     assert f"constant if mode and weights never change: {told}" in screen
     assert "x(T) a in [-3, 3], b in [2, 3] (these signals)" in screen
     assert told in words(report_html(saved)) and told in family_latex(saved)
@@ -310,7 +309,7 @@ def test_a_statement_that_speaks_of_the_stretched_clock_defines_it():
 def test_agents_that_listen_to_nobody_end_where_sliding_variables_bring_them(sigma0):
     moved = Family.from_intervals([("a", "c", 1, 3), ("b", "c", 1, 1)])
     made = certify(moved, SLIDING, InitialState([0, 4, 100], sigma0=sigma0))
-    page, screen = words(report_html(read_certificate(made.to_dict()))), "\n".join(family_summary(made, "moved"))
+    page, screen = words(report_html(read_certificate(made.to_dict()))), "\n".join(summary_lines(made, "moved"))
     for text in (page, screen):
         assert ("a, b keep their value" in text) == made.direct != ("a, b end at x(0) - sigma(0)" in text)
     run = simulate(moved, SLIDING, [0, 4, 100], RandomSignal(1), sigma0=sigma0)

@@ -8,7 +8,6 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.protocols import NominalProtocol
-from ptcc_certify.report.family_screen import family_lines
 from ptcc_certify.report.plots.agents import CAMP_STYLES
 from ptcc_certify.report.plots.counterexample import plot_counterexample
 from ptcc_certify.report.plots.decay import plot_decay
@@ -16,6 +15,7 @@ from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.plots.input import plot_input
 from ptcc_certify.report.plots.runs import sample_runs
 from ptcc_certify.report.plots.trajectory import plot_trajectory
+from ptcc_certify.report.screen import certificate_lines
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.signals import RandomSignal, WorstCaseSignal
 from ptcc_certify.theorems.family_behaviour import decide
@@ -180,5 +180,5 @@ def test_a_certificate_draws_its_figures_by_name(drawn):
 def test_the_certified_peak_has_the_digits_of_the_screen(drawn):
     certificate, runs = drawn
     peak = plot_input(certificate, runs=runs).texts[0].get_text().removeprefix("certified peak ")
-    assert f"|u_k| <= {peak}, " in "\n".join(family_lines(certificate, "day"))
+    assert f"|u_k| <= {peak}, " in "\n".join(certificate_lines(certificate, "day"))
     assert len(peak.replace(".", "").lstrip("0")) == 4

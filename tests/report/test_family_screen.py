@@ -14,19 +14,15 @@ from selection import thinned
 
 import ptcc_certify as ptcc
 from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
-from ptcc_certify.certificate.family_verdict import first_input
+from ptcc_certify.certificate.judgements import first_input
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.model.asks import Expectations
 from ptcc_certify.protocols.restricted_signals import DwellTime
-from ptcc_certify.report.family_screen import (
-    decision_lines,
-    decision_summary,
-    family_lines,
-    family_summary,
-    groups_text,
-)
+from ptcc_certify.report.facts import decision_facts
+from ptcc_certify.report.facts.claim import groups_text
 from ptcc_certify.report.page import report_html
+from ptcc_certify.report.screen import certificate_lines, long_screen, short_screen, summary_lines
 from ptcc_certify.theorems.counterexample_text import counterexample_text
 from ptcc_certify.theorems.family_behaviour import FamilyComponent
 
@@ -57,9 +53,11 @@ def test_the_decision_of_any_family_fits_the_screen(kind: str):
         family = renamed(family, LONG) if case % 3 == 0 else family
         for signal in ("any", "constant"):
             components = ptcc.decide(family, signal)
-            lines = decision_summary(components, family, "g.csv", "row a,b: information flows a -> b; undirected")
+            lines = short_screen(
+                decision_facts(components, family, "g.csv", "row a,b: information flows a -> b; undirected")
+            )
             assert_fits(lines, 14)  # of these up to 3 tell why, and 3 what each mode does alone
-            told = decision_lines(components, family, "g.csv")
+            told = long_screen(decision_facts(components, family, "g.csv"))
             assert len(components) > 1 or sum(line.startswith("claim") for line in told) == 1
 
 
@@ -69,13 +67,13 @@ def test_the_certificate_of_any_family_fits_the_screen(kind: str):
     family = random_family(rng, kind, nodes=3).family
     family = renamed(family, LONG) if KINDS.index(kind) % 2 else family
     cert = certify_family(family, PROTOCOL, "random", time_limit=3)
-    lines = family_summary(cert, "g.csv", {"read": "row a,b: information flows a -> b"})
+    lines = summary_lines(cert, "g.csv", {"read": "row a,b: information flows a -> b"})
     stays = any(line.startswith("x(t)") for line in lines)  # between which ends, where no end is claimed
     assert_fits(lines, 15 + stays + len(cert.parts) - 1)
     (verdict,) = (line for line in lines if line.startswith("verdict"))
     assert re.match("verdict    certified" if cert.verdict == "certified" else "verdict    undecided", verdict)
     assert cert.summary().splitlines()[-1] == lines[-1]
-    assert family_lines(cert, "g.csv")[-1].startswith(f"verdict    {cert.assessment.text}")
+    assert certificate_lines(cert, "g.csv")[-1].startswith(f"verdict    {cert.assessment.text}")
 
 
 def test_where_more_is_claimed_of_some_signals_every_line_says_of_which_it_is():
@@ -86,7 +84,9 @@ def test_where_more_is_claimed_of_some_signals_every_line_says_of_which_it_is():
     for family, told in ((pair, "every signal)"), (depends, "these signals)")):
         for signal in ("any", DwellTime("0.4", clock="t")):
             cert = certify_family(family, PROTOCOL, [1, 2, 3], signal=signal, expectations=asked)
-            marked = [line for line in family_lines(cert, "g.csv") if re.match(r"rate|x\(T|error|input|verdict", line)]
+            marked = [
+                line for line in certificate_lines(cert, "g.csv") if re.match(r"rate|x\(T|error|input|verdict", line)
+            ]
             assert len(marked) == (5 if family is pair else 1 if signal == "any" else 2)
             assert {told in line for line in marked} == {signal != "any"}
 
@@ -97,7 +97,7 @@ def test_the_gain_that_is_proposed_makes_the_bound_useful_and_bounds_the_input()
     slow = ptcc.NominalProtocol(T=1, rho1=1, rho2="0.1", kappa=2)
     for x0 in (None, [1, 2, 4]):
         cert = certify_family(pair, slow, x0)
-        told = re.search(r"--rho2 ([0-9.]+) leaves 1 % and bounds the input", cert.assessment.text)
+        told = re.search(r"rho2=([0-9.]+) leaves 1 % and bounds the input", cert.assessment.text)
         assert cert.assessment.useful is False and told
         again = certify_family(pair, ptcc.NominalProtocol(T=1, rho1=1, rho2=told[1], kappa=2), x0)
         assert again.assessment.useful and again.bounded, x0
@@ -107,12 +107,12 @@ def test_where_no_rate_is_proved_the_line_says_why():
     cases = (
         (430, 1, 9, "(430 agents are above the 400"),
         (130, -1, 9, "(closed forms of 130 agents prove none)"),
-        (60, -1, 0.01, "raise --time-limit)"),
+        (60, -1, 0.01, "raise time_limit)"),
     )
     for size, sign, seconds, told in cases:
         ring = [(k, (k + 1) % size, 1 if k else sign) for k in range(size)]
         family = Family.from_graph(ptcc.SignedDigraph.from_edges(ring), uncertainty="10%")
-        lines = family_lines(certify_family(family, PROTOCOL, time_limit=seconds), "g.csv")
+        lines = certificate_lines(certify_family(family, PROTOCOL, time_limit=seconds), "g.csv")
         assert told in next(line for line in lines if line.startswith("rate"))
 
 
@@ -147,7 +147,7 @@ def test_the_edge_that_moves_a_state_is_told_however_long_the_names_are(kind, to
     rows = [(s, t, 1, 2) for s, t in itertools.pairwise(names)]
     family = Family.from_intervals([*rows, (names[4], names[0], 1, 2), (names[0], names[2], -1, 0)])
     (component,) = ptcc.decide(family)
-    text = " ".join(" ".join(decision_summary([component], family, "net")).split())
+    text = " ".join(" ".join(short_screen(decision_facts([component], family, "net"))).split())
     assert f"{told} rests at the least weights and moves with {names[0]} -> {names[2]} on" in text
 
 
@@ -183,7 +183,7 @@ def test_many_agents_that_keep_their_value_and_many_intervals_are_counted_and_no
     )
     assert intervals > 20
     page = re.sub(r"\s+", " ", re.sub("<[^>]+>", "", report_html(certificate)))
-    short, long = family_summary(certificate, "net"), family_lines(certificate, "net")
+    short, long = summary_lines(certificate, "net"), certificate_lines(certificate, "net")
     for groups in (told(short, "groups"), told(long, "groups"), page):
         assert keep in groups and "(41 in all) end between these, up to signs, or move there for ever" in groups
     for boxes in (told(short, "box"), told(long, "box"), page):
@@ -198,8 +198,8 @@ def test_many_agents_that_keep_their_value_and_many_intervals_are_counted_and_no
 def test_intervals_that_do_not_fit_the_short_screen_are_listed_on_the_long_one():
     family = many_followers(3)
     certificate = certify_family(family, PROTOCOL, range(family.n_nodes))
-    assert "4 agents into " in told(family_summary(certificate, "net"), "box")
-    assert all(f"follower{k} into [" in told(family_lines(certificate, "net"), "box") for k in range(3))
+    assert "4 agents into " in told(summary_lines(certificate, "net"), "box")
+    assert all(f"follower{k} into [" in told(certificate_lines(certificate, "net"), "box") for k in range(3))
 
 
 def test_many_groups_that_agree_are_counted():
@@ -223,13 +223,13 @@ def test_the_screen_of_a_family_that_slides_is_short_and_tells_of_disturbances(s
     unsure = Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 1), ("b", "c", -2, -1)])
     protocol = ptcc.SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=3, mu1=2, mu2=1, mu3=mu3, delta=1)
     certificate = certify_family(unsure, protocol, [1, 2, 3], sigma0=sigma0, time_limit=60)
-    lines, more = family_summary(certificate, "unsure"), "\n".join(family_lines(certificate, "unsure"))
+    lines, more = summary_lines(certificate, "unsure"), "\n".join(certificate_lines(certificate, "unsure"))
     text = "\n".join(lines)
-    assert len(lines) <= 10 and max(map(len, lines)) <= 80
+    assert len(lines) <= 11 and max(map(len, lines)) <= 80
     assert "for every signal and disturbance" in text
     assert ("T_r + 0.99 T_s" in text) == ("reaching time" in more) == (sigma0 is not None)
     if mu3 == "0.1" and sigma0:
-        assert "of the sliding part nothing is proved" in text and "--mu3" in more
+        assert "of the sliding part nothing is proved" in text and "mu3=" in more
     else:
         assert "bounded; |u_k| <=" in text
 
@@ -268,7 +268,7 @@ def _member_input(mode: Mode, x: list[Fraction], rng: random.Random) -> Fraction
 def test_consensus_is_called_by_its_sharpest_name():
     undirected = ptcc.decide(Family.from_intervals([("a", "b", 1, 2), ("b", "c", -2, -1)], undirected=True))
     positive = ptcc.decide([("a", "b", 1, 2), ("b", "a", 0, 1)])
-    lines = [decision_summary(parts, parts[0].family, "g")[1] for parts in (undirected, positive)]
+    lines = [short_screen(decision_facts(parts, parts[0].family, "g"))[1] for parts in (undirected, positive)]
     assert lines[0].startswith("claim      signed-average consensus for every signal")
     assert lines[1].startswith("claim      consensus for every signal")
 
@@ -324,7 +324,7 @@ def test_more_functions_than_the_check_takes_are_left_out_and_nothing_rests_on_t
     pairs = [(s, t, 1, high) for k in range(3) for s, t, high in ((f"a{k}", f"b{k}", 2), (f"b{k}", f"a{k}", 1))]
     monkeypatch.setattr("ptcc_certify.checker.family_rows.MANY_FUNCTIONS", 2)
     refused = certify_family(Family.from_intervals(pairs), PROTOCOL, range(6), time_limit=60)
-    told = "\n".join(family_summary(refused, "pairs")).replace("\n           ", " ")
+    told = "\n".join(summary_lines(refused, "pairs")).replace("\n           ", " ")
     assert refused.verdict == "undecided" and "more than 2 Lyapunov functions" in (refused.checked.reason or "")
     assert "the independent check rejects" in told
     assert not any(f"\n{entry}" in told for entry in ("claim", "rate", "x(T)", "error", "input"))
@@ -340,6 +340,6 @@ def test_a_mode_of_several_parts_is_called_by_one_word():
     nodes = ["ann", "bob", "eve"]
     family = Family.switching({name: SignedDigraph.from_edges(edges, nodes) for name, edges in graphs.items()})
     protocol = ptcc.NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
-    text = " ".join(" ".join(family_summary(ptcc.certify(family, protocol, signal=DwellTime("0.5")), "two")).split())
+    text = " ".join(" ".join(summary_lines(ptcc.certify(family, protocol, signal=DwellTime("0.5")), "two")).split())
     assert "first: containment, in 2 separate parts; second: bipartite containment, in 2 separate parts" in text
     assert "decides: first: containment; second: bipartite containment; how near" in text

@@ -26,10 +26,11 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.model.asks import Expectations
 from ptcc_certify.protocols.gain_limits import GainLimits
+from ptcc_certify.report.facts import structure_facts
+from ptcc_certify.report.facts.instants import told_instants
 from ptcc_certify.report.page import report_html
-from ptcc_certify.report.screen import certificate_lines, check_summary, structure_summary, summary_lines
+from ptcc_certify.report.screen import certificate_lines, check_summary, short_screen, summary_lines
 from ptcc_certify.report.text_layout import columns, shorten_list, wrap_lines
-from ptcc_certify.report.told_instants import told_instants
 
 NOMINAL = ptcc.NominalProtocol(T="0.6", rho1="0.1", rho2="0.6", kappa=1)
 STRONG = ptcc.NominalProtocol(T=1, rho1=1, rho2=2, kappa=2)
@@ -73,7 +74,9 @@ def test_of_every_class_the_screens_fit_8_lines_of_80_columns(kind: str):
         [(label(s), label(t), w) for s, t, w in made.graph.edges], [label(v) for v in made.graph.labels]
     )
     x0 = [Fraction(int(x), 7) for x in rng.integers(-9_999, 10_000, n)]
-    assert_short(structure_summary(analyse(graph), "a graph of a long name" * 4), 8 if len(made.parts) == 1 else 12)
+    assert_short(
+        short_screen(structure_facts(analyse(graph), "a graph of a long name" * 4)), 8 if len(made.parts) == 1 else 12
+    )
     for protocol, sigma in ((NOMINAL, {}), (SLIDING, {"sigma0": x0[::-1]})):
         certificate = certify_words(graph, protocol, x0, simulation=False, method="paper", **sigma)
         assert_screen(certificate, "/a/long/path/of/some/folders/to/the/file/of/the/graph/graph_5.csv")
@@ -123,7 +126,7 @@ REQUESTS: list[tuple[Any, dict[str, Any], int, str]] = [
         ptcc.NominalProtocol(T=1, rho1=1, rho2="0.1", kappa=1),
         {},
         0,
-        "little by T; the input is not bounded; --rho2 0.501 leaves 1 % and bounds the input",
+        "little by T; the input is not bounded; rho2=0.501 leaves 1 % and bounds the input",
     ),
     (ptcc.NominalProtocol(T="1/7", rho1="1/30011", rho2="1/40009", kappa="100003/7"), {}, 0, "kappa="),
 ]
@@ -156,7 +159,7 @@ def test_what_disturbances_add_has_a_line_and_the_verdict_is_of_none():
 
 def test_noise_that_is_left_open_has_its_reason():
     sampled = [GainLimits(gain_cap=30, sample_period="0.001")]
-    for limits, why in (([], "--gain-cap or --stop-before"), (sampled, "ask for each alone")):
+    for limits, why in (([], "gain_cap or stop_before"), (sampled, "ask for each alone")):
         certificate = ptcc.certify(PAIR, NOMINAL, [5, 1], limits=limits, asks=ptcc.Asks(simulation=False, noise="0.01"))
         text = " ".join(line.strip() for line in assert_screen(certificate))
         assert f"{why}); the rest is certified" in text
@@ -221,11 +224,11 @@ def test_a_long_label_keeps_the_end_that_tells_it_apart():
 
 def test_of_many_groups_of_leaders_the_large_ones_are_told():
     edges = [(f"s{k}", "hub", 1) for k in range(9)] + [("a", "b", -1), ("b", "a", -1), ("a", "hub", 1)]
-    lines = structure_summary(analyse(SignedDigraph.from_edges(edges)), "g")
+    lines = short_screen(structure_facts(analyse(SignedDigraph.from_edges(edges)), "g"))
     assert "leaders    10 groups, 10 balanced; 9 of one node, 1 larger, up to 2" in lines
     assert "           group 10: balanced, camps {a} against {b}" in lines
     edges += [(f"{x}{k}", f"{y}{k}", 1) for k in range(40) for x, y in ("pq", "qp")]
-    lines = structure_summary(analyse(SignedDigraph.from_edges(edges)), "g")
+    lines = short_screen(structure_facts(analyse(SignedDigraph.from_edges(edges)), "g"))
     assert "leaders    50 groups, 50 balanced; 9 of one node, 41 larger, up to 2, such as" in lines
 
 
@@ -236,7 +239,7 @@ def test_a_header_that_swaps_the_columns_is_told(tmp_path):
         ("listens", "source listens to target"),
     ):
         structure = analyse(ptcc.read_graph(tmp_path / "g.csv", orientation=orientation))
-        assert structure_summary(structure, "g")[1] == f"read       columns by header: {says}"
+        assert short_screen(structure_facts(structure, "g"))[1] == f"read       columns by header: {says}"
 
 
 def test_of_many_components_the_largest_four_are_told():
@@ -330,7 +333,7 @@ def test_instants_of_the_page_are_those_of_the_screen():
 def test_undecided_for_want_of_time_names_the_search():
     assert set(NO_SEARCHES) - {"exact final state"} <= set(STEPS)  # which gives way to an enclosed one
     text = ptcc.certify(PAIR, NOMINAL, [5, 1], asks=ptcc.Asks(time_limit=1e-9)).assessment.text
-    assert text == "undecided: no rate is proved, the search took its share of 1e-09 s; raise --time-limit"
+    assert text == "undecided: no rate is proved, the search took its share of 1e-09 s; raise time_limit"
 
 
 def test_no_claim_hypothesis_or_parameter_is_cut_short():

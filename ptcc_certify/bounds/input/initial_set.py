@@ -118,7 +118,7 @@ def ellipsoid(center: Any, axes: Sequence[Any], graph: Any = None) -> InitialSet
     ((Fraction(1, 1), Fraction(0, 1)), (Fraction(0, 1), Fraction(2, 1)))
     """
     if not isinstance(axes, Iterable):
-        raise ParameterError(f"axes = {shorten(repr(axes))} is no list of vectors; give one semi-axis or more")
+        raise ParameterError("axes", f"= {shorten(repr(axes))} is no list of vectors; give one semi-axis or more")
     if by_label(axes, "axes") is not None:
         raise ParameterError("axes are a list of vectors, each of which may have labels; a table does not tell which")
     middle = tuple(as_fraction(x, "center") for x in _without_labels(center, graph, "center"))
@@ -132,9 +132,9 @@ def _without_labels(values: Any, graph: Any, name: str) -> Any:
     if graph is not None:
         values = in_node_order(values, as_graph(graph), name)
     elif by_label(values, name) is not None:
-        raise ParameterError(f"{name} has labels, and the graph has the order of its nodes; give graph= besides")
+        raise ParameterError(name, "has labels, and the graph has the order of its nodes; give graph= besides")
     if isinstance(values, str) or not hasattr(values, "__len__"):
-        raise ParameterError(f"{name} is {shorten(repr(values))}; give one number for each agent")
+        raise ParameterError(name, f"is {shorten(repr(values))}; give one number for each agent")
     return values
 
 

@@ -172,25 +172,25 @@ def read_state(
     try:
         items = next(csv.reader([text_or_path], skipinitialspace=True, strict=True)) or [""]
     except csv.Error as error:
-        raise ParameterError(f"{place}: unclear quotes ({error}); close each") from None
+        raise ParameterError(place, f"unclear quotes ({error}); close each") from None
     bare, labelled = text_or_path.strip(), any("=" in item for item in items)
     if re.fullmatch(r"\[.*\]|\(.*\)|\{.*\}", bare) or (
         len(items) == 1 < graph.n_nodes and re.search(r"[;\s]", bare) and bare.partition("=")[0] not in graph.index
     ):
         mend = "separate the values by commas, without brackets, such as 5,2,-4 or a=5,b=2,c=-4"
-        raise ParameterError(f"{place}: no such file; {mend}")
+        raise ParameterError(place, f"no such file; {mend}")
     if labelled:
         if (other := next((item for item in items if "=" not in item), None)) is not None:
             comma = "; for labels with a comma give a CSV file with rows node,value"
             commas = comma * any("," in label for label in graph.labels)
-            raise ParameterError(f'{place}: "{shorten(other)}" is not label=value{commas}')
+            raise ParameterError(place, f'"{shorten(other)}" is not label=value{commas}')
         pairs = [item.rpartition("=")[::2] for item in items]
         pairs = [(label if label in graph.index else label.strip(), value) for label, value in pairs]
     elif len(items) == graph.n_nodes:
         pairs = list(zip(graph.labels, items, strict=True))
     else:
         size = f"{len(items)} value{'s' * (len(items) > 1)} for {graph.n_nodes} nodes"
-        raise ParameterError(f"{place}: no such file, and {size}; give one for each of {first_five(graph.labels)}")
+        raise ParameterError(place, f"no such file, and {size}; give one for each of {first_five(graph.labels)}")
     return _in_node_order([(*pair, place) for pair in pairs], graph, place, ParameterError)
 
 
@@ -354,14 +354,14 @@ def _in_node_order(
     for label, text, place in pairs:
         if label not in graph.index:
             hint = did_you_mean(label, graph.labels) or f"; its nodes are {first_five(graph.labels)}"
-            raise refusal(f'{place}: node "{shorten(label)}" is not in the graph{hint}')
+            raise refusal(place, f'node "{shorten(label)}" is not in the graph{hint}')
         if label in state:
-            raise refusal(f"{place}: node {shorten(label)} has two values; keep one")
+            raise refusal(place, f"node {shorten(label)} has two values; keep one")
         try:
             state[label] = parse_exact(text)
         except NumberError as error:
             mend = "write the minus as -" if MINUS in text else "give a finite number"
-            raise refusal(f"{place}: value of node {shorten(label)}: {error}; {mend}") from None
+            raise refusal(place, f"value of node {shorten(label)}: {error}; {mend}") from None
     if missing := [label for label in graph.labels if label not in state]:
         count = f"{len(missing)} of {graph.n_nodes} nodes have no value"
         raise refusal(f"{name}: {count}: {first_five(missing)}; give one to each node")

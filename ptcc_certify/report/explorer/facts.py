@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from fractions import Fraction
 
 import numpy as np
 
 from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.errors import Change
 from ptcc_certify.graphs.rationals import shorten
 
 #: The rows, and what stands in those for which a certificate has nothing to tell.
@@ -49,16 +49,16 @@ def run_of(certificate: Certificate) -> str:
     return f"bound {'VIOLATED' if comparison.violated else 'kept'}, worst ratio {comparison.worst_ratio:.4g}"
 
 
-def without_flags(verdict: str) -> str:
-    """Return a verdict whose advice is for the controls, not for the command line.
+def of_controls(change: Change) -> str:
+    """Name a change of the controls.
 
     Examples
     --------
-    >>> without_flags("it says little by T; --rho2 1.38 (rho2 kappa 2.76) leaves 1 %")
-    'it says little by T; rho2 = 1.38 leaves 1 %'
+    >>> of_controls(Change("rho2", "1.38")), of_controls(Change("method", "best"))
+    ('rho2 = 1.38', 'bounds = best')
     """
-    verdict = re.sub(r"--(rho2|mu3) (\S+)(?: \(rho2 kappa [^)]*\))?", r"\1 = \2", verdict)
-    return verdict.replace("--method ", "bounds = ")
+    name = "bounds" if change.field == "method" else change.field
+    return f"{name} = {change.number}" if change.number else name
 
 
 def _claim(certificate: Certificate) -> str:

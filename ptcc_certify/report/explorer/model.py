@@ -17,12 +17,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ptcc_certify.bounds.final_state import final_state
-from ptcc_certify.certificate.answer import rejects
+from ptcc_certify.certificate.answer import CERTIFIED, rejects
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.procedure import certify, certify_case
 from ptcc_certify.certificate.request import refuse_long_weights
-from ptcc_certify.certificate.verdict import CERTIFIED
-from ptcc_certify.errors import ParameterError, PTCCError, SimulationError
+from ptcc_certify.errors import ParameterError, PTCCError, SimulationError, spell
 from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io.packaged import GRAPHS
@@ -33,7 +32,7 @@ from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.model.refusals import refuse_before_the_graph
 from ptcc_certify.protocols.disturbance import as_disturbance
 from ptcc_certify.protocols.reaching_time import certified_reaching_times
-from ptcc_certify.report.explorer.facts import UNCHECKED, facts_of, run_of, without_flags
+from ptcc_certify.report.explorer.facts import UNCHECKED, facts_of, of_controls, run_of
 from ptcc_certify.report.explorer.panels import PANELS, draw_panels, message_figure, panel_svg, png, shown_in
 from ptcc_certify.report.explorer.question import Question
 from ptcc_certify.report.explorer.reproduction import command_of, python_of
@@ -78,7 +77,7 @@ class View:
         """The verdict line of ``certify``; before the check it says so."""
         if self.certificate is None:
             return self.refusal
-        return without_flags(self.certificate.assessment.text) if self.checked else UNCHECKED
+        return spell(self.certificate.assessment.sentence, of_controls) if self.checked else UNCHECKED
 
     @property
     def grade(self) -> str:

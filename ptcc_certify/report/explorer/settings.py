@@ -105,7 +105,7 @@ class Settings:
         for name in parameters:
             refuse_unknown("parameter", name, SLIDERS)
         if seed < 0:
-            raise ParameterError(f"seed = {seed} is outside its domain; seed must be >= 0")
+            raise ParameterError("seed", f"= {seed} is outside its domain; seed must be >= 0")
 
     @classmethod
     def from_texts(cls, texts: Mapping[str, str]) -> Settings:

@@ -67,7 +67,7 @@ def explore(graph: Any = None, settings: Settings | None = None, *, orientation:
     verdict    certified; ||E|| <= 1.8e-30 ||E(0)|| at 0.99 T
     """
     if settings is not None and not isinstance(settings, Settings):
-        raise ParameterError(f"settings = {shorten(repr(settings))} is none; give ptcc.report.explorer.Settings()")
+        raise ParameterError("settings", f"= {shorten(repr(settings))} is none; give ptcc.report.explorer.Settings()")
     packaged = isinstance(graph, str) and graph in GRAPHS
     explorer = Explorer(None if graph is None or packaged else as_graph(graph, orientation))
     if settings is None:

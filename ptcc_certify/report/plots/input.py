@@ -13,10 +13,10 @@ from ptcc_certify.bounds.envelope import FLOOR_FACTOR
 from ptcc_certify.bounds.input.effort import Effort
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
-from ptcc_certify.certificate.late_answers import largest_late_input
+from ptcc_certify.certificate.judgements import largest_late_input
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.report.input_lines import initial_states_text
+from ptcc_certify.report.facts.input import initial_states_text
 from ptcc_certify.report.plots.agents import draw_agents, draw_deadlines, name_agents
 from ptcc_certify.report.plots.agents_motion import agents_run
 from ptcc_certify.report.plots.peaks import Peak, draw_peaks

@@ -48,7 +48,7 @@ def styled(plot: Callable[..., Any]) -> Callable[..., Any]:
         subject = read_back(subject)
         if ax is not None:
             if not isinstance(ax, Axes):
-                raise ParameterError(f"ax = {ax!r} is none; give axes of Matplotlib, or leave it out")
+                raise ParameterError("ax", f"= {ax!r} is none; give axes of Matplotlib, or leave it out")
             return plot(subject, ax=ax, **keywords)
         with style.context(STYLE):
             return shown(plot(subject, **keywords))

@@ -1,12 +1,12 @@
-"""What the screen of a family's certificate tells of restricted signals."""
+"""Facts of signals: what holds for restricted ones, and of which signals a fact is."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from lmi.exact.decimal_rounding import down, near, up
+from ptcc_certify.certificate.facts import Fact, Facts
 from ptcc_certify.certificate.restricted_claims import (
     FinalValueClaim,
     LastModeClaim,
@@ -33,15 +33,15 @@ RESTS = "every agent keeps its value"
 CLOCK = {"t": "time", "s": "the clock"}
 
 
-def restricted_entries(certificate: FamilyContent) -> Iterator[tuple[str, str]]:
+def signal_facts(certificate: FamilyContent) -> Facts:
     """Yield what is proved for restricted signals, component after component.
 
     Examples
     --------
     >>> unsure = Family.from_intervals([("a", "b", 1, 2), ("b", "a", -2, -1)])
     >>> cert = certify(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), signal="constant")
-    >>> print(*next(restricted_entries(cert)), sep=": ")
-    constant: if mode and weights never change: rate 1.58578, as for every signal; nothing more is proved
+    >>> print(next(signal_facts(cert)).text)
+    if mode and weights never change: rate 1.58578, as for every signal; nothing more is proved
 
     Where agents end then is told by :mod:`ptcc_certify.certificate.restricted_states`.
     """
@@ -59,9 +59,9 @@ def restricted_entries(certificate: FamilyContent) -> Iterator[tuple[str, str]]:
 
     none = reasons_for_none(certificate)
     if not certificate.restricted and not none:
-        yield head[0], f"{head[1]}: nothing more is proved"
+        yield Fact(head=head[0], note=f"{head[1]}: nothing more is proved")
     for number, (reason, _) in none.items():
-        yield head[0], f"{where(number)}{head[1]}: {reason}"
+        yield Fact(head=head[0], note=f"{where(number)}{head[1]}: {reason}")
     for claim in certificate.restricted:
         if claim.component in none or (isinstance(claim, FinalValueClaim) and not _stands_alone(certificate, claim)):
             continue
@@ -71,7 +71,12 @@ def restricted_entries(certificate: FamilyContent) -> Iterator[tuple[str, str]]:
             text = _share_text(certificate, claim)
         else:
             text = _window_text(claim) if isinstance(claim, WindowClaim) else _rate_text(certificate, claim)
-        yield head[0], f"{where(claim.component)}{head[1]}: {text}"
+        yield Fact(head=head[0], note=f"{where(claim.component)}{head[1]}: {text}")
+
+
+def every_text(certificate: FamilyContent) -> str:
+    """Tell apart what holds for every signal where more is claimed of some."""
+    return "" if certificate.signal == "any" else " (every signal)"
 
 
 def signal_text(signal: SignalClass) -> tuple[str, str]:

@@ -1,4 +1,4 @@
-"""What screens tell of late messages: how late, what is left at the deadline, who misses it."""
+"""Facts of late messages and moving leaders: what is left at the deadline, who misses it, how leaders are tracked."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import down, float_up, near, up
 from ptcc_certify.bounds.small_delays import delay_threshold
+from ptcc_certify.certificate.facts import Fact, Facts
+from ptcc_certify.errors import Change
 from ptcc_certify.graphs.size_limits import EXACT_NODES
-from ptcc_certify.report.structure_text import Lines
 from ptcc_certify.report.text_layout import shorten_label, shorten_list
 
 if TYPE_CHECKING:
@@ -23,49 +24,60 @@ if TYPE_CHECKING:
     from ptcc_certify.protocols.moving_leaders import MovingLeaders
 
 
-def late_lines(certificate: Certificate) -> Lines:
+def late_facts(certificate: Certificate) -> Facts:
     """Tell how late messages are; what cannot be then, and what is left at the deadline."""
     late = certificate.late
     if late is None:
         return
-    yield "messages", messages_text(late.messages, certificate.protocol)
+    yield Fact(head="messages", note=messages_text(late.messages, certificate.protocol))
     if late.leaders is not None:
-        yield "leaders", leaders_text(late.leaders)
-    texts = [*_impossible(late), *([] if late.direct else _left(late)), *_stages(late), *_kept_off(late)]
+        yield Fact(head="leaders", note=leaders_text(late.leaders))
+    left = [] if late.direct else _left(late)
+    texts = [*_impossible(late), *left, *_stages(late), *_kept_off(late)]
     if (at := certificate.at) is not None and (late.rows or late.steps or late.settling or late.lmi):
         texts.append(f"at t = {near(at)} every agent within {up(float(late.largest_bound([float(at)])[0]), 2)}")
-    yield "late" if late.says_something else "LATE", texts[0]
-    yield from (("", text) for text in texts[1:])
-    from ptcc_certify.certificate.late_answers import largest_late_input  # ``classify`` has no use for solvers
+    for text in texts:
+        size = late.largest if text in left and not math.isinf(late.largest) else None
+        yield Fact(head="late", value=size, side="up", note=text, loud=not late.says_something)
+    from ptcc_certify.certificate.judgements import largest_late_input  # ``classify`` has no use for solvers
 
     largest, whole = largest_late_input(late, certificate.protocol), ", from within 1 of it at first" * late.relative
     if largest is not None:
         sliding = "" if certificate.protocol.reaching is None else ", the sliding term included"
-        yield "input", f"bounded up to T; |u_k| <= {up(largest, 4)}{sliding}{whole}"
+        text = f"bounded up to T; |u_k| <= {up(largest, 4)}{sliding}{whole}"
+        yield Fact(head="input", value=largest, side="up", note=text)
     else:
         cap = "a gain without a cap makes ever more of what is late" if late.messages.gain_cap is None else ""
-        yield "INPUT", f"not proved bounded with late messages{': ' * bool(cap)}{cap}"
+        text = f"not proved bounded with late messages{': ' * bool(cap)}{cap}"
+        yield Fact(head="input", standing="unproved", note=text, loud=True)
+    if by_agent := _residual_text(certificate, late):
+        yield Fact(head="left", note=f"at T by agent: {by_agent}", detail=True)
 
 
-def tracking_lines(certificate: Certificate) -> Lines:
+def tracking_facts(certificate: Certificate) -> Facts:
     """Tell how followers track leaders that move."""
     tracking = certificate.tracking
     if tracking is None:
         return
     T = near(certificate.protocol.T)
-    yield "leaders", leaders_text(tracking.leaders)
+    yield Fact(head="leaders", note=leaders_text(tracking.leaders))
     instants = {"0.9 T": Fraction(1, 10), "0.99 T": Fraction(1, 100)}
     if (at := certificate.at) is not None:
         instants = {f"t = {near(at)}": 1 - at / certificate.protocol.T}
     bounds = {when: up(float(tracking.distance_bound([float(q)]).max()), 2) for when, q in instants.items()}
     after = "and ever after" if not tracking.after else f"within {up(tracking.distance_after, 2)} of it from then on"
-    yield "tracking", f"every follower on its target at T = {T}, {after};"
+    yield Fact(head="tracking", note=f"every follower on its target at T = {T}, {after};")
     whole = " from within 1 of it at first" * tracking.relative
-    yield "", f"before T within {', '.join(f'{x} of it at {when}' for when, x in bounds.items())}{whole}"
+    within = ", ".join(f"{x} of it at {when}" for when, x in bounds.items())
+    yield Fact(head="tracking", note=f"before T within {within}{whole}")
     if tracking.input is not None:
-        yield "input", f"bounded up to T; |u_k| <= {up(float(tracking.input.max()), 4)}{whole}"
+        largest = float(tracking.input.max())
+        text = f"bounded up to T; |u_k| <= {up(largest, 4)}{whole}"
+        yield Fact(head="input", value=largest, side="up", note=text)
     else:
-        yield "INPUT", f"not proved bounded while leaders move; rho2 = {tracking.bounding_rho2} bounds it"
+        mend = Change("rho2", str(tracking.bounding_rho2))
+        note = ("not proved bounded while leaders move; ", mend, " bounds it")
+        yield Fact(head="input", standing="unproved", note=note, loud=True)
 
 
 def leaders_text(leaders: MovingLeaders) -> str:
@@ -106,10 +118,9 @@ def messages_text(messages: LateMessages, protocol: Protocol | None = None) -> s
     return "; ".join(told + ["the own state as well"] * messages.own_delay)
 
 
-def residual_text(certificate: Certificate) -> str:
+def _residual_text(certificate: Certificate, late: LateBounds) -> str:
     """List what is left at ``T`` at most, agent by agent; empty where nothing is proved."""
-    late = certificate.late
-    if late is None or math.isinf(late.largest):
+    if math.isinf(late.largest):
         return ""
     bounds = late.residual if late.residual is not None else np.full(certificate.graph.n_nodes, np.inf)
     if late.settling is not None:

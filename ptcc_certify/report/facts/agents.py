@@ -1,8 +1,8 @@
-"""What the screen tells of agents of order n: their equation and protocol, where they end, how near by when, input."""
+"""Facts of agents of order n: their equation and protocol, where they end, how near by when, their input."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import near, up
 from ptcc_certify.bounds.final_state import extremes
+from ptcc_certify.certificate.facts import Fact, Facts
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.protocols.agents import DERIVATIVES, PLURALS, plant_text
 from ptcc_certify.report.text_layout import TEXT, columns, short_number, shorten_label, shorten_list, unbroken
@@ -41,46 +42,57 @@ def agents_text(part: AgentsAnswer) -> str:
     return "; ".join([*texts, *[unbroken(f"u = {protocol.law()}")] * bool(driven)])
 
 
-def answers(part: AgentsAnswer) -> Iterator[tuple[str, str]]:
-    """Return the lines of the short screen: where agents end, bounds of deviations, and of the input."""
-    yield "agents", agents_text(part)
-    yield from _final_lines(part, 2 * TEXT)
+def agents_facts(part: AgentsAnswer, details: bool = True) -> Facts:
+    """Tell what the agents are and how they are driven, where they end, bounds of deviations, and of the input."""
+    gains, proof = part.proof_text
+    text = agents_text(part)
+    yield Fact(head="agents", note=f"{text}; {gains}", brief=(text,))
+    yield Fact(head="agents", note=proof, detail=True)
+    yield from _final_facts(part)
     if not part.functions:
-        if part.structure.graph.n_edges == 0:
-            alone = "comes to rest" if part.derivatives_agree and any(part.protocol.own) else "moves"
-            yield "error", f"none: no agent listens to another, each {alone} by itself"
+        if part.alone:
+            by_itself = "comes to rest" if part.derivatives_agree and any(part.protocol.own) else "moves"
+            yield Fact(head="error", note=f"none: no agent listens to another, each {by_itself} by itself")
             if part.inputs is not None or part.grows:
-                yield _input_line(part)
+                yield _input_fact(part)
         return
-    yield "error", _error_text(part)
-    yield _input_line(part)
+    yield Fact(head="error", note=_error_text(part))
+    if details:
+        yield from _deviation_facts(part)
+    yield _input_fact(part)
 
 
-def _final_lines(part: AgentsAnswer, width: int) -> Iterator[tuple[str, str]]:
+def _final_facts(part: AgentsAnswer) -> Facts:
     """Tell positions at ``T``, and velocities and so on unless all are 0."""
     if part.final_state is None:
         if part.initial_state is not None and part.functions:
-            yield _ENDS[0], "not proved: the equations of followers or leaders are too ill-conditioned for floats"
+            text = "not proved: the equations of followers or leaders are too ill-conditioned for floats"
+            yield Fact(head=_ENDS[0], standing="unproved", note=text)
         return
-    labels = part.structure.graph.labels
     rest = not part.moving and part.settled > 1
     open_end = "; velocities are not proved to vanish" * (not part.derivatives_agree)
     for i in range(part.settled):
         ends = [[chain[i] for chain in agent] for agent in part.final_state]
         if i and not any(m or r for row in ends for m, r in row):
             continue
-        places = [_place(row) for row in ends]
-        words = [f"{shorten_label(label)}={place}" for label, place in zip(labels, places, strict=True)]
         kind = f"({_accuracy(ends)}{', at rest' * (rest and i == 0)}{open_end})"
-        text = shorten_list(words, width - columns(kind) - 1)
-        if len(set(places)) == 1 < len(places):
-            text = f"{places[0]}, of every agent"
-        elif len(words) > EXACT_NODES and part.dimension == 1:
-            (m,), (least,) = extremes([row[0][0] for row in ends], 1, [row[0][1] for row in ends])
-            text = f"least {words[least]}, largest {words[m]}, of {len(words):,} agents"
+        note, brief = (_ends_text(part, ends, width - columns(kind) - 1) for width in (12 * TEXT, 2 * TEXT))
         if i == 0 and part.protocol.gain_cap is not None:
             kind = f"{kind[:-1]}; without the cap)"
-        yield _ENDS[i] if i < len(_ENDS) else f"x^({i})(T)", f"{text} {kind}"
+        head = _ENDS[i] if i < len(_ENDS) else f"x^({i})(T)"
+        yield Fact(head=head, value=ends, note=f"{note} {kind}", brief=(f"{brief} {kind}",))
+
+
+def _ends_text(part: AgentsAnswer, ends: Sequence[Sequence[Interval]], width: int) -> str:
+    """Tell the ends of all agents; the one that all have, or of too many the least and the largest."""
+    labels, places = part.structure.graph.labels, [_place(row) for row in ends]
+    words = [f"{shorten_label(label)}={place}" for label, place in zip(labels, places, strict=True)]
+    if len(set(places)) == 1 < len(places):
+        return f"{places[0]}, of every agent"
+    if len(words) > EXACT_NODES and part.dimension == 1:
+        (m,), (least,) = extremes([row[0][0] for row in ends], 1, [row[0][1] for row in ends])
+        return f"least {words[least]}, largest {words[m]}, of {len(words):,} agents"
+    return shorten_list(words, width)
 
 
 def _place(row: Sequence[Interval]) -> str:
@@ -115,42 +127,32 @@ def _error_text(part: AgentsAnswer) -> str:
     return "at 0.99 T " + _named(bounds.tolist())
 
 
-def _input_line(part: AgentsAnswer) -> tuple[str, str]:
+def _input_fact(part: AgentsAnswer) -> Fact:
     """Tell whether the input is bounded, its proved size, and whose it is."""
     if part.grows:
-        return "INPUT", "NOT BOUNDED: it grows without limit"
+        return Fact(head="input", note="NOT BOUNDED: it grows without limit", loud=True)
     if part.inputs is None:
         if part.unbounded:
-            return "INPUT", f"NOT CERTIFIED BOUNDED: {', '.join(why for why, _ in part.unbounded)}"
-        return "input", "bounded; no number is proved" + " without x(0)" * (part.initial_state is None)
+            why = ", ".join(why for why, _ in part.unbounded)
+            return Fact(head="input", standing="unproved", note=f"NOT CERTIFIED BOUNDED: {why}", loud=True)
+        return Fact(head="input", note="bounded; no number is proved" + " without x(0)" * (part.initial_state is None))
     largest = max(part.inputs)
     if not largest:
-        return "input", "none: u = 0"
+        return Fact(head="input", value=largest, note="none: u = 0")
     label = part.structure.graph.labels[part.inputs.index(largest)]
     text = f"bounded; {part.norm} <= {up(largest, 4)}"
     agent = f", the largest of agent {shorten_label(label, 22)}"
-    return "input", text + agent * (columns(text + agent) <= TEXT)
+    return Fact(head="input", value=largest, side="up", note=text + agent, brief=(text + agent, text))
 
 
-def long_lines(part: AgentsAnswer) -> Iterator[tuple[str, str]]:
-    """Return what the long screen tells besides."""
-    gains, proof = part.proof_text
-    yield "agents", f"{agents_text(part)}; {gains}"
-    yield "", proof
-    yield from _final_lines(part, 12 * TEXT)
-    if part.functions and part.initial_state is not None:
-        for i in range(part.order):
-            worst = part.deviation_bound(np.array([q for q, _ in _INSTANTS]))[:, i].max(axis=0)
-            if np.isfinite(worst).all():
-                bounds = ", ".join(
-                    f"{up(float(x), 2)} at {name}" for x, (_, name) in zip(worst, _INSTANTS, strict=True)
-                )
-                name = DERIVATIVES[i] if i < len(DERIVATIVES) else f"derivative {i}"
-                yield "deviation" if i == 0 else "", f"{name}: from the common motion at most {bounds}"
-    if part.residual is not None:
-        yield "left", _error_text(part)
-    if part.functions or part.inputs is not None or part.grows:
-        yield _input_line(part)
+def _deviation_facts(part: AgentsAnswer) -> Facts:
+    """Tell how far from the common motion the farthest agent may be, of every derivative."""
+    for i in range(part.order if part.initial_state is not None else 0):
+        worst = part.deviation_bound(np.array([q for q, _ in _INSTANTS]))[:, i].max(axis=0)
+        if np.isfinite(worst).all():
+            bounds = ", ".join(f"{up(float(x), 2)} at {name}" for x, (_, name) in zip(worst, _INSTANTS, strict=True))
+            name = DERIVATIVES[i] if i < len(DERIVATIVES) else f"derivative {i}"
+            yield Fact(head="deviation", note=f"{name}: from the common motion at most {bounds}", detail=True)
 
 
 def claimed_of(part: AgentsAnswer) -> str:

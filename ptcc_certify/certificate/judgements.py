@@ -1,0 +1,428 @@
+"""What became of each expectation, of graphs and of families: behaviour, rate, input, limits, late messages."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+
+from lmi.exact.decimal_rounding import down, near, up
+from ptcc_certify.bounds.late_messages import LateBounds
+from ptcc_certify.bounds.missed_deadline import Missed
+from ptcc_certify.bounds.tracking import Tracking
+from ptcc_certify.certificate.answer import MET, OPEN, REFUTED, Answer
+from ptcc_certify.certificate.certificate_data import Content
+from ptcc_certify.certificate.family_content import FamilyContent
+from ptcc_certify.certificate.restricted_claims import LastModeClaim
+from ptcc_certify.certificate.restricted_reasons import reasons_for_none
+from ptcc_certify.errors import Change, Sentence, joined
+from ptcc_certify.graphs.family import Mode
+from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.protocols.base import Protocol
+from ptcc_certify.protocols.restricted_signals import ClockShares, JointWindows
+from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_name
+from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
+from ptcc_certify.theorems.family_claims import component_holds, component_refutation
+from ptcc_certify.theorems.last_mode import last_mode_shows
+
+
+def judge(certificate: Content) -> Iterator[Answer]:
+    """Tell what became of what was asked of the certificate of a graph."""
+    asked = certificate.expectations
+    if asked.behaviour is not None:
+        yield at_deadline(certificate, _judge_behaviour(certificate, asked.behaviour))
+    if asked.min_rate is not None:
+        yield judge_rate(certificate, asked.min_rate)
+    if asked.max_input is not None:
+        yield judge_input(certificate, asked.max_input)
+    yield from judge_limits(certificate)
+    yield from judge_messages(certificate)
+
+
+def judge_family(certificate: FamilyContent) -> Iterator[Answer]:
+    """Tell what became of what was asked of the certificate of a family."""
+    asked, components = certificate.expectations, [part.component for part in certificate.parts]
+    if asked.behaviour is not None:
+        yield _judge_behaviour_of_signal(certificate, components, asked.behaviour)
+    if asked.min_rate is not None:
+        yield _judge_rate_of_signal(certificate, asked.min_rate)
+    if asked.max_input is not None:
+        yield _judge_input_of_signal(certificate, asked.max_input)
+    reasons = (reason for reason, leaves_open in reasons_for_none(certificate).values() if leaves_open)
+    if asked.behaviour is None and asked.min_rate is None and (reason := next(reasons, "")):
+        yield Answer(OPEN, "what these signals do", reason)
+
+
+def _proved_or_bounded(what: str, rate: Fraction | None, bound: Fraction | None, least: Fraction) -> Answer:
+    """Tell that a rate that is not proved is above the proved upper bound, or what is proved."""
+    if bound is not None and least > bound:
+        return Answer(REFUTED, what, f"upper bound {up(bound, 8)}, proved")
+    reason = "none is proved" if rate is None else f"proved: {down(rate)}"
+    return Answer(OPEN, what, reason if bound is None else f"{reason}, at most {up(bound, 8)} can be")
+
+
+# ---------------------------------------------------------------------- one graph
+
+
+def judge_behaviour(structure: Structure, expected: str) -> Answer:
+    """Tell whether a behaviour follows from the theorem that applies, in every component."""
+    if structure.holds(expected):
+        return Answer(MET, expected)
+    claims = [component.claim for component in structure.components]
+    return Answer(REFUTED, expected, f"it is {claims[0].sharpest}" if len(claims) == 1 else "not in every component")
+
+
+def _judge_behaviour(certificate: Content, expected: str) -> Answer:
+    """Tell the same of what the agents are, which may be of order n, and have places or a capped gain."""
+    answer, part = judge_behaviour(certificate.structure, expected), certificate.agents
+    if part is None and certificate.offsets is not None:
+        what = f"{expected} of x - offsets"
+        if certificate.limits:
+            return Answer(OPEN, what, "limits of the gain leave something at T")
+        return replace(answer, what=what)
+    if part is None:
+        return answer
+    what = f"{expected} of x - offsets" if part.formation else expected
+    if part.settles:
+        return replace(answer, what=what)
+    return Answer(OPEN, what, "the capped gain leaves something at T" if part.functions else "no decay is proved")
+
+
+def judge_rate(certificate: Content, least: Fraction) -> Answer:
+    """Tell whether a rate of at least so much is proved, or excluded by the proved upper bound."""
+    what, rate, bound = f"rate >= {near(least, 12)}", certificate.rate, certificate.upper_bound
+    if (beside := judge_rate_beside(certificate, least, what)) is not None:
+        return beside
+    if certificate.agents is not None:
+        rate, bound = certificate.agents.rate if certificate.agents.functions else None, None
+    if certificate.constant or (rate is not None and rate >= least):
+        return Answer(MET, what)
+    if rate is None and certificate.agents is not None and certificate.agents.functions:
+        return Answer(OPEN, what, "deviations of the cascade fall by two laws, not by one rate")
+    return _proved_or_bounded(what, rate, bound, least)
+
+
+def judge_input(certificate: Content, most: Fraction) -> Answer:
+    """Tell whether every input is proved to stay within so much, under all that was asked for besides."""
+    effort, what = certificate.effort, f"|u_k| <= {near(most, 12)}"
+    if certificate.agents is not None:
+        return certificate.agents.judge_input(most)
+    if certificate.constant:
+        return Answer(MET, what)
+    beside = (certificate.late, certificate.tracking, certificate.request.leaders)
+    if any(part is not None for part in beside):
+        return judge_input_beside(certificate, most, what, _first_input(certificate))
+    least, bound = input_range(certificate)
+    if bound is not None and bound <= most:
+        return Answer(MET, what)
+    if least > most:
+        first = effort is not None and effort.first is not None and effort.first >= least
+        size = f"up to {down(least)}" if least < math.inf else "without limit"
+        return Answer(REFUTED, what, f"it is {size} {'at the start' if first else 'by the noise alone'}, proved")
+    solid = (
+        effort is not None and effort.initial_set is not None and all(r > 0 for r in effort.initial_set.radius or (0,))
+    )
+    if effort is not None and effort.bounded is False and solid and not certificate.limits:
+        return Answer(REFUTED, what, "from some of these initial states it grows without limit, proved")
+    return Answer(OPEN, what, "no bound is proved" if bound is None else f"proved: {up(bound)}")
+
+
+def input_range(certificate: Content) -> tuple[Fraction | float, Fraction | None]:
+    """Return proved bounds of the largest ``|u_k|`` over all agents, initial states, noise and disturbances.
+
+    Under the limits of the gain, with noise within ``noise`` and disturbances within ``delta``. The lower bound is
+    attained or approached: at first, or where noise meets the largest gain, without a limit an infinite one.
+    The upper one is None where nothing is proved. What disturbances add under the protocol itself they add at most
+    under a cap and a stop, too: ``gain int_0^t e^(-alpha (s(t) - s(r))) dr`` stays below what is proved without these.
+    """
+    effort, p, graph = certificate.effort, certificate.protocol, certificate.structure.graph
+    if effort is None:
+        return Fraction(0), None
+    tops = [entry.largest_gain(p.gain.exact) for entry in certificate.limits]
+    share = min([Fraction(1), *(top / p.gain.first for top in tops)])
+    least: Fraction | float = (effort.first or Fraction(0)) * share
+    if certificate.noise is not None:
+        rows = graph.exact_rows(range(graph.n_nodes))
+        degree = max(row.get(v, Fraction(0)) for v, row in enumerate(rows))
+        least = max(least, 2 * degree * certificate.noise * min(tops)) if tops else math.inf
+    if certificate.limits:
+        peaks = [e.largest if certificate.noise is None else e.noisy_largest for e in effort.residual]
+        most = None if len(peaks) < len(certificate.limits) or None in peaks else max(x for x in peaks if x is not None)
+    else:
+        most = None if effort.peak is None or certificate.noise is not None else effort.peak.largest
+    if most is not None and certificate.delta is not None:
+        most = None if effort.disturbed is None else most + max(effort.disturbed.inputs)
+    return least, most
+
+
+def _first_input(certificate: Content) -> Fraction:
+    """Return what the largest ``|u_k(0)|`` is at least under the limits of the gain; 0 where nothing is known."""
+    effort, gain, late = certificate.effort, certificate.protocol.gain.exact, certificate.late
+    if effort is None or effort.first is None:
+        return Fraction(0)
+    caps = [] if late is None or late.messages.gain_cap is None else [late.messages.gain_cap]
+    tops = [*caps, *(entry.largest_gain(gain) for entry in certificate.limits)]
+    return effort.first * min([Fraction(1), *(top / certificate.protocol.gain.first for top in tops)])
+
+
+def judge_limits(certificate: Content) -> list[Answer]:
+    """Tell which of the limits, noise and disturbances that were asked for are not certified."""
+    effort, answers = certificate.effort, []
+    residual = () if effort is None else effort.residual
+    mend: Sentence = "" if certificate.method == "best" else ("; try ", Change("method", "best"))
+    no_bound = joined("", ("no bound of its effect is proved", mend))
+    if len(residual) < len(certificate.limits) and not certificate.constant:
+        period = None if effort is None else effort.longest_period
+        why = joined("", ("no bound of their effect is proved", mend))
+        why = why if period is None else f"certified with a period of {down(period, 4)}"
+        answers.append(Answer(OPEN, "limits", why))
+    silent = not residual or len(residual) < len(certificate.limits) or not all(entry.noise for entry in residual)
+    if certificate.noise is not None and silent and not certificate.constant:
+        why = ("without a limit it meets an infinite gain: add ", Change("gain_cap"), " or ", Change("stop_before"))
+        if any(entry.sample_period is not None for entry in certificate.limits):
+            why = "with a sample period no bound is proved: ask for each alone"
+        elif certificate.limits:
+            why = no_bound
+        answers.append(Answer(OPEN, "noise", why))
+    if certificate.delta is not None and (effort is None or effort.disturbed is None):
+        bounded = effort is not None and effort.bounded
+        answers.append(Answer(OPEN, "delta", no_bound if bounded else "the rate proves no bounded input"))
+    return answers
+
+
+# ---------------------------------------------------------------------- late messages, moving leaders
+
+
+def at_deadline(certificate: Content, answer: Answer) -> Answer:
+    """Return what becomes at ``T``, where messages are late, of a behaviour that follows where none are."""
+    late = certificate.late
+    asked = late is not None or certificate.request.messages is not None
+    if not asked or answer.status != MET or certificate.constant:
+        return answer
+    what = f"{answer.what} at T with late messages"
+    if late is None:
+        return Answer(OPEN, what, "nothing is proved of them")
+    if late.direct:
+        return answer
+    if late.missed is not None:
+        return Answer(REFUTED, what, _misses(certificate, late.missed))
+    if late.staged is not None:
+        return Answer(OPEN, what, "with deadlines of stages it holds, with one for all none is proved to hold it")
+    if late.leaders is not None:
+        return Answer(OPEN, what, "leaders move, so that nobody is proved to settle")
+    if late.messages.gain_cap is not None:
+        return Answer(OPEN, what, "nothing settles under a cap")
+    return Answer(OPEN, what, "nobody is proved to settle at T")
+
+
+def judge_rate_beside(certificate: Content, least: Fraction, what: str) -> Answer | None:
+    """Tell the same of a rate where messages are late, leaders move or the gain is held; None where nothing of it is.
+
+    The rates of a certificate, and the upper bound on them, are those of the loop without these.
+    """
+    late = certificate.late
+    if certificate.constant or certificate.agents is not None:
+        return None
+    if certificate.leaders_move:
+        return Answer(OPEN, what, "no rate is proved while leaders move")
+    if any(limits.sample_period is not None for limits in certificate.limits):
+        return Answer(OPEN, what, "no rate is proved of a gain that is held")
+    if (late is None and certificate.request.messages is None) or (late is not None and late.direct):
+        return None
+    if late is None or late.lmi is None:
+        return Answer(OPEN, what, "no rate is proved with late messages")
+    rate = 2 * late.lmi.b
+    return Answer(MET if rate >= least else OPEN, what, f"with late messages {down(rate)} is proved")
+
+
+def judge_messages(certificate: Content) -> list[Answer]:
+    """Tell what becomes of what may be left at ``T`` with late messages, and whether anything is proved of these."""
+    late, most = certificate.late, certificate.expectations.max_residual
+    if late is None:
+        unproved = certificate.request.messages is not None
+        answers = [Answer(OPEN, "late messages", "nothing is proved of what is left at T")] * unproved
+        answers += [] if most is None or unproved else [Answer(OPEN, "max_residual", "no messages are late")]
+        if certificate.request.leaders is not None and certificate.tracking is None:
+            answers.append(Answer(OPEN, "leaders that move", "no vector for their followers was found"))
+        return answers
+    if not late.says_something:
+        known = 0 < (late.longest_delay or 0) < math.inf
+        limit = f"; this certificate's limit is a delay of {late.longest_delay:.3g}" if known else ""
+        wish = "" if most is None else _longest(late, f"within {near(most, 12)} at T is ")
+        mend = "; give an initial state" * (certificate.initial_state is None)
+        return [Answer(OPEN, "late messages", f"nothing is proved of what is left at T{mend}{limit}{wish}")]
+    return [] if most is None else [_judge_residual(certificate, late, most)]
+
+
+def _judge_residual(certificate: Content, late: LateBounds, most: Fraction) -> Answer:
+    """Tell whether no more than ``most`` is left at ``T``, and up to which delay that is proved."""
+    what, missed = f"within {near(most, 12)} at T" + " from within 1 of it" * late.relative, late.missed
+    if late.largest <= most:
+        return Answer(MET, what, _longest(late).removeprefix("; "))
+    if missed is not None and missed.bound > most:
+        return Answer(REFUTED, what, f"{_misses(certificate, missed)}{_longest(late)}")
+    return Answer(OPEN, what, f"this certificate's limit is {up(late.largest, 3)}{_longest(late)}")
+
+
+def _longest(late: LateBounds, what: str = "") -> str:
+    """Tell how old what is heard may be so that what was asked is certified; empty if that is not known."""
+    if late.enough is None:
+        return ""
+    alike = ", all delays in proportion" * isinstance(late.messages.delay, Mapping)
+    return f"; {what}certified where nothing is older than {down(late.enough, 4)}{alike}"
+
+
+def _misses(certificate: Content, missed: Missed) -> str:
+    """Tell who misses the deadline by how much."""
+    return f"agent {certificate.graph.labels[missed.agent]} is away by {down(missed.bound, 2)} at least, proved"
+
+
+def judge_input_beside(certificate: Content, most: Fraction, what: str, first: Fraction | float) -> Answer:
+    """Tell whether every input stays within so much where messages are late, or leaders move.
+
+    Parameters
+    ----------
+    certificate : Certificate
+    most : Fraction
+    what : str
+        What is asked, in words.
+    first : Fraction or float
+        What the largest ``|u_k(0)|`` is at least where nobody hears of anything wrong.
+    """
+    late, tracking = certificate.late, certificate.tracking
+    if first > most and not (late is not None and late.messages.value_error):
+        return Answer(REFUTED, what, f"it is up to {down(first)} at the start, proved")
+    if late is not None:
+        return _judge_late_input(certificate, late, most, what)
+    return _judge_tracking(tracking, most, what)
+
+
+def _judge_late_input(certificate: Content, late: LateBounds, most: Fraction, what: str) -> Answer:
+    """Tell whether every input stays within so much with late messages."""
+    largest = largest_late_input(late, certificate.protocol)
+    if largest is None:
+        why = "no bound is proved with late messages"
+        why += "; a gain without a cap makes ever more of what is left at T" * (late.messages.gain_cap is None)
+        return Answer(OPEN, what, why)
+    what += f" from within 1 of the {'final states' if late.leaders is None else 'targets'}" * late.relative
+    return Answer(MET, what) if largest <= most else Answer(OPEN, what, f"proved: {up(largest)}")
+
+
+def largest_late_input(late: LateBounds, protocol: Protocol) -> Fraction | None:
+    """Return what bounds every ``|u_k|`` with late messages, the sliding term included; None where nothing does."""
+    if late.input is None:
+        return None
+    return Fraction(float(late.input.max())) + (0 if protocol.reaching is None else protocol.reaching.mu1)
+
+
+def _judge_tracking(tracking: Tracking | None, most: Fraction, what: str) -> Answer:
+    """Tell whether every input stays within so much while leaders move."""
+    if tracking is None or tracking.input is None:
+        return Answer(OPEN, what, "no bound is proved while leaders move")
+    what += " from within 1 of the targets" * tracking.relative
+    largest = Fraction(float(tracking.input.max()))
+    return Answer(MET, what) if largest <= most else Answer(OPEN, what, f"proved: {up(largest)}")
+
+
+# ---------------------------------------------------------------------- families
+
+
+def judge_family_behaviour(components: Sequence[FamilyComponent], expected: str) -> Answer:
+    """Tell whether every component shows a behaviour under every signal, with a counterexample where one does not.
+
+    Examples
+    --------
+    >>> from ptcc_certify.theorems.family_behaviour import decide
+    >>> print(judge_family_behaviour(decide(Family.from_intervals([("a", "b", 0, 1)])), "bipartite consensus"))
+    bipartite consensus (held constant, the leader groups of a and b do not hear each other, and do not meet)
+    """
+    answers = [component_holds(component, expected) for component in components]
+    if False in answers:
+        component = components[answers.index(False)]
+        why = component_refutation(component, expected)
+        other = f"it is {component.behaviour}"
+        return Answer(REFUTED, expected, other if why is None else counterexample_text(component, why))
+    return Answer(OPEN, expected, "not decided") if None in answers else Answer(MET, expected)
+
+
+def _judge_behaviour_of_signal(
+    certificate: FamilyContent, components: Sequence[FamilyComponent], expected: str
+) -> Answer:
+    """Tell whether a behaviour holds for every signal, or for those that were asked for, by the last mode."""
+    last = certificate.ends_of_signal
+    others = [component for k, component in enumerate(components) if k not in last]
+    narrow = isinstance(certificate.signal, ClockShares | JointWindows)  # no constant member is one of these signals
+    judged = [component for component in others if component.behaviour != DEPENDS or not narrow]
+    met = Answer(MET, expected, "these signals" if last else "every signal" * (certificate.signal != "any"))
+    answer = judge_family_behaviour(judged, expected) if judged else met
+    answer = met if answer.status == MET else answer
+    if len(judged) < len(others) and answer.status == MET:
+        answer = Answer(OPEN, expected, "not decided of these signals")
+    for k, claim in last.items():
+        family = components[k].family
+        edges = [mode.sign for mode in family.modes] if isinstance(claim, LastModeClaim) else [family.union[2]]
+        pairs = zip(claim.behaviours, edges, strict=True)
+        shows = [last_mode_shows(one, expected, bool((signs > 0).all())) for one, signs in pairs]
+        if False in shows and answer.status != REFUTED:
+            number = shows.index(False)
+            whose = f"{mode_name(certificate.family, number)} by itself: " * isinstance(claim, LastModeClaim)
+            return Answer(REFUTED, expected, f"{whose or 'it is '}{claim.behaviours[number]}")
+        if None in shows and answer.status == MET:
+            answer = Answer(OPEN, expected, "not decided of these signals")
+    return answer
+
+
+def _judge_rate_of_signal(certificate: FamilyContent, least: Fraction) -> Answer:
+    """Tell whether a rate of at least so much is proved for every signal, or excluded by the upper bound."""
+    what, rate, bound = f"rate >= {near(least, 12)}", certificate.rate_of_signal, certificate.upper_bound
+    if certificate.signal != "any":
+        # No constant member is one of these signals.
+        narrow = isinstance(certificate.signal, ClockShares | JointWindows)
+        bound = None if narrow else certificate.member_bound
+    alone = all(part.component.nodes.size == 1 for part in certificate.parts)
+    if alone or (rate is not None and rate >= least):
+        every = alone or (certificate.rate is not None and certificate.rate >= least)
+        return Answer(MET, what, "" if certificate.signal == "any" else "every signal" if every else "these signals")
+    if certificate.signal == "any" and any(part.component.behaviour == DEPENDS for part in certificate.parts):
+        return Answer(REFUTED, what, "no rate holds for every signal")
+    if not certificate.common:
+        differ = any(part.component.behaviour == DEPENDS for part in certificate.parts)
+        reason = "whether rest states agree is not decided"
+        return Answer(OPEN, what, "no rate is proved of modes that end differently" if differ else reason)
+    return _proved_or_bounded(what, rate, bound, least)
+
+
+def _judge_input_of_signal(certificate: FamilyContent, most: Fraction) -> Answer:
+    """Tell whether every input is proved to stay within so much for every signal."""
+    what, peaks = f"|u_k| <= {near(most, 12)}", certificate.input_peaks
+    if peaks is not None and max(peaks) <= most:
+        return Answer(MET, what, "every signal" * (certificate.signal != "any"))
+    known = certificate.initial_state is not None and certificate.protocol.reaching is None
+    if known and (first := first_input(certificate)) > most:
+        return Answer(REFUTED, what, f"it is up to {down(first)} at the start, proved")
+    return Answer(OPEN, what, "no bound is proved" if peaks is None else f"proved: {up(max(peaks))}")
+
+
+def first_input(certificate: FamilyContent) -> Fraction:
+    """Return the largest ``|u_k(0)|`` over all signals and agents: that of some member."""
+    assert certificate.initial_state is not None
+    rows = (row for mode in certificate.family.modes for row in _first_rows(mode, certificate.initial_state).values())
+    return certificate.protocol.gain.first * max((max(abs(low), high) for low, high in rows), default=Fraction(0))
+
+
+def _first_rows(mode: Mode, x: Sequence[Fraction]) -> Mapping[int, tuple[Fraction, Fraction]]:
+    """Return the least and the largest ``(L x)_k`` over the members of a mode; of two signs on a pair one is on."""
+    pairs: dict[tuple[int, int], tuple[Fraction, Fraction]] = {}
+    for edge, (source, target) in enumerate(zip(mode.source.tolist(), mode.target.tolist(), strict=True)):
+        step = x[target] - int(mode.sign[edge]) * x[source]
+        low, high = sorted((mode.lower.fraction(edge) * step, mode.upper.fraction(edge) * step))
+        if (source, target) in pairs:  # both may fail: 0 lies in each
+            other = pairs[source, target]
+            low, high = min(low, other[0]), max(high, other[1])
+        pairs[source, target] = low, high
+    sums: dict[int, tuple[Fraction, Fraction]] = {}
+    for (_, target), (low, high) in pairs.items():
+        before = sums.get(target, (Fraction(0), Fraction(0)))
+        sums[target] = before[0] + low, before[1] + high
+    return sums

@@ -1,0 +1,314 @@
+"""Whether a bound says something by the deadline, of graphs and of families, and which gains would make it.
+
+*Useful* is a bound that leaves at most 1 % at 0.99 T. Of a graph by one of two measures:
+
+* ``||z|| <= ||z(0)|| / 100`` for every initial state, ``z`` being the coordinates ``E`` or ``eps`` of the envelope;
+* from the given initial state, no agent is farther from its final state than a hundredth of the longest way of all.
+
+Under the sliding-mode protocol with a reaching phase the first alone counts, from ``T_r`` on: ``||z||`` at
+``T_r + 0.99 T_s`` against ``||z(T_r)||``. Of a family: of the largest ``|x_k(0)|``, for every agent, under the signals
+that were asked for; without an initial state, of the norm that decays under every signal.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from fractions import Fraction
+from typing import NamedTuple
+
+import numpy as np
+
+from lmi.exact.decimal_rounding import up
+from ptcc_certify.bounds.envelope import Envelope
+from ptcc_certify.bounds.late_messages import LateBounds
+from ptcc_certify.bounds.tracking import Tracking
+from ptcc_certify.certificate.agents_answer import AgentsAnswer
+from ptcc_certify.certificate.certificate_data import Content
+from ptcc_certify.certificate.family_content import FamilyContent
+from ptcc_certify.certificate.restricted_bounds import deviation_of_signal
+from ptcc_certify.checker.input_formulas import InitialSet, root_above
+from ptcc_certify.errors import Change, Sentence, joined
+from ptcc_certify.lyapunov.search import USEFUL
+
+#: The share of the time that is left where the bound is judged.
+LAST = Fraction(1, 100)
+
+
+#: Digits of the gain that is proposed.
+_DIGITS = 3
+
+
+_LARGEST_CLOCK = 1e12
+#: Up to which multiple of ``rho2`` one is looked for that makes the bound useful.
+_LARGEST = 2e4
+
+
+#: How often its interval is halved, to within a digit that is told.
+_HALVINGS = 7
+
+
+class Use(NamedTuple):
+    """What a bound is worth by the deadline.
+
+    Attributes
+    ----------
+    useful : bool or None
+        Whether it says something; None where there is no bound.
+    remark : str, or tuple of str and Change
+        What it says, or does not, or what to try next.
+    caveat : str
+        That the input is not bounded, or not proved bounded; empty if it is.
+    advice : str, or tuple of str and Change
+        What would make it useful, and bound the input.
+    """
+
+    useful: bool | None
+    remark: Sentence = ""
+    caveat: str = ""
+    advice: Sentence = ""
+
+
+def use_of(certificate: Content) -> Use:
+    """Return what the bounds of a graph's certificate are worth: of all that is asked, the worst."""
+    if certificate.constant:
+        return Use(True, "nothing to decay")
+    if certificate.agents is not None:
+        return _use_of_agents(certificate.agents)
+    if certificate.late is not None:
+        return _use_of_late(certificate.late, certificate.longest_way)
+    if certificate.tracking is not None:
+        return _use_of_tracking(certificate.tracking)
+    if certificate.effort is not None and certificate.effort.residual:
+        return Use(*_limited_usefulness(certificate))
+    useful, remark, rho2 = _usefulness(certificate)
+    return Use(useful, remark, *_advise(certificate, rho2))
+
+
+def use_of_family(certificate: FamilyContent) -> Use:
+    """Return what the bounds of a family's certificate are worth for every signal, and for those asked for."""
+    useful, caveat, rho2 = _usefulness_of_signal(certificate), "", None
+    if useful is False:
+        rho2 = _useful_rho2_of_family(certificate) if certificate.direct else _useful_rho2_while_driven(certificate)
+    effects = [] if rho2 is None else ["leaves 1 %"]
+    p, rate, mu3 = certificate.protocol, certificate.rate, None
+    if certificate.common and not certificate.bounded:
+        grows = certificate.unbounded
+        caveat = "the input is not bounded for some signal" if grows else "the input is not proved bounded"
+        caveat += " for every signal" * (not grows and certificate.signal != "any")
+        if rate is not None:
+            rho2 = max(rho2 or Fraction(0), _rounded_up(2 / (rate * p.kappa)))
+            effects.append("bounds the input")
+    if certificate.sliding_bounded is False and certificate.sliding_peaks is None:
+        caveat = caveat or "the input is not proved bounded"
+        mu3 = _rounded_up(1 / p.kappa)
+        effects += [] if "bounds the input" in effects else ["bounds the input"]
+    return Use(useful, "" if useful is not False else "little is proved by 0.99 T", caveat, _gains(rho2, mu3, effects))
+
+
+def _gains(rho2: Fraction | None, mu3: Fraction | None, effects: list[str]) -> Sentence:
+    """Return gains with what they do, in words; nothing where there are none."""
+    changes = [Change(name, gain) for name, gain in (("rho2", rho2), ("mu3", mu3)) if gain is not None]
+    return joined(" ", [*((change,) for change in changes), " and ".join(effects)]) if changes else ""
+
+
+# ---------------------------------------------------------------------- one graph
+
+
+def _usefulness(certificate: Content) -> tuple[bool, str, Fraction | None]:
+    """Return whether the bound is useful, what it says, and a ``rho2`` that would make it so."""
+    envelope, p, direct = certificate.envelope, certificate.protocol, certificate.direct
+    span = p.T if direct else p.span
+    z, instant = envelope.coordinates, "0.99 T"
+    begin = f"{z}(0)"
+    if not direct:
+        begin, instant = f"{z}(T_r)", "T_r + 0.99 T_s"
+    constant, pole = float(p.rho1 * span * (1 - LAST)), float(p.rho2 * p.kappa)
+    share = _share(envelope, constant + pole * math.log(1 / LAST))
+    remark = f"||{z}|| <= {up(share, 2)} ||{begin}|| at {instant}"
+    if share <= USEFUL:
+        return True, remark, None
+    of_set = certificate.effort is not None and certificate.effort.initial_set is not None
+    if direct and not of_set and (way := certificate.longest_way) is not None:
+        worst = float(certificate.deviation_bound([float(LAST)]).max(initial=0.0))
+        if worst <= USEFUL * way:
+            return True, f"every agent within {up(worst, 2)} of its final state at {instant}", None
+    return False, remark, _useful_rho2(envelope, constant, p.kappa)
+
+
+def _use_of_agents(part: AgentsAnswer) -> Use:
+    """Return whether bounds of agents of order n say something by ``T``, what, what is not proved, and a mend."""
+    capped, caveat = part.protocol.gain_cap is not None, ""
+    advice: Sentence = ""
+    if part.unbounded:
+        caveat = "the input is not certified bounded"
+        mends = joined(" and ", ((mend,) for _, mend in part.unbounded))
+        advice = joined(" ", (mends, "bounds it" if len(part.unbounded) == 1 else "bound it"))
+    last = np.array([0.0 if capped else float(LAST)])
+    fall = part.fall(float(last[0]))
+    worst = float(part.deviation_bound(last)[:, 0].max(initial=0.0))
+    when = "T" if capped else "0.99 T"
+    remark = f"every position within {up(worst, 2)} of its place at {when}"
+    if part.initial_state is None or not math.isfinite(worst):
+        return Use(fall <= USEFUL, f"deviations at {when} are {up(fall, 2)} of {part.first_ones}", caveat, advice)
+    useful = worst <= USEFUL * part.longest_way if part.longest_way else fall <= USEFUL
+    if not useful and not capped and not advice:
+        advice = part.nearer
+    return Use(useful, remark, caveat, advice)
+
+
+def _limited_usefulness(certificate: Content) -> tuple[bool, str]:
+    """Return the same of what is left at the deadline itself under the limits of the gain that were asked about."""
+    effort, x0, way = certificate.effort, certificate.initial_state, certificate.longest_way
+    residual = () if effort is None else effort.residual
+    region = None if effort is None else effort.initial_set
+    noisy = any(entry.noise is not None for entry in residual)
+    if region is None and way is not None and not noisy and all(entry.agents is not None for entry in residual):
+        worst = max(x for entry in residual for x in entry.agents or ())
+        if worst <= Fraction(USEFUL) * Fraction(way):
+            return True, f"under the limits every agent within {up(worst, 2)} of its final state at T"
+    norm = max(entry.norm if entry.noisy_norm is None else entry.noisy_norm for entry in residual)
+    remark = f"under the limits ||E|| <= {up(norm, 2)} at T"
+    rows = certificate.structure.graph.exact_rows(range(certificate.structure.graph.n_nodes))
+    if region is not None:  # the largest |e_k(0)| of the set is attained, the norm that goes with it is larger
+        largest = max(region.largest(row) for row in rows)
+        return norm <= Fraction(USEFUL) * largest, f"{remark} from all these initial states"
+    first = Fraction(0) if x0 is None else sum((InitialSet(x0).largest(row) ** 2 for row in rows), Fraction(0))
+    if not first:
+        return norm == 0, remark
+    share = root_above(norm**2 / first)
+    return share <= USEFUL, f"under the limits ||E|| <= {up(share, 2)} ||E(0)|| at T"
+
+
+def _advise(certificate: Content, rho2: Fraction | None) -> tuple[str, Sentence]:
+    """Return what is not proved of the input, and gains that bound it and, given ``rho2``, leave a hundredth."""
+    effort, p, rate = certificate.effort, certificate.protocol, certificate.rate
+    if effort is None:
+        return "", ""
+    sliding_open = effort.peak is None and effort.sliding is not None and not effort.sliding.bounded
+    caveat = "" if effort.bounded else f"the input is not {'' if effort.bounded is False else 'proved '}bounded"
+    caveat = caveat or "the input is not proved bounded" * sliding_open
+    effects = ["leaves 1 %"] * (rho2 is not None) + ["bounds the input"] * bool(caveat)
+    if not effort.bounded and rate is not None:
+        rho2 = max(rho2 or Fraction(0), _rounded_up(2 / rate / p.kappa))
+    return caveat, _gains(rho2, _rounded_up(1 / p.kappa) if sliding_open else None, effects)
+
+
+def _rounded_up(gain: Fraction) -> Fraction:
+    """Return a gain of few digits that is no smaller."""
+    return Fraction(up(gain, _DIGITS))
+
+
+def _share(envelope: Envelope, clock: float) -> float:
+    """Return what is left of ``||z||`` after so much of the clock, rounded up."""
+    return float(Envelope(envelope.structure, envelope.gain, envelope.functions).norm_factor(clock))
+
+
+def _useful_rho2(envelope: Envelope, constant: float, kappa: Fraction) -> Fraction | None:
+    """Return a short ``rho2`` with which the bounds at hand leave a hundredth; None if there is none."""
+    low, high = constant, max(constant, 1e-300)
+    while _share(envelope, high) > USEFUL:
+        low, high = high, 2 * high
+        if high > _LARGEST_CLOCK:
+            return None
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (middle, high) if _share(envelope, middle) > USEFUL else (low, middle)
+    rho2 = Fraction(high - constant) / Fraction(math.log(1 / LAST)) / kappa
+    return _rounded_up(rho2 * (1 + Fraction(1, 10**9))) if rho2 > 0 else None
+
+
+def _use_of_late(late: LateBounds, longest_way: float | None) -> Use:
+    """Tell whether what is left at ``T`` with late messages is a hundredth of the longest way of an agent, if known.
+
+    The rest of the certificate knows of no delay: what it tells of the input does not hold here.
+    """
+    caveat = "" if late.input is not None else "the input is not proved bounded"
+    if math.isinf(late.largest):
+        return Use(None, "", caveat)
+    way = 1.0 if late.relative else longest_way
+    where = "agent within {} of its final state" if late.leaders is None else "follower within {} of its target"
+    remark = f"every {where.format(up(late.largest, 2))} at T{' from within 1 of it' * late.relative}"
+    return Use(way is not None and late.largest <= USEFUL * way, remark, caveat)
+
+
+def _use_of_tracking(tracking: Tracking) -> Use:
+    """Tell whether followers are nearer to their targets at ``0.99 T`` than a hundredth of what is proved at first."""
+    first, last = (float(x) for x in tracking.distance_bound([1.0, 0.01]).max(axis=0))
+    remark = f"every follower within {up(last, 2)} of its target at 0.99 T{' from within 1 of it' * tracking.relative}"
+    useful = last <= USEFUL * first
+    if tracking.input is not None:
+        return Use(useful, remark)
+    mend = Change("rho2", tracking.bounding_rho2)
+    return Use(useful, remark, "the input is not proved bounded", (mend, " bounds the input"))
+
+
+# ---------------------------------------------------------------------- families
+
+
+def _useful_rho2_of_family(certificate: FamilyContent) -> Fraction | None:
+    """Return a short ``rho2`` with which the bounds at hand leave 1 % at 0.99 T; None if there is none within reach.
+
+    ``rho2`` enters the bounds by the clock alone, ``s = rho1 t + rho2 kappa ln(T/(T-t))``.
+    """
+    gain, rho2 = certificate.protocol.gain, certificate.protocol.parameters["rho2"]
+    kappa, last = float(gain.pole / rho2), -math.log(float(LAST))
+    candidates = float(rho2) * np.geomspace(1, _LARGEST, max(15, min(500, 10**6 // certificate.family.n_nodes)))
+    clock = float(gain.clock_at_remaining(float(LAST))) + (candidates - float(rho2)) * kappa * last
+    if certificate.initial_state is not None:
+        with np.errstate(over="ignore", invalid="ignore"):  # functions with negative rates
+            left = certificate.deviation_at(clock).max(axis=0)
+        enough = left <= float(max(map(abs, certificate.initial_state)) * LAST)
+    else:
+        enough = np.ones(clock.size, bool)
+        for part in (part for part in certificate.parts if part.component.nodes.size > 1):
+            decays = [math.sqrt(V.overshoot) * np.exp(-float(V.rate) / 2 * clock) for V in part.functions if V.rate > 0]
+            enough &= np.min(decays or [np.full(clock.size, np.inf)], axis=0) <= float(LAST)
+    return Fraction(up(float(candidates[enough.argmax()]), 3)) if enough.any() else None
+
+
+def _useful_rho2_while_driven(certificate: FamilyContent) -> Fraction | None:
+    """Return the same at ``T_r + 0.99 T_s`` where sliding variables move; None without an initial state.
+
+    They drive the agents with the gain, too: the bound for every signal is formed anew with every ``rho2``.
+    """
+    protocol = certificate.protocol
+    if certificate.initial_state is None or certificate.rate is None:
+        return None
+
+    def suffices(rho2: float) -> bool:
+        other = replace(certificate, protocol=protocol.replace(rho2=Fraction(up(rho2, 3))))
+        left, enough = _target(other)
+        return bool(other.deviation_bound([left]).max() <= enough)
+
+    low = float(protocol.parameters["rho2"])
+    high, largest = 2 * low, _LARGEST * low
+    while not suffices(high):
+        low, high = high, 2 * high
+        if high > largest:
+            return None
+    for _ in range(_HALVINGS):
+        middle = math.sqrt(low * high)
+        low, high = (low, middle) if suffices(middle) else (middle, high)
+    return Fraction(up(high, 3))
+
+
+def _target(certificate: FamilyContent) -> tuple[float, float]:
+    """Return ``1 - t/T`` where the bound is judged, and what of the largest state it may leave there."""
+    sizes = map(abs, (*(certificate.initial_state or ()), *(certificate.sigma0 or ())))
+    return float(LAST) * certificate.settling_share, float(max(sizes) * LAST)
+
+
+def _usefulness_of_signal(certificate: FamilyContent) -> bool | None:
+    """Tell whether the bound leaves at most 1 % at 0.99 T; None where no state is approached by every signal."""
+    if not certificate.common:
+        return None
+    if certificate.initial_state is not None:
+        instant, enough = _target(certificate)
+        return enough == 0 or bool(deviation_of_signal(certificate, [instant]).max() <= enough)
+    clock = float(certificate.protocol.gain.clock_at_remaining(float(LAST)))
+    for part in certificate.parts:
+        left = [math.sqrt(V.overshoot) * math.exp(-float(V.rate) / 2 * clock) for V in part.functions]
+        if part.component.nodes.size > 1 and min(left, default=math.inf) > float(LAST):
+            return False
+    return True

@@ -1,0 +1,316 @@
+"""Facts of what agents do: the claim, and of a family whose behaviour depends on the signal why, and what holds."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from lmi.exact.decimal_rounding import down, near
+from ptcc_certify.certificate.facts import Fact, Facts
+from ptcc_certify.certificate.restricted_claims import LastModeClaim
+from ptcc_certify.graphs.family import Family, Mode
+from ptcc_certify.graphs.structure import BIPARTITE_CONTAINMENT, STABILITY, Structure
+from ptcc_certify.report.facts.agents import claimed_of
+from ptcc_certify.report.facts.intervals import interval_text
+from ptcc_certify.report.facts.signals import RESTS, of_mode
+from ptcc_certify.report.text_layout import (
+    TEXT,
+    columns,
+    counted,
+    printable,
+    shorten_label,
+    shorten_list,
+    wrap_text,
+)
+from ptcc_certify.theorems.claims import Claim
+from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_name
+from ptcc_certify.theorems.family_behaviour import CHAIN, DEPENDS, FamilyComponent, decide
+from ptcc_certify.theorems.family_claims import camps, special_behaviours
+from ptcc_certify.theorems.family_groups import AgreeingGroup, FamilyGroups
+
+if TYPE_CHECKING:
+    from ptcc_certify.bounds.attracting_box import AttractingBox
+    from ptcc_certify.certificate.certificate import Certificate
+    from ptcc_certify.certificate.family_certificate import FamilyCertificate
+    from ptcc_certify.certificate.family_content import FamilyContent
+    from ptcc_certify.checker.reading import Interval
+
+#: Components of which a screen tells, and lines of a text on the short one.
+_COMPONENTS, _LINES = 4, 3
+#: Columns of names within a phrase, and groups that agree of which each is named.
+_NAMES, _GROUPS = 30, 3
+#: Where sliding variables bring an agent that listens to nobody.
+DRIVEN = "ends at x(0) - sigma(0)"
+#: What is told of signals.
+WHATEVER = {"any": "for every signal", "constant": "if mode and weights never change"}
+
+
+def claim_facts(certificate: Certificate) -> Facts:
+    """Tell what the agents of one graph do, by when, and under what."""
+    p = certificate.protocol
+    also = ""
+    if certificate.limits:
+        also = ", without limits"
+    elif certificate.leaders_move:
+        also = ", nothing late, leaders at rest" if certificate.late else ", leaders at rest"
+    elif certificate.late is not None:
+        also = ", nothing late"
+    elif p.reaching is not None:
+        also = f", any |d_k| <= {down(p.reaching.delta, 12)}" if p.reaching.delta else ", without disturbances"
+    when = f" at T = {near(p.T)}"
+    if certificate.agents is not None:
+        when = f"{claimed_of(certificate.agents)}{when}"
+    elif certificate.offsets is not None:
+        when = f" of x - offsets{when}"
+    yield from structure_claims(certificate.structure, certificate.claims, when, also)
+
+
+def structure_claims(structure: Structure, claims: Sequence[Claim], when: str = "", also: str = "") -> Facts:
+    """Tell the claim of a connected graph in full; of every component, of the largest four of many, the sharpest."""
+    if len(claims) == 1:
+        (claim,) = claims
+        brief = [f"{claim.sharpest}{when}{also} ({which})" for which in (claim.reference, f"Theorem {claim.theorem}")]
+        yield Fact(head="claim", value=claim.sharpest, note=_claim_text(claim, when + also), brief=tuple(brief))
+        return
+    components, labels = structure.components, structure.graph.labels
+    for k in sorted(range(len(claims)), key=lambda k: -len(components[k].nodes))[:_COMPONENTS]:
+        text = f"{claims[k].sharpest}{when} (Theorem {claims[k].theorem})"
+        nodes = components[k].nodes
+        names = [printable(labels[v]) for v in nodes[:TEXT]]
+        whose = shorten_list(names, max(TEXT - len(text) - 2, 14), len(nodes))
+        yield Fact(head="claim", value=claims[k].sharpest, note=f"{whose}: {text}")
+    if len(claims) > _COMPONENTS:
+        text = f"... {len(claims):,} components in all"
+        counts = Counter(f"{claim.sharpest} (Theorem {claim.theorem})" for claim in claims)
+        each = ", ".join(f"{number:,} {claim}" for claim, number in counts.items())
+        yield Fact(head="claim", note=f"{text}: {each}", brief=(text,))
+    if also:
+        yield Fact(head="claim", note=also.removeprefix(", "))
+
+
+def _claim_text(claim: Claim, when: str) -> str:
+    numbers = f"Corollar{'y' if len(claim.corollaries) == 1 else 'ies'} {', '.join(claim.corollaries)}"
+    theorem = f"{claim.behaviour}{when} (Theorem {claim.theorem}"
+    if claim.special:
+        return f"{theorem}), in particular {', '.join(claim.special)} ({numbers})"
+    return f"{theorem}, {numbers})" if claim.corollaries else f"{theorem})"
+
+
+# ---------------------------------------------------------------------- families
+
+
+def sharpest(component: FamilyComponent) -> str:
+    """Name the sharpest behaviour of a component.
+
+    Examples
+    --------
+    >>> sharpest(ptcc.decide([("a", "b", 1, 2)])[0])
+    'consensus'
+    """
+    return (str(component.behaviour or "not decided"), *special_behaviours(component))[-1]
+
+
+def family_claims(
+    components: Sequence[FamilyComponent], when: str = "", certificate: FamilyCertificate | None = None
+) -> Facts:
+    """Tell what every component does; where that depends on the signal, why, and what holds all the same."""
+    disturbed = certificate is not None and certificate.sigma0 is not None
+    direct, boxes = (True, {}) if certificate is None else (certificate.direct, certificate.boxes)
+    order = sorted(range(len(components)), key=lambda k: -components[k].nodes.size)
+    if len(components) == 1:
+        text, longer = _behaviour_texts(components[0], when, disturbed)
+        yield Fact(head="claim", value=sharpest(components[0]), note=longer[0], brief=(longer[1], text))
+    else:
+        for k in order[:_COMPONENTS]:
+            text, (_, camps_named) = _behaviour_texts(components[k], when, disturbed)
+            text = camps_named if columns(camps_named) <= TEXT else text
+            names = [printable(label) for label in components[k].family.labels[:TEXT]]
+            whose = shorten_list(names, max(TEXT - len(text) - 2, 12), components[k].nodes.size)
+            yield Fact(head="claim", value=sharpest(components[k]), note=f"{whose}: {text}")
+        if len(components) > _COMPONENTS:
+            yield Fact(head="claim", note=f"... {len(components):,} components in all")
+    depending = [k for k in order if components[k].behaviour == DEPENDS]
+    for place, k in enumerate(depending):
+        yield from _depends_facts(components[k], direct, detail=place > 0)
+        if k in boxes:
+            brief = box_text(components[k], boxes[k], TEXT)
+            yield Fact(head="box", note=box_text(components[k], boxes[k]), brief=(brief,), detail=place > 0)
+
+
+def _behaviour_texts(component: FamilyComponent, when: str, disturbed: bool) -> tuple[str, tuple[str, str]]:
+    """Tell what a component does, and the same with its camps, of which all agents are named or the first."""
+    if component.behaviour is None:
+        return "not decided", ("not decided",) * 2
+    if component.behaviour == DEPENDS:
+        text = DEPENDS if component.signal == "any" else "depends on which graph it is"
+        return text, (text, text)
+    whatever = WHATEVER[component.signal].replace("mode and ", "mode and " * (len(component.family.modes) > 1))
+    text = f"{sharpest(component)}{when} {whatever}{' and disturbance' * disturbed}"
+    sides = camps(component)
+    if component.behaviour == STABILITY or len(sides) < 2:
+        return text, (text, text)
+    named = [
+        " against ".join("{" + _names(component, side.tolist(), width) + "}" for side in sides) for width in (TEXT, 20)
+    ]
+    return text, (f"{text}: camps {named[0]}", f"{text}: camps {named[1]}")
+
+
+def _depends_facts(component: FamilyComponent, direct: bool, detail: bool) -> Facts:
+    texts = {}
+    if component.counterexample is not None:
+        texts["why"] = printable(counterexample_text(component, component.counterexample))
+    family = component.family
+    if len(family.modes) > 1:
+        alone = (f"{mode_name(family, k)}: {_alone(mode, direct)}" for k, mode in enumerate(family.modes))
+        texts["alone"] = "; ".join(alone)
+    elif component.signal == "any":
+        (constant, *_) = decide(family, "constant")
+        behaviour = "it depends on the weights" if constant.behaviour == DEPENDS else sharpest(constant)
+        texts["constant"] = f"where weights never change: {behaviour}"
+    if component.signal == "any":
+        texts["groups"] = groups_text(component, direct)
+    for head, text in texts.items():
+        brief = (_cut(text),) if head in ("why", "alone") else ()
+        yield Fact(head=head, note=text, brief=brief, detail=detail)
+
+
+def _names(component: FamilyComponent, nodes: Sequence[int], width: int) -> str:
+    return shorten_list([printable(shorten_label(component.family.labels[v])) for v in nodes], width)
+
+
+def _alone(mode: Mode, direct: bool) -> str:
+    """Tell what a mode does if no other one acts."""
+    if not mode.n_edges:
+        return RESTS if direct else f"every agent {DRIVEN}"
+    components = decide(Family((mode,)))
+    if len(components) == 1:
+        return sharpest(components[0])
+    parts, behaviours = f"{len(components):,} separate parts", {part.behaviour for part in components}
+    if behaviours <= {*CHAIN}:
+        return f"{of_mode(BIPARTITE_CONTAINMENT, mode)}, in {parts}"
+    return f"{parts}, each by itself: {', '.join(dict.fromkeys(map(sharpest, components)))}"
+
+
+def groups_text(component: FamilyComponent, direct: bool = True) -> str:
+    """Tell which agents agree, follow or end at 0 under every signal, where the behaviour depends on it.
+
+    An agent that listens to nobody keeps its value where no sliding variable moves (``direct``). Many such agents, and
+    many groups that agree, are counted.
+
+    Examples
+    --------
+    >>> groups_text(ptcc.decide([(1, 3, 1, 2), (2, 3, 1, 1)])[0])
+    '1, 2 keep their value; 3 ends between these, up to signs, or moves there for ever'
+    """
+    groups = FamilyGroups(component)
+    parts = _keeping(component, groups.agreeing, direct) + _agreeing(component, groups.agreeing)
+    zero, near = groups.at_zero.tolist(), set(groups.bounded.tolist())
+    known = {v for group in groups.agreeing for v in group.nodes.tolist()}.union(zero)
+    others = [v for v in range(component.nodes.size) if v not in known]
+    followers, free = ([v for v in others if (v in near) == wanted] for wanted in (True, False))
+    if zero:
+        parts.append(f"{_names(component, zero, _NAMES)} {'end' if len(zero) > 1 else 'ends'} at 0")
+    if followers:
+        ends, moves = ("end", "move") if len(followers) > 1 else ("ends", "moves")
+        names = _names(component, followers, _NAMES)
+        parts.append(f"{names} {ends} between these, up to signs, or {moves} there for ever")
+    if free:
+        parts.append(f"no limit is claimed of {_names(component, free, _NAMES)}")
+    return "; ".join(parts)
+
+
+def _keeping(component: FamilyComponent, groups: Sequence[AgreeingGroup], direct: bool) -> list[str]:
+    """Tell of agents that listen to nobody: names of those that nobody agrees with if these are short, else how many.
+
+    Of the many, those count too with whom others agree.
+    """
+    alone = [int(group.nodes[0]) for group in groups if group.nodes.size == 1]
+    if not alone:
+        return []
+    names = ", ".join(printable(shorten_label(component.family.labels[v])) for v in alone)
+    if columns(names) > _NAMES:
+        _, target, _ = component.family.union
+        names = f"{counted(component.nodes.size - np.unique(target).size, 'agent')} that listen to nobody"
+    if direct:
+        return [f"{names} {'keeps its value' if len(alone) == 1 else 'keep their value'}"]
+    return [f"{names} {DRIVEN if len(alone) == 1 else DRIVEN.replace('ends', 'end')}"]
+
+
+def _agreeing(component: FamilyComponent, groups: Sequence[AgreeingGroup]) -> list[str]:
+    """Tell of groups of two agents or more that agree, of many only how many there are."""
+    several = [group for group in groups if group.nodes.size > 1]
+    if len(several) > _GROUPS:
+        agents = sum(group.nodes.size for group in several)
+        camps = ", up to camps" * any((group.camps < 0).any() for group in several)
+        return [f"{len(several):,} groups, of {agents:,} agents in all, agree each within itself{camps}"]
+    return [
+        f"{_names(component, group.nodes.tolist(), _NAMES)} agree{' up to camps' * bool((group.camps < 0).any())}"
+        for group in several
+    ]
+
+
+def told_ranges(certificate: FamilyContent) -> dict[int, tuple[Interval, ...]]:
+    """Return between which ends every signal keeps agents, of components of which no last mode tells the same."""
+    last = certificate.ends_of_signal
+    same = {k for k, claim in last.items() if isinstance(claim, LastModeClaim) and claim.final_states is not None}
+    return {k: ends for k, ends in certificate.ranges.items() if k not in same}
+
+
+def range_text(component: FamilyComponent, ends: Sequence[Interval], width: int = 12 * TEXT) -> str:
+    """Tell in which intervals every signal keeps all agents of a component at all times.
+
+    Where that takes more columns than ``width``, the interval is told that holds them all.
+
+    Examples
+    --------
+    >>> foes = Family.from_intervals([("a", "b", -1, 1), ("b", "a", 1, 2)])
+    >>> cert = certify(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, -2])
+    >>> range_text(cert.parts[0].component, cert.ranges[0])
+    'every signal keeps a, b in [-2, 2] at all times'
+    """
+    groups: dict[str, list[int]] = {}
+    for v, own in enumerate(ends):
+        groups.setdefault(interval_text(own), []).append(v)
+    told = ", ".join(f"{_names(component, nodes, _NAMES)} {text}" for text, nodes in groups.items())
+    text = f"every signal keeps {told} at all times"
+    if columns(text) <= width:
+        return text
+    whole = interval_text((min(low for low, _ in ends), max(high for _, high in ends)))
+    return f"every signal keeps {counted(len(ends), 'agent')} {whole} at all times"
+
+
+def box_text(component: FamilyComponent, box: AttractingBox, width: int = 12 * TEXT) -> str:
+    """Tell into which intervals every signal draws followers, whether or not they come to rest, and at what rate.
+
+    Intervals that take more columns than ``width`` are counted, and the one that holds them all is told.
+
+    Examples
+    --------
+    >>> moved = Family.from_intervals([(1, 3, 1, 3), (2, 3, 1, 1), (1, 4, 1, 1), (2, 4, 1, 4)])
+    >>> cert = certify(moved, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), {1: 0, 2: 4, 3: 100, 4: 0})
+    >>> box_text(cert.parts[0].component, cert.boxes[0])
+    'every signal draws 3 into [1, 2], 4 into [2, 3.2], at the rate 4; no limit is claimed'
+    >>> box_text(cert.parts[0].component, cert.boxes[0], 20)
+    'every signal draws 2 agents into 2 intervals in all, within [1, 3.2], at the rate 4; no limit is claimed'
+    """
+    groups: dict[str, list[int]] = {}
+    for v, *ends in zip(box.decay.nodes.tolist(), box.lower, box.upper, strict=True):
+        text = interval_text((ends[0], ends[1])).replace("in [", "into [").replace("at ", "to ")
+        groups.setdefault(text, []).append(v)
+    told = ", ".join(f"{_names(component, nodes, _NAMES)} {text}" for text, nodes in groups.items())
+    if columns(told) > width:
+        hull = interval_text((min(box.lower), max(box.upper))).removeprefix("in ")
+        told = f"{counted(len(box.lower), 'agent')} into {len(groups):,} intervals in all, within {hull}"
+    return f"every signal draws {told}, at the rate {down(2 * box.decay.rate)}; no limit is claimed"
+
+
+def _cut(text: str) -> str:
+    lines = wrap_text(text)
+    if len(lines) <= _LINES:
+        return text
+    more = "... (all with -v)"
+    (last, *_) = wrap_text(lines[_LINES - 1], TEXT - len(more) - 1)
+    return " ".join([*lines[: _LINES - 1], last, more])

@@ -1,0 +1,272 @@
+"""Facts of how fast agents get where they end: the rate, its functions and its upper bound, and the error."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterable
+from fractions import Fraction
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from lmi.exact.decimal_rounding import down, near, up
+from ptcc_certify.certificate.facts import Fact, Facts, Standing
+from ptcc_certify.errors import Change, Sentence, joined
+from ptcc_certify.graphs.size_limits import EXACT_NODES
+from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
+from ptcc_certify.report.facts.input import limits_text
+from ptcc_certify.report.facts.instants import SHORT, told_instants
+from ptcc_certify.report.facts.signals import TINY, TOO_SMALL, every_text
+from ptcc_certify.report.text_layout import shorten_list
+from ptcc_certify.theorems.counterexample_text import mode_name
+from ptcc_certify.theorems.family_rate import explicit_rate
+
+if TYPE_CHECKING:
+    from ptcc_certify.certificate.certificate import Certificate
+    from ptcc_certify.certificate.family_certificate import FamilyCertificate
+
+#: What proves an upper bound on the rate, in words.
+BOUND_KINDS = {
+    "member": "a single graph of the family, held for ever",
+    "mixture": "a mixture of graphs of the family, between which a signal switches fast",
+    "word": "a periodic signal",
+}
+
+
+# ---------------------------------------------------------------------- one graph
+
+
+def rate_facts(certificate: Certificate) -> Facts:
+    """Tell the rate and its upper bound, and the Lyapunov functions: class, rate, overshoot, what was searched."""
+    rate, bound, spectral = certificate.rate, certificate.upper_bound, certificate.spectral_rate
+    if certificate.constant:
+        return
+    best = "" if bound is None else f"; upper bound {up(bound, 8)}, proved"
+    if bound is not None and spectral is not None and bound > Fraction(spectral) * Fraction(101, 100):
+        best += f" ({spectral:.6g}, numerical)"
+    if rate is None:
+        numerical = certificate.numerical_rate
+        text = f"not proved{'' if numerical is None else f'; numerically {numerical:.6g}'}{best}"
+        yield Fact(head="rate", standing="unproved", note=text, detail=True)
+        return
+    ratio = "" if bound is None else f", optimality ratio at least {down(rate / bound, 4)}"
+    text = f"{down(rate)} per unit of the stretched clock s, proved: V <= e^(-rate s) V(0){best}{ratio}"
+    yield Fact(head="rate", value=rate, side="down", note=text, detail=True)
+    if certificate.overshoot is not None:
+        kinds = ", ".join(f"{number} {kind}" for kind, number in Counter(V.kind for V in certificate.functions).items())
+        of = certificate.fastest.coordinates
+        text = f"overshoot constant at that rate {up(certificate.overshoot, 4)} of ||{of}||^2; functions used: {kinds}"
+        yield Fact(head="rate", value=certificate.overshoot, side="up", note=text, detail=True)
+    V, search = certificate.lyapunov, certificate.search
+    if V is not None and certificate.proof.rate is not None:
+        rho = "" if V.rho is None else f", rho {float(V.rho):.4g}"
+        overshoot = f"overshoot constant {up(V.overshoot, 4)} of ||{V.coordinates}||^2"
+        text = f"paper {down(certificate.proof.rate)} = {V.objective}{rho}; {overshoot}"
+        yield Fact(head="rate", value=certificate.proof.rate, side="down", note=text, detail=True)
+    if search.searched:
+        searched = [f"{kind} {rate:.4g}" for kind, rate in search.searched.items()]
+        limit = "" if search.diagonal_limit is None else f"; diagonal upper bound {search.diagonal_limit:.4g}"
+        time = f"; time limit {certificate.time_limit:.3g} s" if math.isfinite(certificate.time_limit) else ""
+        text = f"searched {', '.join(searched)} (numerical{limit}{time})"
+        yield Fact(head="rate", value=dict(search.searched), standing="unproved", note=text, detail=True)
+        used = [f"{V.kind} {down(V.proved_rate, 4)} (overshoot {up(V.overshoot, 2)})" for V in search.functions]
+        yield Fact(head="rate", note=f"used {', '.join(used) or 'none, no rate was proved'}", detail=True)
+
+
+def error_facts(certificate: Certificate, drawn: bool, details: bool) -> Facts:
+    """Tell how near the agents are to their final states by when; ``drawn`` if the initial state is of no interest."""
+    if certificate.constant:
+        invariant = "its state" if certificate.direct else "x - sigma"
+        yield Fact(head="error", note=f"none: no agent listens to another, each keeps {invariant}")
+        return
+    value, norm, agents, more = _error_texts(certificate)
+    if norm:
+        limited = certificate.effort is not None and bool(certificate.effort.residual)  # from the whole set
+        texts = [norm + agents.replace("every agent", whom) + more for whom in ("every agent", "agents", "each")]
+        brief = [*(texts if limited or not drawn else []), norm + more]
+        standing: Standing = "proved" if limited or certificate.direct else "unproved"
+        yield Fact(head="error", value=value, side="up", standing=standing, note=brief[0], brief=tuple(brief))
+    if details and certificate.rate is not None:
+        yield from _instants_facts(certificate)
+        if certificate.initial_state is not None and not drawn and any(V.deviation for V in certificate.functions):
+            yield from _deviation_facts(certificate)
+
+
+def _error_texts(certificate: Certificate) -> tuple[Fraction | float, str, str, str]:
+    """Return bounds of the error and of every agent's deviation at 0.99 T, at the instant asked for, or under limits.
+
+    The first number, and texts that are empty where nothing is proved; the last one tells that there are more limits.
+    """
+    if certificate.effort is not None and certificate.effort.residual:
+        entry, *others = certificate.effort.residual
+        noise = "" if entry.noise is None else f", |n_k| <= {down(entry.noise, 12)}"
+        size = entry.noisy_norm or entry.norm
+        norm = f"{limits_text(entry)}{noise}: at T ||E|| <= {up(size, 2)}"
+        agents = "" if entry.agents is None or entry.noisy_norm else f", every agent within {up(max(entry.agents), 2)}"
+        return size, norm, agents, f"; ... {len(others) + 1} limits in all" * bool(others)
+    if certificate.rate is None or (not certificate.direct and certificate.initial_state is None):
+        return 0, "", "", ""
+    remaining, when = told_instants(certificate.protocol, certificate.direct)[SHORT]
+    if certificate.at is not None:
+        remaining, when = float(1 - certificate.at / certificate.protocol.T), f"t = {near(certificate.at)}"
+    z = certificate.envelope.coordinates
+    if certificate.direct:
+        value = certificate.envelope.residual(remaining)
+        norm = f"||{z}|| <= {up(value, 2)} ||{z}(0)||"
+    else:
+        value = float(certificate.norm_bound([remaining])[0])
+        norm = f"||{z}|| <= {up(value, 2)}"
+    agents = ""
+    if certificate.initial_state is not None and any(V.deviation for V in certificate.functions):
+        agents = f", every agent within {up(float(certificate.deviation_bound([remaining]).max()), 2)}"
+    return value, f"at {when}{', numerical' * (not certificate.direct)}: {norm}", agents, ""
+
+
+def _at_instants(values: Iterable[float], names: Iterable[str]) -> str:
+    """List bounds at instants, rounded up."""
+    return ", ".join(f"{up(float(x), 2)} at {name}" for x, name in zip(values, names, strict=True))
+
+
+def _instants_facts(certificate: Certificate) -> Facts:
+    """Tell what the proved rate leaves at instants; of a reaching phase from ``T_r`` on."""
+    p, z, direct = certificate.protocol, certificate.envelope.coordinates, certificate.direct
+    instants = told_instants(p, direct)
+    if direct:
+        proved = _at_instants((certificate.envelope.residual(q) for q, _ in instants), (name for _, name in instants))
+        yield Fact(head="error", note=f"||{z}(t)|| / ||{z}(0)|| at most {proved}", detail=True)
+        slowest = [certificate.best_possible_residual(q) for q, _ in instants]
+        if slowest[-1] is not None:
+            text = "slowest mode (numerical) " + ", ".join(f"{x or 0.0:.2g}" for x in slowest)
+            yield Fact(head="error", standing="unproved", note=text, detail=True)
+    elif certificate.initial_state is not None:
+        instants = [(float(p.span / p.T), "T_r"), *instants]
+        bounds = _at_instants(certificate.norm_bound([q for q, _ in instants]), (name for _, name in instants))
+        text = f"||{z}(t)|| at most {bounds} (numerical, rounded up)"
+        yield Fact(head="error", standing="unproved", note=text, detail=True)
+
+
+def _deviation_facts(certificate: Certificate) -> Facts:
+    """Tell how far from its final state the farthest agent may be, and every agent at the instant asked for."""
+    instants = told_instants(certificate.protocol, certificate.direct)[:4]
+    worst = certificate.deviation_bound([q for q, _ in instants]).max(axis=0, initial=0.0)
+    numerical = "" if certificate.direct else " (numerical, rounded up)"
+    bounds = _at_instants(worst, (name for _, name in instants))
+    text = f"of every agent from its final state at most {bounds}{numerical}"
+    yield Fact(head="deviation", standing="unproved" if numerical else "proved", note=text, detail=True)
+    if certificate.at is not None:
+        each = certificate.deviation_bound([float(1 - certificate.at / certificate.protocol.T)])[:, 0]
+        entries = [f"{label} {up(float(x), 2)}" for label, x in zip(certificate.labels, each, strict=True)]
+        text = f"at t = {near(certificate.at, 12)}: {shorten_list(entries)}"
+        yield Fact(head="deviation", value=each, side="up", note=text, detail=True)
+
+
+# ---------------------------------------------------------------------- families
+
+
+def family_rate_facts(certificate: FamilyCertificate) -> Facts:
+    """Tell the proved rate, its upper bound and their ratio; where no rate was found, the one in closed form."""
+    if not certificate.common or all(part.component.nodes.size == 1 for part in certificate.parts):
+        return
+    rate, bound = certificate.rate, certificate.upper_bound
+    limit = "" if bound is None else f"upper bound {up(bound)}"
+    if rate is not None and certificate.refused:
+        text = "none is proved: the independent check does not accept what was found" + f"; {limit}" * bool(limit)
+        yield Fact(head="rate", standing="unproved", note=text)
+        return
+    if rate is not None:
+        ratio = "" if bound is None else f": both proved, ratio {down(rate / bound)}"
+        which = f"{down(rate)}{every_text(certificate)}"
+        text = f"{which}, {limit}{ratio}" if limit else f"{which}, proved"
+        yield Fact(head="rate", value=rate, side="down", note=text)
+        return
+    why = no_search(certificate)
+    why = joined("", [" (", why, ")"]) if why else ""
+    logs = explicit_logs(certificate)
+    text = "there is one, but none was proved"
+    if logs:
+        power = int(min(logs)) - 1
+        least = TOO_SMALL if power < TINY else f"above 1e{power}"
+        text = f"{least}, in closed form; no larger one was proved"
+    yield Fact(head="rate", standing="unproved", note=joined("", [text, why, f"; {limit}" * bool(limit)]))
+
+
+def explicit_logs(certificate: FamilyCertificate) -> list[float]:
+    """Return the logarithms of rates in closed form, of every component of several agents; none if one has none."""
+    explicit = [explicit_rate(part.component) for part in certificate.parts if part.component.nodes.size > 1]
+    logs = [one.log10_decay_rate for one in explicit if one is not None]
+    return logs if len(logs) == len(explicit) else []
+
+
+def no_search(certificate: FamilyCertificate) -> Sentence:
+    """Tell why no rate was proved: too many agents for a search, or too little time; nothing where it is not known."""
+    from ptcc_certify.lyapunov.family_search import CLOSED_ROWS, TOO_MANY_ROWS
+
+    without = [part.component for part in certificate.parts if part.component.nodes.size > 1 and not part.rate]
+    largest = max(without, key=lambda component: component.nodes.size, default=None)
+    late = any("cut off" in note for note in certificate.notes)
+    if largest is not None and largest.behaviour != STABILITY:
+        most = CLOSED_ROWS if largest.behaviour == BIPARTITE_CONSENSUS else EXACT_NODES
+        if largest.nodes.size > most:
+            return f"{largest.nodes.size:,} agents are above the {most:,} of the searches"
+    if large := next((note for note in certificate.notes if TOO_MANY_ROWS in note), ""):
+        return large
+    if largest is not None and largest.nodes.size > EXACT_NODES and not late:
+        return f"closed forms of {largest.nodes.size:,} agents prove none"
+    return ("the searches took too long; raise ", Change("time_limit")) if late else ""
+
+
+def function_facts(certificate: FamilyCertificate) -> Facts:
+    """Tell the rate of every Lyapunov function, of every mode, and what proves the upper bound."""
+    for part in certificate.parts:
+        names = [mode_name(certificate.family, k) for k in range(len(certificate.family.modes))]
+        for V in part.functions:
+            own = getattr(V, "rates", ()) if len(names) > 1 else ()  # functions of rows have one rate
+            rates = ", ".join(f"{name} {down(rate)}" for name, rate in zip(names, own, strict=False))
+            alone = f"; of each mode: {rates}" * bool(own)
+            text = f"{V.kind}: decay rate {down(V.rate) if V.rate > 0 else 0}{alone}"
+            yield Fact(head="function", value=V.rate, side="down", note=text, detail=True)
+        if part.upper_bound is not None:
+            modes = dict.fromkeys(names[member.mode] for member in part.upper_bound.members)
+            what = BOUND_KINDS[part.upper_bound.kind] + f": {', '.join(modes)}" * (len(names) > 1)
+            text = f"decay rate at most {up(part.upper_bound.value)}, proved by {what}"
+            yield Fact(head="bound", value=part.upper_bound.value, side="up", note=text, detail=True)
+
+
+def family_error_facts(certificate: FamilyCertificate) -> Facts:
+    """Tell how near the agents are to their final states by when, for every signal and those that were asked for."""
+    from ptcc_certify.certificate.restricted_bounds import deviation_of_signal, nearer_for_signal  # slow to load
+
+    if certificate.initial_state is None or certificate.refused:
+        return
+    every = certificate.common and certificate.rate is not None
+    if every:
+        yield from _family_error(certificate, certificate.deviation_bound, every_text(certificate))
+    if nearer_for_signal(certificate):
+        bound = partial(deviation_of_signal, certificate)
+        again = certificate.rate is not None
+        usual = (
+            list(_family_error(certificate, certificate.deviation_bound, " (these signals)", again)) if again else []
+        )
+        own = _family_error(certificate, bound, " (these signals)", again)
+        yield from (fact for fact in own if fact not in usual)
+
+
+def _family_error(
+    certificate: FamilyCertificate, bound: Callable[[list[float]], np.ndarray], of: str, again: bool = False
+) -> Facts:
+    """Tell how near at 0.99 T, and at every instant; ``again`` after the same of other signals."""
+    instants = told_instants(certificate.protocol, certificate.direct)[:4]
+    left, when = instants[SHORT]
+    when += ", numerical" * (not certificate.direct)
+    bounds = bound([remaining for remaining, _ in instants]).max(axis=0)
+    worst = float(bound([left]).max())
+    whose = "" if again else " of its final state"
+    standing: Standing = "proved" if certificate.direct else "unproved"
+    text = f"at {when}: every agent within {up(worst, 2)}{whose}{of}"
+    yield Fact(head="error", value=worst, side="up", standing=standing, note=text)
+    numerical = "" if certificate.direct else " (numerical)"
+    each = _at_instants(bounds, (name for _, name in instants))
+    text = f"every agent is within so much of its final state{numerical}: {each}{of}"
+    yield Fact(head="error", standing=standing, note=text, detail=True)

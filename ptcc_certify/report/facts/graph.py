@@ -1,0 +1,219 @@
+"""Facts of a graph or a family: its size, how it was read, its structure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import PurePath
+
+import numpy as np
+
+from ptcc_certify.certificate.facts import Fact, Facts
+from ptcc_certify.graphs.family import Family, Mode
+from ptcc_certify.graphs.io.table_columns import BY_HEADER, IGNORED
+from ptcc_certify.graphs.structure import ClosedComponent, Structure, analyse
+from ptcc_certify.report.text_layout import (
+    TEXT,
+    columns,
+    counted,
+    printable,
+    short_number,
+    shorten_label,
+    shorten_list,
+    shorten_text,
+)
+from ptcc_certify.theorems.counterexample_text import mode_name
+from ptcc_certify.theorems.family_behaviour import FamilyComponent
+
+ORIENTATION = {
+    "information": "row a,b: information flows a -> b",
+    "listens": "row a,b: a listens to b",
+    "matrix": "row = listener",
+}
+_BY_HEADER = {"information": "information flows source -> target", "listens": "source listens to target"}
+#: Remarks on the structure: "(0 negative)" tells the one, and the other is about pairs of edges.
+_OF_STRUCTURE = _POSITIVE, _ASYMMETRIC = "all weights positive", "sign-asymmetric"
+#: Columns of a list of nodes on the long screen: twelve lines.
+_LONG_LIST = 12 * TEXT
+#: Leader groups that are told one by one.
+_GROUPS = 3
+
+
+def graph_facts(structure: Structure, name: str, details: bool = True) -> Facts:
+    """Tell which graph, how its rows were read, and its structure."""
+    brief = _graph_text(structure, name)
+    yield Fact(head="graph", value=structure.graph.n_nodes, note=f"{printable(name)}{_size(structure)}", brief=(brief,))
+    yield from _reading_facts(structure)
+    if not details:
+        return
+    yield Fact(head="nodes", note=shorten_list(structure.graph.labels), detail=True)
+    more = [remark for remark in remarks_on(structure) if remark in _OF_STRUCTURE]
+    yield Fact(head="structure", note="; ".join([structure_text(structure), *more]), detail=True)
+
+
+def family_facts(family: Family, name: str, read: str, components: Sequence[FamilyComponent] | None) -> Facts:
+    """Tell the size of a family, how it was read, and of every mode its edges and the structure of its mandatory graph.
+
+    ``components`` are those of its decision, which hold structures; without them no details are told.
+    """
+    yield Fact(head="family", value=family.n_nodes, note=family_text(family, name))
+    if read or family.notes:
+        yield Fact(head="read", note="; ".join(filter(None, (read, *family.notes))))
+    if components is None:
+        return
+    yield Fact(head="nodes", note=shorten_list(family.labels), detail=True)
+    for number, mode in enumerate(family.modes):
+        known = len(components) == 1
+        structure = components[0].structures[number] if known else analyse(mode.mandatory)
+        size = f"{counted(mode.n_edges, 'edge')} ({int((mode.sign < 0).sum()):,} negative)" + "; undirected" * mode.tied
+        text = f"{mode_name(family, number)}: {size}; mandatory edges: {structure_text(structure)}"
+        yield Fact(head="mode", note=text, detail=True)
+        if edges := _uncertain_edges(mode):
+            yield Fact(head="mode", note=f"uncertain: {edges}", detail=True)
+
+
+def leader_facts(structure: Structure) -> Facts:
+    """Tell the leader groups and the followers of a graph."""
+    for (head, text), (_, short) in zip(_leaders(structure, _LONG_LIST), _leaders(structure, 20), strict=True):
+        brief = short if columns(short) <= TEXT else shorten_text(short.partition(", negative cycle")[0], TEXT)
+        yield Fact(head=head, note=text, brief=(brief,))
+    if followers := [structure.graph.labels[v] for v in structure.followers.tolist()]:
+        brief = shorten_list(followers, TEXT)
+        yield Fact(head="followers", note=shorten_list(followers, _LONG_LIST), brief=(brief,))
+
+
+def family_text(family: Family, name: str) -> str:
+    """Tell the size of a family, its modes by name, and what is uncertain.
+
+    Examples
+    --------
+    >>> family_text(Family.from_intervals([("a", "b", 0, 1)]), "pair")
+    'pair: 2 nodes, 1 edge, 1 optional'
+    """
+    several = len(family.modes) > 1
+    edges = sum(mode.n_edges for mode in family.modes)
+    uncertain = sum(int((~mode.known).sum()) for mode in family.modes)
+    optional = sum(int(mode.optional.sum()) for mode in family.modes)
+    rest = f"{counted(family.n_nodes, 'node')}, {counted(edges, 'edge')}"
+    rest += f", {uncertain:,} uncertain" * (uncertain > optional)
+    rest += f", {optional:,}{' of them' * (uncertain > optional)} optional" * bool(optional)
+    if not (several or name):
+        return rest
+    if not several:
+        return f"{shorten_text(printable(name), max(TEXT - len(rest) - 2, 8))}: {rest}"
+    names = [printable(mode_name(family, k)) for k in range(len(family.modes))]
+    rest = f"{counted(len(names), 'mode')} on {rest}"
+    return f"{shorten_list(names, max(TEXT - len(rest) - 2, 30))}: {rest}"
+
+
+def _uncertain_edges(mode: Mode) -> str:
+    listed = []
+    for edge in np.flatnonzero(~mode.known)[:12].tolist():
+        ends = [shorten_label(mode.labels[int(side[edge])]) for side in (mode.source, mode.target)]
+        least, largest = (short_number(end) for end in mode.edge_interval(edge))
+        listed.append(f"{ends[0]} -> {ends[1]} in [{least}, {largest}]")
+    return shorten_list(listed, 4 * TEXT, int((~mode.known).sum()))
+
+
+def _size(structure: Structure) -> str:
+    graph, negative = structure.graph, int((structure.graph.sign < 0).sum())
+    size = f"{counted(graph.n_nodes, 'node')}, {counted(graph.n_edges, 'edge')} ({negative:,} negative)"
+    return f": {size}, {_connectivity(structure)}"
+
+
+def _graph_text(structure: Structure, name: str) -> str:
+    """Tell the size and the connectivity of a graph, its name as long as fits beside them."""
+    rest = _size(structure)
+    if len(rest) + columns(name) > TEXT:
+        rest, name = rest.replace("ly connected", "").replace("disconnected, ", ""), PurePath(name).name
+    if len(rest) + min(columns(name), 8) > TEXT:  # the claims tell how many components there are
+        rest = rest.rpartition(", ")[0]
+    return shorten_text(printable(name), max(TEXT - len(rest), 8)) + rest
+
+
+def _connectivity(structure: Structure) -> str:
+    words = {"strong": "strongly connected", "quasi-strong": "quasi-strongly connected", "weak": "weakly connected"}
+    return words.get(structure.connectivity, f"disconnected, {len(structure.components):,} components")
+
+
+def _reading_facts(structure: Structure) -> Facts:
+    """Tell how the rows were read: in full what makes another graph of them, and what else as far as it fits."""
+    text = ORIENTATION[structure.graph.read["orientation"]]
+    remarks = [remark for remark in remarks_on(structure) if remark not in _OF_STRUCTURE]
+    if BY_HEADER in remarks:
+        remarks.remove(BY_HEADER)
+        text = f"{BY_HEADER}: {_BY_HEADER[structure.graph.read['orientation']]}"
+    ignored = [shorten_text(remark, TEXT) for remark in remarks if remark.startswith(IGNORED)]
+    lines = [text]
+    for remark in [*(remark for remark in remarks if not remark.startswith(IGNORED)), *ignored]:
+        if columns(f"{lines[-1]}; {remark}") <= TEXT:
+            lines[-1] += f"; {remark}"
+        else:
+            lines.append(remark)
+    yield from (Fact(head="read", note=line) for line in lines)
+
+
+def _leaders(structure: Structure, width: int) -> Iterator[tuple[str, str]]:
+    """Tell of the groups of leaders; of many, the largest that are more than single leaders."""
+    closed, labels = structure.closed_components, structure.graph.labels
+    largest = sorted(enumerate(closed, start=1), key=lambda item: -len(item[1].nodes))[:_GROUPS]
+    many = len(closed) > _GROUPS
+    told = [(number, component) for number, component in sorted(largest) if not many or len(component.nodes) > 1]
+    if many:
+        single, balanced = sum(len(c.nodes) == 1 for c in closed), sum(c.balanced for c in closed)
+        larger, size = len(closed) - single, len(largest[0][1].nodes)
+        whole = [f"{single:,} of one node, {larger:,} larger, up to {size:,}", f"{larger:,} of 2 to {size:,} nodes"]
+        these = ", such as" * (larger > len(told))
+        texts = [f"{whole[0]}{these}", *whole] if larger else ["all of one node"]
+        groups = f"{len(closed):,} groups, {balanced:,} balanced"
+        yield "leaders", next((f"{groups}; {text}" for text in texts if columns(groups + text) + 2 <= TEXT), groups)
+    for number, component in told:
+        text = leaders_text(component, labels, width)
+        head = "leaders" if len(closed) == 1 else f"leaders {number}"
+        yield ("leaders", f"group {number}: {text}") if many else (head, text)
+
+
+def leaders_text(component: ClosedComponent, labels: Sequence[str], width: int = 40) -> str:
+    """Tell how a group of leaders splits, or why it does not."""
+    nodes = [labels[v] for v in component.nodes]
+    if component.negative_cycle is not None:
+        steps = ", ".join(
+            f"{shorten_label(labels[s])}->{shorten_label(labels[t])}" for s, t in component.negative_cycle[:12]
+        )
+        more = ", ..." if len(component.negative_cycle) > 12 else ""
+        return f"{shorten_list(nodes, 2 * width)}: unbalanced, negative cycle {steps}{more}"
+    sides = camps(component)
+    text = " against ".join("{" + shorten_list([labels[v] for v in camp], width) + "}" for camp in sides)
+    return f"balanced, {'camps ' if len(sides) > 1 else 'one camp '}{text}"
+
+
+def camps(component: ClosedComponent) -> list[list[int]]:
+    """Return the camps of a balanced leader group, the one of its first node first."""
+    gauge = component.gauge or ()
+    both = ([v for v, g in zip(component.nodes, gauge, strict=True) if g == sign] for sign in (1, -1))
+    return [camp for camp in both if camp]
+
+
+def structure_text(structure: Structure) -> str:
+    """Return connectivity, closed components, leaders and followers, and balance in one line."""
+    closed = structure.closed_components
+    groups = f"{counted(len(closed), 'closed component')} ({sum(c.balanced for c in closed):,} balanced)"
+    followers = f"{counted(structure.leaders.size, 'leader')}, {counted(structure.followers.size, 'follower')}"
+    whole = f"whole graph {'balanced' if structure.balanced else 'unbalanced'}"
+    return f"{_connectivity(structure)}; {groups}; {followers}; {whole}"
+
+
+def remarks_on(structure: Structure) -> list[str]:
+    """Return what is particular about a graph and about how it was read."""
+    read, some = structure.graph.read, structure.graph.n_edges > 0
+    remarks = (
+        (structure.undirected and some, "undirected"),
+        (structure.all_positive and some, _POSITIVE),
+        (not structure.sign_symmetric, _ASYMMETRIC),
+        (not some, "no edges, is this the right file?"),
+        (read["duplicates"] != "refused", f"duplicates {read['duplicates']}"),
+        (read["self_loops"] != "refused", f"self-loops {read['self_loops']}"),
+        ("zeros" in read, f"weights 0 {read.get('zeros')}"),
+        (read["undirected"], "each row goes both ways"),
+        ("variable" in read, f"variable {shorten_label(str(read.get('variable')))}"),
+    )
+    return [*(text for holds, text in remarks if holds), *read["notes"]]

@@ -1,0 +1,140 @@
+"""Facts of where agents begin, and where they end."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+from lmi.exact.decimal_rounding import up
+from ptcc_certify.bounds.final_state import extremes
+from ptcc_certify.certificate.facts import Fact, Facts
+from ptcc_certify.certificate.restricted_states import constant_states, last_states, states_of_signal
+from ptcc_certify.report.facts.claim import range_text, told_ranges
+from ptcc_certify.report.facts.intervals import interval_text, intervals_text
+from ptcc_certify.report.facts.signals import agreement_text, every_text, rests
+from ptcc_certify.report.text_layout import (
+    TEXT,
+    columns,
+    counted,
+    printable,
+    short_number,
+    shorten_list,
+    value_list,
+    wrap_text,
+)
+
+if TYPE_CHECKING:
+    from ptcc_certify.bounds.final_state import FinalState
+    from ptcc_certify.certificate.certificate import Certificate
+    from ptcc_certify.certificate.family_certificate import FamilyCertificate
+    from ptcc_certify.certificate.family_content import FamilyContent
+    from ptcc_certify.checker.reading import Interval
+
+#: Columns of a list of intervals on a short screen and on a long one.
+_SHORT, _LONG = 2 * TEXT - 20, 12 * TEXT
+
+
+def initial_facts(certificate: Certificate | FamilyCertificate, origins: Mapping[str, str], alone: bool) -> Facts:
+    """Tell the initial positions, and where they come from; ``alone`` if those of the simulated run alone."""
+    if (begin := certificate.initial_positions) is not None:
+        drawn = f" ({origins['x(0)']})" if "x(0)" in origins else ""
+        text = value_list(certificate.labels, begin) + drawn + ", of the simulated run alone" * alone
+        yield Fact(head="x(0)", value=dict(zip(certificate.labels, begin, strict=True)), note=text, detail=True)
+
+
+def final_facts(certificate: Certificate) -> Facts:
+    """Tell where the agents end: each of them, or in two lines those at the same state together, or the extremes."""
+    result, labels = certificate.final_positions, certificate.labels
+    if result is None:
+        return
+    degenerate = "; balanced leaders happen to meet at 0" * bool(result.degenerate)
+    unproved = "; not certified that they get there" * (certificate.verdict == "undecided")
+    more = f"{degenerate}{'; without limits' * bool(certificate.limits)}{unproved})"
+    groups: dict[Fraction | float, list[str]] = {}
+    for label, state in zip(labels, result.states, strict=True):
+        groups.setdefault(state, []).append(printable(label))
+    listed = value_list(labels, result.states, 2 * TEXT)
+    grouped = "; ".join(f"{', '.join(names)} at {short_number(state)}" for state, names in groups.items())
+    brief, kind = min(listed, grouped, key=columns), f"({_accuracy(result, 'rounded')}{more}"
+    cut = ", ... (" in brief or len(wrap_text(f"{brief} {kind}")) > 2
+    if len(groups) == 1 < len(labels):
+        brief = f"every agent at {short_number(result.states[0])}"
+    elif cut and len(groups) == 2:
+        brief = " and ".join(f"{counted(len(names), 'agent')} at {short_number(x)}" for x, names in groups.items())
+    elif cut:
+        highest, lowest = extremes(result.states, 1, result.radius)
+        most, least = (value_list([labels[k]], [result.states[k]]) for (k,) in (highest, lowest))
+        brief = f"least {least}, largest {most}, of {len(labels):,} agents"
+    yield Fact(
+        head="x(T)",
+        value=dict(zip(labels, result.states, strict=True)),
+        standing="unproved" if unproved else "proved",
+        note=f"{value_list(labels, result.states)} ({_accuracy(result)}{more}",
+        brief=(f"{brief} {kind}",),
+    )
+    if result.degenerate:
+        meeting = ", ".join(map(str, result.degenerate))
+        text = f"of this x(0) leader group {meeting} happens to meet at 0, although it is balanced"
+        yield Fact(head="x(T)", note=text, detail=True)
+
+
+def _accuracy(result: FinalState, rounded: str = "here to 5 digits") -> str:
+    """Tell how exactly a final state is known, and whether it is written with fewer digits."""
+    if result.radius is None and not result.exact:
+        return "floating point"
+    cut = any(Fraction(short_number(x)) != x for x in result.states)
+    if widest := max(result.radius or (0,)):
+        return f"to within {up(widest, 2)}, proved" + f"; {rounded}" * cut
+    return "exact" if not cut else rounded if rounded == "rounded" else f"exact; {rounded}"
+
+
+def family_final_facts(certificate: FamilyCertificate) -> Facts:
+    """Tell between which ends every agent is at the deadline, agents with the same ends together."""
+    if certificate.refused:
+        return
+    labels = certificate.labels
+    ends: Sequence[Interval | None] | None = None
+    head, more = "x(T)", ""
+    if certificate.final_states is not None and certificate.common:
+        ends, more = certificate.final_states, every_text(certificate)
+    elif certificate.final_states is not None and any(one is not None for one in last_states(certificate)):
+        ends, more = states_of_signal(certificate), f"{agreement_text(certificate)} (these signals)"
+        head = "x(T)" if rests(certificate) else "x(t)"
+    if ends is not None:
+        note, brief = (f"{intervals_text(labels, ends, width)}{more}" for width in (_LONG, _SHORT))
+        yield Fact(head=head, value=dict(zip(labels, ends, strict=True)), note=note, brief=(brief,))
+    if text := constant_text(certificate):
+        brief = f"{constant_text(certificate, _SHORT)} (constant weights)"
+        yield Fact(head="x(T)", note=f"{text} (constant weights; {attained_text(certificate)})", brief=(brief,))
+    for place, (k, kept) in enumerate(told_ranges(certificate).items()):
+        component = certificate.parts[k].component
+        text, brief = (range_text(component, kept, width) for width in (12 * TEXT, TEXT))
+        yield Fact(head="x(t)", note=text, brief=(brief,), detail=place > 0)
+
+
+def attained_text(certificate: FamilyContent) -> str:
+    """Tell how near some constant weights come to the ends that are told of all of them."""
+    values = (ends for claim in certificate.final_values.values() for ends in claim.values if ends is not None)
+    within = max(ends.within for ends in values)
+    return f"some weights come within {up(within, 2)} of either end" if within else "some weights attain these ends"
+
+
+def constant_text(certificate: FamilyContent, width: int = 12 * TEXT) -> str:
+    """Tell between which ends agents are at the deadline if mode and weights never change; "" if that says no more.
+
+    Of agents whose end depends on the signal nothing is told here.
+
+    Examples
+    --------
+    >>> unsure = Family.from_intervals([("a", "b", 1, 2), ("b", "a", 1, 1)])
+    >>> constant_text(certify(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [0, 6], signal="constant"))
+    'every agent in [2, 3]'
+    """
+    columns = certificate.family.labels, constant_states(certificate), certificate.final_states or ()
+    rows = [row for row in zip(*columns, strict=False) if None not in row]
+    if all(interval_text(own) == interval_text(every) for _, own, every in rows):
+        return ""
+    text = intervals_text([label for label, *_ in rows], [own for _, own, _ in rows], width)
+    whole = len(rows) == certificate.family.n_nodes
+    return text if whole else text.replace("every agent", shorten_list([label for label, *_ in rows], 4 * TEXT), 1)

@@ -1,0 +1,115 @@
+"""Facts of what was asked, and what came of it: the protocol, what a run showed, the proof, the verdict."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from lmi.exact.decimal_rounding import near
+from ptcc_certify.certificate.answer import CERTIFIED, rejects
+from ptcc_certify.certificate.facts import Fact, Facts
+from ptcc_certify.errors import Change, Sentence
+from ptcc_certify.report.facts.input import initial_states_text
+from ptcc_certify.report.text_layout import arithmetic
+
+if TYPE_CHECKING:
+    from ptcc_certify.certificate.certificate import Certificate
+    from ptcc_certify.certificate.family_certificate import FamilyCertificate
+    from ptcc_certify.protocols.base import Protocol
+
+#: Notes that are told.
+_NOTES = 3
+
+
+def gains_text(p: Protocol) -> str:
+    """Tell a protocol with its parameters."""
+    return f"{p.kind}: " + ", ".join(f"{name}={near(getattr(p, name), 12)}" for name in p.to_dict() if name != "kind")
+
+
+def protocol_facts(certificate: Certificate | FamilyCertificate, origins: Mapping[str, str]) -> Facts:
+    """Tell the protocol with its parameters, and where the initial state comes from."""
+    text = f"{gains_text(certificate.protocol)}; {', '.join(_beginning(certificate, origins)) or 'no x(0)'}"
+    yield Fact(head="protocol", value=certificate.protocol, note=text)
+    if certificate.limits or certificate.noise is not None or certificate.delta is not None:
+        text = "a line that names no limits, noise or disturbances is without them"
+        yield Fact(head="protocol", note=text, detail=True)
+
+
+def _beginning(certificate: Certificate | FamilyCertificate, origins: Mapping[str, str]) -> list[str]:
+    """Tell where initial positions, velocities and so on, and sliding variables, come from."""
+    begin = [] if certificate.initial_state is None else [f"x(0) {origins.get('x(0)', 'given')}"]
+    if certificate.agents is not None and (states := certificate.agents.initial_state) is not None:
+        begin = []
+        for i, name in enumerate(("x(0)", "v(0)", "a(0)")[: certificate.agents.order]):
+            still = i > 0 and not any(chain[i] for agent in states for chain in agent)
+            begin.append(f"{name} {origins.get(name, '0' if still else 'given')}")
+    if certificate.initial_set is not None and (not begin or certificate.only_drawn):
+        begin = [initial_states_text(certificate.initial_set)]
+    begin += ["in a formation"] if certificate.offsets is not None else []
+    if certificate.sigma0 is not None:
+        begin += ["sigma(0) 0" if certificate.direct else f"sigma(0) {origins.get('sigma(0)', 'given')}"]
+    return begin
+
+
+def run_facts(certificate: Certificate) -> Facts:
+    """Tell what the simulated run showed, and which disturbance it met."""
+    run, comparison, seen = certificate.trajectory, certificate.comparison, certificate.agents_comparison
+    texts = []
+    if seen is not None:
+        word = "VIOLATED" if seen.violated else "kept"
+        texts.append(f"CVODES: bounds {word}, worst ratio of V {seen.decay:.4g}, of all bounds {seen.worst:.4g}")
+    if run is not None and run.sliding is not None:
+        texts.append(f"the run meets d = {run.sliding.source}; |d| <= delta: {run.sliding.bounded_by}")
+    if run is not None and comparison is not None and not certificate.constant:
+        word = "VIOLATED" if comparison.violated else "kept"
+        if not comparison.judged:
+            word = "not tested, all is below the floor"
+        resolved = f"until 1 - t/T = {comparison.resolved_until:.1e}" if comparison.resolved_until else "throughout"
+        ratio = f"worst ratio {comparison.worst_ratio:.4g}, above integrator tolerance {resolved}"
+        texts.append(f"CVODES to 1 - t/T = {comparison.stop:.0e}: bound {word}, {ratio}")
+    if run is not None and comparison is not None and run.sliding is not None and not certificate.direct:
+        slid, last = run.sliding, int(run.sliding.reaching_z.argmax())
+        when = "at T_r only"
+        if math.isfinite(slid.reaching_z[last]):
+            when = f"at t = {slid.reaching_times[last]:.6g}, {slid.reaching_left[last]:.3g} before T_r"
+        reaching = "kept" if comparison.reaching_kept else "VIOLATED"
+        ratio = f"worst |sigma| ratio {comparison.sliding_ratio or 0:.4g}"
+        texts.append(f"reaching times {reaching}, the last {when} (agent {run.labels[last]}); {ratio}")
+    if run is not None and certificate.final_state is not None:
+        gap = float(abs(run.final_state - certificate.final_state).max())
+        remark = "" if run.deadline_resolved else " (the run had not settled)"
+        texts.append(f"end state within {gap:.1e} of the final state{remark}")
+    yield from (Fact(head="simulated", standing="observed", note=text, detail=True) for text in texts)
+
+
+def verdict_facts(certificate: Certificate | FamilyCertificate) -> Facts:
+    """Tell the proof, remarks, and the verdict; what is not as one would wish comes first."""
+    ended, report, assessment = _cut_off(certificate), certificate.checked, certificate.assessment
+    if ended:
+        yield Fact(head="time limit", note=(*ended, "; what was proved by then stands"), detail=True)
+    notes = [note for note in certificate.notes if note not in certificate.reading_notes]
+    yield from (Fact(head="note", note=note, detail=True) for note in notes[:_NOTES])
+    if report is None:
+        yield Fact(head="proof", standing="unproved", note="nothing to check", detail=True)
+    elif rejects(report):
+        yield Fact(head="proof", standing="unproved", note=report.lines()[-1], detail=True)
+    else:
+        proved = f"{len(report.obligations)} proof obligations proved in {arithmetic(certificate.direct)}"
+        yield Fact(head="proof", note=f"{proved}; checked without a solver: accepted", detail=True)
+    brief = assessment.sentence
+    if assessment.verdict == CERTIFIED:
+        certified = assessment.certified_part + ", but says little by T" * (assessment.useful is False)
+        plain = certified == CERTIFIED and not assessment.answers and not assessment.caveat
+        checked = "checked without a solver" if plain else ""
+        brief = assessment.line(certified, checked, assessment.caveat, assessment.advice, ended)
+    yield Fact(head="verdict", value=assessment.verdict, note=assessment.sentence, brief=(brief,))
+
+
+def _cut_off(certificate: Certificate | FamilyCertificate) -> Sentence:
+    """Tell what was cut off because it took longer than its share of the time limit; nothing if nothing was."""
+    if not certificate.cut_off:
+        return ""
+    shares = "its share" if len(certificate.cut_off) == 1 else "their shares"
+    limit = Change("time_limit", f"{certificate.time_limit:g}")
+    return (f"{', '.join(certificate.cut_off)} cut off after {shares} of ", limit, " s")

@@ -1,0 +1,139 @@
+"""The table of agents of a page: where each begins and ends."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any
+
+from markupsafe import Markup
+
+from ptcc_certify.bounds.final_state import extremes
+from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.family_certificate import FamilyCertificate
+from ptcc_certify.certificate.restricted_states import states_of_signal
+from ptcc_certify.report import notation as texts
+from ptcc_certify.report.facts.signals import agreement_text, rests
+from ptcc_certify.report.notation import above, below, enclosed, rational
+from ptcc_certify.theorems.family_claims import camps
+
+#: Agents up to which each has a row, and how many there are of either extreme above.
+ROWS, EXTREMES = 60, 10
+
+
+def states_table(saved: Certificate | FamilyCertificate) -> tuple[str, list[Any], list[str]]:
+    """Return caption, rows and heads of the table of initial and final states: of all agents, or of the extremes."""
+    if isinstance(saved, FamilyCertificate):
+        return _of_family(saved)
+    columns = _of_agents(saved) if saved.agents is not None else _of_graph(saved)
+    if not columns:
+        return "", [], []
+    agents, end = _tabled(saved), saved.final_state
+    exact = end is None or end.radius is None
+    if saved.agents is not None:
+        caption = "Where the agents begin and end, and their inputs"
+    elif end is None:
+        caption = "Where the agents begin"
+    elif saved.verdict == "certified":
+        caption = f"Where the agents end, proved {'exactly' if exact else 'in intervals'}"
+    else:
+        caption = f"Where the agents end if they settle ({'exact' if exact else 'in proved intervals'})"
+    if saved.graph.n_nodes > ROWS:
+        total = texts.plural(saved.graph.n_nodes, "agent")
+        caption += f": the {EXTREMES} highest and the {EXTREMES} lowest of {total}"
+    names = [texts.label(saved.labels[k]) for k in agents]
+    return caption, list(zip(names, *columns.values(), strict=True)), ["Agent", *columns]
+
+
+def _tabled(saved: Certificate) -> list[int]:
+    """Return the agents that have a row: all, or those that end highest and lowest, from the highest on."""
+    if saved.graph.n_nodes <= ROWS:
+        return list(range(saved.graph.n_nodes))
+    if saved.agents is not None:
+        return list(range(2 * EXTREMES))
+    if (end := saved.final_positions) is None:
+        highest, lowest = extremes(saved.initial_positions or (), EXTREMES)
+    else:
+        highest, lowest = extremes(end.states, EXTREMES, end.radius)
+    return highest + lowest
+
+
+def _of_graph(saved: Certificate) -> dict[str, list[Any]]:
+    if saved.initial_state is None:
+        return {}
+    heads = ("Initial state", "\u03c3(0)", "State at the deadline", "Limit, if it settles")
+    agents, parts = _tabled(saved), texts.agent_parts(saved)
+    columns: dict[str, list[Any]] = {"Part": [parts[k] for k in agents]}
+    if saved.offsets is not None:
+        columns["Place h"] = [rational(saved.offsets[k]) for k in agents]
+    return columns | texts.state_columns(saved, heads, agents, enclosed)
+
+
+def _of_agents(saved: Certificate) -> dict[str, list[Any]]:
+    """Return initial and final positions, velocities and so on, and bounds of inputs, of agents of order n."""
+    part, agents = saved.agents, _tabled(saved)
+    assert part is not None
+    letters = ["x", "v", "a", *(f"x^({i})" for i in range(3, part.order))][: part.order]
+    columns: dict[str, list[Any]] = {}
+    for i, letter in enumerate(letters):
+        if part.initial_state is not None:
+            columns[f"{letter}(0)"] = [_vector([float(c[i]) for c in part.initial_state[k]]) for k in agents]
+        if part.final_state is not None and i < part.settled:
+            columns[f"{letter}(T)"] = [_vector([float(c[i][0]) for c in part.final_state[k]]) for k in agents]
+    if part.input is not None:
+        size = "|u|" if part.dimension == 1 else "\N{DOUBLE VERTICAL LINE}u\N{DOUBLE VERTICAL LINE}"
+        columns[f"{size} at most"] = [above(part.input[k], 6) for k in agents]
+    return columns
+
+
+def _vector(numbers: Sequence[float]) -> str:
+    """Write a number for each coordinate of space, rounded."""
+    told = [f"{x:.6g}" for x in numbers]
+    return told[0] if len(told) == 1 else f"({', '.join(told)})"
+
+
+def _of_family(saved: FamilyCertificate) -> tuple[str, list[Any], list[str]]:
+    rows, finals = state_rows(saved)[:ROWS], states_of_signal(saved)
+    heads = ["Agent", "Camp", "Initial state"]
+    if all(last is None for *_, last in rows):
+        return "Where the agents begin", [(texts.label(name), *cells) for name, *cells, _ in rows], heads
+    every = finals == list(saved.final_states or ())
+    which = "every signal" if every else "these signals"
+    which += " and disturbance" * (saved.protocol.reaching is not None)
+    last = "State at the deadline" if rests(saved) else "State at any instant"
+    caption = f"Where the agents end, proved for {which if every else 'signals that keep the promise'}"
+    written = [(texts.label(name), camp, first, end or _ends(None)) for name, camp, first, end in rows]
+    return caption, written, [*heads, f"{last}{agreement_text(saved)}, for {which}"]
+
+
+def state_rows(saved: FamilyCertificate) -> list[tuple[str, str, str, str | None]]:
+    """Return label, camp, initial and final state of every agent; None where no limit is claimed."""
+    if saved.initial_state is None:
+        return []
+    labels, finals = saved.family.labels, states_of_signal(saved)
+    camp = ["\u2013"] * len(labels)
+    for part in saved.parts:
+        for number, side in enumerate(camps(part.component), 1):
+            for v in part.component.nodes[side].tolist():
+                camp[v] = f"camp {number}"
+    ends = [None if end is None else _ends(end) for end in finals]
+    return list(zip(labels, camp, map(rational, saved.initial_state), ends, strict=True))
+
+
+def _ends(ends: tuple[Fraction, Fraction] | None) -> str:
+    """Write an interval, rounded outwards."""
+    if ends is None:
+        return "no limit is claimed"
+    low, high = ends
+    if low == high:
+        return rational(low)
+    return Markup("[{},\u00a0{}]").format(_rounded(low, -1), _rounded(high, 1))
+
+
+def _rounded(x: Fraction, way: int) -> str:
+    text = rational(x)
+    if "\N{ALMOST EQUAL TO}" not in text and "/" not in text:
+        return text
+    outwards = above if (x > 0) == (way > 0) else below
+    sign = "\N{MINUS SIGN}" if x < 0 else ""
+    return Markup("{}{}").format(sign, outwards(abs(x), 5)) if x else "0"

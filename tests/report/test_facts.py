@@ -1,0 +1,76 @@
+"""What is told of a certificate is data: numbers rounded to the safe side, fields by their names, changes as such."""
+
+from __future__ import annotations
+
+import re
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+from selection import thinned
+
+import ptcc_certify as ptcc
+from lmi.exact.decimal_rounding import down, up
+from ptcc_certify.cli.terminal import flagged
+from ptcc_certify.errors import Change, ParameterError, spell
+from ptcc_certify.report.page import set_text
+from ptcc_certify.report.screen import certificate_lines, summary_lines
+
+CORPUS = Path(__file__).parents[1] / "corpus"
+NAMES = thinned(sorted(path.stem for path in CORPUS.glob("*.json")), 24)
+WEAK = ptcc.NominalProtocol(T=1, rho1=1, rho2="0.1", kappa=1)
+FOES = [("a", "b", -1), ("b", "a", -1)]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_number_stands_in_its_sentence_rounded_to_its_side(name: str):
+    saved = ptcc.read_certificate(CORPUS / f"{name}.json")
+    facts = saved.facts()
+    numbers = [fact for fact in facts if fact.side != "exact" and isinstance(fact.value, Fraction | float)]
+    assert numbers or saved.rate is None or saved.rate == 0
+    for fact in numbers:
+        rounded = {"up": up, "down": down}[fact.side]
+        written = {rounded(fact.value, digits) for digits in range(1, 10)}  # type: ignore[arg-type]
+        assert written & set(re.findall(r"-?[0-9][0-9.]*(?:e[-+]?[0-9]+)?", fact.text)), fact
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_short_screen_leaves_details_out_and_the_long_one_tells_every_fact(name: str):
+    saved = ptcc.read_certificate(CORPUS / f"{name}.json")
+    facts, long = saved.facts(), certificate_lines(saved)
+    assert len(long) == len(facts)
+    heads = {line.split("  ")[0].lower() for line in summary_lines(saved)}
+    assert {head for head in heads if head.strip()} <= {fact.head.lower() for fact in facts if not fact.detail}
+    assert facts[-1].head == "verdict" and facts[-1].value == saved.verdict
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_fact_names_an_option_of_the_command_line(name: str):
+    assert not any("--" in fact.text for fact in ptcc.read_certificate(CORPUS / f"{name}.json").facts())
+
+
+def test_advice_is_a_change_that_each_medium_names_in_its_own_way():
+    certificate = ptcc.certify(FOES, WEAK, [3, 5], asks=ptcc.Asks(simulation=False))
+    verdict = certificate.facts()[-1]
+    (change,) = verdict.changes
+    assert change == Change("rho2", Fraction("0.501"))
+    assert ptcc.certify(
+        FOES, WEAK.replace(rho2=change.value), [3, 5], asks=ptcc.Asks(simulation=False)
+    ).assessment.useful
+    assert "rho2=0.501 leaves 1 %" in verdict.text and "--rho2 0.501 leaves" in spell(verdict.note, flagged)
+    assert "\u03c1<sub>2</sub> = 0.501 leaves 1 %" in set_text(verdict)
+
+
+def test_a_refusal_knows_its_field():
+    with pytest.raises(ParameterError, match=r"^rho1 = -1 is outside its domain; ") as refused:
+        ptcc.NominalProtocol(T=1, rho1=-1, rho2=1, kappa=1)
+    assert refused.value.field == "rho1" and refused.value.told(flagged).startswith("--rho1 = -1 is outside")
+    with pytest.raises(ParameterError) as refused:
+        ptcc.Agents(order=2, rest=1, gain_cap=4)
+    assert refused.value.told(flagged).endswith("; leave --gain-cap out") and "leave gain_cap out" in str(refused.value)
+
+
+def test_labels_that_look_like_signs_stand_as_they_are():
+    certificate = ptcc.certify([("<b>", "a", -1), ("a", "<b>", -1)], WEAK, [0, 5], asks=ptcc.Asks(simulation=False))
+    (end,) = (fact for fact in certificate.facts() if fact.head == "x(T)")
+    assert "&lt;b&gt;=" in set_text(end)
