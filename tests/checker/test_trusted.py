@@ -51,7 +51,7 @@ STANDARD = {
     *("re", "sys", "textwrap", "typing"),
 }
 #: Functions of ``math`` that give integers.
-EXACT_MATH = {"ceil", "comb", "factorial", "floor", "gcd", "isqrt", "lcm", "prod"}
+EXACT_MATH = {"ceil", "comb", "factorial", "floor", "gcd", "isqrt", "lcm", "perm", "prod"}
 #: Where floats may stand, and what for. Nothing that is decided depends on one, but for limits of time and memory.
 FLOATS = {
     ("lmi/exact/decimal_rounding.py", "float_up"): "the float next to a number",
