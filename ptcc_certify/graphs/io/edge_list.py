@@ -90,7 +90,6 @@ def read_edge_list(data: bytes, name: str, how: Reading) -> Rows:
     """Read an edge list, where a row with one field declares a node, or a matrix as text."""
     if data.startswith(b"%%MatrixMarket"):
         raise FormatError(f'{name}, line 1: a Matrix Market file; name it .mtx or pass the format "mtx"')
-    how.refuse("variable", name, "a table of edges")
     if not how.titles and (matrix := bracketed_matrix(data, name)) is not None:
         return matrix
     undirected = direction_of_comments(data, name)

@@ -45,6 +45,11 @@ _GRAPHS = {
 #: Endings of files that are no edge lists.
 OTHER_FORMATS = (*_GRAPHS, *MATRICES)
 _READERS = dict.fromkeys(("csv", "tsv", "txt", "edges", "edgelist"), read_edge_list) | _GRAPHS | MATRICES
+#: Readers that take an option.
+_TAKEN = {
+    "columns": (read_edge_list, read_graphml, read_gml, read_gexf, read_json),
+    "variable": (read_pajek, read_npz, read_mat),
+}
 #: How files of some formats begin, which other endings may hide.
 _BEGINNINGS = {
     rb"<\?xml[^>]*>\s*(<!--.*?-->\s*)*<graphml\b|<graphml\b": "graphml",
@@ -200,7 +205,13 @@ def _rows(path: Source, how: Reading, format: str | None = None) -> tuple[Rows, 
         raise ParameterError(f'format "{shorten(ending)}" is unknown; use one of {", ".join(_READERS)}')
     data = graph_bytes(path, name, ending)
     ending = ending if format else format_of(data, ending)
-    return _READERS.get(ending, read_edge_list)(data, name, how), name
+    reader = _READERS.get(ending, read_edge_list)
+    for option, readers in _TAKEN.items():
+        if reader not in readers:
+            how.refuse(
+                option, name, "a table of edges" if reader is read_edge_list else f"files in the format {ending}"
+            )
+    return reader(data, name, how), name
 
 
 def format_of(data: bytes, ending: str) -> str:
