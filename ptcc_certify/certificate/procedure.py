@@ -63,7 +63,7 @@ from ptcc_certify.errors import Change, HypothesisError, ParameterError, Simulat
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io import as_family, as_graph
-from ptcc_certify.graphs.io.family_conversion import is_family
+from ptcc_certify.graphs.io.conversion import is_family
 from ptcc_certify.graphs.size_limits import (
     EXACT_NODES,
     FACTOR_NODES,

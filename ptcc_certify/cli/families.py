@@ -132,7 +132,7 @@ def read_graph_or_family(graphs: tuple[str, ...], options: shared.Options) -> Si
 def graph_or_family(files: Sequence[Any], options: shared.Options) -> SignedDigraph | Family:
     """Return the family of files, read as the options say, or the graph where there is one, with known weights."""
     from ptcc_certify.graphs.io import read_family
-    from ptcc_certify.graphs.io.family_files import is_family_file
+    from ptcc_certify.graphs.io.graph_files import is_family_file
 
     uncertain = options["uncertainty"] is not None or options["optional"]
     if len(files) == 1 and not uncertain and not is_family_file(files[0]):

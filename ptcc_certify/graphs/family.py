@@ -504,25 +504,38 @@ def _edge_number(graph: SignedDigraph, keys: np.ndarray, edge: tuple[Hashable, H
     return place
 
 
+def read_interval(first: Any, last: Any, place: str) -> tuple[Fraction, Fraction]:
+    """Return the least and the largest weight of an edge, which ``place`` names.
+
+    Raises
+    ------
+    GraphError
+        One is no number, the first is above the last, or both are 0.
+
+    Examples
+    --------
+    >>> read_interval("-0.5", 0, "edge a -> b")
+    (Fraction(-1, 2), Fraction(0, 1))
+    """
+    try:
+        least, largest = as_fraction(first, "the least weight"), as_fraction(last, "the largest weight")
+    except NumberError as error:
+        raise GraphError(f"{place}: {error}; give a number") from None
+    if least > largest:
+        mend = f"exchange them; a weight from {format_exact(largest)} to {format_exact(least)} has the least first"
+        raise GraphError(f"{place}: the least weight {format_exact(least)} is above the largest; {mend}")
+    if least == largest == 0:
+        raise GraphError(f"{place}: its weight is always 0; leave the edge out")
+    return least, largest
+
+
 def _parts(edge: Interval) -> list[tuple[Hashable, Hashable, Fraction, Fraction]]:
     """Return an interval as sizes times signs that do not change: one edge, or two if 0 lies inside."""
     try:
         source, target, first, last = edge
     except (TypeError, ValueError):
         raise GraphError(f"edge {shorten(repr(edge))} is not (source, target, least, largest)") from None
-    name = f"edge {shorten(str(source))} -> {shorten(str(target))}"
-    try:
-        least, largest = (
-            as_fraction(end, f"the {which} weight")  # type: ignore[arg-type]
-            for end, which in ((first, "least"), (last, "largest"))
-        )
-    except NumberError as error:
-        raise GraphError(f"{name}: {error}") from None
-    if least > largest:
-        mend = f"exchange them; a weight from {format_exact(largest)} to {format_exact(least)} has the least first"
-        raise GraphError(f"{name}: the least weight {format_exact(least)} is above the largest; {mend}")
-    if least == largest == 0:
-        raise GraphError(f"{name}: its weight is always 0; leave the edge out")
+    least, largest = read_interval(first, last, f"edge {shorten(str(source))} -> {shorten(str(target))}")
     zero = Fraction(0)
     if least < 0 < largest:
         return [(source, target, least, zero), (source, target, zero, largest)]

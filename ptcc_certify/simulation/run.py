@@ -21,7 +21,7 @@ import numpy as np
 from ptcc_certify.errors import ParameterError, gated, unknown_parameter
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io import as_family, as_graph, as_states
-from ptcc_certify.graphs.io.family_conversion import is_family
+from ptcc_certify.graphs.io.conversion import is_family
 from ptcc_certify.graphs.rationals import number_within, shorten
 from ptcc_certify.model.refusals import refuse_together
 from ptcc_certify.protocols import Protocol

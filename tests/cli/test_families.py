@@ -345,7 +345,7 @@ def test_a_family_is_certified_for_every_disturbance(tmp_path: Path, monkeypatch
 
 
 BAD = {
-    "least above largest": (_rows("a,b,2,1"), (), "bad.csv, line 2: edge a -> b: its least weight 2 is above"),
+    "least above largest": (_rows("a,b,2,1"), (), "bad.csv, line 2: edge a -> b: the least weight 2 is above"),
     "always zero": (_rows("a,b,0,0"), (), "line 2: edge a -> b: its weight is always 0"),
     "two signs in one mode": (_rows("a,b,1,2", "a,b,-2,-1"), (), "line 3: second row .* two files \\(modes\\), or one"),
     "both directions of an undirected edge": (

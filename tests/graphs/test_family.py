@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from ptcc_certify.errors import FormatError, GraphError, ParameterError
+from ptcc_certify.graphs.difference import family_difference, mode_order
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.graphs.family_difference import family_difference, mode_order
 from ptcc_certify.graphs.io import as_family, read_family
-from ptcc_certify.graphs.io.family_conversion import is_family
-from ptcc_certify.graphs.io.family_files import keywords_of
+from ptcc_certify.graphs.io.conversion import is_family
+from ptcc_certify.graphs.io.graph_files import keywords_of
 from tests.families import KINDS, random_family
 
 GRAPH = SignedDigraph.from_edges([("a", "b", 2), ("b", "c", -3)])

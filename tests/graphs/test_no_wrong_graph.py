@@ -656,6 +656,7 @@ def test_signs_of_any_title_in_memory_are_factors_or_refused_and_what_is_not_rea
         ("source,target,weight_min,weight_max,mode\na,b,1,2,inhibits\n", 'column "mode" holds inhibits beside'),
         ("source,target,weight,is_negative,optional\na,b,1,1,yes\n", 'column "is_negative" holds 1 beside'),
         ("source,target,weight,directed,optional\na,b,-1,false,yes\n", 'column "directed" holds false beside'),
+        ("source,target,weight_min,weight_max,direction\na,b,-2,-1,<-\n", 'column "direction" holds <- beside'),
         ("source,target,weight_min,weight_max\na,b,1,2,9\n", "line 2: 5 fields, and the header has 4"),
         ("% sym\nsource,target,weight_min,weight_max\na,b,1,2\n", "% sym means undirected edges"),
     ],

@@ -4,11 +4,9 @@ Every format is turned into the same rows, and one routine (:mod:`ptcc_certify.g
 rows and builds the graph; so a rule of the reader holds for all formats, and a refusal names file, place and mend.
 """
 
-from ptcc_certify.graphs.io.conversion import as_graph
-from ptcc_certify.graphs.io.family_conversion import as_family
-from ptcc_certify.graphs.io.family_files import read_family
+from ptcc_certify.graphs.io.conversion import as_family, as_graph
 from ptcc_certify.graphs.io.files import write_atomically
-from ptcc_certify.graphs.io.graph_files import read_graph, write_graph
+from ptcc_certify.graphs.io.graph_files import read_family, read_graph, write_graph
 from ptcc_certify.graphs.io.initial_state import as_state, as_states, by_label, in_node_order, random_states, read_state
 
 __all__ = [

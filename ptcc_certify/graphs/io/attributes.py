@@ -97,7 +97,6 @@ def attribute_rows(
     labels: list[str], ends: Sequence[tuple[int, int]], data: Sequence[Attributes], name: str, how: Reading
 ) -> Rows:
     """Turn edges with attributes, which are texts, into rows."""
-    how.refuse("variable", name, "a file of one graph")
     data = [{key: str(value).strip() for key, value in lower_case(one).items()} for one in data]
     edge = lambda k: " -> ".join(shorten(labels[end]) for end in ends[k])  # noqa: E731
     told = how.titles[2].lower() if how.titles else None

@@ -90,7 +90,6 @@ def read_edge_list(data: bytes, name: str, how: Reading) -> Rows:
     """Read an edge list, where a row with one field declares a node, or a matrix as text."""
     if data.startswith(b"%%MatrixMarket"):
         raise FormatError(f'{name}, line 1: a Matrix Market file; name it .mtx or pass the format "mtx"')
-    how.refuse("variable", name, "a table of edges")
     if not how.titles and (matrix := bracketed_matrix(data, name)) is not None:
         return matrix
     undirected = direction_of_comments(data, name)
@@ -228,10 +227,9 @@ def _refuse_ambiguous(draft: _EdgeList, rows: Rows, data: bytes, konect: bool) -
     if commas and b'"' not in data:
         which = "nodes, or a matrix, with decimal commas? Write decimals with a point, or quote the names of nodes"
         raise FormatError(f"{name}: {commas[0]} among {which}")
-    met = {*draft.first, *draft.second}
-    lone = [label for k, label in enumerate(rows.labels) if k not in met]
-    if met and lone == rows.labels[:1] and lone[0] in (str(len(met)), str(len(draft.first))):
-        what = f"{lone[0]} is the number of nodes or edges, or a node without edges? Leave the first row out"
+    alone = bool(draft.first) and 0 not in draft.first and 0 not in draft.second  # the first node
+    if alone and rows.labels[0] in (str(len(labels) - 1), str(len(draft.first))):
+        what = f"{rows.labels[0]} is the number of nodes or edges, or a node without edges? Leave the first row out"
         raise FormatError(f"{name}: {what}, or begin with a header source,target,weight")
     extra = dict[str, int]() if konect else draft.extra
     if extra:
@@ -252,8 +250,8 @@ def _refuse_ambiguous(draft: _EdgeList, rows: Rows, data: bytes, konect: bool) -
         what = f"a node called {shorten(odd[0])}: a matrix, or edges?"
         raise FormatError(f"{name}: {what} Save a matrix as .npy or .mtx; of edges, {tell}")
     nodes = len(weights) > 1 and all(text.isdigit() and text in labels for text in weights)
-    alone = nodes and not konect and len(set(draft.first)) == len(draft.first) > 2
-    if alone and all(rows.labels[t] != rows.weights[w] for t, w in zip(draft.second, draft.codes, strict=True)):
+    lists = nodes and not konect and len(set(draft.first)) == len(draft.first) > 2
+    if lists and all(rows.labels[t] != rows.weights[w] for t, w in zip(draft.second, draft.codes, strict=True)):
         raise FormatError(f"{name}: a list of neighbours, or edges with weights that are nodes? Of edges, {tell}")
 
 

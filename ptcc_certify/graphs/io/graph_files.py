@@ -1,27 +1,35 @@
-"""Signed digraphs from files of any format, and to edge lists."""
+"""Signed digraphs and families of them from files of any format, and graphs to edge lists."""
 
 from __future__ import annotations
 
 import gzip
 import os
 import re
-from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
 
+from lmi.exact.decimal_rounding import near
 from ptcc_certify.errors import FormatError, GraphError, ParameterError
 from ptcc_certify.graphs.digraph import WAY, SignedDigraph, graph_of
-from ptcc_certify.graphs.io.edge_list import edge_list, read_edge_list
+from ptcc_certify.graphs.family import Family, Mode, read_share
+from ptcc_certify.graphs.io.columns_beside import column_of, signs_beside_intervals
+from ptcc_certify.graphs.io.edge_list import direction_of_comments, edge_list, read_edge_list, records
 from ptcc_certify.graphs.io.files import Source, name_and_ending, read_bytes, refuse_no_path, write_atomically
+from ptcc_certify.graphs.io.intervals import Entry, Interval, interval_columns, may_fail, numbers_of_words
 from ptcc_certify.graphs.io.json_graphs import read_json
 from ptcc_certify.graphs.io.matrix_files import read_mat, read_mtx, read_npy, read_npz
 from ptcc_certify.graphs.io.networkx_formats import read_gexf, read_gml, read_graphml
 from ptcc_certify.graphs.io.pajek import read_pajek
 from ptcc_certify.graphs.io.rows import Rows
 from ptcc_certify.graphs.io.sif import read_sif
-from ptcc_certify.graphs.io.table_columns import RATERS
+from ptcc_certify.graphs.io.signs import is_sign, weight_and_sign
+from ptcc_certify.graphs.io.table_columns import BY_HEADER, IGNORED, RATERS, edge_columns
 from ptcc_certify.graphs.io.ucinet import read_dl
 from ptcc_certify.graphs.kinds_of_file import refuse_content_as_graph
-from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.graphs.rationals import format_exact, shorten
 from ptcc_certify.graphs.reading import Reading, option_flags, options_of_record
 
 MATRICES = {"mtx": read_mtx, "npz": read_npz, "npy": read_npy, "mat": read_mat}
@@ -37,6 +45,11 @@ _GRAPHS = {
 #: Endings of files that are no edge lists.
 OTHER_FORMATS = (*_GRAPHS, *MATRICES)
 _READERS = dict.fromkeys(("csv", "tsv", "txt", "edges", "edgelist"), read_edge_list) | _GRAPHS | MATRICES
+#: Readers that take an option.
+_TAKEN = {
+    "columns": (read_edge_list, read_graphml, read_gml, read_gexf, read_json),
+    "variable": (read_pajek, read_npz, read_mat),
+}
 #: How files of some formats begin, which other endings may hide.
 _BEGINNINGS = {
     rb"<\?xml[^>]*>\s*(<!--.*?-->\s*)*<graphml\b|<graphml\b": "graphml",
@@ -46,6 +59,25 @@ _BEGINNINGS = {
     rb"(creator\b[^\n]*\n\s*)?graph\s*\[": "gml",
     rb"\{\s*[\"}]": "json",
 }
+
+
+#: Keywords of :func:`read_family` and of what type they are in a certificate.
+_KEYWORDS: dict[str, Any] = {
+    "orientation": (str, type(None)),
+    "duplicates": str,
+    "drop_self_loops": bool,
+    "drop_zeros": bool,
+    "undirected": bool,
+    "laplacian": (bool, type(None)),
+    "columns": (str, type(None)),
+    "variable": (str, type(None)),
+    "uncertainty": str,
+    "optional": list,
+}
+#: What files are whose rows have the directions of ``graph.read``.
+_WAYS = {"matrix": "a matrix as text", "information": "a table of edges"}
+
+Pair = tuple[Hashable, Hashable]
 
 
 def read_graph(
@@ -173,7 +205,13 @@ def _rows(path: Source, how: Reading, format: str | None = None) -> tuple[Rows, 
         raise ParameterError(f'format "{shorten(ending)}" is unknown; use one of {", ".join(_READERS)}')
     data = graph_bytes(path, name, ending)
     ending = ending if format else format_of(data, ending)
-    return _READERS.get(ending, read_edge_list)(data, name, how), name
+    reader = _READERS.get(ending, read_edge_list)
+    for option, readers in _TAKEN.items():
+        if reader not in readers:
+            how.refuse(
+                option, name, "a table of edges" if reader is read_edge_list else f"files in the format {ending}"
+            )
+    return reader(data, name, how), name
 
 
 def format_of(data: bytes, ending: str) -> str:
@@ -295,3 +333,283 @@ def write_graph(graph: SignedDigraph, path: str | os.PathLike[str]) -> None:
     data = edge_list(graph, name)
     packed = os.fspath(path).lower().endswith((".gz", ".gzip"))
     write_atomically(path, gzip.compress(data, mtime=0) if packed else data)
+
+
+def read_family(
+    paths: Source | Sequence[Source],
+    *,
+    uncertainty: Any = 0,
+    optional: Iterable[Pair] = (),
+    orientation: str | None = None,
+    undirected: bool = False,
+    **options: Any,
+) -> Family:
+    r"""Read a family of signed digraphs: one mode from each file.
+
+    An edge list whose header names ``weight_min`` and ``weight_max`` gives the interval of each weight, with its sign:
+    ``-3,-2`` is an opponent; 0 at one end is an edge that may fail; 0 inside, a weight of unknown sign, becomes two
+    such edges, one of each sign. A column ``optional`` (yes or no) marks edges that may fail. Any other file is read
+    as :func:`read_graph` reads it.
+
+    Parameters
+    ----------
+    paths : str, Path, file object, or sequence of these
+        Several files are modes, of which any may act at any instant; each is named by its file.
+    uncertainty : number or str
+        Of weights that are given as one number: a share from 0 to 1, or a text as "10%".
+    optional : iterable of (source, target)
+        Edges that may fail, in every mode that has them: from who is heard to who listens, whatever the orientation.
+    orientation : {"information", "listens"}, optional
+        As in :func:`read_graph`.
+    undirected : bool
+        As in :func:`read_graph`; an undirected edge is one parameter, both directions change together.
+    **options : Any
+        Others of :func:`read_graph`, not for files with intervals.
+
+    Returns
+    -------
+    Family
+        ``family.read`` has the keywords that read the files again.
+
+    Raises
+    ------
+    FormatError
+        A file is no graph; an interval is empty, has both ends 0, or occurs twice: the line is named.
+    GraphError
+        An optional edge is in no file, or two files have different nodes.
+
+    Examples
+    --------
+    >>> family = read_family(StringIO("source,target,weight_min,weight_max\na,b,1,2\nb,a,-1,0\n"))
+    >>> family, family.modes[0].edge_interval(0)
+    (Family(2 nodes, 2 of 2 weights uncertain, 1 edge optional), (Fraction(-1, 1), Fraction(0, 1)))
+    >>> read_family([StringIO("a,b,1"), StringIO("b,a,1")], uncertainty="10%")
+    Family(2 nodes, 2 modes, 2 of 2 weights uncertain)
+    """
+    one = isinstance(paths, str | Path) or hasattr(paths, "read")
+    sources: list[Any] = [paths] if one else list(paths)  # type: ignore[arg-type]
+    share, wanted = read_share(uncertainty), [(str(s), str(t)) for s, t in optional]
+    named: dict[str, Family] = {}
+    ways, notes = dict[str, str](), list[str]()
+    missing = set(wanted)
+    for number, path in enumerate(sources, 1):
+        rows = _interval_rows(path, orientation or "information", share, undirected)
+        name = stem = _mode_name(path, number)
+        again = number
+        while name in named:  # no mode may take the place of another
+            name, again = f"{stem} ({again})", again + 1
+        if rows is not None:
+            if any(value != getattr(Reading, option) for option, value in options.items()):
+                raise ParameterError("rows with intervals are neither merged nor dropped; mend them in the file")
+            nodes, edges = rows
+            both = [{*_both(edge[:2], undirected)} for edge in edges]
+            off = set(wanted) & set[tuple[str, str]]().union(*both)
+            edges = [(*e[:2], *may_fail(*e[2:])) if off & pairs else e for e, pairs in zip(edges, both, strict=True)]
+            named[name] = Family.from_intervals(edges, nodes, undirected=undirected)
+        else:
+            graph = read_graph(path, orientation=orientation, undirected=undirected, **options)
+            if orientation is None and name_and_ending(path)[1] not in MATRICES:
+                ways[graph.read["orientation"]] = name
+            notes += [
+                f"{shorten(name)}: {note}" for note in graph.read["notes"] if not note.startswith((IGNORED, BY_HEADER))
+            ]
+            off = {pair for pair in wanted if _has(graph, pair)}
+            named[name] = Family.from_graph(graph, uncertainty=share, optional=off)
+        missing -= off
+    if missing:
+        source, target = min(missing)
+        turned = any(_has(mode, (target, source)) for family in named.values() for mode in family.modes)
+        mend = f"{_text((target, source))} is: name the one who is heard first" if turned else "check the labels"
+        raise GraphError(f"optional edge {_text((source, target))} is in no file; {mend}")
+    if len(ways) > 1:
+        told = " and ".join(f"{shorten(name)} is {_WAYS[way]}" for way, name in ways.items())
+        raise GraphError(f"{told}: say --edges listens or information, which counts for both")
+    orientation = "listens" if "matrix" in ways else orientation  # a matrix as text, whose ending does not tell it
+    read = {"orientation": orientation, "undirected": undirected, **options}
+    read |= {"uncertainty": format_exact(share), "optional": [list(pair) for pair in wanted]}
+    family = Family.switching(named)
+    again_given = _given_again([str(path) for path in sources], [*named])
+    return replace(family, read=read, notes=(*family.notes, *again_given, *notes))
+
+
+def _given_again(paths: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
+    """Return a note about each file that is given more than once."""
+    notes = []
+    for path in dict.fromkeys(paths):
+        if len(same := [name for other, name in zip(paths, names, strict=True) if other == path]) > 1:
+            modes = ", ".join(shorten(name) for name in same)
+            notes.append(f"{shorten(Path(path).name)} was given {len(same)} times: modes {modes} are the same")
+    return tuple(notes)
+
+
+def keywords_of(read: Any) -> dict[str, Any]:
+    """Return the keywords of :func:`read_family` that a certificate tells; none where it tells anything else.
+
+    Examples
+    --------
+    >>> keywords_of(read_family(StringIO("a,b,1"), uncertainty="10%").read)
+    {'orientation': None, 'undirected': False, 'uncertainty': '1/10', 'optional': []}
+    >>> keywords_of({"uncertainty": [1]})
+    {}
+    """
+    if not isinstance(read, Mapping) or not all(name in _KEYWORDS for name in read):
+        return {}
+    fits = all(isinstance(value, _KEYWORDS[name]) for name, value in read.items())
+    pairs = read.get("optional", []) if fits else []
+    texts = all(isinstance(p, list) and len(p) == 2 and all(isinstance(end, str) for end in p) for p in pairs)
+    return dict(read) if fits and texts else {}
+
+
+def family_flags(read: Mapping[str, Any], path: str = "") -> str:
+    """Return how a family was read from files, one of them ``path``, as flags of the command line.
+
+    Examples
+    --------
+    >>> family_flags(read_family(StringIO("a,b,1"), uncertainty="10%", optional=[("a", "b")]).read)
+    '--edges information --uncertainty 10% --optional a,b'
+    """
+    way = read.get("orientation")
+    matrix = way is None and name_and_ending(path)[1] in MATRICES
+    words = ["a matrix" if matrix else f"--edges {way or 'information'}"]
+    words += option_flags(read)
+    if (share := read.get("uncertainty", "0")) not in ("0", 0):
+        words.append(f"--uncertainty {percent(share)}")
+    return " ".join(words + [f"--optional {','.join(pair)}" for pair in read.get("optional", ())])
+
+
+def percent(share: str) -> str:
+    """Write a share as a percentage, if that is a short decimal.
+
+    Examples
+    --------
+    >>> percent("1/20"), percent("1/3")
+    ('5%', '1/3')
+    """
+    short = near(100 * read_share(share), 6)
+    return share if "/" in short or short.startswith("~") else f"{short}%"
+
+
+def _mode_name(path: Source, number: int) -> str:
+    """Return what the mode of a file is called: as the file, ``stdin``, or by its number."""
+    if path == "-" or getattr(path, "name", None) in ("standard input", "<stdin>"):
+        return "stdin"
+    return Path(re.sub(r"\.gz$", "", str(path))).stem if isinstance(path, str | Path) else str(number)
+
+
+def is_family_file(path: Source) -> bool:
+    """Tell whether a file gives weights in intervals, or edges that may fail: by its header alone.
+
+    Examples
+    --------
+    >>> is_family_file(StringIO("source,target,weight_min,weight_max")), is_family_file(StringIO("a,b,1"))
+    (True, False)
+    """
+    return _family_table(path) is not None
+
+
+class _FamilyTable(NamedTuple):
+    """A table whose header names intervals, or edges that may fail."""
+
+    name: str
+    data: bytes
+    header: list[str]
+    ends: tuple[int, int, int | None]  # columns of source, target and weight
+    columns: tuple[int | None, int | None, int | None]  # of the least and the largest weight, and of what may fail
+    rows: Iterator[tuple[int, list[str]]]  # below the header
+
+
+def _family_table(path: Source) -> _FamilyTable | None:
+    name, ending = name_and_ending(path)
+    if not is_edge_list(ending) or (path == "-") or (hasattr(path, "read") and not hasattr(path, "seek")):
+        return None
+    data = graph_bytes(path, name, ending)
+    if hasattr(path, "seek"):
+        path.seek(0)
+    if not is_edge_list(format_of(data, ending)):
+        return None
+    rows = ((number, [field.strip() for field in row]) for number, row in records(data, name))
+    header = next((row for _, row in rows if len(row) > 1), [])
+    if (ends := edge_columns(header, name)) is None:
+        return None
+    columns = interval_columns(header, name)
+    return None if columns == (None, None, None) else _FamilyTable(name, data, header, ends, columns, rows)
+
+
+def _interval_rows(
+    path: Source, orientation: str, share: Fraction, undirected: bool
+) -> tuple[list[str], list[Interval]] | None:
+    """Return nodes and rows of an edge list whose header names intervals or optional edges; None of other files."""
+    if (table := _family_table(path)) is None:
+        return None
+    name, data, header, ends, columns, below = table
+    low = columns[0]
+    ends = ends if orientation == "information" else (ends[1], ends[0], ends[2])
+    if low is None and ends[2] is None:
+        raise FormatError(f"{name}: the header names no weight; name a column weight, or weight_min and weight_max")
+    _refuse_other_readings(header, low is not None, data, name, undirected)
+    if low is not None and share:
+        raise FormatError(f"{name}: gives intervals itself; leave out the uncertainty, or write those of all files")
+    nodes, edges = dict[str, None](), list[tuple[int, list[str]]]()
+    for number, row in below:
+        if any(row[len(header) :]):
+            what = f"{len(row)} fields, and the header has {len(header)}; quote fields with separators"
+            raise FormatError(f"{name}, line {number}: {what}")
+        filled = [*filter(None, row)]
+        if len(filled) > 1:
+            edges.append((number, row + [""] * (len(header) - len(row))))
+        nodes |= dict.fromkeys([row[k] for k in ends[:2]] if len(filled) > 1 and len(row) > 1 else filled)
+    if not nodes:
+        raise FormatError(f"{name}: no edge and no node below the header; give rows")
+    column = lambda k: [None] * len(edges) if k is None else [row[k] for _, row in edges]  # noqa: E731
+    numbers = [column(k) for k in (ends[2], *columns[:2])]
+    beside = [column_of(header[k], column(k)) for k in range(len(header)) if k not in (*ends, *columns)]
+    if text := signs_beside_intervals(beside, (weight for some in numbers for weight in some)):
+        raise FormatError(f"{name}: {text}")
+    if low is None:
+        numbers[0] = numbers_of_words(numbers[0])
+    optional = [""] * len(edges) if columns[2] is None else column(columns[2])
+    first, second = (column(k) for k in ends[:2])
+    rows: dict[tuple[str, str], tuple[int, Interval]] = {}
+    for (number, _), source, target, *told in zip(edges, first, second, *numbers, optional, strict=True):
+        where = f"{name}, line {number}"
+        if not source or not target:
+            empty = "target" if source else "source"
+            raise FormatError(f"{where}: the {empty} is empty; name a node or remove the row")
+        try:
+            edge = Entry(f"{where}: edge {_text((source, target))}", source, target, *told).interval(share)
+        except GraphError as error:
+            raise FormatError(str(error)) from None
+        if source == target:
+            raise FormatError(f"{where}: self-loop at node {shorten(source)}; remove it")
+        if again := next((rows[pair] for pair in _both(edge[:2], undirected) if pair in rows), None):
+            mend = "an edge of both signs is two files (modes), or one interval with 0 inside"
+            if again[1][:2] != edge[:2]:
+                mend = "--undirected makes each row both directions; keep one, or leave out --undirected"
+            raise FormatError(f"{where}: second row for edge {_text(edge)} (the first is line {again[0]}); {mend}")
+        rows[edge[:2]] = number, edge
+    return list(nodes), [row for _, row in rows.values()]
+
+
+def _both(pair: Sequence[str], undirected: bool) -> list[tuple[str, str]]:
+    return [(pair[0], pair[1])] + [(pair[1], pair[0])] * undirected
+
+
+def _has(graph: SignedDigraph | Mode, pair: tuple[str, str]) -> bool:
+    index = {label: k for k, label in enumerate(graph.labels) if label in pair}
+    source, target = (index.get(label, -1) for label in pair)
+    return bool(((graph.source == source) & (graph.target == target)).any())
+
+
+def _refuse_other_readings(first: Sequence[str], intervals: bool, data: bytes, name: str, undirected: bool) -> None:
+    """Refuse a column of signs beside weights or intervals, and comments that say of undirected edges."""
+    weight, sign = weight_and_sign(first, name)
+    beside = sign if sign is not None or not intervals else weight
+    if beside is not None and is_sign(first[beside]):
+        mend = "write the sign into the weights or both ends of the intervals, and leave the column out"
+        raise FormatError(f'{name}: a column "{shorten(first[beside])}" beside the weights; {mend}')
+    if (said := direction_of_comments(data, name)) and not undirected:
+        raise FormatError(f"{name}: {said} means undirected edges; let each go both ways with --undirected")
+
+
+def _text(edge: Sequence[Any]) -> str:
+    return f"{shorten(edge[0])} -> {shorten(edge[1])}"

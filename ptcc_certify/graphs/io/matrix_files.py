@@ -97,8 +97,6 @@ def _the_matrix(shapes: Mapping[str, tuple[int, ...]], variables: Iterable[str],
 
 def read_mtx(data: bytes, name: str, how: Reading) -> Rows:
     """Read a Matrix Market file; a decimal is the decimal, not the float that it passes through."""
-    how.refuse("columns", name, "a matrix")
-    how.refuse("variable", name, "a file of one matrix")
     lines = files.lines_of(data, name)
     banner = re.fullmatch(_BANNER, " ".join(lines[0].lower().split()))
     if banner is None:
@@ -130,8 +128,6 @@ def read_mtx(data: bytes, name: str, how: Reading) -> Rows:
 
 def read_npy(data: bytes, name: str, how: Reading) -> Rows:
     """Read a matrix that ``numpy.save`` wrote."""
-    how.refuse("columns", name, "a matrix")
-    how.refuse("variable", name, "a file of one matrix")
     if not data.startswith(b"\x93NUMPY"):
         raise FormatError(f"{name}: not a NumPy array file; write it with numpy.save")
     with files.one_line_errors(name, "a NumPy array"):
@@ -140,7 +136,6 @@ def read_npy(data: bytes, name: str, how: Reading) -> Rows:
 
 def read_npz(data: bytes, name: str, how: Reading) -> Rows:
     """Read the only square matrix, or ``variable``, of an archive of ``numpy.savez`` or ``scipy.sparse.save_npz``."""
-    how.refuse("columns", name, "a matrix")
     with files.one_line_errors(name, "an .npz archive"):
         with zipfile.ZipFile(BytesIO(data)) as functions:
             files.refuse_large(sum(function.file_size for function in functions.infolist()), name)
@@ -169,7 +164,6 @@ def read_mat(data: bytes, name: str, how: Reading) -> Rows:
     The file holds tagged elements, compressed or not; a variable is an element that holds elements: flags with the
     class, dimensions, name, and for a real matrix one array, or three if it is sparse.
     """
-    how.refuse("columns", name, "a matrix")
     with files.one_line_errors(name, "a MATLAB file"):
         order = {b"IM": "<", b"MI": ">"}.get(data[126:128])
         if order is None or data.startswith(b"MATLAB 7.3"):

@@ -62,7 +62,6 @@ def read_pajek(data: bytes, name: str, how: Reading) -> Rows:
         network.sections = [section for section in network.sections if section.relation == wanted]
     elif how.variable not in (None, network.title, *relations):
         raise FormatError(f"{name}: no network and no relation is called {shorten(str(how.variable))}")
-    how.refuse("columns", name, "Pajek files")
     labels = _labels(network, name)
     draft = _Rows(labels, name)
     for section in network.sections:

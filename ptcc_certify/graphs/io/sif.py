@@ -11,8 +11,6 @@ from ptcc_certify.graphs.reading import Reading
 
 def read_sif(data: bytes, name: str, how: Reading) -> Rows:
     """Read SIF; tabs separate the fields where there are any, otherwise blanks; a row with one field is a node."""
-    how.refuse("columns", name, "SIF files")
-    how.refuse("variable", name, "SIF files")
     lines = lines_of(data, name)
     separator = "\t" if any("\t" in line for line in lines) else None
     draft = Draft()

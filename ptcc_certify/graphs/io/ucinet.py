@@ -38,8 +38,6 @@ def read_dl(data: bytes, name: str, how: Reading) -> Rows:
         raise FormatError(f"{name}: not one number n of nodes; begin with dl n=3")
     if "data" not in sections:
         raise FormatError(f"{name}: no section data:; write it")
-    how.refuse("columns", name, "DL files")
-    how.refuse("variable", name, "DL files of one matrix")
     own = sections.get("labels", sections.get("row labels"))
     labels = [] if own is None or embedded else _texts(own)
     body = [_texts(line) for line in sections["data"].split("\n") if line.strip()]

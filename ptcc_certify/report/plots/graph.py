@@ -13,7 +13,7 @@ from matplotlib.patches import FancyArrowPatch, Polygon
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family, Mode
-from ptcc_certify.graphs.io.family_conversion import as_family, is_family
+from ptcc_certify.graphs.io.conversion import as_family, is_family
 from ptcc_certify.graphs.size_limits import LABELLED_NODES
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.report.plots.adjacency import draw_adjacency

@@ -1,0 +1,116 @@
+"""Edges whose weights lie in intervals, or that may fail, as files, tables and networkx graphs tell them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+from ptcc_certify.errors import FormatError, GraphError, NumberError, ParameterError
+from ptcc_certify.graphs.family import read_interval
+from ptcc_certify.graphs.io.signs import find, sign_of_word
+from ptcc_certify.graphs.rationals import as_fraction, format_exact, shorten
+
+_LEAST = ("weight_min", "min_weight", "w_min", "least", "min", "lower")
+_LARGEST = ("weight_max", "max_weight", "w_max", "largest", "max", "upper")
+_OPTIONAL = ("optional", "may_fail")
+_YES, _NO = ("yes", "true", "1", "x"), ("no", "false", "0", "")
+#: Of weights in intervals.
+TWICE = "the edges give intervals themselves; leave out the uncertainty"
+
+Interval = tuple[Any, Any, Fraction, Fraction]
+
+
+def interval_columns(first: Sequence[str], place: str) -> tuple[int | None, int | None, int | None]:
+    """Return the columns of the least and the largest weight, and that of edges that may fail; None of each it lacks.
+
+    Raises
+    ------
+    FormatError
+        One end of the intervals is named without the other.
+
+    Examples
+    --------
+    >>> interval_columns(["source", "target", "weight_min", "weight_max"], "a.csv")
+    (2, 3, None)
+    """
+    low, high, may_fail = (find(first, names, place) for names in (_LEAST, _LARGEST, _OPTIONAL))
+    if (low is None) != (high is None):
+        raise FormatError(f"{place}: the header names one end of the intervals; name weight_min and weight_max")
+    return low, high, may_fail
+
+
+class Entry(NamedTuple):
+    """An edge as it is told: where it stands, its ends, its weight or an interval, and whether it may fail."""
+
+    place: str
+    source: Any
+    target: Any
+    weight: Any
+    least: Any
+    largest: Any
+    optional: Any
+
+    def interval(self, share: Fraction) -> Interval:
+        """Return source, target, least and largest weight; ``share`` is the uncertainty of a single weight.
+
+        Raises
+        ------
+        GraphError
+            It has no weight, no interval, or a weight outside of it.
+
+        Examples
+        --------
+        >>> Entry("row 1", "a", "b", "-2", None, None, "yes").interval(Fraction(1, 10))
+        ('a', 'b', Fraction(-11, 5), Fraction(0, 1))
+        """
+        single = self.least is None and self.largest is None
+        if not single and share:
+            raise ParameterError(TWICE)
+        ends = (self.weight, self.weight) if single else (self.least, self.largest)
+        if None in ends:
+            raise GraphError(f"{self.place}: it has no weight; give weight, or weight_min and weight_max")
+        text = str(self.optional).strip().lower()
+        if text not in (*_YES, *_NO):
+            raise GraphError(f"{self.place}: optional is {shorten(str(self.optional))}; write yes or no")
+        least, largest = read_interval(*ends, self.place)
+        if share:
+            least, largest = sorted((least * (1 - share), least * (1 + share)))
+        if not single:
+            _refuse_outside(self.weight, least, largest, self.place)
+        return (self.source, self.target, *(may_fail(least, largest) if text in _YES else (least, largest)))
+
+
+def may_fail(least: Fraction, largest: Fraction) -> tuple[Fraction, Fraction]:
+    """Return the interval of an edge that may fail, too.
+
+    Examples
+    --------
+    >>> may_fail(Fraction(1), Fraction(2))
+    (Fraction(0, 1), Fraction(2, 1))
+    """
+    return min(least, Fraction(0)), max(largest, Fraction(0))
+
+
+def numbers_of_words(weights: Iterable[Any]) -> list[Any]:
+    """Return 1 and -1 in the place of words for signs, where weights are nothing else.
+
+    Examples
+    --------
+    >>> numbers_of_words(["activates", "-"]), numbers_of_words(["-", "2"])
+    ([1, -1], ['-', '2'])
+    """
+    weights = list(weights)
+    words = [sign_of_word(weight) if isinstance(weight, str) else None for weight in weights]
+    return weights if None in words else words
+
+
+def _refuse_outside(weight: object, least: Fraction, largest: Fraction, place: str) -> None:
+    """Refuse a weight that stands beside an interval and lies outside of it; what is no number says nothing."""
+    try:
+        number = as_fraction(weight, "weight")  # type: ignore[arg-type]
+    except (NumberError, TypeError):
+        return
+    if not least <= number <= largest:
+        ends = f"{format_exact(least)} to {format_exact(largest)}"
+        raise GraphError(f"{place}: weight {format_exact(number)} lies outside of its interval, {ends}; mend one")
