@@ -377,7 +377,7 @@ def test_parts_that_stand_alone_or_are_missing_are_refused():
     family = Family.from_intervals([("a", "b", 1, 2)])
     whole = certify_family(family, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2]).to_dict()
     for key in ("messages", "leaders"):
-        assert "of a family" in reason({**whole, "unverified": {}, key: {}})
+        assert "has no place for a family" in reason({**whole, "unverified": {}, key: {}})
 
 
 # ---------------------------------------------------------------------- residual
