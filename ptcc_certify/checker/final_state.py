@@ -20,7 +20,7 @@ from ptcc_certify.checker.matrix_products import Matrix, need_rows
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.protocol import Begin
 from ptcc_certify.checker.reading import Interval, RejectedError, length, need, same
-from ptcc_certify.checker.sections import Agents, Ball, ByFollower, Ends, FewNodes, Several
+from ptcc_certify.checker.sections import Agents, Ball, ByFollower, Ends, Nodes, Several
 from ptcc_certify.checker.side_files import Numbers, beside
 from ptcc_certify.checker.structure import MANY_COMPONENTS, Claim, Structure
 
@@ -181,7 +181,7 @@ class FinalState:
 class LeftNullVector:
     """The left null vector of a balanced leader group."""
 
-    nodes: FewNodes
+    nodes: Nodes
     left_null_vector: Several[Ball]
 
 
