@@ -108,7 +108,7 @@ _NAMED = {
     "integers": "integers",
     "integers of followers": "integers",
     "a column": "side_file",
-    "nodes": "nodes",
+    "many nodes": "nodes",
     "ends by agent": "ends_by_agent",
 }
 
@@ -158,7 +158,7 @@ def _annotated(inner: Any, note: Any, kind: Any, defs: dict[str, Schema]) -> Sch
         return _schema(inner, defs)
     if isinstance(note, Pattern):
         return _text(note.text)
-    if note == "nodes" and "no file" in get_args(kind):
+    if note == "nodes":
         return _array({"type": "string"})
     if note in _NAMED:
         return _ref(_NAMED[note])

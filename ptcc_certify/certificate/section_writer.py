@@ -285,7 +285,9 @@ def _annotated(inner: Any, note: Any, *rest: str, value: Any, out: Writer, key: 
     if note == "a label":
         return out.labels[value]
     if note == "nodes":
-        return [out.labels[v] for v in np.asarray(value).tolist()] if rest else out.nodes(value)
+        return [out.labels[v] for v in np.asarray(value).tolist()]
+    if note == "many nodes":
+        return out.nodes(value)
     if note in ("integers", "integers of followers"):
         return out.integers(key, np.asarray(value))
     if note == "numbers" and not isinstance(value, np.ndarray):  # whose length the file does not tell

@@ -82,8 +82,10 @@ def check_agents(doc: Document, verified: Verified) -> bool:
 
 def _check_document(doc: Document, verified: Verified) -> None:
     """Verify that the parts that speak of agents of order 1 are empty, and that no sliding variable moves."""
-    need(doc.section("initial_state") is None, "an initial state beside that of the agents")
-    need(doc.section("input") is None, "an input beside that of the agents")
+    doc.at = "initial_state"
+    need(doc.data["initial_state"] is None, "an initial state beside that of the agents")
+    doc.at = "input"
+    need(doc.data["input"] is None, "an input beside that of the agents")
     doc.at = "sliding_variable"
     need(not any(verified.begin.sigma or ()), "agents of order n begin with sliding variables that are 0")
 

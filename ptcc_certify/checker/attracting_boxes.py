@@ -29,7 +29,7 @@ from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.protocol import Begin
 from ptcc_certify.checker.reading import RejectedError, need
 from ptcc_certify.checker.restricted_signals import reachable_bounds
-from ptcc_certify.checker.sections import FewNodes, Positive, Several, Vector
+from ptcc_certify.checker.sections import Nodes, Positive, Several, Vector
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,7 +37,7 @@ class AttractingBox:
     """A box to which followers come."""
 
     component: int
-    nodes: FewNodes
+    nodes: Nodes
     vector: Vector
     lower: Several[Fraction]
     upper: Several[Fraction]

@@ -18,8 +18,8 @@ from lmi.exact.polynomials import row_sum
 from lmi.exact.work import fits, spend
 from ptcc_certify.checker.matrix_products import Sparse, block
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import need
-from ptcc_certify.checker.sections import Integers, Several, Vector
+from ptcc_certify.checker.reading import entries, exact, need
+from ptcc_certify.checker.sections import Integers, Several, Unread, Vector, read
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.checker.structure import Structure
 from ptcc_certify.checker.theorem_function import group_decrease
@@ -60,7 +60,7 @@ class DominanceWitness:
     """A vector by which rows are dominated, and of each leader group its rate; a factor where one is needed."""
 
     vector: Vector
-    groups: Several[Fraction | GroupWitness]
+    groups: Unread[Several[Fraction | GroupWitness]]
 
 
 def check_dominance(
@@ -85,8 +85,7 @@ def check_dominance(
         W[v], D[v] = w, d
     groups = [k for k, group in enumerate(structure.closed) if len(group) > 1]
     spare = {}  # of leader groups, by which g_k exceeds the rate
-    need(len(witness.groups) == len(groups), f"groups has not {len(groups)} entries")
-    for k, entry in zip(groups, witness.groups, strict=True):
+    for k, entry in zip(groups, entries(witness.groups, "groups", len(groups)), strict=True):
         g = _group(doc, structure, k, [W[v] for v in structure.closed[k]], scale, entry, proofs)
         spare[k] = ((g - rate) * graph.unit).as_integer_ratio()
     # w_i d_i times rate, less what the others push, times q and unit
@@ -110,8 +109,9 @@ def _group(
     doc: Document, structure: Structure, k: int, weights: Sequence[int], scale: int, entry: Any, proofs: Proved
 ) -> Fraction:
     """Verify the decay of a leader group by itself, once for all multiples of its weights; return its rate."""
-    factor = entry.factor if isinstance(entry, GroupWitness) else None
-    g, common = entry.rate if isinstance(entry, GroupWitness) else entry, math.gcd(*weights)
+    told = read(GroupWitness, entry, doc.context, "a leader group") if isinstance(entry, dict) else None
+    factor = None if told is None else told.factor
+    g, common = exact(entry) if told is None else told.rate, math.gcd(*weights)
     key = k, g, tuple(w // common for w in weights)
     if key in proofs:
         need(factor is None, "a factor of a leader group that is proved already")
@@ -152,16 +152,16 @@ def _factor(
 
 def read_factor(doc: Document, section: FactorSection, n: int) -> tuple[SparseFactor, int]:
     """Return the factor of a matrix of ``n`` rows as a certificate has it, and its power; refuse a large one."""
-    read, arithmetic = doc.files.integers, doc.exact
-    order, exponents = read(section.order, "order", n), read(section.exponents, "exponents", n)
-    indptr = read(section.indptr, "indptr", n + 1)
-    vector = None if section.weights is None else read(section.weights, "weights", n)
+    whole, arithmetic = doc.files.integers, doc.exact
+    order, exponents = whole(section.order, "order", n), whole(section.exponents, "exponents", n)
+    indptr = whole(section.indptr, "indptr", n + 1)
+    vector = None if section.weights is None else whole(section.weights, "weights", n)
     few = 0 <= indptr[-1] <= n * (n + 1) // 2 and fits(indptr[-1], LARGEST_FACTOR)
     need(few, "the factor has too many entries")
     need(all(0 <= b - a <= n for a, b in pairwise(indptr)), "indptr has no columns of a factor")
     work, most = sum((b - a) ** 2 for a, b in pairwise(indptr)), arithmetic.products
     need(work <= most, f"a factor of {work} products; {arithmetic.name} takes {most}")
-    indices, data = (read(getattr(section, key), key, indptr[-1]) for key in ("indices", "data"))
+    indices, data = (whole(getattr(section, key), key, indptr[-1]) for key in ("indices", "data"))
     return SparseFactor(order, indptr, indices, data, exponents, section.bits, vector), section.power
 
 

@@ -33,7 +33,7 @@ from ptcc_certify.checker.matrix_products import (
 )
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError, need
-from ptcc_certify.checker.sections import FewNodes, Several, Some, Triangle
+from ptcc_certify.checker.sections import Nodes, Several, Some, Triangle
 
 Vector = dict[int, Fraction]
 #: Integers by node, and a number by which all are multiplied.
@@ -55,7 +55,7 @@ class FormSection:
 
     class_: Literal["full", "diagonal", "undirected"]
     component: int
-    nodes: FewNodes
+    nodes: Nodes
     lower_triangle: Triangle
     rate: Fraction
     inputs: Some[Fraction]

@@ -29,7 +29,7 @@ from ptcc_certify.checker.family_squares import SquaresFunction, SquaresSection,
 from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import need
-from ptcc_certify.checker.sections import FewNodes, NotNegative, Positive, Several, Vector
+from ptcc_certify.checker.sections import Nodes, NotNegative, Positive, Several, Vector
 
 #: Lyapunov functions that are read.
 MANY_FUNCTIONS = 1000
@@ -41,7 +41,7 @@ BITS = 64
 class PartSection:
     """A part that followers hear: its form, by what it is divided, and bounds of its agents."""
 
-    nodes: FewNodes
+    nodes: Nodes
     function: FormSection
     times: Positive
     bounds: Several[NotNegative]

@@ -15,11 +15,12 @@ from lmi.exact.decimal_rounding import up
 from lmi.exact.numbers import integers, longest, shorten, sized
 from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph
+from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.matrix_products import Matrix, need_rows
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.protocol import Begin
 from ptcc_certify.checker.reading import Interval, RejectedError, length, need, same
-from ptcc_certify.checker.sections import Agents, Ball, ByFollower, Ends, Node, Several
+from ptcc_certify.checker.sections import Agents, Ball, ByFollower, Ends, Nodes, Several
 from ptcc_certify.checker.side_files import Numbers, beside
 from ptcc_certify.checker.structure import MANY_COMPONENTS, Claim, Structure
 
@@ -180,7 +181,7 @@ class FinalState:
 class LeftNullVector:
     """The left null vector of a balanced leader group."""
 
-    nodes: Several[Node]
+    nodes: Nodes
     left_null_vector: Several[Ball]
 
 
@@ -271,7 +272,7 @@ def _left_null_vectors(
     groups, vectors = [b for b in structure.balanced if len(b[1]) > 1 or not large], {}
     need(len(section) == len(groups), f"components has not {len(groups)} entries")
     for entry, (k, group, gauge) in zip(section, groups, strict=True):
-        need(entry.nodes == group, "another component")
+        need(positions(doc, structure.graph, entry.nodes, "a component") == group, "another component")
         need(len(entry.left_null_vector) == len(group), f"left_null_vector has not {len(group)} entries")
         vectors[k] = list(entry.left_null_vector)
         _left_null_vector(structure.graph, group, [(g * x, r) for g, (x, r) in zip(gauge, vectors[k], strict=True)], u)

@@ -13,7 +13,7 @@ from ptcc_certify.checker.lyapunov import Function
 from ptcc_certify.checker.matrix_products import block, congruence, decays, need_rows
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import need
-from ptcc_certify.checker.sections import FewNodes, Node, Several, Triangle
+from ptcc_certify.checker.sections import Node, Nodes, Several, Triangle
 from ptcc_certify.checker.structure import Structure
 from ptcc_certify.checker.theorem_function import Paper
 
@@ -47,7 +47,7 @@ class MeanWitness:
 class InertiaWitness:
     """The nodes of a strong component, a form, and vectors on which it is negative."""
 
-    nodes: FewNodes
+    nodes: Nodes
     lower_triangle: Triangle
     vectors: Several[Several[Fraction]]
 

@@ -26,7 +26,7 @@ from ptcc_certify.checker.matrix_products import Matrix, combined, need_rows
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.protocol import Begin, Protocol
 from ptcc_certify.checker.reading import Interval, need
-from ptcc_certify.checker.sections import Ball, FewNodes, NotNegative, Positive, Several, Some, Triangle
+from ptcc_certify.checker.sections import Ball, Nodes, NotNegative, Positive, Several, Some, Triangle
 from ptcc_certify.checker.structure import Behaviour
 
 #: Claims that are read.
@@ -105,7 +105,7 @@ class SharesSection:
     claim: Literal["shares"]
     signals: Shares
     component: int
-    nodes: FewNodes
+    nodes: Nodes
     form: Triangle
     rate: Fraction
     behaviour: Behaviour | None
@@ -294,7 +294,7 @@ def _check_last_mode(
 def closed_groups(nodes: Sequence[int], edges: Iterable[tuple[int, int, int]]) -> list[tuple[list[int], bool]]:
     """Return the closed strong components of a graph, each with whether it is balanced; a pair may have both signs.
 
-    Nodes are finished by a first search; in the opposite order, a second search begins once in every component that
+    ManyNodes are finished by a first search; in the opposite order, a second search begins once in every component that
     hears nobody else, and this is all that its beginning hears.
 
     Examples

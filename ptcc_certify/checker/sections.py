@@ -70,8 +70,7 @@ Node: TypeAlias = Annotated[int, "a label"]
 Ends: TypeAlias = Annotated[tuple[Numbers, Numbers], "ends by agent"]
 #: Labels; of many agents, labels or a side vector of places.
 Nodes: TypeAlias = Annotated[Any, "nodes"]
-#: Labels alone, where the file does not tell how many.
-FewNodes: TypeAlias = Annotated[Any, "nodes", "no file"]
+ManyNodes: TypeAlias = Annotated[Any, "many nodes"]
 
 
 @dataclass
@@ -253,7 +252,7 @@ def _annotated(kind: Any, value: Any, at: Context, what: str) -> Any:
     if note == "a label":
         need(isinstance(value, str) and value in at.index, f"{what}: an unknown node")
         return at.index[value]
-    if note in ("unread", "numbers", "integers", "a column", "nodes"):
+    if note in ("unread", "numbers", "integers", "a column", "nodes", "many nodes"):
         return value
     if note == "labels":
         texts = bool(entries(value, what)) and all(isinstance(x, str) for x in value)

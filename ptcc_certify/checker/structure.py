@@ -13,7 +13,7 @@ from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError, entries, fields, need, same
-from ptcc_certify.checker.sections import Ball, FewNodes, Integers, Node, Nodes, Pattern, Several, Some, Unread
+from ptcc_certify.checker.sections import Ball, Integers, ManyNodes, Node, Nodes, Pattern, Several, Some, Unread
 from ptcc_certify.checker.side_files import beside
 
 #: Above this many weak components they are listed in arrays.
@@ -32,7 +32,7 @@ Corollary = Literal["1.1", "1.2", "2", "3", "4", "5", "6.1", "6.2", "7", "8", "9
 class BalancedComponent:
     """A balanced closed component: its nodes, and the camp of each."""
 
-    nodes: FewNodes
+    nodes: Nodes
     balanced: Literal[True]
     gauge: Several[Literal[1, -1]]
 
@@ -41,7 +41,7 @@ class BalancedComponent:
 class UnbalancedComponent:
     """A closed component that is not balanced: its nodes, and a negative cycle."""
 
-    nodes: FewNodes
+    nodes: Nodes
     balanced: Literal[False]
     negative_cycle: Several[tuple[Node, Node]]
 
@@ -52,8 +52,8 @@ class StructureSection:
 
     connectivity: Literal["strong", "quasi-strong", "weak", "disconnected"]
     closed_components: Unread[Several[BalancedComponent | UnbalancedComponent]]
-    leaders: Nodes
-    followers: Nodes
+    leaders: ManyNodes
+    followers: ManyNodes
     balanced: bool
     sign_symmetric: bool
 

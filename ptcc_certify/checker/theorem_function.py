@@ -14,7 +14,7 @@ from ptcc_certify.checker.matrix_products import block, congruence, decays, decr
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.quadratic_form import Form
 from ptcc_certify.checker.reading import entries, exact, need
-from ptcc_certify.checker.sections import Nodes, Positive, Several, Triangle, Vector
+from ptcc_certify.checker.sections import ManyNodes, Positive, Several, Triangle, Vector
 from ptcc_certify.checker.structure import Claim, Structure, Theorem
 
 #: By how much weights may be off the left null vector of the comparison matrix: this part of each diagonal term.
@@ -26,7 +26,7 @@ class BlockSection:
     """A block of a Lyapunov matrix: its diagonal, or a full matrix."""
 
     name: str
-    nodes: Nodes
+    nodes: ManyNodes
     diagonal: Vector | None = None
     lower_triangle: Triangle | None = None
     times_rho: bool

@@ -464,7 +464,7 @@ def test_parts_of_agents_of_order_1_are_empty():
     rejected({**data, "initial_state": zero}, "final_state|final-state|initial_state", "")
     plain = json.loads(certify(graph_of(CAMPS), NominalProtocol(T=2, rho1="1/2", rho2="3/4", kappa=2)).to_json())
     rejected({**data, "input": plain["input"]}, "input", "beside that of the agents")
-    rejected({**data, "agents": None}, "agents", "not an object")
+    rejected({**data, "agents": None}, "format", "agents is null")
     rejected({**plain, "agents": data["agents"]}, "initial_state|input", "beside that of the agents")
     rejected({**data, "agents": {**data["agents"], "more": None}}, "agents", "not known")
     rejected(with_agents({key: x for key, x in data.items() if key != "input"}), "format", "missing")
@@ -482,7 +482,7 @@ def test_agents_of_order_n_on_a_family_are_refused():
     one = Family.switching([graph_of(CAMPS), graph_of([*CAMPS[:-1], ("a", "f", 1)])])
     data = json.loads(certify_family(one, NominalProtocol(T=2, rho1="1/2", rho2="3/4", kappa=2)).to_json())
     assert check(data).accepted
-    rejected({**data, "agents": made()["agents"]}, "protocol|format", "on a family")
+    rejected({**data, "agents": made()["agents"]}, "protocol|format", "has no place for a family")
 
 
 def test_an_undecided_certificate_says_nothing_of_the_end():

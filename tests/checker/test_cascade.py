@@ -298,7 +298,7 @@ def test_what_is_rejected_as_false_is_false_to_the_oracle():
 def test_agents_of_the_cascade_on_a_family_and_beside_late_messages_are_refused():
     one = Family.switching([SignedDigraph.from_edges(CAMPS), SignedDigraph.from_edges([*CAMPS[:-1], ("a", "f", 1)])])
     data = json.loads(certify_family(one, NominalProtocol(**NOMINAL)).to_json())
-    rejected({**data, "agents": made()["agents"]}, "protocol|format", "on a family")
+    rejected({**data, "agents": made()["agents"]}, "protocol|format", "has no place for a family")
     rejected({**made(), "messages": {}}, "", "agents of order n with late messages or moving leaders")
     rejected({**made(), "leaders": {}}, "", "agents of order n with late messages or moving leaders")
 

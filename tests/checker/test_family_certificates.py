@@ -494,6 +494,7 @@ def test_no_mutant_of_thousands_is_accepted_that_is_false(capsys: pytest.Capture
 
 
 VALIDATOR = Draft202012Validator(json_schema())
+NUMBERS_AS_KEYS = "rows is not an object with numbers as keys"
 
 
 def test_certificates_of_families_are_valid():
@@ -506,18 +507,13 @@ def test_certificates_of_families_are_valid():
     [
         (("claim", "signal"), "constant"),
         (("claim", "behaviour"), "bipartite"),
-        (("graph", "modes"), []),
         (("graph", "modes", 0, "undirected"), None),
         (("graph", "modes", 0, "edges", 0), ["a"]),
         (("structure", "modes", 0, "connectivity"), "torn"),
         (("protocol", "kind"), "sliding-mode"),
-        (("sliding_variable",), {}),
-        (("lyapunov",), {"functions": [], "drives": []}),
         (("paper",), {}),
         (("verdict",), "undecided"),
-        (("input", "bounded"), False),
         (("lyapunov", "functions", 0, "class"), "paper"),
-        (("proof", 0, "of"), "graph"),
         (("proof", -1, "lemma"), "Lemma 1"),
         (("more",), 1),
     ],
@@ -527,6 +523,21 @@ def test_what_does_not_fit_is_neither_valid_nor_accepted(path: tuple[Any, ...], 
     assert VALIDATOR.is_valid(data) and check(resealed(data)).accepted
     made = {**data, "more": 1} if path == ("more",) else changed(data, path, new)
     assert not VALIDATOR.is_valid(made) and not check(resealed(made)).accepted
+
+
+@pytest.mark.parametrize(
+    ("path", "new", "reason"),
+    [
+        (("graph", "modes"), [], "no mode"),
+        (("sliding_variable",), {}, "the key"),
+        (("lyapunov",), {"functions": [], "drives": []}, "drives"),
+        (("input", "bounded"), False, "no place here"),
+        (("proof", 0, "of"), "graph", "another obligation"),
+    ],
+)
+def test_what_does_not_go_together_is_not_accepted(path: tuple[Any, ...], new: Any, reason: str):
+    report = check(changed(cases()[0][1], path, new))
+    assert not report.accepted and reason in (report.reason or "")
 
 
 # ---------------------------------------------------------------------- forgeries
@@ -645,10 +656,10 @@ def test_a_row_of_a_kernel_has_columns_of_its_own_component_alone():
     (place,) = steps("bipartite containment", "family-claim")
     rows = data["proof"][place]["witness"][0]["rows"]
     label = next(iter(rows))
-    for key in ("0", "9", "01", "-1", ""):
+    for key, reason in {"9": "a row of a kernel", **dict.fromkeys(("0", "01", "-1", ""), NUMBERS_AS_KEYS)}.items():
         path = ("proof", place, "witness", 0, "rows")
         report = forged("bipartite containment", (path, {**rows, label: {**rows[label], key: "0"}}))
-        assert report.reason == "a row of a kernel"
+        assert report.reason == reason
 
 
 @pytest.mark.campaign

@@ -369,7 +369,7 @@ def test_parts_that_stand_alone_or_are_missing_are_refused():
     assert "iff rows or steps" in reason(data, (*TOP, "residual"), None)
     assert '"more" is not known' in reason(data, TOP, {**data["messages"], "more": None})
     assert '"own" is missing' in reason(data, TOP, {k: v for k, v in data["messages"].items() if k != "own"})
-    assert "messages is not an object" in reason(data, TOP, None)
+    assert "messages is null" in reason(data, TOP, None)
     assert "leaders that move" in reason({**data, "leaders": led()["leaders"]})
     assert "rows is not a list" in reason(data, (*TOP, "rows"), None)
     moving = base(sigma=F(1, 10))
@@ -377,7 +377,7 @@ def test_parts_that_stand_alone_or_are_missing_are_refused():
     family = Family.from_intervals([("a", "b", 1, 2)])
     whole = certify_family(family, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2]).to_dict()
     for key in ("messages", "leaders"):
-        assert "of a family" in reason({**whole, "unverified": {}, key: {}})
+        assert "has no place for a family" in reason({**whole, "unverified": {}, key: {}})
 
 
 # ---------------------------------------------------------------------- residual
@@ -741,7 +741,7 @@ def test_leaders_that_are_faster_than_what_follows_are_refused():
     u = data["proof"][told[1]]["witness"]["u"]
     assert "u is not positive" in reason(data, (*told, "witness", "u"), [f"-{u[0]}", *u[1:]])
     assert "u has not" in reason(data, (*told, "witness", "u"), u[1:])
-    assert "leaders is not an object" in reason(data, top, None)
+    assert "leaders is null" in reason(data, top, None)
 
 
 def test_a_sign_term_below_the_speeds_is_refused():
