@@ -294,7 +294,7 @@ def _check_last_mode(
 def closed_groups(nodes: Sequence[int], edges: Iterable[tuple[int, int, int]]) -> list[tuple[list[int], bool]]:
     """Return the closed strong components of a graph, each with whether it is balanced; a pair may have both signs.
 
-    ManyNodes are finished by a first search; in the opposite order, a second search begins once in every component that
+    Nodes are finished by a first search; in the opposite order, a second search begins once in every component that
     hears nobody else, and this is all that its beginning hears.
 
     Examples
