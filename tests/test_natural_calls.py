@@ -31,7 +31,7 @@ CONTROL_RESEARCHER = {
     "ptcc.SlidingModeProtocol(mu1=1, delta=2)": "ParameterError: mu1 = 1 does not exceed delta = 2",
     "ptcc.certify(W, p)": 'GraphError: a matrix does not tell its direction: say orientation="listens"',
     "ptcc.certify(ptcc.as_graph(W, 'listens'), p, asks=fast)": "Certificate(bipartite consensus, Theorem 1.1",
-    "ptcc.as_graph(W, 'rows')": "GraphError: orientation",
+    "ptcc.as_graph(W, 'rows')": "ParameterError: orientation",
     "ptcc.certify(W, p, orientation='listens')": "... certify has no parameter orientation; give it to as_graph(",
     "ptcc.certify(ptcc.as_graph(sparse.csr_matrix(W), 'information'), p, asks=fast)": "Certificate(bipartite consensus",
     "ptcc.analyse(W, 'listens')": "Structure(2 nodes, strong",

@@ -508,20 +508,20 @@ class CertificateSearch:
         first = None if x0 is None else [x - s if s else x for x, s in zip(x0, sigma0, strict=True)]
         matrix, result = None, None
         seconds = ENDING * self.request.time_limit if takes_long(structure.graph) else math.inf
-        with deadline.time_limit(seconds):
-            with share_of_time(0.5, f"exact {STEPS[4]}", self.cut_off):
-                found = influence(structure)
-                if first is not None and found.exact:
-                    result = final_state(structure, first, matrix=found)
-                matrix = found
-            matrix = matrix or influence_in_floats(structure)
-            if not matrix.exact:
-                try:
+        with deadline.time_limit(seconds / 2), share_of_time(1, f"exact {STEPS[4]}", self.cut_off):
+            found = influence(structure)
+            if first is not None and found.exact:
+                result = final_state(structure, first, matrix=found)
+            matrix = found
+        matrix = matrix or influence_in_floats(structure)  # whatever the time
+        if not matrix.exact:
+            try:
+                with deadline.time_limit(seconds / 2):
                     enclosed = enclose(matrix)
                     result = None if first is None else enclosed_final_state(enclosed, first)
-                    matrix = enclosed
-                except (NotEnclosedError, OutOfTime) as error:
-                    self.notes.append(f"the final state is floating point only: {error}")
+                matrix = enclosed
+            except (NotEnclosedError, OutOfTime) as error:
+                self.notes.append(f"the final state is floating point only: {error}")
         if result is None and first is not None:
             result = final_state(structure, first, matrix=matrix)
             if not np.isfinite(np.asarray(result)).all():

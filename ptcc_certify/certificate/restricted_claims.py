@@ -14,6 +14,7 @@ from lmi.exact.numbers import longest
 from ptcc_certify.certificate.functions import Proved, rates_of
 from ptcc_certify.checker.constant_weights import FinalValue, FinalValueSection
 from ptcc_certify.checker.family_function import Multipliers
+from ptcc_certify.checker.family_limits import EQUAL
 from ptcc_certify.checker.restricted_signals import (
     Dwell,
     KeptMean,
@@ -315,7 +316,9 @@ def read_claim(of: str, entry: Section, proved: Proved, components: Sequence[Fam
     assert isinstance(signal, ClockShares), "the check has verified what a claim is about"
     witness = proved["clock-shares", of]["witness"]
     labels = component.family.labels
-    mean = None if witness is None else tuple(witness.mean.get(label, Fraction(0)) for label in labels)
+    mean = None
+    if witness is not None and witness.mean != EQUAL:
+        mean = tuple(witness.mean.get(label, Fraction(0)) for label in labels)
     return ShareClaim(number, signal, _read_share_form(entry, steps, component), entry.rate, ends, mean)
 
 
