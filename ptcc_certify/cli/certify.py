@@ -105,7 +105,7 @@ def _certify_graph(
     from ptcc_certify.certificate.answer import rejects
     from ptcc_certify.certificate.procedure import STEPS
     from ptcc_certify.certificate.procedure import certify as run
-    from ptcc_certify.report.facts import facts_of
+    from ptcc_certify.report.facts.of_certificate import facts_of
 
     LOG.info("%s", one_line(f"read {graph}: {signed.n_nodes} nodes, {signed.n_edges} edges"))
     more = shared.sliding_keywords(protocol, options, signed) | _requests(options)

@@ -125,7 +125,7 @@ def summary(subject: Any) -> str:
 
 def facts(subject: Any) -> list[Any]:
     """Return what is told of a certificate."""
-    return import_module("ptcc_certify.report.facts").facts_of(subject)  # type: ignore[no-any-return]
+    return import_module("ptcc_certify.report.facts.of_certificate").facts_of(subject)  # type: ignore[no-any-return]
 
 
 def summary_of_design(subject: Any) -> str:

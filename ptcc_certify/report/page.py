@@ -32,9 +32,9 @@ from ptcc_certify.errors import Change, spell
 from ptcc_certify.graphs.io.graph_files import reading_flags
 from ptcc_certify.protocols.agents import plant_text
 from ptcc_certify.report import notation as texts
-from ptcc_certify.report.facts import facts_of
 from ptcc_certify.report.facts.decay import BOUND_KINDS
 from ptcc_certify.report.facts.graph import leader_facts
+from ptcc_certify.report.facts.of_certificate import facts_of
 from ptcc_certify.report.facts.signals import signal_text
 from ptcc_certify.report.figures import Counterexamples, counterexamples, draw, inline_figure, run_of_agents
 from ptcc_certify.report.notation import rational

@@ -18,8 +18,8 @@ from ptcc_certify.certificate.judgements import first_input
 from ptcc_certify.certificate.request import Expectations
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family, Mode
-from ptcc_certify.report.facts import decision_facts
 from ptcc_certify.report.facts.claim import groups_text
+from ptcc_certify.report.facts.of_structure import decision_facts
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.screen import certificate_lines, long_screen, short_screen, summary_lines
 from ptcc_certify.theorems.counterexample_text import counterexample_text
