@@ -41,6 +41,7 @@ from ptcc_certify.report.notation import rational
 from ptcc_certify.report.plots.family import keeps_promise
 from ptcc_certify.report.plots.subject import ideal_text, limits_text
 from ptcc_certify.report.states_table import ROWS, states_table
+from ptcc_certify.report.text_layout import NO_BREAK
 from ptcc_certify.simulation.agents import AgentsTrajectory
 from ptcc_certify.simulation.family_run import FamilyTrajectory
 from ptcc_certify.theorems.family_behaviour import DEPENDS
@@ -169,7 +170,7 @@ def set_text(fact: Fact) -> Markup:
     says little; \u03c1<sub>2</sub> = 3 leaves 1 %
     """
     text = spell(fact.note, lambda change: f"{change.field} = {change.number}" if change.number else change.field)
-    return texts.typeset(texts.signs(texts.printable(text, 2000)))
+    return texts.typeset(texts.signs(texts.printable(text.replace(NO_BREAK, " "), 2000)))
 
 
 def _view(saved: Certificate | FamilyCertificate) -> dict[str, Any]:
