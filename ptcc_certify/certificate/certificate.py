@@ -286,7 +286,7 @@ class Certificate(Content, FromFile, Shown):
         >>> verdict.head, [str(change) for change in verdict.changes]
         ('verdict', ['rho2=0.501'])
         """
-        return rendered("facts.facts_of", self)  # type: ignore[no-any-return]
+        return rendered("facts.of_certificate.facts_of", self)  # type: ignore[no-any-return]
 
     def __eq__(self, other: object) -> bool:
         """Two certificates are equal when they claim and prove the same; what was observed does not count."""

@@ -133,7 +133,7 @@ class FamilyCertificate(FamilyContent, FromFile, Shown):
 
     def facts(self) -> list[Fact]:
         """Return everything that is told of it, as data: see :class:`~ptcc_certify.certificate.facts.Fact`."""
-        return rendered("facts.facts_of", self)  # type: ignore[no-any-return]
+        return rendered("facts.of_certificate.facts_of", self)  # type: ignore[no-any-return]
 
     @property
     def refused(self) -> bool:

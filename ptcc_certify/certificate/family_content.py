@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -42,7 +42,7 @@ from ptcc_certify.checker.family_bounds import deviations, ends_near, peaks
 from ptcc_certify.checker.family_function import Scaled
 from ptcc_certify.checker.family_limits import WeightedMean, limits
 from ptcc_certify.checker.family_sliding import Drive, last_time
-from ptcc_certify.checker.input_formulas import Limits, root_above
+from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.checker.protocol import sliding_bounded, sliding_part
 from ptcc_certify.checker.reading import Interval
 from ptcc_certify.errors import ParameterError
@@ -177,9 +177,8 @@ class FamilyContent:
 
     # What a certificate of one graph may have beside that, and none of a family has.
     agents = late = tracking = offsets = initial_set = noise = delta = trajectory = None
-    limits: ClassVar[tuple[Limits, ...]] = ()
-    cut_off: ClassVar[tuple[str, ...]] = ()
-    time_limit: ClassVar[float] = math.inf
+    limits = cut_off = ()
+    time_limit = math.inf
     only_drawn = leaders_move = violated = False
 
     @property

@@ -98,7 +98,7 @@ def _certify_graph(
     """Certify what the protocol does on one graph."""
     from ptcc_certify.certificate.answer import rejects
     from ptcc_certify.certificate.procedure import STEPS, certify_case
-    from ptcc_certify.report.facts import facts_of
+    from ptcc_certify.report.facts.of_certificate import facts_of
 
     LOG.info("%s", one_line(f"read {graph}: {signed.n_nodes} nodes, {signed.n_edges} edges"))
     case, origins = _case_of(graph, signed, protocol, options), _origins(options)

@@ -28,7 +28,7 @@ def classify(graph: tuple[str, ...], expect: str | None, as_json: bool, screen: 
     """
     from ptcc_certify.graphs.family import Family
     from ptcc_certify.graphs.structure import analyse
-    from ptcc_certify.report.facts import structure_facts
+    from ptcc_certify.report.facts.of_structure import structure_facts
 
     given = read_graph_or_family(graph, options)
     if isinstance(given, Family):

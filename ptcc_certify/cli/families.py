@@ -199,7 +199,7 @@ def _show_decision(
     options: shared.Options,
 ) -> None:
     from ptcc_certify.certificate.decision_document import decision_document
-    from ptcc_certify.report.facts import decision_facts
+    from ptcc_certify.report.facts.of_structure import decision_facts
 
     if as_json:
         print_json(decision_document(family, components))
@@ -235,7 +235,7 @@ def certify_family(
     from ptcc_certify.certificate.family_certificate import STEPS
     from ptcc_certify.certificate.procedure import certify_case
     from ptcc_certify.certificate.restricted_search import require_nominal
-    from ptcc_certify.report.facts import facts_of
+    from ptcc_certify.report.facts.of_certificate import facts_of
     from ptcc_certify.theorems.family_behaviour import decide
 
     refuse_options(options)

@@ -363,7 +363,7 @@ def placed(context: click.Context, error: PTCCError | click.BadParameter) -> Exc
     if isinstance(error, click.BadParameter):
         option, text = (error.param.name if error.param else None) or "", error.message
     else:
-        text, option = str(error), error.field if isinstance(error, ParameterError) else ""
+        text, option = str(error), error.field
         option = IN_LIBRARY.get(option, option)
         if text.startswith("--"):  # of a command itself
             flag, _, text = text.partition(" ")

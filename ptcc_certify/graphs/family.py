@@ -469,11 +469,11 @@ def read_share(value: Any) -> Fraction:
     try:
         share = as_fraction(value.strip()[:-1] if percent else value, "it") / (100 if percent else 1)
     except NumberError as error:
-        raise GraphError(f"uncertainty {shorten(str(value))}: {error}; give a share such as 10% or 0.1") from None
+        raise GraphError("uncertainty", f"= {shorten(str(value))}: {error}; give a share such as 10% or 0.1") from None
     if not 0 <= share <= 1:
         more = "; give a share such as 10% or 0.1"
         hint = f"; write {format_exact(share)}% if it is one" if not percent and 1 < share <= 100 else ""
-        raise GraphError(f"uncertainty {shorten(str(value))} is not from 0 to 1{hint or more}")
+        raise GraphError("uncertainty", f"= {shorten(str(value))} is not from 0 to 1{hint or more}")
     return share
 
 

@@ -32,15 +32,16 @@ from ptcc_certify.errors import Change, spell
 from ptcc_certify.graphs.io.graph_files import reading_flags
 from ptcc_certify.protocols.agents import plant_text
 from ptcc_certify.report import notation as texts
-from ptcc_certify.report.facts import facts_of
 from ptcc_certify.report.facts.decay import BOUND_KINDS
 from ptcc_certify.report.facts.graph import leader_facts
+from ptcc_certify.report.facts.of_certificate import facts_of
 from ptcc_certify.report.facts.signals import signal_text
 from ptcc_certify.report.figures import Counterexamples, counterexamples, draw, inline_figure, run_of_agents
 from ptcc_certify.report.notation import rational
 from ptcc_certify.report.plots.runs import keeps_promise
 from ptcc_certify.report.plots.subject import ideal_text, limits_text
 from ptcc_certify.report.states_table import ROWS, states_table
+from ptcc_certify.report.text_layout import NO_BREAK
 from ptcc_certify.simulation.agents import AgentsTrajectory
 from ptcc_certify.simulation.trajectory import Trajectory
 from ptcc_certify.theorems.family_behaviour import DEPENDS
@@ -169,7 +170,7 @@ def set_text(fact: Fact) -> Markup:
     says little; \u03c1<sub>2</sub> = 3 leaves 1 %
     """
     text = spell(fact.note, lambda change: f"{change.field} = {change.number}" if change.number else change.field)
-    return texts.typeset(texts.signs(texts.printable(text, 2000)))
+    return texts.typeset(texts.signs(texts.printable(text.replace(NO_BREAK, " "), 2000)))
 
 
 def _view(saved: Certificate | FamilyCertificate) -> dict[str, Any]:

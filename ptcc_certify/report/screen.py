@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 from ptcc_certify.certificate.facts import Fact
 from ptcc_certify.errors import PTCCError, Spelling, spell
-from ptcc_certify.report.facts import facts_of
 from ptcc_certify.report.facts.claim import WHATEVER
 from ptcc_certify.report.text_layout import TEXT, columns, format_lines, wrap_lines
 from ptcc_certify.theorems.family_behaviour import DEPENDS
@@ -103,6 +102,8 @@ def summary_lines(
     input      bounded for every signal and every initial state
     verdict    certified; checked without a solver
     """
+    from ptcc_certify.report.facts.of_certificate import facts_of  # ``classify`` has no use for solvers
+
     return short_screen(facts_of(certificate, title, origins, details=False), name)
 
 
@@ -113,6 +114,8 @@ def certificate_lines(
     name: Spelling = str,
 ) -> list[str]:
     """Return the long screen of a certificate: all facts; parameters are those of :func:`summary_lines`."""
+    from ptcc_certify.report.facts.of_certificate import facts_of  # ``classify`` has no use for solvers
+
     return long_screen(facts_of(certificate, title, origins), name)
 
 
@@ -144,6 +147,7 @@ def _file_facts(path: str, document: Mapping[str, Any], report: CheckReport) -> 
     """Return the facts of an accepted certificate, of a graph or a family, as its file says it."""
     from ptcc_certify.certificate.certificate import accepted_certificate
     from ptcc_certify.certificate.section_writer import read_side_files
+    from ptcc_certify.report.facts.of_certificate import facts_of
 
     origins = dict.fromkeys(("x(0)", "v(0)", "a(0)", "sigma(0)"), "as in the file")
     files = read_side_files(document, Path(path).parent)

@@ -58,7 +58,7 @@ def test_single_integrators_in_places_under_a_gain_cap_have_the_bounds_of_the_pl
     assert "x(T)       a=4.5, b=0.5, c=5.5, d=-1.5 (exact; without limits)" in ours.out
     assert ptcc("check", str(file)).code == 0 and ptcc("report", str(file), "-o", str(page)).code == 0
     text = page.read_text(encoding="utf-8")
-    assert "Less their places: " in text and "Place h" in text
+    assert "of x - offsets" in text and "Place h" in text
     assert "less its place h" in text
     written = ptcc("report", str(file), "-o", str(tmp_path / "p.tex"))
     assert written.code == 0 and "z_{k} = x_{k} - h_{k}" in (tmp_path / "p.tex").read_text()

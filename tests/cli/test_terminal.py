@@ -14,6 +14,7 @@ import pytest
 from bad_inputs import ptcc
 from rich.cells import cell_len
 
+from ptcc_certify.certificate.facts import Fact
 from ptcc_certify.cli import terminal
 from ptcc_certify.examples import GRAPHS
 
@@ -201,7 +202,7 @@ def test_a_log_on_a_full_disk_is_one_line():
 @pytest.mark.parametrize("stream", ["stdout", "stderr"])
 def test_a_closed_stream_is_no_defect(monkeypatch: pytest.MonkeyPatch, stream: str):
     monkeypatch.setattr(f"sys.{stream}", None)
-    assert terminal.Screen().show(lambda: ["a line"], list) is None
+    assert terminal.Screen().show(lambda details: [Fact(head="a", note="line")]) is None
     with terminal.progress(["a step"]) as begin:
         begin("a step")
 

@@ -51,7 +51,7 @@ GRAPH = SignedDigraph.from_edges([("a", "b", 2), ("b", "c", -3)])
         ),
         (lambda: Family.from_graph(GRAPH, uncertainty=-1), "is not from 0 to 1"),
         (lambda: Family.from_graph(GRAPH, uncertainty=10), "write 10% if it is one"),
-        (lambda: Family.from_graph(GRAPH, uncertainty="much"), "uncertainty much"),
+        (lambda: Family.from_graph(GRAPH, uncertainty="much"), "uncertainty = much"),
         (lambda: Family.from_graph(GRAPH, optional=[("c", "b")]), "c -> b is not in the graph"),
         (lambda: Family.from_graph(GRAPH, optional=["a"]), "is no pair of nodes"),
         (lambda: Family.from_graph(GRAPH, optional=[("a", "z")]), "is no pair of nodes"),

@@ -70,6 +70,11 @@ def test_a_refusal_knows_its_field():
     assert refused.value.told(flagged).endswith("; leave --gain-cap out") and "leave gain_cap out" in str(refused.value)
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_a_page_sets_every_fact_without_codes_of_letters(name: str):
+    assert not any("\\u{" in set_text(fact) for fact in ptcc.read_certificate(CORPUS / f"{name}.json").facts())
+
+
 def test_labels_that_look_like_signs_stand_as_they_are():
     certificate = ptcc.certify([("<b>", "a", -1), ("a", "<b>", -1)], WEAK, [0, 5], asks=ptcc.Asks(simulation=False))
     (end,) = (fact for fact in certificate.facts() if fact.head == "x(T)")

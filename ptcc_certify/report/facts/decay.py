@@ -57,7 +57,7 @@ def rate_facts(certificate: Certificate) -> Facts:
     if certificate.overshoot is not None:
         kinds = ", ".join(f"{number} {kind}" for kind, number in Counter(V.kind for V in certificate.functions).items())
         of = certificate.fastest.coordinates
-        text = f"overshoot constant at that rate {up(certificate.overshoot, 4)} of ||{of}||^2; functions used: {kinds}"
+        text = f"overshoot constant at that rate {up(certificate.overshoot, 4)} of ||{of}||^2; functions: {kinds}"
         yield Fact(head="rate", value=certificate.overshoot, side="up", note=text, detail=True)
     V, search = certificate.lyapunov, certificate.search
     if V is not None and certificate.proof.rate is not None:

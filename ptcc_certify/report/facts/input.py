@@ -68,6 +68,7 @@ def _threshold_facts(certificate: Certificate, effort: Effort) -> Facts:
         below = f" <= {up(upper, 5)}" if upper is not None and effort.by == "upper_bound" else " = 1 or less"
         enough = "" if certificate.rate is None else f" to {up(2 / certificate.rate, 5)} or more"
         text = f"rho2 kappa min Re lambda{below}, 1 is needed: raise rho2 * kappa{enough}"
+        text = f"NOT BOUNDED without limits: {text}" if certificate.limits else text
     else:
         text = f"{product}, 1 is needed"
     told = None if effort.bounded is False or product not in text else lower

@@ -1,0 +1,126 @@
+"""What is told of a certificate: question, answers, verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from lmi.exact.decimal_rounding import near
+from ptcc_certify.certificate.answer import rejects
+from ptcc_certify.certificate.facts import Fact, Facts
+from ptcc_certify.certificate.family_certificate import FamilyCertificate
+from ptcc_certify.report.facts.agents import agents_facts
+from ptcc_certify.report.facts.claim import claim_facts, family_claims
+from ptcc_certify.report.facts.decay import (
+    error_facts,
+    family_error_facts,
+    family_rate_facts,
+    function_facts,
+    rate_facts,
+)
+from ptcc_certify.report.facts.graph import family_facts, graph_facts
+from ptcc_certify.report.facts.input import disturbed_facts, family_input_facts, input_facts
+from ptcc_certify.report.facts.late import late_facts, tracking_facts
+from ptcc_certify.report.facts.signals import signal_facts
+from ptcc_certify.report.facts.sliding import sliding_facts
+from ptcc_certify.report.facts.states import family_final_facts, final_facts, initial_facts
+from ptcc_certify.report.facts.verdict import protocol_facts, run_facts, verdict_facts
+
+if TYPE_CHECKING:
+    from ptcc_certify.certificate.certificate import Certificate
+
+
+def facts_of(
+    certificate: Certificate | FamilyCertificate,
+    name: str | None = None,
+    origins: Mapping[str, str] | None = None,
+    details: bool = True,
+) -> list[Fact]:
+    r"""Return what is told of a certificate: question, answers, verdict. Nothing that the check rejects is told.
+
+    Parameters
+    ----------
+    certificate : Certificate or FamilyCertificate
+    name : str, optional
+        What the graph is called, unless as the certificate says.
+    origins : mapping of str to str, optional
+        Where ``x(0)`` and ``sigma(0)`` come from, and how a family was ``read``, unless as the certificate says.
+    details : bool
+        Whether facts that a short screen leaves out are sought at all: some take as long as the proof.
+
+    Examples
+    --------
+    >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
+    >>> cert = certify(foes, NominalProtocol(T=1, rho1=1, rho2=2, kappa=1), [3, 5], simulation=False)
+    >>> print(*(f"{fact.head}: {fact.text}" for fact in facts_of(cert) if fact.head in ("x(T)", "input")), sep="\n")
+    x(T): a=-1, b=1 (exact)
+    input: bounded; |u_k| <= 24.01, the largest of agent a
+    """
+    origins = certificate.origins if origins is None else origins
+    if name is None:
+        name = certificate.origins.get("graph", "" if isinstance(certificate, FamilyCertificate) else "graph")
+    facts: list[Fact] = []
+    if isinstance(certificate, FamilyCertificate):
+        components = [part.component for part in certificate.parts]
+        facts += family_facts(certificate.family, name, origins.get("read", ""), components if details else None)
+    else:
+        facts += graph_facts(certificate.structure, name, details)
+    facts += protocol_facts(certificate, origins)
+    if not rejects(certificate.checked):
+        if isinstance(certificate, FamilyCertificate):
+            facts += _of_family(certificate, origins, details)
+        else:
+            facts += _of_graph(certificate, origins, details)
+    return [*facts, *verdict_facts(certificate)]
+
+
+def _sliding(certificate: Certificate | FamilyCertificate) -> Facts:
+    labels, reaching = certificate.labels, certificate.protocol.reaching
+    return sliding_facts(labels, reaching, certificate.sigma0, certificate.reaching)
+
+
+def _of_graph(certificate: Certificate, origins: Mapping[str, str], details: bool) -> Facts:
+    """Tell what becomes of the agents of one graph: first with late messages and moving leaders, if there are any."""
+    drawn = certificate.only_drawn
+    yield from initial_facts(certificate, origins, alone=drawn)
+    yield from _sliding(certificate)
+    yield from late_facts(certificate)
+    yield from tracking_facts(certificate)
+    beside = ["messages at once"] * (certificate.late is not None) + ["leaders at rest"] * certificate.leaders_move
+    yield from claim_facts(certificate)
+    if beside:
+        text = f"what follows is of {' and '.join(beside)}"
+        yield Fact(head="claim", note=text, detail=True)
+    if certificate.agents is not None:
+        yield from agents_facts(certificate.agents, details)
+    elif not drawn:
+        yield from _details(final_facts(certificate), certificate.leaders_move)
+    if details:
+        yield from rate_facts(certificate)
+    if certificate.agents is None and (details or not beside):
+        yield from _details(error_facts(certificate, drawn, details), bool(beside))
+        yield from _details(input_facts(certificate, details), bool(beside))
+        yield from _details(disturbed_facts(certificate), bool(beside))
+    if details:
+        yield from run_facts(certificate)
+
+
+def _details(facts: Iterable[Fact], are: bool) -> Iterable[Fact]:
+    """Return facts, which are details where others stand in their place."""
+    return (replace(fact, detail=True) for fact in facts) if are else facts
+
+
+def _of_family(certificate: FamilyCertificate, origins: Mapping[str, str], details: bool) -> Facts:
+    """Tell what becomes of the agents of a family for every signal, and for those that were asked for."""
+    components = [part.component for part in certificate.parts]
+    yield from initial_facts(certificate, origins, alone=False)
+    yield from _sliding(certificate)
+    yield from family_claims(components, f" at T = {near(certificate.protocol.T)}", certificate)
+    yield from family_rate_facts(certificate)
+    if details:
+        yield from function_facts(certificate)
+    yield from signal_facts(certificate)
+    yield from family_final_facts(certificate)
+    yield from family_error_facts(certificate)
+    yield from family_input_facts(certificate)
