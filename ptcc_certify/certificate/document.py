@@ -18,6 +18,7 @@ from ptcc_certify.certificate.agents_part import AgentsPart, matrix_section, pha
 from ptcc_certify.certificate.cascade_part import CascadePart, cascade_section, read_cascade
 from ptcc_certify.certificate.certificate_data import Content, Source
 from ptcc_certify.certificate.checking import record
+from ptcc_certify.certificate.claim_sections import ball, claim_section, claim_steps
 from ptcc_certify.certificate.family_content import FamilyContent
 from ptcc_certify.certificate.final_state_sections import final_state_sections, formation_section, read_final_state
 from ptcc_certify.certificate.functions import (
@@ -41,7 +42,7 @@ from ptcc_certify.certificate.graph_sections import (
     graph_section,
     structure_section,
 )
-from ptcc_certify.certificate.restricted_claims import Claim, ball, claim_section, claim_steps
+from ptcc_certify.certificate.restricted_claims import Claim
 from ptcc_certify.certificate.section_writer import Reader, Writer, write
 from ptcc_certify.certificate.unverified import (
     _read_observations,

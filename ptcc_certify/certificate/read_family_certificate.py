@@ -9,12 +9,12 @@ from typing import Any
 
 from ptcc_certify.bounds.section_numbers import fractions
 from ptcc_certify.certificate.certificate_data import Source
+from ptcc_certify.certificate.claim_sections import read_claim
 from ptcc_certify.certificate.document import read_protocol, read_reaching
 from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate
 from ptcc_certify.certificate.functions import ProvedFunction, read_box, read_function
 from ptcc_certify.certificate.graph_sections import certificate_family
 from ptcc_certify.certificate.request import Expectations
-from ptcc_certify.certificate.restricted_claims import read_claim
 from ptcc_certify.certificate.unverified import read_upper_bound
 from ptcc_certify.checker.attracting_boxes import AttractingBox, KeptBox
 from ptcc_certify.checker.side_files import SideFiles

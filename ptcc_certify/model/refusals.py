@@ -32,7 +32,7 @@ _NOT_OF_AGENTS = {
     "leaders": "leave it out; their leaders move as their plant does",
     "disturbance": "leave it out: what holds holds for every disturbance within delta",
 }
-_NO_SET = "(--initial-bound) is not taken up here, bounds are from one initial state; leave it out, and give x0"
+_NO_SET = "is not taken up here, bounds are from one initial state; leave it out, and give x0"
 #: What is not certified beside late messages, and what to do instead.
 _NOT_LATE = {
     "initial_set": _NO_SET,
@@ -100,7 +100,7 @@ def refuse_agents(case: Case) -> None:
     if not isinstance(case.agents, Agents):
         raise ParameterError("agents", f"= {shorten(repr(case.agents))}: give Agents(order=2) for double integrators")
     for name in asked_of_single_integrators(case):
-        raise ParameterError(f"{name} is for single integrators; of agents of order n: {_NOT_OF_AGENTS[name]}")
+        raise ParameterError(name, f"is for single integrators; of agents of order n: {_NOT_OF_AGENTS[name]}")
     if case.initial.sigma0 is not None and any(_entries(case.initial.sigma0)):
         raise ParameterError(
             "sigma0",
@@ -153,7 +153,7 @@ def _refuse_more(refused: Mapping[str, str], case: Case) -> None:
     """Refuse limits of the gain, noise and disturbances of which nothing is certified beside."""
     for name, mend in refused.items():
         if case.given(name) is not None:
-            raise ParameterError(f"{name}{' ' if mend is _NO_SET else ': '}{mend}")
+            raise ParameterError(name, mend)
 
 
 def _refuse_messages(structure: Structure, messages: LateMessages, caps: Sequence[Fraction | None]) -> None:

@@ -129,7 +129,7 @@ def check_summary(path: str, document: Mapping[str, Any], report: CheckReport) -
         claims = [part["claim"] for part in document.get("components") or [document]]
         texts = sorted({_file_claim(claim) for claim in claims})
         lines = format_lines([("claim", ", ".join(texts) + f" in {len(claims)} components" * (len(claims) > 1))])
-    if report.accepted and path:
+    if report.accepted and report.sections and path:
         with suppress(PTCCError):
             told = dropwhile(lambda fact: fact.head != "protocol", _file_facts(path, document, report))
             lines = short_screen(takewhile(lambda fact: fact.head != "verdict", told))

@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
 
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.rationals import shorten
+
+if TYPE_CHECKING:
+    from scipy import sparse
 
 #: Where uncertain weights lie unless a signal tells: in the middle of their intervals.
 MIDDLE = 0.5
@@ -194,6 +197,8 @@ class Members:
         """Return the Laplacian of a member."""
         if self.alone:
             return self.graph.laplacian().tocsc()
+        from scipy import sparse  # is loaded when a run needs it
+
         n, (indptr, indices) = self.family.n_nodes, self.pattern
         return sparse.csc_array((self.data(choice), indices, indptr), shape=(n, n))
 

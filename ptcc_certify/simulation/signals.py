@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -19,12 +19,14 @@ from ptcc_certify.graphs.io.files import Source, name_and_ending, read_bytes
 from ptcc_certify.graphs.io.signs import find
 from ptcc_certify.graphs.rationals import number_within, parse_exact, shorten, whole_number
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS
-from ptcc_certify.lyapunov.family_function import FamilyFunction
-from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.protocols.gain import Gain
 from ptcc_certify.protocols.restricted_signals import DwellTime
 from ptcc_certify.simulation.members import MIDDLE, Choice, Members
 from ptcc_certify.theorems.family_behaviour import decide
+
+if TYPE_CHECKING:
+    from ptcc_certify.lyapunov.family_function import FamilyFunction
+    from ptcc_certify.lyapunov.quotient import Quotient
 
 #: How random weights lie in their intervals.
 WEIGHTS = ("both", "ends", "between")

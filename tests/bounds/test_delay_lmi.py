@@ -19,7 +19,6 @@ from ptcc_certify.bounds.longest_delay import LateCase
 from ptcc_certify.bounds.small_delays import SmallDelayBounds, delay_threshold
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.model.asks import Asks
 from ptcc_certify.protocols import NominalProtocol
 from ptcc_certify.protocols.late_messages import LateMessages
 from ptcc_certify.simulation.late_messages import simulate_late
@@ -38,11 +37,11 @@ def bounds(graph: SignedDigraph, delay: object, own: bool, x0: list[Fraction] | 
 @pytest.mark.parametrize("own", [False, True])
 def test_delays_of_a_whole_graph_are_certified_that_are_five_times_as_long_as_those_of_its_functions(own: bool) -> None:
     probe = LateMessages("0.001", own_delay=own, gain_cap=CAP)
-    cert = certify_words(TEAM, PROTOCOL, [3, 1, 2, -4, 5], messages=probe, asks=Asks(simulation=False))
+    cert = certify_words(TEAM, PROTOCOL, [3, 1, 2, -4, 5], messages=probe, simulation=False)
     small = SmallDelayBounds(cert.structure, PROTOCOL.gain, probe, cert.influence, cert.initial_state or ())
     delay = Fraction(f"{5 * small.longest_delay(cert.decaying_forms):.3e}")
     longer = LateMessages(delay, own_delay=own, gain_cap=CAP)
-    found = certify_words(TEAM, PROTOCOL, [3, 1, 2, -4, 5], messages=longer, asks=Asks(simulation=False))
+    found = certify_words(TEAM, PROTOCOL, [3, 1, 2, -4, 5], messages=longer, simulation=False)
     assert found.verdict == "certified" and found.checked is not None and found.checked.accepted
     assert found.late is not None and found.late.form is None and found.late.lmi is not None
     assert math.isfinite(found.late.largest) and found.late.input is not None
@@ -51,7 +50,7 @@ def test_delays_of_a_whole_graph_are_certified_that_are_five_times_as_long_as_th
 
 def test_less_is_left_at_the_deadline_than_by_the_functions_where_both_prove_something() -> None:
     messages = LateMessages("0.0002", own_delay=True, gain_cap=CAP)
-    late = certify_words(TEAM, PROTOCOL, [3, 1, 2, -4, 5], messages=messages, asks=Asks(simulation=False)).late
+    late = certify_words(TEAM, PROTOCOL, [3, 1, 2, -4, 5], messages=messages, simulation=False).late
     assert late is not None and late.form is not None and late.lmi is not None
     assert late.largest == float_up(max(late.lmi.residual))
     assert late.largest < float(max(late.form.residual))
@@ -59,7 +58,7 @@ def test_less_is_left_at_the_deadline_than_by_the_functions_where_both_prove_som
 
 def test_what_a_certificate_says_of_it_is_read_back(tmp_path: Path) -> None:
     messages = LateMessages("0.002", own_delay=True, gain_cap=CAP)
-    cert = certify_words(TEAM, PROTOCOL, [3, 1, 2, -4, 5], messages=messages, asks=Asks(simulation=False))
+    cert = certify_words(TEAM, PROTOCOL, [3, 1, 2, -4, 5], messages=messages, simulation=False)
     cert.save(tmp_path / "c.json")
     made, found = cert.late, read_certificate(tmp_path / "c.json").late
     assert made is not None and found is not None and made.lmi is not None and found.lmi is not None
@@ -70,7 +69,7 @@ def test_what_a_certificate_says_of_it_is_read_back(tmp_path: Path) -> None:
 
 def test_the_longest_delay_for_a_wanted_residual_is_sought_by_it_too() -> None:
     graph, start = analyse(TEAM), [Fraction(k) for k in (3, 1, 2, -4, 5)]
-    cert = certify_words(TEAM, PROTOCOL, start, asks=Asks(simulation=False))
+    cert = certify_words(TEAM, PROTOCOL, start, simulation=False)
     ends = None if cert.final_state is None else cert.final_state.intervals
     case = LateCase(graph, PROTOCOL, cert.initial_state, ends, cert.influence, cert.decaying_forms)
     late = case.bound(LateMessages("0.0001", own_delay=True, gain_cap=CAP))
@@ -147,7 +146,7 @@ def test_delays_of_many_times_the_deadline_are_forgiven_where_few_listen_to_each
 
 def test_deviations_on_the_way_are_bounded_of_leaders_too() -> None:
     messages = LateMessages("0.002", own_delay=True, gain_cap=CAP)
-    cert = certify_words(TEAM, PROTOCOL, [3, 1, 2, -4, 5], messages=messages, asks=Asks(simulation=False, at="0.5"))
+    cert = certify_words(TEAM, PROTOCOL, [3, 1, 2, -4, 5], messages=messages, simulation=False, at="0.5")
     assert cert.late is not None and cert.final_state is not None and cert.initial_state is not None
     t = np.linspace(0, 1, 51)
     bound = cert.late.largest_bound(t)
