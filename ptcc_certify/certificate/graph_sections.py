@@ -74,7 +74,7 @@ def certificate_graph(document: Mapping[str, Any], files: Mapping[str, bytes]) -
     Examples
     --------
     >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
-    >>> document = certify(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), simulation=False).to_dict()
+    >>> document = certify(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), asks=Asks(simulation=False)).to_dict()
     >>> certificate_graph(document, {}) == foes
     True
     """

@@ -210,17 +210,17 @@ def test_a_mean_that_is_not_kept_is_refused():
         ({"a": "1", "b": "-3", "c": "1"}, "does not hear"),
         ({"a": "1", "z": "-3"}, "unknown node"),
         (3, "not one of equal"),
-        (["a"], "not one of equal"),
+        (["a"], "unknown node"),
     ):
         step["witness"] = [{"1": entry}]
         assert why in str(answer(data)), entry
     for witness, why in (
         ([{"2": "equal"}], "means of a component"),
-        ([], "means"),
+        ([], "not enclosed"),
         ([None], "not enclosed"),
         (None, "not enclosed"),
-        ({"1": "equal"}, "means"),
-        ([["equal"]], "means of a component"),
+        ({"1": "equal"}, "not a list"),
+        ([["equal"]], "numbers as keys"),
     ):
         step["witness"] = witness
         assert why in str(answer(data)), witness

@@ -301,10 +301,6 @@ def test_python_takes_a_family_in_many_forms():
         (lambda: ptcc.decide("fig1a", "sometimes"), 'signals are "any" or "constant", not "sometimes"'),
         (lambda: ptcc.as_family(Family.from_intervals([("a", "b", 1, 2)]), uncertainty=0.1), "leave out uncertainty"),
         (lambda: Family.from_graph([("a", "b", 1)]), "is no SignedDigraph"),
-        (
-            lambda: ptcc.simulate(Family.from_intervals([("a", "b", 1, 2)]), PROTOCOL, [1, 2]),
-            "is several graphs, and one",
-        ),
     ],
 )
 def test_a_call_that_does_not_fit_a_family_is_one_line(call, says: str):

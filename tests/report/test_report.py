@@ -244,7 +244,7 @@ def test_numbers_are_rounded_to_the_safe_side():
         assert made.rate is not None and made.limit is not None and made.effort is not None
         said: dict[str, str] = {}
         for key, text in rows(source, "In detail"):
-            said[key] = said.get(key, "") + text
+            said[key] = said.get(key, "") + text.replace("\u00a0", " ")
         rate = said["How fast"]
         assert made.rate * Fraction(99999, 100000) <= number(rate) <= made.rate
         upper = number(rate.partition("upper bound ")[2])

@@ -52,7 +52,7 @@ def facts_of(
     Examples
     --------
     >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
-    >>> cert = certify(foes, NominalProtocol(T=1, rho1=1, rho2=2, kappa=1), [3, 5], simulation=False)
+    >>> cert = certify(foes, NominalProtocol(T=1, rho1=1, rho2=2, kappa=1), [3, 5], asks=Asks(simulation=False))
     >>> print(*(f"{fact.head}: {fact.text}" for fact in facts_of(cert) if fact.head in ("x(T)", "input")), sep="\n")
     x(T): a=-1, b=1 (exact)
     input: bounded; |u_k| <= 24.01, the largest of agent a

@@ -55,10 +55,10 @@ def plot_tracking(subject: Any, *, ax: Axes | None = None, time_unit: str = "") 
     --------
     >>> graph = SignedDigraph.from_edges([(1, 2, 1), (2, 3, -1)])
     >>> p = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
-    >>> cert = certify(graph, p, [1, 0, 2], messages=LateMessages(delay="0.05"), simulation=False)
+    >>> cert = certify(graph, p, [1, 0, 2], messages=LateMessages(delay="0.05"), asks=Asks(simulation=False))
     >>> [line.get_label() for line in plot_tracking(cert).lines]
     ['as late as allowed', 'now late, now not', 'proved bound', 'at least, if as late as allowed']
-    >>> cert = certify(graph, p, [1, 0, 2], leaders=MovingLeaders(speed=1), simulation=False)
+    >>> cert = certify(graph, p, [1, 0, 2], leaders=MovingLeaders(speed=1), asks=Asks(simulation=False))
     >>> [line.get_label() for line in plot_tracking(cert).lines]
     ['worst leaders', 'proved bound', '$T$']
     """
