@@ -220,8 +220,8 @@ def _verdict(doc: Document) -> str:
         return doc.close(check_agents(doc, verified))
     need("phases" not in data and "instants" not in data, "phases or instants of agents that are not of order n")
     check_input(doc, verified)
-    check_messages(doc, verified)
-    check_leaders(doc, verified)
+    check_messages(doc, verified, protocol, begin)
+    check_leaders(doc, structure, protocol, begin)
     return doc.close(data["influence"] is not None and (rate is not None or not graph.listening))
 
 
@@ -234,6 +234,8 @@ def _family_verdict(doc: Document, protocol: Protocol) -> str:
     check_family_bounds(doc, family, functions, protocol, begin, drive)
     check_boxes(doc, family, begin)
     check_restricted(doc, family, functions, protocol, begin)
+    check_messages(doc, family, protocol, begin)
+    check_leaders(doc, family, protocol, begin)
     for key in NOT_OF_FAMILIES:
         doc.section(key)
     return doc.close(True)

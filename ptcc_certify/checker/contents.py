@@ -113,6 +113,8 @@ class FamilyCertificate:
     unverified: dict[str, Any]
     boxes: Several[AttractingBox | KeptBox] | None = None
     restricted: Several[Section] | None = None
+    messages: MessagesSection | None = None
+    leaders: LeadersSection | None = None
 
 
 #: What an obligation of each kind brings, if anything; where there are several, one of them, as its numbers tell.

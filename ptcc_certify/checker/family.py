@@ -266,6 +266,8 @@ def check_family(doc: Document) -> Family:
         structure = check_structure(doc, graph, section, f"graph.modes[{number}]")
         need(section.connectivity == _connectivity(structure), "another connectivity of a mode")
         modes.append(Mode(edges, unit, tied, structure))
+    hearing = {edge[1] for mode in modes for edge in mode.edges}
+    doc.context.followers = [label for v, label in enumerate(labels) if v in hearing]
     return Family(labels, modes, _check_claims(doc, labels, modes))
 
 

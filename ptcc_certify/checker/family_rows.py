@@ -29,6 +29,7 @@ from ptcc_certify.checker.family_squares import SquaresFunction, SquaresSection,
 from ptcc_certify.checker.graph import positions
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import need
+from ptcc_certify.checker.rows import WeightsBetween
 from ptcc_certify.checker.sections import Nodes, NotNegative, Positive, Several, Vector
 
 #: Lyapunov functions that are read.
@@ -232,16 +233,11 @@ def check_follower_rows(
     most = dict.fromkeys(followers, 0)
     p, q = rate.as_integer_ratio()
     for mode, edges in zip(family.modes, component.part.edges, strict=True):
-        bits = longest(edge[4] for edge in edges)
-        spend(4 * (len(edges) + len(followers)), bits, longest(sizes.values()), "rows of a family")
-        spend(len(followers), bits + longest(sizes.values()) + 64, units.bit_length(), "rows of a family")
-        sized(2 * len(followers), bits + longest(sizes.values()) + units.bit_length() + 64, "rows of a family")
-        pull, push = dict.fromkeys(sizes, 0), dict.fromkeys(sizes, 0)
-        for s, t, _, low, high in edges:
-            d, other = sizes[t], sizes[s]
-            gap = d - other
-            pull[t] += (high if gap < 0 else low) * gap
-            push[t] += high * (d + other)
+        rows = WeightsBetween(edges, mode.unit)
+        pull, push = rows.least(sizes, sizes), rows.most(sizes, sizes)
+        bits = rows.bits + longest(sizes.values()) + 64
+        spend(len(followers), bits, units.bit_length(), "rows of a family")
+        sized(2 * len(followers), bits + units.bit_length(), "rows of a family")
         lost, needed, factor = 2 * q * mode.unit, p * mode.unit * unit, units // mode.unit
         for v in followers:
             decays = 2 * q * unit * pull[v] - lost * drifts[v] >= needed * sizes[v]

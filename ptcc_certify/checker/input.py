@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
 from itertools import chain
 from typing import Annotated, Any
 
@@ -146,13 +145,10 @@ class Verified:
     rate: Fraction | None
     limit: Fraction | None
 
-    @cached_property
+    @property
     def gain(self) -> formulas.PrescribedGain:
         """The gain of the nominal part of the input."""
-        g = self.protocol.gains
-        return formulas.PrescribedGain(
-            g["T_r"] + g["T_s"] if self.protocol.sliding else g["T"], g["rho1"], g["rho2"] * g["kappa"]
-        )
+        return self.protocol.gain
 
     def sliding_part(self) -> list[Fraction]:
         """Return what the sliding-mode protocol adds to the input of every agent at most."""

@@ -9,12 +9,12 @@ from lmi.exact.decimal_rounding import up
 from lmi.exact.numbers import longest, shorten
 from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph
-from ptcc_certify.checker.follower_rows import Rows
 from ptcc_certify.checker.input_formulas import PrescribedGain, decay_above
 from ptcc_certify.checker.late_messages import Messages
 from ptcc_certify.checker.late_steps import clock_below
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError, need
+from ptcc_certify.checker.rows import Rows
 from ptcc_certify.checker.side_files import Numbers
 
 
@@ -47,7 +47,6 @@ class Inputs:
     Parameters
     ----------
     doc : Document
-    graph : Digraph
     messages : Messages
     values : Numbers
         By agent.
@@ -58,39 +57,41 @@ class Inputs:
         The gain has no cap.
     """
 
-    def __init__(self, doc: Document, graph: Digraph, messages: Messages, values: Numbers):
+    def __init__(self, doc: Document, messages: Messages, values: Numbers):
         doc.at = "messages.input"
         if messages.gain_cap is None:
             raise RejectedError("input without a cap of the gain")
-        self.graph, self.messages, self.gain_cap = graph, messages, messages.gain_cap
-        self.values, self.scale = values.over(range(graph.n))
+        self.labels, self.messages, self.gain_cap = doc.context.labels, messages, messages.gain_cap
+        self.values, self.scale = values.over(range(len(self.labels)))
         need(min(self.values) >= 0, "an input is negative")
-        self.met = bytearray(graph.n)
+        self.met = bytearray(len(self.labels))
 
     def by_rows(self, rows: Rows, b: Fraction, cap: Fraction | None, initial: Fraction, floor: Fraction) -> None:
-        """Mark what is at least ``(2 D_k - b) u_k initial y + gain_cap (floor (D_k u_k + heard_k) + error D_k)``."""
-        graph, error = self.graph, self.messages.wrong
+        """Mark what is at least ``(2 D_k - b) u_k initial y + gain_cap (floor (D_k u_k + heard_k) + error D_k)``.
+
+        Since ``heard_k <= (D_k - b) u_k``, of any weights. Where these are uncertain, the largest are taken.
+        """
+        followers = rows.followers
+        (most, unit), (degrees, _) = rows.largest, followers.degrees
         y = initial * gain_above(self.messages.gain, self.gain_cap, b, cap)
-        each = self.gain_cap * floor
-        factors = [2 * y + each, y * b * graph.unit, each, self.gain_cap * error * rows.scale]
-        factors = [x * self.scale / (rows.scale * graph.unit) for x in factors]
+        each, error = self.gain_cap * floor, self.gain_cap * self.messages.wrong
+        factors = [x * self.scale / (rows.scale * unit) for x in (2 * y, y * b * unit, each, error * rows.scale)]
         bits = longest(n for x in factors for n in x.as_integer_ratio())
-        long = longest(rows.u) + longest(rows.heard) + graph.bits
+        long = longest(rows.u) + longest(most)
         spend(8 * len(rows.u), 4 * bits, long + longest(self.values), "inputs of followers")
         common = 1
         for x in factors:
             common *= x.denominator
-        own, less, heard, wrong = (int(x * common) for x in factors)
-        for v, u, D, h in zip(rows.followers.nodes, rows.u, rows.followers.degrees, rows.heard, strict=True):
-            if common * self.values[v] >= D * u * own - u * less + h * heard + D * wrong:
+        twice, less, steady, wrong = (int(x * common) for x in factors)
+        for v, u, D, total in zip(followers.nodes, rows.u, degrees, most, strict=True):
+            if common * self.values[v] >= D * u * twice - u * less + total * steady + D * wrong:
                 self.met[v] = 1
-        for group in rows.followers.structure.closed:  # leaders that rest
-            for v in group:
-                self.met[v] = 1
+        for v in followers.others:  # leaders that rest
+            self.met[v] = 1
 
-    def by_settling(self, followers: Container[int], u: Numbers, b: Fraction, cap: Fraction) -> None:
+    def by_settling(self, graph: Digraph, followers: Container[int], u: Numbers, b: Fraction, cap: Fraction) -> None:
         """Mark what is at least ``(2 D_k - b) u_k y`` of followers, ``(D_l u_l + heard_l) y`` of leaders."""
-        graph, y = self.graph, gain_above(self.messages.gain, self.gain_cap, b, cap)
+        y = gain_above(self.messages.gain, self.gain_cap, b, cap)
         values, scale = u.over(range(graph.n))
         heard, bits = graph.sums_in(values), longest(n for x in (y, b) for n in x.as_integer_ratio())
         spend(8 * graph.n, 4 * bits, longest(values) + graph.bits + longest(self.values), "inputs of agents")
@@ -113,5 +114,5 @@ class Inputs:
         doc.at = "messages.input"
         doc.open("late-input", "messages.input")
         low = self.met.find(0)
-        need(low < 0, f"the input of agent {shorten(self.graph.labels[max(low, 0)])} is not proved")
+        need(low < 0, f"the input of agent {shorten(self.labels[max(low, 0)])} is not proved")
         doc.done(f"at most {up(Fraction(max(self.values), self.scale))}")

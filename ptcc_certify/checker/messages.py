@@ -9,11 +9,12 @@ from itertools import pairwise
 
 from lmi.exact.decimal_rounding import down, up
 from lmi.exact.elementary_enclosures import log
-from lmi.exact.numbers import longest, shorten
+from lmi.exact.numbers import longest
 from lmi.exact.work import spend
 from ptcc_certify.checker import input_formulas as formulas
 from ptcc_certify.checker.delay_lmi import LateLMI, check_delay_lmi
-from ptcc_certify.checker.follower_rows import Followers, Rows, followers_of
+from ptcc_certify.checker.digraph import Digraph
+from ptcc_certify.checker.family import Family
 from ptcc_certify.checker.graph import MANY_EDGES
 from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.late_drift import drift_above
@@ -23,15 +24,18 @@ from ptcc_certify.checker.late_messages import Delays, Messages, Moving, read_me
 from ptcc_certify.checker.late_steps import FIXED, Steps, clock_below
 from ptcc_certify.checker.missed_deadline import MissedDeadline, check_missed, check_staged
 from ptcc_certify.checker.proof_cursor import Document
+from ptcc_certify.checker.protocol import Begin, Protocol
 from ptcc_certify.checker.reading import length, need
+from ptcc_certify.checker.rows import Followers, Rows, followers_of
 from ptcc_certify.checker.sections import Agents, ByFollower, FollowerNumbers, Positive, Several
 from ptcc_certify.checker.settling_leaders import SettlingSection, check_settling
 from ptcc_certify.checker.side_files import Numbers
 
 #: Witnesses of rows, and instants of steps, that are read.
 MANY_ROWS, MANY_INSTANTS = 100, 2001
-#: What is not proved where leaders move.
+#: What is not proved where leaders move, and what of families.
 AT_REST = ("missed", "staged", "settling", "form", "lmi")
+OF_ONE_GRAPH = ("steps", *AT_REST)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,17 +103,16 @@ class Residual:
                 self.met[k] = 1
 
 
-def check_messages(doc: Document, verified: Verified) -> None:
+def check_messages(doc: Document, of: Verified | Family, protocol: Protocol, begin: Begin) -> None:
     """Verify everything that is said of late messages, if there is something."""
     if "messages" not in doc.data:
         return
-    section, graph = doc.section("messages"), verified.structure.graph
+    section = doc.section("messages")
     need("leaders" not in doc.data, "leaders that move beside late messages stand under messages")
-    sigma = verified.begin.sigma
-    need(sigma is None or not any(sigma.values), "late messages while sliding variables move")
-    messages = read_messages(verified.gain, section)
+    need(begin.sigma is None or not any(begin.sigma.values), "late messages while sliding variables move")
+    messages = read_messages(protocol.gain, section)
     if messages.leaders is not None:
-        need(not verified.protocol.sliding, "leaders that move under the sliding-mode protocol")
+        need(not protocol.sliding, "leaders that move under the sliding-mode protocol")
         need(all(getattr(section, key) is None for key in AT_REST), f"one of {', '.join(AT_REST)} though leaders move")
     need(len(section.rows) <= MANY_ROWS, f"more than {MANY_ROWS} witnesses of rows")
     bounded = bool(section.rows) or section.steps is not None
@@ -117,53 +120,58 @@ def check_messages(doc: Document, verified: Verified) -> None:
     stated = by_rows or any(x is not None for x in (section.settling, section.form, section.lmi))
     need(stated, "nothing is stated of late messages")
     need(bounded == (section.residual is not None), "a residual is stated iff rows or steps bound it")
-    inputs = None if section.input is None else Inputs(doc, graph, messages, section.input)
+    inputs = None if section.input is None else Inputs(doc, messages, section.input)
+    if isinstance(of, Family):
+        need(
+            all(getattr(section, key) is None for key in OF_ONE_GRAPH), f"one of {', '.join(OF_ONE_GRAPH)} of a family"
+        )
     if by_rows:
         need(not messages.late, "rows, steps, missed or staged of a late own state")
-        followers = followers_of(doc, verified.structure, verified.begin)
-        _check_followers(doc, messages, verified, followers, section, inputs)
+        structure = None if isinstance(of, Family) else of.structure
+        followers = followers_of(doc, of if isinstance(of, Family) else of.structure, begin)
+        residual = None if section.residual is None else _residual(doc, followers, section.residual)
+        parts = messages.parts()
+        for k, entry in enumerate(section.rows):
+            _check_rows(doc, messages, followers, parts, entry, f"messages.rows[{k}]", residual, inputs)
+        if structure is not None and section.steps is not None:
+            _check_steps(doc, messages, followers, structure.graph, parts, section.steps.instants, residual)
+        if residual is not None:
+            _close_residual(doc, followers, residual)
+        if structure is not None and section.missed is not None:
+            check_missed(doc, messages, structure, begin, section.missed)
+        if structure is not None and section.staged is not None:
+            check_staged(doc, messages, structure, section.staged)
+    if isinstance(of, Verified):
+        _check_whole_graph(doc, messages, of, section, inputs)
+    if inputs is not None:
+        inputs.close(doc)
+
+
+def _check_whole_graph(
+    doc: Document, messages: Messages, verified: Verified, section: MessagesSection, inputs: Inputs | None
+) -> None:
+    """Verify what is said of all agents of one graph, leaders in groups among them."""
     if section.settling is not None:
         check_settling(doc, messages, verified, section.settling, inputs)
     if section.form is not None:
         check_form(doc, messages, verified, section.form, inputs)
     if section.lmi is not None:
         check_delay_lmi(doc, messages, verified, section.lmi, inputs)
-    if inputs is not None:
-        inputs.close(doc)
-
-
-def _check_followers(
-    doc: Document,
-    messages: Messages,
-    verified: Verified,
-    followers: Followers,
-    section: MessagesSection,
-    inputs: Inputs | None,
-) -> None:
-    """Verify what is said of the followers of leaders that rest."""
-    residual = None if section.residual is None else _residual(doc, followers, section.residual)
-    parts = messages.parts()
-    for k, entry in enumerate(section.rows):
-        _check_rows(doc, messages, followers, parts, entry, f"messages.rows[{k}]", residual, inputs)
-    if section.steps is not None:
-        _check_steps(doc, messages, followers, parts, section.steps.instants, residual)
-    if residual is not None:
-        doc.open("late-residual", "messages.residual")
-        low = residual.met.find(0)
-        label = followers.structure.graph.labels[followers.nodes[max(low, 0)]]
-        need(low < 0, f"the residual of agent {shorten(label)} is not proved")
-        doc.done(f"at most {up(Fraction(max(residual.values), residual.scale))}")
-    if section.missed is not None:
-        check_missed(doc, messages, followers, verified.begin, section.missed)
-    if section.staged is not None:
-        check_staged(doc, messages, followers, section.staged)
 
 
 def _residual(doc: Document, followers: Followers, values: Numbers) -> Residual:
     """Return bounds by agent; leaders rest."""
-    doc.at, structure = "messages.residual", followers.structure
-    need(all(values.values[v] == 0 for group in structure.closed for v in group), "a residual of a leader that rests")
+    doc.at = "messages.residual"
+    need(all(values.values[v] == 0 for v in followers.others), "a residual of a leader that rests")
     return Residual(Numbers([values.values[v] for v in followers.nodes], values.scale))
+
+
+def _close_residual(doc: Document, followers: Followers, residual: Residual) -> None:
+    """Verify that a bound meets what is stated of every follower."""
+    doc.open("late-residual", "messages.residual")
+    low = residual.met.find(0)
+    need(low < 0, f"the residual of agent {followers.label(max(low, 0))} is not proved")
+    doc.done(f"at most {up(Fraction(max(residual.values), residual.scale))}")
 
 
 def _check_rows(
@@ -226,6 +234,7 @@ def _check_steps(
     doc: Document,
     messages: Messages,
     followers: Followers,
+    graph: Digraph,
     parts: Sequence[int],
     instants: Sequence[Fraction],
     residual: Residual | None,
@@ -248,10 +257,10 @@ def _check_steps(
     followers.starts_within(values, scale)
     followers.never_grows(values, error, push)
     ways = [clock_below(gain, messages.gain_cap, a, b) for a, b in pairwise(instants)]
-    kind, graph = Steps, followers.structure.graph
+    kind, degrees = Steps, [graph.diagonal[v] for v in followers.nodes]
     if doc.exact.numpy and graph.n_edges >= MANY_EDGES:
         from ptcc_certify.checker.array_steps import ArraySteps as kind  # noqa: N813
-    steps = kind(graph, followers.nodes, followers.degrees, values, error, parts, push)
+    steps = kind(graph, followers.nodes, degrees, values, error, parts, push)
     bounds = steps.run(instants, messages.delay, ways, gains)
     if residual is not None:
         residual.meet(bounds, Fraction(steps.largest, scale << FIXED))

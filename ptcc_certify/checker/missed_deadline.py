@@ -10,14 +10,14 @@ from lmi.exact.decimal_rounding import down
 from lmi.exact.elementary_enclosures import exp, log
 from lmi.exact.numbers import shorten
 from lmi.exact.work import spend
-from ptcc_certify.checker.digraph import edges_of
-from ptcc_certify.checker.follower_rows import Followers
+from ptcc_certify.checker.digraph import Digraph, edges_of
 from ptcc_certify.checker.input_formulas import BITS
 from ptcc_certify.checker.late_messages import Messages
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.protocol import Begin
 from ptcc_certify.checker.reading import length, need
 from ptcc_certify.checker.sections import FollowerIntegers, Node, Positive
+from ptcc_certify.checker.structure import Structure
 
 #: Products of short integers that an exponential and a logarithm cost, about.
 EACH_EXPONENTIAL = 1000
@@ -39,13 +39,13 @@ class Signs:
 
 
 def check_missed(
-    doc: Document, messages: Messages, followers: Followers, begin: Begin, section: MissedDeadline
+    doc: Document, messages: Messages, structure: Structure, begin: Begin, section: MissedDeadline
 ) -> None:
     """Verify that an agent is away from its final state at the deadline, by the signs of those that it hears of."""
     doc.at = "messages.missed"
-    graph, nodes = followers.structure.graph, followers.nodes
+    graph, nodes = structure.graph, structure.followers
     agent, bound = section.agent, section.bound
-    need(followers.structure.number[agent] < 0, "a leader does not miss its final state")
+    need(structure.number[agent] < 0, "a leader does not miss its final state")
     ideal = not messages.late and messages.value_error == 0 and messages.gain_cap is None
     need(ideal, "missed of a capped gain, of values that are off, or of a late own state")
     final = doc.sections["final_state"]
@@ -70,13 +70,13 @@ def check_missed(
             need(fits, f"agent {shorten(graph.labels[v])} starts on the other side of its final state")
     heard = {s for s in edges_of(graph.into, agent)[0] if s in gauge}
     away = {s: max(abs(state[s] - mid[s]) - radius[s], Fraction(0)) for s in heard}
-    need(bound <= _left_below(messages, followers, agent, away), "the bound is not proved")
+    need(bound <= _left_below(messages, graph, agent, away), "the bound is not proved")
     doc.done(f"agent {shorten(graph.labels[agent])} is away by {down(bound)} at least")
 
 
-def _left_below(messages: Messages, followers: Followers, agent: int, away: dict[int, Fraction]) -> Fraction:
+def _left_below(messages: Messages, graph: Digraph, agent: int, away: dict[int, Fraction]) -> Fraction:
     """Bound ``sum_l (|w_kl|/D_k) e^(-D_l s(T - tau_kl)) e_l`` from below, over the followers that an agent hears."""
-    graph, gain, total = followers.structure.graph, messages.gain, Fraction(0)
+    gain, total = messages.gain, Fraction(0)
     first, (sources, which) = graph.into[0][agent], edges_of(graph.into, agent)
     edges = enumerate(zip(sources, which, strict=True), start=first)
     heard = [(messages.latency_of(e), s, k) for e, (s, k) in edges if s in away]
@@ -92,14 +92,14 @@ def _left_below(messages: Messages, followers: Followers, agent: int, away: dict
     return total
 
 
-def check_staged(doc: Document, messages: Messages, followers: Followers, section: Sequence[Fraction]) -> None:
+def check_staged(doc: Document, messages: Messages, structure: Structure, section: Sequence[Fraction]) -> None:
     """Verify deadlines of their own, each the delay after those of all that are heard."""
     doc.at = "messages.staged"
-    graph, nodes = followers.structure.graph, followers.nodes
+    graph, nodes = structure.graph, structure.followers
     ideal = not messages.late and messages.value_error == 0 and messages.gain_cap is None
     need(ideal, "staged of a capped gain, of values that are off, or of a late own state")
     doc.open("late-staged", "messages.staged")
-    levels = _levels(followers)
+    levels = _levels(structure)
     last = max(levels)
     due = [messages.gain.T - (last - level) * messages.delay for level in range(last + 1)]
     need(due[1] > 0, "information from the leaders has not arrived by the deadline")
@@ -108,13 +108,13 @@ def check_staged(doc: Document, messages: Messages, followers: Followers, sectio
     doc.done(f"{last} levels, the first at {down(due[1])}")
 
 
-def _levels(followers: Followers) -> Sequence[int]:
+def _levels(structure: Structure) -> Sequence[int]:
     """Return the number of edges of the longest path from a leader to every follower; there are no cycles."""
-    graph, waiting = followers.structure.graph, dict[int, int]()
+    graph, waiting = structure.graph, dict[int, int]()
     spend(4 * graph.n_edges + graph.n, what="levels of followers")
-    for v in followers.nodes:
-        waiting[v] = sum(followers.structure.number[s] < 0 for s in edges_of(graph.into, v)[0])
-    level = dict.fromkeys(followers.nodes, 1)
+    for v in structure.followers:
+        waiting[v] = sum(structure.number[s] < 0 for s in edges_of(graph.into, v)[0])
+    level = dict.fromkeys(structure.followers, 1)
     todo = [v for v, count in waiting.items() if not count]
     for v in todo:
         for t in edges_of(graph.out, v)[0]:

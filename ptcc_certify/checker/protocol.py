@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from typing import Literal
 
 from lmi.exact.elementary_enclosures import decay_integrals_below
 from lmi.exact.numbers import shorten
 from lmi.exact.work import spend
 from ptcc_certify.checker.digraph import Digraph
+from ptcc_certify.checker.input_formulas import PrescribedGain
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import RejectedError, need
 from ptcc_certify.checker.sections import ByAgent, FewAgents, NotNegative, Positive
@@ -30,6 +32,12 @@ class Protocol:
 
     sliding: bool
     gains: dict[str, Fraction]
+
+    @cached_property
+    def gain(self) -> PrescribedGain:
+        """The gain of the nominal part of the input."""
+        g = self.gains
+        return PrescribedGain(g["T_r"] + g["T_s"] if self.sliding else g["T"], g["rho1"], g["rho2"] * g["kappa"])
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
 from lmi.exact.decimal_rounding import down
 from lmi.exact.elementary_enclosures import log
-from lmi.exact.numbers import longest, shorten
+from lmi.exact.numbers import shorten
 from lmi.exact.work import spend
 from ptcc_certify.checker import input_formulas as formulas
 from ptcc_certify.checker.digraph import edges_of
-from ptcc_certify.checker.follower_rows import Followers, away_of, heard_later
 from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.late_form import Constants, function_of, initial_value
 from ptcc_certify.checker.late_input import Inputs
 from ptcc_certify.checker.late_messages import Messages
 from ptcc_certify.checker.proof_cursor import Document
 from ptcc_certify.checker.reading import length, need
+from ptcc_certify.checker.rows import away_of
 from ptcc_certify.checker.sections import FewAgents, Positive
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.checker.structure import Structure
@@ -67,9 +66,14 @@ def check_settling(
     need(0 <= clock <= formulas.Limits(limit).clock_below(gain), "the clock does not come so far")
     need(left >= formulas.decay_above(b * clock), "left is not proved")
     _above_leaders(verified, known, u)
-    _decays(structure, u, away_of(doc, structure, verified.begin), q, b, messages.parts())
+    followers = away_of(doc, structure, verified.begin)
+    values, scale = u.over(range(structure.graph.n))
+    own = [values[v] for v in followers.nodes]
+    need(min(own) > 0, "u of a follower is not positive")
+    followers.starts_within(own, scale)
+    followers.need_decay(values, q, b, messages.parts())
     if inputs is not None:
-        inputs.by_settling(set(structure.followers), u, b, cap)
+        inputs.by_settling(structure.graph, set(structure.followers), u, b, cap)
     doc.done(f"b = {down(b)}, q = {down(q)}")
 
 
@@ -94,20 +98,3 @@ def _above_leaders(verified: Verified, known: Constants, u: Numbers) -> None:
         for v in group:
             least = formulas.root_above(known.deviations[v]) * root if len(group) > 1 else Fraction(0)
             need(u[v] >= least, f"u of agent {shorten(structure.graph.labels[v])} is too small")
-
-
-def _decays(
-    structure: Structure, u: Numbers, followers: Followers, q: Fraction, b: Fraction, parts: Sequence[int]
-) -> None:
-    """Verify ``u_k >= |x_k(0) - x*_k|``, and ``D_k u_k - sum_l q^(part_kl/64) |w_kl| u_l >= b u_k``, for followers."""
-    graph = structure.graph
-    values, scale = u.over(range(graph.n))
-    own = [values[v] for v in followers.nodes]
-    need(min(own) > 0, "u of a follower is not positive")
-    followers.starts_within(own, scale)
-    heard, common = heard_later(graph, values, q, parts)
-    spend(6 * len(own), graph.bits + longest(b.as_integer_ratio()), longest(heard), "rows of followers")
-    first, third = common * b.denominator, b.numerator * common * graph.unit
-    rows = zip(own, followers.degrees, (heard[v] for v in followers.nodes), strict=True)
-    low = next((k for k, (x, D, h) in enumerate(rows) if (first * D - third) * x < b.denominator * h), None)
-    need(low is None, f"the row of agent {followers.label(low or 0)} does not decay so fast")

@@ -1,0 +1,333 @@
+"""Rows of followers in integers: what a positive vector proves of all members of a mode, whatever their weights.
+
+Followers ``F`` hear each other and agents that are none. In a row
+
+    sum_l |w_kl| (own_k - heard_l),        heard_l = 0 of agents outside, where nothing else is told,
+
+every weight has a factor that depends on no weight, so that it is least at ``w+`` where the factor is negative, at
+``w-`` elsewhere. A graph is a mode whose weights are known. Where ages differ from edge to edge an edge has a power of
+``q``, as what is heard over it is younger.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+from lmi.exact.elementary_enclosures import exp, log, rounded
+from lmi.exact.numbers import common_denominator, integers, longest, shorten, sized
+from lmi.exact.work import spend
+from ptcc_certify.checker.digraph import Digraph
+from ptcc_certify.checker.family import Edge, Family
+from ptcc_certify.checker.input_formulas import BITS
+from ptcc_certify.checker.late_messages import PARTS
+from ptcc_certify.checker.proof_cursor import Document
+from ptcc_certify.checker.protocol import Begin
+from ptcc_certify.checker.reading import need
+from ptcc_certify.checker.side_files import Numbers
+from ptcc_certify.checker.structure import Structure
+
+#: Factors of ages: by edge the part of the largest age, and what each part multiplies; None where all ages are one.
+ByAge = tuple[Sequence[int], Mapping[int, int]] | None
+
+
+@dataclass(frozen=True, eq=False)
+class KnownWeights:
+    """The edges of a graph."""
+
+    graph: Digraph
+
+    @property
+    def unit(self) -> int:
+        """What divides the weights."""
+        return self.graph.unit
+
+    @property
+    def bits(self) -> int:
+        """Bits of the longest row."""
+        return self.graph.bits
+
+    def least(self, own: Sequence[int], heard: Sequence[int], ages: ByAge = None) -> Sequence[int]:
+        """Return the rows of all agents, times the unit."""
+        sums = self.graph.sums_in(heard) if ages is None else self.graph.sums_by_part(heard, *ages)
+        return [D * y - h for D, y, h in zip(self.graph.diagonal, own, sums, strict=True)]
+
+    def most(self, own: Sequence[int], heard: Sequence[int]) -> Sequence[int]:
+        """Return ``sum_l |w_kl| (own_k + heard_l)`` of all agents, times the unit."""
+        return [D * y + h for D, y, h in zip(self.graph.diagonal, own, self.graph.sums_in(heard), strict=True)]
+
+
+@dataclass(frozen=True, eq=False)
+class WeightsBetween:
+    """Edges whose weights lie between two ends each, times a unit.
+
+    Examples
+    --------
+    >>> rows = WeightsBetween([(0, 1, 1, 2, 3), (1, 2, -1, 1, 5)], 1)
+    >>> rows.least([0, 4, 1], [0, 4, 1]), rows.most([0, 4, 1], [0, 4, 1])
+    ([0, 8, -15], [0, 12, 25])
+    """
+
+    edges: Sequence[Edge]
+    unit: int
+
+    @cached_property
+    def bits(self) -> int:
+        """Bits of the longest row."""
+        return longest(edge[4] for edge in self.edges) + len(self.edges).bit_length()
+
+    def least(self, own: Any, heard: Any, ages: ByAge = None) -> Any:
+        """Return the least rows, times the unit; ``own`` and the rows are lists, or dicts by agent."""
+        need(ages is None, "ages of their own where weights are uncertain")
+        rows = self._none(own, heard)
+        for s, t, _, low, high in self.edges:
+            factor = own[t] - heard[s]
+            rows[t] += (high if factor < 0 else low) * factor
+        return rows
+
+    def most(self, own: Any, heard: Any) -> Any:
+        """Return the largest ``sum_l |w_kl| (own_k + heard_l)``, of values that are not negative, times the unit."""
+        rows = self._none(own, heard)
+        for s, t, _, _, high in self.edges:
+            rows[t] += high * (own[t] + heard[s])
+        return rows
+
+    def _none(self, own: Any, heard: Any) -> Any:
+        """Return rows that are 0, and count what they cost."""
+        bits = max(longest(x.values() if isinstance(x, Mapping) else x) for x in (own, heard))
+        spend(4 * (len(self.edges) + len(own)), self.bits, bits, "rows of followers")
+        sized(2 * len(own), self.bits + bits + 64, "rows of followers")
+        return dict.fromkeys(own, 0) if isinstance(own, Mapping) else [0] * len(own)
+
+
+@dataclass(frozen=True, eq=False)
+class Followers:
+    """Agents that hear others, in every mode.
+
+    Attributes
+    ----------
+    labels : sequence of str
+        Of all agents.
+    nodes : sequence of int
+        The followers, ascending.
+    modes : sequence of KnownWeights or WeightsBetween
+        The edges of every mode, of all agents.
+    away : Numbers
+        By follower, what ``|x_k(0) - x*_k|`` is at most.
+    """
+
+    labels: Sequence[str]
+    nodes: Sequence[int]
+    modes: Sequence[KnownWeights | WeightsBetween]
+    away: Numbers
+
+    @cached_property
+    def others(self) -> list[int]:
+        """The agents that are no followers."""
+        inside = set(self.nodes)
+        return [v for v in range(len(self.labels)) if v not in inside]
+
+    @cached_property
+    def bits(self) -> int:
+        """Bits of the longest row."""
+        return max(mode.bits for mode in self.modes)
+
+    def whole(self, values: Sequence[int]) -> list[int]:
+        """Return values of all agents, 0 of those that are no followers."""
+        whole = [0] * len(self.labels)
+        for v, x in zip(self.nodes, values, strict=True):
+            whole[v] = x
+        return whole
+
+    def label(self, k: int) -> str:
+        """Return the label of follower ``k``, for a message."""
+        return shorten(self.labels[self.nodes[k]])
+
+    @cached_property
+    def degrees(self) -> tuple[list[int], int]:
+        """``D_k`` of every follower at most, times the unit of :meth:`largest`; and this."""
+        most, unit = self.largest([1] * len(self.nodes), heard=0)
+        return most, unit
+
+    def need_rows(
+        self,
+        own: Sequence[int],
+        heard: Sequence[int],
+        least: Sequence[int],
+        why: str,
+        times: int = 1,
+        ages: ByAge = None,
+    ) -> None:
+        """Verify that ``times`` the rows of the followers are at least these numbers, in every mode.
+
+        Parameters
+        ----------
+        own, heard : sequence of N int
+        least : sequence of F int
+            By follower.
+        why : str
+            What is the matter otherwise; ``{}`` is a follower.
+        times : int
+        ages : ByAge
+        """
+        for mode in self.modes:
+            rows, unit = mode.least(own, heard, ages), mode.unit
+            bits = longest(heard) + mode.bits, longest((times, unit)) + longest(least)
+            spend(3 * len(least), *bits, "rows of followers")
+            pairs = enumerate(zip(self.nodes, least, strict=True))
+            low = next((k for k, (v, x) in pairs if times * rows[v] < unit * x), None)
+            need(low is None, why.format(self.label(low or 0)))
+
+    def largest(self, values: Sequence[int], heard: int = 1) -> tuple[list[int], int]:
+        """Bound ``sum_l |w_kl| (u_k + heard u_l)`` of every follower over all members, times a unit; and this."""
+        unit = common_denominator({mode.unit for mode in self.modes}, len(self.nodes), "the weights")
+        most, whole = [0] * len(self.nodes), self.whole(values)
+        for mode in self.modes:
+            rows, factor = mode.most(whole, [heard * x for x in whole]), unit // mode.unit
+            spend(2 * len(most), mode.bits + longest(values), factor.bit_length(), "rows of followers")
+            most = [max(x, factor * rows[v]) for x, v in zip(most, self.nodes, strict=True)]
+        return most, unit
+
+    def need_decay(self, u: Sequence[int], q: Fraction, b: Fraction, parts: Sequence[int]) -> None:
+        """Verify ``sum_l |w_kl| (u_k - q^(part_kl/64) u_l) >= b u_k``, ``u`` of all agents; parts as ages have them."""
+        need(b > 0, "b is not positive")
+        ages, factor, common = None, q.numerator, q.denominator
+        if len(parts) > 1:
+            factors, common = powers(q, parts)
+            ages, factor = (parts, factors), 1
+        own, heard = ([times * x for x in u] for times in (common, factor))
+        least = [b.numerator * common * u[v] for v in self.nodes]
+        self.need_rows(own, heard, least, "the row of agent {} does not decay so fast", b.denominator, ages)
+
+    def starts_within(self, values: Sequence[int], scale: int, initial: Fraction = Fraction(1)) -> None:
+        """Verify ``initial u_k >= |x_k(0) - x*_k|``, ``u`` in integers over a scale."""
+        away, common = self.away.over(range(len(values)))
+        p, q = initial.numerator * common, initial.denominator * scale
+        spend(2 * len(values), longest((p, q)), longest(values) + longest(away), "rows of followers")
+        low = next((k for k, (u, x) in enumerate(zip(values, away, strict=True)) if p * u < q * x), None)
+        need(low is None, f"agent {self.label(low or 0)} starts farther from its final state")
+
+    def never_grows(self, values: Sequence[int], value_error: Fraction, push: Fraction = Fraction(0)) -> None:
+        """Verify ``sum_l |w_kl| (y_k - y_l - value_error) >= push``; all over one scale."""
+        scale = math.lcm(value_error.denominator, push.denominator)
+        heard, error = self.whole([scale * y for y in values]), int(value_error * scale)
+        own = self.whole([scale * y - error for y in values])
+        self.need_rows(own, heard, [int(push * scale)] * len(values), "the start of agent {} may grow")
+
+
+class Rows:
+    """``u > 0`` of followers that decay: ``sum_l |w_kl| (u_k - q u_l) >= b u_k``, ``u_l = 0`` of others.
+
+    Parameters
+    ----------
+    followers : Followers
+    u : Numbers
+        By follower.
+
+    Raises
+    ------
+    RejectedError
+        ``u`` is not positive.
+    """
+
+    def __init__(self, followers: Followers, u: Numbers):
+        need(u.positive(), "u is not positive")
+        self.followers = followers
+        self.u, self.scale = u.over(range(len(u)))
+        self.whole = followers.whole(self.u)
+
+    @property
+    def least(self) -> Fraction:
+        """The least ``u_k``."""
+        return Fraction(min(self.u), self.scale)
+
+    def decay(self, q: Fraction, b: Fraction, parts: Sequence[int] = (PARTS,)) -> None:
+        """Verify ``sum_l |w_kl| (u_k - q^(part_kl/64) u_l) >= b u_k``, with parts by edge, or one for all."""
+        self.followers.need_decay(self.whole, q, b, parts)
+
+    def above_initial(self, initial: Fraction) -> None:
+        """Verify ``initial u_k >= |x_k(0) - x*_k|``."""
+        need(initial >= 0, "initial is negative")
+        self.followers.starts_within(self.u, self.scale, initial)
+
+    def above_floor(self, floor: Fraction, value_error: Fraction) -> None:
+        """Verify ``sum_l |w_kl| (floor (u_k - u_l) - value_error) >= 0``."""
+        need(floor >= 0, "floor is negative")
+        times = floor.numerator * value_error.denominator
+        error = floor.denominator * value_error.numerator * self.scale
+        heard = [times * x for x in self.whole]
+        own = self.followers.whole([times * x - error for x in self.u])
+        why = "what is heard wrong drives agent {} farther"
+        self.followers.need_rows(own, heard, [0] * len(self.u), why)
+
+    def above_push(self, floor: Fraction, push: Fraction) -> None:
+        """Verify ``floor sum_l |w_kl| (u_k - u_l) >= push``."""
+        need(floor >= 0, "what pushes followers is negative")
+        least = [floor.denominator * push.numerator * self.scale] * len(self.u)
+        times = floor.numerator * push.denominator
+        self.followers.need_rows(self.whole, self.whole, least, "agent {} is pushed farther", times)
+
+    @cached_property
+    def largest(self) -> tuple[list[int], int]:
+        """``sum_l |w_kl| (u_k + u_l)`` of every follower at most, times the scale of ``u`` and a unit; and this."""
+        return self.followers.largest(self.u)
+
+
+def powers(q: Fraction, parts: Sequence[int]) -> tuple[dict[int, int], int]:
+    """Bound ``q^(part/64)`` from above for every part, over a common denominator."""
+    log_q = log(q)[1]
+    power = {part: rounded(exp(log_q * Fraction(part, PARTS))[1], BITS, up=True) for part in set(parts)}
+    power |= {0: Fraction(1), PARTS: q}
+    common = math.lcm(*(x.denominator for x in power.values()))
+    return {part: x.numerator * (common // x.denominator) for part, x in power.items()}, common
+
+
+def followers_of(doc: Document, of: Structure | Family, begin: Begin) -> Followers:
+    """Return the followers of leaders that are single nodes, with bounds of ``|x_k(0) - x*_k|``; 1 without a state."""
+    if isinstance(of, Family):
+        return _followers_in_family(of, begin)
+    need(all(len(group) == 1 for group in of.closed), "leaders in a group of two or more, which do not rest")
+    return away_of(doc, of, begin)
+
+
+def away_of(doc: Document, structure: Structure, begin: Begin) -> Followers:
+    """Return the followers, with bounds of ``|x_k(0) - x*_k|``; 1 without a state."""
+    nodes, final, graph = structure.followers, doc.sections["final_state"], structure.graph
+    need(bool(nodes), "no follower")
+    away = Numbers([1] * len(nodes), 1)
+    if final is not None and begin.state is not None:
+        parts = [numbers.over(nodes) for numbers in (begin.state, *final)]
+        scale = math.lcm(*(own for _, own in parts))
+        sized(3 * len(nodes), scale.bit_length() + max(longest(values) for values, _ in parts), "the initial state")
+        x, mid, radius = ([value * (scale // own) for value in values] for values, own in parts)
+        away = Numbers([abs(a - m) + r for a, m, r in zip(x, mid, radius, strict=True)], scale)
+    return Followers(graph.labels, nodes, [KnownWeights(graph)], away)
+
+
+def _followers_in_family(family: Family, begin: Begin) -> Followers:
+    """Return the agents that hear others in some mode, if all others are the leaders of a common kernel.
+
+    Then ``x*_k`` is the same combination of the leaders in every member: ``away`` is ``|x_k(0) - x*_k|`` exactly, or 1
+    without a state.
+    """
+    edges = [edge for mode in family.modes for edge in mode.edges]
+    spend(2 * len(edges), what="rows of followers")
+    hearing = {edge[1] for edge in edges}
+    need(bool(hearing), "no follower")
+    away: dict[int, Fraction] = {}
+    for component in family.components:
+        need(not component.depends, "followers whose targets depend on the signal")
+        single = hearing.isdisjoint(component.pivots.values())
+        need(single, "leaders in a group of two or more, which do not rest")
+        nodes = [v for v in component.nodes if v in hearing]
+        if begin.state is not None and nodes:
+            xi, scale = component.coordinates(nodes, list(begin.state))
+            away |= {v: Fraction(abs(x), scale) for v, x in zip(nodes, xi, strict=True)}
+    nodes = sorted(hearing)
+    (values,), scale = integers([[away.get(v, Fraction(1)) for v in nodes]])
+    modes = [WeightsBetween(mode.edges, mode.unit) for mode in family.modes]
+    return Followers(family.labels, nodes, modes, Numbers(values, scale))
