@@ -19,6 +19,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -48,8 +49,9 @@ from ptcc_certify.checker.sections import RowVector, declared
 from ptcc_certify.checker.settling_leaders import SettlingSection, SettlingWitness
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness
+from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness, UncertainRows, listeners
 from ptcc_certify.protocols.base import Protocol
 from ptcc_certify.protocols.gain_limits import GainLimits
 from ptcc_certify.protocols.late_messages import LateMessages
@@ -109,7 +111,7 @@ class LateBounds:
     Attributes
     ----------
     messages : LateMessages
-    structure : Structure
+    structure : Structure or Family
     gain : LimitedGain
         The gain that acts.
     relative : bool
@@ -141,7 +143,7 @@ class LateBounds:
     """
 
     messages: LateMessages
-    structure: Structure
+    structure: Structure | Family
     gain: LimitedGain
     relative: bool
     rows: tuple[RowBound, ...] = ()
@@ -157,6 +159,16 @@ class LateBounds:
     enough: Fraction | None = None
     settling: Settling | None = None
     leaders: MovingLeaders | None = None
+
+    @cached_property
+    def followers(self) -> np.ndarray:
+        """The agents that are bounded, ascending."""
+        return self.structure.followers if isinstance(self.structure, Structure) else listeners(self.structure)
+
+    @property
+    def labels(self) -> Sequence[str]:
+        """Of all agents."""
+        return self.structure.graph.labels if isinstance(self.structure, Structure) else self.structure.labels
 
     @property
     def says_something(self) -> bool:
@@ -196,6 +208,7 @@ class LateBounds:
             more = (self.leaders.total / (row.witness.b * row.cap) for row in self.rows if row.cap is not None)
             found = (x + float(drift) for x, drift in zip(each, more, strict=True))
             return min(found, default=0.0) / _MORE
+        assert isinstance(self.structure, Structure), "steps are of one graph"
         rows, error = late_rows(self.structure, self.messages), float(self.leaders.speed * self.messages.age)
         y = np.zeros(rows.D.size)
         for _ in range(_ITERATIONS):
@@ -210,7 +223,7 @@ class LateBounds:
     def deviation_bound(self, t: Sequence[float] | np.ndarray) -> np.ndarray:
         """Return what bounds ``|x_k - x_k*|`` at instants, ``(F, M)`` floats; infinite where nothing does."""
         t = np.asarray(t, dtype=float)
-        whole = np.full((self.structure.followers.size, len(t)), np.inf)
+        whole = np.full((self.followers.size, len(t)), np.inf)
         for row in self.rows:
             cap = [x for x in (row.cap, self.gain.limits.gain_cap) if x is not None]
             clock = GainLimits(gain_cap=min(cap, default=None)).limit(self.gain.gain).clock(t)
@@ -224,7 +237,7 @@ class LateBounds:
             at = np.searchsorted([float(x) for x in self.steps.instants], t * (1 - 1e-15), side="right") - 1
             whole = np.minimum(whole, self.steps.bounds[np.maximum(at, 0)].T)
         for one in self._of_all:
-            whole = np.minimum(whole, one.deviation_bound(self.gain, t)[self.structure.followers])
+            whole = np.minimum(whole, one.deviation_bound(self.gain, t)[self.followers])
         return whole
 
     def largest_bound(self, t: Sequence[float] | np.ndarray) -> np.ndarray:
@@ -241,7 +254,7 @@ class LateBounds:
 
 
 def bound_late(
-    structure: Structure,
+    structure: Structure | Family,
     protocol: Protocol,
     messages: LateMessages,
     initial_state: Sequence[Fraction] | None = None,
@@ -252,8 +265,8 @@ def bound_late(
 
     Parameters
     ----------
-    structure : Structure
-        All leaders are single nodes.
+    structure : Structure or Family
+        All leaders are single nodes; of a family all bounds are by rows, for every signal.
     protocol : Protocol
         Its ``gain``; under the sliding-mode protocol with ``sigma(0) = 0``.
     messages : LateMessages
@@ -280,25 +293,16 @@ def bound_late(
     >>> bounds.residual.max() < 0.5
     np.True_
     """
-    latencies = messages.latencies(structure.graph)
     gain = GainLimits(gain_cap=messages.gain_cap).limit(protocol.gain)
+    if isinstance(structure, Family):
+        bounds = LateBounds(messages, structure, gain, ends is None, leaders=leaders)
+        return _by_rows(bounds, UncertainRows(structure), initial_state, ends)
+    latencies = messages.latencies(structure.graph)
     if messages.own_delay or any(len(c.nodes) > 1 for c in structure.closed_components):
         return LateBounds(messages, structure, gain, initial_state is None or ends is None, leaders=leaders)
     rows = late_rows(structure, messages)
-    first = np.ones(rows.D.size)
-    if initial_state is not None and ends is not None:
-        first = _away(rows, initial_state, ends)
     bounds = LateBounds(messages, structure, gain, initial_state is None or ends is None, leaders=leaders)
-    found = search_rows(rows, gain, messages, first, leaders)
-    steps = None
-    if messages.age:
-        with suppress(LMIError):
-            error, push = float(heard_wrong(messages, leaders)) * _MORE, float(leaders.total if leaders else 0)
-            steps = search_steps(rows, gain, messages.age, error, first, push * _MORE)
-    each = [row.residual() for row in found]
-    each += [] if steps is None else [steps.bounds[-1] * _MORE + 1e-300]
-    inputs = _least(structure, [] if messages.gain_cap is None else [_inputs(rows, bounds, row) for row in found])
-    bounds = replace(bounds, rows=found, steps=steps, residual=_least(structure, each), input=inputs)
+    bounds = _by_rows(bounds, rows, initial_state, ends)
     if messages.value_error or messages.gain_cap is not None or leaders is not None:
         return bounds
     if initial_state is not None and ends is not None:
@@ -306,6 +310,28 @@ def bound_late(
     staged = stage_deadlines(rows, protocol.T, messages.age)
     unarrived = staged is None and stage_deadlines(rows, protocol.T, Fraction(0)) is not None
     return replace(bounds, staged=staged, unarrived=unarrived)
+
+
+def _by_rows(
+    bounds: LateBounds,
+    rows: FollowerRows,
+    initial_state: Sequence[Fraction] | None,
+    ends: Sequence[tuple[Fraction, Fraction]] | None,
+) -> LateBounds:
+    """Add what is proved row by row, and of one graph from instant to instant."""
+    messages, gain, leaders = bounds.messages, bounds.gain, bounds.leaders
+    first = np.ones(rows.D.size)
+    if initial_state is not None and ends is not None:
+        first = _away(rows, initial_state, ends)
+    found, steps = search_rows(rows, bounds, first), None
+    if messages.age and isinstance(bounds.structure, Structure):
+        with suppress(LMIError):
+            error, push = float(heard_wrong(messages, leaders)) * _MORE, float(leaders.total if leaders else 0)
+            steps = search_steps(rows, gain, messages.age, error, first, push * _MORE)
+    each = [row.residual() for row in found]
+    each += [] if steps is None else [steps.bounds[-1] * _MORE + 1e-300]
+    inputs = _least(rows, [] if messages.gain_cap is None else [_inputs(rows, bounds, row) for row in found])
+    return replace(bounds, rows=found, steps=steps, residual=_least(rows, each), input=inputs)
 
 
 def heard_wrong(messages: LateMessages, leaders: MovingLeaders | None) -> Fraction:
@@ -321,8 +347,8 @@ def _inputs(rows: FollowerRows, bounds: LateBounds, row: RowBound) -> np.ndarray
     if row.after is not None:
         floor += row.after * min(gain.rho1, cap) / min(gain.value(Fraction(1)), cap)
     error = heard_wrong(bounds.messages, bounds.leaders)
-    wrong = float_up(cap * floor) * (rows.D * u + rows.W @ u) + float_up(cap * error) * rows.D
-    return ((2 * rows.D - b * (1 - 1e-15)) * u * y + wrong) * _MORE + 1e-300
+    wrong = float_up(cap * floor) * rows.largest(u) + float_up(cap * error) * rows.weights
+    return ((2 * rows.weights - b * (1 - 1e-15)) * u * y + wrong) * _MORE + 1e-300
 
 
 def _away(
@@ -356,26 +382,21 @@ def late_rows(structure: Structure, messages: LateMessages) -> FollowerRows:
     return FollowerRows(structure, np.array([part[x] / PARTS for x in latencies]))
 
 
-def _least(structure: Structure, bounds: Sequence[np.ndarray]) -> np.ndarray | None:
+def _least(rows: FollowerRows, bounds: Sequence[np.ndarray]) -> np.ndarray | None:
     """Return the least of bounds of followers, for all agents."""
     if not bounds:
         return None
-    whole = np.zeros(structure.graph.n_nodes)
-    whole[structure.followers] = np.minimum.reduce(bounds)
+    whole = np.zeros(rows.n_nodes)
+    whole[rows.followers] = np.minimum.reduce(bounds)
     return whole
 
 
-def search_rows(
-    rows: FollowerRows,
-    gain: LimitedGain,
-    messages: LateMessages,
-    first: np.ndarray,
-    leaders: MovingLeaders | None = None,
-) -> tuple[RowBound, ...]:
+def search_rows(rows: FollowerRows, bounds: LateBounds, first: np.ndarray) -> tuple[RowBound, ...]:
     """Return the row bound that leaves least at ``T`` of those found, under a cap that of the least input, too.
 
     Where leaders move that which leaves least after ``T``, too.
     """
+    gain, messages, leaders = bounds.gain, bounds.messages, bounds.leaders
     candidates: list[RowBound] = []
 
     def offer(q: float, loss: float) -> None:
@@ -406,8 +427,7 @@ def search_rows(
         return ()
     chosen = [min(candidates, key=_largest)]
     if messages.gain_cap is not None:
-        whole = LateBounds(messages, rows.structure, gain, False, leaders=leaders)
-        chosen.append(min(candidates, key=lambda row: float(_inputs(rows, whole, row).max())))
+        chosen.append(min(candidates, key=lambda row: float(_inputs(rows, bounds, row).max())))
     if leaders is not None:
         chosen.append(min(candidates, key=lambda row: float(row.residual(after=True).max())))
     return tuple(dict.fromkeys(chosen))
@@ -459,9 +479,9 @@ def row_bound(
     if caps:
         clock = Limits(min(caps)).clock_below(gain.gain.exact)
         left = left_above(witness.b * clock)
-    floor, error, slack = 0.0, heard_wrong(messages, leaders), rows.D * witness.u - rows.W @ witness.u
+    floor, error, slack = 0.0, heard_wrong(messages, leaders), rows.slack(witness.u)
     if error:
-        floor = max(float((rows.D / slack).max()) * float(error), _LEAST)
+        floor = max(float((rows.weights / slack).max()) * float(error), _LEAST)
     initial = float((first / witness.u).max())
     row = RowBound(witness, cap, clock, left, Fraction(initial * _MORE), Fraction(floor * _MORE))
     if leaders is None:
@@ -497,9 +517,9 @@ def late_obligations(late: LateBounds | None) -> Iterator[Obligation]:
         yield Obligation("late-lmi", "messages.lmi", {"b": lmi.b}, matrix)
 
 
-def delays(messages: LateMessages, graph: SignedDigraph, leaders: MovingLeaders | None = None) -> Delays:
-    """Return how late, how often lost and how inexact messages are, as files have it."""
-    period, latency = messages.period, messages.latencies(graph)
+def delays(messages: LateMessages, graph: SignedDigraph | None, leaders: MovingLeaders | None = None) -> Delays:
+    """Return how late, how often lost and how inexact messages are, as files have it; of a family without a graph."""
+    period, latency = messages.period, messages.largest_delay if graph is None else messages.latencies(graph)
     return Delays(
         latency=latency if isinstance(latency, Fraction) else Numbers(latency),
         packets=None if period is None else Packets(period=period, losses=Fraction(messages.losses)),
@@ -514,10 +534,13 @@ def delays(messages: LateMessages, graph: SignedDigraph, leaders: MovingLeaders 
 def messages_section(late: LateBounds) -> MessagesSection:
     """Return what is proved with late messages, as files have it."""
     proved: dict[str, Any] = {f.name: getattr(late, f.name) for f in declared(MessagesSection) if hasattr(late, f.name)}
-    return MessagesSection(**proved | vars(delays(late.messages, late.structure.graph, late.leaders)))
+    graph = late.structure.graph if isinstance(late.structure, Structure) else None
+    return MessagesSection(**proved | vars(delays(late.messages, graph, late.leaders)))
 
 
-def read_late(report: CheckReport, structure: Structure, protocol: Protocol, relative: bool) -> LateBounds | None:
+def read_late(
+    report: CheckReport, structure: Structure | Family, protocol: Protocol, relative: bool
+) -> LateBounds | None:
     """Return what an accepted certificate says of late messages; None if it says nothing."""
     section: MessagesSection | None = report.sections.get("messages")
     if section is None:
@@ -533,7 +556,7 @@ def read_late(report: CheckReport, structure: Structure, protocol: Protocol, rel
     if section.missed is not None:
         gauge = np.array(proved["late-missed", "messages.missed"]["witness"].gauge)
         missed = Missed(section.missed.agent, section.missed.bound, gauge)
-    if section.steps is not None:
+    if section.steps is not None and isinstance(structure, Structure):
         start = floats(proved["late-steps", "messages.steps"]["witness"].start)
         error, push = float_up(heard_wrong(messages, leaders)), float_up(leaders.total) if leaders else 0.0
         times = tuple(section.steps.instants)
@@ -579,11 +602,11 @@ def _read_settling(settling: SettlingSection | None, step: Any) -> Settling | No
     return Settling(known.function, step["q"], step["b"], cap, clock, left, tuple(known.u))
 
 
-def read_messages(section: Delays, structure: Structure) -> LateMessages:
+def read_messages(section: Delays, structure: Structure | Family) -> LateMessages:
     """Return what a certificate says of how late messages are."""
     packets, graph = section.packets, structure.graph
     latency: Any = section.latency
-    if isinstance(latency, Numbers):
+    if isinstance(latency, Numbers) and graph is not None:
         latency = {(s, t): x for (s, t, _), x in zip(graph.edges, latency, strict=True)}
     return LateMessages(
         delay=latency,

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
@@ -24,8 +24,9 @@ from ptcc_certify.checker.leaders import LeadersAsked, LeadersSection
 from ptcc_certify.checker.obligations import CheckReport
 from ptcc_certify.checker.sections import RowVector
 from ptcc_certify.checker.side_files import Numbers
+from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness
+from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness, UncertainRows
 from ptcc_certify.model.refusals import refuse_leader_groups
 from ptcc_certify.protocols.base import Protocol
 from ptcc_certify.protocols.gain import Gain
@@ -45,7 +46,7 @@ class Tracking:
     Attributes
     ----------
     leaders : MovingLeaders
-    structure : Structure
+    structure : Structure or Family
     protocol : Protocol
     witness : RowWitness
         ``u`` and, as its ``b``, ``a``.
@@ -60,13 +61,13 @@ class Tracking:
     """
 
     leaders: MovingLeaders
-    structure: Structure
+    structure: Structure | Family
     protocol: Protocol
     witness: RowWitness
     initial: Fraction
     relative: bool
-    after: Fraction
-    input: np.ndarray | None
+    after: Fraction = Fraction(0)
+    input: np.ndarray | None = None
 
     def __repr__(self) -> str:
         return f"Tracking({self.leaders!r}: exact at T, within {up(self.distance_after, 2)} after it)"
@@ -142,7 +143,7 @@ def drift_integral(gain: Gain, b: float, cap: Fraction | None, t: np.ndarray) ->
 
 
 def bound_tracking(
-    structure: Structure,
+    structure: Structure | Family,
     protocol: Protocol,
     leaders: MovingLeaders,
     initial_state: Sequence[Fraction] | None = None,
@@ -152,8 +153,8 @@ def bound_tracking(
 
     Parameters
     ----------
-    structure : Structure
-        All leaders are single nodes.
+    structure : Structure or Family
+        All leaders are single nodes; of a family bounds are for every signal.
     protocol : Protocol
         The nominal one.
     leaders : MovingLeaders
@@ -175,35 +176,35 @@ def bound_tracking(
     >>> tracking.distance_bound([1e-3, 0]).max(axis=0) < 2e-3
     array([ True,  True])
     """
-    refuse_leader_groups(structure, "leaders that move as they like: a bound")
-    rows = FollowerRows(structure)
+    if isinstance(structure, Structure):
+        refuse_leader_groups(structure, "leaders that move as they like: a bound")
+    rows = UncertainRows(structure) if isinstance(structure, Family) else FollowerRows(structure)
     given = None if initial_state is None or ends is None else zip(initial_state, ends, strict=True)
     every = None if given is None else np.array([float_up(abs(x - mid) + radius) for x, (mid, radius) in given])
     first = np.ones(rows.D.size) if every is None else every[rows.followers]
     found: list[Tracking] = []
     for loss in _LOSSES:
         with suppress(LMIError):
-            found.append(_tracking(rows, protocol, leaders, first, every is None, loss))
+            bound = Tracking(leaders, structure, protocol, rows.witness(Fraction(1), loss), Fraction(0), every is None)
+            found.append(_tracking(rows, bound, first))
     if not found:
         raise NoCertificate("no vector for the followers was found")
     return min(found, key=lambda one: (one.input is None, float(one.distance_bound(np.array([_JUDGED])).max())))
 
 
-def _tracking(
-    rows: FollowerRows, protocol: Protocol, leaders: MovingLeaders, first: np.ndarray, relative: bool, loss: float
-) -> Tracking:
-    """Return what one vector proves."""
-    witness, gain, sign = rows.witness(Fraction(1), loss), protocol.gain, leaders.sign_gain
+def _tracking(rows: FollowerRows, bound: Tracking, first: np.ndarray) -> Tracking:
+    """Return what the vector of a bound proves."""
+    witness, gain, leaders, sign = bound.witness, bound.protocol.gain, bound.leaders, bound.leaders.sign_gain
     initial = Fraction(float((first / witness.u).max()) * _MORE)
     c, p = leaders.total / Fraction(float(witness.u.min())), witness.b * gain.pole
     after = Fraction(0) if sign is not None else c / (witness.b * gain.rho1)
     whole = None
     if p > 1 or (sign is not None and p >= 1):
         most = gain.first * initial + (0 if sign is not None else c * (gain.rho1 * gain.T + gain.pole) / (p - 1))
-        whole = np.zeros(rows.structure.graph.n_nodes)
-        whole[rows.followers] = (rows.D * witness.u + rows.W @ witness.u) * float_up(most) * _MORE + float(sign or 0)
+        whole = np.zeros(rows.n_nodes)
+        whole[rows.followers] = rows.largest(witness.u) * float_up(most) * _MORE + float(sign or 0)
         whole[rows.followers] *= _MORE
-    return Tracking(leaders, rows.structure, protocol, witness, initial, relative, after, whole)
+    return replace(bound, initial=initial, after=after, input=whole)
 
 
 def tracking_obligations(tracking: Tracking | None) -> Iterator[Obligation]:
@@ -229,7 +230,9 @@ def leaders_section(tracking: Tracking) -> LeadersSection:
     return LeadersSection(**asked, initial=tracking.initial, input=bound, after=tracking.after)
 
 
-def read_tracking(report: CheckReport, structure: Structure, protocol: Protocol, relative: bool) -> Tracking | None:
+def read_tracking(
+    report: CheckReport, structure: Structure | Family, protocol: Protocol, relative: bool
+) -> Tracking | None:
     """Return what an accepted certificate says of moving leaders; None if it says nothing."""
     section: LeadersSection | None = report.sections.get("leaders")
     if section is None:

@@ -44,6 +44,8 @@ from ptcc_certify.lyapunov.search import DIAGONAL, Search
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.disturbance import ExpressionDisturbance
 from ptcc_certify.protocols.gain_limits import GainLimits
+from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.protocols.moving_leaders import MovingLeaders
 from ptcc_certify.protocols.reaching_time import ReachingTime
 from ptcc_certify.simulation.agents import AgentsTrajectory
 from ptcc_certify.simulation.late_messages import can_run, simulate_late
@@ -447,6 +449,16 @@ class Content:
         if self.initial_state is None or self.final_state is None:
             return None
         return float(np.abs(np.array([float(x) for x in self.initial_state]) - np.asarray(self.final_state)).max())
+
+    @property
+    def asked_messages(self) -> LateMessages | None:
+        """How late messages are."""
+        return self.request.messages if self.late is None else self.late.messages
+
+    @property
+    def asked_leaders(self) -> MovingLeaders | None:
+        """How leaders move."""
+        return self.request.leaders
 
     @property
     def leaders_move(self) -> bool:

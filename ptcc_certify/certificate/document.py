@@ -10,9 +10,9 @@ from typing import Any
 
 from lmi.exact.elementary_enclosures import rounded
 from ptcc_certify.bounds.input.effort import EnergyIntegral, Peak, effort_section, peak_witness, read_effort
-from ptcc_certify.bounds.late_messages import messages_section, read_late
+from ptcc_certify.bounds.late_messages import late_obligations, messages_section, read_late
 from ptcc_certify.bounds.section_numbers import fractions
-from ptcc_certify.bounds.tracking import leaders_section, read_tracking
+from ptcc_certify.bounds.tracking import leaders_section, read_tracking, tracking_obligations
 from ptcc_certify.certificate.agents_answer import AgentsAnswer, rows_of
 from ptcc_certify.certificate.agents_part import AgentsPart, matrix_section, phases_section, read_matrix
 from ptcc_certify.certificate.cascade_part import CascadePart, cascade_section, read_cascade
@@ -51,6 +51,7 @@ from ptcc_certify.certificate.unverified import (
     nothing_proved,
     read_unproved,
     upper_bound_entry,
+    write_unproved,
 )
 from ptcc_certify.checker import NOT_OF_FAMILIES, SCHEMA, SLIDING_BOUND, SLIDING_CLOCK
 from ptcc_certify.checker.agent_cascade import CascadeSection
@@ -73,6 +74,7 @@ from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.checker.theorem_function import PaperSection
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import Structure, analyse
+from ptcc_certify.lyapunov.follower_rows import listeners
 from ptcc_certify.lyapunov.function import Dominance, LyapunovFunction
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.protocols import Protocol
@@ -145,14 +147,21 @@ def certificate_document(
             document["instants"] = write(InstantsSection, instants, out)
     if content.offsets is not None:
         document["formation"] = write(FormationSection, formation_section(content, content.offsets, final), out)
-    if content.late is not None and content.late.says_something:
-        document["messages"] = write(MessagesSection, messages_section(content.late), out)
-    if content.tracking is not None:
-        document["leaders"] = write(LeadersSection, leaders_section(content.tracking), out)
+    document |= _sections_beside(content, out)
     document |= {"digest": "", "unverified": _write_unverified(content)}
     given = {(o.kind, o.of): write_obligation(o, out) for o in content.witnesses}
     document, report = record(document, given, out.files, graph.n_nodes)
     return document, out.files, report
+
+
+def _sections_beside(content: Content | FamilyContent, out: Writer) -> dict[str, Any]:
+    """Return what is proved with late messages, and while leaders move, as files have it."""
+    sections: dict[str, Any] = {}
+    if content.late is not None and content.late.says_something:
+        sections["messages"] = write(MessagesSection, messages_section(content.late), out)
+    if content.tracking is not None:
+        sections["leaders"] = write(LeadersSection, leaders_section(content.tracking), out)
+    return sections
 
 
 def read_document(
@@ -193,7 +202,7 @@ def read_document(
         "final_state": read_final_state(report, structure),
         "matrix": None,
         "late": read_late(report, structure, protocol, relative)
-        or nothing_proved(request, structure, protocol, initial_state is None),
+        or nothing_proved(request.messages, request.leaders, structure, protocol, initial_state is None),
         "tracking": read_tracking(report, structure, protocol, relative),
         "request": request,
         "observed": _read_observations(document["unverified"]),
@@ -253,8 +262,8 @@ def family_document(
     certificate: FamilyContent, files: bool = True
 ) -> tuple[dict[str, Any], Mapping[str, bytes], CheckReport]:
     """Return a certificate of a family as JSON-ready data, its side files, and what the check says of it."""
-    out = Writer(certificate.family.labels, files)
-    family, parts = certificate.family, certificate.parts
+    family, parts, labels = certificate.family, certificate.parts, certificate.family.labels
+    out = Writer(labels, files, [labels[v] for v in listeners(family).tolist()])
     components = [part.component for part in parts]
     used = [function_section(part.component, k, V, out) for k, part in enumerate(parts) for V in part.functions]
     finals, drives = certificate.final_states, certificate.drives
@@ -281,6 +290,7 @@ def family_document(
     if certificate.restricted:
         claims = [_claim(certificate, claim) for claim in certificate.restricted]
         document["restricted"] = [write(type(claim), claim, out) for claim in claims]
+    document |= _sections_beside(certificate, out)
     document |= {"digest": "", "unverified": _unverified(certificate)}
     given = {(o.kind, o.of): write_obligation(o, out) for o in _steps(certificate, out)}
     document, report = record(document, given, out.files, family.n_nodes)
@@ -318,6 +328,8 @@ def _steps(certificate: FamilyContent, out: Writer) -> Iterator[Obligation]:
         yield Obligation("family-final-state", "final_state", witness=_means(certificate))
     for k, claim in enumerate(certificate.restricted):
         yield from claim_steps(f"restricted[{k}]", claim, _labels(certificate, claim))
+    yield from late_obligations(certificate.late)
+    yield from tracking_obligations(certificate.tracking)
 
 
 def _means(certificate: FamilyContent) -> list[Any] | None:
@@ -344,7 +356,7 @@ def _unverified(certificate: FamilyContent) -> dict[str, Any]:
     bounds = [(part.component, part.upper_bound) for part in certificate.parts]
     return {
         "upper_bounds": [None if b is None else upper_bound_entry(Quotient.of(c), b) for c, b in bounds],
-        "asked": {"behaviour": expectations.behaviour},
+        "asked": {"behaviour": expectations.behaviour} | write_unproved(certificate),
         "read": dict(certificate.family.read) or None,
         "origins": dict(certificate.origins),
         "scenario": certificate.scenario,

@@ -26,7 +26,9 @@ from ptcc_certify.bounds.family_deviation import (
 )
 from ptcc_certify.bounds.final_ends import FinalEnds
 from ptcc_certify.bounds.kept_means import LeadingGroup, leading_groups
+from ptcc_certify.bounds.late_messages import LateBounds
 from ptcc_certify.bounds.reaching_phase import ReachingPhase
+from ptcc_certify.bounds.tracking import Tracking
 from ptcc_certify.certificate.certificate_data import Source
 from ptcc_certify.certificate.functions import ProvedFunction
 from ptcc_certify.certificate.request import Expectations
@@ -55,6 +57,8 @@ from ptcc_certify.lyapunov.follower_function import FollowerFunction
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.squares_function import SquaresFunction
 from ptcc_certify.protocols import Protocol
+from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.protocols.moving_leaders import MovingLeaders
 from ptcc_certify.protocols.reaching_time import ReachingTime
 from ptcc_certify.protocols.restricted_signals import SignalClass
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
@@ -174,17 +178,38 @@ class FamilyContent:
     restricted: tuple[Claim, ...] = ()
     boxes: Mapping[int, AttractingBox] = field(default_factory=dict)
     ranges: Mapping[int, tuple[Interval, ...]] = field(default_factory=dict)
+    late: LateBounds | None = None
+    tracking: Tracking | None = None
+    asked_leaders: MovingLeaders | None = None
 
     # What a certificate of one graph may have beside that, and none of a family has.
-    agents = late = tracking = offsets = initial_set = noise = delta = trajectory = None
+    agents = offsets = initial_set = noise = delta = trajectory = at = None
     limits = cut_off = ()
     time_limit = math.inf
-    only_drawn = leaders_move = violated = False
+    only_drawn = violated = False
 
     @property
     def labels(self) -> Sequence[str]:
         """The names of the agents."""
         return self.family.labels
+
+    @property
+    def asked_messages(self) -> LateMessages | None:
+        """How late messages are."""
+        return None if self.late is None else self.late.messages
+
+    @property
+    def leaders_move(self) -> bool:
+        """Whether leaders move where it is told what is proved beside the claim."""
+        return self.asked_leaders is not None
+
+    @property
+    def longest_way(self) -> float | None:
+        """The longest way of an agent from its initial to its final state (numerical); None if unknown."""
+        if self.initial_state is None or self.final_states is None:
+            return None
+        pairs = zip(self.initial_state, self.final_states, strict=True)
+        return max((float(max(abs(x - y) for y in ends)) for x, ends in pairs if ends is not None), default=None)
 
     @property
     def constant(self) -> bool:

@@ -44,7 +44,7 @@ def judge_family(certificate: FamilyContent) -> Iterator[Answer]:
     """Tell what became of what was asked of the certificate of a family."""
     asked, components = certificate.expectations, [part.component for part in certificate.parts]
     if asked.behaviour is not None:
-        yield _judge_behaviour_of_signal(certificate, components, asked.behaviour)
+        yield at_deadline(certificate, _judge_behaviour_of_signal(certificate, components, asked.behaviour))
     if asked.min_rate is not None:
         yield _judge_rate_of_signal(certificate, asked.min_rate)
     if asked.max_input is not None:
@@ -52,6 +52,7 @@ def judge_family(certificate: FamilyContent) -> Iterator[Answer]:
     reasons = (reason for reason, leaves_open in reasons_for_none(certificate).values() if leaves_open)
     if asked.behaviour is None and asked.min_rate is None and (reason := next(reasons, "")):
         yield Answer(OPEN, "what these signals do", reason)
+    yield from judge_messages(certificate)
 
 
 def _proved_or_bounded(what: str, rate: Fraction | None, bound: Fraction | None, least: Fraction) -> Answer:
@@ -110,8 +111,7 @@ def judge_input(certificate: Content, most: Fraction) -> Answer:
         return certificate.agents.judge_input(most)
     if certificate.constant:
         return Answer(MET, what)
-    beside = (certificate.late, certificate.tracking, certificate.request.leaders)
-    if any(part is not None for part in beside):
+    if certificate.late is not None or certificate.tracking is not None or certificate.asked_leaders is not None:
         return judge_input_beside(certificate, most, what, _first_input(certificate))
     least, bound = input_range(certificate)
     if bound is not None and bound <= most:
@@ -158,12 +158,16 @@ def input_range(certificate: Content) -> tuple[Fraction | float, Fraction | None
 
 def _first_input(certificate: Content) -> Fraction:
     """Return what the largest ``|u_k(0)|`` is at least under the limits of the gain; 0 where nothing is known."""
-    effort, gain, late = certificate.effort, certificate.protocol.gain.exact, certificate.late
-    if effort is None or effort.first is None:
-        return Fraction(0)
+    first = None if certificate.effort is None else certificate.effort.first
+    return Fraction(0) if first is None else first * _first_share(certificate)
+
+
+def _first_share(certificate: Content | FamilyContent) -> Fraction:
+    """Return what the limits of the gain leave of the first gain."""
+    gain, late, limits = certificate.protocol.gain, certificate.late, certificate.limits
     caps = [] if late is None or late.messages.gain_cap is None else [late.messages.gain_cap]
-    tops = [*caps, *(entry.largest_gain(gain) for entry in certificate.limits)]
-    return effort.first * min([Fraction(1), *(top / certificate.protocol.gain.first for top in tops)])
+    tops = [*caps, *(entry.largest_gain(gain.exact) for entry in limits)]
+    return min([Fraction(1), *(top / gain.first for top in tops)])
 
 
 def judge_limits(certificate: Content) -> list[Answer]:
@@ -194,10 +198,10 @@ def judge_limits(certificate: Content) -> list[Answer]:
 # ---------------------------------------------------------------------- late messages, moving leaders
 
 
-def at_deadline(certificate: Content, answer: Answer) -> Answer:
+def at_deadline(certificate: Content | FamilyContent, answer: Answer) -> Answer:
     """Return what becomes at ``T``, where messages are late, of a behaviour that follows where none are."""
     late = certificate.late
-    asked = late is not None or certificate.request.messages is not None
+    asked = certificate.asked_messages is not None
     if not asked or answer.status != MET or certificate.constant:
         return answer
     what = f"{answer.what} at T with late messages"
@@ -206,7 +210,7 @@ def at_deadline(certificate: Content, answer: Answer) -> Answer:
     if late.direct:
         return answer
     if late.missed is not None:
-        return Answer(REFUTED, what, _misses(certificate, late.missed))
+        return Answer(REFUTED, what, _misses(late, late.missed))
     if late.staged is not None:
         return Answer(OPEN, what, "with deadlines of stages it holds, with one for all none is proved to hold it")
     if late.leaders is not None:
@@ -216,7 +220,7 @@ def at_deadline(certificate: Content, answer: Answer) -> Answer:
     return Answer(OPEN, what, "nobody is proved to settle at T")
 
 
-def judge_rate_beside(certificate: Content, least: Fraction, what: str) -> Answer | None:
+def judge_rate_beside(certificate: Content | FamilyContent, least: Fraction, what: str) -> Answer | None:
     """Tell the same of a rate where messages are late, leaders move or the gain is held; None where nothing of it is.
 
     The rates of a certificate, and the upper bound on them, are those of the loop without these.
@@ -228,7 +232,7 @@ def judge_rate_beside(certificate: Content, least: Fraction, what: str) -> Answe
         return Answer(OPEN, what, "no rate is proved while leaders move")
     if any(limits.sample_period is not None for limits in certificate.limits):
         return Answer(OPEN, what, "no rate is proved of a gain that is held")
-    if (late is None and certificate.request.messages is None) or (late is not None and late.direct):
+    if certificate.asked_messages is None or (late is not None and late.direct):
         return None
     if late is None or late.lmi is None:
         return Answer(OPEN, what, "no rate is proved with late messages")
@@ -236,14 +240,14 @@ def judge_rate_beside(certificate: Content, least: Fraction, what: str) -> Answe
     return Answer(MET if rate >= least else OPEN, what, f"with late messages {down(rate)} is proved")
 
 
-def judge_messages(certificate: Content) -> list[Answer]:
+def judge_messages(certificate: Content | FamilyContent) -> list[Answer]:
     """Tell what becomes of what may be left at ``T`` with late messages, and whether anything is proved of these."""
     late, most = certificate.late, certificate.expectations.max_residual
     if late is None:
-        unproved = certificate.request.messages is not None
+        unproved = certificate.asked_messages is not None
         answers = [Answer(OPEN, "late messages", "nothing is proved of what is left at T")] * unproved
         answers += [] if most is None or unproved else [Answer(OPEN, "max_residual", "no messages are late")]
-        if certificate.request.leaders is not None and certificate.tracking is None:
+        if certificate.asked_leaders is not None and certificate.tracking is None:
             answers.append(Answer(OPEN, "leaders that move", "no vector for their followers was found"))
         return answers
     if not late.says_something:
@@ -255,13 +259,13 @@ def judge_messages(certificate: Content) -> list[Answer]:
     return [] if most is None else [_judge_residual(certificate, late, most)]
 
 
-def _judge_residual(certificate: Content, late: LateBounds, most: Fraction) -> Answer:
+def _judge_residual(certificate: Content | FamilyContent, late: LateBounds, most: Fraction) -> Answer:
     """Tell whether no more than ``most`` is left at ``T``, and up to which delay that is proved."""
     what, missed = f"within {near(most, 12)} at T" + " from within 1 of it" * late.relative, late.missed
     if late.largest <= most:
         return Answer(MET, what, _longest(late).removeprefix("; "))
     if missed is not None and missed.bound > most:
-        return Answer(REFUTED, what, f"{_misses(certificate, missed)}{_longest(late)}")
+        return Answer(REFUTED, what, f"{_misses(late, missed)}{_longest(late)}")
     return Answer(OPEN, what, f"this certificate's limit is {up(late.largest, 3)}{_longest(late)}")
 
 
@@ -273,12 +277,14 @@ def _longest(late: LateBounds, what: str = "") -> str:
     return f"; {what}certified where nothing is older than {down(late.enough, 4)}{alike}"
 
 
-def _misses(certificate: Content, missed: Missed) -> str:
+def _misses(late: LateBounds, missed: Missed) -> str:
     """Tell who misses the deadline by how much."""
-    return f"agent {certificate.graph.labels[missed.agent]} is away by {down(missed.bound, 2)} at least, proved"
+    return f"agent {late.labels[missed.agent]} is away by {down(missed.bound, 2)} at least, proved"
 
 
-def judge_input_beside(certificate: Content, most: Fraction, what: str, first: Fraction | float) -> Answer:
+def judge_input_beside(
+    certificate: Content | FamilyContent, most: Fraction, what: str, first: Fraction | float
+) -> Answer:
     """Tell whether every input stays within so much where messages are late, or leaders move.
 
     Parameters
@@ -298,7 +304,7 @@ def judge_input_beside(certificate: Content, most: Fraction, what: str, first: F
     return _judge_tracking(tracking, most, what)
 
 
-def _judge_late_input(certificate: Content, late: LateBounds, most: Fraction, what: str) -> Answer:
+def _judge_late_input(certificate: Content | FamilyContent, late: LateBounds, most: Fraction, what: str) -> Answer:
     """Tell whether every input stays within so much with late messages."""
     largest = largest_late_input(late, certificate.protocol)
     if largest is None:
@@ -376,6 +382,8 @@ def _judge_behaviour_of_signal(
 def _judge_rate_of_signal(certificate: FamilyContent, least: Fraction) -> Answer:
     """Tell whether a rate of at least so much is proved for every signal, or excluded by the upper bound."""
     what, rate, bound = f"rate >= {near(least, 12)}", certificate.rate_of_signal, certificate.upper_bound
+    if (beside := judge_rate_beside(certificate, least, what)) is not None:
+        return beside
     if certificate.signal != "any":
         # No constant member is one of these signals.
         narrow = isinstance(certificate.signal, ClockShares | JointWindows)
@@ -396,9 +404,12 @@ def _judge_rate_of_signal(certificate: FamilyContent, least: Fraction) -> Answer
 def _judge_input_of_signal(certificate: FamilyContent, most: Fraction) -> Answer:
     """Tell whether every input is proved to stay within so much for every signal."""
     what, peaks = f"|u_k| <= {near(most, 12)}", certificate.input_peaks
+    known = certificate.initial_state is not None and certificate.protocol.reaching is None
+    if certificate.late is not None or certificate.leaders_move:
+        first = first_input(certificate) * _first_share(certificate) if known else Fraction(0)
+        return judge_input_beside(certificate, most, what, first)
     if peaks is not None and max(peaks) <= most:
         return Answer(MET, what, "every signal" * (certificate.signal != "any"))
-    known = certificate.initial_state is not None and certificate.protocol.reaching is None
     if known and (first := first_input(certificate)) > most:
         return Answer(REFUTED, what, f"it is up to {down(first)} at the start, proved")
     return Answer(OPEN, what, "no bound is proved" if peaks is None else f"proved: {up(max(peaks))}")

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import partial
@@ -292,7 +293,7 @@ def _certify_family(
 ) -> FamilyCertificate:
     """Certify a family, or refuse what it does not take."""
     refuse_of_families(case)
-    return certify_family(
+    certificate = certify_family(
         as_family(case.graph, uncertainty=case.uncertainty),
         case.protocol,
         case.initial.x0,
@@ -304,6 +305,25 @@ def _certify_family(
         origins=origins,
         progress=progress,
     )
+    if case.messages is None and case.leaders is None:
+        return certificate
+    return _beside_families(certificate, case)
+
+
+def _beside_families(certificate: FamilyCertificate, case: Case) -> FamilyCertificate:
+    """Add what is proved for every signal where messages are late, or leaders move."""
+    family, state, finals = certificate.family, certificate.initial_state, certificate.final_states
+    if not certificate.direct:
+        raise ParameterError("sigma0", "late messages ask for 0, so that no sliding variable moves; leave it out")
+    known = [] if finals is None else [pair for pair in finals if pair is not None]
+    ends = [((low + high) / 2, (high - low) / 2) for low, high in known] if len(known) == family.n_nodes else None
+    late, tracking = None, None
+    if case.messages is not None:
+        late = bound_late(family, certificate.protocol, case.messages, state, ends, case.leaders)
+    elif case.leaders is not None:
+        with suppress(NoCertificate):
+            tracking = bound_tracking(family, certificate.protocol, case.leaders, state, ends)
+    return replace(certificate, late=late, tracking=tracking, asked_leaders=case.leaders)
 
 
 def _with_agents(certificate: Certificate, agents: Agents, chains: Chains, run: bool) -> Certificate:

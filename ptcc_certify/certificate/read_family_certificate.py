@@ -7,7 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from ptcc_certify.bounds.late_messages import read_late
 from ptcc_certify.bounds.section_numbers import fractions
+from ptcc_certify.bounds.tracking import read_tracking
 from ptcc_certify.certificate.certificate_data import Source
 from ptcc_certify.certificate.claim_sections import read_claim
 from ptcc_certify.certificate.document import read_protocol, read_reaching
@@ -15,12 +17,14 @@ from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCe
 from ptcc_certify.certificate.functions import ProvedFunction, read_box, read_function
 from ptcc_certify.certificate.graph_sections import certificate_family
 from ptcc_certify.certificate.request import Expectations
-from ptcc_certify.certificate.unverified import read_upper_bound
+from ptcc_certify.certificate.unverified import nothing_proved, read_unproved, read_upper_bound
 from ptcc_certify.checker.attracting_boxes import AttractingBox, KeptBox
 from ptcc_certify.checker.side_files import SideFiles
 from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound
 from ptcc_certify.lyapunov.quotient import Quotient
+from ptcc_certify.protocols import Protocol
 from ptcc_certify.theorems.family_behaviour import FamilyComponent, decide
 
 
@@ -61,6 +65,7 @@ def read_family_certificate(source: Source) -> FamilyCertificate:
         if isinstance(entry, KeptBox)
     }
     kept |= {"expectations": _read_expectations(document["unverified"].get("asked")), "source": source}
+    kept |= _read_beside(source, family, protocol, state is None)
     return FamilyCertificate(
         family,
         protocol,
@@ -70,6 +75,17 @@ def read_family_certificate(source: Source) -> FamilyCertificate:
         read_reaching(sections.get("reaching_time"), protocol),
         **kept,
     )
+
+
+def _read_beside(source: Source, family: Family, protocol: Protocol, relative: bool) -> dict[str, Any]:
+    """Return what the file says of late messages and of leaders that move, or that nothing is proved of them."""
+    asked = read_unproved(source.document, family)
+    messages, leaders = asked.get("messages"), asked.get("leaders")
+    late = read_late(source.report, family, protocol, relative)
+    tracking = read_tracking(source.report, family, protocol, relative)
+    late = late or nothing_proved(messages, leaders, family, protocol, relative)
+    proved = next((one.leaders for one in (late, tracking) if one is not None), None)
+    return {"late": late, "tracking": tracking, "asked_leaders": proved or leaders}
 
 
 def _read_bounds(stated: Any, components: Sequence[FamilyComponent]) -> list[FamilyRateBound | None]:

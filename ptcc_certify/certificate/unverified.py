@@ -15,6 +15,7 @@ from ptcc_certify.bounds.input.effort import LIMITS
 from ptcc_certify.bounds.late_messages import LateBounds, delays, read_messages
 from ptcc_certify.bounds.tracking import asked_leaders, read_leaders
 from ptcc_certify.certificate.certificate_data import Content, Observations
+from ptcc_certify.certificate.family_content import FamilyContent
 from ptcc_certify.certificate.request import Expectations, Request
 from ptcc_certify.certificate.section_writer import Writer, finite, readable, text, write
 from ptcc_certify.checker.input_formulas import InitialSet, Limits
@@ -24,6 +25,7 @@ from ptcc_certify.checker.reading import RejectedError, entries, exact, need
 from ptcc_certify.checker.sections import Context, read
 from ptcc_certify.checker.side_files import SideFiles
 from ptcc_certify.errors import one_line
+from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import format_exact
 from ptcc_certify.graphs.structure import Structure, behaviour_name
 from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound, Member, prove_again
@@ -31,6 +33,8 @@ from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.search import METHODS
 from ptcc_certify.protocols.base import Protocol
 from ptcc_certify.protocols.gain_limits import GainLimits
+from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.protocols.moving_leaders import MovingLeaders
 from ptcc_certify.theorems.counterexample_text import mode_name
 
 #: Members of a word or mixture that are read.
@@ -108,22 +112,24 @@ def _member(quotient: Quotient, entry: Mapping[str, Any]) -> Member:
     return Member(number, tuple(levels))
 
 
-def write_unproved(content: Content) -> dict[str, Any]:
+def write_unproved(content: Content | FamilyContent) -> dict[str, Any]:
     """Return the late messages or moving leaders that were asked for where nothing is proved of them."""
-    messages, leaders, late = content.request.messages, content.request.leaders, content.late
+    messages, leaders, late = content.asked_messages, content.asked_leaders, content.late
     if (late is not None and late.says_something) or content.tracking is not None:
         return {}
     asked: dict[str, Any] = {}
     if messages is not None:
-        asked["messages"] = write(Delays, delays(messages, content.graph), Writer(content.graph.labels))
+        graph = content.graph if isinstance(content, Content) else None
+        asked["messages"] = write(Delays, delays(messages, graph), Writer(content.labels))
         del asked["messages"]["leaders"]
     return asked if leaders is None else {**asked, "leaders": write(LeadersAsked, asked_leaders(leaders), Writer(()))}
 
 
-def read_unproved(document: Mapping[str, Any], structure: Structure) -> dict[str, Any]:
+def read_unproved(document: Mapping[str, Any], structure: Structure | Family) -> dict[str, Any]:
     """Read what :func:`write_unproved` wrote, unless something of the kind is proved."""
     asked, graph = document["unverified"].get("asked"), structure.graph
-    at = Context(SideFiles(Path(), {}), graph.labels, edges=graph.n_edges)
+    labels = graph.labels if graph is not None else structure.labels if isinstance(structure, Family) else ()
+    at = Context(SideFiles(Path(), {}), labels, edges=0 if graph is None else graph.n_edges)
     if not isinstance(asked, dict) or "messages" in document or "leaders" in document:
         return {}
     return {
@@ -134,22 +140,28 @@ def read_unproved(document: Mapping[str, Any], structure: Structure) -> dict[str
     }
 
 
-def nothing_proved(request: Request, structure: Structure, protocol: Protocol, relative: bool) -> LateBounds | None:
+def nothing_proved(
+    messages: LateMessages | None,
+    leaders: MovingLeaders | None,
+    structure: Structure | Family,
+    protocol: Protocol,
+    relative: bool,
+) -> LateBounds | None:
     """Return that nothing is proved of late messages that were asked for; None if none were.
 
     Parameters
     ----------
-    request : Request
-    structure : Structure
+    messages : LateMessages or None
+    leaders : MovingLeaders or None
+    structure : Structure or Family
     protocol : Protocol
     relative : bool
         Whether no initial state was given.
     """
-    messages = request.messages
     if messages is None:
         return None
     gain = GainLimits(gain_cap=messages.gain_cap).limit(protocol.gain)
-    return LateBounds(messages, structure, gain, relative, leaders=request.leaders)
+    return LateBounds(messages, structure, gain, relative, leaders=leaders)
 
 
 def _write_unverified(content: Content) -> dict[str, Any]:

@@ -87,6 +87,10 @@ def use_of(certificate: Content) -> Use:
 
 def use_of_family(certificate: FamilyContent) -> Use:
     """Return what the bounds of a family's certificate are worth for every signal, and for those asked for."""
+    if certificate.late is not None:
+        return _use_of_late(certificate.late, certificate.longest_way)
+    if certificate.tracking is not None:
+        return _use_of_tracking(certificate.tracking)
     useful, caveat, rho2 = _usefulness_of_signal(certificate), "", None
     if useful is False:
         rho2 = _useful_rho2_of_family(certificate) if certificate.direct else _useful_rho2_while_driven(certificate)

@@ -13,6 +13,7 @@ from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
 from ptcc_certify.cli.declared import SIGNAL, click_option, flag_of, options_asking, options_for, together
+from ptcc_certify.cli.messages import asks_for_leaders, asks_for_messages, leaders_of, messages_of
 from ptcc_certify.cli.scenario import scenario_record
 from ptcc_certify.cli.terminal import LOG, Screen, in_flags, print_json, progress
 from ptcc_certify.errors import ExitCode, ParameterError, one_line
@@ -39,9 +40,7 @@ if TYPE_CHECKING:
 
 #: Options of certify that families do not take; agents are refused by themselves, disturbances by the protocol.
 _NOT_OF_FAMILIES = tuple(
-    name
-    for name in options_asking(["method", "max_residual", *NOT_OF_FAMILIES])
-    if name not in ("agents", "disturbance", "delta")
+    name for name in options_asking(["method", *NOT_OF_FAMILIES]) if name not in ("agents", "disturbance", "delta")
 )
 
 
@@ -261,7 +260,8 @@ def certify_family(
     with progress(STEPS, screen.quiet) as begin:
         origins = {"graph": Path(name).name, "read": read, **random_states}
         asks = Asks(time_limit=options["time_limit"], expectations=expected)
-        case = Case(family, protocol, InitialState(x0, sigma0), signal=signal, asks=asks)
+        beside: dict[str, Any] = {"messages": messages_of(graphs[0], family, options), "leaders": leaders_of(options)}
+        case = Case(family, protocol, InitialState(x0, sigma0), signal=signal, asks=asks, **beside)
         certificate: Any = certify_case(case, progress=begin, scenario=scenario_record(), origins=origins)
         assessment = certificate.assessment
     LOG.info("verdict %s; exit code %d", in_flags(assessment.sentence), assessment.exit_code)
@@ -305,7 +305,11 @@ def _refuse_disturbance(options: shared.Options) -> None:
 def refuse_options(options: shared.Options) -> None:
     """Refuse what is asked of one graph alone, on the command line or in a scenario."""
     source = click.get_current_context().get_parameter_source
-    foreign = (*_NOT_OF_FAMILIES, *["disturbance", "delta"] * (options["kind"] == "nominal"))
+    foreign = [*_NOT_OF_FAMILIES]
+    if options["kind"] == "nominal":
+        foreign += ["disturbance"] if asks_for_leaders(options) else ["disturbance", "delta"]
+    if asks_for_messages(options):
+        foreign.remove("gain_cap")
     for name in foreign:
         given = source(name) in (ParameterSource.COMMANDLINE, ParameterSource.DEFAULT_MAP)
         if given and options[name] not in (None, False):

@@ -10,22 +10,33 @@ from typing import TYPE_CHECKING
 from ptcc_certify.cli.declared import flag_of, given_of, names_of, options_for
 from ptcc_certify.cli.options import Options, graph_file
 from ptcc_certify.errors import NumberError, ParameterError
+from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.protocols.late_messages import LateMessages
 from ptcc_certify.protocols.moving_leaders import MovingLeaders
 
 if TYPE_CHECKING:
-    from ptcc_certify.graphs.digraph import SignedDigraph
+    from ptcc_certify.graphs.family import Family
 
 message_options, leader_options = options_for(LateMessages, asked=True), options_for(MovingLeaders, asked=True)
 #: What asks for bounds with late messages; --own-delay belongs to these.
 _ASKING = ("delay", "period", "quantisation")
 
 
-def messages_of(graph: str, signed: SignedDigraph, options: Options) -> LateMessages | None:
+def asks_for_messages(options: Options) -> bool:
+    """Tell whether something is asked of late, lost or rounded messages."""
+    return any(options[name] is not None for name in _ASKING)
+
+
+def asks_for_leaders(options: Options) -> bool:
+    """Tell whether leaders move."""
+    return bool(given_of(MovingLeaders, options))
+
+
+def messages_of(graph: str, signed: SignedDigraph | Family, options: Options) -> LateMessages | None:
     """Return how late messages are; None if nothing is asked of them."""
     if options["packet_loss"] and options["period"] is None:
         raise ParameterError("--packet-loss says nothing by itself; give --period, the time between two messages")
-    if all(options[name] is None for name in _ASKING):
+    if not asks_for_messages(options):
         if options["own_delay"]:
             raise ParameterError("--own-delay says nothing by itself; give --delay and --gain-cap")
         return None
@@ -51,15 +62,16 @@ def messages_of(graph: str, signed: SignedDigraph, options: Options) -> LateMess
     return replace(messages, own_delay=True)
 
 
-def _needs_cap(signed: SignedDigraph, messages: LateMessages) -> str:
+def _needs_cap(signed: SignedDigraph | Family, messages: LateMessages) -> str:
     """Tell that an own state that is late asks for a cap, and what gain agents bear with this delay."""
     from ptcc_certify.bounds.small_delays import delay_threshold
     from ptcc_certify.graphs.size_limits import EXACT_NODES
     from ptcc_certify.graphs.structure import analyse
 
     cap = ""
-    if signed.n_nodes <= EXACT_NODES and signed.n_edges and messages.age:
-        most = delay_threshold(analyse(signed), 1.0) / float(messages.age)
+    graph = signed if isinstance(signed, SignedDigraph) else signed.graph
+    if graph is not None and graph.n_nodes <= EXACT_NODES and graph.n_edges and messages.age:
+        most = delay_threshold(analyse(graph), 1.0) / float(messages.age)
         cap = f" (with this delay a constant gain diverges above {most:.3g}, numerical; what is certified is less)"
     return (
         "--own-delay: an own state that is late makes the protocol diverge, for its gain grows without limit before T; "
@@ -74,7 +86,7 @@ def refuse_unheard(signed: SignedDigraph, options: Options) -> None:
         raise ParameterError(f"{flag_of(given)}: nobody listens to anybody; leave it out, or add edges")
 
 
-def _delay(graph: str, signed: SignedDigraph, text: str) -> Fraction | dict[tuple[str, str], Fraction]:
+def _delay(graph: str, signed: SignedDigraph | Family, text: str) -> Fraction | dict[tuple[str, str], Fraction]:
     """Return a delay, or those of a column."""
     from ptcc_certify.graphs.io.edge_delays import read_delays
     from ptcc_certify.graphs.io.files import name_and_ending
@@ -89,6 +101,8 @@ def _delay(graph: str, signed: SignedDigraph, text: str) -> Fraction | dict[tupl
             raise ParameterError(
                 f"--delay: {error}; give a number in your unit of time, or the name of a column"
             ) from None
+    if not isinstance(signed, SignedDigraph):
+        raise ParameterError("--delay: edge by edge is not proved of families yet; give one number for all")
     if graph == "-":
         raise ParameterError("--delay names a column, but standard input is read once; save the edge list to a file")
     if (ending := name_and_ending(graph)[1]) in OTHER_FORMATS:

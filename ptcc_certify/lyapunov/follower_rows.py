@@ -7,6 +7,7 @@
 has a solution with ``b > 0`` iff ``q`` is below 1 over the spectral radius of ``D^-1 |W_F|``: ``u = (D - q |W_F| - t
 I)^-1 1``, ``t`` just below the smallest eigenvalue of ``D - q |W_F|``. With ``q = 1`` it is the
 row-wise decay rate of followers. Where what is heard over an edge is younger than elsewhere, ``q`` has a smaller power.
+Where weights are uncertain, or a graph is one of several, the row of every follower is that of the worst member.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -22,9 +24,13 @@ from lmi.dyadic import round_to_bits
 from lmi.errors import NoCertificate
 from lmi.sparse_h_matrix import DIRECT_ROWS, SparseHMatrix, solve
 from ptcc_certify.errors import HypothesisError
+from ptcc_certify.graphs.family import Family
+from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.dominance import round_array
+from ptcc_certify.lyapunov.interval_rows import IntervalRows
 from ptcc_certify.model.refusals import refuse_leader_groups
+from ptcc_certify.theorems.family_behaviour import decide
 
 #: What floats may have lost in a row: a share of ``b``, and of the terms that cancel. The check forms rows exactly.
 _SLACK, _ROUNDING = 1e-9, 1e-13
@@ -32,6 +38,8 @@ _SLACK, _ROUNDING = 1e-9, 1e-13
 _LOOSE = 0.05
 #: Inverse iterations for many followers.
 _ROUNDS = 3
+#: Members of a family that are tried one after the other, each the worst for the vector of the last.
+_POLICIES = 20
 #: Products by which the largest ``q`` is found, halvings where ages differ, and the largest one that is tried then.
 _PRODUCTS, _HALVINGS, _LARGEST = 30, 8, 1e12
 
@@ -170,6 +178,10 @@ class FollowerRows:
         NoCertificate
             No positive ``b`` was found: ``q`` is too large.
         """
+        return self.rounded(q, self._vector(q, loss))
+
+    def _vector(self, q: Fraction, loss: float) -> np.ndarray:
+        """Return ``u`` of the member at hand, in floats."""
         A = SparseHMatrix(_with_diagonal(self.D, self.heard(float(q))))
         if q not in self._smallest:
             self._smallest[q] = A.smallest() if self.D.size <= DIRECT_ROWS else self._roughly_smallest(A)
@@ -178,7 +190,7 @@ class FollowerRows:
         u = solve(shifted, ones, np.maximum(self.D - t, self.D * 1e-3), _LOOSE / math.sqrt(ones.size))
         if not (np.isfinite(u).all() and u.min() > 1e-280 * u.max()):
             raise NoCertificate(f"no positive vector for q = {float(q):.6g}")
-        return self.rounded(q, u)
+        return np.asarray(u)
 
     def _roughly_smallest(self, A: SparseHMatrix) -> float:
         """Bound the smallest eigenvalue from below by a few loose solves, for many followers."""
@@ -201,11 +213,146 @@ class FollowerRows:
             It is not positive.
         """
         u = round_array(u / u.max())
-        pushed = (self.heard(float(q)) @ u) / u
-        b = float((self.D - pushed - _ROUNDING * (self.D + pushed)).min())
+        b = self._proved(u, float(q))
         if not b > 0:
             raise NoCertificate(f"no positive b for q = {float(q):.6g}")
         return RowWitness(q, Fraction(round_to_bits(b * (1 - _SLACK), 53)), u)
+
+    def _proved(self, u: np.ndarray, q: float) -> float:
+        """Return the largest ``b`` that leaves room for the rounding of floats."""
+        pushed = (self.heard(q) @ u) / u
+        return float((self.D - pushed - _ROUNDING * (self.D + pushed)).min())
+
+    # ------------------------------------------------------------------ over all members
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of agents."""
+        return self.structure.graph.n_nodes
+
+    @property
+    def weights(self) -> np.ndarray:
+        """``D`` at most."""
+        return self.D
+
+    def slack(self, u: np.ndarray) -> np.ndarray:
+        """Return ``D_k u_k - sum_l |w_kl| u_l`` of every follower, at least."""
+        return np.asarray(self.D * u - self.W @ u)
+
+    def largest(self, u: np.ndarray) -> np.ndarray:
+        """Return ``D_k u_k + sum_l |w_kl| u_l`` of every follower, at most."""
+        return np.asarray(self.D * u + self.W @ u)
+
+
+class UncertainRows(FollowerRows):
+    """The agents that hear others in some mode of a family, if all others are leaders that rest or move as they like.
+
+    ``D`` and ``W`` are those of the member whose rows were the worst at last.
+
+    Parameters
+    ----------
+    family : Family
+
+    Raises
+    ------
+    HypothesisError
+        Nobody listens to anybody, or where followers are drawn to depends on the signal, or leaders hear each other.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graphs.family import Family
+    >>> rows = UncertainRows(Family.from_intervals([(1, 2, 1, 2), (2, 3, 1, 2), (3, 2, "0.5", 1)]))
+    >>> round(float(rows.witness(Fraction(5, 4)).b), 3)
+    0.154
+    """
+
+    def __init__(self, family: Family):
+        self.followers, self.shares, self._smallest = listeners(family), None, {}
+        if not self.followers.size:
+            raise HypothesisError("nobody listens to anybody, so there is nothing that could be late; add edges")
+        refuse_other_targets(family)
+        self.family, self.intervals = family, IntervalRows.of(family.modes, self.followers)
+        self._take(np.ones(self.followers.size), 1.0)
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of agents."""
+        return self.family.n_nodes
+
+    @cached_property
+    def weights(self) -> np.ndarray:
+        """``D`` at most."""
+        ones = np.ones(self.intervals.n + self.intervals.outside)
+        return np.asarray(self.intervals.largest_pushes(ones).max(axis=0))
+
+    def slack(self, u: np.ndarray) -> np.ndarray:
+        """Return ``sum_l |w_kl| (u_k - u_l)`` of every follower, at least."""
+        return np.asarray(self.intervals.pull(self._all(u)).min(axis=0))
+
+    def largest(self, u: np.ndarray) -> np.ndarray:
+        """Return ``sum_l |w_kl| (u_k + u_l)`` of every follower, at most."""
+        return np.asarray(self.weights * u + self.intervals.largest_pushes(self._all(u)).max(axis=0))
+
+    def decay(self, witness: RowWitness, q: float) -> float:
+        """Return the ``b`` that the ``u`` of a witness proves with another ``q``, in floats."""
+        return float((self.intervals.pull(self._all(witness.u), q).min(axis=0) / witness.u).min())
+
+    def _vector(self, q: Fraction, loss: float) -> np.ndarray:
+        for _ in range(_POLICIES):
+            self._smallest.clear()
+            u = super()._vector(q, loss)
+            if not self._take(u, float(q)):
+                break
+        return u
+
+    def _proved(self, u: np.ndarray, q: float) -> float:
+        lost = _ROUNDING * (self.weights + q * self.intervals.largest_pushes(self._all(u)).max(axis=0) / u)
+        return float((self.intervals.pull(self._all(u), q).min(axis=0) / u - lost).min())
+
+    def _all(self, u: np.ndarray) -> np.ndarray:
+        return np.concatenate([u, np.zeros(self.intervals.outside)])
+
+    def _take(self, u: np.ndarray, q: float) -> bool:
+        """Take the member whose rows are the worst for ``u``; tell whether it is another."""
+        from scipy import sparse
+
+        policy = self.intervals.worst(self._all(u), q)
+        if policy == getattr(self, "_policy", None):
+            return False
+        self._policy, (M, _) = policy, self.intervals.system(policy)
+        self.D = M.diagonal()
+        self.W = sparse.csr_array(sparse.diags_array(self.D) - M)
+        return True
+
+
+def listeners(family: Family) -> np.ndarray:
+    """Return the agents that hear others in some mode, ascending.
+
+    Examples
+    --------
+    >>> from ptcc_certify.graphs.family import Family
+    >>> listeners(Family.from_intervals([("a", "b", 0, 1), ("b", "c", 1, 1)])).tolist()
+    [1, 2]
+    """
+    return np.unique(family.union[1])
+
+
+def refuse_other_targets(family: Family) -> None:
+    """Refuse a family of whose members the followers of leaders that are single nodes have no common targets."""
+    for component in decide(family):
+        labels, kernel = component.family.labels, component.kernel
+        if kernel is None or component.behaviour is None:
+            raise HypothesisError(
+                "late messages and moving leaders: where agents are drawn to depends on the signal here, "
+                "of which nothing is proved yet"
+            )
+        heard = set(listeners(component.family).tolist())
+        group = next((c for c in kernel.structure.closed_components if heard.intersection(c.nodes)), None)
+        if group is not None:
+            raise HypothesisError(
+                f"late messages and moving leaders of a family: leaders hear nobody in any mode; "
+                f"{shorten(labels[group.nodes[0]])} leads and hears others, of which nothing is proved yet"
+            )
 
 
 def _entries(graph: Any, values: np.ndarray) -> Any:

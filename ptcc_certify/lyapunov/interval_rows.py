@@ -134,13 +134,15 @@ class IntervalRows:
 
     # ------------------------------------------------------------------ rows
 
-    def pull(self, values: np.ndarray) -> np.ndarray:
-        """Return the least ``sum_l |w_kl| (y_k - y_l)`` of every row, in every mode.
+    def pull(self, values: np.ndarray, times: float = 1.0) -> np.ndarray:
+        """Return the least ``sum_l |w_kl| (y_k - times y_l)`` of every row, in every mode.
 
         Parameters
         ----------
         values : (n + outside,) array
             ``y``. Of integers everything is exact, in units of ``unit``; of floats nothing is, and the unit is 1.
+        times : float
+            Of floats.
 
         Returns
         -------
@@ -148,13 +150,14 @@ class IntervalRows:
         """
         if values.dtype.kind == "f":
             low, high = self._floats
+            gap = values[self.target] - times * values[self.source]
         else:
             low, high = self.lower, self.upper
             span = int(values.max(initial=0)) - int(values.min(initial=0))
             small = span < INT64_SAFE and self.degree * int(high.max(initial=0)) * span < INT64_SAFE
             kind: Any = np.int64 if small else object
             low, high, values = low.astype(kind), high.astype(kind), values.astype(kind)
-        gap = values[self.target] - values[self.source]
+            gap = values[self.target] - values[self.source]
         return self._sums(np.where(gap < 0, high, low) * gap)
 
     def pull_of(self, policy: Policy, values: np.ndarray) -> np.ndarray:
@@ -193,10 +196,10 @@ class IntervalRows:
 
     # ------------------------------------------------------------------ policies
 
-    def worst(self, values: np.ndarray) -> Policy:
+    def worst(self, values: np.ndarray, times: float = 1.0) -> Policy:
         """Return the choice of the least pull of every row, in floats."""
-        mode = self.pull(values.astype(float)).argmin(axis=0)
-        return Policy(mode, values[self.source] > values[self.target])
+        mode = self.pull(values.astype(float), times).argmin(axis=0)
+        return Policy(mode, times * values[self.source] > values[self.target])
 
     def system(self, policy: Policy) -> tuple[Any, Any]:
         """Return ``M`` (n, n) and ``N`` (n, outside), in floats: ``M y - N z`` are the rows under a policy."""

@@ -18,9 +18,7 @@ if TYPE_CHECKING:
     from ptcc_certify.protocols.moving_leaders import MovingLeaders
 
 #: What is asked of one graph alone.
-NOT_OF_FAMILIES = (
-    *("at", "initial_set", "limits", "delta", "noise", "messages", "leaders", "agents", "simulation", "disturbance"),
-)
+NOT_OF_FAMILIES = (*("at", "initial_set", "limits", "delta", "noise", "agents", "simulation", "disturbance"),)
 #: What is asked of single integrators alone.
 _NOT_OF_AGENTS = {
     "at": "leave it out",
@@ -85,8 +83,12 @@ def refuse_of_families(case: Case) -> None:
     given += [name for name in NOT_OF_FAMILIES if (value := case.given(name)) is not None and value is not False]
     if given:
         raise ParameterError(given[0], "is not for families of graphs yet; leave it out, or certify one graph")
-    if case.asks.expectations.max_residual is not None:
-        raise ParameterError("max_residual", "is asked of late messages, which families do not take yet; leave it out")
+    _refuse_beside_any_graph(case)
+    if case.messages is not None:
+        if isinstance(case.messages.delay, Mapping):
+            raise ParameterError("delay", "edge by edge is not proved of families yet; give one for all")
+        if case.messages.own_delay:
+            raise ParameterError("own_delay", "an own state that is late is not proved of families yet; leave it out")
 
 
 def refuse_agents(case: Case) -> None:
@@ -126,21 +128,24 @@ def _entries(values: Any) -> list[Any]:
         return [values]
 
 
+def _refuse_beside_any_graph(case: Case) -> None:
+    """Refuse what is proved of no graph where messages are late, or leaders move."""
+    if case.messages is None and case.asks.expectations.max_residual is not None:
+        raise ParameterError("max_residual", "is asked of late messages; tell how late they are, or leave it out")
+    refuse_together(case.messages, case.leaders)
+    if case.leaders is not None and case.sliding:
+        raise ParameterError("leaders that move are certified under the nominal protocol; change it, or leave them out")
+
+
 def refuse_beside(structure: Structure, case: Case) -> None:
     """Refuse late messages and moving leaders where nothing could be certified, before anything is searched."""
     messages, leaders = case.messages, case.leaders
-    if messages is None and case.asks.expectations.max_residual is not None:
-        raise ParameterError("max_residual", "is asked of late messages; tell how late they are, or leave it out")
+    _refuse_beside_any_graph(case)
     if messages is None and leaders is None:
         return
-    refuse_together(messages, leaders)
     together = messages is not None and leaders is not None
     _refuse_more(_NOT_TOGETHER if together else _NOT_TRACKING if messages is None else _NOT_LATE, case)
     if leaders is not None:
-        if case.sliding:
-            raise ParameterError(
-                "leaders that move are certified under the nominal protocol; change it, or leave them out"
-            )
         refuse_leader_groups(structure, "leaders that move as they like: a bound")
     if messages is not None:
         _refuse_messages(structure, messages, [limit.gain_cap for limit in case.limits])

@@ -14,17 +14,19 @@ from ptcc_certify.bounds.small_delays import delay_threshold
 from ptcc_certify.certificate.facts import Fact, Facts
 from ptcc_certify.errors import Change
 from ptcc_certify.graphs.size_limits import EXACT_NODES
+from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.report.text_layout import shorten_label, shorten_list
 
 if TYPE_CHECKING:
     from ptcc_certify.bounds.late_messages import LateBounds
     from ptcc_certify.certificate.certificate import Certificate
+    from ptcc_certify.certificate.family_certificate import FamilyCertificate
     from ptcc_certify.protocols.base import Protocol
     from ptcc_certify.protocols.late_messages import LateMessages
     from ptcc_certify.protocols.moving_leaders import MovingLeaders
 
 
-def late_facts(certificate: Certificate) -> Facts:
+def late_facts(certificate: Certificate | FamilyCertificate) -> Facts:
     """Tell how late messages are; what cannot be then, and what is left at the deadline."""
     late = certificate.late
     if late is None:
@@ -50,11 +52,11 @@ def late_facts(certificate: Certificate) -> Facts:
         cap = "a gain without a cap makes ever more of what is late" if late.messages.gain_cap is None else ""
         text = f"not proved bounded with late messages{': ' * bool(cap)}{cap}"
         yield Fact(head="input", standing="unproved", note=text, loud=True)
-    if by_agent := _residual_text(certificate, late):
+    if by_agent := _residual_text(late):
         yield Fact(head="left", note=f"at T by agent: {by_agent}", detail=True)
 
 
-def tracking_facts(certificate: Certificate) -> Facts:
+def tracking_facts(certificate: Certificate | FamilyCertificate) -> Facts:
     """Tell how followers track leaders that move."""
     tracking = certificate.tracking
     if tracking is None:
@@ -118,17 +120,17 @@ def messages_text(messages: LateMessages, protocol: Protocol | None = None) -> s
     return "; ".join(told + ["the own state as well"] * messages.own_delay)
 
 
-def _residual_text(certificate: Certificate, late: LateBounds) -> str:
+def _residual_text(late: LateBounds) -> str:
     """List what is left at ``T`` at most, agent by agent; empty where nothing is proved."""
     if math.isinf(late.largest):
         return ""
-    bounds = late.residual if late.residual is not None else np.full(certificate.graph.n_nodes, np.inf)
+    bounds = late.residual if late.residual is not None else np.full(len(late.labels), np.inf)
     if late.settling is not None:
         bounds = np.minimum(bounds, late.settling.residual)
     for one in (late.form, late.lmi):
         if one is not None:
             bounds = np.minimum(bounds, [float_up(x) for x in one.residual])
-    names = certificate.graph.labels
+    names = late.labels
     return shorten_list([f"{names[v]} {up(float(bounds[v]), 2)}" for v in range(len(names)) if bounds[v]])
 
 
@@ -136,7 +138,7 @@ def _impossible(late: LateBounds) -> list[str]:
     """Tell what cannot be: who misses the deadline, and delays from which on a constant gain diverges."""
     texts = []
     if late.missed is not None:
-        label = shorten_label(late.structure.graph.labels[late.missed.agent], 22)
+        label = shorten_label(late.labels[late.missed.agent], 22)
         size = down(late.missed.bound, 2)
         texts.append(f"agent {label} is off its final state at T by {size} at least, if none comes sooner")
     threshold = _threshold(late)
@@ -148,9 +150,10 @@ def _impossible(late: LateBounds) -> list[str]:
 
 def _threshold(late: LateBounds) -> float:
     """Return the delay that constant gain bears with a late own state; infinite if the own state is fresh."""
-    if not late.messages.own_delay or late.structure.graph.n_nodes > EXACT_NODES:
+    structure = late.structure
+    if not late.messages.own_delay or not isinstance(structure, Structure) or structure.graph.n_nodes > EXACT_NODES:
         return math.inf
-    return delay_threshold(late.structure, float(late.messages.gain_cap or 1))
+    return delay_threshold(structure, float(late.messages.gain_cap or 1))
 
 
 def _left(late: LateBounds) -> list[str]:

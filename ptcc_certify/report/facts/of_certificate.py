@@ -87,11 +87,9 @@ def _of_graph(certificate: Certificate, origins: Mapping[str, str], details: boo
     yield from _sliding(certificate)
     yield from late_facts(certificate)
     yield from tracking_facts(certificate)
-    beside = ["messages at once"] * (certificate.late is not None) + ["leaders at rest"] * certificate.leaders_move
+    beside = _beside(certificate)
     yield from claim_facts(certificate)
-    if beside:
-        text = f"what follows is of {' and '.join(beside)}"
-        yield Fact(head="claim", note=text, detail=True)
+    yield from beside
     if certificate.agents is not None:
         yield from agents_facts(certificate.agents, details)
     elif not drawn:
@@ -106,6 +104,14 @@ def _of_graph(certificate: Certificate, origins: Mapping[str, str], details: boo
         yield from run_facts(certificate)
 
 
+def _beside(certificate: Certificate | FamilyCertificate) -> list[Fact]:
+    """Tell what the rest of a certificate knows nothing of: nothing, or one fact."""
+    without = ["messages at once"] if certificate.late is not None else []
+    without += ["leaders at rest"] if certificate.leaders_move else []
+    text = f"what follows is of {' and '.join(without)}"
+    return [Fact(head="claim", note=text, detail=True)] if without else []
+
+
 def _details(facts: Iterable[Fact], are: bool) -> Iterable[Fact]:
     """Return facts, which are details where others stand in their place."""
     return (replace(fact, detail=True) for fact in facts) if are else facts
@@ -116,11 +122,15 @@ def _of_family(certificate: FamilyCertificate, origins: Mapping[str, str], detai
     components = [part.component for part in certificate.parts]
     yield from initial_facts(certificate, origins, alone=False)
     yield from _sliding(certificate)
+    yield from late_facts(certificate)
+    yield from tracking_facts(certificate)
+    beside = _beside(certificate)
     yield from family_claims(components, f" at T = {near(certificate.protocol.T)}", certificate)
+    yield from beside
     yield from family_rate_facts(certificate)
     if details:
         yield from function_facts(certificate)
     yield from signal_facts(certificate)
-    yield from family_final_facts(certificate)
-    yield from family_error_facts(certificate)
-    yield from family_input_facts(certificate)
+    yield from _details(family_final_facts(certificate), certificate.leaders_move)
+    yield from _details(family_error_facts(certificate), bool(beside))
+    yield from _details(family_input_facts(certificate), bool(beside))
