@@ -290,7 +290,7 @@ let lyapunov_of nodes parts modes proof work k v =
   | _ -> form_of nodes parts modes proof work k v
 
 (* * The document *)
-let keys = [ "restricted", "signals that are restricted" ]
+let keys = ("restricted", "signals that are restricted") :: Reader.besides
 let certificate (j : Json.t) : t =
   let there key = match j with Obj l -> List.mem_assoc key l | _ -> false in
   let more = List.filter (fun (key, _) -> there key) keys in

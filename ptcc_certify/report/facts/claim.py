@@ -54,10 +54,8 @@ def claim_facts(certificate: Certificate) -> Facts:
     also = ""
     if certificate.limits:
         also = ", without limits"
-    elif certificate.leaders_move:
-        also = ", nothing late, leaders at rest" if certificate.late else ", leaders at rest"
-    elif certificate.late is not None:
-        also = ", nothing late"
+    elif certificate.leaders_move or certificate.late is not None:
+        also = _left_out(certificate)
     elif p.reaching is not None:
         also = f", any |d_k| <= {down(p.reaching.delta, 12)}" if p.reaching.delta else ", without disturbances"
     when = f" at T = {near(p.T)}"
@@ -113,19 +111,27 @@ def sharpest(component: FamilyComponent) -> str:
     return (str(component.behaviour or "not decided"), *special_behaviours(component))[-1]
 
 
+def _left_out(certificate: Certificate | FamilyCertificate) -> str:
+    """Tell what a claim knows nothing of: late messages, leaders that move."""
+    late = ", nothing late" if certificate.late is not None else ""
+    return f"{late}, leaders at rest" if certificate.leaders_move else late
+
+
 def family_claims(
     components: Sequence[FamilyComponent], when: str = "", certificate: FamilyCertificate | None = None
 ) -> Facts:
     """Tell what every component does; where that depends on the signal, why, and what holds all the same."""
     disturbed = certificate is not None and certificate.sigma0 is not None
     direct, boxes = (True, {}) if certificate is None else (certificate.direct, certificate.boxes)
+    also = " and disturbance" if disturbed else ""
+    also += "" if certificate is None else _left_out(certificate)
     order = sorted(range(len(components)), key=lambda k: -components[k].nodes.size)
     if len(components) == 1:
-        text, longer = _behaviour_texts(components[0], when, disturbed)
+        text, longer = _behaviour_texts(components[0], when, also)
         yield Fact(head="claim", value=sharpest(components[0]), note=longer[0], brief=(longer[1], text))
     else:
         for k in order[:_COMPONENTS]:
-            text, (_, camps_named) = _behaviour_texts(components[k], when, disturbed)
+            text, (_, camps_named) = _behaviour_texts(components[k], when, also)
             text = camps_named if columns(camps_named) <= TEXT else text
             names = [printable(label) for label in components[k].family.labels[:TEXT]]
             whose = shorten_list(names, max(TEXT - len(text) - 2, 12), components[k].nodes.size)
@@ -140,7 +146,7 @@ def family_claims(
             yield Fact(head="box", note=box_text(components[k], boxes[k]), brief=(brief,), detail=place > 0)
 
 
-def _behaviour_texts(component: FamilyComponent, when: str, disturbed: bool) -> tuple[str, tuple[str, str]]:
+def _behaviour_texts(component: FamilyComponent, when: str, also: str) -> tuple[str, tuple[str, str]]:
     """Tell what a component does, and the same with its camps, of which all agents are named or the first."""
     if component.behaviour is None:
         return "not decided", ("not decided",) * 2
@@ -148,7 +154,7 @@ def _behaviour_texts(component: FamilyComponent, when: str, disturbed: bool) -> 
         text = DEPENDS if component.signal == "any" else "depends on which graph it is"
         return text, (text, text)
     whatever = WHATEVER[component.signal].replace("mode and ", "mode and " * (len(component.family.modes) > 1))
-    text = f"{sharpest(component)}{when} {whatever}{' and disturbance' * disturbed}"
+    text = f"{sharpest(component)}{when} {whatever}{also}"
     sides = camps(component)
     if component.behaviour == STABILITY or len(sides) < 2:
         return text, (text, text)
