@@ -74,6 +74,7 @@ from ptcc_certify.graphs.size_limits import (
 )
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.lyapunov.error_system import ErrorSystem
+from ptcc_certify.lyapunov.follower_rows import refuse_other_targets
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.lyapunov.rate_upper_bound import RateBound, mean_bound, prove_rate_bound
 from ptcc_certify.lyapunov.search import APART_NODES, Search, search_functions, search_large
@@ -293,8 +294,12 @@ def _certify_family(
 ) -> FamilyCertificate:
     """Certify a family, or refuse what it does not take."""
     refuse_of_families(case)
+    family = as_family(case.graph, uncertainty=case.uncertainty)
+    beside = case.messages is not None or case.leaders is not None
+    if beside:
+        refuse_other_targets(family)
     certificate = certify_family(
-        as_family(case.graph, uncertainty=case.uncertainty),
+        family,
         case.protocol,
         case.initial.x0,
         sigma0=case.initial.sigma0,
@@ -305,9 +310,7 @@ def _certify_family(
         origins=origins,
         progress=progress,
     )
-    if case.messages is None and case.leaders is None:
-        return certificate
-    return _beside_families(certificate, case)
+    return _beside_families(certificate, case) if beside else certificate
 
 
 def _beside_families(certificate: FamilyCertificate, case: Case) -> FamilyCertificate:

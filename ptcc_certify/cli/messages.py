@@ -24,7 +24,7 @@ _ASKING = ("delay", "period", "quantisation")
 
 def asks_for_messages(options: Options) -> bool:
     """Tell whether something is asked of late, lost or rounded messages."""
-    return any(options[name] is not None for name in _ASKING)
+    return any(options.get(name) is not None for name in _ASKING)
 
 
 def asks_for_leaders(options: Options) -> bool:

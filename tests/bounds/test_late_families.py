@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+import json
 from fractions import Fraction
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+import ptcc_certify as ptcc
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.checker import check
+from ptcc_certify.checker.reading import digest
+from ptcc_certify.errors import HypothesisError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.lyapunov.follower_rows import FollowerRows, UncertainRows
-from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.model.asks import Asks, Expectations
+from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.late_messages import LateMessages
 from ptcc_certify.protocols.moving_leaders import MovingLeaders
 
@@ -203,3 +210,134 @@ def test_known_weights_in_one_mode_are_bounded_as_those_of_a_graph():
     )
     wide = UncertainRows(Family.from_graph(graph, uncertainty="10%"))
     assert wide.witness(Fraction(1)).b < plain.witness(Fraction(1)).b
+
+
+BESIDE: dict[str, dict[str, Any]] = {
+    "late": {"messages": LateMessages("0.01")},
+    "capped": {"messages": LateMessages("0.01", period="0.002", losses=2, value_error="0.01", gain_cap=20)},
+    "late behind leaders that move": {
+        "messages": LateMessages("0.01", gain_cap=20),
+        "leaders": MovingLeaders(speed="0.5", disturbance="0.1"),
+    },
+    "leaders that move": {"leaders": MovingLeaders(speed="0.5")},
+    "leaders that move, followed with a sign term": {"leaders": MovingLeaders(speed="0.5", sign_gain=1)},
+}
+
+
+@pytest.mark.parametrize("x0", [[1, 2, -3], None], ids=["state", "every state"])
+@pytest.mark.parametrize("name", BESIDE)
+def test_what_is_certified_is_read_back(name: str, x0: list[int] | None, tmp_path: Path):
+    made = certify(UNSURE, PROTOCOL, x0, **BESIDE[name])
+    made.save(tmp_path / "c.json")
+    found = ptcc.read_certificate(tmp_path / "c.json")
+    assert found == made and found.leaders_move == made.leaders_move == ("leaders" in BESIDE[name])
+    assert found.summary() == made.summary() and "nothing late" not in found.summary().split("claim")[0]
+    if made.late is not None:
+        assert found.late.messages == made.late.messages and found.late.leaders == made.late.leaders
+        assert found.late.largest == pytest.approx(made.late.largest) and found.late.relative == (x0 is None)
+        t = np.linspace(0, 1, 11)
+        assert found.late.deviation_bound(t) == pytest.approx(made.late.deviation_bound(t))
+    if made.tracking is not None:
+        q = np.linspace(0, 1, 11)
+        assert found.tracking.distance_bound(q) == pytest.approx(made.tracking.distance_bound(q))
+
+
+def test_a_delay_that_is_not_forgiven_is_left_open_and_read_back(tmp_path: Path):
+    asked = Asks(expectations=Expectations("bipartite consensus", max_residual="0.1"))
+    made = certify(UNSURE, PROTOCOL, [1, 2, -3], messages=LateMessages(50, gain_cap=100), asks=asked)
+    made.save(tmp_path / "c.json")
+    for certificate in (made, ptcc.read_certificate(tmp_path / "c.json")):
+        assert certificate.verdict == "certified" and certificate.assessment.asked == "left open"
+        assert int(certificate.assessment.exit_code) == 4 and certificate.late.messages.delay == 50
+
+
+@pytest.mark.parametrize(
+    ("words", "code"),
+    [
+        ({"behaviour": "bipartite consensus"}, 4),
+        ({"max_residual": "0.1"}, 0),
+        ({"max_residual": "1e-9"}, 4),
+        ({"min_rate": "0.1"}, 4),
+        ({"max_input": 10_000}, 0),
+        ({"max_input": 1}, 3),
+    ],
+)
+def test_expectations_are_of_what_is_asked(words: dict[str, Any], code: int):
+    """What follows where nothing is late is no answer to a question about late messages."""
+    messages, asked = LateMessages("0.001", gain_cap=50), Asks(expectations=Expectations(**words))
+    certificate = certify(UNSURE, PROTOCOL, [1, 2, -3], messages=messages, asks=asked)
+    assert int(certificate.assessment.exit_code) == code
+
+
+@pytest.mark.parametrize(
+    ("family", "more", "why"),
+    [
+        ([("a", "b", 1, 2), ("b", "a", 1, 2), ("b", "c", 1, 2)], {}, "a leads and hears others"),
+        ([("a", "c", 1, 2), ("b", "c", 1, 2)], {}, "depends on the signal"),
+        ([("a", "b", 1, 2)], {"messages": LateMessages({("a", "b"): "0.1"})}, "edge by edge"),
+        ([("a", "b", 1, 2)], {"messages": LateMessages("0.1", own_delay=True, gain_cap=2)}, "own state"),
+        ([("a", "b", 1, 2)], {"asks": Asks(expectations=Expectations(max_residual=1)), "messages": None}, "how late"),
+    ],
+)
+def test_what_is_not_proved_is_refused(family: Any, more: dict[str, Any], why: str):
+    with pytest.raises((ParameterError, HypothesisError), match=why):
+        certify(Family.from_intervals(family), PROTOCOL, **{"messages": LateMessages("0.1"), **more})
+
+
+def test_under_the_sliding_mode_protocol_variables_begin_at_0():
+    sliding = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=2, kappa=1, mu1=2, mu2=1, mu3=1, delta=1)
+    messages = LateMessages("0.01")
+    assert certify(UNSURE, sliding, [1, 2, -3], messages=messages).verdict == "certified"
+    with pytest.raises(ParameterError, match="sigma0"):
+        certify(UNSURE, sliding, ptcc.InitialState([1, 2, -3], sigma0=[1, 0, 0]), messages=messages)
+    with pytest.raises(ParameterError, match="nominal"):
+        certify(UNSURE, sliding, [1, 2, -3], leaders=MovingLeaders(speed=1))
+
+
+def forged(name: str, path: str, value: Any) -> str | None:
+    """Return what the check says of a certificate with another number; None if it accepts that."""
+    data = certify(UNSURE, PROTOCOL, [1, 2, -3], **BESIDE[name]).to_dict()
+    *way, last = path.split(".")
+    at: Any = data
+    for key in way:
+        at = at[int(key) if key.isdigit() else key]
+    assert at[int(last) if last.isdigit() else last] != value
+    at[int(last) if last.isdigit() else last] = value
+    return check(data | {"digest": digest(data)}).rejected
+
+
+@pytest.mark.parametrize(
+    ("name", "path", "value"),
+    [
+        ("late", "messages.delay", "1/2"),
+        ("late", "messages.residual.a", "0"),
+        ("late", "messages.residual.l", "1"),
+        ("late", "messages.rows.0.initial", "1/100"),
+        ("late", "messages.rows.0.left", "0"),
+        ("capped", "messages.rows.0.floor", "0"),
+        ("capped", "messages.input.b", "1"),
+        ("capped", "messages.value_error", "1"),
+        ("late behind leaders that move", "messages.rows.0.drift", "0"),
+        ("late behind leaders that move", "messages.rows.0.after", "0"),
+        ("leaders that move", "leaders.initial", "0"),
+        ("leaders that move", "leaders.after", "0"),
+        ("leaders that move", "leaders.speed", "9"),
+        ("leaders that move, followed with a sign term", "leaders.sign_gain", "1/4"),
+    ],
+)
+def test_a_forged_number_is_rejected(name: str, path: str, value: str):
+    assert forged(name, path, value) is not None
+
+
+def test_rows_hold_at_the_worst_weights_of_every_mode_alone():
+    """Of two modes, each of which has a rate, none is proved by the rows of the other; ``b`` above the least fails."""
+    day = Family.from_intervals([("l", "a", 1, 2), ("a", "b", 5, 6)])
+    night = Family.from_intervals([("l", "a", "0.1", 2), ("a", "b", 1, 6)])
+    both = certify(Family.switching([day, night]), PROTOCOL, [0, 1, 1], leaders=MovingLeaders(speed=1))
+    data = both.to_dict()
+    (step,) = (one for one in data["proof"] if one["kind"] == "tracking")
+    assert float(Fraction(step["numbers"]["a"])) <= 0.1
+    step["numbers"]["a"] = "1/9"
+    data["digest"] = digest(data)
+    assert "does not decay so fast" in str(check(data).reason)
+    assert json.loads(both.to_json())["leaders"]["speed"] == "1"

@@ -20,8 +20,8 @@ from selection import thinned
 from side_files import Side
 
 from lmi.exact.work import WorkError, limited
-from ptcc_certify.certificate.family_certificate import certify_family
 from ptcc_certify.certificate.json_schema import json_schema
+from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check, graph
 from ptcc_certify.checker.array_digraph import ArrayDigraph
 from ptcc_certify.checker.array_steps import ArraySteps
@@ -30,6 +30,7 @@ from ptcc_certify.checker.late_steps import Steps, decay_above
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.protocols.late_messages import LateMessages
 
 SCHEMA = json_schema()
 VALIDATOR = Draft202012Validator(SCHEMA)
@@ -377,7 +378,12 @@ def test_parts_that_stand_alone_or_are_missing_are_refused():
     family = Family.from_intervals([("a", "b", 1, 2)])
     whole = certify_family(family, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2]).to_dict()
     for key in ("messages", "leaders"):
-        assert "has no place for a family" in reason({**whole, "unverified": {}, key: {}})
+        assert "is missing" in reason({**whole, "unverified": {}, key: {}})
+    whole = certify(
+        family, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2], messages=LateMessages("0.01")
+    ).to_dict()
+    assert check(whole).accepted
+    assert "of a family" in reason(changed(whole, (*TOP, "staged"), {"b": "1"}))
 
 
 # ---------------------------------------------------------------------- residual

@@ -220,9 +220,10 @@ def test_followers_track_leaders_that_move_and_the_file_says_so() -> None:
         (("team.csv", "--leader-speed", "1", "--gain-cap", "9"), "--gain-cap: leaders that move are tracked at T by a"),
         (("team.csv", "--leader-speed", "1", "--stop-before", "0.1"), "--stop-before: leaders that move are tracked"),
         (("team.csv", "--leader-speed", "1", "--noise", "1"), "noise is not proved while leaders move"),
-        (("team.csv", "--uncertainty", "1%", "--delay", "0.1"), "--delay is for one graph, not for families yet"),
-        (("team.csv", "--uncertainty", "1%", "--leader-speed", "1"), "--leader-speed is for one graph, not for"),
-        (("team.csv", "--uncertainty", "1%", "--max-residual", "1"), "--max-residual is for one graph, not for"),
+        (("team.csv", "--uncertainty", "1%", "--delay", "late"), "--delay: edge by edge is not proved of families yet"),
+        (("team.csv", "--uncertainty", "1%", "--delta", "1"), "--delta is for one graph, not for families yet"),
+        (("team.csv", "--uncertainty", "1%", "--gain-cap", "9"), "--gain-cap is for one graph, not for families yet"),
+        (("team.csv", "--uncertainty", "1%", "--max-residual", "1"), "--max-residual is asked of late messages"),
         (("team.csv", "--delay", "1e"), "give a number in your unit of time, or the name of a column"),
         (("team.csv", "--delay", "latency"), 'team.csv, line 1: no column "latency"; begin with a header'),
         (("team.csv", "--packet-loss", "3"), "--packet-loss says nothing by itself; give --period"),
@@ -591,9 +592,9 @@ def test_families_and_other_limits_are_refused_in_python_too() -> None:
     for asked, said in (({"messages": LateMessages("0.1")}, "messages"), ({"leaders": MovingLeaders(1)}, "leaders")):
         with pytest.raises(ParameterError, match=f"{said}: nobody listens to anybody, so .*; leave it out"):
             certify_words(alone, protocol, **asked)
-    with pytest.raises(ParameterError, match="messages is not for families of graphs yet"):
+    with pytest.raises(ParameterError, match="delay: edge by edge is not proved of families yet"):
         certify(pair, protocol, uncertainty="10%", messages=each)
-    with pytest.raises(ParameterError, match="max_residual is asked of late messages, which families"):
+    with pytest.raises(ParameterError, match="max_residual is asked of late messages; tell how late"):
         certify(pair, protocol, uncertainty="10%", asks=Asks(expectations=Expectations(max_residual=1)))
     with pytest.raises(ParameterError, match="gain_cap: limits and late messages have two"):
         certify(pair, protocol, messages=each, limits=same)
