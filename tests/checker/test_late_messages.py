@@ -376,7 +376,7 @@ def test_parts_that_stand_alone_or_are_missing_are_refused():
     moving = base(sigma=F(1, 10))
     assert "while sliding variables move" in reason({**moving, "messages": samples()["sliding"]["messages"]})
     family = Family.from_intervals([("a", "b", 1, 2)])
-    whole = certify_family(family, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2]).to_dict()
+    whole = certify(family, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2]).to_dict()
     for key in ("messages", "leaders"):
         assert "is missing" in reason({**whole, "unverified": {}, key: {}})
     whole = certify(
