@@ -142,7 +142,14 @@ class FamilyCertificate(FamilyContent, FromFile, Shown):
 
     @property
     def main_figure(self) -> str:
-        """The figure that is drawn where none is named: the decay, or the states where nothing of one is proved."""
+        """The figure that is drawn where none is named: the decay, or the states where nothing of one is proved.
+
+        With late messages what is left, while leaders move how they are tracked.
+        """
+        if self.late is not None:
+            return "late" if self.late.rows else "graph"
+        if self.leaders_move:
+            return "graph" if self.tracking is None else "tracking"
         nothing = self.initial_state is not None and not np.isfinite(self.deviation_bound([0.5])).any()
         return "states" if nothing else "decay"
 
@@ -151,9 +158,9 @@ class FamilyCertificate(FamilyContent, FromFile, Shown):
 
         Parameters
         ----------
-        what : {"decay", "input", "graph", "states"}, optional
+        what : {"decay", "input", "graph", "states", "late", "tracking"}, optional
             Runs under many signals within what is proved for every signal: their error, their inputs, their states; or
-            the graphs. None: :attr:`main_figure`.
+            the graphs, or what is proved with late messages or while leaders move. None: :attr:`main_figure`.
         **keywords : Any
             ``ax`` and others of the function that draws it: ``plot_decay``, ``plot_input``, ``plot_graph`` or
             ``plot_trajectory``.

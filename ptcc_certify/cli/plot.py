@@ -273,8 +273,6 @@ def _draw(what: str, subject: Any, wide: bool, time_unit: str) -> Any:
     from ptcc_certify.simulation.trajectory import Trajectory
 
     if isinstance(subject, Family | FamilyCertificate):
-        if what in OF_A_CERTIFICATE:
-            raise ParameterError(f"--what {what} is of the certificate of one graph; this one is of a family")
         if wide:
             mend = "figures of families are one column wide: leave it out"
             raise ParameterError(f"--wide is for the states of one graph; {mend}")

@@ -144,8 +144,11 @@ def _draw_family(
     there = {"graph": saved.family.n_nodes <= DRAWN_NODES, "states": small, "input": small}
     moves = bool(runs) and saved.common and saved.rate is not None
     there["decay"] = moves and bool(saved.deviation_bound([1.0]).max() > 0)
+    there["late"] = saved.late is not None and bool(saved.late.rows)
+    there["tracking"] = saved.tracking is not None
+    taken = ("states", "input", "decay")
     figures = {
-        name: PLOTS[name](saved, **({} if name == "graph" else {"runs": runs})).figure
+        name: PLOTS[name](saved, **({"runs": runs} if name in taken else {})).figure
         for name in wanted
         if there.get(name)
     }

@@ -162,6 +162,8 @@ def _runs(saved: FamilyCertificate, simulation: bool | None) -> tuple[list[Traje
         return [], "it was left out (--no-simulation)"
     if saved.initial_state is None:
         return [], "the certificate names no initial state"
+    if saved.late is not None or saved.leaders_move:
+        return [], "with late messages or leaders that move none is made of a family"
     if simulation is None and saved.family.n_nodes > INPUT_NODES:
         return [], f"above {INPUT_NODES} agents it is made only where that is asked for"
     try:

@@ -25,6 +25,7 @@ from ptcc_certify.model.asks import Asks, Expectations
 from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.protocols.late_messages import LateMessages
 from ptcc_certify.protocols.moving_leaders import MovingLeaders
+from ptcc_certify.report.page import report_html
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
 UNSURE = Family.from_intervals([("l", "a", 1, 2), ("a", "b", -3, -1), ("b", "a", "-0.5", 0), ("l", "b", -1, -1)])
@@ -341,3 +342,17 @@ def test_rows_hold_at_the_worst_weights_of_every_mode_alone():
     data["digest"] = digest(data)
     assert "does not decay so fast" in str(check(data).reason)
     assert json.loads(both.to_json())["leaders"]["speed"] == "1"
+
+
+def test_figures_are_of_what_is_asked():
+    """The bound is drawn, and no run in which nothing is late and leaders rest."""
+    late = certify(UNSURE, PROTOCOL, [1, 2, -3], **BESIDE["late"])
+    moving = certify(UNSURE, PROTOCOL, [1, 2, -3], **BESIDE["leaders that move"])
+    assert [late.main_figure, moving.main_figure] == ["late", "tracking"]
+    assert [line.get_label() for line in late.plot().lines] == ["proved bound"]
+    assert [line.get_label() for line in moving.plot().lines] == ["proved bound", "$T$"]
+    for what in ("states", "decay", "input"):
+        with pytest.raises(ParameterError, match="no run of a family is made with late messages"):
+            late.plot(what)
+    page = report_html(late)
+    assert 'id="figure-late"' in page and 'id="figure-states"' not in page

@@ -8,7 +8,7 @@ from typing import Any
 
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.certificate.family_comparison import worst_case_signals
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.errors import Change, ParameterError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.protocols.restricted_signals import ClockShares, DwellTime, JointWindows
 from ptcc_certify.report.plots.style import RUN
@@ -91,6 +91,9 @@ def runs_of(subject: Any, runs: Sequence[Trajectory] | None = None) -> list[Traj
         if runs is not None:
             raise ParameterError("runs are of the certificate of a family; leave them out")
         return [trajectory_of(subject)]
+    if subject.late is not None or subject.leaders_move:
+        why = "no run of a family is made with late messages or leaders that move; draw what is proved of these: "
+        raise ParameterError((why, Change("what", subject.main_figure)))
     result = sample_runs(subject) if runs is None else list(runs)
     if not result or not all(_is_of(run, subject.family) for run in result):
         raise ParameterError("runs are what simulate returned for the family of the certificate")

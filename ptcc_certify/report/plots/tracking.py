@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from ptcc_certify.bounds.late_messages import LateBounds
 from ptcc_certify.bounds.tracking import Tracking
 from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled, time_label
 from ptcc_certify.report.plots.subject import certificate_of
@@ -36,8 +37,8 @@ def plot_tracking(subject: Any, *, ax: Axes | None = None, time_unit: str = "") 
 
     Parameters
     ----------
-    subject : Certificate
-        With late messages or moving leaders, and an initial state.
+    subject : Certificate or FamilyCertificate
+        With late messages or moving leaders, and an initial state; of a family the bound is drawn alone.
     ax : Axes, optional
     time_unit : str
         Of time on the axis.
@@ -62,23 +63,18 @@ def plot_tracking(subject: Any, *, ax: Axes | None = None, time_unit: str = "") 
     >>> [line.get_label() for line in plot_tracking(cert).lines]
     ['worst leaders', 'proved bound', '$T$']
     """
-    certificate = certificate_of(subject)
+    certificate = subject if isinstance(subject, FamilyCertificate) else certificate_of(subject)
     late, tracking, x0 = certificate.late, certificate.tracking, certificate.initial_state
     late = late if late is not None and late.says_something else None
     if late is None and tracking is None:
         mend = "certify with messages or leaders, or --delay or --leader-speed"
         raise ParameterError(f"the certificate says nothing of late messages or of leaders that move; {mend}")
-    ends = certificate.final_state
-    if x0 is None or (late is not None and ends is None):
-        raise ParameterError("the certificate has no initial state to run from; certify with x0")
-    ax, nodes, T = axes_of(ax), certificate.structure.followers, float(certificate.protocol.T)
-    if not nodes.size or (late is not None and (late.settling is not None or late.lmi is not None)):
-        nodes = np.arange(certificate.graph.n_nodes)
+    ax, T = axes_of(ax), float(certificate.protocol.T)
     t = np.linspace(0, T, 401)
-    for run, style in _runs(certificate, late, tracking, [float(x) for x in x0]):
-        aims = np.asarray(ends, dtype=float)[:, None] if run.targets is None else run.targets
-        ax.plot(run.t, np.abs(run.states - aims)[nodes].max(axis=0), **style)
-        t = run.t
+    if isinstance(certificate, Certificate):
+        if x0 is None or (late is not None and certificate.final_state is None):
+            raise ParameterError("the certificate has no initial state to run from; certify with x0")
+        t = _draw_runs(ax, certificate, late, [float(x) for x in x0])
     if late is not None:
         _draw_late_bound(ax, late, t)
     elif tracking is not None:
@@ -88,6 +84,19 @@ def plot_tracking(subject: Any, *, ax: Axes | None = None, time_unit: str = "") 
     ax.set_xlim(0, t[-1])
     moving = "" if late is not None and late.leaders is None else "(t)"
     return finished(ax, time_label("time $t$", time_unit), rf"$\max_k |x_k(t) - x_k^*{moving}|$")
+
+
+def _draw_runs(ax: Axes, certificate: Certificate, late: LateBounds | None, start: list[float]) -> np.ndarray:
+    """Draw the runs of one graph; return their instants."""
+    nodes, ends = certificate.structure.followers, np.asarray(certificate.final_state, dtype=float)
+    if not nodes.size or (late is not None and (late.settling is not None or late.lmi is not None)):
+        nodes = np.arange(certificate.graph.n_nodes)
+    t = np.linspace(0, float(certificate.protocol.T), 401)
+    for run, style in _runs(certificate, late, certificate.tracking, start):
+        aims = ends[:, None] if run.targets is None else run.targets
+        ax.plot(run.t, np.abs(run.states - aims)[nodes].max(axis=0), **style)
+        t = run.t
+    return t
 
 
 def _runs(
