@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -17,10 +18,13 @@ import numpy as np
 
 from lmi import search_time as deadline
 from lmi.blas_threads import one_thread
+from lmi.errors import NoCertificate
 from lmi.exact.decimal_rounding import down
 from lmi.search_time import share_of_time
 from ptcc_certify.bounds.attracting_box import AttractingBox, box_of_family
 from ptcc_certify.bounds.kept_means import with_means
+from ptcc_certify.bounds.late_messages import bound_late
+from ptcc_certify.bounds.tracking import bound_tracking
 from ptcc_certify.certificate.answer import Assessment, rejection, rejects
 from ptcc_certify.certificate.certificate_file import FromFile, write_certificate
 from ptcc_certify.certificate.document import family_document
@@ -58,6 +62,8 @@ from ptcc_certify.model.asks import Expectations, read_expectations
 from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.protocols import Protocol
 from ptcc_certify.protocols.base import refuse_no_protocol
+from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.protocols.moving_leaders import MovingLeaders
 from ptcc_certify.protocols.restricted_signals import ClockShares, JointWindows, SignalClass, read_signal
 from ptcc_certify.shown import Shown, rendered
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent, decide
@@ -139,6 +145,30 @@ class FamilyCertificate(FamilyContent, FromFile, Shown):
     def refused(self) -> bool:
         """Whether the check does not accept the functions that were found: nothing that follows from them is told."""
         return self.verdict != "certified" and any(part.functions for part in self.parts)
+
+    def beside(self, messages: LateMessages | None, leaders: MovingLeaders | None) -> FamilyCertificate:
+        """Return the certificate with what is proved for every signal where messages are late, or leaders move.
+
+        Raises
+        ------
+        ParameterError
+            Sliding variables move.
+        HypothesisError
+            Where followers are drawn to depends on the signal, or leaders hear somebody in some mode.
+        """
+        state, finals = self.initial_state, self.final_states
+        if not self.direct:
+            raise ParameterError("sigma0", "late messages ask for 0, so that no sliding variable moves; leave it out")
+        known = [] if finals is None else [pair for pair in finals if pair is not None]
+        middles = [((low + high) / 2, (high - low) / 2) for low, high in known]
+        ends = middles if len(known) == self.family.n_nodes else None
+        late, tracking = None, None
+        if messages is not None:
+            late = bound_late(self.family, self.protocol, messages, state, ends, leaders)
+        elif leaders is not None:
+            with suppress(NoCertificate):
+                tracking = bound_tracking(self.family, self.protocol, leaders, state, ends)
+        return replace(self, late=late, tracking=tracking, asked_leaders=leaders)
 
     @property
     def main_figure(self) -> str:

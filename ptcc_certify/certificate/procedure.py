@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import partial
@@ -310,23 +309,7 @@ def _certify_family(
         origins=origins,
         progress=progress,
     )
-    return _beside_families(certificate, case) if beside else certificate
-
-
-def _beside_families(certificate: FamilyCertificate, case: Case) -> FamilyCertificate:
-    """Add what is proved for every signal where messages are late, or leaders move."""
-    family, state, finals = certificate.family, certificate.initial_state, certificate.final_states
-    if not certificate.direct:
-        raise ParameterError("sigma0", "late messages ask for 0, so that no sliding variable moves; leave it out")
-    known = [] if finals is None else [pair for pair in finals if pair is not None]
-    ends = [((low + high) / 2, (high - low) / 2) for low, high in known] if len(known) == family.n_nodes else None
-    late, tracking = None, None
-    if case.messages is not None:
-        late = bound_late(family, certificate.protocol, case.messages, state, ends, case.leaders)
-    elif case.leaders is not None:
-        with suppress(NoCertificate):
-            tracking = bound_tracking(family, certificate.protocol, case.leaders, state, ends)
-    return replace(certificate, late=late, tracking=tracking, asked_leaders=case.leaders)
+    return certificate.beside(case.messages, case.leaders) if beside else certificate
 
 
 def _with_agents(certificate: Certificate, agents: Agents, chains: Chains, run: bool) -> Certificate:

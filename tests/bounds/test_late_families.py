@@ -344,7 +344,7 @@ def test_rows_hold_at_the_worst_weights_of_every_mode_alone():
     assert json.loads(both.to_json())["leaders"]["speed"] == "1"
 
 
-def test_figures_are_of_what_is_asked():
+def test_figures_are_of_what_is_asked(tmp_path: Path):
     """The bound is drawn, and no run in which nothing is late and leaders rest."""
     late = certify(UNSURE, PROTOCOL, [1, 2, -3], **BESIDE["late"])
     moving = certify(UNSURE, PROTOCOL, [1, 2, -3], **BESIDE["leaders that move"])
@@ -354,5 +354,6 @@ def test_figures_are_of_what_is_asked():
     for what in ("states", "decay", "input"):
         with pytest.raises(ParameterError, match="no run of a family is made with late messages"):
             late.plot(what)
-    page = report_html(late)
+    late.save(tmp_path / "c.json")
+    page = report_html(ptcc.read_certificate(tmp_path / "c.json"))
     assert 'id="figure-late"' in page and 'id="figure-states"' not in page
