@@ -11,7 +11,7 @@ from ptcc_certify.certificate.answer import rejects
 from ptcc_certify.certificate.facts import Fact, Facts
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.report.facts.agents import agents_facts
-from ptcc_certify.report.facts.claim import claim_facts, family_claims
+from ptcc_certify.report.facts.claim import assumptions, claim_facts, family_claims
 from ptcc_certify.report.facts.decay import (
     error_facts,
     family_error_facts,
@@ -87,11 +87,11 @@ def _of_graph(certificate: Certificate, origins: Mapping[str, str], details: boo
     yield from _sliding(certificate)
     yield from late_facts(certificate)
     yield from tracking_facts(certificate)
-    beside = ["messages at once"] * (certificate.late is not None) + ["leaders at rest"] * certificate.leaders_move
+    beside = [text for text in assumptions(certificate) if text != "without limits"]
     yield from claim_facts(certificate)
     if beside:
-        text = f"what follows is of {' and '.join(beside)}"
-        yield Fact(head="claim", note=text, detail=True)
+        text = f"{' and '.join(beside)}, in what follows"
+        yield Fact(head="given", note=text, detail=True)
     if certificate.agents is not None:
         yield from agents_facts(certificate.agents, details)
     elif not drawn:
