@@ -91,7 +91,7 @@ def error_facts(certificate: Certificate, drawn: bool, details: bool) -> Facts:
         standing: Standing = "proved" if limited or certificate.direct else "unproved"
         yield Fact(head="error", value=value, side="up", standing=standing, note=brief[0], brief=tuple(brief))
     if details and certificate.rate is not None:
-        yield from _instants_facts(certificate)
+        yield from instants_facts(certificate)
         if certificate.initial_state is not None and not drawn and any(V.deviation for V in certificate.functions):
             yield from _deviation_facts(certificate)
 
@@ -131,7 +131,7 @@ def _at_instants(values: Iterable[float], names: Iterable[str]) -> str:
     return ", ".join(f"{up(float(x), 2)} at {name}" for x, name in zip(values, names, strict=True))
 
 
-def _instants_facts(certificate: Certificate) -> Facts:
+def instants_facts(certificate: Certificate) -> Facts:
     """Tell what the proved rate leaves at instants; of a reaching phase from ``T_r`` on."""
     p, z, direct = certificate.protocol, certificate.envelope.coordinates, certificate.direct
     instants = told_instants(p, direct)

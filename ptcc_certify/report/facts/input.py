@@ -27,7 +27,7 @@ def input_facts(certificate: Certificate, details: bool) -> Facts:
     yield _input_fact(certificate, effort)
     if not details:
         return
-    yield from _threshold_facts(certificate, effort)
+    yield from threshold_facts(certificate)
     yield from _size_facts(certificate, effort)
     yield from _limited_facts(effort)
 
@@ -56,8 +56,11 @@ def _input_fact(certificate: Certificate, effort: Effort) -> Fact:
     return Fact(head="input", value=largest, side="up", note=text + agent, brief=(text + agent, text), loud=loud)
 
 
-def _threshold_facts(certificate: Certificate, effort: Effort) -> Facts:
+def threshold_facts(certificate: Certificate) -> Facts:
     """Tell what decides whether the input is bounded."""
+    effort = certificate.effort
+    if effort is None or certificate.constant:
+        return
     lower, upper = effort.threshold
     whose = "the nominal part is " if effort.sliding is not None else ""
     product = f"rho2 kappa min Re lambda >= {down(lower, 5)}" if lower is not None else "nothing else is proved"
