@@ -81,8 +81,28 @@ Sentence = str | tuple[str | Change, ...]
 Spelling = Callable[[Change], str]
 
 
-def spell(sentence: Sentence, name: Spelling = str) -> str:
-    """Return a sentence as a text, its changes named as a medium names them.
+#: What a label stands between in a sentence, as Unicode isolates a text whose direction of writing is not known.
+LABEL, LABEL_END = "\N{FIRST STRONG ISOLATE}", "\N{POP DIRECTIONAL ISOLATE}"
+
+
+def labelled(label: str) -> str:
+    """Return a label as it stands in a sentence: apart from words and formulas, whatever it looks like.
+
+    Examples
+    --------
+    >>> spell(f"the largest of agent {labelled('delta')}")
+    'the largest of agent delta'
+    """
+    return f"{LABEL}{label}{LABEL_END}"
+
+
+def unlabelled(text: str) -> str:
+    """Return a text without the marks of labels."""
+    return text.replace(LABEL, "").replace(LABEL_END, "")
+
+
+def spell(sentence: Sentence, name: Spelling = str, marked: bool = False) -> str:
+    """Return a sentence as a text, its changes named as a medium names them; labels stay ``marked`` if it sets them.
 
     Examples
     --------
@@ -90,7 +110,8 @@ def spell(sentence: Sentence, name: Spelling = str) -> str:
     ('no rate is proved; raise time_limit', 'proved')
     """
     parts = (sentence,) if isinstance(sentence, str) else sentence
-    return "".join(part if isinstance(part, str) else name(part) for part in parts)
+    text = "".join(part if isinstance(part, str) else name(part) for part in parts)
+    return text if marked else unlabelled(text)
 
 
 def joined(separator: str, sentences: Iterable[Sentence]) -> Sentence:

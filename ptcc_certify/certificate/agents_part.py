@@ -246,7 +246,7 @@ class AgentsPart(AgentsAnswer):
         matrix = self.matrix
         pieces, count = max(len(matrix.points) - 1, 0), len(self.used)
         proof = f"V <= e^(-r s) V(0), r = {down(matrix.rate)}, R = r rho2 kappa = {near(self.decay)}; one matrix for "
-        proof += f"{count} Lyapunov function{'s' * (count != 1)}, {pieces} pieces"
+        proof += f"{count} Lyapunov function{'s' * (count != 1)}, {pieces} piece{'s' * (pieces != 1)}"
         return f"{self.gains_text}, coupling {near(matrix.coupling)}", proof
 
     def __repr__(self) -> str:

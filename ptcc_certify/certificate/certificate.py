@@ -14,9 +14,8 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, BinaryIO
 
-import numpy as np
-
 from lmi.exact.decimal_rounding import down
+from ptcc_certify.certificate.agents_table import agents_table
 from ptcc_certify.certificate.answer import Assessment, rejection, rejects, verdict_of
 from ptcc_certify.certificate.certificate_data import Content, Source
 from ptcc_certify.certificate.certificate_file import FromFile, bytes_of, text_of, write_certificate
@@ -228,17 +227,7 @@ class Certificate(Content, FromFile, Shown):
         >>> certify(pair, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), [3, 5]).to_pandas()["x(T)"].to_dict()
         {'a': -1.0, 'b': 1.0}
         """
-        if self.agents is not None:
-            return self.structure.to_pandas().assign(**self.agents.columns())
-        table, unknown = self.structure.to_pandas(), np.full(self.graph.n_nodes, np.nan)
-        start, end, deviation = self.initial_positions, self.final_positions, unknown
-        if start is not None and self.functions:
-            share = 1 if self.direct else float(self.protocol.span / self.protocol.T)
-            deviation = self.deviation_bound([0.01 * share])[:, 0]
-        table["x(0)"] = unknown if start is None else [float(x) for x in start]
-        table["x(T)"] = unknown if end is None else np.asarray(end, dtype=float)
-        table["deviation"] = np.where(np.isfinite(deviation), deviation, np.nan)
-        return table
+        return agents_table(self)
 
     def plot(self, what: str | None = None, **keywords: Any) -> Any:
         """Draw a figure of the certificate.

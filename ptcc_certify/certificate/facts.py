@@ -28,7 +28,8 @@ class Fact:
     standing : {"proved", "observed", "unproved"}
         ``observed``: in a simulated run. ``unproved``: nobody proves it, or it is numerical.
     note : str or tuple of str and Change
-        The sentence, with the number, rounded to that side.
+        The sentence, with the number, rounded to that side; labels stand in it between marks, see
+        :func:`ptcc_certify.errors.labelled`.
     brief : tuple of sentences
         Shorter sentences, the shortest last, for a screen of few lines.
     detail : bool

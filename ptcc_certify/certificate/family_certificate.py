@@ -25,12 +25,12 @@ from ptcc_certify.bounds.attracting_box import AttractingBox, box_of_family
 from ptcc_certify.bounds.kept_means import with_means
 from ptcc_certify.bounds.late_messages import bound_late
 from ptcc_certify.bounds.tracking import bound_tracking
+from ptcc_certify.certificate.agents_table import agents_table
 from ptcc_certify.certificate.answer import Assessment, rejection, rejects
 from ptcc_certify.certificate.certificate_file import FromFile, write_certificate
 from ptcc_certify.certificate.document import family_document
 from ptcc_certify.certificate.facts import Fact
 from ptcc_certify.certificate.family_content import ComponentProof, FamilyContent
-from ptcc_certify.certificate.family_table import family_table
 from ptcc_certify.certificate.functions import ProvedFunction
 from ptcc_certify.certificate.request import (
     listener,
@@ -289,7 +289,7 @@ class FamilyCertificate(FamilyContent, FromFile, Shown):
         >>> table.loc["b", ["least", "largest"]].tolist(), table["keeps"].tolist()
         ([-1.0, -1.0], [True, False])
         """
-        return family_table(self, self.verdict == "certified")
+        return agents_table(self)
 
     def __eq__(self, other: object) -> bool:
         """Two certificates are equal when they claim and prove the same; upper bounds on the rate do not count."""

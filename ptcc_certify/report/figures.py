@@ -13,11 +13,11 @@ from ptcc_certify.bounds.late_messages import LateBounds
 from ptcc_certify.certificate.answer import REFUTED
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
-from ptcc_certify.errors import ParameterError, SimulationError, gated
+from ptcc_certify.errors import ParameterError, SimulationError, gated, labelled
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.size_limits import DRAWN_NODES, EXACT_NODES, INPUT_NODES
 from ptcc_certify.protocols.base import Protocol
-from ptcc_certify.report.notation import printable, signs
+from ptcc_certify.report.notation import set_text
 from ptcc_certify.report.plots.agents_motion import plot_formation, plot_motion
 from ptcc_certify.report.plots.counterexample import plot_counterexample
 from ptcc_certify.report.plots.decay import plot_decay
@@ -176,10 +176,7 @@ def counterexamples(saved: FamilyCertificate) -> Counterexamples:
                 if why is not None and why not in [one for _, _, one in result]:
                     result.append((asked, part.component, why))
                 break
-    return [
-        (what, Markup("{}").format(signs(printable(counterexample_text(c, why), 500))), c, why)
-        for what, c, why in result
-    ]
+    return [(what, set_text(counterexample_text(c, why, labelled)), c, why) for what, c, why in result]
 
 
 def _late_is_drawn(late: LateBounds, protocol: Protocol) -> bool:

@@ -6,7 +6,6 @@ What holds HTML is :class:`markupsafe.Markup`, which the templates print as it i
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Callable, Sequence
 from decimal import Decimal, localcontext
 from fractions import Fraction
@@ -21,21 +20,32 @@ from ziamath.tex import tex2mml
 from lmi.exact.decimal_rounding import down, up
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.document import producer
-from ptcc_certify.checker.input_formulas import InitialSet
+from ptcc_certify.errors import LABEL, LABEL_END, Change
 from ptcc_certify.graphs.rationals import format_exact, nearest_float, writable
 from ptcc_certify.protocols import Protocol
-from ptcc_certify.report.facts.graph import structure_text
-from ptcc_certify.report.text_layout import arithmetic
+from ptcc_certify.report.text_layout import NO_BREAK
 
 #: Labels of a list that are written out, and characters of a label.
 LISTED, CHARACTERS = 30, 48
 AUTHORS = "Zhen-Hua Zhu, Huaiyu Wu, Zhi-Hong Guan, Zhi-Wei Liu, Yang Chen, Xiujuan Zheng"
 TITLE = "Robust prescribed-time coordination control of cooperative-antagonistic networks with disturbances"
 
+#: What facts are of, in words, by their heads.
+HEADS = {"nodes": "Their names", "read": "Read as", "family": "Family of graphs", "given": "Assumed"}
+HEADS |= {"x(0)": "Initial state", "sigma(0)": "Sliding variables sigma(0)", "claim": "What they do"}
+HEADS |= {"alone": "Each mode alone", "groups": "What holds all the same", "box": "Where they are drawn"}
+HEADS |= {"rate": "How fast", "error": "How near", "bound": "Upper bound", "function": "Lyapunov functions"}
+HEADS |= {"x(T)": "Where they end", "v(T)": "Velocities at T", "a(T)": "Accelerations at T", "x(t)": "Where they stay"}
+HEADS |= {"messages": "Late messages", "late": "Left by then", "left": "Left"}
+HEADS |= {"tracking": "How leaders are tracked", "disturbed": "Disturbances", "limited": "Within limits"}
+HEADS |= dict.fromkeys(("constant", "dwell", "shares", "windows"), "If signals are restricted")
+HEADS |= {"effort": "Size of the input"}
+
 _MINUS = "\N{MINUS SIGN}"
 #: Units of a formula's drawing in the size of its letters.
 _EM = 200
-_LETTERS = {
+#: Greek letters by the names that a screen gives them.
+LETTERS = {
     "rho": "\u03c1",
     "kappa": "\u03ba",
     "mu": "\u03bc",
@@ -44,7 +54,7 @@ _LETTERS = {
     "Theta": "\u0398",
     "lambda": "\u03bb",
 }
-_LETTERS |= {"Xi": "\u039e", "Xit": "\u039e\u0303", "Phi": "\u03a6", "Psi": "\u03a8", "Pi": "\u03a0"}
+LETTERS |= {"eps": "\u03b5", "Xi": "\u039e", "Xit": "\u039e\u0303", "Phi": "\u03a6", "Psi": "\u03a8", "Pi": "\u03a0"}
 
 # ---------------------------------------------------------------------- texts of the file
 
@@ -65,6 +75,42 @@ def labels(nodes: Sequence[Any], names: Sequence[str] | None = None, most: int =
     limit = CHARACTERS if most >= LISTED else CHARACTERS // 2
     listing = Markup(", ").join(label(node if names is None else names[node], limit) for node in nodes[:most])
     return listing + (f" and {len(nodes) - most:,} more" if len(nodes) > most else "")
+
+
+def labels_apart(text: str) -> list[tuple[str, bool]]:
+    """Return the pieces of a sentence, and whether each is a label.
+
+    Examples
+    --------
+    >>> labels_apart(f"of agent {labelled('mu1')}.")
+    [('of agent ', False), ('mu1', True), ('.', False)]
+    """
+    pieces = re.split(f"{LABEL}([^{LABEL_END}]*){LABEL_END}?", text)
+    return [(piece, number % 2 == 1) for number, piece in enumerate(pieces) if piece]
+
+
+def as_parameters(change: Change) -> str:
+    """Name a change as a paper does; it has no options of a command line."""
+    return f"{change.field} = {change.number}" if change.number else change.field
+
+
+def set_text(text: str) -> Markup:
+    """Set a sentence: formulas as such, and labels as they are.
+
+    Examples
+    --------
+    >>> print(set_text(f"mu1 of agent {labelled('mu1')}"))
+    \u03bc<sub>1</sub> of agent <bdi>mu1</bdi>
+    """
+    return Markup("").join(
+        label(piece, 2000) if is_label else typeset(signs(printable(piece, 2000)))
+        for piece, is_label in labels_apart(text.replace(NO_BREAK, " "))
+    )
+
+
+def head_text(head: str) -> str:
+    """Return what facts of a head are of, in words, or a text that begins with a capital."""
+    return HEADS.get(head) or head[:1].upper() + head[1:]
 
 
 # ---------------------------------------------------------------------- numbers
@@ -139,7 +185,7 @@ def indexed(text: str) -> Markup:
 def symbol(name: str) -> Markup:
     """Return a parameter's letter with its index: ``rho1``."""
     letters, index = re.fullmatch(r"([A-Za-z]+?)_?([0-9rs]?)", name).groups()  # type: ignore[union-attr]
-    letter = _LETTERS.get(letters, letters)
+    letter = LETTERS.get(letters, letters)
     return indexed(f"{letter}_{index}" if index else letter)
 
 
@@ -150,7 +196,7 @@ def signs(text: str) -> str:
 
 def typeset(text: str) -> Markup:
     """Set what a screen writes in ASCII: ``||E|| <= 2e-07``, ``lmin(Xi_F)``, ``rho2``."""
-    text = re.sub(r"\b[A-Za-z]+(?![A-Za-z])", lambda word: _LETTERS.get(word[0], word[0]), text)
+    text = re.sub(r"\b[A-Za-z]+(?![A-Za-z])", lambda word: LETTERS.get(word[0], word[0]), text)
     text = re.sub(r"(?<=[\u03c1\u03bc])(?=\d)", "_", text)
     text = re.sub(r"(?<=L)'|(?<=L_F)'", "\u2032", text)
     for plain, sign in ((" <= ", " \u2264 "), (" >= ", " \u2265 "), ("||", "\u2016")):  # a label may be ">"
@@ -255,12 +301,6 @@ def state_columns(
     return columns
 
 
-def _common_bound(initial_set: InitialSet) -> Fraction | None:
-    """Return ``R`` of a set that is all initial states with ``|x_k(0)| <= R``; None of another one."""
-    same = len(set(initial_set.radius)) == 1 and not any(initial_set.center) and not initial_set.axes
-    return initial_set.radius[0] if same else None
-
-
 # ---------------------------------------------------------------------- templates
 
 
@@ -276,18 +316,3 @@ def environment(finalize: Callable[[str], str], **syntax: Any) -> jinja2.Environ
     )
     result.globals |= {"AUTHORS": AUTHORS, "TITLE": TITLE, "LISTED": LISTED, "producer": producer()}
     return result
-
-
-def facts(saved: Certificate) -> dict[str, Any]:
-    """Return what the templates of page and statement show both."""
-    effort = saved.effort
-    return {
-        **{"saved": saved, "graph": saved.graph, "effort": effort, "certified": saved.verdict == "certified"},
-        "sliding": saved.protocol.reaching is not None,
-        "arithmetic": arithmetic(saved.direct),
-        "negative": int((saved.graph.sign < 0).sum()),
-        "structure_words": structure_text(saved.structure),
-        "claims": sorted(Counter(saved.claims).items(), key=lambda item: item[0].theorem),
-        "claims_in_all": len(saved.claims),
-        "common_bound": _common_bound(effort.initial_set) if effort and effort.initial_set is not None else None,
-    }

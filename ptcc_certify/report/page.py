@@ -22,13 +22,12 @@ import jinja2
 from markupsafe import Markup
 
 from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate
-from ptcc_certify.certificate.facts import Fact
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.certificate.family_comparison import compare
 from ptcc_certify.certificate.restricted_bounds import nearer_for_signal
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.obligations import VerifiedObligation
-from ptcc_certify.errors import Change, spell
+from ptcc_certify.errors import Change, Sentence, spell
 from ptcc_certify.graphs.io.graph_files import reading_flags
 from ptcc_certify.protocols.agents import plant_text
 from ptcc_certify.report import notation as texts
@@ -41,7 +40,7 @@ from ptcc_certify.report.notation import rational
 from ptcc_certify.report.plots.runs import keeps_promise
 from ptcc_certify.report.plots.subject import ideal_text, limits_text
 from ptcc_certify.report.states_table import ROWS, states_table
-from ptcc_certify.report.text_layout import NO_BREAK
+from ptcc_certify.report.text_layout import arithmetic
 from ptcc_certify.simulation.agents import AgentsTrajectory
 from ptcc_certify.simulation.trajectory import Trajectory
 from ptcc_certify.theorems.family_behaviour import DEPENDS
@@ -155,22 +154,24 @@ def _environment() -> jinja2.Environment:
     named = ("above", "below", "indexed", "label", "labels", "plural", "power", "printable", "rational", "symbol")
     environment.filters |= {name: getattr(texts, name) for name in named}
     environment.filters |= {"grouped": "{:,}".format, "flags": reading_flags, "merged": dict.__or__}
-    environment.filters |= {"capitalized": lambda text: text[:1].upper() + text[1:], "set": set_text}
+    environment.filters |= {
+        "head": lambda head: texts.typeset(texts.head_text(head)),
+        "set": lambda fact: set_note(fact.note),
+    }
     style = (resources.files("ptcc_certify.report") / "page.css").read_text(encoding="utf-8")
     environment.globals |= {"style": Markup(style), "inline_figure": inline_figure, "newline": Markup("\n")}
     return environment
 
 
-def set_text(fact: Fact) -> Markup:
-    """Return the sentence of a fact, set as formulas are; it has no options of the command line.
+def set_note(note: Sentence) -> Markup:
+    """Return the sentence of a fact, set as formulas are.
 
     Examples
     --------
-    >>> print(set_text(Fact(head="verdict", note=("says little; ", Change("rho2", "3"), " leaves 1 %"))))
+    >>> print(set_note(("says little; ", Change("rho2", "3"), " leaves 1 %")))
     says little; \u03c1<sub>2</sub> = 3 leaves 1 %
     """
-    text = spell(fact.note, lambda change: f"{change.field} = {change.number}" if change.number else change.field)
-    return texts.typeset(texts.signs(texts.printable(text.replace(NO_BREAK, " "), 2000)))
+    return texts.set_text(spell(note, texts.as_parameters, marked=True))
 
 
 def _view(saved: Certificate | FamilyCertificate) -> dict[str, Any]:
@@ -195,12 +196,12 @@ def _view(saved: Certificate | FamilyCertificate) -> dict[str, Any]:
     ]
     return {
         **{"saved": saved, "certified": certified, "sliding": saved.protocol.reaching is not None},
-        "verdict_text": set_text(facts[-1]),
+        "verdict_text": set_note(facts[-1].note),
         "larger_rho2": advised if "leaves 1 %" in spell(assessment.advice) else "",
-        "arithmetic": texts.arithmetic(saved.direct),
+        "arithmetic": arithmetic(saved.direct),
         **{"answers": answers, "asked": asked, "details": details, "lacks": lacks},
-        "graph_text": set_text(facts[0]),
-        "equations": texts.formula_svg(_law(saved), inline=False),
+        "graph_text": set_note(facts[0].note),
+        "equations": texts.formula_svg(protocol_latex(saved), inline=False),
         "parameters": [(name, getattr(saved.protocol, name)) for name in texts.parameter_names(saved.protocol)],
         "states": states_table(saved),
         "reaching": [] if saved.direct else list(islice(pairs, ROWS)),
@@ -214,7 +215,7 @@ def _view(saved: Certificate | FamilyCertificate) -> dict[str, Any]:
     }
 
 
-def _law(saved: Certificate | FamilyCertificate) -> str:
+def protocol_latex(saved: Certificate | FamilyCertificate) -> str:
     """Return the protocol in LaTeX: that of agents of order n, or with places in a formation."""
     if saved.agents is not None:
         return saved.agents.protocol.latex()

@@ -20,7 +20,7 @@ from ptcc_certify.report.figures import draw
 from ptcc_certify.report.page import rejected_html, report_html
 from ptcc_certify.report.plots.runs import sample_runs
 from ptcc_certify.report.plots.style import figure_bytes
-from ptcc_certify.report.statement import family_latex, report_latex
+from ptcc_certify.report.statement import report_latex
 from ptcc_certify.simulation.trajectory import Trajectory
 
 #: What a report is written as.
@@ -107,8 +107,6 @@ def write_report(
     if isinstance(saved, FamilyCertificate):
         _write_family(saved, path, suffix, simulation, progress, day)
         return saved.verdict
-    if saved.agents is not None and suffix == ".tex":
-        raise ParameterError("there is no statement in LaTeX of agents of order n yet; write the page, FILE.html")
     saved, why = _with_run(saved, simulation)
     progress("report")
     if suffix == ".tex":
@@ -139,7 +137,7 @@ def _write_family(
     runs, why = _runs(saved, simulation)
     progress("report")
     if suffix == ".tex":
-        _write_statement(path, draw(saved, ("graph", "decay"), runs), lambda names: family_latex(saved, names))
+        _write_statement(path, draw(saved, ("graph", "decay"), runs), lambda names: report_latex(saved, names))
     else:
         write_atomically(path, report_html(saved, runs=runs, no_run=why, day=day))
 

@@ -1,14 +1,13 @@
-"""A certificate as a statement in LaTeX: a proposition with hypotheses, claims and numbers.
+"""A certificate as a statement in LaTeX: a proposition with hypotheses, claims, and the facts of the certificate.
 
 Its sentences are in ``templates/statement.tex``; what is not LaTeX already is escaped where it is printed.
 """
 
 from __future__ import annotations
 
-import math
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from functools import cache
 from typing import Any
@@ -16,50 +15,36 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
-from ptcc_certify.bounds.envelope import FRACTIONS, Envelope
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
-from ptcc_certify.certificate.judgements import largest_late_input
-from ptcc_certify.certificate.restricted_bounds import deviation_of_signal, nearer_for_signal
 from ptcc_certify.certificate.restricted_claims import WindowClaim
 from ptcc_certify.certificate.restricted_states import states_of_signal
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import STABILITY
+from ptcc_certify.protocols.agents import plant_text
 from ptcc_certify.protocols.casadi_latex import symbol_latex
 from ptcc_certify.report import notation as texts
-from ptcc_certify.report.facts.claim import box_text, range_text, sharpest, told_ranges
-from ptcc_certify.report.facts.decay import BOUND_KINDS, explicit_logs
-from ptcc_certify.report.facts.instants import FEW, told_instants
-from ptcc_certify.report.facts.signals import signal_facts, signal_text
-from ptcc_certify.report.facts.states import attained_text, constant_text
-from ptcc_certify.report.page import THEOREM
+from ptcc_certify.report.facts.agents import claimed_of
+from ptcc_certify.report.facts.claim import assumptions, sharpest
+from ptcc_certify.report.facts.of_certificate import facts_of
+from ptcc_certify.report.facts.signals import signal_text
+from ptcc_certify.report.latex_text import latex_of_number, latex_of_sentence, latex_of_text
+from ptcc_certify.report.page import THEOREM, protocol_latex
 from ptcc_certify.report.plots.subject import ideal_text
 from ptcc_certify.report.states_table import state_rows
 from ptcc_certify.report.text_layout import arithmetic
-from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_name
-from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
+from ptcc_certify.theorems.counterexample_text import mode_name
+from ptcc_certify.theorems.family_behaviour import DEPENDS
 
 #: Agents up to which ``W`` is printed (a matrix of amsmath has 10 columns), and edges up to which these are.
 _MATRIX, _EDGES = 10, 60
 #: Width in pt of a column of ``article`` in two columns, and of ``W = (w_kl) =`` with the brackets.
 _COLUMN, _HEAD = 229, 78
-_CAPTIONS = {
-    "graph": "The signed digraph: arrows point to who listens, solid from allies, dashed from opponents.",
-    "decay": (
-        "What is left of the error against the time left, both logarithmic. Thick line: the %s from the initial state"
-        " of the table, the least of those of the Lyapunov functions, which are the thin lines; dashed: that of the"
-        " theorem's own. With circles: a simulated run (numerical), down to the dotted line, below which the integrator"
-        " resolves nothing."
-    ),
-}
-_FAMILY_CAPTIONS = {
-    "graph": "The graphs: arrows point to who listens, solid from allies, dashed from opponents.",
-    "decay": (
-        "How far agents are from their final states, against the time left, both logarithmic. Thick line: the %s"
-        " for every signal. Thin: simulated runs (numerical), down to the dotted line, below which the integrator"
-        " resolves nothing."
-    ),
-}
+#: Facts that stand elsewhere in a statement, or are of no interest in one.
+_ELSEWHERE = {"graph", "family", "read", "nodes", "mode", "structure", "protocol", "claim", "function"}
+_ELSEWHERE |= {"time limit", "note", "proof", "verdict"}
+_DOWN_TO = "down to the dotted line, below which the integrator resolves nothing."
 #: What a behaviour is, in symbols.
 _MEANINGS = {
     "stability": r"$x_{k}(t) \to 0$ for every $k$",
@@ -84,12 +69,12 @@ _MEANINGS = {
 }
 
 
-def report_latex(saved: Certificate, figures: dict[str, str] | None = None) -> str:
+def report_latex(saved: Certificate | FamilyCertificate, figures: dict[str, str] | None = None) -> str:
     r"""Return a certificate as a statement in LaTeX, to be read by ``\input``; it needs amsmath and graphicx.
 
     Parameters
     ----------
-    saved : Certificate
+    saved : Certificate or FamilyCertificate
         As :func:`ptcc_certify.certificate.certificate.read_certificate` reads it.
     figures : mapping of {"graph", "decay"} to str, optional
         Names of the files that are included.
@@ -97,7 +82,8 @@ def report_latex(saved: Certificate, figures: dict[str, str] | None = None) -> s
     Returns
     -------
     str
-        A proposition with hypotheses, claims and numbers; of an undecided certificate what was verified.
+        A proposition with hypotheses, claims and numbers; of an undecided certificate what was verified. What is not
+        proved, such as what is numerical, stands behind it.
 
     Examples
     --------
@@ -108,127 +94,66 @@ def report_latex(saved: Certificate, figures: dict[str, str] | None = None) -> s
     >>> print(next(line for line in text.splitlines() if line.startswith("{}a")))
     {}a\_1 & leader, camp 1 & $3$ & $-1$ \\
     """
-    names = texts.parameter_names(saved.protocol)
-    view = texts.facts(saved) | {
-        "comment": _comment(saved.path.name),
-        "parameters": [(Markup(symbol_latex(name)), getattr(saved.protocol, name)) for name in names],
-        **{"structure": saved.structure, "named": _named(saved.graph.labels)},
-        **dict(zip(("matrix", "small"), _matrix(saved.graph), strict=True)),
-        "edges": _edges(saved.graph),
-        **{"connectivity": texts.structure_text(saved.structure).partition(";")[0], "bounds": _bounds(saved)},
-        "shares": _shares(saved),
-        "times": [0.0, *(r.time for r in saved.reaching or () if r.z is not None)],
-        **dict(zip(("columns", "rows"), _states(saved), strict=True)),
-        **{"figures": figures or {}, "stem": _stem(saved.path.stem), "captions": _captions(saved)},
-        "sha256": _broken(saved.sha256),
-        **_late(saved),
-    }
-    return _environment().get_template("statement.tex").render(view)
-
-
-def family_latex(saved: FamilyCertificate, figures: dict[str, str] | None = None) -> str:
-    r"""Return a family's certificate as a statement in LaTeX, to be read by ``\input``; see :func:`report_latex`.
-
-    Parameters
-    ----------
-    saved : FamilyCertificate
-        As :func:`ptcc_certify.certificate.certificate.read_certificate` reads it.
-    figures : mapping of {"graph", "decay"} to str, optional
-        Names of the files that are included.
-
-    Examples
-    --------
-    >>> unsure = Family.from_intervals([("a", "b", "0.8", "1.2"), ("b", "a", "0.5", "1.5")])
-    >>> with TemporaryDirectory() as folder:
-    ...     certify(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2]).save(f"{folder}/c.json")
-    ...     text = family_latex(read_certificate(f"{folder}/c.json"))
-    >>> print(next(line for line in text.splitlines() if line.startswith("Consensus")))
-    Consensus occurs at $T$ for every such choice: as $t \to T$, all $x_{k}(t)$ have the same limit.
-    """
     assert saved.source is not None
     names = texts.parameter_names(saved.protocol)
-    rows = [
-        (_cut(label), Markup("--") if camp == "\N{EN DASH}" else camp, *ends)
-        for label, camp, *ends in state_rows(saved)[: texts.LISTED]
-    ]
-    facts = _family_facts(saved)
-    view = facts | {
-        "comment": _comment(saved.source.path.name),
+    own = _of_family(saved) if isinstance(saved, FamilyCertificate) else _of_graph(saved)
+    told = [fact for fact in facts_of(saved) if fact.head not in _ELSEWHERE and not isinstance(fact.value, dict)]
+    if saved.agents is not None:  # the rate of the graph alone, with which single integrators would decay
+        told = [fact for fact in told if fact.head != "rate"]
+    view = {
+        **{"saved": saved, "certified": saved.verdict == "certified", "sliding": saved.protocol.reaching is not None},
+        **{"n": len(saved.labels), "named": _named(saved.labels), "part": saved.agents},
+        "protocol": protocol_latex(saved),
         "parameters": [(Markup(symbol_latex(name)), getattr(saved.protocol, name)) for name in names],
-        **{"named": _named(saved.family.labels), "listed": _intervals(saved), "rows": rows},
-        "remaining": [(_instant(saved, name), _number(bound)) for name, bound in _remaining(saved)],
-        "remaining_promised": [
-            (_instant(saved, name), _number(bound)) for name, bound in _remaining(saved, of_signal=True)
-        ],
-        **{"sigma0": saved.sigma0, "last_time": _last_time(saved)},
-        "why": [counterexample_text(c, c.counterexample) for c in _depending(saved) if c.counterexample is not None],
-        "restricted_tex": [_powers(text) for text in facts["restricted"]],
-        "left_by_windows": _left_by_windows(saved),
-        "ends_known": any(last is not None for *_, last in rows),
-        **{"figures": figures or {}, "stem": _stem(saved.source.path.stem), "report": saved.checked},
-        **{"sha256": _broken(saved.source.sha256), "sha256_plain": saved.source.sha256},
-        **{"bound_kinds": BOUND_KINDS, "theorem": THEOREM, "captions": _family_captions(saved)},
+        "proved": [fact for fact in told if fact.standing == "proved"],
+        "unproved": [fact for fact in told if fact.standing == "unproved"],
+        "begins": saved.initial_positions is not None,
+        "comment": _comment(saved.source.path.name),
+        **{"figures": figures or {}, "stem": _stem(saved.source.path.stem), "captions": _captions(saved)},
+        **{"report": saved.source.report, "arithmetic": arithmetic(saved.direct), "theorem": THEOREM},
+        **{"sha256": saved.source.sha256, "broken": _broken(saved.source.sha256)},
     }
-    return _environment().get_template("family_statement.tex").render(view)
+    return _environment().get_template("statement.tex").render(view | own)
 
 
-def _family_facts(saved: FamilyCertificate) -> dict[str, Any]:
-    """Return what the template of a family shows."""
-    family, components = saved.family, [part.component for part in saved.parts]
-    certified = saved.verdict == "certified"
-    parameters = [(mode, mode.parameters) for mode in family.modes]  # both directions of an undirected edge are one
+def _of_graph(saved: Certificate) -> dict[str, Any]:
+    """Return what the template shows of one graph alone."""
+    matrix, small = _matrix(saved.graph)
+    columns, rows = _states(saved)
+    heads = ["Part", *columns] if columns else []
+    (structure,) = (fact for fact in facts_of(saved) if fact.head == "structure")
+    claims = sorted(Counter(saved.claims).items(), key=lambda item: item[0].theorem)
     return {
-        **{"saved": saved, "family": family, "components": components, "certified": certified},
-        "claims": list(Counter(map(sharpest, components)).items()),
-        **{"claims_in_all": len(components), "several": len(family.modes) > 1},
+        **{"family": None, "several": False, "depends": False, "matrix": matrix, "small": small},
+        "modes": [] if matrix else _modes(Family.from_graph(saved.graph)),
+        "n_edges": saved.graph.n_edges,
+        "negative": int((saved.graph.sign < 0).sum()),
+        "structure": structure,
+        "claims": [(claim.behaviour, claim.special[-1:], claim.theorem, number) for claim, number in claims],
+        **{"claims_in_all": len(saved.claims), "assumed": assumptions(saved), "offsets": saved.offsets},
+        "plant": "" if saved.agents is None else plant_text(saved.agents.protocol.plant),
+        **{"bounds": _bounds(saved), "heads": heads, "rows": rows, "windows": ""},
+    }
+
+
+def _of_family(saved: FamilyCertificate) -> dict[str, Any]:
+    """Return what the template shows of a family alone."""
+    family, components = saved.family, [part.component for part in saved.parts]
+    parameters = [(mode, mode.parameters) for mode in family.modes]  # both directions of an undirected edge are one
+    claims = Counter(map(sharpest, components))
+    heads, rows = _family_states(saved)
+    return {
+        **{"family": family, "several": len(family.modes) > 1, "matrix": [], "modes": _modes(family)},
+        "mode_names": [texts.printable(mode_name(family, k)) for k in range(len(family.modes))],
         "n_edges": sum(mode.n_edges for mode in family.modes),
         "uncertain": sum(edges.size for _, edges in parameters),
         "optional": sum(int(mode.optional[edges].sum()) for mode, edges in parameters),
-        "depends": any(c.behaviour == DEPENDS for c in components),
-        "mode_names": [texts.printable(mode_name(family, k)) for k in range(len(family.modes))],
-        "rate_bound": min((p.upper_bound for p in saved.parts if p.upper_bound), key=lambda b: b.value, default=None),
-        "constant": all(component.nodes.size == 1 for component in components),
-        "restricted": _restricted(saved) if certified else [],
-        "boxes": [box_text(components[k], box) for k, box in sorted(saved.boxes.items())] if certified else [],
-        "ranges": [range_text(components[k], ends) for k, ends in told_ranges(saved).items()] if certified else [],
+        "depends": DEPENDS in claims,
+        "claims": [(behaviour, (), "", number) for behaviour, number in claims.items()],
+        **{"claims_in_all": len(components), "assumed": [], "offsets": None, "plant": "", "bounds": []},
         "promise": "" if saved.signal == "any" else signal_text(saved.signal)[1],
-        "these": states_of_signal(saved) != list(saved.final_states or ()),
-        "explicit_power": _explicit_power(saved),
-        **{"sliding": saved.protocol.reaching is not None, "arithmetic": arithmetic(saved.direct)},
+        **{"heads": heads, "rows": rows, "windows": _left_by_windows(saved)},
     }
-
-
-def _restricted(saved: FamilyCertificate) -> list[str]:
-    """Tell what is proved of restricted signals, with the ends of constant weights."""
-    entries = [fact.text for fact in signal_facts(saved)]
-    if text := constant_text(saved):
-        entries.append(f"{signal_text('constant')[1]}: at the deadline {text}; {attained_text(saved)}")
-    return entries
-
-
-def _remaining(saved: FamilyCertificate, of_signal: bool = False) -> list[tuple[str, Markup]]:
-    """Return the names of instants and the bound of the deviation of any agent from its final state there.
-
-    For every signal, or for those that were asked for, where more is proved of these.
-    """
-    proved = nearer_for_signal(saved) if of_signal else saved.common and saved.rate is not None
-    if saved.initial_state is None or not proved:
-        return []
-    instants = told_instants(saved.protocol, saved.direct)[:FEW]
-    left = [share for share, _ in instants]
-    bounds = deviation_of_signal(saved, left) if of_signal else saved.deviation_bound(left)
-    return [(name, texts.above(float(x), 2)) for (_, name), x in zip(instants, bounds.max(axis=0), strict=True)]
-
-
-def _explicit_power(saved: FamilyCertificate) -> int | None:
-    """Return ``p`` with a rate above ``10^p`` in closed form; None if some component has none, or a better one."""
-    logs = explicit_logs(saved) if saved.rate is None and saved.common else []
-    return int(min(logs)) - 1 if logs else None
-
-
-def _powers(text: str) -> Markup:
-    """Return a text of the screen whose powers of ten are set as such."""
-    return Markup(re.sub(r"\b1e(-?\d+)", r"$10^{\1}$", _tex(text)))
 
 
 def _left_by_windows(saved: FamilyCertificate) -> str:
@@ -240,53 +165,35 @@ def _left_by_windows(saved: FamilyCertificate) -> str:
     return "; or ".join(dict.fromkeys(sizes.get(claim.behaviour, spread) + within for claim in claims))
 
 
-def _last_time(saved: FamilyCertificate) -> float | None:
-    """Return an instant from which on all sliding variables are proved 0; None if that is ``T_r``."""
-    times = [None if r.z is None else r.time for r in saved.reaching or ()]
-    return None if None in times else max((t for t in times if t is not None), default=0.0)
-
-
-def _instant(saved: FamilyCertificate, name: str) -> Markup:
-    """Return the name of an instant in symbols; without a reaching phase ``T`` is the sum of two parameters."""
-    if saved.protocol.reaching is not None and saved.direct:
-        name = name.replace("T", "(T_r + T_s)")
-    return Markup(re.sub(r"_(\w)", r"_{\1}", re.sub(r"(?<=\d) (?=\(?T)", r"\,", name)))
-
-
-def _captions(saved: Certificate) -> dict[str, str]:
+def _captions(saved: Certificate | FamilyCertificate) -> dict[str, str]:
     """Return captions that say whether the bound is proved; through a reaching phase it is integrated in floats."""
-    decay = _CAPTIONS["decay"].replace("%s", _bound_word(saved))
-    if saved.trajectory is not None and saved.asked_trajectory is not None:
-        decay += f" Bounds and circles: {ideal_text(saved)}; without circles: the run that was asked."
-    return _CAPTIONS | {"decay": decay}
-
-
-def _bound_word(saved: Certificate | FamilyCertificate) -> str:
-    return "proved bound" if saved.direct else "bound (numerical)"
-
-
-def _family_captions(saved: FamilyCertificate) -> dict[str, str]:
-    """Return captions that speak of bands and dotted edges where there are some, and of the bound as of one graph."""
-    caption = _FAMILY_CAPTIONS["graph"]
+    bound = "proved bound" if saved.direct else "bound (numerical)"
+    if not isinstance(saved, FamilyCertificate):
+        decay = f"What is left of the error against the time left, both logarithmic. Thick line: the {bound} from the"
+        decay += " initial state of the table, the least of those of the Lyapunov functions, which are the thin lines;"
+        decay += f" dashed: that of the theorem's own. With circles: a simulated run (numerical), {_DOWN_TO}"
+        if saved.trajectory is not None and saved.asked_trajectory is not None:
+            decay += f" Bounds and circles: {ideal_text(saved)}; without circles: the run that was asked."
+        graph = "The signed digraph: arrows point to who listens, solid from allies, dashed from opponents."
+        return {"graph": graph, "decay": decay}
+    graph = "The graphs: arrows point to who listens, solid from allies, dashed from opponents."
     if any(mode.parameters.size for mode in saved.family.modes):
-        caption += " A pale band is as wide as the largest weight, the line on it as the least."
+        graph += " A pale band is as wide as the largest weight, the line on it as the least."
     if any(mode.optional.any() for mode in saved.family.modes):
-        caption += " Dotted ones may fail."
-    return _FAMILY_CAPTIONS | {"graph": caption, "decay": _FAMILY_CAPTIONS["decay"].replace("%s", _bound_word(saved))}
+        graph += " Dotted ones may fail."
+    decay = "How far agents are from their final states, against the time left, both logarithmic. Thick line: the"
+    decay += f" {bound} for every signal. Thin: simulated runs (numerical), {_DOWN_TO}"
+    return {"graph": graph, "decay": decay}
 
 
-def _depending(saved: FamilyCertificate) -> list[FamilyComponent]:
-    return [part.component for part in saved.parts if part.component.behaviour == DEPENDS]
-
-
-def _intervals(saved: FamilyCertificate) -> list[tuple[str, list[tuple[int, int, Fraction, Fraction]]]]:
+def _modes(family: Family) -> list[tuple[str, list[tuple[int, int, Fraction, Fraction]]]]:
     """Return listener, source and interval of the edges of every mode of a family that has few, agents from 1."""
-    modes = saved.family.modes
+    modes = family.modes
     if sum(mode.n_edges for mode in modes) > _EDGES:
         return []
     return [
         (
-            texts.printable(mode_name(saved.family, number)),
+            texts.printable(mode_name(family, number)),
             [(int(mode.target[e]) + 1, int(mode.source[e]) + 1, *mode.edge_interval(e)) for e in range(mode.n_edges)],
         )
         for number, mode in enumerate(modes)
@@ -337,12 +244,6 @@ def _width(number: str) -> float:
     return sum(points.get(c, 5) for c in re.sub(r"\\[a-z]+", "00", number))
 
 
-def _edges(graph: SignedDigraph) -> list[tuple[int, int, Fraction]]:
-    """Return listener, source and weight of the edges of a graph that has few, agents counted from 1."""
-    number = {label: k for k, label in enumerate(graph.labels, start=1)}
-    return [(number[t], number[s], w) for s, t, w in graph.edges] if graph.n_edges <= _EDGES else []
-
-
 def _bounds(saved: Certificate) -> list[tuple[Fraction, Fraction]]:
     """Return overshoot constant and rate of the functions whose least bound holds; none that another one beats."""
     own = [m for m in saved.envelope.functions if m.coordinates == saved.envelope.coordinates]
@@ -355,36 +256,9 @@ def _bounds(saved: Certificate) -> list[tuple[Fraction, Fraction]]:
     return bounds
 
 
-def _shares(saved: Certificate) -> list[tuple[float, float]]:
-    """Return the share of the norm where the decay begins that may be left at fractions of the time from there."""
-    if saved.rate is None or saved.overshoot is None:
-        return []
-    envelope, p = saved.envelope, saved.protocol
-    if saved.direct:
-        return [(f, envelope.residual(float(1 - Fraction(str(f))))) for f in FRACTIONS]
-    sliding = Envelope(envelope.structure, envelope.gain, envelope.functions)
-    clocks = [float(p.rho1 * p.span) * f - float(p.rho2 * p.kappa) * math.log(1 - f) for f in FRACTIONS]
-    return [(f, float(sliding.norm_factor(s * (1 - 1e-12)))) for f, s in zip(FRACTIONS, clocks, strict=True)]
-
-
-def _late(saved: Certificate) -> dict[str, Fraction | float | str | None]:
-    """Return what is left at ``T`` with late messages, the input, who misses it, and followers' drift after ``T``."""
-    late, tracking = saved.late, saved.tracking
-    missed = None if late is None else late.missed
-    where = "targets" if saved.leaders_move else "final states"
-    return {
-        "late_largest": None if late is None or math.isinf(late.largest) else late.largest,
-        "late_after": None if late is None else late.after,
-        "late_input": None if late is None else largest_late_input(late, saved.protocol),
-        "whole_late": f", from within 1 of the {where}" if late is not None and late.relative else "",
-        "late_missed": None if missed is None else _cut(saved.graph.labels[missed.agent]),
-        "tracking_after": None if tracking is None else tracking.distance_after,
-    }
-
-
-def _states(saved: Certificate) -> tuple[list[str], list[tuple[str, str, tuple[str, ...]]]]:
+def _states(saved: Certificate) -> tuple[list[str], list[tuple[str, ...]]]:
     """Return heads and rows of the table of places in a formation, and of initial and final states."""
-    if saved.initial_state is None and saved.offsets is None:
+    if (saved.initial_state is None and saved.offsets is None) or saved.agents is not None:
         return [], []
     heads = ("$x_{k}(0)$", r"$\sigma_{k}(0)$", "at the deadline", "limit, if it settles")
     agents = range(min(saved.graph.n_nodes, texts.LISTED))
@@ -393,16 +267,38 @@ def _states(saved: Certificate) -> tuple[list[str], list[tuple[str, str, tuple[s
         numbers |= texts.state_columns(
             saved, heads, agents, lambda x: texts.enclosed(x) if x[1] else texts.rational(x[0])
         )
-    labels = [_cut(label) for label in saved.graph.labels[: texts.LISTED]]
     parts = [part.removeprefix("leader of ") for part in texts.agent_parts(saved)]  # a column of two has little room
-    return list(numbers), list(zip(labels, parts, zip(*numbers.values(), strict=True), strict=False))
+    labels = map(latex_of_text, map(_cut, saved.labels))
+    return list(numbers), list(zip(labels, parts, *map(_in_math, numbers.values()), strict=False))
+
+
+def _family_states(saved: FamilyCertificate) -> tuple[list[str], list[tuple[str, ...]]]:
+    """Return heads and rows of the table of camps, initial and final states."""
+    rows = state_rows(saved)[: texts.LISTED]
+    if not rows:
+        return [], []
+    labels, camps, begins, ends = zip(*rows, strict=True)
+    columns = {"Camp": [Markup("--") if camp == "\N{EN DASH}" else camp for camp in camps]}
+    columns["$x_{k}(0)$"] = _in_math(begins)
+    if not saved.direct:
+        columns[r"$\sigma_{k}(0)$"] = _in_math(map(texts.rational, (saved.sigma0 or ())[: texts.LISTED]))
+    if any(end is not None for end in ends):
+        restricted = states_of_signal(saved) != list(saved.final_states or ())
+        head = "at the deadline, restricted" if restricted else "at the deadline"
+        columns[head] = ["no limit claimed" if end is None else _in_math([end])[0] for end in ends]
+    return list(columns), list(zip(map(latex_of_text, map(_cut, labels)), *columns.values(), strict=True))
+
+
+def _in_math(numbers: Iterable[str]) -> list[Markup]:
+    """Return numbers, as the page shows them, in formulas."""
+    return [Markup(f"${latex_of_number(number)}$") for number in numbers]
 
 
 @cache
 def _environment() -> jinja2.Environment:
     """Return the template with what it may use; an unknown name is an error."""
     environment = texts.environment(
-        _tex,
+        latex_of_text,
         block_start_string="<%",
         block_end_string="%>",
         variable_start_string="<<",
@@ -412,40 +308,20 @@ def _environment() -> jinja2.Environment:
         keep_trailing_newline=True,
     )
     environment.filters |= {
-        **{"latex": Markup, "rational": _rational, "coordinate": _coordinate, "number": _number},
-        "above": lambda x, digits: _number(texts.above(x, digits)),
-        "below": lambda x, digits: _number(texts.below(x, digits)),
+        **{
+            "latex": Markup,
+            "rational": _rational,
+            "coordinate": _coordinate,
+            "sentence": lambda fact: latex_of_sentence(fact.note),
+        },
+        "above": lambda x, digits: latex_of_number(texts.above(x, digits)),
+        "below": lambda x, digits: latex_of_number(texts.below(x, digits)),
         "equals": lambda x: ("= " + _rational(x)).replace(r"= \approx", r"\approx"),
+        "head": lambda head: latex_of_sentence(texts.head_text(head)),
+        "claimed": lambda part: latex_of_sentence(claimed_of(part)),
     }
-    environment.filters["arrows"] = lambda text: Markup(_tex(text).replace("-$>$", r"$\to$"))
     environment.globals |= {"meanings": _MEANINGS}
     return environment
-
-
-# ---------------------------------------------------------------------- texts and numbers
-
-_TEX = {c: f"\\{c}" for c in "{}$&#%_"}
-_TEX |= {"\\": r"$\backslash$", "^": r"\^{}", "~": r"\~{}", "<": "$<$", ">": "$>$", "|": "$|$"}
-_TEX |= {c: rf"{{\char{ord(c)}}}" for c in "\"'`"}
-
-
-def _tex(text: str) -> str:
-    r"""Return a text as LaTeX that every engine sets; letters beyond Latin-1 are written as their code.
-
-    Examples
-    --------
-    >>> print(_tex("50% of {a}_1 \\ \u4e2d"))
-    50\% of \{a\}\_1 $\backslash$ U+4E2D
-    """
-
-    def one(c: str) -> str:
-        if " " <= c <= "~":
-            return _TEX.get(c, c)
-        if c == "\N{HORIZONTAL ELLIPSIS}":
-            return "..."
-        return c if "\u00c0" <= c <= "\u00ff" and c not in "\u00d0\u00de\u00f0\u00fe" else f"U+{ord(c):04X}"
-
-    return re.sub("-(?=-)", "-{}", "".join(map(one, text)))
 
 
 def _coordinate(text: str) -> Markup:
@@ -455,18 +331,4 @@ def _coordinate(text: str) -> Markup:
 
 def _rational(x: Fraction) -> Markup:
     """Write a rational: exactly if that is short, else marked as near."""
-    return _number(texts.rational(x))
-
-
-def _number(text: str) -> Markup:
-    """Turn a number as the page shows it into LaTeX."""
-    signs = {
-        "\N{MINUS SIGN}": "-",
-        "\N{ALMOST EQUAL TO}": r"\approx",
-        "\u00d7": r"\cdot",
-        "\u00b1": r"\pm",
-        "\u00a0": " ",
-    }
-    for sign, latex in (signs | {"<sup>": "^{", "</sup>": "}"}).items():
-        text = str(text).replace(sign, latex)
-    return Markup(text)
+    return latex_of_number(texts.rational(x))

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 from fractions import Fraction
 
 from lmi.exact.decimal_rounding import near
+from ptcc_certify.errors import LABEL, LABEL_END, labelled, unlabelled
 
 #: Columns of a screen, and of the head of a line on it, blank included.
 WIDTH, HEAD = 80, 11
@@ -18,25 +19,27 @@ NO_BREAK = "\N{NO-BREAK SPACE}"
 
 
 def columns(text: str) -> int:
-    """Return the columns that a text takes at most: 2 for a wide letter, 1 for any other.
+    """Return the columns that a text takes at most: 2 for a wide letter, 1 for any other, none for marks of labels.
 
     Examples
     --------
     >>> columns("abc"), columns("日本")
     (3, 4)
     """
+    text = unlabelled(text)
     return len(text) if text.isascii() else sum(1 + (unicodedata.east_asian_width(c) in "WF") for c in text)
 
 
 def printable(text: str) -> str:
-    r"""Return a text with ``?`` for what would steer a terminal.
+    r"""Return a text with ``?`` for what would steer a terminal, marks of labels apart.
 
     Examples
     --------
     >>> printable("a\x1b[31m")
     'a?[31m'
     """
-    return text if text.isprintable() else "".join(c if c.isprintable() else "?" for c in text)
+    shown = {LABEL, LABEL_END}
+    return text if text.isprintable() else "".join(c if c.isprintable() or c in shown else "?" for c in text)
 
 
 def counted(number: int, noun: str) -> str:
@@ -74,6 +77,11 @@ def shorten_label(label: str, width: int = 24) -> str:
     return label if columns(label) <= width else f"{_cut(label, 7)}...{_cut(label[::-1], width - 10)[::-1]}"
 
 
+def agent_text(label: str, width: int = 24) -> str:
+    """Return a label, shortened, as it stands in a sentence."""
+    return labelled(shorten_label(printable(unlabelled(label)), width))
+
+
 def shorten_list(words: Sequence[str], width: int = 90, total: int = 0) -> str:
     """List as many words as fit, and tell how many there are: ``total``, if these are the first of more.
 
@@ -98,8 +106,8 @@ def shorten_list(words: Sequence[str], width: int = 90, total: int = 0) -> str:
 
 def value_list(labels: Sequence[str], values: Iterable[object], width: int = 4 * TEXT) -> str:
     """List the value of every node, long labels shortened."""
-    entries = (f"{shorten_label(label)}={short_number(value)}" for label, value in zip(labels, values, strict=True))
-    return shorten_list([printable(entry) for entry in entries], width)
+    entries = [f"{agent_text(label)}={short_number(value)}" for label, value in zip(labels, values, strict=True)]
+    return shorten_list(entries, width)
 
 
 def short_number(value: object) -> str:

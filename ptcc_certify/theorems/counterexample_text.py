@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 
+from ptcc_certify.errors import unlabelled
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.rationals import nearest_float, shorten
 from ptcc_certify.theorems.family_behaviour import (
@@ -23,7 +24,7 @@ _LISTED, _STEPS, _WIDTH = 4, 8, 24
 _SENTENCE = 105
 
 
-def counterexample_text(component: FamilyComponent, why: Counterexample) -> str:
+def counterexample_text(component: FamilyComponent, why: Counterexample, mark: Callable[[str], str] = str) -> str:
     """Tell in one sentence what refutes a behaviour of a component for every signal.
 
     Parameters
@@ -31,6 +32,8 @@ def counterexample_text(component: FamilyComponent, why: Counterexample) -> str:
     component : FamilyComponent
         Whose nodes and modes ``why`` numbers.
     why : Counterexample
+    mark : callable
+        How a label or the name of a mode is marked.
 
     Returns
     -------
@@ -44,8 +47,8 @@ def counterexample_text(component: FamilyComponent, why: Counterexample) -> str:
     >>> counterexample_text(pair, pair.refutation("stability"))
     'held constant and its optional edges off, b hears nobody else and keeps its value'
     """
-    family, names = component.family, [shorten(label, _WIDTH) for label in component.family.labels]
-    where = f"held in {mode_name(family, why.mode)}" if len(family.modes) > 1 else "held constant"
+    family, names = component.family, [mark(shorten(label, _WIDTH)) for label in component.family.labels]
+    where = f"held in {mark(mode_name(family, why.mode))}" if len(family.modes) > 1 else "held constant"
     if why.kind == CLOSED_SET:
         without = " and its optional edges off" if family.modes[why.mode].optional.any() else ""
         alone = f"{_listed([names[v] for v in why.nodes])} hear{'s' * (len(why.nodes) == 1)} nobody else"
@@ -63,13 +66,13 @@ def counterexample_text(component: FamilyComponent, why: Counterexample) -> str:
         walk = ", ".join(steps[:_STEPS]) + ", ..." * (len(steps) > _STEPS)
         return f"the signs of {walk} multiply to -1, so that no camps keep them"
     if why.kind == DIFFERENT:
-        return _different(component, why)
+        return _different(component, why, mark)
     if why.kind == STABLE:
-        off = [_edge(family.modes[why.mode], edge) for edge in why.off]
+        off = [_edge(family.modes[why.mode], edge, names) for edge in why.off]
         rest = f"with {_listed(off)} off and every other edge on" if off else "with every edge on"
-        mode = mode_name(family, why.mode)
+        mode = mark(mode_name(family, why.mode))
         return f"{mode if len(family.modes) > 1 else 'the graph'} {rest} is stable: all its agents end at 0"
-    return _moving(family, names, why)
+    return _moving(family, names, why, mark)
 
 
 def mode_name(family: Family, number: int) -> str:
@@ -83,22 +86,23 @@ def mode_name(family: Family, number: int) -> str:
     return shorten(family.modes[number].name or (f"mode {number + 1}" if len(family.modes) > 1 else "the graph"), 40)
 
 
-def _different(component: FamilyComponent, why: Counterexample) -> str:
+def _different(component: FamilyComponent, why: Counterexample, mark: Callable[[str], str]) -> str:
     """Tell how many leader groups keep values in one mode and in another."""
     counts = [
         sum(c.balanced for c in component.structures[number].closed_components) for number in (why.mode, why.other)
     ]
-    one, two = (mode_name(component.family, number) for number in (why.mode, why.other))
+    one, two = (mark(mode_name(component.family, number)) for number in (why.mode, why.other))
     groups = f"{counts[0]} leader group{'s keep values' if counts[0] > 1 else ' keeps its value'} in {one}"
     return f"{groups}, {counts[1] or 'none'} in {two}" + " (every agent ends at 0)" * (not counts[1])
 
 
-def _moving(family: Family, names: Sequence[str], why: Counterexample) -> str:
+def _moving(family: Family, names: Sequence[str], why: Counterexample, mark: Callable[[str], str]) -> str:
     """Tell which state is at rest in one member and moves in another."""
-    one, two = (f"in {mode_name(family, number)} " * (len(family.modes) > 1) for number in (why.mode, why.other))
+    modes = (f"in {mark(mode_name(family, number))} " for number in (why.mode, why.other))
+    one, two = modes if len(family.modes) > 1 else ("", "")
     if why.edge is not None:
         optional = family.modes[why.other].optional[why.edge]
-        two += f"with {_edge(family.modes[why.other], why.edge)} {'on' if optional else 'at its largest'}"
+        two += f"with {_edge(family.modes[why.other], why.edge, names)} {'on' if optional else 'at its largest'}"
         one += "at the least weights " * (why.mode == why.other)
     if why.state is not None:
         size = max(map(abs, why.state)) or Fraction(1)
@@ -106,7 +110,7 @@ def _moving(family: Family, names: Sequence[str], why: Counterexample) -> str:
         for listed in range(len(values), 0, -1):
             state = ", ".join(values[:listed]) + ", ..." * (len(names) > listed)
             sentence = f"the state {state} rests {one}and moves {two}".rstrip()
-            if len(sentence) <= _SENTENCE:
+            if len(unlabelled(sentence)) <= _SENTENCE:
                 return sentence
     group = "" if why.column is None else f" at the camps of leader group {why.column + 1}"
     return f"a state{group} rests {one}and moves {two}".rstrip()
@@ -117,8 +121,8 @@ def _number(x: Fraction) -> str:
     return str(x) if short else f"{nearest_float(x):.4g}"
 
 
-def _edge(mode: Mode, edge: int) -> str:
-    return f"{shorten(mode.labels[mode.source[edge]], _WIDTH)} -> {shorten(mode.labels[mode.target[edge]], _WIDTH)}"
+def _edge(mode: Mode, edge: int, names: Sequence[str]) -> str:
+    return f"{names[mode.source[edge]]} -> {names[mode.target[edge]]}"
 
 
 def _listed(names: Sequence[str]) -> str:

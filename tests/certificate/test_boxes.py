@@ -22,7 +22,7 @@ from ptcc_certify.certificate.family_certificate import FamilyCertificate, certi
 from ptcc_certify.checker import check
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.screen import certificate_lines, summary_lines
-from ptcc_certify.report.statement import family_latex
+from ptcc_certify.report.statement import report_latex
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
 GAINS = {"T_r": 1, "T_s": 1, "rho1": 1, "rho2": 1, "kappa": 3, "mu1": 2, "mu2": 1, "mu3": 1, "delta": 1}
@@ -113,9 +113,9 @@ def test_screen_page_and_statement_tell_the_box_and_claim_no_limit():
     told = "every signal draws c into [1, 2], d into [0.5, 2], at the rate 1.99004; no limit is claimed"
     screen = re.sub(r"\s+", " ", "\n".join(summary_lines(saved, "f")))
     assert f"box {told}" in screen and "x(T)" not in screen
-    page = " ".join(re.sub("<[^>]*>", " ", report_html(saved)).split())
+    page = " ".join(re.sub("</?bdi>|(<[^>]*>)", lambda tag: " " if tag[1] else "", report_html(saved)).split())
     assert f"Where they are drawn {told}." in page
-    assert f"From the initial state below {told}; that is" in family_latex(saved)
+    assert f"Where they are drawn: {told}." in re.sub("[$]", "", report_latex(saved))
 
 
 # ---------------------------------------------------------------------- forged files

@@ -19,7 +19,7 @@ from ptcc_certify.protocols.restricted_signals import ClockShares, DwellTime, Jo
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.plots.input import plot_input
 from ptcc_certify.report.screen import certificate_lines
-from ptcc_certify.report.statement import family_latex
+from ptcc_certify.report.statement import report_latex
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.signals import RandomSignal
 
@@ -141,11 +141,11 @@ def test_pages_and_statements_say_what_slides(tmp_path):
     saved = read_certificate(tmp_path / "c.json")
     assert saved == made == copy.deepcopy(saved) and saved.upper_bound == made.upper_bound
     assert saved.sigma0 == made.sigma0 and saved.reaching == made.reaching
-    page, statement = report_html(saved), family_latex(saved)
+    page, statement = report_html(saved), report_latex(saved)
     assert "Sliding-mode protocol" in page and "Reaching times" in page and "nominal protocol," not in page
     assert "every signal and disturbance" in page and "signed average of the initial states" not in page
     assert r"\dot x_{k} = u_{k} + d_{k}$ with $|d_{k}| \le \delta$" in statement and "V(X(T_{r}))" in statement
-    assert "whatever the disturbances" in statement and "all sliding variables are $0$ from" in statement
+    assert "whatever the disturbances" in statement and "All sliding variables are $0$ from" in statement
     assert "the mean of the initial states" not in statement
     text = "\n".join(certificate_lines(saved, "path", {}))
     assert "sigma(0)" in text and "for every signal and disturbance" in text

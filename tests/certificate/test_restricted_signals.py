@@ -35,7 +35,7 @@ from ptcc_certify.protocols.restricted_signals import ClockShares, DwellTime, Jo
 from ptcc_certify.report.facts.signals import signal_facts
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.screen import certificate_lines, summary_lines
-from ptcc_certify.report.statement import family_latex
+from ptcc_certify.report.statement import report_latex
 from ptcc_certify.theorems.family_behaviour import decide
 from ptcc_certify.theorems.joint_windows import clock_for_all_edges
 
@@ -196,9 +196,9 @@ def test_the_error_bound_of_seldom_switches_is_told_beside_that_of_every_signal(
     for text in (short, long):
         assert f"{up(these, 2)} " in text and text.count("(these signals)") == (1 if text == short else 2)
     saved = read_certificate(certificate.to_dict())
-    page, statement = report_html(saved), family_latex(saved)
+    page, statement = report_html(saved), report_latex(saved)
     assert "(these signals)" in page and "Nor are the error bounds under the promise" in page
-    assert "Under these, from the initial state below, every agent differs" in statement
+    assert "of its final state (these signals)." in statement
 
 
 def test_so_many_switches_that_nothing_would_be_said_leave_the_bound_of_every_signal():

@@ -837,7 +837,7 @@ def test_an_input_without_bound_is_said_prominently_and_refutes_every_limit():
     words = ("certify", "fig5b", "--T", "0.6", "--rho1", "0.1", "--rho2", "0.3", "--kappa", "1", "--no-simulation")
     assert "INPUT      NOT BOUNDED" in ptcc(*words).out
     run = detailed(*words)
-    assert run.code == 0 and "INPUT      NOT BOUNDED" in run.out and "raise rho2 * kappa to 0.38337" in run.out
+    assert run.code == 0 and "INPUT      NOT BOUNDED" in run.out and "raise rho2 kappa to 0.38337" in run.out
     refuted = detailed(*words, "--initial-bound", "1", "--max-input", "1e9")
     assert refuted.code == 3 and "without limit, proved" in refuted.out.splitlines()[-1]
 

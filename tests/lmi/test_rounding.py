@@ -206,7 +206,7 @@ def test_page_and_statement_round_to_the_safe_side(k: int, tmp_path: Path):
     above(re.findall(rf"upper bound {NUMBER}, proved", page), saved.upper_bound)
     below(re.findall(rf"optimality ratio at least {NUMBER}(?:<| )", page), saved.rate / saved.upper_bound)
     above(re.findall(rf"overshoot constant at that rate {NUMBER} of", page), saved.overshoot)
-    above(re.findall(rf"Lyapunov function exceeds \${NUMBER}\$", text), saved.upper_bound)
+    above(re.findall(rf"upper bound \${NUMBER}\$, proved", text), saved.upper_bound)
     rates = re.findall(rf"e\}}\^\{{-{NUMBER}\\,", text) or _row_of_table(text, "r")
     constants = re.findall(rf"\^2 \\le {NUMBER}\\,", text) or _row_of_table(text, "c")
     below(rates, saved.rate)

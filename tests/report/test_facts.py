@@ -13,7 +13,7 @@ import ptcc_certify as ptcc
 from lmi.exact.decimal_rounding import down, up
 from ptcc_certify.cli.terminal import flagged
 from ptcc_certify.errors import Change, ParameterError, spell
-from ptcc_certify.report.page import set_text
+from ptcc_certify.report.page import set_note
 from ptcc_certify.report.screen import certificate_lines, summary_lines
 
 CORPUS = Path(__file__).parents[1] / "corpus"
@@ -58,7 +58,7 @@ def test_advice_is_a_change_that_each_medium_names_in_its_own_way():
         FOES, WEAK.replace(rho2=change.value), [3, 5], asks=ptcc.Asks(simulation=False)
     ).assessment.useful
     assert "rho2=0.501 leaves 1 %" in verdict.text and "--rho2 0.501 leaves" in spell(verdict.note, flagged)
-    assert "\u03c1<sub>2</sub> = 0.501 leaves 1 %" in set_text(verdict)
+    assert "\u03c1<sub>2</sub> = 0.501 leaves 1 %" in set_note(verdict.note)
 
 
 def test_a_refusal_knows_its_field():
@@ -72,10 +72,10 @@ def test_a_refusal_knows_its_field():
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_page_sets_every_fact_without_codes_of_letters(name: str):
-    assert not any("\\u{" in set_text(fact) for fact in ptcc.read_certificate(CORPUS / f"{name}.json").facts())
+    assert not any("\\u{" in set_note(fact.note) for fact in ptcc.read_certificate(CORPUS / f"{name}.json").facts())
 
 
 def test_labels_that_look_like_signs_stand_as_they_are():
     certificate = ptcc.certify([("<b>", "a", -1), ("a", "<b>", -1)], WEAK, [0, 5], asks=ptcc.Asks(simulation=False))
     (end,) = (fact for fact in certificate.facts() if fact.head == "x(T)")
-    assert "&lt;b&gt;=" in set_text(end)
+    assert "<bdi>&lt;b&gt;</bdi>=" in set_note(end.note)

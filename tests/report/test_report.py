@@ -51,12 +51,13 @@ from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.io import read_graph
 from ptcc_certify.model.asks import Asks
 from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.report.latex_text import latex_of_text
 from ptcc_certify.report.notation import LISTED, formula_svg, printable, typeset
 from ptcc_certify.report.page import _environment, report_html
 from ptcc_certify.report.plots.decay import plot_decay
 from ptcc_certify.report.report_file import write_report
 from ptcc_certify.report.screen import certificate_lines
-from ptcc_certify.report.statement import _tex, report_latex
+from ptcc_certify.report.statement import report_latex
 from ptcc_certify.report.states_table import EXTREMES
 
 #: What a page needs, and nothing that loads, runs or leaves it.
@@ -590,8 +591,8 @@ def test_a_statement_tells_the_input_with_late_messages(x0: Any):
     certificate = certify(graph, NOMINAL, x0, messages=messages, asks=Asks(method="perron", simulation=False))
     text = report_latex(read_certificate(certificate.to_dict()))
     largest = up(Fraction(float(certificate.late.input.max())), 4)
-    told = f"The input then satisfies $|u_{{k}}| \\le {largest}$ up to $T$"
-    assert told + (", from within 1 of the final states" if x0 is None else "") + "." in text
+    told = f"Input: bounded up to $T$; $|u_{{k}}| \\le {largest}$"
+    assert told + (", from within $1$ of it at first" if x0 is None else "") + "." in text
 
 
 def test_the_answer_of_late_messages_tells_whose_speed_it_names():
@@ -670,8 +671,8 @@ def test_the_file_does_not_say_who_checked_it(tmp_path: Path):
 
 def shares_of(text: str) -> dict[float, float]:
     """Return the instants, as fractions of the deadline, and the shares of the error that a statement gives."""
-    line = next(line for line in text.splitlines() if "the following share is left" in line)
-    pairs = re.findall(r"\$([0-9.]+)(?: \\cdot 10\^\{(-?\d+)\})?\$ at \$t = ([0-9.]+)", line)
+    line = next(line for line in text.splitlines() if r")\|$ at most" in line)
+    pairs = re.findall(r"\$([0-9.]+)(?: \\cdot 10\^\{(-?\d+)\})?\$ at \$([0-9.]+)", line)
     return {float(f): float(share) * 10 ** int(power or 0) for share, power, f in pairs}
 
 
@@ -679,7 +680,10 @@ def test_a_statement_holds_hypotheses_claim_and_numbers(tmp_path: Path):
     made = example("limits")
     made.save(tmp_path / "c.json")
     text = report_latex(read_certificate(tmp_path / "c.json"), {"graph": "g.pdf", "decay": "d.pdf"})
-    assert r"[certified]\label{prop:c}" in text and r"at $T$, by Theorem~2.1: as $t \to T$, for some $a$" in text
+    assert (
+        r"[certified]\label{prop:c}" in text
+        and r"at $T$, without limits, by Theorem~2.1: as $t \to T$, for some $a$" in text
+    )
     assert NOMINAL.latex() in text and made.graph.sha256 in text and "$\\kappa = 1$" in text
     rows = [re.search(rf"^{name}_{{i}} & ([^\\]*)", text, re.M) for name in "cr"]
     constants, rates = ([Fraction(x) for x in row[1].split(" & ")] for row in rows if row is not None)
@@ -693,7 +697,9 @@ def test_a_statement_holds_hypotheses_claim_and_numbers(tmp_path: Path):
         assert least * 0.999 <= share <= least * 1.12
     assert r"\includegraphics[width=\linewidth]{g.pdf}" in text and "{d.pdf}" in text
     assert text.count("\\begin{") == text.count("\\end{")
-    assert "the gain is at most $50$" in text and r"|n_{k}| \le 0.01" in text and r"|d_{k}| \le 1/3" in text
+    assert (
+        r"gain $\le 50$: $\|E\| \le" in text and r"|n_{k}| \le 0.01" in text and r"|d_{k}| \le 0.333333333333" in text
+    )
 
 
 @pytest.mark.parametrize("sigma0", [None, [1, 0, -2, 1, 0, 3]], ids=["nominal", "sliding"])
@@ -728,9 +734,9 @@ def test_a_statement_of_a_formation_without_an_initial_state_tells_the_places():
 def test_through_a_reaching_phase_the_statement_tells_what_is_left_from_T_r_on(tmp_path: Path):
     saved = read_certificate(example("sliding").to_dict())
     text, p = report_latex(saved, {"decay": "d.pdf"}), saved.protocol
-    assert r"Hence of $\|E(T_{r})\|$ at most" in text and r"at $t = T_{r} + 0.99\,T_{s}$." in text
+    assert r"$\|E(t)\| / \|E(T_{r})\|$ at most" in text and r" at $T_{r} + 0.99\, T_{s}$," in text
     own = [m for m in saved.envelope.functions if m.coordinates == saved.envelope.coordinates]
-    line = text[text.index("Hence of") :].partition("\n")[0].replace("T_{r} + ", "")
+    line = text[text.index("E(T_{r})\\|$ at most") :].partition("\n")[0].replace("T_{r} + ", "")
     for instant, share in shares_of(line).items():
         s = p.rho1 * p.span * Fraction(instant) - p.rho2 * p.kappa * Fraction(math.log(1 - instant))  # type: ignore[attr-defined]
         least = min(math.sqrt(m.overshoot) * math.exp(-m.proved_rate * s / 2) for m in own)  # type: ignore[type-var]
@@ -760,9 +766,9 @@ def test_a_statement_holds_the_weights_and_says_that_it_is_without_disturbances(
     saved = read_certificate(tmp_path / "c.json")
     text, page = report_latex(saved), sound(report_html(saved)).text
     assert "0 & -1 & 0 \\\\\n2 & 0 & 0 \\\\\n0 & 1 & 0\n\\end{bmatrix}" in text and "(labelled ann, bob, eve)" in text
-    assert "All this is without disturbances." in text and r"u_{k} + d_{k}" in text
+    assert "All this is without disturbances, but for" in text and r"u_{k} + d_{k}" in text
     assert "certified without disturbances" in page and "disturbances is without them" in page
-    assert "agents end where they would" in text and "moves no xk(T)" in page
+    assert "moves no $x_{k}(T)$" in text and "moves no xk(T)" in page
     certify(graph, protocol, [1, 2, 3], limits=[GainLimits(gain_cap=30)], asks=Asks(delta=1, simulation=False)).save(
         tmp_path / "l.json"
     )
@@ -789,7 +795,7 @@ def test_bounds_without_the_limits_of_the_gain_are_told_so(more: dict[str, Any],
     page = sound(report_html(read_certificate(tmp_path / "c.json"))).text
     assert page.count("without limits") >= 2 and "names no limits, noise or disturbances is without them" in page
     assert ("left open: limits (" in page) == bool(more)
-    assert ("gain \u2264 3: at T" in page) != bool(more)
+    assert ("gain \u2264 3: \u2016E\u2016" in page) != bool(more)
 
 
 def test_a_page_needs_neither_an_instant_after_the_reaching_time_nor_an_edge(tmp_path: Path):
@@ -813,7 +819,7 @@ def test_long_tables_are_cut(tmp_path: Path):
 def test_every_special_character_of_latex_is_escaped():
     special = "\\{}$&#%_^~"
     for c in map(chr, range(32, 127)):
-        left = _tex(c)
+        left = latex_of_text(c)
         for known in (r"$\backslash$", "$<$", "$>$", "$|$", r"\^{}", r"\~{}", *(rf"\{s}" for s in "{}$&#%_")):
             if left == known:
                 left = ""
@@ -821,7 +827,7 @@ def test_every_special_character_of_latex_is_escaped():
             assert left == rf"{{\char{ord(c)}}}"
             continue
         assert left in ("", c) and (left == "" or c not in special), c
-    assert _tex("---") == "-{}-{}-" and _tex("\u4e2d\u00e9\u00d0") == "U+4E2D\u00e9U+00D0"
+    assert latex_of_text("---") == "-{}-{}-" and latex_of_text("\u4e2d\u00e9\u00d0") == "U+4E2D\u00e9U+00D0"
 
 
 # ---------------------------------------------------------------------- the command

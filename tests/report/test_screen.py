@@ -89,15 +89,15 @@ REQUESTS: list[tuple[Any, dict[str, Any], int, str]] = [
     (NOMINAL, {"expectations": Expectations("bipartite consensus", Fraction(1), Fraction(10**6))}, 0, "met: bipartite"),
     (NOMINAL, {"expectations": Expectations(max_input=Fraction(1, 10**6))}, 3, "refuted: |u_k|"),
     (SLIDING, {"expectations": Expectations("stability", Fraction(9), Fraction(1, 10**6))}, 3, "refuted: stability"),
-    (NOMINAL, {"limits": [GainLimits(gain_cap=30)]}, 0, "gain <= 30: at T ||E||"),
+    (NOMINAL, {"limits": [GainLimits(gain_cap=30)]}, 0, "gain <= 30: ||E|| <= "),
     (
         NOMINAL,
         {"limits": [GainLimits(gain_cap=30)], "noise": "0.1", "delta": "0.1"},
         0,
-        "gain <= 30, |n_k| <= 0.1: at T",
+        "gain <= 30, |n_k| <= 0.1: ||E||",
     ),
     (NOMINAL, {"noise": "0.1"}, 4, "left open: noise"),
-    (NOMINAL, {"limits": [GainLimits(sample_period="0.1")]}, 0, "zero-order hold 0.1: at T ||E||"),
+    (NOMINAL, {"limits": [GainLimits(sample_period="0.1")]}, 0, "zero-order hold 0.1: ||E|| <= "),
     (NOMINAL, {"limits": [GainLimits(sample_period="0.1")]}, 0, "; under a sample period no number is proved"),
     (
         NOMINAL,

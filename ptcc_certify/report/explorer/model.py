@@ -32,7 +32,7 @@ from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.model.refusals import refuse_before_the_graph
 from ptcc_certify.protocols.disturbance import as_disturbance
 from ptcc_certify.protocols.reaching_time import certified_reaching_times
-from ptcc_certify.report.explorer.facts import UNCHECKED, facts_of, of_controls, run_of
+from ptcc_certify.report.explorer.facts import UNCHECKED, of_controls, rows_of
 from ptcc_certify.report.explorer.panels import PANELS, draw_panels, message_figure, panel_svg, png, shown_in
 from ptcc_certify.report.explorer.question import Question
 from ptcc_certify.report.explorer.reproduction import command_of, python_of
@@ -70,7 +70,7 @@ class View:
         """What is claimed and bounded, by heads that are the same for all settings; empty if refused, or rejected."""
         if self.certificate is None or (self.checked and rejects(self.certificate.checked)):
             return {}
-        return facts_of(self.certificate) | ({"simulated": run_of(self.certificate)} if self.checked else {})
+        return rows_of(self.certificate, compared=self.checked)
 
     @property
     def verdict(self) -> str:

@@ -13,7 +13,7 @@ from ptcc_certify.bounds.final_state import extremes
 from ptcc_certify.certificate.facts import Fact, Facts
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.protocols.agents import DERIVATIVES, PLURALS, plant_text
-from ptcc_certify.report.text_layout import TEXT, columns, short_number, shorten_label, shorten_list, unbroken
+from ptcc_certify.report.text_layout import TEXT, agent_text, columns, short_number, shorten_list, unbroken
 
 if TYPE_CHECKING:
     from ptcc_certify.bounds.agent_motion import Interval
@@ -86,7 +86,7 @@ def _final_facts(part: AgentsAnswer) -> Facts:
 def _ends_text(part: AgentsAnswer, ends: Sequence[Sequence[Interval]], width: int) -> str:
     """Tell the ends of all agents; the one that all have, or of too many the least and the largest."""
     labels, places = part.structure.graph.labels, [_place(row) for row in ends]
-    words = [f"{shorten_label(label)}={place}" for label, place in zip(labels, places, strict=True)]
+    words = [f"{agent_text(label)}={place}" for label, place in zip(labels, places, strict=True)]
     if len(set(places)) == 1 < len(places):
         return f"{places[0]}, of every agent"
     if len(words) > EXACT_NODES and part.dimension == 1:
@@ -141,7 +141,7 @@ def _input_fact(part: AgentsAnswer) -> Fact:
         return Fact(head="input", value=largest, note="none: u = 0")
     label = part.structure.graph.labels[part.inputs.index(largest)]
     text = f"bounded; {part.norm} <= {up(largest, 4)}"
-    agent = f", the largest of agent {shorten_label(label, 22)}"
+    agent = f", the largest of agent {agent_text(label, 22)}"
     return Fact(head="input", value=largest, side="up", note=text + agent, brief=(text + agent, text))
 
 

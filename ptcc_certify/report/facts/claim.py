@@ -11,6 +11,7 @@ import numpy as np
 from lmi.exact.decimal_rounding import down, near
 from ptcc_certify.certificate.facts import Fact, Facts
 from ptcc_certify.certificate.restricted_claims import LastModeClaim
+from ptcc_certify.errors import labelled
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.structure import BIPARTITE_CONTAINMENT, STABILITY, Structure
 from ptcc_certify.report.facts.agents import claimed_of
@@ -18,10 +19,10 @@ from ptcc_certify.report.facts.intervals import interval_text
 from ptcc_certify.report.facts.signals import RESTS, of_mode
 from ptcc_certify.report.text_layout import (
     TEXT,
+    agent_text,
     columns,
     counted,
     printable,
-    shorten_label,
     shorten_list,
     wrap_text,
 )
@@ -48,15 +49,22 @@ DRIVEN = "ends at x(0) - sigma(0)"
 WHATEVER = {"any": "for every signal", "constant": "if mode and weights never change"}
 
 
+def assumptions(certificate: Certificate | FamilyCertificate) -> list[str]:
+    """Tell what claim, final state, rate and error are without, where more was asked."""
+    assumed = {
+        "without limits": bool(certificate.limits),
+        "nothing late": certificate.late is not None,
+        "leaders at rest": certificate.leaders_move,
+    }
+    return [text for text, holds in assumed.items() if holds]
+
+
 def claim_facts(certificate: Certificate) -> Facts:
     """Tell what the agents of one graph do, by when, and under what."""
     p = certificate.protocol
-    also = ""
-    if certificate.limits:
-        also = ", without limits"
-    elif certificate.leaders_move or certificate.late is not None:
-        also = _left_out(certificate)
-    elif p.reaching is not None:
+    assumed = assumptions(certificate)
+    also = "".join(f", {text}" for text in (assumed[:1] if certificate.limits else assumed))
+    if p.reaching is not None and not also:
         also = f", any |d_k| <= {down(p.reaching.delta, 12)}" if p.reaching.delta else ", without disturbances"
     when = f" at T = {near(p.T)}"
     if certificate.agents is not None:
@@ -77,7 +85,7 @@ def structure_claims(structure: Structure, claims: Sequence[Claim], when: str = 
     for k in sorted(range(len(claims)), key=lambda k: -len(components[k].nodes))[:_COMPONENTS]:
         text = f"{claims[k].sharpest}{when} (Theorem {claims[k].theorem})"
         nodes = components[k].nodes
-        names = [printable(labels[v]) for v in nodes[:TEXT]]
+        names = [labelled(printable(labels[v])) for v in nodes[:TEXT]]
         whose = shorten_list(names, max(TEXT - len(text) - 2, 14), len(nodes))
         yield Fact(head="claim", value=claims[k].sharpest, note=f"{whose}: {text}")
     if len(claims) > _COMPONENTS:
@@ -111,12 +119,6 @@ def sharpest(component: FamilyComponent) -> str:
     return (str(component.behaviour or "not decided"), *special_behaviours(component))[-1]
 
 
-def _left_out(certificate: Certificate | FamilyCertificate) -> str:
-    """Tell what a claim knows nothing of: late messages, leaders that move."""
-    late = ", nothing late" if certificate.late is not None else ""
-    return f"{late}, leaders at rest" if certificate.leaders_move else late
-
-
 def family_claims(
     components: Sequence[FamilyComponent], when: str = "", certificate: FamilyCertificate | None = None
 ) -> Facts:
@@ -124,7 +126,7 @@ def family_claims(
     disturbed = certificate is not None and certificate.sigma0 is not None
     direct, boxes = (True, {}) if certificate is None else (certificate.direct, certificate.boxes)
     also = " and disturbance" if disturbed else ""
-    also += "" if certificate is None else _left_out(certificate)
+    also += "" if certificate is None else "".join(f", {text}" for text in assumptions(certificate))
     order = sorted(range(len(components)), key=lambda k: -components[k].nodes.size)
     if len(components) == 1:
         text, longer = _behaviour_texts(components[0], when, also)
@@ -133,7 +135,7 @@ def family_claims(
         for k in order[:_COMPONENTS]:
             text, (_, camps_named) = _behaviour_texts(components[k], when, also)
             text = camps_named if columns(camps_named) <= TEXT else text
-            names = [printable(label) for label in components[k].family.labels[:TEXT]]
+            names = [labelled(printable(label)) for label in components[k].family.labels[:TEXT]]
             whose = shorten_list(names, max(TEXT - len(text) - 2, 12), components[k].nodes.size)
             yield Fact(head="claim", value=sharpest(components[k]), note=f"{whose}: {text}")
         if len(components) > _COMPONENTS:
@@ -167,10 +169,10 @@ def _behaviour_texts(component: FamilyComponent, when: str, also: str) -> tuple[
 def _depends_facts(component: FamilyComponent, direct: bool, detail: bool) -> Facts:
     texts = {}
     if component.counterexample is not None:
-        texts["why"] = printable(counterexample_text(component, component.counterexample))
+        texts["why"] = printable(counterexample_text(component, component.counterexample, labelled))
     family = component.family
     if len(family.modes) > 1:
-        alone = (f"{mode_name(family, k)}: {_alone(mode, direct)}" for k, mode in enumerate(family.modes))
+        alone = (f"{labelled(mode_name(family, k))}: {_alone(mode, direct)}" for k, mode in enumerate(family.modes))
         texts["alone"] = "; ".join(alone)
     elif component.signal == "any":
         (constant, *_) = decide(family, "constant")
@@ -184,7 +186,7 @@ def _depends_facts(component: FamilyComponent, direct: bool, detail: bool) -> Fa
 
 
 def _names(component: FamilyComponent, nodes: Sequence[int], width: int) -> str:
-    return shorten_list([printable(shorten_label(component.family.labels[v])) for v in nodes], width)
+    return shorten_list([agent_text(component.family.labels[v]) for v in nodes], width)
 
 
 def _alone(mode: Mode, direct: bool) -> str:
@@ -236,7 +238,7 @@ def _keeping(component: FamilyComponent, groups: Sequence[AgreeingGroup], direct
     alone = [int(group.nodes[0]) for group in groups if group.nodes.size == 1]
     if not alone:
         return []
-    names = ", ".join(printable(shorten_label(component.family.labels[v])) for v in alone)
+    names = ", ".join(agent_text(component.family.labels[v]) for v in alone)
     if columns(names) > _NAMES:
         _, target, _ = component.family.union
         names = f"{counted(component.nodes.size - np.unique(target).size, 'agent')} that listen to nobody"

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lmi.exact.decimal_rounding import down, near, up
+from ptcc_certify.bounds.envelope import Envelope
 from ptcc_certify.certificate.facts import Fact, Facts, Standing
-from ptcc_certify.errors import Change, Sentence, joined
+from ptcc_certify.errors import Change, Sentence, joined, labelled
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
 from ptcc_certify.report.facts.input import limits_text
@@ -52,27 +53,28 @@ def rate_facts(certificate: Certificate) -> Facts:
         yield Fact(head="rate", standing="unproved", note=text, detail=True)
         return
     ratio = "" if bound is None else f", optimality ratio at least {down(rate / bound, 4)}"
-    text = f"{down(rate)} per unit of the stretched clock s, proved: V <= e^(-rate s) V(0){best}{ratio}"
+    law = "V <= e^(-rate s) V(0)" if certificate.direct else "V <= e^(-rate (s - s(T_r))) V(T_r) from T_r on"
+    text = f"{down(rate)} per unit of the stretched clock s, proved: {law}{best}{ratio}"
     yield Fact(head="rate", value=rate, side="down", note=text, detail=True)
     if certificate.overshoot is not None:
         kinds = ", ".join(f"{number} {kind}" for kind, number in Counter(V.kind for V in certificate.functions).items())
         of = certificate.fastest.coordinates
         text = f"overshoot constant at that rate {up(certificate.overshoot, 4)} of ||{of}||^2; functions: {kinds}"
-        yield Fact(head="rate", value=certificate.overshoot, side="up", note=text, detail=True)
+        yield Fact(head="function", value=certificate.overshoot, side="up", note=text, detail=True)
     V, search = certificate.lyapunov, certificate.search
     if V is not None and certificate.proof.rate is not None:
         rho = "" if V.rho is None else f", rho {float(V.rho):.4g}"
         overshoot = f"overshoot constant {up(V.overshoot, 4)} of ||{V.coordinates}||^2"
         text = f"paper {down(certificate.proof.rate)} = {V.objective}{rho}; {overshoot}"
-        yield Fact(head="rate", value=certificate.proof.rate, side="down", note=text, detail=True)
+        yield Fact(head="function", value=certificate.proof.rate, side="down", note=text, detail=True)
     if search.searched:
         searched = [f"{kind} {rate:.4g}" for kind, rate in search.searched.items()]
         limit = "" if search.diagonal_limit is None else f"; diagonal upper bound {search.diagonal_limit:.4g}"
         time = f"; time limit {certificate.time_limit:.3g} s" if math.isfinite(certificate.time_limit) else ""
         text = f"searched {', '.join(searched)} (numerical{limit}{time})"
-        yield Fact(head="rate", value=dict(search.searched), standing="unproved", note=text, detail=True)
+        yield Fact(head="function", value=dict(search.searched), standing="unproved", note=text, detail=True)
         used = [f"{V.kind} {down(V.proved_rate, 4)} (overshoot {up(V.overshoot, 2)})" for V in search.functions]
-        yield Fact(head="rate", note=f"used {', '.join(used) or 'none, no rate was proved'}", detail=True)
+        yield Fact(head="function", note=f"used {', '.join(used) or 'none, no rate was proved'}", detail=True)
 
 
 def error_facts(certificate: Certificate, drawn: bool, details: bool) -> Facts:
@@ -89,7 +91,7 @@ def error_facts(certificate: Certificate, drawn: bool, details: bool) -> Facts:
         standing: Standing = "proved" if limited or certificate.direct else "unproved"
         yield Fact(head="error", value=value, side="up", standing=standing, note=brief[0], brief=tuple(brief))
     if details and certificate.rate is not None:
-        yield from _instants_facts(certificate)
+        yield from instants_facts(certificate)
         if certificate.initial_state is not None and not drawn and any(V.deviation for V in certificate.functions):
             yield from _deviation_facts(certificate)
 
@@ -103,7 +105,7 @@ def _error_texts(certificate: Certificate) -> tuple[Fraction | float, str, str, 
         entry, *others = certificate.effort.residual
         noise = "" if entry.noise is None else f", |n_k| <= {down(entry.noise, 12)}"
         size = entry.noisy_norm or entry.norm
-        norm = f"{limits_text(entry)}{noise}: at T ||E|| <= {up(size, 2)}"
+        norm = f"{limits_text(entry)}{noise}: ||E|| <= {up(size, 2)} at T"
         agents = "" if entry.agents is None or entry.noisy_norm else f", every agent within {up(max(entry.agents), 2)}"
         return size, norm, agents, f"; ... {len(others) + 1} limits in all" * bool(others)
     if certificate.rate is None or (not certificate.direct and certificate.initial_state is None):
@@ -129,7 +131,7 @@ def _at_instants(values: Iterable[float], names: Iterable[str]) -> str:
     return ", ".join(f"{up(float(x), 2)} at {name}" for x, name in zip(values, names, strict=True))
 
 
-def _instants_facts(certificate: Certificate) -> Facts:
+def instants_facts(certificate: Certificate) -> Facts:
     """Tell what the proved rate leaves at instants; of a reaching phase from ``T_r`` on."""
     p, z, direct = certificate.protocol, certificate.envelope.coordinates, certificate.direct
     instants = told_instants(p, direct)
@@ -140,7 +142,15 @@ def _instants_facts(certificate: Certificate) -> Facts:
         if slowest[-1] is not None:
             text = "slowest mode (numerical) " + ", ".join(f"{x or 0.0:.2g}" for x in slowest)
             yield Fact(head="error", standing="unproved", note=text, detail=True)
-    elif certificate.initial_state is not None:
+    else:
+        envelope = certificate.envelope
+        sliding = Envelope(envelope.structure, envelope.gain, envelope.functions)
+        left = [q * float(p.T / p.span) for q, _ in instants]
+        clocks = [float(p.rho1 * p.span) * (1 - q) - float(p.rho2 * p.kappa) * math.log(q) for q in left]
+        shares = [float(sliding.norm_factor(s * (1 - 1e-12))) for s in clocks]
+        proved = _at_instants(shares, (name for _, name in instants))
+        yield Fact(head="error", note=f"||{z}(t)|| / ||{z}(T_r)|| at most {proved}", detail=True)
+    if not direct and certificate.initial_state is not None:
         instants = [(float(p.span / p.T), "T_r"), *instants]
         bounds = _at_instants(certificate.norm_bound([q for q, _ in instants]), (name for _, name in instants))
         text = f"||{z}(t)|| at most {bounds} (numerical, rounded up)"
@@ -157,7 +167,7 @@ def _deviation_facts(certificate: Certificate) -> Facts:
     yield Fact(head="deviation", standing="unproved" if numerical else "proved", note=text, detail=True)
     if certificate.at is not None:
         each = certificate.deviation_bound([float(1 - certificate.at / certificate.protocol.T)])[:, 0]
-        entries = [f"{label} {up(float(x), 2)}" for label, x in zip(certificate.labels, each, strict=True)]
+        entries = [f"{labelled(label)} {up(float(x), 2)}" for label, x in zip(certificate.labels, each, strict=True)]
         text = f"at t = {near(certificate.at, 12)}: {shorten_list(entries)}"
         yield Fact(head="deviation", value=each, side="up", note=text, detail=True)
 
@@ -220,7 +230,7 @@ def no_search(certificate: FamilyCertificate) -> Sentence:
 def function_facts(certificate: FamilyCertificate) -> Facts:
     """Tell the rate of every Lyapunov function, of every mode, and what proves the upper bound."""
     for part in certificate.parts:
-        names = [mode_name(certificate.family, k) for k in range(len(certificate.family.modes))]
+        names = [labelled(mode_name(certificate.family, k)) for k in range(len(certificate.family.modes))]
         for V in part.functions:
             own = getattr(V, "rates", ()) if len(names) > 1 else ()  # functions of rows have one rate
             rates = ", ".join(f"{name} {down(rate)}" for name, rate in zip(names, own, strict=False))
@@ -230,7 +240,7 @@ def function_facts(certificate: FamilyCertificate) -> Facts:
         if part.upper_bound is not None:
             modes = dict.fromkeys(names[member.mode] for member in part.upper_bound.members)
             what = BOUND_KINDS[part.upper_bound.kind] + f": {', '.join(modes)}" * (len(names) > 1)
-            text = f"decay rate at most {up(part.upper_bound.value)}, proved by {what}"
+            text = f"decay rate at most {up(part.upper_bound.value, 8)}, proved by {what}"
             yield Fact(head="bound", value=part.upper_bound.value, side="up", note=text, detail=True)
 
 

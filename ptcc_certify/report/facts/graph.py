@@ -8,16 +8,17 @@ from pathlib import PurePath
 import numpy as np
 
 from ptcc_certify.certificate.facts import Fact, Facts
+from ptcc_certify.errors import labelled
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.io.table_columns import BY_HEADER, IGNORED
 from ptcc_certify.graphs.structure import ClosedComponent, Structure, analyse
 from ptcc_certify.report.text_layout import (
     TEXT,
+    agent_text,
     columns,
     counted,
     printable,
     short_number,
-    shorten_label,
     shorten_list,
     shorten_text,
 )
@@ -41,11 +42,16 @@ _GROUPS = 3
 def graph_facts(structure: Structure, name: str, details: bool = True) -> Facts:
     """Tell which graph, how its rows were read, and its structure."""
     brief = _graph_text(structure, name)
-    yield Fact(head="graph", value=structure.graph.n_nodes, note=f"{printable(name)}{_size(structure)}", brief=(brief,))
+    yield Fact(
+        head="graph",
+        value=structure.graph.n_nodes,
+        note=f"{labelled(printable(name))}{_size(structure)}",
+        brief=(brief,),
+    )
     yield from _reading_facts(structure)
     if not details:
         return
-    yield Fact(head="nodes", note=shorten_list(structure.graph.labels), detail=True)
+    yield Fact(head="nodes", note=shorten_list([labelled(label) for label in structure.graph.labels]), detail=True)
     more = [remark for remark in remarks_on(structure) if remark in _OF_STRUCTURE]
     yield Fact(head="structure", note="; ".join([structure_text(structure), *more]), detail=True)
 
@@ -60,12 +66,12 @@ def family_facts(family: Family, name: str, read: str, components: Sequence[Fami
         yield Fact(head="read", note="; ".join(filter(None, (read, *family.notes))))
     if components is None:
         return
-    yield Fact(head="nodes", note=shorten_list(family.labels), detail=True)
+    yield Fact(head="nodes", note=shorten_list([labelled(label) for label in family.labels]), detail=True)
     for number, mode in enumerate(family.modes):
         known = len(components) == 1
         structure = components[0].structures[number] if known else analyse(mode.mandatory)
         size = f"{counted(mode.n_edges, 'edge')} ({int((mode.sign < 0).sum()):,} negative)" + "; undirected" * mode.tied
-        text = f"{mode_name(family, number)}: {size}; mandatory edges: {structure_text(structure)}"
+        text = f"{labelled(mode_name(family, number))}: {size}; mandatory edges: {structure_text(structure)}"
         yield Fact(head="mode", note=text, detail=True)
         if edges := _uncertain_edges(mode):
             yield Fact(head="mode", note=f"uncertain: {edges}", detail=True)
@@ -76,7 +82,7 @@ def leader_facts(structure: Structure) -> Facts:
     for (head, text), (_, short) in zip(_leaders(structure, _LONG_LIST), _leaders(structure, 20), strict=True):
         brief = short if columns(short) <= TEXT else shorten_text(short.partition(", negative cycle")[0], TEXT)
         yield Fact(head=head, note=text, brief=(brief,))
-    if followers := [structure.graph.labels[v] for v in structure.followers.tolist()]:
+    if followers := [labelled(structure.graph.labels[v]) for v in structure.followers.tolist()]:
         brief = shorten_list(followers, TEXT)
         yield Fact(head="followers", note=shorten_list(followers, _LONG_LIST), brief=(brief,))
 
@@ -99,8 +105,8 @@ def family_text(family: Family, name: str) -> str:
     if not (several or name):
         return rest
     if not several:
-        return f"{shorten_text(printable(name), max(TEXT - len(rest) - 2, 8))}: {rest}"
-    names = [printable(mode_name(family, k)) for k in range(len(family.modes))]
+        return f"{labelled(shorten_text(printable(name), max(TEXT - len(rest) - 2, 8)))}: {rest}"
+    names = [labelled(printable(mode_name(family, k))) for k in range(len(family.modes))]
     rest = f"{counted(len(names), 'mode')} on {rest}"
     return f"{shorten_list(names, max(TEXT - len(rest) - 2, 30))}: {rest}"
 
@@ -108,7 +114,7 @@ def family_text(family: Family, name: str) -> str:
 def _uncertain_edges(mode: Mode) -> str:
     listed = []
     for edge in np.flatnonzero(~mode.known)[:12].tolist():
-        ends = [shorten_label(mode.labels[int(side[edge])]) for side in (mode.source, mode.target)]
+        ends = [agent_text(mode.labels[int(side[edge])]) for side in (mode.source, mode.target)]
         least, largest = (short_number(end) for end in mode.edge_interval(edge))
         listed.append(f"{ends[0]} -> {ends[1]} in [{least}, {largest}]")
     return shorten_list(listed, 4 * TEXT, int((~mode.known).sum()))
@@ -127,7 +133,7 @@ def _graph_text(structure: Structure, name: str) -> str:
         rest, name = rest.replace("ly connected", "").replace("disconnected, ", ""), PurePath(name).name
     if len(rest) + min(columns(name), 8) > TEXT:  # the claims tell how many components there are
         rest = rest.rpartition(", ")[0]
-    return shorten_text(printable(name), max(TEXT - len(rest), 8)) + rest
+    return labelled(shorten_text(printable(name), max(TEXT - len(rest), 8))) + rest
 
 
 def _connectivity(structure: Structure) -> str:
@@ -174,15 +180,13 @@ def _leaders(structure: Structure, width: int) -> Iterator[tuple[str, str]]:
 
 def leaders_text(component: ClosedComponent, labels: Sequence[str], width: int = 40) -> str:
     """Tell how a group of leaders splits, or why it does not."""
-    nodes = [labels[v] for v in component.nodes]
+    nodes = [labelled(labels[v]) for v in component.nodes]
     if component.negative_cycle is not None:
-        steps = ", ".join(
-            f"{shorten_label(labels[s])}->{shorten_label(labels[t])}" for s, t in component.negative_cycle[:12]
-        )
+        steps = ", ".join(f"{agent_text(labels[s])}->{agent_text(labels[t])}" for s, t in component.negative_cycle[:12])
         more = ", ..." if len(component.negative_cycle) > 12 else ""
         return f"{shorten_list(nodes, 2 * width)}: unbalanced, negative cycle {steps}{more}"
     sides = camps(component)
-    text = " against ".join("{" + shorten_list([labels[v] for v in camp], width) + "}" for camp in sides)
+    text = " against ".join("{" + shorten_list([labelled(labels[v]) for v in camp], width) + "}" for camp in sides)
     return f"balanced, {'camps ' if len(sides) > 1 else 'one camp '}{text}"
 
 
@@ -214,6 +218,6 @@ def remarks_on(structure: Structure) -> list[str]:
         (read["self_loops"] != "refused", f"self-loops {read['self_loops']}"),
         ("zeros" in read, f"weights 0 {read.get('zeros')}"),
         (read["undirected"], "each row goes both ways"),
-        ("variable" in read, f"variable {shorten_label(str(read.get('variable')))}"),
+        ("variable" in read, f"variable {agent_text(str(read.get('variable')))}"),
     )
     return [*(text for holds, text in remarks if holds), *read["notes"]]

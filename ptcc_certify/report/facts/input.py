@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.certificate.facts import Fact, Facts, Standing
+from ptcc_certify.errors import labelled
 from ptcc_certify.report.facts.signals import every_text
-from ptcc_certify.report.text_layout import TEXT, shorten_label, shorten_list, value_list
+from ptcc_certify.report.text_layout import TEXT, agent_text, shorten_list, value_list
 
 if TYPE_CHECKING:
     from ptcc_certify.bounds.input.effort import Effort, Limited
@@ -26,7 +27,7 @@ def input_facts(certificate: Certificate, details: bool) -> Facts:
     yield _input_fact(certificate, effort)
     if not details:
         return
-    yield from _threshold_facts(certificate, effort)
+    yield from threshold_facts(certificate)
     yield from _size_facts(certificate, effort)
     yield from _limited_facts(effort)
 
@@ -44,19 +45,22 @@ def _input_fact(certificate: Certificate, effort: Effort) -> Fact:
             text, nothing = "the nominal part is bounded", ", of the sliding part nothing is proved"
     loud = effort.bounded is False and entry is None
     if largest is None:
-        standing: Standing = "proved" if effort.bounded or entry is not None else "unproved"
+        standing: Standing = "unproved" if effort.bounded is None and entry is None else "proved"
         return Fact(head="input", standing=standing, note=text + nothing, loud=loud)
     whom = "" if effort.initial_set is None else f" for {initial_states_text(effort.initial_set)}"
     text = f"{text}; |u_k| <= {up(largest, 4)}{whom}"
     agent = ""
     if entry is None and effort.peak is not None:
         label = certificate.labels[effort.peak.agents.index(largest)]
-        agent = f", the largest of agent {shorten_label(label, 22)}"
+        agent = f", the largest of agent {agent_text(label, 22)}"
     return Fact(head="input", value=largest, side="up", note=text + agent, brief=(text + agent, text), loud=loud)
 
 
-def _threshold_facts(certificate: Certificate, effort: Effort) -> Facts:
+def threshold_facts(certificate: Certificate) -> Facts:
     """Tell what decides whether the input is bounded."""
+    effort = certificate.effort
+    if effort is None or certificate.constant:
+        return
     lower, upper = effort.threshold
     whose = "the nominal part is " if effort.sliding is not None else ""
     product = f"rho2 kappa min Re lambda >= {down(lower, 5)}" if lower is not None else "nothing else is proved"
@@ -67,7 +71,7 @@ def _threshold_facts(certificate: Certificate, effort: Effort) -> Facts:
     elif effort.bounded is False:
         below = f" <= {up(upper, 5)}" if upper is not None and effort.by == "upper_bound" else " = 1 or less"
         enough = "" if certificate.rate is None else f" to {up(2 / certificate.rate, 5)} or more"
-        text = f"rho2 kappa min Re lambda{below}, 1 is needed: raise rho2 * kappa{enough}"
+        text = f"rho2 kappa min Re lambda{below}, 1 is needed: raise rho2 kappa{enough}"
         text = f"NOT BOUNDED without limits: {text}" if certificate.limits else text
     else:
         text = f"{product}, 1 is needed"
@@ -89,7 +93,7 @@ def _size_facts(certificate: Certificate, effort: Effort) -> Facts:
     other = bool(certificate.limits) or not certificate.direct  # the initial state that is found is of neither
     worst = None if effort.peak is None or other else certificate.worst_initial_state
     if worst is not None and math.isfinite(worst.size):
-        where = f"|u_{certificate.labels[worst.agent]}| = {worst.size:.4g} at t = {worst.t:.4g}"
+        where = f"|u_{labelled(certificate.labels[worst.agent])}| = {worst.size:.4g} at t = {worst.t:.4g}"
         text = f"largest found (numerical) {where} from {value_list(certificate.labels, worst.x0.tolist())}"
         yield Fact(head="effort", value=worst.size, standing="observed", note=text, detail=True)
     if effort.sliding is not None and not effort.sliding.bounded:
@@ -115,7 +119,7 @@ def _limited_facts(effort: Effort) -> Facts:
     for entry in effort.residual:
         agents = "" if entry.agents is None else f", every agent within {up(max(entry.agents), 3)} of its final state"
         largest = "" if entry.largest is None else f", |u_k| <= {up(entry.largest, 4)}"
-        text = f"{limits_text(entry)}: at T ||E|| <= {up(entry.norm, 3)}{agents}{largest}"
+        text = f"{limits_text(entry)}: ||E|| <= {up(entry.norm, 3)} at T{agents}{largest}"
         yield Fact(head="limited", value=entry.norm, side="up", note=text, detail=True)
         if entry.noise is not None and entry.noisy_norm is not None and entry.noisy_largest is not None:
             noise = f"noise |n_k| <= {near(entry.noise)} leaves ||E|| <= {up(entry.noisy_norm, 3)} at T"
@@ -158,8 +162,8 @@ def family_input_facts(certificate: FamilyCertificate) -> Facts:
         yield Fact(head="input", note="bounded for every signal and every initial state")
     else:
         largest = max(peaks)
-        agent = shorten_label(certificate.labels[peaks.index(largest)], 22)
+        agent = agent_text(certificate.labels[peaks.index(largest)], 22)
         text = f"bounded; |u_k| <= {up(largest, 4)}, the largest of agent {agent}{every}"
         yield Fact(head="input", value=largest, side="up", note=text)
-        each = [f"{shorten_label(label)} {up(peak, 4)}" for label, peak in zip(certificate.labels, peaks, strict=True)]
+        each = [f"{agent_text(label)} {up(peak, 4)}" for label, peak in zip(certificate.labels, peaks, strict=True)]
         yield Fact(head="input", note=f"|u_k| <= {shorten_list(each, 4 * TEXT)}", detail=True)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 from lmi.exact.decimal_rounding import down, up
-from ptcc_certify.report.text_layout import TEXT, printable, short_number, shorten_label, shorten_list
+from ptcc_certify.report.text_layout import TEXT, agent_text, short_number, shorten_list
 
 
 def interval_text(ends: tuple[Fraction, Fraction] | None) -> str:
@@ -34,7 +34,7 @@ def intervals_text(labels: Sequence[str], states: Sequence[tuple[Fraction, Fract
     """
     groups: dict[str, list[str]] = {}
     for label, ends in zip(labels, states, strict=True):
-        groups.setdefault(interval_text(ends), []).append(printable(shorten_label(label)))
+        groups.setdefault(interval_text(ends), []).append(agent_text(label))
     if len(groups) == 1 < len(states):
         return f"every agent {next(iter(groups))}"
     texts = [f"{shorten_list(names, 24 if width < 4 * TEXT else 4 * TEXT)} {ends}" for ends, names in groups.items()]

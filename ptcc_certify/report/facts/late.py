@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
@@ -12,10 +13,10 @@ import numpy as np
 from lmi.exact.decimal_rounding import down, float_up, near, up
 from ptcc_certify.bounds.small_delays import delay_threshold
 from ptcc_certify.certificate.facts import Fact, Facts
-from ptcc_certify.errors import Change
+from ptcc_certify.errors import Change, joined, labelled
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.report.text_layout import shorten_label, shorten_list
+from ptcc_certify.report.text_layout import agent_text, shorten_list
 
 if TYPE_CHECKING:
     from ptcc_certify.bounds.late_messages import LateBounds
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
     from ptcc_certify.protocols.base import Protocol
     from ptcc_certify.protocols.late_messages import LateMessages
     from ptcc_certify.protocols.moving_leaders import MovingLeaders
+
+#: From where bounds are that no initial state is given for.
+FROM_WITHIN_1 = ", from within 1 of it at first"
 
 
 def late_facts(certificate: Certificate | FamilyCertificate) -> Facts:
@@ -34,23 +38,23 @@ def late_facts(certificate: Certificate | FamilyCertificate) -> Facts:
     yield Fact(head="messages", note=messages_text(late.messages, certificate.protocol))
     if late.leaders is not None:
         yield Fact(head="leaders", note=leaders_text(late.leaders))
-    left = [] if late.direct else _left(late)
-    texts = [*_impossible(late), *left, *_stages(late), *_kept_off(late)]
+    told = [*_impossible(late), *([] if late.direct else _left(late)), *_stages(late), *_kept_off(late)]
     if (at := certificate.at) is not None and (late.rows or late.steps or late.settling or late.lmi):
-        texts.append(f"at t = {near(at)} every agent within {up(float(late.largest_bound([float(at)])[0]), 2)}")
-    for text in texts:
-        size = late.largest if text in left and not math.isinf(late.largest) else None
-        yield Fact(head="late", value=size, side="up", note=text, loud=not late.says_something)
+        bound = float(late.largest_bound([float(at)])[0])
+        note = f"at t = {near(at)} every agent within {up(bound, 2)}"
+        told.append(Fact(head="late", value=bound, side="up", note=note))
+    yield from (replace(fact, loud=not late.says_something) for fact in told)
     from ptcc_certify.certificate.judgements import largest_late_input  # ``classify`` has no use for solvers
 
-    largest, whole = largest_late_input(late, certificate.protocol), ", from within 1 of it at first" * late.relative
+    largest, whole = largest_late_input(late, certificate.protocol), FROM_WITHIN_1 if late.relative else ""
     if largest is not None:
         sliding = "" if certificate.protocol.reaching is None else ", the sliding term included"
         text = f"bounded up to T; |u_k| <= {up(largest, 4)}{sliding}{whole}"
         yield Fact(head="input", value=largest, side="up", note=text)
     else:
-        cap = "a gain without a cap makes ever more of what is late" if late.messages.gain_cap is None else ""
-        text = f"not proved bounded with late messages{': ' * bool(cap)}{cap}"
+        text = "not proved bounded with late messages"
+        if late.messages.gain_cap is None:
+            text += ": a gain without a cap makes ever more of what is late"
         yield Fact(head="input", standing="unproved", note=text, loud=True)
     if by_agent := _residual_text(late):
         yield Fact(head="left", note=f"at T by agent: {by_agent}", detail=True)
@@ -68,8 +72,9 @@ def tracking_facts(certificate: Certificate | FamilyCertificate) -> Facts:
         instants = {f"t = {near(at)}": 1 - at / certificate.protocol.T}
     bounds = {when: up(float(tracking.distance_bound([float(q)]).max()), 2) for when, q in instants.items()}
     after = "and ever after" if not tracking.after else f"within {up(tracking.distance_after, 2)} of it from then on"
-    yield Fact(head="tracking", note=f"every follower on its target at T = {T}, {after};")
-    whole = " from within 1 of it at first" * tracking.relative
+    text = f"every follower on its target at T = {T}, {after}"
+    yield Fact(head="tracking", note=text, brief=(f"{text};",))
+    whole = FROM_WITHIN_1.removeprefix(",") if tracking.relative else ""
     within = ", ".join(f"{x} of it at {when}" for when, x in bounds.items())
     yield Fact(head="tracking", note=f"before T within {within}{whole}")
     if tracking.input is not None:
@@ -90,9 +95,12 @@ def leaders_text(leaders: MovingLeaders) -> str:
     >>> leaders_text(MovingLeaders(speed="0.5", disturbance=1))
     "speed |x_j'| <= 0.5; any |d_k| <= 1"
     """
-    sign = "" if leaders.sign_gain is None else f"; followers add {near(leaders.sign_gain)} sign(e_k)"
-    pushed = f"; any |d_k| <= {near(leaders.disturbance)}" * (leaders.disturbance > 0)
-    return f"speed |x_j'| <= {near(leaders.speed)}{pushed}{sign}"
+    clauses = [f"speed |x_j'| <= {near(leaders.speed)}"]
+    if leaders.disturbance > 0:
+        clauses.append(f"any |d_k| <= {near(leaders.disturbance)}")
+    if leaders.sign_gain is not None:
+        clauses.append(f"followers add {near(leaders.sign_gain)} sign(e_k)")
+    return "; ".join(clauses)
 
 
 def messages_text(messages: LateMessages, protocol: Protocol | None = None) -> str:
@@ -106,18 +114,23 @@ def messages_text(messages: LateMessages, protocol: Protocol | None = None) -> s
     >>> messages_text(LateMessages(delay={("a", "b"): "0.01", ("b", "c"): "0.02"}))
     'up to 0.02 old, edge by edge'
     """
-    each = ", edge by edge" * isinstance(messages.delay, Mapping)
-    parts = [f"{near(messages.largest_delay)} late{each}"] * (messages.largest_delay > 0)
+    each = ", edge by edge" if isinstance(messages.delay, Mapping) else ""
     if messages.period is not None:
-        parts.append(f"every {near(messages.period)}")
-        parts += [f"{messages.losses} in a row lost"] * (messages.losses > 0)
-        each = f": {', '.join(parts)}"
-    told = [f"up to {near(messages.age)} old{each}"] * (messages.age > 0)
+        late = [f"{near(messages.largest_delay)} late{each}"] if messages.largest_delay > 0 else []
+        lost = [f"{messages.losses} in a row lost"] if messages.losses > 0 else []
+        each = f": {', '.join([*late, f'every {near(messages.period)}', *lost])}"
+    clauses = []
+    if messages.age > 0:
+        clauses.append(f"up to {near(messages.age)} old{each}")
     if protocol is not None and messages.age >= protocol.T:
-        told.append(f"T = {near(protocol.T)}, so that by T nothing new need arrive")
-    told += [f"off by up to {near(messages.value_error)}"] * (messages.value_error != 0)
-    told += [f"gain <= {near(messages.gain_cap)}"] if messages.gain_cap is not None else []
-    return "; ".join(told + ["the own state as well"] * messages.own_delay)
+        clauses.append(f"T = {near(protocol.T)}, so that by T nothing new need arrive")
+    if messages.value_error != 0:
+        clauses.append(f"off by up to {near(messages.value_error)}")
+    if messages.gain_cap is not None:
+        clauses.append(f"gain <= {near(messages.gain_cap)}")
+    if messages.own_delay:
+        clauses.append("the own state as well")
+    return "; ".join(clauses)
 
 
 def _residual_text(late: LateBounds) -> str:
@@ -131,21 +144,23 @@ def _residual_text(late: LateBounds) -> str:
         if one is not None:
             bounds = np.minimum(bounds, [float_up(x) for x in one.residual])
     names = late.labels
-    return shorten_list([f"{names[v]} {up(float(bounds[v]), 2)}" for v in range(len(names)) if bounds[v]])
+    return shorten_list([f"{labelled(names[v])} {up(float(bounds[v]), 2)}" for v in range(len(names)) if bounds[v]])
 
 
-def _impossible(late: LateBounds) -> list[str]:
+def _impossible(late: LateBounds) -> Facts:
     """Tell what cannot be: who misses the deadline, and delays from which on a constant gain diverges."""
-    texts = []
     if late.missed is not None:
-        label = shorten_label(late.labels[late.missed.agent], 22)
-        size = down(late.missed.bound, 2)
-        texts.append(f"agent {label} is off its final state at T by {size} at least, if none comes sooner")
+        label = agent_text(late.labels[late.missed.agent], 22)
+        notes = [
+            f"agent {label} is off its final state at T by {size} at least, if none comes sooner"
+            for size in (down(late.missed.bound, 3), down(late.missed.bound, 2))
+        ]
+        yield Fact(head="late", value=late.missed.bound, side="down", note=notes[0], brief=(notes[1],))
     threshold = _threshold(late)
     if late.messages.age >= threshold:
         gain = near(late.messages.gain_cap or Fraction(1))
-        texts.append(f"at a constant gain of {gain} agents diverge with delays above {threshold:.3g} (numerical)")
-    return texts
+        note = f"at a constant gain of {gain} agents diverge with delays above {threshold:.3g} (numerical)"
+        yield Fact(head="late", standing="unproved", note=note)
 
 
 def _threshold(late: LateBounds) -> float:
@@ -156,44 +171,55 @@ def _threshold(late: LateBounds) -> float:
     return delay_threshold(structure, float(late.messages.gain_cap or 1))
 
 
-def _left(late: LateBounds) -> list[str]:
+def _left(late: LateBounds) -> Facts:
     """Tell what is left at T at most, and which delays are certified."""
-    cap = "under a cap nothing settles: " * (late.messages.gain_cap is not None and late.leaders is None)
+    cap = "under a cap nothing settles: " if late.messages.gain_cap is not None and late.leaders is None else ""
+    limit = _limit_text(late)
     if math.isinf(late.largest):
-        return [f"{cap}nothing is proved of what is left at T{_limits(late)}"]
-    whole = ", from within 1 of it at first" * late.relative
+        note = f"{cap}nothing is proved of what is left at T"
+        yield Fact(head="late", standing="unproved", note=joined("; ", (note, limit)))
+        return
+    notes = [f"{cap}{_within_text(late, digits)}" for digits in (3, 2)]
     formed = late.largest in [float_up(max(one.residual)) for one in (late.form, late.lmi) if one is not None]
-    settling = "; leaders hear each other at once, and settle by themselves" * (late.settling is not None)
-    within = f"every agent within {up(late.largest, 2)} of its final state at T"
+    brief = joined("; ", (notes[1], limit if formed else ""))
+    yield Fact(head="late", value=late.largest, side="up", note=notes[0], brief=(brief,))
+    if formed and limit:
+        yield Fact(head="late", standing="unproved", note=limit, detail=True)
+
+
+def _within_text(late: LateBounds, digits: int) -> str:
+    """Tell how far agents are from their final states at T at most, or from the targets that leaders move."""
+    text = f"every agent within {up(late.largest, digits)} of its final state at T"
     if late.leaders is not None:
-        within = f"every follower within {up(late.largest, 2)} of its target at T"
-        within += "" if late.after is None else f", within {up(late.after, 2)} from then on"
-    return [f"{cap}{within}{whole}{settling}{_limits(late) * formed}"]
+        text = f"every follower within {up(late.largest, digits)} of its target at T"
+        text += "" if late.after is None else f", within {up(late.after, digits)} from then on"
+    text += FROM_WITHIN_1 if late.relative else ""
+    return text + ("; leaders hear each other at once, and settle by themselves" if late.settling is not None else "")
 
 
-def _kept_off(late: LateBounds) -> list[str]:
+def _kept_off(late: LateBounds) -> Facts:
     """Tell what of this bound no gain takes away, since leaders move on while messages come."""
-    if not late.never_below:
-        return []
-    return [f"{down(late.never_below, 2)} of that no gain takes away: leaders move on while messages come"]
+    if late.never_below:
+        note = f"{down(late.never_below, 2)} of that no gain takes away: leaders move on while messages come"
+        yield Fact(head="late", value=late.never_below, side="down", note=note)
 
 
-def _limits(late: LateBounds) -> str:
+def _limit_text(late: LateBounds) -> str:
     """Tell the longest delay that the certificate forgives, and the one that constant gain does."""
     if late.longest_delay is None or math.isinf(late.longest_delay):
         return ""
     threshold = _threshold(late)
     more = "" if math.isinf(threshold) else f", the loop's {threshold:.3g} at constant gain"
-    return f"; this certificate's limit is a delay of {late.longest_delay:.2g} (double under half the cap){more}"
+    return f"this certificate's limit is a delay of {late.longest_delay:.2g} (double under half the cap){more}"
 
 
-def _stages(late: LateBounds) -> list[str]:
+def _stages(late: LateBounds) -> Facts:
     """Tell the deadlines of stages, at which agents are at their final states exactly."""
     if late.unarrived:
-        return ["no deadlines of stages: information takes longer than T from the leaders to the last agent"]
-    if late.direct:
-        return ["every agent exactly at its final state at T: all hear of leaders alone"]
-    if late.staged is None:
-        return []
-    when = f"from {near(min(late.staged))} to {near(max(late.staged))}, {near(late.messages.age)} apart"
-    return [f"exactly at x(T) by T if agents have deadlines of their own, {when}"]
+        note = "no deadlines of stages: information takes longer than T from the leaders to the last agent"
+        yield Fact(head="late", note=note)
+    elif late.direct:
+        yield Fact(head="late", note="every agent exactly at its final state at T: all hear of leaders alone")
+    elif late.staged is not None:
+        when = f"from {near(min(late.staged))} to {near(max(late.staged))}, {near(late.messages.age)} apart"
+        yield Fact(head="late", note=f"exactly at x(T) by T if agents have deadlines of their own, {when}")

@@ -11,7 +11,7 @@ from ptcc_certify.certificate.answer import rejects
 from ptcc_certify.certificate.facts import Fact, Facts
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.report.facts.agents import agents_facts
-from ptcc_certify.report.facts.claim import claim_facts, family_claims
+from ptcc_certify.report.facts.claim import assumptions, claim_facts, family_claims
 from ptcc_certify.report.facts.decay import (
     error_facts,
     family_error_facts,
@@ -106,10 +106,9 @@ def _of_graph(certificate: Certificate, origins: Mapping[str, str], details: boo
 
 def _beside(certificate: Certificate | FamilyCertificate) -> list[Fact]:
     """Tell what the rest of a certificate knows nothing of: nothing, or one fact."""
-    without = ["messages at once"] if certificate.late is not None else []
-    without += ["leaders at rest"] if certificate.leaders_move else []
-    text = f"what follows is of {' and '.join(without)}"
-    return [Fact(head="claim", note=text, detail=True)] if without else []
+    without = [text for text in assumptions(certificate) if text != "without limits"]
+    text = f"{' and '.join(without)}, in what follows"
+    return [Fact(head="given", note=text, detail=True)] if without else []
 
 
 def _details(facts: Iterable[Fact], are: bool) -> Iterable[Fact]:

@@ -15,10 +15,11 @@ from ptcc_certify.certificate.restricted_claims import (
     WindowClaim,
 )
 from ptcc_certify.certificate.restricted_reasons import TOO_SMALL, reasons_for_none
+from ptcc_certify.errors import labelled
 from ptcc_certify.graphs.family import Mode
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, CONSENSUS, CONTAINMENT
 from ptcc_certify.protocols.restricted_signals import ClockShares, DwellTime, JointWindows, SignalClass
-from ptcc_certify.report.text_layout import printable, shorten_label
+from ptcc_certify.report.text_layout import agent_text, printable
 from ptcc_certify.theorems.counterexample_text import mode_name
 from ptcc_certify.theorems.family_behaviour import DEPENDS
 from ptcc_certify.theorems.family_claims import GENERAL
@@ -54,8 +55,8 @@ def signal_facts(certificate: FamilyContent) -> Facts:
     several = len(certificate.parts) > 1
 
     def where(component: int) -> str:
-        name = shorten_label(certificate.parts[component].component.family.labels[0])
-        return f"component of {printable(name)}: " if several else ""
+        name = agent_text(certificate.parts[component].component.family.labels[0])
+        return f"component of {name}: " if several else ""
 
     none = reasons_for_none(certificate)
     if not certificate.restricted and not none:
@@ -116,7 +117,7 @@ def _last_mode_text(certificate: FamilyContent, claim: LastModeClaim | FinalValu
     if len(set(behaviours)) == 1:
         camps = ", camps of that mode" if begin and own[0] == BIPARTITE_CONSENSUS else ""
         return f"{begin}: {behaviours[0]}{camps}{late}".removeprefix(": ")
-    names = (printable(mode_name(certificate.family, k)) for k in range(len(behaviours)))
+    names = (labelled(printable(mode_name(certificate.family, k))) for k in range(len(behaviours)))
     each = "; ".join(f"{name}: {behaviour}" for name, behaviour in zip(names, behaviours, strict=True))
     return f"{begin}: {each}{late}".removeprefix(": ")
 
@@ -141,7 +142,7 @@ def _window_text(claim: WindowClaim) -> str:
 
 
 def _share_text(certificate: FamilyContent, claim: ShareClaim) -> str:
-    names = (printable(mode_name(certificate.family, k)) for k in range(len(certificate.family.modes)))
+    names = (labelled(printable(mode_name(certificate.family, k))) for k in range(len(certificate.family.modes)))
     own = map(down, claim.form.function.rates)
     each = ", ".join(f"{name} {rate}" for name, rate in zip(names, own, strict=True))
     late = "how near by when depends on how far the shares stray"

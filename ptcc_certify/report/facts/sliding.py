@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from lmi.exact.decimal_rounding import down, up
 from lmi.exact.elementary_enclosures import LARGEST_PUSH
 from ptcc_certify.certificate.facts import Fact, Facts
+from ptcc_certify.errors import labelled
 from ptcc_certify.report.text_layout import shorten_list, value_list
 
 if TYPE_CHECKING:
@@ -38,11 +39,11 @@ def sliding_facts(
         return
     values = dict(zip(labels, sigma0, strict=True))
     yield Fact(head="sigma(0)", value=values, note=value_list(labels, sigma0), detail=True)
-    late = [label for label, r in zip(labels, reaching, strict=True) if r.z is None]
+    late = [labelled(label) for label, r in zip(labels, reaching, strict=True) if r.z is None]
     last = max((r for r in reaching if r.z is not None), key=lambda r: r.z or 0, default=None)
     clauses = []
     if last is not None and last.z:
-        agent = labels[list(reaching).index(last)]
+        agent = labelled(labels[list(reaching).index(last)])
         margin = f"{down(last.remaining, 3)} before T_r" if last.remaining else "nearer to T_r than a float tells"
         others = " of others" * bool(late)
         clauses.append(f"reaching time{others} at most {up(last.time, 6)}, {margin} (agent {agent})")

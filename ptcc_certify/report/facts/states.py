@@ -10,6 +10,7 @@ from lmi.exact.decimal_rounding import up
 from ptcc_certify.bounds.final_state import extremes
 from ptcc_certify.certificate.facts import Fact, Facts
 from ptcc_certify.certificate.restricted_states import constant_states, last_states, states_of_signal
+from ptcc_certify.errors import labelled
 from ptcc_certify.report.facts.claim import range_text, told_ranges
 from ptcc_certify.report.facts.intervals import interval_text, intervals_text
 from ptcc_certify.report.facts.signals import agreement_text, every_text, rests
@@ -53,7 +54,7 @@ def final_facts(certificate: Certificate) -> Facts:
     more = f"{degenerate}{'; without limits' * bool(certificate.limits)}{unproved})"
     groups: dict[Fraction | float, list[str]] = {}
     for label, state in zip(labels, result.states, strict=True):
-        groups.setdefault(state, []).append(printable(label))
+        groups.setdefault(state, []).append(labelled(printable(label)))
     listed = value_list(labels, result.states, 2 * TEXT)
     grouped = "; ".join(f"{', '.join(names)} at {short_number(state)}" for state, names in groups.items())
     brief, kind = min(listed, grouped, key=columns), f"({_accuracy(result, 'rounded')}{more}"
@@ -137,4 +138,8 @@ def constant_text(certificate: FamilyContent, width: int = 12 * TEXT) -> str:
         return ""
     text = intervals_text([label for label, *_ in rows], [own for _, own, _ in rows], width)
     whole = len(rows) == certificate.family.n_nodes
-    return text if whole else text.replace("every agent", shorten_list([label for label, *_ in rows], 4 * TEXT), 1)
+    return (
+        text
+        if whole
+        else text.replace("every agent", shorten_list([labelled(label) for label, *_ in rows], 4 * TEXT), 1)
+    )

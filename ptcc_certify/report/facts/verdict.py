@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from lmi.exact.decimal_rounding import near
 from ptcc_certify.certificate.answer import CERTIFIED, rejects
 from ptcc_certify.certificate.facts import Fact, Facts
-from ptcc_certify.errors import Change, Sentence
+from ptcc_certify.errors import Change, Sentence, labelled
 from ptcc_certify.report.facts.input import initial_states_text
 from ptcc_certify.report.text_layout import arithmetic
 
@@ -75,7 +75,7 @@ def run_facts(certificate: Certificate) -> Facts:
             when = f"at t = {slid.reaching_times[last]:.6g}, {slid.reaching_left[last]:.3g} before T_r"
         reaching = "kept" if comparison.reaching_kept else "VIOLATED"
         ratio = f"worst |sigma| ratio {comparison.sliding_ratio or 0:.4g}"
-        texts.append(f"reaching times {reaching}, the last {when} (agent {run.labels[last]}); {ratio}")
+        texts.append(f"reaching times {reaching}, the last {when} (agent {labelled(run.labels[last])}); {ratio}")
     if run is not None and certificate.final_state is not None:
         gap = float(abs(run.final_state - certificate.final_state).max())
         remark = "" if run.deadline_resolved else " (the run had not settled)"

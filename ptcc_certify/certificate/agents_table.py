@@ -1,9 +1,9 @@
-"""The table of agents that the certificate of a family is made into."""
+"""The table of agents that a certificate is made into."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,36 +17,58 @@ from ptcc_certify.graphs.tables import import_pandas
 if TYPE_CHECKING:
     import pandas as pd
 
+    from ptcc_certify.certificate.certificate import Certificate
+    from ptcc_certify.certificate.family_certificate import FamilyCertificate
 
-def family_table(certificate: FamilyContent, certified: bool) -> pd.DataFrame:
-    """Return one row per agent; see :meth:`FamilyCertificate.to_pandas`.
 
-    Parameters
-    ----------
-    certificate : FamilyContent
-    certified : bool
-        Whether the check accepts it: without that nothing is told of restricted signals, nor of boxes.
+def agents_table(certificate: Certificate | FamilyCertificate) -> pd.DataFrame:
+    """Return one row per agent; see :meth:`Certificate.to_pandas` and :meth:`FamilyCertificate.to_pandas`.
 
     Examples
     --------
     >>> moved = Family.from_intervals([("a", "c", 1, 3), ("b", "c", 1, 1)])
     >>> cert = certify(moved, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), {"a": 0, "b": 4, "c": 9})
-    >>> family_table(cert, True)[["box_least", "box_largest"]].loc["c"].tolist()
+    >>> agents_table(cert)[["box_least", "box_largest"]].loc["c"].tolist()
     [1.0, 2.0]
     """
-    pandas, n = import_pandas(), certificate.family.n_nodes
-    unknown: list[Interval | None] = [None] * n
-    own = ends_for_signal(certificate) if certified else unknown
+    pandas = import_pandas()
+    columns: Mapping[Any, Any]
+    if isinstance(certificate, FamilyContent):
+        columns = _of_family(certificate)
+    else:
+        own = _of_graph(certificate) if certificate.agents is None else certificate.agents.columns()
+        columns = {**certificate.structure.to_pandas(), **own}
+    return pandas.DataFrame(columns, index=pandas.Index(certificate.labels, name="node"))
+
+
+def _of_graph(certificate: Certificate) -> dict[str, Any]:
+    """Return where agents begin and end, and how near they are proved to be, NaN where that is not known."""
+    unknown = np.full(certificate.graph.n_nodes, np.nan)
+    begin, end, deviation = certificate.initial_positions, certificate.final_positions, unknown
+    if begin is not None and certificate.functions:
+        share = 1 if certificate.direct else float(certificate.protocol.span / certificate.protocol.T)
+        deviation = certificate.deviation_bound([0.01 * share])[:, 0]
+    return {
+        "x(0)": unknown if begin is None else [float(x) for x in begin],
+        "x(T)": unknown if end is None else np.asarray(end, dtype=float),
+        "deviation": np.where(np.isfinite(deviation), deviation, np.nan),
+    }
+
+
+def _of_family(certificate: FamilyCertificate) -> dict[str, Any]:
+    """Return intervals; nothing of restricted signals, nor of boxes, unless the check accepts the certificate."""
+    certified = certificate.verdict == "certified"
+    unknown: list[Interval | None] = [None] * certificate.family.n_nodes
+    restricted = ends_for_signal(certificate) if certified else unknown
     signal = "" if certificate.signal == "any" else str(certificate.signal)
-    columns: dict[str, Any] = {
+    return {
         **_pair("least", "largest", certificate.final_states or unknown),
-        **_pair("restricted_least", "restricted_largest", own),
-        "restricted_to": ["" if ends is None else signal for ends in own],
+        **_pair("restricted_least", "restricted_largest", restricted),
+        "restricted_to": ["" if ends is None else signal for ends in restricted],
         **_pair("box_least", "box_largest", _boxes(certificate) if certified else unknown),
         **_pair("stays_least", "stays_largest", _ranges(certificate) if certified else unknown),
         "keeps": _keeps(certificate),
     }
-    return pandas.DataFrame(columns, index=pandas.Index(certificate.family.labels, name="node"))
 
 
 def _pair(least: str, largest: str, states: Iterable[Interval | None]) -> dict[str, np.ndarray]:
