@@ -481,7 +481,7 @@ def row_bound(
         left = left_above(witness.b * clock)
     floor, error, slack = 0.0, heard_wrong(messages, leaders), rows.slack(witness.u)
     if error:
-        floor = max(float((rows.weights / slack).max()) * float(error), _LEAST)
+        floor = max(rows.floor(witness.u, float(error)), _LEAST)
     initial = float((first / witness.u).max())
     row = RowBound(witness, cap, clock, left, Fraction(initial * _MORE), Fraction(floor * _MORE))
     if leaders is None:

@@ -40,6 +40,8 @@ _LOOSE = 0.05
 _ROUNDS = 3
 #: Members of a family that are tried one after the other, each the worst for the vector of the last.
 _POLICIES = 20
+#: Halvings of what errors of values add.
+_FLOORS = 40
 #: Products by which the largest ``q`` is found, halvings where ages differ, and the largest one that is tried then.
 _PRODUCTS, _HALVINGS, _LARGEST = 30, 8, 1e12
 
@@ -239,6 +241,10 @@ class FollowerRows:
         """Return ``D_k u_k - sum_l |w_kl| u_l`` of every follower, at least."""
         return np.asarray(self.D * u - self.W @ u)
 
+    def floor(self, u: np.ndarray, error: float) -> float:
+        """Return about the least ``f`` with ``sum_l |w_kl| (f (u_k - u_l) - error) >= 0`` for every follower."""
+        return float((self.D / self.slack(u)).max()) * error
+
     def largest(self, u: np.ndarray) -> np.ndarray:
         """Return ``D_k u_k + sum_l |w_kl| u_l`` of every follower, at most."""
         return np.asarray(self.D * u + self.W @ u)
@@ -288,6 +294,18 @@ class UncertainRows(FollowerRows):
     def slack(self, u: np.ndarray) -> np.ndarray:
         """Return ``sum_l |w_kl| (u_k - u_l)`` of every follower, at least."""
         return np.asarray(self.intervals.pull(self._all(u)).min(axis=0))
+
+    def floor(self, u: np.ndarray, error: float) -> float:
+        """Return about the least ``f`` with ``sum_l |w_kl| (f (u_k - u_l) - error) >= 0`` for every follower.
+
+        Halved towards it: at the largest weights of the least rows all are known to hold.
+        """
+        low, high = error, float((self.weights / self.slack(u)).max()) * error
+        for _ in range(_FLOORS):
+            middle = (low + high) / 2
+            holds = bool((self.intervals.pull(self._all(middle * u), less=error) >= 0).all())
+            low, high = (low, middle) if holds else (middle, high)
+        return high
 
     def largest(self, u: np.ndarray) -> np.ndarray:
         """Return ``sum_l |w_kl| (u_k + u_l)`` of every follower, at most."""

@@ -134,14 +134,14 @@ class IntervalRows:
 
     # ------------------------------------------------------------------ rows
 
-    def pull(self, values: np.ndarray, times: float = 1.0) -> np.ndarray:
-        """Return the least ``sum_l |w_kl| (y_k - times y_l)`` of every row, in every mode.
+    def pull(self, values: np.ndarray, times: float = 1.0, less: float = 0.0) -> np.ndarray:
+        """Return the least ``sum_l |w_kl| (y_k - times y_l - less)`` of every row, in every mode.
 
         Parameters
         ----------
         values : (n + outside,) array
             ``y``. Of integers everything is exact, in units of ``unit``; of floats nothing is, and the unit is 1.
-        times : float
+        times, less : float
             Of floats.
 
         Returns
@@ -150,7 +150,7 @@ class IntervalRows:
         """
         if values.dtype.kind == "f":
             low, high = self._floats
-            gap = values[self.target] - times * values[self.source]
+            gap = values[self.target] - times * values[self.source] - less
         else:
             low, high = self.lower, self.upper
             span = int(values.max(initial=0)) - int(values.min(initial=0))
