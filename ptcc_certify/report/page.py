@@ -14,7 +14,7 @@ from datetime import date
 from fractions import Fraction
 from functools import cache
 from importlib import resources
-from itertools import islice
+from itertools import groupby, islice
 from pathlib import PurePath
 from typing import Any
 
@@ -199,7 +199,8 @@ def _view(saved: Certificate | FamilyCertificate) -> dict[str, Any]:
         "verdict_text": set_note(facts[-1].note),
         "larger_rho2": advised if "leaves 1 %" in spell(assessment.advice) else "",
         "arithmetic": arithmetic(saved.direct),
-        **{"answers": answers, "asked": asked, "details": details, "lacks": lacks},
+        "answers": [(head, list(each)) for head, each in groupby(answers, lambda fact: fact.head)],
+        **{"asked": asked, "details": details, "lacks": lacks},
         "graph_text": set_note(facts[0].note),
         "equations": texts.formula_svg(protocol_latex(saved), inline=False),
         "parameters": [(name, getattr(saved.protocol, name)) for name in texts.parameter_names(saved.protocol)],
