@@ -276,10 +276,10 @@ def test_the_bound_of_a_family_through_a_reaching_phase_is_called_numerical_ever
     page, statement = words(report_html(saved)), report_latex(saved, {"decay": "d.pdf"})
     inside, outside = " ".join(statement.split()).split(r"\end{proposition}")
     proved = made.direct
-    assert ("every agent is within so much of its final state" in inside) == proved
+    assert ("of every agent from its final state at most" in inside) == proved
     assert ("Not proved, or numerical, by floating point, and no part of the certificate" in outside) == (not proved)
     assert ("Thick line: the proved bound for every signal" in outside) == proved != ("bound (numerical)" in outside)
-    assert ("of its final state (numerical): " in page) == ("0.99 T s , numerical: " in page) == (not proved)
+    assert ("(numerical, rounded up)" in page) == ("0.99 T s , numerical: " in page) == (not proved)
     runs = sample_runs(made, [RandomSignal(1)])
     for plot in (plot_trajectory, plot_decay, plot_input):
         labels = [text.get_text() for text in plot(made, runs=runs).figure.axes[0].get_legend().get_texts()]

@@ -13,6 +13,7 @@ from ptcc_certify.bounds.final_state import extremes
 from ptcc_certify.certificate.facts import Fact, Facts
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.protocols.agents import DERIVATIVES, PLURALS, plant_text
+from ptcc_certify.report.facts.input import peak_fact
 from ptcc_certify.report.text_layout import TEXT, agent_text, columns, short_number, shorten_list, unbroken
 
 if TYPE_CHECKING:
@@ -139,10 +140,8 @@ def _input_fact(part: AgentsAnswer) -> Fact:
     largest = max(part.inputs)
     if not largest:
         return Fact(head="input", value=largest, note="none: u = 0")
-    label = part.structure.graph.labels[part.inputs.index(largest)]
     text = f"bounded; {part.norm} <= {up(largest, 4)}"
-    agent = f", the largest of agent {agent_text(label, 22)}"
-    return Fact(head="input", value=largest, side="up", note=text + agent, brief=(text + agent, text))
+    return peak_fact(text, largest, part.structure.graph.labels, part.inputs)
 
 
 def _deviation_facts(part: AgentsAnswer) -> Facts:

@@ -84,10 +84,8 @@ def structure_claims(structure: Structure, claims: Sequence[Claim], when: str = 
     components, labels = structure.components, structure.graph.labels
     for k in sorted(range(len(claims)), key=lambda k: -len(components[k].nodes))[:_COMPONENTS]:
         text = f"{claims[k].sharpest}{when} (Theorem {claims[k].theorem})"
-        nodes = components[k].nodes
-        names = [labelled(printable(labels[v])) for v in nodes[:TEXT]]
-        whose = shorten_list(names, max(TEXT - len(text) - 2, 14), len(nodes))
-        yield Fact(head="claim", value=claims[k].sharpest, note=f"{whose}: {text}")
+        names = [labels[v] for v in components[k].nodes]
+        yield _component_fact(names, claims[k].sharpest, text)
     if len(claims) > _COMPONENTS:
         text = f"... {len(claims):,} components in all"
         counts = Counter(f"{claim.sharpest} (Theorem {claim.theorem})" for claim in claims)
@@ -95,6 +93,13 @@ def structure_claims(structure: Structure, claims: Sequence[Claim], when: str = 
         yield Fact(head="claim", note=f"{text}: {each}", brief=(text,))
     if also:
         yield Fact(head="claim", note=also.removeprefix(", "))
+
+
+def _component_fact(labels: Sequence[str], behaviour: str, text: str) -> Fact:
+    """Tell what one component of several does, with as many of its agents as fit the line."""
+    names = [labelled(printable(label)) for label in labels[:TEXT]]
+    whose = shorten_list(names, max(TEXT - len(text) - 2, 14), len(labels))
+    return Fact(head="claim", value=behaviour, note=f"{whose}: {text}")
 
 
 def _claim_text(claim: Claim, when: str) -> str:
@@ -135,9 +140,7 @@ def family_claims(
         for k in order[:_COMPONENTS]:
             text, (_, camps_named) = _behaviour_texts(components[k], when, also)
             text = camps_named if columns(camps_named) <= TEXT else text
-            names = [labelled(printable(label)) for label in components[k].family.labels[:TEXT]]
-            whose = shorten_list(names, max(TEXT - len(text) - 2, 12), components[k].nodes.size)
-            yield Fact(head="claim", value=sharpest(components[k]), note=f"{whose}: {text}")
+            yield _component_fact(components[k].family.labels, sharpest(components[k]), text)
         if len(components) > _COMPONENTS:
             yield Fact(head="claim", note=f"... {len(components):,} components in all")
     depending = [k for k in order if components[k].behaviour == DEPENDS]

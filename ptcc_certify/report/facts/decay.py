@@ -44,18 +44,15 @@ def rate_facts(certificate: Certificate) -> Facts:
     rate, bound, spectral = certificate.rate, certificate.upper_bound, certificate.spectral_rate
     if certificate.constant:
         return
-    best = "" if bound is None else f"; upper bound {up(bound, 8)}, proved"
+    limit = "" if bound is None else f"upper bound {up(bound, 8)}, proved"
     if bound is not None and spectral is not None and bound > Fraction(spectral) * Fraction(101, 100):
-        best += f" ({spectral:.6g}, numerical)"
+        limit += f" ({spectral:.6g}, numerical)"
     if rate is None:
-        numerical = certificate.numerical_rate
-        text = f"not proved{'' if numerical is None else f'; numerically {numerical:.6g}'}{best}"
-        yield Fact(head="rate", standing="unproved", note=text, detail=True)
+        numerical = "" if certificate.numerical_rate is None else f"numerically {certificate.numerical_rate:.6g}"
+        note = "; ".join(filter(None, ("not proved", numerical, limit)))
+        yield Fact(head="rate", standing="unproved", note=note, detail=True)
         return
-    ratio = "" if bound is None else f", optimality ratio at least {down(rate / bound, 4)}"
-    law = "V <= e^(-rate s) V(0)" if certificate.direct else "V <= e^(-rate (s - s(T_r))) V(T_r) from T_r on"
-    text = f"{down(rate)} per unit of the stretched clock s, proved: {law}{best}{ratio}"
-    yield Fact(head="rate", value=rate, side="down", note=text, detail=True)
+    yield Fact(head="rate", value=rate, side="down", note=_rate_text(certificate, rate, limit), detail=True)
     if certificate.overshoot is not None:
         kinds = ", ".join(f"{number} {kind}" for kind, number in Counter(V.kind for V in certificate.functions).items())
         of = certificate.fastest.coordinates
@@ -75,6 +72,15 @@ def rate_facts(certificate: Certificate) -> Facts:
         yield Fact(head="function", value=dict(search.searched), standing="unproved", note=text, detail=True)
         used = [f"{V.kind} {down(V.proved_rate, 4)} (overshoot {up(V.overshoot, 2)})" for V in search.functions]
         yield Fact(head="function", note=f"used {', '.join(used) or 'none, no rate was proved'}", detail=True)
+
+
+def _rate_text(certificate: Certificate | FamilyCertificate, rate: Fraction, limit: str) -> str:
+    """Tell a proved rate, what decays at it, and its ratio to what limits it."""
+    law = "V <= e^(-rate s) V(0)" if certificate.direct else "V <= e^(-rate (s - s(T_r))) V(T_r) from T_r on"
+    text = f"{down(rate)} per unit of the stretched clock s, proved: {law}"
+    if certificate.upper_bound is None:
+        return text
+    return f"{text}; {limit}, optimality ratio at least {down(rate / certificate.upper_bound, 4)}"
 
 
 def error_facts(certificate: Certificate, drawn: bool, details: bool) -> Facts:
@@ -159,17 +165,25 @@ def instants_facts(certificate: Certificate) -> Facts:
 
 def _deviation_facts(certificate: Certificate) -> Facts:
     """Tell how far from its final state the farthest agent may be, and every agent at the instant asked for."""
-    instants = told_instants(certificate.protocol, certificate.direct)[:4]
-    worst = certificate.deviation_bound([q for q, _ in instants]).max(axis=0, initial=0.0)
-    numerical = "" if certificate.direct else " (numerical, rounded up)"
-    bounds = _at_instants(worst, (name for _, name in instants))
-    text = f"of every agent from its final state at most {bounds}{numerical}"
-    yield Fact(head="deviation", standing="unproved" if numerical else "proved", note=text, detail=True)
+    yield _deviation_fact(certificate, certificate.deviation_bound)
     if certificate.at is not None:
         each = certificate.deviation_bound([float(1 - certificate.at / certificate.protocol.T)])[:, 0]
         entries = [f"{labelled(label)} {up(float(x), 2)}" for label, x in zip(certificate.labels, each, strict=True)]
         text = f"at t = {near(certificate.at, 12)}: {shorten_list(entries)}"
         yield Fact(head="deviation", value=each, side="up", note=text, detail=True)
+
+
+def _deviation_fact(
+    certificate: Certificate | FamilyCertificate, bound: Callable[[list[float]], np.ndarray], of: str = ""
+) -> Fact:
+    """Tell how far from its final state the farthest agent may be at instants, under the signals ``of`` names."""
+    instants = told_instants(certificate.protocol, certificate.direct)[:4]
+    worst = bound([remaining for remaining, _ in instants]).max(axis=0, initial=0.0)
+    numerical = "" if certificate.direct else " (numerical, rounded up)"
+    bounds = _at_instants(worst, (name for _, name in instants))
+    note = f"of every agent from its final state at most {bounds}{numerical}{of}"
+    standing: Standing = "proved" if certificate.direct else "unproved"
+    return Fact(head="deviation", standing=standing, note=note, detail=True)
 
 
 # ---------------------------------------------------------------------- families
@@ -182,14 +196,14 @@ def family_rate_facts(certificate: FamilyCertificate) -> Facts:
     rate, bound = certificate.rate, certificate.upper_bound
     limit = "" if bound is None else f"upper bound {up(bound)}"
     if rate is not None and certificate.refused:
-        text = "none is proved: the independent check does not accept what was found" + f"; {limit}" * bool(limit)
-        yield Fact(head="rate", standing="unproved", note=text)
+        text = "none is proved: the independent check does not accept what was found"
+        yield Fact(head="rate", standing="unproved", note=joined("; ", (text, limit)))
         return
     if rate is not None:
-        ratio = "" if bound is None else f": both proved, ratio {down(rate / bound)}"
         which = f"{down(rate)}{every_text(certificate)}"
-        text = f"{which}, {limit}{ratio}" if limit else f"{which}, proved"
-        yield Fact(head="rate", value=rate, side="down", note=text)
+        brief = f"{which}, proved" if bound is None else f"{which}, {limit}: both proved, ratio {down(rate / bound)}"
+        note = _rate_text(certificate, rate, "" if bound is None else f"upper bound {up(bound, 8)}, proved")
+        yield Fact(head="rate", value=rate, side="down", note=f"{note}{every_text(certificate)}", brief=(brief,))
         return
     why = no_search(certificate)
     why = joined("", [" (", why, ")"]) if why else ""
@@ -199,7 +213,8 @@ def family_rate_facts(certificate: FamilyCertificate) -> Facts:
         power = int(min(logs)) - 1
         least = TOO_SMALL if power < TINY else f"above 1e{power}"
         text = f"{least}, in closed form; no larger one was proved"
-    yield Fact(head="rate", standing="unproved", note=joined("", [text, why, f"; {limit}" * bool(limit)]))
+    standing: Standing = "proved" if logs else "unproved"
+    yield Fact(head="rate", standing=standing, note=joined("; ", [joined("", [text, why]), limit]))
 
 
 def explicit_logs(certificate: FamilyCertificate) -> list[float]:
@@ -267,16 +282,11 @@ def _family_error(
     certificate: FamilyCertificate, bound: Callable[[list[float]], np.ndarray], of: str, again: bool = False
 ) -> Facts:
     """Tell how near at 0.99 T, and at every instant; ``again`` after the same of other signals."""
-    instants = told_instants(certificate.protocol, certificate.direct)[:4]
-    left, when = instants[SHORT]
-    when += ", numerical" * (not certificate.direct)
-    bounds = bound([remaining for remaining, _ in instants]).max(axis=0)
+    left, when = told_instants(certificate.protocol, certificate.direct)[SHORT]
+    when += "" if certificate.direct else ", numerical"
     worst = float(bound([left]).max())
     whose = "" if again else " of its final state"
     standing: Standing = "proved" if certificate.direct else "unproved"
     text = f"at {when}: every agent within {up(worst, 2)}{whose}{of}"
     yield Fact(head="error", value=worst, side="up", standing=standing, note=text)
-    numerical = "" if certificate.direct else " (numerical)"
-    each = _at_instants(bounds, (name for _, name in instants))
-    text = f"every agent is within so much of its final state{numerical}: {each}{of}"
-    yield Fact(head="error", standing=standing, note=text, detail=True)
+    yield _deviation_fact(certificate, bound, of)

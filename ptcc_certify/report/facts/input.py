@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from lmi.exact.decimal_rounding import down, near, up
 from ptcc_certify.certificate.facts import Fact, Facts, Standing
@@ -48,12 +49,17 @@ def _input_fact(certificate: Certificate, effort: Effort) -> Fact:
         standing: Standing = "unproved" if effort.bounded is None and entry is None else "proved"
         return Fact(head="input", standing=standing, note=text + nothing, loud=loud)
     whom = "" if effort.initial_set is None else f" for {initial_states_text(effort.initial_set)}"
-    text = f"{text}; |u_k| <= {up(largest, 4)}{whom}"
-    agent = ""
-    if entry is None and effort.peak is not None:
-        label = certificate.labels[effort.peak.agents.index(largest)]
-        agent = f", the largest of agent {agent_text(label, 22)}"
-    return Fact(head="input", value=largest, side="up", note=text + agent, brief=(text + agent, text), loud=loud)
+    peaks = effort.peak.agents if entry is None and effort.peak is not None else ()
+    return peak_fact(f"{text}; |u_k| <= {up(largest, 4)}{whom}", largest, certificate.labels, peaks, loud=loud)
+
+
+def peak_fact(
+    text: str, largest: Fraction | float, labels: Sequence[str], peaks: Sequence[Any], of: str = "", loud: bool = False
+) -> Fact:
+    """Tell a bound of every input, and of which agent it is, where ``peaks`` are known; ``of`` names signals."""
+    agent = f", the largest of agent {agent_text(labels[peaks.index(largest)], 22)}" if peaks else ""
+    note = f"{text}{agent}{of}"
+    return Fact(head="input", value=largest, side="up", note=note, brief=(note, f"{text}{of}"), loud=loud)
 
 
 def threshold_facts(certificate: Certificate) -> Facts:
@@ -162,8 +168,6 @@ def family_input_facts(certificate: FamilyCertificate) -> Facts:
         yield Fact(head="input", note="bounded for every signal and every initial state")
     else:
         largest = max(peaks)
-        agent = agent_text(certificate.labels[peaks.index(largest)], 22)
-        text = f"bounded; |u_k| <= {up(largest, 4)}, the largest of agent {agent}{every}"
-        yield Fact(head="input", value=largest, side="up", note=text)
+        yield peak_fact(f"bounded; |u_k| <= {up(largest, 4)}", largest, certificate.labels, peaks, every)
         each = [f"{agent_text(label)} {up(peak, 4)}" for label, peak in zip(certificate.labels, peaks, strict=True)]
         yield Fact(head="input", note=f"|u_k| <= {shorten_list(each, 4 * TEXT)}", detail=True)
