@@ -7,9 +7,9 @@ docs/theory/families.md, "Where it ends" and "Disturbances".
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -20,9 +20,10 @@ from ptcc_certify.checker.family_bounds import deviations, least
 from ptcc_certify.checker.family_function import Scaled
 from ptcc_certify.checker.family_sliding import Drive
 from ptcc_certify.graphs.rationals import nearest_float
-from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY
 
 _SLACK = 1 + 1e-12
+#: Bits beyond those of the sizes to which shares of these are rounded up.
+_ROUNDING_BITS = 32
 
 
 class Function(BoundsFunction, Protocol):
@@ -33,20 +34,25 @@ class Function(BoundsFunction, Protocol):
         """Bounds of ``|xi_k| / sqrt(V)``."""
 
 
+class RestStates(NamedTuple):
+    """The common kernel of a component: the rows of its basis by node, without zeros, and its leading groups."""
+
+    rows: Mapping[int, Mapping[int, Fraction]]
+    groups: Sequence[Sequence[int]]
+
+
 def deviation_on_clock(
-    V: Function, behaviour: str | None, x: Sequence[Fraction], clock: np.ndarray
+    V: Function, rest: RestStates | None, x: Sequence[Fraction], clock: np.ndarray
 ) -> np.ndarray | None:
     """Bound ``|x_k(t) - x_k(T)|`` by a function of a component, (n, M); None if it does not decay.
 
-    That is what the speeds add up to until the deadline. Agents that end at 0 are no farther from it than they are
-    large, and those that come to ``+-c`` no farther than from some other agent: at all times ``c`` is between the
-    least and the largest ``g_k x_k``, since no signal lets these grow apart.
+    That is what the speeds add up to until the deadline, and at most what :func:`from_rest` tells.
 
     Parameters
     ----------
     V : Function
-    behaviour : str or None
-        Of the component.
+    rest : RestStates or None
+        Of the component, where they are known.
     x : sequence of n Fraction
         The initial state.
     clock : (M,) array
@@ -54,26 +60,47 @@ def deviation_on_clock(
     moves, unit = deviations([V], x)
     if not moves:
         return None
-    if behaviour in (STABILITY, BIPARTITE_CONSENSUS):
-        root, own = V.root(x), V.sizes
-        if behaviour == BIPARTITE_CONSENSUS:
-            own = [_from_others(own, len(x))]
-        moves, unit = least([(moves, Fraction(1, unit)), *((vector, factor * root) for vector, factor in own)])
+    if rest is not None:
+        vector, factor = from_rest(V.sizes, rest)
+        moves, unit = least([(moves, Fraction(1, unit)), (vector, factor * V.root(x))])
     return _times([Fraction(moves[k], unit) for k in range(len(x))], _decay(V, clock))
 
 
-def _from_others(sizes: Sequence[Scaled], n: int) -> Scaled:
-    """Bound how far each agent is from any other, by how far they are from the pivot, which is not named.
+def from_rest(sizes: Sequence[Scaled], rest: RestStates) -> Scaled:
+    """Bound ``|x_k(t) - x_k(T)| / sqrt(V)``, for every signal after ``t``.
+
+        x_k - x_k(T) = xi_k + sum_j B_kj (x_(p_j) - c_j)
+
+    Of every leading group ``c_j`` is between the least and the largest ``g_l x_l`` at all times, since no signal lets
+    these grow apart: its pivot is no farther from it than the farthest agent of the group from the pivot, and another
+    one no farther than from some other agent. Groups of one agent rest.
+
+    Parameters
+    ----------
+    sizes : sequence of Scaled
+        Bounds of ``|xi_k| / sqrt(V)``, for all but pivots and agents at rest.
+    rest : RestStates
 
     Examples
     --------
-    >>> _from_others([({1: 3, 2: 5}, Fraction(1, 2))], 3)
-    ({0: 5, 1: 8, 2: 8}, Fraction(1, 2))
+    >>> one = Fraction(1)
+    >>> shares = {0: {0: one}, 1: {0: one}, 2: {1: one}, 3: {0: one / 2, 1: one / 2}}
+    >>> vector, unit = from_rest([({1: 3, 3: 5}, Fraction(1, 2))], RestStates(shares, [[0, 1], [2]]))
+    >>> [str(x * unit) for x in vector.values()]  # the pivot is as far as agent 1 from it; agent 3 hears it by halves
+    ['3/2', '3/2', '0', '13/4']
     """
-    from_pivot, scale = least(sizes)
-    reach = [from_pivot.get(k, 0) for k in range(n)]
-    second, largest = sorted([0, *reach])[-2:]
-    return {k: x + (second if x == largest else largest) for k, x in enumerate(reach)}, Fraction(1, scale)
+    known, scale = least(sizes)
+    reach = {k: known.get(k, 0) << _ROUNDING_BITS for k in rest.rows}
+    ends = [sorted([0, *(reach[v] for v in group)])[-2:] for group in rest.groups]
+    members = [set(group) for group in rest.groups]
+    result = {}
+    for k, row in rest.rows.items():
+        result[k] = reach[k]
+        for j, b in row.items():
+            second, largest = ends[j]
+            far = second if k in members[j] and reach[k] == largest else largest
+            result[k] -= -abs(b.numerator) * far // b.denominator
+    return result, Fraction(1, scale << _ROUNDING_BITS)
 
 
 def input_on_clock(V: Function, x: Sequence[Fraction], clock: np.ndarray, gain: np.ndarray) -> np.ndarray:
@@ -97,18 +124,20 @@ def _decay(V: Function, clock: np.ndarray) -> np.ndarray:
 
 
 def deviation_while_driven(
-    V: Function, stable: bool, y: Sequence[Fraction], drive: Drive, phase: ReachingPhase, at: Instants
+    V: Function, rest: RestStates | None, y: Sequence[Fraction], drive: Drive, phase: ReachingPhase, at: Instants
 ) -> np.ndarray | None:
     """Bound the same where sliding variables move: of ``y = x - sigma`` by the integral of its speed, and ``|sigma|``.
 
         |y_k(t) - x_k(T)|  <=  int_t^T gain |(L x)_k|  <=  c_k (v(t) + c R(t)) / alpha + m_k R(t)
 
-    ``R(t) = int_t^T gain psi``, with the rate ``2 alpha`` and ``|(L y)_k| <= c_k v``.
+    ``R(t) = int_t^T gain psi``, with the rate ``2 alpha`` and ``|(L y)_k| <= c_k v``. Besides by :func:`from_rest`
+    where ``R`` is 0, and at all times where all agents end at 0.
 
     Parameters
     ----------
     V : Function
-    stable : bool
+    rest : RestStates or None
+        Of the component, where they are known.
     y : sequence of n Fraction
         ``x(0) - sigma(0)``.
     drive : Drive
@@ -120,11 +149,12 @@ def deviation_while_driven(
         return None
     half, nodes, c = float(V.rate) * (1 - 1e-12) / 2, range(len(y)), above(drive.constant(V))
     with np.errstate(over="ignore", invalid="ignore"):
-        v, rest = phase.driven(half, above(V.root(y)), c, at), phase.rest(at)
-        own = np.multiply.outer(_floats(V.speeds, len(y)), (v + c * rest) / half)
-        own += np.multiply.outer([above(drive.sizes[k]) for k in nodes], rest)
-        if stable:
-            own = np.fmin(own, np.multiply.outer(_floats(V.sizes, len(y)), v))
+        v, more = phase.driven(half, above(V.root(y)), c, at), phase.rest(at)
+        own = np.multiply.outer(_floats(V.speeds, len(y)), (v + c * more) / half)
+        own += np.multiply.outer([above(drive.sizes[k]) for k in nodes], more)
+        if rest is not None:
+            near = np.multiply.outer(_floats([from_rest(V.sizes, rest)], len(y)), v)
+            own = np.fmin(own, near if not rest.groups else np.where(more == 0, near, np.inf))
         own += sliding_sizes(drive, phase, at)
     return np.nan_to_num(own, nan=np.inf, posinf=np.inf)
 

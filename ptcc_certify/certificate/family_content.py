@@ -18,6 +18,7 @@ from lmi.exact.numbers import integers
 from ptcc_certify.bounds.attracting_box import AttractingBox
 from ptcc_certify.bounds.envelope import Instants, remaining_part
 from ptcc_certify.bounds.family_deviation import (
+    RestStates,
     deviation_on_clock,
     deviation_while_driven,
     input_on_clock,
@@ -97,6 +98,15 @@ class ComponentProof:
     def leading_groups(self) -> tuple[LeadingGroup, ...]:
         """The leading group of every column of the common kernel."""
         return leading_groups(self.component)
+
+    @cached_property
+    def rest_states(self) -> RestStates | None:
+        """The common kernel as the formulas of the bounds take it; None where it is not known."""
+        if self.component.behaviour == STABILITY:
+            return RestStates({k: {} for k in range(self.component.nodes.size)}, ())
+        if self.component.kernel is None or not self.component.kernel.has_rows:
+            return None
+        return RestStates(self.kernel_rows, [group.nodes for group in self.leading_groups])
 
     @property
     def kernel_rows(self) -> dict[int, dict[int, Fraction]]:
@@ -481,14 +491,14 @@ class FamilyContent:
     def _deviation(self, at: Instants) -> np.ndarray:
         bounds = np.full((self.family.n_nodes, at.clock.size), np.inf)
         for part, functions, driven in self._driven_parts:
-            nodes, x, stable = part.component.nodes, self._state(part), part.component.behaviour == STABILITY
+            nodes, x, rest = part.component.nodes, self._state(part), part.rest_states
             if nodes.size == 1:
                 bounds[nodes] = 0 if driven is None else sliding_sizes(driven, self._phase, at)
             for V in functions:
                 if driven is None:
-                    own = deviation_on_clock(V, part.component.behaviour, x, at.clock)
+                    own = deviation_on_clock(V, rest, x, at.clock)
                 else:
-                    own = deviation_while_driven(V, stable, x, driven, self._phase, at)
+                    own = deviation_while_driven(V, rest, x, driven, self._phase, at)
                 if own is not None:
                     bounds[nodes] = np.minimum(bounds[nodes], own)
         return bounds

@@ -121,13 +121,13 @@ def _deviation(
     if len(functions) < len(pairs):
         return None
     if not isinstance(claim.signal, DwellTime):  # one mode acts for ever
-        own = [deviation_on_clock(V, part.component.behaviour, x, clock) for V in functions]
+        own = [deviation_on_clock(V, part.rest_states, x, clock) for V in functions]
         return np.max([one for one in own if one is not None], axis=0)
     switches = claim.signal.switches(certificate.protocol.T) if claim.signal.clock == "t" else 1
     if switches * max(map(int.bit_length, claim.ratio.as_integer_ratio())) > _BITS:
         return None
     V = SwitchedFunction(functions, claim.rate, claim.ratio**switches)
-    return deviation_on_clock(V, part.component.behaviour, x, clock)
+    return deviation_on_clock(V, part.rest_states, x, clock)
 
 
 def _largest(some: Sequence[Scaled]) -> Scaled:

@@ -185,7 +185,13 @@ def _common_functions(
             if condition <= _GOOD_CONDITION or (loss and not top > 0):
                 return
             wanted = [rate - loss * top for rate in goal]
-            certificate = least_condition(arrays, wanted, shape=kind) if loss else best
+            try:
+                certificate = least_condition(arrays, wanted, shape=kind) if loss else best
+            except OutOfTime:
+                raise
+            except (LMIError, np.linalg.LinAlgError) as error:  # a smaller rate is easier
+                notes.append(f"class {kind}: {error}")
+                continue
             if not certificate.condition < _WORTH * condition:
                 continue
             certificate = best_multipliers(certificate, arrays)

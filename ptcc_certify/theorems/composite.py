@@ -305,6 +305,8 @@ def _prove_interval(
         return next((value for value in lowered if prove_positive_definite(phi(value))), V.rho)
 
     printed, exact = prove(V.interval.printed), prove(V.interval.exact)
+    if exact is not None and V.rho is not None:
+        exact = max(exact, V.rho)  # which may lie next to the end, beyond what it is lowered to
     if printed is not None and exact is not None:
         printed = min(printed, exact)  # they may coincide, and differ by rounding
     numbers = {name: end for name, end in (("printed", printed), ("exact", exact)) if end is not None}

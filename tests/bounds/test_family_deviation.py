@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from ptcc_certify import NominalProtocol
+from ptcc_certify import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.certificate.family_certificate import certify_family
+from ptcc_certify.certificate.family_content import ComponentProof
 from ptcc_certify.graphs.family import Family
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=3)
@@ -57,3 +59,55 @@ def test_followers_of_a_large_component_are_no_farther_either():
     certificate = certify_family(Family.from_intervals(edges), PROTOCOL, x)
     assert certificate.behaviours == ("bipartite consensus",) and certificate.rate > 0
     assert (deviations(edges, x, 0) <= certificate.deviation_at(CLOCK) * (1 + 1e-9)).all()
+
+
+LED = [(0, 2, *near(2)), (1, 2, *near(-2)), (2, 3, *near(1)), (3, 4, *near(-1)), (4, 3, *near(-2))]
+
+
+@pytest.mark.parametrize(
+    ("edges", "behaviour", "most"),
+    [
+        ([(0, 1, *near(1)), (1, 2, *near(-2)), (2, 3, *near(1)), (0, 3, *near(-1, "0"))], "stability", 20),
+        ([(0, 2, Fraction(1), Fraction(1)), (1, 2, Fraction(-1), Fraction(-1)), *LED[2:]], "bipartite containment", 8),
+    ],
+)
+def test_followers_of_single_leaders_are_as_near_as_their_coordinates_are_small(
+    edges: list[tuple[int, int, Fraction, Fraction]], behaviour: str, most: float
+):
+    if behaviour == "stability":
+        edges = [*edges, (1, 0, *near(-1)), (3, 0, *near(1))]
+    x = [3, -1, 4, 1, -5][: 1 + max(max(edge[:2]) for edge in edges)]
+    certificate = certify_family(Family.from_intervals(edges), PROTOCOL, x)
+    assert certificate.behaviours == (behaviour,)
+    bound, seen = certificate.deviation_at(CLOCK), deviations(edges, x, 1)
+    assert (seen <= bound * (1 + 1e-9)).all()
+    assert (bound.max(axis=0) / seen.max(axis=0)).max() < most
+
+
+def test_pairs_that_lead_are_no_farther_from_their_values_than_from_each_other():
+    """Two groups of two leaders, a follower that weighs both, and one that hears it."""
+    edges = [(0, 1, *near(1)), (1, 0, *near(2)), (2, 3, *near(-1)), (3, 2, *near(-1))]
+    edges += [(0, 4, Fraction(1), Fraction(1)), (2, 4, Fraction(2), Fraction(2)), (4, 5, *near(-2))]
+    x = [3, -1, 4, 1, -5, 9]
+    certificate = certify_family(Family.from_intervals(edges), PROTOCOL, x)
+    assert certificate.behaviours == ("bipartite containment",)
+    bound, seen = certificate.deviation_at(CLOCK), deviations(edges, x, 2)
+    assert (seen <= bound * (1 + 1e-9)).all()
+    assert (bound.max(axis=0) / seen.max(axis=0)).max() < 20
+
+
+@pytest.mark.parametrize("sigma", [[0, 0, 0, 0, 1], [1, -1, 0, 2, 0]])
+def test_once_no_sliding_variable_moves_deviations_are_told_by_coordinates(sigma: list[int]):
+    edges = [(0, 2, Fraction(1), Fraction(1)), (1, 2, Fraction(-1), Fraction(-1)), *LED[2:]]
+    protocol = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=3, delta=1, mu1=2)
+    certificate = certify_family(Family.from_intervals(edges), protocol, [3, -1, 4, 1, -5], sigma0=sigma)
+    (part,) = certificate.parts
+    early, late = (certificate.deviation_bound([q]) for q in (0.9, 0.1))
+    coarse = replace(certificate, parts=(_without_rest(part),))
+    assert (early == coarse.deviation_bound([0.9])).all() and (late < coarse.deviation_bound([0.1]))[3:].all()
+
+
+def _without_rest(part: ComponentProof) -> ComponentProof:
+    other = replace(part)
+    other.__dict__["rest_states"] = None
+    return other

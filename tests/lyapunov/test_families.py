@@ -19,6 +19,7 @@ from ptcc_certify.certificate.family_certificate import certify_family
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
+from ptcc_certify.lyapunov import family_search
 from ptcc_certify.lyapunov.family_function import FamilyFunction, decay_matrices, prove_mode
 from ptcc_certify.lyapunov.family_rate_upper_bound import (
     FamilyRateBound,
@@ -230,6 +231,23 @@ def test_where_no_program_can_be_afforded_there_is_a_useful_rate_all_the_same(mo
     assert {"class diagonal", "class full"} <= set(search.cut_off)
     (V,) = search.functions
     assert V.kind == "full" and V.rate > Fraction(1, 10)
+
+
+def test_a_program_that_fails_leaves_those_of_smaller_rates(monkeypatch: pytest.MonkeyPatch):
+    ring = [(k, (k + 1) % 5, -1 if k == 4 else 1, -1 if k == 4 else 1) for k in range(5)]
+    quotient = Quotient.of(decide(Family.from_intervals([*ring, (0, 2, 1, 3), (3, 1, 1, 3)]))[0])
+    usual, calls = family_search.least_condition, list[int]()
+
+    def failing(*given, **words):
+        calls.append(1)
+        if len(calls) == 1:
+            raise lmi.NoCertificate("the solver failed")
+        return usual(*given, **words)
+
+    monkeypatch.setattr(family_search, "least_condition", failing)
+    search = search_family(quotient, ["full"])
+    assert len(calls) > 1 and "class full: the solver failed" in search.notes
+    assert len(search.functions) > 1 and search.functions[-1].overshoot < search.functions[0].overshoot / 2
 
 
 def test_consensus_of_more_agents_than_programs_take_has_a_rate_that_the_check_accepts():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 
 import casadi as ca
@@ -20,6 +21,7 @@ from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.protocols import NominalProtocol
 from ptcc_certify.theorems.claims import sliding_claim
+from ptcc_certify.theorems.composite import _prove_interval
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
 from ptcc_certify.theorems.symbolic import symbolic_lyapunov
 from ptcc_certify.theorems.table import THEOREMS, theorem_for
@@ -168,8 +170,6 @@ def test_the_objective_of_a_row_is_the_optimum_of_another_solver(name: str, seed
 @pytest.mark.parametrize("theorem", ["2.1", "2.2", "3.1 no single", "3.1 mixed", "3.2"])
 @pytest.mark.parametrize("seed", range(3))
 def test_the_chosen_rho_beats_a_thousand_others(theorem: str, seed: int):
-    from dataclasses import replace
-
     kwargs = dict(all_classes())[theorem if theorem != "2.1" else "2.1 K>=2"]
     rng = np.random.default_rng(seed)
     structure = analyse(random_graph(rng, **kwargs).graph)
@@ -188,6 +188,16 @@ def test_the_chosen_rho_beats_a_thousand_others(theorem: str, seed: int):
 
     assert rate(float(V.rho)) == pytest.approx(row.rate(structure, V), rel=1e-9)
     assert row.rate(structure, V) >= max(rate(rho) for rho in tried if rho > 0) * (1 - 1e-9)
+
+
+@pytest.mark.parametrize("gap", [1e-2, 1e-8, 1e-10])
+def test_a_rho_next_to_the_end_of_its_interval_lies_within_what_is_proved(gap: float):
+    structure = analyse(random_graph(np.random.default_rng(0), **dict(all_classes())["2.1 K>=2"]).graph)
+    V = theorem_for(structure).lyapunov(structure)
+    assert V.interval is not None
+    near = replace(V, rho=Fraction(1 - gap), interval=replace(V.interval, printed=0.5, exact=1.0))
+    interval, _ = _prove_interval(near, lambda rho: [[1 - rho]])
+    assert interval is not None and interval.exact is not None and near.rho <= interval.exact < 1
 
 
 @pytest.mark.parametrize(("name", "kwargs"), class_cases())
@@ -276,8 +286,6 @@ def test_the_hypotheses_are_named():
 
 def test_a_wrong_matrix_is_not_proved():
     """The proof judges the matrix, not its origin: a diagonal that does not decay is refused."""
-    from dataclasses import replace
-
     structure = analyse(SignedDigraph.from_edges([(1, 2, 3), (2, 3, -1), (3, 1, 1), (1, 3, 1)]))
     theorem = theorem_for(structure)
     V = theorem.lyapunov(structure)
