@@ -17,11 +17,10 @@ from ptcc_certify.graphs.tables import import_pandas
 if TYPE_CHECKING:
     import pandas as pd
 
-    from ptcc_certify.certificate.certificate import Certificate
-    from ptcc_certify.certificate.family_certificate import FamilyCertificate
+    from ptcc_certify.certificate.certificate_data import Content
 
 
-def agents_table(certificate: Certificate | FamilyCertificate) -> pd.DataFrame:
+def agents_table(certificate: Content | FamilyContent, certified: bool = True) -> pd.DataFrame:
     """Return one row per agent; see :meth:`Certificate.to_pandas` and :meth:`FamilyCertificate.to_pandas`.
 
     Examples
@@ -34,14 +33,14 @@ def agents_table(certificate: Certificate | FamilyCertificate) -> pd.DataFrame:
     pandas = import_pandas()
     columns: Mapping[Any, Any]
     if isinstance(certificate, FamilyContent):
-        columns = _of_family(certificate)
+        columns = _of_family(certificate, certified)
     else:
         own = _of_graph(certificate) if certificate.agents is None else certificate.agents.columns()
         columns = {**certificate.structure.to_pandas(), **own}
     return pandas.DataFrame(columns, index=pandas.Index(certificate.labels, name="node"))
 
 
-def _of_graph(certificate: Certificate) -> dict[str, Any]:
+def _of_graph(certificate: Content) -> dict[str, Any]:
     """Return where agents begin and end, and how near they are proved to be, NaN where that is not known."""
     unknown = np.full(certificate.graph.n_nodes, np.nan)
     begin, end, deviation = certificate.initial_positions, certificate.final_positions, unknown
@@ -55,9 +54,8 @@ def _of_graph(certificate: Certificate) -> dict[str, Any]:
     }
 
 
-def _of_family(certificate: FamilyCertificate) -> dict[str, Any]:
+def _of_family(certificate: FamilyContent, certified: bool) -> dict[str, Any]:
     """Return intervals; nothing of restricted signals, nor of boxes, unless the check accepts the certificate."""
-    certified = certificate.verdict == "certified"
     unknown: list[Interval | None] = [None] * certificate.family.n_nodes
     restricted = ends_for_signal(certificate) if certified else unknown
     signal = "" if certificate.signal == "any" else str(certificate.signal)

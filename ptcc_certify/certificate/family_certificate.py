@@ -289,7 +289,7 @@ class FamilyCertificate(FamilyContent, FromFile, Shown):
         >>> table.loc["b", ["least", "largest"]].tolist(), table["keeps"].tolist()
         ([-1.0, -1.0], [True, False])
         """
-        return agents_table(self)
+        return agents_table(self, self.verdict == "certified")
 
     def __eq__(self, other: object) -> bool:
         """Two certificates are equal when they claim and prove the same; upper bounds on the rate do not count."""
