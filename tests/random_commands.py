@@ -24,6 +24,7 @@ from families import KINDS as FAMILY_KINDS
 from families import random_family
 from generators import WEIGHTS, all_classes, random_graph, smallest
 from late_certificates import grouped_graph, led_graph
+from led_families import led_family
 
 from ptcc_certify import Expectations, GainLimits, NominalProtocol, box, ellipsoid
 from ptcc_certify.errors import ParameterError
@@ -294,6 +295,24 @@ def leaders(draw: Draw) -> tuple[int, list[str], dict[str, str]]:
     return graph.n_nodes, command, {"g.csv": text_of(graph)}
 
 
+def beside(draw: Draw) -> tuple[int, list[str], dict[str, str]]:
+    """Return late messages, and leaders that move, of a family that draws its followers to the same targets."""
+    rng, count = np.random.default_rng(draw.getrandbits(32)), draw.randint(1, 3)
+    family = led_family(rng, count, draw.randint(1, 12), draw.randint(1, 3), common=count > 1 and draw.random() < 0.4)
+    files = {f"m{k}.csv": text_of_mode(mode, family.labels) for k, mode in enumerate(family.modes)}
+    command = ["certify", *files, "--switching", *draw.gain(), *draw.state(family.labels), *draw.asked()]
+    late = draw.random() < 0.7
+    if late:
+        command += draw.choice([["--delay", draw.number(1e-4, 0.2)], ["--quantisation", draw.number(1e-3, 1)]])
+        command += draw.sometimes(0.3, "--period", draw.number(1e-3, 0.05), "--packet-loss", str(draw.randint(0, 4)))
+        command += draw.sometimes(0.5, "--gain-cap", draw.number(2, 50))
+        command += draw.sometimes(0.25, "--max-residual", draw.number(1e-6, 1))
+    if not late or draw.random() < 0.4:
+        command += ["--leader-speed", draw.number(0.01, 2), *draw.sometimes(0.3, "--delta", draw.number(0.01, 1))]
+        command += [] if late else draw.sometimes(0.3, "--sign-gain", draw.number(0.1, 5))
+    return family.n_nodes, command, files
+
+
 def design(draw: Draw) -> tuple[int, list[str], dict[str, str]]:
     """Return a search of gains within a limit of the input."""
     graph, files, _ = _one(draw, most=60)
@@ -316,6 +335,7 @@ KINDS: dict[str, Callable[[Draw], tuple[int, list[str], dict[str, str]]]] = {
     "agents": agents,
     "late": late,
     "leaders": leaders,
+    "beside": beside,
     "design": design,
 }
 
