@@ -187,7 +187,7 @@ def _read_rows(
 ) -> FollowerFunction:
     family, kernel = component.family, component.kernel
     if kernel is None:
-        raise FormatError("rest states of more than 120 agents are verified, not read back; see ptcc check --json")
+        raise FormatError("rest states of more than 120 agents are verified, not read back")
     index = {label: v for v, label in enumerate(family.labels)}
     pivots = {c.nodes[0] for c in kernel.structure.closed_components if c.balanced}
     agents = [np.array([index[label] for label in part.nodes]) for part in section.parts]

@@ -381,7 +381,7 @@ def _with_word_of_check(certificate: Certificate) -> Certificate:
     """Check a certificate, and note what the check has to say besides."""
     report = certificate.checked
     if report.accepted and report.memory > 1:
-        note = f"the check of this certificate needs more than 1 GB: ptcc check --memory {math.ceil(report.memory)}"
+        note = f"the check of this certificate needs more than 1 GB: allow {math.ceil(report.memory)} GB of memory"
         return certificate.changed(notes=(*certificate.notes, note))
     if not report.accepted:
         note = f"the independent check does not accept {report.rejected}: {report.reason}"

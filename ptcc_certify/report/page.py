@@ -31,6 +31,7 @@ from ptcc_certify.errors import Change, Sentence, spell
 from ptcc_certify.graphs.io.graph_files import reading_flags
 from ptcc_certify.protocols.agents import plant_text
 from ptcc_certify.report import notation as texts
+from ptcc_certify.report.facts.claim import assumptions
 from ptcc_certify.report.facts.decay import BOUND_KINDS
 from ptcc_certify.report.facts.graph import leader_facts
 from ptcc_certify.report.facts.of_certificate import facts_of
@@ -255,8 +256,8 @@ def _title(saved: Certificate) -> Markup:
     elif saved.constant:
         text = Markup("every agent keeps {}").format("its state" if saved.direct else "x \u2212 \u03c3")
     if saved.agents is None:
-        text += " of x \N{MINUS SIGN} offsets" * (saved.offsets is not None)
-        text += ", nothing late" * (saved.late is not None) + ", leaders at rest" * saved.leaders_move
+        text += "" if saved.offsets is None else " of x \N{MINUS SIGN} offsets"
+        text += "".join(f", {assumption}" for assumption in assumptions(saved) if assumption != "without limits")
     return text[:1].upper() + text[1:] if saved.verdict == "certified" else "Undecided: " + text
 
 

@@ -157,7 +157,7 @@ def _write_statement(path: Path, drawn: Mapping[str, Any], latex: Callable[[dict
 def _runs(saved: FamilyCertificate, simulation: bool | None) -> tuple[list[Trajectory], str]:
     """Simulate a family under many signals, if there is an initial state; return why there is no run."""
     if simulation is False:
-        return [], "it was left out (--no-simulation)"
+        return [], "it was left out, as was asked"
     if saved.initial_state is None:
         return [], "the certificate names no initial state"
     if saved.late is not None or saved.leaders_move:
@@ -174,7 +174,7 @@ def _with_run(saved: Certificate, simulation: bool | None) -> tuple[Certificate,
     """Repeat the run, if there is one to repeat; return why there is none."""
     n = saved.graph.n_nodes
     if simulation is False:
-        return saved, "it was left out (--no-simulation)"
+        return saved, "it was left out, as was asked"
     if saved.initial_state is None:
         return saved, "the certificate names no initial state"
     if simulation is None and n > REPEATED_NODES:

@@ -128,7 +128,8 @@ def check_summary(path: str, document: Mapping[str, Any], report: CheckReport) -
     if report.accepted:
         claims = [part["claim"] for part in document.get("components") or [document]]
         texts = sorted({_file_claim(claim) for claim in claims})
-        lines = format_lines([("claim", ", ".join(texts) + f" in {len(claims)} components" * (len(claims) > 1))])
+        where = f" in {len(claims)} components" if len(claims) > 1 else ""
+        lines = format_lines([("claim", ", ".join(texts) + where)])
     if report.accepted and report.sections and path:
         with suppress(PTCCError):
             told = dropwhile(lambda fact: fact.head != "protocol", _file_facts(path, document, report))
@@ -140,7 +141,7 @@ def _file_claim(claim: Mapping[str, str]) -> str:
     """Tell a claim of a file in a few words."""
     if "signal" not in claim:
         return f"{claim['behaviour']} (Theorem {claim['theorem']})"
-    return claim["behaviour"] + f" {WHATEVER['any']}" * (claim["behaviour"] != DEPENDS)
+    return claim["behaviour"] if claim["behaviour"] == DEPENDS else f"{claim['behaviour']} {WHATEVER['any']}"
 
 
 def _file_facts(path: str, document: Mapping[str, Any], report: CheckReport) -> list[Fact]:

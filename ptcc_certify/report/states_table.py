@@ -99,7 +99,7 @@ def _of_family(saved: FamilyCertificate) -> tuple[str, list[Any], list[str]]:
         return "Where the agents begin", [(texts.label(name), *cells) for name, *cells, _ in rows], heads
     every = finals == list(saved.final_states or ())
     which = "every signal" if every else "these signals"
-    which += " and disturbance" * (saved.protocol.reaching is not None)
+    which += "" if saved.protocol.reaching is None else " and disturbance"
     last = "State at the deadline" if rests(saved) else "State at any instant"
     caption = f"Where the agents end, proved for {which if every else 'signals that keep the promise'}"
     written = [(texts.label(name), camp, first, end or _ends(None)) for name, camp, first, end in rows]

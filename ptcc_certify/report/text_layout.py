@@ -93,7 +93,7 @@ def shorten_list(words: Sequence[str], width: int = 90, total: int = 0) -> str:
     rest = f", ... ({max(total, len(words)):,} in all)"
     room, used, fitting = width - columns(rest), 0, 0
     for number, word in enumerate(words, start=1):
-        used += columns(word) + 2 * (number > 1)
+        used += columns(word) + (2 if number > 1 else 0)
         if used > width:
             break
         fitting = number if used <= room else fitting

@@ -206,7 +206,7 @@ def test_no_port_at_all_is_one_line(monkeypatch: pytest.MonkeyPatch):
 
     monkeypatch.setattr(ExplorerServer, "server_bind", taken)
     monkeypatch.setattr("errno.EADDRINUSE", 98)
-    with pytest.raises(ParameterError, match="--port 65530: this port and those after it are taken"):
+    with pytest.raises(ParameterError, match="port = 65530: this port and those after it are taken"):
         open_server(Explorer(), FEW, 65_530)
 
 

@@ -320,7 +320,7 @@ def test_a_page_is_the_same_every_time_on_the_same_day(tmp_path: Path):
 
 def test_without_a_run_the_page_says_why(tmp_path: Path):
     page = sound(page_without_run("nominal"))
-    assert "it was left out (--no-simulation)" in page.text
+    assert "it was left out, as was asked" in page.text
     assert {a["id"] for a in page.named("figure")} == {"figure-graph"}
     page = sound(reported(certify(load_graph("fig1a"), NOMINAL), tmp_path))
     assert "the certificate names no initial state" in page.text

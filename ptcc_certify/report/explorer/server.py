@@ -315,9 +315,8 @@ def open_server(explorer: Explorer, settings: Settings, port: int) -> ExplorerSe
             return ExplorerServer(explorer, settings, candidate)
         except OSError as error:
             if error.errno == errno.EACCES and os.name != "nt":
-                raise ParameterError(
-                    f"--port {candidate}: the system does not give it to you; take one above 1023"
-                ) from None
+                refusal = f"= {candidate}: the system does not give it to you; take one above 1023"
+                raise ParameterError("port", refusal) from None
             if error.errno not in (errno.EADDRINUSE, errno.EACCES):
                 raise
-    raise ParameterError(f"--port {port}: this port and those after it are taken; give another")
+    raise ParameterError("port", f"= {port}: this port and those after it are taken; give another")

@@ -32,15 +32,18 @@ def agents_text(part: AgentsAnswer) -> str:
     The gains are those of relative positions, velocities and so on, each times a power of the gain.
     """
     protocol = part.protocol
-    more = ["in formation"] * part.formation
-    more += [f"in {part.dimension} dimensions"] * (part.dimension > 1)
-    more += ["meeting at rest"] * (any(protocol.own) and part.derivatives_agree)
-    texts = [
-        f"{plant_text(protocol.plant)} {', '.join(more)}".strip(),
-        *([] if protocol.gain_cap is None else [f"gain at most {near(protocol.gain_cap)}"]),
-    ]
-    driven = part.functions or not part.structure.graph.n_edges  # else no gains are proved
-    return "; ".join([*texts, *[unbroken(f"u = {protocol.law()}")] * bool(driven)])
+    remarks = {
+        "in formation": part.formation,
+        f"in {part.dimension} dimensions": part.dimension > 1,
+        "meeting at rest": any(protocol.own) and part.derivatives_agree,
+    }
+    how = ", ".join(remark for remark, holds in remarks.items() if holds)
+    texts = [f"{plant_text(protocol.plant)} {how}".strip()]
+    if protocol.gain_cap is not None:
+        texts.append(f"gain at most {near(protocol.gain_cap)}")
+    if part.functions or not part.structure.graph.n_edges:  # else no gains are proved
+        texts.append(unbroken(f"u = {protocol.law()}"))
+    return "; ".join(texts)
 
 
 def agents_facts(part: AgentsAnswer, details: bool = True) -> Facts:
@@ -71,12 +74,12 @@ def _final_facts(part: AgentsAnswer) -> Facts:
             yield Fact(head=_ENDS[0], standing="unproved", note=text)
         return
     rest = not part.moving and part.settled > 1
-    open_end = "; velocities are not proved to vanish" * (not part.derivatives_agree)
+    open_end = "" if part.derivatives_agree else "; velocities are not proved to vanish"
     for i in range(part.settled):
         ends = [[chain[i] for chain in agent] for agent in part.final_state]
         if i and not any(m or r for row in ends for m, r in row):
             continue
-        kind = f"({_accuracy(ends)}{', at rest' * (rest and i == 0)}{open_end})"
+        kind = f"({_accuracy(ends)}{', at rest' if rest and i == 0 else ''}{open_end})"
         note, brief = (_ends_text(part, ends, width - columns(kind) - 1) for width in (12 * TEXT, 2 * TEXT))
         if i == 0 and part.protocol.gain_cap is not None:
             kind = f"{kind[:-1]}; without the cap)"
@@ -105,7 +108,7 @@ def _accuracy(ends: Sequence[Sequence[Interval]]) -> str:
     widest = max(r for row in ends for _, r in row)
     cut = any(Fraction(short_number(float(m) if r else m)) != m for row in ends for m, r in row)
     if widest > Fraction(1, 10**12):
-        return f"to within {up(widest, 2)}, proved" + "; rounded" * cut
+        return f"to within {up(widest, 2)}, proved{'; rounded' if cut else ''}"
     return "rounded" if cut or widest else "exact"
 
 
@@ -136,7 +139,7 @@ def _input_fact(part: AgentsAnswer) -> Fact:
         if part.unbounded:
             why = ", ".join(why for why, _ in part.unbounded)
             return Fact(head="input", standing="unproved", note=f"NOT CERTIFIED BOUNDED: {why}", loud=True)
-        return Fact(head="input", note="bounded; no number is proved" + " without x(0)" * (part.initial_state is None))
+        return Fact(head="input", note=f"bounded; no number is proved{'' if part.initial_state else ' without x(0)'}")
     largest = max(part.inputs)
     if not largest:
         return Fact(head="input", value=largest, note="none: u = 0")
@@ -156,6 +159,7 @@ def _deviation_facts(part: AgentsAnswer) -> Facts:
 
 def claimed_of(part: AgentsAnswer) -> str:
     """Tell of what the claim of the graph holds, where it is not just of the positions."""
+    of = " of x - offsets" if part.formation else ""
     if part.settles:
-        return " of x - offsets" * part.formation
-    return f"{' of x - offsets' * part.formation} but for what the cap leaves" if part.functions else " of x' = u"
+        return of
+    return f"{of} but for what the cap leaves" if part.functions else " of x' = u"

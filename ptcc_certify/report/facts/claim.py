@@ -158,7 +158,9 @@ def _behaviour_texts(component: FamilyComponent, when: str, also: str) -> tuple[
     if component.behaviour == DEPENDS:
         text = DEPENDS if component.signal == "any" else "depends on which graph it is"
         return text, (text, text)
-    whatever = WHATEVER[component.signal].replace("mode and ", "mode and " * (len(component.family.modes) > 1))
+    whatever = WHATEVER[component.signal]
+    if len(component.family.modes) == 1:
+        whatever = whatever.replace("mode and ", "")
     text = f"{sharpest(component)}{when} {whatever}{also}"
     sides = camps(component)
     if component.behaviour == STABILITY or len(sides) < 2:
@@ -255,10 +257,10 @@ def _agreeing(component: FamilyComponent, groups: Sequence[AgreeingGroup]) -> li
     several = [group for group in groups if group.nodes.size > 1]
     if len(several) > _GROUPS:
         agents = sum(group.nodes.size for group in several)
-        camps = ", up to camps" * any((group.camps < 0).any() for group in several)
+        camps = ", up to camps" if any((group.camps < 0).any() for group in several) else ""
         return [f"{len(several):,} groups, of {agents:,} agents in all, agree each within itself{camps}"]
     return [
-        f"{_names(component, group.nodes.tolist(), _NAMES)} agree{' up to camps' * bool((group.camps < 0).any())}"
+        f"{_names(component, group.nodes.tolist(), _NAMES)} agree{' up to camps' if (group.camps < 0).any() else ''}"
         for group in several
     ]
 

@@ -113,7 +113,7 @@ def _error_texts(certificate: Certificate) -> tuple[Fraction | float, str, str, 
         size = entry.noisy_norm or entry.norm
         norm = f"{limits_text(entry)}{noise}: ||E|| <= {up(size, 2)} at T"
         agents = "" if entry.agents is None or entry.noisy_norm else f", every agent within {up(max(entry.agents), 2)}"
-        return size, norm, agents, f"; ... {len(others) + 1} limits in all" * bool(others)
+        return size, norm, agents, f"; ... {len(others) + 1} limits in all" if others else ""
     if certificate.rate is None or (not certificate.direct and certificate.initial_state is None):
         return 0, "", "", ""
     remaining, when = told_instants(certificate.protocol, certificate.direct)[SHORT]
@@ -129,7 +129,8 @@ def _error_texts(certificate: Certificate) -> tuple[Fraction | float, str, str, 
     agents = ""
     if certificate.initial_state is not None and any(V.deviation for V in certificate.functions):
         agents = f", every agent within {up(float(certificate.deviation_bound([remaining]).max()), 2)}"
-    return value, f"at {when}{', numerical' * (not certificate.direct)}: {norm}", agents, ""
+    when += "" if certificate.direct else ", numerical"
+    return value, f"at {when}: {norm}", agents, ""
 
 
 def _at_instants(values: Iterable[float], names: Iterable[str]) -> str:
@@ -249,12 +250,13 @@ def function_facts(certificate: FamilyCertificate) -> Facts:
         for V in part.functions:
             own = getattr(V, "rates", ()) if len(names) > 1 else ()  # functions of rows have one rate
             rates = ", ".join(f"{name} {down(rate)}" for name, rate in zip(names, own, strict=False))
-            alone = f"; of each mode: {rates}" * bool(own)
+            alone = f"; of each mode: {rates}" if own else ""
             text = f"{V.kind}: decay rate {down(V.rate) if V.rate > 0 else 0}{alone}"
             yield Fact(head="function", value=V.rate, side="down", note=text, detail=True)
         if part.upper_bound is not None:
             modes = dict.fromkeys(names[member.mode] for member in part.upper_bound.members)
-            what = BOUND_KINDS[part.upper_bound.kind] + f": {', '.join(modes)}" * (len(names) > 1)
+            what = BOUND_KINDS[part.upper_bound.kind]
+            what += f": {', '.join(modes)}" if len(names) > 1 else ""
             text = f"decay rate at most {up(part.upper_bound.value, 8)}, proved by {what}"
             yield Fact(head="bound", value=part.upper_bound.value, side="up", note=text, detail=True)
 

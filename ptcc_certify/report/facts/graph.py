@@ -70,7 +70,8 @@ def family_facts(family: Family, name: str, read: str, components: Sequence[Fami
     for number, mode in enumerate(family.modes):
         known = len(components) == 1
         structure = components[0].structures[number] if known else analyse(mode.mandatory)
-        size = f"{counted(mode.n_edges, 'edge')} ({int((mode.sign < 0).sum()):,} negative)" + "; undirected" * mode.tied
+        size = f"{counted(mode.n_edges, 'edge')} ({int((mode.sign < 0).sum()):,} negative)"
+        size += "; undirected" if mode.tied else ""
         text = f"{labelled(mode_name(family, number))}: {size}; mandatory edges: {structure_text(structure)}"
         yield Fact(head="mode", note=text, detail=True)
         if edges := _uncertain_edges(mode):
@@ -100,8 +101,9 @@ def family_text(family: Family, name: str) -> str:
     uncertain = sum(int((~mode.known).sum()) for mode in family.modes)
     optional = sum(int(mode.optional.sum()) for mode in family.modes)
     rest = f"{counted(family.n_nodes, 'node')}, {counted(edges, 'edge')}"
-    rest += f", {uncertain:,} uncertain" * (uncertain > optional)
-    rest += f", {optional:,}{' of them' * (uncertain > optional)} optional" * bool(optional)
+    rest += f", {uncertain:,} uncertain" if uncertain > optional else ""
+    if optional:
+        rest += f", {optional:,}{' of them' if uncertain > optional else ''} optional"
     if not (several or name):
         return rest
     if not several:
@@ -130,7 +132,8 @@ def _graph_text(structure: Structure, name: str) -> str:
     """Tell the size and the connectivity of a graph, its name as long as fits beside them."""
     rest = _size(structure)
     if len(rest) + columns(name) > TEXT:
-        rest, name = rest.replace("ly connected", "").replace("disconnected, ", ""), PurePath(name).name
+        rest = rest.replace("ly connected", "").replace("disconnected, ", "")
+        name = PurePath(name).name
     if len(rest) + min(columns(name), 8) > TEXT:  # the claims tell how many components there are
         rest = rest.rpartition(", ")[0]
     return labelled(shorten_text(printable(name), max(TEXT - len(rest), 8))) + rest
@@ -168,7 +171,7 @@ def _leaders(structure: Structure, width: int) -> Iterator[tuple[str, str]]:
         single, balanced = sum(len(c.nodes) == 1 for c in closed), sum(c.balanced for c in closed)
         larger, size = len(closed) - single, len(largest[0][1].nodes)
         whole = [f"{single:,} of one node, {larger:,} larger, up to {size:,}", f"{larger:,} of 2 to {size:,} nodes"]
-        these = ", such as" * (larger > len(told))
+        these = ", such as" if larger > len(told) else ""
         texts = [f"{whole[0]}{these}", *whole] if larger else ["all of one node"]
         groups = f"{len(closed):,} groups, {balanced:,} balanced"
         yield "leaders", next((f"{groups}; {text}" for text in texts if columns(groups + text) + 2 <= TEXT), groups)

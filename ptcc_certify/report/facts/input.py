@@ -41,7 +41,7 @@ def _input_fact(certificate: Certificate, effort: Effort) -> Fact:
     else:
         states = {True: "bounded", False: "NOT BOUNDED from some initial states", None: "not proved bounded"}
         text, largest = states[effort.bounded], None if effort.peak is None else effort.peak.largest
-        nothing = "; no number is proved" * bool(effort.bounded and certificate.initial_state is not None)
+        nothing = "; no number is proved" if effort.bounded and certificate.initial_state is not None else ""
         if largest is None and effort.bounded and effort.sliding is not None and not effort.sliding.bounded:
             text, nothing = "the nominal part is bounded", ", of the sliding part nothing is proved"
     loud = effort.bounded is False and entry is None
@@ -114,7 +114,7 @@ def disturbed_facts(certificate: Certificate) -> Facts:
         held = any(entry.sample_period is not None for entry in certificate.limits)
         text = f"|d_k| <= {down(d.delta, 12)} adds at most {up(max(d.inputs), 4)} to |u_k|"
         if d.drift is None or certificate.limits:
-            text += " without a sample period" * held + "; of x(T) nothing is proved"
+            text += f"{' without a sample period' if held else ''}; of x(T) nothing is proved"
         else:
             text += f" and moves x_k(T) by at most {up(max(d.drift), 4)}" if any(d.drift) else " and moves no x_k(T)"
         yield Fact(head="disturbed", note=text)

@@ -51,7 +51,7 @@ def signal_facts(certificate: FamilyContent) -> Facts:
     head = signal_text(certificate.signal)
     if isinstance(certificate.signal, DwellTime) and certificate.signal.clock == "t":
         longer = certificate.signal.least > certificate.protocol.T
-        head = head[0], head[1] + ", longer than T: at most one switch" * longer
+        head = head[0], head[1] + (", longer than T: at most one switch" if longer else "")
     several = len(certificate.parts) > 1
 
     def where(component: int) -> str:
@@ -190,4 +190,4 @@ def _rate_text(certificate: FamilyContent, claim: RateClaim) -> str:
             text += " at the one switch" if most == 1 else f" at each of {most} switches at most"
         else:
             text += " V(0)"
-    return text + ", input bounded" * claim.bounded
+    return f"{text}, input bounded" if claim.bounded else text

@@ -45,7 +45,7 @@ def sliding_facts(
     if last is not None and last.z:
         agent = labelled(labels[list(reaching).index(last)])
         margin = f"{down(last.remaining, 3)} before T_r" if last.remaining else "nearer to T_r than a float tells"
-        others = " of others" * bool(late)
+        others = " of others" if late else ""
         clauses.append(f"reaching time{others} at most {up(last.time, 6)}, {margin} (agent {agent})")
     if late:
         pole, push = protocol.mu3 * protocol.kappa, protocol.mu2 * protocol.T_r

@@ -40,7 +40,8 @@ def initial_facts(certificate: Certificate | FamilyCertificate, origins: Mapping
     """Tell the initial positions, and where they come from; ``alone`` if those of the simulated run alone."""
     if (begin := certificate.initial_positions) is not None:
         drawn = f" ({origins['x(0)']})" if "x(0)" in origins else ""
-        text = value_list(certificate.labels, begin) + drawn + ", of the simulated run alone" * alone
+        text = value_list(certificate.labels, begin) + drawn
+        text += ", of the simulated run alone" if alone else ""
         yield Fact(head="x(0)", value=dict(zip(certificate.labels, begin, strict=True)), note=text, detail=True)
 
 
@@ -49,15 +50,19 @@ def final_facts(certificate: Certificate) -> Facts:
     result, labels = certificate.final_positions, certificate.labels
     if result is None:
         return
-    degenerate = "; balanced leaders happen to meet at 0" * bool(result.degenerate)
-    unproved = "; not certified that they get there" * (certificate.verdict == "undecided")
-    more = f"{degenerate}{'; without limits' * bool(certificate.limits)}{unproved})"
+    remarks = {
+        "balanced leaders happen to meet at 0": bool(result.degenerate),
+        "without limits": bool(certificate.limits),
+        "not certified that they get there": certificate.verdict == "undecided",
+    }
+    more = "".join(f"; {remark}" for remark, holds in remarks.items() if holds) + ")"
     groups: dict[Fraction | float, list[str]] = {}
     for label, state in zip(labels, result.states, strict=True):
         groups.setdefault(state, []).append(labelled(printable(label)))
     listed = value_list(labels, result.states, 2 * TEXT)
     grouped = "; ".join(f"{', '.join(names)} at {short_number(state)}" for state, names in groups.items())
-    brief, kind = min(listed, grouped, key=columns), f"({_accuracy(result, 'rounded')}{more}"
+    brief = min(listed, grouped, key=columns)
+    kind = f"({_accuracy(result, 'rounded')}{more}"
     cut = ", ... (" in brief or len(wrap_text(f"{brief} {kind}")) > 2
     if len(groups) == 1 < len(labels):
         brief = f"every agent at {short_number(result.states[0])}"
@@ -70,7 +75,7 @@ def final_facts(certificate: Certificate) -> Facts:
     yield Fact(
         head="x(T)",
         value=dict(zip(labels, result.states, strict=True)),
-        standing="unproved" if unproved else "proved",
+        standing="unproved" if certificate.verdict == "undecided" else "proved",
         note=f"{value_list(labels, result.states)} ({_accuracy(result)}{more}",
         brief=(f"{brief} {kind}",),
     )
@@ -86,7 +91,8 @@ def _accuracy(result: FinalState, rounded: str = "here to 5 digits") -> str:
         return "floating point"
     cut = any(Fraction(short_number(x)) != x for x in result.states)
     if widest := max(result.radius or (0,)):
-        return f"to within {up(widest, 2)}, proved" + f"; {rounded}" * cut
+        within = f"to within {up(widest, 2)}, proved"
+        return f"{within}; {rounded}" if cut else within
     return "exact" if not cut else rounded if rounded == "rounded" else f"exact; {rounded}"
 
 

@@ -99,7 +99,8 @@ def verdict_facts(certificate: Certificate | FamilyCertificate) -> Facts:
         yield Fact(head="proof", note=f"{proved}; checked without a solver: accepted", detail=True)
     brief = assessment.sentence
     if assessment.verdict == CERTIFIED:
-        certified = assessment.certified_part + ", but says little by T" * (assessment.useful is False)
+        certified = assessment.certified_part
+        certified += ", but says little by T" if assessment.useful is False else ""
         plain = certified == CERTIFIED and not assessment.answers and not assessment.caveat
         checked = "checked without a solver" if plain else ""
         brief = assessment.line(certified, checked, assessment.caveat, assessment.advice, ended)

@@ -163,7 +163,8 @@ def plot_formation(subject: Any, *, ax: Axes | None = None) -> Axes:
     if run.states.shape[1] != 2:
         d = run.states.shape[1]
         raise ParameterError(
-            f"a formation is drawn in the plane; these agents have {d} coordinate{'s' * (d > 1)}: certify them with 2"
+            f"a formation is drawn in the plane; these agents have {d} coordinate{'s' if d > 1 else ''}: "
+            "certify them with 2"
         )
     ax, groups, width = axes_of(ax, (SINGLE_COLUMN[0], SINGLE_COLUMN[0])), camp_groups(analyse(run.graph)), 1.0
     for k, (x, y) in enumerate(run.positions):

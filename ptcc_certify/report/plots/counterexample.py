@@ -114,7 +114,7 @@ def _member_text(component: FamilyComponent, why: Counterexample, place: int, na
     """Name the member that acts."""
     family = component.family
     mode = family.modes[why.other if place else why.mode]
-    lines = [name] * (len(family.modes) > 1)
+    lines = [name] if len(family.modes) > 1 else []
     if place and why.edge is not None:
         ends = (shorten_text(printable(mode.labels[int(side[why.edge])]), 10) for side in (mode.source, mode.target))
         lines += [" -> ".join(ends), "at its largest"]

@@ -159,7 +159,7 @@ def _peaks(run: Trajectory, certificate: Certificate) -> list[Peak]:
     peak, late = _certified_peak(run, certificate), certificate.late
     found = [] if peak is None else [Peak(peak, f"certified peak {up(peak, 4)}{_set_text(run, certificate)}")]
     if late is not None and (largest := largest_late_input(late, certificate.protocol)) is not None:
-        whole = ", from within 1 of the final states" * late.relative
+        whole = ", from within 1 of the final states" if late.relative else ""
         found.append(Peak(float(largest), f"late messages: at most {up(largest, 4)}{whole}", BOUND))
     leads = run.conditions.leaders is not None and run.conditions.messages is None
     tracking = certificate.tracking if leads else None
@@ -173,7 +173,7 @@ def _set_text(run: Trajectory, certificate: Certificate) -> str:
     """Name the set of initial states for which a peak is proved, and say whether a run begins outside a box."""
     region = certificate.effort and certificate.effort.initial_set
     if not region:
-        return ", messages at once" * (certificate.late is not None)
+        return "" if certificate.late is None else ", messages at once"
     outside = False
     if region.radius:
         center, radius = (np.array(list(map(float, numbers))) for numbers in (region.center, region.radius))

@@ -112,7 +112,7 @@ def bound_label(certificate: FamilyCertificate) -> str:
 def count_of_signals(certificate: FamilyCertificate, runs: Sequence[Trajectory]) -> str:
     """Tell how many signals are drawn, and where some are promised, whether these keep the promise or are any."""
     kept = " of the kind asked for" if keeps_promise(certificate, runs) else " of any kind"
-    return f"{len(runs)} signals" + kept * (certificate.signal != "any")
+    return f"{len(runs)} signals{'' if certificate.signal == 'any' else kept}"
 
 
 def is_worst(run: Trajectory) -> bool:

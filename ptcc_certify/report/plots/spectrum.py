@@ -120,5 +120,6 @@ def plot_frontier(subject: Any, *, ax: Axes | None = None) -> Axes:
         rates.append(subject.spectral_rate)
         ax.axhline(rates[-1], color="black", linewidth=0.9, linestyle=":", label="spectral rate (numerical)")
     low, high = min(0.0, *rates), max(0.0, *rates)
-    ax.set_ylim(low - 0.08 * (high - low) * (low < 0), high + 0.08 * (high - low))
+    room = 0.08 * (high - low)
+    ax.set_ylim(low - room if low < 0 else low, high + room)
     return finished(ax, "overshoot constant of the squared norm", "proved rate")

@@ -11,7 +11,7 @@ from ptcc_certify.bounds.late_messages import LateBounds
 from ptcc_certify.bounds.tracking import Tracking
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
-from ptcc_certify.errors import ParameterError
+from ptcc_certify.errors import Change, ParameterError
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled, time_label
 from ptcc_certify.report.plots.subject import certificate_of
 from ptcc_certify.simulation.late_messages import can_run, simulate_late
@@ -67,8 +67,8 @@ def plot_tracking(subject: Any, *, ax: Axes | None = None, time_unit: str = "") 
     late, tracking, x0 = certificate.late, certificate.tracking, certificate.initial_state
     late = late if late is not None and late.says_something else None
     if late is None and tracking is None:
-        mend = "certify with messages or leaders, or --delay or --leader-speed"
-        raise ParameterError(f"the certificate says nothing of late messages or of leaders that move; {mend}")
+        what = "the certificate says nothing of late messages or of leaders that move; certify with "
+        raise ParameterError((what, Change("delay"), " or ", Change("leader_speed")))
     ax, T = axes_of(ax), float(certificate.protocol.T)
     t = np.linspace(0, T, 401)
     if isinstance(certificate, Certificate):
