@@ -81,6 +81,10 @@ restricted_options = together(
 )
 
 
+#: What restricts signals, by the names of the options.
+_RESTRICTED = ("dwell", "clock_dwell", "window", "clock_window", "window_on", "share")
+
+
 def dwell_of(options: shared.Options) -> DwellTime | None:
     """Return the dwell time of time or of the clock, or refuse both at once; None if there is none."""
     dwells = {"t": options["dwell"], "s": options["clock_dwell"]}
@@ -107,12 +111,18 @@ def signals_of(options: shared.Options) -> SignalClass:
         raise ParameterError("dwell times, windows and shares are for signals of different kinds: give one of them")
     if given and options["signal"] == "constant":
         raise ParameterError("--signal constant never switches: leave dwell times, windows and shares out")
+    if given and options.get("kind") == "sliding-mode":
+        flag = flag_of(next(name for name in _RESTRICTED if options.get(name)))
+        raise ParameterError(
+            f"{flag}: restricted signals are certified under the nominal protocol; leave it out, or take "
+            "--protocol nominal"
+        )
     return given[0] if given else options["signal"]
 
 
 def refuse_restricted(options: shared.Options) -> None:
     """Refuse restricted signals where one graph acts for ever."""
-    for name in ("dwell", "clock_dwell", "window", "clock_window", "window_on", "share"):
+    for name in _RESTRICTED:
         if options.get(name):
             raise ParameterError(f"{flag_of(name)} is for families of graphs; this is one graph: leave it out")
 

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 from ptcc_certify.cli.declared import flag_of, given_of, names_of, options_for
 from ptcc_certify.cli.options import Options, graph_file
 from ptcc_certify.errors import NumberError, ParameterError
-from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.protocols.late_messages import LateMessages
 from ptcc_certify.protocols.moving_leaders import MovingLeaders
 
 if TYPE_CHECKING:
+    from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.family import Family
 
 message_options, leader_options = options_for(LateMessages, asked=True), options_for(MovingLeaders, asked=True)
@@ -65,6 +65,7 @@ def messages_of(graph: str, signed: SignedDigraph | Family, options: Options) ->
 def _needs_cap(signed: SignedDigraph | Family, messages: LateMessages) -> str:
     """Tell that an own state that is late asks for a cap, and what gain agents bear with this delay."""
     from ptcc_certify.bounds.small_delays import delay_threshold
+    from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.size_limits import EXACT_NODES
     from ptcc_certify.graphs.structure import analyse
 
@@ -88,6 +89,7 @@ def refuse_unheard(signed: SignedDigraph, options: Options) -> None:
 
 def _delay(graph: str, signed: SignedDigraph | Family, text: str) -> Fraction | dict[tuple[str, str], Fraction]:
     """Return a delay, or those of a column."""
+    from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.io.edge_delays import read_delays
     from ptcc_certify.graphs.io.files import name_and_ending
     from ptcc_certify.graphs.io.graph_files import OTHER_FORMATS

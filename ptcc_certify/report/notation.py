@@ -82,6 +82,7 @@ def labels_apart(text: str) -> list[tuple[str, bool]]:
 
     Examples
     --------
+    >>> from ptcc_certify.errors import labelled
     >>> labels_apart(f"of agent {labelled('mu1')}.")
     [('of agent ', False), ('mu1', True), ('.', False)]
     """
@@ -99,6 +100,7 @@ def set_text(text: str) -> Markup:
 
     Examples
     --------
+    >>> from ptcc_certify.errors import labelled
     >>> print(set_text(f"mu1 of agent {labelled('mu1')}"))
     \u03bc<sub>1</sub> of agent <bdi>mu1</bdi>
     """

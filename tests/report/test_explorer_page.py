@@ -82,7 +82,7 @@ def test_a_view_is_text_figures_and_code(server: ExplorerServer):
         assert view["verdict"].startswith("certified" if checked else "not checked")
         assert list(view["panels"]) == ["states", "decay", "graph", "input"]
         assert all("<svg" in panel for panel in view["panels"].values())
-        assert "T_r + T_s = 1.1 whatever" in view["facts"]["claim"]
+        assert "at T = 1.1, any |d_k| <= 1" in view["facts"]["claim"]
         assert "--T-r 0.6" in view["command"] and "T_r='0.6'" in view["python"]
 
 

@@ -219,7 +219,7 @@ def test_every_page_is_sound_and_says_what_it_is(name: str, tmp_path: Path):
     made = example(name)
     source = reported(made, tmp_path)
     page = sound(source)
-    assert page.text.index("CERTIFIED") < page.text.index("Where they end") < page.text.index("What was asked")
+    assert page.text.index("CERTIFIED") < page.text.index("What they do") < page.text.index("What was asked")
     assert made.graph.sha256 in page.text and made.to_dict()["digest"] in page.text
     assert "ptcc check c.json" in page.text and "python -m ptcc_certify.checker c.json" in page.text
     order = ["asked", "proved", "graph", "bound", "obligations", "check", "limits", "cite"]

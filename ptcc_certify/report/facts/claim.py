@@ -215,7 +215,8 @@ def groups_text(component: FamilyComponent, direct: bool = True) -> str:
 
     Examples
     --------
-    >>> groups_text(ptcc.decide([(1, 3, 1, 2), (2, 3, 1, 1)])[0])
+    >>> from ptcc_certify.errors import unlabelled
+    >>> unlabelled(groups_text(ptcc.decide([(1, 3, 1, 2), (2, 3, 1, 1)])[0]))
     '1, 2 keep their value; 3 ends between these, up to signs, or moves there for ever'
     """
     groups = FamilyGroups(component)
@@ -281,7 +282,8 @@ def range_text(component: FamilyComponent, ends: Sequence[Interval], width: int 
     --------
     >>> foes = Family.from_intervals([("a", "b", -1, 1), ("b", "a", 1, 2)])
     >>> cert = certify(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, -2])
-    >>> range_text(cert.parts[0].component, cert.ranges[0])
+    >>> from ptcc_certify.errors import unlabelled
+    >>> unlabelled(range_text(cert.parts[0].component, cert.ranges[0]))
     'every signal keeps a, b in [-2, 2] at all times'
     """
     groups: dict[str, list[int]] = {}
@@ -304,7 +306,8 @@ def box_text(component: FamilyComponent, box: AttractingBox, width: int = 12 * T
     --------
     >>> moved = Family.from_intervals([(1, 3, 1, 3), (2, 3, 1, 1), (1, 4, 1, 1), (2, 4, 1, 4)])
     >>> cert = certify(moved, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), {1: 0, 2: 4, 3: 100, 4: 0})
-    >>> box_text(cert.parts[0].component, cert.boxes[0])
+    >>> from ptcc_certify.errors import unlabelled
+    >>> unlabelled(box_text(cert.parts[0].component, cert.boxes[0]))
     'every signal draws 3 into [1, 2], 4 into [2, 3.2], at the rate 4; no limit is claimed'
     >>> box_text(cert.parts[0].component, cert.boxes[0], 20)
     'every signal draws 2 agents into 2 intervals in all, within [1, 3.2], at the rate 4; no limit is claimed'

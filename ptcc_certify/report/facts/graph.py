@@ -93,7 +93,8 @@ def family_text(family: Family, name: str) -> str:
 
     Examples
     --------
-    >>> family_text(Family.from_intervals([("a", "b", 0, 1)]), "pair")
+    >>> from ptcc_certify.errors import unlabelled
+    >>> unlabelled(family_text(Family.from_intervals([("a", "b", 0, 1)]), "pair"))
     'pair: 2 nodes, 1 edge, 1 optional'
     """
     several = len(family.modes) > 1

@@ -29,8 +29,11 @@ def intervals_text(labels: Sequence[str], states: Sequence[tuple[Fraction, Fract
     Examples
     --------
     >>> both = (Fraction(0), Fraction(1))
-    >>> intervals_text(["a", "b", "c"], [both, both, None], 80), intervals_text(["a", "b"], [both, both], 80)
-    ('a, b in [0, 1], c no limit is claimed', 'every agent in [0, 1]')
+    >>> from ptcc_certify.errors import unlabelled
+    >>> unlabelled(intervals_text(["a", "b", "c"], [both, both, None], 80))
+    'a, b in [0, 1], c no limit is claimed'
+    >>> intervals_text(["a", "b"], [both, both], 80)
+    'every agent in [0, 1]'
     """
     groups: dict[str, list[str]] = {}
     for label, ends in zip(labels, states, strict=True):
