@@ -57,7 +57,7 @@ IN_ROOMS = {
     "bounds.input.initial_set": ("initial_set_within",),
     "bounds.input.worst_initial_state": ("WorstInitialState",),
     "certificate.answer": ("Assessment",),
-    "certificate.certificate": ("RejectedCertificate",),
+    "certificate.certificate_file": ("RejectedCertificate",),
     "checker": ("CheckReport",),
     "checker.input_formulas": ("InitialSet",),
     "gain_design.answer": ("Design",),

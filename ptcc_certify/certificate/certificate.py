@@ -6,7 +6,6 @@ import hashlib
 import json
 import sys
 from collections.abc import Mapping
-from copy import deepcopy
 from dataclasses import dataclass
 from functools import cached_property
 from io import BytesIO
@@ -16,20 +15,16 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 from lmi.exact.decimal_rounding import down
 from ptcc_certify.certificate.agents_table import agents_table
-from ptcc_certify.certificate.answer import Assessment, rejection, rejects, verdict_of
 from ptcc_certify.certificate.certificate_data import Content, Source
-from ptcc_certify.certificate.certificate_file import FromFile, bytes_of, text_of, write_certificate
+from ptcc_certify.certificate.certificate_file import Recorded, RejectedCertificate, bytes_of, text_of
 from ptcc_certify.certificate.checking import read_and_check, refuse_no_certificate
 from ptcc_certify.certificate.document import certificate_document, read_document
-from ptcc_certify.certificate.facts import Fact
 from ptcc_certify.certificate.section_writer import read_side_files
-from ptcc_certify.certificate.verdict import assess
 from ptcc_certify.checker import CheckReport, VerifiedObligation
-from ptcc_certify.errors import FormatError, PTCCError, gated
+from ptcc_certify.errors import FormatError, gated
 from ptcc_certify.graphs.io.files import refuse_no_path
 from ptcc_certify.graphs.kinds_of_file import refuse_as_certificate
 from ptcc_certify.graphs.rationals import shorten
-from ptcc_certify.shown import Shown, rendered
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,40 +32,9 @@ if TYPE_CHECKING:
     from ptcc_certify.certificate.family_certificate import FamilyCertificate
 
 
-class RejectedCertificate(PTCCError, ValueError):
-    """The independent check does not accept a certificate: nothing in its file may be taken for proved.
-
-    Attributes
-    ----------
-    path : Path
-        Of the file.
-    report : CheckReport
-        What the check found: ``rejected`` names the part, ``reason`` tells why.
-
-    Examples
-    --------
-    >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
-    >>> with TemporaryDirectory() as folder:
-    ...     path = Path(folder, "c.json")
-    ...     certify(foes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=1)).save(path)
-    ...     _ = path.write_text(path.read_text().replace('"rho2": "1"', '"rho2": "2"'))
-    ...     try:
-    ...         read_certificate(path)
-    ...     except RejectedCertificate as error:
-    ...         print(error.path.name, error.report.rejected)
-    c.json input
-    """
-
-    def __init__(self, path: Path, report: CheckReport, mend: str = "certify the graph again"):
-        self.path = path
-        self.report = report
-        reason = f"the independent check rejects {report.rejected}: {report.reason}"
-        super().__init__(f"{shorten(str(path), 200)}: {reason}; {mend}")
-
-
 @gated
 @dataclass(frozen=True, eq=False, repr=False)
-class Certificate(Content, FromFile, Shown):
+class Certificate(Content, Recorded):
     """A claim about a signed digraph under a protocol, with its proof.
 
     Made by :func:`ptcc_certify.certify`, or read from a file by :func:`read_certificate`.
@@ -127,86 +91,18 @@ class Certificate(Content, FromFile, Shown):
     (FinalState(1=1, 2=-1), True, True)
     """
 
-    @property
-    def document(self) -> Mapping[str, Any]:
-        """The JSON. What stands under ``unverified`` is its own word; where the check rejects, nothing but that."""
-        if self.source is not None:
-            return self.source.document
-        document, files, report = self._recorded
-        if rejects(report):
-            return rejection(report)
-        return document if not files else certificate_document(self, files=False)[0]
+    def _record(self, files: bool) -> tuple[dict[str, Any], Mapping[str, bytes], CheckReport]:
+        return certificate_document(self, files)
 
     @cached_property
     def checked(self) -> CheckReport:
         """What the independent check says of the certificate as it is written, certified or undecided."""
-        if self.source is not None:
-            return self.source.report
         return self._recorded[2]
 
     @property
     def obligations(self) -> tuple[VerifiedObligation, ...]:
         """What the independent check verified, in its order."""
         return self.checked.obligations
-
-    @property
-    def verdict(self) -> str:
-        """``certified`` if rate and final state were proved and the check accepts it, else ``undecided``."""
-        return verdict_of(self.checked)
-
-    @cached_property
-    def assessment(self) -> Assessment:
-        """The graded verdict: whether the bound says something by the deadline, and what became of expectations."""
-        return assess(self, self.checked)
-
-    @cached_property
-    def _recorded(self) -> tuple[dict[str, Any], Mapping[str, bytes], CheckReport]:
-        """The JSON, its side files, and what the check says, which laid down the proof."""
-        return certificate_document(self)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the certificate as JSON-ready data of schema ``ptcc-certificate/2``, without side files: a copy.
-
-        One that was read is what its file says. Of one that the independent check rejects, a defect of this program,
-        it tells the verdict, what is rejected and why, and no claim.
-        """
-        return deepcopy(dict(self.document))
-
-    def to_json(self) -> str:
-        """Return the certificate as one JSON object, without NaN or infinity."""
-        return text_of(self.document)
-
-    @gated
-    def save(self, path: str | Path) -> None:
-        """Write the certificate to ``path``; the file appears whole or not at all.
-
-        Vectors of more than 50,000 entries go to ``.npy`` files beside it, which are written first.
-
-        Parameters
-        ----------
-        path : str or Path
-            Ends in ``.json``, or has no ending.
-
-        Raises
-        ------
-        ParameterError
-            Another ending.
-        FormatError
-            The file cannot be written.
-        RejectedCertificate
-            The independent check does not accept it, a defect of this program: nothing is written.
-        """
-        refuse_no_path(path)
-        if rejects(self.checked):
-            mend = "this is a defect of this program, nothing was written; please report this graph"
-            raise RejectedCertificate(Path(path), self.checked, mend)
-        write_certificate(path, *self.for_check())
-
-    def for_check(self) -> tuple[Mapping[str, Any], Mapping[str, bytes]]:
-        """Return the JSON and the contents of its side files, as the independent check takes them."""
-        if self.source is not None:
-            return self.source.document, self.source.files
-        return self._recorded[:2]
 
     def to_pandas(self) -> pd.DataFrame:
         """Return one row per agent: its place in the graph, where it begins and ends, how near its end it is proved.
@@ -229,28 +125,6 @@ class Certificate(Content, FromFile, Shown):
         """
         return agents_table(self)
 
-    def plot(self, what: str | None = None, **keywords: Any) -> Any:
-        """Draw a figure of the certificate.
-
-        Parameters
-        ----------
-        what : {"decay", "input", "graph", "spectrum", "states", "motion", "formation", "late", "tracking", None}
-            Run and bound, inputs and their proved peaks, the graph, the eigenvalues, or the states; of agents of order
-            n positions and velocities, their inputs, or their ways in the plane. None: :attr:`main_figure`.
-        **keywords : Any
-            ``ax`` and others of the function ``ptcc_certify.plot_<what>``.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-
-        Raises
-        ------
-        ParameterError
-            No figure is called so, or there is nothing to draw.
-        """
-        return rendered("figures.plot", self, what or self.main_figure, **keywords)
-
     @property
     def main_figure(self) -> str:
         """The figure of what is claimed: of moving leaders, late messages, agents of order n, else the decay."""
@@ -259,35 +133,6 @@ class Certificate(Content, FromFile, Shown):
         if self.initial_state is None or self.final_state is None:
             return "decay"
         return "tracking" if self.tracking is not None else "decay" if self.late is None else "late"
-
-    def summary(self) -> str:
-        """Return what ``ptcc certify`` prints of it."""
-        return "\n".join(rendered("screen.summary_lines", self))
-
-    def facts(self) -> list[Fact]:
-        """Return everything that is told of it, as data: see :class:`~ptcc_certify.certificate.facts.Fact`.
-
-        Examples
-        --------
-        >>> foes = SignedDigraph.from_edges([("a", "b", -1), ("b", "a", -1)])
-        >>> cert = certify(foes, NominalProtocol(T=1, rho1=1, rho2="0.1", kappa=1), [3, 5], asks=Asks(simulation=False))
-        >>> verdict = cert.facts()[-1]
-        >>> verdict.head, [str(change) for change in verdict.changes]
-        ('verdict', ['rho2=0.501'])
-        """
-        return rendered("facts.of_certificate.facts_of", self)  # type: ignore[no-any-return]
-
-    def __eq__(self, other: object) -> bool:
-        """Two certificates are equal when they claim and prove the same; what was observed does not count."""
-        return isinstance(other, Certificate) and self._digest == other._digest
-
-    def __hash__(self) -> int:
-        return hash(self._digest)
-
-    @property
-    def _digest(self) -> str:
-        document = self._recorded[0] if self.source is None else self.source.document
-        return str(document["digest"])
 
     def __repr__(self) -> str:
         rate = "none" if self.rate is None else down(self.rate)

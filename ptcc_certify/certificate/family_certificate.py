@@ -5,13 +5,10 @@ A family of one mode with known weights is a graph, and :func:`ptcc_certify.cert
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,10 +23,8 @@ from ptcc_certify.bounds.kept_means import with_means
 from ptcc_certify.bounds.late_messages import bound_late
 from ptcc_certify.bounds.tracking import bound_tracking
 from ptcc_certify.certificate.agents_table import agents_table
-from ptcc_certify.certificate.answer import Assessment, rejection, rejects
-from ptcc_certify.certificate.certificate_file import FromFile, write_certificate
+from ptcc_certify.certificate.certificate_file import Recorded
 from ptcc_certify.certificate.document import family_document
-from ptcc_certify.certificate.facts import Fact
 from ptcc_certify.certificate.family_content import ComponentProof, FamilyContent
 from ptcc_certify.certificate.functions import ProvedFunction
 from ptcc_certify.certificate.request import (
@@ -41,7 +36,6 @@ from ptcc_certify.certificate.request import (
 )
 from ptcc_certify.certificate.restricted_claims import RateClaim
 from ptcc_certify.certificate.restricted_search import STEP, claims_for, require_nominal
-from ptcc_certify.certificate.verdict import assess
 from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.family import MANY_MODES
 from ptcc_certify.checker.family_rows import MANY_FUNCTIONS
@@ -65,7 +59,6 @@ from ptcc_certify.protocols.base import refuse_no_protocol
 from ptcc_certify.protocols.late_messages import LateMessages
 from ptcc_certify.protocols.moving_leaders import MovingLeaders
 from ptcc_certify.protocols.restricted_signals import ClockShares, JointWindows, SignalClass, read_signal
-from ptcc_certify.shown import Shown, rendered
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent, decide
 from ptcc_certify.theorems.joint_windows import refuse_impossible_windows
 
@@ -81,7 +74,7 @@ _MANY = 200_000
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FamilyCertificate(FamilyContent, FromFile, Shown):
+class FamilyCertificate(FamilyContent, Recorded):
     """What a protocol does on a family of graphs, whatever the signal, with its proof.
 
     Attributes
@@ -128,19 +121,6 @@ class FamilyCertificate(FamilyContent, FromFile, Shown):
     FamilyCertificate(bipartite consensus for every signal, rate 0.955184, certified)
     """
 
-    @cached_property
-    def assessment(self) -> Assessment:
-        """The graded verdict: what became of what was asked, whether the bound is useful, and the exit code."""
-        return assess(self, self.checked)
-
-    def summary(self) -> str:
-        """Return what ``ptcc certify`` prints of it."""
-        return "\n".join(rendered("screen.summary_lines", self))
-
-    def facts(self) -> list[Fact]:
-        """Return everything that is told of it, as data: see :class:`~ptcc_certify.certificate.facts.Fact`."""
-        return rendered("facts.of_certificate.facts_of", self)  # type: ignore[no-any-return]
-
     @property
     def refused(self) -> bool:
         """Whether the check does not accept the functions that were found: nothing that follows from them is told."""
@@ -183,82 +163,13 @@ class FamilyCertificate(FamilyContent, FromFile, Shown):
         nothing = self.initial_state is not None and not np.isfinite(self.deviation_bound([0.5])).any()
         return "states" if nothing else "decay"
 
-    def plot(self, what: str | None = None, **keywords: Any) -> Any:
-        """Draw a figure of the certificate.
-
-        Parameters
-        ----------
-        what : {"decay", "input", "graph", "states", "late", "tracking"}, optional
-            Runs under many signals within what is proved for every signal: their error, their inputs, their states; or
-            the graphs, or what is proved with late messages or while leaders move. None: :attr:`main_figure`.
-        **keywords : Any
-            ``ax`` and others of the function that draws it: ``plot_decay``, ``plot_input``, ``plot_graph`` or
-            ``plot_trajectory``.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-
-        Raises
-        ------
-        ParameterError
-            No figure is called so, or there is nothing to draw.
-        """
-        return rendered("figures.plot", self, what or self.main_figure, **keywords)
-
-    # ------------------------------------------------------------------ the file
-
-    @cached_property
-    def _recorded(self) -> tuple[dict[str, Any], Mapping[str, bytes], CheckReport]:
-        """The JSON, its side files by name, and what the check says, which laid down the proof."""
-        if self.source is not None:
-            return dict(self.source.document), self.source.files, self.source.report
-        return family_document(self)
-
-    @cached_property
-    def checked(self) -> CheckReport | None:
-        """What the independent check says; None where a behaviour is not decided, or takes too many rows."""
-        return self._recorded[2] if all(part.certifiable for part in self.parts) else None
-
-    def for_check(self) -> tuple[Mapping[str, Any], Mapping[str, bytes]]:
-        """Return the JSON and the contents of its side files, as the independent check takes them."""
-        return self._recorded[:2]
-
     @property
-    def verdict(self) -> str:
-        """``certified`` if the independent check accepts it, else ``undecided``."""
-        return "certified" if self.checked is not None and self.checked.accepted else "undecided"
+    def checkable(self) -> bool:
+        """Whether every behaviour is decided, and takes few enough rows to be written."""
+        return all(part.certifiable for part in self.parts)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the certificate as JSON-ready data, without side files: a copy.
-
-        Of one that the independent check rejects, a defect of this program, the verdict, what is rejected and why.
-        """
-        if self.checked is not None and rejects(self.checked):
-            return rejection(self.checked)
-        document, files = self.for_check()
-        whole = family_document(self, files=False)[0] if files and self.source is None else document
-        return json.loads(json.dumps({**whole, "verdict": self.verdict}))
-
-    def save(self, path: str | Path) -> None:
-        """Write the certificate; the file appears whole or not at all.
-
-        Vectors of more than 50,000 entries go to ``.npy`` files beside it, which are written first.
-
-        Raises
-        ------
-        FormatError
-            The file cannot be written.
-        ParameterError
-            The certificate is undecided: there is nothing to check. Or the path ends in another way than ``.json``.
-        """
-        if self.verdict != "certified":
-            raise ParameterError("nothing is certified of this family, so that no certificate is written")
-        write_certificate(path, *self.for_check())
-
-    def to_json(self) -> str:
-        """Return the certificate as one JSON object, without NaN or infinity."""
-        return json.dumps(self.to_dict(), ensure_ascii=False, allow_nan=False)
+    def _record(self, files: bool) -> tuple[dict[str, Any], Mapping[str, bytes], CheckReport]:
+        return family_document(self, files)
 
     def to_pandas(self) -> pd.DataFrame:
         """Return one row per agent, with ends that are rounded outwards to floats; NaN where nothing is proved.
@@ -290,17 +201,6 @@ class FamilyCertificate(FamilyContent, FromFile, Shown):
         ([-1.0, -1.0], [True, False])
         """
         return agents_table(self, self.verdict == "certified")
-
-    def __eq__(self, other: object) -> bool:
-        """Two certificates are equal when they claim and prove the same; upper bounds on the rate do not count."""
-        return isinstance(other, FamilyCertificate) and self._digest == other._digest
-
-    def __hash__(self) -> int:
-        return hash(self._digest)
-
-    @property
-    def _digest(self) -> str:
-        return str(self._recorded[0]["digest"])
 
     def __repr__(self) -> str:
         behaviour = self.parts[0].component.behaviour or "not decided"

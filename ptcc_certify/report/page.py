@@ -21,7 +21,8 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
-from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate
+from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.certificate_file import RejectedCertificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.certificate.family_comparison import compare
 from ptcc_certify.certificate.restricted_bounds import nearer_for_signal

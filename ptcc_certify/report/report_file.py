@@ -8,7 +8,8 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
-from ptcc_certify.certificate.certificate import Certificate, RejectedCertificate, read_certificate
+from ptcc_certify.certificate.certificate import Certificate, read_certificate
+from ptcc_certify.certificate.certificate_file import RejectedCertificate
 from ptcc_certify.certificate.checking import refuse_no_certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.certificate.request import listener

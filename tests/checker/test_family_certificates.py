@@ -27,7 +27,8 @@ from selection import thinned
 
 from ptcc_certify import checker
 from ptcc_certify.certificate import section_writer
-from ptcc_certify.certificate.certificate import RejectedCertificate, read_certificate
+from ptcc_certify.certificate.certificate import read_certificate
+from ptcc_certify.certificate.certificate_file import RejectedCertificate
 from ptcc_certify.certificate.document import family_document
 from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate, certify_family
 from ptcc_certify.certificate.json_schema import json_schema
