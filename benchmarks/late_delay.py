@@ -29,9 +29,9 @@ from ptcc_certify.bounds.late_messages import LateBounds, bound_late
 from ptcc_certify.bounds.small_delays import SmallDelayBounds, delay_threshold
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.graphs.structure import analyse
+from ptcc_certify.model import NominalProtocol
 from ptcc_certify.model.asks import Asks
-from ptcc_certify.protocols import NominalProtocol
-from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.simulation.late_messages import simulate_late
 
 #: What may be left, over the largest deviation at first; delays are found to 2 %.

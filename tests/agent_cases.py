@@ -9,8 +9,8 @@ import numpy as np
 from generators import all_classes, random_graph
 
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.protocols import NominalProtocol, Protocol, SlidingModeProtocol
-from ptcc_certify.protocols.agents import Agents
+from ptcc_certify.model import NominalProtocol, Protocol, SlidingModeProtocol
+from ptcc_certify.model.agents import Agents
 
 CLASSES = all_classes()
 Rows = list[list[Fraction]]

@@ -24,7 +24,7 @@ from oracle import Oracle, inverse, number
 
 from ptcc_certify.checker import OBLIGATIONS
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 
 Vector = list[Fraction]
 Matrix = list[Vector]

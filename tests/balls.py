@@ -9,7 +9,7 @@ import flint
 
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.lyapunov.function import LyapunovFunction
-from ptcc_certify.protocols import NominalProtocol, ReachingProtocol
+from ptcc_certify.model import NominalProtocol, ReachingProtocol
 
 BITS = 512
 

@@ -20,8 +20,8 @@ from scipy.integrate import trapezoid
 from lmi.exact.elementary_enclosures import exp, log, sqrt
 from ptcc_certify.checker import OBLIGATIONS
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.protocols import NominalProtocol
-from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.model import NominalProtocol
+from ptcc_certify.model.late_messages import LateMessages
 
 ROOM = Fraction(1, 10**6)
 

@@ -13,9 +13,9 @@ import ptcc_certify as ptcc
 from ptcc_certify.certificate.procedure import certify_case
 from ptcc_certify.errors import FormatError, ParameterError
 from ptcc_certify.model.case import Case
-from ptcc_certify.protocols.disturbance import as_disturbance
-from ptcc_certify.protocols.gain import Gain
-from ptcc_certify.protocols.gain_limits import GainLimits
+from ptcc_certify.model.disturbance import as_disturbance
+from ptcc_certify.model.gain import Gain
+from ptcc_certify.model.gain_limits import GainLimits
 
 TEAM = ptcc.as_graph([("ann", "bob", 2), ("bob", "ann", -1), ("bob", "eve", 1)])
 PROTOCOL = ptcc.NominalProtocol(T=1, rho1=1, rho2=1, kappa=1)

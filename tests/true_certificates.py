@@ -21,11 +21,11 @@ from ptcc_certify.certificate.family_certificate import certify_family
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
+from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.model.agents import Agents
 from ptcc_certify.model.asks import Asks
-from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.protocols.agents import Agents
-from ptcc_certify.protocols.gain_limits import GainLimits
-from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.model.gain_limits import GainLimits
+from ptcc_certify.model.late_messages import LateMessages
 
 CLASSES = dict(all_classes())
 Case = tuple[str, Json, dict[str, bytes]]

@@ -14,11 +14,11 @@ from ptcc_certify.cli import cli
 #: The rooms of ``ptcc_certify`` in the order of their use: title, and modules whose further names are listed too.
 ROOMS = {
     "graphs": ("Graphs and their structure", "graphs.digraph graphs.io graphs.structure graphs.ensembles"),
-    "protocols": (
-        "Protocols and disturbances",
-        "protocols protocols.gain protocols.gain_limits protocols.disturbance protocols.reaching_time",
+    "model": (
+        "What is asked of what: protocols, agents, messages, disturbances",
+        "model model.gain model.gain_limits model.disturbance model.reaching_time model.case model.asks "
+        "model.initial_state",
     ),
-    "model": ("What is asked of what", "model.case model.asks model.initial_state"),
     "certificate": (
         "Certificates",
         "certificate.certificate certificate.answer certificate.facts",

@@ -30,7 +30,7 @@ from ptcc_certify.graphs.io import write_atomically, write_graph
 from ptcc_certify.graphs.io.files import refuse_no_path
 from ptcc_certify.graphs.rationals import shorten, whole_number
 from ptcc_certify.graphs.reading import Reading
-from ptcc_certify.protocols import Protocol
+from ptcc_certify.model import Protocol
 
 __all__ = ["COLUMNS", "Row", "Settings", "certify_many", "default_workers", "table_bytes", "write_graphs"]
 

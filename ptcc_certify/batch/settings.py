@@ -15,14 +15,14 @@ from ptcc_certify.graphs.io import by_label
 from ptcc_certify.graphs.rationals import as_fraction, format_exact, shorten, whole_number
 from ptcc_certify.graphs.reading import Reading
 from ptcc_certify.graphs.structure import behaviour_name
+from ptcc_certify.model import Protocol
 from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.base import refuse_no_protocol
 from ptcc_certify.model.case import Case
+from ptcc_certify.model.disturbance import as_disturbance
 from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.parameters import parameter
 from ptcc_certify.model.refusals import refuse_before_the_graph
-from ptcc_certify.protocols import Protocol
-from ptcc_certify.protocols.base import refuse_no_protocol
-from ptcc_certify.protocols.disturbance import as_disturbance
-from ptcc_certify.protocols.parameters import parameter
 
 #: What an initial state may be given as.
 StateLike = str | Sequence[Any] | Mapping[Any, Any] | None

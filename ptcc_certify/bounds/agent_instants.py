@@ -21,7 +21,7 @@ from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.lyapunov import Function
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
-from ptcc_certify.protocols.agents_protocol import AgentsProtocol
+from ptcc_certify.model.agents_protocol import AgentsProtocol
 from ptcc_certify.theorems.agent_decrease import AgentMatrix
 
 Values = tuple[Fraction | None, ...]

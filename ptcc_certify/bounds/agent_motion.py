@@ -11,7 +11,7 @@ from fractions import Fraction
 
 from lmi.exact.matrix_exponential import expm
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.protocols.gain import Gain
+from ptcc_certify.model.gain import Gain
 
 Interval = tuple[Fraction, Fraction]
 #: Bits after the point that are kept of a common motion that is not rational, and that are computed.

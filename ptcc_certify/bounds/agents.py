@@ -22,7 +22,7 @@ from ptcc_certify.bounds.input.effort_bounds import full_constants
 from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
-from ptcc_certify.protocols.agents_protocol import AgentsProtocol
+from ptcc_certify.model.agents_protocol import AgentsProtocol
 from ptcc_certify.theorems.agent_decrease import Matrix
 
 #: Of every agent, in every coordinate of space, its position, velocity and so on.
@@ -78,7 +78,7 @@ def first_inputs(structure: Structure, protocol: AgentsProtocol, states: States)
 
     Examples
     --------
-    >>> from ptcc_certify.protocols import NominalProtocol
+    >>> from ptcc_certify.model import NominalProtocol
     >>> base, zero, one = NominalProtocol(T=1, rho1=1, rho2=1, kappa=1), Fraction(0), Fraction(1)  # eta(0) = 2
     >>> pair = analyse(SignedDigraph.from_edges([("a", "b", 1)]))
     >>> protocol = AgentsProtocol(base, (zero,) * 2, (zero,) * 2, (3 * one, one), ((zero,),) * 2, None)

@@ -39,7 +39,7 @@ from ptcc_certify.bounds.agents import States, initial_value, root_product
 from ptcc_certify.bounds.input.tightest_bound import round_up
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
-from ptcc_certify.protocols.gain import Gain
+from ptcc_certify.model.gain import Gain
 
 Rows = tuple[tuple[Fraction, ...], ...]
 #: By this share what is formed in floats is enlarged; bits to which what bounds every agent is rounded.

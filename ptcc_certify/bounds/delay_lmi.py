@@ -30,9 +30,9 @@ from ptcc_certify.checker.input_formulas import BITS, Limits
 from ptcc_certify.checker.late_input import gain_above
 from ptcc_certify.checker.late_messages import PARTS
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.protocols.gain import Gain
-from ptcc_certify.protocols.late_messages import LateMessages
-from ptcc_certify.protocols.limited_gain import LimitedGain
+from ptcc_certify.model.gain import Gain
+from ptcc_certify.model.late_messages import LateMessages
+from ptcc_certify.model.limited_gain import LimitedGain
 
 #: Above so many free agents nothing is searched; above the other the first function that is found is taken, and the
 #: longest delay sought by factors of 2 alone: a search takes 0.3 s with 20 free agents, 2 to 4 s with 30, 10 s with 40.

@@ -19,7 +19,7 @@ from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.error_system import ErrorSystem
 from ptcc_certify.lyapunov.function import LyapunovFunction
-from ptcc_certify.protocols.gain import Gain
+from ptcc_certify.model.gain import Gain
 from ptcc_certify.simulation.trajectory import Trajectory
 
 #: Instants, as fractions of the deadline, at which ratios and residuals are reported.

@@ -27,7 +27,7 @@ from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.graphs.io import as_graph, as_states
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.protocols.gain import Gain
+from ptcc_certify.model.gain import Gain
 
 #: Agents at most: the places of more are not solved for exactly.
 MOST_NODES = 400

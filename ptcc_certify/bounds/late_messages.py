@@ -1,6 +1,6 @@
 """What holds with late messages: what is left at the deadline, row by row; who misses it; deadlines of stages.
 
-Agents obey :mod:`ptcc_certify.protocols.late_messages`, leaders listen to nobody. With ``D_k u_k - q sum_l |w_kl| u_l
+Agents obey :mod:`ptcc_certify.model.late_messages`, leaders listen to nobody. With ``D_k u_k - q sum_l |w_kl| u_l
 >= b u_k``, ``cap <= ln q / (b age)`` and ``s_c`` the integral of ``min(gain, cap)``
 
     |x_k(t) - x_k*| <= u_k (initial e^(-b s_c(t)) + floor)
@@ -52,11 +52,11 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness, UncertainRows, listeners
-from ptcc_certify.protocols.base import Protocol
-from ptcc_certify.protocols.gain_limits import GainLimits
-from ptcc_certify.protocols.late_messages import LateMessages
-from ptcc_certify.protocols.limited_gain import LimitedGain
-from ptcc_certify.protocols.moving_leaders import MovingLeaders
+from ptcc_certify.model.base import Protocol
+from ptcc_certify.model.gain_limits import GainLimits
+from ptcc_certify.model.late_messages import LateMessages
+from ptcc_certify.model.limited_gain import LimitedGain
+from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.theorems.theorem import Obligation
 
 #: Up to so many followers many ``q`` are tried; beyond, the best of those that one vector proves.

@@ -24,7 +24,7 @@ from fractions import Fraction
 import numpy as np
 
 from ptcc_certify.lyapunov.follower_rows import FollowerRows
-from ptcc_certify.protocols.limited_gain import LimitedGain
+from ptcc_certify.model.limited_gain import LimitedGain
 
 #: Instants at most, and products of weights that all instants together may take.
 MOST_INSTANTS, MOST_PRODUCTS = 2000, 20_000_000

@@ -16,9 +16,9 @@ from ptcc_certify.bounds.late_messages import LateBounds, bound_late
 from ptcc_certify.bounds.settling_leaders import SettlingBounds
 from ptcc_certify.bounds.small_delays import DecayingForm, SmallDelayBounds
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.protocols.base import Protocol
-from ptcc_certify.protocols.late_messages import LateMessages
-from ptcc_certify.protocols.moving_leaders import MovingLeaders
+from ptcc_certify.model.base import Protocol
+from ptcc_certify.model.late_messages import LateMessages
+from ptcc_certify.model.moving_leaders import MovingLeaders
 
 #: Halvings of the interval, in powers of two, and digits of the delay that is returned.
 _HALVINGS, _DIGITS = 9, 3

@@ -19,7 +19,7 @@ from lmi.exact.elementary_enclosures import exp, log, rounded
 from ptcc_certify.checker.input_formulas import BITS
 from ptcc_certify.graphs.rationals import writable
 from ptcc_certify.lyapunov.follower_rows import FollowerRows
-from ptcc_certify.protocols.base import Protocol
+from ptcc_certify.model.base import Protocol
 
 #: Followers up to which it is searched who misses the deadline.
 _MISSED_FOLLOWERS = 400

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 from ptcc_certify.bounds.envelope import Instants, remaining_part
-from ptcc_certify.protocols.base import ReachingProtocol
-from ptcc_certify.protocols.reaching_time import LAST_Z, ReachingTime
+from ptcc_certify.model.base import ReachingProtocol
+from ptcc_certify.model.reaching_time import LAST_Z, ReachingTime
 
 _PIECES = 4000
 #: What sums of so many floats may be off by, relatively.

@@ -25,9 +25,9 @@ from ptcc_certify.checker.input_formulas import BITS, Limits, root_above
 from ptcc_certify.checker.late_input import gain_above
 from ptcc_certify.checker.late_messages import PARTS
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.protocols.gain_limits import GainLimits
-from ptcc_certify.protocols.late_messages import LateMessages
-from ptcc_certify.protocols.limited_gain import LimitedGain
+from ptcc_certify.model.gain_limits import GainLimits
+from ptcc_certify.model.late_messages import LateMessages
+from ptcc_certify.model.limited_gain import LimitedGain
 
 #: Values of ``q`` that are tried, and the largest one; shares of the largest ``b``.
 _TRIED, _LARGEST_Q, _SHARES = 16, 1e9, (0.3, 0.6, 0.85, 0.97)

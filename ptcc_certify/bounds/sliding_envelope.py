@@ -36,8 +36,8 @@ from ptcc_certify.bounds.envelope import (
 from ptcc_certify.bounds.reaching_phase import ReachingPhase
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.lyapunov.function import LyapunovFunction
-from ptcc_certify.protocols.base import ReachingProtocol
-from ptcc_certify.protocols.reaching_time import ReachingTime, sliding_bound
+from ptcc_certify.model.base import ReachingProtocol
+from ptcc_certify.model.reaching_time import ReachingTime, sliding_bound
 
 if TYPE_CHECKING:
     from ptcc_certify.simulation.trajectory import Trajectory

@@ -24,8 +24,8 @@ from ptcc_certify.checker.input_formulas import BITS, Limits, decay_above, root_
 from ptcc_certify.checker.late_input import gain_above
 from ptcc_certify.checker.quadratic_form import Form
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.protocols.gain import Gain
-from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.model.gain import Gain
+from ptcc_certify.model.late_messages import LateMessages
 
 #: Halvings of the interval of ``b``, and of the longest delay.
 _HALVINGS = 40

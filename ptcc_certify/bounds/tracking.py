@@ -27,10 +27,10 @@ from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness, UncertainRows
+from ptcc_certify.model.base import Protocol
+from ptcc_certify.model.gain import Gain
+from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.model.refusals import refuse_leader_groups
-from ptcc_certify.protocols.base import Protocol
-from ptcc_certify.protocols.gain import Gain
-from ptcc_certify.protocols.moving_leaders import MovingLeaders
 from ptcc_certify.theorems.theorem import Obligation
 
 #: Losses of ``a`` that are tried for a more even ``u``; the share of the time that is left where they are compared.

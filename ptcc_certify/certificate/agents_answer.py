@@ -26,7 +26,7 @@ from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.errors import Change, ParameterError, Sentence
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
-from ptcc_certify.protocols.agents_protocol import AgentsProtocol
+from ptcc_certify.model.agents_protocol import AgentsProtocol
 from ptcc_certify.simulation.agents import AgentsTrajectory, simulate_agents
 from ptcc_certify.theorems.theorem import Obligation
 

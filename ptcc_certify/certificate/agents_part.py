@@ -46,9 +46,9 @@ from ptcc_certify.checker.input_formulas import Limits, decay_above
 from ptcc_certify.errors import Change, Sentence
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
-from ptcc_certify.protocols import Protocol
-from ptcc_certify.protocols.agents import Agents
-from ptcc_certify.protocols.agents_protocol import AgentsProtocol
+from ptcc_certify.model import Protocol
+from ptcc_certify.model.agents import Agents
+from ptcc_certify.model.agents_protocol import AgentsProtocol
 from ptcc_certify.simulation.agents import AgentsTrajectory
 from ptcc_certify.theorems.agent_decrease import (
     AgentMatrix,

@@ -41,9 +41,9 @@ from ptcc_certify.checker.agent_cascade import CascadeSection, TrackedSection
 from ptcc_certify.errors import Change, ParameterError, Sentence
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
-from ptcc_certify.protocols import Protocol
-from ptcc_certify.protocols.agents import Agents
-from ptcc_certify.protocols.cascade import CascadeProtocol
+from ptcc_certify.model import Protocol
+from ptcc_certify.model.agents import Agents
+from ptcc_certify.model.cascade import CascadeProtocol
 from ptcc_certify.simulation.agents import AgentsTrajectory
 from ptcc_certify.theorems.theorem import Obligation
 

@@ -41,12 +41,12 @@ from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.lyapunov.rate_upper_bound import RateBound, optimality_ratio
 from ptcc_certify.lyapunov.search import DIAGONAL, Search
-from ptcc_certify.protocols import Protocol
-from ptcc_certify.protocols.disturbance import ExpressionDisturbance
-from ptcc_certify.protocols.gain_limits import GainLimits
-from ptcc_certify.protocols.late_messages import LateMessages
-from ptcc_certify.protocols.moving_leaders import MovingLeaders
-from ptcc_certify.protocols.reaching_time import ReachingTime
+from ptcc_certify.model import Protocol
+from ptcc_certify.model.disturbance import ExpressionDisturbance
+from ptcc_certify.model.gain_limits import GainLimits
+from ptcc_certify.model.late_messages import LateMessages
+from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.model.reaching_time import ReachingTime
 from ptcc_certify.simulation.agents import AgentsTrajectory
 from ptcc_certify.simulation.late_messages import can_run, simulate_late
 from ptcc_certify.simulation.run import simulate

@@ -40,7 +40,7 @@ from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY, find_c
 from ptcc_certify.lyapunov.clock_shares import ShareForm
 from ptcc_certify.lyapunov.family_function import FamilyFunction, prove_ends
 from ptcc_certify.lyapunov.mode_forms import ModeForms
-from ptcc_certify.protocols.restricted_signals import ClockShares, DwellTime, JointWindows, SignalClass
+from ptcc_certify.model.restricted_signals import ClockShares, DwellTime, JointWindows, SignalClass
 from ptcc_certify.theorems.family_behaviour import FamilyComponent
 from ptcc_certify.theorems.joint_windows import contraction
 from ptcc_certify.theorems.theorem import Obligation

@@ -77,8 +77,8 @@ from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.lyapunov.follower_rows import listeners
 from ptcc_certify.lyapunov.function import Dominance, LyapunovFunction
 from ptcc_certify.lyapunov.quotient import Quotient
-from ptcc_certify.protocols import Protocol
-from ptcc_certify.protocols.reaching_time import ReachingTime
+from ptcc_certify.model import Protocol
+from ptcc_certify.model.reaching_time import ReachingTime
 from ptcc_certify.theorems.agent_decrease import Phase
 from ptcc_certify.theorems.theorem import ExactInterval, Obligation, RateProof
 

@@ -52,13 +52,13 @@ from ptcc_certify.lyapunov.family_search import CLOSED_ROWS, FamilySearch, searc
 from ptcc_certify.lyapunov.follower_function import follower_functions
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.squares_function import SquaresFunction, squares_function
+from ptcc_certify.model import Protocol
 from ptcc_certify.model.asks import Expectations, read_expectations
+from ptcc_certify.model.base import refuse_no_protocol
 from ptcc_certify.model.initial_state import InitialState
-from ptcc_certify.protocols import Protocol
-from ptcc_certify.protocols.base import refuse_no_protocol
-from ptcc_certify.protocols.late_messages import LateMessages
-from ptcc_certify.protocols.moving_leaders import MovingLeaders
-from ptcc_certify.protocols.restricted_signals import ClockShares, JointWindows, SignalClass, read_signal
+from ptcc_certify.model.late_messages import LateMessages
+from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.model.restricted_signals import ClockShares, JointWindows, SignalClass, read_signal
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent, decide
 from ptcc_certify.theorems.joint_windows import refuse_impossible_windows
 

@@ -57,11 +57,11 @@ from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound
 from ptcc_certify.lyapunov.follower_function import FollowerFunction
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.squares_function import SquaresFunction
-from ptcc_certify.protocols import Protocol
-from ptcc_certify.protocols.late_messages import LateMessages
-from ptcc_certify.protocols.moving_leaders import MovingLeaders
-from ptcc_certify.protocols.reaching_time import ReachingTime
-from ptcc_certify.protocols.restricted_signals import SignalClass
+from ptcc_certify.model import Protocol
+from ptcc_certify.model.late_messages import LateMessages
+from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.model.reaching_time import ReachingTime
+from ptcc_certify.model.restricted_signals import SignalClass
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
 from ptcc_certify.theorems.family_kernel import UNKNOWN
 

@@ -19,8 +19,8 @@ from ptcc_certify.certificate.restricted_reasons import reasons_for_none
 from ptcc_certify.errors import Change, Sentence, joined
 from ptcc_certify.graphs.family import Mode
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.protocols.base import Protocol
-from ptcc_certify.protocols.restricted_signals import ClockShares, JointWindows
+from ptcc_certify.model.base import Protocol
+from ptcc_certify.model.restricted_signals import ClockShares, JointWindows
 from ptcc_certify.theorems.counterexample_text import counterexample_text, mode_name
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
 from ptcc_certify.theorems.family_claims import component_holds, component_refutation

@@ -77,8 +77,15 @@ from ptcc_certify.lyapunov.follower_rows import refuse_other_targets
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.lyapunov.rate_upper_bound import RateBound, mean_bound, prove_rate_bound
 from ptcc_certify.lyapunov.search import APART_NODES, Search, search_functions, search_large
+from ptcc_certify.model import Protocol
+from ptcc_certify.model.agents import Agents
 from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.base import ReachingProtocol
 from ptcc_certify.model.case import Case
+from ptcc_certify.model.disturbance import as_disturbance
+from ptcc_certify.model.late_messages import LateMessages
+from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.model.reaching_time import ReachingTime
 from ptcc_certify.model.refusals import (
     refuse_agents,
     refuse_before_the_graph,
@@ -86,14 +93,7 @@ from ptcc_certify.model.refusals import (
     refuse_exchanged,
     refuse_of_families,
 )
-from ptcc_certify.protocols import Protocol
-from ptcc_certify.protocols.agents import Agents
-from ptcc_certify.protocols.base import ReachingProtocol
-from ptcc_certify.protocols.disturbance import as_disturbance
-from ptcc_certify.protocols.late_messages import LateMessages
-from ptcc_certify.protocols.moving_leaders import MovingLeaders
-from ptcc_certify.protocols.reaching_time import ReachingTime
-from ptcc_certify.protocols.restricted_signals import SignalClass
+from ptcc_certify.model.restricted_signals import SignalClass
 from ptcc_certify.simulation.instants import PAST
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.sliding import rounding_slack
@@ -159,7 +159,7 @@ def certify(
         Of every weight, as a share of it, such as "10%": then the graph is a family.
     signal : {"any", "constant"}, DwellTime, JointWindows or ClockShares
         Of a family: restricted signals of which more is claimed, beside what holds for every signal; the three classes
-        are in :mod:`ptcc_certify.protocols.restricted_signals`.
+        are in :mod:`ptcc_certify.model.restricted_signals`.
     agents : Agents, optional
         Agents of order n, or in a formation; without them ``x' = u``. Then ``x0`` may be N rows of coordinates.
     messages : LateMessages, optional

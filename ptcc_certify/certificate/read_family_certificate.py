@@ -24,7 +24,7 @@ from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound
 from ptcc_certify.lyapunov.quotient import Quotient
-from ptcc_certify.protocols import Protocol
+from ptcc_certify.model import Protocol
 from ptcc_certify.theorems.family_behaviour import FamilyComponent, decide
 
 

@@ -21,15 +21,15 @@ from ptcc_certify.graphs.io import as_state
 from ptcc_certify.graphs.rationals import as_fraction, shorten, writable
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.model import Protocol
 from ptcc_certify.model.asks import Expectations
 from ptcc_certify.model.case import Case
+from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.initial_state import InitialState
-from ptcc_certify.protocols import Protocol
-from ptcc_certify.protocols.gain_limits import GainLimits
-from ptcc_certify.protocols.late_messages import LateMessages
-from ptcc_certify.protocols.moving_leaders import MovingLeaders
-from ptcc_certify.protocols.parameters import parameter
-from ptcc_certify.protocols.reaching_time import ReachingTime, certified_reaching_times
+from ptcc_certify.model.late_messages import LateMessages
+from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.model.parameters import parameter
+from ptcc_certify.model.reaching_time import ReachingTime, certified_reaching_times
 
 #: Longest weights and initial states, over a common denominator: so many bits over ``N^(5/4)``, for seconds of work.
 LONGEST_BITS = 470_000

@@ -22,7 +22,7 @@ from ptcc_certify.checker.family_limits import WeightedMean
 from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.lyapunov.mode_forms import mode_functions
 from ptcc_certify.lyapunov.quotient import Quotient
-from ptcc_certify.protocols.restricted_signals import DwellTime
+from ptcc_certify.model.restricted_signals import DwellTime
 
 #: Longest product of the factors at all switches, in bits.
 _BITS = 2000
@@ -79,7 +79,7 @@ def deviation_of_signal(certificate: FamilyContent, remaining: Sequence[float] |
 
     Examples
     --------
-    >>> from ptcc_certify.protocols.restricted_signals import DwellTime
+    >>> from ptcc_certify.model.restricted_signals import DwellTime
     >>> one, other = [("a", "b", 1), ("b", "c", -4)], [("b", "a", 1), ("a", "c", -1)]
     >>> modes = {"one": SignedDigraph.from_edges(one), "other": SignedDigraph.from_edges(other)}
     >>> cert = certify(modes, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [1, 2, 3], signal=DwellTime(1, clock="t"))

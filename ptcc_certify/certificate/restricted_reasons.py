@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from lmi.exact.decimal_rounding import down
 from ptcc_certify.certificate.restricted_claims import ShareClaim
 from ptcc_certify.checker.restricted_signals import MANY_CLAIMS
-from ptcc_certify.protocols.restricted_signals import ClockShares, JointWindows
+from ptcc_certify.model.restricted_signals import ClockShares, JointWindows
 from ptcc_certify.theorems.family_behaviour import DEPENDS
 from ptcc_certify.theorems.joint_windows import joint_behaviour
 

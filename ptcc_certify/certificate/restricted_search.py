@@ -34,8 +34,8 @@ from ptcc_certify.lyapunov.clock_shares import search_share_form
 from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.mode_forms import ModeForms, search_mode_forms, search_single_forms, within_reach
 from ptcc_certify.lyapunov.quotient import Quotient
-from ptcc_certify.protocols import Protocol
-from ptcc_certify.protocols.restricted_signals import ClockShares, DwellTime, JointWindows, SignalClass
+from ptcc_certify.model import Protocol
+from ptcc_certify.model.restricted_signals import ClockShares, DwellTime, JointWindows, SignalClass
 from ptcc_certify.theorems.family_behaviour import DEPENDS, FamilyComponent
 from ptcc_certify.theorems.joint_windows import joint_behaviour, window_rate
 from ptcc_certify.theorems.last_mode import last_mode_behaviours

@@ -31,10 +31,10 @@ from ptcc_certify.graphs.structure import Structure, behaviour_name
 from ptcc_certify.lyapunov.family_rate_upper_bound import FamilyRateBound, Member, prove_again
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.search import METHODS
-from ptcc_certify.protocols.base import Protocol
-from ptcc_certify.protocols.gain_limits import GainLimits
-from ptcc_certify.protocols.late_messages import LateMessages
-from ptcc_certify.protocols.moving_leaders import MovingLeaders
+from ptcc_certify.model.base import Protocol
+from ptcc_certify.model.gain_limits import GainLimits
+from ptcc_certify.model.late_messages import LateMessages
+from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.theorems.counterexample_text import mode_name
 
 #: Members of a word or mixture that are read.

@@ -20,17 +20,17 @@ from ptcc_certify.cli.declared import (
 from ptcc_certify.cli.options import Options, read_initial_state
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.model.agents import Agents
 from ptcc_certify.model.case import Case
 from ptcc_certify.model.initial_state import InitialState
-from ptcc_certify.protocols.agents import Agents
-from ptcc_certify.protocols.late_messages import LateMessages
-from ptcc_certify.protocols.moving_leaders import MovingLeaders
+from ptcc_certify.model.late_messages import LateMessages
+from ptcc_certify.model.moving_leaders import MovingLeaders
 
 if TYPE_CHECKING:
     from fractions import Fraction
 
     from ptcc_certify.graphs.digraph import SignedDigraph
-    from ptcc_certify.protocols import Protocol
+    from ptcc_certify.model import Protocol
     from ptcc_certify.simulation.agents import AgentsTrajectory
     from ptcc_certify.simulation.trajectory import Trajectory
 

@@ -37,7 +37,7 @@ from ptcc_certify.model.initial_state import InitialState
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate
     from ptcc_certify.graphs.digraph import SignedDigraph
-    from ptcc_certify.protocols import Protocol
+    from ptcc_certify.model import Protocol
 
 
 @click.command(cls=Command)

@@ -13,10 +13,10 @@ from ptcc_certify.cli.declared import flag_of, one_of, together
 from ptcc_certify.cli.options import Options, kind_option, protocol_of
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import short_exact
+from ptcc_certify.model import SlidingModeProtocol
+from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.model.run import Run
-from ptcc_certify.protocols import SlidingModeProtocol
-from ptcc_certify.protocols.gain_limits import GainLimits
 
 if TYPE_CHECKING:
     from ptcc_certify.gain_design.agents_answer import AgentsDesign

@@ -24,7 +24,7 @@ from ptcc_certify.model.asks import Asks
 from ptcc_certify.model.case import Case
 from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.model.refusals import NOT_OF_FAMILIES
-from ptcc_certify.protocols.restricted_signals import (
+from ptcc_certify.model.restricted_signals import (
     CLOCK_DWELL,
     WINDOWS_OF_TIME,
     ClockShares,
@@ -35,7 +35,7 @@ from ptcc_certify.protocols.restricted_signals import (
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.family import Family
-    from ptcc_certify.protocols.restricted_signals import SignalClass
+    from ptcc_certify.model.restricted_signals import SignalClass
     from ptcc_certify.theorems.family_behaviour import FamilyComponent
 
 #: Options of certify that families do not take; agents are refused by themselves, disturbances by the protocol.

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from ptcc_certify.cli.declared import flag_of, given_of, names_of, options_for
 from ptcc_certify.cli.options import Options, graph_file
 from ptcc_certify.errors import NumberError, ParameterError
-from ptcc_certify.protocols.late_messages import LateMessages
-from ptcc_certify.protocols.moving_leaders import MovingLeaders
+from ptcc_certify.model.late_messages import LateMessages
+from ptcc_certify.model.moving_leaders import MovingLeaders
 
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph

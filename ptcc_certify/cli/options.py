@@ -39,16 +39,16 @@ from ptcc_certify.errors import Change, ParameterError
 from ptcc_certify.graphs.kinds_of_file import TOML, kind_of, refuse_as_certificate, refuse_as_graph, shell_word
 from ptcc_certify.graphs.option import options_of
 from ptcc_certify.graphs.reading import Reading, option_flags
+from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.model.asks import Asks, Expectations
+from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.initial_state import InitialState
 from ptcc_certify.model.run import Run
-from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.protocols.gain_limits import GainLimits
 
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate
     from ptcc_certify.graphs.digraph import SignedDigraph
-    from ptcc_certify.protocols import Protocol
+    from ptcc_certify.model import Protocol
 
 #: What the commands are given, by the names of their parameters.
 Options = Mapping[str, Any]
@@ -276,7 +276,7 @@ def sigma0_of(protocol: Protocol, options: Options, graph: SignedDigraph) -> lis
 
 def disturbance_of(protocol: Protocol, options: Options, graph: SignedDigraph) -> Any:
     """Return what a run meets under the sliding-mode protocol, by default the worst; None under the nominal one."""
-    from ptcc_certify.protocols.disturbance import as_disturbance
+    from ptcc_certify.model.disturbance import as_disturbance
 
     if (sliding := protocol.reaching) is None:
         return None

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from ptcc_certify.certificate.family_certificate import FamilyCertificate
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.family import Family
-    from ptcc_certify.protocols import Protocol
+    from ptcc_certify.model import Protocol
     from ptcc_certify.simulation.trajectory import Trajectory
 
 #: Options that a certificate takes; the others are for graphs.
@@ -218,7 +218,7 @@ def _of_graph(
 ) -> Certificate | Trajectory | tuple[SignedDigraph, Any]:
     """Return what the figure of a graph is drawn from: itself, a run, or for its decay a certificate."""
     from ptcc_certify.certificate.procedure import STEPS, certify_case
-    from ptcc_certify.protocols.agents import Agents
+    from ptcc_certify.model.agents import Agents
 
     protocol = shared.protocol_of(options, () if what == "decay" else ("delta", "disturbance"))
     if what in ("graph", "spectrum"):

@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.family import Family
-    from ptcc_certify.protocols import Protocol
+    from ptcc_certify.model import Protocol
     from ptcc_certify.simulation.agents import AgentsTrajectory
     from ptcc_certify.simulation.trajectory import Trajectory
 

@@ -15,7 +15,7 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import read_graph
 from ptcc_certify.graphs.io.packaged import PAPER as GRAPHS
 from ptcc_certify.graphs.io.packaged import graph_path
-from ptcc_certify.protocols import NominalProtocol, Protocol, SlidingModeProtocol
+from ptcc_certify.model import NominalProtocol, Protocol, SlidingModeProtocol
 
 __all__ = ["EXAMPLES", "GRAPHS", "Example", "graph_path", "load_graph", "select"]
 

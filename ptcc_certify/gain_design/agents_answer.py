@@ -9,7 +9,7 @@ from typing import Any
 from lmi.exact.decimal_rounding import down, float_up, up
 from ptcc_certify.gain_design.answer import DesignAnswer, texts
 from ptcc_certify.graphs.rationals import short_exact
-from ptcc_certify.protocols.agents import Agents
+from ptcc_certify.model.agents import Agents
 
 
 @dataclass(frozen=True, repr=False)

@@ -22,8 +22,8 @@ from ptcc_certify.certificate.agents_part import prove_agents
 from ptcc_certify.certificate.cascade_part import prove_cascade
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.gain_design.request import Request
-from ptcc_certify.protocols import Protocol
-from ptcc_certify.protocols.agents import MOST_MOTION, Agents
+from ptcc_certify.model import Protocol
+from ptcc_certify.model.agents import MOST_MOTION, Agents
 
 #: A deadline that is shorter by this share than the one that is found does not keep the limit.
 TOLERANCE = Fraction(1, 1000)

@@ -30,10 +30,10 @@ from ptcc_certify.gain_design.answer import INFEASIBLE, MET, UNPROVED, refusal
 from ptcc_certify.gain_design.request import Request
 from ptcc_certify.graphs.io import as_graph
 from ptcc_certify.graphs.rationals import short_exact, shorten
+from ptcc_certify.model import NominalProtocol, Protocol
+from ptcc_certify.model.agents import Agents
 from ptcc_certify.model.asks import Asks, Expectations
-from ptcc_certify.protocols import NominalProtocol, Protocol
-from ptcc_certify.protocols.agents import Agents
-from ptcc_certify.protocols.parameters import parameter
+from ptcc_certify.model.parameters import parameter
 
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import Exact

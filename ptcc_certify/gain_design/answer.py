@@ -20,8 +20,8 @@ from ptcc_certify.certificate.facts import Fact, Facts
 from ptcc_certify.checker.input_formulas import Limits
 from ptcc_certify.gain_design.request import DesignRequest, Request, fit_of
 from ptcc_certify.graphs.rationals import format_exact, nearest_float, short_exact
-from ptcc_certify.protocols import Protocol
-from ptcc_certify.protocols.parameters import parameter
+from ptcc_certify.model import Protocol
+from ptcc_certify.model.parameters import parameter
 from ptcc_certify.shown import Shown, rendered
 
 MET, INFEASIBLE, UNPROVED = "met", "infeasible", "not with this certificate"

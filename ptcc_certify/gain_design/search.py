@@ -56,10 +56,10 @@ from ptcc_certify.gain_design.request import DesignRequest, Fit, fit_of
 from ptcc_certify.gain_design.shortest_possible import lower_product
 from ptcc_certify.graphs.rationals import nearest_float, shorten
 from ptcc_certify.graphs.structure import Structure, analyse
+from ptcc_certify.model import NominalProtocol
 from ptcc_certify.model.asks import Asks, Expectations
-from ptcc_certify.protocols import NominalProtocol
-from ptcc_certify.protocols.gain_limits import GainLimits
-from ptcc_certify.protocols.parameters import parameter
+from ptcc_certify.model.gain_limits import GainLimits
+from ptcc_certify.model.parameters import parameter
 from ptcc_certify.theorems.lemmas import laplacian_spectrum
 
 if TYPE_CHECKING:

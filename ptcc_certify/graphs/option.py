@@ -117,7 +117,7 @@ def options_of(*kinds: Any) -> Mapping[str, Option]:
 
     Examples
     --------
-    >>> from ptcc_certify.protocols.moving_leaders import MovingLeaders
+    >>> from ptcc_certify.model.moving_leaders import MovingLeaders
     >>> {name: told.key for name, told in options_of(MovingLeaders).items()}
     {'speed': 'leaders.speed', 'sign_gain': 'leaders.sign_gain'}
     """

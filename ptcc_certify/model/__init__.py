@@ -1,5 +1,7 @@
-"""What is asked of what: the classes that a user gives, each field of which declares its option once."""
+"""What is asked of what: protocols, agents, messages, leaders, limits; each field declares its option once."""
 
-from ptcc_certify import modules_of
+from ptcc_certify.model.base import Protocol, ReachingProtocol
+from ptcc_certify.model.nominal import NominalProtocol
+from ptcc_certify.model.sliding_mode import SlidingModeProtocol
 
-__getattr__ = modules_of(__name__)
+__all__ = ["NominalProtocol", "Protocol", "ReachingProtocol", "SlidingModeProtocol"]

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.graphs.option import option
 from ptcc_certify.graphs.rationals import shorten
-from ptcc_certify.protocols.parameters import parameter
+from ptcc_certify.model.parameters import parameter
 
 #: Which Lyapunov functions are searched; see :mod:`ptcc_certify.lyapunov.search`.
 METHODS = ("paper", "perron", "lmi", "full", "best")

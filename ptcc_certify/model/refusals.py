@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 from ptcc_certify.errors import HypothesisError, ParameterError
 from ptcc_certify.graphs.rationals import shorten
-from ptcc_certify.protocols.agents import Agents
-from ptcc_certify.protocols.base import Protocol, refuse_no_protocol
+from ptcc_certify.model.agents import Agents
+from ptcc_certify.model.base import Protocol, refuse_no_protocol
 
 if TYPE_CHECKING:
     from ptcc_certify.graphs.structure import Structure
     from ptcc_certify.model.case import Case
-    from ptcc_certify.protocols.late_messages import LateMessages
-    from ptcc_certify.protocols.moving_leaders import MovingLeaders
+    from ptcc_certify.model.late_messages import LateMessages
+    from ptcc_certify.model.moving_leaders import MovingLeaders
 
 #: What is asked of one graph alone.
 NOT_OF_FAMILIES = (*("at", "initial_set", "limits", "delta", "noise", "agents", "simulation", "disturbance"),)

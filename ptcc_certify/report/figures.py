@@ -16,7 +16,7 @@ from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.errors import ParameterError, SimulationError, gated, labelled
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.size_limits import DRAWN_NODES, EXACT_NODES, INPUT_NODES
-from ptcc_certify.protocols.base import Protocol
+from ptcc_certify.model.base import Protocol
 from ptcc_certify.report.notation import set_text
 from ptcc_certify.report.plots.agents_motion import plot_formation, plot_motion
 from ptcc_certify.report.plots.counterexample import plot_counterexample

@@ -8,7 +8,7 @@ from itertools import pairwise
 from markupsafe import Markup
 
 from ptcc_certify.errors import Sentence, spell
-from ptcc_certify.protocols.casadi_latex import symbol_latex
+from ptcc_certify.model.casadi_latex import symbol_latex
 from ptcc_certify.report.notation import LETTERS, as_parameters, labels_apart
 from ptcc_certify.report.text_layout import NO_BREAK
 

@@ -22,7 +22,7 @@ from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.document import producer
 from ptcc_certify.errors import LABEL, LABEL_END, Change
 from ptcc_certify.graphs.rationals import format_exact, nearest_float, writable
-from ptcc_certify.protocols import Protocol
+from ptcc_certify.model import Protocol
 from ptcc_certify.report.text_layout import NO_BREAK
 
 #: Labels of a list that are written out, and characters of a label.

@@ -30,7 +30,7 @@ from ptcc_certify.checker import CheckReport
 from ptcc_certify.checker.obligations import VerifiedObligation
 from ptcc_certify.errors import Change, Sentence, spell
 from ptcc_certify.graphs.io.graph_files import reading_flags
-from ptcc_certify.protocols.agents import plant_text
+from ptcc_certify.model.agents import plant_text
 from ptcc_certify.report import notation as texts
 from ptcc_certify.report.facts.claim import assumptions
 from ptcc_certify.report.facts.decay import BOUND_KINDS

@@ -22,8 +22,8 @@ from ptcc_certify.certificate.restricted_states import states_of_signal
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import STABILITY
-from ptcc_certify.protocols.agents import plant_text
-from ptcc_certify.protocols.casadi_latex import symbol_latex
+from ptcc_certify.model.agents import plant_text
+from ptcc_certify.model.casadi_latex import symbol_latex
 from ptcc_certify.report import notation as texts
 from ptcc_certify.report.facts.agents import claimed_of
 from ptcc_certify.report.facts.claim import assumptions, sharpest

@@ -15,7 +15,7 @@ import numpy as np
 
 from ptcc_certify.errors import SimulationError
 from ptcc_certify.graphs.rationals import number_within
-from ptcc_certify.protocols.disturbance import Disturbance, ExpressionDisturbance, WorstCaseDisturbance
+from ptcc_certify.model.disturbance import Disturbance, ExpressionDisturbance, WorstCaseDisturbance
 from ptcc_certify.simulation.interrupt import interruptible
 from ptcc_certify.simulation.members import Choice, Members
 

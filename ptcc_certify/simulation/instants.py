@@ -15,7 +15,7 @@ from ptcc_certify.graphs.rationals import as_fraction, number_within, whole_numb
 
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import Exact
-    from ptcc_certify.protocols import Protocol
+    from ptcc_certify.model import Protocol
 
 #: How far a run goes past the deadline unless told otherwise, as a share of it.
 PAST = 0.25

@@ -27,13 +27,13 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import as_graph, as_state
 from ptcc_certify.graphs.rationals import shorten, whole_number
 from ptcc_certify.graphs.structure import analyse
+from ptcc_certify.model.base import Protocol, refuse_no_protocol
+from ptcc_certify.model.gain import Gain
+from ptcc_certify.model.gain_limits import GainLimits
+from ptcc_certify.model.late_messages import LateMessages
+from ptcc_certify.model.limited_gain import LimitedGain
+from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.model.refusals import refuse_together
-from ptcc_certify.protocols.base import Protocol, refuse_no_protocol
-from ptcc_certify.protocols.gain import Gain
-from ptcc_certify.protocols.gain_limits import GainLimits
-from ptcc_certify.protocols.late_messages import LateMessages
-from ptcc_certify.protocols.limited_gain import LimitedGain
-from ptcc_certify.protocols.moving_leaders import MovingLeaders
 from ptcc_certify.simulation.cvodes import Tolerances
 from ptcc_certify.simulation.instants import steps_towards
 from ptcc_certify.simulation.members import Choice, Members

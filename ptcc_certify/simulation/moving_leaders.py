@@ -22,8 +22,8 @@ from ptcc_certify.errors import gated
 from ptcc_certify.graphs.io import as_graph, as_state
 from ptcc_certify.graphs.rationals import whole_number
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.protocols.base import Protocol, refuse_no_protocol
-from ptcc_certify.protocols.moving_leaders import MovingLeaders
+from ptcc_certify.model.base import Protocol, refuse_no_protocol
+from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.simulation.instants import steps_towards
 from ptcc_certify.simulation.late_messages import stepped_run
 from ptcc_certify.simulation.trajectory import Conditions, Trajectory

@@ -16,15 +16,15 @@ import numpy as np
 
 from ptcc_certify.errors import ParameterError, SimulationError, gated
 from ptcc_certify.graphs.rationals import shorten
-from ptcc_certify.protocols.disturbance import ExpressionDisturbance, SampledDisturbance, as_disturbance
-from ptcc_certify.protocols.limited_gain import Periods
-from ptcc_certify.protocols.parameters import parameter, readable
+from ptcc_certify.model.disturbance import ExpressionDisturbance, SampledDisturbance, as_disturbance
+from ptcc_certify.model.limited_gain import Periods
+from ptcc_certify.model.parameters import parameter, readable
 from ptcc_certify.simulation.cvodes import Forcing, Phase
 from ptcc_certify.simulation.instants import Instants
 
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
-    from ptcc_certify.protocols.limited_gain import LimitedGain, Periods
+    from ptcc_certify.model.limited_gain import LimitedGain, Periods
     from ptcc_certify.simulation.course import Course
 
 MAX_JUMPS = 10**4
@@ -43,7 +43,7 @@ class Bounded:
     Parameters
     ----------
     signal : Disturbance, str, number or sequence
-        Whatever :func:`ptcc_certify.protocols.disturbance.as_disturbance` takes, such as ``"sin(2*k*t)"``.
+        Whatever :func:`ptcc_certify.model.disturbance.as_disturbance` takes, such as ``"sin(2*k*t)"``.
     bound : int, float, str or Fraction
         In units of the input, of noise in those of the states.
 

@@ -23,13 +23,13 @@ from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.io import as_family, as_graph, as_states
 from ptcc_certify.graphs.io.conversion import is_family
 from ptcc_certify.graphs.rationals import number_within, shorten
+from ptcc_certify.model import Protocol
+from ptcc_certify.model.base import refuse_no_protocol
+from ptcc_certify.model.disturbance import StateDependent, as_disturbance
+from ptcc_certify.model.gain_limits import GainLimits
+from ptcc_certify.model.late_messages import LateMessages
+from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.model.refusals import refuse_together
-from ptcc_certify.protocols import Protocol
-from ptcc_certify.protocols.base import refuse_no_protocol
-from ptcc_certify.protocols.disturbance import StateDependent, as_disturbance
-from ptcc_certify.protocols.gain_limits import GainLimits
-from ptcc_certify.protocols.late_messages import LateMessages
-from ptcc_certify.protocols.moving_leaders import MovingLeaders
 from ptcc_certify.simulation.course import Course
 from ptcc_certify.simulation.cvodes import Motion, Tolerances
 from ptcc_certify.simulation.instants import PAST, Instants, default_instants, wanted_instants
@@ -98,7 +98,7 @@ def simulate(
     The nominal protocol gives ``X' = -gain(t) L X``. The sliding-mode protocol under a disturbance gives the Filippov
     solution: every sliding variable reaches 0 at a root of its own equation and stays there.
 
-    The nominal protocol may act under :class:`~ptcc_certify.protocols.gain_limits.GainLimits`, and under a disturbance
+    The nominal protocol may act under :class:`~ptcc_certify.model.gain_limits.GainLimits`, and under a disturbance
     and measurement noise: ``X' = -gain(t) L (X + n) + d``, the gain being the one that acts.
 
     Parameters
@@ -121,7 +121,7 @@ def simulate(
     sigma0 : state-like, optional
         Sliding mode: ``sigma(0)``, like ``x0``; without it 0, which leaves no reaching phase.
     disturbance : Disturbance, str, number, callable or sequence, optional
-        Sliding mode: whatever :func:`ptcc_certify.protocols.disturbance.as_disturbance` takes, such as
+        Sliding mode: whatever :func:`ptcc_certify.model.disturbance.as_disturbance` takes, such as
         ``"sin(2*k*t)"``; by default the worst case, ``d_k = delta sign(sigma_k)``. It is refused where it exceeds
         ``delta``, and of families where it reads the states. Nominal protocol: :class:`Bounded`, one that reads neither
         states nor sliding variables; by default none.

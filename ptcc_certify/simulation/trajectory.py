@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.family import Family
-    from ptcc_certify.protocols import Protocol, ReachingProtocol
-    from ptcc_certify.protocols.gain_limits import GainLimits
-    from ptcc_certify.protocols.late_messages import LateMessages
-    from ptcc_certify.protocols.moving_leaders import MovingLeaders
+    from ptcc_certify.model import Protocol, ReachingProtocol
+    from ptcc_certify.model.gain_limits import GainLimits
+    from ptcc_certify.model.late_messages import LateMessages
+    from ptcc_certify.model.moving_leaders import MovingLeaders
     from ptcc_certify.simulation.cvodes import Tolerances
 
 #: A state at the deadline is settled when its residual is below this multiple of the tolerances.

@@ -11,9 +11,9 @@ import numpy as np
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 from ptcc_certify.graphs.structure import Structure
+from ptcc_certify.model.base import Protocol
+from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.model.refusals import refuse_leader_groups
-from ptcc_certify.protocols.base import Protocol
-from ptcc_certify.protocols.moving_leaders import MovingLeaders
 
 
 class WorstLeaders:

@@ -11,8 +11,8 @@ from scipy.sparse import csc_matrix
 from ptcc_certify.graphs.io import as_graph
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.lyapunov.function import LyapunovFunction
-from ptcc_certify.protocols import Protocol, SlidingModeProtocol
-from ptcc_certify.protocols.casadi_latex import to_latex
+from ptcc_certify.model import Protocol, SlidingModeProtocol
+from ptcc_certify.model.casadi_latex import to_latex
 from ptcc_certify.theorems.table import theorem_for
 
 if TYPE_CHECKING:

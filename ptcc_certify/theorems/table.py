@@ -15,7 +15,7 @@ from typing import Any
 from ptcc_certify.errors import ParameterError, did_you_mean
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.protocols import Protocol
+from ptcc_certify.model import Protocol
 from ptcc_certify.theorems.claims import sliding_number
 from ptcc_certify.theorems.quasi_strong import BalancedQuasiStrong, UnbalancedQuasiStrong
 from ptcc_certify.theorems.strong import BalancedStrong, UnbalancedStrong

@@ -10,7 +10,7 @@ import pytest
 
 from ptcc_certify.bounds.agent_motion import common_motion, companion, decay_integral
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.protocols.gain import Gain
+from ptcc_certify.model.gain import Gain
 
 
 def ball(x: Fraction) -> flint.arb:

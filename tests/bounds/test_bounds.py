@@ -18,9 +18,9 @@ from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.model.asks import Asks
 from ptcc_certify.model.initial_state import InitialState
-from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.simulation.run import simulate
 
 INSTANTS = [

@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from ptcc_certify.bounds.cascade import drive_integral, input_from, input_is_bounded
-from ptcc_certify.protocols.gain import Gain
+from ptcc_certify.model.gain import Gain
 
 F = Fraction
 

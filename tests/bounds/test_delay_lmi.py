@@ -19,8 +19,8 @@ from ptcc_certify.bounds.longest_delay import LateCase
 from ptcc_certify.bounds.small_delays import SmallDelayBounds, delay_threshold
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.protocols import NominalProtocol
-from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.model import NominalProtocol
+from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.simulation.late_messages import simulate_late
 
 PROTOCOL, CAP = NominalProtocol(T=1, rho1=1, rho2=3, kappa=1), 20

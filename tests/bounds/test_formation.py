@@ -18,10 +18,10 @@ from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import analyse
+from ptcc_certify.model import NominalProtocol
+from ptcc_certify.model.agents import Agents
 from ptcc_certify.model.asks import Asks
-from ptcc_certify.protocols import NominalProtocol
-from ptcc_certify.protocols.agents import Agents
-from ptcc_certify.protocols.gain import Gain
+from ptcc_certify.model.gain import Gain
 
 CLASSES = all_classes()
 

@@ -22,10 +22,10 @@ from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.lyapunov.follower_rows import FollowerRows, UncertainRows
+from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.model.asks import Asks, Expectations
-from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.protocols.late_messages import LateMessages
-from ptcc_certify.protocols.moving_leaders import MovingLeaders
+from ptcc_certify.model.late_messages import LateMessages
+from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.report.page import report_html
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)

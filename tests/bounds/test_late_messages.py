@@ -36,10 +36,10 @@ from ptcc_certify.errors import HypothesisError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.lyapunov.follower_rows import FollowerRows
+from ptcc_certify.model import NominalProtocol
 from ptcc_certify.model.asks import Asks, Expectations
-from ptcc_certify.protocols import NominalProtocol
-from ptcc_certify.protocols.late_messages import LateMessages
-from ptcc_certify.protocols.moving_leaders import MovingLeaders
+from ptcc_certify.model.late_messages import LateMessages
+from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.simulation.late_messages import PATTERNS, simulate_late
 from ptcc_certify.simulation.moving_leaders import simulate_tracking
 

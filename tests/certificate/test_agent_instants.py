@@ -22,8 +22,8 @@ from ptcc_certify.checker.agent_instants import halvings
 from ptcc_certify.checker.agent_model import Agents as CheckedAgents
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.ensembles import Ensemble
-from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.protocols.agents import Agents
+from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.model.agents import Agents
 
 F = Fraction
 PROTOCOL = NominalProtocol(T=2, rho1="1/2", rho2=1, kappa=2)

@@ -24,9 +24,9 @@ from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.model.agents import Agents
 from ptcc_certify.model.asks import Asks
-from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.protocols.agents import Agents
 
 F = Fraction
 CLASSES = all_classes()

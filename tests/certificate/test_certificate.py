@@ -41,8 +41,8 @@ from ptcc_certify.graphs.size_limits import SEARCH_NODES
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.lyapunov import dominance
 from ptcc_certify.lyapunov.search import METHODS
+from ptcc_certify.model import NominalProtocol
 from ptcc_certify.model.asks import Asks, Expectations
-from ptcc_certify.protocols import NominalProtocol
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
 CLASSES = all_classes()

@@ -12,7 +12,7 @@ from ptcc_certify.certificate.family_certificate import certify_family
 from ptcc_certify.certificate.family_comparison import compare, functions_of, worst_case_signals
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.model import NominalProtocol
 from ptcc_certify.simulation.members import Members
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.signals import ConstantSignal, PeriodicSignal, RandomSignal

@@ -23,8 +23,8 @@ from ptcc_certify.errors import Change, ParameterError, spell
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.follower_function import follower_functions
-from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.protocols.reaching_time import certified_reaching_times
+from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.model.reaching_time import certified_reaching_times
 from ptcc_certify.simulation.members import Members
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.signals import ConstantSignal, PeriodicSignal, RandomSignal, Signal, Stretch

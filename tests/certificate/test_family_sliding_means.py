@@ -14,8 +14,8 @@ from ptcc_certify.certificate.family_comparison import compare
 from ptcc_certify.checker import check, digest
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.protocols.restricted_signals import ClockShares, DwellTime, JointWindows
+from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.model.restricted_signals import ClockShares, DwellTime, JointWindows
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.plots.input import plot_input
 from ptcc_certify.report.screen import certificate_lines

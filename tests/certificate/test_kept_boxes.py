@@ -21,7 +21,7 @@ from ptcc_certify import Family, NominalProtocol, SlidingModeProtocol
 from ptcc_certify.certificate.certificate import read_certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate, certify_family
 from ptcc_certify.checker import check
-from ptcc_certify.protocols.restricted_signals import DwellTime
+from ptcc_certify.model.restricted_signals import DwellTime
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.screen import certificate_lines, summary_lines
 from ptcc_certify.report.statement import report_latex

@@ -33,8 +33,8 @@ from ptcc_certify.graphs.io import read_graph
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.lyapunov import dominance
 from ptcc_certify.lyapunov.dominance import dominant_functions
+from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.model.asks import Asks
-from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.report.screen import certificate_lines
 from ptcc_certify.simulation.interrupt import interruptible
 from ptcc_certify.theorems.lemmas import laplacian_spectrum, left_vector

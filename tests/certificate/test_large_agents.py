@@ -24,10 +24,10 @@ from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.model import NominalProtocol
+from ptcc_certify.model.agents import Agents
 from ptcc_certify.model.asks import Asks
 from ptcc_certify.model.initial_state import InitialState
-from ptcc_certify.protocols import NominalProtocol
-from ptcc_certify.protocols.agents import Agents
 
 F = Fraction
 STRONG = NominalProtocol(T=2, rho1="0.5", rho2=3, kappa=1)

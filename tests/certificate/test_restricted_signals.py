@@ -31,7 +31,7 @@ from ptcc_certify.lyapunov.clock_shares import search_share_form
 from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.model.asks import Expectations
-from ptcc_certify.protocols.restricted_signals import ClockShares, DwellTime, JointWindows
+from ptcc_certify.model.restricted_signals import ClockShares, DwellTime, JointWindows
 from ptcc_certify.report.facts.signals import signal_facts
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.screen import certificate_lines, summary_lines

@@ -33,7 +33,7 @@ from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import agent_motion, check
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.model import NominalProtocol
 
 F = Fraction
 CLASSES = dict(all_classes())

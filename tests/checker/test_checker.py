@@ -54,10 +54,10 @@ from ptcc_certify.errors import FormatError
 from ptcc_certify.examples import load_graph, select
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io import read_graph
+from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.initial_state import InitialState
-from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.protocols.gain_limits import GainLimits
 
 CLASSES = dict(all_classes())
 PACKAGE = Path(ptcc_certify.__file__).parent

@@ -16,8 +16,8 @@ from oracle_messages import late_claims
 from ptcc_certify.certificate.json_schema import json_schema
 from ptcc_certify.checker import check
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.protocols import NominalProtocol
-from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.model import NominalProtocol
+from ptcc_certify.model.late_messages import LateMessages
 
 SCHEMA = json_schema()
 TOP = ("messages", "lmi")

@@ -18,7 +18,7 @@ from ptcc_certify.checker import check
 from ptcc_certify.checker.reading import exact
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.follower_function import FollowerFunction, follower_functions
-from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.model import NominalProtocol
 from ptcc_certify.theorems.family_behaviour import decide
 
 KINDS = ("stability", "bipartite consensus", "bipartite containment")

@@ -19,7 +19,7 @@ from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.reading import exact
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.follower_function import follower_functions
-from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.model import NominalProtocol
 from ptcc_certify.theorems.family_behaviour import decide
 
 LED = ("stability", "bipartite consensus", "bipartite containment")

@@ -23,7 +23,7 @@ from ptcc_certify.checker.reading import exact
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.family_search import FamilySearch
 from ptcc_certify.lyapunov.squares_function import SquaresFunction
-from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.theorems.family_behaviour import decide
 

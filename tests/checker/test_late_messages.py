@@ -29,8 +29,8 @@ from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.late_steps import Steps, decay_above
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.model.late_messages import LateMessages
 
 SCHEMA = json_schema()
 VALIDATOR = Draft202012Validator(SCHEMA)

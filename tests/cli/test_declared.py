@@ -17,8 +17,8 @@ import ptcc_certify
 from ptcc_certify.cli import cli
 from ptcc_certify.cli.declared import DECLARED, OF_PROTOCOL, TITLES, given_of, options_for
 from ptcc_certify.graphs.option import option, options_of
-from ptcc_certify.protocols.moving_leaders import MovingLeaders
-from ptcc_certify.protocols.parameters import Given
+from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.model.parameters import Given
 
 PARAMETERS = {name: {p.name: p for p in command.params} for name, command in cli.commands.items()}
 

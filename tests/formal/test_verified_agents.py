@@ -20,9 +20,9 @@ from verified import compare, named, program, said
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.model import NominalProtocol
+from ptcc_certify.model.agents import Agents
 from ptcc_certify.model.asks import Asks
-from ptcc_certify.protocols import NominalProtocol
-from ptcc_certify.protocols.agents import Agents
 
 F = Fraction
 SOURCES = Path(__file__).resolve().parents[2] / "formal"

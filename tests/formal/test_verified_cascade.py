@@ -21,8 +21,8 @@ from ptcc_certify.bounds import final_state as final_states
 from ptcc_certify.certificate import procedure
 from ptcc_certify.checker import check
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.protocols.agents import Agents
+from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.model.agents import Agents
 
 F = Fraction
 SOURCES = Path(__file__).resolve().parents[2] / "formal"
@@ -262,4 +262,5 @@ def test_what_the_checker_accepts_of_random_cascades_the_verified_one_accepts(pa
         data = random_document(seed)
         assert check(data).accepted
         code, text = said(data, tmp_path)
-        assert code == 0 or (code == 2 and any(word in text for word in UNREAD)), (seed, text)
+        resting = code == 4 and not data["graph"]["edges"]  # agents that hear nobody are not covered
+        assert code == 0 or resting or (code == 2 and any(word in text for word in UNREAD)), (seed, text)

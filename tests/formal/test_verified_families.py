@@ -26,8 +26,8 @@ from ptcc_certify.checker import check
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.follower_function import follower_functions
-from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.protocols.restricted_signals import ClockShares, JointWindows
+from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.model.restricted_signals import ClockShares, JointWindows
 from ptcc_certify.theorems.family_behaviour import decide
 
 Json = dict[str, Any]

@@ -24,8 +24,8 @@ from ptcc_certify.certificate import procedure
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
 from ptcc_certify.lyapunov import dominance
+from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.model.asks import Asks
-from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 
 NOMINAL = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
 SLIDING = SlidingModeProtocol(T_r="0.5", T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)

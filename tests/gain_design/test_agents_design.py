@@ -22,10 +22,10 @@ from ptcc_certify.gain_design.agents_deadlines import TOLERANCE, Candidate, at_d
 from ptcc_certify.gain_design.agents_search import design_agents
 from ptcc_certify.gain_design.answer import INFEASIBLE, MET, UNPROVED
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.model.agents import Agents
 from ptcc_certify.model.asks import Asks
 from ptcc_certify.model.initial_state import InitialState
-from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
-from ptcc_certify.protocols.agents import Agents
 
 TRIO = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 2), ("a", "c", -1), ("c", "a", -1)])
 PLACES = {"a": [0, 0], "b": [1, 0], "c": [0, 1]}

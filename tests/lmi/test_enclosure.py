@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lmi.exact import elementary_enclosures as enclosure
-from ptcc_certify.protocols import SlidingModeProtocol
+from ptcc_certify.model import SlidingModeProtocol
 
 
 @pytest.fixture(autouse=True)

@@ -19,9 +19,9 @@ from ptcc_certify.gain_design.search import design
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.size_limits import SHOWN_NODES
 from ptcc_certify.graphs.structure import analyse
+from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.model.asks import Asks
 from ptcc_certify.model.initial_state import InitialState
-from ptcc_certify.protocols import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.simulation.run import simulate
 
 PROTOCOL = NominalProtocol(T=2, rho1=1, rho2=1, kappa=2)

@@ -7,7 +7,7 @@ from ptcc_certify.certificate.family_certificate import certify_family
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.model import NominalProtocol
 from ptcc_certify.report.plots.agents import CAMP_STYLES
 from ptcc_certify.report.plots.counterexample import plot_counterexample
 from ptcc_certify.report.plots.decay import plot_decay

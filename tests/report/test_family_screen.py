@@ -19,7 +19,7 @@ from ptcc_certify.errors import unlabelled
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.model.asks import Expectations
-from ptcc_certify.protocols.restricted_signals import DwellTime
+from ptcc_certify.model.restricted_signals import DwellTime
 from ptcc_certify.report.facts.claim import groups_text
 from ptcc_certify.report.facts.of_structure import decision_facts
 from ptcc_certify.report.page import report_html

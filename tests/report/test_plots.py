@@ -39,12 +39,12 @@ from ptcc_certify.graphs.size_limits import LABELLED_NODES
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.graphs.weights import Weights
 from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.initial_state import InitialState
-from ptcc_certify.protocols.gain_limits import GainLimits
-from ptcc_certify.protocols.late_messages import LateMessages
-from ptcc_certify.protocols.moving_leaders import MovingLeaders
-from ptcc_certify.protocols.nominal import NominalProtocol
-from ptcc_certify.protocols.sliding_mode import SlidingModeProtocol
+from ptcc_certify.model.late_messages import LateMessages
+from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.model.nominal import NominalProtocol
+from ptcc_certify.model.sliding_mode import SlidingModeProtocol
 from ptcc_certify.report.notebook import trajectory_html
 from ptcc_certify.report.page import report_html
 from ptcc_certify.report.plots.agents import CAMP_STYLES, NAME_SIZE, NAMED_AGENTS, NAMED_OF_PART

@@ -25,7 +25,7 @@ from ptcc_certify.examples import load_graph
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import analyse
 from ptcc_certify.model.asks import Expectations
-from ptcc_certify.protocols.gain_limits import GainLimits
+from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.report.facts.instants import told_instants
 from ptcc_certify.report.facts.of_structure import structure_facts
 from ptcc_certify.report.page import report_html

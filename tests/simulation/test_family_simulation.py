@@ -12,9 +12,9 @@ from selection import thinned
 from ptcc_certify.errors import FormatError, ParameterError, SimulationError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
-from ptcc_certify.protocols import NominalProtocol
-from ptcc_certify.protocols.gain_limits import GainLimits
-from ptcc_certify.protocols.late_messages import LateMessages
+from ptcc_certify.model import NominalProtocol
+from ptcc_certify.model.gain_limits import GainLimits
+from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.simulation.members import Members
 from ptcc_certify.simulation.run import simulate
 from ptcc_certify.simulation.signals import (

@@ -22,7 +22,7 @@ from selection import thinned
 import ptcc_certify
 from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.model import NominalProtocol
 from ptcc_certify.simulation.run import simulate
 
 EXAMPLE_1 = NominalProtocol("0.6", "0.1", "0.3", 1)

@@ -19,9 +19,9 @@ from ptcc_certify.bounds.final_state import final_state
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.protocols import SlidingModeProtocol
-from ptcc_certify.protocols.disturbance import SampledDisturbance, StateDependent, telegraph_noise
-from ptcc_certify.protocols.reaching_time import certified_reaching_times
+from ptcc_certify.model import SlidingModeProtocol
+from ptcc_certify.model.disturbance import SampledDisturbance, StateDependent, telegraph_noise
+from ptcc_certify.model.reaching_time import certified_reaching_times
 from ptcc_certify.simulation.nominal import Bounded
 from ptcc_certify.simulation.run import simulate
 

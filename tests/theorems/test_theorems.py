@@ -19,7 +19,7 @@ from ptcc_certify.checker import OBLIGATIONS
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.structure import Structure, analyse
 from ptcc_certify.lyapunov.function import LyapunovFunction
-from ptcc_certify.protocols import NominalProtocol
+from ptcc_certify.model import NominalProtocol
 from ptcc_certify.theorems.claims import sliding_claim
 from ptcc_certify.theorems.composite import _prove_interval
 from ptcc_certify.theorems.lemmas import laplacian_spectrum

@@ -27,7 +27,7 @@ from ptcc_certify.checker.obligations import CheckReport
 from ptcc_certify.checker.protocol import SlidingPart as SlidingSection
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.protocols.base import Protocol
+from ptcc_certify.model.base import Protocol
 from ptcc_certify.theorems.theorem import Obligation
 
 

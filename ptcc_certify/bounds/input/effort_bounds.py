@@ -42,7 +42,7 @@ from ptcc_certify.checker.input_formulas import (
     root_above,
 )
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.protocols import Protocol
+from ptcc_certify.model import Protocol
 
 #: By how much constants of full matrices are raised, so that they are quick to prove.
 RAISE = Fraction(1, 2**30)

@@ -11,8 +11,8 @@ import numpy as np
 from ptcc_certify.bounds.input.initial_set import read_initial_set
 from ptcc_certify.graphs.rationals import nearest_float, whole_number
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.protocols import Protocol
-from ptcc_certify.protocols.base import refuse_no_protocol
+from ptcc_certify.model import Protocol
+from ptcc_certify.model.base import refuse_no_protocol
 
 
 @dataclass(frozen=True)

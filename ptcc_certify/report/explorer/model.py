@@ -28,10 +28,10 @@ from ptcc_certify.graphs.io.packaged import GRAPHS
 from ptcc_certify.graphs.size_limits import EXPLORED_NODES
 from ptcc_certify.model.asks import Asks
 from ptcc_certify.model.case import Case
+from ptcc_certify.model.disturbance import as_disturbance
 from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.reaching_time import certified_reaching_times
 from ptcc_certify.model.refusals import refuse_before_the_graph
-from ptcc_certify.protocols.disturbance import as_disturbance
-from ptcc_certify.protocols.reaching_time import certified_reaching_times
 from ptcc_certify.report.explorer.facts import UNCHECKED, of_controls, rows_of
 from ptcc_certify.report.explorer.panels import PANELS, draw_panels, message_figure, panel_svg, png, shown_in
 from ptcc_certify.report.explorer.question import Question

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.protocols import Protocol
-from ptcc_certify.protocols.disturbance import Disturbance
+from ptcc_certify.model import Protocol
+from ptcc_certify.model.disturbance import Disturbance
 from ptcc_certify.report.explorer.settings import Settings
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from ptcc_certify.graphs.io.packaged import GRAPHS
 from ptcc_certify.graphs.reading import Reading, option_flags
-from ptcc_certify.protocols import SlidingModeProtocol
+from ptcc_certify.model import SlidingModeProtocol
 from ptcc_certify.report.explorer.question import Question
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.lyapunov.search import METHODS
-from ptcc_certify.protocols import Protocol
+from ptcc_certify.model import Protocol
 
 KINDS = ("nominal", "sliding-mode")
 DISTURBANCES = ("none", "worst-case", "sin", "telegraph")

@@ -12,7 +12,7 @@ from lmi.exact.decimal_rounding import near, up
 from ptcc_certify.bounds.final_state import extremes
 from ptcc_certify.certificate.facts import Fact, Facts
 from ptcc_certify.graphs.size_limits import EXACT_NODES
-from ptcc_certify.protocols.agents import DERIVATIVES, PLURALS, plant_text
+from ptcc_certify.model.agents import DERIVATIVES, PLURALS, plant_text
 from ptcc_certify.report.facts.input import peak_fact
 from ptcc_certify.report.text_layout import TEXT, agent_text, columns, short_number, shorten_list, unbroken
 

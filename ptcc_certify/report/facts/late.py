@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from ptcc_certify.bounds.late_messages import LateBounds
     from ptcc_certify.certificate.certificate import Certificate
     from ptcc_certify.certificate.family_certificate import FamilyCertificate
-    from ptcc_certify.protocols.base import Protocol
-    from ptcc_certify.protocols.late_messages import LateMessages
-    from ptcc_certify.protocols.moving_leaders import MovingLeaders
+    from ptcc_certify.model.base import Protocol
+    from ptcc_certify.model.late_messages import LateMessages
+    from ptcc_certify.model.moving_leaders import MovingLeaders
 
 #: From where bounds are that no initial state is given for.
 FROM_WITHIN_1 = ", from within 1 of it at first"
@@ -108,7 +108,7 @@ def messages_text(messages: LateMessages, protocol: Protocol | None = None) -> s
 
     Examples
     --------
-    >>> from ptcc_certify.protocols.late_messages import LateMessages
+    >>> from ptcc_certify.model.late_messages import LateMessages
     >>> messages_text(LateMessages(delay="0.01", period="0.005", losses=3))
     'up to 0.03 old: 0.01 late, every 0.005, 3 in a row lost'
     >>> messages_text(LateMessages(delay={("a", "b"): "0.01", ("b", "c"): "0.02"}))

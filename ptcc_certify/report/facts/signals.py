@@ -18,7 +18,7 @@ from ptcc_certify.certificate.restricted_reasons import TOO_SMALL, reasons_for_n
 from ptcc_certify.errors import labelled
 from ptcc_certify.graphs.family import Mode
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, CONSENSUS, CONTAINMENT
-from ptcc_certify.protocols.restricted_signals import ClockShares, DwellTime, JointWindows, SignalClass
+from ptcc_certify.model.restricted_signals import ClockShares, DwellTime, JointWindows, SignalClass
 from ptcc_certify.report.text_layout import agent_text, printable
 from ptcc_certify.theorems.counterexample_text import mode_name
 from ptcc_certify.theorems.family_behaviour import DEPENDS

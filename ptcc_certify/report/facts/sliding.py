@@ -13,8 +13,8 @@ from ptcc_certify.errors import labelled
 from ptcc_certify.report.text_layout import shorten_list, value_list
 
 if TYPE_CHECKING:
-    from ptcc_certify.protocols.base import ReachingProtocol
-    from ptcc_certify.protocols.reaching_time import ReachingTime
+    from ptcc_certify.model.base import ReachingProtocol
+    from ptcc_certify.model.reaching_time import ReachingTime
 
 
 def sliding_facts(
@@ -27,7 +27,7 @@ def sliding_facts(
 
     Examples
     --------
-    >>> from ptcc_certify.protocols.reaching_time import ReachingTime
+    >>> from ptcc_certify.model.reaching_time import ReachingTime
     >>> p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
     >>> print(next(sliding_facts(["a"], p, [Fraction(0)], [ReachingTime(p.T_r, Fraction(0))])).text)
     0: no reaching phase, the agents slide from the beginning

@@ -16,7 +16,7 @@ from ptcc_certify.report.text_layout import arithmetic
 if TYPE_CHECKING:
     from ptcc_certify.certificate.certificate import Certificate
     from ptcc_certify.certificate.family_certificate import FamilyCertificate
-    from ptcc_certify.protocols.base import Protocol
+    from ptcc_certify.model.base import Protocol
 
 #: Notes that are told.
 _NOTES = 3

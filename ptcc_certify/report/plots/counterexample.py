@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Mode
-from ptcc_certify.protocols import NominalProtocol, Protocol
+from ptcc_certify.model import NominalProtocol, Protocol
 from ptcc_certify.report.plots.agents import CAMP_STYLES, NAME_SIZE, NAMED_AGENTS, camp_groups, name_agents
 from ptcc_certify.report.plots.graph import plot_graph
 from ptcc_certify.report.plots.style import axes_of, finished, styled, time_label

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from lmi.exact.decimal_rounding import float_up
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.protocols import Protocol
+from ptcc_certify.model import Protocol
 from ptcc_certify.report.plots.style import BEHIND, BOUND, RUN, axes_of, finished, styled
 from ptcc_certify.report.plots.subject import certificate_of, structure_of
 from ptcc_certify.simulation.trajectory import Trajectory

@@ -13,7 +13,7 @@ from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS
-from ptcc_certify.protocols.reaching_time import ReachingTime
+from ptcc_certify.model.reaching_time import ReachingTime
 from ptcc_certify.report.plots.agents import (
     CAMP_STYLES,
     NAMED_AGENTS,
@@ -246,7 +246,7 @@ def plot_sliding(
     >>> pair = SignedDigraph.from_edges([(1, 2, -1), (2, 1, -1)])
     >>> p = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=1, mu1=2, mu2=1, mu3=1, delta=1)
     >>> run = simulate(pair, p, [3, 5], sigma0=[1, -4])
-    >>> ax = plot_sliding(run, reaching=ptcc.protocols.reaching_time.certified_reaching_times(p, [1, -4]))
+    >>> ax = plot_sliding(run, reaching=ptcc.model.reaching_time.certified_reaching_times(p, [1, -4]))
     >>> [text.get_text() for text in ax.get_legend().get_texts()][-3:]
     ['$\\sigma_k$ reaches 0', 'reaching time at most', '$T_r$']
     """

@@ -1,7 +1,7 @@
 r"""Bounded disturbances ``d_k(t)`` of the agents ``x_k' = u_k + d_k`` with ``|d_k| <= delta``.
 
 An expression is written in ``t`` and in ``k = 1, ..., N``, the position of the agent
-(:mod:`ptcc_certify.protocols.expression`). The bound ``|d| <= delta`` on the whole horizon is established by interval
+(:mod:`ptcc_certify.model.expression`). The bound ``|d| <= delta`` on the whole horizon is established by interval
 arithmetic over balls, bisecting boxes of time, for the expression in real arithmetic.
 """
 
@@ -19,8 +19,8 @@ import numpy as np
 from ptcc_certify.errors import NumberError, ParameterError, gated
 from ptcc_certify.graphs.equality import ByValue
 from ptcc_certify.graphs.rationals import Exact, as_fraction, nearest_float, shorten, whole_number
-from ptcc_certify.protocols.casadi_latex import to_latex
-from ptcc_certify.protocols.expression import ATOMS, Program, enclosure, floats, parse, symbolic
+from ptcc_certify.model.casadi_latex import to_latex
+from ptcc_certify.model.expression import ATOMS, Program, enclosure, floats, parse, symbolic
 
 if TYPE_CHECKING:
     import casadi as ca

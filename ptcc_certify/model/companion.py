@@ -9,7 +9,7 @@ from typing import Any
 
 from ptcc_certify.errors import NumberError, ParameterError, gated
 from ptcc_certify.graphs.rationals import as_fraction, shorten
-from ptcc_certify.protocols.agents import MOST_ORDER, Agents
+from ptcc_certify.model.agents import MOST_ORDER, Agents
 
 Rows = tuple[tuple[Fraction, ...], ...]
 

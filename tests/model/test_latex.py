@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.protocols import NominalProtocol
-from ptcc_certify.protocols.casadi_latex import symbol_latex, to_latex
-from ptcc_certify.protocols.gain import Gain
+from ptcc_certify.model import NominalProtocol
+from ptcc_certify.model.casadi_latex import symbol_latex, to_latex
+from ptcc_certify.model.gain import Gain
 
 TOKEN = re.compile(r"\s*(\\begin\{cases\}|\\end\{cases\}|\\\\|\\[a-zA-Z]+|[0-9.]+|.)")
 FUNCTIONS = {

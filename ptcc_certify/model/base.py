@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.rationals import format_exact, shorten
-from ptcc_certify.protocols.parameters import Parameters
+from ptcc_certify.model.parameters import Parameters
 
 if TYPE_CHECKING:
     import casadi as ca
     import numpy as np
 
     from ptcc_certify.graphs.digraph import SignedDigraph
-    from ptcc_certify.protocols.gain import Gain
+    from ptcc_certify.model.gain import Gain
 
 
 class Protocol(Parameters, ABC):
@@ -51,7 +51,7 @@ class Protocol(Parameters, ABC):
     @cached_property
     def gain(self) -> Gain:
         """The gain of the nominal input and its clock; its pole is at ``T``."""
-        from ptcc_certify.protocols.gain import Gain
+        from ptcc_certify.model.gain import Gain
 
         return Gain(self.T, self.rho1, self.rho2, self.kappa)
 
@@ -157,7 +157,7 @@ class ReachingProtocol(Protocol):
     @cached_property
     def reaching_gain(self) -> Gain:
         """``mu2 + mu3 kappa/(T_r - t)``; by its clock ``c``, ``||sigma|| <= e^-c ||sigma(0)||`` (Proposition 1)."""
-        from ptcc_certify.protocols.gain import Gain
+        from ptcc_certify.model.gain import Gain
 
         return Gain(self.T_r, self.mu2, self.mu3, self.kappa)
 

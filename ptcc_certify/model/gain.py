@@ -21,8 +21,8 @@ import numpy as np
 from ptcc_certify.checker.input_formulas import PrescribedGain
 from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.graphs.rationals import Exact, shorten
-from ptcc_certify.protocols.casadi_latex import to_latex
-from ptcc_certify.protocols.parameters import NotNegative, Parameters, Positive, parameter, refuse_out_of_range
+from ptcc_certify.model.casadi_latex import to_latex
+from ptcc_certify.model.parameters import NotNegative, Parameters, Positive, parameter, refuse_out_of_range
 
 if TYPE_CHECKING:
     import casadi as ca

@@ -26,10 +26,10 @@ from lmi.exact.decimal_rounding import down, float_down, near, up
 from lmi.exact.elementary_enclosures import decay_integrals_below, rounded
 from ptcc_certify.checker import REACHING_BITS
 from ptcc_certify.errors import SimulationError
-from ptcc_certify.protocols.disturbance import Disturbance, WorstCaseDisturbance
+from ptcc_certify.model.disturbance import Disturbance, WorstCaseDisturbance
 
 if TYPE_CHECKING:
-    from ptcc_certify.protocols.base import ReachingProtocol
+    from ptcc_certify.model.base import ReachingProtocol
 
 #: Beyond this z the time is T_r to the last bit of a float.
 LAST_Z = 40.0

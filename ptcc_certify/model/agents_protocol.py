@@ -11,10 +11,10 @@ import numpy as np
 
 from lmi.exact.decimal_rounding import near
 from ptcc_certify.graphs.io import as_graph
-from ptcc_certify.protocols.base import Protocol, aligned, position_latex
-from ptcc_certify.protocols.casadi_latex import to_latex
-from ptcc_certify.protocols.gain import Gain
-from ptcc_certify.protocols.nominal import coupling
+from ptcc_certify.model.base import Protocol, aligned, position_latex
+from ptcc_certify.model.casadi_latex import to_latex
+from ptcc_certify.model.gain import Gain
+from ptcc_certify.model.nominal import coupling
 
 if TYPE_CHECKING:
     import casadi as ca
@@ -42,7 +42,7 @@ class AgentsProtocol:
 
     Examples
     --------
-    >>> from ptcc_certify.protocols import NominalProtocol
+    >>> from ptcc_certify.model import NominalProtocol
     >>> base, zero, K = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), Fraction(0), (Fraction(3), Fraction(2))
     >>> protocol = AgentsProtocol(base, (zero, zero), (zero, zero), K, ((zero,), (zero,)), None)
     >>> loop = protocol.closed_loop(SignedDigraph.from_edges([(1, 2, 1)]))
@@ -115,7 +115,7 @@ class AgentsProtocol:
 
         Examples
         --------
-        >>> from ptcc_certify.protocols import NominalProtocol
+        >>> from ptcc_certify.model import NominalProtocol
         >>> base, zero = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), Fraction(0)
         >>> AgentsProtocol(base, (zero,) * 2, (zero, Fraction(1)), (Fraction(3), Fraction(2)), ((zero,),), None).law()
         "3 g^2 e + 2 g e' - 1 g x'"
@@ -180,7 +180,7 @@ class AgentsProtocol:
 
         Examples
         --------
-        >>> from ptcc_certify.protocols import NominalProtocol
+        >>> from ptcc_certify.model import NominalProtocol
         >>> base, zero = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2), Fraction(0)
         >>> protocol = AgentsProtocol(base, (zero,) * 2, (zero,) * 2, (Fraction(3), Fraction(2)), ((zero,),), None)
         >>> print(protocol.latex())

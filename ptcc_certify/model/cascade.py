@@ -7,9 +7,9 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from lmi.exact.decimal_rounding import near
-from ptcc_certify.protocols.agents_protocol import AgentsProtocol
-from ptcc_certify.protocols.base import Protocol, aligned
-from ptcc_certify.protocols.casadi_latex import to_latex
+from ptcc_certify.model.agents_protocol import AgentsProtocol
+from ptcc_certify.model.base import Protocol, aligned
+from ptcc_certify.model.casadi_latex import to_latex
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,7 +27,7 @@ class CascadeProtocol(AgentsProtocol):
 
     Examples
     --------
-    >>> from ptcc_certify.protocols import NominalProtocol
+    >>> from ptcc_certify.model import NominalProtocol
     >>> base = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
     >>> protocol = CascadeProtocol.of(base, Fraction(3), ((Fraction(0),), (Fraction(0),)))
     >>> protocol.closed_loop(SignedDigraph.from_edges([(1, 2, 1)]))["ode"].shape
@@ -70,7 +70,7 @@ class CascadeProtocol(AgentsProtocol):
 
         Examples
         --------
-        >>> from ptcc_certify.protocols import NominalProtocol
+        >>> from ptcc_certify.model import NominalProtocol
         >>> base = NominalProtocol(T=1, rho1=1, rho2=1, kappa=2)
         >>> print(CascadeProtocol.of(base, Fraction(3), ((Fraction(0),),)).latex().partition(r" \\")[0])
         \begin{aligned}

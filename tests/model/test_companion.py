@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.protocols.companion import companion_form
+from ptcc_certify.model.companion import companion_form
 
 
 @pytest.mark.parametrize("seed", range(12))

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, ClassVar
 from ptcc_certify.checker.input_formulas import Limits
 from ptcc_certify.errors import gated
 from ptcc_certify.graphs.option import option
-from ptcc_certify.protocols.parameters import Given, Parameters
+from ptcc_certify.model.parameters import Given, Parameters
 
 if TYPE_CHECKING:
-    from ptcc_certify.protocols.gain import Gain
-    from ptcc_certify.protocols.limited_gain import LimitedGain
+    from ptcc_certify.model.gain import Gain
+    from ptcc_certify.model.limited_gain import LimitedGain
 
 
 @gated
@@ -40,7 +40,7 @@ class GainLimits(Parameters, Limits):
 
     Examples
     --------
-    >>> from ptcc_certify.protocols.gain import Gain
+    >>> from ptcc_certify.model.gain import Gain
     >>> limits = GainLimits(gain_cap=11, stop_before="0.01")
     >>> limits
     GainLimits(gain_cap=11, stop_before=1/100)
@@ -79,6 +79,6 @@ class GainLimits(Parameters, Limits):
         ParameterError
             ``stop_before`` is not below ``T``, or a limit acts only where ``1 - t/T`` is below 1e-300.
         """
-        from ptcc_certify.protocols.limited_gain import LimitedGain
+        from ptcc_certify.model.limited_gain import LimitedGain
 
         return LimitedGain(gain, self)

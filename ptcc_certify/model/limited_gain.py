@@ -22,8 +22,8 @@ import numpy as np
 
 from ptcc_certify.checker.input_formulas import Limits
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.protocols.gain import Gain
-from ptcc_certify.protocols.parameters import readable
+from ptcc_certify.model.gain import Gain
+from ptcc_certify.model.parameters import readable
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -15,9 +15,9 @@ from selection import thinned
 
 from ptcc_certify.errors import SimulationError
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.protocols import SlidingModeProtocol
-from ptcc_certify.protocols.disturbance import SampledDisturbance, WorstCaseDisturbance, as_disturbance, telegraph_noise
-from ptcc_certify.protocols.reaching_time import (
+from ptcc_certify.model import SlidingModeProtocol
+from ptcc_certify.model.disturbance import SampledDisturbance, WorstCaseDisturbance, as_disturbance, telegraph_noise
+from ptcc_certify.model.reaching_time import (
     ReachingProblem,
     ReachingTime,
     certified_reaching_times,

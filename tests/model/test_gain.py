@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.protocols.gain import Gain, prescribed_time_bound
+from ptcc_certify.model.gain import Gain, prescribed_time_bound
 
 positive = st.fractions(min_value=Fraction(1, 20), max_value=20, max_denominator=50)
 GAINS = st.builds(Gain, positive, positive, positive | st.just(Fraction(0)), positive)
@@ -134,8 +134,8 @@ def test_parameters_are_exact_and_frozen():
 
 def test_importing_the_modules_loads_neither_casadi_nor_scipy():
     code = (
-        "import sys, ptcc_certify.protocols.gain, ptcc_certify.protocols.nominal, ptcc_certify.simulation.run;"
-        "import ptcc_certify.protocols.casadi_latex;"
+        "import sys, ptcc_certify.model.gain, ptcc_certify.model.nominal, ptcc_certify.simulation.run;"
+        "import ptcc_certify.model.casadi_latex;"
         "sys.exit(bool({'casadi', 'scipy', 'networkx', 'matplotlib'} & set(sys.modules)))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

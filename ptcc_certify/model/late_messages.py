@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.graphs.option import option
 from ptcc_certify.graphs.rationals import Exact, shorten
-from ptcc_certify.protocols.parameters import Given, NotNegative, parameter, readable
+from ptcc_certify.model.parameters import Given, NotNegative, parameter, readable
 
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph

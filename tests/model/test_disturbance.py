@@ -14,7 +14,7 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from ptcc_certify.errors import ParameterError
-from ptcc_certify.protocols.disturbance import (
+from ptcc_certify.model.disturbance import (
     Disturbance,
     ExpressionDisturbance,
     SampledDisturbance,
@@ -23,7 +23,7 @@ from ptcc_certify.protocols.disturbance import (
     as_disturbance,
     telegraph_noise,
 )
-from ptcc_certify.protocols.expression import enclosure, parse
+from ptcc_certify.model.expression import enclosure, parse
 
 ONE = Fraction(1)
 LABELS = ["a", "b", "c"]

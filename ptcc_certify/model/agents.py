@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 from ptcc_certify.errors import Change, NumberError, ParameterError, Sentence, gated, joined
 from ptcc_certify.graphs.option import option
 from ptcc_certify.graphs.rationals import Exact, as_fraction, no_number, shorten, whole_number
-from ptcc_certify.protocols.parameters import parameter, readable
+from ptcc_certify.model.parameters import parameter, readable
 
 #: Largest order, and largest dimension of space.
 MOST_ORDER, MOST_DIMENSION = 8, 8
@@ -42,7 +42,7 @@ class Agents:
         ``alpha > 0``: agents of order 2 meet at rest, by ``-alpha eta`` times their own velocity; gains as designed.
     cascade : number or str, optional
         ``alpha > 0``: double integrators track the velocity that the paper's protocol commands, at this rate per unit
-        of the clock. No gain depends on the graph; see :class:`~ptcc_certify.protocols.cascade.CascadeProtocol`.
+        of the clock. No gain depends on the graph; see :class:`~ptcc_certify.model.cascade.CascadeProtocol`.
     decay : number or str, optional
         ``R = r rho2 kappa``: deviations decay like ``(1 - t/T)^(R/2)`` near ``T``; above ``2 (n - 1)``. By default
         ``2 n``, from which on the input is bounded; single integrators without it run the paper's protocol, ``K = 1``.

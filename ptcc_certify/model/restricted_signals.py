@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 from ptcc_certify.errors import ParameterError, gated
 from ptcc_certify.graphs.option import Option, option
 from ptcc_certify.graphs.rationals import shorten
-from ptcc_certify.protocols.parameters import parameter, readable
+from ptcc_certify.model.parameters import parameter, readable
 
 #: What a dwell time of the clock is called.
 CLOCK_DWELL = Option(
