@@ -1,5 +1,7 @@
 """Lyapunov functions of agents of order n where halves of the time are left, as the check encloses them.
 
+Of agents by one matrix they are of ``y``; of the cascade of positions and of ``r``, of which its bounds are made.
+
 What a function is worth there, of the motion from one initial state, is far less than its decay says: most of it is of
 motions that die sooner.
 """
@@ -15,13 +17,15 @@ from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.work import WorkError, limited
 from ptcc_certify.bounds.agents import States
 from ptcc_certify.checker.agent_bounds import Begin
+from ptcc_certify.checker.agent_cascade import halvings_of, roots_above
 from ptcc_certify.checker.agent_instants import halvings, value_above
-from ptcc_certify.checker.agent_model import Agents
+from ptcc_certify.checker.agent_model import Agents, Cascade
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.lyapunov import Function
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.model.agents_protocol import AgentsProtocol
+from ptcc_certify.model.cascade import CascadeProtocol
 from ptcc_certify.theorems.agent_decrease import AgentMatrix
 
 Values = tuple[Fraction | None, ...]
@@ -50,13 +54,42 @@ def instant_values(
     nodes, found = range(structure.graph.n_nodes), list[Values]()
     with suppress(WorkError), limited(WORK):
         begin = Begin(agents, _checked(structure), states, protocol.offsets)
-        read = {k: Function("", V.proved_rate, Fraction(1), V.form, None, None) for k, V in known.items()}
+        read = {k: _read(V) for k, V in known.items()}
         graph, deviations = begin.graph, {k: V.deviation.agents for k, V in known.items() if V.deviation is not None}
         for at in islice(halvings(agents, graph.laplacian_product, graph.unit, states, protocol.offsets), INSTANTS):
             values = {k: rounded(value_above(begin, V, at), BITS, up=True) for k, V in read.items()}
             best = {min(known, key=lambda k: deviations[k][v] * values[k]) for v in nodes}
             found.append(tuple(values[k] if k in best else None for k in range(len(functions))))
     return tuple(found)
+
+
+def instant_roots(
+    structure: Structure, protocol: CascadeProtocol, functions: Sequence[LyapunovFunction], states: States
+) -> tuple[Values, ...]:
+    """Return bounds of ``sqrt(V)`` of positions and of ``r``, function after function, at ``T (1 - 2^-i)``.
+
+    Of those functions alone that bound a position best; as many instants as little work allows.
+    """
+    known = {k: V for k, V in enumerate(functions) if V.deviation is not None and V.form is not None}
+    if not known:
+        return ()
+    agents = Cascade(2, len(states[0]), protocol.plant, protocol.own, None, protocol.gain.exact)
+    nodes, found, remaining = range(structure.graph.n_nodes), list[Values](), Fraction(1)
+    with suppress(WorkError), limited(WORK):
+        graph, read = _checked(structure), {k: _read(V) for k, V in known.items()}
+        deviations = {k: V.deviation.agents for k, V in known.items() if V.deviation is not None}
+        for at in islice(halvings_of(graph, agents, states, protocol.offsets), INSTANTS):
+            remaining /= 2
+            roots = {k: roots_above(graph, agents, V, at, remaining) for k, V in read.items()}
+            best = {min(known, key=lambda k: deviations[k][v] * roots[k][0] ** 2) for v in nodes}
+            told = [roots[k] if k in best else (None, None) for k in range(len(functions))]
+            found.append(tuple(None if x is None else rounded(x, BITS, up=True) for pair in told for x in pair))
+    return tuple(found)
+
+
+def _read(V: LyapunovFunction) -> Function:
+    """Return a Lyapunov function as the check reads it, without its constants."""
+    return Function("", V.proved_rate, Fraction(1), V.form, None, None)
 
 
 def _checked(structure: Structure) -> Digraph:

@@ -15,12 +15,17 @@ from ptcc_certify.lyapunov.function import LyapunovFunction
 from ptcc_certify.simulation.agents import AgentsTrajectory
 from ptcc_certify.theorems.agent_decrease import AgentMatrix
 
+#: Tolerances of the integrator within which nothing is told from 0.
+RESOLVED = 100
+
 
 @dataclass(frozen=True)
 class AgentsComparison:
     """How near a run comes to its bounds: ratios, at most 1 up to rounding where none is violated.
 
-    All are taken of ``e^(r s/2)`` times what is bounded, which is what was integrated: there is no floor.
+    All are taken of ``e^(r s/2)`` times what is bounded, which is what was integrated. Of bounds from a matrix there is no
+    floor. Bounds of the cascade may fall faster than that, and a run counts by how much it is above :data:`RESOLVED`
+    times the tolerance of its integrator, relative to its largest.
 
     Attributes
     ----------
@@ -117,9 +122,9 @@ def compare_with_bounds(
     decay = 0.0
     for V, bound in zip(functions, roots(q), strict=True):
         values = (V.scaled(V.coordinates_of(z[:, :, :1], L)) ** 2).sum(axis=(0, 1, 2))
-        decay = max(decay, float(_ratio(np.sqrt(values), bound * weight).max()))
+        decay = max(decay, float(_ratio(_resolved(np.sqrt(values), run.rtol), bound * weight).max()))
     most = deviations(q) * weight / eta ** np.arange(z.shape[2])[:, None]
-    sizes = np.sqrt((z**2).sum(axis=1))
+    sizes = _resolved(np.sqrt((z**2).sum(axis=1)), run.rtol)
     ratios = _ratio(sizes, most).max(axis=(0, 2)).tolist() if np.isfinite(most).all() else []
     return AgentsComparison(decay, tuple(ratios), None, _input_ratio(run, later, bounds))
 
@@ -130,6 +135,11 @@ def _input_ratio(run: AgentsTrajectory, later: np.ndarray, bounds: Sequence[Frac
         return None
     actual = np.sqrt((run.input[..., later] ** 2).sum(axis=1)).max(axis=-1)
     return float(_ratio(actual, np.array([float_up(x) for x in bounds])).max())
+
+
+def _resolved(size: np.ndarray, rtol: float) -> np.ndarray:
+    """Return by how much sizes are above what the integrator resolves; nothing of what rests."""
+    return np.maximum(size - RESOLVED * rtol * float(size.max(initial=0.0)), 0.0)
 
 
 def _ratio(size: np.ndarray, bound: np.ndarray) -> np.ndarray:

@@ -150,8 +150,12 @@ def drive_integral(gain: Gain, rate: Fraction, alpha: Fraction, remaining: np.nd
     return np.minimum(first, second) * (1 + _ROOM)
 
 
-def course(gain: Gain, rate: Fraction, alpha: Fraction, roots: Roots, remaining: np.ndarray) -> Course:
+def course(
+    gain: Gain, rate: Fraction, alpha: Fraction, roots: Roots, remaining: np.ndarray, begin: float = 1.0
+) -> Course:
     """Return bounds of ``R``, ``S`` and ``J`` where ``1 - t/T`` is ``remaining``, above 0, from above.
+
+    The roots are those where it is ``begin``, from which on ``J`` counts.
 
     Step by step: in a step in which ``theta`` grows by ``d`` and ``s`` by ``D``, let ``m = int e^(-g s)`` over it, with
     the ``g`` it begins with. ``S <= (S + m R)/(1 - m d)`` all along, which times ``d`` is what ``theta' S`` adds to
@@ -164,7 +168,8 @@ def course(gain: Gain, rate: Fraction, alpha: Fraction, roots: Roots, remaining:
     >>> bool(1 <= late.state[0] < 1.01), bool(0 < late.state[1] < 1e-3)
     (True, True)
     """
-    q = np.unique(np.concatenate([np.geomspace(remaining.min(), 1, _STEPS), remaining]))[::-1]
+    steps_of_course = _STEPS if begin == 1 else 20 + int(15 * math.log2(begin / remaining.min()))
+    q = np.unique(np.concatenate([np.geomspace(remaining.min(), begin, steps_of_course), remaining]))[::-1]
     a, b, k, linear = float_down(alpha), float_down(rate / 2), float(gain.pole), float(gain.rho1 * gain.T)
     past = linear * q + k  # eta (T - t)
     theta = (k / past) ** 2 / k

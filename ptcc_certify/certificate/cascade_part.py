@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from lmi.exact.decimal_rounding import down, float_down, float_up, near, up
+from ptcc_certify.bounds.agent_instants import Values, instant_roots
 from ptcc_certify.bounds.agent_motion import LARGEST_DECAY, Interval, common_motion
 from ptcc_certify.bounds.agents import States, error_constants, root_product
 from ptcc_certify.bounds.agents_comparison import AgentsComparison, compare_with_bounds
@@ -69,6 +70,8 @@ class CascadePart(AgentsAnswer):
         Positions alone where velocities are not proved to vanish.
     input : tuple of N Fraction, or None
         Bounds of the Euclidean norm of every agent's input.
+    instants : tuple of tuples of Fraction or None
+        Bounds of ``sqrt(V)`` of positions and of ``r``, of each function used, at ``1 - t/T = 1/2, 1/4, ..``.
     """
 
     structure: Structure
@@ -81,6 +84,7 @@ class CascadePart(AgentsAnswer):
     final_state: Intervals | None = None
     input: tuple[Fraction, ...] | None = None
     residual: Residual | None = None
+    instants: tuple[Values, ...] = ()
 
     @property
     def settles(self) -> bool:
@@ -195,9 +199,27 @@ class CascadePart(AgentsAnswer):
         for V, root in zip(self.functions, roots, strict=True):
             own = float_up(root.state) * np.exp(-float_down(V.proved_rate) / 2 * clock)
             own += float_up(root.drive) * drive_integral(gain, V.proved_rate, self.alpha, q)
-            known = root.combined is not None
-            found.append(np.minimum(own, course(gain, V.proved_rate, self.alpha, root, q).state) if known else own)
+            if root.combined is not None:
+                own = np.minimum(own, course(gain, V.proved_rate, self.alpha, root, q).state)
+            found.append(own)
+        if roots is self.roots:
+            found = [np.minimum(own, self._from_instants(k, q)[0]) for k, own in enumerate(found)]
         return found
+
+    def _from_instants(self, number: int, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return bounds of ``S`` and of ``R + g S`` of a function used, each from the last instant that tells of it."""
+        V, state, speed = self.functions[number], np.full(len(q), np.inf), np.full(len(q), np.inf)
+        known = dict[float, Roots]()
+        for i, row in enumerate(self.instants, start=1):
+            S, R = row[2 * number : 2 * number + 2]
+            if S is not None and R is not None:
+                known[2.0**-i] = Roots(S, Fraction(0), R)
+        ends = [*known, 0.0][1:]
+        for (begin, roots), end in zip(known.items(), ends, strict=True):
+            if (late := (q <= begin) & (q > end)).any():
+                own = course(self.protocol.gain, V.proved_rate, self.alpha, roots, q[late], begin)
+                state[late], speed[late] = own.state, own.combined + own.pull * own.state
+        return state, speed
 
     @cached_property
     def error_constants(self) -> tuple[tuple[Fraction, ...] | None, ...]:
@@ -218,12 +240,13 @@ class CascadePart(AgentsAnswer):
         near, fast, errors, drive, integral, begin = (np.full((N, len(q)), np.inf) for _ in range(6))
         fading = np.exp(-float_down(self.alpha) * gain.clock_at_remaining(q))
         each = zip(self.functions, self.roots, self._values(self.roots, q), self.error_constants, strict=True)
-        for V, root, value, constants in each:
+        for number, (V, root, value, constants) in enumerate(each):
             own = course(gain, V.proved_rate, self.alpha, root, q)
             if V.deviation is not None:
                 c = np.array([float_up(root_product(x)) for x in V.deviation.agents])
                 near = np.minimum(near, np.outer(c, value))
-                fast = np.minimum(fast, np.outer(c, own.combined + own.pull * own.state))
+                later = self._from_instants(number, q)[1]
+                fast = np.minimum(fast, np.outer(c, np.minimum(own.combined + own.pull * own.state, later)))
                 drive = np.minimum(drive, np.outer(c, float_up(root.drive) * fading))
                 begin = np.minimum(begin, np.outer(c, float_up(root.velocity or Fraction(0)) * fading))
             if constants is not None:
@@ -304,7 +327,9 @@ def prove_cascade(
         final = final_states(part, influence)
         if final is not None and not part.derivatives_agree:
             final = tuple(tuple(chain[:1] for chain in agent) for agent in final)
-    return replace(part, final_state=final, input=_input(part))
+    begins = initial_state is not None and any(root.state or root.drive for root in roots)
+    instants = instant_roots(structure, protocol, used, initial_state) if initial_state and begins else ()
+    return replace(part, final_state=final, input=_input(part), instants=instants)
 
 
 def _input(part: CascadePart) -> tuple[Fraction, ...] | None:

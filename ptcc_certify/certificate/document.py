@@ -98,13 +98,13 @@ def read_agents(
     section: AgentsSection | CascadeSection | None = report.sections.get("agents")
     if section is None:
         return None
+    instants = rows_of(report.sections.get("instants", ()))
     if isinstance(section, CascadeSection):
-        return read_cascade(section, structure, base, functions)
+        return replace(read_cascade(section, structure, base, functions), instants=instants)
     phases = tuple(
         Phase(p.function, rows_of(p.lower_triangle), p.rate, p.coupling, tuple(p.points))
         for p in report.sections.get("phases", ())
     )
-    instants = rows_of(report.sections.get("instants", ()))
     return replace(read_matrix(section, structure, base, functions), phases=phases, instants=instants)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import chain
@@ -14,14 +14,15 @@ from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.numbers import integers, longest, shorten, sized
 from lmi.exact.work import spend
 from ptcc_certify.checker.agent_bounds import BITS, AgentsInput, Used, UsedSection, Weights, verify_used
-from ptcc_certify.checker.agent_model import LARGEST_DIMENSION, LONGEST, Chains, within
+from ptcc_certify.checker.agent_instants import MANY_INSTANTS, Halved, halvings, largest_value
+from ptcc_certify.checker.agent_model import LARGEST_DIMENSION, LONGEST, Cascade, within
 from ptcc_certify.checker.agent_motion import States, check_final_states, check_motion, need_shape, sized_offsets
 from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.input import Verified
 from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.checker.lyapunov import Function
 from ptcc_certify.checker.proof_cursor import Document
-from ptcc_certify.checker.reading import length, need
+from ptcc_certify.checker.reading import RejectedError, length, need
 from ptcc_certify.checker.sections import Ball, ByAgent, Positive, Several
 
 
@@ -51,7 +52,7 @@ class Vectors(NamedTuple):
     """A number of every agent in each coordinate of space, in integers over a scale."""
 
     columns: Sequence[Sequence[int]]
-    scale: int
+    scale: int | Fraction
 
     def value(self, graph: Digraph, function: Function) -> Fraction:
         """Bound ``V``, summed over the coordinates of space, from above, to many bits."""
@@ -71,7 +72,7 @@ class Drive(NamedTuple):
     error: Vectors
     velocities: Vectors
 
-    def combined(self, agents: Chains, theta: Fraction) -> Vectors:
+    def combined(self, agents: Cascade, theta: Fraction) -> Vectors:
         """Return ``r(0) = v(0)/eta(0) + (alpha + theta) x(0)``."""
         (p, q), (a, c) = agents.eta_0.as_integer_ratio(), (agents.own[1] + theta).as_integer_ratio()
         X, V = self.positions, self.velocities
@@ -98,7 +99,7 @@ def check_cascade(doc: Document, verified: Verified) -> bool:
     gain = verified.gain
     longest_number = length((alpha, gain.T, gain.rho1, gain.k))
     need(longest_number <= LONGEST, f"agents: a number of {longest_number} bits; {LONGEST} are taken")
-    agents = Chains(2, d, (Fraction(0),) * 2, (Fraction(0), alpha), None, gain)
+    agents = Cascade(2, d, (Fraction(0),) * 2, (Fraction(0), alpha), None, gain)
     offsets, states = sized_offsets(section.offsets, agents), section.initial_state
     need_shape(states, "initial_state", agents)
     drive = None if states is None else _drive(graph, agents, states, offsets)
@@ -117,10 +118,13 @@ def check_cascade(doc: Document, verified: Verified) -> bool:
         need(drive is not None, "a bound of the input without initial states")
         if drive is not None:
             _check_input(doc, verified, agents, used, drive, section.input)
+    if "instants" in doc.data:
+        need(states is not None, "instants without initial states")
+        _check_instants(doc, graph, agents, used, halvings_of(graph, agents, states or (), offsets))
     return proved
 
 
-def _drive(graph: Digraph, agents: Chains, states: States, offsets: Sequence[Sequence[Fraction]]) -> Drive:
+def _drive(graph: Digraph, agents: Cascade, states: States, offsets: Sequence[Sequence[Fraction]]) -> Drive:
     """Return what the motion begins with, in integers."""
     longest_state = length(x for part in (*states, offsets) for row in part for x in row)
     spend(40 * agents.d * graph.n, longest_state, longest_state, "the initial states")
@@ -160,7 +164,7 @@ def _functions(doc: Document, verified: Verified, section: CascadeSection, drive
 
 
 def _check_input(
-    doc: Document, verified: Verified, agents: Chains, used: Sequence[Tracked], drive: Drive, section: AgentsInput
+    doc: Document, verified: Verified, agents: Cascade, used: Sequence[Tracked], drive: Drive, section: AgentsInput
 ) -> None:
     """Verify the bound of every agent's input, in Euclidean norm over space."""
     graph, k, alpha, eta = verified.structure.graph, agents.gain.k, agents.own[1], agents.eta_0
@@ -188,3 +192,53 @@ def _check_input(
         need(x >= least + added, f"the input of agent {shorten(graph.labels[v])} is not proved")
     need(section.largest == max(values), "the largest input is another")
     doc.done(f"at most {up(max(values))}")
+
+
+def halvings_of(
+    graph: Digraph, agents: Cascade, states: States, offsets: Sequence[Sequence[Fraction]]
+) -> Iterator[Halved]:
+    """Yield where agents are at instants ``T (1 - 2^-i)``, ``i = 1, 2, ..``; every entry of ``y`` is off by ``off``.
+
+    A push of size 1, of ``y`` or of its slope, moves ``X' + L X`` by ``1 + |L|`` at most, which falls like
+    ``e^(-alpha s)``, and ``X' = -L X + ..`` does not expand the largest entry: so it moves ``X`` by ``1 + (1 +
+    |L|)/alpha``, and the other entry of ``y``, ``X'``, by ``|L|`` times that and ``1 + |L|``.
+    """
+    reach = 1 + Fraction(2 * max(graph.diagonal), graph.unit)
+    most = rounded(reach * (2 + reach / agents.own[1]), BITS, up=True)
+    for at in halvings(agents, graph.laplacian_product, graph.unit, states, offsets):
+        yield at._replace(off=rounded(at.off * most, BITS, up=True))
+
+
+def roots_above(
+    graph: Digraph, agents: Cascade, function: Function, at: Halved, remaining: Fraction
+) -> tuple[Fraction, Fraction]:
+    """Bound ``sqrt(V)`` of positions less places, and of ``r = X' + g X``, at an instant from above."""
+    g = agents.pull(remaining)
+    a, c = g.as_integer_ratio()
+    columns = list(chain.from_iterable(chain.from_iterable(at.columns)))
+    spend(2 * len(columns), longest(columns), longest((a, c)), "agents at an instant")
+    positions = Vectors([x for x, _ in at.columns], at.scale)
+    combined = [[c * v + a * y for y, v in zip(*rows, strict=True)] for rows in at.columns]
+    spread = root_above(largest_value(graph, function)) * at.off
+    roots = [root_above(each.value(graph, function)) for each in (positions, Vectors(combined, at.scale * c))]
+    return roots[0] + spread, roots[1] + (1 + g) * spread
+
+
+def _check_instants(
+    doc: Document, graph: Digraph, agents: Cascade, used: Sequence[Tracked], known: Iterator[Halved]
+) -> None:
+    """Verify roots of Lyapunov functions at instants at which the time left is halved."""
+    section, remaining = doc.section("instants"), Fraction(1)
+    need(1 <= len(section) <= MANY_INSTANTS, f"no instants, or more than {MANY_INSTANTS}")
+    doc.open("agent-instants", "instants")
+    for row in section:
+        if (at := next(known, None)) is None:
+            raise RejectedError("the agents are not enclosed at an instant")
+        remaining /= 2
+        need(len(row) == 2 * len(used), f"an instant has not {2 * len(used)} entries")
+        for one, told in zip(used, zip(row[::2], row[1::2], strict=True), strict=True):
+            if any(x is not None for x in told):
+                least = roots_above(graph, agents, one.use.function, at, remaining)
+                holds = all(x is None or x >= y for x, y in zip(told, least, strict=True))
+                need(holds, "a Lyapunov function is larger at an instant")
+    doc.done(f"{len(section)} instants")

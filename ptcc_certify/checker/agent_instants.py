@@ -8,6 +8,9 @@ Between ``tau_0`` and ``tau_0/2`` left let ``tau = tau_0 w``, ``w = 1 - x``, ``D
 A polynomial ``p`` with integer coefficients leaves a defect ``d``: it is the motion of agents that are pushed by ``b
 d/h^n`` per unit of the clock in the coordinates ``y_i = D^(i-1) p/h^(i-1)``, and rounded where it begins. Since ``V``
 decays, ``sqrt(V)`` of the difference from the motion is at most the sum of ``sqrt(V)`` of all that was pushed.
+
+In the cascade ``K_1 h^2`` is ``alpha h^2 + k``. What is made of pushes there is told by
+:mod:`~ptcc_certify.checker.agent_cascade`.
 """
 
 from __future__ import annotations
@@ -23,8 +26,9 @@ from lmi.exact.elementary_enclosures import rounded
 from lmi.exact.numbers import integers, longest
 from lmi.exact.work import spend
 from ptcc_certify.checker.agent_bounds import Begin, Used, Weights
-from ptcc_certify.checker.agent_model import Agents
+from ptcc_certify.checker.agent_model import Agents, Cascade
 from ptcc_certify.checker.agent_motion import States
+from ptcc_certify.checker.digraph import Digraph
 from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.checker.lyapunov import Function
 from ptcc_certify.checker.proof_cursor import Document
@@ -32,7 +36,7 @@ from ptcc_certify.checker.reading import RejectedError, need
 from ptcc_certify.checker.sections import Several
 
 Columns = list[list[list[int]]]
-#: ``V`` of every function that is used, at most, at every instant; None: not told.
+#: ``V`` of every function that is used, at most, at every instant; None: not told. Of the cascade two roots of each.
 InstantsSection = Several[Several[Fraction | None]]
 #: Bits of the largest initial coefficient; coefficients end where what they add is below the root of the unit.
 BITS = 256
@@ -50,7 +54,8 @@ class Halved(NamedTuple):
     scale : Fraction
         What 1 is in these.
     off : Fraction
-        ``sqrt(V)`` of ``y`` is off by at most this, for every ``V`` that is at most 1 where one entry of ``y`` of every
+        The sum of all that was pushed, of all coordinates of space, as the largest entry of ``y`` of any agent: so much
+        ``sqrt(V)`` of ``y`` is off, for every ``V`` that decays, and is at most 1 where one entry of ``y`` of every
         agent is at most 1, in one coordinate of space.
     """
 
@@ -64,7 +69,7 @@ class _Step:
 
     Parameters
     ----------
-    agents : Agents
+    agents : Agents or Cascade
     tau : Fraction
         What is left at first.
     product : callable
@@ -72,7 +77,9 @@ class _Step:
     unit : int
     """
 
-    def __init__(self, agents: Agents, tau: Fraction, product: Callable[[Sequence[int]], list[int]], unit: int):
+    def __init__(
+        self, agents: Agents | Cascade, tau: Fraction, product: Callable[[Sequence[int]], list[int]], unit: int
+    ):
         self.n, self.product, self.unit = agents.n, product, unit
         n, part = agents.n, agents.gain.rho1 * tau
         self.last = part / 2 + agents.gain.k
@@ -84,6 +91,8 @@ class _Step:
             pull = [sum(h[d - j] * w[j] for j in range(i + 1) if 0 <= d - j <= power) for d in range(n + 1)]
             plant = [a * tau**power * (-1) ** d * comb(n, d) for d in range(n + 1)]
             rows += [[K * x for x in pull], [f * x + y for x, y in zip(pull, plant, strict=True)]]
+        if isinstance(agents, Cascade):
+            rows[0][0] += agents.gain.k  # theta h^2
         self.rows, self.times = integers(rows)
         self.bits = longest(chain([self.times], *self.rows))
 
@@ -131,7 +140,7 @@ class _Step:
 
 
 def halvings(
-    agents: Agents,
+    agents: Agents | Cascade,
     product: Callable[[Sequence[int]], list[int]],
     unit: int,
     states: States,
@@ -141,7 +150,7 @@ def halvings(
 
     Parameters
     ----------
-    agents : Agents
+    agents : Agents or Cascade
         Without a cap of the gain.
     product : callable
         ``L x``, times ``unit``, of one integer for each agent.
@@ -183,16 +192,21 @@ def halvings(
         yield Halved(columns, scale * p ** (n - 1), off)
 
 
-def value_above(begin: Begin, function: Function, at: Halved) -> Fraction:
-    """Bound ``V`` at an instant from above."""
-    form, (P, times) = Weights.of(function), begin.inverse
+def largest_value(graph: Digraph, function: Function) -> Fraction:
+    """Bound ``V`` of one number of every agent that is at most 1, in one coordinate of space."""
+    form = Weights.of(function)
     if form.matrix is None:
         total = sum(map(abs, form.diagonal or ()))
     else:
         total = sum(map(abs, chain.from_iterable(form.matrix)))
-    graph = begin.graph
     reach = Fraction(2 * max(graph.diagonal), graph.unit) if not form.gauge else Fraction(2)
-    spread = Fraction(total, form.scale) * reach**2 * (sum(P[i][i] for i in range(len(P))) / times)
+    return Fraction(total, form.scale) * reach**2
+
+
+def value_above(begin: Begin, function: Function, at: Halved) -> Fraction:
+    """Bound ``V`` at an instant from above."""
+    P, times = begin.inverse
+    spread = largest_value(begin.graph, function) * (sum(P[i][i] for i in range(len(P))) / times)
     return (root_above(begin.value(function, (at.columns, at.scale))) + root_above(spread) * at.off) ** 2
 
 

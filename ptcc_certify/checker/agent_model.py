@@ -94,6 +94,28 @@ class Agents(Chains):
         return spare >= 0 and self.plant[1] + spare * self.first_gain >= 0
 
 
+@dataclass(frozen=True)
+class Cascade(Chains):
+    """Double integrators that track the velocity of the paper's protocol: ``K = (alpha + theta, 1)``."""
+
+    @property
+    def gains(self) -> tuple[Fraction, Fraction]:
+        """``K`` without ``theta``."""
+        return self.own[1], Fraction(1)
+
+    def pull(self, remaining: Fraction) -> Fraction:
+        """Return ``g = alpha + theta`` where ``1 - t/T`` is ``remaining``: ``theta = k/(eta (T - t))^2``.
+
+        Examples
+        --------
+        >>> one = Fraction(1)
+        >>> agents = Cascade(2, 1, (0 * one, 0 * one), (0 * one, 3 * one), None, PrescribedGain(one, one, one))
+        >>> agents.pull(one), agents.pull(0 * one)
+        (Fraction(13, 4), Fraction(4, 1))
+        """
+        return self.own[1] + self.gain.k / (self.gain.rho1 * self.gain.T * remaining + self.gain.k) ** 2
+
+
 @dataclass(frozen=True, kw_only=True)
 class OneAgent:
     """What the file says of one agent."""

@@ -48,7 +48,7 @@ def check_agents(doc: Document, verified: Verified) -> bool:
     """
     _check_document(doc, verified)
     if isinstance(doc.data["agents"], dict) and "cascade" in doc.data["agents"]:
-        need("phases" not in doc.data and "instants" not in doc.data, "phases or instants of the cascade")
+        need("phases" not in doc.data, "phases of the cascade")
         return check_cascade(doc, verified)
     section, graph = doc.section("agents"), verified.structure.graph
     agents = agents_of(section, verified.gain)

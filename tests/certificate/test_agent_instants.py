@@ -16,10 +16,12 @@ from mutations import resealed
 from scipy.integrate import solve_ivp
 
 from ptcc_certify.certificate.agents_part import AgentsPart
+from ptcc_certify.certificate.cascade_part import CascadePart
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.checker import check
 from ptcc_certify.checker.agent_instants import halvings
 from ptcc_certify.checker.agent_model import Agents as CheckedAgents
+from ptcc_certify.checker.agent_model import Cascade
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.ensembles import Ensemble
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
@@ -38,6 +40,8 @@ KINDS = {
     "drag, at rest": Agents(order=2, drag="1/2", rest="3/2"),
     "order 3": Agents(order=3, drag=1),
     "oscillators in a formation": Agents(plant=[4, 0], offsets=[1, 2, 3, 5]),
+    "cascade": Agents(order=2, cascade=2),
+    "cascade in a formation": Agents(order=2, cascade="1/2", offsets=[1, 2, 3, 5]),
 }
 CASES = [(graph, kind) for graph in GRAPHS for kind in KINDS]
 
@@ -49,12 +53,12 @@ def made(graph: str, kind: str) -> Certificate:
     return certify_words(GRAPHS[graph], PROTOCOL, [5, 2, -4, 1], agents=agents, derivatives=later, simulation=False)
 
 
-def part_of(certificate: Certificate) -> AgentsPart:
-    assert isinstance(certificate.agents, AgentsPart)
+def part_of(certificate: Certificate) -> AgentsPart | CascadePart:
+    assert isinstance(certificate.agents, AgentsPart | CascadePart)
     return certificate.agents
 
 
-def deviations(part: AgentsPart) -> tuple[np.ndarray, np.ndarray]:
+def deviations(part: AgentsPart | CascadePart) -> tuple[np.ndarray, np.ndarray]:
     """Instants ``1 - t/T`` of a run, and the deviations from the common motion there, (N, n, M)."""
     run = part.simulate(remaining=1e-3)
     known = run.remaining > 0
@@ -80,16 +84,21 @@ def test_bounds_are_above_the_motion_and_at_99_percent_within_ten_times_of_it(gr
 def test_agents_are_where_they_are_enclosed(kind: str):
     """The motion in original coordinates, by an explicit integrator of high order."""
     part = part_of(made("camps", kind))
-    protocol, matrix, n = part.protocol, part.matrix, part.order
-    numbers = (protocol.gains, matrix.coupling, matrix.W, matrix.rate, matrix.points)
-    agents = CheckedAgents(n, 1, protocol.plant, protocol.own, None, protocol.gain.exact, *numbers)
+    protocol, n = part.protocol, part.order
+    chains: Any = (n, 1, protocol.plant, protocol.own, None, protocol.gain.exact)
+    if isinstance(part, CascadePart):
+        agents: Cascade | CheckedAgents = Cascade(*chains)
+    else:
+        matrix = part.matrix
+        agents = CheckedAgents(*chains, protocol.gains, matrix.coupling, matrix.W, matrix.rate, matrix.points)
     L, h = CAMPS.laplacian().toarray(), np.array([float(row[0]) for row in protocol.offsets])
     K, f, a = (np.array(list(map(float, x))) for x in (protocol.gains, protocol.own, protocol.plant))
 
     def slope(t: float, x: np.ndarray) -> np.ndarray:
-        X, eta = x.reshape(n, 4), 1 / 2 + 2 / (2 - t)
-        powers = eta ** np.arange(n, 0, -1.0)
-        return np.concatenate([X[1:].ravel(), -(powers * K) @ X @ L.T - (powers * f + a) @ X])
+        X, eta, theta = x.reshape(n, 4), 1 / 2 + 2 / (2 - t), 2 / (3 - t / 2) ** 2
+        powers, own = eta ** np.arange(n, 0, -1.0), K.copy()
+        own[0] += theta * isinstance(part, CascadePart)
+        return np.concatenate([X[1:].ravel(), -(powers * own) @ X @ L.T - (powers * f + a) @ X])
 
     start = np.array([[float(x) for x in agent[0]] for agent in part.initial_state or ()]).T
     start[0] -= h
@@ -107,8 +116,8 @@ def test_agents_are_where_they_are_enclosed(kind: str):
         assert at.off < 1e-30
 
 
-def changed(change: Callable[[list[Any]], Any]) -> Any:
-    document = copy.deepcopy(made("camps", "at rest").to_dict())
+def changed(change: Callable[[list[Any]], Any], kind: str = "at rest") -> Any:
+    document = copy.deepcopy(made("camps", kind).to_dict())
     document["instants"] = change(document["instants"])
     return resealed(document)
 
@@ -118,6 +127,7 @@ def less(rows: list[Any], i: int) -> list[Any]:
     return rows
 
 
+@pytest.mark.parametrize("kind", ["at rest", "cascade"])
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
@@ -130,16 +140,33 @@ def less(rows: list[Any], i: int) -> list[Any]:
         (lambda rows: None, ""),
     ],
 )
-def test_forged_instants_are_rejected(change: Callable[[list[Any]], Any], reason: str):
-    report = check(changed(change))
+def test_forged_instants_are_rejected(change: Callable[[list[Any]], Any], reason: str, kind: str):
+    report = check(changed(change, kind))
     assert not report.accepted and reason in (report.reason or "")
 
 
-def test_instants_are_accepted_and_read_back_whole_or_in_part():
-    certificate = made("camps", "at rest")
+@pytest.mark.parametrize("kind", ["at rest", "cascade"])
+def test_no_root_of_an_instant_is_less_than_it_is(kind: str):
+    """Every number by itself, a hundred thousandth smaller."""
+    rows = made("camps", kind).to_dict()["instants"]
+    for i, k in [(i, k) for i, row in enumerate(rows) for k, value in enumerate(row) if value is not None]:
+
+        def smaller(rows: list[Any], i: int = i, k: int = k) -> list[Any]:
+            rows[i][k] = str(F(rows[i][k]) * F(99999, 100000))
+            return rows
+
+        assert check(changed(smaller, kind)).reason == "a Lyapunov function is larger at an instant"
+
+
+@pytest.mark.parametrize("kind", ["at rest", "cascade"])
+def test_instants_are_accepted_and_read_back_whole_or_in_part(kind: str):
+    certificate = made("camps", kind)
     assert check(certificate.to_dict()).accepted and len(part_of(certificate).instants) == 10
-    assert read_certificate(certificate) == certificate
-    assert check(changed(lambda rows: [rows[0], [None] * len(rows[0])])).accepted
+    back = read_certificate(certificate)
+    assert back == certificate and part_of(back).instants == part_of(certificate).instants
+    q = np.array([0.5, 0.3, 0.1, 0.01, 1e-6])
+    assert (part_of(back).deviation_bound(q) == part_of(certificate).deviation_bound(q)).all()
+    assert check(changed(lambda rows: [rows[0], [None] * len(rows[0])], kind)).accepted
 
 
 def test_instants_stand_beside_agents_of_order_n_without_a_cap_alone():
@@ -147,9 +174,9 @@ def test_instants_stand_beside_agents_of_order_n_without_a_cap_alone():
     options: dict[str, Any] = {"simulation": False, "method": "paper"}
     plain = certify_words(CAMPS, PROTOCOL, [5, 2, -4, 1], **options)
     capped = certify_words(CAMPS, PROTOCOL, [5, 2, -4, 1], agents=Agents(order=3, gain_cap=50), **options)
-    cascade = certify_words(CAMPS, PROTOCOL, [5, 2, -4, 1], agents=Agents(order=2, cascade=1), **options)
     nowhere = certify_words(CAMPS, PROTOCOL, agents=Agents(order=2), **options)
-    for certificate in (plain, capped, cascade, nowhere):
+    no_cascade = certify_words(CAMPS, PROTOCOL, agents=Agents(order=2, cascade=1), **options)
+    for certificate in (plain, capped, nowhere, no_cascade):
         document = certificate.to_dict()
         assert "instants" not in document
         assert not check(resealed({**document, "instants": instants})).accepted

@@ -17,7 +17,7 @@ import pytest
 from asked import certify_words
 from generators import all_classes, random_graph
 from jsonschema import Draft202012Validator  # type: ignore[import-untyped]
-from mutations import Json, changed, judged_mutants, mutants, nudged, resealed
+from mutations import Json, changed, judged_mutants, mutants, nudged, resealed, without_instants
 from oracle_cascade import false_claims_of_cascade
 
 from ptcc_certify.certificate.family_certificate import certify_family
@@ -59,7 +59,7 @@ def made(name: str = "plain", kind: str = "camps") -> Json:
     }
     agents = Agents(**{"order": 2, "cascade": 2, **of_agents})
     asked: Json = {"method": "paper", "simulation": False, "agents": agents, **begin, **options}
-    return {**json.loads(certify_words(graph, protocol, **asked).to_json()), "unverified": {}}
+    return without_instants({**json.loads(certify_words(graph, protocol, **asked).to_json()), "unverified": {}})
 
 
 def accepted(data: Json) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from asked import certify_words
 from generators import all_classes, random_graph
-from mutations import Json, at, changed, mutants, nudged, resealed
+from mutations import Json, at, changed, mutants, nudged, resealed, without_instants
 from verified import compare, named, program, said
 
 from ptcc_certify.bounds import final_state as final_states
@@ -49,8 +49,10 @@ SETTINGS: dict[str, tuple[str, Any, Json, int]] = {
 UNREAD = ("large form", "undecided", "radius", "dominance", "weak components")
 
 
-def document(graph: SignedDigraph, protocol: Any, of_agents: Json, dimension: int, seed: int = 3) -> Json:
-    """A certificate, with offsets and initial states of small quotients."""
+def document(
+    graph: SignedDigraph, protocol: Any, of_agents: Json, dimension: int, seed: int = 3, instants: bool = False
+) -> Json:
+    """A certificate, with offsets and initial states of small quotients; with what it says of instants, or without."""
     rng, labels, options = np.random.default_rng(seed), graph.labels, {"cascade": 2, **of_agents}
     rows = lambda: {v: [str(F(int(x), 4)) for x in rng.integers(-20, 21, dimension)] for v in labels}  # noqa: E731
     asked: Json = {"method": options.pop("method", "paper"), "simulation": False}
@@ -59,7 +61,8 @@ def document(graph: SignedDigraph, protocol: Any, of_agents: Json, dimension: in
     if dimension:
         asked |= {"x0": rows(), "v0": rows()}
     text = certify_words(graph, protocol, agents=Agents(order=2, **options), **asked).to_json()
-    return {**json.loads(text), "unverified": {}}
+    data = {**json.loads(text), "unverified": {}}
+    return data if instants else without_instants(data)
 
 
 @cache
@@ -78,6 +81,17 @@ def test_certificates_of_the_cascade_are_accepted_and_every_obligation_is_verifi
     listed = [f"{o['kind']} of {o['of']}" for o in data["proof"]]
     assert re.findall(r"^verified    ([^:\n]*)", text, re.MULTILINE) == listed
     assert ("agent-input of agents" in listed) == (data["agents"]["input"] is not None)
+
+
+def test_instants_are_named_as_not_checked_and_the_rest_is_verified(tmp_path: Path) -> None:
+    program()
+    kind, *rest = SETTINGS["plain"]
+    data = document(SignedDigraph.from_edges(GRAPHS[kind]), *rest, instants=True)
+    assert check(data).accepted and data["instants"]
+    code, text = said(data, tmp_path)
+    assert code == 0 and "agent-instants of instants" in named(text), text
+    listed = [f"{o['kind']} of {o['of']}" for o in data["proof"] if o["kind"] != "agent-instants"]
+    assert re.findall(r"^verified    ([^:\n]*)", text, re.MULTILINE) == listed
 
 
 def test_the_statement_is_one_more_file_of_as_many_lines_as_is_said() -> None:
