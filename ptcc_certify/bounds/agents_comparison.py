@@ -23,8 +23,8 @@ RESOLVED = 100
 class AgentsComparison:
     """How near a run comes to its bounds: ratios, at most 1 up to rounding where none is violated.
 
-    All are taken of ``e^(r s/2)`` times what is bounded, which is what was integrated. Of bounds from a matrix there is no
-    floor. Bounds of the cascade may fall faster than that, and a run counts by how much it is above :data:`RESOLVED`
+    All are taken of ``e^(r s/2)`` times what is bounded, which is what was integrated. Of bounds from a matrix there is
+    no floor. Bounds of the cascade may fall faster than that, and a run counts by how much it is above :data:`RESOLVED`
     times the tolerance of its integrator, relative to its largest.
 
     Attributes
