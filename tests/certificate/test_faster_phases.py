@@ -128,7 +128,7 @@ def test_phases_stand_beside_agents_of_order_n_without_a_cap_alone():
     for certificate, reason in (
         (plain, "not of order n"),
         (capped, "capped"),
-        (cascade, "phases or instants of the cascade"),
+        (cascade, "phases of the cascade"),
     ):
         document = certificate.to_dict()
         assert check(document).accepted and "phases" not in document
