@@ -190,6 +190,15 @@ def test_known_weights_in_one_mode_are_bounded_as_those_of_a_graph():
     assert wide.witness(Fraction(1)).b < plain.witness(Fraction(1)).b
 
 
+def test_what_no_gain_takes_away_is_less_than_every_gain_leaves():
+    leaders, found = MovingLeaders(speed="0.5"), []
+    for cap, rho2 in ((Fraction(1, 1000), 2), (5, 2), (20, 2), (500, 2), (None, 2), (None, 50)):
+        protocol, messages = NominalProtocol(T=1, rho1=1, rho2=rho2, kappa=1), LateMessages("0.05", gain_cap=cap)
+        late = certify(UNSURE, protocol, [1, 2, -3], messages=messages, leaders=leaders).late
+        found.append((late.never_below, late.largest))
+    assert 0.025 <= max(kept for kept, _ in found) <= min(left for _, left in found)  # speed times delay at least
+
+
 BESIDE: dict[str, dict[str, Any]] = {
     "late": {"messages": LateMessages("0.01")},
     "capped": {"messages": LateMessages("0.01", period="0.002", losses=2, value_error="0.01", gain_cap=20)},
