@@ -63,8 +63,6 @@ from ptcc_certify.theorems.theorem import Obligation
 SEARCHED_FOLLOWERS = 3000
 #: Values of ``q`` that are tried, and the largest one; losses of ``b`` for a more even vector.
 _TRIED, _LARGEST_Q, _LOSSES = 10, 1e9, (0.01, 0.2, 0.6)
-#: Iterations for what no gain takes away.
-_ITERATIONS = 200
 #: What is added to a bound in floats, relatively, so that it holds.
 _MORE = 1 + 1e-9
 #: What errors of values add, at least: less is lost in floats.
@@ -194,26 +192,18 @@ class LateBounds:
         found = [float(row.residual(after=True).max()) for row in self.rows]
         return min(found) if found and self.leaders is not None else None
 
-    @property
+    @cached_property
     def never_below(self) -> float | None:
         """What stays at least of the largest bound however large the gain, where leaders move while messages come.
 
-        From instant to instant that is ``y = D^-1 |W_F| y + speed age`` from below. By rows it is more by the drift,
-        for ``s_c`` grows no faster than its cap.
+        What no decay takes away obeys ``D_k y_k >= sum_l |w_kl| y_l + speed age D_k`` in every member, by rows as from
+        instant to instant, and is above the least such ``y``. By rows more stays, how much depends on those found.
         """
-        if self.leaders is None or not self.messages.age:
+        if self.leaders is None or not self.messages.age or not (self.rows or self.steps):
             return None
-        if self.steps is None:
-            each = (row.witness.u.max() * float(row.floor) for row in self.rows)
-            more = (self.leaders.total / (row.witness.b * row.cap) for row in self.rows if row.cap is not None)
-            found = (x + float(drift) for x, drift in zip(each, more, strict=True))
-            return min(found, default=0.0) / _MORE
-        assert isinstance(self.structure, Structure), "steps are of one graph"
-        rows, error = late_rows(self.structure, self.messages), float(self.leaders.speed * self.messages.age)
-        y = np.zeros(rows.D.size)
-        for _ in range(_ITERATIONS):
-            y = (rows.W @ y) / rows.D + error
-        return float(y.max()) / _MORE
+        of, error = self.structure, float(self.leaders.speed * self.messages.age)
+        rows = UncertainRows(of) if isinstance(of, Family) else late_rows(of, self.messages)
+        return float(rows.kept_off(error).max()) / _MORE
 
     @property
     def direct(self) -> bool:

@@ -97,8 +97,8 @@ def _ranges(certificate: FamilyContent) -> list[Interval | None]:
 
 
 def _keeps(certificate: FamilyContent) -> np.ndarray:
-    """Tell which agents no edge of any mode leads to, while no sliding variable moves."""
+    """Tell which agents no edge of any mode leads to, while no sliding variable moves, nor leaders."""
     _, target, _ = certificate.family.union
     hears = np.zeros(certificate.family.n_nodes, dtype=bool)
     hears[target] = True
-    return ~hears & certificate.direct
+    return ~hears & (certificate.direct and not certificate.leaders_move)

@@ -174,6 +174,8 @@ class FamilyCertificate(FamilyContent, Recorded):
     def to_pandas(self) -> pd.DataFrame:
         """Return one row per agent, with ends that are rounded outwards to floats; NaN where nothing is proved.
 
+        Ends are those with nothing late and leaders at rest, also where more was asked.
+
         - ``least``, ``largest``: of the state at the deadline, for every signal.
         - ``restricted_least``, ``restricted_largest``: the same for the signals that were asked for, if not all were;
           ``restricted_to`` names these, ``"constant"`` or ``"DwellTime(1/5, clock='t')"`` say, and is empty where there
@@ -183,8 +185,9 @@ class FamilyCertificate(FamilyContent, Recorded):
           signal. It may move there for ever: these are no ends at the deadline.
         - ``stays_least``, ``stays_largest``: the interval in which every signal keeps an agent at all times whose end
           depends on the signal.
-        - ``keeps``: whether no edge of any mode leads to the agent and no sliding variable moves, so that it stays at
-          ``x(0)`` under every signal. Edges alone decide this, and it is no part of the claim that is checked.
+        - ``keeps``: whether no edge of any mode leads to the agent and neither sliding variables nor leaders move, so
+          that it stays at ``x(0)`` under every signal. Edges alone decide this, and it is no part of the claim that is
+          checked.
 
         Without an initial state ``keeps`` alone is known, of an undecided certificate no restricted ends and no boxes.
 

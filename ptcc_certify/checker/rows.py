@@ -199,8 +199,8 @@ class Followers:
         if len(parts) > 1:
             factors, common = powers(q, parts)
             ages, factor = (parts, factors), 1
-        own, heard = ([times * x for x in u] for times in (common, factor))
-        least = [b.numerator * common * u[v] for v in self.nodes]
+        own, heard = _times(common, u), _times(factor, u)
+        least = _times(b.numerator * common, [u[v] for v in self.nodes])
         self.need_rows(own, heard, least, "the row of agent {} does not decay so fast", b.denominator, ages)
 
     def starts_within(self, values: Sequence[int], scale: int, initial: Fraction = Fraction(1)) -> None:
@@ -214,8 +214,7 @@ class Followers:
     def never_grows(self, values: Sequence[int], value_error: Fraction, push: Fraction = Fraction(0)) -> None:
         """Verify ``sum_l |w_kl| (y_k - y_l - value_error) >= push``; all over one scale."""
         scale = math.lcm(value_error.denominator, push.denominator)
-        heard, error = self.whole([scale * y for y in values]), int(value_error * scale)
-        own = self.whole([scale * y - error for y in values])
+        heard, own = (self.whole(_times(scale, values, less)) for less in (0, int(value_error * scale)))
         self.need_rows(own, heard, [int(push * scale)] * len(values), "the start of agent {} may grow")
 
 
@@ -259,8 +258,7 @@ class Rows:
         need(floor >= 0, "floor is negative")
         times = floor.numerator * value_error.denominator
         error = floor.denominator * value_error.numerator * self.scale
-        heard = [times * x for x in self.whole]
-        own = self.followers.whole([times * x - error for x in self.u])
+        heard, own = (self.followers.whole(_times(times, self.u, less)) for less in (0, error))
         why = "what is heard wrong drives agent {} farther"
         self.followers.need_rows(own, heard, [0] * len(self.u), why)
 
@@ -275,6 +273,14 @@ class Rows:
     def largest(self) -> tuple[list[int], int]:
         """``sum_l |w_kl| (u_k + u_l)`` of every follower at most, times the scale of ``u`` and a unit; and this."""
         return self.followers.largest(self.u)
+
+
+def _times(factor: int, values: Sequence[int], less: int = 0) -> list[int]:
+    """Return a multiple of values, less a number, unless this is long."""
+    bits = longest(values), factor.bit_length()
+    sized(len(values), max(sum(bits), less.bit_length()), "rows of followers")
+    spend(len(values), *bits, "rows of followers")
+    return [factor * x - less for x in values]
 
 
 def powers(q: Fraction, parts: Sequence[int]) -> tuple[dict[int, int], int]:

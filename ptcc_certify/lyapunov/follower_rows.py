@@ -13,6 +13,7 @@ Where weights are uncertain, or a graph is one of several, the row of every foll
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -21,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from lmi.dyadic import round_to_bits
-from lmi.errors import NoCertificate
+from lmi.errors import LMIError, NoCertificate
 from lmi.sparse_h_matrix import DIRECT_ROWS, SparseHMatrix, solve
 from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.family import Family
@@ -42,6 +43,8 @@ _ROUNDS = 3
 _POLICIES = 20
 #: Halvings of what errors of values add.
 _FLOORS = 40
+#: Products by which what errors of values add at least is found.
+_ITERATIONS = 200
 #: Products by which the largest ``q`` is found, halvings where ages differ, and the largest one that is tried then.
 _PRODUCTS, _HALVINGS, _LARGEST = 30, 8, 1e12
 
@@ -245,6 +248,13 @@ class FollowerRows:
         """Return about the least ``f`` with ``sum_l |w_kl| (f (u_k - u_l) - error) >= 0`` for every follower."""
         return float((self.D / self.slack(u)).max()) * error
 
+    def kept_off(self, error: float) -> np.ndarray:
+        """Return what every ``y`` exceeds with ``D_k y_k - sum_l |w_kl| y_l >= error D_k`` for every follower."""
+        y = np.zeros(self.D.size)
+        for _ in range(_ITERATIONS):
+            y = (self.W @ y) / self.D + error
+        return y
+
     def largest(self, u: np.ndarray) -> np.ndarray:
         """Return ``D_k u_k + sum_l |w_kl| u_l`` of every follower, at most."""
         return np.asarray(self.D * u + self.W @ u)
@@ -306,6 +316,12 @@ class UncertainRows(FollowerRows):
             holds = bool((self.intervals.pull(self._all(middle * u), less=error) >= 0).all())
             low, high = (low, middle) if holds else (middle, high)
         return high
+
+    def kept_off(self, error: float) -> np.ndarray:
+        """Return what every such ``y`` exceeds, by the member that decays the least."""
+        with suppress(LMIError):  # any member serves
+            self._vector(Fraction(1), 0.01)
+        return super().kept_off(error)
 
     def largest(self, u: np.ndarray) -> np.ndarray:
         """Return ``sum_l |w_kl| (u_k + u_l)`` of every follower, at most."""

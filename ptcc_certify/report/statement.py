@@ -150,7 +150,7 @@ def _of_family(saved: FamilyCertificate) -> dict[str, Any]:
         "optional": sum(int(mode.optional[edges].sum()) for mode, edges in parameters),
         "depends": DEPENDS in claims,
         "claims": [(behaviour, (), "", number) for behaviour, number in claims.items()],
-        **{"claims_in_all": len(components), "assumed": [], "offsets": None, "plant": "", "bounds": []},
+        **{"claims_in_all": len(components), "assumed": assumptions(saved), "offsets": None, "plant": "", "bounds": []},
         "promise": "" if saved.signal == "any" else signal_text(saved.signal)[1],
         **{"heads": heads, "rows": rows, "windows": _left_by_windows(saved)},
     }

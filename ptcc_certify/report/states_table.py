@@ -13,6 +13,7 @@ from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.certificate.restricted_states import states_of_signal
 from ptcc_certify.report import notation as texts
+from ptcc_certify.report.facts.claim import assumptions
 from ptcc_certify.report.facts.signals import agreement_text, rests
 from ptcc_certify.report.notation import above, below, enclosed, rational
 from ptcc_certify.theorems.family_claims import camps
@@ -28,21 +29,26 @@ def states_table(saved: Certificate | FamilyCertificate) -> tuple[str, list[Any]
     columns = _of_agents(saved) if saved.agents is not None else _of_graph(saved)
     if not columns:
         return "", [], []
-    agents, end = _tabled(saved), saved.final_state
+    agents, end, ends = _tabled(saved), saved.final_state, f"Where the agents end{_assumed(saved)}"
     exact = end is None or end.radius is None
     if saved.agents is not None:
         caption = "Where the agents begin and end, and their inputs"
     elif end is None:
         caption = "Where the agents begin"
     elif saved.verdict == "certified":
-        caption = f"Where the agents end, proved {'exactly' if exact else 'in intervals'}"
+        caption = f"{ends}, proved {'exactly' if exact else 'in intervals'}"
     else:
-        caption = f"Where the agents end if they settle ({'exact' if exact else 'in proved intervals'})"
+        caption = f"{ends} if they settle ({'exact' if exact else 'in proved intervals'})"
     if saved.graph.n_nodes > ROWS:
         total = texts.plural(saved.graph.n_nodes, "agent")
         caption += f": the {EXTREMES} highest and the {EXTREMES} lowest of {total}"
     names = [texts.label(saved.labels[k]) for k in agents]
     return caption, list(zip(names, *columns.values(), strict=True)), ["Agent", *columns]
+
+
+def _assumed(saved: Certificate | FamilyCertificate) -> str:
+    """Tell what final states are without, where more was asked."""
+    return "".join(f", {text}" for text in assumptions(saved))
 
 
 def _tabled(saved: Certificate) -> list[int]:
@@ -101,7 +107,7 @@ def _of_family(saved: FamilyCertificate) -> tuple[str, list[Any], list[str]]:
     which = "every signal" if every else "these signals"
     which += "" if saved.protocol.reaching is None else " and disturbance"
     last = "State at the deadline" if rests(saved) else "State at any instant"
-    caption = f"Where the agents end, proved for {which if every else 'signals that keep the promise'}"
+    caption = f"Where the agents end{_assumed(saved)}, proved for {which if every else 'signals that keep the promise'}"
     written = [(texts.label(name), camp, first, end or _ends(None)) for name, camp, first, end in rows]
     return caption, written, [*heads, f"{last}{agreement_text(saved)}, for {which}"]
 

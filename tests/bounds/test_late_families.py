@@ -27,6 +27,7 @@ from ptcc_certify.model.asks import Asks, Expectations
 from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.report.page import report_html
+from ptcc_certify.report.statement import report_latex
 
 PROTOCOL = NominalProtocol(T=1, rho1=1, rho2=2, kappa=1)
 UNSURE = Family.from_intervals([("l", "a", 1, 2), ("a", "b", -3, -1), ("b", "a", "-0.5", 0), ("l", "b", -1, -1)])
@@ -190,6 +191,15 @@ def test_known_weights_in_one_mode_are_bounded_as_those_of_a_graph():
     assert wide.witness(Fraction(1)).b < plain.witness(Fraction(1)).b
 
 
+def test_what_no_gain_takes_away_is_less_than_every_gain_leaves():
+    leaders, found = MovingLeaders(speed="0.5"), []
+    for cap, rho2 in ((Fraction(1, 1000), 2), (5, 2), (20, 2), (500, 2), (None, 2), (None, 50)):
+        protocol, messages = NominalProtocol(T=1, rho1=1, rho2=rho2, kappa=1), LateMessages("0.05", gain_cap=cap)
+        late = certify(UNSURE, protocol, [1, 2, -3], messages=messages, leaders=leaders).late
+        found.append((late.never_below, late.largest))
+    assert 0.025 <= max(kept for kept, _ in found) <= min(left for _, left in found)  # speed times delay at least
+
+
 BESIDE: dict[str, dict[str, Any]] = {
     "late": {"messages": LateMessages("0.01")},
     "capped": {"messages": LateMessages("0.01", period="0.002", losses=2, value_error="0.01", gain_cap=20)},
@@ -334,3 +344,17 @@ def test_figures_are_of_what_is_asked(tmp_path: Path):
     late.save(tmp_path / "c.json")
     page = report_html(ptcc.read_certificate(tmp_path / "c.json"))
     assert 'id="figure-late"' in page and 'id="figure-states"' not in page
+
+
+@pytest.mark.parametrize("name", ["late", "late behind leaders that move", "leaders that move"])
+def test_page_and_latex_tell_no_end_of_another_problem(name: str, tmp_path: Path):
+    """Where agents end is told with what it leaves out, and a bound without a run is not called a run."""
+    made = certify(UNSURE, PROTOCOL, [1, 2, -3], **BESIDE[name])
+    made.save(tmp_path / "c.json")
+    saved = ptcc.read_certificate(tmp_path / "c.json")
+    without = ", ".join(["nothing late"] * (made.late is not None) + ["leaders at rest"] * made.leaders_move)
+    page = report_html(saved)
+    assert f"Where the agents end, {without}, proved for every signal" in page
+    assert "numerical), under the proved bound" not in page and "at most: the proved bound for every signal" in page
+    assert f"occurs at $T$ for every such choice, {without}: as" in report_latex(saved)
+    assert saved.to_pandas()["keeps"].tolist() == [not made.leaders_move, False, False]
