@@ -75,7 +75,7 @@ def as_graph(graph: Any, orientation: str | None = None, **reading: Any) -> Sign
     """
     if isinstance(own := graph if isinstance(graph, SignedDigraph) else getattr(graph, "graph", None), SignedDigraph):
         if orientation is not None or reading:
-            given = ", ".join(f"{name}=" for name in (*["orientation"] * (orientation is not None), *reading))
+            given = ", ".join(f"{name}=" for name in (reading if orientation is None else ("orientation", *reading)))
             raise ParameterError(f"a SignedDigraph has its orientation and its edges; leave out {given}")
         return own
     if isinstance(graph, Family):
