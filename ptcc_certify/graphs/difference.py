@@ -57,7 +57,8 @@ def difference(one: SignedDigraph, other: SignedDigraph) -> str | None:
         example = f"such as {_arrow(reversals[0])} in the certificate"
         return f"{len(reversals)} of {len(reference)} edges {point} the other way, {example}"
     missing, more = (
-        [_arrow(pair) for pair in part if pair not in rest] for part, rest in ((reference, actual), (actual, reference))
+        [_arrow(pair) for pair in edges if pair not in others]
+        for edges, others in ((reference, actual), (actual, reference))
     )
     return _lists("edge", missing, more)
 
@@ -164,9 +165,9 @@ def family_difference(one: Family, other: Family) -> str | None:
     number, place = pairs[0]
     first, second = (set(f.modes[k].marked_lines()) for f, k in ((one, number), (other, place)))
     alone = [
-        f"{shorten(min(some), 120)} is only in the {where}"
-        for where, some in (("certificate", first - second), ("files", second - first))
-        if some
+        f"{shorten(min(lines), 120)} is only in the {where}"
+        for where, lines in (("certificate", first - second), ("files", second - first))
+        if lines
     ]
     return _mode_text(one, other, pairs) + ", and ".join(alone)
 

@@ -281,8 +281,8 @@ class Family(Shown):
         for number, mode in enumerate(self.modes):
             parts += [["{}"], mode.marked_lines()] if number else [mode.marked_lines()]
         digest, lines = hashlib.sha256(), chain.from_iterable(parts)
-        while some := list(islice(lines, _TOGETHER)):
-            digest.update("".join(f"{line}\n" for line in some).encode("utf-8", "surrogatepass"))
+        while batch := list(islice(lines, _TOGETHER)):
+            digest.update("".join(f"{line}\n" for line in batch).encode("utf-8", "surrogatepass"))
         return digest.hexdigest()
 
     # ------------------------------------------------------------------ constructors
