@@ -382,7 +382,8 @@ class _Components:
             sparse.csr_array((entries.data[k], (entries.row[k], entries.col[k])), shape=A.shape)
             for k in (inside, ~inside)
         )
-        self.blocks, self.coupling, self.diagonal = within, across, within.diagonal()
+        self.blocks, self.coupling = within, across
+        self.diagonal = within.diagonal()
         # One step of the substitution per level: first row, first row of a larger block, end.
         by_row, large = level[label], size[label] > 1
         ends = np.append(np.flatnonzero(np.diff(by_row)) + 1, len(label))
@@ -502,7 +503,8 @@ def _ratios(A: sparse.csr_array, log_u: np.ndarray, blur: float = 0.0) -> tuple[
     """Return ``(A u)_i / u_i`` of a Z-matrix and a bound of its rounding; ``blur`` units more for that of ``log u``."""
     entries = sparse.coo_array(A)
     diagonal, away = A.diagonal(), entries.row != entries.col
-    rows, columns, n = entries.row[away], entries.col[away], len(log_u)
+    rows, columns = entries.row[away], entries.col[away]
+    n = len(log_u)
     apart = log_u[columns] - log_u[rows]
     with np.errstate(over="ignore", invalid="ignore"):
         terms = -entries.data[away] * np.exp(apart)

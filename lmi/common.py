@@ -208,20 +208,21 @@ class _Search:
         """Climb from the best of a few matrices until nothing is gained."""
         starts = list(self._starts()) if start is None else [np.asarray(start, dtype=float)]
         P = max(starts, key=lambda P: self.worth(self._nominal_rates(P)))
-        P, rates, best = P / np.linalg.eigvalsh(P)[-1], self._nominal_rates(P), None
+        rates, best = self._nominal_rates(P), None
+        P = P / np.linalg.eigvalsh(P)[-1]
         trust = _LEAST if self.shares is None else _TRUST[0]
         for _ in range(_STEPS):
             try:
-                found = self._step(P, rates, trust)
+                step = self._step(P, rates, trust)
             except (NoCertificate, np.linalg.LinAlgError):
                 break
             except OutOfTime:
                 if best is None:
                     raise
                 break
-            gain = math.inf if best is None else self.worth(found.rates) - self.worth(best.rates)
+            gain = math.inf if best is None else self.worth(step.rates) - self.worth(best.rates)
             if gain > 0:
-                best, P, rates = found, found.matrix, found.rates
+                best, P, rates = step, step.matrix, step.rates
             if best is None or best.condition > _LARGEST_CONDITION:
                 break
             if gain <= _GAIN * abs(self.worth(best.rates)):

@@ -107,14 +107,17 @@ def tuned_multipliers(P: np.ndarray, mode: UncertainMatrix) -> np.ndarray:
     """
     if not mode.radii.size:
         return np.zeros(0)
-    own, scale = mode.transformed(np.linalg.cholesky(P).T)
-    form, tau, best = own.A + own.A.T, np.ones(len(scale)), (-np.inf, np.ones(len(scale)))
+    transformed, scale = mode.transformed(np.linalg.cholesky(P).T)
+    form = transformed.A + transformed.A.T
+    tau, best = np.ones(len(scale)), (-np.inf, np.ones(len(scale)))
     for step in range(_STEPS):
-        sizes, vectors = np.linalg.eigh(form - (own.H * tau) @ own.H.T - (own.F / tau) @ own.F.T)
+        sizes, vectors = np.linalg.eigh(
+            form - (transformed.H * tau) @ transformed.H.T - (transformed.F / tau) @ transformed.F.T
+        )
         if sizes[0] > best[0]:
             best = float(sizes[0]), tau
         below = max(float(sizes[-1] - sizes[0]), 1e-12) * 10.0 ** (-0.5 - 2 * step / _STEPS)
         root = vectors / np.sqrt(sizes - sizes[0] + below)
-        f, h = (np.square(X.T @ root).sum(axis=1) for X in (own.F, own.H))
+        f, h = (np.square(X.T @ root).sum(axis=1) for X in (transformed.F, transformed.H))
         tau = np.sqrt(np.where(step > 0, tau, np.sqrt(f / h)) * np.sqrt(f / h))
     return best[1] / scale

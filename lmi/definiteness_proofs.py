@@ -451,11 +451,12 @@ def no_diagonal_rate_above(A: Rows, Y: Rows, rate: Fraction) -> bool:
     n = len(A)
     if n == 0 or len(Y) != n or any(len(row) != n for row in A) or len({len(row) for row in Y}) > 1:
         raise MatrixError("A is not square, is empty, or Y has not as many rows")
-    (a, unit), (y, _), ((bound,),) = integers(_fractions(A)), integers(_fractions(Y)), _fractions([[rate]])
+    (a, unit), (y, _) = integers(_fractions(A)), integers(_fractions(Y))
+    ((bound,),) = _fractions([[rate]])
     sizes = [sum(map(mul, row, row)) for row in y]
     columns = list(zip(*y, strict=True))
     forms = [
-        sum(x * sum(map(mul, row, column)) for x, column in zip(own, columns, strict=True))
-        for row, own in zip(a, y, strict=True)
+        sum(x * sum(map(mul, row, column)) for x, column in zip(y_row, columns, strict=True))
+        for row, y_row in zip(a, y, strict=True)
     ]
     return any(sizes) and all(2 * m <= bound * unit * size for m, size in zip(forms, sizes, strict=True))

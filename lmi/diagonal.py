@@ -222,7 +222,8 @@ class _RateSearch:
     def climb(self, diagonal: np.ndarray | None = None, steps: int = 40) -> tuple[np.ndarray, DiagonalCertificate]:
         """Climb to the best rate from a balanced scaling, the frame of all steps; the rate may be negative."""
         best = self.best_candidate(diagonal)
-        frame, least, tolerance = best.log_omega, 1e-7, self.tolerance
+        frame = best.log_omega
+        least, tolerance = 1e-7, self.tolerance
         # At a given condition a larger matrix is one of several, whose last digits are worth no further steps.
         if self.max_condition is not None and len(self.A) > _FINE_ROWS:
             least, tolerance, steps = _COARSE_GAIN, max(tolerance, _COARSE), min(steps, _COARSE_STEPS)

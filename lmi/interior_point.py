@@ -179,12 +179,13 @@ class _Weights:
 
 
 def _box(n: int, low: float) -> _Weights:
-    own, none, offset = np.repeat([[1.0], [-1.0]], n, axis=1), np.zeros((2, 1)), np.array([[-low], [1.0]])
+    signs = np.repeat([[1.0], [-1.0]], n, axis=1)
+    none, offset = np.zeros((2, 1)), np.array([[-low], [1.0]])
 
     def bound(pull: np.ndarray) -> float:
         return float(np.where(pull > 0, pull, low * pull).sum())
 
-    return _Weights(own, none, offset, False, np.full(n, (1 + low) / 2), bound)
+    return _Weights(signs, none, offset, False, np.full(n, (1 + low) / 2), bound)
 
 
 def _simplex(n: int) -> _Weights:
@@ -287,11 +288,13 @@ def _iterate(problem: _Problem, weights: _Weights, tolerance: float) -> Solution
     X = problem.lift(np.eye(len(problem.restrict(np.eye(len(problem.weight))))))
     X /= problem.weight @ np.diag(X)
     z = (float(np.abs(problem.inner(X)[:n]).max()) or 1.0) / np.maximum(np.abs(weights.own), np.abs(weights.shared))
-    own, factor = _cholesky(problem.restrict(X)), _cholesky(problem.slack(y))
-    if own is None or factor is None:
+    primal_factor, factor = _cholesky(problem.restrict(X)), _cholesky(problem.slack(y))
+    if primal_factor is None or factor is None:
         raise NoCertificate("the interior-point method broke down at its start")
-    point: _Point | None = _Point(X, y, z, own, factor)
-    lower, upper, idle = y, (np.inf, X), 0
+    point: _Point | None = _Point(X, y, z, primal_factor, factor)
+    lower = y
+    upper = (np.inf, X)
+    idle = 0
     for _ in range(_MOST_ITERATIONS):
         checkpoint()
         if point is None:
@@ -427,7 +430,9 @@ def _solver(K: np.ndarray, border: np.ndarray, defect: float) -> Callable[[np.nd
         plain = partial(lapack.dgetrs, *lapack.dgetrf(K)[:2])
 
     def solve(rhs: np.ndarray) -> np.ndarray:
-        x, multiplier, answer = np.zeros(len(rhs)), 0.0, plain(border)[0]
+        x = np.zeros(len(rhs))
+        multiplier = 0.0
+        answer = plain(border)[0]
         for _ in range(3):
             x = x + plain(unit * rhs - K @ x - multiplier * border)[0]
             if border.any():

@@ -163,17 +163,19 @@ def coupled_lyapunov(
     omegas, halves, groups = [], [], []
     for k, block in enumerate(leaders, start=1):
         if isinstance(block, FixedLeader):
-            group, omega, half = 0, block.omega / top, block.decrease / (2 * top * scale)
+            group, omega = 0, block.omega / top
+            half = block.decrease / (2 * top * scale)
         else:
             best = diagonal_lyapunov(block.A, tolerance=tolerance, solver="interior-point")
-            group, omega, half = k, best.omega, np.full(len(best.omega), best.rate / (2 * scale))
+            group, omega = k, best.omega
+            half = np.full(len(best.omega), best.rate / (2 * scale))
         omegas.append(omega)
         halves.append(half)
         groups.append(np.full(len(omega), group))
     shared = np.unique(np.concatenate(groups), return_inverse=True)[1]
     C = np.block([[np.diag(np.concatenate(halves)), np.zeros((n_L, n_F))], [A_FL / scale, A_F / scale]])
-    own = np.concatenate([shared, shared.max() + 1 + np.arange(n_F)])
-    solution = maximise_margin(C, np.ones(len(C)), tolerance=tolerance, least=0.0, groups=own)
+    separate = np.concatenate([shared, shared.max() + 1 + np.arange(n_F)])
+    solution = maximise_margin(C, np.ones(len(C)), tolerance=tolerance, least=0.0, groups=separate)
     if solution.t > _RESOLVED * tolerance:
         weights = positive(solution.omega)
     else:  # the best joint rate lies below what the method resolves: each block by itself

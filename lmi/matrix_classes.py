@@ -276,7 +276,9 @@ def block_depths(A: sparse.csr_array) -> tuple[np.ndarray, np.ndarray]:
     keep = rows != columns
     graph = sparse.csr_array((np.ones(keep.sum()), (rows[keep], columns[keep])), shape=(count, count))
     waiting, dependents = np.diff(graph.indptr), graph.tocsc()
-    depth, frontier, level = np.zeros(count, dtype=int), np.flatnonzero(waiting == 0), 0
+    depth = np.zeros(count, dtype=int)
+    frontier = np.flatnonzero(waiting == 0)
+    level = 0
     while frontier.size:
         depth[frontier] = level
         touched, hits = np.unique(dependents[:, frontier].indices, return_counts=True)

@@ -171,7 +171,8 @@ class _Program:
             import cvxpy as cp
         n = len(self.modes[0].A)
         unit = max(float(np.abs(mode.A).max(initial=0.0)) for mode in self.modes) or 1.0
-        t, constraints, forms, taus = cp.Variable(), [], [], []
+        t = cp.Variable()
+        constraints, forms, taus = [], [], []
         for mode in self.modes:
             P = cp.Variable((n, n), symmetric=True)
             tau = cp.Variable(len(mode.radii)) if mode.radii.size else None

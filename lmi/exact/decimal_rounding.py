@@ -54,6 +54,17 @@ def near(x: Fraction, digits: int = 6) -> str:
     return str(x) if short else f"~{text}"
 
 
+def counted(number: int, noun: str) -> str:
+    """Return a number with its noun.
+
+    Examples
+    --------
+    >>> counted(1, "edge"), counted(0, "edge"), counted(1005, "closed component")
+    ('1 edge', '0 edges', '1,005 closed components')
+    """
+    return f"{number:,} {noun}" if number == 1 else f"{number:,} {noun}s"
+
+
 def float_down(x: Fraction) -> float:
     """Return the largest float that is not above a rational.
 

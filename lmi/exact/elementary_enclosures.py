@@ -149,7 +149,8 @@ def decay_integrals_below(
     """
     # Smaller factors give a lower bound too, and short ones cost less.
     T_r, mu2, m = (rounded(x, 4 * bits) for x in (T_r, mu2, m))
-    w, total, near = rounded(mu2 * T_r, 4 * bits), Fraction(0), Fraction(1)
+    w = rounded(mu2 * T_r, 4 * bits)
+    total, near = Fraction(0), Fraction(1)
     if w + m > LARGEST_PUSH:
         return dict.fromkeys(instants, Fraction(0))
     elementary = Fraction(1, 2**bits) / max(w, Fraction(1))
@@ -165,8 +166,8 @@ def decay_integrals_below(
             decay = exp(w * (1 - near) + m * log(1 / near, 2 * bits)[0], bits)[0]
             total += rounded(T_r * near * decay * _series_below(w * near, m, share, bits), bits)
             near = following
-        rest = T_r * exp(w * (1 - near), bits)[0] * _power_integral_below(m - 1, log(1 / near)[1], short, bits)
-        bounds[z] = rounded(total + rest, bits)
+        remainder = T_r * exp(w * (1 - near), bits)[0] * _power_integral_below(m - 1, log(1 / near)[1], short, bits)
+        bounds[z] = rounded(total + remainder, bits)
     return bounds
 
 
@@ -190,14 +191,15 @@ def _power_integral_below(a: Fraction, begin: Fraction, end: Fraction, bits: int
 
 def _series_below(w: Fraction, m: Fraction, q: Fraction, bits: int) -> Fraction:
     """Bound ``int_0^q e^(w x) (1 - x)^(-m) dx`` from below, with ``x = q y`` as a power series in ``y``."""
-    one, push = 1 << (bits + 32), w * q
-    exponential, binomial, total, n = [one], [one], one, 0
+    unit, push = 1 << (bits + 32), w * q
+    exponential, binomial = [unit], [unit]
+    total, n = unit, 0
     while True:
         n += 1
         exponential.append(exponential[-1] * push.numerator // (push.denominator * n))
         grown = binomial[-1] * (m.numerator + (n - 1) * m.denominator) * q.numerator
         binomial.append(grown // (m.denominator * q.denominator * n))
-        term = sum(map(mul, exponential, reversed(binomial))) // (one * (n + 1))
+        term = sum(map(mul, exponential, reversed(binomial))) // (unit * (n + 1))
         total += term
         if term == 0:
-            return q * Fraction(total, one)
+            return q * Fraction(total, unit)

@@ -308,7 +308,8 @@ class Remainder(NamedTuple):
         """Return ``E_ii d_i - sum_j |E_ij| d_j``."""
         d, margins = np.array(weights, dtype=object), np.zeros(self.n, dtype=object)
         off = self.i != self.j
-        i, j, size, on = self.i[off], self.j[off], np.abs(self.value[off]), self.i[~off]
+        i, j = self.i[off], self.j[off]
+        size, on = np.abs(self.value[off]), self.i[~off]
         np.subtract.at(margins, i, size * d[j])
         np.subtract.at(margins, j, size * d[i])
         margins[on] += self.value[~off] * d[on]
@@ -347,9 +348,10 @@ def remainder(S: Scaled) -> Remainder | None:
     values = np.array(list(E.values()), dtype=object)
     i, j = np.divmod(np.array(list(E), dtype=np.int64), max(n, 1))
     inside = j >= first
-    a, b, part = i[inside] - first, j[inside] - first, values[inside]
-    block[a, b] += part
-    block[b[a != b], a[a != b]] += part[a != b]
+    a, b = i[inside] - first, j[inside] - first
+    entries = values[inside]
+    block[a, b] += entries
+    block[b[a != b], a[a != b]] += entries[a != b]
     return Remainder(i[~inside], j[~inside], values[~inside], block, n)
 
 

@@ -63,7 +63,8 @@ def expm(A: Sequence[Sequence[Fraction]], bits: int = BITS) -> tuple[Rows, Fract
     spend(n**3 * (terms + halvings), p + 2 * int(norm), p + 2 * int(norm), "the exponential of a matrix")
     B = [[_floor(x, p - halvings) for x in row] for row in A]
     # off: what rows are off by, in units of 2^-p
-    total, off, each = [[(i == j) << p for j in range(n)] for i in range(n)], Fraction(2), Fraction(0)
+    total = [[(i == j) << p for j in range(n)] for i in range(n)]
+    off, each = Fraction(2), Fraction(0)
     term = total
     for j in range(1, terms + 1):
         term = [[x // j for x in row] for row in _times(term, B, p)]

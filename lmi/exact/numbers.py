@@ -73,10 +73,11 @@ def _parse(text: str) -> Fraction:
         raise NumberError(f'"{text}" is not a finite number')
     else:
         raise NumberError(f'"{shorten(text)}" is not a number')
-    sign, whole, part, digits = match[1], match[2] or "", match[3] or "", match[4] or "0"
+    sign = match[1]
+    integer, fraction, digits = match[2] or "", match[3] or "", match[4] or "0"
     if len(digits.lstrip("+-")) > 5 or abs(int(digits)) > limit:
         raise NumberError(f'the exponent of "{shorten(text)}" is beyond {limit}')
-    value, power = int(sign + whole + part, base), int(digits) - len(part) * (4 if base == 16 else 1)
+    value, power = int(sign + integer + fraction, base), int(digits) - len(fraction) * (4 if base == 16 else 1)
     return Fraction(value * radix**power) if power >= 0 else Fraction(value, radix**-power)
 
 

@@ -138,7 +138,9 @@ def _roots_on_axis(p: Polynomial) -> tuple[int, Polynomial] | None:
         [c + (len(g) - k) * before for k, (before, c) in enumerate(zip([0, *g], g, strict=False))]
     )
     simple = None if repeated is None else quotient(g, _of_square(repeated))
-    return None if simple is None else (zeros + len(g) - 1, simple + [0] * (zeros > 0))
+    if simple is None:
+        return None
+    return zeros + len(g) - 1, [*simple, 0] if zeros else simple
 
 
 def _symmetric_part(p: Polynomial) -> Polynomial | None:

@@ -43,7 +43,8 @@ class Account:
     """
 
     def __init__(self, memory: float):
-        self.allowed, self.work, self.largest, self.permanent = int(Fraction(memory) * GB), 0, 0, 0
+        self.allowed = int(Fraction(memory) * GB)
+        self.work, self.largest, self.permanent = 0, 0, 0
 
     @property
     def needed(self) -> Fraction:

@@ -194,7 +194,8 @@ def _compute(client: Any, loss: str, tasks: Iterator[Task], settings: Settings) 
     from distributed import wait
 
     under_way: dict[Any, Task] = {}
-    query_time, alive, threads = -math.inf, time.monotonic(), 0
+    query_time, threads = -math.inf, 0
+    alive = time.monotonic()
     while True:
         try:
             if (now := time.monotonic()) > query_time + 1:  # workers come and go

@@ -167,7 +167,8 @@ class Journal:
     """
 
     def __init__(self, path: Path, selection: Sequence[Source], settings: Settings, restart: bool):
-        self.path, self.name, self._selection = path, shorten(os.fspath(path), 200), selection
+        self.path, self._selection = path, selection
+        self.name = shorten(os.fspath(path), 200)
         header = {"schema": SCHEMA, "version": package_version(), **settings.to_dict()}
         self._file = _open_alone(path, self.name)
         self._rows: dict[str, Row] = {}

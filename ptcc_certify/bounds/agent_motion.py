@@ -35,7 +35,8 @@ def common_motion(plant: Sequence[Fraction], own: Sequence[Fraction], gain: Gain
     >>> float(at_rest[0][1][0]).__round__(6), float(at_rest[0][1][1]) < 1e-20  # int e^(-t) (1 - t/2) dt
     (0.567668, True)
     """
-    n, T, zero = len(plant), gain.T, (Fraction(0), Fraction(0))
+    n, T = len(plant), gain.T
+    zero = (Fraction(0), Fraction(0))
     if any(own):
         w = (plant[1] + own[1] * gain.rho1) * T
         middle, radius = decay_integral(w, own[1] * gain.pole)

@@ -70,8 +70,9 @@ def compare_agents(
     z, L = run.scaled[..., later], structure.graph.laplacian()
     N, n = len(z), z.shape[2]
     P = np.linalg.cholesky(np.array([[float(x) for x in row] for row in matrix.inverse])).T
-    decay, deviation, relative = 0.0, np.full((N, n), np.inf), np.full(N, np.inf)
-    for V, value, own in zip(functions, initial_values, inputs, strict=True):
+    decay = 0.0
+    deviation, relative = np.full((N, n), np.inf), np.full(N, np.inf)
+    for V, value, input_constants in zip(functions, initial_values, inputs, strict=True):
         if not value:
             continue
         roots = V.scaled(V.coordinates_of(z, L))
@@ -80,7 +81,7 @@ def compare_agents(
         if V.deviation is not None:
             rows = [[float_up(root_product(c, matrix.W[i][i], value)) for i in range(n)] for c in V.deviation.agents]
             deviation = np.minimum(deviation, rows)
-        constants = own if V.matrix is not None else error_constants(structure, V)
+        constants = input_constants if V.matrix is not None else error_constants(structure, V)
         if constants is not None:
             gain = matrix.gains[-1] * matrix.coupling
             relative = np.minimum(relative, [float_up(root_product(gain, c, value)) for c in constants])
@@ -90,10 +91,10 @@ def compare_agents(
     pull = np.einsum("i,kdim->kdm", np.array(list(map(float, matrix.gains))), eps)
     pulls = np.sqrt((pull**2).sum(axis=1)).max(axis=-1)
     sizes = np.sqrt((z**2).sum(axis=1)).max(axis=-1)
-    known = np.isfinite(deviation).all()
+    finite = np.isfinite(deviation).all()
     return AgentsComparison(
         decay,
-        tuple(_ratio(sizes, deviation).max(axis=0).tolist()) if known else (),
+        tuple(_ratio(sizes, deviation).max(axis=0).tolist()) if finite else (),
         float(_ratio(pulls, relative).max()) if np.isfinite(relative).all() else None,
         _input_ratio(run, later, bounds),
     )
@@ -117,7 +118,8 @@ def compare_with_bounds(
         Of the same to (N, n, M) bounds.
     """
     later = np.isfinite(run.scaled).all(axis=(0, 1, 2)) & (run.t > 0) & (run.rate * run.clock < 1200)  # e^600
-    z, q, L = run.scaled[..., later], run.remaining[later], structure.graph.laplacian()
+    z, q = run.scaled[..., later], run.remaining[later]
+    L = structure.graph.laplacian()
     weight, eta = np.exp(run.rate * run.clock[later] / 2), np.array([run.protocol.value(x) for x in q])
     decay = 0.0
     for V, bound in zip(functions, roots(q), strict=True):

@@ -141,8 +141,10 @@ def drive_integral(gain: Gain, rate: Fraction, alpha: Fraction, remaining: np.nd
     >>> float(late[0]), bool(0 < late[1] < 1e-3)
     (0.0, True)
     """
-    q, T, rho1 = np.asarray(remaining, dtype=float), float(gain.T), float(gain.rho1)
-    a, b, k = float_down(alpha), float_down(rate / 2), float(gain.pole)
+    q = np.asarray(remaining, dtype=float)
+    T, rho1 = float(gain.T), float(gain.rho1)
+    a, b = float_down(alpha), float_down(rate / 2)
+    k = float(gain.pole)
     z, slowest = np.log(1 / q), min(a, b)
     s = gain.clock_at_remaining(q)
     first = T * np.exp(-slowest * rho1 * T * (1 - q) - min(b * k, a * k + 1) * z) * _falling(abs(a * k + 1 - b * k), z)
@@ -170,14 +172,16 @@ def course(
     """
     steps_of_course = _STEPS if begin == 1 else 20 + int(15 * math.log2(begin / remaining.min()))
     q = np.unique(np.concatenate([np.geomspace(remaining.min(), begin, steps_of_course), remaining]))[::-1]
-    a, b, k, linear = float_down(alpha), float_down(rate / 2), float(gain.pole), float(gain.rho1 * gain.T)
+    a, b = float_down(alpha), float_down(rate / 2)
+    k, linear = float(gain.pole), float(gain.rho1 * gain.T)
     past = linear * q + k  # eta (T - t)
     theta = (k / past) ** 2 / k
     grows = linear * (q[:-1] - q[1:]) / (past[:-1] * past[1:]) * (k / past[:-1] + k / past[1:])
     steps = linear * (q[:-1] - q[1:]) + k * np.log(q[:-1] / q[1:])
     falls = np.exp(-a * steps) * (past[:-1] / past[1:]) * (q[1:] / q[:-1])  # of e^-G
     R, first = float_up(roots.combined or Fraction(0)), float_up(roots.state)
-    S, J, values = first, 0.0, np.empty((len(q), 3))
+    S, J = first, 0.0
+    values = np.empty((len(q), 3))
     values[0] = R, S, J
     for i, (D, d, fall) in enumerate(zip(steps.tolist(), grows.tolist(), falls.tolist(), strict=True)):
         g = a + float(theta[i])

@@ -229,7 +229,8 @@ class DelayLMIBounds:
         lmi = DelayLMI(loop, b, matrix, each)
         if not lmi.proved(exact):
             return None
-        root, left, constants = lmi.root(self.state), left_above(b * self.clock), lmi.constants(exact)
+        root, left = lmi.root(self.state), left_above(b * self.clock)
+        constants = lmi.constants(exact)
         moved = [rounded(root * x * _MORE, BITS, up=True) for x in constants.walk]
         away = [rounded(root * x * _MORE, BITS, up=True) for x in constants.away]
         residual = [rounded(x + y * left, BITS, up=True) for x, y in zip(moved, away, strict=True)]
@@ -252,7 +253,8 @@ def _dense(rows: Sequence[Row], width: int) -> np.ndarray:
 
 def _system(loop: LateLoop) -> LateSystem:
     """Return a loop in floats."""
-    m, n, q, channels = len(loop.free), len(loop.laplacian), len(loop.listeners), loop.channels
+    m, n, q = len(loop.free), len(loop.laplacian), len(loop.listeners)
+    channels = loop.channels
     place = {v: k for k, v in enumerate(loop.listeners)}
     Z = _dense([{j: Fraction(x, loop.unit) for j, x in row.items()} for row in loop.slopes], m + q)
     return LateSystem(

@@ -147,16 +147,18 @@ def deviation_while_driven(
     """
     if V.rate <= 0:
         return None
-    half, nodes, c = float(V.rate) * (1 - 1e-12) / 2, range(len(y)), above(drive.constant(V))
+    half = float(V.rate) * (1 - 1e-12) / 2
+    nodes = range(len(y))
+    c = above(drive.constant(V))
     with np.errstate(over="ignore", invalid="ignore"):
         v, more = phase.driven(half, above(V.root(y)), c, at), phase.rest(at)
-        own = np.multiply.outer(_floats(V.speeds, len(y)), (v + c * more) / half)
-        own += np.multiply.outer([above(drive.sizes[k]) for k in nodes], more)
+        deviation = np.multiply.outer(_floats(V.speeds, len(y)), (v + c * more) / half)
+        deviation += np.multiply.outer([above(drive.sizes[k]) for k in nodes], more)
         if rest is not None:
             near = np.multiply.outer(_floats([from_rest(V.sizes, rest)], len(y)), v)
-            own = np.fmin(own, near if not rest.groups else np.where(more == 0, near, np.inf))
-        own += sliding_sizes(drive, phase, at)
-    return np.nan_to_num(own, nan=np.inf, posinf=np.inf)
+            deviation = np.fmin(deviation, near if not rest.groups else np.where(more == 0, near, np.inf))
+        deviation += sliding_sizes(drive, phase, at)
+    return np.nan_to_num(deviation, nan=np.inf, posinf=np.inf)
 
 
 def input_while_driven(

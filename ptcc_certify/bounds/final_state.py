@@ -553,7 +553,8 @@ def enclosed_final_state(influence: Influence, initial_state: Sequence[Fraction]
         value, spread = final[first] * (component.gauge or (1,))[0], spreads[first]
         if spread and abs(Fraction(value)) <= 2 * spread:
             raise NotEnclosedError(f"the consensus value of leader group {number} may or may not be 0")
-        degenerate += [number] * (not value)
+        if not value:
+            degenerate.append(number)
         values.append(value)
     labels = influence.structure.graph.labels
     return FinalState(labels, tuple(final), tuple(values), tuple(degenerate), tuple(spreads))
@@ -584,7 +585,9 @@ def _enclosed(
     influence: Influence, state: Sequence[Fraction], spread: Sequence[Fraction] | None = None
 ) -> tuple[list[Number], list[Fraction]]:
     """Return middles and radii of ``Q x`` for all ``x`` within ``spread`` of a state; in floats where not exact."""
-    structure, n, unit, enclosure = influence.structure, len(state), Fraction(1), influence.enclosure
+    structure, enclosure = influence.structure, influence.enclosure
+    n = len(state)
+    unit = Fraction(1)
     zero = Fraction(0)
     assert enclosure is not None
     size = max((abs(state[v]) for c in influence.balanced for v in c.nodes), default=zero)
@@ -592,22 +595,21 @@ def _enclosed(
     if size and not _SMALLEST <= size <= 1 / _SMALLEST:
         unit = Fraction(2) ** (size.numerator.bit_length() - size.denominator.bit_length())
         state, spread = [x / unit for x in state], spread and [r / unit for r in spread]
-    middle, radius, exact = np.zeros(n), np.zeros(n), dict[int, tuple[Fraction, Fraction]]()
+    middle, radius = np.zeros(n), np.zeros(n)
+    exact = dict[int, tuple[Fraction, Fraction]]()
     for k, (component, null_vector) in enumerate(influence.groups):
         signs, nodes = np.array(component.gauge or ()), component.nodes
-        own, wide = (
-            [state[v] for v in nodes],
-            [Fraction(0)] * len(nodes) if spread is None else [spread[v] for v in nodes],
-        )
-        if k in enclosure.left_null_vectors and (any(own) or any(wide)):
-            value, width = _enclosed_value(enclosure.left_null_vectors[k], own, wide)
+        group_state = [state[v] for v in nodes]
+        group_spread = [Fraction(0)] * len(nodes) if spread is None else [spread[v] for v in nodes]
+        if k in enclosure.left_null_vectors and (any(group_state) or any(group_spread)):
+            value, width = _enclosed_value(enclosure.left_null_vectors[k], group_state, group_spread)
             middle[list(nodes)], radius[list(nodes)] = signs * value, width
             continue
-        consensus = sum((Fraction(w) * x for w, x in zip(null_vector, own, strict=True) if x), zero)
-        blur = sum((abs(Fraction(w)) * r for w, r in zip(null_vector, wide, strict=True) if r), zero)
+        consensus = sum((Fraction(w) * x for w, x in zip(null_vector, group_state, strict=True) if x), zero)
+        blur = sum((abs(Fraction(w)) * r for w, r in zip(null_vector, group_spread, strict=True) if r), zero)
         exact.update((v, (sign * consensus, blur)) for v, sign in zip(nodes, component.gauge or (), strict=True))
         middle[list(nodes)] = signs * float(consensus)
-        radius[list(nodes)] = rounding_radius(consensus) + float(blur) * _MORE + bool(blur) * _TINY
+        radius[list(nodes)] = rounding_radius(consensus) + float(blur) * _MORE + (_TINY if blur else 0)
     exact.update(
         (v, (Fraction(0), Fraction(0))) for c in structure.closed_components if not c.balanced for v in c.nodes
     )
@@ -629,7 +631,8 @@ def _enclosed_value(
     null_vector: tuple[np.ndarray, np.ndarray], own: Sequence[Fraction], wide: Sequence[Fraction]
 ) -> tuple[float, float]:
     """Return middle and radius of the consensus value of a group whose left null vector is enclosed, in floats."""
-    (weights, radii), states, spread = null_vector, np.array(own, dtype=float), np.array(wide, dtype=float)
+    weights, radii = null_vector
+    states, spread = np.array(own, dtype=float), np.array(wide, dtype=float)
     value, total = float(weights @ states), float(np.abs(weights) @ np.abs(states))
     more = float(radii @ (np.abs(states) + spread)) + float(np.abs(weights) @ spread)
     return value, (more + _ROUNDING * total) * _MORE + _TINY
@@ -758,5 +761,5 @@ def _exactly_enclosed_followers(
         if comparison <= 0 or residual * _SMALLEST > comparison:
             raise NotEnclosedError("the followers' equations are too ill-conditioned for floats")
         error = max(error, residual / comparison)
-    radii = [Fraction(float(error * weight) * _MORE + bool(error) * _TINY) for weight in weights.values()]
+    radii = [Fraction(float(error * weight) * _MORE + (_TINY if error else 0)) for weight in weights.values()]
     return dict(zip(F, zip(middles, radii, strict=True), strict=True))

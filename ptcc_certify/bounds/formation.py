@@ -59,7 +59,8 @@ class GroupDrift:
 
     def __str__(self) -> str:
         rates = ", ".join(str(x) for x in self.rate)
-        return f"{', '.join(map(shorten, self.nodes[:5]))}{', ...' * (len(self.nodes) > 5)} by {shorten(rates)}"
+        more = ", ..." if len(self.nodes) > 5 else ""
+        return f"{', '.join(map(shorten, self.nodes[:5]))}{more} by {shorten(rates)}"
 
 
 @dataclass(frozen=True)

@@ -331,7 +331,8 @@ def heard_wrong(messages: LateMessages, leaders: MovingLeaders | None) -> Fracti
 
 def _inputs(rows: FollowerRows, bounds: LateBounds, row: RowBound) -> np.ndarray:
     """Bound ``gain (D_k |eps_k| + sum_l |w_kl| |eps_l(t - tau_kl)| + error D_k)`` of every follower."""
-    cap, u, b, gain = bounds.messages.gain_cap, row.witness.u, float_up(row.witness.b), bounds.gain.gain.exact
+    cap, gain = bounds.messages.gain_cap, bounds.gain.gain.exact
+    u, b = row.witness.u, float_up(row.witness.b)
     assert cap is not None
     y, floor = float_up(row.initial * gain_above(gain, cap, row.witness.b, row.cap)), row.floor
     if row.after is not None:
@@ -469,7 +470,9 @@ def row_bound(
     if caps:
         clock = Limits(min(caps)).clock_below(gain.gain.exact)
         left = left_above(witness.b * clock)
-    floor, error, slack = 0.0, heard_wrong(messages, leaders), rows.slack(witness.u)
+    floor = 0.0
+    error = heard_wrong(messages, leaders)
+    slack = rows.slack(witness.u)
     if error:
         floor = max(rows.floor(witness.u, float(error)), _LEAST)
     initial = float((first / witness.u).max())
@@ -535,14 +538,16 @@ def read_late(
     section: MessagesSection | None = report.sections.get("messages")
     if section is None:
         return None
-    messages, proved, moving = read_messages(section, structure), report.proved, section.leaders
+    messages = read_messages(section, structure)
+    proved, moving = report.proved, section.leaders
     leaders = None if moving is None else MovingLeaders(moving.speed, moving.disturbance)
     rows = []
     for i, row in enumerate(section.rows):
         step = proved["late-rows", f"messages.rows[{i}]"]
         witness = RowWitness(step["q"], step["b"], floats(step["witness"].u))
         rows.append(RowBound(witness, row.cap, row.clock, row.left, row.initial, row.floor, row.drift, row.after))
-    gain, missed, steps = GainLimits(gain_cap=messages.gain_cap).limit(protocol.gain), None, None
+    gain = GainLimits(gain_cap=messages.gain_cap).limit(protocol.gain)
+    missed, steps = None, None
     if section.missed is not None:
         gauge = np.array(proved["late-missed", "messages.missed"]["witness"].gauge)
         missed = Missed(section.missed.agent, section.missed.bound, gauge)

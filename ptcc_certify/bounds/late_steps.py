@@ -126,7 +126,9 @@ def bound_steps(
 ) -> Steps:
     """Bound followers from instant to instant, in floats that leave room for the integers of the check."""
     parts = [(W, _hearing(instants, delay * Fraction(share))) for share, W in rows.by_age().items()]
-    clock, size, lags = _clock(gain, instants), float(start.max()), _lags(rows, gain, push, instants[:-1])
+    clock = _clock(gain, instants)
+    size = float(start.max())
+    lags = _lags(rows, gain, push, instants[:-1])
     room, bounds = _UNIT * size * (np.diff(rows.W.indptr) + 6.0), [start + _UNIT * size]
     for i in range(1, len(instants)):
         before, heard = bounds[-1], sum(W @ bounds[at[i - 1]] for W, at in parts) / rows.D + error + room

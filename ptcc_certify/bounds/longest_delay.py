@@ -125,12 +125,13 @@ class LateCase:
             None if no delay is found. One of ``T`` is as good as any longer one, and none longer is tried.
         """
         T, age = self.protocol.T, late.messages.age
-        best, shortest, high = None, T * Fraction(_SHORTEST), min(age, T)
+        best = None
+        shortest, high = T * Fraction(_SHORTEST), min(age, T)
         if late.largest <= residual:
             best, shortest, high = late, age, max(age, T)
-            whole = late if age >= T else self._bound_at(late.messages, T)
-            if whole.largest <= residual:
-                return whole
+            latest = late if age >= T else self._bound_at(late.messages, T)
+            if latest.largest <= residual:
+                return latest
         low, top = math.log(float(shortest)), math.log(float(high))
         for _ in range(_HALVINGS):
             middle = (low + top) / 2

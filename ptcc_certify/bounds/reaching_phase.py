@@ -42,7 +42,8 @@ class ReachingPhase:
 
     def instants(self, remaining: Any) -> Instants:
         """Return ``s`` and ``z`` where ``1 - t/(T_r + T_s)`` is ``remaining``, or refuse it."""
-        q, T_r, T_s = remaining_part(remaining), float(self.protocol.T_r), float(self.protocol.T_s)
+        q = remaining_part(remaining)
+        T_r, T_s = float(self.protocol.T_r), float(self.protocol.T_s)
         T = float(self.protocol.T)
         with np.errstate(divide="ignore"):
             z = -np.log(np.maximum((q - T_s / T) * (T / T_r), 0.0))

@@ -157,7 +157,8 @@ class SmallDelayBounds:
         pushed = [sum((x * exact[v] for v, x in row.items()), Fraction(0)) for row in self.B]
         kap = Fraction(self._kap(self._weights(one), np.array([float(x) for x in pushed])) * (1 + _MORE))
         left = left_above(b * self.clock)
-        root, moved, residual = self._root(one), list[Fraction](), list[Fraction]()
+        root = self._root(one)
+        moved, residual = list[Fraction](), list[Fraction]()
         for k, c in enumerate(one.deviations):
             share = sum((abs(Fraction(x)) * pushed[v] for v, x in self.influence.row(k).items()), Fraction(0))
             moved.append(rounded(h * q / b * share * root, BITS, up=True))

@@ -54,7 +54,8 @@ def levels(rows: FollowerRows) -> np.ndarray | None:
     if np.bincount(components).max() > 1:
         return None
     out, waiting = rows.W.tocsc(), np.diff(rows.W.indptr).tolist()
-    first, listeners, level = out.indptr.tolist(), out.indices.tolist(), [1] * rows.D.size
+    first, listeners = out.indptr.tolist(), out.indices.tolist()
+    level = [1] * rows.D.size
     todo = [k for k, count in enumerate(waiting) if not count]
     for k in todo:
         for j in listeners[first[k] : first[k + 1]]:

@@ -131,7 +131,8 @@ def drift_integral(gain: Gain, b: float, cap: Fraction | None, t: np.ndarray) ->
     >>> drift_integral(gain, 1.0, Fraction(2), np.array([0, 1])).round(4)  # (1 - e^-2)/2
     array([0.    , 0.4323])
     """
-    T, p, turn = float(gain.T), b * float(gain.pole), 0.0
+    T, p = float(gain.T), b * float(gain.pole)
+    turn = 0.0
     if cap is not None:
         turn = 1.0 if cap <= gain.first else float(gain.pole / (cap - gain.rho1) / gain.T)
     q = np.maximum(1 - t / T, 0)

@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from lmi.exact.decimal_rounding import down, float_down, float_up, near, up
+from lmi.exact.decimal_rounding import counted, down, float_down, float_up, near, up
 from ptcc_certify.bounds.agent_instants import Values, instant_values
 from ptcc_certify.bounds.agent_motion import Interval, common_motion
 from ptcc_certify.bounds.agents import (
@@ -188,14 +188,16 @@ class AgentsPart(AgentsAnswer):
 
         Minus infinity before.
         """
-        s, gain, former = self.protocol.clock(q), self.protocol.gain, self.matrix.rate
+        s = self.protocol.clock(q)
+        gain, former = self.protocol.gain, self.matrix.rate
         fallen, begun = 0.0, float(self.protocol.clock(np.array([since]))[0])
         yield self.matrix.W, np.where(q <= since, float_down(former) * (s - begun), -np.inf)
         for phase in self.phases:
             if phase.function == function:
                 since = min(since, phase.begins(gain.rho1, gain.pole, gain.T))
                 clock = float(self.protocol.clock(np.array([since]))[0])
-                fallen, begun, former = fallen + float_down(former) * (clock - begun), clock, phase.rate
+                fallen += float_down(former) * (clock - begun)
+                begun, former = clock, phase.rate
                 yield phase.W, np.where(q <= since, fallen + float_down(former) * (s - clock), -np.inf)
 
     def compare(self, run: AgentsTrajectory) -> AgentsComparison | None:
@@ -244,9 +246,9 @@ class AgentsPart(AgentsAnswer):
     def proof_text(self) -> tuple[str, str]:
         """What the long screen tells of gains and of the proof."""
         matrix = self.matrix
-        pieces, count = max(len(matrix.points) - 1, 0), len(self.used)
+        pieces = max(len(matrix.points) - 1, 0)
         proof = f"V <= e^(-r s) V(0), r = {down(matrix.rate)}, R = r rho2 kappa = {near(self.decay)}; one matrix for "
-        proof += f"{count} Lyapunov function{'s' * (count != 1)}, {pieces} piece{'s' * (pieces != 1)}"
+        proof += f"{counted(len(self.used), 'Lyapunov function')}, {counted(pieces, 'piece')}"
         return f"{self.gains_text}, coupling {near(matrix.coupling)}", proof
 
     def __repr__(self) -> str:

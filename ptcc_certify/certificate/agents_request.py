@@ -97,20 +97,26 @@ def _drift_text(groups: Sequence[GroupDrift], agents: Agents, gain: Gain) -> str
     Of chains of integrators that are capped the drift at ``T`` is a number, rounded up, times ``K_1`` where that is a
     gain to be designed.
     """
-    n, cap, designed = agents.degree, agents.cap, not agents.of_paper
+    n, cap = agents.degree, agents.cap
+    designed = not agents.of_paper
     name = f"the {DERIVATIVES[n]}" if n < len(DERIVATIVES) else f"derivative {n}"
     power = "g" if n == 1 else f"g^{n}"
     unit = f" times K_1 {power}" if designed else " per unit of the clock"
     if agents.cascade is not None:
         unit, designed = f" times ({readable(agents.alpha)} g^2 + g')", False
     far = None if cap is None or any(agents.coefficients) else drift_until_deadline(gain, cap, n)[1]
-    named = []
-    for group in groups[:3]:
-        most = "" if far is None else f"at most {'K_1 times ' * designed}{up(far * root_above(group.square))} until T"
-        named.append(f"{group}{unit}" + (f", {'positions ' * (n > 1)}{most}" if most else ""))
-    text = f"{'move' if n == 1 else f'change {name} of'} leader group {'; '.join(named)}{'; ...' * (len(groups) > 3)}"
-    text += f", {'positions ' * (n > 1)}without bound before T" * (cap is None)
-    return text + " (K_1 is the gain of relative positions, g the gain)" * designed
+    positions = "positions " if n > 1 else ""
+    factor = "K_1 times " if designed else ""
+    drifts = [f"{group}{unit}" for group in groups[:3]]
+    if far is not None:
+        most = [f"at most {factor}{up(far * root_above(group.square))} until T" for group in groups[:3]]
+        drifts = [f"{drift}, {positions}{limit}" for drift, limit in zip(drifts, most, strict=True)]
+    if len(groups) > 3:
+        drifts.append("...")
+    text = f"{'move' if n == 1 else f'change {name} of'} leader group {'; '.join(drifts)}"
+    if cap is None:
+        text += f", {positions}without bound before T"
+    return f"{text} (K_1 is the gain of relative positions, g the gain)" if designed else text
 
 
 def read_chains(agents: Agents, graph: SignedDigraph, gain: Gain, initial: InitialState) -> Chains:

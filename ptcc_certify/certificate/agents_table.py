@@ -43,7 +43,8 @@ def agents_table(certificate: Content | FamilyContent, certified: bool = True) -
 def _of_graph(certificate: Content) -> dict[str, Any]:
     """Return where agents begin and end, and how near they are proved to be, NaN where that is not known."""
     unknown = np.full(certificate.graph.n_nodes, np.nan)
-    begin, end, deviation = certificate.initial_positions, certificate.final_positions, unknown
+    begin, end = certificate.initial_positions, certificate.final_positions
+    deviation = unknown
     if begin is not None and certificate.functions:
         share = 1 if certificate.direct else float(certificate.protocol.span / certificate.protocol.T)
         deviation = certificate.deviation_bound([0.01 * share])[:, 0]

@@ -147,7 +147,7 @@ class Assessment:
     @property
     def certified_part(self) -> str:
         """What is certified where something asked is not."""
-        return "the rest is " * (self.asked in (REFUTED, OPEN)) + CERTIFIED + self.without
+        return f"{'the rest is ' if self.asked in (REFUTED, OPEN) else ''}{CERTIFIED}{self.without}"
 
     @property
     def sentence(self) -> Sentence:
@@ -177,9 +177,9 @@ class Assessment:
             status: joined(", ", (a.sentence for a in self.answers if a.status == status))
             for status in (REFUTED, OPEN, MET)
         }
-        *unmet, met = (joined(": ", (status, told)) if told else "" for status, told in answers.items())
+        *unmet, met = (joined(": ", (status, answer)) if answer else "" for status, answer in answers.items())
         order = (met, *verdict) if self.verdict == CERTIFIED else (*verdict, met)
-        return joined("; ", (VIOLATED * self.violated, *unmet, *order))
+        return joined("; ", (VIOLATED if self.violated else "", *unmet, *order))
 
 
 def verdict_of(report: CheckReport | None) -> str:

@@ -120,19 +120,20 @@ class CascadePart(AgentsAnswer):
     @property
     def unbounded(self) -> tuple[tuple[str, Change], ...]:
         """What leaves the input without a bound, and what mends it; empty where nothing does."""
-        k, best, found = self.protocol.gain.pole, self.best, []
+        k, best = self.protocol.gain.pole, self.best
+        reasons = []
         if not self.functions or any(input_is_bounded(k, V.proved_rate, self.alpha) for V in self.functions):
             return ()
         if best * k < 4:
             rho2 = up(4 / (best * self.protocol.base.kappa), 4)
-            found.append((f"rate {down(best)} is below 4/(rho2 kappa) = {up(4 / k, 4)}", Change("rho2", rho2)))
+            reasons.append((f"rate {down(best)} is below 4/(rho2 kappa) = {up(4 / k, 4)}", Change("rho2", rho2)))
             k = Fraction(rho2) * self.protocol.base.kappa
         if not input_is_bounded(k, best, self.alpha):
             least = up(1 / k, 4)
             mend = least if input_is_bounded(k, best, Fraction(least)) else up(2 / k, 4)
             limit = f"below 1/(rho2 kappa) = {least}" if self.alpha * k < 1 else "just 1/(rho2 kappa), as is rate/4"
-            found.append((f"cascade {down(self.alpha)} is {limit}", Change("cascade", mend)))
-        return tuple(found)
+            reasons.append((f"cascade {down(self.alpha)} is {limit}", Change("cascade", mend)))
+        return tuple(reasons)
 
     @property
     def bounding_rho2(self) -> Fraction | None:
@@ -236,23 +237,24 @@ class CascadePart(AgentsAnswer):
         """
         if not self.roots:
             return np.full((self.structure.graph.n_nodes, 2, len(np.atleast_1d(remaining))), np.inf)
-        q, N, gain = np.atleast_1d(np.asarray(remaining, dtype=float)), self.structure.graph.n_nodes, self.protocol.gain
+        q = np.atleast_1d(np.asarray(remaining, dtype=float))
+        N, gain = self.structure.graph.n_nodes, self.protocol.gain
         near, fast, errors, drive, integral, begin = (np.full((N, len(q)), np.inf) for _ in range(6))
         fading = np.exp(-float_down(self.alpha) * gain.clock_at_remaining(q))
         each = zip(self.functions, self.roots, self._values(self.roots, q), self.error_constants, strict=True)
         for number, (V, root, value, constants) in enumerate(each):
-            own = course(gain, V.proved_rate, self.alpha, root, q)
+            curve = course(gain, V.proved_rate, self.alpha, root, q)
             if V.deviation is not None:
                 c = np.array([float_up(root_product(x)) for x in V.deviation.agents])
                 near = np.minimum(near, np.outer(c, value))
                 later = self._from_instants(number, q)[1]
-                fast = np.minimum(fast, np.outer(c, np.minimum(own.combined + own.pull * own.state, later)))
+                fast = np.minimum(fast, np.outer(c, np.minimum(curve.combined + curve.pull * curve.state, later)))
                 drive = np.minimum(drive, np.outer(c, float_up(root.drive) * fading))
                 begin = np.minimum(begin, np.outer(c, float_up(root.velocity or Fraction(0)) * fading))
             if constants is not None:
                 c = np.array([float_up(root_product(x)) for x in constants])
                 errors = np.minimum(errors, np.outer(c, value))
-                integral = np.minimum(integral, np.outer(c, own.integral))
+                integral = np.minimum(integral, np.outer(c, curve.integral))
         eta = np.array([self.protocol.value(x) for x in q])
         speeds = np.min([eta * fast, eta * errors + drive, eta * integral + begin], axis=0)
         return np.stack([near, speeds], axis=1) * (1 + 1e-9)
@@ -385,13 +387,14 @@ def read_cascade(
     section: CascadeSection, structure: Structure, base: Protocol, functions: Sequence[LyapunovFunction]
 ) -> CascadePart:
     """Return what an accepted certificate says of the cascade."""
-    alpha, offsets, begin = section.cascade, rows_of(section.offsets), states_of(section.initial_state)
-    used, roots = [functions[one.function] for one in section.functions], list[Roots]()
+    alpha = section.cascade
+    offsets, begin = rows_of(section.offsets), states_of(section.initial_state)
+    used, roots = [functions[use.function] for use in section.functions], list[Roots]()
     if begin is not None:
         rows = initial_rows(structure, begin, offsets, base.gain, alpha)[2:]
-        for one, V in zip(section.functions, used, strict=True):
-            told = one.initial or Fraction(0), one.drive or Fraction(0)
-            roots.append(Roots(*told, *(root_of(structure, V, x) for x in rows)))
+        for use, V in zip(section.functions, used, strict=True):
+            constants = use.initial or Fraction(0), use.drive or Fraction(0)
+            roots.append(Roots(*constants, *(root_of(structure, V, x) for x in rows)))
     return CascadePart(
         structure,
         CascadeProtocol.of(base, alpha, offsets),

@@ -320,7 +320,9 @@ class Content:
     def theorems_named(self) -> str:
         """The theorem of the claim, or those of the components: ``Theorems 1.2 and 2.1``."""
         numbers = sorted({claim.theorem for claim in self.claims})
-        return f"Theorem{'s' * (len(numbers) > 1)} {' and '.join(filter(None, (', '.join(numbers[:-1]), numbers[-1])))}"
+        if len(numbers) == 1:
+            return f"Theorem {numbers[0]}"
+        return f"Theorems {', '.join(numbers[:-1])} and {numbers[-1]}"
 
     @cached_property
     def claims(self) -> tuple[Claim, ...]:

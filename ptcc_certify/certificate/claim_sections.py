@@ -136,7 +136,9 @@ def _read_signal(entry: Any) -> SignalClass:
 
 def read_claim(of: str, entry: Section, proved: Proved, components: Sequence[FamilyComponent]) -> Claim:
     """Return a claim of a certificate that was accepted; about one of its components."""
-    number, signal, component = entry.component, _read_signal(entry.signals), components[entry.component]
+    number = entry.component
+    signal = _read_signal(entry.signals)
+    component = components[entry.component]
     steps = rates_of(of, proved)
     if isinstance(entry, FinalValueSection):
         pairs = zip(entry.modes, component.family.modes, strict=True)

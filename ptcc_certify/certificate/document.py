@@ -169,7 +169,9 @@ def read_document(
 ) -> dict[str, Any]:
     """Return the fields of a certificate that was accepted; the structure is computed anew from the edges."""
     graph = certificate_graph(document, files)
-    structure, protocol, data = analyse(graph), read_protocol(report.sections["protocol"]), Reader(graph.labels, files)
+    structure = analyse(graph)
+    protocol = read_protocol(report.sections["protocol"])
+    data = Reader(graph.labels, files)
     sections, proved = report.sections, report.proved
     paper: PaperSection | None = sections["paper"]
     functions = [

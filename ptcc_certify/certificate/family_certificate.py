@@ -16,7 +16,7 @@ import numpy as np
 from lmi import search_time as deadline
 from lmi.blas_threads import one_thread
 from lmi.errors import NoCertificate
-from lmi.exact.decimal_rounding import down
+from lmi.exact.decimal_rounding import counted, down
 from lmi.search_time import share_of_time
 from ptcc_certify.bounds.attracting_box import AttractingBox, box_of_family
 from ptcc_certify.bounds.kept_means import with_means
@@ -283,15 +283,17 @@ def certify_family(
     if isinstance(signal, JointWindows):
         refuse_impossible_windows(family, signal)
     if isinstance(signal, ClockShares) and len(signal.shares) != len(family.modes):
-        count, modes = len(signal.shares), len(family.modes)
-        raise ParameterError(f"{count} share{'s' * (count > 1)} of the clock; give one for each of {modes} modes")
-    asked, seconds, progress = read_expectations(expectations), read_seconds(time_limit, family), listener(progress)
+        shares = counted(len(signal.shares), "share")
+        raise ParameterError(f"{shares} of the clock; give one for each of {len(family.modes)} modes")
+    asked, seconds = read_expectations(expectations), read_seconds(time_limit, family)
+    progress = listener(progress)
     structure = analyse(family.modes[0].mandatory)
     initial_state = None if x0 is None else read_initial_state(structure, x0, "x0")
     sigma, reaching = read_sliding_variable(structure, protocol, sigma0)
     progress(STEPS[0])
     components = decide(family)
-    parts, notes, still = [], list(family.notes), sigma is None or not any(sigma)
+    parts, notes = [], list(family.notes)
+    still = sigma is None or not any(sigma)
     few = one_thread(family.n_nodes <= ONE_THREAD_NODES)
     with few, deadline.time_limit(seconds, work=time_limit is None):
         for component in components:
@@ -300,7 +302,7 @@ def certify_family(
         if signal != "any":
             progress(STEP)
         begin = initial_state if still else None
-        kept: dict[str, Any] = {
+        fields: dict[str, Any] = {
             "boxes": _boxes(parts, begin, notes),
             "ranges": _ranges(parts, begin),
             "signal": signal,
@@ -308,9 +310,9 @@ def certify_family(
         }
     progress(STEPS[-1])
     notes = [f"{note}: cut off by the time limit" if note in (*STEPS, BOXES) else note for note in notes]
-    kept |= {"expectations": asked, "notes": tuple(dict.fromkeys(notes)), "scenario": scenario}
-    kept["origins"] = origins_of(None, InitialState(x0, sigma0)) | dict(origins or {})
-    return _fewer_functions(FamilyCertificate(family, protocol, tuple(parts), initial_state, sigma, reaching, **kept))
+    fields |= {"expectations": asked, "notes": tuple(dict.fromkeys(notes)), "scenario": scenario}
+    fields["origins"] = origins_of(None, InitialState(x0, sigma0)) | dict(origins or {})
+    return _fewer_functions(FamilyCertificate(family, protocol, tuple(parts), initial_state, sigma, reaching, **fields))
 
 
 def _fewer_functions(certificate: FamilyCertificate) -> FamilyCertificate:

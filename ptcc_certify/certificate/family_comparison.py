@@ -214,7 +214,8 @@ def _input_ratio(certificate: FamilyCertificate, run: Trajectory, floor: float) 
 
 def _sliding_ratio(certificate: FamilyCertificate, run: Trajectory) -> float | None:
     """Return the worst ratio of sliding variables to ``psi |sigma_k(0)|``."""
-    sliding, reaching, protocol = run.sliding, certificate.reaching, certificate.protocol.reaching
+    sliding = run.sliding
+    reaching, protocol = certificate.reaching, certificate.protocol.reaching
     if sliding is None or reaching is None or protocol is None or certificate.direct:
         return None
     certain = np.array([np.inf if r.z is None else float(r.z) for r in reaching])

@@ -491,16 +491,17 @@ class FamilyContent:
     def _deviation(self, at: Instants) -> np.ndarray:
         bounds = np.full((self.family.n_nodes, at.clock.size), np.inf)
         for part, functions, driven in self._driven_parts:
-            nodes, x, rest = part.component.nodes, self._state(part), part.rest_states
+            nodes, rest = part.component.nodes, part.rest_states
+            x = self._state(part)
             if nodes.size == 1:
                 bounds[nodes] = 0 if driven is None else sliding_sizes(driven, self._phase, at)
             for V in functions:
                 if driven is None:
-                    own = deviation_on_clock(V, rest, x, at.clock)
+                    deviation = deviation_on_clock(V, rest, x, at.clock)
                 else:
-                    own = deviation_while_driven(V, rest, x, driven, self._phase, at)
-                if own is not None:
-                    bounds[nodes] = np.minimum(bounds[nodes], own)
+                    deviation = deviation_while_driven(V, rest, x, driven, self._phase, at)
+                if deviation is not None:
+                    bounds[nodes] = np.minimum(bounds[nodes], deviation)
         return bounds
 
     def norm_bound(self, V: Any, part: int, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
@@ -508,7 +509,9 @@ class FamilyContent:
 
         Where no sliding variable moves it is ``e^(-rate s / 2) sqrt(V(0))``.
         """
-        at, half, driven = self._instants(remaining), float(V.rate) / 2, self._drives[part]
+        at = self._instants(remaining)
+        half = float(V.rate) / 2
+        driven = self._drives[part]
         root = nearest_float(V.root(self._state(self.parts[part]))) * (1 + 1e-12)
         if driven is None:
             return root * np.exp(-half * at.clock)

@@ -260,7 +260,8 @@ def _block(block: LyapunovBlock) -> BlockSection:
 def _read_function(
     name: str, section: FunctionSection, structure: Structure, data: Reader, proved: Mapping[tuple[str, str], Any]
 ) -> LyapunovFunction:
-    bound, full, rows = section.deviation, proved.get(("overshoot", name)), proved.get(("dominance", name))
+    bound = section.deviation
+    full, rows = proved.get(("overshoot", name)), proved.get(("dominance", name))
     blocks = tuple(_read_block(block, data, rows is not None) for block in section.blocks)
     gauge = structure.closed_components[0].gauge if section.coordinates == "eps" else ()
     return LyapunovFunction(

@@ -196,7 +196,9 @@ def certificate_family(section: Mapping[str, Any], files: Mapping[str, bytes]) -
     >>> certificate_family(family_sections(family, decide(family))["graph"], {}) == family
     True
     """
-    labels, modes, side = tuple(section["nodes"]), [], SideFiles(Path(), files)
+    labels = tuple(section["nodes"])
+    modes = []
+    side = SideFiles(Path(), files)
     index = {label: v for v, label in enumerate(labels)}
     for mode in section["modes"]:
         rows = mode["edges"]

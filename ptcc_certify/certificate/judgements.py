@@ -92,9 +92,10 @@ def _judge_behaviour(certificate: Content, expected: str) -> Answer:
 
 def judge_rate(certificate: Content, least: Fraction) -> Answer:
     """Tell whether a rate of at least so much is proved, or excluded by the proved upper bound."""
-    what, rate, bound = f"rate >= {near(least, 12)}", certificate.rate, certificate.upper_bound
-    if (beside := judge_rate_beside(certificate, least, what)) is not None:
-        return beside
+    what = f"rate >= {near(least, 12)}"
+    rate, bound = certificate.rate, certificate.upper_bound
+    if (answer := judge_rate_beside(certificate, least, what)) is not None:
+        return answer
     if certificate.agents is not None:
         rate, bound = certificate.agents.rate if certificate.agents.functions else None, None
     if certificate.constant or (rate is not None and rate >= least):
@@ -245,23 +246,27 @@ def judge_messages(certificate: Content | FamilyContent) -> list[Answer]:
     late, most = certificate.late, certificate.expectations.max_residual
     if late is None:
         unproved = certificate.asked_messages is not None
-        answers = [Answer(OPEN, "late messages", "nothing is proved of what is left at T")] * unproved
-        answers += [] if most is None or unproved else [Answer(OPEN, "max_residual", "no messages are late")]
+        answers = []
+        if unproved:
+            answers.append(Answer(OPEN, "late messages", "nothing is proved of what is left at T"))
+        elif most is not None:
+            answers.append(Answer(OPEN, "max_residual", "no messages are late"))
         if certificate.asked_leaders is not None and certificate.tracking is None:
             answers.append(Answer(OPEN, "leaders that move", "no vector for their followers was found"))
         return answers
     if not late.says_something:
-        known = 0 < (late.longest_delay or 0) < math.inf
-        limit = f"; this certificate's limit is a delay of {late.longest_delay:.3g}" if known else ""
+        limited = 0 < (late.longest_delay or 0) < math.inf
+        limit = f"; this certificate's limit is a delay of {late.longest_delay:.3g}" if limited else ""
         wish = "" if most is None else _longest(late, f"within {near(most, 12)} at T is ")
-        mend = "; give an initial state" * (certificate.initial_state is None)
+        mend = "; give an initial state" if certificate.initial_state is None else ""
         return [Answer(OPEN, "late messages", f"nothing is proved of what is left at T{mend}{limit}{wish}")]
     return [] if most is None else [_judge_residual(certificate, late, most)]
 
 
 def _judge_residual(certificate: Content | FamilyContent, late: LateBounds, most: Fraction) -> Answer:
     """Tell whether no more than ``most`` is left at ``T``, and up to which delay that is proved."""
-    what, missed = f"within {near(most, 12)} at T" + " from within 1 of it" * late.relative, late.missed
+    what = f"within {near(most, 12)} at T{' from within 1 of it' if late.relative else ''}"
+    missed = late.missed
     if late.largest <= most:
         return Answer(MET, what, _longest(late).removeprefix("; "))
     if missed is not None and missed.bound > most:
@@ -273,7 +278,7 @@ def _longest(late: LateBounds, what: str = "") -> str:
     """Tell how old what is heard may be so that what was asked is certified; empty if that is not known."""
     if late.enough is None:
         return ""
-    alike = ", all delays in proportion" * isinstance(late.messages.delay, Mapping)
+    alike = ", all delays in proportion" if isinstance(late.messages.delay, Mapping) else ""
     return f"; {what}certified where nothing is older than {down(late.enough, 4)}{alike}"
 
 
@@ -309,9 +314,11 @@ def _judge_late_input(certificate: Content | FamilyContent, late: LateBounds, mo
     largest = largest_late_input(late, certificate.protocol)
     if largest is None:
         why = "no bound is proved with late messages"
-        why += "; a gain without a cap makes ever more of what is left at T" * (late.messages.gain_cap is None)
+        if late.messages.gain_cap is None:
+            why += "; a gain without a cap makes ever more of what is left at T"
         return Answer(OPEN, what, why)
-    what += f" from within 1 of the {'final states' if late.leaders is None else 'targets'}" * late.relative
+    if late.relative:
+        what += f" from within 1 of the {'final states' if late.leaders is None else 'targets'}"
     return Answer(MET, what) if largest <= most else Answer(OPEN, what, f"proved: {up(largest)}")
 
 
@@ -326,7 +333,8 @@ def _judge_tracking(tracking: Tracking | None, most: Fraction, what: str) -> Ans
     """Tell whether every input stays within so much while leaders move."""
     if tracking is None or tracking.input is None:
         return Answer(OPEN, what, "no bound is proved while leaders move")
-    what += " from within 1 of the targets" * tracking.relative
+    if tracking.relative:
+        what += " from within 1 of the targets"
     largest = Fraction(float(tracking.input.max()))
     return Answer(MET, what) if largest <= most else Answer(OPEN, what, f"proved: {up(largest)}")
 
@@ -360,7 +368,8 @@ def _judge_behaviour_of_signal(
     others = [component for k, component in enumerate(components) if k not in last]
     narrow = isinstance(certificate.signal, ClockShares | JointWindows)  # no constant member is one of these signals
     judged = [component for component in others if component.behaviour != DEPENDS or not narrow]
-    met = Answer(MET, expected, "these signals" if last else "every signal" * (certificate.signal != "any"))
+    every = "" if certificate.signal == "any" else "every signal"
+    met = Answer(MET, expected, "these signals" if last else every)
     answer = judge_family_behaviour(judged, expected) if judged else met
     answer = met if answer.status == MET else answer
     if len(judged) < len(others) and answer.status == MET:
@@ -369,11 +378,13 @@ def _judge_behaviour_of_signal(
         family = components[k].family
         edges = [mode.sign for mode in family.modes] if isinstance(claim, LastModeClaim) else [family.union[2]]
         pairs = zip(claim.behaviours, edges, strict=True)
-        shows = [last_mode_shows(one, expected, bool((signs > 0).all())) for one, signs in pairs]
+        shows = [last_mode_shows(behaviour, expected, bool((signs > 0).all())) for behaviour, signs in pairs]
         if False in shows and answer.status != REFUTED:
             number = shows.index(False)
-            whose = f"{mode_name(certificate.family, number)} by itself: " * isinstance(claim, LastModeClaim)
-            return Answer(REFUTED, expected, f"{whose or 'it is '}{claim.behaviours[number]}")
+            whose = "it is "
+            if isinstance(claim, LastModeClaim):
+                whose = f"{mode_name(certificate.family, number)} by itself: "
+            return Answer(REFUTED, expected, f"{whose}{claim.behaviours[number]}")
         if None in shows and answer.status == MET:
             answer = Answer(OPEN, expected, "not decided of these signals")
     return answer
@@ -381,9 +392,10 @@ def _judge_behaviour_of_signal(
 
 def _judge_rate_of_signal(certificate: FamilyContent, least: Fraction) -> Answer:
     """Tell whether a rate of at least so much is proved for every signal, or excluded by the upper bound."""
-    what, rate, bound = f"rate >= {near(least, 12)}", certificate.rate_of_signal, certificate.upper_bound
-    if (beside := judge_rate_beside(certificate, least, what)) is not None:
-        return beside
+    what = f"rate >= {near(least, 12)}"
+    rate, bound = certificate.rate_of_signal, certificate.upper_bound
+    if (answer := judge_rate_beside(certificate, least, what)) is not None:
+        return answer
     if certificate.signal != "any":
         # No constant member is one of these signals.
         narrow = isinstance(certificate.signal, ClockShares | JointWindows)
@@ -404,13 +416,13 @@ def _judge_rate_of_signal(certificate: FamilyContent, least: Fraction) -> Answer
 def _judge_input_of_signal(certificate: FamilyContent, most: Fraction) -> Answer:
     """Tell whether every input is proved to stay within so much for every signal."""
     what, peaks = f"|u_k| <= {near(most, 12)}", certificate.input_peaks
-    known = certificate.initial_state is not None and certificate.protocol.reaching is None
+    has_first_input = certificate.initial_state is not None and certificate.protocol.reaching is None
     if certificate.late is not None or certificate.leaders_move:
-        first = first_input(certificate) * _first_share(certificate) if known else Fraction(0)
+        first = first_input(certificate) * _first_share(certificate) if has_first_input else Fraction(0)
         return judge_input_beside(certificate, most, what, first)
     if peaks is not None and max(peaks) <= most:
-        return Answer(MET, what, "every signal" * (certificate.signal != "any"))
-    if known and (first := first_input(certificate)) > most:
+        return Answer(MET, what, "" if certificate.signal == "any" else "every signal")
+    if has_first_input and (first := first_input(certificate)) > most:
         return Answer(REFUTED, what, f"it is up to {down(first)} at the start, proved")
     return Answer(OPEN, what, "no bound is proved" if peaks is None else f"proved: {up(max(peaks))}")
 

@@ -249,7 +249,9 @@ def certify_case(
     progress, graph = listener(progress), as_graph(case.graph)
     refuse_before_the_graph(case)
     refuse_long_weights(graph)
-    structure, protocol, agents, chains, formation = analyse(graph), case.protocol, case.agents, None, None
+    structure = analyse(graph)
+    protocol, agents = case.protocol, case.agents
+    chains, formation = None, None
     if agents is not None:
         chains = read_chains(agents, graph, protocol.gain, case.initial)
         formation = formation_on_a_line(case, agents, chains)
@@ -317,7 +319,7 @@ def _with_agents(certificate: Certificate, agents: Agents, chains: Chains, run: 
     functions = certificate.functions
     try:
         prove = prove_agents if agents.cascade is None else prove_cascade
-        part = prove(
+        proof = prove(
             certificate.structure,
             certificate.protocol,
             agents,
@@ -328,16 +330,17 @@ def _with_agents(certificate: Certificate, agents: Agents, chains: Chains, run: 
         )
     except NoCertificate as error:
         raise ParameterError("agents", f"{error}; ask for a smaller decay or a lower order") from None
-    part = with_instants(with_phases(part)) if isinstance(part, AgentsPart) else part
-    notes, cut_off, motion = [*certificate.notes, *chains.notes], list(certificate.cut_off), None
-    if run and part.initial_state is not None:
+    proof = with_instants(with_phases(proof)) if isinstance(proof, AgentsPart) else proof
+    notes, cut_off = [*certificate.notes, *chains.notes], list(certificate.cut_off)
+    motion = None
+    if run and proof.initial_state is not None:
         limit = SEARCHING * certificate.time_limit
         with deadline.time_limit(limit), share_of_time(SHARES[0], STEPS[0], cut_off):
             try:
-                motion = part.simulate()
+                motion = proof.simulate()
             except SimulationError as error:
                 notes.append(f"simulation: {error}")
-    return certificate.changed(agents=part, notes=tuple(notes), cut_off=tuple(cut_off), agents_run=motion)
+    return certificate.changed(agents=proof, notes=tuple(notes), cut_off=tuple(cut_off), agents_run=motion)
 
 
 def _with_small_delays(certificate: Certificate) -> Certificate:

@@ -91,15 +91,18 @@ def use_of_family(certificate: FamilyContent) -> Use:
         return _use_of_late(certificate.late, certificate.longest_way)
     if certificate.tracking is not None:
         return _use_of_tracking(certificate.tracking)
-    useful, caveat, rho2 = _usefulness_of_signal(certificate), "", None
+    useful = _usefulness_of_signal(certificate)
+    caveat, rho2 = "", None
     if useful is False:
         rho2 = _useful_rho2_of_family(certificate) if certificate.direct else _useful_rho2_while_driven(certificate)
     effects = [] if rho2 is None else ["leaves 1 %"]
-    p, rate, mu3 = certificate.protocol, certificate.rate, None
+    p, rate = certificate.protocol, certificate.rate
+    mu3 = None
     if certificate.common and not certificate.bounded:
         grows = certificate.unbounded
         caveat = "the input is not bounded for some signal" if grows else "the input is not proved bounded"
-        caveat += " for every signal" * (not grows and certificate.signal != "any")
+        if not grows and certificate.signal != "any":
+            caveat += " for every signal"
         if rate is not None:
             rho2 = max(rho2 or Fraction(0), _rounded_up(2 / (rate * p.kappa)))
             effects.append("bounds the input")
@@ -191,8 +194,11 @@ def _advise(certificate: Content, rho2: Fraction | None) -> tuple[str, Sentence]
         return "", ""
     sliding_open = effort.peak is None and effort.sliding is not None and not effort.sliding.bounded
     caveat = "" if effort.bounded else f"the input is not {'' if effort.bounded is False else 'proved '}bounded"
-    caveat = caveat or "the input is not proved bounded" * sliding_open
-    effects = ["leaves 1 %"] * (rho2 is not None) + ["bounds the input"] * bool(caveat)
+    if sliding_open and not caveat:
+        caveat = "the input is not proved bounded"
+    effects = [] if rho2 is None else ["leaves 1 %"]
+    if caveat:
+        effects.append("bounds the input")
     if not effort.bounded and rate is not None:
         rho2 = max(rho2 or Fraction(0), _rounded_up(2 / rate / p.kappa))
     return caveat, _gains(rho2, _rounded_up(1 / p.kappa) if sliding_open else None, effects)
@@ -232,14 +238,15 @@ def _use_of_late(late: LateBounds, longest_way: float | None) -> Use:
         return Use(None, "", caveat)
     way = 1.0 if late.relative else longest_way
     where = "agent within {} of its final state" if late.leaders is None else "follower within {} of its target"
-    remark = f"every {where.format(up(late.largest, 2))} at T{' from within 1 of it' * late.relative}"
+    remark = f"every {where.format(up(late.largest, 2))} at T{' from within 1 of it' if late.relative else ''}"
     return Use(way is not None and late.largest <= USEFUL * way, remark, caveat)
 
 
 def _use_of_tracking(tracking: Tracking) -> Use:
     """Tell whether followers are nearer to their targets at ``0.99 T`` than a hundredth of what is proved at first."""
     first, last = (float(x) for x in tracking.distance_bound([1.0, 0.01]).max(axis=0))
-    remark = f"every follower within {up(last, 2)} of its target at 0.99 T{' from within 1 of it' * tracking.relative}"
+    relative = " from within 1 of it" if tracking.relative else ""
+    remark = f"every follower within {up(last, 2)} of its target at 0.99 T{relative}"
     useful = last <= USEFUL * first
     if tracking.input is not None:
         return Use(useful, remark)

@@ -178,7 +178,9 @@ def _report(doc: Document, account: Account) -> CheckReport:
         reason = str(error)
     except MALFORMED as error:
         reason = f"malformed ({type(error).__name__})"
-    at, obligations, needed = None if reason is None else doc.at, tuple(doc.obligations), float(account.needed)
+    at = None if reason is None else doc.at
+    obligations = tuple(doc.obligations)
+    needed = float(account.needed)
     results = (reason is None, verdict, obligations, at, reason, doc.exact.name, doc.sha256, needed)
     return CheckReport(*results, doc.sections, doc.proved)
 
@@ -267,8 +269,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except UnreadableError as error:
         print(f"checker: {error}", file=sys.stderr)
         return 2
-    whose = [f"graph      SHA-256 {report.sha256}; compare it with that of the graph you mean"] * bool(report.sha256)
-    *lines, last = whose + report.lines()
+    *lines, last = report.lines()
+    if report.sha256:
+        lines.insert(0, f"graph      SHA-256 {report.sha256}; compare it with that of the graph you mean")
     for line in lines:
         print(textwrap.fill(line, 80, subsequent_indent=" " * 11, break_on_hyphens=False, break_long_words=False))
     print(last)  # a refusal is one line

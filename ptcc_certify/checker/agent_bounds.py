@@ -74,13 +74,14 @@ class UsedSection:
 
 def verify_used(doc: Document, verified: Verified, entry: UsedSection, before: int) -> Used:
     """Return which Lyapunov function is used, after the one of number ``before``, and verify its constants."""
-    doc.at, k, known = "agents.functions", entry.function, verified.functions
-    need(before < k < len(known), "functions that are used: none such, or in another order")
-    need(known[k].rate > 0, "a Lyapunov function that is used and does not decay")
+    doc.at = "agents.functions"
+    k, functions = entry.function, verified.functions
+    need(before < k < len(functions), "functions that are used: none such, or in another order")
+    need(functions[k].rate > 0, "a Lyapunov function that is used and does not decay")
     constants = None
     if entry.inputs is not None:
-        constants = check_constants(doc, verified.structure.graph, known[k], k, entry.inputs)
-    return Used(k, known[k], constants)
+        constants = check_constants(doc, verified.structure.graph, functions[k], k, entry.inputs)
+    return Used(k, functions[k], constants)
 
 
 @dataclass(frozen=True)
@@ -129,8 +130,11 @@ class Begin:
 
         At time 0, or of other columns over a scale.
         """
-        n, (P, times), (columns, scale) = self.agents.n, self.inverse, at or self.columns
-        form, total, unit = Weights.of(function), 0, 1
+        n = self.agents.n
+        P, times = self.inverse
+        columns, scale = at or self.columns
+        form = Weights.of(function)
+        total, unit = 0, 1
         for each in columns:
             Z: list[list[int]] = []
             for x in each:

@@ -56,7 +56,8 @@ class Vectors(NamedTuple):
 
     def value(self, graph: Digraph, function: Function) -> Fraction:
         """Bound ``V``, summed over the coordinates of space, from above, to many bits."""
-        form, total, unit = Weights.of(function), 0, 1
+        form = Weights.of(function)
+        total, unit = 0, 1
         for x in self.columns:
             z, unit = form.coordinates(graph, x)
             u = form.times(z)

@@ -101,13 +101,14 @@ class _Step:
 
         From the first ``n`` coefficients of every agent. None if there would be too many.
         """
-        n, X, size, defect = self.n, list(X), len(X[0]), Fraction(0)
+        n, X = self.n, list(X)
+        size, defect = len(X[0]), Fraction(0)
         while len(X) < 4 * n + 16 or any(longest(x) > BITS // 2 + len(X) - n for x in X[-n:]):
             j = len(X) - n
             if j > MANY_TERMS:
                 return None
-            whole = self.times * self.unit * perm(j + n, n)
-            X.append([x // whole for x in self._rest(X, j)])
+            divisor = self.times * self.unit * perm(j + n, n)
+            X.append([x // divisor for x in self._rest(X, j)])
             defect += Fraction(perm(j + n, n), 2**j)
         last = len(X) - 1
         for j in range(last - n + 1, last + n + 1):

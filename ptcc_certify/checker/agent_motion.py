@@ -42,7 +42,8 @@ def check_motion(doc: Document, agents: Chains, M: Sequence[Sequence[Interval]])
 
 def _motion(agents: Chains) -> tuple[list[list[Interval]], Fraction]:
     """Return ends of the entries of ``M``, and how far it may be beyond them."""
-    n, T, zero = agents.n, agents.gain.T, Fraction(0)
+    n, T = agents.n, agents.gain.T
+    zero = Fraction(0)
     if any(agents.own):  # at rest
         damping = agents.own[1]
         exponent = (agents.plant[1] + damping * agents.gain.rho1) * T

@@ -72,7 +72,8 @@ class ArrayDigraph(Digraph):
         Node ``v`` is there twice, ``v`` and ``v + n``: with either sign. An edge joins equal or opposite signs. Camps
         exclude each other where both copies of a node are connected.
         """
-        tails, heads, over = np.asarray(source), np.asarray(target), n * np.array(minus, dtype=np.int64)
+        tails, heads = np.asarray(source), np.asarray(target)
+        over = n * np.array(minus, dtype=np.int64)
         x, y = np.concatenate([tails, tails + n]), np.concatenate([heads + over, heads + n - over])
         label = np.arange(2 * n)
         while x.size:
@@ -83,9 +84,9 @@ class ArrayDigraph(Digraph):
                 label = further
             apart = label[x] != label[y]
             x, y = x[apart], y[apart]
-        one, other = label[:n], label[n:]
-        first = np.minimum(one, other)
-        return first.tolist(), (other < one).tolist(), set(first[one == other].tolist())
+        positive, negative = label[:n], label[n:]
+        first = np.minimum(positive, negative)
+        return first.tolist(), (negative < positive).tolist(), set(first[positive == negative].tolist())
 
     def _lines(self, order: Sequence[int], rank: Sequence[int], *texts: Sequence[str]) -> Iterator[str]:
         edges, place = [np.asarray(part) for part in (self.source, self.target, self.which)], np.array(rank)

@@ -279,11 +279,13 @@ class DelayLMI:
 
     def inequality(self, exact: Arithmetic) -> Matrix:
         """Return ``N``, times a positive integer."""
-        loop, m, q = self.loop, len(self.loop.free), len(self.loop.listeners)
+        loop = self.loop
+        m, q = len(loop.free), len(loop.listeners)
         need_rows(m + q)
         A, a = _sparse_integers(loop.system)
         C, c = _sparse_integers(loop.pushed)
-        PA, PC, b2 = times(exact, self.P, A, m), times(exact, self.P, C, q), 2 * self.b
+        PA, PC = times(exact, self.P, A, m), times(exact, self.P, C, q)
+        b2 = 2 * self.b
         bits = longest(chain.from_iterable(PA)) + (a * c * self.scale).bit_length() + length([self.b])
         spend(2 * (m + q) ** 2 + 4 * (m + 1) ** 2 * len(loop.channels), bits, bits, "the delay LMI")
         N = [[Fraction(0)] * (m + q) for _ in range(m + q)]

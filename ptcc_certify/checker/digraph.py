@@ -76,8 +76,10 @@ class Digraph:
     """
 
     def __init__(self, labels: Sequence[str], source: Any, target: Any, weights: Any, scale: int):
-        self.labels, self.index, self.n = labels, {label: v for v, label in enumerate(labels)}, len(labels)
-        self.source, self.target, self.scale, self.n_edges = array("q", source), array("q", target), scale, len(source)
+        self.labels, self.n = labels, len(labels)
+        self.index = {label: v for v, label in enumerate(labels)}
+        self.source, self.target = array("q", source), array("q", target)
+        self.scale, self.n_edges = scale, len(source)
         self._rows: dict[int, dict[int, int]] = {}
         self._formed = 0  # entries of these rows
         ordered = all(starmap(lt, pairwise(zip(self.target, self.source, strict=True))))
@@ -93,7 +95,8 @@ class Digraph:
     @cached_property
     def out(self) -> Adjacency:
         """The edges that leave every node; see the class."""
-        offsets, ends, which = _offsets(self.n, self.source), array("q", self.target), array("q", self.which)
+        offsets = _offsets(self.n, self.source)
+        ends, which = array("q", self.target), array("q", self.which)
         place = list(offsets)
         for s, t, k in zip(self.source, self.target, self.which, strict=True):
             ends[place[s]], which[place[s]] = t, k
@@ -164,7 +167,8 @@ class Digraph:
         >>> Digraph("abc", [0, 1], [2, 2], [3, -4], 1).sums_by_part([1, 10, 0], [5, 7], {5: 1, 7: 100})
         [0, 0, 4003]
         """
-        sizes, bits, more = [abs(w) for w in self.values], longest(x), longest(factors.values())
+        sizes = [abs(w) for w in self.values]
+        bits, more = longest(x), longest(factors.values())
         sized(self.n, self.bits + bits + more)
         spend(2 * self.n_edges, self.bits + more, bits, "sums over edges")
         return self._add_by_part(sizes, x, parts, factors)
@@ -244,7 +248,8 @@ class Digraph:
         >>> Digraph.signed_pieces(4, [0, 2, 3], [1, 3, 2], [True, False, True])
         ([0, 0, 2, 2], [False, True, False, False], {2})
         """
-        parent, opposite, odd = list(range(n)), [False] * n, set()
+        parent, opposite = list(range(n)), [False] * n
+        odd = set()
 
         def root(v: int) -> tuple[int, bool]:
             against = False
@@ -256,11 +261,11 @@ class Digraph:
             return v, against
 
         for s, t, m in zip(source, target, minus, strict=True):
-            (one, x), (other, y) = sorted((root(s), root(t)))
-            if one != other:
-                parent[other], opposite[other] = one, x ^ y ^ m
+            (smaller, x), (larger, y) = sorted((root(s), root(t)))
+            if smaller != larger:
+                parent[larger], opposite[larger] = smaller, x ^ y ^ m
             elif x ^ y ^ m:
-                odd.add(one)
+                odd.add(smaller)
         first, against = map(list, zip(*map(root, range(n)), strict=True))
         return first, against, {first[v] for v in odd}
 
@@ -286,7 +291,8 @@ class Digraph:
     @cached_property
     def mutual(self) -> tuple[bool, set[int]]:
         """Whether no two opposite edges differ in sign, and the pieces with an edge whose opposite is not its equal."""
-        piece, symmetric, odd = self.pieces[0], True, set()
+        piece = self.pieces[0]
+        symmetric, odd = True, set()
         for v in range(self.n):
             sources, targets = edges_of(self.into, v), edges_of(self.out, v)
             if sources != targets:

@@ -176,14 +176,14 @@ def check_form(doc: Document, family: Family, component: Component, entry: FormS
     need(min(rates) == rate, "the rate is not the least of the modes'")
     doc.open("family-constants", of)
     labels = family.labels
-    own = {v: labels[v] for v in component.nodes}
-    inputs = dict(zip(own, ordered(list(own.values()), entry.inputs, "inputs").values(), strict=True))
-    some = [labels[v] for v in nodes]
-    coordinates = dict(zip(nodes, ordered(some, entry.coordinates, "coordinates").values(), strict=True))
+    labels_of = {v: labels[v] for v in component.nodes}
+    inputs = dict(zip(labels_of, ordered(list(labels_of.values()), entry.inputs, "inputs").values(), strict=True))
+    function_labels = [labels[v] for v in nodes]
+    coordinates = dict(zip(nodes, ordered(function_labels, entry.coordinates, "coordinates").values(), strict=True))
     means = [_mean(doc, graph, component, mean) for mean in entry.means]
     need(len(means) <= MANY_MEANS, f"more than {MANY_MEANS} means")
     _constants(doc.exact, modes, (P, scale), inputs, coordinates, means)
-    doc.done(f"{len(inputs)} inputs, {len(coordinates)} coordinates" + f", {len(means)} means" * bool(means))
+    doc.done(f"{len(inputs)} inputs, {len(coordinates)} coordinates" + (f", {len(means)} means" if means else ""))
     return FamilyFunction(component, nodes, P, scale, rate, inputs, coordinates, means)
 
 
@@ -206,7 +206,8 @@ def _mean(doc: Document, graph: Digraph, component: Component, entry: MeanSectio
 
 def quotient_of(family: Family, number: int, component: Component, nodes: list[int]) -> QuotientMode:
     """Return a mode in the coordinates ``xi``; columns are numbered as ``nodes``."""
-    mode, place, edges = family.modes[number], {v: i for i, v in enumerate(nodes)}, component.part.edges[number]
+    mode, edges = family.modes[number], component.part.edges[number]
+    place = {v: i for i, v in enumerate(nodes)}
     kernel, scale = component.whole
     spend(8 * (len(edges) + component.size), mode.unit.bit_length(), what="a quotient")
     rows: dict[int, Whole] = {v: {} for v in component.nodes}
@@ -221,10 +222,10 @@ def quotient_of(family: Family, number: int, component: Component, nodes: list[i
     sized(entries_of_f + 8 * len(uncertain), longest_entry, "the uncertain weights of a family")
     parts = [_part(columns, place, edge, mode.tied) for edge in uncertain]
     bits = longest(x for row in rows.values() for x in row.values())
-    own = longest_entry + scale.bit_length()
+    entry_bits = longest_entry + scale.bit_length()
     of_pivots = sum(len(rows[component.pivots[j]]) for v in nodes for j in kernel[v])
-    spend(sum(len(rows[v]) for v in nodes) + of_pivots, bits, own, "a quotient")
-    sized(min(len(nodes) ** 2, sum(map(len, rows.values())) + of_pivots), bits + own + len(nodes), "a quotient")
+    spend(sum(len(rows[v]) for v in nodes) + of_pivots, bits, entry_bits, "a quotient")
+    sized(min(len(nodes) ** 2, sum(map(len, rows.values())) + of_pivots), bits + entry_bits + len(nodes), "a quotient")
     center = []
     for v in nodes:
         factors = {v: scale, **{component.pivots[j]: -b for j, b in kernel[v].items()}}
@@ -265,7 +266,9 @@ def decreases(
     With multipliers ``tau > 0``: ``[[P A_0 + A_0'P - b P - H diag(tau) H', P F diag(r)], [.., diag(tau)]] > 0``.
     Without: every ``P f_e`` is a multiple ``c_e >= 0`` of ``h_e``, so that the least weights are the worst.
     """
-    (P, scale), n, unit = form, len(form[0]), mode.unit * kernel_scale
+    P, scale = form
+    n = len(form[0])
+    unit = mode.unit * kernel_scale
     parts = [part for part in mode.parts if part.f and part.h]
     if not parts and not any(mode.center):
         need(b == 0 and witness is None, "nothing moves in this mode")
@@ -293,9 +296,9 @@ def decreases(
     rounds = [[part.radius * x for x in push] for part, push in zip(parts, pushes, strict=True)]
     side = combined("a form of a family", (d * common, rounds)) if q else []
     corner = combined("a form of a family", (d * scale * unit, diagonal)) if q else []
-    whole = [[*row, *(push[i] for push in side)] for i, row in enumerate(low)]
-    whole += [[*push, *row] for push, row in zip(side, corner, strict=True)]
-    need(judge.definite(whole), "not proved definite")
+    bordered = [[*row, *(push[i] for push in side)] for i, row in enumerate(low)]
+    bordered += [[*push, *row] for push, row in zip(side, corner, strict=True)]
+    need(judge.definite(bordered), "not proved definite")
 
 
 def _zeros(n: int) -> Matrix:

@@ -154,11 +154,12 @@ class Drive:
         Then ``gain e^(-rate s / 2)`` does not grow: in a stretch the product is at most the gain at its begin times the
         root there, and the gain at its end times what the stretch adds.
         """
-        half, most, v, c = V.rate / 2, Fraction(0), root, self.constant(V)
-        for part in self.stretches:
-            added = c * part.psi * min(part.most, 1 / half)
-            most = max(most, part.first * v + part.last * added)
-            v = rounded(v * decay_above(min(half * part.least, MOST_DECAY)) + added, BITS, up=True)
+        half, c = V.rate / 2, self.constant(V)
+        most, v = Fraction(0), root
+        for stretch in self.stretches:
+            added = c * stretch.psi * min(stretch.most, 1 / half)
+            most = max(most, stretch.first * v + stretch.last * added)
+            v = rounded(v * decay_above(min(half * stretch.least, MOST_DECAY)) + added, BITS, up=True)
         return rounded(max(most, self.stretches[-1].last * v), BITS, up=True)
 
     def ends(self, camps: Mapping[int, int], y: Sequence[Fraction]) -> Interval:

@@ -87,7 +87,8 @@ class WeightedSquares:
         diagonal = [-2 * r * unit * weight for weight in p.values()]
         rows, columns, values = [*range(len(p))], [*range(len(p))], diagonal
         for s, t, sign, low, high in edges:
-            i, j, weight = place[t], place[s], q * p[t]
+            i, j = place[t], place[s]
+            weight = q * p[t]
             diagonal[i] += 4 * weight * low
             diagonal[j] -= weight * (high - low)
             if low:

@@ -248,11 +248,13 @@ def check_constants(doc: Document, graph: Digraph, function: Function, k: int, v
     if form is None or form.matrix is None:
         raise RejectedError("constants that follow from a diagonal")
     doc.open("input-constants", f"lyapunov.functions[{k}]")
-    constants, (P, scale), forms = list(values), form.entries, []
+    constants = list(values)
+    P, scale = form.entries
+    forms = []
     for v, c in enumerate(constants):
         p, q = (c / scale).as_integer_ratio()
         sized(v + 1, longest((q, q * p)), "constants")
-        forms.append(([q * (own == v) for own in form.nodes], q * p))
+        forms.append(([q * (node == v) for node in form.nodes], q * p))
     failed = doc.exact.bounded(P, forms)
     need(failed is None, f"the constant of agent {shorten(graph.labels[failed or 0])} is not proved")
     doc.done(f"at most {up(max(constants))}")
@@ -276,11 +278,12 @@ def _bounds(
     doc: Document, verified: Verified, initial_set: formulas.InitialSet, constants: Sequence[Sequence[Fraction] | None]
 ) -> formulas.InputBounds:
     """Return what bounds the input over the initial states."""
-    graph, g, sigma0 = verified.structure.graph, verified.protocol.gains, list(verified.begin.sigma or ())
-    whole, _ = integers([initial_set.center, initial_set.radius, *initial_set.axes])
-    own, each = graph.bits + graph.unit.bit_length(), longest(chain.from_iterable(whole))
-    sized(graph.n_edges + graph.n, own, "the rows of L")
-    spend(len(whole) * (graph.n_edges + graph.n), own + each, own + each, "the initial states")
+    graph, g = verified.structure.graph, verified.protocol.gains
+    sigma0 = list(verified.begin.sigma or ())
+    set_rows, _ = integers([initial_set.center, initial_set.radius, *initial_set.axes])
+    row_bits, state_bits = graph.bits + graph.unit.bit_length(), longest(chain.from_iterable(set_rows))
+    sized(graph.n_edges + graph.n, row_bits, "the rows of L")
+    spend(len(set_rows) * (graph.n_edges + graph.n), row_bits + state_bits, row_bits + state_bits, "the initial states")
     rows = [{j: Fraction(x, graph.unit) for j, x in graph.row(v).items()} for v in range(graph.n)]
     reaching = None
     if any(sigma0):

@@ -291,7 +291,8 @@ class Limits:
         ValueError
             Nothing limits the gain: the integrals are infinite.
         """
-        top, end, turn = self.largest_gain(gain), self.end(gain), Fraction(0)  # from the turn on the gain is the top
+        top, end = self.largest_gain(gain), self.end(gain)
+        turn = Fraction(0)  # from the turn on the gain is the top
         if top > gain.value(Fraction(1)):
             turn = min(gain.T - gain.k / (top - gain.rho1), end)
         q = 1 - turn / gain.T
@@ -579,11 +580,12 @@ class InputBounds:
         The lesser of two bounds: from the largest ``|z_i|``, and from the center and ``M = A'P A``, with
         ``sum_jl |M_jl| radius_j radius_l`` for a box and ``sum_j axes_j'M axes_j`` for an ellipsoid.
         """
-        rows, initial_set, (P, _) = self._coordinates(form), self.initial_set, form.entries
+        rows, initial_set = self._coordinates(form), self.initial_set
+        P, _ = form.entries
         vectors = [initial_set.center, initial_set.radius, *initial_set.axes]
         bits = length(chain.from_iterable(row.values() for row in rows)) + length(chain.from_iterable(vectors))
-        own = bits + longest(chain.from_iterable(P))
-        spend(5 * len(vectors) * (sum(map(len, rows)) + len(P) ** 2), bits, own, "initial states")
+        entry_bits = bits + longest(chain.from_iterable(P))
+        spend(5 * len(vectors) * (sum(map(len, rows)) + len(P) ** 2), bits, entry_bits, "initial states")
 
         def value(x: Sequence[Fraction]) -> Fraction:
             return form.value([_dot(row, x) for row in rows])
@@ -611,19 +613,21 @@ class InputBounds:
         if (k, z) in self._cache:
             return self._cache[k, z]
         assert self.reaching is not None
-        gain, form, v, pieces = self.gain, self.form(k), self.initial_root(k), list[Piece]()
+        gain = self.gain
+        form, v = self.form(k), self.initial_root(k)
+        pieces = list[Piece]()
         of_errors = form.coordinates == "E"
         pushes = (
             [self._pushes[v] for v in form.nodes] if of_errors else map(self.reaching.pushes, self._coordinates(form))
         )
-        w, f = (root_above(form.value(own, sizes=True)) for own in zip(*pushes, strict=True))
+        w, f = (root_above(form.value(push, sizes=True)) for push in zip(*pushes, strict=True))
         if ("stretches", z) not in self._cache:
             self._cache["stretches", z] = stretches(gain, self.reaching, z, PIECES)
-        for part in self._cache["stretches", z]:
-            added = w * (part.psi[1] - part.psi[0]) + f * part.length
-            above = (v, added, part.first, part.last, part.clock[1], part.square)
+        for stretch in self._cache["stretches", z]:
+            added = w * (stretch.psi[1] - stretch.psi[0]) + f * stretch.length
+            above = (v, added, stretch.first, stretch.last, stretch.clock[1], stretch.square)
             pieces.append(Piece(*(rounded(x, BITS, up=True) for x in above)))
-            v = rounded(v * decay_above(form.rate / 2 * part.clock[0]) + added, BITS, up=True)
+            v = rounded(v * decay_above(form.rate / 2 * stretch.clock[0]) + added, BITS, up=True)
         nearest = exp(-z, BITS)[0]
         begin = rounded(v * exp(form.rate / 2 * gain.clock(z, nearest), BITS)[1], BITS, up=True)
         self._cache[k, z] = pieces, max(p.first * p.root + p.last * p.added for p in pieces), begin

@@ -97,7 +97,8 @@ class Steps:
         parts: Sequence[int] = (PARTS,),
         push: Fraction = Fraction(0),
     ):
-        self.graph, self.nodes, self.largest = graph, nodes, max(max(start), 1)
+        self.graph, self.nodes = graph, nodes
+        self.largest = max(max(start), 1)
         spend(graph.n_edges + 2 * graph.n, graph.bits + FIXED, longest(start), "bounds from instant to instant")
         self.start = array("q", (-(-(x << FIXED) // self.largest) for x in start))
         self.error = -(-(value_error.numerator << FIXED) // (value_error.denominator * self.largest))

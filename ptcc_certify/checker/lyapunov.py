@@ -146,7 +146,8 @@ def _searched(
     doc: Document, structure: Structure, function: FunctionSection, of: str
 ) -> tuple[Function, tuple[Matrix, Fraction]]:
     """Verify rate and overshoot constant of a diagonal or a full matrix; return its form of the state besides."""
-    (nodes, entry), rate, graph = _block(doc, structure, function), function.rate, structure.graph
+    nodes, entry = _block(doc, structure, function)
+    rate, graph = function.rate, structure.graph
     need_rows(graph.n)
     if entry.lower_triangle is not None:
         need(len(entry.lower_triangle) == len(nodes), f"lower_triangle has not {len(nodes)} entries")

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from lmi.exact.decimal_rounding import counted
+
 #: What each kind of obligation states, and what makes it part of the claim; the fixed texts of FORMAT.md.
 _TEXTS = json.loads(Path(__file__).with_suffix(".json").read_text("utf-8"))
 OBLIGATIONS: dict[str, tuple[str, str]] = {kind: (text, lemma) for kind, (text, lemma) in _TEXTS.items()}
@@ -107,6 +109,6 @@ class CheckReport:
     def _lines(self) -> list[str]:
         lines = [f"verified   {o.kind} of {o.of}: {o.detail} ({o.lemma})" for o in self.obligations]
         if self.accepted:
-            count = f"{len(self.obligations)} proof obligation{'s' * (len(self.obligations) != 1)}"
+            count = counted(len(self.obligations), "proof obligation")
             return [*lines, f"accepted   {self.verdict}; {count} by {self.arithmetic}"]
         return [*lines, f"rejected   {self.rejected}: {self.reason}"]

@@ -112,7 +112,8 @@ def check_begin(doc: Document, protocol: Protocol) -> Begin:
 
 def check_sliding(doc: Document, graph: Digraph, protocol: Protocol, begin: Begin) -> None:
     """Verify Proposition 1 and every reaching time."""
-    section, sigma0, g = doc.section("reaching_time"), begin.sigma, protocol.gains
+    section = doc.section("reaching_time")
+    sigma0, g = begin.sigma, protocol.gains
     if sigma0 is None or section is None:
         need(sigma0 is None and section is None, "reaching times are told iff there are sliding variables")
         return

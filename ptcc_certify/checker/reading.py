@@ -124,9 +124,9 @@ def loaded_bytes(content: bytes) -> int:
 def digest(data: Mapping[str, Any]) -> str:
     """Return the SHA-256 of everything but ``digest`` and ``unverified``, as JSON with sorted keys and no blanks."""
     hashed, encoder = hashlib.sha256(b"{"), json.JSONEncoder(sort_keys=True, separators=(",", ":"))
-    parts = (f"{encoder.encode(key)}:{encoder.encode(data[key])}" for key in sorted(data) if key not in OUTSIDE)
-    for number, part in enumerate(parts):
-        hashed.update(f"{',' * (number > 0)}{part}".encode("ascii"))
+    members = (f"{encoder.encode(key)}:{encoder.encode(data[key])}" for key in sorted(data) if key not in OUTSIDE)
+    for number, member in enumerate(members):
+        hashed.update(f"{',' if number else ''}{member}".encode("ascii"))
     hashed.update(b"}")
     return hashed.hexdigest()
 

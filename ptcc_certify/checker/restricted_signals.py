@@ -361,7 +361,8 @@ def contraction_below(largest: Fraction, least: Fraction, window: Fraction, on: 
 
 def _check_windows(doc: Document, family: Family, x: Sequence[Fraction] | None, entry: WindowsSection, of: str) -> None:
     """Verify what joint windows do, and the contraction in as many as there are nodes."""
-    component, window, on, eta = family.component(entry.component), entry.signals.window, entry.signals.on, entry.eta
+    component = family.component(entry.component)
+    window, on, eta = entry.signals.window, entry.signals.on, entry.eta
     need(on <= window, "a window, or the part of it in which an edge is on")
     need(component.depends, "every signal does the same")
     doc.open("joint-windows", of)
@@ -372,7 +373,8 @@ def _check_windows(doc: Document, family: Family, x: Sequence[Fraction] | None, 
         total = dict.fromkeys(component.nodes, 0)
         for _, t, _, low, high in edges:
             total[t] += high
-            weights += [Fraction(low, mode.unit)] * (low > 0)
+            if low > 0:
+                weights.append(Fraction(low, mode.unit))
         sums.append(Fraction(max(total.values()), mode.unit))
     on_edges = {edge[:3] for edges in part.edges for edge in edges if edge[3]}
     groups = closed_groups(component.nodes, on_edges)

@@ -195,7 +195,8 @@ class Followers:
     def need_decay(self, u: Sequence[int], q: Fraction, b: Fraction, parts: Sequence[int]) -> None:
         """Verify ``sum_l |w_kl| (u_k - q^(part_kl/64) u_l) >= b u_k``, ``u`` of all agents; parts as ages have them."""
         need(b > 0, "b is not positive")
-        ages, factor, common = None, q.numerator, q.denominator
+        ages = None
+        factor, common = q.numerator, q.denominator
         if len(parts) > 1:
             factors, common = powers(q, parts)
             ages, factor = (parts, factors), 1

@@ -236,7 +236,8 @@ def check_claim(doc: Document, structure: Structure, sliding: bool) -> Claim:
 
 def _expected(structure: Structure, sliding: bool) -> list[tuple[list[int], str, ClaimSection]]:
     """Return nodes, connectivity and claim of every weak component, by section 7 of the format."""
-    (piece, torn), odd, negative = structure.graph.pieces, structure.graph.mutual[1], structure.graph.antagonistic()
+    piece, torn = structure.graph.pieces
+    odd, negative = structure.graph.mutual[1], structure.graph.antagonistic()
     pieces: dict[int, list[int]] = {}
     for v, root in enumerate(piece):
         pieces.setdefault(root, []).append(v)
@@ -246,18 +247,18 @@ def _expected(structure: Structure, sliding: bool) -> list[tuple[list[int], str,
     expected = []
     for root, nodes in pieces.items():
         row = 2 if len(groups[root]) > 1 else int(len(structure.closed[groups[root][0]]) < len(nodes))
-        some = any(structure.gauges[k] is not None for k in groups[root])
+        balanced = any(structure.gauges[k] is not None for k in groups[root])
         holds = {
-            "1.1": row == 0 and some and root not in odd,
-            "1.2": row == 0 and not some and root not in odd,
-            "2": row == 0 and some and root not in negative,
-            "3": row == 1 and some and root not in torn,
-            "4": row == 1 and some and root not in negative,
-            "5": row == 2 and some and root not in negative,
+            "1.1": row == 0 and balanced and root not in odd,
+            "1.2": row == 0 and not balanced and root not in odd,
+            "2": row == 0 and balanced and root not in negative,
+            "3": row == 1 and balanced and root not in torn,
+            "4": row == 1 and balanced and root not in negative,
+            "5": row == 2 and balanced and root not in negative,
         }
         corollaries: list[Any] = [COROLLARIES[key] if sliding else key for key in holds if holds[key]]
-        theorem = f"{row + (4 if sliding else 1)}.{1 if some else 2}"
-        behaviour = BEHAVIOURS[row] if some else "stability"
+        theorem = f"{row + (4 if sliding else 1)}.{1 if balanced else 2}"
+        behaviour = BEHAVIOURS[row] if balanced else "stability"
         claim = ClaimSection(theorem=theorem, behaviour=behaviour, corollaries=corollaries)
         expected.append((nodes, CONNECTIVITY[row], claim))
     return expected

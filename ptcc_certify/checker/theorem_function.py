@@ -126,7 +126,8 @@ def check_paper(doc: Document, structure: Structure, claim: Claim) -> Paper | No
 
 def _row(structure: Structure, theorem: str) -> tuple[str, str, list[tuple[str, list[int], bool]]]:
     """Return objective, coordinates and blocks of the theorem's row, by section 10 of the format."""
-    row, balanced, F = (int(theorem[0]) - 1) % 3 + 1, theorem.endswith("1"), structure.followers
+    row, balanced = (int(theorem[0]) - 1) % 3 + 1, theorem.endswith("1")
+    F = structure.followers
     groups = [(k, group) for k, group in enumerate(structure.closed, start=1) if len(group) > 1]
     if not structure.graph.listening:
         return "none: every agent keeps its state", "eps" if row == 1 else "E", []
@@ -140,9 +141,9 @@ def _row(structure: Structure, theorem: str) -> tuple[str, str, list[tuple[str, 
     if row == 2:
         name, objective = ("Xi_L", "lmin(Phi) / lmax(Xi)") if balanced else ("Xit_L", "lmin(Psi) / lmax(Xit)")
         return objective, "E", [(name, groups[0][1], False), ("Xi_F", F, True)]
-    one, last = ("H_", "H_F") if balanced else ("Theta_L", "Theta_F")
+    prefix, last = ("H_", "H_F") if balanced else ("Theta_L", "Theta_F")
     objective = "lmin(Pi) / lmax(H)" if balanced else "lmin(Theta L + L' Theta) / lmax(Theta)"
-    return objective, "E", [(f"{one}{k}", group, False) for k, group in groups] + ([(last, F, True)] if F else [])
+    return objective, "E", [(f"{prefix}{k}", group, False) for k, group in groups] + ([(last, F, True)] if F else [])
 
 
 def _near_null_vector(structure: Structure, nodes: Sequence[int], p: Sequence[Fraction]) -> list[int]:

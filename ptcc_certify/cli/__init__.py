@@ -106,8 +106,10 @@ class _Commands(click.Group):
                 options = [p for p in error.possibilities or () if did_you_mean(flag.lstrip("-"), [p.lstrip("-")])]
                 hint = f" Did you mean {' or '.join(options)}?" if options else ""  # click's counts the dashes as alike
                 raise click.UsageError(f"{unknown}.{hint}") from None
-            each = f"; of many graphs certify each: ptcc certify GRAPH {flag}" * (ctx.invoked_subcommand == "batch")
-            raise click.UsageError(f"{unknown}. It is an option of {', '.join(having)}{each}") from None
+            message = f"{unknown}. It is an option of {', '.join(having)}"
+            if ctx.invoked_subcommand == "batch":
+                message += f"; of many graphs certify each: ptcc certify GRAPH {flag}"
+            raise click.UsageError(message) from None
 
 
 @click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"], "show_default": True})

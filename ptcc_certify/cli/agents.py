@@ -6,6 +6,7 @@ import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NoReturn
 
+from lmi.exact.decimal_rounding import counted
 from ptcc_certify.cli.declared import (
     A0,
     DIMENSION,
@@ -212,8 +213,8 @@ def read_vectors(text: str, seed: Any, graph: SignedDigraph, dimension: int, nam
     texts = text.split(",")
     if len(texts) != graph.n_nodes * dimension:
         raise ParameterError(
-            f"{name} has {len(texts)} value{'s' * (len(texts) > 1)} for {graph.n_nodes} agents of dimension "
+            f"{name} has {counted(len(texts), 'value')} for {counted(graph.n_nodes, 'agent')} of dimension "
             f"{dimension}; give {graph.n_nodes * dimension} numbers, agent after agent, or a file node,x,y"
         )
-    numbers = [exact_number(one, name) for one in texts]
+    numbers = [exact_number(text, name) for text in texts]
     return [numbers[k : k + dimension] for k in range(0, len(numbers), dimension)]

@@ -130,7 +130,9 @@ def _interrupts() -> Iterator[Callable[[], None]]:
 
     numbers: list[int] = []
     if threading.current_thread() is threading.main_thread():  # which alone handles signals
-        numbers = [signal.SIGTERM, *[signal.SIGINT] * (signal.getsignal(signal.SIGINT) is signal.default_int_handler)]
+        numbers.append(signal.SIGTERM)
+        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+            numbers.append(signal.SIGINT)
     before = {number: signal.signal(number, interrupt) for number in numbers}
     try:
         yield ask
@@ -148,7 +150,8 @@ def _tell_rows(rows: list[dict[str, Any]], total: int, output: str | None, resta
     if output is None:
         click.echo(table_bytes(rows, ".csv").decode(), nl=False, color=True)
         return f"{len(rows)} of {total} rows are printed; with -o FILE.csv the same command could go on"
-    missing = f"{total - len(rows)} are missing, and the same command{' without --restart' * restart} goes on"
+    again = "the same command without --restart" if restart else "the same command"
+    missing = f"{total - len(rows)} are missing, and {again} goes on"
     return f"{len(rows)} of {total} rows are kept, in {output} too; {missing}"
 
 

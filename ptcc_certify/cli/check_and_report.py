@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
+from lmi.exact.decimal_rounding import counted
 from ptcc_certify.cli import options as shared
 from ptcc_certify.cli.families import mode_options
 from ptcc_certify.cli.same_graph import READING, compare
@@ -93,17 +94,16 @@ def _own_graph(document: dict[str, Any], report: CheckReport) -> list[str]:
     >>> [text.partition(" SHA")[0] for text in _own_graph(cert.to_dict(), cert.checked)]
     ['2 nodes, 1 edge, as in the file; name yours to compare;']
     """
-    from ptcc_certify.report.text_layout import counted
-
     if not report.accepted:
         return []
     graph = document["graph"]
     modes = graph.get("modes", [graph])
     edges = [mode["edges"] for mode in modes]
-    count = sum(one["count"] if isinstance(one, dict) else len(one) for one in edges)
-    parts = [counted(len(modes), "mode")] * (len(modes) > 1)
-    parts += [counted(len(graph["nodes"]), "node"), counted(count, "edge")]
-    return [f"{', '.join(parts)}, as in the file; name yours to compare; SHA-256 {report.sha256}"]
+    count = sum(listed["count"] if isinstance(listed, dict) else len(listed) for listed in edges)
+    sizes = [counted(len(graph["nodes"]), "node"), counted(count, "edge")]
+    if len(modes) > 1:
+        sizes.insert(0, counted(len(modes), "mode"))
+    return [f"{', '.join(sizes)}, as in the file; name yours to compare; SHA-256 {report.sha256}"]
 
 
 @click.command()

@@ -139,7 +139,8 @@ def _show(
             screen.note(f"note       not designed for: {', '.join(ignored)}; ask ptcc certify about them")
         if command is not None:
             again = " (give it the graph again, on standard input)" if graph == "-" else ""
-            again += "; of the deviation see its line error" * (answer.gain_cap is not None)
+            if answer.gain_cap is not None:
+                again += "; of the deviation see its line error"
             screen.note("\n".join([f"to prove it again{again}:", *wrap_command(command)]))
         elif answer.protocol is not None:
             where = f"the proof is in {output}" if output else "add -o design.json to keep the proof"

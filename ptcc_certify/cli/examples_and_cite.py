@@ -34,7 +34,7 @@ def examples(name: str, output: str | None, suffix: str) -> int:
         except OSError as error:
             raise ParameterError(f"{output}: cannot make this folder ({error.strerror})") from None
     steps = [f"example {example.number} on {graph}" for example, graph, _ in selection]
-    with progress([*steps, *["figures"] * bool(output)]) as begin:
+    with progress([*steps, "figures"] if output else steps) as begin:
         begin(steps[0])
         from ptcc_certify.certificate.answer import worst_code
         from ptcc_certify.report.example_results import RESULTS_HEAD, certify_example, result_lines

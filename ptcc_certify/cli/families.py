@@ -184,8 +184,10 @@ def _names(graphs: tuple[str, ...], family: Family, options: shared.Options) -> 
         or options["edges"]
         or ("matrix" if PurePath(graphs[0]).suffix[1:] in MATRICES else "information")
     )
-    tied = "; undirected, both directions change together" * any(mode.tied for mode in family.modes)
-    return ", ".join(PurePath(graph).name for graph in graphs), ORIENTATION[way] + tied
+    read = ORIENTATION[way]
+    if any(mode.tied for mode in family.modes):
+        read += "; undirected, both directions change together"
+    return ", ".join(PurePath(graph).name for graph in graphs), read
 
 
 def classify_family(

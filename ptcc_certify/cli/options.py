@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from lmi.exact.decimal_rounding import counted
 from ptcc_certify.cli.declared import (
     IN_LIBRARY,
     KIND,
@@ -196,8 +197,9 @@ class OneGraph(Command):
 def written(certificate: Certificate, output: str) -> str:
     """Return what is said of a certificate that was saved, with its side files."""
     count = len(certificate.for_check()[1])
-    beside = f" and {count} side file{'s' * (count > 1)} in the same folder, which go with it" if count else ""
-    return f"written    {output}{beside}"
+    if not count:
+        return f"written    {output}"
+    return f"written    {output} and {counted(count, 'side file')} in the same folder, which go with it"
 
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print exactly one JSON object.")
@@ -246,7 +248,8 @@ def protocol_of(options: Options, disturbed: tuple[str, ...] = ("delta",)) -> Pr
     """Return the protocol; ``disturbed`` are the options about disturbances that the nominal one takes too."""
     nominal = options["kind"] == "nominal"
     other = "sliding-mode" if nominal else "nominal"
-    for name in (*OF_PROTOCOL["sliding-mode" if nominal else "nominal"], *["delta"] * nominal):
+    foreign = (*OF_PROTOCOL["sliding-mode"], "delta") if nominal else OF_PROTOCOL["nominal"]
+    for name in foreign:
         if options.get(name) is not None and name not in disturbed:
             mend = "the deadline is --T-r plus --T-s" if name == "T" else "leave it out or change the protocol"
             raise ParameterError(f"{flag_of(name)} belongs to --protocol {other}; {mend}")
@@ -332,7 +335,8 @@ def read_initial_states(options: Options, graph: SignedDigraph) -> Any:
 
     from ptcc_certify.graphs.io import random_states
 
-    x0, seed, n, dimension = options["x0"], options["seed"], graph.n_nodes, options["dimension"]
+    x0, seed, dimension = options["x0"], options["seed"], options["dimension"]
+    n = graph.n_nodes
     if dimension == 1:
         return read_initial_state(x0, seed, graph, within=options["initial_bound"])
     if x0 == "random":
@@ -340,7 +344,7 @@ def read_initial_states(options: Options, graph: SignedDigraph) -> Any:
     texts = x0.split(",")
     if len(texts) != n * dimension:
         raise ParameterError(
-            f"--x0 has {len(texts)} value{'s' * (len(texts) > 1)} for {n} agents of dimension {dimension}; "
+            f"--x0 has {counted(len(texts), 'value')} for {counted(n, 'agent')} of dimension {dimension}; "
             f"give {n * dimension} numbers, agent after agent"
         )
     return np.array([exact_number(text, "--x0") for text in texts]).reshape(n, dimension)

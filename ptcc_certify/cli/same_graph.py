@@ -176,7 +176,8 @@ def _flags(options: shared.Options, told: shared.Options, file: Any) -> str:
     direction = "listens" if name_and_ending(file)[1] in MATRICES else "information"
     words = []
     for name in READING:
-        flag, old, new = shared.flag_of(name), options[name], told[name]
+        flag = shared.flag_of(name)
+        old, new = options[name], told[name]
         if name == "edges":
             old, new = old or direction, new or direction
         elif name == "uncertainty":

@@ -258,15 +258,15 @@ def graph_of(context: click.Context, parameter: click.Parameter, graph: Any) -> 
     The callback of every GRAPH; these are eager, so that options find their defaults here.
     """
     given = graph if isinstance(graph, tuple) else (graph,)
-    named = [one for one in given if is_scenario(one)]
+    named = [path for path in given if is_scenario(path)]
     if context.resilient_parsing or not named:
         return graph
     if len(given) > 1:
         raise ParameterError(f"{shorten(named[0], 200)}: a scenario stands alone; let its key file list the graphs")
     scenario = _scenario_of(named[0])
     context.meta.update({MEMORY: scenario, COMMAND: context, SCENARIO: named[0]})
-    own = {parameter.name for parameter in context.command.params}
-    if "agents" not in own and context.command.name not in _OF_THE_GRAPH_ALONE:
+    accepted = {parameter.name for parameter in context.command.params}
+    if "agents" not in accepted and context.command.name not in _OF_THE_GRAPH_ALONE:
         for key in ("agents", "offsets", "biases"):
             if scenario.options.get(key) not in (None, "integrator", "1"):
                 why = (
@@ -275,13 +275,15 @@ def graph_of(context: click.Context, parameter: click.Parameter, graph: Any) -> 
                 raise ParameterError(f"{scenario.place(key)}: {why}")
     if context.command.name == "design":
         refuse_beside(scenario, context.command.name)
-    if "x0" in own and "dimension" not in own and scenario.options.get("dimension", "1") != "1":
+    if "x0" in accepted and "dimension" not in accepted and scenario.options.get("dimension", "1") != "1":
         why = f"ptcc {context.command.name} takes scalar agents; what is proved of one component holds for each"
         raise ParameterError(f"{scenario.place('dimension')}: {why}: leave it out, and let x0 be one component")
-    families = [*["graph"] * (len(scenario.graphs) > 1), *(key for key in OF_FAMILIES if key in scenario.options)]
-    if families and "switching" not in own:
+    families = [key for key in OF_FAMILIES if key in scenario.options]
+    if len(scenario.graphs) > 1:
+        families.insert(0, "graph")
+    if families and "switching" not in accepted:
         raise ParameterError(f"{scenario.place(families[0])}: {takes_one_graph(context.command.name)}")
-    context.default_map = {name: value for name, value in scenario.options.items() if name in own}
+    context.default_map = {name: value for name, value in scenario.options.items() if name in accepted}
     context.default_map |= {"switching": True} if len(scenario.graphs) > 1 else {}
     kind_of_protocol(context, None, context.params.get("kind"))
     return scenario.graphs if isinstance(graph, tuple) else scenario.graph

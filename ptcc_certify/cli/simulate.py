@@ -191,16 +191,17 @@ def _run_beside(
     messages, leaders = messages_of(graph, signed, options), leaders_of(options)
     if messages is None and leaders is None:
         return None
-    source, name = (
-        click.get_current_context().get_parameter_source,
-        "late messages" if messages else "leaders that move",
-    )
+    source = click.get_current_context().get_parameter_source
+    name = "late messages" if messages else "leaders that move"
     refused = ["steps", "boundary_layer", "noise", "stop_before", "sample_period"]
-    refused += ["gain_cap"] * (messages is None) + ["delta"] * (leaders is None and protocol.reaching is None)
-    refused += ["disturbance"] * (protocol.reaching is None)
+    if messages is None:
+        refused.append("gain_cap")
+    if protocol.reaching is None:
+        refused += ["delta", "disturbance"] if leaders is None else ["disturbance"]
     given = [option for option in refused if options[option] is not None]
     given += [option for option in ("samples", "signal") if source(option) == ParameterSource.COMMANDLINE]
-    given += ["dimension"] * (options["dimension"] > 1)
+    if options["dimension"] > 1:
+        given.append("dimension")
     if given:
         raise ParameterError(f"{flag_of(given[0])}: is not simulated with {name}; leave it out")
     refuse_restricted(options)

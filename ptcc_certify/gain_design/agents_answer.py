@@ -79,12 +79,12 @@ class AgentsDesign(DesignAnswer):
     @property
     def deadline_text(self) -> str:
         """What is proved of shorter deadlines, in one line; empty where nothing is."""
-        parts = ["every one is met"] * (self.peak == 0)
+        clauses = ["every one is met"] if self.peak == 0 else []
         if self.certificate is not None and self.deadline is not None and self.too_short is not None:
-            parts = [f"{short_exact(self.deadline)} is met, {short_exact(self.too_short)} not by these bounds"]
+            clauses = [f"{short_exact(self.deadline)} is met, {short_exact(self.too_short)} not by these bounds"]
         if self.shortest_possible is not None:
-            parts.append(f"no gains meet one below {down(self.shortest_possible)}")
-        return "; ".join(parts)
+            clauses.append(f"no gains meet one below {down(self.shortest_possible)}")
+        return "; ".join(clauses)
 
     @property
     def ratio_text(self) -> str:

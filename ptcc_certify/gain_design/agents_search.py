@@ -197,9 +197,10 @@ def _unusable(base: Certificate, part: AgentsAnswer, request: Request) -> str | 
     places = forces * max(sum(map(abs, h), Fraction(0)) for h in part.protocol.offsets)
     if terms + places < request.max_input:
         return None
-    named = [f"the sliding terms {short_exact(terms)}"] * bool(terms)
-    named += [f"the force that holds agents in their places {up(places)}"] * bool(places)
-    return f"whatever the deadline, the limit is taken by {' and '.join(named)}: give a larger limit or a smaller mu1"
+    reasons = [f"the sliding terms {short_exact(terms)}"] if terms else []
+    if places:
+        reasons.append(f"the force that holds agents in their places {up(places)}")
+    return f"whatever the deadline, the limit is taken by {' and '.join(reasons)}: give a larger limit or a smaller mu1"
 
 
 def _with(blank: AgentsDesign, candidate: Candidate, base: Certificate, again: Certificate) -> AgentsDesign:

@@ -314,8 +314,8 @@ class Design(DesignAnswer):
             return ""
         size = f"{'||u||' if self.asked.input_norm == 2 else '|u_k|'} <= {up(self.peak)}"
         ends = f"within {up(self.residual)} of" if self.residual else "at"
-        exact = " (deviation 0)" * (self.asked.residual is not None and not self.residual)
-        return f"{size}, every agent {ends} its final state at T{exact}"
+        text = f"{size}, every agent {ends} its final state at T"
+        return f"{text} (deviation 0)" if self.asked.residual is not None and not self.residual else text
 
     @property
     def gains_text(self) -> str:

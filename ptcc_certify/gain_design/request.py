@@ -74,7 +74,8 @@ class Fit(NamedTuple):
 
 def fit_of(cert: Certificate, request: DesignRequest) -> Fit:
     """Return what a certificate proves of its gains: the peak of the input, and what is left at the deadline."""
-    T, effort, by_norm = cert.protocol.T, cert.effort, request.input_norm == 2
+    T, effort = cert.protocol.T, cert.effort
+    by_norm = request.input_norm == 2
     if not cert.limits:
         if effort is None or effort.peak is None:
             moves = any(input_bounds(cert, request.initial_set).error_bounds)

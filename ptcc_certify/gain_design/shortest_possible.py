@@ -17,7 +17,8 @@ _PRODUCT_BITS = 40
 
 def lower_product(base: Certificate, request: DesignRequest) -> tuple[Fraction | None, str]:
     """Return what ``U T`` is at least, whatever the gains, and why; None if nothing is known."""
-    candidates, initial_set, graph = [(Fraction(0), "")], request.initial_set, base.graph
+    candidates = [(Fraction(0), "")]
+    initial_set, graph = request.initial_set, base.graph
     agents = [shorten(label) for label in graph.labels]
     if base.influence.exact and graph.n_nodes <= INPUT_NODES:
         for agent, row in zip(agents, ways(base.influence), strict=True):

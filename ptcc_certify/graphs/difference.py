@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from fractions import Fraction
 
+from lmi.exact.decimal_rounding import counted
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import nearest_float, shorten
@@ -52,10 +53,12 @@ def difference(one: SignedDigraph, other: SignedDigraph) -> str | None:
         return f"{_tell_reversal(other)} Then {_weights(reference, {(t, s): w for (s, t), w in actual.items()})}"
     reversals = [(s, t) for s, t in reference if (s, t) not in actual and (t, s) in actual and (t, s) not in reference]
     if reversals:
-        some = f"{len(reversals)} of {len(reference)} edges point{'s' * (len(reversals) == 1)} the other way"
-        return f"{some}, such as {_arrow(reversals[0])} in the certificate"
+        point = "points" if len(reversals) == 1 else "point"
+        example = f"such as {_arrow(reversals[0])} in the certificate"
+        return f"{len(reversals)} of {len(reference)} edges {point} the other way, {example}"
     missing, more = (
-        [_arrow(pair) for pair in part if pair not in rest] for part, rest in ((reference, actual), (actual, reference))
+        [_arrow(pair) for pair in edges if pair not in others]
+        for edges, others in ((reference, actual), (actual, reference))
     )
     return _lists("edge", missing, more)
 
@@ -90,7 +93,7 @@ def _weights(reference: Edges, actual: Edges) -> str:
 
 
 def _count(some: int, of: int) -> str:
-    return f"{some} of {of} edge{'s' * (of != 1)} {'has' if some == 1 else 'have'}"
+    return f"{some} of {counted(of, 'edge')} {'has' if some == 1 else 'have'}"
 
 
 def _both(pair: tuple[str, str], reference: Edges, actual: Edges) -> str:
@@ -109,7 +112,7 @@ def _arrow(pair: tuple[str, str]) -> str:
 def _lists(what: str, missing: list[str], more: list[str]) -> str:
     """Tell what is missing and what is more, each with an example."""
     clauses = [
-        f"{len(names)} {what}{'s' * (len(names) > 1)} of the {where} alone, such as {shorten(names[0], 90)}"
+        f"{counted(len(names), what)} of the {where} alone, such as {shorten(names[0], 90)}"
         for names, where in ((missing, "certificate"), (more, "graph"))
         if names
     ]
@@ -157,15 +160,14 @@ def family_difference(one: Family, other: Family) -> str | None:
     if odd := sorted(set(one.labels) ^ set(other.labels)):
         return f"node {shorten(odd[0])} is only in the {'certificate' if odd[0] in one.labels else 'files'}"
     if len(one.modes) != len(other.modes):
-        modes = len(one.modes)
-        return f"{modes} mode{'s' * (modes > 1)} in the certificate, {len(other.modes)} in the files"
+        return f"{counted(len(one.modes), 'mode')} in the certificate, {len(other.modes)} in the files"
     pairs = _different_modes(one, other)
     number, place = pairs[0]
     first, second = (set(f.modes[k].marked_lines()) for f, k in ((one, number), (other, place)))
     alone = [
-        f"{shorten(min(some), 120)} is only in the {where}"
-        for where, some in (("certificate", first - second), ("files", second - first))
-        if some
+        f"{shorten(min(lines), 120)} is only in the {where}"
+        for where, lines in (("certificate", first - second), ("files", second - first))
+        if lines
     ]
     return _mode_text(one, other, pairs) + ", and ".join(alone)
 
@@ -195,5 +197,7 @@ def _mode_text(one: Family, other: Family, pairs: list[tuple[int, int]]) -> str:
     if len(one.modes) == 1:
         return ""
     name, also = (shorten(family.modes[k].name) for family, k in zip((one, other), pairs[0], strict=True))
-    remarks = [f"{also} of the files"] * (also != name) + [f"one of {len(pairs)} that differ"] * (len(pairs) > 1)
-    return f"in mode {name} " + f"({', '.join(remarks)}) " * bool(remarks)
+    remarks = [f"{also} of the files"] if also != name else []
+    if len(pairs) > 1:
+        remarks.append(f"one of {len(pairs)} that differ")
+    return f"in mode {name} ({', '.join(remarks)}) " if remarks else f"in mode {name} "

@@ -135,7 +135,8 @@ class SignedDigraph(ReadOnly, Shown):
         super().__setattr__(name, value)
 
     def _refuse_bad_edges(self) -> None:
-        source, target, table, size = self.source, self.target, self._weights.table, np.abs(self.weights)
+        source, target, table = self.source, self.target, self._weights.table
+        size = np.abs(self.weights)
         again = (source[1:] == source[:-1]) & (target[1:] == target[:-1])
         long = np.array([not writable(w) for w in table.tolist()] if table.dtype == object else [], dtype=bool)
         loops = source == target

@@ -128,10 +128,11 @@ class Ensemble:
             for balanced in self.balanced:
                 least = _least(connectivity, balanced, self.undirected)
                 if few < least:
+                    graph = "undirected graph" if self.undirected else "graph"
                     leaders = "balanced" if balanced else "unbalanced"
                     raise ParameterError(
-                        f"nodes = {few} is too few: a {connectivity} {'undirected ' * self.undirected}graph with "
-                        f"{leaders} leaders has {least} nodes or more"
+                        f"nodes = {few} is too few: a {connectivity} {graph} with {leaders} leaders has {least} nodes "
+                        "or more"
                     )
 
     @classmethod
@@ -304,7 +305,8 @@ class _Drawing:
         signs = self.signs(source, target).tolist()
         weights = [size * sign for size, sign in zip(self.sizes(source.size), signs, strict=True)]
         if self.undirected:
-            source, target, weights = np.append(source, target), np.append(target, source), weights * 2
+            source, target = np.append(source, target), np.append(target, source)
+            weights = weights * 2
         number = self.rng.permutation(self.n)  # no number tells who leads
         return SignedDigraph(map(str, range(1, self.n + 1)), number[source], number[target], Weights(weights))
 
@@ -351,8 +353,8 @@ class _Drawing:
         for blocks in list(self.parts()):
             for block in blocks:
                 here = slice(block.first, block.last)
-                own = (block.first + self.rng.permutation(block.last - block.first)).tolist()
-                edges, length = self.tree(own) if self.undirected else self.ears(own)
+                nodes = (block.first + self.rng.permutation(block.last - block.first)).tolist()
+                edges, length = self.tree(nodes) if self.undirected else self.ears(nodes)
                 if block.leads:
                     self.leading[here] = len(self.cycles)
                     self.cycles.append(range(len(pairs), len(pairs) + length))
@@ -360,7 +362,9 @@ class _Drawing:
                 low[here], high[here] = block.floor, block.last
             pairs += self.links(blocks)
         if self.undirected:  # every edge from the smaller position to the larger one
-            pairs, degree, high = [(min(pair), max(pair)) for pair in pairs], degree / 2, np.arange(n)
+            pairs = [(min(pair), max(pair)) for pair in pairs]
+            degree = degree / 2
+            high = np.arange(n)
         skeleton = np.array([t * n + s for s, t in pairs], dtype=np.int64)
         keys = np.append(skeleton, self.further(low, high, skeleton, round(degree * n) - skeleton.size))
         return keys % n, keys // n

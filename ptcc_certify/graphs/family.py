@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lmi.exact.decimal_rounding import counted
 from ptcc_certify.errors import GraphError, NumberError, did_you_mean, gated
 from ptcc_certify.graphs.digraph import (
     CallableTuple,
@@ -278,10 +279,10 @@ class Family(Shown):
         """
         parts: list[Iterable[str]] = [(json.dumps([label], ensure_ascii=False) for label in sorted(self.labels))]
         for number, mode in enumerate(self.modes):
-            parts += [["{}"] * (number > 0), mode.marked_lines()]
+            parts += [["{}"], mode.marked_lines()] if number else [mode.marked_lines()]
         digest, lines = hashlib.sha256(), chain.from_iterable(parts)
-        while some := list(islice(lines, _TOGETHER)):
-            digest.update("".join(f"{line}\n" for line in some).encode("utf-8", "surrogatepass"))
+        while batch := list(islice(lines, _TOGETHER)):
+            digest.update("".join(f"{line}\n" for line in batch).encode("utf-8", "surrogatepass"))
         return digest.hexdigest()
 
     # ------------------------------------------------------------------ constructors
@@ -446,10 +447,14 @@ class Family(Shown):
         edges = sum(mode.n_edges for mode in self.modes)
         uncertain = sum(int((~mode.known).sum()) for mode in self.modes)
         optional = sum(int(mode.optional.sum()) for mode in self.modes)
-        parts = [f"{self.n_nodes} nodes"] + [f"{len(self.modes)} modes"] * (len(self.modes) > 1)
-        parts += [f"{uncertain} of {edges} weights uncertain"] * bool(uncertain)
-        parts += [f"{optional} edge{'s' * (optional > 1)} optional"] * bool(optional)
-        return f"Family({', '.join(parts)})"
+        sizes = [f"{self.n_nodes} nodes"]
+        if len(self.modes) > 1:
+            sizes.append(f"{len(self.modes)} modes")
+        if uncertain:
+            sizes.append(f"{uncertain} of {edges} weights uncertain")
+        if optional:
+            sizes.append(f"{counted(optional, 'edge')} optional")
+        return f"Family({', '.join(sizes)})"
 
 
 def read_share(value: Any) -> Fraction:

@@ -217,7 +217,8 @@ def refuse_as_certificate(path: str, before_graph: bool = False, content: bytes 
         raise FormatError(f"{shorten(path)}: is JSON text, not a path; give json.loads(text), a path or a Certificate")
     output = "certificate.json" if path == "-" else shell_word(f"{Path(path).stem}.json")
     made = f"ptcc certify {shell_word(path)} -o {output} makes one"
-    made += "; the certificate comes first: ptcc check CERTIFICATE GRAPH" * before_graph
+    if before_graph:
+        made += "; the certificate comes first: ptcc check CERTIFICATE GRAPH"
     if path in GRAPHS and kind in ("missing", "a folder"):
         raise FormatError(f"{name}: is a packaged graph, not a certificate; {made}")
     if kind == "missing":

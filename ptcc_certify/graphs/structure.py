@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lmi.exact.decimal_rounding import counted
 from ptcc_certify.errors import ParameterError, did_you_mean
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.equality import ReadOnly
@@ -296,8 +297,8 @@ class Structure(ReadOnly, Shown):
         if self.claim:
             claim = f"{self.claim.reference}: {self.claim.sharpest}"
         return (
-            f"Structure({self.graph.n_nodes} nodes, {self.connectivity}, {closed} closed "
-            f"component{'s' * (closed > 1)}, {balanced} balanced, {self.leaders.size} leaders; {claim})"
+            f"Structure({self.graph.n_nodes} nodes, {self.connectivity}, {counted(closed, 'closed component')}, "
+            f"{balanced} balanced, {self.leaders.size} leaders; {claim})"
         )
 
 

@@ -131,7 +131,8 @@ def decay_matrices(mode: QuotientMode, P: Matrix, multipliers: Sequence[Fraction
     >>> [[str(x) for x in row] for row in S]
     [['3', '1'], ['1', '1']]
     """
-    n, q, zero = len(P), len(mode.parts), Fraction(0)
+    n, q = len(P), len(mode.parts)
+    zero = Fraction(0)
     (form, p), (A, a) = integer_matrix(P), integer_matrix(mode.center)
     product = integer_rows(form * A)
     S = [[Fraction(product[i][j] + product[j][i], p * a) for j in range(n)] + [zero] * q for i in range(n)]

@@ -335,7 +335,8 @@ class _BoundSearch:
         n = len(P)
         unit = n / max(float(np.mean([np.trace(array.A) for array in self.arrays])), 1e-300)
         for step in _STEP:
-            x, letters, flows = self.rng.standard_normal(n), [], {}
+            x = self.rng.standard_normal(n)
+            letters, flows = [], {}
             for _ in range(_STEPS):
                 checkpoint()
                 member = self._worst(P, x)
@@ -344,7 +345,8 @@ class _BoundSearch:
                 x = flows[member] @ x
                 x /= max(float(np.linalg.norm(x)), 1e-300)
                 letters.append(member)
-            Phi, best, length = np.eye(n), np.inf, 0
+            Phi = np.eye(n)
+            best, length = np.inf, 0
             for count, member in enumerate(letters[: -_WINDOW - 1 : -1], 1):
                 Phi = Phi @ flows[member]
                 if (rate := _word_rate(Phi, count * step * unit)) < best:
@@ -361,7 +363,8 @@ class _BoundSearch:
 
     def _worst(self, P: np.ndarray, x: np.ndarray) -> Member:
         """Return the member by which ``x' P x`` falls least."""
-        gradient, least, worst = P @ x, np.inf, None
+        gradient = P @ x
+        least, worst = np.inf, None
         for mode, array in enumerate(self.arrays):
             slopes = (gradient @ array.F) * (x @ array.H)
             member = self._member(mode, np.where(slopes < 0, 1.0, 0.0))

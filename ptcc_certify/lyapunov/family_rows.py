@@ -307,7 +307,8 @@ def _smallest(M: Any) -> tuple[float, np.ndarray] | None:
     diagonal, n = M.diagonal(), M.shape[0]
     if not (diagonal > 0).all():
         return None
-    y, best, low = np.ones(n), np.ones(n), 0.0
+    y, best = np.ones(n), np.ones(n)
+    low = 0.0
     for _ in range(_ROUNDS):
         try:
             if n <= DIRECT_ROWS:

@@ -283,7 +283,8 @@ class UncertainRows(FollowerRows):
     """
 
     def __init__(self, family: Family):
-        self.followers, self.shares, self._smallest = listeners(family), None, {}
+        self.followers = listeners(family)
+        self.shares, self._smallest = None, {}
         if not self.followers.size:
             raise HypothesisError("nobody listens to anybody, so there is nothing that could be late; add edges")
         refuse_other_targets(family)

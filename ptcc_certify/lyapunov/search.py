@@ -321,10 +321,10 @@ def _for_deviations(
     if not any(c.kind == "full" for c in candidates):
         return None
     A, U = system.matrix, np.eye(len(system.nodes)) if system.basis is None else system.basis
-    own = U.T @ A @ U
-    own /= np.abs(own).max()  # the scale is immaterial
+    reduced = U.T @ A @ U
+    reduced /= np.abs(reduced).max()  # the scale is immaterial
     try:
-        inverse = np.linalg.inv(own)
+        inverse = np.linalg.inv(reduced)
     except np.linalg.LinAlgError:
         return None
 
@@ -338,9 +338,10 @@ def _for_deviations(
     def reduce(c: Candidate) -> np.ndarray:
         return U.T @ (c.matrix @ U if c.matrix is not None else np.exp(c.log_weights)[:, None] * U)  # type: ignore[arg-type]
 
-    bounds = [log_bounds(own.T @ reduce(c) @ own, c.rate) for c in selection]
+    bounds = [log_bounds(reduced.T @ reduce(c) @ reduced, c.rate) for c in selection]
     bounds.append(np.full(len(clocks), math.log(LARGEST_ENTRY)))
-    best, least, candidate = np.min(bounds, axis=0), math.log(WORTH_A_FUNCTION), None
+    best, candidate = np.min(bounds, axis=0), None
+    least = math.log(WORTH_A_FUNCTION)
     for c in candidates:
         if c.kind == "full":
             gain = best - log_bounds(reduce(c), c.rate)

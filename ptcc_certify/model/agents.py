@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, ClassVar
 
+from lmi.exact.decimal_rounding import counted
 from ptcc_certify.errors import Change, NumberError, ParameterError, Sentence, gated, joined
 from ptcc_certify.graphs.option import option
 from ptcc_certify.graphs.rationals import Exact, as_fraction, no_number, shorten, whole_number
@@ -104,8 +105,9 @@ give 4, from which on the input is bounded
             raise ParameterError("plant", "is empty; give a_1 to a_n, or leave it out for chains of integrators")
         order = whole_number(given if self.order is None else self.order, "order", 1, MOST_ORDER)
         if given != order and numbers is not None:
-            count = f"{given} number{'s' * (given > 1)}"
-            raise ParameterError("plant", f"has {count} for agents of order {order}; give a_1 to a_{order}")
+            raise ParameterError(
+                "plant", f"has {counted(given, 'number')} for agents of order {order}; give a_1 to a_{order}"
+            )
         plant = [Fraction(0)] * order if numbers is None else [_number("plant", x) for x in numbers]
         if self.drag is not None:
             if plant[-1]:

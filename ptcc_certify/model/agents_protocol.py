@@ -151,7 +151,9 @@ class AgentsProtocol:
         """
         import casadi as ca
 
-        graph, eta, n = as_graph(graph), self._gain(t), self.order
+        graph = as_graph(graph)
+        eta = self._gain(t)
+        n = self.order
         gains = self.gains_at(ca.jacobian(eta, t) / eta**2)
         h = ca.vertcat(*(float(row[coordinate]) for row in self.offsets))
         total = float(self.plant[0]) * ca.SX(h)
@@ -167,7 +169,9 @@ class AgentsProtocol:
         """
         import casadi as ca
 
-        graph, t, n = as_graph(graph), ca.SX.sym("t"), self.order
+        graph = as_graph(graph)
+        t = ca.SX.sym("t")
+        n = self.order
         marks = ["", *(f"_{i}" for i in range(1, n))]
         states = [ca.vertcat(*(ca.SX.sym(f"x{k + 1}{mark}") for k in range(graph.n_nodes))) for mark in marks]
         last = self.input(graph, states, t, coordinate)

@@ -133,7 +133,9 @@ def _uncontrollable(A: Sequence[Sequence[Fraction]], q: Sequence[Fraction]) -> s
 
 def _solve(M: Sequence[Sequence[Fraction]], right: Sequence[Fraction]) -> tuple[list[Fraction], list[Fraction] | None]:
     """Return the solution of ``M c = right`` and None; of a singular ``M`` nothing, and a vector of its kernel."""
-    n, rows, pivots = len(M), [[*row, x] for row, x in zip(M, right, strict=True)], list[int]()
+    n = len(M)
+    rows = [[*row, x] for row, x in zip(M, right, strict=True)]
+    pivots = list[int]()
     for j in range(n):
         k = len(pivots)
         place = next((i for i in range(k, n) if rows[i][j]), None)

@@ -216,7 +216,8 @@ class ExpressionDisturbance(Disturbance):
         ParameterError
             Names agent, time and value where the bound is broken, or where no bound can be given.
         """
-        limit, budget, sampled = _Limit(delta, slack, labels), _BOXES, False
+        limit = _Limit(delta, slack, labels)
+        budget, sampled = _BOXES, False
         if not self.common:
             limit.refuse_other_count(len(self.texts), "expressions")
         for text, agents in self._groups(np.arange(len(labels))):
@@ -237,7 +238,8 @@ class ExpressionDisturbance(Disturbance):
 
     def _check_boxes(self, text: str, agents: np.ndarray, limit: _Limit, until: float, budget: int) -> tuple[int, bool]:
         """Return the number of boxes left to spend, and whether samples had to do."""
-        program, place, bound = self._programs[text], f'disturbance "{shorten(text)}"', limit.bound
+        program, bound = self._programs[text], limit.bound
+        place = f'disturbance "{shorten(text)}"'
 
         def sample(k: np.ndarray, t: np.ndarray) -> None:
             limit.refuse_beyond(floats(program, k + 1.0, t), t, k, place)
@@ -259,7 +261,7 @@ class ExpressionDisturbance(Disturbance):
                 raise ParameterError(f"{place}: no bound can be given near {where}; {mend}")
             halves = [(agent, lo, (lo + hi) / 2, hi) for agent, lo, hi in boxes]
             sample(np.array([half[0] for half in halves]), np.array([half[2] for half in halves]))
-            boxes = [(agent, *part) for agent, lo, mid, hi in halves for part in ((lo, mid), (mid, hi))]
+            boxes = [(agent, *side) for agent, lo, mid, hi in halves for side in ((lo, mid), (mid, hi))]
             budget -= len(boxes)
         if sampled:
             # Not on a lattice, which a fast signal could hide between.
@@ -359,7 +361,9 @@ class SampledDisturbance(ByValue, Disturbance):
 
     def check(self, delta: Fraction, labels: Sequence[str], until: float, slack: float = TOLERANCE) -> str:
         """Compare all samples on [0, until], and the values at both ends, with ``delta``."""
-        limit, count, place = _Limit(delta, slack, labels), len(self.samples), f"disturbance ({shorten(self.text)})"
+        limit = _Limit(delta, slack, labels)
+        count = len(self.samples)
+        place = f"disturbance ({shorten(self.text)})"
         if count > 1:
             limit.refuse_other_count(count, "signals")
         instants = np.unique([0.0, *self.breaks(until), until])

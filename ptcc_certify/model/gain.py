@@ -208,7 +208,10 @@ class Gain(Parameters):
         """Return gain, ``phi`` and clock for parameters by name, numbers or symbols."""
         import casadi as ca
 
-        T, rho1, pole, before = p["T"], p["rho1"], p["rho2"] * p["kappa"], t < p["T"]
+        T = p["T"]
+        rho1 = p["rho1"]
+        pole = p["rho2"] * p["kappa"]
+        before = t < p["T"]
         phi = ca.if_else(before, (T / (T - t)) ** p["kappa"], 1)
         if not self.rho2:
             return {"gain": ca.SX(rho1), "phi": phi, "clock": rho1 * t}

@@ -206,12 +206,16 @@ lambda of L, or measure the own state without delay
         return tuple(none if x is None else x for x in found)
 
     def __repr__(self) -> str:
-        parts = [f"delay={readable(self.largest_delay)}"]
-        parts += [] if self.period is None else [f"period={readable(self.period)}, losses={self.losses}"]
-        parts += [f"value_error={readable(self.value_error)}"] * (self.value_error != 0)
-        parts += ["own_delay=True"] * self.own_delay
-        parts += [] if self.gain_cap is None else [f"gain_cap={readable(self.gain_cap)}"]
-        return f"LateMessages({', '.join(parts)})"
+        fields = [f"delay={readable(self.largest_delay)}"]
+        if self.period is not None:
+            fields.append(f"period={readable(self.period)}, losses={self.losses}")
+        if self.value_error:
+            fields.append(f"value_error={readable(self.value_error)}")
+        if self.own_delay:
+            fields.append("own_delay=True")
+        if self.gain_cap is not None:
+            fields.append(f"gain_cap={readable(self.gain_cap)}")
+        return f"LateMessages({', '.join(fields)})"
 
 
 def _read(delays: Mapping[Any, Any]) -> dict[Any, Fraction]:

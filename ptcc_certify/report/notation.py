@@ -118,11 +118,6 @@ def head_text(head: str) -> str:
 # ---------------------------------------------------------------------- numbers
 
 
-def plural(number: int, what: str) -> str:
-    """Return a number of things: ``1 agent``, ``2 agents``."""
-    return f"{number:,} {what}{'' if number == 1 else 's'}"
-
-
 def rational(x: Fraction) -> str:
     """Write a rational: as a decimal or a quotient if that is short, else with six digits, marked as near."""
     cofactor = x.denominator

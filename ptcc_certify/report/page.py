@@ -21,6 +21,7 @@ from typing import Any
 import jinja2
 from markupsafe import Markup
 
+from lmi.exact.decimal_rounding import counted
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.certificate_file import RejectedCertificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
@@ -153,9 +154,9 @@ def _written(day: date | None) -> dict[str, str]:
 def _environment() -> jinja2.Environment:
     """Return the templates with what they may use; what is printed is escaped, and an unknown name is an error."""
     environment = texts.environment(lambda text: texts.printable(text, 2000), autoescape=True)
-    named = ("above", "below", "indexed", "label", "labels", "plural", "power", "printable", "rational", "symbol")
+    named = ("above", "below", "indexed", "label", "labels", "power", "printable", "rational", "symbol")
     environment.filters |= {name: getattr(texts, name) for name in named}
-    environment.filters |= {"grouped": "{:,}".format, "flags": reading_flags, "merged": dict.__or__}
+    environment.filters |= {"counted": counted, "grouped": "{:,}".format, "flags": reading_flags, "merged": dict.__or__}
     environment.filters |= {
         "head": lambda head: texts.typeset(texts.head_text(head)),
         "set": lambda fact: set_note(fact.note),
@@ -178,14 +179,15 @@ def set_note(note: Sentence) -> Markup:
 
 def _view(saved: Certificate | FamilyCertificate) -> dict[str, Any]:
     """Return what the template shows of every certificate."""
-    facts, source, assessment = facts_of(saved), saved.source, saved.assessment
-    told = [fact for fact in facts if fact.head not in (*_QUESTION, *_ELSEWHERE)]
-    answers, details = ([fact for fact in told if fact.detail == wanted] for wanted in (False, True))
+    facts = facts_of(saved)
+    source, assessment = saved.source, saved.assessment
+    shown = [fact for fact in facts if fact.head not in (*_QUESTION, *_ELSEWHERE)]
+    answers, details = ([fact for fact in shown if fact.detail == wanted] for wanted in (False, True))
     asked = [fact for fact in facts if fact.head in _QUESTION]
     if isinstance(saved, Certificate):
         asked += leader_facts(saved.structure)
     pairs = zip(saved.labels, saved.sigma0 or (), saved.reaching or (), strict=False)
-    advised = next((part.number for part in assessment.advice if isinstance(part, Change)), "")
+    advised = next((piece.number for piece in assessment.advice if isinstance(piece, Change)), "")
     begins = saved.initial_state if saved.agents is None else saved.agents.initial_state
     certified = saved.verdict == "certified"
     lacks = [
@@ -297,16 +299,21 @@ def _runs(
     if isinstance(saved, FamilyCertificate):
         if not runs:
             return view | {"run_text": ""}
-        ratios, kept = [compare(saved, run) for run in runs], saved.signal != "any" and keeps_promise(saved, runs)
+        ratios = [compare(saved, run) for run in runs]
+        promise_kept = saved.signal != "any" and keeps_promise(saved, runs)
         worst = sum(run.signal.startswith("worst") for run in runs)
-        text = f"{texts.plural(len(runs), 'run')} from the initial state of the certificate"
-        text += " under signals that keep the promise" if kept else f", {worst} of them under the worst that was found"
+        text = f"{counted(len(runs), 'run')} from the initial state of the certificate"
+        text += (
+            " under signals that keep the promise"
+            if promise_kept
+            else f", {worst} of them under the worst that was found"
+        )
         text += "." if saved.direct else ", under the worst disturbance."
         if any(ratio.judged for ratio in ratios) and saved.common:
             largest = max(ratio.worst_ratio for ratio in ratios)
             word = "VIOLATED" if any(ratio.violated for ratio in ratios) else "kept"
             text += f" The bounds are {word}: the largest ratio of run to bound is {largest:.3g}."
-        return view | {"run_text": text, "of_the_kind": kept}
+        return view | {"run_text": text, "of_the_kind": promise_kept}
     if saved.agents is not None:
         seen = None if run is None else saved.agents.compare(run)
         if seen is None:
@@ -321,8 +328,8 @@ def _runs(
     asked, ideal = saved.asked_trajectory, ideal_text(saved)
     text = "The run was repeated for this page with CVODES, from the initial state of the certificate"
     if asked is not None:
-        told = limits_text(asked, saved).replace("$T$", "T")
-        text += f"; states and input are those of a run with what was asked: {told}"
+        limits = limits_text(asked, saved).replace("$T$", "T")
+        text += f"; states and input are those of a run with what was asked: {limits}"
     elif ideal:
         text += f", with {ideal}"
     return view | {"run_text": f"{text}.", "asked_run": asked is not None}

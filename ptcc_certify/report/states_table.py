@@ -8,6 +8,7 @@ from typing import Any
 
 from markupsafe import Markup
 
+from lmi.exact.decimal_rounding import counted
 from ptcc_certify.bounds.final_state import extremes
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
@@ -40,7 +41,7 @@ def states_table(saved: Certificate | FamilyCertificate) -> tuple[str, list[Any]
     else:
         caption = f"{ends} if they settle ({'exact' if exact else 'in proved intervals'})"
     if saved.graph.n_nodes > ROWS:
-        total = texts.plural(saved.graph.n_nodes, "agent")
+        total = counted(saved.graph.n_nodes, "agent")
         caption += f": the {EXTREMES} highest and the {EXTREMES} lowest of {total}"
     names = [texts.label(saved.labels[k]) for k in agents]
     return caption, list(zip(names, *columns.values(), strict=True)), ["Agent", *columns]

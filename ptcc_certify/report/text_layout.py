@@ -42,19 +42,6 @@ def printable(text: str) -> str:
     return text if text.isprintable() else "".join(c if c.isprintable() or c in shown else "?" for c in text)
 
 
-def counted(number: int, noun: str) -> str:
-    """Return a number with its noun.
-
-    Examples
-    --------
-    >>> counted(1, "edge"), counted(0, "edge")
-    ('1 edge', '0 edges')
-    >>> counted(1005, "closed component")
-    '1,005 closed components'
-    """
-    return f"{number:,} {noun}{'' if number == 1 else 's'}"
-
-
 def shorten_text(text: str, width: int) -> str:
     """Cut the end of a text that takes more columns than ``width``, and mark the cut.
 
@@ -90,8 +77,9 @@ def shorten_list(words: Sequence[str], width: int = 90, total: int = 0) -> str:
     >>> shorten_list(["ann", "bob", "eve", "daniel", "zoe"], 25), shorten_list(["ann"], 25)
     ('ann, ... (5 in all)', 'ann')
     """
-    rest = f", ... ({max(total, len(words)):,} in all)"
-    room, used, fitting = width - columns(rest), 0, 0
+    ending = f", ... ({max(total, len(words)):,} in all)"
+    room = width - columns(ending)
+    used, fitting = 0, 0
     for number, word in enumerate(words, start=1):
         used += columns(word) + (2 if number > 1 else 0)
         if used > width:
@@ -100,8 +88,8 @@ def shorten_list(words: Sequence[str], width: int = 90, total: int = 0) -> str:
     if used <= width and total <= len(words):
         return ", ".join(words)
     if fitting:
-        return ", ".join(words[:fitting]) + rest
-    return shorten_label(words[0], room) + rest if max(total, len(words)) > 1 else shorten_text(words[0], width)
+        return ", ".join(words[:fitting]) + ending
+    return shorten_label(words[0], room) + ending if max(total, len(words)) > 1 else shorten_text(words[0], width)
 
 
 def value_list(labels: Sequence[str], values: Iterable[object], width: int = 4 * TEXT) -> str:

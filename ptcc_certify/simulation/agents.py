@@ -133,13 +133,14 @@ class _Deviations(Motion):
         """Return the slope of the deviations on the clock of the phase."""
         import casadi as ca
 
-        n, rho1, k = self._of.order, float(self._of.gain.rho1), float(self._of.gain.pole)
+        n = self._of.order
+        rho1, k = float(self._of.gain.rho1), float(self._of.gain.pole)
         R = phase.rate(z, ca.exp)
         g = phase.nominal(R)
         zeta = R / g
         theta = ca.MX(0) if phase.past else (1 - rho1 * zeta) ** 2 / k
         A = ca.MX(ca.DM(np.eye(n, k=1) + self._rate / 2 * np.eye(n))) - theta * ca.DM(np.diag(np.arange(float(n))))
-        plant, own = (list(map(float, part)) for part in (self._of.plant, self._of.own))
+        plant, own = (list(map(float, numbers)) for numbers in (self._of.plant, self._of.own))
         last = ca.hcat([-own[i] - plant[i] * zeta ** (n - i) for i in range(n)])
         A = A + ca.mtimes(ca.DM(np.eye(n)[:, [-1]]), last)
         feedback = ca.horzcat(ca.MX(n, n - 1), ca.vertcat(*self._of.gains_at(theta)))  # K'b'
@@ -240,7 +241,8 @@ def _integrate(
     z = np.zeros((len(q), *state.shape))
     if not state.size or not np.abs(state).max():
         return z
-    motion, gain, turn = _Deviations(graph, state, block, protocol, rate, rtol), protocol.gain, protocol.capped_from
+    motion = _Deviations(graph, state, block, protocol, rate, rtol)
+    gain, turn = protocol.gain, protocol.capped_from
     T, early = float(gain.T), q >= turn
     if turn < 1:
         end = -math.log(max(turn, float(q[-1])))

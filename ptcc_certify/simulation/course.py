@@ -57,7 +57,8 @@ class Course:
     """
 
     def __init__(self, motion: Motion, play: Callable[[State], Iterator[Stretch]]):
-        self.motion, self.clock, self.until, self.stretches = motion, 0.0, 0.0, 0
+        self.motion = motion
+        self.clock, self.until, self.stretches = 0.0, 0.0, 0
         self.choices: list[Choice] = []
         self.switches: list[float] = []
         self.acting: list[int] = []
@@ -90,7 +91,8 @@ class Course:
 
     def sample(self, z: np.ndarray, end: float, leg: Leg = CLOCK_LEG, events: Iterable[float] = ()) -> np.ndarray:
         """Move on to the end of a leg; return the (len(z), N, S) states at increasing instants of it."""
-        states, now, before = np.empty((z.size, *self.motion.state.shape)), leg.place(self.clock), 0
+        states = np.empty((z.size, *self.motion.state.shape))
+        now, before = leg.place(self.clock), 0
         while True:
             stop = min(end, max(now, leg.place(self.until)))
             after = z.size if stop >= end else int(np.searchsorted(z, stop, side="right"))

@@ -42,7 +42,8 @@ class _ModeArrays:
     """The edges of a mode with their sizes in floats, and which parameter each belongs to."""
 
     def __init__(self, mode: Mode):
-        self.source, self.target, self.sign = mode.source, mode.target, mode.sign.astype(float)
+        self.source, self.target = mode.source, mode.target
+        self.sign = mode.sign.astype(float)
         self.lower = mode.lower.as_float()
         self.upper = mode.upper.as_float()
         self.q = mode.parameters.size
@@ -172,8 +173,10 @@ class Members:
             return int(mode) - 1
         if not isinstance(mode, str) and 0 <= int(mode) < count and int(mode) == mode:
             return int(mode)
-        known = ", ".join(shorten(self.name(k)) for k in range(min(count, 8)))
-        raise ParameterError(f"the family has no mode {shorten(str(mode))}; it has {known}{', ..' * (count > 8)}")
+        listed = [shorten(self.name(k)) for k in range(min(count, 8))]
+        if count > 8:
+            listed.append("..")
+        raise ParameterError(f"the family has no mode {shorten(str(mode))}; it has {', '.join(listed)}")
 
     def data(self, choice: Choice) -> np.ndarray:
         """Return the entries of the Laplacian of a member over the pattern."""

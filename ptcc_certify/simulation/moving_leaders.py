@@ -96,7 +96,8 @@ def simulate_tracking(
     t, clock, last = _grid(protocol, steps)
     step_of = _Step(worst, leaders)
     states, targets, inputs = np.zeros((3, t.size, structure.graph.n_nodes))
-    lead, eps, begin = x[heads], x[F] - Q @ x[heads], time.perf_counter()
+    lead, eps = x[heads], x[F] - Q @ x[heads]
+    begin = time.perf_counter()
     remaining = np.maximum(1 - t / float(protocol.T), 0)
     gain = protocol.gain.value_at_remaining(remaining)
     for i in range(t.size):
@@ -130,7 +131,8 @@ class _Step:
     """One step of the deviations, at the worst velocities and disturbances."""
 
     def __init__(self, worst: WorstLeaders, leaders: MovingLeaders):
-        self.worst, self.L_F, self.inverse = worst, worst.L_F, np.linalg.inv(worst.L_F)
+        self.worst, self.L_F = worst, worst.L_F
+        self.inverse = np.linalg.inv(worst.L_F)
         self.sign = None if leaders.sign_gain is None else float(leaders.sign_gain)
 
     def __call__(self, eps: np.ndarray, ds: float, gain: float, dt: float) -> tuple[np.ndarray, np.ndarray]:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from lmi.exact.decimal_rounding import counted
 from ptcc_certify.errors import FormatError, NumberError, ParameterError
 from ptcc_certify.graphs.io.edge_list import records
 from ptcc_certify.graphs.io.files import Source, name_and_ending, read_bytes
@@ -128,7 +129,7 @@ class TableSignal(Signal):
             self.rows.append((instant, row[1], row[2] if len(row) > 2 else MIDDLE))
         if not self.rows:
             raise ParameterError("the table of a signal is empty; give a row for the instant 0")
-        self.text = f"{len(self.rows)} row{'s' * (len(self.rows) > 1)} over {'the clock' if clock else 'time'}"
+        self.text = f"{counted(len(self.rows), 'row')} over {'the clock' if clock else 'time'}"
 
     @classmethod
     def read(cls, path: Source) -> TableSignal:
@@ -213,7 +214,7 @@ class PeriodicSignal(Signal):
             for letter in word
         ]
         period = sum(duration for _, duration, _ in self.word)
-        self.text = f"{len(word)} mode{'s' * (len(word) > 1)} in turn, period {period:.4g} of the clock"
+        self.text = f"{counted(len(word), 'mode')} in turn, period {period:.4g} of the clock"
 
     def play(self, members: Members, gain: Gain, state: State) -> Iterator[Stretch]:
         """Yield the word again and again."""
@@ -288,11 +289,14 @@ class RandomDwellSignal(Signal):
 
     def play(self, members: Members, gain: Gain, state: State) -> Iterator[Stretch]:
         """Yield them."""
-        rng, clock, until, instant = np.random.default_rng(self.seed), 0.0, 0.0, 0.0
-        least, T, on_clock = float(self.promise.least) * (1 + 1e-9), float(gain.T), self.promise.clock == "s"
-        rest, mode = _largest_at_rest(state()), 0
+        rng = np.random.default_rng(self.seed)
+        clock, until, instant = 0.0, 0.0, 0.0
+        least = float(self.promise.least) * (1 + 1e-9)
+        T = float(gain.T)
+        on_clock = self.promise.clock == "s"
+        at_rest, mode = _largest_at_rest(state()), 0
         while True:
-            doubled = 1 if members.imbalance(state()) > rest else 2
+            doubled = 1 if members.imbalance(state()) > at_rest else 2
             if clock >= until:
                 mode = int(rng.integers(len(members.arrays)))
                 hold = least + rng.exponential(max(least, members.unit if on_clock else T / 10))

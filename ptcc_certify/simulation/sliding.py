@@ -71,7 +71,8 @@ class SlidingMotion(Motion):
         state = np.stack([initial_state - self.sigma0, self.sigma0], axis=1)
         unit = float(max(np.abs(initial_state).max(), np.abs(state).max())) or 1.0
         super().__init__(members, state / unit, tolerances, unit=unit)
-        self.protocol, self.tolerances, self.slack = protocol, tolerances, rounding_slack(protocol)
+        self.protocol, self.tolerances = protocol, tolerances
+        self.slack = rounding_slack(protocol)
         self.disturbance, self.drives = disturbance, [Drive(disturbance, len(state))]
         self._moving = ca.MX.sym("moving", len(state))
         self.reaching_z, self.layer = np.full(len(state), np.inf), boundary_layer
@@ -178,7 +179,9 @@ class SlidingMotion(Motion):
         """Do the same under a disturbance that reads the states: all agents at once, events by bracketing."""
         from scipy.integrate import LSODA
 
-        n, end, now, phase = len(self.state), self._last_z, 0.0, self.reaching
+        n = len(self.state)
+        end, now = self._last_z, 0.0
+        phase = self.reaching
         laplacian = self.members.graph.laplacian()
         state, signs = self.state.T.ravel(), np.sign(self.sigma0)
         reaching_z = np.where(signs == 0, 0.0, np.inf)

@@ -325,23 +325,24 @@ def find_phases(
     """
     if agent.span is None or agent.cap is not None:
         return []
-    W, c, found = _floats(matrix.W), float(matrix.coupling), list[Phase]()
+    W, c = _floats(matrix.W), float(matrix.coupling)
+    phases = list[Phase]()
     gains, driven = _floats((matrix.gains,))[0], np.zeros_like(W)
     driven[-1, -1] = c * float(beta)
     frame = np.linalg.inv(np.linalg.cholesky(W))
-    whole = agent.vertices(matrix.points)
-    slowest = min(float(np.linalg.eigvalsh(frame @ (driven - A @ W - W @ A.T) @ frame.T).min()) for A in whole)
+    vertices = agent.vertices(matrix.points)
+    slowest = min(float(np.linalg.eigvalsh(frame @ (driven - A @ W - W @ A.T) @ frame.T).min()) for A in vertices)
     rate = Fraction(down(Fraction(max(slowest, 0.0)) * (1 - Fraction(1, 10**6)), 6))
     if rate >= FASTER * matrix.rate and (
         points := prove_decrease(agent, _scaled(matrix.W, 1 / (matrix.coupling * beta)), rate)
     ):
-        found.append(Phase(function, matrix.W, rate, matrix.coupling, points))
+        phases.append(Phase(function, matrix.W, rate, matrix.coupling, points))
     for times in LATER if later else ():
-        rest = replace(agent, first=agent.first * times)
-        former, rate = (found[-1].W, found[-1].rate) if found else (matrix.W, matrix.rate)
-        phase = _later_phase(rest, gains, matrix.gains, former, function, beta, rate)
-        found += [] if phase is None else [phase]
-    return found
+        later_agent = replace(agent, first=agent.first * times)
+        former, rate = (phases[-1].W, phases[-1].rate) if phases else (matrix.W, matrix.rate)
+        phase = _later_phase(later_agent, gains, matrix.gains, former, function, beta, rate)
+        phases += [] if phase is None else [phase]
+    return phases
 
 
 def _later_phase(
@@ -355,12 +356,13 @@ def _later_phase(
 ) -> Phase | None:
     """Return the fastest phase that is found, if it is faster than the former by :data:`FASTER`."""
     systems, W = agent.vertices(agent.span or ()), _floats(former)
-    low, high, best = float(rate), 2 * float(rate), None
+    low, high = float(rate), 2 * float(rate)
+    best = None
     for _ in range(BISECTIONS):
         middle = (low + high) / 2
-        found = later_matrix(systems, floats, W, float(beta), middle)
-        low, high = (low, middle) if found is None else (middle, high)
-        best = best if found is None else (found, middle)
+        solution = later_matrix(systems, floats, W, float(beta), middle)
+        low, high = (low, middle) if solution is None else (middle, high)
+        best = best if solution is None else (solution, middle)
     if best is None or best[1] < FASTER * float(rate):
         return None
     matrix, chosen = best

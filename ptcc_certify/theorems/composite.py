@@ -205,7 +205,8 @@ class BalancedComposite(Composite):
         graph = structure.graph.subgraph(block.nodes)
         share: Sequence[Fraction] = [Fraction(1)] * len(block.nodes)
         if _is_balanced(structure, block):
-            kind, number, share = "leader-decrease", "b", self._share(block.diagonal)
+            kind, number = "leader-decrease", "b"
+            share = self._share(block.diagonal)
             bound = prove_connectivity(graph, block.diagonal, connectivity_rate(graph, block.diagonal))
         else:
             kind, number = "leader-margin", "m"

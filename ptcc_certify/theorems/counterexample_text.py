@@ -51,27 +51,25 @@ def counterexample_text(component: FamilyComponent, why: Counterexample, mark: C
     where = f"held in {mark(mode_name(family, why.mode))}" if len(family.modes) > 1 else "held constant"
     if why.kind == CLOSED_SET:
         without = " and its optional edges off" if family.modes[why.mode].optional.any() else ""
-        alone = f"{_listed([names[v] for v in why.nodes])} hear{'s' * (len(why.nodes) == 1)} nobody else"
-        keep = (
-            "keeps its value" if len(why.nodes) == 1 else f"stay at {_camps([names[v] for v in why.nodes], why.camps)}"
-        )
-        return f"{where}{without}, {alone} and {keep}"
+        group = [names[v] for v in why.nodes]
+        if len(group) == 1:
+            return f"{where}{without}, {group[0]} hears nobody else and keeps its value"
+        return f"{where}{without}, {_listed(group)} hear nobody else and stay at {_camps(group, why.camps)}"
     if why.kind == TWO_COMPONENTS:
-        one, two = (names[v] for v in why.nodes)
-        return f"{where}, the leader groups of {one} and {two} do not hear each other, and do not meet"
+        first, second = (names[v] for v in why.nodes)
+        return f"{where}, the leader groups of {first} and {second} do not hear each other, and do not meet"
     if why.kind == NO_CAMPS:
         steps = list(dict.fromkeys(f"{names[source]} -> {names[target]}" for source, target in why.cycle))
         if len(steps) == 1:
             return f"{steps[0]} has both signs, so that no camps keep it"
-        walk = ", ".join(steps[:_STEPS]) + ", ..." * (len(steps) > _STEPS)
-        return f"the signs of {walk} multiply to -1, so that no camps keep them"
+        return f"the signs of {_first(steps, _STEPS)} multiply to -1, so that no camps keep them"
     if why.kind == DIFFERENT:
         return _different(component, why, mark)
     if why.kind == STABLE:
         off = [_edge(family.modes[why.mode], edge, names) for edge in why.off]
-        rest = f"with {_listed(off)} off and every other edge on" if off else "with every edge on"
+        states_of_edges = f"with {_listed(off)} off and every other edge on" if off else "with every edge on"
         mode = mark(mode_name(family, why.mode))
-        return f"{mode if len(family.modes) > 1 else 'the graph'} {rest} is stable: all its agents end at 0"
+        return f"{mode if len(family.modes) > 1 else 'the graph'} {states_of_edges} is stable: all its agents end at 0"
     return _moving(family, names, why, mark)
 
 
@@ -91,29 +89,30 @@ def _different(component: FamilyComponent, why: Counterexample, mark: Callable[[
     counts = [
         sum(c.balanced for c in component.structures[number].closed_components) for number in (why.mode, why.other)
     ]
-    one, two = (mark(mode_name(component.family, number)) for number in (why.mode, why.other))
-    groups = f"{counts[0]} leader group{'s keep values' if counts[0] > 1 else ' keeps its value'} in {one}"
-    return f"{groups}, {counts[1] or 'none'} in {two}" + " (every agent ends at 0)" * (not counts[1])
+    first, second = (mark(mode_name(component.family, number)) for number in (why.mode, why.other))
+    groups = f"{counts[0]} leader group{'s keep values' if counts[0] > 1 else ' keeps its value'} in {first}"
+    return f"{groups}, {counts[1]} in {second}" if counts[1] else f"{groups}, none in {second} (every agent ends at 0)"
 
 
 def _moving(family: Family, names: Sequence[str], why: Counterexample, mark: Callable[[str], str]) -> str:
     """Tell which state is at rest in one member and moves in another."""
     modes = (f"in {mark(mode_name(family, number))} " for number in (why.mode, why.other))
-    one, two = modes if len(family.modes) > 1 else ("", "")
+    first, second = modes if len(family.modes) > 1 else ("", "")
     if why.edge is not None:
         optional = family.modes[why.other].optional[why.edge]
-        two += f"with {_edge(family.modes[why.other], why.edge, names)} {'on' if optional else 'at its largest'}"
-        one += "at the least weights " * (why.mode == why.other)
+        second += f"with {_edge(family.modes[why.other], why.edge, names)} {'on' if optional else 'at its largest'}"
+        if why.mode == why.other:
+            first += "at the least weights "
     if why.state is not None:
         size = max(map(abs, why.state)) or Fraction(1)
         values = [f"{name}={_number(x / size)}" for name, x in zip(names[:_LISTED], why.state, strict=False)]
         for listed in range(len(values), 0, -1):
-            state = ", ".join(values[:listed]) + ", ..." * (len(names) > listed)
-            sentence = f"the state {state} rests {one}and moves {two}".rstrip()
+            state = values[:listed] if listed == len(names) else [*values[:listed], "..."]
+            sentence = f"the state {', '.join(state)} rests {first}and moves {second}".rstrip()
             if len(unlabelled(sentence)) <= _SENTENCE:
                 return sentence
     group = "" if why.column is None else f" at the camps of leader group {why.column + 1}"
-    return f"a state{group} rests {one}and moves {two}".rstrip()
+    return f"a state{group} rests {first}and moves {second}".rstrip()
 
 
 def _number(x: Fraction) -> str:
@@ -130,6 +129,10 @@ def _listed(names: Sequence[str]) -> str:
     return ", ".join(names[:_LISTED]) + more
 
 
+def _first(names: Sequence[str], count: int) -> str:
+    return ", ".join(names if len(names) <= count else (*names[:count], "..."))
+
+
 def _camps(names: Sequence[str], camps: Sequence[int]) -> str:
     signs = [f"{name}={sign}" for name, sign in zip(names[:_LISTED], camps, strict=False)]
-    return ", ".join(signs) + ", ..." * (len(names) > _LISTED)
+    return ", ".join(signs if len(names) <= _LISTED else (*signs, "..."))

@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from lmi.exact.decimal_rounding import counted
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.io import as_family
@@ -141,9 +142,10 @@ class FamilyComponent(Shown):
     def __repr__(self) -> str:
         signals = {"any": "every signal", "constant": "constant signals"}[self.signal]
         whom = "" if self.behaviour in (None, DEPENDS) else f" for {signals}"
-        n, modes = self.nodes.size, len(self.family.modes)
-        parts = [f"{n:,} node{'s' * (n > 1)}"] + [f"{modes} modes"] * (modes > 1)
-        return f"FamilyComponent({', '.join(parts)}, {self.behaviour or 'not decided'}{whom})"
+        size = counted(self.nodes.size, "node")
+        if len(self.family.modes) > 1:
+            size += f", {len(self.family.modes)} modes"
+        return f"FamilyComponent({size}, {self.behaviour or 'not decided'}{whom})"
 
     @cached_property
     def structures(self) -> tuple[Structure, ...]:

@@ -43,10 +43,13 @@ def special_behaviours(component: FamilyComponent) -> tuple[str, ...]:
         return ()
     positive = bool((component.family.union[2] > 0).all())
     if component.behaviour != BIPARTITE_CONSENSUS:
-        return (CONTAINMENT,) * positive
+        return (CONTAINMENT,) if positive else ()
     pairs = zip(component.family.modes, component.structures, strict=True)
     undirected = all(mode.tied or (mode.known.all() and s.undirected) for mode, s in pairs) and component.nodes.size > 1
-    return (SIGNED_AVERAGE_CONSENSUS,) * undirected + (CONSENSUS,) * positive
+    special = [SIGNED_AVERAGE_CONSENSUS] if undirected else []
+    if positive:
+        special.append(CONSENSUS)
+    return tuple(special)
 
 
 def component_holds(component: FamilyComponent, behaviour: str) -> bool | None:

@@ -275,7 +275,8 @@ def _follow(graph: SignedDigraph, codes: np.ndarray) -> np.ndarray:
     n = graph.n_nodes
     follower = codes == UNKNOWN
     into = np.flatnonzero(follower[graph.target])
-    source, target, sign = graph.source[into], graph.target[into], graph.sign[into].astype(np.int64)
+    source, target = graph.source[into], graph.target[into]
+    sign = graph.sign[into].astype(np.int64)
     codes = spread(codes, source, target, sign)
     # A follower that hears anything else spoils itself and all that hear it.
     spoiled = np.unique(target[codes[target] != sign * codes[source]])
@@ -292,18 +293,19 @@ def _number_rows(graph: SignedDigraph, codes: np.ndarray, dimension: int) -> np.
     """
     unknown = codes == UNKNOWN
     into = np.flatnonzero(unknown[graph.target])
-    source, target, sign = graph.source[into], graph.target[into], graph.sign[into].astype(np.int64)
-    own = dimension + 1 + np.arange(graph.n_nodes)
+    source, target = graph.source[into], graph.target[into]
+    sign = graph.sign[into].astype(np.int64)
+    own_numbers = dimension + 1 + np.arange(graph.n_nodes)
     alone = np.zeros(graph.n_nodes, dtype=bool)
     for _ in range(_ROUNDS):
         free = ~alone[target]
         edges = source[free], target[free], sign[free]
-        numbers = spread(np.where(alone, own, codes), *edges)
+        numbers = spread(np.where(alone, own_numbers, codes), *edges)
         spoiled = numbers[edges[1]] != edges[2] * numbers[edges[0]]
         if not spoiled.any():
             return numbers
         alone[edges[1][spoiled]] = True
-    return np.where(unknown, own, codes)
+    return np.where(unknown, own_numbers, codes)
 
 
 def _proportional_rows(graph: SignedDigraph, other: SignedDigraph) -> np.ndarray:

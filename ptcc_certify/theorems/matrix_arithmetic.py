@@ -48,7 +48,8 @@ def diagonal_matrix(weights: Iterable[Fraction]) -> Matrix:
 
 def symmetric_product(weights: Iterable[Fraction], A: Matrix) -> Matrix:
     """Return ``Omega A + A' Omega`` with ``Omega = diag(weights)``."""
-    w, n, zero = list(weights), len(A), Fraction(0)
+    w = list(weights)
+    n, zero = len(A), Fraction(0)
     return [
         [w[i] * A[i][j] + w[j] * A[j][i] if A[i][j] or A[j][i] else zero for j in range(n)]  # many are
         for i in range(n)

@@ -76,7 +76,8 @@ def _prove_weighted_deviation(graph: SignedDigraph, V: LyapunovFunction, guess: 
 
     ``Z G1 = 0`` and ``(Z L + L'Z) G1 = 0`` exactly for any ``p > 0``; one row and column are deleted.
     """
-    gauge, p, n = V.gauge, V.weights, len(V.weights)
+    gauge, p = V.gauge, V.weights
+    n = len(V.weights)
     total = sum(p)
     Z = [[gauge[i] * gauge[j] * (p[i] * (i == j) - p[i] * p[j] / total) for j in range(n)] for i in range(n)]
     ZL = multiply(Z, graph.exact_laplacian())

@@ -244,9 +244,10 @@ def _region(states: InitialSet, n: int) -> Box | Ellipsoid:
 
 
 def _limited(entry: Limited) -> LimitedSection:
-    noise, bound, whole, largest = None, entry.noise, entry.noisy_norm, entry.noisy_largest
-    if bound is not None and whole is not None and largest is not None:
-        noise = NoiseSection(bound=bound, norm=whole, largest=largest)
+    noise = None
+    bound, norm, largest = entry.noise, entry.noisy_norm, entry.noisy_largest
+    if bound is not None and norm is not None and largest is not None:
+        noise = NoiseSection(bound=bound, norm=norm, largest=largest)
     return LimitedSection(
         **{key: getattr(entry.limits, key) for key in LIMITS},
         clock=entry.clock,

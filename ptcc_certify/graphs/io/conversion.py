@@ -73,11 +73,13 @@ def as_graph(graph: Any, orientation: str | None = None, **reading: Any) -> Sign
     >>> as_graph([("1", "2", -2)]) == as_graph(np.array([[0, -2], [0, 0]]), "information")
     True
     """
-    if isinstance(own := graph if isinstance(graph, SignedDigraph) else getattr(graph, "graph", None), SignedDigraph):
+    if isinstance(
+        signed := graph if isinstance(graph, SignedDigraph) else getattr(graph, "graph", None), SignedDigraph
+    ):
         if orientation is not None or reading:
-            given = ", ".join(f"{name}=" for name in (*["orientation"] * (orientation is not None), *reading))
+            given = ", ".join(f"{name}=" for name in (reading if orientation is None else ("orientation", *reading)))
             raise ParameterError(f"a SignedDigraph has its orientation and its edges; leave out {given}")
-        return own
+        return signed
     if isinstance(graph, Family):
         raise GraphError(
             f"{graph!r} is several graphs, and one is asked for; certify, decide and simulate take families"

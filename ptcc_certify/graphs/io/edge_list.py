@@ -195,7 +195,8 @@ class _EdgeList(Draft):
     def rows(self) -> Rows:
         """Return what was read; refuse titles that are nodes, too."""
         columns, rows = self.columns, super().rows()
-        rows.headerless, rows.notes, rows.asks = not columns.titles, columns.notes, columns.asks
+        rows.headerless = not columns.titles
+        rows.notes, rows.asks = columns.notes, columns.asks
         rows.notes += ("columns ignored: after the third",) if self.extra else ()
         rows.beside = Beside(columns.codes, None, [column for _, column in self.beside], columns.told)
         if columns.sign is not None:
@@ -212,7 +213,8 @@ def _refuse_titles(row: list[str], place: str, data: bytes) -> None:
     if plain("".join(row[2:3])) in (*WEIGHT, "sign"):
         titles = ", ".join(shorten(field.strip()) for field in row[:3])
         mend = "name the column of who is heard source, that of who listens target"
-        mend += DECIMALS * (re.search(rb"[;\t]\s*[+-]?\d+,\d+\s*$", data, re.MULTILINE) is not None)
+        if re.search(rb"[;\t]\s*[+-]?\d+,\d+\s*$", data, re.MULTILINE):
+            mend += DECIMALS
         raise FormatError(f"{place}: the header {titles} names no source and target; {mend}")
 
 

@@ -591,7 +591,8 @@ def _interval_rows(
 
 
 def _both(pair: Sequence[str], undirected: bool) -> list[tuple[str, str]]:
-    return [(pair[0], pair[1])] + [(pair[1], pair[0])] * undirected
+    source, target = pair
+    return [(source, target), (target, source)] if undirected else [(source, target)]
 
 
 def _has(graph: SignedDigraph | Mode, pair: tuple[str, str]) -> bool:

@@ -227,7 +227,9 @@ class _Draft:
             return "remove the row or give a weight"
         mend = "give one, or a word for a sign such as + - activates inhibits"
         if code == 0 and self.rows.headerless:
-            mend += HEADER_MEND + DECIMALS * any("," in other for other in self.rows.weights[1:])
+            mend += HEADER_MEND
+            if any("," in other for other in self.rows.weights[1:]):
+                mend += DECIMALS
         return mend
 
     def multiply_signs(self) -> None:
@@ -238,7 +240,9 @@ class _Draft:
     def read_beside(self) -> None:
         """Multiply weights that are all positive by signs in another column; refuse what may be signs."""
         for column in () if self.rows.beside.told else self.rows.beside.columns:
-            what, values, title = verdict(column.title, [*column.values]), [*column.values], shorten(column.title)
+            what = verdict(column.title, [*column.values])
+            values = [*column.values]
+            title = shorten(column.title)
             if not what.kind or not len(self.codes):
                 continue
             positive = not any(value < 0 for value in self.values)

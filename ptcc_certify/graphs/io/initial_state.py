@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from lmi.exact.decimal_rounding import counted
 from ptcc_certify.errors import FormatError, NumberError, ParameterError, PTCCError, did_you_mean
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.io.conversion import as_graph
@@ -108,7 +109,7 @@ def as_states(values: Any, graph: Any, name: str = "x0") -> list[list[Fraction]]
         raise ParameterError(f"{what} is {'missing' if values is None else shorten(repr(values))}; {mend}")
     rows = [list(row) if _is_row(row) else [row] for row in values]
     if len(rows) != graph.n_nodes:
-        count = f"{len(rows)} value{'s' * (len(rows) != 1)} for {graph.n_nodes} agents"
+        count = f"{counted(len(rows), 'value')} for {counted(graph.n_nodes, 'agent')}"
         raise ParameterError(f"{what} has {count}; {mend}")
     if len({len(row) for row in rows}) > 1 or not rows[0]:
         raise ParameterError(f"{what} has empty rows, or rows of different lengths; give as many numbers to each agent")
@@ -181,15 +182,16 @@ def read_state(
         raise ParameterError(place, f"no such file; {mend}")
     if labelled:
         if (other := next((item for item in items if "=" not in item), None)) is not None:
-            comma = "; for labels with a comma give a CSV file with rows node,value"
-            commas = comma * any("," in label for label in graph.labels)
-            raise ParameterError(place, f'"{shorten(other)}" is not label=value{commas}')
+            message = f'"{shorten(other)}" is not label=value'
+            if any("," in label for label in graph.labels):
+                message += "; for labels with a comma give a CSV file with rows node,value"
+            raise ParameterError(place, message)
         pairs = [item.rpartition("=")[::2] for item in items]
         pairs = [(label if label in graph.index else label.strip(), value) for label, value in pairs]
     elif len(items) == graph.n_nodes:
         pairs = list(zip(graph.labels, items, strict=True))
     else:
-        size = f"{len(items)} value{'s' * (len(items) > 1)} for {graph.n_nodes} nodes"
+        size = f"{counted(len(items), 'value')} for {counted(graph.n_nodes, 'node')}"
         raise ParameterError(place, f"no such file, and {size}; give one for each of {first_five(graph.labels)}")
     return _in_node_order([(*pair, place) for pair in pairs], graph, place, ParameterError)
 
@@ -229,8 +231,9 @@ def in_node_order(values: Any, graph: SignedDigraph, name: str = "x0") -> Any:
     missing = [label for label in graph.labels if label not in entries]
     unknown = [label for label in entries if label not in graph.index]
     if missing or unknown:
-        wrong = [f"no value for {first_five(missing)}"] * bool(missing)
-        wrong += [f"{first_five(unknown)} {'is' if len(unknown) == 1 else 'are'} not in the graph"] * bool(unknown)
+        wrong = [f"no value for {first_five(missing)}"] if missing else []
+        if unknown:
+            wrong.append(f"{first_five(unknown)} {'is' if len(unknown) == 1 else 'are'} not in the graph")
         mend = "give each node one value, or values without labels in node order"
         raise ParameterError(f"the initial state {name}: {', and '.join(wrong)}; {mend}")
     return [entries[label] for label in graph.labels]

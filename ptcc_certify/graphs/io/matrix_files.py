@@ -111,7 +111,8 @@ def read_mtx(data: bytes, name: str, how: Reading) -> Rows:
         _refuse_no_adjacency((n, columns), number, name)
         if layout == "coordinate":
             table = np.loadtxt(body, [("row", "i8"), ("column", "i8"), ("entry", number)], None, ndmin=1)
-            target, source, entries = table["row"] - 1, table["column"] - 1, table["entry"]
+            target, source = table["row"] - 1, table["column"] - 1
+            entries = table["entry"]
         else:
             entries = np.loadtxt(body, number, None, ndmin=1).ravel()
             announced.append(n * (n + 1) // 2 if half else n * n)
@@ -146,7 +147,9 @@ def read_npz(data: bytes, name: str, how: Reading) -> Rows:
             numeric = {key: array.shape for key, array in arrays.items() if array.dtype.kind in "iufc"}
             return _dense(arrays[_the_matrix(numeric, arrays, name, how.variable)], labels, name)
         how.refuse("variable", name, "an archive of one sparse matrix")
-        layout, entries, shape = arrays["format"].astype(str).item(), arrays["data"], arrays["shape"].tolist()
+        layout = arrays["format"].astype(str).item()
+        entries = arrays["data"]
+        shape = arrays["shape"].tolist()
         _refuse_no_adjacency(shape, entries.dtype, name)
         if layout == "coo":
             row, column = arrays["row"], arrays["col"]

@@ -159,7 +159,8 @@ class _Rows(Draft):
 
     def __init__(self, labels: list[str], name: str):
         super().__init__(labels)
-        self.labels, self.n, self.name = labels, len(labels), name
+        self.labels, self.name = labels, name
+        self.n = len(labels)
         self.undirected, self.lists = list[bool](), False
 
     def read(self, section: _Section) -> None:

@@ -158,8 +158,10 @@ def named_columns(titles: Sequence[str], place: str) -> Columns:
             return Columns()
         mend = "name one column weight, sign or rating, or tell the three: --columns source,target,NAME"
         raise FormatError(f"{place}: the header names no weight; {mend}")
-    notes = (BY_HEADER,) * (source > 0) + (RATERS,) * (plain(titles[source]) == "rater")
-    return Columns(source, target, weight, sign, tuple(titles), notes=notes)
+    notes = [BY_HEADER] if source > 0 else []
+    if plain(titles[source]) == "rater":
+        notes.append(RATERS)
+    return Columns(source, target, weight, sign, tuple(titles), notes=tuple(notes))
 
 
 def _told(titles: tuple[str, ...], others: Sequence[Sequence[str]], place: str, how: Reading) -> Columns:

@@ -221,7 +221,8 @@ class Explorer:
         refuse_unknown("graph", settings.graph, self.graphs)
         graph, protocol = self.graphs[settings.graph], settings.protocol()
         x0, random = np.random.default_rng(settings.seed).integers(-9, 10, size=(2, graph.n_nodes)).tolist()
-        source, sigma0, disturbance = self._sources.get(settings.graph), None, None
+        source = self._sources.get(settings.graph)
+        sigma0, disturbance = None, None
         if (sliding := protocol.reaching) is not None:
             sigma0 = random if settings.reaching else [0] * graph.n_nodes
             until = 2 * float(protocol.T)

@@ -90,7 +90,8 @@ class ExplorerServer(ThreadingHTTPServer):
 
     def __init__(self, explorer: Explorer, settings: Settings, port: int):
         refuse_unknown("graph", settings.graph, explorer.graphs)
-        self.explorer, self.settings, self._moves = explorer, settings, 0
+        self.explorer, self.settings = explorer, settings
+        self._moves = 0
         self._token = secrets.token_urlsafe(16)
         self._work: SimpleQueue[tuple[_Queue, Callable[[], Parts]] | None] = SimpleQueue()
         super().__init__((HOSTS[0], port), _Handler)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lmi.exact.decimal_rounding import down, near
+from lmi.exact.decimal_rounding import counted, down, near
 from ptcc_certify.certificate.facts import Fact, Facts
 from ptcc_certify.certificate.restricted_claims import LastModeClaim
 from ptcc_certify.errors import labelled
@@ -21,7 +21,6 @@ from ptcc_certify.report.text_layout import (
     TEXT,
     agent_text,
     columns,
-    counted,
     printable,
     shorten_list,
     wrap_text,

@@ -7,6 +7,7 @@ from pathlib import PurePath
 
 import numpy as np
 
+from lmi.exact.decimal_rounding import counted
 from ptcc_certify.certificate.facts import Fact, Facts
 from ptcc_certify.errors import labelled
 from ptcc_certify.graphs.family import Family, Mode
@@ -16,7 +17,6 @@ from ptcc_certify.report.text_layout import (
     TEXT,
     agent_text,
     columns,
-    counted,
     printable,
     short_number,
     shorten_list,

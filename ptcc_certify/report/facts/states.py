@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
-from lmi.exact.decimal_rounding import up
+from lmi.exact.decimal_rounding import counted, up
 from ptcc_certify.bounds.final_state import extremes
 from ptcc_certify.certificate.facts import Fact, Facts
 from ptcc_certify.certificate.restricted_states import constant_states, last_states, states_of_signal
@@ -17,7 +17,6 @@ from ptcc_certify.report.facts.signals import agreement_text, every_text, rests
 from ptcc_certify.report.text_layout import (
     TEXT,
     columns,
-    counted,
     printable,
     short_number,
     shorten_list,

@@ -85,7 +85,8 @@ def run_facts(certificate: Certificate) -> Facts:
 
 def verdict_facts(certificate: Certificate | FamilyCertificate) -> Facts:
     """Tell the proof, remarks, and the verdict; what is not as one would wish comes first."""
-    ended, report, assessment = _cut_off(certificate), certificate.checked, certificate.assessment
+    ended = _cut_off(certificate)
+    report, assessment = certificate.checked, certificate.assessment
     if ended:
         yield Fact(head="time limit", note=(*ended, "; what was proved by then stands"), detail=True)
     notes = [note for note in certificate.notes if note not in certificate.reading_notes]

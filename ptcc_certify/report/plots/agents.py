@@ -102,17 +102,18 @@ def draw_agents(
     ranges = False
     step: Any = "post" if style.get("drawstyle") == "steps-post" else None
     for name, (colour, line) in CAMP_STYLES.items():
-        own = np.flatnonzero(group == name)
+        members = np.flatnonzero(group == name)
         width, label = 0.9 if name == "followers" else 1.5, name
-        if len(group) > NAMED_AGENTS and own.size > NAMED_OF_PART:
-            rows = np.nan_to_num(values[own])
+        if len(group) > NAMED_AGENTS and members.size > NAMED_OF_PART:
+            rows = np.nan_to_num(values[members])
             high, low = rows.max(axis=0), 0 if size else rows.min(axis=0)
             ax.fill_between(run.t, low, high, color=colour, alpha=0.2, linewidth=0, step=step)
             middle = high if size else np.median(rows, axis=0)
             ax.plot(run.t, middle, color=colour, linestyle=line, linewidth=2, label=name, **style)
             ends = {int(rows[:, 0].argmax())} | (set() if size else {int(rows[:, 0].argmin())})
-            own, width, label, ranges = own[sorted(ends)], 0.7, "", True
-        for v in own:
+            members = members[sorted(ends)]
+            width, label, ranges = 0.7, "", True
+        for v in members:
             drawn = {"color": colour, "linestyle": line, "linewidth": width}
             ax.plot(run.t, values[v], label=label or None, **drawn, **style)
             label, single[int(v)] = "", colour

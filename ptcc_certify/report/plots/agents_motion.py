@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from lmi.exact.decimal_rounding import counted
 from ptcc_certify.certificate.agents_answer import AgentsAnswer
 from ptcc_certify.certificate.certificate import Certificate
 from ptcc_certify.errors import ParameterError
@@ -163,10 +164,11 @@ def plot_formation(subject: Any, *, ax: Axes | None = None) -> Axes:
     if run.states.shape[1] != 2:
         d = run.states.shape[1]
         raise ParameterError(
-            f"a formation is drawn in the plane; these agents have {d} coordinate{'s' if d > 1 else ''}: "
-            "certify them with 2"
+            f"a formation is drawn in the plane; these agents have {counted(d, 'coordinate')}: certify them with 2"
         )
-    ax, groups, width = axes_of(ax, (SINGLE_COLUMN[0], SINGLE_COLUMN[0])), camp_groups(analyse(run.graph)), 1.0
+    ax = axes_of(ax, (SINGLE_COLUMN[0], SINGLE_COLUMN[0]))
+    groups = camp_groups(analyse(run.graph))
+    width = 1.0
     for k, (x, y) in enumerate(run.positions):
         color, line = CAMP_STYLES[groups[k]]
         first = k == int(np.flatnonzero(groups == groups[k])[0])

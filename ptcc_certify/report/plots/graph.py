@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import FancyArrowPatch, Polygon
 
+from lmi.exact.decimal_rounding import counted
 from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family, Mode
@@ -103,15 +104,17 @@ def plot_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
     if isinstance(subject, Family | FamilyCertificate) or is_family(subject):
         return _draw_family(as_family(getattr(subject, "family", subject)), ax)
     structure = structure_of(subject)
-    graph, own, ax = structure.graph, ax is None, axes_of(ax, (SINGLE_COLUMN[0], _HEIGHT))
+    graph = structure.graph
+    own_axes = ax is None
+    ax = axes_of(ax, (SINGLE_COLUMN[0], _HEIGHT))
     if graph.n_nodes > LABELLED_NODES:
         return draw_adjacency(ax, structure)
     room = np.array(ax.get_window_extent().size) / ax.figure.dpi * 72 * [1.05, 0.95]  # points, of own axes
-    part = np.full(graph.n_nodes, -1)
+    component_of = np.full(graph.n_nodes, -1)
     for number, component in enumerate(structure.closed_components):
-        part[list(component.nodes)] = number
+        component_of[list(component.nodes)] = number
     edges = weight_ranges(Family.from_graph(graph).modes[0])
-    layout, bends = _layout(graph.labels, [edge.arrow for edge in edges], part, room)
+    layout, bends = _layout(graph.labels, [edge.arrow for edge in edges], component_of, room)
     groups = [c.nodes for c in structure.closed_components if len(c.nodes) > 1 and structure.followers.size]
     for nodes in groups:
         draw_ground(ax, graph, layout.place, nodes, layout.radius)
@@ -119,7 +122,7 @@ def plot_graph(subject: Any, *, ax: Axes | None = None) -> Axes:
         ax.fill([], [], color=GROUND, label="leader group")
     boxes = _draw_mode(ax, structure, camp_groups(structure), edges, bends, layout)
     finished(ax, "", "")
-    if own:
+    if own_axes:
         fit_height(ax, boxes, layout.radius)
     return ax
 
@@ -130,11 +133,13 @@ def _draw_family(family: Family, ax: Axes | None) -> Axes:
     side = 2 if len(modes) > 1 and family.n_nodes <= BESIDE_NODES else 1
     rows, title = math.ceil(len(modes) / side), _TITLE if len(modes) > 1 else 0.0
     width = SINGLE_COLUMN[0] / side if ax is None else ax.get_window_extent().width / ax.figure.dpi / side
-    high, layout, edges = width * _SHAPE, None, [weight_ranges(mode) for mode in modes]
+    high = width * _SHAPE
+    layout = None
+    edges = [weight_ranges(mode) for mode in modes]
     if family.n_nodes <= LABELLED_NODES:
-        every = {edge.arrow[:3]: edge.arrow for some in edges for edge in some}
-        room, part = 72 * width * np.array([1.0, _SHAPE]), np.full(family.n_nodes, -1)
-        layout, _ = _layout(family.labels, list(every.values()), part, room)
+        every = {edge.arrow[:3]: edge.arrow for mode_edges in edges for edge in mode_edges}
+        room, component_of = 72 * width * np.array([1.0, _SHAPE]), np.full(family.n_nodes, -1)
+        layout, _ = _layout(family.labels, list(every.values()), component_of, room)
         high = layout.size[1] / 72
     else:
         title *= 2  # matrices name their axes
@@ -146,21 +151,21 @@ def _draw_family(family: Family, ax: Axes | None) -> Axes:
         panels = [ax.inset_axes((c / side, 1 - (r + 1) / rows, 1 / side, share / rows)) for r, c in places]
     camps, seen = family_camps(family), dict[str, Any]()
     groups = family_groups(family) if camps is None else camps
-    for number, (panel, mode, some) in enumerate(zip(panels, modes, edges, strict=True)):
+    for number, (panel, mode, mode_edges) in enumerate(zip(panels, modes, edges, strict=True)):
         if layout is None:
             draw_adjacency(panel, analyse(mode.mandatory))
             if len(panels) > 1 and (legend := panel.get_legend()) is not None:
                 legend.remove()
         else:
-            every_size = [edge for own in edges for edge in own]
-            _draw_mode(panel, analyse(mode.mandatory), groups, some, _bends(some), layout, every_size)
+            every_size = [edge for of_mode in edges for edge in of_mode]
+            _draw_mode(panel, analyse(mode.mandatory), groups, mode_edges, _bends(mode_edges), layout, every_size)
         for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
             seen.setdefault(label, handle)
         if len(modes) > 1:
             panel.set_title(shorten_text(printable(mode_name(family, number)), _NAME), pad=2, parse_math=False)
     left = len(family.modes) - len(modes)
     style: dict[str, Any] = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "frameon": False, "ncols": 2}
-    more = f"{left:,} more mode{'s' if left > 1 else ''}" if left else ""
+    more = counted(left, "more mode") if left else ""
     ax.legend(seen.values(), seen.keys(), borderaxespad=0.2, title=more, **style)
     return ax
 
@@ -270,7 +275,8 @@ def _draw_arrows(
     style: dict[str, Any] = {"shrinkA": radius + 1, "shrinkB": radius + 1}
     for (arrow, least), bend in zip(edges, bends, strict=True):
         colour, line, _ = EDGE_STYLES[arrow.sign]
-        start, end, curve = place[arrow.source], place[arrow.target], f"arc3,rad={bend}"
+        start, end = place[arrow.source], place[arrow.target]
+        curve = f"arc3,rad={bend}"
         sizes = [0.0 if largest is None else _WIDTHS[1] * size / largest for size in (least, arrow.size)]
         width, band = (_EQUAL if largest is None else _WIDTHS[0] + size for size in sizes)
         if least < arrow.size:

@@ -72,10 +72,12 @@ def arc(start: np.ndarray, end: np.ndarray, bend: float, along: np.ndarray = ALO
 
 def _bends(arrows: Sequence[Arrow], place: np.ndarray, least: float) -> tuple[np.ndarray, int]:
     """Return the smallest bend of every arrow that keeps it so far from foreign nodes, and how many have none."""
-    known, bends, without = {(a.source, a.target) for a in arrows}, np.zeros(len(arrows)), 0
+    pairs = {(a.source, a.target) for a in arrows}
+    bends = np.zeros(len(arrows))
+    without = 0
     for number, (a, b, *_) in enumerate(arrows):
         foreign, clearest = np.delete(place, [a, b], axis=0), -1.0
-        for bend in OPPOSITE_BENDS if (b, a) in known else BENDS:
+        for bend in OPPOSITE_BENDS if (b, a) in pairs else BENDS:
             gaps = np.linalg.norm(arc(place[a], place[b], bend)[:, None] - foreign, axis=-1)
             gap = float(gaps.min(initial=least))
             if gap > clearest:
@@ -104,7 +106,8 @@ def _layouts(arrows: Sequence[Arrow], part: np.ndarray) -> Iterator[np.ndarray]:
     angle = np.empty(n)
     order = np.lexsort((np.arctan2(*points.T), part))
     places = np.arange(n) + np.searchsorted(np.unique(part), part[order])  # one is empty between parts
-    angle[order] = 2 * np.pi * places / (n + np.unique(part).size * (np.unique(part).size > 1))
+    gaps = np.unique(part).size if np.unique(part).size > 1 else 0
+    angle[order] = 2 * np.pi * places / (n + gaps)
     yield np.stack([1.15 * np.sin(angle), np.cos(angle)], axis=1)
 
 

@@ -98,7 +98,8 @@ def plot_input(
         sliding = moved.protocol.base.reaching is not None
         name = "nominal input" if sliding else "input"
         name += " $|u_k|$" if run.input.shape[1] == 1 else r" $\|u_k\|$"
-        size, steps, title = np.sqrt((run.input**2).sum(axis=1)), "default", ""
+        size = np.sqrt((run.input**2).sum(axis=1))
+        steps, title = "default", ""
         peaks = [] if certificate is None else _agents_peaks(certificate, sliding)
     else:
         run, name = trajectory_of(subject), "input $|u_k|$"
@@ -258,19 +259,21 @@ def _energy(trajectory: Trajectory) -> np.ndarray:
         It is beyond the range of floats, with every second sample it would differ by more than a hundredth, or its
         trend before the deadline adds more than a fiftieth after the last sample.
     """
-    T, t, remaining = float(trajectory.protocol.T), trajectory.t, trajectory.remaining
+    T = float(trajectory.protocol.T)
+    t = trajectory.t
+    remaining = trajectory.remaining
     with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused
         power, unsettled = (np.nan_to_num(_resolved_input(trajectory)) ** 2).sum(axis=0), False
         if trajectory.held_input is not None:
             every = np.concatenate([[0.0], np.cumsum(power[:-1] * np.diff(t))])
-            some = every[::2]
+            coarse = every[::2]
         else:
             full = (trajectory.input**2).sum(axis=0)
-            every, some = (_integrated(power[::k], full[::k], t[::k], remaining[::k], T) for k in (1, 2))
+            every, coarse = (_integrated(power[::k], full[::k], t[::k], remaining[::k], T) for k in (1, 2))
             unsettled = _energy_after(power, remaining, T) > every[-1] / 50
     if not np.isfinite(every).all():
         raise ParameterError("the energy is beyond the range of floats; scale the initial state down")
-    if unsettled or (t.size > 2 and abs(every[::2][-1] - some[-1]) > every[-1] / 100):
+    if unsettled or (t.size > 2 and abs(every[::2][-1] - coarse[-1]) > every[-1] / 100):
         raise ParameterError("these samples do not settle the energy: simulate with more, unless it is infinite")
     return every
 

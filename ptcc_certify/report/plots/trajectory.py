@@ -250,7 +250,8 @@ def plot_sliding(
     >>> [text.get_text() for text in ax.get_legend().get_texts()][-3:]
     ['$\\sigma_k$ reaches 0', 'reaching time at most', '$T_r$']
     """
-    run, structure, ax = trajectory_of(subject), structure_of(subject), axes_of(ax)
+    run, structure = trajectory_of(subject), structure_of(subject)
+    ax = axes_of(ax)
     if (sliding := run.sliding) is None:
         raise ParameterError("the run has no sliding variables; simulate under the sliding-mode protocol")
     reaching = subject.reaching if reaching is None and isinstance(subject, Certificate) else reaching
