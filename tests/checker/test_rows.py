@@ -12,7 +12,7 @@ from lmi.exact.work import WorkError
 from ptcc_certify.checker.rows import Followers, Rows, WeightsBetween
 from ptcc_certify.checker.side_files import Numbers
 
-MANY, LONG = 30_000, 10**3990
+MANY, LONG = 40_000, 10**3990
 
 
 @pytest.mark.parametrize(
