@@ -36,6 +36,7 @@ from ptcc_certify.bounds.settling_leaders import Settling
 from ptcc_certify.bounds.small_delays import SmallDelays, left_above
 from ptcc_certify.bounds.staged_deadlines import stage_deadlines
 from ptcc_certify.bounds.tracking import drift_integral
+from ptcc_certify.bounds.vehicles import VehicleBounds, bound_vehicles, read_vehicles, vehicles_section
 from ptcc_certify.checker.delay_lmi import LateLMI, LateLMIWitness
 from ptcc_certify.checker.input_formulas import BITS, Limits
 from ptcc_certify.checker.late_drift import drift_above
@@ -57,6 +58,7 @@ from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.limited_gain import LimitedGain
 from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.model.vehicles import TrackingProtocol, Vehicles
 from ptcc_certify.theorems.theorem import Obligation
 
 #: Up to so many followers many ``q`` are tried; beyond, the best of those that one vector proves.
@@ -138,6 +140,8 @@ class LateBounds:
         ``messages`` in proportion.
     leaders : MovingLeaders or None
         How leaders move, and what disturbs the followers; None if they rest, and nothing does.
+    vehicles : VehicleBounds or None
+        What follows of double integrators that track these agents, which then are virtual.
     """
 
     messages: LateMessages
@@ -157,6 +161,7 @@ class LateBounds:
     enough: Fraction | None = None
     settling: Settling | None = None
     leaders: MovingLeaders | None = None
+    vehicles: VehicleBounds | None = None
 
     @cached_property
     def followers(self) -> np.ndarray:
@@ -176,7 +181,9 @@ class LateBounds:
 
     @property
     def largest(self) -> float:
-        """The largest of the bounds of ``|x_k(T) - x_k*|``; infinite where nothing is bounded."""
+        """The largest of the bounds of ``|x_k(T) - x_k*|``, of vehicles theirs; infinite where nothing is bounded."""
+        if self.vehicles is not None:
+            return float(self.vehicles.position.max())
         largest = math.inf if self.residual is None else float(self.residual.max())
         largest = largest if self.settling is None else min(largest, float(self.settling.residual.max()))
         whole = [float_up(max(one.residual)) for one in (self.form, self.lmi) if one is not None]
@@ -189,6 +196,8 @@ class LateBounds:
     @property
     def after(self) -> float | None:
         """What bounds ``|x_k - x_k*|`` from ``T`` on where leaders move; None where they rest."""
+        if self.vehicles is not None:
+            return None if self.leaders is None else self.vehicles.after(self)
         found = [float(row.residual(after=True).max()) for row in self.rows]
         return min(found) if found and self.leaders is not None else None
 
@@ -204,6 +213,18 @@ class LateBounds:
         of, error = self.structure, float(self.leaders.speed * self.messages.age)
         rows = UncertainRows(of) if isinstance(of, Family) else late_rows(of, self.messages)
         return float(rows.kept_off(error).max()) / _MORE
+
+    @property
+    def inputs(self) -> np.ndarray | None:
+        """What bounds ``|u_k|`` up to ``T``, of vehicles theirs, the sliding term left out; None where nothing does."""
+        return self.input if self.vehicles is None else self.vehicles.input
+
+    @property
+    def tracking_protocol(self) -> TrackingProtocol | None:
+        """The protocol of vehicles that are bounded; None without them."""
+        if self.vehicles is None:
+            return None
+        return TrackingProtocol(self.gain.gain, self.vehicles.a1, self.vehicles.a2, self.messages.gain_cap)
 
     @property
     def direct(self) -> bool:
@@ -293,7 +314,7 @@ def bound_late(
     rows = late_rows(structure, messages)
     bounds = LateBounds(messages, structure, gain, initial_state is None or ends is None, leaders=leaders)
     bounds = _by_rows(bounds, rows, initial_state, ends)
-    if messages.value_error or messages.gain_cap is not None or leaders is not None:
+    if messages.value_error or messages.gain_cap is not None or leaders is not None or messages.vehicles is not None:
         return bounds
     if initial_state is not None and ends is not None:
         bounds = replace(bounds, missed=find_missed(rows, protocol, latencies, initial_state, ends))
@@ -314,14 +335,15 @@ def _by_rows(
     if initial_state is not None and ends is not None:
         first = _away(rows, initial_state, ends)
     found, steps = search_rows(rows, bounds, first), None
-    if messages.age and isinstance(bounds.structure, Structure):
+    if messages.age and messages.vehicles is None and isinstance(bounds.structure, Structure):
         with suppress(LMIError):
             error, push = float(heard_wrong(messages, leaders)) * _MORE, float(leaders.total if leaders else 0)
             steps = search_steps(rows, gain, messages.age, error, first, push * _MORE)
     each = [row.residual() for row in found]
     each += [] if steps is None else [steps.bounds[-1] * _MORE + 1e-300]
     inputs = _least(rows, [] if messages.gain_cap is None else [_inputs(rows, bounds, row) for row in found])
-    return replace(bounds, rows=found, steps=steps, residual=_least(rows, each), input=inputs)
+    bounds = replace(bounds, rows=found, steps=steps, residual=_least(rows, each), input=inputs)
+    return bounds if messages.vehicles is None else bound_vehicles(bounds, rows)
 
 
 def heard_wrong(messages: LateMessages, leaders: MovingLeaders | None) -> Fraction:
@@ -528,6 +550,7 @@ def messages_section(late: LateBounds) -> MessagesSection:
     """Return what is proved with late messages, as files have it."""
     proved: dict[str, Any] = {f.name: getattr(late, f.name) for f in declared(MessagesSection) if hasattr(late, f.name)}
     graph = late.structure.graph if isinstance(late.structure, Structure) else None
+    proved["vehicles"] = vehicles_section(late.vehicles)
     return MessagesSection(**proved | vars(delays(late.messages, graph, late.leaders)))
 
 
@@ -538,7 +561,8 @@ def read_late(
     section: MessagesSection | None = report.sections.get("messages")
     if section is None:
         return None
-    messages = read_messages(section, structure)
+    vehicles = read_vehicles(section.vehicles)
+    messages = read_messages(section, structure, None if vehicles is None else Vehicles(vehicles.v0))
     proved, moving = report.proved, section.leaders
     leaders = None if moving is None else MovingLeaders(moving.speed, moving.disturbance)
     rows = []
@@ -571,6 +595,7 @@ def read_late(
         settling=_read_settling(section.settling, proved.get(("late-settling", "messages.settling"))),
         input=floats_up(section.input),
         leaders=leaders,
+        vehicles=vehicles,
     )
 
 
@@ -597,7 +622,7 @@ def _read_settling(settling: SettlingSection | None, step: Any) -> Settling | No
     return Settling(known.function, step["q"], step["b"], cap, clock, left, tuple(known.u))
 
 
-def read_messages(section: Delays, structure: Structure | Family) -> LateMessages:
+def read_messages(section: Delays, structure: Structure | Family, vehicles: Vehicles | None = None) -> LateMessages:
     """Return what a certificate says of how late messages are."""
     packets, graph = section.packets, structure.graph
     latency: Any = section.latency
@@ -610,4 +635,5 @@ def read_messages(section: Delays, structure: Structure | Family) -> LateMessage
         value_error=section.value_error,
         own_delay=section.own == "late",
         gain_cap=section.gain_cap,
+        vehicles=vehicles,
     )

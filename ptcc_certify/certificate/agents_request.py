@@ -13,6 +13,8 @@ from ptcc_certify.bounds.formation import GroupDrift, drift_until_deadline, form
 from ptcc_certify.checker.input_formulas import InitialSet, root_above
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.io import as_family, as_graph
+from ptcc_certify.graphs.io.conversion import is_family
 from ptcc_certify.graphs.io.initial_state import as_states, random_states
 from ptcc_certify.graphs.rationals import shorten, writable
 from ptcc_certify.graphs.size_limits import EXACT_NODES
@@ -20,8 +22,10 @@ from ptcc_certify.model.agents import DERIVATIVES, MOST_DIMENSION, PLURALS, Agen
 from ptcc_certify.model.case import Case
 from ptcc_certify.model.gain import Gain
 from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.parameters import readable
 from ptcc_certify.model.refusals import asked_of_single_integrators, refuse_agents
+from ptcc_certify.model.vehicles import Vehicles, one_cap, refuse_unproved
 
 
 class Chains(NamedTuple):
@@ -67,6 +71,37 @@ def formation_on_a_line(case: Case, agents: Agents, chains: Chains) -> Formation
     if chains.states is not None:
         begin = [x - h for ((x,),), h in zip(chains.states, places, strict=True)]
     return Formation(begin, places, case.limits_with(agents))
+
+
+def with_vehicles(case: Case) -> Case:
+    """Return a case of double integrators that exchange virtual positions as that of these, with late messages.
+
+    Raises
+    ------
+    ParameterError
+        Something is asked that is not proved of them.
+    """
+    agents = case.agents
+    if not (isinstance(agents, Agents) and agents.virtual):
+        return case
+    refuse_unproved(case)
+    if case.uncertainty or is_family(case.graph):
+        given: Any = as_family(case.graph, uncertainty=case.uncertainty)
+        graph = given.modes[0].mandatory
+    else:
+        given = graph = as_graph(case.graph)
+    chains = read_chains(agents, graph, case.protocol.gain, case.initial)
+    if chains.dimension > 1:
+        raise ParameterError("dimension", "what is proved of vehicles on a line holds in each coordinate: give one")
+    cap = one_cap([agents.cap, *(limit.gain_cap for limit in case.limits), getattr(case.messages, "gain_cap", None)])
+    states = chains.states or ()
+    vehicles = Vehicles(tuple(v for ((_, v),) in states) or (Fraction(0),) * graph.n_nodes)
+    if case.messages is None:
+        messages = LateMessages(gain_cap=cap, vehicles=vehicles)
+    else:
+        messages = replace(case.messages, gain_cap=cap, vehicles=vehicles)
+    begin = InitialState([x for ((x, _),) in states] or None)
+    return replace(case, graph=given, initial=begin, uncertainty=0, agents=None, messages=messages, limits=())
 
 
 def read_offsets(agents: Agents, graph: SignedDigraph, dimension: int, gain: Gain) -> tuple[tuple[Fraction, ...], ...]:

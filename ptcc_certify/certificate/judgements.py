@@ -208,7 +208,7 @@ def at_deadline(certificate: Content | FamilyContent, answer: Answer) -> Answer:
     what = f"{answer.what} at T with late messages"
     if late is None:
         return Answer(OPEN, what, "nothing is proved of them")
-    if late.direct:
+    if late.direct or (late.vehicles is not None and not late.largest):
         return answer
     if late.missed is not None:
         return Answer(REFUTED, what, _misses(late, late.missed))
@@ -302,7 +302,8 @@ def judge_input_beside(
         What the largest ``|u_k(0)|`` is at least where nobody hears of anything wrong.
     """
     late, tracking = certificate.late, certificate.tracking
-    if first > most and not (late is not None and late.messages.value_error):
+    other = late is not None and (late.messages.value_error or late.messages.vehicles is not None)
+    if first > most and not other:
         return Answer(REFUTED, what, f"it is up to {down(first)} at the start, proved")
     if late is not None:
         return _judge_late_input(certificate, late, most, what)
@@ -314,7 +315,9 @@ def _judge_late_input(certificate: Content | FamilyContent, late: LateBounds, mo
     largest = largest_late_input(late, certificate.protocol)
     if largest is None:
         why = "no bound is proved with late messages"
-        if late.messages.gain_cap is None:
+        if late.messages.vehicles is not None:
+            why = "no bound is proved of virtual positions without a cap"
+        elif late.messages.gain_cap is None:
             why += "; a gain without a cap makes ever more of what is left at T"
         return Answer(OPEN, what, why)
     if late.relative:
@@ -324,9 +327,9 @@ def _judge_late_input(certificate: Content | FamilyContent, late: LateBounds, mo
 
 def largest_late_input(late: LateBounds, protocol: Protocol) -> Fraction | None:
     """Return what bounds every ``|u_k|`` with late messages, the sliding term included; None where nothing does."""
-    if late.input is None:
+    if late.inputs is None:
         return None
-    return Fraction(float(late.input.max())) + (0 if protocol.reaching is None else protocol.reaching.mu1)
+    return Fraction(float(late.inputs.max())) + (0 if protocol.reaching is None else protocol.reaching.mu1)
 
 
 def _judge_tracking(tracking: Tracking | None, most: Fraction, what: str) -> Answer:

@@ -42,6 +42,7 @@ from ptcc_certify.certificate.agents_request import (
     Chains,
     formation_on_a_line,
     read_chains,
+    with_vehicles,
 )
 from ptcc_certify.certificate.cascade_part import prove_cascade
 from ptcc_certify.certificate.certificate import Certificate
@@ -240,7 +241,7 @@ def certify_case(
     Certificate or FamilyCertificate
     """
     origins = origins_of(case.graph, case.initial) | dict(origins or {})
-    case = case.with_plain_agents()
+    case = with_vehicles(case.with_plain_agents())
     _refuse_before_reading(case)
     if case.uncertainty or is_family(case.graph):
         return _certify_family(case, progress, scenario, origins)
@@ -346,7 +347,7 @@ def _with_agents(certificate: Certificate, agents: Agents, chains: Chains, run: 
 def _with_small_delays(certificate: Certificate) -> Certificate:
     """Add what Lyapunov functions of the whole graph prove with late messages, and the longest delay that was asked."""
     late, final = certificate.late, certificate.final_state
-    if late is None:
+    if late is None or late.messages.vehicles is not None:
         return certificate
     case = LateCase(
         certificate.structure,

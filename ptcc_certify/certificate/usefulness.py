@@ -233,9 +233,11 @@ def _use_of_late(late: LateBounds, longest_way: float | None) -> Use:
 
     The rest of the certificate knows of no delay: what it tells of the input does not hold here.
     """
-    caveat = "" if late.input is not None else "the input is not proved bounded"
+    caveat = "" if late.inputs is not None else "the input is not proved bounded"
     if math.isinf(late.largest):
         return Use(None, "", caveat)
+    if late.vehicles is not None and not late.largest:
+        return Use(True, "", caveat)
     way = 1.0 if late.relative else longest_way
     where = "agent within {} of its final state" if late.leaders is None else "follower within {} of its target"
     remark = f"every {where.format(up(late.largest, 2))} at T{' from within 1 of it' if late.relative else ''}"

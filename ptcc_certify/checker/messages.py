@@ -30,6 +30,7 @@ from ptcc_certify.checker.rows import Followers, Rows, followers_of
 from ptcc_certify.checker.sections import Agents, ByFollower, FollowerNumbers, Positive, Several
 from ptcc_certify.checker.settling_leaders import SettlingSection, check_settling
 from ptcc_certify.checker.side_files import Numbers
+from ptcc_certify.checker.vehicles import Decay, Vehicles, VehiclesSection
 
 #: Witnesses of rows, and instants of steps, that are read.
 MANY_ROWS, MANY_INSTANTS = 100, 2001
@@ -78,6 +79,7 @@ class MessagesSection(Delays):
     form: LateForm | None
     lmi: LateLMI | None
     input: Agents | None
+    vehicles: VehiclesSection | None = None
 
 
 class Residual:
@@ -121,6 +123,10 @@ def check_messages(doc: Document, of: Verified | Family, protocol: Protocol, beg
     need(stated, "nothing is stated of late messages")
     need(bounded == (section.residual is not None), "a residual is stated iff rows or steps bound it")
     inputs = None if section.input is None else Inputs(doc, messages, section.input)
+    vehicles = None
+    if section.vehicles is not None:
+        need(not protocol.sliding and bool(section.rows), "vehicles without rows, or under the sliding-mode protocol")
+        vehicles = Vehicles(doc, messages, section.vehicles)
     if isinstance(of, Family):
         need(
             all(getattr(section, key) is None for key in OF_ONE_GRAPH), f"one of {', '.join(OF_ONE_GRAPH)} of a family"
@@ -132,7 +138,7 @@ def check_messages(doc: Document, of: Verified | Family, protocol: Protocol, beg
         residual = None if section.residual is None else _residual(doc, followers, section.residual)
         parts = messages.parts()
         for k, entry in enumerate(section.rows):
-            _check_rows(doc, messages, followers, parts, entry, f"messages.rows[{k}]", residual, inputs)
+            _check_rows(doc, messages, followers, parts, entry, f"messages.rows[{k}]", residual, inputs, vehicles)
         if structure is not None and section.steps is not None:
             _check_steps(doc, messages, followers, structure.graph, parts, section.steps.instants, residual)
         if residual is not None:
@@ -145,6 +151,8 @@ def check_messages(doc: Document, of: Verified | Family, protocol: Protocol, beg
         _check_whole_graph(doc, messages, of, section, inputs)
     if inputs is not None:
         inputs.close(doc)
+    if vehicles is not None:
+        vehicles.close(doc)
 
 
 def _check_whole_graph(
@@ -183,6 +191,7 @@ def _check_rows(
     of: str,
     residual: Residual | None,
     inputs: Inputs | None,
+    vehicles: Vehicles | None,
 ) -> None:
     """Verify ``|x_k - x*_k| <= u_k (initial e^(-b s) + floor)`` by one witness of rows."""
     doc.at = of
@@ -215,6 +224,8 @@ def _check_rows(
         residual.meet(rows.u, (initial * left + floor + drift) / rows.scale)
     if inputs is not None:
         inputs.by_rows(rows, b, cap, initial, floor_up_to_T)
+    if vehicles is not None:
+        vehicles.by_rows(rows, Decay(b, cap, left, initial, floor, drift, floor_up_to_T))
     doc.done(f"b = {down(b)}, q = {down(q)}")
 
 

@@ -84,7 +84,7 @@ def _named_agents(options: Options) -> Agents | None:
     plant = None
     if options["plant"] is not None:
         plant = [exact_number(text, "--plant") for text in options["plant"].split(",")]
-    numbers = {name: options[name] for name in ("drag", "rest", "cascade", "decay")}
+    numbers = {name: options[name] for name in ("drag", "rest", "cascade", "decay", "exchange")}
     for least, (name, quantity) in enumerate((("v0", "velocity"), ("a0", "acceleration")), start=2):
         if options[name] is not None and options[name].strip() != "0" and int(order) < least:
             why = f"agents of order {order} have no {quantity} to begin with"
@@ -105,7 +105,7 @@ def agents_and_states(
     if agents is None:
         return None, None
     d = options["dimension"] or 1
-    if not (certified and agents.of_paper and d == 1):
+    if not (certified and d == 1 and (agents.of_paper or agents.virtual)):
         _refuse_unproved(options)
     agents = _in_places(agents, options, graph, d)
     given = [options["v0"], options["a0"]]
@@ -152,6 +152,12 @@ def _in_places(agents: Agents, options: Options, graph: SignedDigraph, dimension
     return agents
 
 
+def exchanges_virtual(options: Options) -> bool:
+    """Tell whether double integrators exchange virtual positions: what is certified then is of families, too."""
+    agents = agents_of(options)
+    return agents is not None and agents.virtual
+
+
 def agents_flags(options: Options) -> str:
     """Return the options without which agents are single integrators, as they were given."""
     return " and ".join(flag_of(name) for name in ("agents", *_OWN) if options[name] is not None)
@@ -168,6 +174,11 @@ def refuse_agents_of_family(options: Options, verb: str) -> NoReturn:
 
 def _refuse_unproved(options: Options) -> None:
     """Refuse what is asked of single integrators alone, by the names of the options: those with one mend at once."""
+    if exchanges_virtual(options):
+        raise ParameterError(
+            "--exchange: of vehicles that exchange virtual positions this is not built yet; certify them with "
+            "ptcc certify, one coordinate at a time, or leave it out"
+        )
     given = [name for name in _OF_SINGLE_INTEGRATORS if options.get(name) is not None]
     if given:
         mend = _OF_SINGLE_INTEGRATORS[given[0]]
@@ -194,6 +205,11 @@ def run_of_agents(case: Case, samples: int) -> AgentsTrajectory:
     from ptcc_certify.certificate.procedure import certify_case
 
     certificate: Any = certify_case(case)
+    if certificate.late is not None and (tracking := certificate.late.tracking_protocol) is not None:
+        from ptcc_certify.simulation.vehicles import simulate_vehicles
+
+        begin = [[float(x) for x in values] for values in (certificate.initial_state, certificate.late.vehicles.v0)]
+        return simulate_vehicles(certificate.graph, tracking, *begin, samples=samples)
     part = certificate.agents
     if part is None or (case.graph.n_edges and not part.functions):
         raise ParameterError("no gains of these agents are proved; ptcc certify tells why")

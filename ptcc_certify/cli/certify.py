@@ -15,6 +15,7 @@ from ptcc_certify.cli.agents import (
     agents_of,
     agents_options,
     dimension_option,
+    exchanges_virtual,
     refuse_agents_of_family,
     refuse_dimension,
 )
@@ -79,7 +80,7 @@ def certify(graph: tuple[str, ...], output: str | None, as_json: bool, screen: S
     refuse_dimension(options, "certify")
     protocol, given = shared.protocol_of(options), read_graph_or_family(graph, options)
     if isinstance(given, Family):
-        if agents_of(options) is not None:
+        if agents_of(options) is not None and not exchanges_virtual(options):
             refuse_agents_of_family(options, "certify")
         return certify_family(graph, given, output, as_json, screen, options)
     refuse_restricted(options)

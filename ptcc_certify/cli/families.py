@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Sequence
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,7 @@ import click
 from click.core import ParameterSource
 
 from ptcc_certify.cli import options as shared
+from ptcc_certify.cli.agents import agents_and_states, exchanges_virtual
 from ptcc_certify.cli.declared import SIGNAL, click_option, flag_of, options_asking, options_for, together
 from ptcc_certify.cli.messages import asks_for_leaders, asks_for_messages, leaders_of, messages_of
 from ptcc_certify.cli.scenario import scenario_record
@@ -267,13 +269,15 @@ def certify_family(
         _show_decision(graphs, family, left, as_json, screen, options)
         return _judged_alone(left, options["expect"], output)
     name, read = _names(graphs, family, options)
-    states = {"x(0)": options["x0"], "sigma(0)": options["sigma0"]}
+    states = {"x(0)": options["x0"], "sigma(0)": options["sigma0"], "v(0)": options["v0"]}
     random_states = {what: f"random, seed {options['seed']}" for what, text in states.items() if text == "random"}
     with progress(STEPS, screen.quiet) as begin:
         origins = {"graph": Path(name).name, "read": read, **random_states}
         asks = Asks(time_limit=options["time_limit"], expectations=expected)
         beside: dict[str, Any] = {"messages": messages_of(graphs[0], family, options), "leaders": leaders_of(options)}
-        case = Case(family, protocol, InitialState(x0, sigma0), signal=signal, asks=asks, **beside)
+        agents, begun = agents_and_states(options, family.modes[0].mandatory, certified=True)
+        beginning = InitialState(x0, sigma0) if begun is None else replace(begun, sigma0=sigma0)
+        case = Case(family, protocol, beginning, signal=signal, agents=agents, asks=asks, **beside)
         certificate: Any = certify_case(case, progress=begin, scenario=scenario_record(), origins=origins)
         assessment = certificate.assessment
     LOG.info("verdict %s; exit code %d", in_flags(assessment.sentence), assessment.exit_code)
@@ -320,7 +324,7 @@ def refuse_options(options: shared.Options) -> None:
     foreign = [*_NOT_OF_FAMILIES]
     if options["kind"] == "nominal":
         foreign += ["disturbance"] if asks_for_leaders(options) else ["disturbance", "delta"]
-    if asks_for_messages(options):
+    if asks_for_messages(options) or exchanges_virtual(options):
         foreign.remove("gain_cap")
     for name in foreign:
         given = source(name) in (ParameterSource.COMMANDLINE, ParameterSource.DEFAULT_MAP)

@@ -17,6 +17,7 @@ from ptcc_certify.cli.agents import (
     agents_flags,
     agents_of,
     agents_options,
+    exchanges_virtual,
     places_of,
     refuse_agents_of_family,
     run_in_places,
@@ -171,7 +172,7 @@ def _run_agents(signed: SignedDigraph, protocol: Protocol, options: shared.Optio
     if source("signal") == ParameterSource.COMMANDLINE:
         raise ParameterError("--signal: is for families of graphs; this is one graph: leave it out")
     refuse_restricted(options)
-    agents, initial = agents_and_states(options, signed)
+    agents, initial = agents_and_states(options, signed, certified=exchanges_virtual(options))
     asks = Asks(method=options["method"], simulation=False)
     begin = replace(initial or InitialState(), sigma0=shared.sigma0_of(protocol, options, signed))
     return run_of_agents(Case(signed, protocol, begin, agents=agents, asks=asks), options["samples"])

@@ -19,6 +19,8 @@ MOST_ORDER, MOST_DIMENSION = 8, 8
 MOST_MOTION, LONGEST_BITS = 100, 2000
 #: Largest ``R`` that is asked for.
 MOST_DECAY = 1000
+#: What agents hear of each other.
+EXCHANGES = ("states", "virtual")
 #: Derivatives of a position by their names.
 DERIVATIVES = ("position", "velocity", "acceleration", "jerk")
 PLURALS = ("positions", "velocities", "accelerations", "jerks")
@@ -53,6 +55,10 @@ class Agents:
         What is added to the relative positions ``e_k``, by sensors or by hand: they make a formation, or are refused.
     gain_cap : number or str, optional
         What the gain is at most, in 1/time/weight; then something is left at ``T``.
+    exchange : {"states", "virtual"}, optional
+        What double integrators hear of each other: relative positions and velocities, or virtual positions, which each
+        tracks by its own state alone. The latter goes with late messages, uncertain weights and leaders that move; see
+        :class:`~ptcc_certify.model.vehicles.TrackingProtocol`.
 
     Raises
     ------
@@ -94,6 +100,13 @@ give 4, from which on the input is bounded
         "--biases STATE", "Agents: what is added to their relative positions, like --x0.", example='"biases.csv"'
     )
     gain_cap: Exact | None = None
+    exchange: str | None = option(
+        "--exchange",
+        "Double integrators: what they hear of each other; virtual positions may come late.",
+        shown="states",
+        example='"virtual"',
+        choices=EXCHANGES,
+    )
 
     def __post_init__(self) -> None:
         listed = getattr(self.plant, "ndim", 1) == 1 and isinstance(self.plant, Collection)
@@ -123,6 +136,10 @@ give 4, from which on the input is bounded
 
     def _refuse(self) -> None:
         """Refuse what does not fit together."""
+        if self.exchange not in (None, *EXCHANGES):
+            raise ParameterError("exchange", f"= {shorten(repr(self.exchange))} is none of {', '.join(EXCHANGES)}")
+        if self.virtual:
+            self._refuse_beside_virtual()
         if self.cascade is not None:
             self._refuse_beside_cascade()
         n, decay = self.degree, self.decay_rate
@@ -150,6 +167,18 @@ give 4, from which on the input is bounded
             if why:
                 begin = f"= {readable(self.alpha)}: meeting at rest is proved for "
                 raise ParameterError("rest", joined("", (begin, why)))
+
+    def _refuse_beside_virtual(self) -> None:
+        """Refuse what is not proved where virtual positions are exchanged."""
+        begin = "= virtual is proved of double integrators"
+        if self.degree != 2:
+            raise ParameterError("exchange", f"{begin}; these agents are of order {self.degree}: not proved yet")
+        given = {name: getattr(self, name) for name in ("rest", "cascade", "decay", "offsets", "biases")}
+        name = next((name for name, value in given.items() if value is not None), None)
+        name = ("plant" if self.coefficients[0] else "drag") if any(self.coefficients) else name
+        if name is not None:
+            why = "is not proved yet where virtual positions are exchanged; leave it or "
+            raise ParameterError(name, (why, Change("exchange"), " out"))
 
     def _refuse_beside_cascade(self) -> None:
         """Refuse what the cascade does not take."""
@@ -196,6 +225,11 @@ give 4, from which on the input is bounded
     def decay_rate(self) -> Fraction:
         """``R``."""
         return Fraction(2 * self.degree) if self.decay is None else Fraction(self.decay)
+
+    @property
+    def virtual(self) -> bool:
+        """Whether virtual positions are exchanged."""
+        return self.exchange == "virtual"
 
     @property
     def plain(self) -> bool:

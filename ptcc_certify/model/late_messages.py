@@ -22,6 +22,7 @@ from ptcc_certify.model.parameters import Given, NotNegative, parameter, readabl
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.structure import Structure
+    from ptcc_certify.model.vehicles import Vehicles
 
 #: Most losses in a row.
 MOST_LOSSES = 10**6
@@ -48,6 +49,8 @@ class LateMessages:
         Whether the own state is as old as what is heard: a relative position that is measured late.
     gain_cap : number or str, optional
         The gain is at most this, 1/time/weight; ``own_delay`` asks for it.
+    vehicles : Vehicles, optional
+        Double integrators that exchange virtual states, and track these; then nothing need be late, lost or rounded.
 
     Raises
     ------
@@ -107,6 +110,7 @@ lambda of L, or measure the own state without delay
         example="false",
     )
     gain_cap: Given = Given()
+    vehicles: Vehicles | None = None
     _of_graph: tuple[SignedDigraph, tuple[Fraction, ...]] | None = field(
         default=None, init=False, repr=False, compare=False
     )
@@ -136,7 +140,7 @@ lambda of L, or measure the own state without delay
                 "add a gain_cap, below (pi/2 - |arg lambda|)/(delay |lambda|) for all nonzero eigenvalues lambda of L, "
                 "or measure the own state without delay"
             )
-        if not self.age and not self.value_error:
+        if self.exact and self.vehicles is None:
             raise ParameterError(
                 "messages that are neither late, nor lost, nor rounded; give delay, period or value_error above 0"
             )
@@ -156,6 +160,11 @@ lambda of L, or measure the own state without delay
     def age(self) -> Fraction:
         """How old is what is heard, at most, in units of time: ``largest_delay + held``."""
         return self.largest_delay + self.held
+
+    @property
+    def exact(self) -> bool:
+        """Whether nothing is late, lost or rounded."""
+        return not self.age and not self.value_error
 
     def latencies(self, graph: SignedDigraph) -> Fraction | tuple[Fraction, ...]:
         """Return what messages take: one number, or one for every edge of a graph, in the order of its edges.

@@ -224,6 +224,8 @@ def protocol_latex(saved: Certificate | FamilyCertificate) -> str:
     """Return the protocol in LaTeX: that of agents of order n, or with places in a formation."""
     if saved.agents is not None:
         return saved.agents.protocol.latex()
+    if saved.late is not None and (tracking := saved.late.tracking_protocol) is not None:
+        return tracking.latex()
     return saved.protocol.latex(places=saved.offsets is not None)
 
 

@@ -50,9 +50,13 @@ WHATEVER = {"any": "for every signal", "constant": "if mode and weights never ch
 
 def assumptions(certificate: Certificate | FamilyCertificate) -> list[str]:
     """Tell what claim, final state, rate and error are without, where more was asked."""
+    messages = None if certificate.late is None else certificate.late.messages
+    virtual = messages is not None and messages.vehicles is not None
     assumed = {
         "without limits": bool(certificate.limits),
-        "nothing late": certificate.late is not None,
+        "of virtual positions": virtual,
+        "without a gain cap": messages is not None and virtual and messages.gain_cap is not None,
+        "nothing late": messages is not None and not (virtual and messages.exact),
         "leaders at rest": certificate.leaders_move,
     }
     return [text for text, holds in assumed.items() if holds]

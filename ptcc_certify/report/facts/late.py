@@ -35,6 +35,7 @@ def late_facts(certificate: Certificate | FamilyCertificate) -> Facts:
     late = certificate.late
     if late is None:
         return
+    yield from _vehicles(late)
     yield Fact(head="messages", note=messages_text(late.messages, certificate.protocol))
     if late.leaders is not None:
         yield Fact(head="leaders", note=leaders_text(late.leaders))
@@ -49,15 +50,38 @@ def late_facts(certificate: Certificate | FamilyCertificate) -> Facts:
     largest, whole = largest_late_input(late, certificate.protocol), FROM_WITHIN_1 if late.relative else ""
     if largest is not None:
         sliding = "" if certificate.protocol.reaching is None else ", the sliding term included"
-        text = f"bounded up to T; |u_k| <= {up(largest, 4)}{sliding}{whole}"
+        speed = None if late.vehicles is None or late.vehicles.velocity is None else late.vehicles.velocity.max()
+        also = "" if speed is None else f", |v_k| <= {up(float(speed), 4)}"
+        text = f"bounded up to T; |u_k| <= {up(largest, 4)}{also}{sliding}{whole}"
         yield Fact(head="input", value=largest, side="up", note=text)
     else:
         text = "not proved bounded with late messages"
-        if late.messages.gain_cap is None:
+        if late.vehicles is not None:
+            text = "not proved bounded yet of virtual positions without a cap of the gain"
+        elif late.messages.gain_cap is None:
             text += ": a gain without a cap makes ever more of what is late"
         yield Fact(head="input", standing="unproved", note=text, loud=True)
     if by_agent := _residual_text(late):
         yield Fact(head="left", note=f"at T by agent: {by_agent}", detail=True)
+
+
+def _vehicles(late: LateBounds) -> Facts:
+    """Tell what vehicles do that exchange virtual positions, and what is proved of their motion before ``T``."""
+    if late.messages.vehicles is None:
+        return
+    text = "double integrators exchange virtual positions z_k, z_k' = gain e_k"
+    if (proved := late.vehicles) is None:
+        yield Fact(head="agents", note=text)
+        return
+    gains = "a_1 = a_2" if proved.a1 == proved.a2 else f"a_1 = {near(proved.a1)}, a_2"
+    yield Fact(head="agents", note=f"{text}, and track them: {gains} = {near(proved.a2)}")
+    shares = (0.5, 0.9, 0.99)
+    position, velocity = proved.over_time(late, float(late.gain.gain.T) * np.array(shares))
+    whole = FROM_WITHIN_1 if late.relative else ""
+    for name, bounds in (("deviations", position), ("velocities", velocity)):
+        largest = zip(bounds.max(axis=0).tolist(), shares, strict=True)
+        each = ", ".join(f"{up(x, 2)} at {share:g} T" for x, share in largest)
+        yield Fact(head="agents", note=f"{name} at most {each}{whole}", detail=True)
 
 
 def tracking_facts(certificate: Certificate | FamilyCertificate) -> Facts:
@@ -119,7 +143,7 @@ def messages_text(messages: LateMessages, protocol: Protocol | None = None) -> s
         late = [f"{near(messages.largest_delay)} late{each}"] if messages.largest_delay > 0 else []
         lost = [f"{messages.losses} in a row lost"] if messages.losses > 0 else []
         each = f": {', '.join([*late, f'every {near(messages.period)}', *lost])}"
-    clauses = []
+    clauses = ["nothing late, lost or rounded"] if messages.exact else []
     if messages.age > 0:
         clauses.append(f"up to {near(messages.age)} old{each}")
     if protocol is not None and messages.age >= protocol.T:
@@ -138,6 +162,7 @@ def _residual_text(late: LateBounds) -> str:
     if math.isinf(late.largest):
         return ""
     bounds = late.residual if late.residual is not None else np.full(len(late.labels), np.inf)
+    bounds = bounds if late.vehicles is None else late.vehicles.position
     if late.settling is not None:
         bounds = np.minimum(bounds, late.settling.residual)
     for one in (late.form, late.lmi):
@@ -189,6 +214,8 @@ def _left(late: LateBounds) -> Facts:
 
 def _within_text(late: LateBounds, digits: int) -> str:
     """Tell how far agents are from their final states at T at most, or from the targets that leaders move."""
+    if late.vehicles is not None and not late.largest:
+        return f"every {'agent exactly at its final state' if late.leaders is None else 'follower on its target'} at T"
     text = f"every agent within {up(late.largest, digits)} of its final state at T"
     if late.leaders is not None:
         text = f"every follower within {up(late.largest, digits)} of its target at T"

@@ -44,6 +44,9 @@ def _beginning(certificate: Certificate | FamilyCertificate, origins: Mapping[st
         for i, name in enumerate(("x(0)", "v(0)", "a(0)")[: certificate.agents.order]):
             still = i > 0 and not any(chain[i] for agent in states for chain in agent)
             begin.append(f"{name} {origins.get(name, '0' if still else 'given')}")
+    vehicles = None if certificate.late is None else certificate.late.messages.vehicles
+    if vehicles is not None:
+        begin.append(f"v(0) {origins.get('v(0)', 'given' if any(vehicles.v0) else '0')}")
     if certificate.initial_set is not None and (not begin or certificate.only_drawn):
         begin = [initial_states_text(certificate.initial_set)]
     begin += ["in a formation"] if certificate.offsets is not None else []

@@ -89,7 +89,9 @@ def plot_tracking(subject: Any, *, ax: Axes | None = None, time_unit: str = "") 
 def _draw_runs(ax: Axes, certificate: Certificate, late: LateBounds | None, start: list[float]) -> np.ndarray:
     """Draw the runs of one graph; return their instants."""
     nodes, ends = certificate.structure.followers, np.asarray(certificate.final_state, dtype=float)
-    if not nodes.size or (late is not None and (late.settling is not None or late.lmi is not None)):
+    if not nodes.size or (
+        late is not None and (late.vehicles is not None or late.settling is not None or late.lmi is not None)
+    ):
         nodes = np.arange(certificate.graph.n_nodes)
     t = np.linspace(0, float(certificate.protocol.T), 401)
     for run, style in _runs(certificate, late, certificate.tracking, start):
@@ -104,6 +106,9 @@ def _runs(
 ) -> list[tuple[Trajectory, dict[str, Any]]]:
     """Return the runs that are drawn, and how."""
     graph, protocol = certificate.graph, certificate.protocol
+    if late is not None and late.vehicles is not None:
+        seen = certificate.asked_trajectory
+        return [] if seen is None else [(seen, {"color": RUN, "linewidth": 1.1, "label": "vehicles"})]
     if late is not None:
         drawn = _RUNS if can_run(protocol, late.messages) else {}
         more = {"leaders": late.leaders}

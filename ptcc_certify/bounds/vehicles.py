@@ -1,0 +1,194 @@
+"""What holds of double integrators that track virtual states: every decay of these by rows carries over.
+
+With ``|z_k - x*_k| <= u_k (M y + C + floor)``, ``y' >= -b g y`` and ``C' >= -b g C`` where nothing drives it, ``g`` the
+gain of the chain, ``a_1 > b`` and ``a_2 >= b``
+
+    |x_k - x*_k| <= u_k (a_1 (M y + C)/(a_1 - b) + floor) + |v_k(0)| y/((a_1 - b) g(0))
+    |v_k| <= a_1 g (|x_k - x*_k| + |z_k + r_k/(a_1 g) - x*_k|),   |r_k| <= |v_k(0)| g y/g(0).
+
+Floors are not drives: they are added as they are. ``v_k(0)`` has a term of its own, which is there where ``M = 0``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lmi.exact.decimal_rounding import up
+from ptcc_certify.bounds.section_numbers import floats_up
+from ptcc_certify.bounds.tracking import drift_integral
+from ptcc_certify.checker.input_formulas import PrescribedGain
+from ptcc_certify.checker.late_messages import Messages, Moving
+from ptcc_certify.checker.side_files import Numbers
+from ptcc_certify.checker.vehicles import Decay, VehiclesSection, coefficients
+from ptcc_certify.errors import ParameterError
+from ptcc_certify.graphs.rationals import shorten
+from ptcc_certify.model.gain_limits import GainLimits
+
+if TYPE_CHECKING:
+    from ptcc_certify.bounds.late_messages import LateBounds, RowBound
+    from ptcc_certify.lyapunov.follower_rows import FollowerRows
+
+#: How many times faster vehicles track than the virtual states decay.
+FASTER = 2
+#: What is added to a bound in floats, relatively and absolutely, so that it holds.
+_MORE, _LEAST = 1 + 1e-9, 1e-300
+
+
+@dataclass(frozen=True, eq=False)
+class VehicleBounds:
+    """Bounds of vehicles that track virtual states.
+
+    Attributes
+    ----------
+    a1, a2 : Fraction
+        Gains of the tracking.
+    v0 : tuple of N Fraction
+        Initial velocities.
+    position : (N,) array
+        What bounds ``|x_k(T) - x*_k|``, in floats from above.
+    velocity, input : (N,) array or None
+        What bounds ``|x_k'|`` and ``|u_k|`` up to ``T``; None without a cap of the gain. Those of leaders that move, as
+        they like, are 0.
+    """
+
+    a1: Fraction
+    a2: Fraction
+    v0: tuple[Fraction, ...]
+    position: np.ndarray
+    velocity: np.ndarray | None
+    input: np.ndarray | None
+
+    def over_time(self, late: LateBounds, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return what bounds positions and velocities of all agents at instants before ``T``, ``(N, M)`` floats."""
+        chosen, a1 = late.followers, float(self.a1)
+        speed = np.array([float(abs(x)) for x in self.v0])[:, None]
+        g, first = late.gain.value(t), float(_messages(late).least_gain())
+        position, velocity = (np.full((speed.size, len(t)), np.inf) for _ in range(2))
+        for row in late.rows:
+            b = float(row.witness.b)
+            if b >= a1:
+                continue
+            caps = [x for x in (row.cap, late.messages.gain_cap) if x is not None]
+            y = np.exp(-b * GainLimits(gain_cap=min(caps, default=None)).limit(late.gain.gain).clock(t))
+            C = np.zeros(t.shape)
+            if late.leaders is not None:
+                push = float(late.leaders.total) / float(row.witness.u.min())
+                C = push * drift_integral(late.gain.gain, b, min(caps, default=None), t)
+            u, lag, floor = np.zeros((speed.size, 1)), 1 / (a1 - b), float(row.floor)
+            u[chosen, 0] = row.witness.u
+            decaying = float(row.initial) * y + C
+            own = u * (a1 * lag * decaying + floor) + speed * lag / first * y
+            ahead = u * (decaying + floor) + speed / (a1 * first) * y
+            position = np.minimum(position, own * _MORE + _LEAST)
+            with np.errstate(invalid="ignore"):
+                velocity = np.minimum(velocity, a1 * g * (own + ahead) * _MORE + _LEAST)
+        if late.leaders is not None:  # which move as they like
+            others = np.setdiff1d(np.arange(speed.size), chosen)
+            position[others] = velocity[others] = 0
+        return position, velocity
+
+    def after(self, late: LateBounds) -> float | None:
+        """Return what bounds ``|x_k - x*_k|`` from ``T`` on under a cap; None where nothing does."""
+        if late.messages.gain_cap is None:
+            return None
+        found = [
+            _meet(late, row, coefficients(_messages(late), _decay(late, row, row.after), self.a1, self.a2)[0], self.v0)
+            for row in late.rows
+            if row.witness.b < self.a1
+        ]
+        return float(min(bound.max() for bound in found))
+
+
+def bound_vehicles(late: LateBounds, rows: FollowerRows) -> LateBounds:
+    """Add what holds of vehicles that track virtual states, of which bounds by rows are proved.
+
+    Raises
+    ------
+    ParameterError
+        A leader that moves as it likes has an initial velocity.
+
+    Examples
+    --------
+    >>> structure = analyse(SignedDigraph.from_edges([(1, 2, 1)]))
+    >>> messages = LateMessages(gain_cap=9, vehicles=Vehicles((Fraction(0), Fraction(1))))
+    >>> ends = [(Fraction(1), Fraction(0))] * 2
+    >>> bounds = bound_late(structure, NominalProtocol(rho2=4), messages, [Fraction(1), Fraction(3)], ends)
+    >>> bounds.vehicles.position.max() < 0.01, bounds.vehicles.input.max() < 800
+    (np.True_, np.True_)
+    """
+    vehicles = late.messages.vehicles
+    assert vehicles is not None
+    chosen = set(late.followers.tolist())
+    if late.leaders is not None:
+        moving = next((v for v, x in enumerate(vehicles.v0) if x and v not in chosen), None)
+        if moving is not None:
+            name = shorten(late.labels[moving])
+            raise ParameterError("v0", f"of {name} is not 0, a leader that moves as it likes here; give it 0")
+    if not late.rows:
+        return late
+    a = Fraction(up(FASTER * max(row.witness.b for row in late.rows), 3))
+    each = []
+    for row in late.rows:
+        weights = rows.largest(row.witness.u), rows.weights
+        terms = coefficients(_messages(late), _decay(late, row, row.drift), a, a)
+        each.append([_meet(late, row, one, vehicles.v0, *weights) for one in terms])
+    position, *capped = (np.minimum.reduce(bounds) for bounds in zip(*each, strict=True))
+    velocity, push = capped or (None, None)
+    return replace(late, vehicles=VehicleBounds(a, a, vehicles.v0, position, velocity, push))
+
+
+def _messages(late: LateBounds) -> Messages:
+    """Return what the formulas of the check know of the messages."""
+    gain, told, leaders = late.gain.gain.exact, late.messages, late.leaders
+    moving = None if leaders is None else Moving(speed=leaders.speed, disturbance=leaders.disturbance)
+    exact = PrescribedGain(gain.T, gain.rho1, gain.k)
+    return Messages(exact, Numbers([Fraction(0)]), told.age, False, told.value_error, told.gain_cap, moving)
+
+
+def _decay(late: LateBounds, row: RowBound, drift: Fraction | None) -> Decay:
+    """Return the decay of a row; ``drift`` is what leaders that move add."""
+    highest, messages = row.floor, _messages(late)
+    if row.after is not None:
+        highest += row.after * messages.least_gain(always=True) / messages.least_gain()
+    return Decay(row.witness.b, row.cap, row.left, row.initial, row.floor, drift or Fraction(0), highest)
+
+
+def _meet(
+    late: LateBounds,
+    row: RowBound,
+    terms: Sequence[Fraction],
+    v0: Sequence[Fraction],
+    pulled: np.ndarray | float = 0.0,
+    degrees: np.ndarray | float = 0.0,
+) -> np.ndarray:
+    """Return the bounds of all agents by the coefficients of one decay, in floats from above."""
+    by_velocity, by_u, by_pull, by_degree, by_error = (float(x) for x in terms)
+    bound = by_velocity * np.array([float(abs(x)) for x in v0]) * _MORE
+    u = row.witness.u
+    bound[late.followers] += u * by_u + (pulled * by_pull + degrees * u * by_degree + degrees * by_error) * _MORE
+    return np.asarray(bound * _MORE + np.where(bound > 0, _LEAST, 0))
+
+
+def vehicles_section(bounds: VehicleBounds | None) -> VehiclesSection | None:
+    """Return bounds of vehicles as files have them."""
+    if bounds is None:
+        return None
+    numbers: dict[str, Any] = {
+        name: None if (value := getattr(bounds, name)) is None else Numbers(value)
+        for name in ("position", "velocity", "input")
+    }
+    return VehiclesSection(a1=bounds.a1, a2=bounds.a2, v0=Numbers(bounds.v0), **numbers)
+
+
+def read_vehicles(section: VehiclesSection | None) -> VehicleBounds | None:
+    """Return what an accepted certificate says of vehicles."""
+    if section is None:
+        return None
+    position, velocity, push = (floats_up(x) for x in (section.position, section.velocity, section.input))
+    assert position is not None
+    return VehicleBounds(section.a1, section.a2, tuple(section.v0), position, velocity, push)

@@ -1,0 +1,162 @@
+"""Double integrators that exchange virtual positions, which move as single integrators, and track these.
+
+    z_k' = gamma e_k,   e_k = sum_l w_kl (z_l - sign(w_kl) z_k),   z_k(0) = x_k(0)             what is exchanged
+    u_k = -a_1 g' (x_k - z_k) - a_1 g (x_k' - z_k') - a_2 g (x_k' + a_1 g (x_k - z_k))         what moves the vehicle
+
+``gamma`` is the gain that acts, ``g`` that up to ``T``, which from there on stays what it came to under a cap. With
+``r = x_k' + a_1 g (x_k - z_k)`` it is ``r' = -a_2 g r``, ``x_k' = -a_1 g (x_k - z_k) + r``: the vehicle is the virtual
+agent as it is seen through two filters of the first order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+from ptcc_certify.errors import Change, ParameterError
+from ptcc_certify.graphs.io import as_graph
+from ptcc_certify.model.base import aligned, symbols
+from ptcc_certify.model.casadi_latex import to_latex
+from ptcc_certify.model.gain import Gain
+from ptcc_certify.model.nominal import coupling
+
+if TYPE_CHECKING:
+    import casadi as ca
+
+    from ptcc_certify.model.case import Case
+
+#: What is not proved of vehicles, of all that may be asked.
+_NOT_PROVED = ("stop_before", "sample_period", "noise", "delta", "disturbance", "initial_set", "sigma0")
+
+
+@dataclass(frozen=True)
+class Vehicles:
+    """Double integrators that track virtual states.
+
+    Attributes
+    ----------
+    v0 : tuple of N Fraction
+        Their initial velocities.
+    """
+
+    v0: tuple[Fraction, ...]
+
+
+@dataclass(frozen=True)
+class TrackingProtocol:
+    """The protocol of double integrators that exchange virtual positions.
+
+    Attributes
+    ----------
+    gain : Gain
+        Without a cap; deadline and clock are its.
+    a1, a2 : Fraction
+        How fast they track, per unit of the clock of the gain.
+    gain_cap : Fraction or None
+
+    Examples
+    --------
+    >>> protocol = TrackingProtocol(Gain(T=1, rho1=1, rho2=1, kappa=2), Fraction(4), Fraction(3), None)
+    >>> loop = protocol.closed_loop(SignedDigraph.from_edges([(1, 2, 1)]))
+    >>> loop["x"], loop["ode"].shape
+    (SX([x1, x2, v1, v2, z1, z2]), (6, 1))
+    """
+
+    gain: Gain
+    a1: Fraction
+    a2: Fraction
+    gain_cap: Fraction | None = None
+
+    def gain_at(self, t: ca.SX) -> ca.SX:
+        """Return the gain before ``T``, capped or not, as a CasADi expression."""
+        import casadi as ca
+
+        gain = self.gain.expression(t)
+        return gain if self.gain_cap is None else ca.fmin(gain, float(self.gain_cap))
+
+    def input(self, x: ca.SX, v: ca.SX, z: ca.SX, moved: ca.SX, g: ca.SX, slope: ca.SX) -> ca.SX:
+        """Return ``u``; ``moved`` is ``z'``, ``g`` the gain and ``slope`` its derivative."""
+        a1, a2 = float(self.a1), float(self.a2)
+        return -a1 * slope * (x - z) - a1 * g * (v - moved) - a2 * g * (v + a1 * g * (x - z))
+
+    def closed_loop(self, graph: Any) -> dict[str, ca.SX]:
+        """Return the closed loop as CasADi's ``{"t", "x", "ode"}``, before ``T``: positions, velocities, virtual ones.
+
+        What is exchanged is heard at once here.
+        """
+        import casadi as ca
+
+        graph = as_graph(graph)
+        t = ca.SX.sym("t")
+        x, v, z = (symbols(name, graph) for name in "xvz")
+        g = self.gain_at(t)
+        moved = g * coupling(graph, z)
+        u = self.input(x, v, z, moved, g, ca.jacobian(g, t))
+        return {"t": t, "x": ca.vertcat(x, v, z), "ode": ca.vertcat(v, u, moved)}
+
+    def latex(self) -> str:
+        r"""Return the protocol of an agent k in LaTeX, printed from its expressions.
+
+        Examples
+        --------
+        >>> base = Gain(T=1, rho1=1, rho2=1, kappa=2)
+        >>> print(TrackingProtocol(base, Fraction(4), Fraction(3)).latex().partition("=")[2].partition(r" \\")[0][:58])
+         -4 \dot{g} \left(x_{k} - z_{k}\right) - 4 g \left(\dot{x}_
+        """
+        import casadi as ca
+
+        names = ("x_{k}", r"\dot{x}_{k}", "z_{k}", r"\dot{z}_{k}", "g", r"\dot{g}")
+        u = self.input(*map(ca.SX.sym, names))
+        pull = r"z_{l} - \operatorname{sign}\left(w_{kl}\right) z_{k}"
+        gain = self.gain.latex(numbers=True)
+        if self.gain_cap is not None:
+            gain = rf"\min\left({float(self.gain_cap):g}, {gain}\right)"
+        rows = [
+            f"u_{{k}} &= {to_latex(u)}",
+            rf"\dot{{z}}_{{k}} &= g \sum_{{l=1}}^{{N}} w_{{kl}} \left({pull}\right), \quad z_{{k}}(0) = x_{{k}}(0)",
+            f"g &= {gain}",
+        ]
+        return aligned(rows)
+
+    def _repr_latex_(self) -> str:
+        return f"$${self.latex()}$$"
+
+
+def refuse_unproved(case: Case) -> None:
+    """Refuse what is not proved of double integrators that exchange virtual positions.
+
+    Raises
+    ------
+    ParameterError
+        Says what.
+
+    Examples
+    --------
+    >>> from ptcc_certify.model.case import Case
+    >>> agents = Agents(order=2, exchange="virtual")
+    >>> refuse_unproved(Case("fig1a", NominalProtocol(), agents=agents, limits=GainLimits(stop_before="0.1")))
+    Traceback (most recent call last):
+    ptcc_certify.errors.ParameterError: stop_before is not proved yet where virtual positions are exchanged; leave it \
+or exchange out
+    """
+    given = ["protocol"] * case.sliding + [name for name in _NOT_PROVED if case.given(name) is not None]
+    if case.leaders is not None:
+        given += ["delta"] * (case.leaders.disturbance > 0) + ["sign_gain"] * (case.leaders.sign_gain is not None)
+    if case.messages is not None and case.messages.own_delay:
+        given.append("own_delay")
+    if case.signal != "any":
+        given.append("signal")
+    if given:
+        what = {"protocol": "the sliding-mode protocol ", "signal": "a restricted signal "}.get(given[0], "")
+        why = f"{what}is not proved yet where virtual positions are exchanged; leave it or "
+        raise ParameterError(given[0], (why, Change("exchange"), " out"))
+
+
+def one_cap(caps: Sequence[Fraction | None]) -> Fraction | None:
+    """Return the one cap of the gain that is given, or refuse two."""
+    found = {cap for cap in caps if cap is not None}
+    if len(found) > 1:
+        raise ParameterError("gain_cap", "of agents, limits and messages there are two; give one")
+    return next(iter(found), None)
