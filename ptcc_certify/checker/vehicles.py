@@ -67,6 +67,8 @@ def coefficients(messages: Messages, decay: Decay, a1: Fraction, a2: Fraction) -
 
     Examples
     --------
+    >>> from ptcc_certify.checker.input_formulas import PrescribedGain
+    >>> from ptcc_certify.checker.side_files import Numbers
     >>> gain = PrescribedGain(Fraction(1), Fraction(1), Fraction(1))
     >>> messages = Messages(gain, Numbers([Fraction(0)]), Fraction(0), False, Fraction(0), Fraction(2))
     >>> decay = Decay(*map(Fraction, (1, 2)), Fraction(1, 4), Fraction(1), *[Fraction(0)] * 3)

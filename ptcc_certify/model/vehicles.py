@@ -103,7 +103,7 @@ class TrackingProtocol:
         --------
         >>> base = Gain(T=1, rho1=1, rho2=1, kappa=2)
         >>> print(TrackingProtocol(base, Fraction(4), Fraction(3)).latex().partition("=")[2].partition(r" \\")[0][:58])
-         -4 \dot{g} \left(x_{k} - z_{k}\right) - 4 g \left(\dot{x}_
+         \left(-4 \dot{g}\right) \left(x_{k} - z_{k}\right) - 4 g
         """
         import casadi as ca
 

@@ -290,6 +290,8 @@ class Trajectory(ByAgent, ByValue, Shown):
         What else the run met.
     held_input : (N, M) or (N, S, M) array or None
         The input where it is not that of the states: under zero-order hold, of late messages, of leaders that move.
+    vehicles : bool
+        Whether these are double integrators that track the agents of another run.
     targets : (N, M) array or None
         Where leaders move, ``-L_F^-1 L_FL X_L`` of followers, of leaders their states.
 
@@ -320,6 +322,7 @@ class Trajectory(ByAgent, ByValue, Shown):
     played: Played | None = field(default=None, kw_only=True)
     conditions: Conditions = field(default=Conditions(), kw_only=True)
     held_input: np.ndarray | None = field(default=None, kw_only=True)
+    vehicles: bool = field(default=False, kw_only=True)
     targets: np.ndarray | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:

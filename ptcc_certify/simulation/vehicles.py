@@ -176,4 +176,8 @@ def follow(run: Trajectory, protocol: TrackingProtocol, v0: Sequence[Fraction]) 
             x[:, i + 1] = z[:, i + 1] + lag + kept * (ahead[:, i] + ahead[:, i + 1]) / (2 * a1)
         v = r - a1 * g * (x - z)
         u = -a1 * _slope(protocol, g) * (x - z) - a1 * g * (v - run.input) - a2 * g * r
-    return replace(run, states=x, held_input=np.where(np.isfinite(u), u, np.nan))
+    u = np.where(np.isfinite(u), u, np.nan)
+    if run.targets is not None:  # leaders that move as they like send their own positions
+        leading = run.graph.in_weight() == 0
+        x[leading], u[leading] = z[leading], 0.0
+    return replace(run, states=x, held_input=u, vehicles=True)

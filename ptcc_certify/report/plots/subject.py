@@ -138,7 +138,13 @@ def structure_of(subject: Any) -> Structure:
 def ideal_text(certificate: Certificate) -> str:
     """Say what of a certificate is not in its bounds over time: limits of the gain, late messages, moving leaders."""
     late, moving = certificate.late, certificate.leaders_move
-    absent = {"no limits": certificate.limits, "nothing late": late, "leaders at rest": moving}
+    virtual = late is not None and late.messages.vehicles is not None
+    absent = {
+        "virtual positions": virtual,
+        "no limits": certificate.limits or (virtual and late is not None and late.messages.gain_cap is not None),
+        "nothing late": late is not None and not (virtual and late.messages.exact),
+        "leaders at rest": moving,
+    }
     return ", ".join(text for text, there in absent.items() if there)
 
 
@@ -151,12 +157,14 @@ def limits_text(run: Trajectory, certificate: Certificate | None) -> str:
         numbers = dict(zip(_LIMITS, (limits.gain_cap, limits.stop_before, limits.sample_period), strict=True))
     numbers |= {} if messages is None else {"messages late by up to": messages.age, "off by": messages.value_error}
     named = [f"{name} {near(number)}" for name, number in numbers.items() if number]
+    named += ["vehicles that track virtual positions"] if run.vehicles else []
     named += [] if leaders is None else [f"leaders move at up to {near(leaders.speed)}"]
     if certificate is not None:
+        vehicles = run.vehicles
         forced = certificate.sigma0 is None and met.forcing is None and leaders is None
         absent = {
             "without the limits of the gain": limits is None and certificate.limits,
-            "without late messages": messages is None and certificate.late,
+            "without late messages": messages is None and certificate.late and not vehicles,
             "leaders at rest": leaders is None and certificate.leaders_move,
             "without disturbance": forced and certificate.delta,
             "without noise": forced and certificate.noise,

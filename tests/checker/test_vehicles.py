@@ -1,0 +1,339 @@
+"""Double integrators that exchange virtual positions: accepted, refused where forged, and no run exceeds a bound."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from fractions import Fraction
+from functools import cache
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from jsonschema import Draft202012Validator  # type: ignore[import-untyped]
+from late_certificates import led_graph
+from mutations import Json, at, changed, judged_mutants, mutants, resealed
+from oracle import number
+
+from ptcc_certify import read_certificate
+from ptcc_certify.certificate.json_schema import json_schema
+from ptcc_certify.certificate.procedure import certify
+from ptcc_certify.checker import check
+from ptcc_certify.errors import HypothesisError, ParameterError
+from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.family import Family
+from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
+from ptcc_certify.model.agents import Agents
+from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.gain_limits import GainLimits
+from ptcc_certify.model.initial_state import InitialState
+from ptcc_certify.model.late_messages import LateMessages
+from ptcc_certify.model.moving_leaders import MovingLeaders
+from ptcc_certify.model.vehicles import TrackingProtocol
+from ptcc_certify.simulation.late_messages import simulate_late
+from ptcc_certify.simulation.run import simulate
+from ptcc_certify.simulation.vehicles import follow, simulate_vehicles
+
+F = Fraction
+VIRTUAL = Agents(order=2, exchange="virtual")
+PATH = ("messages", "vehicles")
+#: What goes together, by name: the parts beside agents, initial state and protocol.
+CASES: dict[str, dict[str, Any]] = {
+    "plain": {},
+    "capped": {"limits": GainLimits(gain_cap=20)},
+    "late": {"messages": LateMessages(delay="0.02")},
+    "late-capped": {"messages": LateMessages(delay="0.02", value_error="0.01"), "limits": GainLimits(gain_cap=12)},
+    "lost": {"messages": LateMessages(delay="0.005", period="0.01", losses=2, gain_cap=15)},
+    "moving": {"leaders": MovingLeaders(speed="0.5"), "limits": GainLimits(gain_cap=30)},
+    "late-moving": {"messages": LateMessages(delay="0.02", gain_cap=25), "leaders": MovingLeaders(speed="0.3")},
+    "uncertain": {"uncertainty": "10%", "limits": GainLimits(gain_cap=20)},
+    "uncertain-late-moving": {
+        "uncertainty": "10%",
+        "messages": LateMessages(delay="0.01", gain_cap=25),
+        "leaders": MovingLeaders(speed="0.3"),
+    },
+    "uncertain-late": {"uncertainty": "20%", "messages": LateMessages(delay="0.01")},
+}
+
+
+def problem(seed: int, name: str) -> tuple[SignedDigraph, NominalProtocol, InitialState]:
+    """A random graph of one leader, or two, and where its vehicles begin."""
+    rng, parts = np.random.default_rng(seed), CASES[name]
+    one = "uncertainty" in parts
+    graph = led_graph(rng, 1 if one else 2, 3, signs="gauge" if one else "mixed")
+    x0, v0 = ([F(int(x), 10) for x in rng.integers(-50, 50, graph.n_nodes)] for _ in range(2))
+    if "leaders" in parts:
+        v0 = [v if d else F(0) for v, d in zip(v0, graph.in_weight(), strict=True)]
+    protocol = NominalProtocol(T=1, rho1=1, rho2=int(rng.integers(2, 6)), kappa=1)
+    return graph, protocol, InitialState(x0, v0=v0)
+
+
+@cache
+def certified(seed: int, name: str) -> Any:
+    graph, protocol, initial = problem(seed, name)
+    more = {} if "uncertainty" in CASES[name] else {"asks": Asks(simulation=False, method="paper")}
+    return certify(graph, protocol, initial, agents=VIRTUAL, **CASES[name], **more)
+
+
+@cache
+def document(seed: int, name: str) -> Json:
+    return {**json.loads(certified(seed, name).to_json()), "unverified": {}}
+
+
+def weights_of(data: Json) -> list[list[tuple[int, int, Fraction]]]:
+    """The edges of every mode, at their largest weights."""
+    index = {label: v for v, label in enumerate(data["graph"]["nodes"])}
+    modes = data["graph"]["modes"] if "modes" in data["graph"] else [data["graph"]]
+    sizes = []
+    for mode in modes:
+        pairs = [(index[edge[0]], index[edge[1]], edge[2:]) for edge in mode["edges"]]
+        sizes.append([(s, t, max(abs(number(x)) for x in ends)) for s, t, ends in pairs])
+    return sizes
+
+
+def false_claims(data: Json) -> list[str]:
+    """What is stated of vehicles and does not follow: each bound by its formula, suprema over a fine grid of time."""
+    said = data["messages"]
+    told, labels = said["vehicles"], data["graph"]["nodes"]
+    a1, a2 = float(number(told["a1"])), float(number(told["a2"]))
+    T, rho1, rho2, kappa = (float(number(data["protocol"][key])) for key in ("T", "rho1", "rho2", "kappa"))
+    k, cap = rho2 * kappa, None if said["gain_cap"] is None else float(number(said["gain_cap"]))
+    modes = weights_of(data)
+    D = np.max([[sum(float(w) for _, t, w in edges if t == v) for v in range(len(labels))] for edges in modes], axis=0)
+    followers = np.flatnonzero(D > 0)
+    v0 = np.abs([float(number(told["v0"][label])) for label in labels])
+    leaders = said["leaders"]
+    if leaders is not None and (v0[D == 0].any() or number(leaders["disturbance"])):
+        return ["vehicles that nothing is proved of"]
+    speed = 0.0 if leaders is None else float(number(leaders["speed"]))
+    wrong = float(number(said["value_error"])) + speed * float(number(said["delay"]))
+    t = np.unique(np.concatenate([np.linspace(0, T, 20001)[:-1], T - np.geomspace(1e-9, 1, 4000) * T]))
+    gain = rho1 + k / (T - t)
+    g = gain if cap is None else np.minimum(gain, cap)
+    steps = {step["of"]: step for step in data["proof"] if step["kind"] == "late-rows"}
+    least = {key: np.full(len(labels), np.inf) for key in ("position", "velocity", "input")}
+    for i, row in enumerate(said["rows"]):
+        step = steps[f"messages.rows[{i}]"]
+        b = float(number(step["numbers"]["b"]))
+        if b >= a1 or b > a2:
+            continue
+        u = np.zeros(len(labels))
+        u[followers] = [float(number(x)) for x in step["witness"]["u"]]
+        limit = np.inf if row["cap"] is None else float(number(row["cap"]))
+        paced = np.minimum(g, limit)
+        s = np.concatenate([[0.0], np.cumsum(np.minimum(paced[1:], paced[:-1]) * np.diff(t))])
+        numbers = {key: float(number(x)) for key, x in row.items() if x is not None}
+        M, left, lag = numbers["initial"], numbers["left"], 1 / (a1 - b)
+        drift, after = numbers.get("drift", 0.0), numbers.get("after", 0.0)
+        least["position"] = np.minimum(
+            least["position"], u * (a1 * lag * (M * left + drift) + numbers["floor"]) + v0 * lag * left / g[0]
+        )
+        if cap is None:
+            continue
+        f = numbers["floor"] + after * min(rho1, cap) / g[0]
+        heard = np.max(
+            [
+                [sum(float(w) * u[source] for source, to, w in edges if to == v) for v in range(len(labels))]
+                for edges in modes
+            ],
+            axis=0,
+        )
+        p, n = (2 * D - b) * u * M, f * (D * u + heard) + wrong * D
+        # s is too small, and y too large, by less than a part in a thousand
+        y, y2 = (g * np.exp(-b * s)).max() * 0.99, (g * g * np.exp(-b * s)).max() * 0.99
+        c = a1 / k + a1 * a1
+        velocity = (v0 * (1 + a1 * lag) / g[0] + a1 * lag * p) * y + cap * n
+        push = (v0 * (c * lag + a1 + a2) / g[0] + (c * lag + a1) * p) * y2 + (1 / k + 2 * a1) * cap**2 * n
+        least["velocity"] = np.minimum(least["velocity"], velocity)
+        least["input"] = np.minimum(least["input"], push)
+    claims = {key: told[key] for key in least if told[key] is not None}
+    return [
+        f"{key} of {label}"
+        for key, stated in claims.items()
+        for v, label in enumerate(labels)
+        if float(number(stated[label])) < least[key][v] * (1 - 1e-6)
+    ]
+
+
+# ---------------------------------------------------------------------- what is true is accepted
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_every_combination_is_proved_checked_with_and_without_arrays_and_read_back(name: str, tmp_path: Any):
+    certificate, data = certified(1, name), document(1, name)
+    assert Draft202012Validator(json_schema()).is_valid(data)
+    for stdlib in (False, True):
+        report = check(resealed(data), stdlib=stdlib)
+        assert report.accepted, (report.rejected, report.reason)
+    assert "late-vehicles" in {step["kind"] for step in data["proof"]}
+    assert false_claims(data) == []
+    certificate.save(tmp_path / "c.json")
+    again, vehicles = read_certificate(tmp_path / "c.json").late, certificate.late.vehicles
+    for key in ("a1", "a2", "v0"):
+        assert getattr(again.vehicles, key) == getattr(vehicles, key)
+    assert np.array_equal(again.vehicles.position, vehicles.position)
+    t = np.array([0.5, 0.9, 0.99])
+    for one, other in zip(again.vehicles.over_time(again, t), vehicles.over_time(certificate.late, t), strict=True):
+        assert one == pytest.approx(other)
+
+
+@pytest.mark.parametrize("name", ["plain", "capped", "late", "late-capped", "lost", "late-moving"])
+@pytest.mark.parametrize("seed", range(1, 7))
+def test_no_run_exceeds_a_bound(seed: int, name: str):
+    certificate = certified(seed, name)
+    late, graph, protocol = certificate.late, certificate.graph, certificate.protocol
+    tracking = late.tracking_protocol
+    x0, v0 = [float(x) for x in certificate.initial_state], late.vehicles.v0
+    if late.messages.exact:
+        cap = late.messages.gain_cap
+        more = {} if cap is None else {"actuator": GainLimits(gain_cap=cap)}
+        runs = [simulate(graph, protocol, x0, samples=1001, **more)]
+    else:
+        runs = [
+            simulate_late(graph, protocol, late.messages, x0, pattern=pattern, leaders=late.leaders)
+            for pattern in ("oldest", "square")
+        ]
+    moved = graph.in_weight() > 0 if late.leaders is not None else np.ones(graph.n_nodes, dtype=bool)
+    ends = np.asarray(certificate.final_state, dtype=float)[:, None]
+    for run in (follow(one, tracking, v0) for one in runs):
+        before = run.t < 0.999
+        position, _ = late.vehicles.over_time(late, run.t[before])
+        off = np.abs(run.states - (ends if run.targets is None else run.targets))
+        assert (off[:, before] <= position * (1 + 1e-6) + 1e-6)[moved].all()
+        at_T = int(np.argmax(run.remaining == 0))
+        assert (off[:, at_T] <= late.vehicles.position + 1e-6)[moved].all()
+        if late.vehicles.input is not None:
+            up_to_T = run.remaining > 0
+            assert (np.abs(run.input[:, up_to_T]).max(axis=1) <= late.vehicles.input * (1 + 1e-6))[moved].all()
+
+
+@pytest.mark.parametrize("cap", [None, 20, 2])
+def test_cvodes_the_filters_and_the_expression_agree(cap: int | None):
+    graph, protocol, initial = problem(3, "plain")
+    x0, v0 = ([float(x) for x in values] for values in (initial.x0, initial.v0))
+    tracking = TrackingProtocol(protocol.gain, F(5, 2), F(3), None if cap is None else F(cap))
+    run = simulate_vehicles(graph, tracking, x0, v0, samples=201)
+    actuator = {} if cap is None else {"actuator": GainLimits(gain_cap=cap)}
+    followed = follow(simulate(graph, protocol, x0, samples=4001, **actuator), tracking, initial.v0)
+    for k in range(graph.n_nodes):
+        seen = np.interp(run.t, followed.t, followed.states[k])
+        assert seen == pytest.approx(run.positions[k, 0], abs=1e-3)
+    loop = tracking.closed_loop(graph)
+    options = {"reltol": 1e-10, "abstol": 1e-12}
+    solver = ca.integrator("f", "cvodes", {key: loop[key] for key in ("t", "x", "ode")}, 0, 0.5, options)
+    end = solver(x0=[*x0, *v0, *x0])["xf"].full().ravel()[: graph.n_nodes]
+    assert [np.interp(0.5, run.t, row) for row in run.positions[:, 0]] == pytest.approx(end, abs=1e-3)
+
+
+def test_vehicles_that_begin_on_their_targets_with_a_velocity_are_bounded():
+    graph, initial = SignedDigraph.from_edges([("a", "b", 1), ("b", "c", 2)]), InitialState([1, 1, 1], v0=[0, 3, 0])
+    limits = GainLimits(gain_cap=20)
+    certificate = certify(graph, NominalProtocol(rho2=3), initial, agents=VIRTUAL, limits=limits)
+    position, velocity = certificate.late.vehicles.over_time(certificate.late, np.array([0.0, 0.1]))
+    assert position[1].min() > 0.01 and velocity[1, 0] >= 3
+    assert position[2].max() < 1e-200 and certificate.checked.accepted
+
+
+# ---------------------------------------------------------------------- forgeries
+
+
+@pytest.mark.parametrize("name", ["late-capped", "late-moving", "uncertain-late-moving", "plain"])
+def test_no_mutant_of_what_is_said_of_vehicles_is_accepted_unless_it_is_true(name: str):
+    data = document(2, name)
+    of = next(i for i, step in enumerate(data["proof"]) if step["kind"] == "late-vehicles")
+    kept = (one for one in mutants(data) if one[0][:2] in (PATH, ("proof", of)))
+    count, passed = judged_mutants(data, kept, false_claims)  # which judges each that is accepted
+    assert count > 90 and passed  # larger bounds are true
+
+
+@pytest.mark.parametrize("name", ["capped", "late-capped", "late-moving", "uncertain"])
+def test_bounds_without_a_part_of_their_formula_are_refused(name: str):
+    data = document(2, name)
+    told = at(data, PATH)
+    for key, label in itertools.product(("position", "velocity", "input"), told["position"]):
+        value = number(told[key][label])
+        if value:
+            less = changed(data, (*PATH, key, label), str(value * F(999, 1000)))
+            report = check(resealed(less))
+            assert not report.accepted and f"the {key} of agent {label}" in report.reason
+    slow = changed(changed(data, (*PATH, "a1"), "1/1000"), (*PATH, "a2"), "1/1000")
+    faster = {label: str(number(x) * 2 + 1) for label, x in told["v0"].items()}
+    for forged in (slow, changed(data, (*PATH, "a2"), "1/1000"), changed(data, (*PATH, "v0"), faster)):
+        assert not check(resealed(forged)).accepted
+
+
+def test_bounds_of_the_virtual_positions_are_none_of_the_vehicles():
+    data = document(2, "late-capped")
+    less = changed(data, (*PATH, "position"), data["messages"]["residual"])
+    assert "position" in (check(resealed(less)).reason or "")
+
+
+def test_what_is_not_stated_and_what_is_not_proved_is_refused():
+    free, capped, moving = document(1, "late"), document(1, "late-capped"), document(1, "late-moving")
+    told = at(free, PATH)
+    for data, path, value, why in (
+        (free, (*PATH, "velocity"), told["position"], "iff the gain has a cap"),
+        (capped, (*PATH, "input"), None, "iff the gain has a cap"),
+        (moving, ("messages", "leaders", "disturbance"), "1/10", "disturbed"),
+        (free, (*PATH, "a1"), "0", "not positive"),
+    ):
+        assert why in (check(resealed(changed(data, path, value))).reason or "")
+    leader = next(label for label, x in moving["messages"]["residual"].items() if not number(x))
+    assert "a leader that moves" in (check(resealed(changed(moving, (*PATH, "v0", leader), "1"))).reason or "")
+    without = {key: x for key, x in document(1, "plain")["messages"].items() if key != "vehicles"}
+    proof = [step for step in document(1, "plain")["proof"] if step["kind"] != "late-vehicles"]
+    bare = {**document(1, "plain"), "messages": without, "proof": proof}
+    assert check(resealed(bare)).reason == "nothing is late, and nothing is off"
+
+
+# ---------------------------------------------------------------------- what is not proved yet
+
+SLIDING = SlidingModeProtocol(T_r=1, T_s=1, rho1=1, rho2=1, kappa=2, mu1=2, mu2=1, mu3=1, delta=1)
+
+
+@pytest.mark.parametrize(
+    ("parts", "why"),
+    [
+        ({"limits": GainLimits(stop_before="0.1")}, "stop_before"),
+        ({"limits": GainLimits(sample_period="0.1")}, "sample_period"),
+        ({"leaders": MovingLeaders(speed=1, disturbance=1)}, "delta"),
+        ({"leaders": MovingLeaders(speed=1, sign_gain=1)}, "sign_gain"),
+        ({"messages": LateMessages(delay=1, own_delay=True, gain_cap=1)}, "own_delay"),
+        ({"protocol": SLIDING}, "protocol"),
+        ({"asks": Asks(noise=1)}, "noise"),
+        ({"asks": Asks(delta=1)}, "delta"),
+        ({"asks": Asks(initial_set=1)}, "initial_set"),
+        ({"uncertainty": "10%", "signal": "constant"}, "signal"),
+    ],
+)
+def test_what_is_not_proved_of_vehicles_is_refused_by_name(parts: dict[str, Any], why: str):
+    pair = SignedDigraph.from_edges([("a", "b", 1)])
+    given = {"protocol": NominalProtocol(), "x0": [1, 2], "agents": VIRTUAL} | parts
+    with pytest.raises(ParameterError, match=f"^{why}.*not proved yet where virtual positions are exchanged"):
+        certify(pair, **given)
+
+
+@pytest.mark.parametrize("name", ["drag", "rest", "cascade", "decay", "offsets", "biases"])
+def test_agents_that_exchange_virtual_positions_have_no_other_protocol(name: str):
+    with pytest.raises(ParameterError, match=f"^{name}.*not proved yet"):
+        Agents(order=2, exchange="virtual", **{name: [1, 2] if name in ("offsets", "biases") else 5})
+    with pytest.raises(ParameterError, match="order 3: not proved yet"):
+        Agents(order=3, exchange="virtual")
+    with pytest.raises(ParameterError, match="exchange"):
+        Agents(order=2, exchange="everything")
+
+
+def test_leader_groups_moving_leaders_with_a_velocity_and_planes_are_refused():
+    group = SignedDigraph.from_edges([("a", "b", 1), ("b", "a", 1), ("b", "c", 1)])
+    for graph in (group, Family.from_graph(group)):
+        with pytest.raises(HypothesisError, match="proved yet"):
+            certify(graph, NominalProtocol(), [1, 2, 3], agents=VIRTUAL)
+    pair, moving = SignedDigraph.from_edges([("a", "b", 1)]), MovingLeaders(speed=1)
+    with pytest.raises(ParameterError, match="v0: of a is not 0, a leader that moves as it likes"):
+        certify(pair, NominalProtocol(), InitialState([1, 2], v0=[1, 0]), agents=VIRTUAL, leaders=moving)
+    with pytest.raises(ParameterError, match="one"):
+        certify(pair, NominalProtocol(), [[1, 2], [2, 3]], agents=VIRTUAL)
+    with pytest.raises(ParameterError, match="there are two"):
+        two = {"messages": LateMessages(delay=1, gain_cap=1), "limits": GainLimits(gain_cap=2)}
+        certify(pair, NominalProtocol(), [1, 2], agents=VIRTUAL, **two)
