@@ -47,7 +47,6 @@ from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.late_messages import LateMessages
 from ptcc_certify.model.moving_leaders import MovingLeaders
 from ptcc_certify.model.reaching_time import ReachingTime
-from ptcc_certify.model.vehicles import TrackingProtocol
 from ptcc_certify.simulation.agents import AgentsTrajectory
 from ptcc_certify.simulation.late_messages import can_run, simulate_late
 from ptcc_certify.simulation.run import simulate
@@ -708,7 +707,11 @@ class Content:
         try:
             start = [float(x) for x in self.initial_state]
             if late is not None and late.tracking_protocol is not None:
-                return self._run_of_vehicles(late, late.tracking_protocol, start)
+                from ptcc_certify.simulation.vehicles import run_of_vehicles
+
+                return run_of_vehicles(
+                    self.graph, self.protocol, late.tracking_protocol, late.messages, start, late.leaders
+                )
             if late is not None:
                 if not can_run(self.protocol, late.messages):
                     return None
@@ -725,22 +728,6 @@ class Content:
             return self.simulate(actuator=GainLimits(limits.gain_cap, limits.stop_before, limits.sample_period))
         except (ParameterError, SimulationError, OverflowError):
             return None
-
-    def _run_of_vehicles(
-        self, late: LateBounds, tracking: TrackingProtocol, start: Sequence[float]
-    ) -> Trajectory | None:
-        """Return the run of vehicles that track virtual positions; none where these are exact while leaders move."""
-        from ptcc_certify.simulation.vehicles import follow
-
-        messages, cap = late.messages, late.messages.gain_cap
-        if messages.exact and late.leaders is None:
-            run = self.simulate(samples=1001, **({} if cap is None else {"actuator": GainLimits(gain_cap=cap)}))
-        elif messages.exact or not can_run(self.protocol, messages):
-            return None
-        else:
-            run = simulate_late(self.graph, self.protocol, messages, start, leaders=late.leaders)
-        assert messages.vehicles is not None
-        return follow(run, tracking, messages.vehicles.v0)
 
     def with_simulation(self, **options: Any) -> Self:
         """Return the same with ``trajectory`` and, if a bound was proved, ``comparison``.

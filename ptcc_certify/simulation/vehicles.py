@@ -20,7 +20,9 @@ from ptcc_certify.graphs.rationals import whole_number
 from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.simulation.agents import MOST_STATES, AgentsTrajectory
 from ptcc_certify.simulation.cvodes import Motion, Phase, Tolerances
+from ptcc_certify.simulation.late_messages import can_run, simulate_late
 from ptcc_certify.simulation.members import Members
+from ptcc_certify.simulation.run import simulate
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,8 +30,14 @@ if TYPE_CHECKING:
     import casadi as ca
 
     from ptcc_certify.graphs.digraph import SignedDigraph
+    from ptcc_certify.model.base import Protocol
+    from ptcc_certify.model.late_messages import LateMessages
+    from ptcc_certify.model.moving_leaders import MovingLeaders
     from ptcc_certify.model.vehicles import TrackingProtocol
     from ptcc_certify.simulation.trajectory import Trajectory
+
+#: Instants of a run that vehicles follow.
+_SAMPLES = 1001
 
 
 class _Tracking(Motion):
@@ -181,3 +189,38 @@ def follow(run: Trajectory, protocol: TrackingProtocol, v0: Sequence[Fraction]) 
         leading = run.graph.in_weight() == 0
         x[leading], u[leading] = z[leading], 0.0
     return replace(run, states=x, held_input=u, vehicles=True)
+
+
+def run_of_vehicles(
+    graph: SignedDigraph,
+    protocol: Protocol,
+    tracking: TrackingProtocol,
+    messages: LateMessages,
+    x0: Sequence[float],
+    leaders: MovingLeaders | None = None,
+) -> Trajectory | None:
+    """Return a run of vehicles whose messages are as late as allowed, up to ``T`` or past it.
+
+    None where delays are too short for a run, or messages exact while leaders move.
+
+    Parameters
+    ----------
+    graph : SignedDigraph
+    protocol : Protocol
+        That of the virtual positions.
+    tracking : TrackingProtocol
+    messages : LateMessages
+        With the vehicles.
+    x0 : sequence of N float
+    leaders : MovingLeaders, optional
+    """
+    cap, vehicles = messages.gain_cap, messages.vehicles
+    assert vehicles is not None
+    if messages.exact and leaders is None:
+        actuator = None if cap is None else GainLimits(gain_cap=cap)
+        run = simulate(graph, protocol, x0, samples=_SAMPLES, actuator=actuator)
+    elif messages.exact or not can_run(protocol, messages):
+        return None
+    else:
+        run = simulate_late(graph, protocol, messages, x0, leaders=leaders)
+    return follow(run, tracking, vehicles.v0)
