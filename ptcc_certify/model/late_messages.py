@@ -15,7 +15,6 @@ from numbers import Integral
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ptcc_certify.errors import ParameterError, gated
-from ptcc_certify.graphs.family import pairs_of
 from ptcc_certify.graphs.option import option
 from ptcc_certify.graphs.rationals import Exact, shorten
 from ptcc_certify.model.parameters import Given, NotNegative, parameter, readable
@@ -198,6 +197,8 @@ lambda of L, or measure the own state without delay
         return not any(x for x, v in zip(each, structure.graph.target.tolist(), strict=True) if v not in followers)
 
     def _by_edge(self, of: SignedDigraph | Family) -> tuple[Fraction, ...]:
+        from ptcc_certify.graphs.family import pairs_of  # which loads NumPy
+
         assert isinstance(self.delay, Mapping)
         given: dict[tuple[str, str], Any] = {(str(s), str(t)): x for (s, t), x in self.delay.items()}
         none, found = Fraction(0), [given.pop(pair, None) for pair in pairs_of(of)]
