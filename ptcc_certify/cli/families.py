@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
@@ -272,7 +273,9 @@ def certify_family(
     with progress(STEPS, screen.quiet) as begin:
         origins = {"graph": Path(name).name, "read": read, **random_states}
         asks = Asks(time_limit=options["time_limit"], expectations=expected)
-        beside: dict[str, Any] = {"messages": messages_of(graphs[0], family, options), "leaders": leaders_of(options)}
+        beside: dict[str, Any] = {"messages": messages_of(graphs, family, options), "leaders": leaders_of(options)}
+        if beside["messages"] is not None and isinstance(beside["messages"].delay, Mapping):
+            family = replace(family, notes=(f'delays of column "{options["delay"]}"', *family.notes))
         case = Case(family, protocol, InitialState(x0, sigma0), signal=signal, asks=asks, **beside)
         certificate: Any = certify_case(case, progress=begin, scenario=scenario_record(), origins=origins)
         assessment = certificate.assessment
