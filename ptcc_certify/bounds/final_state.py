@@ -28,7 +28,7 @@ import numpy as np
 
 from lmi.child_process import apart
 from lmi.errors import LMIError
-from lmi.search_time import checkpoint, seconds_left
+from lmi.search_time import checkpoint, processor_left, seconds_left
 from lmi.sparse_h_matrix import SparseHMatrix, solve
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
@@ -322,7 +322,8 @@ def _left_null_vectors(structure: Structure, exact: bool, floats: bool) -> tuple
 
 def _in_time(work: Callable[[], Any], graph: SignedDigraph) -> Any:
     """Return what exact work gives: under a time limit in a process of its own if it may take long."""
-    apart_from_here = math.isfinite(seconds_left()) and takes_long(graph)
+    limited = math.isfinite(min(seconds_left(), processor_left()))
+    apart_from_here = limited and takes_long(graph)
     return next(apart(lambda: iter([work()]))) if apart_from_here else work()
 
 

@@ -50,9 +50,9 @@ from ptcc_certify.checker.sections import RowVector, declared
 from ptcc_certify.checker.settling_leaders import SettlingSection, SettlingWitness
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.graphs.family import Family
+from ptcc_certify.graphs.family import Family, pairs_of
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness, UncertainRows, listeners
+from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness, listeners
 from ptcc_certify.model.base import Protocol
 from ptcc_certify.model.gain_limits import GainLimits
 from ptcc_certify.model.late_messages import LateMessages
@@ -211,8 +211,7 @@ class LateBounds:
         if self.leaders is None or not self.messages.age or not (self.rows or self.steps):
             return None
         of, error = self.structure, float(self.leaders.speed * self.messages.age)
-        rows = UncertainRows(of) if isinstance(of, Family) else late_rows(of, self.messages)
-        return float(rows.kept_off(error).max()) / _MORE
+        return float(late_rows(of, self.messages).kept_off(error).max()) / _MORE
 
     @property
     def inputs(self) -> np.ndarray | None:
@@ -307,7 +306,7 @@ def bound_late(
     gain = GainLimits(gain_cap=messages.gain_cap).limit(protocol.gain)
     if isinstance(structure, Family):
         bounds = LateBounds(messages, structure, gain, ends is None, leaders=leaders)
-        return _by_rows(bounds, UncertainRows(structure), initial_state, ends)
+        return _by_rows(bounds, late_rows(structure, messages), initial_state, ends)
     latencies = messages.latencies(structure.graph)
     if messages.own_delay or any(len(c.nodes) > 1 for c in structure.closed_components):
         return LateBounds(messages, structure, gain, initial_state is None or ends is None, leaders=leaders)
@@ -377,22 +376,22 @@ def _away(
     return np.array([float_up(abs(initial_state[v] - ends[v][0]) + ends[v][1]) for v in rows.followers])
 
 
-def late_rows(structure: Structure, messages: LateMessages) -> FollowerRows:
+def late_rows(of: Structure | Family, messages: LateMessages) -> FollowerRows:
     """Return the rows of the followers, with ages of what is heard by edge, in 64ths of the oldest, rounded up.
 
     Parameters
     ----------
-    structure : Structure
+    of : Structure or Family
         All leaders are single nodes.
     messages : LateMessages
     """
-    latencies = messages.latencies(structure.graph)
+    latencies = messages.latencies(of.graph if isinstance(of, Structure) else of)
     if not isinstance(latencies, tuple) or not messages.age:
-        return FollowerRows(structure)
+        return FollowerRows(of)
     part = {x: math.ceil(PARTS * (x + messages.held) / messages.age) for x in set(latencies)}
     if min(part.values()) == PARTS:
-        return FollowerRows(structure)
-    return FollowerRows(structure, np.array([part[x] / PARTS for x in latencies]))
+        return FollowerRows(of)
+    return FollowerRows(of, np.array([part[x] / PARTS for x in latencies]))
 
 
 def _least(rows: FollowerRows, bounds: Sequence[np.ndarray]) -> np.ndarray | None:
@@ -532,9 +531,9 @@ def late_obligations(late: LateBounds | None) -> Iterator[Obligation]:
         yield Obligation("late-lmi", "messages.lmi", {"b": lmi.b}, matrix)
 
 
-def delays(messages: LateMessages, graph: SignedDigraph | None, leaders: MovingLeaders | None = None) -> Delays:
-    """Return how late, how often lost and how inexact messages are, as files have it; of a family without a graph."""
-    period, latency = messages.period, messages.largest_delay if graph is None else messages.latencies(graph)
+def delays(messages: LateMessages, of: SignedDigraph | Family, leaders: MovingLeaders | None = None) -> Delays:
+    """Return how late, how often lost and how inexact messages are, as files have it."""
+    period, latency = messages.period, messages.latencies(of)
     return Delays(
         latency=latency if isinstance(latency, Fraction) else Numbers(latency),
         packets=None if period is None else Packets(period=period, losses=Fraction(messages.losses)),
@@ -549,9 +548,9 @@ def delays(messages: LateMessages, graph: SignedDigraph | None, leaders: MovingL
 def messages_section(late: LateBounds) -> MessagesSection:
     """Return what is proved with late messages, as files have it."""
     proved: dict[str, Any] = {f.name: getattr(late, f.name) for f in declared(MessagesSection) if hasattr(late, f.name)}
-    graph = late.structure.graph if isinstance(late.structure, Structure) else None
+    of = late.structure.graph if isinstance(late.structure, Structure) else late.structure
     proved["vehicles"] = vehicles_section(late.vehicles)
-    return MessagesSection(**proved | vars(delays(late.messages, graph, late.leaders)))
+    return MessagesSection(**proved | vars(delays(late.messages, of, late.leaders)))
 
 
 def read_late(
@@ -624,10 +623,10 @@ def _read_settling(settling: SettlingSection | None, step: Any) -> Settling | No
 
 def read_messages(section: Delays, structure: Structure | Family, vehicles: Vehicles | None = None) -> LateMessages:
     """Return what a certificate says of how late messages are."""
-    packets, graph = section.packets, structure.graph
+    packets, of = section.packets, structure.graph if isinstance(structure, Structure) else structure
     latency: Any = section.latency
-    if isinstance(latency, Numbers) and graph is not None:
-        latency = {(s, t): x for (s, t, _), x in zip(graph.edges, latency, strict=True)}
+    if isinstance(latency, Numbers):
+        latency = dict(zip(pairs_of(of), latency, strict=True))
     return LateMessages(
         delay=latency,
         period=None if packets is None else packets.period,

@@ -26,7 +26,7 @@ from ptcc_certify.checker.sections import RowVector
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.structure import Structure
-from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness, UncertainRows
+from ptcc_certify.lyapunov.follower_rows import FollowerRows, RowWitness
 from ptcc_certify.model.base import Protocol
 from ptcc_certify.model.gain import Gain
 from ptcc_certify.model.moving_leaders import MovingLeaders
@@ -179,7 +179,7 @@ def bound_tracking(
     """
     if isinstance(structure, Structure):
         refuse_leader_groups(structure, "leaders that move as they like: a bound")
-    rows = UncertainRows(structure) if isinstance(structure, Family) else FollowerRows(structure)
+    rows = FollowerRows(structure)
     given = None if initial_state is None or ends is None else zip(initial_state, ends, strict=True)
     every = None if given is None else np.array([float_up(abs(x - mid) + radius) for x, (mid, radius) in given])
     first = np.ones(rows.D.size) if every is None else every[rows.followers]

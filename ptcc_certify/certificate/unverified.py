@@ -119,17 +119,18 @@ def write_unproved(content: Content | FamilyContent) -> dict[str, Any]:
         return {}
     asked: dict[str, Any] = {}
     if messages is not None:
-        graph = content.graph if isinstance(content, Content) else None
-        asked["messages"] = write(Delays, delays(messages, graph), Writer(content.labels))
+        of = content.graph if isinstance(content, Content) else content.family
+        asked["messages"] = write(Delays, delays(messages, of), Writer(content.labels))
         del asked["messages"]["leaders"]
     return asked if leaders is None else {**asked, "leaders": write(LeadersAsked, asked_leaders(leaders), Writer(()))}
 
 
 def read_unproved(document: Mapping[str, Any], structure: Structure | Family) -> dict[str, Any]:
     """Read what :func:`write_unproved` wrote, unless something of the kind is proved."""
-    asked, graph = document["unverified"].get("asked"), structure.graph
-    labels = graph.labels if graph is not None else structure.labels if isinstance(structure, Family) else ()
-    at = Context(SideFiles(Path(), {}), labels, edges=0 if graph is None else graph.n_edges)
+    asked = document["unverified"].get("asked")
+    of = structure if isinstance(structure, Family) else structure.graph
+    pairs = of.pairs[0].size if isinstance(of, Family) else of.n_edges
+    at = Context(SideFiles(Path(), {}), of.labels, edges=pairs)
     if not isinstance(asked, dict) or "messages" in document or "leaders" in document:
         return {}
     return {

@@ -26,7 +26,7 @@ from ptcc_certify.errors import Change, Sentence
 from ptcc_certify.graphs.size_limits import EXACT_NODES
 
 #: Steps of :func:`certify` without which there may be a rate; the time limit may end the others, which seek one.
-NO_SEARCHES = ("simulation", "upper bound on the decay rate", "exact final state")
+NO_SEARCHES = ("simulation", "upper bound on the decay rate", "exact final state", "final state")
 #: From so many decades between weights on, they are named as the reason that nothing was proved.
 MANY_DECADES = 8
 #: What to try where edges do not tell whether rest states agree.
@@ -114,6 +114,9 @@ def _next_step(certificate: Content, report: CheckReport | None) -> Sentence:
             return f"no rate is proved: a leader group of {most} nodes is too much; certify followers and leaders apart"
         mend = Change("method", "lmi") if n > EXACT_NODES else "rounding the weights to fewer digits"
         return "no rate is proved; try ", mend
+    if "final state" in certificate.cut_off:
+        share = f"the final state is not proved, it took its share of {certificate.time_limit:g} s; raise "
+        return share, Change("time_limit")
     return (
         "the final state is not proved, the equations are ill-conditioned: rescale weights that are far from the others"
     )

@@ -168,6 +168,13 @@ class Family:
     modes: list[Mode]
     components: list[Component]
 
+    @cached_property
+    def pairs(self) -> dict[tuple[int, int], int]:
+        """Places of the ordered pairs of edges of any mode, by source and target; sorted by target, then source."""
+        spend(8 * sum(len(mode.edges) for mode in self.modes), what="edges of all modes")
+        ends = sorted({(target, source) for mode in self.modes for source, target, *_ in mode.edges})
+        return {(source, target): place for place, (target, source) in enumerate(ends)}
+
     def component(self, number: int) -> Component:
         """Return the component of a number that a file tells."""
         need(0 <= number < len(self.components), "an unknown component")

@@ -109,6 +109,8 @@ def check_messages(doc: Document, of: Verified | Family, protocol: Protocol, beg
     """Verify everything that is said of late messages, if there is something."""
     if "messages" not in doc.data:
         return
+    if isinstance(of, Family):
+        doc.context.edges = len(of.pairs)
     section = doc.section("messages")
     need("leaders" not in doc.data, "leaders that move beside late messages stand under messages")
     need(begin.sigma is None or not any(begin.sigma.values), "late messages while sliding variables move")

@@ -31,7 +31,8 @@ from ptcc_certify.checker.reading import need
 from ptcc_certify.checker.side_files import Numbers
 from ptcc_certify.checker.structure import Structure
 
-#: Factors of ages: by edge the part of the largest age, and what each part multiplies; None where all ages are one.
+#: Factors of ages: by edge, or by ordered pair of an edge, the part of the largest age, and what each part multiplies;
+#: None where all ages are one.
 ByAge = tuple[Sequence[int], Mapping[int, int]] | None
 
 
@@ -65,6 +66,13 @@ class KnownWeights:
 class WeightsBetween:
     """Edges whose weights lie between two ends each, times a unit.
 
+    Attributes
+    ----------
+    edges : sequence of Edge
+    unit : int
+    family : Family, optional
+        Whose pairs have ages.
+
     Examples
     --------
     >>> rows = WeightsBetween([(0, 1, 1, 2, 3), (1, 2, -1, 1, 5)], 1)
@@ -74,6 +82,7 @@ class WeightsBetween:
 
     edges: Sequence[Edge]
     unit: int
+    family: Family | None = None
 
     @cached_property
     def bits(self) -> int:
@@ -82,10 +91,17 @@ class WeightsBetween:
 
     def least(self, own: Any, heard: Any, ages: ByAge = None) -> Any:
         """Return the least rows, times the unit; ``own`` and the rows are lists, or dicts by agent."""
-        need(ages is None, "ages of their own where weights are uncertain")
         rows = self._none(own, heard)
-        for s, t, _, low, high in self.edges:
-            factor = own[t] - heard[s]
+        if ages is None:
+            factors = (own[t] - heard[s] for s, t, *_ in self.edges)
+        else:
+            assert self.family is not None
+            parts, multiples, place = *ages, self.family.pairs
+            more, bits = longest(multiples.values()), longest(heard)
+            spend(4 * len(self.edges), self.bits + more, bits, "rows of followers")
+            sized(2 * len(own), self.bits + more + bits + 64, "rows of followers")
+            factors = (own[t] - multiples[parts[place[s, t]]] * heard[s] for s, t, *_ in self.edges)
+        for (_, t, _, low, high), factor in zip(self.edges, factors, strict=True):
             rows[t] += (high if factor < 0 else low) * factor
         return rows
 
@@ -336,5 +352,5 @@ def _followers_in_family(family: Family, begin: Begin) -> Followers:
             away |= {v: Fraction(abs(x), scale) for v, x in zip(nodes, xi, strict=True)}
     nodes = sorted(hearing)
     (values,), scale = integers([[away.get(v, Fraction(1)) for v in nodes]])
-    modes = [WeightsBetween(mode.edges, mode.unit) for mode in family.modes]
+    modes = [WeightsBetween(mode.edges, mode.unit, family) for mode in family.modes]
     return Followers(family.labels, nodes, modes, Numbers(values, scale))

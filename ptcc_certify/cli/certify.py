@@ -139,7 +139,7 @@ def _case_of(graph: str, signed: SignedDigraph, protocol: Protocol, options: sha
         agents, limits = (replace(agents, gain_cap=None), limits) if more else (agents, ())
         disturbance = disturbance if more or agents.of_paper else None
     refuse_unheard(signed, options)
-    messages, leaders = messages_of(graph, signed, options), leaders_of(options)
+    messages, leaders = messages_of((graph,), signed, options), leaders_of(options)
     if options["kind"] == "nominal":
         asks = replace(asks, noise=options["noise"], delta=options["delta"] if leaders is None else None)
     asks, initial = replace(asks, disturbance=disturbance), replace(initial, sigma0=sigma0)

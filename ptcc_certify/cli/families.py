@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path, PurePath
@@ -274,7 +274,9 @@ def certify_family(
     with progress(STEPS, screen.quiet) as begin:
         origins = {"graph": Path(name).name, "read": read, **random_states}
         asks = Asks(time_limit=options["time_limit"], expectations=expected)
-        beside: dict[str, Any] = {"messages": messages_of(graphs[0], family, options), "leaders": leaders_of(options)}
+        beside: dict[str, Any] = {"messages": messages_of(graphs, family, options), "leaders": leaders_of(options)}
+        if beside["messages"] is not None and isinstance(beside["messages"].delay, Mapping):
+            family = replace(family, notes=(f'delays of column "{options["delay"]}"', *family.notes))
         agents, begun = agents_and_states(options, family.modes[0].mandatory, certified=True)
         beginning = InitialState(x0, sigma0) if begun is None else replace(begun, sigma0=sigma0)
         case = Case(family, protocol, beginning, signal=signal, agents=agents, asks=asks, **beside)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from typing import TYPE_CHECKING
@@ -32,7 +32,7 @@ def asks_for_leaders(options: Options) -> bool:
     return bool(given_of(MovingLeaders, options))
 
 
-def messages_of(graph: str, signed: SignedDigraph | Family, options: Options) -> LateMessages | None:
+def messages_of(graphs: Sequence[str], signed: SignedDigraph | Family, options: Options) -> LateMessages | None:
     """Return how late messages are; None if nothing is asked of them."""
     if options["packet_loss"] and options["period"] is None:
         raise ParameterError("--packet-loss says nothing by itself; give --period, the time between two messages")
@@ -43,7 +43,7 @@ def messages_of(graph: str, signed: SignedDigraph | Family, options: Options) ->
     step = options["quantisation"]
     if step is not None and step < 0:
         raise ParameterError("--quantisation is outside its domain; a step must be >= 0")
-    delay = Fraction(0) if options["delay"] is None else _delay(graph, signed, options["delay"])
+    delay = Fraction(0) if options["delay"] is None else _delay(graphs, signed, options["delay"])
     if not (any(delay.values()) if isinstance(delay, dict) else delay) and options["period"] is None and not step:
         raise ParameterError(
             "messages are neither late, nor lost, nor rounded; give --delay, --period or --quantisation above 0"
@@ -87,8 +87,10 @@ def refuse_unheard(signed: SignedDigraph, options: Options) -> None:
         raise ParameterError(f"{flag_of(given)}: nobody listens to anybody; leave it out, or add edges")
 
 
-def _delay(graph: str, signed: SignedDigraph | Family, text: str) -> Fraction | dict[tuple[str, str], Fraction]:
-    """Return a delay, or those of a column."""
+def _delay(
+    graphs: Sequence[str], signed: SignedDigraph | Family, text: str
+) -> Fraction | dict[tuple[str, str], Fraction]:
+    """Return a delay, or those of a column: of several files the largest of every edge."""
     from ptcc_certify.graphs.digraph import SignedDigraph
     from ptcc_certify.graphs.io.edge_delays import read_delays
     from ptcc_certify.graphs.io.files import name_and_ending
@@ -103,15 +105,19 @@ def _delay(graph: str, signed: SignedDigraph | Family, text: str) -> Fraction | 
             raise ParameterError(
                 f"--delay: {error}; give a number in your unit of time, or the name of a column"
             ) from None
-    if not isinstance(signed, SignedDigraph):
-        raise ParameterError("--delay: edge by edge is not proved of families yet; give one number for all")
-    if graph == "-":
-        raise ParameterError("--delay names a column, but standard input is read once; save the edge list to a file")
-    if (ending := name_and_ending(graph)[1]) in OTHER_FORMATS:
-        mend = "save it as one, or give one delay for all"
-        raise ParameterError(f"--delay {text}: names a column of an edge list, and .{ending} is none; {mend}")
-    delays = read_delays(graph_file(graph), signed, text)
-    signed.read["notes"] = (f'delays of column "{text}"', *_without(signed.read["notes"], text))
+    delays: dict[tuple[str, str], Fraction] = {}
+    for graph in graphs:
+        if graph == "-":
+            raise ParameterError(
+                "--delay names a column, but standard input is read once; save the edge list to a file"
+            )
+        if (ending := name_and_ending(graph)[1]) in OTHER_FORMATS:
+            mend = "save it as one, or give one delay for all"
+            raise ParameterError(f"--delay {text}: names a column of an edge list, and .{ending} is none; {mend}")
+        for pair, delay in read_delays(graph_file(graph), signed, text).items():
+            delays[pair] = max(delay, delays.get(pair, delay))
+    if isinstance(signed, SignedDigraph):
+        signed.read["notes"] = (f'delays of column "{text}"', *_without(signed.read["notes"], text))
     return delays
 
 

@@ -189,7 +189,7 @@ def _run_beside(
     graph: str, signed: SignedDigraph, protocol: Protocol, options: shared.Options, places: Sequence[Fraction] | None
 ) -> Trajectory | None:
     """Return the run with late messages or leaders that move; None if nothing is asked of them."""
-    messages, leaders = messages_of(graph, signed, options), leaders_of(options)
+    messages, leaders = messages_of((graph,), signed, options), leaders_of(options)
     if messages is None and leaders is None:
         return None
     source = click.get_current_context().get_parameter_source

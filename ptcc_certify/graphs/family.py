@@ -264,6 +264,20 @@ class Family(Shown):
         target, source = np.divmod(pair, n)
         return source, target, (2 * positive - 1).astype(np.int8)
 
+    @cached_property
+    def pairs(self) -> tuple[np.ndarray, np.ndarray]:
+        """Source and target of all edges, each ordered pair once, by target, then source: of a graph its edges.
+
+        Examples
+        --------
+        >>> [ends.tolist() for ends in Family.from_intervals([("a", "b", -1, 2), ("b", "c", 1, 1)]).pairs]
+        [[0, 1], [1, 2]]
+        """
+        source, target, _ = self.union
+        new = np.ones(source.size, dtype=bool)
+        new[1:] = (source[1:] != source[:-1]) | (target[1:] != target[:-1])
+        return source[new], target[new]
+
     def restricted(self, nodes: np.ndarray) -> Family:
         """Return the family on the nodes ``nodes`` (indices, ascending) and the edges among them."""
         return Family(tuple(mode.restricted(nodes) for mode in self.modes), self.notes)
@@ -614,3 +628,15 @@ def _in_order(mode: Mode, labels: tuple[str, ...], name: str, first: str) -> Mod
     order = np.lexsort((mode.sign, source, target))
     lower, upper = mode.lower.take(order), mode.upper.take(order)
     return Mode(labels, source[order], target[order], mode.sign[order], lower, upper, mode.name or name, mode.tied)
+
+
+def pairs_of(of: SignedDigraph | Family) -> list[tuple[str, str]]:
+    """Return source and target of all edges by label, each ordered pair once, by target, then source, as nodes are.
+
+    Examples
+    --------
+    >>> pairs_of(SignedDigraph.from_edges([("a", "c", 1), ("a", "b", 1)], nodes="abc"))
+    [('a', 'b'), ('a', 'c')]
+    """
+    source, target = of.pairs if isinstance(of, Family) else (of.source, of.target)
+    return [(of.labels[s], of.labels[t]) for s, t in zip(source.tolist(), target.tolist(), strict=True)]

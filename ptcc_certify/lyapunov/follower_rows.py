@@ -29,7 +29,7 @@ from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import shorten
 from ptcc_certify.graphs.structure import Structure
 from ptcc_certify.lyapunov.dominance import round_array
-from ptcc_certify.lyapunov.interval_rows import IntervalRows
+from ptcc_certify.lyapunov.interval_rows import IntervalRows, Policy
 from ptcc_certify.model.refusals import refuse_leader_groups
 from ptcc_certify.theorems.family_behaviour import decide
 
@@ -67,27 +67,30 @@ class RowWitness:
 
 
 class FollowerRows:
-    """The followers of a graph all of whose leaders are single nodes.
+    """The agents that hear others, if all others are leaders that rest or move as they like; of a graph or a family.
 
     Parameters
     ----------
-    structure : Structure
-    shares : (E,) array, optional
-        By edge, how old is what is heard over it in terms of the oldest: ``q`` has this power there. All 1 by default.
+    of : Structure or Family
+    shares : (P,) array, optional
+        By ordered pair of an edge, as :func:`ptcc_certify.graphs.family.Family.pairs` has them, how old is what is
+        heard over it in terms of the oldest: ``q`` has this power there. All 1 by default.
 
     Attributes
     ----------
     followers : (F,) int array
         Their nodes.
+    n_nodes : int
+        Number of agents.
     D : (F,) array
-        Their in-weights.
+        Their in-weights, in the member whose rows were the worst at last.
     W : (F, F) sparse array
-        ``|W_F|``: listeners are rows.
+        ``|W_F|`` of this member: listeners are rows.
 
     Raises
     ------
     HypothesisError
-        A leader belongs to a group, or nobody listens to anybody.
+        Nobody listens to anybody, a leader belongs to a group, or where followers are drawn to depends on the signal.
 
     Examples
     --------
@@ -95,53 +98,53 @@ class FollowerRows:
     >>> witness = chain.witness(Fraction(5, 4))
     >>> round(float(witness.b), 3), chain.largest_q() > 1.4
     (0.154, True)
+    >>> from ptcc_certify.graphs.family import Family
+    >>> unsure = FollowerRows(Family.from_intervals([(1, 2, 1, 2), (2, 3, 1, 2), (3, 2, "0.5", 1)]))
+    >>> round(float(unsure.witness(Fraction(5, 4)).b), 3)
+    0.154
     """
 
-    def __init__(self, structure: Structure, shares: np.ndarray | None = None):
-        refuse_leader_groups(structure, "a bound row by row")
-        if not structure.followers.size:
+    def __init__(self, of: Structure | Family, shares: np.ndarray | None = None):
+        if isinstance(of, Structure):
+            refuse_leader_groups(of, "a bound row by row")
+            self.structure, family, self.followers = of, Family.from_graph(of.graph), of.followers
+        else:
+            family, self.followers = of, listeners(of)
+        if not self.followers.size:
             raise HypothesisError("nobody listens to anybody, so there is nothing that could be late; add edges")
-        graph = structure.graph
-        self.structure, self.followers = structure, structure.followers
-        self.D = graph.in_weight()[self.followers]
-        self.W: Any = abs(graph.adjacency()[self.followers][:, self.followers]).tocsr()
-        self.shares: np.ndarray | None = None
-        if shares is not None:
-            # one more, so that no entry is 0, in the order of those of W
-            ages = _entries(graph, 1.0 + shares)[self.followers][:, self.followers].tocsr()
-            self.W.sort_indices()
-            ages.sort_indices()
-            self.shares = ages.data - 1.0
+        if isinstance(of, Family):
+            refuse_other_targets(family)
+        self.n_nodes = family.n_nodes
+        self.intervals = IntervalRows.of(family.modes, self.followers)
+        self._known = family.graph is not None
+        self.shares = None if shares is None else self.intervals.by_pair(family, self.followers, shares)
         self._smallest: dict[Fraction, float] = {}
+        self._policy: Policy | None = None
+        self._take(np.ones(self.followers.size), 1.0)
 
     @property
     def least_share(self) -> Fraction:
-        """The least positive share of an edge between followers; 1 if there is none."""
+        """The least positive share of an edge; 1 if there is none."""
         positive = np.ones(0) if self.shares is None else self.shares[self.shares > 0]
         return Fraction(float(positive.min(initial=1.0)))
 
     def heard(self, q: float) -> Any:
-        """Return ``|W_F|`` times ``q``, to the power of the share of every edge."""
+        """Return ``|W_F|`` of the member at hand times ``q``, to the power of the share of every edge."""
         if self.shares is None:
             return q * self.W
-        heard = self.W.copy()
-        heard.data = heard.data * q**self.shares
-        return heard
+        target, source, weights, shares = self._edges
+        return _csr(target, source, weights * q**shares, self.D.size)
 
     def by_age(self) -> dict[float, Any]:
-        """Return ``|W_F|`` in parts, edges of one share each."""
+        """Return ``|W_F|`` of the member at hand in parts, edges of one share each."""
         if self.shares is None:
             return {1.0: self.W}
-        parts = {}
-        for share in np.unique(self.shares):
-            part = self.W.copy()
-            part.data = np.where(self.shares == share, part.data, 0.0)
-            part.eliminate_zeros()
-            parts[float(share)] = part
-        return parts
+        target, source, weights, shares = self._edges
+        ages = ((float(x), shares == x) for x in np.unique(shares))
+        return {x: _csr(target[on], source[on], weights[on], self.D.size) for x, on in ages}
 
     def share(self, u: np.ndarray) -> np.ndarray:
-        """Return ``(|W_F| u)_k / (D_k u_k)`` for every follower."""
+        """Return ``(|W_F| u)_k / (D_k u_k)`` for every follower, in the member at hand."""
         return (self.W @ u) / (self.D * u)
 
     def largest_q(self) -> float:
@@ -158,7 +161,7 @@ class FollowerRows:
 
     def _largest_power(self, q: float, u: np.ndarray) -> float:
         """Return a larger ``q`` than one that serves if all edges have share 1, where some have less."""
-        positive = self.shares[self.shares > 0] if self.shares is not None else np.ones(0)
+        positive = self._edges[3][self._edges[3] > 0]
         if not positive.size:
             return math.inf
         low, high = math.log(max(q, 1.0)), min(math.log(max(q, 1.0)) / float(positive.min()), math.log(_LARGEST))
@@ -171,10 +174,6 @@ class FollowerRows:
             low, high = (middle, high) if ((heard @ u) / (self.D * u)).max() < 1 else (low, middle)
         return math.exp(low)
 
-    def decay(self, witness: RowWitness, q: float) -> float:
-        """Return the ``b`` that the ``u`` of a witness proves with another ``q``, in floats."""
-        return float((self.D - (self.heard(q) @ witness.u) / witness.u).min())
-
     def witness(self, q: Fraction, loss: float = 0.01) -> RowWitness:
         """Return a witness whose ``b`` is about ``1 - loss`` of the largest for this ``q``.
 
@@ -186,15 +185,18 @@ class FollowerRows:
         return self.rounded(q, self._vector(q, loss))
 
     def _vector(self, q: Fraction, loss: float) -> np.ndarray:
-        """Return ``u`` of the member at hand, in floats."""
-        A = SparseHMatrix(_with_diagonal(self.D, self.heard(float(q))))
-        if q not in self._smallest:
-            self._smallest[q] = A.smallest() if self.D.size <= DIRECT_ROWS else self._roughly_smallest(A)
-        t, ones = self._smallest[q] * (1 - loss), np.ones(self.D.size)
-        shifted = A.M - t * _identity(ones.size)
-        u = solve(shifted, ones, np.maximum(self.D - t, self.D * 1e-3), _LOOSE / math.sqrt(ones.size))
-        if not (np.isfinite(u).all() and u.min() > 1e-280 * u.max()):
-            raise NoCertificate(f"no positive vector for q = {float(q):.6g}")
+        """Return ``u`` in floats: that of one member after the other, each the worst for the last, until it stands."""
+        for _ in range(_POLICIES):
+            A = SparseHMatrix(_with_diagonal(self.D, self.heard(float(q))))
+            if q not in self._smallest:
+                self._smallest[q] = A.smallest() if self.D.size <= DIRECT_ROWS else self._roughly_smallest(A)
+            t, ones = self._smallest[q] * (1 - loss), np.ones(self.D.size)
+            shifted = A.M - t * _identity(ones.size)
+            u = solve(shifted, ones, np.maximum(self.D - t, self.D * 1e-3), _LOOSE / math.sqrt(ones.size))
+            if not (np.isfinite(u).all() and u.min() > 1e-280 * u.max()):
+                raise NoCertificate(f"no positive vector for q = {float(q):.6g}")
+            if not self._take(u, float(q)):
+                break
         return np.asarray(u)
 
     def _roughly_smallest(self, A: SparseHMatrix) -> float:
@@ -218,83 +220,17 @@ class FollowerRows:
             It is not positive.
         """
         u = round_array(u / u.max())
-        b = self._proved(u, float(q))
+        lost = self.weights + float(q) * self.intervals.largest_pushes(self._all(u)).max(axis=0) / u
+        b = float((self._least(u, float(q)) / u - _ROUNDING * lost).min())
         if not b > 0:
             raise NoCertificate(f"no positive b for q = {float(q):.6g}")
         return RowWitness(q, Fraction(round_to_bits(b * (1 - _SLACK), 53)), u)
 
-    def _proved(self, u: np.ndarray, q: float) -> float:
-        """Return the largest ``b`` that leaves room for the rounding of floats."""
-        pushed = (self.heard(q) @ u) / u
-        return float((self.D - pushed - _ROUNDING * (self.D + pushed)).min())
-
     # ------------------------------------------------------------------ over all members
 
-    @property
-    def n_nodes(self) -> int:
-        """Number of agents."""
-        return self.structure.graph.n_nodes
-
-    @property
-    def weights(self) -> np.ndarray:
-        """``D`` at most."""
-        return self.D
-
-    def slack(self, u: np.ndarray) -> np.ndarray:
-        """Return ``D_k u_k - sum_l |w_kl| u_l`` of every follower, at least."""
-        return np.asarray(self.D * u - self.W @ u)
-
-    def floor(self, u: np.ndarray, error: float) -> float:
-        """Return about the least ``f`` with ``sum_l |w_kl| (f (u_k - u_l) - error) >= 0`` for every follower."""
-        return float((self.D / self.slack(u)).max()) * error
-
-    def kept_off(self, error: float) -> np.ndarray:
-        """Return what every ``y`` exceeds with ``D_k y_k - sum_l |w_kl| y_l >= error D_k`` for every follower."""
-        y = np.zeros(self.D.size)
-        for _ in range(_ITERATIONS):
-            y = (self.W @ y) / self.D + error
-        return y
-
-    def largest(self, u: np.ndarray) -> np.ndarray:
-        """Return ``D_k u_k + sum_l |w_kl| u_l`` of every follower, at most."""
-        return np.asarray(self.D * u + self.W @ u)
-
-
-class UncertainRows(FollowerRows):
-    """The agents that hear others in some mode of a family, if all others are leaders that rest or move as they like.
-
-    ``D`` and ``W`` are those of the member whose rows were the worst at last.
-
-    Parameters
-    ----------
-    family : Family
-
-    Raises
-    ------
-    HypothesisError
-        Nobody listens to anybody, or where followers are drawn to depends on the signal, or leaders hear each other.
-
-    Examples
-    --------
-    >>> from ptcc_certify.graphs.family import Family
-    >>> rows = UncertainRows(Family.from_intervals([(1, 2, 1, 2), (2, 3, 1, 2), (3, 2, "0.5", 1)]))
-    >>> round(float(rows.witness(Fraction(5, 4)).b), 3)
-    0.154
-    """
-
-    def __init__(self, family: Family):
-        self.followers = listeners(family)
-        self.shares, self._smallest = None, {}
-        if not self.followers.size:
-            raise HypothesisError("nobody listens to anybody, so there is nothing that could be late; add edges")
-        refuse_other_targets(family)
-        self.family, self.intervals = family, IntervalRows.of(family.modes, self.followers)
-        self._take(np.ones(self.followers.size), 1.0)
-
-    @property
-    def n_nodes(self) -> int:
-        """Number of agents."""
-        return self.family.n_nodes
+    def decay(self, witness: RowWitness, q: float) -> float:
+        """Return the ``b`` that the ``u`` of a witness proves with another ``q``, in floats."""
+        return float((self._least(witness.u, q) / witness.u).min())
 
     @cached_property
     def weights(self) -> np.ndarray:
@@ -312,51 +248,55 @@ class UncertainRows(FollowerRows):
         Halved towards it: at the largest weights of the least rows all are known to hold.
         """
         low, high = error, float((self.weights / self.slack(u)).max()) * error
-        for _ in range(_FLOORS):
+        for _ in range(0 if self._known else _FLOORS):
             middle = (low + high) / 2
             holds = bool((self.intervals.pull(self._all(middle * u), less=error) >= 0).all())
             low, high = (low, middle) if holds else (middle, high)
         return high
 
     def kept_off(self, error: float) -> np.ndarray:
-        """Return what every such ``y`` exceeds, by the member that decays the least."""
-        with suppress(LMIError):  # any member serves
-            self._vector(Fraction(1), 0.01)
-        return super().kept_off(error)
+        """Return what every ``y`` exceeds with ``D_k y_k - sum_l |w_kl| y_l >= error D_k`` for every follower.
+
+        By the member that decays the least; any serves.
+        """
+        if not self._known:
+            with suppress(LMIError):
+                self._vector(Fraction(1), 0.01)
+        y = np.zeros(self.D.size)
+        for _ in range(_ITERATIONS):
+            y = (self.W @ y) / self.D + error
+        return y
 
     def largest(self, u: np.ndarray) -> np.ndarray:
         """Return ``sum_l |w_kl| (u_k + u_l)`` of every follower, at most."""
         return np.asarray(self.weights * u + self.intervals.largest_pushes(self._all(u)).max(axis=0))
 
-    def decay(self, witness: RowWitness, q: float) -> float:
-        """Return the ``b`` that the ``u`` of a witness proves with another ``q``, in floats."""
-        return float((self.intervals.pull(self._all(witness.u), q).min(axis=0) / witness.u).min())
+    def _least(self, u: np.ndarray, q: float) -> np.ndarray:
+        """Return ``sum_l |w_kl| (u_k - q^share u_l)`` of every follower, at least."""
+        return np.asarray(self.intervals.pull(self._all(u), self._times(q)).min(axis=0))
 
-    def _vector(self, q: Fraction, loss: float) -> np.ndarray:
-        for _ in range(_POLICIES):
-            self._smallest.clear()
-            u = super()._vector(q, loss)
-            if not self._take(u, float(q)):
-                break
-        return u
-
-    def _proved(self, u: np.ndarray, q: float) -> float:
-        lost = _ROUNDING * (self.weights + q * self.intervals.largest_pushes(self._all(u)).max(axis=0) / u)
-        return float((self.intervals.pull(self._all(u), q).min(axis=0) / u - lost).min())
+    def _times(self, q: float) -> Any:
+        """Return ``q`` to the power of the share of every edge."""
+        return q if self.shares is None else q**self.shares
 
     def _all(self, u: np.ndarray) -> np.ndarray:
         return np.concatenate([u, np.zeros(self.intervals.outside)])
 
     def _take(self, u: np.ndarray, q: float) -> bool:
         """Take the member whose rows are the worst for ``u``; tell whether it is another."""
-        from scipy import sparse
-
-        policy = self.intervals.worst(self._all(u), q)
-        if policy == getattr(self, "_policy", None):
+        if self._known and self._policy is not None:
             return False
-        self._policy, (M, _) = policy, self.intervals.system(policy)
-        self.D = M.diagonal()
-        self.W = sparse.csr_array(sparse.diags_array(self.D) - M)
+        policy = self.intervals.worst(self._all(u), self._times(q))
+        if policy == self._policy:
+            return False
+        self._policy = policy
+        self._smallest.clear()
+        target, source, weights, edge = self.intervals.edges_of(policy)
+        self.D = np.bincount(target, weights, self.followers.size).astype(float)
+        inside = source < self.followers.size
+        shares = np.ones(edge.size) if self.shares is None else self.shares[edge]
+        self._edges = target[inside], source[inside], weights[inside], shares[inside]
+        self.W: Any = _csr(*self._edges[:3], self.D.size)
         return True
 
 
@@ -390,11 +330,10 @@ def refuse_other_targets(family: Family) -> None:
             )
 
 
-def _entries(graph: Any, values: np.ndarray) -> Any:
+def _csr(target: np.ndarray, source: np.ndarray, weights: np.ndarray, n: int) -> Any:
     from scipy import sparse
 
-    n = graph.n_nodes
-    return sparse.csr_array((values, (graph.target, graph.source)), shape=(n, n))
+    return sparse.csr_array((weights, (target, source)), shape=(n, n))
 
 
 def _with_diagonal(D: np.ndarray, W: Any) -> Any:

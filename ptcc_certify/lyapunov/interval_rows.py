@@ -22,7 +22,7 @@ import numpy as np
 
 from lmi.dyadic import dyadic_array
 from lmi.exact.fast import INT64_SAFE
-from ptcc_certify.graphs.family import Mode
+from ptcc_certify.graphs.family import Family, Mode
 from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.weights import Weights
 
@@ -134,14 +134,23 @@ class IntervalRows:
 
     # ------------------------------------------------------------------ rows
 
-    def pull(self, values: np.ndarray, times: float = 1.0, less: float = 0.0) -> np.ndarray:
+    def by_pair(self, family: Family, nodes: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """Return of every edge what belongs to its ends; ``nodes`` are the block, values in the order of pairs."""
+        n = family.n_nodes
+        node = np.concatenate([nodes, np.setdiff1d(np.arange(n), nodes)])
+        source, target = family.pairs
+        return values[np.searchsorted(target * n + source, node[self.target] * n + node[self.source])]
+
+    def pull(self, values: np.ndarray, times: float | np.ndarray = 1.0, less: float = 0.0) -> np.ndarray:
         """Return the least ``sum_l |w_kl| (y_k - times y_l - less)`` of every row, in every mode.
 
         Parameters
         ----------
         values : (n + outside,) array
             ``y``. Of integers everything is exact, in units of ``unit``; of floats nothing is, and the unit is 1.
-        times, less : float
+        times : float or (m,) array
+            Of floats; by edge.
+        less : float
             Of floats.
 
         Returns
@@ -196,19 +205,23 @@ class IntervalRows:
 
     # ------------------------------------------------------------------ policies
 
-    def worst(self, values: np.ndarray, times: float = 1.0) -> Policy:
+    def worst(self, values: np.ndarray, times: float | np.ndarray = 1.0) -> Policy:
         """Return the choice of the least pull of every row, in floats."""
         mode = self.pull(values.astype(float), times).argmin(axis=0)
         return Policy(mode, times * values[self.source] > values[self.target])
+
+    def edges_of(self, policy: Policy) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return targets, sources, weights in floats and places of the edges that a policy has, of weight 0 none."""
+        low, high = self._floats
+        weights = np.where(policy.largest, high, low)
+        on = np.flatnonzero((self.mode == policy.mode[self.target]) & (weights > 0))
+        return self.target[on], self.source[on], weights[on], on
 
     def system(self, policy: Policy) -> tuple[Any, Any]:
         """Return ``M`` (n, n) and ``N`` (n, outside), in floats: ``M y - N z`` are the rows under a policy."""
         from scipy import sparse
 
-        low, high = self._floats
-        weights = np.where(policy.largest, high, low)
-        on = (self.mode == policy.mode[self.target]) & (weights > 0)
-        target, source, weights = self.target[on], self.source[on], weights[on]
+        target, source, weights, _ = self.edges_of(policy)
         inside = source < self.n
         diagonal = np.bincount(target, weights, self.n).astype(float)  # of no edges they are integers
         M = sparse.csr_array(

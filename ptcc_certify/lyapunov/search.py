@@ -230,7 +230,9 @@ def search_large(structure: Structure, method: str, clocks: Sequence[float]) -> 
 
 
 def choose(candidates: Sequence[Candidate], clocks: Sequence[float]) -> list[Candidate]:
-    """Return the fastest candidate that is useful, the best at each clock value, and the fastest diagonal one.
+    """Return the fastest candidate that is useful, the best at each clock value, and the fastest diagonal ones.
+
+    The diagonal ones are that of the largest rate at any overshoot constant, and the fastest useful one.
 
     Besides, unless one of these is nearly as early, the one that first leaves a hundredth of the error.
 
@@ -246,8 +248,7 @@ def choose(candidates: Sequence[Candidate], clocks: Sequence[float]) -> list[Can
     selection = [_fastest(useful) if useful else min(candidates, key=lambda c: c.condition)]
     selection += [min(candidates, key=lambda c, s=s: c.log_bound(s)) for s in clocks]  # type: ignore[misc]
     diagonal = [c for c in candidates if c.kind in DIAGONAL]
-    if diagonal:
-        selection.append(_fastest(diagonal))
+    selection += [_fastest(some) for some in (diagonal, [c for c in diagonal if c in useful]) if some]
     if decaying := [c for c in candidates if c.rate > 0]:
         first = min(decaying, key=_useful_from)
         if all(c.rate <= 0 or _useful_from(c) > _LATE * _useful_from(first) for c in selection):

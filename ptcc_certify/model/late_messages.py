@@ -21,6 +21,7 @@ from ptcc_certify.model.parameters import Given, NotNegative, parameter, readabl
 
 if TYPE_CHECKING:
     from ptcc_certify.graphs.digraph import SignedDigraph
+    from ptcc_certify.graphs.family import Family
     from ptcc_certify.graphs.structure import Structure
     from ptcc_certify.model.vehicles import Vehicles
 
@@ -111,7 +112,7 @@ lambda of L, or measure the own state without delay
     )
     gain_cap: Given = Given()
     vehicles: Vehicles | None = None
-    _of_graph: tuple[SignedDigraph, tuple[Fraction, ...]] | None = field(
+    _of_graph: tuple[SignedDigraph | Family, tuple[Fraction, ...]] | None = field(
         default=None, init=False, repr=False, compare=False
     )
 
@@ -166,12 +167,13 @@ lambda of L, or measure the own state without delay
         """Whether nothing is late, lost or rounded."""
         return not self.age and not self.value_error
 
-    def latencies(self, graph: SignedDigraph) -> Fraction | tuple[Fraction, ...]:
-        """Return what messages take: one number, or one for every edge of a graph, in the order of its edges.
+    def latencies(self, of: SignedDigraph | Family) -> Fraction | tuple[Fraction, ...]:
+        """Return what messages take: one number, or one for every ordered pair of an edge, in the order of these.
 
         Parameters
         ----------
-        graph : SignedDigraph
+        of : SignedDigraph or Family
+            See :func:`ptcc_certify.graphs.family.pairs_of`.
 
         Raises
         ------
@@ -180,8 +182,8 @@ lambda of L, or measure the own state without delay
         """
         if not isinstance(self.delay, Mapping):
             return Fraction(self.delay)
-        if self._of_graph is None or self._of_graph[0] is not graph:
-            object.__setattr__(self, "_of_graph", (graph, self._by_edge(graph)))
+        if self._of_graph is None or self._of_graph[0] is not of:
+            object.__setattr__(self, "_of_graph", (of, self._by_edge(of)))
         return self._of_graph[1]  # type: ignore[index]
 
     def leaders_hear_at_once(self, structure: Structure) -> bool:
@@ -203,10 +205,12 @@ lambda of L, or measure the own state without delay
         each = latencies if isinstance(latencies, tuple) else (latencies,) * structure.graph.n_edges
         return not any(x for x, v in zip(each, structure.graph.target.tolist(), strict=True) if v not in followers)
 
-    def _by_edge(self, graph: SignedDigraph) -> tuple[Fraction, ...]:
+    def _by_edge(self, of: SignedDigraph | Family) -> tuple[Fraction, ...]:
+        from ptcc_certify.graphs.family import pairs_of  # which loads NumPy
+
         assert isinstance(self.delay, Mapping)
         given: dict[tuple[str, str], Any] = {(str(s), str(t)): x for (s, t), x in self.delay.items()}
-        none, found = Fraction(0), [given.pop(edge[:2], None) for edge in graph.edges]
+        none, found = Fraction(0), [given.pop(pair, None) for pair in pairs_of(of)]
         for source, target in given:
             raise ParameterError(
                 f"a delay of {shorten(source)} -> {shorten(target)}, but the graph has no such edge; "

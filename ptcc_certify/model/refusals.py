@@ -84,11 +84,8 @@ def refuse_of_families(case: Case) -> None:
     if given:
         raise ParameterError(given[0], "is not for families of graphs yet; leave it out, or certify one graph")
     _refuse_beside_any_graph(case)
-    if case.messages is not None:
-        if isinstance(case.messages.delay, Mapping):
-            raise ParameterError("delay", "edge by edge is not proved of families yet; give one for all")
-        if case.messages.own_delay:
-            raise ParameterError("own_delay", "an own state that is late is not proved of families yet; leave it out")
+    if case.messages is not None and case.messages.own_delay:
+        raise ParameterError("own_delay", "an own state that is late is not proved of families yet; leave it out")
 
 
 def refuse_agents(case: Case) -> None:

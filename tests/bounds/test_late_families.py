@@ -19,9 +19,9 @@ from ptcc_certify.checker import check
 from ptcc_certify.checker.reading import digest
 from ptcc_certify.errors import HypothesisError, ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
-from ptcc_certify.graphs.family import Family
+from ptcc_certify.graphs.family import Family, pairs_of
 from ptcc_certify.graphs.structure import analyse
-from ptcc_certify.lyapunov.follower_rows import FollowerRows, UncertainRows
+from ptcc_certify.lyapunov.follower_rows import FollowerRows
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.model.asks import Asks, Expectations
 from ptcc_certify.model.late_messages import LateMessages
@@ -48,6 +48,17 @@ def targets_of(family: Family, followers: np.ndarray) -> np.ndarray:
     return R
 
 
+def ages_of(family: Family, messages: LateMessages | None) -> dict[tuple[int, int], float]:
+    """How old what is heard may be, by source and target."""
+    source, target = (ends.tolist() for ends in family.pairs)
+    pairs = list(zip(source, target, strict=True))
+    if messages is None:
+        return dict.fromkeys(pairs, 0.0)
+    each = messages.latencies(family)
+    each = each if isinstance(each, tuple) else (each,) * len(pairs)
+    return {pair: float(x + messages.held) for pair, x in zip(pairs, each, strict=True)}
+
+
 def worst_ratio(certificate: FamilyCertificate, rng: np.random.Generator) -> tuple[float, float]:
     """Seen over certified, distance to the target and input, of a motion that is chosen against the followers.
 
@@ -56,12 +67,13 @@ def worst_ratio(certificate: FamilyCertificate, rng: np.random.Generator) -> tup
     """
     family, late, tracking = certificate.family, certificate.late, certificate.tracking
     messages = None if late is None else late.messages
+    ages = ages_of(family, messages)
     leaders = certificate.asked_leaders
     gain = certificate.protocol.gain if late is None else late.gain
     T, delay = float(certificate.protocol.T), 0.0 if messages is None else float(messages.age)
     error = 0.0 if messages is None else float(messages.value_error)
     speed, pushed = (0.0, 0.0) if leaders is None else (float(leaders.speed), float(leaders.disturbance))
-    followers = UncertainRows(family).followers
+    followers = FollowerRows(family).followers
     R, moving = targets_of(family, followers), np.setdiff1d(np.arange(family.n_nodes), followers)
     modes = [
         [
@@ -85,8 +97,10 @@ def worst_ratio(certificate: FamilyCertificate, rng: np.random.Generator) -> tup
         off = x[followers] - R @ x
         side = np.where(off == 0, rng.choice([-1.0, 1.0], off.size), np.sign(off))
         sides = dict(zip(followers.tolist(), side.tolist(), strict=True))
-        oldest = max(delay - (after - t), 0.0) if delay else 0.0
-        past = [y for when, y in history if when >= t - oldest - 1e-15] or [x]
+        past = {
+            pair: [y for when, y in history if when >= t - max(age - (after - t), 0.0) - 1e-15] or [x]
+            for pair, age in ages.items()
+        }
         worst = int(np.argmax(np.abs(off) / bounds[:, j]))
         rows = [_rows(edges, sides, x, past, error) for edges in modes]
         outwards = [side[worst] * (heard - D * x)[followers[worst]] for D, heard in rows]
@@ -122,7 +136,7 @@ def _fresh_step(
     """Return the state after a step in which nothing is late: Runge and Kutta's, the mode and all pushes held."""
 
     def slope(t: float, y: np.ndarray) -> np.ndarray:
-        D, heard = _rows(edges, sides, y, [y], 0.0)
+        D, heard = _rows(edges, sides, y, {edge[:2]: [y] for edge in edges}, 0.0)
         gain = float(certificate.protocol.gain.value_at_remaining(1 - t / float(certificate.protocol.T)))
         return np.asarray(pace + gain * (heard - D * y))
 
@@ -140,20 +154,20 @@ def _rows(
     edges: list[tuple[int, int, int, float, float]],
     sides: dict[int, float],
     x: np.ndarray,
-    past: list[np.ndarray],
+    past: dict[tuple[int, int], list[np.ndarray]],
     error: float,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return ``D`` and what is heard, with the ages, errors and weights that drive every follower farthest off."""
     D, heard = np.zeros(x.size), np.zeros(x.size)
     for source, v, sign, low, high in edges:
-        value = max(sign * sides[v] * y[source] for y in past) + error
+        value = max(sign * sides[v] * y[source] for y in past[source, v]) + error
         weight = high if value > sides[v] * x[v] else low
         D[v] += weight
         heard[v] += weight * sides[v] * value
     return D, heard
 
 
-def random_case(seed: int) -> FamilyCertificate:
+def random_case(seed: int, by_edge: bool = False) -> FamilyCertificate:
     rng = np.random.default_rng(seed)
     family = led_family(rng, 1 + seed % 3, 2 + seed % 5, 1 + seed % 3, common=seed % 3 == 1)
     x0 = [int(x) for x in rng.integers(-9, 10, family.n_nodes)]
@@ -162,14 +176,19 @@ def random_case(seed: int) -> FamilyCertificate:
     if seed % 4:
         error = Fraction(1, 10) if seed % 5 == 0 else 0
         asked["messages"] = LateMessages(Fraction(int(rng.integers(1, 40)), 1000), value_error=error, gain_cap=cap)
+    if by_edge:
+        delay = Fraction(int(rng.integers(5, 60)), 1000)
+        each = {pair: delay * Fraction(int(rng.integers(0, 5)), 4) for pair in pairs_of(family)}
+        asked["messages"] = LateMessages({**each, pairs_of(family)[0]: delay}, gain_cap=cap)
     if seed % 4 in (0, 3):
         asked["leaders"] = MovingLeaders(speed="0.5", disturbance=Fraction(seed % 2))
     return certify(family, PROTOCOL, x0, **asked)  # type: ignore[no-any-return]
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_no_adversary_leaves_more_than_is_certified(seed: int):
-    certificate = random_case(seed)
+@pytest.mark.parametrize("by_edge", [False, True], ids=["one delay", "edge by edge"])
+def test_no_adversary_leaves_more_than_is_certified(by_edge: bool, seed: int):
+    certificate = random_case(seed, by_edge)
     assert certificate.verdict == "certified", certificate.checked
     late, rng = certificate.late, np.random.default_rng(seed)
     if late is not None and not late.says_something:
@@ -181,13 +200,13 @@ def test_no_adversary_leaves_more_than_is_certified(seed: int):
 
 def test_known_weights_in_one_mode_are_bounded_as_those_of_a_graph():
     graph = SignedDigraph.from_edges([(1, 2, 1), (2, 3, -2), (3, 2, "-0.5"), (1, 3, -1)])
-    ours, plain = UncertainRows(Family.from_graph(graph)), FollowerRows(analyse(graph))
+    ours, plain = FollowerRows(Family.from_graph(graph)), FollowerRows(analyse(graph))
     for q in (Fraction(1), Fraction(5, 4)):
         assert float(ours.witness(q).b) == pytest.approx(float(plain.witness(q).b), rel=1e-9)
     assert ours.weights == pytest.approx(plain.D) and ours.largest(np.ones(2)) == pytest.approx(
         plain.largest(np.ones(2))
     )
-    wide = UncertainRows(Family.from_graph(graph, uncertainty="10%"))
+    wide = FollowerRows(Family.from_graph(graph, uncertainty="10%"))
     assert wide.witness(Fraction(1)).b < plain.witness(Fraction(1)).b
 
 
@@ -202,6 +221,7 @@ def test_what_no_gain_takes_away_is_less_than_every_gain_leaves():
 
 BESIDE: dict[str, dict[str, Any]] = {
     "late": {"messages": LateMessages("0.01")},
+    "late edge by edge": {"messages": LateMessages({("a", "b"): "0.02", ("b", "a"): "0.001", ("l", "b"): "0.5"})},
     "capped": {"messages": LateMessages("0.01", period="0.002", losses=2, value_error="0.01", gain_cap=20)},
     "late behind leaders that move": {
         "messages": LateMessages("0.01", gain_cap=20),
@@ -221,7 +241,8 @@ def test_what_is_certified_is_read_back(name: str, x0: list[int] | None, tmp_pat
     assert found == made and found.leaders_move == made.leaders_move == ("leaders" in BESIDE[name])
     assert found.summary() == made.summary() and "nothing late" not in found.summary().split("claim")[0]
     if made.late is not None:
-        assert found.late.messages == made.late.messages and found.late.leaders == made.late.leaders
+        assert found.late.messages.latencies(UNSURE) == made.late.messages.latencies(UNSURE)
+        assert found.late.messages.age == made.late.messages.age and found.late.leaders == made.late.leaders
         assert found.late.largest == pytest.approx(made.late.largest) and found.late.relative == (x0 is None)
         t = np.linspace(0, 1, 11)
         assert found.late.deviation_bound(t) == pytest.approx(made.late.deviation_bound(t))
@@ -262,7 +283,7 @@ def test_expectations_are_of_what_is_asked(words: dict[str, Any], code: int):
     [
         ([("a", "b", 1, 2), ("b", "a", 1, 2), ("b", "c", 1, 2)], {}, "a leads and hears others"),
         ([("a", "c", 1, 2), ("b", "c", 1, 2)], {}, "depends on the signal"),
-        ([("a", "b", 1, 2)], {"messages": LateMessages({("a", "b"): "0.1"})}, "edge by edge"),
+        ([("a", "b", 1, 2)], {"messages": LateMessages({("b", "a"): "0.1"})}, "no such edge"),
         ([("a", "b", 1, 2)], {"messages": LateMessages("0.1", own_delay=True, gain_cap=2)}, "own state"),
         ([("a", "b", 1, 2)], {"asks": Asks(expectations=Expectations(max_residual=1)), "messages": None}, "how late"),
     ],
@@ -302,6 +323,9 @@ def forged(name: str, path: str, value: Any) -> str | None:
         ("late", "messages.residual.l", "1"),
         ("late", "messages.rows.0.initial", "1/100"),
         ("late", "messages.rows.0.left", "0"),
+        ("late edge by edge", "messages.latency.3", "1/5"),
+        ("late edge by edge", "messages.latency", ["0", "0.02", "0.5"]),
+        ("late edge by edge", "messages.latency", ["0", "1/2", "1/1000", "1/50", "0"]),
         ("capped", "messages.rows.0.floor", "0"),
         ("capped", "messages.input.b", "1"),
         ("capped", "messages.value_error", "1"),

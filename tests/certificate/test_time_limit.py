@@ -26,6 +26,7 @@ from lmi.child_process import apart
 from lmi.errors import OutOfTime
 from lmi.search_time import checkpoint, part_of_time, seconds_left, share_of_time, spend, time_limit
 from ptcc_certify import Agents, NominalProtocol, SignedDigraph, certify, check, simulate
+from ptcc_certify.certificate import procedure
 from ptcc_certify.certificate.family_certificate import certify_family
 from ptcc_certify.certificate.procedure import STEPS
 from ptcc_certify.errors import ParameterError
@@ -102,11 +103,32 @@ def leaping(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(search_time, "_now", lambda: next(now))
 
 
-def test_without_a_limit_asked_for_no_wall_time_changes_what_is_found_of_a_graph(monkeypatch: pytest.MonkeyPatch):
-    at_leisure = certify(load_graph("fig1a"), PROTOCOL, [1] * 6)
+def tree(n: int) -> SignedDigraph:
+    return SignedDigraph.from_edges([(k // 2, k, 1 if k % 3 else -2) for k in range(1, n)])
+
+
+@pytest.mark.parametrize("graph", [load_graph("fig1a"), tree(130)], ids=["small", "large"])
+def test_without_a_limit_asked_for_no_wall_time_changes_what_is_found_of_a_graph(
+    graph: SignedDigraph, monkeypatch: pytest.MonkeyPatch
+):
+    at_leisure = certify(graph, PROTOCOL, [1] * graph.n_nodes)
     leaping(monkeypatch)
-    busy = certify(load_graph("fig1a"), PROTOCOL, [1] * 6)
-    assert busy == at_leisure and not busy.cut_off
+    busy = certify(graph, PROTOCOL, [1] * graph.n_nodes)
+    assert busy == at_leisure and not busy.cut_off and busy.verdict == "certified"
+
+
+def test_final_states_that_run_out_of_time_are_not_called_ill_conditioned(monkeypatch: pytest.MonkeyPatch):
+    def endless(*_: object) -> None:
+        raise OutOfTime("the time limit is reached")
+
+    monkeypatch.setattr(procedure, "enclose", endless)
+    cert = certify(tree(130), PROTOCOL, [1] * 130, asks=Asks(time_limit=50))
+    assert cert.verdict == "undecided" and "final state" in cert.cut_off
+    assert cert.assessment.text.endswith("it took its share of 50 s; raise time_limit"), cert.assessment.text
+
+
+def test_a_limit_that_is_asked_for_counts_wall_time(monkeypatch: pytest.MonkeyPatch):
+    leaping(monkeypatch)
     assert certify(
         load_graph("fig1a"), PROTOCOL, [1] * 6, asks=Asks(time_limit=3600)
     ).cut_off  # a limit that is asked for

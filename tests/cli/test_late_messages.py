@@ -221,7 +221,7 @@ def test_followers_track_leaders_that_move_and_the_file_says_so() -> None:
         (("team.csv", "--leader-speed", "1", "--gain-cap", "9"), "--gain-cap: leaders that move are tracked at T by a"),
         (("team.csv", "--leader-speed", "1", "--stop-before", "0.1"), "--stop-before: leaders that move are tracked"),
         (("team.csv", "--leader-speed", "1", "--noise", "1"), "noise is not proved while leaders move"),
-        (("team.csv", "--uncertainty", "1%", "--delay", "late"), "--delay: edge by edge is not proved of families yet"),
+        (("team.csv", "--uncertainty", "1%", "--delay", "none"), 'no column "none"; begin with a header'),
         (("team.csv", "--uncertainty", "1%", "--delta", "1"), "--delta is for one graph, not for families yet"),
         (("team.csv", "--uncertainty", "1%", "--gain-cap", "9"), "--gain-cap is for one graph, not for families yet"),
         (("team.csv", "--uncertainty", "1%", "--max-residual", "1"), "--max-residual is asked of late messages"),
@@ -341,6 +341,21 @@ def test_screens_say_first_what_cannot_be_and_then_what_is_left() -> None:
     star = ptcc("certify", "star.csv", "--delay", "0.02", *QUICK, "--expect", "bipartite-consensus")
     assert star.code == 0, star
     assert "every agent exactly at its final state at T" in star.out
+
+
+def test_delays_of_a_column_are_those_of_uncertain_edges_too() -> None:
+    """Of intervals and several files as well; of an edge in two files the larger one counts."""
+    Path("day.csv").write_text("source,target,weight,lag\nl,a,1,0.001\na,b,-2,0.03\nb,a,-0.5,0\nl,b,-1,0.01\n")
+    rows = "l,a,0.8,1.2,0.002\na,b,-2.2,-2,0.02\nb,a,-0.5,-0.4,0\nl,b,-1,-1,0.01\n"
+    Path("night.csv").write_text(f"source,target,weight_min,weight_max,lag\n{rows}")
+    start, largest = ("--x0", "1,2,-3", "--kappa", "3", "-o", "c.json"), Fraction(3, 100)
+    for words in (("day.csv", "--uncertainty", "10%"), ("night.csv",), ("day.csv", "night.csv", "--switching")):
+        run = ptcc("certify", *words, "--delay", "lag", *start)
+        assert run.code == 0 and 'delays of column "lag"' in run.out, run
+        messages = read_certificate("c.json").late.messages
+        assert messages.age == (Fraction(1, 50) if words == ("night.csv",) else largest)
+        assert messages.delay["b", "a"] == 0
+        assert messages.delay["l", "a"] == Fraction(2 if "night.csv" in words else 1, 1000)
 
 
 def test_a_column_of_delays_is_named_and_not_called_ignored() -> None:
@@ -593,8 +608,8 @@ def test_families_and_other_limits_are_refused_in_python_too() -> None:
     for asked, said in (({"messages": LateMessages("0.1")}, "messages"), ({"leaders": MovingLeaders(1)}, "leaders")):
         with pytest.raises(ParameterError, match=f"{said}: nobody listens to anybody, so .*; leave it out"):
             certify_words(alone, protocol, **asked)
-    with pytest.raises(ParameterError, match="delay: edge by edge is not proved of families yet"):
-        certify(pair, protocol, uncertainty="10%", messages=each)
+    with pytest.raises(ParameterError, match="own_delay: an own state that is late is not proved of families yet"):
+        certify(pair, protocol, uncertainty="10%", messages=LateMessages("0.1", own_delay=True, gain_cap=2))
     with pytest.raises(ParameterError, match="max_residual is asked of late messages; tell how late"):
         certify(pair, protocol, uncertainty="10%", asks=Asks(expectations=Expectations(max_residual=1)))
     with pytest.raises(ParameterError, match="gain_cap: limits and late messages have two"):

@@ -7,22 +7,23 @@ from itertools import chain, islice
 
 from ptcc_certify.errors import FormatError, NumberError
 from ptcc_certify.graphs.digraph import SignedDigraph
+from ptcc_certify.graphs.family import Family, pairs_of
 from ptcc_certify.graphs.io.edge_list import records
 from ptcc_certify.graphs.io.files import Source, name_and_ending, read_bytes
 from ptcc_certify.graphs.io.signs import find
-from ptcc_certify.graphs.io.table_columns import columns_of
+from ptcc_certify.graphs.io.table_columns import columns_of, edge_columns
 from ptcc_certify.graphs.rationals import parse_exact, shorten
 from ptcc_certify.graphs.reading import Reading
 
 
-def read_delays(path: Source, graph: SignedDigraph, title: str = "delay") -> dict[tuple[str, str], Fraction]:
+def read_delays(path: Source, graph: SignedDigraph | Family, title: str = "delay") -> dict[tuple[str, str], Fraction]:
     r"""Read what messages take over every edge from a column of an edge list with a header.
 
     Parameters
     ----------
     path : str, Path or file object
         The file that the graph was read from; ``graph.read`` tells which end of a row listens.
-    graph : SignedDigraph
+    graph : SignedDigraph or Family
     title : str
         Of the column.
 
@@ -48,12 +49,15 @@ def read_delays(path: Source, graph: SignedDigraph, title: str = "delay") -> dic
     begin = list(islice((row for row in rows if len(row[1]) > 1), 20))
     number, fields = begin[0] if begin else (1, [])
     place, titles = f"{name}, line {number}", [field.strip() for field in fields]
-    told = columns_of(titles, [row for _, row in begin[1:]], place, Reading(columns=graph.read.get("columns")))
-    at = find(told.titles, [title.lower()], place)
+    how = Reading(columns=graph.read.get("columns"))
+    ends = None if how.titles else edge_columns(titles, place)  # of intervals, too
+    if ends is None:
+        told = columns_of(titles, [row for _, row in begin[1:]], place, how)
+        titles, ends = list(told.titles), (told.source, told.target, told.weight)
+    at = find(titles, [title.lower()], place)
     if at is None:
         raise FormatError(f'{place}: no column "{shorten(title)}"; begin with a header source,target,weight,{title}')
-    ends = told.source, told.target
-    first, second = ends if graph.read["orientation"] != "listens" else ends[::-1]
+    first, second, _ = ends if graph.read.get("orientation") != "listens" else (ends[1], ends[0], None)
     delays: dict[tuple[str, str], Fraction] = {}
     known: dict[str, Fraction] = {}  # many edges, few delays
     for number, row in chain(begin[1:], rows):
@@ -76,9 +80,9 @@ def read_delays(path: Source, graph: SignedDigraph, title: str = "delay") -> dic
             edge = f"{shorten(source)} -> {shorten(target)}"
             raise FormatError(f"{place}: delay {shorten(text)} of edge {edge} is negative; give a number >= 0")
         delays[source, target] = max(value, delays.get((source, target), value))
-        if graph.read["undirected"]:
+        if graph.read.get("undirected"):
             delays[target, source] = max(value, delays.get((target, source), value))
-    if "zeros" in graph.read:  # edges of weight 0 were dropped
-        edges = {edge[:2] for edge in graph.edges}
+    if "zeros" in graph.read or "drop_zeros" in graph.read:  # edges of weight 0 were dropped
+        edges = set(pairs_of(graph))
         delays = {pair: delay for pair, delay in delays.items() if pair in edges}
     return delays
