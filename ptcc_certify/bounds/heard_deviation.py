@@ -24,7 +24,7 @@ from ptcc_certify.graphs.family import Family
 from ptcc_certify.graphs.rationals import nearest_float
 
 #: Entries of the weights of all modes up to which rows are followed, and steps at most beside the instants.
-_ENTRIES, _STEPS = 100_000, 300
+_ENTRIES, _STEPS = 10_000, 300
 #: Share that functions may lose in one step, and rounds in which what is heard in a step is made smaller.
 _LOSS, _ROUNDS = 0.1, 2
 #: Room for the rounding of all steps.

@@ -72,7 +72,8 @@ class UndrivenPart:
             bounds[one.agents] = np.minimum(bounds[one.agents], own)
         if self._rows is not None:
             with np.errstate(over="ignore", invalid="ignore"):
-                bounds = np.fmin(bounds, self._rows.speeds(self.deviation(clock)) * gain)
+                heard = self._rows.speeds(self.deviation(clock)) * gain
+            bounds = np.where(np.isfinite(clock), np.fmin(bounds, heard), bounds)
         return bounds
 
     def _state(self, one: FunctionOf) -> list[Fraction]:
