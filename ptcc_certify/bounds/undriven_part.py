@@ -10,14 +10,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
 
 import numpy as np
 
 from ptcc_certify.bounds.family_deviation import Function, RestStates, above, deviation_on_clock, input_on_clock
 from ptcc_certify.bounds.heard_deviation import HeardRows
 from ptcc_certify.checker.reading import Interval
-from ptcc_certify.graphs.family import Family
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,32 +33,27 @@ class UndrivenPart:
 
     Attributes
     ----------
-    family : Family
-        Of the component.
     functions : sequence of FunctionOf
     x : sequence of N Fraction
         The initial state.
+    rows : HeardRows, or None
+        Followed if ``ends`` are known and a function decays.
     ends : sequence of N intervals, or None
         Where every agent ends.
     """
 
-    family: Family
     functions: Sequence[FunctionOf]
     x: Sequence[Fraction]
-    ends: Sequence[Interval] | None
-
-    @cached_property
-    def _rows(self) -> HeardRows | None:
-        decays = any(one.function.rate > 0 for one in self.functions)
-        return HeardRows.of(self.family) if decays and self.ends is not None else None
+    rows: HeardRows | None = None
+    ends: Sequence[Interval] | None = None
 
     def deviation(self, clock: np.ndarray) -> np.ndarray:
         """Bound ``|x_k(t) - x_k(T)|`` at instants of the clock, (N, M)."""
         bounds, finite = self._by_functions(clock), np.isfinite(clock)
-        if self._rows is not None and self.ends is not None and finite.any():
+        rate = max((float(one.function.rate) for one in self.functions), default=0.0)
+        if self.rows is not None and self.ends is not None and rate > 0 and finite.any():
             start = np.array([above(max(abs(x - e) for e in ends)) for x, ends in zip(self.x, self.ends, strict=True)])
-            rate = max(float(one.function.rate) for one in self.functions)
-            followed = self._rows.follow(start, self._by_functions, clock[finite], rate)
+            followed = self.rows.follow(start, self._by_functions, clock[finite], rate)
             bounds[:, finite] = np.fmin(bounds[:, finite], followed)
         return bounds
 
@@ -70,9 +63,9 @@ class UndrivenPart:
         for one in self.functions:
             own = input_on_clock(one.function, self._state(one), clock, gain)
             bounds[one.agents] = np.minimum(bounds[one.agents], own)
-        if self._rows is not None:
+        if self.rows is not None:
             with np.errstate(over="ignore", invalid="ignore"):
-                heard = self._rows.speeds(self.deviation(clock)) * gain
+                heard = self.rows.speeds(self.deviation(clock)) * gain
             bounds = np.where(np.isfinite(clock), np.fmin(bounds, heard), bounds)
         return bounds
 

@@ -24,6 +24,7 @@ from ptcc_certify.bounds.family_deviation import (
     sliding_sizes,
 )
 from ptcc_certify.bounds.final_ends import FinalEnds
+from ptcc_certify.bounds.heard_deviation import HeardRows
 from ptcc_certify.bounds.kept_means import LeadingGroup, leading_groups
 from ptcc_certify.bounds.late_messages import LateBounds
 from ptcc_certify.bounds.reaching_phase import ReachingPhase
@@ -504,13 +505,15 @@ class FamilyContent:
 
     def _undriven(self, part: ComponentProof, functions: Sequence[AnyBoundFunction]) -> UndrivenPart:
         """Return a component with its functions, those of parts that others follow included."""
-        ends = None if self.final_states is None else [self.final_states[v] for v in part.component.nodes.tolist()]
-        known = None if ends is None or None in ends else [pair for pair in ends if pair is not None]
+        rows = HeardRows.of(part.component.family)
+        finals = None if rows is None else self.final_states  # of large families they take long
+        ends = [] if finals is None else [finals[v] for v in part.component.nodes.tolist()]
+        known = [pair for pair in ends if pair is not None]
         everybody = np.arange(part.component.nodes.size)
         own = [FunctionOf(everybody, V, part.rest_states) for V in functions]
         for led in (led for V in functions if isinstance(V, FollowerFunction) for led in V.parts):
             own.append(FunctionOf(led.agents, BoundFunction(led.quotient, led.function), _rest_states(led.quotient)))
-        return UndrivenPart(part.component.family, own, self._state(part), known)
+        return UndrivenPart(own, self._state(part), rows, known if len(known) == everybody.size else None)
 
     def norm_bound(self, V: Any, part: int, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
         """Bound ``sqrt(V(x - sigma))`` of a function of a part at instants ``1 - t/T``, from the initial state.
