@@ -35,6 +35,8 @@ _START_LOSS = 0.2
 _LEAST, _LARGEST_CONDITION = 1e-7, 1e12
 #: The same of steps that weigh modes by their shares: large ones, then smaller ones.
 _TRUST = (0.3, 0.8)
+#: Weight of other directions than that of the state at which ``P`` is to be small.
+_ASIDE = 1e-3
 #: Rows up to which Clarabel takes a matrix as it is; with a diagonal ``P`` those of sparse matrices have zeros.
 _WHOLE_ROWS = {False: 60, True: 24}
 #: Seconds that a program takes for each block: what multiplies a power of its rows, by what ``P`` is.
@@ -381,27 +383,82 @@ def least_condition(
     >>> least_condition([fast], [1.9]).condition < common_lyapunov([fast]).condition
     True
     """
+    return _least_form(modes, rates, np.eye(len(modes[0].A)), None, shape == "diagonal", tolerance)
+
+
+def least_value(
+    modes: Sequence[UncertainMatrix], rates: Sequence[float], x: np.ndarray, least: np.ndarray, tolerance: float = 1e-7
+) -> CommonCertificate:
+    """Find one ``P`` of given rates that is small at one state: ``minimise x'P x`` subject to ``P >= least``.
+
+    Other directions are weighed by a thousandth, so that ``P`` is no larger there than it needs to be.
+
+    Parameters
+    ----------
+    modes : sequence of UncertainMatrix
+    rates : sequence of float
+        One of each mode, less than what some ``P`` has.
+    x : (n,) array
+        Not 0.
+    least : (n, n) array
+        Positive definite: a sum of ``y y'`` bounds every ``|y'x|`` by ``sqrt(V)``.
+    tolerance : float
+        Relative gap asked of the solver.
+
+    Raises
+    ------
+    NoCertificate, numpy.linalg.LinAlgError, OutOfTime
+        As :func:`least_condition`.
+
+    Examples
+    --------
+    >>> fast = UncertainMatrix.known([[1.0, 9.0], [0.0, 2.0]])
+    >>> x = np.array([1.0, 0.0])
+    >>> forms = [least_value([fast], [1.9], x, np.eye(2)).matrix, least_condition([fast], [1.9]).matrix]
+    >>> [round(float(x @ P @ x / np.linalg.eigvalsh(P)[0]), 2) for P in forms]
+    [1.05, 1.41]
+    """
+    R = np.linalg.cholesky(least).T
+    z = R @ x
+    return _least_form(modes, rates, R, np.outer(z, z) / (z @ z) + _ASIDE * np.eye(len(z)), False, tolerance)
+
+
+def _least_form(
+    modes: Sequence[UncertainMatrix],
+    rates: Sequence[float],
+    R: np.ndarray,
+    moment: np.ndarray | None,
+    diagonal: bool,
+    tolerance: float,
+) -> CommonCertificate:
+    """Minimise the trace of ``moment Q``, or the condition of ``Q``, over ``P = R'Q R`` of these rates, ``Q >= I``."""
     if child_process.forked:
         raise NoCertificate("Clarabel is not run in a forked process")
     with uncounted():
         import cvxpy as cp
-    n = len(modes[0].A)
-    pairs = [mode.transformed(np.eye(n)) for mode in modes]
-    p = cp.Variable(n) if shape == "diagonal" else cp.Variable((n, n), symmetric=True)
-    P, c = cp.diag(p) if shape == "diagonal" else p, cp.Variable()
-    constraints = [p >= 1, p <= c] if shape == "diagonal" else [P >> np.eye(n), P << c * np.eye(n)]
+    n = len(R)
+    pairs = [mode.transformed(R) for mode in modes]
+    q = cp.Variable(n) if diagonal else cp.Variable((n, n), symmetric=True)
+    Q = cp.diag(q) if diagonal else q
+    constraints = [q >= 1] if diagonal else [Q >> np.eye(n)]
+    if moment is None:
+        goal = cp.Variable()
+        constraints.append(q <= goal if diagonal else Q << goal * np.eye(n))
+    else:
+        goal = cp.sum(cp.multiply(moment, Q))
     taus = []
     for (mode, _), rate in zip(pairs, rates, strict=True):
         taus.append(cp.Variable(len(mode.radii)) if mode.radii.size else None)
         unit = float(np.abs(mode.A).max(initial=0.0)) or 1.0
-        constraints.append(inequality(P, mode, taus[-1], rate, 0.0, unit) >> 0)
-    problem = cp.Problem(cp.Minimize(c), constraints)
-    spend(program_seconds(modes, shape))
-    run_program(problem, n + max(mode.radii.size for mode in modes), tolerance, shape == "diagonal")
-    if p.value is None or not np.isfinite(p.value).all():
+        constraints.append(inequality(Q, mode, taus[-1], rate, 0.0, unit) >> 0)
+    problem = cp.Problem(cp.Minimize(goal), constraints)
+    spend(program_seconds(modes, "diagonal" if diagonal else "full"))
+    run_program(problem, n + max(mode.radii.size for mode in modes), tolerance, diagonal)
+    if q.value is None or not np.isfinite(q.value).all():
         raise NoCertificate(f"the solver answered {problem.status}")
-    value = np.diag(p.value) if shape == "diagonal" else (p.value + p.value.T) / 2
-    top = float(np.linalg.eigvalsh(value)[-1])
+    value = np.diag(q.value) if diagonal else (q.value + q.value.T) / 2
+    value = R.T @ value @ R
+    value, top = (value + value.T) / 2, float(np.linalg.eigvalsh(value)[-1])
     multipliers = [
         np.zeros(0) if tau is None else np.maximum(tau.value, 1e-12) / scale / top
         for tau, (_, scale) in zip(taus, pairs, strict=True)

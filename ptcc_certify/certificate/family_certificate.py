@@ -19,6 +19,7 @@ from lmi.errors import NoCertificate
 from lmi.exact.decimal_rounding import counted, down
 from lmi.search_time import share_of_time
 from ptcc_certify.bounds.attracting_box import AttractingBox, box_of_family
+from ptcc_certify.bounds.envelope import FRACTIONS
 from ptcc_certify.bounds.kept_means import with_means
 from ptcc_certify.bounds.late_messages import bound_late
 from ptcc_certify.bounds.tracking import bound_tracking
@@ -44,12 +45,14 @@ from ptcc_certify.checker.reading import Interval
 from ptcc_certify.checker.restricted_signals import reachable_bounds
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.family import Family
+from ptcc_certify.graphs.rationals import nearest_float
 from ptcc_certify.graphs.size_limits import EXACT_NODES, ONE_THREAD_NODES
 from ptcc_certify.graphs.structure import BIPARTITE_CONSENSUS, STABILITY, analyse
+from ptcc_certify.lyapunov.aimed_forms import Aim, aimed_functions
 from ptcc_certify.lyapunov.family_function import FamilyFunction
 from ptcc_certify.lyapunov.family_rate_upper_bound import prove_family_rate_bound
-from ptcc_certify.lyapunov.family_search import CLOSED_ROWS, FamilySearch, search_family
-from ptcc_certify.lyapunov.follower_function import follower_functions
+from ptcc_certify.lyapunov.family_search import CLOSED_ROWS, FULL_ROWS, FamilySearch, search_family
+from ptcc_certify.lyapunov.follower_function import LOSSES, FollowerFunction, follower_functions
 from ptcc_certify.lyapunov.quotient import Quotient
 from ptcc_certify.lyapunov.squares_function import SquaresFunction, squares_function
 from ptcc_certify.model import Protocol
@@ -297,7 +300,7 @@ def certify_family(
     few = one_thread(family.n_nodes <= ONE_THREAD_NODES)
     with few, deadline.time_limit(seconds, work=time_limit is None):
         for component in components:
-            part = _prove(component, notes, progress)
+            part = _prove(component, notes, progress, protocol, initial_state if still else None)
             parts.append(_with_means(part) if initial_state is not None and still else part)
         if signal != "any":
             progress(STEP)
@@ -395,7 +398,29 @@ def _dense(component: FamilyComponent, notes: list[str]) -> tuple[ProvedFunction
     return search.functions
 
 
-def _prove(component: FamilyComponent, notes: list[str], progress: Callable[[str], None]) -> ComponentProof:
+def _led(component: FamilyComponent) -> list[FollowerFunction]:
+    """Return a function of rows if small parts lead in which something moves, for the rates of these parts."""
+    found = follower_functions(component, LOSSES[:1], largest_part=component.nodes.size // 2)
+    return [W for W in found if W.parts]
+
+
+def _aim(quotient: Quotient, protocol: Protocol, x: Sequence[Fraction]) -> Aim | None:
+    """Return where bounds should be small: at the instants that are reported; None where other functions serve."""
+    begin = quotient.coordinates(x)
+    if not (1 < len(begin) <= FULL_ROWS and any(begin)):
+        return None
+    top = max(map(abs, begin))
+    clocks = protocol.gain.clock_at_remaining([1 - fraction for fraction in FRACTIONS])
+    return Aim(np.array([nearest_float(xi / top) for xi in begin]), np.asarray(clocks))
+
+
+def _prove(
+    component: FamilyComponent,
+    notes: list[str],
+    progress: Callable[[str], None],
+    protocol: Protocol,
+    state: Sequence[Fraction] | None,
+) -> ComponentProof:
     bare = ComponentProof(component)
     if component.kernel is None or component.nodes.size == 1 or not bare.certifiable:
         return bare
@@ -414,9 +439,15 @@ def _prove(component: FamilyComponent, notes: list[str], progress: Callable[[str
         bound = prove_family_rate_bound(quotient)
     progress(STEPS[2])
     squares: list[SquaresFunction] = []
+    aimed: list[ProvedFunction] = []
+    aim = None if state is None else _aim(quotient, protocol, [state[v] for v in component.nodes.tolist()])
     with share_of_time(1.0, STEPS[2], notes):
         squares = _squares(component)  # which takes no time to speak of
-        search = search_family(quotient, enough=None if bound is None else _ENOUGH * bound.value)
+        enough = None if bound is None else _ENOUGH * bound.value
+        search = search_family(quotient, enough=enough, slower=aim is None)
+        for V in () if aim is None else aimed_functions(quotient, aim, search.functions, notes):
+            aimed.append(V)  # kept, whatever comes after
+        aimed += [] if aim is None else _led(component)
     notes += [*search.notes, *(f"{name}: cut off by the time limit" for name in search.cut_off)]
     rate = max((V.rate for V in search.functions), default=Fraction(0))
     if bound is not None and search.functions and rate < _ENOUGH * bound.value:
@@ -424,4 +455,5 @@ def _prove(component: FamilyComponent, notes: list[str], progress: Callable[[str
             again = prove_family_rate_bound(quotient, search.functions)
             bound = bound if again is None else min(bound, again, key=lambda b: b.value)
     better = [V for V in squares if _ENOUGH * V.rate > rate]
-    return ComponentProof(component, (*better, *search.functions), bound)
+    functions = sorted((*search.functions, *aimed), key=lambda V: -V.rate)
+    return ComponentProof(component, (*better, *functions), bound)

@@ -19,17 +19,17 @@ from ptcc_certify.bounds.attracting_box import AttractingBox
 from ptcc_certify.bounds.envelope import Instants, remaining_part
 from ptcc_certify.bounds.family_deviation import (
     RestStates,
-    deviation_on_clock,
     deviation_while_driven,
-    input_on_clock,
     input_while_driven,
     sliding_sizes,
 )
 from ptcc_certify.bounds.final_ends import FinalEnds
+from ptcc_certify.bounds.heard_deviation import HeardRows
 from ptcc_certify.bounds.kept_means import LeadingGroup, leading_groups
 from ptcc_certify.bounds.late_messages import LateBounds
 from ptcc_certify.bounds.reaching_phase import ReachingPhase
 from ptcc_certify.bounds.tracking import Tracking
+from ptcc_certify.bounds.undriven_part import FunctionOf, UndrivenPart
 from ptcc_certify.certificate.certificate_data import Source
 from ptcc_certify.certificate.functions import ProvedFunction
 from ptcc_certify.certificate.request import Expectations
@@ -43,7 +43,7 @@ from ptcc_certify.certificate.restricted_claims import (
 )
 from ptcc_certify.checker.family_bounds import deviations, ends_near, peaks
 from ptcc_certify.checker.family_function import Scaled
-from ptcc_certify.checker.family_limits import WeightedMean, limits
+from ptcc_certify.checker.family_limits import WeightedMean, agents_heard, limits
 from ptcc_certify.checker.family_sliding import Drive, last_time
 from ptcc_certify.checker.input_formulas import root_above
 from ptcc_certify.checker.protocol import sliding_bounded, sliding_part
@@ -458,15 +458,15 @@ class FamilyContent:
         at, gain = self._instants(remaining), self.protocol.gain.value_at_remaining(_row(remaining))
         bounds = np.full((self.family.n_nodes, at.clock.size), np.inf)
         for part, functions, driven in self._driven_parts:
-            nodes, x = part.component.nodes, self._state(part)
+            nodes = part.component.nodes
             if nodes.size == 1:
                 bounds[nodes] = 0
-            for V in functions:
-                if driven is None:
-                    own = input_on_clock(V, x, at.clock, gain)
-                else:
-                    own = input_while_driven(V, x, driven, self._phase, at, gain)
-                bounds[nodes] = np.minimum(bounds[nodes], own)
+            elif driven is None:
+                bounds[nodes] = self._undriven(part, functions).input(at.clock, gain)
+            else:
+                for V in functions:
+                    own = input_while_driven(V, self._state(part), driven, self._phase, at, gain)
+                    bounds[nodes] = np.minimum(bounds[nodes], own)
         if self.sigma0 is None:
             return bounds
         added = [np.inf] * len(bounds) if self.sliding_peaks is None else list(map(nearest_float, self.sliding_peaks))
@@ -492,17 +492,28 @@ class FamilyContent:
         bounds = np.full((self.family.n_nodes, at.clock.size), np.inf)
         for part, functions, driven in self._driven_parts:
             nodes, rest = part.component.nodes, part.rest_states
-            x = self._state(part)
+            if driven is None:
+                bounds[nodes] = 0 if nodes.size == 1 else self._undriven(part, functions).deviation(at.clock)
+                continue
             if nodes.size == 1:
-                bounds[nodes] = 0 if driven is None else sliding_sizes(driven, self._phase, at)
+                bounds[nodes] = sliding_sizes(driven, self._phase, at)
             for V in functions:
-                if driven is None:
-                    deviation = deviation_on_clock(V, rest, x, at.clock)
-                else:
-                    deviation = deviation_while_driven(V, rest, x, driven, self._phase, at)
+                deviation = deviation_while_driven(V, rest, self._state(part), driven, self._phase, at)
                 if deviation is not None:
                     bounds[nodes] = np.minimum(bounds[nodes], deviation)
         return bounds
+
+    def _undriven(self, part: ComponentProof, functions: Sequence[AnyBoundFunction]) -> UndrivenPart:
+        """Return a component with its functions, those of parts that others follow included."""
+        rows = HeardRows.of(part.component.family)
+        finals = None if rows is None else self.final_states  # of large families they take long
+        ends = [] if finals is None else [finals[v] for v in part.component.nodes.tolist()]
+        known = [pair for pair in ends if pair is not None]
+        everybody = np.arange(part.component.nodes.size)
+        own = [FunctionOf(everybody, V, part.rest_states) for V in functions]
+        for led in (led for V in functions if isinstance(V, FollowerFunction) for led in V.parts):
+            own.append(FunctionOf(led.agents, BoundFunction(led.quotient, led.function), _rest_states(led.quotient)))
+        return UndrivenPart(own, self._state(part), rows, known if len(known) == everybody.size else None)
 
     def norm_bound(self, V: Any, part: int, remaining: Sequence[float] | np.ndarray) -> np.ndarray:
         """Bound ``sqrt(V(x - sigma))`` of a function of a part at instants ``1 - t/T``, from the initial state.
@@ -531,6 +542,14 @@ class FamilyContent:
     def _phase(self) -> ReachingPhase:
         assert self.protocol.reaching is not None and self.reaching is not None
         return ReachingPhase(self.protocol.reaching, self.reaching)
+
+
+def _rest_states(quotient: Quotient) -> RestStates:
+    """Return the common kernel of a leading part as the formulas of the bounds take it."""
+    source, target, _ = quotient.family.union
+    rows = {v: {j: b for j, b in enumerate(row) if b} for v, row in enumerate(quotient.basis)}
+    groups = agents_heard(zip(source.tolist(), target.tolist(), strict=True), dict(enumerate(quotient.pivots)))
+    return RestStates(rows, list(groups.values()))
 
 
 def _row(remaining: Any) -> np.ndarray:

@@ -71,6 +71,7 @@ def search_family(
     kinds: Sequence[str] = KINDS,
     enough: Fraction | None = None,
     shares: Sequence[float] | None = None,
+    slower: bool = True,
 ) -> FamilySearch:
     """Search and prove Lyapunov functions of a family for every signal.
 
@@ -86,6 +87,8 @@ def search_family(
     shares : sequence of float, optional
         Of the clock that each mode is active: the mean of the rates is made large instead of the least one, for
         families with modes in which not everything decays.
+    slower : bool
+        Whether slower functions of much smaller overshoot constants are searched besides.
 
     Returns
     -------
@@ -127,6 +130,8 @@ def search_family(
     closed = _closed_function(quotient, cut_off) if "full" in kinds and shares is None else None
     share = _DIAGONAL_SHARE if "full" in kinds and n <= FULL_ROWS else 1.0  # else nothing comes after the diagonal one
     for kind, rows, own in (("diagonal", DIAGONAL_ROWS, share), ("full", FULL_ROWS, 1.0)):
+        if n == 1 and kind == "full" and functions:
+            continue  # the same
         if kind not in kinds or (enough is not None and any(_worth(quotient, V, shares) >= enough for V in functions)):
             continue
         if n > rows:
@@ -135,7 +140,8 @@ def search_family(
             continue
         with share_of_time(own, f"class {kind}", cut_off):
             try:
-                for function in _common_functions(quotient, kind, notes, shares):  # kept, whatever comes after
+                losses = _LOSSES if slower else ()
+                for function in _common_functions(quotient, kind, notes, shares, losses):  # kept, whatever comes after
                     functions.append(function)
             except OutOfTime:
                 raise
@@ -170,7 +176,7 @@ def _worth(quotient: Quotient, V: FamilyFunction, shares: Sequence[float] | None
 
 
 def _common_functions(
-    quotient: Quotient, kind: str, notes: list[str], shares: Sequence[float] | None
+    quotient: Quotient, kind: str, notes: list[str], shares: Sequence[float] | None, losses: Sequence[float]
 ) -> Iterator[FamilyFunction]:
     """Yield the function of the largest rate, then slower ones whose overshoot constants are much smaller."""
     moving = [number for number, mode in enumerate(quotient.modes) if not mode.at_rest]
@@ -181,7 +187,7 @@ def _common_functions(
             best = common_lyapunov(arrays, shape=kind, shares=own)
         goal = [best.rate] * len(arrays) if shares is None else best.rates
         condition, top = math.inf, max(goal)
-        for loss in (0.0, *_LOSSES):
+        for loss in (0.0, *losses):
             if condition <= _GOOD_CONDITION or (loss and not top > 0):
                 return
             wanted = [rate - loss * top for rate in goal]

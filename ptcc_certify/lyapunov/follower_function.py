@@ -194,12 +194,15 @@ class FollowerFunction:
 
 
 def follower_functions(
-    component: FamilyComponent, losses: Sequence[float] = LOSSES, notes: list[str] | None = None
+    component: FamilyComponent,
+    losses: Sequence[float] = LOSSES,
+    notes: list[str] | None = None,
+    largest_part: int = LARGEST_PART,
 ) -> Iterator[FollowerFunction]:
     """Search and prove functions of a component that has followers and common states at rest; from the fastest.
 
-    Yields nothing where rows prove no positive rate, or no function is found of a part that the followers hear;
-    ``notes`` is told which.
+    Yields nothing where rows prove no positive rate, or no function is found of a part that the followers hear, as of
+    those of more agents than ``largest_part``; ``notes`` is told which.
 
     Examples
     --------
@@ -212,7 +215,7 @@ def follower_functions(
     followers = follower_nodes(family)
     if component.kernel is None or not followers.size:
         return
-    parts = _leading_parts(family, followers)
+    parts = _leading_parts(family, followers, largest_part)
     if parts is None:
         if notes is not None:
             notes.append("no function was found of the agents that lead")
@@ -226,17 +229,16 @@ def follower_functions(
         notes.append("the rows of the followers prove no rate")
 
 
-def _leading_parts(family: Family, followers: np.ndarray) -> list[LeadingPart] | None:
+def _leading_parts(family: Family, followers: np.ndarray, largest_part: int) -> list[LeadingPart] | None:
     """Return the parts of ``R`` in which something moves, each with its function; None if one has none."""
     rest = np.setdiff1d(np.arange(family.n_nodes), followers)
     part_family = family.restricted(rest)
     source, target, _ = part_family.union
     parts = []
-    for own in weak_components(rest.size, source, target):
-        if own.size == 1:
-            continue
-        if own.size > LARGEST_PART:
-            return None
+    moving = [own for own in weak_components(rest.size, source, target) if own.size > 1]
+    if any(own.size > largest_part for own in moving):
+        return None
+    for own in moving:
         (component,) = decide(part_family.restricted(own))
         try:
             quotient = Quotient.of(component)

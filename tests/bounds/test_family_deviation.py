@@ -20,10 +20,18 @@ CLOCK = np.array([0.0, 0.5, 1.0, 2.0, 4.0])
 
 def deviations(edges: list[tuple[int, int, Fraction, Fraction]], x: list[int], seed: int) -> np.ndarray:
     """Return the largest ``|x_k(s) - x_k(end)|`` at the instants over signals that change at each of them."""
-    rng, n, worst = np.random.default_rng(seed), len(x), np.zeros((len(x), CLOCK.size))
+    return deviations_and_speeds(edges, x, seed)[0]
+
+
+def deviations_and_speeds(
+    edges: list[tuple[int, int, Fraction, Fraction]], x: list[int], seed: int, clock: np.ndarray = CLOCK
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the same, and the largest ``|(L x)_k|`` there."""
+    rng, n, worst = np.random.default_rng(seed), len(x), np.zeros((len(x), clock.size))
+    fastest = worst.copy()
     for _ in range(60):
-        states, state = [], np.array(x, dtype=float)
-        for step in [0.0, *np.diff(CLOCK), 400.0]:
+        states, speeds, state = [], [], np.array(x, dtype=float)
+        for step in [0.0, *np.diff(clock), 400.0]:
             L = np.zeros((n, n))
             for a, b, *ends in edges:
                 weight = float(ends[rng.integers(2)])
@@ -31,8 +39,10 @@ def deviations(edges: list[tuple[int, int, Fraction, Fraction]], x: list[int], s
                 L[b, a] -= weight
             state = expm(-L * step) @ state
             states.append(state)
+            speeds.append(L @ state)
         worst = np.maximum(worst, np.abs(np.array(states[:-1]) - states[-1]).T)
-    return worst
+        fastest = np.maximum(fastest, np.abs(speeds[:-1]).T)
+    return worst, fastest
 
 
 def near(weight: int, of: str = "1/5") -> tuple[Fraction, Fraction]:
@@ -94,6 +104,25 @@ def test_pairs_that_lead_are_no_farther_from_their_values_than_from_each_other()
     bound, seen = certificate.deviation_at(CLOCK), deviations(edges, x, 2)
     assert (seen <= bound * (1 + 1e-9)).all()
     assert (bound.max(axis=0) / seen.max(axis=0)).max() < 20
+
+
+def test_quick_followers_of_slow_agents_are_as_near_as_what_they_hear():
+    """The first value of a function of all agents is that of quick ones; late bounds are those of slow ones."""
+    known = [(0, 4, 2), (1, 4, 2), (2, 4, -7), (3, 4, -8), (0, 5, 3), (1, 5, 3), (3, 5, -7)]
+    edges = [(1, 2, *near(-2)), (2, 1, *near(-1)), *((a, b, Fraction(w), Fraction(w)) for a, b, w in known)]
+    edges.append((5, 6, *near(2)))
+    x = [2, -1, 5, 3, 5, 0, -3]
+    certificate = certify_family(Family.from_intervals(edges), PROTOCOL, x)
+    assert certificate.behaviours == ("bipartite containment",) and certificate.checked.accepted
+    remaining = np.array([1, 0.5, 0.3, 0.1])
+    clock, gain = PROTOCOL.gain.clock_at_remaining(remaining), PROTOCOL.gain.value_at_remaining(remaining)
+    deviation, speed = deviations_and_speeds(edges, x, 3, clock)
+    for bound, seen in (
+        (certificate.deviation_bound(remaining), deviation),
+        (certificate.input_bound(remaining), speed * gain),
+    ):
+        assert (seen <= bound * (1 + 1e-9)).all()
+        assert (bound.max(axis=0) / seen.max(axis=0)).max() < 8
 
 
 @pytest.mark.parametrize("sigma", [[0, 0, 0, 0, 1], [1, -1, 0, 2, 0]])

@@ -20,6 +20,7 @@ from ptcc_certify.errors import HypothesisError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov import family_search
+from ptcc_certify.lyapunov.aimed_forms import Aim, aimed_functions
 from ptcc_certify.lyapunov.family_function import FamilyFunction, decay_matrices, prove_mode
 from ptcc_certify.lyapunov.family_rate_upper_bound import (
     FamilyRateBound,
@@ -401,3 +402,25 @@ def test_scaling_all_weights_scales_the_rate_however_far(exponent):
         rates.append((search.functions[0].rate / size, bound.value / size))
     assert float(rates[1][0]) == pytest.approx(float(rates[0][0]), rel=1e-3)
     assert rates[1][0] <= rates[1][1]
+
+
+def test_forms_for_one_state_bound_inputs_more_closely_than_those_of_least_condition():
+    pairs = [(1, 0, 4, 4), (0, 1, 2, 4), (3, 2, 1, 2), (2, 3, 1, 3)]
+    known = [(0, 4, 7), (1, 4, 8), (2, 4, -5), (3, 4, 4), (4, 5, 4)]
+    quotient = Quotient.of(decide(Family.from_intervals([*pairs, *((a, b, w, w) for a, b, w in known)]))[0])
+    x = [Fraction(v) for v in (1, 1, -5, -1, 3, 2)]
+    aim = Aim(np.array(floats([quotient.coordinates(x)])[0]), np.array([2.0, 5.0]))
+
+    def bounds(functions):
+        return [
+            min(
+                math.sqrt(V.value(quotient.coordinates(x)) * max(V.input_constants)) * math.exp(-float(V.rate) / 2 * s)
+                for V in functions
+            )
+            for s in aim.clocks
+        ]
+
+    fastest = search_family(quotient, slower=False).functions
+    aimed = list(aimed_functions(quotient, aim, fastest, []))
+    assert max(V.rate for V in aimed) <= max(V.rate for V in fastest)
+    assert (np.array(bounds(aimed)) < 0.7 * np.array(bounds(search_family(quotient).functions))).all()
