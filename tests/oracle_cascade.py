@@ -1,8 +1,8 @@
 """Whether what a certificate of the cascade claims is true: judged from a motion in positions and velocities.
 
 The motion is formed from ``x' = v``, ``v' = eta' e + eta e' + alpha eta (eta e - v)``, of deviations from the common
-motion: in a basis of the range of ``L``, so that they have no floor. What is said of the graph is left to
-:mod:`oracle`.
+motion: in a basis of the range of ``L``, so that they have no floor. At the instants that a file tells of it is formed
+once more, by power series in ``t`` of many digits. What is said of the graph is left to :mod:`oracle`.
 """
 
 from __future__ import annotations
@@ -12,15 +12,18 @@ from collections.abc import Callable, Mapping
 from fractions import Fraction
 from functools import lru_cache
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import flint
 import numpy as np
-from oracle import Json, Oracle, number
+from oracle import Json, Matrix, Oracle, ball, number
 from oracle_agents import SLACK, AgentOracle, of_graph_alone
 from scipy.integrate import quad, solve_ivp
 
 #: ``z = ln(T/(T - t))`` up to which the motion is formed, unless it decays by ``e^-MOST`` before; and instants.
 LATEST, MOST, COUNT = 12.0, 60.0, 17
+#: Bits of power series, which end where eight terms are below ``2^-SMALL`` of the largest.
+BITS, SMALL = 3000, 400
 
 
 class Motion(NamedTuple):
@@ -57,7 +60,15 @@ class CascadeOracle(AgentOracle):
         if self.false:
             return
         self.used = [(e, self.data["lyapunov"]["functions"][e["function"]]) for e in self.agents["functions"]]
-        for claim in (self.error_constants, self.common, self.ends, self.velocities, self.roots, self.along_a_motion):
+        for claim in (
+            self.error_constants,
+            self.common,
+            self.ends,
+            self.velocities,
+            self.roots,
+            self.along_a_motion,
+            self.where_halves_are_left,
+        ):
             claim()
 
     def velocities(self) -> None:
@@ -130,6 +141,33 @@ class CascadeOracle(AgentOracle):
                 seen = float(np.linalg.norm(whole[v])) * (1 - SLACK) + pushed
                 self.require(float(number(bound)) * (1 + 1e-9) >= seen - 1e-9, f"input at z = {z}: {bound} {seen}")
 
+    def where_halves_are_left(self) -> None:
+        """``sqrt(V)`` of positions and of ``r = x'/eta + (alpha + theta) x`` at ``T (1 - 2^-i)``."""
+        told = self.data.get("instants")
+        if told is None:
+            return
+        self.require(self.agents["initial_state"] is not None and told, "instants of no motion")
+        if self.false:
+            return
+        T, rho1, k = self.gain
+        states = tuple(tuple(map(tuple, row)) for row in self.shifted)
+        motion = halved(self.key, states, (*self.gain, self.alpha), len(told))
+        for i, (row, (x, v)) in enumerate(zip(told, motion, strict=True), 1):
+            eta = rho1 + k / T * 2**i
+            pull = self.alpha + k * (2**i / (T * eta)) ** 2
+            self.require(len(row) == 2 * len(self.used), "entries of an instant")
+            for (_, function), S, R in zip(self.used, row[::2], row[1::2], strict=True):
+                Z = self.form(function)[0]
+                for root, at in ((S, x), (R, v * ball(1 / eta) + x * ball(pull))):
+                    self.require(root is None or not below(number(root), Z, at), f"V where 2^-{i} is left")
+
+
+def below(root: Fraction, Z: Matrix, at: Any) -> bool:
+    """Whether a number is negative, or its square surely below ``V`` of agents, (N, d)."""
+    pushed = flint.arb_mat([[ball(z) for z in row] for row in Z]) * at
+    value = sum((x * y for x, y in zip(at.entries(), pushed.entries(), strict=True)), flint.arb(0))
+    return root < 0 or bool(ball(root**2) < value)
+
 
 def clock(gain: tuple[Fraction, Fraction, Fraction], z: float) -> float:
     """``s``, the integral of the gain."""
@@ -181,3 +219,36 @@ def moved(laplacian: bytes, states: bytes, shape: tuple[int, ...], numbers: tupl
         found.append(w)
     inputs = [np.einsum("ki,ia->ka", U, control(z, w)) for z, w in zip(places, found, strict=True)]
     return Motion(places, np.array([np.einsum("ki,iaj->kaj", U, w) for w in found]), np.array(inputs))
+
+
+@lru_cache(maxsize=100)
+def halved(laplacian: Any, states: Any, numbers: tuple[Fraction, ...], count: int) -> list[tuple[Any, Any]]:
+    """Positions and velocities, (N, d) each, where ``2^-i`` of the time is left, ``i = 1, .., count``.
+
+    While ``w (1 - y/2)`` is left, ``0 <= y <= 1``, with ``q = rho1 w/2``, ``h = k + 2 q`` and ``D = d/dy``,
+
+        (4 - 4 y + y^2) D^2 x = -L ((k + alpha (h - q y)^2) x + F) - alpha F,  F = (2 h - (h + 2 q) y + q y^2) D x
+    """
+    flint.ctx.prec = BITS
+    w, rho1, k, alpha = map(ball, numbers)
+    L = flint.arb_mat([[ball(a) for a in row] for row in laplacian])
+    x, v = (flint.arb_mat([[ball(chain[i]) for chain in agent] for agent in states]) for i in (0, 1))
+    found = []
+    for _ in range(count):
+        q, h, c = rho1 * w / 2, rho1 * w + k, [0 * x, 0 * x, x, v * (w / 2)]
+        while len(c) < 12 or max(map(size, c[-8:])) > max(map(size, c)) / 2**SMALL:
+            m = len(c) - 4
+            assert m < 10_000, "a series that does not end"
+            fast = c[-1] * (2 * h * (m + 1)) - c[-2] * ((h + 2 * q) * m) + c[-3] * (q * (m - 1))
+            drawn = c[-2] * (k + alpha * h**2) - c[-3] * (2 * alpha * h * q) + c[-4] * (alpha * q**2)
+            own = c[-1] * (4 * m * (m + 1)) - c[-2] * (m * (m - 1))
+            c.append((own - L * (drawn + fast) - fast * alpha) * (1 / flint.arb(4 * (m + 1) * (m + 2))))
+        x, v = sum(c, 0 * x), sum((m * each for m, each in enumerate(c[2:])), 0 * x) * (2 / w)
+        x, v, w = x.mid(), v.mid(), w / 2  # their radii would grow by many digits in every step
+        found.append((x, v))
+    return found
+
+
+def size(matrix: Any) -> Any:
+    """Not below the largest entry."""
+    return max(x.abs_upper() for x in matrix.entries())

@@ -7,6 +7,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -17,16 +18,20 @@ from generators import all_classes, random_graph
 from oracle_cascade import false_claims_of_cascade, moved
 from scipy.integrate import solve_ivp
 
+from ptcc_certify.bounds.agent_instants import _checked
 from ptcc_certify.bounds.cascade import Roots, course
 from ptcc_certify.certificate.cascade_part import CascadePart
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.procedure import certify
 from ptcc_certify.checker import check
+from ptcc_certify.checker.agent_cascade import halvings_of
+from ptcc_certify.checker.agent_model import Cascade
 from ptcc_certify.errors import ParameterError
 from ptcc_certify.graphs.digraph import SignedDigraph
 from ptcc_certify.model import NominalProtocol, SlidingModeProtocol
 from ptcc_certify.model.agents import Agents
 from ptcc_certify.model.asks import Asks
+from ptcc_certify.model.cascade import CascadeProtocol
 
 F = Fraction
 CLASSES = all_classes()
@@ -85,9 +90,9 @@ def case_of(seed: int) -> Case:
     return Case(graph, protocol, alpha, rows(), rows(), rows() if rng.random() < 0.4 else None)
 
 
-def certified(case: Case, method: str) -> Certificate:
+def certified(case: Case, method: str, simulation: bool = True) -> Certificate:
     agents = Agents(order=2, cascade=case.alpha, offsets=case.offsets)
-    return made(case.graph, case.protocol, case.x0, agents, v0=case.v0, method=method, simulation=True)
+    return made(case.graph, case.protocol, case.x0, agents, v0=case.v0, method=method, simulation=simulation)
 
 
 def worst_ratio(certificate: Certificate) -> float:
@@ -111,6 +116,72 @@ def test_deviations_stay_within_their_bounds_on_every_kind_of_graph():
         certificate = certified(case_of(seed), ("paper", "best")[seed % 2])
         assert certificate.verdict == "certified" and worst_ratio(certificate) <= 1 + 1e-7
         holds(certificate)
+
+
+def enclosed_deviations(certificate: Certificate, remaining: np.ndarray) -> np.ndarray:
+    """Deviations of positions and velocities where a half, a quarter, .. of the time is left, (N, 2, M), from below.
+
+    In rationals, less what the enclosure of the check is off by: ``Q x`` has no larger entry than ``x``.
+    """
+    part, gain = part_of(certificate), certificate.protocol.gain
+    states, offsets = part.initial_state or (), part.protocol.offsets
+    agents = Cascade(2, len(states[0]), part.protocol.plant, part.protocol.own, None, gain.exact)
+    sizes = np.zeros((len(states), 2, len(remaining)))
+    for m, at in enumerate(islice(halvings_of(_checked(part.structure), agents, states, offsets), len(remaining))):
+        for i, x in [(i, [F(y) / at.scale for y in row]) for rows in at.columns for i, row in enumerate(rows)]:
+            ends, _ = certificate.influence.apply(x)
+            sizes[:, i, m] += [float(one - end) ** 2 for one, end in zip(x, ends, strict=True)]
+        sizes[:, :, m] = np.maximum(np.sqrt(sizes[:, :, m]) - 2 * float(at.off), 0)
+    sizes[:, 1] *= gain.value_at_remaining(remaining)
+    return sizes
+
+
+#: ``1 - t/T`` down to a sixty thousandth; bounds start again at the first ten.
+HALVINGS = 2.0 ** -np.arange(1, 17)
+
+
+def ratios_where_enclosed(part: CascadePart, sizes: np.ndarray) -> np.ndarray:
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.where(sizes > 0, sizes / part.deviation_bound(HALVINGS), 0)
+
+
+@pytest.mark.few(10)
+@pytest.mark.parametrize("seed", range(160))
+def test_bounds_are_above_where_agents_are_enclosed_by_no_integrator(seed: int):
+    """From the beginning, from the third instant and from every one; what is near to its bound shows that it is."""
+    certificate = certified(case_of(seed), ("paper", "best")[seed % 2], simulation=False)
+    part, sizes = part_of(certificate), enclosed_deviations(certificate, HALVINGS)
+    for count in (0, 3, 10) if part.instants else (0,):
+        ratios = ratios_where_enclosed(replace(part, instants=part.instants[:count]), sizes)
+        assert ratios.max() <= 1, (count, ratios.max(axis=0))
+    assert ratios.max() > 0.25 or not part.instants
+
+
+def with_smaller_roots(part: CascadePart) -> CascadePart:
+    """Roots at the instants a hundred thousandth less."""
+    return replace(part, instants=tuple(tuple(x and x * F(99_999, 10**5) for x in row) for row in part.instants))
+
+
+def with_faster_functions(part: CascadePart) -> CascadePart:
+    faster = [replace(V, rate=V.proved_rate * F(1001, 1000)) for V in part.functions]
+    return replace(part, functions=tuple(faster))
+
+
+def with_larger_alpha(part: CascadePart) -> CascadePart:
+    return replace(
+        part, protocol=CascadeProtocol.of(part.protocol.base, part.alpha * F(1001, 1000), part.protocol.offsets)
+    )
+
+
+@pytest.mark.parametrize("change", [with_smaller_roots, with_faster_functions, with_larger_alpha])
+def test_false_bounds_are_below_where_agents_are_enclosed_and_below_a_run(change: Any):
+    """Also below one that is judged above the floor of :data:`~ptcc_certify.bounds.agents_comparison.RESOLVED`."""
+    for seed in (5, 12, 13, 15):
+        certificate = certified(case_of(seed), ("paper", "best")[seed % 2], simulation=False)
+        part = part_of(certificate)
+        assert ratios_where_enclosed(change(part), enclosed_deviations(certificate, HALVINGS)).max() > 1
+        true, false = (each.compare(part.simulate()) for each in (part, change(part)))
+        assert true is not None and not true.violated and false is not None and false.violated
 
 
 @pytest.mark.campaign

@@ -17,7 +17,7 @@ import pytest
 from asked import certify_words
 from generators import all_classes, random_graph
 from jsonschema import Draft202012Validator  # type: ignore[import-untyped]
-from mutations import Json, changed, judged_mutants, mutants, nudged, resealed, without_instants
+from mutations import Json, changed, judged_mutants, mutants, nudged, resealed
 from oracle_cascade import false_claims_of_cascade
 
 from ptcc_certify.certificate.family_certificate import certify_family
@@ -59,7 +59,7 @@ def made(name: str = "plain", kind: str = "camps") -> Json:
     }
     agents = Agents(**{"order": 2, "cascade": 2, **of_agents})
     asked: Json = {"method": "paper", "simulation": False, "agents": agents, **begin, **options}
-    return without_instants({**json.loads(certify_words(graph, protocol, **asked).to_json()), "unverified": {}})
+    return {**json.loads(certify_words(graph, protocol, **asked).to_json()), "unverified": {}}
 
 
 def accepted(data: Json) -> None:
@@ -161,9 +161,10 @@ def with_input(data: Json) -> Json:
     """A bound that is never reached, where none is proved."""
     names = data["graph"]["nodes"]
     text = {"agents": dict.fromkeys(names, "100000000"), "largest": "100000000"}
-    step = copy.deepcopy(made()["proof"][-1])
-    assert step["kind"] == "agent-input"
-    return {**data, "agents": {**data["agents"], "input": text}, "proof": [*data["proof"], step]}
+    input_step = next(step for step in made()["proof"] if step["kind"] == "agent-input")
+    last = next((k for k, step in enumerate(data["proof"]) if step["kind"] == "agent-instants"), len(data["proof"]))
+    proof = [*data["proof"][:last], input_step, *data["proof"][last:]]
+    return {**data, "agents": {**data["agents"], "input": text}, "proof": proof}
 
 
 def without_functions(data: Json) -> Json:
@@ -262,7 +263,8 @@ FORGERIES: dict[str, tuple[str, Change, str, str]] = {
     "an agent less": ("plain", agents(offsets={key: ["0", "0"] for key in "abc"}), "agents", "missing"),
     "offsets in a side file": ("plain", agents(offsets=SIDE), "agents", "the key"),
     "a step less": ("plain", without_step("agent-cascade"), "agent-cascade", "another obligation"),
-    "the last step less": ("plain", without_step("agent-input"), "agent-input", "does not list"),
+    "a step of the input less": ("plain", without_step("agent-input"), "agent-input", "another obligation"),
+    "the last step less": ("plain", without_step("agent-instants"), "agent-instants", "does not list"),
     "a step of the other protocol": (
         "plain", lambda data: {**data, "proof": [*data["proof"], data["proof"][-1]]}, "proof", "nothing asks for"),
     "a witness": ("plain", step_of("agent-cascade", witness={"u": "1"}), "agent-cascade", "nothing asks for"),
@@ -292,6 +294,9 @@ def test_what_is_rejected_as_false_is_false_to_the_oracle():
     false["velocities"] = false_claims_of_cascade(with_velocities(made("slow")))
     low = {"agents": dict.fromkeys("abcf", "1/10"), "largest": "1/10"}
     false["a low input"] = false_claims_of_cascade(agents(input=low)(made()))
+    for root in (0, 1):
+        told = F(made()["instants"][0][root])
+        false[f"instants {root}"] = false_claims_of_cascade(changed(made(), ("instants", 0, root), str(told * LESS**3)))
     assert all(false.values()), false
 
 
@@ -333,15 +338,20 @@ def told_again(mutant: Json, path: Any, new: str) -> Json:
 
 
 def nudges(data: Json, seed: int, count: int) -> Iterator[tuple[Any, Json]]:
-    return nudged(data, ("agents", "protocol", "graph", "lyapunov"), seed, count, told_again)
+    return nudged(data, ("agents", "protocol", "graph", "lyapunov", "instants"), seed, count, told_again)
 
 
 def test_mutants_that_are_accepted_are_true():
     data = made("formation")
-    own = ((path, x) for path, x in mutants(data, 41, 1) if path[0] in ("agents", "proof"))
+    own = ((path, x) for path, x in mutants(data, 41, 1) if path[0] in ("agents", "proof", "instants"))
     count, _ = judged(data, own)
     more, passed = judged(data, nudges(data, 1, 40))
     assert count > 20 and more > 30 and passed
+    last, kept = judged(data, nudged(data, ("instants",), 2, 40, told_again))
+    assert last > 30 and kept["instants.k.k"] > 5
+
+
+OWN = ("agents", "protocol", "proof", "verdict", "instants")
 
 
 @pytest.mark.campaign
@@ -350,7 +360,7 @@ def test_mutants_of_every_kind_of_cascade_that_are_accepted_are_true(name: str):
     total, passed = 0, Counter[str]()
     for kind in ("camps", "singles", "enemies"):
         data = made(name, kind)
-        own = ((path, x) for path, x in mutants(data, 3, 1) if path[0] in ("agents", "protocol", "proof", "verdict"))
+        own = ((path, x) for path, x in mutants(data, 3, 1) if path[0] in OWN)
         assert false_claims_of_cascade(data) == []
         for changes in (own, nudges(data, len(name), int(os.environ.get("PTCC_FUZZ_COUNT", "60")))):
             count, through = judged(data, changes)

@@ -52,7 +52,10 @@ UNREAD = ("large form", "undecided", "radius", "dominance", "weak components")
 def document(
     graph: SignedDigraph, protocol: Any, of_agents: Json, dimension: int, seed: int = 3, instants: bool = False
 ) -> Json:
-    """A certificate, with offsets and initial states of small quotients; with what it says of instants, or without."""
+    """A certificate, with offsets and initial states of small quotients; with what it says of instants, or without.
+
+    Forgeries and mutants are made without: the program leaves instants out, and would take whatever they say.
+    """
     rng, labels, options = np.random.default_rng(seed), graph.labels, {"cascade": 2, **of_agents}
     rows = lambda: {v: [str(F(int(x), 4)) for x in rng.integers(-20, 21, dimension)] for v in labels}  # noqa: E731
     asked: Json = {"method": options.pop("method", "paper"), "simulation": False}
