@@ -11,7 +11,6 @@ from typing import Any
 from ptcc_certify.certificate.certificate import Certificate, read_certificate
 from ptcc_certify.certificate.certificate_file import RejectedCertificate
 from ptcc_certify.certificate.checking import refuse_no_certificate
-from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.certificate.request import listener
 from ptcc_certify.errors import ParameterError, SimulationError
 from ptcc_certify.graphs.io import write_atomically
@@ -29,7 +28,7 @@ SUFFIXES = (".html", ".htm", ".tex")
 
 
 def write_report(
-    certificate: str | Path | Mapping[str, Any] | Certificate | FamilyCertificate,
+    certificate: str | Path | Mapping[str, Any] | Certificate,
     output: str | Path,
     *,
     simulation: bool | None = None,
@@ -44,7 +43,7 @@ def write_report(
 
     Parameters
     ----------
-    certificate : path, mapping, Certificate or FamilyCertificate
+    certificate : path, mapping, Certificate
         A file of schema ``ptcc-certificate/2`` (``"-"``: standard input), its parsed JSON, or a certificate.
     output : path
         The suffix decides what is written.
@@ -87,7 +86,7 @@ def write_report(
     if suffix not in SUFFIXES:
         raise ParameterError(f"{output}: a report is written to .html or .tex; choose one of these")
     refuse_no_certificate(certificate)
-    in_memory = isinstance(certificate, Certificate | FamilyCertificate | Mapping)
+    in_memory = isinstance(certificate, Certificate | Mapping)
     file = None if in_memory or certificate == "-" else Path(certificate)  # type: ignore[arg-type]
     if file is not None and path.is_file() and file.is_file() and path.samefile(file):
         raise ParameterError(f"{output}: is the certificate itself; name another file")
@@ -105,7 +104,7 @@ def write_report(
         write_atomically(path, rejected_html(error, day=day))
         return "rejected"
     progress("simulation")
-    if isinstance(saved, FamilyCertificate):
+    if saved.of_family:
         _write_family(saved, path, suffix, simulation, progress, day)
         return saved.verdict
     saved, why = _with_run(saved, simulation)
@@ -117,15 +116,15 @@ def write_report(
     return saved.verdict
 
 
-def _read(certificate: Any, memory: float) -> Certificate | FamilyCertificate:
+def _read(certificate: Any, memory: float) -> Certificate:
     """Read a certificate back; that of a family of which nothing is certified has no file, and stays what it is."""
-    if isinstance(certificate, FamilyCertificate) and certificate.verdict != "certified":
+    if isinstance(certificate, Certificate) and certificate.of_family and certificate.verdict != "certified":
         return certificate
     return read_certificate(certificate, memory=memory)
 
 
 def _write_family(
-    saved: FamilyCertificate,
+    saved: Certificate,
     path: Path,
     suffix: str,
     simulation: bool | None,
@@ -155,7 +154,7 @@ def _write_statement(path: Path, drawn: Mapping[str, Any], latex: Callable[[dict
     write_atomically(path, text)
 
 
-def _runs(saved: FamilyCertificate, simulation: bool | None) -> tuple[list[Trajectory], str]:
+def _runs(saved: Certificate, simulation: bool | None) -> tuple[list[Trajectory], str]:
     """Simulate a family under many signals, if there is an initial state; return why there is no run."""
     if simulation is False:
         return [], "it was left out, as was asked"

@@ -9,12 +9,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from asked import certify_family, family_certificate
 from row_families import laplacian, random_interval, random_led, random_vertex
 from scipy.linalg import expm
 
 from ptcc_certify import NominalProtocol
 from ptcc_certify.bounds.kept_means import leading_groups
-from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate, certify_family
+from ptcc_certify.certificate.certificate import Certificate
+from ptcc_certify.certificate.family_proof import ComponentProof
 from ptcc_certify.checker import check, digest
 from ptcc_certify.graphs.family import Family
 from ptcc_certify.lyapunov.family_function import FamilyFunction
@@ -68,9 +70,9 @@ def end_of_a_signal(rng: random.Random, family: Family, x: list[Fraction]) -> np
     return np.linalg.matrix_power(step, 100_000) @ X
 
 
-def plain(family: Family, x: list[Fraction]) -> FamilyCertificate:
+def plain(family: Family, x: list[Fraction]) -> Certificate:
     """A certificate without any Lyapunov function."""
-    return FamilyCertificate(family, PROTOCOL, tuple(map(ComponentProof, decide(family))), tuple(x))
+    return family_certificate(family, PROTOCOL, tuple(map(ComponentProof, decide(family))), tuple(x))
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -147,7 +149,7 @@ def test_weights_known_to_a_part_leave_the_mean_nearly_kept():
     family = Family.from_intervals([(s, t, low * Fraction(19, 20), low * Fraction(21, 20)) for s, t, low, _ in cycle])
     x = [Fraction(v) for v in (5, -3, 8, 0, -9)]
     certificate = certify_family(family, PROTOCOL, x)
-    bare = replace(certificate, parts=tuple(replace(p, functions=stripped(p)) for p in certificate.parts))
+    bare = certificate.changed(parts=tuple(replace(p, functions=stripped(p)) for p in certificate.parts))
     assert certificate.verdict == bare.verdict == "certified"
     assert certificate.final_states is not None and bare.final_states is not None
     (low, high), (before, after) = (ends for c in (certificate, bare) if (ends := c.final_states[0]) is not None)

@@ -6,10 +6,10 @@ from functools import cache
 
 import numpy as np
 import pytest
+from asked import certify_family
 from common_kernel_families import random_family
 
 from ptcc_certify.certificate.certificate import read_certificate
-from ptcc_certify.certificate.family_certificate import certify_family
 from ptcc_certify.certificate.family_comparison import compare
 from ptcc_certify.checker import check, digest
 from ptcc_certify.errors import ParameterError

@@ -9,11 +9,12 @@ from functools import cache
 
 import numpy as np
 import pytest
+from asked import certify_family, family_certificate
 from mutations import Json, changed, resealed
 from row_families import bounds_of, random_led
 
-from ptcc_certify.certificate.certificate import read_certificate
-from ptcc_certify.certificate.family_certificate import ComponentProof, FamilyCertificate, certify_family
+from ptcc_certify.certificate.certificate import Certificate, read_certificate
+from ptcc_certify.certificate.family_proof import ComponentProof
 from ptcc_certify.checker import check
 from ptcc_certify.checker.reading import exact
 from ptcc_certify.graphs.family import Family
@@ -24,11 +25,11 @@ from ptcc_certify.theorems.family_behaviour import decide
 KINDS = ("stability", "bipartite consensus", "bipartite containment")
 
 
-def certificate(family: Family, losses: tuple[float, ...] = (0.01,)) -> FamilyCertificate:
+def certificate(family: Family, losses: tuple[float, ...] = (0.01,)) -> Certificate:
     """With functions of followers alone."""
     x0 = tuple(Fraction(7 * k % 11 - 5, 2) for k in range(family.n_nodes))
     parts = [ComponentProof(c, tuple(follower_functions(c, losses)) if c.kernel else ()) for c in decide(family)]
-    return FamilyCertificate(family, NominalProtocol(T=1, rho1=1, rho2=30, kappa=3), tuple(parts), x0)
+    return family_certificate(family, NominalProtocol(T=1, rho1=1, rho2=30, kappa=3), tuple(parts), x0)
 
 
 @cache

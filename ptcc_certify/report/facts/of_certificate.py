@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 from lmi.exact.decimal_rounding import near
 from ptcc_certify.certificate.answer import rejects
 from ptcc_certify.certificate.facts import Fact, Facts
-from ptcc_certify.certificate.family_certificate import FamilyCertificate
 from ptcc_certify.report.facts.agents import agents_facts
 from ptcc_certify.report.facts.claim import assumptions, claim_facts, family_claims
 from ptcc_certify.report.facts.decay import (
@@ -32,7 +31,7 @@ if TYPE_CHECKING:
 
 
 def facts_of(
-    certificate: Certificate | FamilyCertificate,
+    certificate: Certificate,
     name: str | None = None,
     origins: Mapping[str, str] | None = None,
     details: bool = True,
@@ -41,7 +40,7 @@ def facts_of(
 
     Parameters
     ----------
-    certificate : Certificate or FamilyCertificate
+    certificate : Certificate
     name : str, optional
         What the graph is called, unless as the certificate says.
     origins : mapping of str to str, optional
@@ -59,23 +58,23 @@ def facts_of(
     """
     origins = certificate.origins if origins is None else origins
     if name is None:
-        name = certificate.origins.get("graph", "" if isinstance(certificate, FamilyCertificate) else "graph")
+        name = certificate.origins.get("graph", "" if certificate.of_family else "graph")
     facts: list[Fact] = []
-    if isinstance(certificate, FamilyCertificate):
+    if certificate.of_family:
         components = [part.component for part in certificate.parts]
         facts += family_facts(certificate.family, name, origins.get("read", ""), components if details else None)
     else:
         facts += graph_facts(certificate.structure, name, details)
     facts += protocol_facts(certificate, origins)
     if not rejects(certificate.checked):
-        if isinstance(certificate, FamilyCertificate):
+        if certificate.of_family:
             facts += _of_family(certificate, origins, details)
         else:
             facts += _of_graph(certificate, origins, details)
     return [*facts, *verdict_facts(certificate)]
 
 
-def _sliding(certificate: Certificate | FamilyCertificate) -> Facts:
+def _sliding(certificate: Certificate) -> Facts:
     labels, reaching = certificate.labels, certificate.protocol.reaching
     return sliding_facts(labels, reaching, certificate.sigma0, certificate.reaching)
 
@@ -104,7 +103,7 @@ def _of_graph(certificate: Certificate, origins: Mapping[str, str], details: boo
         yield from run_facts(certificate)
 
 
-def _beside(certificate: Certificate | FamilyCertificate) -> list[Fact]:
+def _beside(certificate: Certificate) -> list[Fact]:
     """Tell what the rest of a certificate knows nothing of: nothing, or one fact."""
     without = [text for text in assumptions(certificate) if text != "without limits"]
     text = f"{' and '.join(without)}, in what follows"
@@ -116,7 +115,7 @@ def _details(facts: Iterable[Fact], are: bool) -> Iterable[Fact]:
     return (replace(fact, detail=True) for fact in facts) if are else facts
 
 
-def _of_family(certificate: FamilyCertificate, origins: Mapping[str, str], details: bool) -> Facts:
+def _of_family(certificate: Certificate, origins: Mapping[str, str], details: bool) -> Facts:
     """Tell what becomes of the agents of a family for every signal, and for those that were asked for."""
     components = [part.component for part in certificate.parts]
     yield from initial_facts(certificate, origins, alone=False)
