@@ -63,7 +63,7 @@ def _of_family(proof: FamilyProof, certified: bool) -> dict[str, Any]:
     restricted = ends_for_signal(proof) if certified else unknown
     signal = "" if proof.signal == "any" else str(proof.signal)
     return {
-        **_pair("least", "largest", proof.final_states or unknown),
+        **_pair("least", "largest", proof.final_state or unknown),
         **_pair("restricted_least", "restricted_largest", restricted),
         "restricted_to": ["" if ends is None else signal for ends in restricted],
         **_pair("box_least", "box_largest", _boxes(proof) if certified else unknown),

@@ -133,7 +133,7 @@ def _family_sections(proof: FamilyProof, out: Writer) -> tuple[dict[str, Any], d
     """Return what files say of a family, before the proof and behind it."""
     components = [part.component for part in proof.parts]
     used = [function_section(part.component, k, V, out) for k, part in enumerate(proof.parts) for V in part.functions]
-    finals = proof.final_states
+    finals = proof.final_state
     ends = None if finals is None else [None if pair is None else ball(*pair) for pair in finals]
     sections = {
         **family_sections(proof.family, components, out),
@@ -235,7 +235,7 @@ def _steps(proof: FamilyProof, out: Writer) -> Iterator[Obligation]:
     yield Obligation("family-claim", "graph", witness=claim_witnesses(proof.family, components))
     for k, V in enumerate(functions):
         yield from function_steps(f"lyapunov.functions[{k}]", V, out)
-    if proof.final_states is not None:
+    if proof.final_state is not None:
         yield Obligation("family-final-state", "final_state", witness=_means(proof))
     for k, claim in enumerate(proof.restricted):
         yield from claim_steps(f"restricted[{k}]", claim, _labels(proof, claim))

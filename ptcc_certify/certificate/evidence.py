@@ -14,6 +14,7 @@ from ptcc_certify.bounds.envelope import Comparison, remaining_part
 from ptcc_certify.bounds.final_state import final_state
 from ptcc_certify.certificate.family_proof import FamilyProof
 from ptcc_certify.certificate.graph_proof import GraphProof
+from ptcc_certify.certificate.proof import OfQuestion
 from ptcc_certify.certificate.request import Question
 from ptcc_certify.errors import ParameterError, PTCCError, SimulationError, unknown_parameter
 from ptcc_certify.lyapunov.search import Search
@@ -70,7 +71,7 @@ _ONCE = ("functions", "full_constants")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Evidence(Shown):
+class Evidence(OfQuestion, Shown):
     """What a certificate rests on: the proof, with the question that it answers, and what was observed.
 
     What the parts tell is asked of it by the same names, see :class:`ptcc_certify.Certificate`.
@@ -80,7 +81,7 @@ class Evidence(Shown):
     observed: Observations = field(default_factory=Observations)
 
     @property
-    def question(self) -> Question:
+    def question(self) -> Question:  # type: ignore[override]
         """Of whom it is, under which protocol, from where, and what was asked beside."""
         return self.proof.question
 

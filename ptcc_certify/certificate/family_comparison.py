@@ -190,7 +190,7 @@ def _worst(values: np.ndarray, bounds: np.ndarray) -> float | None:
 
 
 def _final_ratio(certificate: Certificate, run: Trajectory, floor: float) -> float | None:
-    ends = certificate.final_states
+    ends = certificate.final_state
     if run.deadline_index is None or not run.deadline_resolved or ends is None:
         return None
     known = [k for k, interval in enumerate(ends) if interval is not None]

@@ -229,9 +229,9 @@ class FamilyProof(Proof):
     @property
     def longest_way(self) -> float | None:
         """The longest way of an agent from its initial to its final state (numerical); None if unknown."""
-        if self.initial_state is None or self.final_states is None:
+        if self.initial_state is None or self.final_state is None:
             return None
-        pairs = zip(self.initial_state, self.final_states, strict=True)
+        pairs = zip(self.initial_state, self.final_state, strict=True)
         return max((float(max(abs(x - y) for y in ends)) for x, ends in pairs if ends is not None), default=None)
 
     @property
@@ -362,10 +362,10 @@ class FamilyProof(Proof):
         )
 
     @cached_property
-    def final_states(self) -> FinalEnds | None:
+    def final_state(self) -> FinalEnds | None:
         """Ends between which each agent is at the deadline, for every signal; None where no limit is claimed.
 
-        By place, or by label: ``final_states["ann"]``.
+        By place, or by label: ``final_state["ann"]``.
         """
         if self.initial_state is None:
             return None

@@ -125,7 +125,8 @@ def certify_family(
     progress(STEPS[-1])
     notes = [f"{note}: cut off by the time limit" if note in (*STEPS, BOXES) else note for note in notes]
     certificate = _fewer_functions(Certificate(proof, Observations(notes=tuple(dict.fromkeys(notes)))))
-    return certificate.changed(**_beside(certificate.family_proof))
+    beside = _beside(certificate.family_proof)
+    return certificate.changed(**beside) if beside else certificate
 
 
 def _beside(proof: FamilyProof) -> dict[str, Any]:
@@ -135,7 +136,7 @@ def _beside(proof: FamilyProof) -> dict[str, Any]:
         return {}
     if not proof.direct:
         raise ParameterError("sigma0", "late messages ask for 0, so that no sliding variable moves; leave it out")
-    known = [pair for pair in proof.final_states or () if pair is not None]
+    known = [pair for pair in proof.final_state or () if pair is not None]
     middles = [((low + high) / 2, (high - low) / 2) for low, high in known]
     ends = middles if len(known) == proof.family.n_nodes else None
     if messages is not None:

@@ -47,30 +47,10 @@ class Source:
     files: Mapping[str, bytes] = field(repr=False)
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Proof:
-    """What is proved of a graph or of a family.
-
-    Attributes
-    ----------
-    question : Question
-    reaching : tuple of N ReachingTime, or None
-        When each sliding variable is proved to be 0, whatever the disturbance.
-    late : LateBounds or None
-        What holds with late messages; None where nothing was asked of them.
-    tracking : Tracking or None
-        What holds while leaders move; None where nothing was asked of that.
-    source : Source or None
-        The file that it was read from.
-    """
+class OfQuestion:
+    """What a question tells, asked of what answers it."""
 
     question: Question
-    reaching: tuple[ReachingTime, ...] | None = None
-    late: LateBounds | None = None
-    tracking: Tracking | None = None
-    source: Source | None = None
-
-    # ------------------------------------------------------------------ the question
 
     @property
     def protocol(self) -> Protocol:
@@ -148,6 +128,35 @@ class Proof:
         return self.request.time_limit
 
     @property
+    def direct(self) -> bool:
+        """Whether the decay begins at 0: nominal protocol, or ``sigma(0) = 0``."""
+        return not any(self.sigma0 or ())
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Proof(OfQuestion):
+    """What is proved of a graph or of a family.
+
+    Attributes
+    ----------
+    question : Question
+    reaching : tuple of N ReachingTime, or None
+        When each sliding variable is proved to be 0, whatever the disturbance.
+    late : LateBounds or None
+        What holds with late messages; None where nothing was asked of them.
+    tracking : Tracking or None
+        What holds while leaders move; None where nothing was asked of that.
+    source : Source or None
+        The file that it was read from.
+    """
+
+    question: Question
+    reaching: tuple[ReachingTime, ...] | None = None
+    late: LateBounds | None = None
+    tracking: Tracking | None = None
+    source: Source | None = None
+
+    @property
     def asked_messages(self) -> LateMessages | None:
         """How late messages are."""
         return self.request.messages if self.late is None else self.late.messages
@@ -157,8 +166,3 @@ class Proof:
         """How leaders move."""
         proved = (one.leaders for one in (self.late, self.tracking) if one is not None and one.leaders is not None)
         return next(proved, self.request.leaders)
-
-    @property
-    def direct(self) -> bool:
-        """Whether the decay begins at 0: nominal protocol, or ``sigma(0) = 0``."""
-        return not any(self.sigma0 or ())

@@ -44,14 +44,14 @@ def constant_states(proof: FamilyProof) -> list[Interval | None]:
 
 def states_of_signal(proof: FamilyProof) -> list[Interval | None]:
     """Return the final states for every signal, and where there are none, those for the signals that were asked for."""
-    pairs = zip(proof.final_states or (), last_states(proof), strict=False)
+    pairs = zip(proof.final_state or (), last_states(proof), strict=False)
     return [other if ends is None else ends for ends, other in pairs]
 
 
 def ends_for_signal(proof: FamilyProof) -> list[Interval | None]:
     """Return the nearest ends that are proved for the signals that were asked for; None of agents that have none.
 
-    All are None where all signals were asked for, which :attr:`FamilyProof.final_states` tells of.
+    All are None where all signals were asked for, which :attr:`FamilyProof.final_state` tells of.
 
     Examples
     --------
@@ -63,5 +63,5 @@ def ends_for_signal(proof: FamilyProof) -> list[Interval | None]:
     unknown: list[Interval | None] = [None] * proof.family.n_nodes
     if proof.signal == "any":
         return unknown
-    pairs = zip(last_states(proof), proof.final_states or unknown, strict=True)
+    pairs = zip(last_states(proof), proof.final_state or unknown, strict=True)
     return [every if ends is None else ends for ends, every in pairs]

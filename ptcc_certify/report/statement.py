@@ -282,7 +282,7 @@ def _family_states(saved: Certificate) -> tuple[list[str], list[tuple[str, ...]]
     if not saved.direct:
         columns[r"$\sigma_{k}(0)$"] = _in_math(map(texts.rational, (saved.sigma0 or ())[: texts.LISTED]))
     if any(end is not None for end in ends):
-        restricted = states_of_signal(saved.family_proof) != list(saved.final_states or ())
+        restricted = states_of_signal(saved.family_proof) != list(saved.final_state or ())
         head = "at the deadline, restricted" if restricted else "at the deadline"
         columns[head] = ["no limit claimed" if end is None else _in_math([end])[0] for end in ends]
     return list(columns), list(zip(map(latex_of_text, map(_cut, labels)), *columns.values(), strict=True))

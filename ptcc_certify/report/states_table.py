@@ -103,7 +103,7 @@ def _of_family(saved: Certificate) -> tuple[str, list[Any], list[str]]:
     heads = ["Agent", "Camp", "Initial state"]
     if all(last is None for *_, last in rows):
         return "Where the agents begin", [(texts.label(name), *cells) for name, *cells, _ in rows], heads
-    every = finals == list(saved.final_states or ())
+    every = finals == list(saved.final_state or ())
     which = "every signal" if every else "these signals"
     which += "" if saved.protocol.reaching is None else " and disturbance"
     last = "State at the deadline" if rests(saved) else "State at any instant"

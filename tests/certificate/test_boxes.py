@@ -105,7 +105,7 @@ def test_what_is_read_back_says_the_same():
     again = read_certificate(certificate.to_dict())
     assert again == certificate and certificate_lines(again, "f")[2:] == certificate_lines(certificate, "f")[2:]
     assert again.boxes[0].excess([0, 4, 100, 3]) == certificate.boxes[0].excess([0, 4, 100, 3]) > 0
-    assert certificate.final_states == (None,) * 4
+    assert certificate.final_state == (None,) * 4
 
 
 def test_screen_page_and_statement_tell_the_box_and_claim_no_limit():

@@ -51,12 +51,12 @@ def compare(seed: int) -> int:
     certificate = made(family, x)
     assert certificate.verdict == "certified" and check(certificate.to_dict(), stdlib=True).accepted
     if not certificate.final_values:
-        assert family.n_nodes == 1 or certificate.final_states[0][0] == certificate.final_states[0][1]
+        assert family.n_nodes == 1 or certificate.final_state[0][0] == certificate.final_state[0][1]
         return 0
     (ends,) = claim_of(certificate).values
     values = values_of_vertices(family.modes[0], [g * y for g, y in zip(ends.camps, x, strict=True)])
     assert (ends.lower, ends.upper, ends.within) == (min(values), max(values), 0)
-    for (low, high), (wide_low, wide_high) in zip(ends.final_states, certificate.final_states, strict=True):
+    for (low, high), (wide_low, wide_high) in zip(ends.final_states, certificate.final_state, strict=True):
         assert wide_low <= high and low <= wide_high
     return 1
 

@@ -46,7 +46,7 @@ def test_what_is_decided_on_edges_alone_is_told_and_not_certified():
     assert (
         certificate.assessment.exit_code == 4 and "decided on edges, and not certified" in certificate.assessment.text
     )
-    assert certificate.final_states == (None,) * 302
+    assert certificate.final_state == (None,) * 302
     text = "\n".join(
         [*summary_lines(certificate, "net"), *certificate_lines(certificate, "net"), str(certificate.to_dict())]
     )

@@ -265,7 +265,7 @@ def test_without_sliding_variables_all_is_as_without_disturbances(kind):
     reaching = certified_reaching_times(PROTOCOL, zero)
     own = family_certificate(family, PROTOCOL, nominal.parts, nominal.initial_state, zero, reaching)
     assert own.direct and own.drives is None and own.verdict == "certified"
-    assert own.final_states == nominal.final_states and own.nominal_peaks == nominal.input_peaks
+    assert own.final_state == nominal.final_state and own.nominal_peaks == nominal.input_peaks
     if own.input_peaks is not None:
         assert all(x - y == PROTOCOL.mu1 for x, y in zip(own.input_peaks, nominal.input_peaks, strict=True))
     q = np.geomspace(1, 1e-6, 9)

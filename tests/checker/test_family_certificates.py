@@ -865,13 +865,13 @@ def test_what_is_read_back_says_the_same(k: int, kind: str, tmp_path: Path):
     made.save(tmp_path / "c.json")
     saved = read_certificate(tmp_path / "c.json")
     assert (saved.behaviours, saved.rate, saved.family) == (made.behaviours, made.rate, made.family)
-    assert (saved.final_states, saved.input_peaks, saved.bounded) == (made.final_states, made.input_peaks, made.bounded)
+    assert (saved.final_state, saved.input_peaks, saved.bounded) == (made.final_state, made.input_peaks, made.bounded)
     assert (saved.deviation_bound([1, 0.5, 0.1]) == made.deviation_bound([1, 0.5, 0.1])).all()
     assert saved.verdict == made.verdict == "certified" and saved.checked.accepted
     assert [part.upper_bound for part in saved.parts] == [part.upper_bound for part in made.parts]
     saved.save(tmp_path / "again.json")
     assert (tmp_path / "again.json").read_bytes() == (tmp_path / "c.json").read_bytes()
-    assert read_certificate(made.to_dict()).final_states == made.final_states
+    assert read_certificate(made.to_dict()).final_state == made.final_state
 
 
 def test_functions_of_rows_are_read_back():
@@ -879,7 +879,7 @@ def test_functions_of_rows_are_read_back():
         if name.startswith("rows"):
             saved = read_certificate(resealed(data))
             assert [V.kind for V in saved.parts[0].functions] == [V["class"] for V in data["lyapunov"]["functions"]]
-            for told, ends in zip(data["final_state"].values(), saved.final_states, strict=True):
+            for told, ends in zip(data["final_state"].values(), saved.final_state, strict=True):
                 middle, radius = (Fraction(told[k]) for k in ("mid", "radius")) if isinstance(told, dict) else (told, 0)
                 middle = Fraction(middle)
                 assert middle - radius <= ends[0] <= ends[1] <= middle + radius

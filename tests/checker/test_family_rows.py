@@ -114,7 +114,7 @@ def test_files_are_read_back(tmp_path):
     (V,), (W,) = cert.parts[0].functions, again.parts[0].functions
     assert isinstance(W, FollowerFunction) and V.rate == W.rate
     assert [bounds_of(x) for x in (V.speeds, V.sizes)] == [bounds_of(x) for x in (W.speeds, W.sizes)]
-    assert again.final_states == cert.final_states and again.input_peaks == cert.input_peaks
+    assert again.final_state == cert.final_state and again.input_peaks == cert.input_peaks
     remaining = np.linspace(0, 1, 5)
     assert (again.deviation_bound(remaining) == cert.deviation_bound(remaining)).all()
 
@@ -127,4 +127,4 @@ def test_a_large_family_gets_a_rate():
         edges += [(s, t, 2, 3) for s in sorted({rng.randrange(leaders), rng.randrange(t)})]
     cert = certify_family(Family.from_intervals(edges), NominalProtocol(T=1, rho1=1, rho2=9, kappa=3), [1.0] * n)
     assert cert.verdict == "certified" and cert.rate > Fraction(1, 2) and cert.bounded
-    assert cert.final_states == ((1, 1),) * n
+    assert cert.final_state == ((1, 1),) * n

@@ -64,7 +64,7 @@ def test_random_unbalanced_families_of_hundreds_of_agents_are_certified_with_a_r
     (V,) = cert.parts[0].functions
     assert isinstance(V, SquaresFunction) and len(V.factors) == modes
     assert cert.verdict == "certified" and cert.bounded and cert.rate > 3
-    assert cert.final_states == ((0, 0),) * cert.family.n_nodes and min(cert.input_peaks) > 0
+    assert cert.final_state == ((0, 0),) * cert.family.n_nodes and min(cert.input_peaks) > 0
     assert check(cert.to_dict(), stdlib=True).accepted
     assert np.isfinite(cert.deviation_bound([0.9, 0.1])).all()
 

@@ -168,7 +168,7 @@ def test_a_statement_has_intervals_behaviour_rate_bound_and_input(made, tmp_path
 def test_intervals_of_the_page_enclose_what_is_proved():
     pair = as_family([("a", "b", "1/3", "2/3"), ("b", "a", "1/7", "6/7")])
     saved = read_certificate(certify(pair, PROTOCOL, ["1/3", "2/7"]).to_dict())
-    low, high = saved.final_states[0]
+    low, high = saved.final_state[0]
     shown = re.search(r"\[([0-9.]+),\N{NO-BREAK SPACE}([0-9.]+)\]", report_html(saved))
     assert float(shown[1]) <= low <= high <= float(shown[2])
 

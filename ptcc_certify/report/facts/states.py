@@ -100,9 +100,9 @@ def family_final_facts(certificate: Certificate) -> Facts:
     labels = certificate.labels
     ends: Sequence[Interval | None] | None = None
     head, more = "x(T)", ""
-    if certificate.final_states is not None and certificate.common:
-        ends, more = certificate.final_states, every_text(certificate)
-    elif certificate.final_states is not None and any(one is not None for one in last_states(certificate.family_proof)):
+    if certificate.final_state is not None and certificate.common:
+        ends, more = certificate.final_state, every_text(certificate)
+    elif certificate.final_state is not None and any(one is not None for one in last_states(certificate.family_proof)):
         ends, more = states_of_signal(certificate.family_proof), f"{agreement_text(certificate)} (these signals)"
         head = "x(T)" if rests(certificate) else "x(t)"
     if ends is not None:
@@ -135,7 +135,7 @@ def constant_text(certificate: Certificate, width: int = 12 * TEXT) -> str:
     >>> constant_text(certify(unsure, NominalProtocol(T=1, rho1=1, rho2=1, kappa=3), [0, 6], signal="constant"))
     'every agent in [2, 3]'
     """
-    columns = certificate.family.labels, constant_states(certificate.family_proof), certificate.final_states or ()
+    columns = certificate.family.labels, constant_states(certificate.family_proof), certificate.final_state or ()
     rows = [row for row in zip(*columns, strict=False) if None not in row]
     if all(interval_text(own) == interval_text(every) for _, own, every in rows):
         return ""

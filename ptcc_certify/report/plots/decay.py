@@ -160,7 +160,7 @@ def _draw_signals(ax: Axes, certificate: Certificate, runs: Sequence[Trajectory]
 
 def _known_end(certificate: Certificate) -> np.ndarray | None:
     """Return the state at ``T`` if it is proved to be the same for every signal."""
-    ends = [] if certificate.final_states is None else [one for one in certificate.final_states if one is not None]
+    ends = [] if certificate.final_state is None else [one for one in certificate.final_state if one is not None]
     same = len(ends) == certificate.family.n_nodes and all(low == high for low, high in ends)
     return np.array([float(low) for low, _ in ends]) if same else None
 

@@ -138,7 +138,7 @@ def _draw_tubes(
     """Shade where the agents of each camp are for every signal; draw the final intervals beyond ``T``, return ends."""
     before = run.remaining > 0
     moves = certificate.deviation_bound(run.remaining[before])
-    finals = certificate.final_states or ()
+    finals = certificate.final_state or ()
     largest = np.zeros(len(groups))  # what the states of a component never exceed
     for part in certificate.parts:
         nodes = part.component.nodes
